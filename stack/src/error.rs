@@ -1,0 +1,89 @@
+//! What can be wrong with a stack.
+
+use std::io;
+
+use thiserror::Error;
+
+use crate::g4::G4Error;
+
+/// Why a stack cannot be read or written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StackError {
+    /// Nothing arrived at all.
+    #[error("the input is empty: no stack arrived")]
+    Empty,
+    /// The first bytes are not those of a TIFF.
+    #[error("this is not a TIFF stack (it starts with bytes {start:02x?})")]
+    NotTiff {
+        /// The first bytes of the input.
+        start: Vec<u8>,
+    },
+    /// The input ends before its last page's end.
+    #[error("the stack is cut off: {}; run the stage that wrote it again", last_whole_text(*.last_whole))]
+    CutOff {
+        /// The last layer that arrived whole.
+        last_whole: Option<u32>,
+    },
+    /// A page's directory or data contradicts itself.
+    #[error("page {page}: {what}")]
+    Malformed {
+        /// The page, from 0.
+        page: u32,
+        /// What is wrong.
+        what: String,
+    },
+    /// A page that is valid TIFF but not of a kind that is read here.
+    #[error(
+        "page {page}: {what} is not read here; convert it first (tiffcp -c g4 for 1-bit images, -c packbits for 8-bit)"
+    )]
+    Unsupported {
+        /// The page, from 0.
+        page: u32,
+        /// The feature in question.
+        what: String,
+    },
+    /// A TIFF whose parts stand in an order that a stream cannot follow.
+    #[error(
+        "page {page}: its parts do not follow each other, so it cannot be read from a pipe; give the file's name instead"
+    )]
+    NotForward {
+        /// The page, from 0.
+        page: u32,
+    },
+    /// A strip that does not decode.
+    #[error("layer {layer}: {source}")]
+    Strip {
+        /// The layer's index.
+        layer: u32,
+        /// What is wrong with its codes.
+        source: G4Error,
+    },
+    /// A folder without pages.
+    #[error("the folder holds no .tif page")]
+    NoPages,
+    /// The stack does not fit a classic TIFF.
+    #[error(
+        "the stack passes 4 GiB at layer {layer}: a classic TIFF cannot hold it, write a BigTIFF"
+    )]
+    PastClassic {
+        /// The layer that does not fit.
+        layer: u32,
+    },
+    /// A stack must have at least one layer.
+    #[error("there is no layer to write")]
+    NoLayers,
+    /// A folder of pages is to be written where something stands already.
+    #[error("{0} is there already: remove it or choose another name")]
+    Exists(String),
+    /// Reading or writing failed.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+fn last_whole_text(last_whole: Option<u32>) -> String {
+    match last_whole {
+        Some(layer) => format!("the last whole layer is {layer}"),
+        None => "not one layer is whole".to_owned(),
+    }
+}

@@ -1,0 +1,125 @@
+//! The CCITT Group 4 (T.6) codec, between runs and bits.
+//!
+//! T.6 is defined on the places where a row changes colour, which is what a
+//! [`Mask`](crate::Mask) holds: neither direction makes a bitmap.
+
+mod codes;
+mod decode;
+mod encode;
+
+pub use decode::decode;
+pub(crate) use decode::decode_rows;
+pub use encode::encode;
+
+use thiserror::Error;
+
+/// A strip that is not T.6, and where.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("row {row} of the G4 strip {fault}")]
+pub struct G4Error {
+    /// The row that could not be decoded, from the strip's top.
+    pub row: u32,
+    /// What is wrong with it.
+    pub fault: G4Fault,
+}
+
+/// What is wrong with a row of T.6 codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum G4Fault {
+    /// The strip, or its EOFB, comes before the row is full.
+    #[error("is missing: the codes end early")]
+    EndsEarly,
+    /// Bits that are no T.6 code (uncompressed mode is not known here).
+    #[error("has bits that are no T.6 code")]
+    NotACode,
+    /// A run goes past the width or turns back.
+    #[error("has a run outside the image")]
+    OutsideRow,
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::mask::{Mask, MaskBuilder};
+    use crate::testing::{arbitrary_mask, fax_decode, fax_encode, mask_of};
+
+    fn check(mask: &Mask) {
+        let strip = encode(mask);
+        assert_eq!(&decode(&strip, mask.width(), mask.height()).unwrap(), mask);
+        if mask.width() > 0 {
+            assert_eq!(&fax_decode(&strip, mask.width(), mask.height()), mask);
+            assert_eq!(decode(&fax_encode(mask), mask.width(), mask.height()).unwrap(), *mask);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn decoding_undoes_encoding_and_the_fax_crate_agrees(mask in arbitrary_mask()) {
+            check(&mask);
+        }
+
+        #[test]
+        fn no_bytes_make_the_decoder_panic(
+            strip in prop::collection::vec(any::<u8>(), 0..200),
+            width in 0u32..5000,
+            height in 0u32..50,
+        ) {
+            if let Ok(mask) = decode(&strip, width, height) {
+                let rows = mask.rows().flatten().copied().collect::<Vec<_>>();
+                prop_assert!(rows.iter().all(|&t| t < width));
+                prop_assert_eq!(mask.height(), height);
+            }
+        }
+
+        #[test]
+        fn a_cut_strip_is_an_error(mask in arbitrary_mask(), part in 0.0..1.0f64) {
+            // Whole bytes of the last row's codes are gone with EOFB's 3.
+            let strip = encode(&mask);
+            let cut = (strip.len().saturating_sub(4) as f64 * part) as usize;
+            if mask.width() > 0 && mask.height() > 0 && cut + 4 < strip.len() {
+                let fault = decode(&strip[..cut], mask.width(), mask.height()).unwrap_err().fault;
+                prop_assert_eq!(fault, G4Fault::EndsEarly);
+            }
+        }
+    }
+
+    #[test]
+    fn every_run_length_survives() {
+        for width in [1u32, 7, 8, 9, 63, 64, 65, 1727, 1728, 2559, 2560, 2561, 2623, 2624, 8000] {
+            let mut mask = MaskBuilder::new(width);
+            for start in 0..width.min(3000) {
+                mask.push_row(&[start]).unwrap();
+                // A black row between keeps the codes horizontal.
+                mask.push_black(1);
+            }
+            check(&mask.finish());
+        }
+    }
+
+    #[test]
+    fn adversarial_rows_survive() {
+        for width in [1u32, 2, 3, 31, 32, 33, 64, 2560, 2561] {
+            let alternating: Vec<u32> = (0..width).collect();
+            let shifted: Vec<u32> = (1..width).collect();
+            let pairs: Vec<u32> = (0..width).step_by(2).collect();
+            let full = vec![0];
+            let rows = [&alternating, &shifted, &full, &pairs, &alternating, &vec![], &pairs];
+            check(&mask_of(width, rows.iter().map(|row| row.as_slice())));
+        }
+    }
+
+    #[test]
+    fn a_known_page_has_known_bits() {
+        // `......##` after a black row: VL2, V0 at the edge; the same again:
+        // V0, V0; `#.......`: horizontal, 0 and 1, VR2 from b1 at 6; EOFB.
+        let mask = Mask::new(8, vec![0, 1, 2, 4], vec![6, 6, 0, 1]).unwrap();
+        let bits: String = encode(&mask).iter().map(|byte| format!("{byte:08b}")).collect();
+        let expected =
+            "000010 1 1 1 001 00110101 010 000011 000000000001 000000000001".replace(' ', "");
+        assert!(bits.starts_with(&expected), "{bits}");
+        assert!(bits[expected.len()..].chars().all(|bit| bit == '0'));
+    }
+}

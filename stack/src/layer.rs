@@ -1,0 +1,169 @@
+//! One layer of a stack: its image and what is known of it.
+
+use serde::{Deserialize, Serialize, Serializer};
+use serde_json::{Map, Value};
+
+use crate::gray::GrayMask;
+use crate::length::{Dpi, Length};
+use crate::mask::Mask;
+
+/// What is exposed at one height: an image, and where and how it is exposed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// What the page's JSON line says.
+    pub info: PageInfo,
+    /// The image's resolution, where the page states one in inches or
+    /// centimetres.
+    pub dpi: Option<Dpi>,
+    /// The image.
+    pub image: Image,
+}
+
+/// A layer's image: 1-bit or 8-bit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Image {
+    /// Exposed or not.
+    Mask(Mask),
+    /// Exposed by degrees.
+    Gray(GrayMask),
+}
+
+impl Image {
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        match self {
+            Self::Mask(mask) => mask.width(),
+            Self::Gray(gray) => gray.width(),
+        }
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        match self {
+            Self::Mask(mask) => mask.height(),
+            Self::Gray(gray) => gray.height(),
+        }
+    }
+
+    /// How many runs of one colour the rows hold, black ends not counted:
+    /// what the image costs.
+    pub fn changes(&self) -> usize {
+        match self {
+            Self::Mask(mask) => mask.transition_count(),
+            Self::Gray(gray) => gray.change_count(),
+        }
+    }
+}
+
+/// What the JSON line of a page says: which layer it is, and whatever later
+/// stages need. Keys that are not known are kept.
+///
+/// Pages of other writers may lack all but the index, which is then the
+/// page's.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PageInfo {
+    /// The layer's index, 0 at the bottom.
+    #[serde(rename = "layer")]
+    pub index: u32,
+    /// The height of the layer's bottom in part coordinates, in micrometres.
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
+    pub z_um: Option<f64>,
+    /// The layer's thickness in micrometres.
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
+    pub thickness_um: Option<f64>,
+    /// The image's top left corner (x, y) in part coordinates, in millimetres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin_mm: Option<[f64; 2]>,
+    /// How long the layer is exposed, in milliseconds.
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
+    pub exposure_ms: Option<f64>,
+    /// Rows whose crossings did not balance, increasing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stray_rows: Vec<u32>,
+    /// What holds for the whole stack; on page 0 only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stack: Option<StackInfo>,
+    /// Whatever else the line says.
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+/// What page 0 says of the whole stack. It holds no date, host or path, so
+/// that equal input gives equal bytes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StackInfo {
+    /// The part's name.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub part: String,
+    /// The commands that made every page, first to last, with the options
+    /// that matter to the images.
+    #[serde(default)]
+    pub commands: Vec<String>,
+    /// The digest of the input, as `blake3:` and 64 hexadecimal digits.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub digest: String,
+    /// How many layers the stack has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layers: Option<u32>,
+    /// Whatever else is said.
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+impl PageInfo {
+    /// The height of the layer's bottom, where it is known.
+    pub fn z(&self) -> Option<Length> {
+        self.z_um.map(Length::from_um)
+    }
+
+    /// The layer as people name it: `layer 812 (z 81.20 mm)`.
+    pub fn name(&self) -> String {
+        match self.z() {
+            Some(z) => format!("layer {} (z {:.2} mm)", self.index, z.mm()),
+            None => format!("layer {}", self.index),
+        }
+    }
+
+    /// Reads a page's description; `None` where it is not this JSON line.
+    pub(crate) fn parse(description: &[u8]) -> Option<Self> {
+        serde_json::from_slice(description).ok()
+    }
+
+    /// The line as it stands in the file.
+    pub(crate) fn to_line(&self) -> String {
+        serde_json::to_string(self).expect("maps have string keys and numbers are finite")
+    }
+}
+
+/// Writes a whole number without `.0`.
+#[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
+fn short_number<S: Serializer>(number: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
+    match *number {
+        None => to.serialize_none(),
+        Some(n) if n.fract() == 0.0 && n.abs() < 1e15 => to.serialize_i64(n as i64),
+        Some(n) => to.serialize_f64(n),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_of_the_format_reads_and_writes_back() {
+        let line = r#"{"layer":812,"z_um":81200,"thickness_um":100,"origin_mm":[-1.016934,77.216934],"exposure_ms":136.7,"stray_rows":[1034,1035],"who":{"knows":[1,null]}}"#;
+        let info = PageInfo::parse(line.as_bytes()).unwrap();
+        assert_eq!(info.index, 812);
+        assert_eq!(info.z(), Some(Length::from_mm(81.2)));
+        assert_eq!(info.stray_rows, [1034, 1035]);
+        assert_eq!(info.name(), "layer 812 (z 81.20 mm)");
+        assert_eq!(info.to_line(), line);
+    }
+
+    #[test]
+    fn other_descriptions_are_not_taken_for_ours() {
+        for text in ["", "a scan", "{}", r#"{"layer":-1}"#, "[1]", "\u{0}"] {
+            assert_eq!(PageInfo::parse(text.as_bytes()), None, "{text}");
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! Lengths and resolution, parsed from what people write.
+
+use std::fmt;
+use std::str::FromStr;
+
+use thiserror::Error;
+
+/// A length. It is kept in micrometres; the accessors name their unit.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Default)]
+pub struct Length {
+    um: f64,
+}
+
+impl Length {
+    /// The length of `um` micrometres.
+    pub const fn from_um(um: f64) -> Self {
+        Self { um }
+    }
+
+    /// The length of `mm` millimetres.
+    pub const fn from_mm(mm: f64) -> Self {
+        Self { um: mm * 1000.0 }
+    }
+
+    /// In micrometres.
+    pub const fn um(self) -> f64 {
+        self.um
+    }
+
+    /// In millimetres.
+    pub const fn mm(self) -> f64 {
+        self.um / 1000.0
+    }
+
+    /// In pixels of a resolution (not rounded).
+    pub fn pixels(self, dpi: Dpi) -> f64 {
+        self.um * dpi.get() / 25_400.0
+    }
+}
+
+impl fmt::Display for Length {
+    /// Writes micrometres below one millimetre, millimetres above.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.um.abs() < 1000.0 {
+            write!(f, "{}um", self.um)
+        } else {
+            write!(f, "{}mm", self.mm())
+        }
+    }
+}
+
+/// Why a text is not a length, a size or a resolution.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum LengthError {
+    /// No number stands before the unit.
+    #[error("`{0}` is not a length: write a number and a unit, as 100um, 0.1mm, 4mil or 0.004in")]
+    NotALength(String),
+    /// The number has no unit, or an unknown one.
+    #[error("`{text}` has no unit that is known: write {text}um, {text}mm, {text}mil or {text}in")]
+    NoUnit {
+        /// The text as given.
+        text: String,
+    },
+    /// Not two lengths with an `x` between.
+    #[error("`{0}` is not a size: write width x height and a unit, as 4x4.5in or 100x80mm")]
+    NotASize(String),
+    /// Not a positive number of dots per inch.
+    #[error("`{0}` is not a resolution: write dots per inch between 1 and 100000, as 1500")]
+    NotAResolution(String),
+}
+
+/// Splits `100um` into its number and the micrometres in its unit (`None`
+/// where no unit stands).
+fn split_unit(text: &str) -> Result<(f64, Option<f64>), LengthError> {
+    let text = text.trim();
+    let digits = text.trim_end_matches(|c: char| c.is_alphabetic() || c == '"').trim_end();
+    let number: f64 = match digits.parse() {
+        Ok(n) if f64::is_finite(n) => n,
+        _ => return Err(LengthError::NotALength(text.to_owned())),
+    };
+    let um_per_unit = match text[digits.len()..].trim() {
+        "" => None,
+        "um" | "µm" | "μm" => Some(1.0),
+        "mm" => Some(1000.0),
+        "in" | "inch" | "\"" => Some(25_400.0),
+        "mil" => Some(25.4),
+        _ => return Err(LengthError::NoUnit { text: digits.to_owned() }),
+    };
+    Ok((number, um_per_unit))
+}
+
+impl FromStr for Length {
+    type Err = LengthError;
+
+    /// Parses a number and its unit: `um`, `mm`, `in` (or `inch`) or `mil`.
+    ///
+    /// # Errors
+    /// Where the number or the unit is missing or unknown.
+    fn from_str(text: &str) -> Result<Self, LengthError> {
+        match split_unit(text)? {
+            (number, Some(um)) => Ok(Self::from_um(number * um)),
+            (_, None) => Err(LengthError::NoUnit { text: text.trim().to_owned() }),
+        }
+    }
+}
+
+/// A width and a height, as of a build area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// Along x.
+    pub width: Length,
+    /// Along y.
+    pub height: Length,
+}
+
+impl FromStr for Size {
+    type Err = LengthError;
+
+    /// Parses `4x4.5in` or `100mm x 4in`: the last unit serves both sides
+    /// where the first has none.
+    ///
+    /// # Errors
+    /// Where the text is not two positive lengths with an `x` between.
+    fn from_str(text: &str) -> Result<Self, LengthError> {
+        let wrong = || LengthError::NotASize(text.to_owned());
+        let (width, height) = text.split_once(['x', 'X', '*']).ok_or_else(wrong)?;
+        let (w, w_unit) = split_unit(width).map_err(|_| wrong())?;
+        let (h, h_unit) = split_unit(height).map_err(|_| wrong())?;
+        let h_unit = h_unit.ok_or_else(wrong)?;
+        if w <= 0.0 || h <= 0.0 {
+            return Err(wrong());
+        }
+        Ok(Self {
+            width: Length::from_um(w * w_unit.unwrap_or(h_unit)),
+            height: Length::from_um(h * h_unit),
+        })
+    }
+}
+
+impl fmt::Display for Size {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}mm", self.width.mm(), self.height.mm())
+    }
+}
+
+/// A resolution in dots per inch: the stored quantity, from which the pixel
+/// pitch follows (25.4 mm / dpi). Always between 1 and 100 000.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Dpi(f64);
+
+impl Dpi {
+    /// A resolution of `dpi` dots per inch, if that is between 1 and 100 000.
+    pub fn new(dpi: f64) -> Option<Self> {
+        (1.0..=100_000.0).contains(&dpi).then_some(Self(dpi))
+    }
+
+    /// Dots per inch.
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+
+    /// The distance between two pixel centres, 25.4 mm / dpi.
+    pub fn pitch(self) -> Length {
+        Length::from_um(25_400.0 / self.0)
+    }
+
+    /// As a fraction with the smallest decimal denominator that holds it (at
+    /// most 10 000), for TIFF's rational tags.
+    pub(crate) fn to_rational(self) -> (u32, u32) {
+        let holds = |den: &u32| {
+            let scaled = self.0 * f64::from(*den);
+            (scaled - scaled.round()).abs() < 1e-9 * scaled
+        };
+        let den = [1, 10, 100, 1000].into_iter().find(holds).unwrap_or(10_000);
+        ((self.0 * f64::from(den)).round() as u32, den)
+    }
+}
+
+impl FromStr for Dpi {
+    type Err = LengthError;
+
+    /// Parses `1500` or `1500dpi`.
+    ///
+    /// # Errors
+    /// Where the number is missing or out of range.
+    fn from_str(text: &str) -> Result<Self, LengthError> {
+        let number = text.trim().trim_end_matches("dpi").trim_end();
+        number
+            .parse()
+            .ok()
+            .and_then(Self::new)
+            .ok_or_else(|| LengthError::NotAResolution(text.to_owned()))
+    }
+}
+
+impl fmt::Display for Dpi {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_unit_parses() {
+        for (text, um) in [
+            ("100um", 100.0),
+            ("100 µm", 100.0),
+            ("0.1mm", 100.0),
+            ("4mil", 101.6),
+            ("0.004in", 101.6),
+            ("1 inch", 25_400.0),
+            ("-2mm", -2000.0),
+            ("1e-1mm", 100.0),
+        ] {
+            let length: Length = text.parse().unwrap();
+            assert!((length.um() - um).abs() < 1e-9, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_length_needs_a_number_and_a_unit() {
+        for text in ["", "mm", "100", "100furlong", "nanmm", "infmm", "1..2mm"] {
+            assert!(text.parse::<Length>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_size_shares_its_unit() {
+        let size: Size = "4x4.5in".parse().unwrap();
+        assert_eq!((size.width.mm(), size.height.mm()), (101.6, 114.3));
+        let size: Size = "100mm x 4in".parse().unwrap();
+        assert_eq!((size.width.mm(), size.height.mm()), (100.0, 101.6));
+        for text in ["4x4", "4in", "x4in", "-4x4in", "0x4in"] {
+            assert!(text.parse::<Size>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn resolutions_survive_as_rationals() {
+        for dpi in [1500.0, 2400.0, 203.2, 72.25, 1.0, 99_999.999] {
+            let (num, den) = Dpi::new(dpi).unwrap().to_rational();
+            assert_eq!(f64::from(num) / f64::from(den), dpi);
+        }
+        assert_eq!(Dpi::new(1500.0).unwrap().to_rational(), (1500, 1));
+        assert!("0".parse::<Dpi>().is_err());
+        assert!("nan".parse::<Dpi>().is_err());
+    }
+}

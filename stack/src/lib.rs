@@ -1,0 +1,48 @@
+//! The vocabulary that every stage of LAMP shares.
+//!
+//! A layer image is never pixels here but runs: each row of a [`Mask`] is the
+//! sorted list of columns where the colour toggles. A [`Layer`] is an image
+//! and what is known of it; a stack is a file, folder or stream of layers,
+//! bottom first, in TIFF. A stage is a function from layers to layers.
+//!
+//! ```
+//! use lamp_stack::{Destination, Format, Image, Layer, Mask, PageInfo, Pages, write_stack};
+//! # fn main() -> Result<(), lamp_stack::StackError> {
+//! // Two rows: `.##.` and `....`.
+//! let mask = Mask::new(4, vec![0, 2, 2], vec![1, 3]).unwrap();
+//! let layer = Layer { info: PageInfo::default(), dpi: None, image: Image::Mask(mask) };
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("one.tif");
+//! let layers = std::iter::once(Ok::<_, lamp_stack::StackError>(layer.clone()));
+//! write_stack(layers, Destination::File(path.clone()), Format::Big)?;
+//!
+//! let read: Vec<Layer> = Pages::open(&path)?.layers().collect::<Result<_, _>>()?;
+//! assert_eq!(read, [layer]);
+//! # Ok(())
+//! # }
+//! ```
+
+mod error;
+pub mod g4;
+mod gray;
+mod input;
+mod layer;
+mod length;
+mod mask;
+mod ordered;
+mod output;
+mod packbits;
+#[cfg(test)]
+mod testing;
+mod tiff;
+
+pub use error::StackError;
+pub use gray::{GrayMask, GrayMaskError, LevelChange, gray_runs};
+pub use input::Pages;
+pub use layer::{Image, Layer, PageInfo, StackInfo};
+pub use length::{Dpi, Length, LengthError, Size};
+pub use mask::{Mask, MaskBuilder, MaskError, white_in_row};
+pub use ordered::map_in_order;
+pub use output::{Destination, file_beside, write_stack};
+pub use tiff::{Compression, EncodedPage, Format, Page, PageReader, PageWriter};

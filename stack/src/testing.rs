@@ -1,0 +1,58 @@
+//! Masks and the `fax` crate's view of them, for the tests of this crate.
+
+use fax::{Color, VecWriter, decoder, encoder};
+use proptest::prelude::*;
+
+use crate::mask::{Mask, MaskBuilder};
+
+pub(crate) fn mask_of<'a>(width: u32, rows: impl IntoIterator<Item = &'a [u32]>) -> Mask {
+    let mut mask = MaskBuilder::new(width);
+    for row in rows {
+        mask.push_row(row).unwrap();
+    }
+    mask.finish()
+}
+
+/// Masks whose rows are random, or the row above with some edges moved a
+/// little: what the modes of T.6 tell apart.
+pub(crate) fn arbitrary_mask() -> impl Strategy<Value = Mask> {
+    let width = prop_oneof![0u32..70, Just(2560), Just(2561), 1000u32..9000];
+    let row = (any::<bool>(), prop::collection::vec((any::<u32>(), -4i32..=4), 0..24));
+    (width, prop::collection::vec(row, 0..20)).prop_map(|(width, rows)| {
+        let mut mask = MaskBuilder::new(width);
+        let mut before: Vec<u32> = Vec::new();
+        for (like_above, edges) in rows {
+            let mut row: Vec<u32> = if like_above {
+                let moved = before.iter().zip(edges.iter().cycle());
+                moved.map(|(&column, edge)| column.saturating_add_signed(edge.1)).collect()
+            } else {
+                edges.iter().map(|edge| edge.0 % width.max(1)).collect()
+            };
+            row.retain(|&column| column < width);
+            row.sort_unstable();
+            row.dedup();
+            mask.push_row(&row).unwrap();
+            before = row;
+        }
+        mask.finish()
+    })
+}
+
+pub(crate) fn fax_encode(mask: &Mask) -> Vec<u8> {
+    let mut encoder = encoder::Encoder::new(VecWriter::new());
+    for row in 0..mask.height() {
+        let pixel = |column| if mask.is_white(column, row) { Color::Black } else { Color::White };
+        encoder.encode_line((0..mask.width()).map(pixel), mask.width()).unwrap();
+    }
+    encoder.finish().unwrap().finish()
+}
+
+pub(crate) fn fax_decode(strip: &[u8], width: u32, height: u32) -> Mask {
+    let mut mask = MaskBuilder::new(width);
+    decoder::decode_g4(strip.iter().copied(), width, Some(height), |row| {
+        let inside: Vec<u32> = row.iter().copied().filter(|&column| column < width).collect();
+        mask.push_row(&inside).unwrap();
+    })
+    .unwrap();
+    mask.finish()
+}

@@ -1,0 +1,209 @@
+//! A stream or file to pages.
+
+use std::collections::{HashMap, HashSet};
+use std::fs::File;
+use std::io::{BufReader, Read};
+
+use super::fields::{Fields, KNOWN, malformed, number};
+use super::page::Page;
+use super::source::Source;
+use super::tags::{FILL_ORDER, STRIP_BYTE_COUNTS, STRIP_OFFSETS, type_size};
+use crate::error::StackError;
+
+/// More directory entries than any TIFF writer makes.
+const MOST_ENTRIES: u64 = 4096;
+/// More bytes than any text or table of strips of a page takes.
+const LONGEST_VALUE: u64 = 64 << 20;
+/// Reads pages one after the other, from a stream (forward only) or from a
+/// file (any order).
+#[derive(Debug)]
+pub struct PageReader {
+    source: Source,
+    big: bool,
+    little_endian: bool,
+    /// Where the next directory stands; 0 behind the last page.
+    next: u64,
+    number: u32,
+    last_whole: Option<u32>,
+    /// Directories seen, so that a loop of links ends.
+    seen: HashSet<u64>,
+}
+
+impl PageReader {
+    /// Reads from a stream, such as standard input.
+    ///
+    /// # Errors
+    /// Where the stream is empty or does not start as a TIFF.
+    pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
+        let stream = BufReader::with_capacity(1 << 18, Box::new(stream) as Box<dyn Read + Send>);
+        Self::new(Source::Stream { stream, position: 0 })
+    }
+
+    /// Reads from a file.
+    ///
+    /// # Errors
+    /// Where the file is empty or does not start as a TIFF.
+    pub fn from_file(file: File) -> Result<Self, StackError> {
+        Self::new(Source::File { file: BufReader::with_capacity(1 << 18, file), position: 0 })
+    }
+
+    fn new(mut source: Source) -> Result<Self, StackError> {
+        let mut start = source.read_up_to(0, 8)?;
+        if start.is_empty() {
+            return Err(StackError::Empty);
+        }
+        let (little_endian, big) = match start.as_slice() {
+            [b'I', b'I', 42, 0, ..] => (true, false),
+            [b'M', b'M', 0, 42, ..] => (false, false),
+            [b'I', b'I', 43, 0, ..] => (true, true),
+            [b'M', b'M', 0, 43, ..] => (false, true),
+            _ => return Err(StackError::NotTiff { start }),
+        };
+        if big {
+            start = source.read_up_to(8, 8)?;
+        } else {
+            start.drain(..4.min(start.len()));
+        }
+        if start.len() < if big { 8 } else { 4 } {
+            return Err(StackError::CutOff { last_whole: None });
+        }
+        let next = number(&start, little_endian);
+        Ok(Self {
+            source,
+            big,
+            little_endian,
+            next,
+            number: 0,
+            last_whole: None,
+            seen: HashSet::new(),
+        })
+    }
+
+    /// Counts pages from `first`, for a folder's later files.
+    pub(crate) fn numbered(mut self, first: u32) -> Self {
+        self.number = first;
+        self
+    }
+
+    fn read_page(&mut self) -> Result<Page, StackError> {
+        if !self.seen.insert(self.next) {
+            return Err(malformed(
+                self.number,
+                "its directory was met before: the links form a loop",
+            ));
+        }
+        let (entries, next) = self.read_directory()?;
+        let fields = self.read_values(&entries)?;
+        let page = self.read_strips(&fields)?;
+        self.next = next;
+        self.number += 1;
+        self.last_whole = Some(page.info.index);
+        Ok(page)
+    }
+
+    /// `length` bytes at `offset`, all of them.
+    fn read(&mut self, offset: u64, length: u64) -> Result<Vec<u8>, StackError> {
+        if !self.source.reaches(offset) {
+            return Err(StackError::NotForward { page: self.number });
+        }
+        let bytes = self.source.read_up_to(offset, length)?;
+        if (bytes.len() as u64) < length {
+            return Err(StackError::CutOff { last_whole: self.last_whole });
+        }
+        Ok(bytes)
+    }
+
+    /// The directory's entries, and the link to the next.
+    fn read_directory(&mut self) -> Result<(Vec<Entry>, u64), StackError> {
+        let (count_size, entry_size, word) = if self.big { (8, 20, 8) } else { (2, 12, 4) };
+        let count = number(&self.read(self.next, count_size)?, self.little_endian);
+        if count > MOST_ENTRIES {
+            return Err(malformed(self.number, format!("its directory claims {count} entries")));
+        }
+        let bytes = self.read(self.next + count_size, count * entry_size + word)?;
+        let (entries, link) = bytes.split_at((count * entry_size) as usize);
+        let entries = entries
+            .chunks_exact(entry_size as usize)
+            .map(|entry| Entry {
+                tag: number(&entry[..2], self.little_endian) as u16,
+                kind: number(&entry[2..4], self.little_endian) as u16,
+                count: number(&entry[4..4 + word as usize], self.little_endian),
+                value: entry[4 + word as usize..].to_vec(),
+            })
+            .collect();
+        Ok((entries, number(link, self.little_endian)))
+    }
+
+    /// The values of the fields that matter, read in the order in which they
+    /// stand.
+    fn read_values(&mut self, entries: &[Entry]) -> Result<Fields, StackError> {
+        let mut fields =
+            Fields { page: self.number, little_endian: self.little_endian, values: HashMap::new() };
+        let mut distant = Vec::new();
+        for entry in entries.iter().filter(|entry| KNOWN.contains(&entry.tag)) {
+            let length = entry.count.saturating_mul(type_size(entry.kind));
+            if length > LONGEST_VALUE {
+                let what = format!("its tag {} claims {length} bytes", entry.tag);
+                return Err(malformed(self.number, what));
+            }
+            if length <= entry.value.len() as u64 {
+                let value = entry.value[..length as usize].to_vec();
+                fields.values.insert(entry.tag, (entry.kind, value));
+            } else {
+                distant.push((number(&entry.value, self.little_endian), length, entry));
+            }
+        }
+        distant.sort_by_key(|value| value.0);
+        for (offset, length, entry) in distant {
+            fields.values.insert(entry.tag, (entry.kind, self.read(offset, length)?));
+        }
+        Ok(fields)
+    }
+
+    fn read_strips(&mut self, fields: &Fields) -> Result<Page, StackError> {
+        let mut page = fields.page()?;
+        let offsets = fields.numbers(STRIP_OFFSETS)?;
+        let counts = fields.numbers(STRIP_BYTE_COUNTS)?;
+        let strips = page.strip_heights().count();
+        if offsets.len() != strips || counts.len() != strips {
+            let what = format!("it has {} strips where its rows make {strips}", offsets.len());
+            return Err(malformed(self.number, what));
+        }
+        let mut order: Vec<usize> = (0..strips).collect();
+        order.sort_by_key(|&i| offsets[i]);
+        page.strips = vec![Vec::new(); strips];
+        let reversed = fields.number_or(FILL_ORDER, 1)? == 2;
+        for i in order {
+            let mut strip = self.read(offsets[i], counts[i])?;
+            if reversed {
+                strip.iter_mut().for_each(|byte| *byte = byte.reverse_bits());
+            }
+            page.strips[i] = strip;
+        }
+        Ok(page)
+    }
+}
+
+impl Iterator for PageReader {
+    type Item = Result<Page, StackError>;
+
+    /// The next page; after an error, none.
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.next == 0 {
+            return None;
+        }
+        let page = self.read_page();
+        if page.is_err() {
+            self.next = 0;
+        }
+        Some(page)
+    }
+}
+
+struct Entry {
+    tag: u16,
+    kind: u16,
+    count: u64,
+    /// The value itself if it fits, else its offset.
+    value: Vec<u8>,
+}

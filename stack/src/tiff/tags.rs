@@ -1,0 +1,52 @@
+//! Tag and type numbers of TIFF 6.0 that a stack uses.
+
+pub(super) const NEW_SUBFILE_TYPE: u16 = 254;
+pub(super) const IMAGE_WIDTH: u16 = 256;
+pub(super) const IMAGE_LENGTH: u16 = 257;
+pub(super) const BITS_PER_SAMPLE: u16 = 258;
+pub(super) const COMPRESSION: u16 = 259;
+pub(super) const PHOTOMETRIC: u16 = 262;
+pub(super) const FILL_ORDER: u16 = 266;
+pub(super) const IMAGE_DESCRIPTION: u16 = 270;
+pub(super) const STRIP_OFFSETS: u16 = 273;
+pub(super) const ORIENTATION: u16 = 274;
+pub(super) const SAMPLES_PER_PIXEL: u16 = 277;
+pub(super) const ROWS_PER_STRIP: u16 = 278;
+pub(super) const STRIP_BYTE_COUNTS: u16 = 279;
+pub(super) const X_RESOLUTION: u16 = 282;
+pub(super) const Y_RESOLUTION: u16 = 283;
+pub(super) const PLANAR_CONFIGURATION: u16 = 284;
+pub(super) const T6_OPTIONS: u16 = 293;
+pub(super) const RESOLUTION_UNIT: u16 = 296;
+pub(super) const TILE_OFFSETS: u16 = 324;
+
+/// Compression values.
+pub(super) const UNCOMPRESSED: u64 = 1;
+pub(super) const T6: u64 = 4;
+pub(super) const PACK_BITS: u64 = 32_773;
+
+/// Photometric interpretations.
+pub(super) const WHITE_IS_ZERO: u64 = 0;
+pub(super) const BLACK_IS_ZERO: u64 = 1;
+
+/// Resolution units.
+pub(super) const PER_INCH: u64 = 2;
+pub(super) const PER_CENTIMETRE: u64 = 3;
+
+/// Field types.
+pub(super) const ASCII: u16 = 2;
+pub(super) const SHORT: u16 = 3;
+pub(super) const LONG: u16 = 4;
+pub(super) const RATIONAL: u16 = 5;
+pub(super) const LONG8: u16 = 16;
+
+/// How many bytes a value of a field type takes; 0 for types not known.
+pub(super) fn type_size(kind: u16) -> u64 {
+    match kind {
+        1 | ASCII | 6 | 7 => 1,
+        SHORT | 8 => 2,
+        LONG | 9 | 11 | 13 => 4,
+        RATIONAL | 10 | 12 | LONG8 | 17 | 18 => 8,
+        _ => 0,
+    }
+}

@@ -1,0 +1,214 @@
+//! Layers to pages, pages to a stream.
+
+use std::io::Write;
+
+use super::tags::{
+    ASCII, BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, FILL_ORDER, IMAGE_DESCRIPTION,
+    IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, NEW_SUBFILE_TYPE, ORIENTATION, PACK_BITS, PER_INCH,
+    PHOTOMETRIC, PLANAR_CONFIGURATION, RATIONAL, RESOLUTION_UNIT, ROWS_PER_STRIP,
+    SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS, STRIP_OFFSETS, T6, T6_OPTIONS, X_RESOLUTION,
+    Y_RESOLUTION,
+};
+use crate::error::StackError;
+use crate::layer::{Image, Layer};
+use crate::{g4, packbits};
+
+/// The two shapes of a TIFF.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Format {
+    /// 64-bit offsets: any size.
+    #[default]
+    Big,
+    /// 32-bit offsets: at most 4 GiB.
+    Classic,
+}
+
+impl Format {
+    fn header(self) -> &'static [u8] {
+        match self {
+            Self::Big => &[b'I', b'I', 43, 0, 8, 0, 0, 0, 16, 0, 0, 0, 0, 0, 0, 0],
+            Self::Classic => &[b'I', b'I', 42, 0, 8, 0, 0, 0],
+        }
+    }
+
+    /// An offset, count or link in the width of the format.
+    fn put_word(self, out: &mut Vec<u8>, word: u64) {
+        match self {
+            Self::Big => out.extend_from_slice(&word.to_le_bytes()),
+            Self::Classic => out.extend_from_slice(&(word as u32).to_le_bytes()),
+        }
+    }
+
+    fn word_size(self) -> usize {
+        match self {
+            Self::Big => 8,
+            Self::Classic => 4,
+        }
+    }
+}
+
+/// A layer as it will stand in a file, before its place is known. Encoding
+/// is the costly part of writing, and needs nothing of the other pages.
+#[derive(Clone, Debug)]
+pub struct EncodedPage {
+    index: u32,
+    width: u32,
+    height: u32,
+    gray: bool,
+    resolution: (u32, u32),
+    description: String,
+    strip: Vec<u8>,
+}
+
+impl EncodedPage {
+    /// Encodes a layer: a mask as G4, a gray mask as PackBits.
+    pub fn new(layer: &Layer) -> Self {
+        let (gray, strip) = match &layer.image {
+            Image::Mask(mask) => (false, g4::encode(mask)),
+            Image::Gray(image) => (true, packbits::encode(image)),
+        };
+        Self {
+            index: layer.info.index,
+            width: layer.image.width(),
+            height: layer.image.height(),
+            gray,
+            resolution: layer.dpi.map_or((0, 1), crate::Dpi::to_rational),
+            description: layer.info.to_line(),
+            strip,
+        }
+    }
+
+    /// The page's bytes where it starts at `start`: directory, texts, strip
+    /// and padding. The link is to the byte after it, or zero on the last.
+    fn bytes(&self, format: Format, start: u64, last: bool) -> Vec<u8> {
+        // Lengths do not depend on offsets: lay out once to learn them.
+        let data = start + self.directory(format, start, 0, 0).len() as u64;
+        let end = (data + self.strip.len() as u64).next_multiple_of(8);
+        let mut bytes = self.directory(format, start, data, if last { 0 } else { end });
+        bytes.extend_from_slice(&self.strip);
+        bytes.resize((end - start) as usize, 0);
+        bytes
+    }
+
+    /// The directory and the texts behind it, padded to 8 bytes.
+    fn directory(&self, format: Format, start: u64, data: u64, link: u64) -> Vec<u8> {
+        let fields = self.fields(format, data);
+        let word = format.word_size();
+        let count_size = if format == Format::Big { 8 } else { 2 };
+        let size = count_size + fields.len() * (4 + 2 * word) + word;
+        let mut out = (fields.len() as u64).to_le_bytes()[..count_size].to_vec();
+        let mut texts: Vec<u8> = Vec::new();
+        let texts_start = (start + size as u64).next_multiple_of(8);
+        for (tag, kind, count, mut value) in fields {
+            out.extend_from_slice(&tag.to_le_bytes());
+            out.extend_from_slice(&kind.to_le_bytes());
+            format.put_word(&mut out, count);
+            if value.len() <= word {
+                value.resize(word, 0);
+                out.extend_from_slice(&value);
+            } else {
+                format.put_word(&mut out, texts_start + texts.len() as u64);
+                value.resize(value.len().next_multiple_of(8), 0);
+                texts.extend_from_slice(&value);
+            }
+        }
+        format.put_word(&mut out, link);
+        out.resize((texts_start - start) as usize, 0);
+        out.extend_from_slice(&texts);
+        out
+    }
+
+    /// The fields as (tag, type, count, value), in the order of their tags.
+    fn fields(&self, format: Format, data: u64) -> Vec<(u16, u16, u64, Vec<u8>)> {
+        let short = |tag, value: u64| (tag, SHORT, 1, (value as u16).to_le_bytes().to_vec());
+        let long = |tag, value: u32| (tag, LONG, 1, value.to_le_bytes().to_vec());
+        let word = |tag, value: u64| match format {
+            Format::Big => (tag, LONG8, 1, value.to_le_bytes().to_vec()),
+            Format::Classic => long(tag, value as u32),
+        };
+        let resolution = |tag| {
+            let (num, den) = self.resolution;
+            (tag, RATIONAL, 1, [num.to_le_bytes(), den.to_le_bytes()].concat())
+        };
+        let description = [self.description.as_bytes(), &[0]].concat();
+        let mut fields = vec![
+            // One page of many.
+            long(NEW_SUBFILE_TYPE, 2),
+            long(IMAGE_WIDTH, self.width),
+            long(IMAGE_LENGTH, self.height),
+            short(BITS_PER_SAMPLE, if self.gray { 8 } else { 1 }),
+            short(COMPRESSION, if self.gray { PACK_BITS } else { T6 }),
+            short(PHOTOMETRIC, BLACK_IS_ZERO),
+            short(FILL_ORDER, 1),
+            (IMAGE_DESCRIPTION, ASCII, description.len() as u64, description),
+            word(STRIP_OFFSETS, data),
+            short(ORIENTATION, 1),
+            short(SAMPLES_PER_PIXEL, 1),
+            long(ROWS_PER_STRIP, self.height),
+            word(STRIP_BYTE_COUNTS, self.strip.len() as u64),
+            short(PLANAR_CONFIGURATION, 1),
+        ];
+        if self.resolution.0 > 0 {
+            fields.extend([resolution(X_RESOLUTION), resolution(Y_RESOLUTION)]);
+            fields.push(short(RESOLUTION_UNIT, PER_INCH));
+        }
+        if !self.gray {
+            fields.push(long(T6_OPTIONS, 0));
+        }
+        fields.sort_by_key(|field| field.0);
+        fields
+    }
+}
+
+/// Writes pages to a stream, forward only. It keeps one page back, because
+/// only the last page's link is zero.
+#[derive(Debug)]
+pub struct PageWriter<W> {
+    out: W,
+    format: Format,
+    offset: u64,
+    held: Option<EncodedPage>,
+}
+
+impl<W: Write> PageWriter<W> {
+    /// A stack of `format` to be written to `out`, which should be buffered.
+    pub fn new(out: W, format: Format) -> Self {
+        Self { out, format, offset: 0, held: None }
+    }
+
+    /// Adds a page.
+    ///
+    /// # Errors
+    /// Where writing fails or a classic TIFF would pass 4 GiB.
+    pub fn push(&mut self, page: EncodedPage) -> Result<(), StackError> {
+        match self.held.replace(page) {
+            Some(before) => self.write(&before, false),
+            None => Ok(()),
+        }
+    }
+
+    /// Writes the last page and gives the stream back, flushed.
+    ///
+    /// # Errors
+    /// As [`push`](Self::push); and where no page was pushed.
+    pub fn finish(mut self) -> Result<W, StackError> {
+        let last = self.held.take().ok_or(StackError::NoLayers)?;
+        self.write(&last, true)?;
+        self.out.flush()?;
+        Ok(self.out)
+    }
+
+    fn write(&mut self, page: &EncodedPage, last: bool) -> Result<(), StackError> {
+        if self.offset == 0 {
+            self.out.write_all(self.format.header())?;
+            self.offset = self.format.header().len() as u64;
+        }
+        let bytes = page.bytes(self.format, self.offset, last);
+        self.offset += bytes.len() as u64;
+        if self.format == Format::Classic && self.offset > u64::from(u32::MAX) {
+            return Err(StackError::PastClassic { layer: page.index });
+        }
+        self.out.write_all(&bytes)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,281 @@
+//! The stack format: what is written is read back, by us and by others, and
+//! what is cut off is noticed.
+
+use std::io::Cursor;
+use std::path::Path;
+use std::process::Command;
+
+use lamp_stack::{
+    Destination, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Mask, PageInfo, PageReader,
+    PageWriter, Pages, StackError, StackInfo, write_stack,
+};
+use tiff::decoder::{Decoder, DecodingResult};
+
+fn mask(width: u32, rows: &[&[u32]]) -> Mask {
+    let mut mask = lamp_stack::MaskBuilder::new(width);
+    for row in rows {
+        mask.push_row(row).unwrap();
+    }
+    mask.finish()
+}
+
+fn layers(count: u32) -> Vec<Layer> {
+    let stack = StackInfo {
+        part: "part".to_owned(),
+        commands: vec!["slice part.stl".to_owned()],
+        layers: Some(count),
+        ..StackInfo::default()
+    };
+    let layer = |index: u32| Layer {
+        info: PageInfo {
+            index,
+            z_um: Some(f64::from(index) * 100.0),
+            thickness_um: Some(100.0),
+            origin_mm: Some([-1.016934, 77.216934]),
+            stray_rows: if index == 1 { vec![2] } else { vec![] },
+            stack: (index == 0).then(|| stack.clone()),
+            ..PageInfo::default()
+        },
+        dpi: Dpi::new(1500.0),
+        image: Image::Mask(mask(
+            64,
+            &[&[], &[3 + index, 40], &[0, 5, 60], &[2, 40 + index], &[63]],
+        )),
+    };
+    (0..count).map(layer).collect()
+}
+
+fn gray_layer() -> Layer {
+    let mut gray = GrayMask::new(300);
+    gray.push_runs([(10, 0), (200, 255), (1, 128), (1, 127)]).unwrap();
+    gray.push_runs([]).unwrap();
+    Layer { info: PageInfo::default(), dpi: None, image: Image::Gray(gray) }
+}
+
+fn write(layers: &[Layer], format: Format) -> Vec<u8> {
+    let mut pages = PageWriter::new(Vec::new(), format);
+    for layer in layers {
+        pages.push(EncodedPage::new(layer)).unwrap();
+    }
+    pages.finish().unwrap()
+}
+
+fn read(bytes: Vec<u8>) -> Result<Vec<Layer>, StackError> {
+    Pages::from_stream(Cursor::new(bytes))?.layers().collect()
+}
+
+#[test]
+fn a_stream_reads_back() {
+    for format in [Format::Big, Format::Classic] {
+        let layers = layers(5);
+        assert_eq!(read(write(&layers, format)).unwrap(), layers);
+        let gray = [gray_layer(), gray_layer()];
+        assert_eq!(read(write(&gray, format)).unwrap(), gray);
+    }
+}
+
+#[test]
+fn every_part_stands_on_eight_bytes_and_offsets_grow() {
+    let bytes = write(&layers(3), Format::Big);
+    assert_eq!(bytes.len() % 8, 0);
+    let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
+    let mut directory = number(8);
+    for last in [false, false, true] {
+        assert_eq!(directory % 8, 0);
+        let link = directory + 8 + 20 * number(directory);
+        assert_eq!(number(link) == 0, last);
+        assert!(last || number(link) > link);
+        directory = number(link);
+    }
+}
+
+#[test]
+fn a_cut_stream_names_the_last_whole_layer() {
+    let layers = layers(4);
+    for format in [Format::Big, Format::Classic] {
+        let whole = write(&layers, format);
+        // Where each page ends: the same bytes with fewer pages, but for the
+        // last link.
+        let ends: Vec<usize> = (1..4).map(|count| write(&layers[..count], format).len()).collect();
+        for cut in 1..whole.len() {
+            match read(whole[..cut].to_vec()) {
+                Err(StackError::CutOff { last_whole }) => {
+                    let pages = ends.iter().filter(|&&end| end <= cut).count();
+                    let text = format!("cut at {cut} of {}", whole.len());
+                    // Padding does not count: the page may be whole before it.
+                    let known = last_whole.map_or(0, |layer| layer + 1) as usize;
+                    assert!(
+                        known == pages || ends[..].get(pages).is_some_and(|end| end - cut < 8),
+                        "{text}"
+                    );
+                }
+                Err(StackError::NotTiff { .. }) => assert!(cut < 4),
+                Ok(read) => assert!(cut > whole.len() - 8 && read.len() == 4, "cut at {cut}"),
+                Err(error) => panic!("cut at {cut}: {error}"),
+            }
+        }
+        assert!(matches!(read(Vec::new()), Err(StackError::Empty)));
+    }
+}
+
+#[test]
+fn layers_before_a_cut_are_given() {
+    let bytes = write(&layers(4), Format::Big);
+    let cut = bytes[..bytes.len() - 40].to_vec();
+    let read: Vec<_> = Pages::from_stream(Cursor::new(cut)).unwrap().layers().collect();
+    assert_eq!(read.len(), 4);
+    assert!(read[..3].iter().all(Result::is_ok));
+    let message = read[3].as_ref().unwrap_err().to_string();
+    assert!(message.contains("the last whole layer is 2"), "{message}");
+}
+
+#[test]
+fn the_tiff_crate_reads_what_we_write() {
+    for format in [Format::Big, Format::Classic] {
+        let layers = layers(3);
+        let mut decoder = Decoder::new(Cursor::new(write(&layers, format))).unwrap();
+        for (index, layer) in layers.iter().enumerate() {
+            decoder.seek_to_image(index).unwrap();
+            assert_eq!(decoder.dimensions().unwrap(), (64, 5));
+            let DecodingResult::U8(bits) = decoder.read_image().unwrap() else { panic!() };
+            let Image::Mask(mask) = &layer.image else { panic!() };
+            for (pixel, row) in (0..5).flat_map(|row| (0..64).map(move |column| (column, row))) {
+                let bit = bits[(row * 8 + pixel / 8) as usize] >> (7 - pixel % 8) & 1;
+                assert_eq!(bit == 1, mask.is_white(pixel, row), "layer {index} {pixel},{row}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_file_and_a_folder_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, folder_of_pages) in [("stack.tif", false), ("stack", true)] {
+        let path = folder.path().join(name);
+        let to = if folder_of_pages {
+            Destination::Folder(path.clone())
+        } else {
+            Destination::File(path.clone())
+        };
+        let stack = layers(12);
+        write_stack::<StackError>(stack.iter().cloned().map(Ok), to, Format::Big).unwrap();
+        let read: Vec<_> = Pages::open(&path).unwrap().layers().map(Result::unwrap).collect();
+        assert_eq!(read, stack);
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no temporary files remain");
+
+    std::fs::remove_file(folder.path().join("stack/layer_00011.tif")).unwrap();
+    let last = Pages::open(&folder.path().join("stack")).unwrap().layers().last().unwrap();
+    assert!(matches!(last, Err(StackError::CutOff { last_whole: Some(10) })));
+}
+
+#[test]
+fn a_failure_leaves_nothing_under_the_final_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for to in [
+        Destination::File(folder.path().join("stack.tif")),
+        Destination::Folder(folder.path().join("stack")),
+    ] {
+        let cut =
+            layers(3).into_iter().map(Ok).chain([Err(StackError::CutOff { last_whole: Some(2) })]);
+        assert!(write_stack(cut, to, Format::Big).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn a_folder_in_use_is_not_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("thesis.doc"), "mine").unwrap();
+    let to = Destination::Folder(folder.path().to_owned());
+    let written = write_stack::<StackError>(layers(1).into_iter().map(Ok), to, Format::Big);
+    assert!(matches!(written, Err(StackError::Exists(_))));
+    assert!(folder.path().join("thesis.doc").exists());
+}
+
+#[test]
+fn lying_directories_cost_only_an_error() {
+    let good = write(&layers(1), Format::Big);
+    // Every byte of the directory, set to every extreme.
+    for at in 0..good.len().min(600) {
+        for value in [0, 1, 0x7F, 0x80, 0xFF] {
+            let mut bad = good.clone();
+            bad[at] = value;
+            drop(read(bad));
+        }
+    }
+    let looped = [&good[..8], &16u64.to_le_bytes(), &good[16..]].concat();
+    let count = looped[16] as usize;
+    let mut looped = looped;
+    looped[24 + 20 * count..32 + 20 * count].copy_from_slice(&16u64.to_le_bytes());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("loop.tif");
+    std::fs::write(&path, looped).unwrap();
+    let error = PageReader::from_file(std::fs::File::open(&path).unwrap()).unwrap().last().unwrap();
+    assert!(error.unwrap_err().to_string().contains("loop"));
+}
+
+/// Runs another program on a stack, where it is installed.
+fn run(program: &str, arguments: &[&str], stack: &Path) -> Option<String> {
+    let output = Command::new(program).args(arguments).arg(stack).output().ok()?;
+    let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+    assert!(output.status.success(), "{program}: {text}");
+    Some(text)
+}
+
+#[test]
+fn libtiff_reads_what_we_write_and_we_read_what_it_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stack.tif");
+    for (format, stack) in [(Format::Big, layers(3)), (Format::Classic, vec![gray_layer()])] {
+        std::fs::write(&path, write(&stack, format)).unwrap();
+        let Some(text) = run("tiffinfo", &["-D"], &path) else {
+            eprintln!("tiffinfo is not installed: libtiff was not asked");
+            return;
+        };
+        assert!(!text.to_lowercase().contains("warning"), "{text}");
+        // Strips of two rows each, and both bit orders.
+        for options in [["-r", "2", "-f", "msb2lsb"], ["-r", "100", "-f", "lsb2msb"]] {
+            for compression in ["none", "packbits", "g4"] {
+                if compression == "g4" && format == Format::Classic {
+                    continue;
+                }
+                let copy = folder.path().join("copy.tif");
+                let copied = Command::new("tiffcp")
+                    .args(options)
+                    .args(["-c", compression])
+                    .args([&path, &copy])
+                    .status();
+                assert!(copied.unwrap().success());
+                let read: Vec<Layer> =
+                    Pages::open(&copy).unwrap().layers().map(Result::unwrap).collect();
+                assert_eq!(read, stack, "{compression}");
+            }
+        }
+    }
+}
+
+#[test]
+fn pillow_reads_what_we_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stack.tif");
+    std::fs::write(&path, write(&layers(3), Format::Big)).unwrap();
+    let script = "import sys\n\
+        try:\n    from PIL import Image, ImageSequence\n\
+        except ImportError:\n    print('no Pillow'); sys.exit()\n\
+        for page in ImageSequence.Iterator(Image.open(sys.argv[1])):\n    \
+            print(page.size, page.mode, page.histogram()[255])";
+    let Some(text) = run("python3", &["-c", script], &path) else { return };
+    if text.contains("no Pillow") {
+        eprintln!("Pillow is not installed: it was not asked");
+        return;
+    }
+    let expected: String = layers(3)
+        .iter()
+        .map(|layer| {
+            let Image::Mask(mask) = &layer.image else { panic!() };
+            format!("(64, 5) 1 {}\n", mask.white_pixels())
+        })
+        .collect();
+    assert_eq!(text, expected);
+}
