@@ -1,0 +1,196 @@
+//! A facet's crossings with planes and rows.
+//!
+//! Both facets on an edge find its point on a plane by the same arithmetic on
+//! the same two endpoints, ordered by z. The points of a closed mesh on a
+//! plane therefore form closed chains, whatever the rounding; and since a
+//! point is past a row or it is not, every row is crossed an even number of
+//! times. Only the column of a crossing depends on one facet alone.
+
+use std::ops::Range;
+
+use crate::facet::{Facet, Units};
+use crate::grid::PixelGrid;
+use crate::planes::Planes;
+
+/// A crossing of a row: the row in the high half; in the low half the first
+/// column whose centre is past it, and in the lowest bit the direction in
+/// which the contour crosses. Sorting orders crossings along a layer's rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Crossing(u64);
+
+impl Crossing {
+    #[inline]
+    fn new(row: u32, column: u32, rising: bool) -> Self {
+        Self(u64::from(row) << 32 | u64::from(column) << 1 | u64::from(rising))
+    }
+
+    #[inline]
+    pub(crate) fn row(self) -> usize {
+        (self.0 >> 32) as usize
+    }
+
+    /// Column and direction in one, to sort by.
+    #[inline]
+    pub(crate) fn place(self) -> Place {
+        Place(self.0 as u32)
+    }
+}
+
+/// Where in its row a crossing is, and in which direction the contour goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Place(u32);
+
+impl Place {
+    #[inline]
+    pub(crate) fn column(self) -> u32 {
+        self.0 >> 1
+    }
+
+    /// +1 or -1.
+    #[inline]
+    pub(crate) fn winding(self) -> i32 {
+        (self.0 & 1) as i32 * 2 - 1
+    }
+}
+
+/// Cuts facets into crossings.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cutter<'a> {
+    pub(crate) grid: &'a PixelGrid,
+    pub(crate) planes: &'a Planes,
+    pub(crate) units: Units,
+}
+
+/// A corner: x and y in pixels, z in micrometres.
+#[derive(Clone, Copy)]
+struct Corner {
+    pixels: [f64; 2],
+    z_um: f64,
+}
+
+impl Cutter<'_> {
+    /// Adds the facet's crossings in `layers` to the tables of those layers.
+    #[inline]
+    pub(crate) fn cut(&self, facet: &Facet, layers: &Range<usize>, tables: &mut [Vec<Crossing>]) {
+        let [a, b, c] = facet.map(|corner| f64::from(corner[2]) * self.units.um());
+        let met = self.planes.between(a.min(b).min(c), a.max(b).max(c));
+        let met = met.start.max(layers.start)..met.end.min(layers.end);
+        if met.is_empty() {
+            return;
+        }
+        let ([low, middle, high], odd) = self.sorted_corners(facet);
+        // The longest edge in z is crossed by every plane met, the other two
+        // below and above the middle corner.
+        let long = Edge::new(low, high);
+        let turn = self.planes.at_or_below(middle.z_um).clamp(met.start, met.end);
+        for (from, to, met) in [(low, middle, met.start..turn), (middle, high, turn..met.end)] {
+            if met.is_empty() {
+                continue;
+            }
+            let short = Edge::new(from, to);
+            for layer in met {
+                let z_um = self.planes.z_um(layer);
+                let table = &mut tables[layer - layers.start];
+                self.cross_rows(long.at(z_um), short.at(z_um), odd, table);
+            }
+        }
+    }
+
+    /// The corners from the lowest to the highest, and whether putting them
+    /// in this order turned the facet over.
+    #[inline]
+    fn sorted_corners(&self, facet: &Facet) -> ([Corner; 3], bool) {
+        let mm = self.units.mm();
+        let [mut low, mut middle, mut high] = facet.map(|[x, y, z]| Corner {
+            pixels: self.grid.to_pixels(f64::from(x) * mm, f64::from(y) * mm),
+            z_um: f64::from(z) * self.units.um(),
+        });
+        let mut odd = false;
+        let mut order = |lower: &mut Corner, upper: &mut Corner| {
+            if upper.z_um < lower.z_um {
+                std::mem::swap(lower, upper);
+                odd = !odd;
+            }
+        };
+        order(&mut low, &mut middle);
+        order(&mut middle, &mut high);
+        order(&mut low, &mut middle);
+        ([low, middle, high], odd)
+    }
+
+    /// Adds the crossings of rows with a segment between two points of a
+    /// plane, in pixels.
+    #[inline]
+    fn cross_rows(&self, a: [f64; 2], b: [f64; 2], odd: bool, table: &mut Vec<Crossing>) {
+        let down = a[1] < b[1];
+        let (upper, lower) = if down { (a, b) } else { (b, a) };
+        let rising = down != odd;
+        // A point is past the rows whose centre is at or below it.
+        let (first, end) =
+            (ceil_clamped(upper[1], self.grid.height), ceil_clamped(lower[1], self.grid.height));
+        if first >= end {
+            return;
+        }
+        let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
+        table.extend((first..end).map(|row| {
+            let x = upper[0] + slope * (f64::from(row) - upper[1]);
+            Crossing::new(row, ceil_clamped(x, self.grid.width), rising)
+        }));
+    }
+}
+
+/// The least whole number that is not below `value`, between 0 and `most`.
+#[inline]
+fn ceil_clamped(value: f64, most: u32) -> u32 {
+    // Casts saturate. `f64::ceil` is a call on processors before SSE4.1.
+    let whole = value as i32;
+    let ceiling = whole.saturating_add(i32::from(f64::from(whole) < value));
+    ceiling.clamp(0, most as i32) as u32
+}
+
+/// An edge from its lower to its higher corner.
+#[derive(Clone, Copy)]
+struct Edge {
+    low: Corner,
+    pixels_per_um: [f64; 2],
+}
+
+impl Edge {
+    #[inline]
+    fn new(low: Corner, high: Corner) -> Self {
+        let rise_um = high.z_um - low.z_um;
+        let slope = |axis: usize| (high.pixels[axis] - low.pixels[axis]) / rise_um;
+        Self { low, pixels_per_um: [slope(0), slope(1)] }
+    }
+
+    /// The edge's point at a height, in pixels.
+    #[inline]
+    fn at(&self, z_um: f64) -> [f64; 2] {
+        let above_um = z_um - self.low.z_um;
+        [
+            self.low.pixels[0] + self.pixels_per_um[0] * above_um,
+            self.low.pixels[1] + self.pixels_per_um[1] * above_um,
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ceilings_are_exact_and_clamped() {
+        for (value, ceiling) in [
+            (0.0, 0),
+            (-0.5, 0),
+            (-7.0, 0),
+            (1e-300, 1),
+            (5.0, 5),
+            (5.000_000_000_1, 6),
+            (1e9, 1000),
+            (f64::INFINITY, 1000),
+        ] {
+            assert_eq!(ceil_clamped(value, 1000), ceiling, "{value}");
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! What can be wrong with a part.
+
+use std::io;
+
+use thiserror::Error;
+
+/// Why a part cannot be sliced.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SliceError {
+    /// The file holds nothing.
+    #[error("the file is empty: export the part again")]
+    EmptyFile,
+    /// Neither binary nor ASCII STL.
+    #[error(
+        "this is not an STL file: it has {size} bytes, and neither a binary header nor `solid` and `facet`"
+    )]
+    NotStl {
+        /// The file's size in bytes.
+        size: u64,
+    },
+    /// A binary STL whose header does not agree with its size.
+    #[error(
+        "the header declares {declared} facets, which take {} bytes, but the file has {size}: {}",
+        84 + 50 * u64::from(*.declared),
+        count_advice(*.declared, *.size)
+    )]
+    Count {
+        /// How many facets the header declares.
+        declared: u32,
+        /// The file's size in bytes.
+        size: u64,
+    },
+    /// An ASCII STL that breaks off or has a line of another kind.
+    #[error("facet {facet} of the ASCII file: {reason}; export the part again")]
+    Ascii {
+        /// The facet, from 0, in the whole file.
+        facet: usize,
+        /// What the line parser says.
+        reason: String,
+    },
+    /// A coordinate that is no number.
+    #[error(
+        "facet {facet} has a coordinate that is not a finite number: repair or export the part again"
+    )]
+    NotFinite {
+        /// The facet, from 0.
+        facet: usize,
+    },
+    /// There is nothing to slice.
+    #[error("the file holds no facets: there is nothing to slice")]
+    NoFacets,
+    /// An image would have too many pixels on a side.
+    #[error(
+        "an image would be {width} x {height} pixels, more than {} on a side: check --units and --dpi",
+        crate::grid::LARGEST_SIDE
+    )]
+    TooLarge {
+        /// Width in pixels.
+        width: f64,
+        /// Height in pixels.
+        height: f64,
+    },
+    /// The part would have too many layers.
+    #[error(
+        "the part is {height_mm} mm high, {layers:.0} layers of {thickness_um} um: check --units and --thickness"
+    )]
+    TooManyLayers {
+        /// The part's height in millimetres.
+        height_mm: f64,
+        /// The thickness asked for, in micrometres.
+        thickness_um: f64,
+        /// How many layers that makes.
+        layers: f64,
+    },
+    /// The layers asked for do not exist.
+    #[error("layers {start}..{end} were asked for, but the part has layers 0..{count}")]
+    NoSuchLayers {
+        /// The first layer asked for.
+        start: u32,
+        /// The layer after the last asked for.
+        end: u32,
+        /// How many layers there are.
+        count: u32,
+    },
+    /// Reading the file failed.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+fn count_advice(declared: u32, size: u64) -> String {
+    let held = size.saturating_sub(84) / 50;
+    if held < u64::from(declared) {
+        format!("it was cut off after facet {held}; export it again")
+    } else {
+        "bytes follow the last facet; export it again".to_owned()
+    }
+}

@@ -1,0 +1,34 @@
+//! Facets.
+
+/// A triangle of a part's surface: three corners (x, y, z) in file units, as
+/// STL holds them, counter-clockwise seen from outside.
+pub type Facet = [[f32; 3]; 3];
+
+/// What the coordinates of a file without a unit mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Units {
+    /// Millimetres.
+    #[default]
+    Millimetres,
+    /// Inches.
+    Inches,
+}
+
+impl Units {
+    /// Millimetres in one unit.
+    pub fn mm(self) -> f64 {
+        match self {
+            Self::Millimetres => 1.0,
+            Self::Inches => 25.4,
+        }
+    }
+
+    /// Micrometres in one unit: whole, so that multiplying a 32-bit
+    /// coordinate by it is exact.
+    pub(crate) fn um(self) -> f64 {
+        match self {
+            Self::Millimetres => 1000.0,
+            Self::Inches => 25_400.0,
+        }
+    }
+}

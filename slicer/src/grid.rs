@@ -1,0 +1,121 @@
+//! Where pixels lie on the part.
+
+use lamp_stack::Dpi;
+
+use crate::error::SliceError;
+
+/// Images are at most so wide and high, in pixels.
+pub(crate) const LARGEST_SIDE: u32 = 1 << 24;
+
+/// The pixels of a layer in part coordinates.
+///
+/// ```text
+///   (x0, y1) +---+---+---+--> column, x
+///            | . | . | . |
+///            +---+---+---+        the centre of pixel (c, r) is
+///            | . | . | . |        x0 + (c + 1/2) p, y1 - (r + 1/2) p
+///            +---+---+---+        with the pitch p = 25.4 mm / dpi
+///            v  row, -y
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelGrid {
+    /// The top left corner (x0, y1) in part coordinates, in millimetres.
+    pub origin_mm: [f64; 2],
+    /// The resolution.
+    pub dpi: Dpi,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl PixelGrid {
+    /// The grid around a box (x, y), with `margin` pixels on every side and
+    /// its width rounded up to a multiple of 32 on the right. The origin is
+    /// moved outwards to a whole nanometre, so that six decimals state it
+    /// exactly.
+    ///
+    /// # Errors
+    /// Where a side would pass 2^24 pixels.
+    ///
+    /// Source: 002 section 2.2.2 (equations 1 and 2; width in 32 bits).
+    pub fn around(
+        min_mm: [f64; 2],
+        max_mm: [f64; 2],
+        margin: u32,
+        dpi: Dpi,
+    ) -> Result<Self, SliceError> {
+        let margin_mm = f64::from(margin) * dpi.pitch().mm();
+        let x0 = ((min_mm[0] - margin_mm) * 1e6).floor() / 1e6;
+        let y1 = ((max_mm[1] + margin_mm) * 1e6).ceil() / 1e6;
+        let pixels = |mm: f64| (mm * pixels_per_127_mm(dpi) / 127.0).ceil() + f64::from(margin);
+        let width = (pixels(max_mm[0] - x0) / 32.0).ceil().max(1.0) * 32.0;
+        let height = pixels(y1 - min_mm[1]).max(1.0);
+        Self::at([x0, y1], width, height, dpi)
+    }
+
+    /// The grid with its top left corner at `origin_mm`.
+    ///
+    /// # Errors
+    /// Where a side is not between 1 and 2^24 pixels.
+    pub fn at(origin_mm: [f64; 2], width: f64, height: f64, dpi: Dpi) -> Result<Self, SliceError> {
+        let allowed = 1.0..=f64::from(LARGEST_SIDE);
+        if !allowed.contains(&width) || !allowed.contains(&height) {
+            return Err(SliceError::TooLarge { width, height });
+        }
+        Ok(Self { origin_mm, dpi, width: width as u32, height: height as u32 })
+    }
+
+    /// A point in pixels, such that it lies left of (or on) the centre of
+    /// column c exactly when its first coordinate is at most c, and above (or
+    /// on) the centre of row r exactly when its second is at most r.
+    ///
+    /// A coordinate that lies on a centre comes out as that whole number:
+    /// the one division is by a whole number.
+    #[inline]
+    pub fn to_pixels(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
+        let scale = pixels_per_127_mm(self.dpi);
+        [
+            (x_mm - self.origin_mm[0]) * scale / 127.0 - 0.5,
+            (self.origin_mm[1] - y_mm) * scale / 127.0 - 0.5,
+        ]
+    }
+}
+
+/// dpi / 25.4 is five dpi / 127: whole for whole resolutions.
+fn pixels_per_127_mm(dpi: Dpi) -> f64 {
+    dpi.get() * 5.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_frame_is_the_box_and_its_margin() {
+        let dpi = Dpi::new(1500.0).unwrap();
+        let grid = PixelGrid::around([-1.0, 0.0], [75.0, 77.2], 1, dpi).unwrap();
+        assert_eq!(grid.origin_mm, [-1.016934, 77.216934]);
+        // 76 mm are 4488.2 pixels and 77.2 mm 4559.1; then the margins.
+        assert_eq!((grid.width, grid.height), (4512, 4562));
+        let none = PixelGrid::around([0.0, 0.0], [25.4, 25.4], 0, dpi).unwrap();
+        assert_eq!((none.origin_mm, none.width, none.height), ([0.0, 25.4], 1504, 1500));
+    }
+
+    #[test]
+    fn centres_are_whole_numbers() {
+        // 203.2 dpi is a pitch of 1/8 mm, which floating point holds.
+        let grid = PixelGrid::at([-3.0, 5.0], 64.0, 64.0, Dpi::new(203.2).unwrap()).unwrap();
+        for c in 0..64u32 {
+            let centre = (f64::from(c) + 0.5) * 0.125;
+            assert_eq!(grid.to_pixels(-3.0 + centre, 5.0 - centre), [f64::from(c); 2]);
+        }
+    }
+
+    #[test]
+    fn too_many_pixels_are_refused() {
+        let dpi = Dpi::new(1500.0).unwrap();
+        assert!(PixelGrid::around([0.0, 0.0], [1e6, 1.0], 1, dpi).is_err());
+        assert!(PixelGrid::at([0.0, 0.0], f64::NAN, 1.0, dpi).is_err());
+    }
+}

@@ -1,0 +1,51 @@
+//! CAD parts to layer images, straight from facets to runs.
+//!
+//! A [`Model`] is a part as a source of facets; [`Slices`] are its layers. No
+//! contour is ever linked and no pixel is painted: each facet's crossings
+//! with the planes of the layers and the rows of the images go straight into
+//! a table of (layer, row), and sorting a row's crossings gives its runs
+//! (002 section 2.3.4, algorithm 9).
+//!
+//! ```
+//! use lamp_slicer::{Model, SliceOptions, Slices};
+//! use lamp_stack::{Dpi, Image, Length};
+//!
+//! // A tetrahedron: four facets, counter-clockwise seen from outside.
+//! let [o, x, y, z] = [[0.0; 3], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 10.0f32]];
+//! let model = Model::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
+//! let options = SliceOptions {
+//!     dpi: Dpi::new(254.0).unwrap(), // 0.1 mm pixels
+//!     thickness: Length::from_mm(2.0),
+//!     ..SliceOptions::default()
+//! };
+//! let areas_mm2: Vec<f64> = Slices::new(model, &options)?
+//!     .map(|layer| match layer?.image {
+//!         Image::Mask(mask) => Ok(mask.white_pixels() as f64 * 0.01),
+//!         Image::Gray(_) => unreachable!("slices are masks"),
+//!     })
+//!     .collect::<Result<_, lamp_slicer::SliceError>>()?;
+//! // Sections at the layers' tops, 2, 4, ... 10 mm: half a square each.
+//! for (area, side) in areas_mm2.iter().zip([8.0, 6.0, 4.0, 2.0, 0.0]) {
+//!     assert!((area - side * side / 2.0).abs() < 0.5);
+//! }
+//! # Ok::<(), lamp_slicer::SliceError>(())
+//! ```
+
+mod ascii;
+mod cut;
+mod error;
+mod facet;
+mod grid;
+mod model;
+mod planes;
+mod slices;
+mod survey;
+mod table;
+
+pub use error::SliceError;
+pub use facet::{Facet, Units};
+pub use grid::PixelGrid;
+pub use model::Model;
+pub use planes::{PlaneRule, Planes};
+pub use slices::{Frame, SliceOptions, Slices};
+pub use table::Fill;

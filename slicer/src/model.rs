@@ -1,0 +1,164 @@
+//! A part as a source of facets.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::ops::Range;
+use std::path::Path;
+
+use blake3::Hasher;
+use memmap2::{Mmap, MmapOptions};
+
+use crate::ascii;
+use crate::error::SliceError;
+use crate::facet::Facet;
+
+/// Header and count of a binary STL.
+const HEADER_BYTES: u64 = 84;
+/// A facet of a binary STL: normal, three corners, attributes.
+const FACET_BYTES: usize = 50;
+/// Facets are read in blocks of so many: 200 kB of a binary file.
+pub(crate) const BLOCK_FACETS: usize = 4096;
+
+/// A part: its name and its facets. A binary STL stays in its file, of which
+/// only a few blocks are mapped at a time.
+#[derive(Debug)]
+pub struct Model {
+    name: String,
+    facets: Facets,
+    digest: String,
+}
+
+#[derive(Debug)]
+enum Facets {
+    Binary { file: File, count: usize },
+    Memory(Vec<Facet>),
+}
+
+impl Model {
+    /// Opens an STL file, binary or ASCII. Which one it is follows from its
+    /// size and content: many binary files begin with `solid`, too.
+    ///
+    /// The file must not change while the model is in use.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, is no STL, or contradicts itself.
+    pub fn open(path: &Path) -> Result<Self, SliceError> {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Self::from_file(name, &File::open(path)?)
+    }
+
+    /// Reads an STL from a stream, such as standard input, by way of a
+    /// temporary file.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn from_stream(name: &str, mut stream: impl Read) -> Result<Self, SliceError> {
+        let mut file = tempfile::tempfile()?;
+        io::copy(&mut stream, &mut file)?;
+        Self::from_file(name.to_owned(), &file)
+    }
+
+    /// A part of these facets.
+    pub fn from_facets(name: &str, facets: Vec<Facet>) -> Self {
+        let mut hasher = Hasher::new();
+        for corner in facets.iter().flatten().flatten() {
+            hasher.update(&corner.to_le_bytes());
+        }
+        Self { name: name.to_owned(), facets: Facets::Memory(facets), digest: digest_text(&hasher) }
+    }
+
+    fn from_file(name: String, file: &File) -> Result<Self, SliceError> {
+        let size = file.metadata()?.len();
+        if size == 0 {
+            return Err(SliceError::EmptyFile);
+        }
+        let start = map(file, 0, size.min(1024) as usize)?;
+        let declared = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
+        let facets = match declared {
+            Some(count) if HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size => {
+                Facets::Binary { file: file.try_clone()?, count: count as usize }
+            }
+            _ if ascii::looks_ascii(&start) => {
+                Facets::Memory(ascii::read(&map(file, 0, size as usize)?)?)
+            }
+            Some(declared) => return Err(SliceError::Count { declared, size }),
+            None => return Err(SliceError::NotStl { size }),
+        };
+        Ok(Self { name, facets, digest: digest_of(file, size)? })
+    }
+
+    /// The part's name: the file's, without folder and extension.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// How many facets the part has.
+    pub fn facet_count(&self) -> usize {
+        match &self.facets {
+            Facets::Binary { count, .. } => *count,
+            Facets::Memory(facets) => facets.len(),
+        }
+    }
+
+    /// The digest of the file (of the coordinates, where there is no file):
+    /// `blake3:` and 64 hexadecimal digits.
+    pub fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    pub(crate) fn block_count(&self) -> usize {
+        self.facet_count().div_ceil(BLOCK_FACETS)
+    }
+
+    /// Gives every facet of a block.
+    pub(crate) fn for_each_in_block(
+        &self,
+        block: usize,
+        mut each: impl FnMut(&Facet),
+    ) -> io::Result<()> {
+        let Range { start, end } =
+            block * BLOCK_FACETS..self.facet_count().min((block + 1) * BLOCK_FACETS);
+        match &self.facets {
+            Facets::Memory(facets) => facets[start..end].iter().for_each(each),
+            Facets::Binary { file, .. } => {
+                let offset = HEADER_BYTES + (start * FACET_BYTES) as u64;
+                let bytes = map(file, offset, (end - start) * FACET_BYTES)?;
+                let (records, _) = bytes.as_chunks::<FACET_BYTES>();
+                records.iter().for_each(|record| each(&parse(record)));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The corners of a binary facet.
+#[inline]
+fn parse(record: &[u8; FACET_BYTES]) -> Facet {
+    let number = |at: usize| {
+        f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
+    };
+    let corner = |at| [number(at), number(at + 4), number(at + 8)];
+    [corner(12), corner(24), corner(36)]
+}
+
+/// Maps a part of a file.
+#[expect(unsafe_code, reason = "mapping a file is unsafe, since others may change it")]
+fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
+    // SAFETY: the map is private and read only. Its bytes are undefined only
+    // if another process changes the file meanwhile, which `Model::open`
+    // forbids; any bytes are valid numbers here.
+    unsafe { MmapOptions::new().offset(offset).len(length).map(file) }
+}
+
+fn digest_of(file: &File, size: u64) -> io::Result<String> {
+    const WINDOW: u64 = 1 << 20;
+    let mut hasher = Hasher::new();
+    for offset in (0..size).step_by(WINDOW as usize) {
+        hasher.update(&map(file, offset, WINDOW.min(size - offset) as usize)?);
+    }
+    Ok(digest_text(&hasher))
+}
+
+fn digest_text(hasher: &Hasher) -> String {
+    format!("blake3:{}", hasher.finalize().to_hex())
+}

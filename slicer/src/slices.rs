@@ -1,0 +1,242 @@
+//! A part's layers, in order.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use lamp_stack::{Dpi, Image, Layer, Length, PageInfo, StackInfo};
+use rayon::prelude::*;
+
+use crate::cut::{Crossing, Cutter};
+use crate::error::SliceError;
+use crate::facet::Units;
+use crate::grid::PixelGrid;
+use crate::model::Model;
+use crate::planes::{PlaneRule, Planes};
+use crate::survey::Survey;
+use crate::table::{Fill, Table};
+
+/// How a part is sliced.
+#[derive(Clone, Debug)]
+pub struct SliceOptions {
+    /// Resolution in the plane.
+    pub dpi: Dpi,
+    /// Thickness of the layers.
+    pub thickness: Length,
+    /// Where in the layer the section is taken.
+    pub plane: PlaneRule,
+    /// What the file's coordinates mean.
+    pub units: Units,
+    /// What is inside.
+    pub fill: Fill,
+    /// The layers wanted, all where `None`.
+    pub layers: Option<Range<u32>>,
+    /// The frame of the images.
+    pub frame: Frame,
+    /// About how many bytes the table of crossings may take; at least one
+    /// layer's is held.
+    pub memory: u64,
+}
+
+/// Which part of the plane the images show.
+#[derive(Clone, Copy, Debug)]
+pub enum Frame {
+    /// The part's box and a margin of so many pixels.
+    Around {
+        /// Black pixels on every side.
+        margin: u32,
+    },
+    /// A given place: what lies outside is cut away.
+    At {
+        /// The top left corner (x, y) in part coordinates, in millimetres.
+        origin_mm: [f64; 2],
+        /// Width and height in pixels.
+        pixels: [u32; 2],
+    },
+}
+
+impl Default for SliceOptions {
+    /// 1500 dpi and 100 um, the seed's resolution; everything else plain.
+    fn default() -> Self {
+        Self {
+            dpi: Dpi::new(1500.0).expect("1500 is a resolution"),
+            thickness: Length::from_um(100.0),
+            plane: PlaneRule::default(),
+            units: Units::default(),
+            fill: Fill::default(),
+            layers: None,
+            frame: Frame::Around { margin: 1 },
+            memory: 64 << 20,
+        }
+    }
+}
+
+/// The layers of a part, bottom first.
+///
+/// The part is looked at once for its box; then z is processed in slabs of as
+/// many layers as the memory holds, each slab reading only those blocks of
+/// the file that it meets. All threads of the current rayon pool work; order
+/// and bytes do not depend on them.
+#[derive(Debug)]
+pub struct Slices {
+    model: Model,
+    survey: Survey,
+    grid: PixelGrid,
+    planes: Planes,
+    units: Units,
+    fill: Fill,
+    wanted: Range<usize>,
+    most_crossings: usize,
+    expected: Vec<f64>,
+    table: Table,
+    /// The layers of the table that are still to be made into images.
+    pending: Range<usize>,
+    ready: VecDeque<Layer>,
+}
+
+impl Slices {
+    /// Prepares to slice a part.
+    ///
+    /// # Errors
+    /// Where the part is empty or not finite, or the images or layers would
+    /// be too many.
+    pub fn new(model: Model, options: &SliceOptions) -> Result<Self, SliceError> {
+        let survey = Survey::of(&model)?;
+        let (mm, um) = (options.units.mm(), options.units.um());
+        let corner = |box_corner: [f32; 3]| [0, 1].map(|axis| f64::from(box_corner[axis]) * mm);
+        let grid = match options.frame {
+            Frame::Around { margin } => {
+                PixelGrid::around(corner(survey.min), corner(survey.max), margin, options.dpi)
+            }
+            Frame::At { origin_mm, pixels: [width, height] } => {
+                PixelGrid::at(origin_mm, width.into(), height.into(), options.dpi)
+            }
+        }?;
+        let planes = Planes::uniform(
+            f64::from(survey.min[2]) * um,
+            f64::from(survey.max[2]) * um,
+            options.thickness,
+            options.plane,
+        )?;
+        let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
+        let expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm(), options.units);
+        Ok(Self {
+            model,
+            survey,
+            grid,
+            units: options.units,
+            fill: options.fill,
+            // A list that grows holds up to twice what it needs.
+            most_crossings: (options.memory as usize / (2 * size_of::<Crossing>())).max(1),
+            pending: wanted.start..wanted.start,
+            wanted,
+            planes,
+            expected,
+            table: Table::default(),
+            ready: VecDeque::new(),
+        })
+    }
+
+    /// The pixels of the layers.
+    pub fn grid(&self) -> &PixelGrid {
+        &self.grid
+    }
+
+    /// How many layers there will be.
+    pub fn layer_count(&self) -> usize {
+        self.wanted.len()
+    }
+
+    /// Fills the table with the next slab.
+    fn fill_slab(&mut self) -> Result<(), SliceError> {
+        let start = self.pending.end;
+        let mut end = self.slab_end(start);
+        loop {
+            let cutter = Cutter { grid: &self.grid, planes: &self.planes, units: self.units };
+            let (low, high) = (self.planes.z_um(start), self.planes.z_um(end - 1));
+            let blocks = self.survey.blocks_between(low, high, self.units);
+            let fits =
+                self.table.fill(&self.model, &blocks, cutter, start..end, self.most_crossings)?;
+            if fits {
+                self.pending = start..end;
+                return Ok(());
+            }
+            // The estimate was too low here: take fewer layers.
+            end = start + (end - start) / 2;
+        }
+    }
+
+    /// Where a slab that starts at `start` ends by the estimate.
+    fn slab_end(&self, start: usize) -> usize {
+        let mut room = self.most_crossings as f64;
+        let fits = |&&crossings: &&f64| {
+            room -= crossings;
+            room > 0.0
+        };
+        let layers = self.expected[start..self.wanted.end].iter().take_while(fits).count();
+        start + layers.max(1)
+    }
+
+    /// Makes the next layers of the table into images.
+    fn finish_batch(&mut self) {
+        let end = self.pending.end.min(self.pending.start + 2 * rayon::current_num_threads());
+        let batch = self.pending.start..end;
+        self.pending.start = end;
+        let layer = |layer| {
+            let (mask, stray_rows) =
+                self.table.layer(layer, self.grid.width, self.grid.height, self.fill);
+            Layer {
+                info: self.page_info(layer, stray_rows),
+                dpi: Some(self.grid.dpi),
+                image: Image::Mask(mask),
+            }
+        };
+        self.ready = batch.into_par_iter().map(layer).collect();
+    }
+
+    fn page_info(&self, layer: usize, stray_rows: Vec<u32>) -> PageInfo {
+        let stack = StackInfo {
+            part: self.model.name().to_owned(),
+            digest: self.model.digest().to_owned(),
+            layers: Some(self.wanted.len() as u32),
+            ..StackInfo::default()
+        };
+        PageInfo {
+            index: layer as u32,
+            z_um: Some(self.planes.layer_bottom_um(layer)),
+            thickness_um: Some(self.planes.thickness_um()),
+            origin_mm: Some(self.grid.origin_mm),
+            stray_rows,
+            stack: (layer == self.wanted.start).then_some(stack),
+            ..PageInfo::default()
+        }
+    }
+}
+
+impl Iterator for Slices {
+    type Item = Result<Layer, SliceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ready.is_empty() {
+            if self.pending.is_empty() {
+                if self.pending.end == self.wanted.end {
+                    return None;
+                }
+                if let Err(error) = self.fill_slab() {
+                    self.pending = self.wanted.end..self.wanted.end;
+                    return Some(Err(error));
+                }
+            }
+            self.finish_batch();
+        }
+        self.ready.pop_front().map(Ok)
+    }
+}
+
+fn wanted_layers(asked: Option<&Range<u32>>, count: usize) -> Result<Range<usize>, SliceError> {
+    let Some(&Range { start, end }) = asked else { return Ok(0..count) };
+    let count = count as u32;
+    if start >= count || end <= start {
+        return Err(SliceError::NoSuchLayers { start, end, count });
+    }
+    Ok(start as usize..end.min(count) as usize)
+}

@@ -1,0 +1,160 @@
+//! The intersection table: crossings in cells of (layer, row), and rows from
+//! cells.
+//!
+//! Source: 002 section 2.3.4, algorithm 9 and figure 26. The seed keeps the
+//! table of the whole part; here it holds one slab of layers at a time.
+
+use std::io;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+
+use lamp_stack::{Mask, MaskBuilder};
+use rayon::prelude::*;
+
+use crate::cut::{Crossing, Cutter, Place};
+use crate::model::Model;
+
+/// What is inside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Fill {
+    /// Every crossing toggles the colour, as the seed does.
+    #[default]
+    EvenOdd,
+    /// White where the contours wind around the pixel, for bodies that
+    /// overlap; the facets' orientation gives the sign.
+    NonZero,
+}
+
+/// The crossings of a slab of layers.
+#[derive(Debug, Default)]
+pub(crate) struct Table {
+    layers: Range<usize>,
+    /// One table a worker, one list a layer in each. Lists keep their memory
+    /// from slab to slab.
+    parts: Vec<Vec<Vec<Crossing>>>,
+}
+
+impl Table {
+    /// Fills the table with the crossings of `layers`, from the given blocks
+    /// of the model. Gives up, returning `false`, once the crossings pass
+    /// `most` in a slab that could be smaller.
+    pub(crate) fn fill(
+        &mut self,
+        model: &Model,
+        blocks: &[usize],
+        cutter: Cutter<'_>,
+        layers: Range<usize>,
+        most: usize,
+    ) -> io::Result<bool> {
+        self.parts.resize_with(rayon::current_num_threads(), Vec::new);
+        let (next, total) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let too_many = AtomicBool::new(false);
+        self.parts.par_iter_mut().try_for_each(|lists| -> io::Result<()> {
+            lists.iter_mut().for_each(Vec::clear);
+            lists.resize_with(lists.len().max(layers.len()), Vec::new);
+            let mut known = 0;
+            while let Some(&block) = blocks.get(next.fetch_add(1, Relaxed)) {
+                model.for_each_in_block(block, |facet| cutter.cut(facet, &layers, lists))?;
+                let count = lists.iter().map(Vec::len).sum();
+                if total.fetch_add(count - known, Relaxed) + count - known > most
+                    && layers.len() > 1
+                {
+                    too_many.store(true, Relaxed);
+                }
+                known = count;
+                if too_many.load(Relaxed) {
+                    break;
+                }
+            }
+            Ok(())
+        })?;
+        self.layers = layers;
+        Ok(!too_many.into_inner())
+    }
+
+    /// The image of a layer of the slab, and the rows whose crossings do not
+    /// balance.
+    pub(crate) fn layer(
+        &self,
+        layer: usize,
+        width: u32,
+        height: u32,
+        fill: Fill,
+    ) -> (Mask, Vec<u32>) {
+        let crossings =
+            || self.parts.iter().flat_map(move |lists| &lists[layer - self.layers.start]).copied();
+        let (starts, mut places) = sort_by_row(crossings, height);
+        let mut mask = MaskBuilder::new(width);
+        mask.reserve(height as usize, places.len());
+        let mut stray_rows = Vec::new();
+        let mut transitions = Vec::new();
+        for (row, ends) in starts.windows(2).enumerate() {
+            let places = &mut places[ends[0]..ends[1]];
+            places.sort_unstable();
+            transitions.clear();
+            let balanced = match fill {
+                Fill::EvenOdd => even_odd(places, &mut transitions),
+                Fill::NonZero => non_zero(places, &mut transitions),
+            };
+            if !balanced {
+                stray_rows.push(row as u32);
+            }
+            while transitions.last().is_some_and(|&column| column >= width) {
+                transitions.pop();
+            }
+            mask.push_row(&transitions).expect("sorted places without pairs increase strictly");
+        }
+        (mask.finish(), stray_rows)
+    }
+}
+
+/// Sorts crossings by their rows (a counting sort): where each row starts,
+/// and the places in the rows.
+fn sort_by_row<I: Iterator<Item = Crossing>>(
+    crossings: impl Fn() -> I,
+    height: u32,
+) -> (Vec<usize>, Vec<Place>) {
+    let mut starts = vec![0; height as usize + 2];
+    for crossing in crossings() {
+        starts[crossing.row() + 2] += 1;
+    }
+    for row in 2..starts.len() {
+        starts[row] += starts[row - 1];
+    }
+    let mut places = vec![Place::default(); starts[height as usize + 1]];
+    for crossing in crossings() {
+        let at = &mut starts[crossing.row() + 1];
+        places[*at] = crossing.place();
+        *at += 1;
+    }
+    starts.pop();
+    (starts, places)
+}
+
+/// Toggles at every place; two at one column cancel. Says whether the number
+/// of places is even.
+#[inline]
+fn even_odd(places: &[Place], transitions: &mut Vec<u32>) -> bool {
+    for place in places {
+        if transitions.last() == Some(&place.column()) {
+            transitions.pop();
+        } else {
+            transitions.push(place.column());
+        }
+    }
+    places.len().is_multiple_of(2)
+}
+
+/// Toggles where the winding number leaves or reaches zero. Says whether it
+/// is zero at the end.
+fn non_zero(places: &[Place], transitions: &mut Vec<u32>) -> bool {
+    let mut winding = 0;
+    for group in places.chunk_by(|a, b| a.column() == b.column()) {
+        let before = winding;
+        winding += group.iter().map(|place| place.winding()).sum::<i32>();
+        if (before == 0) != (winding == 0) {
+            transitions.push(group[0].column());
+        }
+    }
+    winding == 0
+}
