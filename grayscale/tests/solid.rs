@@ -1,0 +1,52 @@
+//! What dithering must leave alone.
+
+use lamp_grayscale::{Method, dither, dither_image};
+use lamp_stack::{GrayMask, Image, Layer, Mask, PageInfo};
+use proptest::prelude::*;
+
+fn gray_image() -> impl Strategy<Value = GrayMask> {
+    let level = prop_oneof![Just(0), Just(255), any::<u8>()];
+    let row = prop::collection::vec((0u32..9, level), 0..12);
+    prop::collection::vec(row, 0..20).prop_map(|rows| {
+        let mut gray = GrayMask::new(100);
+        rows.into_iter().for_each(|row| gray.push_runs(row).unwrap());
+        gray
+    })
+}
+
+fn level_at(gray: &GrayMask, column: u32, row: usize) -> u8 {
+    let changes = gray.rows().nth(row).unwrap();
+    changes.iter().rev().find(|change| change.column <= column).map_or(0, |change| change.level)
+}
+
+proptest! {
+    #[test]
+    fn solid_pixels_keep_their_colour(gray in gray_image()) {
+        for method in [Method::Ordered, Method::FloydSteinberg] {
+            let dots = dither_image(&gray, method);
+            prop_assert_eq!((dots.width(), dots.height()), (gray.width(), gray.height()));
+            for pixel in 0..gray.width() * gray.height() {
+                let (column, row) = (pixel % 100, pixel / 100);
+                match level_at(&gray, column, row as usize) {
+                    0 => prop_assert!(!dots.is_white(column, row)),
+                    255 => prop_assert!(dots.is_white(column, row)),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn masks_pass_unchanged_and_gray_pages_name_the_method() {
+    let info = PageInfo { index: 3, ..PageInfo::default() };
+    let mask = Image::Mask(Mask::new(8, vec![0, 2], vec![1, 4]).unwrap());
+    let masked = Layer { info: info.clone(), dpi: None, image: mask };
+    let gray = Layer { info, dpi: None, image: Image::Gray(GrayMask::new(8)) };
+    let layers = [Ok::<_, ()>(masked.clone()), Ok(gray)];
+    let out: Vec<_> =
+        dither(layers.into_iter(), Method::FloydSteinberg).map(Result::unwrap).collect();
+    assert_eq!(out[0], masked);
+    assert!(matches!(out[1].image, Image::Mask(_)));
+    assert_eq!(out[1].info.other["dither"], "floyd-steinberg");
+}
