@@ -17,7 +17,7 @@
 //!     assert_eq!((info.index, bands[0].first_row, bands[0].pixels), (0, 1, 3));
 //! });
 //! let options = TileOptions { area: "0.2x0.1in".parse()?, ..TileOptions::default() };
-//! let mut build = tile(fixed, &options);
+//! let mut build = tile(fixed, options);
 //! let Image::Mask(build) = build.next().unwrap()?.image else { unreachable!() };
 //! assert_eq!((build.width(), build.height()), (20, 10));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -100,9 +100,8 @@ impl std::fmt::Display for Pixels {
 /// layer and is stated on its page, in pixels.
 pub fn tile<E: From<TileError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
-    options: &TileOptions,
+    options: TileOptions,
 ) -> impl Iterator<Item = Result<Layer, E>> {
-    let options = *options;
     let mut layout: Option<Layout> = None;
     let placed = layers.map(move |layer| {
         let layer = layer?;
@@ -266,7 +265,7 @@ mod tests {
     }
 
     fn tiled(mask: Mask, options: &TileOptions) -> Result<Layer, TileError> {
-        tile(std::iter::once(Ok(layer(mask))), options).next().unwrap()
+        tile(std::iter::once(Ok(layer(mask))), *options).next().unwrap()
     }
 
     fn lefts_and_tops(options: &TileOptions) -> Vec<(u32, Vec<u32>)> {
@@ -276,13 +275,7 @@ mod tests {
     #[test]
     fn copies_fill_the_area_and_stand_centred() {
         let rows = lefts_and_tops(&options("100x50mm", None, 2.0));
-        assert_eq!(
-            rows,
-            [(4, vec![0, 34, 68]), (26, vec![0, 34, 68])].map(|(top, lefts)| (
-                top,
-                lefts.into_iter().map(|left: u32| left).collect::<Vec<_>>()
-            ))
-        );
+        assert_eq!(rows, [(4, vec![0, 34, 68]), (26, vec![0, 34, 68])]);
         let rows = lefts_and_tops(&options("100x50mm", Some(2), 2.0));
         assert_eq!(rows, [(15, vec![17, 51])]);
         let rows = lefts_and_tops(&options("100x50mm", Some(4), 2.0));
@@ -299,7 +292,7 @@ mod tests {
         assert!(error("100x50mm", Some(7)).contains("only 6 fit"));
         let mut foreign = layer(Mask::black(1, 1));
         foreign.dpi = None;
-        let refused = tile(std::iter::once(Ok(foreign)), &options("9x9mm", None, 1.0)).next();
+        let refused = tile(std::iter::once(Ok(foreign)), options("9x9mm", None, 1.0)).next();
         assert!(matches!(refused, Some(Err(TileError::NoResolution { .. }))));
     }
 
@@ -307,7 +300,7 @@ mod tests {
     fn layers_of_another_size_are_refused() {
         let layers = [layer(Mask::black(32, 20)), layer(Mask::black(32, 21))];
         let options = options("100x50mm", None, 2.0);
-        let mut build = tile(layers.into_iter().map(Ok), &options);
+        let mut build = tile(layers.into_iter().map(Ok), options);
         assert!(build.next().unwrap().is_ok());
         assert!(matches!(build.next(), Some(Err(TileError::OtherSize { .. }))));
     }
@@ -318,7 +311,7 @@ mod tests {
         part.info.stray_rows = vec![3];
         let options = options("100x50mm", None, 2.0);
         let build =
-            tile(std::iter::once(Ok::<_, TileError>(part)), &options).next().unwrap().unwrap();
+            tile(std::iter::once(Ok::<_, TileError>(part)), options).next().unwrap().unwrap();
         assert_eq!(build.info.stray_rows, [7, 29]);
     }
 

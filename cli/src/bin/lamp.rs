@@ -1,0 +1,7 @@
+//! Every command of LAMP.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    lamp_cli::run_lamp()
+}

@@ -1,0 +1,145 @@
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context;
+use clap::{Args, Parser};
+use lamp_fixtures::{Part, build};
+use lamp_grayscale::Method;
+use lamp_postprocess::{TileOptions, fix, tile};
+use lamp_slicer::Model;
+use lamp_stack::{Layer, Pages};
+
+use crate::commands::sample::write_file;
+use crate::commands::slice::PartOptions;
+use crate::options::{Common, Output, parse_count};
+use crate::picture::{Picture, Region, Scale};
+use crate::report::Report;
+use crate::stop::Stop;
+use crate::streams::{failed_at, write_layers};
+
+/// Do the main job on a built-in blade mould: model, pipeline, stack, pictures
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp demo
+  lamp demo /tmp/lamp --facets 5.5M")]
+pub(crate) struct DemoArgs {
+    /// The folder to work in
+    #[arg(value_name = "DIR", default_value = "lamp-demo")]
+    folder: PathBuf,
+
+    /// About how many facets the mould has
+    #[arg(long, value_name = "N", default_value = "750k", value_parser = parse_count)]
+    facets: usize,
+}
+
+/// The heights of the pictures, as shares of the stack: drains in the flange,
+/// a row of pins and holes, the serpentine between them, the tip plate.
+const PICTURED: [f64; 4] = [0.04, 0.354, 0.76, 0.925];
+
+pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
+    fs::create_dir_all(&args.folder).with_context(|| args.folder.display().to_string())?;
+    let [stl, stack, sheet] =
+        ["blade.stl", "build.tif", "layers.png"].map(|name| args.folder.join(name));
+    let facets = write_model(args, &stl)?;
+    let report = Report::new("demo", common.quiet, true);
+    let started = Instant::now();
+    let size = run_pipeline(&stl, &stack, &report)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let pictures = draw(&stack, &sheet, size.layers)?;
+    if !common.quiet {
+        let bytes = fs::metadata(&stack).context("build.tif")?.len();
+        println!("{}: a hollow blade mould, 76 x 76 x 127 mm, {facets} facets", stl.display());
+        println!(
+            "{}: {} layers of {} x {} pixels at 1500 dpi and 100 um, {:.1} MB, made in {seconds:.2} s",
+            stack.display(),
+            size.layers,
+            size.width,
+            size.height,
+            bytes as f64 / 1e6,
+        );
+        println!("{}: layers {pictures}, one pixel for 8 x 8", sheet.display());
+        println!(
+            "The same by hand: slice {} | fix | dither | tile > {}",
+            stl.display(),
+            stack.display()
+        );
+    }
+    Ok(())
+}
+
+fn write_model(args: &DemoArgs, path: &Path) -> Result<usize, Stop> {
+    let part = Part::Blade;
+    let mesh = build(part, args.facets).map_err(|error| Stop::usage(error.to_string()))?;
+    write_file(path, |out| mesh.write_stl(part.name(), out))?;
+    Ok(mesh.facets.len())
+}
+
+#[derive(Default)]
+struct StackSize {
+    layers: u32,
+    width: u32,
+    height: u32,
+}
+
+/// The four stages in one process: no coding in between.
+fn run_pipeline(stl: &Path, stack: &Path, report: &Report) -> Result<StackSize, Stop> {
+    #[derive(Parser)]
+    struct Defaults {
+        #[command(flatten)]
+        options: PartOptions,
+    }
+    let Defaults { options } = Defaults::parse_from(["slice"]);
+    let model = Model::open(stl)?;
+    let file = stl.file_name().unwrap_or_default().to_string_lossy();
+    let (slices, name_command) = options.slices(model, &file, None, None)?;
+    report.expect(slices.layer_count() as u64);
+    let layers = slices.map(move |layer| {
+        let mut layer = layer?;
+        name_command(&mut layer);
+        Ok::<Layer, Stop>(layer)
+    });
+    let fixed = fix(layers, |info, _| report.say(&format!("{} had stray rows", info.name())));
+    let dithered = lamp_grayscale::dither(fixed, Method::default());
+    let mut size = StackSize::default();
+    let tiled = tile(dithered, TileOptions::default()).inspect(|layer| {
+        if let Ok(Layer { image, .. }) = layer {
+            size =
+                StackSize { layers: size.layers + 1, width: image.width(), height: image.height() };
+        }
+    });
+    let output = Output { output: stack.to_owned(), classic: false };
+    write_layers(tiled, &output, report)?;
+    Ok(size)
+}
+
+/// Draws some layers as pictures of their own and on one sheet, and names
+/// them.
+fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Stop> {
+    let wanted = PICTURED.map(|share| (f64::from(layers) * share) as u32);
+    let failed = |error| failed_at(stack.display().to_string(), error);
+    let mut shown = Vec::new();
+    for page in Pages::open(stack).map_err(failed)? {
+        let page = page.map_err(failed)?;
+        if wanted.contains(&page.info().index) {
+            shown.push(page.decode().map_err(failed)?);
+        }
+    }
+    let picture = |layer| picture_of(layer, Scale::Down(8));
+    for layer in &shown {
+        let name = format!("layer_{:05}.png", layer.info.index);
+        write_picture(&sheet.with_file_name(name), picture(layer))?;
+    }
+    write_picture(sheet, Picture::side_by_side(shown.iter().map(picture).collect()))?;
+    Ok(shown.iter().map(|layer| layer.info.index.to_string()).collect::<Vec<_>>().join(", "))
+}
+
+fn picture_of(layer: &Layer, scale: Scale) -> Picture<'_> {
+    Picture::new(&layer.image, Region::of(&layer.image), scale)
+}
+
+fn write_picture(path: &Path, picture: Picture<'_>) -> Result<(), Stop> {
+    write_file(path, |out| picture.write_png(out).map_err(io::Error::other))
+}

@@ -1,0 +1,144 @@
+use std::io::{self, Write};
+
+use clap::Args;
+use lamp_stack::{Compression, Layer, Page, StackInfo, map_in_order};
+
+use crate::options::Input;
+use crate::stop::Stop;
+use crate::streams::{failed_at, input_name, open_pages};
+
+/// Say what a stack holds: pages, size, resolution, heights, runs, bytes
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp info build.tif
+  slice blade.stl | lamp info")]
+pub(crate) struct InfoArgs {
+    #[command(flatten)]
+    input: Input,
+}
+
+pub(crate) fn run(args: &InfoArgs) -> Result<(), Stop> {
+    let name = input_name(&args.input.stack);
+    let failed = |error| failed_at(name.clone(), error);
+    let wanted = |page: &Page| {
+        args.input.layers.as_ref().is_none_or(|layers| layers.contains(&page.info().index))
+    };
+    let pages = open_pages(&args.input.stack)?
+        .map(|page| page.map_err(failed))
+        .filter(|page| page.as_ref().map_or(true, wanted));
+    let decoded = map_in_order(pages, |page: Page| {
+        let (bytes, compression) = (page.strip_bytes(), page.compression());
+        Ok::<_, Stop>((page.decode().map_err(failed)?, bytes, compression))
+    });
+    let mut totals: Option<Totals> = None;
+    for page in decoded {
+        let (layer, bytes, compression) = page?;
+        totals.get_or_insert_with(|| Totals::new(&layer, compression)).add(&layer, bytes);
+    }
+    let Some(totals) = totals else {
+        return Err(Stop::Failed(anyhow::anyhow!("{name}: no layer is in that range")));
+    };
+    let written = io::stdout().lock().write_all(totals.text(&name).as_bytes());
+    written.map_err(|error| Stop::Output(error.into()))
+}
+
+/// What adds up over the layers.
+struct Totals {
+    first: Layer,
+    last: Layer,
+    compression: Compression,
+    pages: u64,
+    changes: u64,
+    bytes: u64,
+    stray_rows: u64,
+    stray_layers: u64,
+    one_size: bool,
+}
+
+impl Totals {
+    fn new(first: &Layer, compression: Compression) -> Self {
+        Self {
+            first: first.clone(),
+            last: first.clone(),
+            compression,
+            pages: 0,
+            changes: 0,
+            bytes: 0,
+            stray_rows: 0,
+            stray_layers: 0,
+            one_size: true,
+        }
+    }
+
+    fn add(&mut self, layer: &Layer, bytes: u64) {
+        self.pages += 1;
+        self.changes += layer.image.changes() as u64;
+        self.bytes += bytes;
+        self.stray_rows += layer.info.stray_rows.len() as u64;
+        self.stray_layers += u64::from(!layer.info.stray_rows.is_empty());
+        let (first, image) = (&self.first.image, &layer.image);
+        self.one_size &= first.width() == image.width() && first.height() == image.height();
+        self.last.info = layer.info.clone();
+    }
+
+    fn text(&self, name: &str) -> String {
+        let Layer { info, dpi, image } = &self.first;
+        let mut lines = vec![("stack", name.to_owned())];
+        if let Some(stack) = &info.stack {
+            lines.extend(stack_lines(stack));
+        }
+        let (first, last) = (info.index, self.last.info.index);
+        lines.push(("layers", format!("{} ({first} to {last})", self.pages)));
+        let others = if self.one_size { "" } else { " on the first page; others differ" };
+        lines.push(("size", format!("{} x {} pixels{others}", image.width(), image.height())));
+        match dpi {
+            Some(dpi) => {
+                let mm = |pixels: u32| f64::from(pixels) * dpi.pitch().mm();
+                let (width, height) = (mm(image.width()), mm(image.height()));
+                lines.push(("resolution", format!("{dpi} dpi ({width:.3} x {height:.3} mm)")));
+            }
+            None => lines.push(("resolution", "not stated".to_owned())),
+        }
+        if let (Some(bottom), Some(top)) = (info.z(), self.top_mm()) {
+            lines.push(("z", format!("{:.3} to {top:.3} mm", bottom.mm())));
+        }
+        lines.push(("runs", format!("{} transitions", self.changes)));
+        lines.push((
+            "data",
+            format!("{} bytes, {}", self.bytes, compression_name(self.compression)),
+        ));
+        lines.push((
+            "stray rows",
+            match self.stray_rows {
+                0 => "none known".to_owned(),
+                rows => format!("{rows} in {} layers", self.stray_layers),
+            },
+        ));
+        lines
+            .into_iter()
+            .map(|(key, value)| format!("{:<12}{value}\n", format!("{key}:")))
+            .collect()
+    }
+
+    fn top_mm(&self) -> Option<f64> {
+        let info = &self.last.info;
+        Some((info.z_um? + info.thickness_um?) / 1000.0)
+    }
+}
+
+fn stack_lines(stack: &StackInfo) -> Vec<(&'static str, String)> {
+    let mut lines = vec![("part", stack.part.clone())];
+    lines.extend(stack.commands.iter().map(|command| ("made by", command.clone())));
+    lines.push(("input", stack.digest.clone()));
+    lines.retain(|(_, value)| !value.is_empty());
+    lines
+}
+
+fn compression_name(compression: Compression) -> &'static str {
+    match compression {
+        Compression::Uncompressed => "uncompressed",
+        Compression::G4 => "CCITT Group 4",
+        Compression::PackBits => "PackBits",
+    }
+}

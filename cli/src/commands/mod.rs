@@ -1,0 +1,66 @@
+//! One file a command: its options, and what it does with them.
+
+mod demo;
+mod dither;
+mod fix;
+mod info;
+mod sample;
+mod show;
+mod slice;
+mod tile;
+
+use clap::{ArgMatches, FromArgMatches, Subcommand};
+
+use crate::options::Common;
+use crate::stop::Stop;
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    Slice(slice::SliceArgs),
+    Fix(fix::FixArgs),
+    Dither(dither::DitherArgs),
+    Tile(tile::TileArgs),
+    Sample(sample::SampleArgs),
+    Demo(demo::DemoArgs),
+    Info(info::InfoArgs),
+    Show(show::ShowArgs),
+}
+
+impl Command {
+    /// A stage of the pipeline, called by its own name.
+    pub(crate) fn of_stage(name: &str, matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(match name {
+            "slice" => Self::Slice(FromArgMatches::from_arg_matches(matches)?),
+            "fix" => Self::Fix(FromArgMatches::from_arg_matches(matches)?),
+            "dither" => Self::Dither(FromArgMatches::from_arg_matches(matches)?),
+            "tile" => Self::Tile(FromArgMatches::from_arg_matches(matches)?),
+            _ => unreachable!("{name} is no stage"),
+        })
+    }
+
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Slice(_) => "slice",
+            Self::Fix(_) => "fix",
+            Self::Dither(_) => "dither",
+            Self::Tile(_) => "tile",
+            Self::Sample(_) => "sample",
+            Self::Demo(_) => "demo",
+            Self::Info(_) => "info",
+            Self::Show(_) => "show",
+        }
+    }
+
+    pub(crate) fn run(&self, common: &Common) -> Result<(), Stop> {
+        match self {
+            Self::Slice(args) => slice::run(args, common),
+            Self::Fix(args) => fix::run(args, common),
+            Self::Dither(args) => dither::run(args, common),
+            Self::Tile(args) => tile::run(args, common),
+            Self::Sample(args) => sample::run(args, common),
+            Self::Demo(args) => demo::run(args, common),
+            Self::Info(args) => info::run(args),
+            Self::Show(args) => show::run(args),
+        }
+    }
+}

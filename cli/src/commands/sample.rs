@@ -1,0 +1,144 @@
+use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{Args, ValueEnum, builder::PossibleValue};
+use lamp_fixtures::{Defect, Mesh, Part, build, inject};
+use lamp_stack::{Length, file_beside};
+
+use crate::options::{Common, parse_count};
+use crate::report::Report;
+use crate::stop::Stop;
+use crate::streams::is_stream;
+
+/// Write a sample part as STL, whole or with defects
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp sample blade -o blade.stl --facets 750k
+  lamp sample torus | slice - | lamp info
+  lamp sample tower --defect drop --count 20 --seed 7 -o broken.stl")]
+pub(crate) struct SampleArgs {
+    /// Which part
+    #[arg(value_enum)]
+    part: PartArg,
+
+    /// About how many facets
+    #[arg(long, value_name = "N", default_value = "100k", value_parser = parse_count)]
+    facets: usize,
+
+    /// Write ASCII instead of binary STL
+    #[arg(long)]
+    ascii: bool,
+
+    /// Break the mesh: drop, flip or duplicate facets, or nudge a corner of each
+    #[arg(long, value_enum)]
+    defect: Option<DefectArg>,
+
+    /// How many facets to break
+    #[arg(long, value_name = "N", default_value = "10", value_parser = parse_count, requires = "defect")]
+    count: usize,
+
+    /// Which facets to break: the same seed breaks the same ones
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "defect")]
+    seed: u64,
+
+    /// How far a nudge moves a corner
+    #[arg(long, value_name = "LENGTH", default_value = "50um", requires = "defect")]
+    by: Length,
+
+    /// Where to write the STL: a file, or - for standard output
+    #[arg(short, long, value_name = "OUT", default_value = "-")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy)]
+struct PartArg(Part);
+
+impl ValueEnum for PartArg {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [PartArg; Part::ALL.len()] = {
+            let mut all = [PartArg(Part::Blade); Part::ALL.len()];
+            let mut i = 0;
+            while i < all.len() {
+                all[i] = PartArg(Part::ALL[i]);
+                i += 1;
+            }
+            all
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.0.name()).help(self.0.description()))
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum DefectArg {
+    Drop,
+    Flip,
+    Duplicate,
+    Nudge,
+}
+
+pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
+    let PartArg(part) = args.part;
+    let mut mesh = build(part, args.facets).map_err(|error| Stop::usage(error.to_string()))?;
+    if let Some(defect) = args.defect {
+        inject(&mut mesh, args.defect(defect), args.count, args.seed);
+    }
+    let write = |out: &mut dyn Write| {
+        if args.ascii {
+            mesh.write_ascii_stl(part.name(), out)
+        } else {
+            mesh.write_stl(part.name(), out)
+        }
+    };
+    if !is_stream(&args.output) {
+        write_file(&args.output, write)?;
+        say_size(args, common, &mesh);
+        return Ok(());
+    }
+    if io::stdout().is_terminal() {
+        return Err(Stop::usage(
+            "an STL is no text for a terminal: name a file with -o, or pipe it on",
+        ));
+    }
+    let mut out = BufWriter::new(io::stdout().lock());
+    let written = write(&mut out).and_then(|()| out.flush());
+    written.map_err(|error| Stop::Output(anyhow::Error::new(error).context("standard output")))
+}
+
+impl SampleArgs {
+    fn defect(&self, defect: DefectArg) -> Defect {
+        match defect {
+            DefectArg::Drop => Defect::Drop,
+            DefectArg::Flip => Defect::Flip,
+            DefectArg::Duplicate => Defect::Duplicate,
+            DefectArg::Nudge => Defect::Nudge { by_mm: self.by.mm() as f32 },
+        }
+    }
+}
+
+fn say_size(args: &SampleArgs, common: &Common, mesh: &Mesh) {
+    let report = Report::new("sample", common.quiet, true);
+    report.say(&format!("{}: {} facets", args.output.display(), mesh.facets.len()));
+}
+
+/// Writes a file that gets its name only when it is complete.
+pub(crate) fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Stop> {
+    let whole = || -> io::Result<()> {
+        let mut file = file_beside(path)?;
+        let mut out = BufWriter::with_capacity(1 << 18, &mut file);
+        write(&mut out)?;
+        out.flush()?;
+        drop(out);
+        file.persist(path)?;
+        Ok(())
+    };
+    Ok(whole().with_context(|| path.display().to_string())?)
+}

@@ -1,0 +1,74 @@
+use std::io::{self, BufWriter, IsTerminal};
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use clap::Args;
+use lamp_stack::Layer;
+
+use crate::commands::sample::write_file;
+use crate::picture::{Picture, Region, Scale};
+use crate::stop::Stop;
+use crate::streams::{failed_at, input_name, is_stream, open_pages};
+
+/// Show a layer as a PNG picture, whole or in part
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp show build.tif --layer 600 --scale 1/8 -o layer.png
+  lamp show build.tif --layer 600 --region 2000,1500,200,100 --scale 4 -o detail.png")]
+pub(crate) struct ShowArgs {
+    /// The stack: a TIFF file, a folder of pages, or - for standard input
+    #[arg(value_name = "STACK", default_value = "-")]
+    stack: PathBuf,
+
+    /// The layer's index
+    #[arg(long, value_name = "K")]
+    layer: u32,
+
+    /// Only a part of the image: left column, top row, width and height in pixels
+    #[arg(long, value_name = "X,Y,W,H")]
+    region: Option<Region>,
+
+    /// 4 shows each pixel as 4 x 4; 1/8 shows the mean of 8 x 8
+    #[arg(long, value_name = "N|1/N", default_value = "1")]
+    scale: Scale,
+
+    /// Where to write the PNG: a file, or - for standard output
+    #[arg(short, long, value_name = "OUT", default_value = "-")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(args: &ShowArgs) -> Result<(), Stop> {
+    if is_stream(&args.output) && io::stdout().is_terminal() {
+        return Err(Stop::usage("a picture is no text for a terminal: name a file with -o"));
+    }
+    let Layer { image, .. } = find_layer(args)?;
+    let whole = Region::of(&image);
+    let region = args.region.as_ref().unwrap_or(&whole).on(&image).ok_or_else(|| {
+        let (width, height) = (image.width(), image.height());
+        Stop::usage(format!(
+            "the region lies outside the image, which is {width} x {height} pixels"
+        ))
+    })?;
+    let picture = Picture::new(&image, region, args.scale);
+    if is_stream(&args.output) {
+        picture.write_png(BufWriter::new(io::stdout().lock())).map_err(Stop::Output)
+    } else {
+        write_file(&args.output, |out| picture.write_png(out).map_err(io::Error::other))
+    }
+}
+
+fn find_layer(args: &ShowArgs) -> Result<Layer, Stop> {
+    let name = input_name(&args.stack);
+    let failed = |error| failed_at(name.clone(), error);
+    let mut last = None;
+    for page in open_pages(&args.stack)? {
+        let page = page.map_err(failed)?;
+        if page.info().index == args.layer {
+            return page.decode().map_err(failed);
+        }
+        last = Some(page.info().index);
+    }
+    let last = last.map_or_else(String::new, |last| format!("; the last is {last}"));
+    Err(Stop::Failed(anyhow!("{name}: there is no layer {}{last}", args.layer)))
+}

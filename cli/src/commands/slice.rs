@@ -1,0 +1,240 @@
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use lamp_slicer::{Fill, Frame, Model, PlaneRule, SliceOptions, Slices, Units};
+use lamp_stack::{Dpi, Layer, Length, Size};
+
+use crate::options::{Common, Output, parse_bytes, parse_layers};
+use crate::report::Report;
+use crate::stop::Stop;
+use crate::streams::{input_name, is_stream, report, write_layers};
+
+/// Slice an STL part into a stack of layer images
+///
+/// A pixel is white (cured) exactly when its centre is inside the part's section at the layer's
+/// plane. Rows whose crossings do not balance, because the mesh has a gap, are listed on their
+/// page: `fix` corrects them.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  slice blade.stl -o blade.tif
+  slice blade.stl --dpi 2400 --thickness 25um --layers 100..200 | fix > part.tif
+  slice core.stl --units inch --fill nonzero -o core/")]
+pub(crate) struct SliceArgs {
+    /// The part: an STL file, binary or ASCII, or - for standard input
+    part: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) options: PartOptions,
+
+    /// Only these layers: A..B is A to B - 1; A.. and ..B are open ended
+    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    layers: Option<Range<u32>>,
+
+    /// Memory to work in: less means smaller slabs of layers [default: a quarter of the machine's]
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    memory: Option<u64>,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+/// What decides the images.
+#[derive(Args, Clone)]
+pub(crate) struct PartOptions {
+    /// Resolution in dots per inch
+    #[arg(long, value_name = "DPI", default_value = "1500")]
+    dpi: Dpi,
+
+    /// Thickness of the layers, as 100um, 0.1mm, 4mil or 0.004in
+    #[arg(long, value_name = "LENGTH", default_value = "100um")]
+    thickness: Length,
+
+    /// Where in its layer a section is taken
+    #[arg(long, value_enum, default_value_t)]
+    plane: PlaneArg,
+
+    /// What the numbers of the STL mean
+    #[arg(long, value_enum, default_value_t)]
+    units: UnitsArg,
+
+    /// What is inside: between odd and even crossings, or wherever contours wind around (for
+    /// bodies that overlap)
+    #[arg(long, value_enum, default_value_t)]
+    fill: FillArg,
+
+    /// Black pixels around the part's box
+    #[arg(long, value_name = "PIXELS", default_value_t = 1)]
+    margin: u32,
+
+    /// Top left corner of the image in part coordinates, in millimetres, instead of the part's box
+    #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
+    #[arg(allow_hyphen_values = true)]
+    origin: Option<[f64; 2]>,
+
+    /// Size of the image, as 80x80mm or 4x4.5in; goes with --origin
+    #[arg(long, value_name = "WxH", requires = "origin")]
+    size: Option<Size>,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum PlaneArg {
+    #[default]
+    Top,
+    Middle,
+    Bottom,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum UnitsArg {
+    #[default]
+    Mm,
+    Inch,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum FillArg {
+    #[default]
+    EvenOdd,
+    #[value(name = "nonzero", alias = "non-zero")]
+    NonZero,
+}
+
+impl PartOptions {
+    fn for_slicing(&self) -> SliceOptions {
+        SliceOptions {
+            dpi: self.dpi,
+            thickness: self.thickness,
+            plane: match self.plane {
+                PlaneArg::Top => PlaneRule::Top,
+                PlaneArg::Middle => PlaneRule::Middle,
+                PlaneArg::Bottom => PlaneRule::Bottom,
+            },
+            units: match self.units {
+                UnitsArg::Mm => Units::Millimetres,
+                UnitsArg::Inch => Units::Inches,
+            },
+            fill: match self.fill {
+                FillArg::EvenOdd => Fill::EvenOdd,
+                FillArg::NonZero => Fill::NonZero,
+            },
+            frame: self.frame(),
+            ..SliceOptions::default()
+        }
+    }
+
+    fn frame(&self) -> Frame {
+        match (self.origin, self.size) {
+            (Some(origin_mm), Some(size)) => {
+                let side = |length: Length| (length.pixels(self.dpi) + 1e-6) as u32;
+                Frame::At { origin_mm, pixels: [side(size.width), side(size.height)] }
+            }
+            _ => Frame::Around { margin: self.margin },
+        }
+    }
+
+    /// The command as the stack remembers it: no paths, no option that leaves
+    /// the bytes alone.
+    fn command_line(&self, part: &str) -> String {
+        let name = |value: &dyn Fn() -> Option<clap::builder::PossibleValue>| {
+            value().map_or_else(String::new, |value| value.get_name().to_owned())
+        };
+        let mut line = format!(
+            "slice {part} --dpi {} --thickness {} --plane {} --units {} --fill {}",
+            self.dpi,
+            self.thickness,
+            name(&|| self.plane.to_possible_value()),
+            name(&|| self.units.to_possible_value()),
+            name(&|| self.fill.to_possible_value()),
+        );
+        line += &match (self.origin, self.size) {
+            (Some([x, y]), Some(size)) => format!(" --origin {x},{y} --size {size}"),
+            _ => format!(" --margin {}", self.margin),
+        };
+        line
+    }
+
+    /// The layers of a part, the first naming this command; `part` is the
+    /// file's name.
+    pub(crate) fn slices(
+        &self,
+        model: Model,
+        part: &str,
+        layers: Option<Range<u32>>,
+        memory: Option<u64>,
+    ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Stop> {
+        let options = SliceOptions { layers, memory: table_memory(memory), ..self.for_slicing() };
+        let slices = Slices::new(model, &options)?;
+        let command = self.command_line(part);
+        let name_command = move |layer: &mut Layer| {
+            if let Some(stack) = &mut layer.info.stack {
+                stack.commands.push(command.clone());
+            }
+        };
+        Ok((slices, name_command))
+    }
+}
+
+pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
+    let name = input_name(&args.part);
+    let model = open_model(&args.part).map_err(|stop| stop.at(name.clone()))?;
+    let file = args.part.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let (slices, name_command) = args
+        .options
+        .slices(model, &file, args.layers.clone(), args.memory)
+        .map_err(|stop| stop.at(name.clone()))?;
+    let report = report("slice", common, &args.output);
+    report.expect(slices.layer_count() as u64);
+    let (mut stray_layers, mut stray_rows) = (0, 0);
+    let layers = slices.map(|layer| {
+        let mut layer = layer.map_err(|error| Stop::from(error).at(name.clone()))?;
+        name_command(&mut layer);
+        stray_rows += layer.info.stray_rows.len();
+        stray_layers += usize::from(!layer.info.stray_rows.is_empty());
+        Ok(layer)
+    });
+    write_layers(layers, &args.output, &report)?;
+    say_stray_rows(&report, stray_rows, stray_layers);
+    Ok(())
+}
+
+fn open_model(path: &Path) -> Result<Model, Stop> {
+    Ok(if is_stream(path) {
+        Model::from_stream("stdin", std::io::stdin().lock())?
+    } else {
+        Model::open(path)?
+    })
+}
+
+fn say_stray_rows(report: &Report, rows: usize, layers: usize) {
+    if rows > 0 {
+        report.say(&format!(
+            "{rows} rows in {layers} layers do not balance: the mesh has gaps; fix corrects them"
+        ));
+    }
+}
+
+/// How much the table of crossings may take of the memory allowed: the rest
+/// is for the images on their way. More than 64 MiB would not make it faster.
+fn table_memory(allowed: Option<u64>) -> u64 {
+    let allowed = allowed.unwrap_or_else(|| machine_memory() / 4);
+    (allowed / 2).min(64 << 20)
+}
+
+/// The machine's memory in bytes; 4 GiB where it does not say.
+fn machine_memory() -> u64 {
+    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let total = text.lines().find_map(|line| line.strip_prefix("MemTotal:"));
+    let kib = total.and_then(|rest| rest.trim().trim_end_matches(" kB").parse::<u64>().ok());
+    kib.map_or(4 << 30, |kib| kib * 1024)
+}
+
+/// Parses `X,Y` in millimetres.
+fn parse_origin(text: &str) -> Result<[f64; 2], String> {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| n.is_finite());
+    text.trim_end_matches("mm")
+        .split_once(',')
+        .and_then(|(x, y)| Some([number(x)?, number(y)?]))
+        .ok_or_else(|| format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2"))
+}

@@ -1,0 +1,82 @@
+//! The commands. Each parses its options, calls one library function and
+//! reports.
+//!
+//! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` are the
+//! same code under the names of the pipeline.
+
+mod commands;
+mod options;
+mod picture;
+mod report;
+mod stop;
+mod streams;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, FromArgMatches, Parser};
+
+use commands::Command;
+use options::Common;
+use stop::Stop;
+
+/// CAD parts to the layer images of projection photopolymerization.
+#[derive(Parser)]
+#[command(name = "lamp", version, max_term_width = 100, after_help = EXAMPLES)]
+struct Lamp {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: Common,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  slice blade.stl | fix | dither | tile > build.tif
+  lamp sample blade -o blade.stl --facets 750k
+  lamp info build.tif
+  lamp show build.tif --layer 600 --scale 1/8 -o layer.png
+
+slice, fix, dither and tile stand for lamp slice, lamp fix, lamp dither and lamp tile.";
+
+/// Runs `lamp` with the process's arguments.
+pub fn run_lamp() -> ExitCode {
+    let Lamp { command, common } = Lamp::parse();
+    finish(command.name(), common.apply().and_then(|()| command.run(&common)))
+}
+
+/// Runs one of the pipeline's stages with the process's arguments.
+///
+/// # Panics
+/// If `lamp` has no command of that name.
+pub fn run_stage(name: &str) -> ExitCode {
+    let lamp = Lamp::command();
+    let stage = lamp.find_subcommand(name).expect("a stage is a command of lamp").clone();
+    // The stage's own arguments, with lamp's general ones.
+    let general = lamp.get_arguments().filter(|arg| arg.is_global_set()).cloned();
+    let stage = stage.args(general).version(env!("CARGO_PKG_VERSION")).max_term_width(100);
+    let matches = stage.get_matches();
+    let common = Common::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let command = Command::of_stage(name, &matches).unwrap_or_else(|error| error.exit());
+    finish(name, common.apply().and_then(|()| command.run(&common)))
+}
+
+/// Says in one sentence why a command stopped, and turns it into a status.
+fn finish(name: &str, result: Result<(), Stop>) -> ExitCode {
+    match result {
+        Err(stop) if !stop.is_reader_gone() => {
+            eprintln!("{name}: {stop}");
+            ExitCode::from(stop.status())
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Lamp::command().debug_assert();
+    }
+}

@@ -1,0 +1,135 @@
+//! Options that several commands share, and the values people write in them.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::stop::Stop;
+
+/// Options of every command.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Common {
+    /// Say nothing but errors
+    #[arg(short, long, global = true, help_heading = "General options")]
+    pub(crate) quiet: bool,
+
+    /// Work on N threads [default: all processors]
+    #[arg(long, value_name = "N", global = true, help_heading = "General options")]
+    threads: Option<NonZeroUsize>,
+}
+
+impl Common {
+    /// Sets up the threads. To be called once.
+    pub(crate) fn apply(&self) -> Result<(), Stop> {
+        let threads = self.threads.map_or(0, NonZeroUsize::get);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        pool.map_err(|error| Stop::Failed(anyhow::Error::new(error)))
+    }
+}
+
+/// The stack that a stage reads.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Input {
+    /// The stack to read: a TIFF file, a folder of pages, or - for standard input
+    #[arg(value_name = "STACK", default_value = "-")]
+    pub(crate) stack: PathBuf,
+
+    /// Only these layers: A..B is A to B - 1; A.. and ..B are open ended
+    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    pub(crate) layers: Option<Range<u32>>,
+}
+
+/// The stack that a stage writes.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Output {
+    /// Where to write the stack: a file, a folder of pages (a name that ends in /, or an empty
+    /// folder), or - for standard output
+    #[arg(short, long, value_name = "OUT", default_value = "-")]
+    pub(crate) output: PathBuf,
+
+    /// Write a classic TIFF (at most 4 GiB) instead of a BigTIFF
+    #[arg(long)]
+    pub(crate) classic: bool,
+}
+
+/// Parses `A..B`, `A..`, `..B` or a single layer.
+pub(crate) fn parse_layers(text: &str) -> Result<Range<u32>, String> {
+    let wrong = |_| format!("`{text}` is not a range of layers: write A..B, A.. or ..B");
+    let (start, end) = match text.split_once("..") {
+        Some((start, end)) => {
+            let start = if start.is_empty() { 0 } else { start.parse().map_err(wrong)? };
+            let end = if end.is_empty() { u32::MAX } else { end.parse().map_err(wrong)? };
+            (start, end)
+        }
+        None => {
+            let layer: u32 = text.parse().map_err(wrong)?;
+            (layer, layer.saturating_add(1))
+        }
+    };
+    if start >= end {
+        return Err(format!("`{text}` holds no layer: the end must be above the start"));
+    }
+    Ok(start..end)
+}
+
+/// Parses a count with an optional `k` or `M`: `750k`, `5.5M`.
+pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
+    let (number, factor) = match text.as_bytes() {
+        [.., b'k' | b'K'] => (&text[..text.len() - 1], 1e3),
+        [.., b'm' | b'M'] => (&text[..text.len() - 1], 1e6),
+        _ => (text, 1.0),
+    };
+    match number.parse::<f64>() {
+        Ok(n) if n >= 0.0 && n * factor < 1e9 => Ok((n * factor).round() as usize),
+        _ => Err(format!("`{text}` is not a count: write 20000, 750k or 5.5M")),
+    }
+}
+
+/// Parses a number of bytes: `64MB`, `1.5GiB`, `100000`.
+pub(crate) fn parse_bytes(text: &str) -> Result<u64, String> {
+    let wrong = || format!("`{text}` is not an amount of memory: write 64MB, 2GB or 512MiB");
+    let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let factor = match text[split..].to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kb" => 1e3,
+        "m" | "mb" => 1e6,
+        "g" | "gb" => 1e9,
+        "kib" => 1024.0,
+        "mib" => 1024.0 * 1024.0,
+        "gib" => 1024.0 * 1024.0 * 1024.0,
+        _ => return Err(wrong()),
+    };
+    match text[..split].trim().parse::<f64>() {
+        Ok(n) if n > 0.0 && n * factor < 1e15 => Ok((n * factor) as u64),
+        _ => Err(wrong()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_layers() {
+        assert_eq!(parse_layers("3..7"), Ok(3..7));
+        assert_eq!(parse_layers("..7"), Ok(0..7));
+        assert_eq!(parse_layers("3.."), Ok(3..u32::MAX));
+        assert_eq!(parse_layers("3"), Ok(3..4));
+        for wrong in ["", "7..3", "3..3", "a..b", "-1..2", "1..2..3"] {
+            assert!(parse_layers(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn counts_and_bytes() {
+        assert_eq!(parse_count("750k"), Ok(750_000));
+        assert_eq!(parse_count("5.5M"), Ok(5_500_000));
+        assert_eq!(parse_bytes("64MB"), Ok(64_000_000));
+        assert_eq!(parse_bytes("1.5GiB"), Ok(1_610_612_736));
+        for wrong in ["", "k", "-1", "nan", "1e99", "5x"] {
+            assert!(parse_count(wrong).is_err() && parse_bytes(wrong).is_err(), "{wrong}");
+        }
+    }
+}

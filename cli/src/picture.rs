@@ -1,0 +1,238 @@
+//! Layers as PNG pictures.
+
+use std::io::Write;
+use std::ops::Range;
+use std::str::FromStr;
+
+use anyhow::Context;
+use lamp_stack::{Image, gray_runs};
+use png::{BitDepth, ColorType, Encoder};
+
+/// A part of an image, in pixels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Region {
+    pub(crate) columns: Range<u32>,
+    pub(crate) rows: Range<u32>,
+}
+
+impl Region {
+    /// The whole of an image.
+    pub(crate) fn of(image: &Image) -> Self {
+        Self { columns: 0..image.width(), rows: 0..image.height() }
+    }
+
+    /// The part that lies on the image; `None` where nothing does.
+    pub(crate) fn on(&self, image: &Image) -> Option<Self> {
+        let columns = self.columns.start..self.columns.end.min(image.width());
+        let rows = self.rows.start..self.rows.end.min(image.height());
+        (!columns.is_empty() && !rows.is_empty()).then_some(Self { columns, rows })
+    }
+}
+
+impl FromStr for Region {
+    type Err = String;
+
+    /// Parses `X,Y,W,H`: the left column, the top row, width and height.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("`{text}` is not a region: write X,Y,W,H in pixels, as 1000,400,64,64");
+        let numbers: Result<Vec<u32>, _> =
+            text.split(',').map(|number| number.trim().parse()).collect();
+        match numbers.as_deref() {
+            Ok(&[x, y, width, height]) if width > 0 && height > 0 => {
+                Ok(Self { columns: x..x.saturating_add(width), rows: y..y.saturating_add(height) })
+            }
+            _ => Err(wrong()),
+        }
+    }
+}
+
+/// How many picture pixels an image pixel has, or how many image pixels (on a
+/// side) a picture pixel is the mean of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scale {
+    Up(u32),
+    Down(u32),
+}
+
+impl FromStr for Scale {
+    type Err = String;
+
+    /// Parses `4` (each pixel as 4 x 4) or `1/8` (the mean of 8 x 8).
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (scale, factor) = match text.split_once('/') {
+            Some(("1", factor)) => (Self::Down as fn(u32) -> Self, factor),
+            _ => (Self::Up as fn(u32) -> Self, text),
+        };
+        match factor.trim().parse() {
+            Ok(factor @ 1..=1000) => Ok(scale(factor)),
+            _ => Err(format!("`{text}` is not a scale: write 4 to enlarge, 1/8 to reduce")),
+        }
+    }
+}
+
+/// Rows of gray pixels, and how many there are of what width.
+pub(crate) struct Picture<'a> {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    rows: Box<dyn Iterator<Item = Vec<u8>> + 'a>,
+}
+
+impl<'a> Picture<'a> {
+    /// A picture of a region, which must lie on the image. It is made row by
+    /// row, so a large layer takes little memory.
+    pub(crate) fn new(image: &'a Image, region: Region, scale: Scale) -> Self {
+        let (up, down) = match scale {
+            Scale::Up(up) => (up, 1),
+            Scale::Down(down) => (1, down),
+        };
+        let width = region.columns.len().div_ceil(down as usize) as u32;
+        let height = region.rows.len().div_ceil(down as usize) as u32;
+        let mut rows = runs_of_rows(image).skip(region.rows.start as usize).take(region.rows.len());
+        let mean_rows = (0..height).map(move |_| {
+            mean_row(rows.by_ref().take(down as usize), &region.columns, down, width)
+        });
+        let rows = mean_rows.flat_map(move |row| {
+            let wide: Vec<u8> =
+                row.iter().flat_map(|&level| std::iter::repeat_n(level, up as usize)).collect();
+            std::iter::repeat_n(wide, up as usize)
+        });
+        Self { width: width * up, height: height * up, rows: Box::new(rows) }
+    }
+
+    /// Pictures of one height side by side, with a gray gutter between.
+    pub(crate) fn side_by_side(pictures: Vec<Self>) -> Self {
+        const GUTTER: usize = 8;
+        let count = pictures.len() as u32;
+        let width = pictures.iter().map(|p| p.width).sum::<u32>() + (count - 1) * GUTTER as u32;
+        let height = pictures.iter().map(|p| p.height).min().unwrap_or(0);
+        let mut rows: Vec<_> = pictures.into_iter().map(|picture| picture.rows).collect();
+        let joined = (0..height).map(move |_| {
+            let parts: Vec<Vec<u8>> = rows.iter_mut().filter_map(Iterator::next).collect();
+            parts.join(&[128; GUTTER][..])
+        });
+        Self { width, height, rows: Box::new(joined) }
+    }
+
+    /// Writes the picture as an 8-bit gray PNG.
+    pub(crate) fn write_png(self, out: impl Write) -> anyhow::Result<()> {
+        let mut encoder = Encoder::new(out, self.width, self.height);
+        encoder.set_color(ColorType::Grayscale);
+        encoder.set_depth(BitDepth::Eight);
+        let mut writer = encoder.write_header().context("cannot start the PNG")?;
+        let mut pixels = writer.stream_writer()?;
+        for row in self.rows {
+            pixels.write_all(&row)?;
+        }
+        pixels.finish()?;
+        Ok(())
+    }
+}
+
+/// The runs of a row that are not black, as (first column, end, level).
+type Runs = Vec<(u32, u32, u8)>;
+
+fn runs_of_rows(image: &Image) -> Box<dyn Iterator<Item = Runs> + '_> {
+    let width = image.width();
+    match image {
+        Image::Gray(gray) => Box::new(gray.rows().map(move |row| gray_runs(row, width).collect())),
+        Image::Mask(mask) => Box::new(mask.rows().map(move |row| {
+            let run = |run: &[u32]| (run[0], run.get(1).copied().unwrap_or(width), 255);
+            row.chunks(2).map(run).collect()
+        })),
+    }
+}
+
+/// The mean levels of `down` x `down` blocks over some rows' runs. Blocks that
+/// reach over the end count what is missing as black.
+fn mean_row(
+    rows: impl Iterator<Item = Runs>,
+    columns: &Range<u32>,
+    down: u32,
+    width: u32,
+) -> Vec<u8> {
+    let mut sums = vec![0u32; width as usize];
+    for (start, end, level) in rows.flatten() {
+        let mut at = start.max(columns.start) - columns.start;
+        let end = end.min(columns.end).saturating_sub(columns.start);
+        while at < end {
+            let block = at / down;
+            let next = end.min((block + 1) * down);
+            sums[block as usize] += (next - at) * u32::from(level);
+            at = next;
+        }
+    }
+    sums.into_iter().map(|sum| (sum / (down * down)) as u8).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{GrayMask, Mask};
+
+    use super::*;
+
+    fn rows(picture: Picture<'_>) -> Vec<Vec<u8>> {
+        let rows: Vec<_> = picture.rows.collect();
+        assert_eq!(rows.len(), picture.height as usize);
+        assert!(rows.iter().all(|row| row.len() == picture.width as usize));
+        rows
+    }
+
+    fn image() -> Image {
+        // `.##.#` and `#####`.
+        Image::Mask(Mask::new(5, vec![0, 3, 4], vec![1, 3, 4, 0]).unwrap())
+    }
+
+    #[test]
+    fn pixels_are_copied_enlarged_and_averaged() {
+        let image = image();
+        let all = Region::of(&image);
+        let picture = |scale| rows(Picture::new(&image, all.clone(), scale));
+        assert_eq!(picture(Scale::Up(1)), [[0, 255, 255, 0, 255], [255; 5]]);
+        assert_eq!(picture(Scale::Up(2))[1], [0, 0, 255, 255, 255, 255, 0, 0, 255, 255]);
+        assert_eq!(picture(Scale::Down(2)), [[191, 191, 127]]);
+    }
+
+    #[test]
+    fn a_region_is_cut_to_the_image() {
+        let image = image();
+        let region: Region = "3,1,99,99".parse().unwrap();
+        let region = region.on(&image).unwrap();
+        assert_eq!(rows(Picture::new(&image, region, Scale::Up(1))), [[255, 255]]);
+        assert_eq!("5,0,1,1".parse::<Region>().unwrap().on(&image), None);
+        for wrong in ["", "1,2,3", "1,2,0,4", "a,b,c,d", "1,2,3,4,5"] {
+            assert!(wrong.parse::<Region>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn scales_parse() {
+        assert_eq!("4".parse(), Ok(Scale::Up(4)));
+        assert_eq!("1/8".parse(), Ok(Scale::Down(8)));
+        for wrong in ["", "0", "1/0", "2/3", "-1", "0.5", "1/5000"] {
+            assert!(wrong.parse::<Scale>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn gray_levels_show_and_a_png_reads_back() {
+        let mut gray = GrayMask::new(4);
+        gray.push_runs([(1, 0), (2, 100), (1, 255)]).unwrap();
+        let image = Image::Gray(gray);
+        let mut png = Vec::new();
+        Picture::new(&image, Region::of(&image), Scale::Up(1)).write_png(&mut png).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+        let mut pixels = vec![0; 4];
+        reader.next_frame(&mut pixels).unwrap();
+        assert_eq!(pixels, [0, 100, 100, 255]);
+    }
+
+    #[test]
+    fn pictures_stand_side_by_side() {
+        let image = image();
+        let one = || Picture::new(&image, Region::of(&image), Scale::Up(1));
+        let both = rows(Picture::side_by_side(vec![one(), one()]));
+        assert_eq!(both[0][..6], [0, 255, 255, 0, 255, 128]);
+        assert_eq!(both[1].len(), 18);
+    }
+}

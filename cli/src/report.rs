@@ -1,0 +1,52 @@
+//! What a command says while it works, on standard error.
+
+use std::io::IsTerminal;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Says things, and shows how far the work is.
+#[derive(Clone)]
+pub(crate) struct Report {
+    command: &'static str,
+    quiet: bool,
+    bar: ProgressBar,
+}
+
+impl Report {
+    /// A report with a bar, if somebody watches. Of the stages of a pipeline
+    /// only the last shows one (`is_last`): they share the terminal.
+    pub(crate) fn new(command: &'static str, quiet: bool, is_last: bool) -> Self {
+        let watched = !quiet && is_last && std::io::stderr().is_terminal();
+        let bar = if watched { ProgressBar::no_length() } else { ProgressBar::hidden() };
+        bar.set_style(style("{prefix} {human_pos} layers {per_sec}"));
+        bar.set_prefix(command);
+        Self { command, quiet, bar }
+    }
+
+    /// Tells how many layers there will be.
+    pub(crate) fn expect(&self, layers: u64) {
+        self.bar.set_length(layers);
+        self.bar.set_style(style("{prefix} {bar:40} layer {human_pos} of {human_len}, {eta} left"));
+    }
+
+    /// Counts a layer.
+    pub(crate) fn layer_done(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Says a line, unless quiet.
+    pub(crate) fn say(&self, line: &str) {
+        if !self.quiet {
+            self.bar.suspend(|| eprintln!("{}: {line}", self.command));
+        }
+    }
+
+    /// Takes the bar away.
+    pub(crate) fn done(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).expect("the templates are fixed")
+}

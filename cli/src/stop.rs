@@ -1,0 +1,91 @@
+//! Why a command stops.
+
+use std::fmt;
+use std::io;
+
+use lamp_postprocess::TileError;
+use lamp_slicer::SliceError;
+use lamp_stack::StackError;
+
+/// Why a command stops: whose fault it is decides the exit status.
+#[derive(Debug)]
+pub(crate) enum Stop {
+    /// Wrong usage: status 2.
+    Usage(String),
+    /// Bad input, or a failure on the way: status 1.
+    Failed(anyhow::Error),
+    /// Writing the output failed: status 1, or none if its reader went away.
+    Output(anyhow::Error),
+}
+
+impl Stop {
+    pub(crate) fn usage(message: impl Into<String>) -> Self {
+        Self::Usage(message.into())
+    }
+
+    /// Puts what was being worked on before the message.
+    pub(crate) fn at(self, place: impl fmt::Display + Send + Sync + 'static) -> Self {
+        match self {
+            Self::Usage(message) => Self::Usage(format!("{place}: {message}")),
+            Self::Failed(error) => Self::Failed(error.context(place)),
+            Self::Output(error) => Self::Output(error.context(place)),
+        }
+    }
+
+    pub(crate) fn status(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::Failed(_) | Self::Output(_) => 1,
+        }
+    }
+
+    /// Whether the program that reads the output ended, as `head` does: no
+    /// failure of this one.
+    pub(crate) fn is_reader_gone(&self) -> bool {
+        let Self::Output(error) = self else { return false };
+        error.chain().any(|cause| {
+            let io = match cause.downcast_ref::<StackError>() {
+                Some(StackError::Io(io)) => Some(io),
+                _ => cause.downcast_ref::<io::Error>(),
+            };
+            io.is_some_and(|io| io.kind() == io::ErrorKind::BrokenPipe)
+        })
+    }
+}
+
+impl fmt::Display for Stop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usage(message) => f.write_str(message),
+            Self::Failed(error) | Self::Output(error) => write!(f, "{error:#}"),
+        }
+    }
+}
+
+impl From<SliceError> for Stop {
+    fn from(error: SliceError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<TileError> for Stop {
+    fn from(error: TileError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+/// What `write_stack` itself reports; errors of the layers it passes on.
+impl From<StackError> for Stop {
+    fn from(error: StackError) -> Self {
+        match error {
+            StackError::NoLayers => Self::Failed(error.into()),
+            error => Self::Output(error.into()),
+        }
+    }
+}
+
+impl From<anyhow::Error> for Stop {
+    fn from(error: anyhow::Error) -> Self {
+        Self::Failed(error)
+    }
+}

@@ -1,0 +1,133 @@
+//! Where a stage's layers come from and go to.
+
+use std::fmt::Display;
+use std::io::{self, IsTerminal};
+use std::ops::Range;
+use std::path::Path;
+
+use lamp_stack::{
+    Destination, Format, Layer, Page, Pages, StackError, StackInfo, map_in_order, write_stack,
+};
+
+use crate::options::{Common, Input, Output};
+use crate::report::Report;
+use crate::stop::Stop;
+
+/// Whether a path stands for standard input or output.
+pub(crate) fn is_stream(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// What people call an input.
+pub(crate) fn input_name(path: &Path) -> String {
+    if is_stream(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// Opens a stack's pages.
+pub(crate) fn open_pages(path: &Path) -> Result<Pages, Stop> {
+    let pages = if !is_stream(path) {
+        Pages::open(path)
+    } else if io::stdin().is_terminal() {
+        return Err(Stop::usage(
+            "no stack to read: name a file, or pipe one in (--help shows how)",
+        ));
+    } else {
+        Pages::from_stream(io::stdin())
+    };
+    pages.map_err(|error| failed_at(input_name(path), error))
+}
+
+/// A failure to read, and where.
+pub(crate) fn failed_at(place: impl Display + Send + Sync + 'static, error: StackError) -> Stop {
+    Stop::Failed(anyhow::Error::new(error).context(place))
+}
+
+/// A report for a command that writes to `output`.
+pub(crate) fn report(command: &'static str, common: &Common, output: &Output) -> Report {
+    let last = !is_stream(&output.output) || io::stdout().is_terminal() || stdout_is_file();
+    Report::new(command, common.quiet, last)
+}
+
+/// Whether standard output goes to a file, so that no other stage follows.
+fn stdout_is_file() -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::fd::AsFd;
+        let file = io::stdout().as_fd().try_clone_to_owned().map(std::fs::File::from);
+        file.and_then(|file| file.metadata()).is_ok_and(|metadata| metadata.is_file())
+    }
+    #[cfg(not(unix))]
+    false
+}
+
+/// Reads the wanted layers of a stack, decoded, in order.
+pub(crate) fn read_layers(
+    input: &Input,
+    report: &Report,
+) -> Result<impl Iterator<Item = Result<Layer, Stop>> + use<>, Stop> {
+    let name = input_name(&input.stack);
+    let pages = open_pages(&input.stack)?;
+    let pages = pages.map(move |page| page.map_err(|error| failed_at(name.clone(), error)));
+    let report = report.clone();
+    let pages = wanted_pages(pages, input.layers.clone()).inspect(move |page| {
+        if let Ok((_, Some(stack))) = page
+            && let Some(layers) = stack.layers
+        {
+            report.expect(layers.into());
+        }
+    });
+    let name = input_name(&input.stack);
+    Ok(map_in_order(pages, move |(page, stack): (Page, _)| {
+        let mut layer = page.decode().map_err(|error| failed_at(name.clone(), error))?;
+        layer.info.stack = stack;
+        Ok(layer)
+    }))
+}
+
+/// The pages of the layers wanted. What the first page says of the stack goes
+/// to the first of them.
+fn wanted_pages(
+    pages: impl Iterator<Item = Result<Page, Stop>>,
+    layers: Option<Range<u32>>,
+) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>> {
+    let mut stack: Option<StackInfo> = None;
+    pages.filter_map(move |page| {
+        let page = match page {
+            Ok(page) => page,
+            Err(stop) => return Some(Err(stop)),
+        };
+        let of_page = page.info().stack.clone();
+        let Some(layers) = &layers else { return Some(Ok((page, of_page))) };
+        // How many pages are wanted is not known before the last.
+        stack = of_page.map(|of_page| StackInfo { layers: None, ..of_page }).or(stack.take());
+        layers.contains(&page.info().index).then(|| Ok((page, stack.take())))
+    })
+}
+
+/// Writes layers where `output` says, counting them in `report`.
+pub(crate) fn write_layers(
+    layers: impl Iterator<Item = Result<Layer, Stop>>,
+    output: &Output,
+    report: &Report,
+) -> Result<(), Stop> {
+    let path = &output.output;
+    let to = if is_stream(path) {
+        if io::stdout().is_terminal() {
+            return Err(Stop::usage(
+                "a stack is no text for a terminal: name a file with -o, or pipe it on",
+            ));
+        }
+        Destination::Stream(Box::new(io::stdout().lock()))
+    } else if path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir() {
+        Destination::Folder(path.clone())
+    } else {
+        Destination::File(path.clone())
+    };
+    let format = if output.classic { Format::Classic } else { Format::Big };
+    let counted = layers.inspect(|_| report.layer_done());
+    let written = write_stack(counted, to, format);
+    report.done();
+    let name =
+        if is_stream(path) { "standard output".to_owned() } else { path.display().to_string() };
+    written.map_err(|stop| if let Stop::Output(_) = stop { stop.at(name) } else { stop })
+}
