@@ -21,6 +21,21 @@ impl Region {
         Self { columns: 0..image.width(), rows: 0..image.height() }
     }
 
+    /// The least region that holds everything but black.
+    pub(crate) fn of_content(image: &Image) -> Option<Self> {
+        let runs = || (0..).zip(runs_of_rows(image)).filter(|(_, runs)| !runs.is_empty());
+        let rows = runs().next()?.0..runs().last()?.0 + 1;
+        let left = runs().filter_map(|(_, runs)| Some(runs.first()?.0)).min()?;
+        let right = runs().filter_map(|(_, runs)| Some(runs.last()?.1)).max()?;
+        Some(Self { columns: left..right, rows })
+    }
+
+    /// The least region that holds both.
+    pub(crate) fn joined(self, other: Self) -> Self {
+        let join = |a: Range<u32>, b: Range<u32>| a.start.min(b.start)..a.end.max(b.end);
+        Self { columns: join(self.columns, other.columns), rows: join(self.rows, other.rows) }
+    }
+
     /// The part that lies on the image; `None` where nothing does.
     pub(crate) fn on(&self, image: &Image) -> Option<Self> {
         let columns = self.columns.start..self.columns.end.min(image.width());
@@ -203,6 +218,14 @@ mod tests {
         for wrong in ["", "1,2,3", "1,2,0,4", "a,b,c,d", "1,2,3,4,5"] {
             assert!(wrong.parse::<Region>().is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn content_is_found() {
+        let mask = Mask::new(9, vec![0, 0, 2, 3, 3], vec![3, 5, 8]).unwrap();
+        let region = Region::of_content(&Image::Mask(mask)).unwrap();
+        assert_eq!(region, Region { columns: 3..9, rows: 1..3 });
+        assert_eq!(Region::of_content(&Image::Mask(Mask::black(9, 9))), None);
     }
 
     #[test]

@@ -69,14 +69,21 @@ struct Corner {
 }
 
 impl Cutter<'_> {
-    /// Adds the facet's crossings in `layers` to the tables of those layers.
+    /// Adds the facet's crossings in `layers` to the lists of those layers, and
+    /// says how many there are.
     #[inline]
-    pub(crate) fn cut(&self, facet: &Facet, layers: &Range<usize>, tables: &mut [Vec<Crossing>]) {
+    pub(crate) fn cut(
+        &self,
+        facet: &Facet,
+        layers: &Range<usize>,
+        lists: &mut [Vec<Crossing>],
+    ) -> usize {
         let [a, b, c] = facet.map(|corner| f64::from(corner[2]) * self.units.um());
         let met = self.planes.between(a.min(b).min(c), a.max(b).max(c));
         let met = met.start.max(layers.start)..met.end.min(layers.end);
+        let mut count = 0;
         if met.is_empty() {
-            return;
+            return count;
         }
         let ([low, middle, high], odd) = self.sorted_corners(facet);
         // The longest edge in z is crossed by every plane met, the other two
@@ -90,10 +97,11 @@ impl Cutter<'_> {
             let short = Edge::new(from, to);
             for layer in met {
                 let z_um = self.planes.z_um(layer);
-                let table = &mut tables[layer - layers.start];
-                self.cross_rows(long.at(z_um), short.at(z_um), odd, table);
+                let list = &mut lists[layer - layers.start];
+                count += self.cross_rows(long.at(z_um), short.at(z_um), odd, list);
             }
         }
+        count
     }
 
     /// The corners from the lowest to the highest, and whether putting them
@@ -121,7 +129,7 @@ impl Cutter<'_> {
     /// Adds the crossings of rows with a segment between two points of a
     /// plane, in pixels.
     #[inline]
-    fn cross_rows(&self, a: [f64; 2], b: [f64; 2], odd: bool, table: &mut Vec<Crossing>) {
+    fn cross_rows(&self, a: [f64; 2], b: [f64; 2], odd: bool, list: &mut Vec<Crossing>) -> usize {
         let down = a[1] < b[1];
         let (upper, lower) = if down { (a, b) } else { (b, a) };
         let rising = down != odd;
@@ -129,13 +137,14 @@ impl Cutter<'_> {
         let (first, end) =
             (ceil_clamped(upper[1], self.grid.height), ceil_clamped(lower[1], self.grid.height));
         if first >= end {
-            return;
+            return 0;
         }
         let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
-        table.extend((first..end).map(|row| {
+        list.extend((first..end).map(|row| {
             let x = upper[0] + slope * (f64::from(row) - upper[1]);
             Crossing::new(row, ceil_clamped(x, self.grid.width), rising)
         }));
+        (end - first) as usize
     }
 }
 

@@ -61,6 +61,16 @@ pub enum SliceError {
         /// Height in pixels.
         height: f64,
     },
+    /// The part sticks out of the frame given for it.
+    #[error(
+        "the part spans x {:.3} to {:.3} and y {:.3} to {:.3} mm, which sticks out of the frame of the images: \
+         move or enlarge the frame",
+        part_mm[0][0], part_mm[1][0], part_mm[0][1], part_mm[1][1]
+    )]
+    OutsideFrame {
+        /// The least and greatest x and y of the part, in millimetres.
+        part_mm: [[f64; 2]; 2],
+    },
     /// The part would have too many layers.
     #[error(
         "the part is {height_mm} mm high, {layers:.0} layers of {thickness_um} um: check --units and --thickness"

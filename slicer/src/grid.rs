@@ -66,6 +66,17 @@ impl PixelGrid {
         Ok(Self { origin_mm, dpi, width: width as u32, height: height as u32 })
     }
 
+    /// Whether a box lies inside the grid.
+    pub(crate) fn holds(&self, min_mm: [f64; 2], max_mm: [f64; 2]) -> bool {
+        // In pixels, the grid's edges lie half a pixel outside its centres.
+        let [left, bottom] = self.to_pixels(min_mm[0], min_mm[1]);
+        let [right, top] = self.to_pixels(max_mm[0], max_mm[1]);
+        left >= -0.5
+            && top >= -0.5
+            && right <= f64::from(self.width) - 0.5
+            && bottom <= f64::from(self.height) - 0.5
+    }
+
     /// A point in pixels, such that it lies left of (or on) the centre of
     /// column c exactly when its first coordinate is at most c, and above (or
     /// on) the centre of row r exactly when its second is at most r.

@@ -45,13 +45,29 @@ pub enum Frame {
         /// Black pixels on every side.
         margin: u32,
     },
-    /// A given place: what lies outside is cut away.
+    /// A given place, which must hold the whole part.
     At {
         /// The top left corner (x, y) in part coordinates, in millimetres.
         origin_mm: [f64; 2],
         /// Width and height in pixels.
         pixels: [u32; 2],
     },
+}
+
+impl Frame {
+    fn grid(self, min_mm: [f64; 2], max_mm: [f64; 2], dpi: Dpi) -> Result<PixelGrid, SliceError> {
+        match self {
+            Self::Around { margin } => PixelGrid::around(min_mm, max_mm, margin, dpi),
+            Self::At { origin_mm, pixels: [width, height] } => {
+                let grid = PixelGrid::at(origin_mm, width.into(), height.into(), dpi)?;
+                if grid.holds(min_mm, max_mm) {
+                    Ok(grid)
+                } else {
+                    Err(SliceError::OutsideFrame { part_mm: [min_mm, max_mm] })
+                }
+            }
+        }
+    }
 }
 
 impl Default for SliceOptions {
@@ -102,15 +118,9 @@ impl Slices {
     pub fn new(model: Model, options: &SliceOptions) -> Result<Self, SliceError> {
         let survey = Survey::of(&model)?;
         let (mm, um) = (options.units.mm(), options.units.um());
-        let corner = |box_corner: [f32; 3]| [0, 1].map(|axis| f64::from(box_corner[axis]) * mm);
-        let grid = match options.frame {
-            Frame::Around { margin } => {
-                PixelGrid::around(corner(survey.min), corner(survey.max), margin, options.dpi)
-            }
-            Frame::At { origin_mm, pixels: [width, height] } => {
-                PixelGrid::at(origin_mm, width.into(), height.into(), options.dpi)
-            }
-        }?;
+        let [min_mm, max_mm] =
+            [survey.min, survey.max].map(|corner| [0, 1].map(|axis| f64::from(corner[axis]) * mm));
+        let grid = options.frame.grid(min_mm, max_mm, options.dpi)?;
         let planes = Planes::uniform(
             f64::from(survey.min[2]) * um,
             f64::from(survey.max[2]) * um,

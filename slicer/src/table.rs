@@ -6,7 +6,7 @@
 
 use std::io;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use lamp_stack::{Mask, MaskBuilder};
 use rayon::prelude::*;
@@ -34,6 +34,30 @@ pub(crate) struct Table {
     parts: Vec<Vec<Vec<Crossing>>>,
 }
 
+/// How many crossings all workers may make together.
+struct Budget {
+    used: AtomicUsize,
+    most: usize,
+    /// Whether the slab could be smaller.
+    must_fit: bool,
+}
+
+impl Budget {
+    /// Claims crossings that were made, a few thousand at a time, so that the
+    /// workers seldom meet.
+    #[inline]
+    fn claim(&self, unclaimed: &mut usize) {
+        if *unclaimed > 4096 {
+            self.used.fetch_add(std::mem::take(unclaimed), Relaxed);
+        }
+    }
+
+    #[inline]
+    fn is_spent(&self) -> bool {
+        self.must_fit && self.used.load(Relaxed) > self.most
+    }
+}
+
 impl Table {
     /// Fills the table with the crossings of `layers`, from the given blocks
     /// of the model. Gives up, returning `false`, once the crossings pass
@@ -47,29 +71,24 @@ impl Table {
         most: usize,
     ) -> io::Result<bool> {
         self.parts.resize_with(rayon::current_num_threads(), Vec::new);
-        let (next, total) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let too_many = AtomicBool::new(false);
+        let budget = Budget { used: AtomicUsize::new(0), most, must_fit: layers.len() > 1 };
+        let next = AtomicUsize::new(0);
         self.parts.par_iter_mut().try_for_each(|lists| -> io::Result<()> {
             lists.iter_mut().for_each(Vec::clear);
             lists.resize_with(lists.len().max(layers.len()), Vec::new);
-            let mut known = 0;
+            let mut unclaimed = 0;
             while let Some(&block) = blocks.get(next.fetch_add(1, Relaxed)) {
-                model.for_each_in_block(block, |facet| cutter.cut(facet, &layers, lists))?;
-                let count = lists.iter().map(Vec::len).sum();
-                if total.fetch_add(count - known, Relaxed) + count - known > most
-                    && layers.len() > 1
-                {
-                    too_many.store(true, Relaxed);
-                }
-                known = count;
-                if too_many.load(Relaxed) {
-                    break;
-                }
+                model.for_each_in_block(block, |facet| {
+                    if !budget.is_spent() {
+                        unclaimed += cutter.cut(facet, &layers, lists);
+                        budget.claim(&mut unclaimed);
+                    }
+                })?;
             }
             Ok(())
         })?;
         self.layers = layers;
-        Ok(!too_many.into_inner())
+        Ok(!budget.is_spent())
     }
 
     /// The image of a layer of the slab, and the rows whose crossings do not

@@ -38,6 +38,7 @@ pub(crate) struct DemoArgs {
 /// The heights of the pictures, as shares of the stack: drains in the flange,
 /// a row of pins and holes, the serpentine between them, the tip plate.
 const PICTURED: [f64; 4] = [0.04, 0.354, 0.76, 0.925];
+const SCALE: Scale = Scale::Down(8);
 
 pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
     fs::create_dir_all(&args.folder).with_context(|| args.folder.display().to_string())?;
@@ -127,17 +128,16 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Stop> {
             shown.push(page.decode().map_err(failed)?);
         }
     }
-    let picture = |layer| picture_of(layer, Scale::Down(8));
     for layer in &shown {
         let name = format!("layer_{:05}.png", layer.info.index);
-        write_picture(&sheet.with_file_name(name), picture(layer))?;
+        let picture = Picture::new(&layer.image, Region::of(&layer.image), SCALE);
+        write_picture(&sheet.with_file_name(name), picture)?;
     }
-    write_picture(sheet, Picture::side_by_side(shown.iter().map(picture).collect()))?;
+    let content = shown.iter().filter_map(|layer| Region::of_content(&layer.image));
+    let content = content.reduce(Region::joined).context("the pictured layers are black")?;
+    let parts = shown.iter().map(|layer| Picture::new(&layer.image, content.clone(), SCALE));
+    write_picture(sheet, Picture::side_by_side(parts.collect()))?;
     Ok(shown.iter().map(|layer| layer.info.index.to_string()).collect::<Vec<_>>().join(", "))
-}
-
-fn picture_of(layer: &Layer, scale: Scale) -> Picture<'_> {
-    Picture::new(&layer.image, Region::of(&layer.image), scale)
 }
 
 fn write_picture(path: &Path, picture: Picture<'_>) -> Result<(), Stop> {

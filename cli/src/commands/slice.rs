@@ -32,7 +32,8 @@ pub(crate) struct SliceArgs {
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     layers: Option<Range<u32>>,
 
-    /// Memory to work in: less means smaller slabs of layers [default: a quarter of the machine's]
+    /// Memory to work in, from 16MB up: less means smaller slabs of layers [default: a quarter of
+    /// the machine's, though no more is used than helps]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
     memory: Option<u64>,
 
@@ -215,11 +216,12 @@ fn say_stray_rows(report: &Report, rows: usize, layers: usize) {
     }
 }
 
-/// How much the table of crossings may take of the memory allowed: the rest
-/// is for the images on their way. More than 64 MiB would not make it faster.
+/// How much the table of crossings may take of the memory allowed: its lists
+/// double as they grow, and the rest is for the images on their way. More
+/// than 64 MiB would not make it faster.
 fn table_memory(allowed: Option<u64>) -> u64 {
     let allowed = allowed.unwrap_or_else(|| machine_memory() / 4);
-    (allowed / 2).min(64 << 20)
+    (allowed / 4).min(64 << 20)
 }
 
 /// The machine's memory in bytes; 4 GiB where it does not say.
