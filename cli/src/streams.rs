@@ -1,7 +1,7 @@
 //! Where a stage's layers come from and go to.
 
 use std::fmt::Display;
-use std::io::{self, IsTerminal};
+use std::io::{self, IsTerminal, Write};
 use std::ops::Range;
 use std::path::Path;
 
@@ -21,6 +21,11 @@ pub(crate) fn is_stream(path: &Path) -> bool {
 /// What people call an input.
 pub(crate) fn input_name(path: &Path) -> String {
     if is_stream(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// Prints a text that was asked for.
+pub(crate) fn print(text: &str) -> Result<(), Stop> {
+    io::stdout().lock().write_all(text.as_bytes()).map_err(|error| Stop::Output(error.into()))
 }
 
 /// Opens a stack's pages.

@@ -17,7 +17,7 @@ use crate::options::{Common, Output, parse_count};
 use crate::picture::{Picture, Region, Scale};
 use crate::report::Report;
 use crate::stop::Stop;
-use crate::streams::{failed_at, write_layers};
+use crate::streams::{failed_at, print, write_layers};
 
 /// Do the main job on a built-in blade mould: model, pipeline, stack, pictures
 #[derive(Args)]
@@ -50,25 +50,20 @@ pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
     let size = run_pipeline(&stl, &stack, &report)?;
     let seconds = started.elapsed().as_secs_f64();
     let pictures = draw(&stack, &sheet, size.layers)?;
-    if !common.quiet {
-        let bytes = fs::metadata(&stack).context("build.tif")?.len();
-        println!("{}: a hollow blade mould, 76 x 76 x 127 mm, {facets} facets", stl.display());
-        println!(
-            "{}: {} layers of {} x {} pixels at 1500 dpi and 100 um, {:.1} MB, made in {seconds:.2} s",
-            stack.display(),
-            size.layers,
-            size.width,
-            size.height,
-            bytes as f64 / 1e6,
-        );
-        println!("{}: layers {pictures}, one pixel for 8 x 8", sheet.display());
-        println!(
-            "The same by hand: slice {} | fix | dither | tile > {}",
-            stl.display(),
-            stack.display()
-        );
+    if common.quiet {
+        return Ok(());
     }
-    Ok(())
+    let megabytes = fs::metadata(&stack).context("build.tif")?.len() as f64 / 1e6;
+    let [stl, stack, sheet] = [stl, stack, sheet].map(|path| path.display().to_string());
+    let StackSize { layers, width, height } = size;
+    print(&format!(
+        "\
+{stl}: a hollow blade mould, 76 x 76 x 127 mm, {facets} facets
+{stack}: {layers} layers of {width} x {height} pixels at 1500 dpi and 100 um, {megabytes:.1} MB, made in {seconds:.2} s
+{sheet}: layers {pictures}, one pixel for 8 x 8
+The same by hand: slice {stl} | fix | dither | tile > {stack}
+"
+    ))
 }
 
 fn write_model(args: &DemoArgs, path: &Path) -> Result<usize, Stop> {

@@ -1,11 +1,9 @@
-use std::io::{self, Write};
-
 use clap::Args;
 use lamp_stack::{Compression, Layer, Page, StackInfo, map_in_order};
 
 use crate::options::Input;
 use crate::stop::Stop;
-use crate::streams::{failed_at, input_name, open_pages};
+use crate::streams::{failed_at, input_name, open_pages, print};
 
 /// Say what a stack holds: pages, size, resolution, heights, runs, bytes
 #[derive(Args)]
@@ -39,8 +37,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Stop> {
     let Some(totals) = totals else {
         return Err(Stop::Failed(anyhow::anyhow!("{name}: no layer is in that range")));
     };
-    let written = io::stdout().lock().write_all(totals.text(&name).as_bytes());
-    written.map_err(|error| Stop::Output(error.into()))
+    print(&totals.text(&name))
 }
 
 /// What adds up over the layers.

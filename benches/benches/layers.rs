@@ -1,0 +1,77 @@
+//! Slicing, encoding and decoding of blade-mould layers, beside the `fax`
+//! crate on the same pixels. Throughput counts transitions.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use fax::{Color, VecWriter, decoder, encoder};
+use lamp_fixtures::{Part, build};
+use lamp_slicer::{Model, SliceOptions, Slices};
+use lamp_stack::{Image, Mask, g4};
+
+/// Layers with pins and holes, 1500 dpi.
+const LAYERS: std::ops::Range<u32> = 440..460;
+
+fn slices(facets: usize) -> impl Fn() -> Vec<Mask> {
+    let facets = build(Part::Blade, facets).expect("enough facets").facets;
+    move || {
+        let model = Model::from_facets("blade", facets.clone());
+        let options = SliceOptions { layers: Some(LAYERS), ..SliceOptions::default() };
+        let layers = Slices::new(model, &options).expect("the blade slices");
+        let mask = |layer| match layer {
+            Ok(lamp_stack::Layer { image: Image::Mask(mask), .. }) => mask,
+            _ => unreachable!("slices are masks"),
+        };
+        layers.map(mask).collect()
+    }
+}
+
+fn fax_encode(mask: &Mask) -> Vec<u8> {
+    let mut encoder = encoder::Encoder::new(VecWriter::new());
+    for row in mask.rows() {
+        let (mut next, mut white) = (0, false);
+        let pixels = (0..mask.width()).map(|column| {
+            if row.get(next) == Some(&column) {
+                (next, white) = (next + 1, !white);
+            }
+            if white { Color::Black } else { Color::White }
+        });
+        encoder.encode_line(pixels, mask.width()).expect("a Vec takes all bits");
+    }
+    encoder.finish().expect("a Vec takes all bits").finish()
+}
+
+fn layers(criterion: &mut Criterion) {
+    let slice = slices(100_000);
+    let masks = slice();
+    let transitions: usize = masks.iter().map(Mask::transition_count).sum();
+    let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
+    let size = (masks[0].width(), masks[0].height());
+
+    let mut group = criterion.benchmark_group("blade");
+    group.throughput(Throughput::Elements(transitions as u64));
+    group.bench_function("slice", |b| b.iter(&slice));
+    group.bench_function("encode", |b| {
+        b.iter(|| masks.iter().map(|mask| g4::encode(mask).len()).sum::<usize>());
+    });
+    group.bench_function("decode", |b| {
+        let decode = |strip: &Vec<u8>| g4::decode(strip, size.0, size.1).expect("our own strip");
+        b.iter(|| strips.iter().map(|strip| decode(strip).transition_count()).sum::<usize>());
+    });
+    group.bench_function("encode, fax crate", |b| {
+        b.iter(|| masks.iter().map(|mask| fax_encode(mask).len()).sum::<usize>());
+    });
+    group.bench_function("decode, fax crate", |b| {
+        b.iter(|| {
+            let mut count = 0;
+            for strip in &strips {
+                let bytes = strip.iter().copied();
+                decoder::decode_g4(bytes, size.0, Some(size.1), |row| count += row.len())
+                    .expect("our own strip");
+            }
+            count
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, layers);
+criterion_main!(benches);
