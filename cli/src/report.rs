@@ -2,13 +2,14 @@
 
 use std::io::IsTerminal;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// Says things, and shows how far the work is.
 #[derive(Clone)]
 pub(crate) struct Report {
     command: &'static str,
     quiet: bool,
+    watched: bool,
     bar: ProgressBar,
 }
 
@@ -17,10 +18,10 @@ impl Report {
     /// only the last shows one (`is_last`): they share the terminal.
     pub(crate) fn new(command: &'static str, quiet: bool, is_last: bool) -> Self {
         let watched = !quiet && is_last && std::io::stderr().is_terminal();
-        let bar = if watched { ProgressBar::no_length() } else { ProgressBar::hidden() };
+        let bar = ProgressBar::hidden();
         bar.set_style(style("{prefix} {human_pos} layers {per_sec}"));
         bar.set_prefix(command);
-        Self { command, quiet, bar }
+        Self { command, quiet, watched, bar }
     }
 
     /// Tells how many layers there will be.
@@ -29,8 +30,11 @@ impl Report {
         self.bar.set_style(style("{prefix} {bar:40} layer {human_pos} of {human_len}, {eta} left"));
     }
 
-    /// Counts a layer.
+    /// Counts a layer. The bar appears with the first.
     pub(crate) fn layer_done(&self) {
+        if self.watched && self.bar.position() == 0 {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
         self.bar.inc(1);
     }
 

@@ -11,6 +11,9 @@ pub enum SliceError {
     /// The file holds nothing.
     #[error("the file is empty: export the part again")]
     EmptyFile,
+    /// A folder or a device.
+    #[error("this is not a file")]
+    NotAFile,
     /// Neither binary nor ASCII STL.
     #[error(
         "this is not an STL file: it has {size} bytes, and neither a binary header nor `solid` and `facet`"

@@ -68,7 +68,11 @@ impl Model {
     }
 
     fn from_file(name: String, file: &File) -> Result<Self, SliceError> {
-        let size = file.metadata()?.len();
+        let metadata = file.metadata()?;
+        if !metadata.is_file() {
+            return Err(SliceError::NotAFile);
+        }
+        let size = metadata.len();
         if size == 0 {
             return Err(SliceError::EmptyFile);
         }

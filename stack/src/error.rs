@@ -62,6 +62,14 @@ pub enum StackError {
     /// A folder without pages.
     #[error("the folder holds no .tif page")]
     NoPages,
+    /// A file of a folder that is a stack of its own.
+    #[error(
+        "file {page} of the folder, by name, has several pages: a folder's files have one page each"
+    )]
+    SeveralPages {
+        /// The file, from 0.
+        page: u32,
+    },
     /// The stack does not fit a classic TIFF.
     #[error(
         "the stack passes 4 GiB at layer {layer}: a classic TIFF cannot hold it, write a BigTIFF"

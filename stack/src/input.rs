@@ -15,6 +15,7 @@ pub struct Pages {
     reader: PageReader,
     /// The files of a folder that are still to be read, last first.
     files: Vec<PathBuf>,
+    in_folder: bool,
     /// How many pages a folder should have, where its first page says so.
     expected: Option<u32>,
     count: u32,
@@ -35,6 +36,7 @@ impl Pages {
         let first = files.pop().ok_or(StackError::NoPages)?;
         let mut pages = Self::of(PageReader::from_file(File::open(first)?)?);
         pages.files = files;
+        pages.in_folder = true;
         Ok(pages)
     }
 
@@ -47,7 +49,14 @@ impl Pages {
     }
 
     fn of(reader: PageReader) -> Self {
-        Self { reader, files: Vec::new(), expected: None, count: 0, last_whole: None }
+        Self {
+            reader,
+            files: Vec::new(),
+            in_folder: false,
+            expected: None,
+            count: 0,
+            last_whole: None,
+        }
     }
 
     /// The pages' layers, decoded on all threads, in order.
@@ -58,7 +67,11 @@ impl Pages {
     fn next_page(&mut self) -> Result<Option<Page>, StackError> {
         loop {
             if let Some(page) = self.reader.next() {
-                return page.map(Some);
+                let page = page?;
+                if self.in_folder && !self.reader.is_at_end() {
+                    return Err(StackError::SeveralPages { page: self.count });
+                }
+                return Ok(Some(page));
             }
             match self.files.pop() {
                 Some(file) => {
@@ -82,7 +95,7 @@ impl Iterator for Pages {
         let page = self.next_page().transpose()?;
         match &page {
             Ok(page) => {
-                if self.count == 0 && !self.files.is_empty() {
+                if self.count == 0 && self.in_folder {
                     self.expected = page.info().stack.as_ref().and_then(|stack| stack.layers);
                 }
                 self.count += 1;

@@ -55,13 +55,15 @@ where
 pub fn file_beside(path: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     set_mode(&mut builder, 0o666);
-    builder.prefix(&hidden_prefix(path)).suffix(".part").tempfile_in(folder_of(path))
+    let folder = folder_of(path)?;
+    builder.prefix(&hidden_prefix(path)).suffix(".part").tempfile_in(folder)
 }
 
 fn folder_beside(path: &Path) -> io::Result<TempDir> {
     let mut builder = tempfile::Builder::new();
     set_mode(&mut builder, 0o777);
-    builder.prefix(&hidden_prefix(path)).suffix(".part").tempdir_in(folder_of(path))
+    let folder = folder_of(path)?;
+    builder.prefix(&hidden_prefix(path)).suffix(".part").tempdir_in(folder)
 }
 
 enum Sink {
@@ -130,11 +132,17 @@ fn is_empty_folder(path: &Path) -> bool {
     fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
 }
 
-fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
+/// The folder that `path` is to stand in.
+fn folder_of(path: &Path) -> io::Result<&Path> {
+    let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
+    };
+    if folder.is_dir() {
+        return Ok(folder);
     }
+    let message = format!("there is no folder {}: make it first", folder.display());
+    Err(io::Error::new(io::ErrorKind::NotFound, message))
 }
 
 /// How hidden names beside `path` start.

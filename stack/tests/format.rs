@@ -170,6 +170,16 @@ fn a_file_and_a_folder_read_back() {
 }
 
 #[test]
+fn a_folder_of_stacks_is_no_stack() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.tif", "b.tif"] {
+        std::fs::write(folder.path().join(name), write(&layers(2), Format::Big)).unwrap();
+    }
+    let error = Pages::open(folder.path()).unwrap().layers().next().unwrap().unwrap_err();
+    assert!(matches!(error, StackError::SeveralPages { page: 0 }));
+}
+
+#[test]
 fn a_failure_leaves_nothing_under_the_final_name() {
     let folder = tempfile::tempdir().unwrap();
     for to in [

@@ -85,6 +85,11 @@ impl PageReader {
         self
     }
 
+    /// Whether no page follows.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.next == 0
+    }
+
     fn read_page(&mut self) -> Result<Page, StackError> {
         if !self.seen.insert(self.next) {
             return Err(malformed(
