@@ -47,16 +47,28 @@ fn read_solid(text: &[u8], facets: &mut Vec<Facet>) -> Result<(), SliceError> {
     if header.len() < 5 || !header[..5].eq_ignore_ascii_case(b"solid") {
         return Err(failed(facets.len(), &"a line stands where `solid` should"));
     }
-    // stl_io wants lower case and a space behind `solid`.
-    let mut normal = b"solid ".to_vec();
-    normal.extend(body.iter().map(u8::to_ascii_lowercase));
-    let mut source = Cursor::new(normal);
+    let mut plain = b"solid part".to_vec();
+    body.split_inclusive(|&byte| byte == b'\n').for_each(|line| push_plain(line, &mut plain));
+    let mut source = Cursor::new(plain);
     let triangles = stl_io::create_stl_reader(&mut source).map_err(|e| failed(facets.len(), &e))?;
     for triangle in triangles {
         let triangle = triangle.map_err(|e| failed(facets.len(), &e))?;
         facets.push(triangle.vertices.map(|corner| corner.0));
     }
     Ok(())
+}
+
+/// Adds a line as stl_io wants it: in lower case, and without what it would
+/// refuse though nothing here needs it, names that are not UTF-8 and normals
+/// that are no numbers.
+fn push_plain(line: &[u8], out: &mut Vec<u8>) {
+    let line = line.to_ascii_lowercase();
+    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    match (words.next(), words.next(), words.count()) {
+        (Some(b"endsolid"), ..) => out.extend_from_slice(b"endsolid\n"),
+        (Some(b"facet"), Some(b"normal"), 3) => out.extend_from_slice(b"facet normal 0 0 0\n"),
+        _ => out.extend_from_slice(&line),
+    }
 }
 
 #[cfg(test)]

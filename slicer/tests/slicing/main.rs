@@ -1,0 +1,12 @@
+//! Whole parts through the slicer: against closed forms, against a slow
+//! obvious twin, and against the rules that the layers keep.
+
+mod closed_forms;
+mod common;
+mod even_rows;
+mod fill;
+mod layers;
+mod referee;
+mod same_bytes;
+mod stl;
+mod ties;

@@ -1,0 +1,129 @@
+//! Layers depend on the part and the options alone: not on threads, memory,
+//! the order of facets, or the way the part came in.
+
+use std::fs;
+
+use lamp_fixtures::{Mesh, sphere, tower};
+use lamp_slicer::{Fill, Model, SliceOptions, Slices};
+use lamp_stack::Layer;
+
+use crate::common::{
+    block, joined, model, options, slice, try_layers, white_pixels, without_stack,
+};
+
+/// Several blocks of facets, with rows of many crossings.
+fn part() -> Mesh {
+    tower(20_000)
+}
+
+fn coarse() -> SliceOptions {
+    options(120.0, 700.0)
+}
+
+fn with_threads<T: Send>(threads: usize, run: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(run)
+}
+
+#[test]
+fn threads_and_memory_do_not_change_the_layers() {
+    let mesh = part();
+    let expected = slice(&mesh, &coarse());
+    assert!(expected.len() > 100 && white_pixels(&expected) > 100_000);
+    for threads in 1..=3 {
+        for memory in [1, 3_000, 100_000, 1 << 30] {
+            let options = SliceOptions { memory, ..coarse() };
+            let layers = with_threads(threads, || slice(&mesh, &options));
+            assert!(layers == expected, "{threads} threads, {memory} bytes");
+        }
+    }
+}
+
+/// The facets of one block lie in few of its layers: more crossings come
+/// than the memory was planned for.
+#[test]
+fn crowded_layers_in_little_memory_do_not_change() {
+    let needle = block([0.0; 3], [0.1, 0.1, 60.0]);
+    for z in [0.0, 30.0, 55.0] {
+        let crowd = sphere(2.0, 3_000).map(|p| [p[0], p[1], p[2] + z]);
+        let mesh = joined(&[crowd, needle.clone()]);
+        let expected = slice(&mesh, &options(2400.0, 100.0));
+        for power in [14, 16, 17, 18, 20] {
+            let options = SliceOptions { memory: 1 << power, ..options(2400.0, 100.0) };
+            assert!(slice(&mesh, &options) == expected, "z {z}, 2^{power} bytes");
+        }
+    }
+}
+
+#[test]
+fn threads_may_change_between_layers() {
+    let mesh = part();
+    let options = SliceOptions { memory: 100_000, ..coarse() };
+    let mut slices = Slices::new(model(&mesh), &options).unwrap();
+    let mut layers: Vec<Layer> = Vec::new();
+    while let Some(layer) = with_threads(1 + layers.len() % 3, || slices.next()) {
+        layers.push(layer.unwrap());
+    }
+    assert!(layers == slice(&mesh, &coarse()));
+}
+
+#[test]
+fn the_order_of_facets_and_corners_does_not_change_the_layers() {
+    let mesh = part();
+    let count = mesh.facets.len();
+    // A step prime to the count meets every facet.
+    let step = (7919..).find(|step| step % 2 == 1 && gcd(*step, count) == 1).unwrap();
+    let mixed = (0..count).map(|k| {
+        let mut facet = mesh.facets[k * step % count];
+        facet.rotate_left(k % 3);
+        facet
+    });
+    let mixed = Mesh { facets: mixed.collect() };
+    for fill in [Fill::EvenOdd, Fill::NonZero] {
+        let options = SliceOptions { fill, memory: 50_000, ..coarse() };
+        let [mesh, mixed] = [&mesh, &mixed].map(|mesh| without_stack(slice(mesh, &options)));
+        assert!(mesh == mixed, "{fill:?}");
+    }
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[test]
+fn a_range_of_layers_is_that_part_of_the_whole() {
+    let mesh = part();
+    let whole = slice(&mesh, &coarse());
+    let count = whole.len() as u32;
+    for (start, end) in [(0, 1), (0, count), (3, 41), (count - 1, count), (60, count + 100)] {
+        let layers = Some(start..end);
+        let some = slice(&mesh, &SliceOptions { layers, memory: 20_000, ..coarse() });
+        let (start, end) = (start as usize, end.min(count) as usize);
+        let mut stack = whole[0].info.stack.clone().unwrap();
+        stack.layers = Some((end - start) as u32);
+        assert_eq!(some[0].info.stack, Some(stack));
+        assert!(without_stack(some) == without_stack(whole[start..end].to_vec()));
+    }
+}
+
+#[test]
+fn files_streams_and_memory_give_the_same_layers() {
+    let mesh = part();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.stl");
+    let (mut binary, mut text) = (Vec::new(), Vec::new());
+    mesh.write_stl("a tower", &mut binary).unwrap();
+    mesh.write_ascii_stl("a tower", &mut text).unwrap();
+    let expected = slice(&mesh, &coarse());
+    for bytes in [binary, text] {
+        fs::write(&path, &bytes).unwrap();
+        let from_file = try_layers(Model::open(&path).unwrap(), &coarse()).unwrap();
+        let stream = Model::from_stream("part", &bytes[..]).unwrap();
+        assert_eq!(stream.facet_count(), mesh.facets.len());
+        assert!(try_layers(stream, &coarse()).unwrap() == from_file);
+
+        let stack = from_file[0].info.stack.clone().unwrap();
+        assert_eq!(stack.part, "part");
+        assert_eq!(stack.digest, format!("blake3:{}", blake3::hash(&bytes).to_hex()));
+        assert!(without_stack(from_file) == without_stack(expected.clone()));
+    }
+}
