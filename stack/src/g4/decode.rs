@@ -34,23 +34,56 @@ pub(crate) fn decode_rows(
     mask: &mut MaskBuilder,
 ) -> Result<(), G4Error> {
     let mut bits = BitReader::new(strip);
-    let mut reference = Vec::new();
+    let mut above = RowAbove::new(width);
     let mut row = Vec::new();
     for index in 0..height {
         row.clear();
-        decode_row(&mut bits, &reference, &mut row, width)
+        decode_row(&mut bits, &above, &mut row, width)
             .map_err(|fault| G4Error { row: index, fault })?;
         mask.push_checked(&row);
-        std::mem::swap(&mut reference, &mut row);
+        above.replace(&mut row);
     }
     Ok(())
+}
+
+/// The row above, with places behind its last transition, so that several can
+/// be looked at together: the width, and on from there in wide steps.
+struct RowAbove {
+    places: Vec<u32>,
+    len: usize,
+    behind: [u32; LOOK],
+}
+
+/// How many vertical codes are taken together, and the place after them.
+const LOOK: usize = 5;
+/// Transitions so far apart stay in order when each moves by three pixels.
+const WIDE: u32 = 7;
+
+impl RowAbove {
+    fn new(width: u32) -> Self {
+        let behind = std::array::from_fn(|k| width + WIDE * k as u32);
+        Self { places: behind.to_vec(), len: 0, behind }
+    }
+
+    /// Takes the row's transitions, leaving it some other ones.
+    fn replace(&mut self, row: &mut Vec<u32>) {
+        std::mem::swap(&mut self.places, row);
+        self.len = self.places.len();
+        self.places.extend_from_slice(&self.behind);
+    }
+
+    /// Transition `i`; the width behind the last.
+    #[inline]
+    fn at(&self, i: usize) -> u32 {
+        if i < self.len { self.places[i] } else { self.behind[0] }
+    }
 }
 
 /// Decodes one row against the row above it. Names are those of
 /// [`encode_row`](super::encode).
 fn decode_row(
     bits: &mut BitReader<'_>,
-    reference: &[u32],
+    above: &RowAbove,
     row: &mut Vec<u32>,
     width: u32,
 ) -> Result<(), G4Fault> {
@@ -59,10 +92,19 @@ fn decode_row(
     // The index of b1; its parity is the colour's.
     let mut j = 0;
     while a0 < width || !started {
-        let b1 = reference.get(j).copied().unwrap_or(width);
+        if let Some(count) = take_verticals(bits, above, j, a0, row) {
+            a0 = row[row.len() - 1];
+            white ^= count % 2 == 1;
+            j += count;
+            started = true;
+            if a0 == width {
+                row.pop();
+            }
+            continue;
+        }
         match bits.mode()? {
             Mode::Vertical(shift) => {
-                let a1 = b1.checked_add_signed(shift).ok_or(G4Fault::OutsideRow)?;
+                let a1 = above.at(j).checked_add_signed(shift).ok_or(G4Fault::OutsideRow)?;
                 if a1 < a0 || a1 > width {
                     return Err(G4Fault::OutsideRow);
                 }
@@ -72,22 +114,53 @@ fn decode_row(
                 j = if j > 0 { j - 1 } else { j + 1 };
             }
             Mode::Pass => {
-                a0 = reference.get(j + 1).copied().unwrap_or(width);
+                a0 = above.at(j + 1);
                 j += 2;
             }
             Mode::Horizontal => {
                 for colour in [white, !white] {
-                    a0 = bits.run(colour, width - a0)? + a0;
+                    a0 += bits.run(colour, width - a0)?;
                     toggle(row, a0, width);
                 }
             }
         }
         started = true;
-        while reference.get(j).is_some_and(|&b1| b1 <= a0) {
+        while j < above.len && above.places[j] <= a0 {
             j += 2;
         }
     }
     Ok(())
+}
+
+/// Takes up to four vertical codes at once and adds their transitions, where
+/// these lie in order whatever the codes, because the runs above are wide. The
+/// last may be the row's end. Gives how many were taken.
+#[inline]
+fn take_verticals(
+    bits: &mut BitReader<'_>,
+    above: &RowAbove,
+    j: usize,
+    a0: u32,
+    row: &mut Vec<u32>,
+) -> Option<usize> {
+    let b: &[u32; LOOK] = above.places.get(j..)?.first_chunk()?;
+    let mut wide = b[0] >= a0 + WIDE;
+    for k in 1..LOOK {
+        wide &= b[k].wrapping_sub(b[k - 1]) >= WIDE;
+    }
+    let codes = bits.verticals[bits.peek(VERTICALS_BITS)];
+    // Behind the last transition stands the row's end, coded once.
+    let count = usize::from(codes.count).min(above.len - j + 1);
+    if !wide || count == 0 {
+        return None;
+    }
+    let moved: [u32; 4] = std::array::from_fn(|k| b[k].wrapping_add_signed(codes.shifts[k].into()));
+    if moved[count - 1] > above.behind[0] {
+        return None;
+    }
+    bits.take(codes.ends[count - 1]).ok()?;
+    row.extend_from_slice(&moved[..count]);
+    Some(count)
 }
 
 /// Adds a transition; an empty run cancels the one before it.
@@ -136,6 +209,38 @@ static MODES: LazyLock<Vec<Entry<Mode>>> = LazyLock::new(|| {
     table
 });
 
+/// The vertical codes that some bits begin with, at most four.
+#[derive(Clone, Copy, Default)]
+struct Verticals {
+    count: u8,
+    shifts: [i8; 4],
+    /// How many bits the first code takes, the first two, and so on.
+    ends: [u8; 4],
+}
+
+const VERTICALS_BITS: u32 = 11;
+
+static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {
+    let begin = |bits: usize| {
+        let mut found = Verticals::default();
+        let mut end = 0;
+        while found.count < 4 {
+            let rest = bits << end & ((1 << VERTICALS_BITS) - 1);
+            let entry = MODES[rest >> (VERTICALS_BITS - MODE_BITS)];
+            let Mode::Vertical(shift) = entry.value else { break };
+            end += u32::from(entry.len);
+            if entry.len == 0 || end > VERTICALS_BITS {
+                break;
+            }
+            found.shifts[usize::from(found.count)] = shift as i8;
+            found.ends[usize::from(found.count)] = end as u8;
+            found.count += 1;
+        }
+        found
+    };
+    (0..1 << VERTICALS_BITS).map(begin).collect()
+});
+
 /// Run-length codes of both colours, 0 first.
 static RUNS: LazyLock<[Vec<Entry<u16>>; 2]> = LazyLock::new(|| {
     let table = |terminating: &[Code], make_up: &[Code]| {
@@ -157,12 +262,20 @@ struct BitReader<'a> {
     /// How many bits are at hand; negative once bits past the end were taken.
     count: i32,
     modes: &'static [Entry<Mode>],
+    verticals: &'static [Verticals],
     runs: &'static [Vec<Entry<u16>>; 2],
 }
 
 impl<'a> BitReader<'a> {
     fn new(strip: &'a [u8]) -> Self {
-        Self { rest: strip, pending: 0, count: 0, modes: &MODES, runs: &RUNS }
+        Self {
+            rest: strip,
+            pending: 0,
+            count: 0,
+            modes: &MODES,
+            verticals: &VERTICALS,
+            runs: &RUNS,
+        }
     }
 
     /// The next `n` bits (zeros past the end).
