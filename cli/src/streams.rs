@@ -1,12 +1,14 @@
 //! Where a stage's layers come from and go to.
 
 use std::fmt::Display;
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::ops::Range;
 use std::path::Path;
 
+use anyhow::Context;
 use lamp_stack::{
-    Destination, Format, Layer, Page, Pages, StackError, StackInfo, map_in_order, write_stack,
+    Destination, Format, Layer, Page, Pages, StackError, StackInfo, file_beside, map_in_order,
+    write_stack,
 };
 
 use crate::options::{Common, Input, Output};
@@ -135,4 +137,21 @@ pub(crate) fn write_layers(
     let name =
         if is_stream(path) { "standard output".to_owned() } else { path.display().to_string() };
     written.map_err(|stop| if let Stop::Output(_) = stop { stop.at(name) } else { stop })
+}
+
+/// Writes a file that gets its name only when it is complete.
+pub(crate) fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Stop> {
+    let whole = || -> io::Result<()> {
+        let mut file = file_beside(path)?;
+        let mut out = BufWriter::with_capacity(1 << 18, &mut file);
+        write(&mut out)?;
+        out.flush()?;
+        drop(out);
+        file.persist(path)?;
+        Ok(())
+    };
+    Ok(whole().with_context(|| path.display().to_string())?)
 }

@@ -11,13 +11,12 @@ use lamp_postprocess::{TileOptions, fix, tile};
 use lamp_slicer::Model;
 use lamp_stack::{Layer, Pages};
 
-use crate::commands::sample::write_file;
 use crate::commands::slice::PartOptions;
 use crate::options::{Common, Output, parse_count};
 use crate::picture::{Picture, Region, Scale};
 use crate::report::Report;
 use crate::stop::Stop;
-use crate::streams::{failed_at, print, write_layers};
+use crate::streams::{failed_at, print, write_file, write_layers};
 
 /// Do the main job on a built-in blade mould: model, pipeline, stack, pictures
 #[derive(Args)]

@@ -1,15 +1,14 @@
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::{Args, ValueEnum, builder::PossibleValue};
 use lamp_fixtures::{Defect, Mesh, Part, build, inject};
-use lamp_stack::{Length, file_beside};
+use lamp_stack::Length;
 
 use crate::options::{Common, parse_count};
 use crate::report::Report;
 use crate::stop::Stop;
-use crate::streams::is_stream;
+use crate::streams::{is_stream, write_file};
 
 /// Write a sample part as STL, whole or with defects
 #[derive(Args)]
@@ -124,21 +123,4 @@ impl SampleArgs {
 fn say_size(args: &SampleArgs, common: &Common, mesh: &Mesh) {
     let report = Report::new("sample", common.quiet, true);
     report.say(&format!("{}: {} facets", args.output.display(), mesh.facets.len()));
-}
-
-/// Writes a file that gets its name only when it is complete.
-pub(crate) fn write_file(
-    path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), Stop> {
-    let whole = || -> io::Result<()> {
-        let mut file = file_beside(path)?;
-        let mut out = BufWriter::with_capacity(1 << 18, &mut file);
-        write(&mut out)?;
-        out.flush()?;
-        drop(out);
-        file.persist(path)?;
-        Ok(())
-    };
-    Ok(whole().with_context(|| path.display().to_string())?)
 }

@@ -5,10 +5,9 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_stack::Layer;
 
-use crate::commands::sample::write_file;
 use crate::picture::{Picture, Region, Scale};
 use crate::stop::Stop;
-use crate::streams::{failed_at, input_name, is_stream, open_pages};
+use crate::streams::{failed_at, input_name, is_stream, open_pages, write_file};
 
 /// Show a layer as a PNG picture, whole or in part
 #[derive(Args)]
