@@ -17,7 +17,7 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 
 use commands::Command;
 use options::Common;
-use stop::Stop;
+use stop::{Stop, stop_on_signals};
 
 /// CAD parts to the layer images of projection photopolymerization.
 #[derive(Parser)]
@@ -41,7 +41,7 @@ slice, fix, dither and tile stand for lamp slice, lamp fix, lamp dither and lamp
 /// Runs `lamp` with the process's arguments.
 pub fn run_lamp() -> ExitCode {
     let Lamp { command, common } = Lamp::parse();
-    finish(command.name(), common.apply().and_then(|()| command.run(&common)))
+    finish(command.name(), run(&command, &common))
 }
 
 /// Runs one of the pipeline's stages with the process's arguments.
@@ -57,7 +57,13 @@ pub fn run_stage(name: &str) -> ExitCode {
     let matches = stage.get_matches();
     let common = Common::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let command = Command::of_stage(name, &matches).unwrap_or_else(|error| error.exit());
-    finish(name, common.apply().and_then(|()| command.run(&common)))
+    finish(name, run(&command, &common))
+}
+
+fn run(command: &Command, common: &Common) -> Result<(), Stop> {
+    stop_on_signals()?;
+    common.apply()?;
+    command.run(common)
 }
 
 /// Says in one sentence why a command stopped, and turns it into a status.

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use lamp_postprocess::TileError;
 use lamp_slicer::SliceError;
@@ -16,6 +17,26 @@ pub(crate) enum Stop {
     Failed(anyhow::Error),
     /// Writing the output failed: status 1, or none if its reader went away.
     Output(anyhow::Error),
+    /// Somebody ended the command: status 130, as shells have it.
+    Interrupted,
+}
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Lets Ctrl-C and the signals that end a batch stop the work in order, so
+/// that no temporary file remains; a second one stops it at once.
+pub(crate) fn stop_on_signals() -> Result<(), Stop> {
+    let interrupt = || {
+        if INTERRUPTED.swap(true, Relaxed) {
+            std::process::exit(Stop::Interrupted.status().into());
+        }
+    };
+    ctrlc::set_handler(interrupt).map_err(|error| Stop::Failed(error.into()))
+}
+
+/// Stops between two layers if somebody ended the command.
+pub(crate) fn check_interrupted() -> Result<(), Stop> {
+    if INTERRUPTED.load(Relaxed) { Err(Stop::Interrupted) } else { Ok(()) }
 }
 
 impl Stop {
@@ -29,6 +50,7 @@ impl Stop {
             Self::Usage(message) => Self::Usage(format!("{place}: {message}")),
             Self::Failed(error) => Self::Failed(error.context(place)),
             Self::Output(error) => Self::Output(error.context(place)),
+            Self::Interrupted => Self::Interrupted,
         }
     }
 
@@ -36,6 +58,7 @@ impl Stop {
         match self {
             Self::Usage(_) => 2,
             Self::Failed(_) | Self::Output(_) => 1,
+            Self::Interrupted => 130,
         }
     }
 
@@ -57,6 +80,7 @@ impl fmt::Display for Stop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Usage(message) => f.write_str(message),
+            Self::Interrupted => f.write_str("interrupted"),
             Self::Failed(error) | Self::Output(error) => write!(f, "{error:#}"),
         }
     }

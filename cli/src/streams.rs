@@ -13,7 +13,7 @@ use lamp_stack::{
 
 use crate::options::{Common, Input, Output};
 use crate::report::Report;
-use crate::stop::Stop;
+use crate::stop::{Stop, check_interrupted};
 
 /// Whether a path stands for standard input or output.
 pub(crate) fn is_stream(path: &Path) -> bool {
@@ -131,7 +131,11 @@ pub(crate) fn write_layers(
         Destination::File(path.clone())
     };
     let format = if output.classic { Format::Classic } else { Format::Big };
-    let counted = layers.inspect(|_| report.layer_done());
+    let counted = layers.map(|layer| {
+        check_interrupted()?;
+        report.layer_done();
+        layer
+    });
     let written = write_stack(counted, to, format);
     report.done();
     let name =
