@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_stack::{Length, LengthError};
 
 use crate::stop::Stop;
 
@@ -72,6 +73,18 @@ pub(crate) fn parse_layers(text: &str) -> Result<Range<u32>, String> {
         return Err(format!("`{text}` holds no layer: the end must be above the start"));
     }
     Ok(start..end)
+}
+
+/// Parses a length that is not below zero.
+pub(crate) fn parse_distance(text: &str) -> Result<Length, String> {
+    let length: Length = text.parse().map_err(|error: LengthError| error.to_string())?;
+    if length.um() < 0.0 { Err(format!("{length} is below zero")) } else { Ok(length) }
+}
+
+/// Parses a length above zero.
+pub(crate) fn parse_thickness(text: &str) -> Result<Length, String> {
+    let length = parse_distance(text)?;
+    if length.um() == 0.0 { Err("a layer has some thickness".to_owned()) } else { Ok(length) }
 }
 
 /// Parses a count with an optional `k` or `M`: `750k`, `5.5M`.

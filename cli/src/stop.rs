@@ -44,6 +44,10 @@ impl Stop {
         Self::Usage(message.into())
     }
 
+    pub(crate) fn output(error: io::Error, place: &'static str) -> Self {
+        Self::Output(anyhow::Error::new(error).context(place))
+    }
+
     /// Puts what was being worked on before the message.
     pub(crate) fn at(self, place: impl fmt::Display + Send + Sync + 'static) -> Self {
         match self {

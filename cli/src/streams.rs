@@ -2,10 +2,9 @@
 
 use std::fmt::Display;
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::ops::Range;
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use lamp_stack::{
     Destination, Format, Layer, Page, Pages, StackError, StackInfo, file_beside, map_in_order,
     write_stack,
@@ -27,7 +26,8 @@ pub(crate) fn input_name(path: &Path) -> String {
 
 /// Prints a text that was asked for.
 pub(crate) fn print(text: &str) -> Result<(), Stop> {
-    io::stdout().lock().write_all(text.as_bytes()).map_err(|error| Stop::Output(error.into()))
+    let written = io::stdout().lock().write_all(text.as_bytes());
+    written.map_err(|error| Stop::output(error, "standard output"))
 }
 
 /// Opens a stack's pages.
@@ -73,17 +73,12 @@ pub(crate) fn read_layers(
     report: &Report,
 ) -> Result<impl Iterator<Item = Result<Layer, Stop>> + use<>, Stop> {
     let name = input_name(&input.stack);
-    let pages = open_pages(&input.stack)?;
-    let pages = pages.map(move |page| page.map_err(|error| failed_at(name.clone(), error)));
     let report = report.clone();
-    let pages = wanted_pages(pages, input.layers.clone()).inspect(move |page| {
-        if let Ok((_, Some(stack))) = page
-            && let Some(layers) = stack.layers
-        {
-            report.expect(layers.into());
+    let pages = read_pages(input)?.inspect(move |page| {
+        if let Ok((_, Some(StackInfo { layers: Some(layers), .. }))) = page {
+            report.expect((*layers).into());
         }
     });
-    let name = input_name(&input.stack);
     Ok(map_in_order(pages, move |(page, stack): (Page, _)| {
         let mut layer = page.decode().map_err(|error| failed_at(name.clone(), error))?;
         layer.info.stack = stack;
@@ -91,24 +86,37 @@ pub(crate) fn read_layers(
     }))
 }
 
-/// The pages of the layers wanted. What the first page says of the stack goes
-/// to the first of them.
-fn wanted_pages(
-    pages: impl Iterator<Item = Result<Page, Stop>>,
-    layers: Option<Range<u32>>,
-) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>> {
+/// Reads the pages of the layers wanted. What the first page says of the stack
+/// stands beside the first of them.
+pub(crate) fn read_pages(
+    input: &Input,
+) -> Result<impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>> + use<>, Stop> {
+    let name = input_name(&input.stack);
+    let layers = input.layers.clone();
+    let mut pages = open_pages(&input.stack)?;
     let mut stack: Option<StackInfo> = None;
-    pages.filter_map(move |page| {
-        let page = match page {
-            Ok(page) => page,
-            Err(stop) => return Some(Err(stop)),
-        };
-        let of_page = page.info().stack.clone();
-        let Some(layers) = &layers else { return Some(Ok((page, of_page))) };
-        // How many pages are wanted is not known before the last.
-        stack = of_page.map(|of_page| StackInfo { layers: None, ..of_page }).or(stack.take());
-        layers.contains(&page.info().index).then(|| Ok((page, stack.take())))
-    })
+    let mut found = false;
+    Ok(std::iter::from_fn(move || {
+        for page in pages.by_ref() {
+            let page = match page {
+                Ok(page) => page,
+                Err(error) => {
+                    found = true;
+                    return Some(Err(failed_at(name.clone(), error)));
+                }
+            };
+            let of_page = page.info().stack.clone();
+            let Some(layers) = &layers else { return Some(Ok((page, of_page))) };
+            // How many pages are wanted is not known before the last.
+            stack = of_page.map(|of_page| StackInfo { layers: None, ..of_page }).or(stack.take());
+            if layers.contains(&page.info().index) {
+                found = true;
+                return Some(Ok((page, stack.take())));
+            }
+        }
+        let none_found = layers.is_some() && !std::mem::replace(&mut found, true);
+        none_found.then(|| Err(Stop::Failed(anyhow!("{name}: no layer is in that range"))))
+    }))
 }
 
 /// Writes layers where `output` says, counting them in `report`.

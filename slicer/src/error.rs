@@ -22,6 +22,9 @@ pub enum SliceError {
         /// The file's size in bytes.
         size: u64,
     },
+    /// A file of a format that is known, but not read.
+    #[error("this is a {0} file, not an STL: export the part as STL")]
+    OtherFormat(&'static str),
     /// A binary STL whose header does not agree with its size.
     #[error(
         "the header declares {declared} facets, which take {} bytes, but the file has {size}: {}",

@@ -85,8 +85,7 @@ impl Model {
             _ if ascii::looks_ascii(&start) => {
                 Facets::Memory(ascii::read(&map(file, 0, size as usize)?)?)
             }
-            Some(declared) => return Err(SliceError::Count { declared, size }),
-            None => return Err(SliceError::NotStl { size }),
+            declared => return Err(why_not_stl(&start, declared, size)),
         };
         Ok(Self { name, facets, digest: digest_of(file, size)? })
     }
@@ -133,6 +132,28 @@ impl Model {
         }
         Ok(())
     }
+}
+
+fn why_not_stl(start: &[u8], declared: Option<u32>, size: u64) -> SliceError {
+    match (other_format(start), declared) {
+        (Some(format), _) => SliceError::OtherFormat(format),
+        (None, Some(declared)) => SliceError::Count { declared, size },
+        (None, None) => SliceError::NotStl { size },
+    }
+}
+
+/// The format of a file that is given for an STL by mistake, if it is known.
+fn other_format(start: &[u8]) -> Option<&'static str> {
+    const FORMATS: [(&[u8], &str); 7] = [
+        (b"ISO-10303-21", "STEP"),
+        (b"II*\0", "TIFF"),
+        (b"II+\0", "TIFF"),
+        (b"MM\0*", "TIFF"),
+        (b"PK\x03\x04", "ZIP or 3MF"),
+        (b"ply", "PLY"),
+        (b"\x89PNG", "PNG"),
+    ];
+    FORMATS.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, name)| *name)
 }
 
 /// The corners of a binary facet.

@@ -62,6 +62,12 @@ pub enum StackError {
     /// A folder without pages.
     #[error("the folder holds no .tif page")]
     NoPages,
+    /// A page is missing from a folder.
+    #[error("the folder lacks a page: layer {layer} does not follow what was before it")]
+    MissingPage {
+        /// The layer behind the gap.
+        layer: u32,
+    },
     /// A file of a folder that is a stack of its own.
     #[error(
         "file {page} of the folder, by name, has several pages: a folder's files have one page each"
@@ -82,8 +88,10 @@ pub enum StackError {
     #[error("there is no layer to write")]
     NoLayers,
     /// A folder of pages is to be written where something stands already.
-    #[error("{0} is there already: remove it or choose another name")]
-    Exists(String),
+    #[error(
+        "a folder of pages is not written over what is there: remove it or choose another name"
+    )]
+    Exists,
     /// Reading or writing failed.
     #[error(transparent)]
     Io(#[from] io::Error),

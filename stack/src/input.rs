@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::error::StackError;
-use crate::layer::Layer;
+use crate::layer::{Layer, PageInfo};
 use crate::ordered::map_in_order;
 use crate::tiff::{Page, PageReader};
 
@@ -71,6 +71,9 @@ impl Pages {
                 if self.in_folder && !self.reader.is_at_end() {
                     return Err(StackError::SeveralPages { page: self.count });
                 }
+                if self.in_folder && !self.follows(page.info()) {
+                    return Err(StackError::MissingPage { layer: page.info().index });
+                }
                 return Ok(Some(page));
             }
             match self.files.pop() {
@@ -83,6 +86,15 @@ impl Pages {
                 }
                 None => return Ok(None),
             }
+        }
+    }
+
+    /// Whether a folder's page can be the next. The first of ours states the
+    /// stack.
+    fn follows(&self, info: &PageInfo) -> bool {
+        match self.last_whole {
+            Some(last) => info.index == last + 1,
+            None => info.stack.is_some() || info.z_um.is_none(),
         }
     }
 }

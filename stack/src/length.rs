@@ -57,7 +57,7 @@ pub enum LengthError {
     #[error("`{0}` is not a length: write a number and a unit, as 100um, 0.1mm, 4mil or 0.004in")]
     NotALength(String),
     /// The number has no unit, or an unknown one.
-    #[error("`{text}` has no unit that is known: write {text}um, {text}mm, {text}mil or {text}in")]
+    #[error("`{text}` has no unit that is known: add um, mm, mil or in")]
     NoUnit {
         /// The text as given.
         text: String,

@@ -88,7 +88,7 @@ impl Sink {
             }
             Destination::Folder(path) => {
                 if path.exists() && !is_empty_folder(&path) {
-                    return Err(StackError::Exists(path.display().to_string()));
+                    return Err(StackError::Exists);
                 }
                 Self::Folder { temporary: folder_beside(&path)?, path, format, empty: true }
             }

@@ -109,7 +109,6 @@ fn a_cut_stream_names_the_last_whole_layer() {
                         "{text}"
                     );
                 }
-                Err(StackError::NotTiff { .. }) => assert!(cut < 4),
                 Ok(read) => assert!(cut > whole.len() - 8 && read.len() == 4, "cut at {cut}"),
                 Err(error) => panic!("cut at {cut}: {error}"),
             }
@@ -164,9 +163,16 @@ fn a_file_and_a_folder_read_back() {
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no temporary files remain");
 
-    std::fs::remove_file(folder.path().join("stack/layer_00011.tif")).unwrap();
-    let last = Pages::open(&folder.path().join("stack")).unwrap().layers().last().unwrap();
+    let without = |page: &str| {
+        std::fs::remove_file(folder.path().join("stack").join(page)).unwrap();
+        Pages::open(&folder.path().join("stack")).unwrap().layers().last().unwrap()
+    };
+    let last = without("layer_00011.tif");
     assert!(matches!(last, Err(StackError::CutOff { last_whole: Some(10) })));
+    let middle = without("layer_00004.tif");
+    assert!(matches!(middle, Err(StackError::MissingPage { layer: 5 })));
+    let first = without("layer_00000.tif");
+    assert!(matches!(first, Err(StackError::MissingPage { layer: 1 })));
 }
 
 #[test]
@@ -199,7 +205,7 @@ fn a_folder_in_use_is_not_written_over() {
     std::fs::write(folder.path().join("thesis.doc"), "mine").unwrap();
     let to = Destination::Folder(folder.path().to_owned());
     let written = write_stack::<StackError>(layers(1).into_iter().map(Ok), to, Format::Big);
-    assert!(matches!(written, Err(StackError::Exists(_))));
+    assert!(matches!(written, Err(StackError::Exists)));
     assert!(folder.path().join("thesis.doc").exists());
 }
 

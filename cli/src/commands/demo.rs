@@ -1,5 +1,4 @@
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -40,10 +39,12 @@ const PICTURED: [f64; 4] = [0.04, 0.354, 0.76, 0.925];
 const SCALE: Scale = Scale::Down(8);
 
 pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
+    let part = Part::Blade;
+    let mesh = build(part, args.facets).map_err(|error| Stop::usage(error.to_string()))?;
     fs::create_dir_all(&args.folder).with_context(|| args.folder.display().to_string())?;
     let [stl, stack, sheet] =
         ["blade.stl", "build.tif", "layers.png"].map(|name| args.folder.join(name));
-    let facets = write_model(args, &stl)?;
+    write_file(&stl, |out| mesh.write_stl(part.name(), out))?;
     let report = Report::new("demo", common.quiet, true);
     let started = Instant::now();
     let size = run_pipeline(&stl, &stack, &report)?;
@@ -55,6 +56,7 @@ pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
     let megabytes = fs::metadata(&stack).context("build.tif")?.len() as f64 / 1e6;
     let [stl, stack, sheet] = [stl, stack, sheet].map(|path| path.display().to_string());
     let StackSize { layers, width, height } = size;
+    let facets = mesh.facets.len();
     print(&format!(
         "\
 {stl}: a hollow blade mould, 76 x 76 x 127 mm, {facets} facets
@@ -63,13 +65,6 @@ pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
 The same by hand: slice {stl} | fix | dither | tile > {stack}
 "
     ))
-}
-
-fn write_model(args: &DemoArgs, path: &Path) -> Result<usize, Stop> {
-    let part = Part::Blade;
-    let mesh = build(part, args.facets).map_err(|error| Stop::usage(error.to_string()))?;
-    write_file(path, |out| mesh.write_stl(part.name(), out))?;
-    Ok(mesh.facets.len())
 }
 
 #[derive(Default)]
@@ -135,5 +130,5 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Stop> {
 }
 
 fn write_picture(path: &Path, picture: Picture<'_>) -> Result<(), Stop> {
-    write_file(path, |out| picture.write_png(out).map_err(io::Error::other))
+    write_file(path, |out| picture.write_png(out))
 }

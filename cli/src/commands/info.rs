@@ -3,7 +3,7 @@ use lamp_stack::{Compression, Layer, Page, StackInfo, map_in_order};
 
 use crate::options::Input;
 use crate::stop::Stop;
-use crate::streams::{failed_at, input_name, open_pages, print};
+use crate::streams::{failed_at, input_name, print, read_pages};
 
 /// Say what a stack holds: pages, size, resolution, heights, runs, bytes
 #[derive(Args)]
@@ -18,26 +18,18 @@ pub(crate) struct InfoArgs {
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Stop> {
     let name = input_name(&args.input.stack);
-    let failed = |error| failed_at(name.clone(), error);
-    let wanted = |page: &Page| {
-        args.input.layers.as_ref().is_none_or(|layers| layers.contains(&page.info().index))
-    };
-    let pages = open_pages(&args.input.stack)?
-        .map(|page| page.map_err(failed))
-        .filter(|page| page.as_ref().map_or(true, wanted));
-    let decoded = map_in_order(pages, |page: Page| {
+    let decoded = map_in_order(read_pages(&args.input)?, |(page, stack): (Page, _)| {
         let (bytes, compression) = (page.strip_bytes(), page.compression());
-        Ok::<_, Stop>((page.decode().map_err(failed)?, bytes, compression))
+        let mut layer = page.decode().map_err(|error| failed_at(name.clone(), error))?;
+        layer.info.stack = stack;
+        Ok((layer, bytes, compression))
     });
     let mut totals: Option<Totals> = None;
     for page in decoded {
         let (layer, bytes, compression) = page?;
         totals.get_or_insert_with(|| Totals::new(&layer, compression)).add(&layer, bytes);
     }
-    let Some(totals) = totals else {
-        return Err(Stop::Failed(anyhow::anyhow!("{name}: no layer is in that range")));
-    };
-    print(&totals.text(&name))
+    totals.map_or(Ok(()), |totals| print(&totals.text(&name)))
 }
 
 /// What adds up over the layers.

@@ -106,7 +106,7 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
     }
     let mut out = BufWriter::new(io::stdout().lock());
     let written = write(&mut out).and_then(|()| out.flush());
-    written.map_err(|error| Stop::Output(anyhow::Error::new(error).context("standard output")))
+    written.map_err(|error| Stop::output(error, "standard output"))
 }
 
 impl SampleArgs {

@@ -51,9 +51,10 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Stop> {
     })?;
     let picture = Picture::new(&image, region, args.scale);
     if is_stream(&args.output) {
-        picture.write_png(BufWriter::new(io::stdout().lock())).map_err(Stop::Output)
+        let written = picture.write_png(BufWriter::new(io::stdout().lock()));
+        written.map_err(|error| Stop::output(error, "standard output"))
     } else {
-        write_file(&args.output, |out| picture.write_png(out).map_err(io::Error::other))
+        write_file(&args.output, |out| picture.write_png(out))
     }
 }
 

@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use lamp_slicer::{Fill, Frame, Model, PlaneRule, SliceOptions, Slices, Units};
 use lamp_stack::{Dpi, Layer, Length, Size};
 
-use crate::options::{Common, Output, parse_bytes, parse_layers};
+use crate::options::{Common, Output, parse_bytes, parse_layers, parse_thickness};
 use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream, report, write_layers};
@@ -49,7 +49,8 @@ pub(crate) struct PartOptions {
     dpi: Dpi,
 
     /// Thickness of the layers, as 100um, 0.1mm, 4mil or 0.004in
-    #[arg(long, value_name = "LENGTH", default_value = "100um")]
+    #[arg(long, value_name = "LENGTH", default_value = "100um", value_parser = parse_thickness)]
+    #[arg(allow_hyphen_values = true)]
     thickness: Length,
 
     /// Where in its layer a section is taken

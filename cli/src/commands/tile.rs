@@ -2,7 +2,7 @@ use clap::Args;
 use lamp_postprocess::TileOptions;
 use lamp_stack::{Length, Size};
 
-use crate::options::{Common, Input, Output};
+use crate::options::{Common, Input, Output, parse_distance};
 use crate::stop::Stop;
 use crate::streams::{input_name, read_layers, report, write_layers};
 
@@ -29,7 +29,7 @@ pub(crate) struct TileArgs {
     copies: Option<u32>,
 
     /// The least distance between copies [default: 1mm]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_gap)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     gap: Option<Length>,
 
     #[command(flatten)]
@@ -53,9 +53,4 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
         }
         stop => stop,
     })
-}
-
-fn parse_gap(text: &str) -> Result<Length, String> {
-    let gap: Length = text.parse().map_err(|error: lamp_stack::LengthError| error.to_string())?;
-    if gap.um() < 0.0 { Err("copies cannot overlap".to_owned()) } else { Ok(gap) }
 }

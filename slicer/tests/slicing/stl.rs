@@ -127,10 +127,21 @@ fn a_file_without_facets_says_so() {
 
 #[test]
 fn other_files_are_not_stl() {
-    for bytes in [&b"x"[..], b"solid", b"solid part\n", b"\x89PNG\r\n", &[0; 83]] {
+    for bytes in [&b"x"[..], b"solid", b"solid part\n", &[0; 83]] {
         let message = refusal(bytes);
         assert!(message.contains("not an STL file"), "{message}");
         assert!(message.contains(&format!("has {} bytes", bytes.len())), "{message}");
+    }
+}
+
+#[test]
+fn a_file_of_another_format_is_named() {
+    let step = [b"ISO-10303-21;\nHEADER;\n".as_slice(), &[b' '; 200]].concat();
+    for (bytes, format) in
+        [(step.as_slice(), "STEP"), (b"II*\0\x08\0\0\0", "TIFF"), (b"\x89PNG\r\n", "PNG")]
+    {
+        let message = refusal(bytes);
+        assert!(message.contains(&format!("a {format} file, not an STL")), "{message}");
     }
 }
 

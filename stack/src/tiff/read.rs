@@ -57,6 +57,15 @@ impl PageReader {
             [b'M', b'M', 0, 42, ..] => (false, false),
             [b'I', b'I', 43, 0, ..] => (true, true),
             [b'M', b'M', 0, 43, ..] => (false, true),
+            // The first bytes of a TIFF, but not all that tell one.
+            [b'I']
+            | [b'I', b'I']
+            | [b'I', b'I', 42 | 43]
+            | [b'M']
+            | [b'M', b'M']
+            | [b'M', b'M', 0] => {
+                return Err(StackError::CutOff { last_whole: None });
+            }
             _ => return Err(StackError::NotTiff { start }),
         };
         if big {

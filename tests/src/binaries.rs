@@ -1,0 +1,59 @@
+//! Where the binaries are.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// Returns the path of a binary of `lamp-cli`, built from the sources as they
+/// are now.
+///
+/// # Panics
+/// Where the binaries do not build; the message is the compiler's.
+pub fn bin(name: &str) -> PathBuf {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        build();
+        profile_dir()
+    });
+    folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// Returns the folder of the workspace's `Cargo.toml`.
+pub fn workspace_root() -> &'static Path {
+    // By name, not by `..`: a member may be a link to a folder elsewhere.
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
+    root.expect("this package is a folder of the workspace")
+}
+
+/// Returns the folder that cargo builds in.
+pub fn target_dir() -> PathBuf {
+    folder_above(&profile_dir())
+}
+
+/// `target/debug` or `target/release`: a test runs as `target/debug/deps/x`.
+fn profile_dir() -> PathBuf {
+    let test = std::env::current_exe().expect("a test knows its path");
+    folder_above(&folder_above(&test))
+}
+
+fn folder_above(path: &Path) -> PathBuf {
+    path.parent().expect("tests run in target/<profile>/deps").to_owned()
+}
+
+/// Cargo builds a package's binaries for that package's own tests only, so
+/// they are built here, with the profile of this test.
+fn build() {
+    let folder = profile_dir();
+    let profile = match folder.file_name().and_then(|name| name.to_str()) {
+        Some("debug") | None => "dev",
+        Some(name) => name,
+    };
+    let built = Command::new(env!("CARGO"))
+        .args(["build", "--package", "lamp-cli", "--bins", "--profile", profile, "--target-dir"])
+        .arg(target_dir())
+        .current_dir(workspace_root())
+        .output()
+        .expect("cargo starts");
+    let said = String::from_utf8_lossy(&built.stderr);
+    assert!(built.status.success(), "the binaries do not build:\n{said}");
+}

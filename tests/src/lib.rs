@@ -1,0 +1,42 @@
+//! What the end-to-end tests share: the binaries, a folder to run them in,
+//! and the comparison of layers with golden images.
+//!
+//! The tests run the real `lamp`, `slice`, `fix`, `dither` and `tile`; they
+//! are built first, so that they are never stale. A test reads as what people
+//! type:
+//!
+//! ```
+//! use lamp_fixtures::Part;
+//! use lamp_tests::Scratch;
+//!
+//! let scratch = Scratch::new();
+//! scratch.part("cube.stl", Part::Cube, 64);
+//! scratch.run("slice cube.stl --dpi 100 | fix | dither | tile > build.tif").succeeds();
+//! assert_eq!(scratch.layers("build.tif").len(), 200);
+//! ```
+
+mod binaries;
+mod golden;
+mod scratch;
+
+pub use binaries::{bin, target_dir, workspace_root};
+pub use golden::{Change, Golden, Shade, difference};
+pub use scratch::{Ran, Scratch, ends_white, mask, masks, read_stack, write_gray_ramp};
+
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Returns a folder of models or images from elsewhere, `stl` or `tiff`:
+/// `../shared/data` beside the workspace, where it exists.
+pub fn shared_data(kind: &str) -> Option<PathBuf> {
+    let folder = workspace_root().parent()?.join("shared/data").join(kind);
+    folder.is_dir().then_some(folder)
+}
+
+/// Says a line that shows even where the test passes, such as why something
+/// was skipped: the test harness only captures what `println!` and its like
+/// write.
+pub fn note(line: &str) {
+    // Nobody may be listening; that is no failure of the test.
+    let _ = writeln!(std::io::stderr().lock(), "note: {line}");
+}

@@ -1,0 +1,252 @@
+//! A folder to run the binaries in.
+
+use std::fs::{self, File};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use lamp_fixtures::{Mesh, Part, build};
+use lamp_stack::{
+    Destination, Dpi, Format, GrayMask, Image, Layer, Mask, PageInfo, Pages, StackError,
+    write_stack,
+};
+use tempfile::TempDir;
+
+use crate::binaries::bin;
+
+/// A temporary folder that commands run in.
+#[derive(Debug)]
+pub struct Scratch {
+    folder: TempDir,
+}
+
+/// What became of a pipeline.
+#[derive(Clone, Debug)]
+pub struct Ran {
+    /// The command line.
+    pub line: String,
+    /// The exit status of each stage; `None` for one that a signal ended.
+    pub statuses: Vec<Option<i32>>,
+    /// What the last stage wrote, unless that went to a file.
+    pub stdout: Vec<u8>,
+    /// What all stages said, as a terminal shows it.
+    pub stderr: String,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Scratch {
+    /// Makes an empty folder.
+    ///
+    /// # Panics
+    /// Where the system has no room for one.
+    pub fn new() -> Self {
+        Self { folder: tempfile::tempdir().expect("a temporary folder") }
+    }
+
+    /// Returns the path of something in the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Writes a file.
+    pub fn write(&self, name: &str, bytes: &[u8]) {
+        fs::write(self.path(name), bytes).expect("the folder can be written to");
+    }
+
+    /// Reads a file.
+    pub fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    /// Writes a sample part.
+    pub fn part(&self, name: &str, part: Part, facets: usize) {
+        self.mesh(name, &build(part, facets).expect("enough facets"));
+    }
+
+    /// Writes a mesh.
+    pub fn mesh(&self, name: &str, mesh: &Mesh) {
+        let mut stl = Vec::new();
+        mesh.write_stl(name.trim_end_matches(".stl"), &mut stl).expect("memory takes all");
+        self.write(name, &stl);
+    }
+
+    /// Reads a stack, a file or a folder of pages.
+    pub fn layers(&self, name: &str) -> Vec<Layer> {
+        let pages = Pages::open(&self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let layers: Result<_, _> = pages.layers().collect();
+        layers.unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    /// Returns what stands in the folder, hidden files too, sorted.
+    pub fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.folder.path()).expect("the folder is there");
+        let name = |entry: std::io::Result<fs::DirEntry>| {
+            entry.expect("it can be listed").file_name().to_string_lossy().into_owned()
+        };
+        let mut names: Vec<_> = entries.map(name).collect();
+        names.sort();
+        names
+    }
+
+    /// Returns a binary with its arguments, set to run in the folder with
+    /// nothing on its standard input.
+    pub fn command(&self, words: &str) -> Command {
+        let mut words = words.split_whitespace();
+        let mut command = Command::new(bin(words.next().expect("a command has a name")));
+        command.args(words).current_dir(self.folder.path()).stdin(Stdio::null());
+        command
+    }
+
+    /// Runs a pipeline as a shell does, `a x | b | c > file`, each stage's
+    /// output being the pipe that the next one reads. There are no quotes.
+    pub fn run(&self, line: &str) -> Ran {
+        self.run_on(line, &[])
+    }
+
+    /// Runs a pipeline with `input` on the first stage's standard input.
+    pub fn run_on(&self, line: &str, input: &[u8]) -> Ran {
+        let (stages, file) = match line.split_once('>') {
+            Some((stages, file)) => (stages, Some(file.trim())),
+            None => (line, None),
+        };
+        let mut said = tempfile::tempfile().expect("a temporary file");
+        let mut children = self.start(stages, file, &said);
+        let to_first = children[0].stdin.take().expect("it was asked for");
+        let from_last = children.last_mut().and_then(|child| child.stdout.take());
+        let stdout = std::thread::scope(|scope| {
+            scope.spawn(move || {
+                let mut to_first = to_first;
+                // A stage may refuse its input before the end.
+                let _ = to_first.write_all(input);
+            });
+            from_last.map_or_else(Vec::new, |mut from| {
+                let mut bytes = Vec::new();
+                from.read_to_end(&mut bytes).expect("a pipe can be read");
+                bytes
+            })
+        });
+        let statuses = children
+            .iter_mut()
+            .map(|child| child.wait().expect("a child can be waited for").code())
+            .collect();
+        let mut stderr = String::new();
+        said.rewind().and_then(|()| said.read_to_string(&mut stderr)).expect("text");
+        Ran { line: line.to_owned(), statuses, stdout, stderr }
+    }
+
+    fn start(&self, stages: &str, file: Option<&str>, said: &File) -> Vec<Child> {
+        let stages: Vec<&str> = stages.split('|').collect();
+        let mut children: Vec<Child> = Vec::new();
+        for (i, words) in stages.iter().enumerate() {
+            let from = match children.last_mut() {
+                Some(before) => before.stdout.take().expect("it was asked for").into(),
+                None => Stdio::piped(),
+            };
+            let to = match file {
+                Some(name) if i + 1 == stages.len() => {
+                    File::create(self.path(name)).expect("the folder can be written to").into()
+                }
+                _ => Stdio::piped(),
+            };
+            let said = said.try_clone().expect("a file has many handles");
+            let child = self.command(words).stdin(from).stdout(to).stderr(said).spawn();
+            children.push(child.unwrap_or_else(|error| panic!("{words}: {error}")));
+        }
+        children
+    }
+}
+
+impl Ran {
+    /// Checks that every stage ended well.
+    ///
+    /// # Panics
+    /// Where one did not, with what was said.
+    #[track_caller]
+    pub fn succeeds(self) -> Self {
+        assert!(self.statuses.iter().all(|&status| status == Some(0)), "{self:?}");
+        self
+    }
+
+    /// Checks that every stage ended well and none said a word.
+    ///
+    /// # Panics
+    /// Where that is not so.
+    #[track_caller]
+    pub fn succeeds_quietly(self) -> Self {
+        let ran = self.succeeds();
+        assert_eq!(ran.stderr, "", "{}", ran.line);
+        ran
+    }
+
+    /// Checks that the last stage refused its input: status 1 and one line
+    /// that starts with the command's name and holds all of `words`.
+    ///
+    /// # Panics
+    /// Where that is not so.
+    #[track_caller]
+    pub fn is_refused_with(self, words: &[&str]) -> Self {
+        assert_eq!(self.statuses.last(), Some(&Some(1)), "{self:?}");
+        assert_eq!(self.stderr.lines().count(), 1, "{self:?}");
+        assert!(!self.stderr.contains("panicked"), "{self:?}");
+        for word in words {
+            assert!(self.stderr.contains(word), "no `{word}` in {self:?}");
+        }
+        self
+    }
+}
+
+/// Returns the 1-bit image of a layer.
+///
+/// # Panics
+/// If it is gray.
+pub fn mask(layer: &Layer) -> &Mask {
+    match &layer.image {
+        Image::Mask(mask) => mask,
+        Image::Gray(_) => panic!("{} is gray", layer.info.name()),
+    }
+}
+
+/// Returns the 1-bit images of layers.
+pub fn masks(layers: &[Layer]) -> Vec<&Mask> {
+    layers.iter().map(mask).collect()
+}
+
+/// Reads a stack from memory, as it comes through a pipe.
+pub fn read_stack(bytes: Vec<u8>) -> Vec<Layer> {
+    let pages = Pages::from_stream(std::io::Cursor::new(bytes)).expect("a stack");
+    pages.layers().collect::<Result<_, _>>().expect("a whole stack")
+}
+
+/// Whether some row of the image ends white, as none of a whole part does.
+pub fn ends_white(mask: &Mask) -> bool {
+    mask.rows().any(|row| row.len() % 2 == 1)
+}
+
+/// The folder, where a path is wanted.
+impl AsRef<Path> for Scratch {
+    fn as_ref(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+/// Writes a stack of one gray layer: each row rises from black on its left to
+/// full exposure on its right.
+///
+/// # Panics
+/// Where the file cannot be written.
+pub fn write_gray_ramp(path: &Path, width: u32, height: u32) {
+    let mut gray = GrayMask::new(width);
+    let level = |column: u32| (1, (column * 255 / (width - 1)) as u8);
+    for _ in 0..height {
+        gray.push_runs((0..width).map(level)).expect("as many pixels as the width");
+    }
+    let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: Image::Gray(gray) };
+    let to = Destination::File(path.to_owned());
+    let layers = std::iter::once(Ok::<_, StackError>(layer));
+    write_stack(layers, to, Format::Big).expect("the file can be written");
+}

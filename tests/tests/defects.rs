@@ -1,0 +1,176 @@
+//! Broken meshes: `slice` says which rows do not balance, `fix` mends them,
+//! and what is whole passes untouched.
+
+use lamp_fixtures::Part;
+use lamp_stack::Layer;
+use lamp_tests::{Ran, Scratch, ends_white, mask, masks};
+
+const COARSE: &str = "--dpi 150 --thickness 500um";
+
+/// Makes `broken.stl` and slices it to `stray.tif`.
+fn sliced(scratch: &Scratch, defect: &str) -> Ran {
+    let line = format!("lamp sample tower --facets 20k {defect} -o broken.stl");
+    scratch.run(&line).succeeds();
+    scratch.run(&format!("slice broken.stl {COARSE} -o stray.tif")).succeeds()
+}
+
+fn stray_rows(layers: &[Layer]) -> usize {
+    layers.iter().map(|layer| layer.info.stray_rows.len()).sum()
+}
+
+#[test]
+fn slice_lists_the_rows_that_do_not_balance() {
+    for seed in [1, 7] {
+        let scratch = Scratch::new();
+        let ran = sliced(&scratch, &format!("--defect drop --count 40 --seed {seed}"));
+        let layers = scratch.layers("stray.tif");
+        let rows = stray_rows(&layers);
+        let of = layers.iter().filter(|layer| !layer.info.stray_rows.is_empty()).count();
+        assert!(rows > 0);
+        let says = format!("slice: {rows} rows in {of} layers do not balance: the mesh has gaps");
+        assert!(ran.stderr.starts_with(&says), "{}", ran.stderr);
+        for layer in &layers {
+            let image = mask(layer);
+            let listed = &layer.info.stray_rows;
+            assert!(listed.is_sorted_by(|a, b| a < b));
+            assert!(listed.iter().all(|&row| row < image.height()));
+            let ends_white = |row: &u32| image.row(*row).len() % 2 == 1;
+            let missed = (0..image.height()).filter(ends_white).find(|row| !listed.contains(row));
+            assert_eq!(missed, None, "{}", layer.info.name());
+        }
+    }
+}
+
+#[test]
+fn a_seed_always_breaks_the_same_facets() {
+    let scratch = Scratch::new();
+    let broken = |seed: u32| {
+        let line = format!("lamp sample tower --facets 5k --defect drop --count 9 --seed {seed}");
+        scratch.run(&line).succeeds_quietly().stdout
+    };
+    assert!(broken(3) == broken(3));
+    assert!(broken(3) != broken(4));
+    let whole = scratch.run("lamp sample tower --facets 5k").succeeds_quietly().stdout;
+    assert_eq!(whole.len() - broken(3).len(), 9 * 50);
+}
+
+#[test]
+fn fix_says_what_it_changed_and_leaves_no_row_that_ends_white() {
+    let scratch = Scratch::new();
+    sliced(&scratch, "--defect drop --count 40 --seed 7");
+    let ran = scratch.run("fix stray.tif -o fixed.tif").succeeds();
+    let (stray, fixed) = (scratch.layers("stray.tif"), scratch.layers("fixed.tif"));
+    assert_eq!(stray.len(), fixed.len());
+    assert!(masks(&stray).iter().any(|mask| ends_white(mask)));
+    let mut lines = ran.stderr.lines();
+    for (stray, fixed) in stray.iter().zip(&fixed) {
+        assert!(!ends_white(mask(fixed)) && fixed.info.stray_rows.is_empty());
+        if stray.info.stray_rows.is_empty() {
+            assert!(stray == fixed, "{} had nothing to mend", stray.info.name());
+            continue;
+        }
+        let changed = changed_pixels(stray, fixed);
+        let line = lines.next().expect("a line for each layer that had stray rows");
+        assert!(line.starts_with(&format!("fix: {}: row", stray.info.name())), "{line}");
+        assert!(line.ends_with(&format!(" corrected, {changed} pixels changed")), "{line}");
+        let on_page = &fixed.info.other["fix"]["bands"];
+        let pixels =
+            on_page.as_array().unwrap().iter().map(|band| band["pixels"].as_u64().unwrap());
+        assert_eq!(pixels.sum::<u64>(), changed);
+    }
+    assert_eq!(lines.next(), None);
+}
+
+fn changed_pixels(a: &Layer, b: &Layer) -> u64 {
+    let (a, b) = (mask(a), mask(b));
+    let differ = |row| (0..a.width()).filter(move |&c| a.is_white(c, row) != b.is_white(c, row));
+    (0..a.height()).map(|row| differ(row).count() as u64).sum()
+}
+
+#[test]
+fn a_mended_stack_is_nearer_to_the_whole_part() {
+    let scratch = Scratch::new();
+    sliced(&scratch, "--defect drop --count 40 --seed 7");
+    scratch.run("fix stray.tif -o fixed.tif").succeeds();
+    scratch.run("lamp sample tower --facets 20k -o whole.stl").succeeds();
+    scratch.run(&format!("slice whole.stl {COARSE} -o whole.tif")).succeeds_quietly();
+    let [whole, stray, fixed] =
+        ["whole", "stray", "fixed"].map(|n| scratch.layers(&format!("{n}.tif")));
+    let off =
+        |layers: &[Layer]| whole.iter().zip(layers).map(|(a, b)| changed_pixels(a, b)).sum::<u64>();
+    // One hole a facet high spoils whole rows; a mended row is off by the
+    // slope of the wall.
+    let (stray, fixed) = (off(&stray), off(&fixed));
+    assert!(stray > 5_000 && fixed * 20 < stray, "{stray} pixels off, {fixed} after the fix");
+}
+
+#[test]
+fn fixing_twice_changes_no_byte() {
+    let scratch = Scratch::new();
+    sliced(&scratch, "--defect drop --count 40 --seed 7");
+    scratch.run("fix stray.tif -o fixed.tif").succeeds();
+    scratch.run("fix fixed.tif -o again.tif").succeeds_quietly();
+    assert!(scratch.bytes("stray.tif") != scratch.bytes("fixed.tif"));
+    assert!(scratch.bytes("fixed.tif") == scratch.bytes("again.tif"));
+}
+
+#[test]
+fn the_stage_that_is_told_of_stray_rows_by_their_page_mends_them_after_tiling_too() {
+    let scratch = Scratch::new();
+    sliced(&scratch, "--defect drop --count 40 --seed 7");
+    scratch.run("tile stray.tif --copies 4 -o tiled.tif").succeeds();
+    let (part, build) = (scratch.layers("stray.tif"), scratch.layers("tiled.tif"));
+    // Copies stand side by side: two rows of two, or four in a row.
+    let per_part = stray_rows(&build) / stray_rows(&part);
+    assert!([1, 2, 4].contains(&per_part));
+    assert_eq!(stray_rows(&build), per_part * stray_rows(&part));
+    scratch.run("fix tiled.tif -o fixed.tif").succeeds();
+    assert!(masks(&scratch.layers("fixed.tif")).iter().all(|mask| !ends_white(mask)));
+}
+
+#[test]
+fn a_clean_stack_passes_byte_for_byte() {
+    let scratch = Scratch::new();
+    for part in Part::ALL {
+        scratch.part("part.stl", part, part.min_facets().max(2_000));
+        let stack = scratch.run(&format!("slice part.stl {COARSE}")).succeeds_quietly().stdout;
+        for stage in ["fix", "dither", "dither --method floyd-steinberg"] {
+            let passed = scratch.run_on(stage, &stack).succeeds_quietly().stdout;
+            assert!(passed == stack, "{stage} changed a clean {}", part.name());
+        }
+    }
+}
+
+#[test]
+fn flipped_facets_change_no_pixel_under_even_odd() {
+    let scratch = Scratch::new();
+    scratch.run("lamp sample tower --facets 20k -o whole.stl").succeeds();
+    scratch.run(&format!("slice whole.stl {COARSE} -o whole.tif")).succeeds_quietly();
+    let ran = sliced(&scratch, "--defect flip --count 500 --seed 3");
+    assert_eq!(ran.stderr, "");
+    let (whole, flipped) = (scratch.layers("whole.tif"), scratch.layers("stray.tif"));
+    assert!(masks(&whole) == masks(&flipped));
+    // It is another file, and that shows.
+    let digest = |layers: &[Layer]| layers[0].info.stack.clone().unwrap().digest;
+    assert_ne!(digest(&whole), digest(&flipped));
+}
+
+#[test]
+fn flipped_facets_are_stray_under_nonzero() {
+    let scratch = Scratch::new();
+    sliced(&scratch, "--defect flip --count 20 --seed 3");
+    let line = format!("slice broken.stl {COARSE} --fill nonzero -o nonzero.tif");
+    let ran = scratch.run(&line).succeeds();
+    assert!(ran.stderr.contains("do not balance"), "{ran:?}");
+    assert!(stray_rows(&scratch.layers("nonzero.tif")) > 0);
+}
+
+#[test]
+fn nudged_and_doubled_facets_never_stop_the_pipeline() {
+    let scratch = Scratch::new();
+    for defect in ["--defect duplicate --count 40", "--defect nudge --count 40 --by 0.5mm"] {
+        sliced(&scratch, defect);
+        scratch.run("fix stray.tif | dither | tile -o build.tif").succeeds();
+        assert!(masks(&scratch.layers("build.tif")).iter().all(|mask| !ends_white(mask)));
+    }
+}

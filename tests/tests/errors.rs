@@ -1,0 +1,258 @@
+//! What goes wrong is said in one sentence, the exit status says whose fault
+//! it is, and nothing appears under a final name.
+
+use std::fs;
+
+use lamp_fixtures::Part;
+use lamp_tests::{Ran, Scratch};
+
+/// A folder with a good part, a good stack and all sorts of bad files.
+fn with_all_sorts() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.run("slice cube.stl --dpi 100 --thickness 1mm -o cube.tif").succeeds();
+    let stl = scratch.bytes("cube.stl");
+    scratch.write("empty.stl", b"");
+    scratch.write("text.stl", b"A recipe for pancakes.\n");
+    scratch.write("truncated.stl", &stl[..84 + 50 * 20 + 17]);
+    scratch.write("lying.stl", &with_count(&stl, u32::MAX));
+    scratch.write("modest.stl", &with_count(&stl, 10));
+    scratch.write("none.stl", &with_count(&stl[..84], 0));
+    scratch.write("nan.stl", &with_nan(&stl, 5));
+    scratch
+        .write("ascii.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0");
+    fs::create_dir(scratch.path("folder")).unwrap();
+    scratch.write("folder/kept", b"");
+    scratch
+}
+
+/// A binary STL whose header claims another number of facets.
+fn with_count(stl: &[u8], count: u32) -> Vec<u8> {
+    [&stl[..80], &count.to_le_bytes(), &stl[84..]].concat()
+}
+
+/// A binary STL with a corner that is no number.
+fn with_nan(stl: &[u8], facet: usize) -> Vec<u8> {
+    let mut stl = stl.to_vec();
+    let corner = 84 + 50 * facet + 12;
+    stl[corner..corner + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+    stl
+}
+
+/// Runs a command that must fail, and checks that it left the folder alone.
+#[track_caller]
+fn fails(scratch: &Scratch, line: &str) -> Ran {
+    let before = scratch.names();
+    let ran = scratch.run(line);
+    assert!(!ran.stderr.contains("panicked"), "{ran:?}");
+    assert!(ran.stdout.is_empty(), "{line} wrote something");
+    assert_eq!(scratch.names(), before, "{line}");
+    ran
+}
+
+#[track_caller]
+fn is_wrong_usage(scratch: &Scratch, line: &str, words: &[&str]) {
+    let ran = fails(scratch, line);
+    assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+    for word in words {
+        assert!(ran.stderr.contains(word), "no `{word}` in {ran:?}");
+    }
+}
+
+#[track_caller]
+fn is_bad_input(scratch: &Scratch, line: &str, words: &[&str]) {
+    let ran = fails(scratch, line).is_refused_with(words);
+    let name = line.trim_start_matches("lamp ").split(' ').next().unwrap();
+    assert!(ran.stderr.starts_with(&format!("{name}: ")), "{ran:?}");
+}
+
+#[test]
+fn wrong_usage_is_status_2_and_says_what_to_write() {
+    let scratch = with_all_sorts();
+    for (line, words) in [
+        ("slice cube.stl --frobnicate -o x.tif", &["--frobnicate"][..]),
+        ("slice", &["<PART>"]),
+        ("slice cube.stl --thickness 100 -o x.tif", &["`100` has no unit", "add um"]),
+        ("slice cube.stl --thickness 0um -o x.tif", &["some thickness"]),
+        ("slice cube.stl --thickness -1um -o x.tif", &["below zero"]),
+        ("slice cube.stl --thickness thick -o x.tif", &["`thick` is not a length", "100um"]),
+        ("slice cube.stl --dpi 0 -o x.tif", &["`0` is not a resolution", "1500"]),
+        ("slice cube.stl --layers 7..3 -o x.tif", &["`7..3` holds no layer"]),
+        ("slice cube.stl --layers a..b -o x.tif", &["not a range of layers", "A..B"]),
+        ("slice cube.stl --memory lots -o x.tif", &["`lots` is not an amount of memory", "64MB"]),
+        ("slice cube.stl --threads 0 -o x.tif", &["--threads"]),
+        ("slice cube.stl --origin 0,0 -o x.tif", &["--size"]),
+        ("slice cube.stl --origin 0 --size 3x3mm -o x.tif", &["`0` is not a point", "X,Y"]),
+        ("slice cube.stl --units furlong -o x.tif", &["furlong", "inch"]),
+        ("slice cube.stl --fill odd -o x.tif", &["even-odd", "nonzero"]),
+        ("tile cube.tif --area 5mm -o x.tif", &["`5mm` is not a size", "4x4.5in"]),
+        ("tile cube.tif --area 0x5mm -o x.tif", &["--area"]),
+        ("tile cube.tif --copies 0 -o x.tif", &["--copies"]),
+        ("tile cube.tif --gap -1mm -o x.tif", &["below zero"]),
+        ("dither cube.tif --method magic -o x.tif", &["magic", "ordered", "floyd-steinberg"]),
+        ("lamp sample teapot -o x.stl", &["teapot", "blade"]),
+        ("lamp sample tower --facets 999 -o x.stl", &["at least 1000 facets, not 999"]),
+        ("lamp sample tower --facets some -o x.stl", &["`some` is not a count", "750k"]),
+        ("lamp sample tower --seed 5 -o x.stl", &["--defect"]),
+        ("lamp show cube.tif -o x.png", &["--layer"]),
+        ("lamp show cube.tif --layer 3 --scale 2/3 -o x.png", &["`2/3` is not a scale", "1/8"]),
+        ("lamp show cube.tif --layer 3 --region 1,2,3 -o x.png", &["is not a region", "X,Y,W,H"]),
+        ("lamp show cube.tif --layer 3 --region 96,0,1,1 -o x.png", &["outside", "96 x 81"]),
+        ("lamp show cube.tif --layer 3 --region 0,81,1,1 -o x.png", &["outside", "96 x 81"]),
+        ("lamp frobnicate", &["frobnicate"]),
+        ("lamp", &["Usage"]),
+    ] {
+        is_wrong_usage(&scratch, line, words);
+    }
+}
+
+#[test]
+fn a_part_that_cannot_be_sliced_is_named_with_what_is_wrong() {
+    let scratch = with_all_sorts();
+    for (name, words) in [
+        ("missing.stl", &["No such file"][..]),
+        ("folder", &["not a file"]),
+        ("empty.stl", &["empty"]),
+        ("text.stl", &["not an STL file"]),
+        ("truncated.stl", &["cut off after facet 20", "export it again"]),
+        ("lying.stl", &["declares 4294967295 facets", "export it again"]),
+        ("modest.stl", &["declares 10 facets", "bytes follow"]),
+        ("none.stl", &["no facets"]),
+        ("nan.stl", &["facet 5 ", "not a finite number"]),
+        ("ascii.stl", &["facet 0 ", "export the part again"]),
+        ("cube.tif", &["a TIFF file, not an STL"]),
+    ] {
+        let place = format!("{name}: ");
+        let words = [&[place.as_str()], words].concat();
+        is_bad_input(&scratch, &format!("slice {name} -o x.tif"), &words);
+        is_bad_input(&scratch, &format!("slice {name} -o x/"), &words);
+        is_bad_input(&scratch, &format!("slice {name}"), &words);
+    }
+}
+
+#[test]
+fn a_part_that_does_not_fit_the_options_is_refused() {
+    let scratch = with_all_sorts();
+    for (options, words) in [
+        ("--layers 200..", &["200", "0..200"][..]),
+        ("--origin 0,0 --size 5x5mm", &["sticks out of the frame", "-10.000 to 10.000"]),
+        ("--units inch --dpi 100000 --margin 99999999", &["pixels", "--units", "--dpi"]),
+        ("--thickness 0.00001um", &["layers", "--thickness"]),
+    ] {
+        let words = [&["cube.stl: "], words].concat();
+        is_bad_input(&scratch, &format!("slice cube.stl {options} -o x.tif"), &words);
+    }
+}
+
+#[test]
+fn a_stack_that_cannot_be_read_is_named_with_what_is_wrong() {
+    let scratch = with_all_sorts();
+    let stages = ["fix", "dither", "tile", "lamp info", "lamp show --layer 0"];
+    for (name, words) in [
+        ("missing.tif", &["No such file"][..]),
+        ("folder", &["holds no .tif"]),
+        ("cube.stl", &["not a TIFF stack"]),
+        ("text.stl", &["not a TIFF stack"]),
+        ("empty.stl", &["empty"]),
+    ] {
+        let place = format!("{name}: ");
+        let words = [&[place.as_str()], words].concat();
+        for stage in stages {
+            let output = if stage == "lamp info" { "" } else { "-o x.tif" };
+            is_bad_input(&scratch, &format!("{stage} {name} {output}"), &words);
+        }
+    }
+}
+
+#[test]
+fn a_stack_that_does_not_fit_the_options_is_refused() {
+    let scratch = with_all_sorts();
+    for (line, words) in [
+        ("tile cube.tif --area 20x20mm -o x.tif", &["96 x 81", "78 x 78", "--area"][..]),
+        ("tile cube.tif --copies 21 -o x.tif", &["only 20 fit", "101.6x114.3mm"]),
+        ("fix cube.tif --layers 20.. -o x.tif", &["layer"]),
+        ("fix cube.tif --layers 20.. -o x/", &["layer"]),
+        ("lamp info cube.tif --layers 20..", &["no layer is in that range"]),
+        ("lamp show cube.tif --layer 20 -o x.png", &["no layer 20", "the last is 19"]),
+    ] {
+        let words = [&["cube.tif: "], words].concat();
+        is_bad_input(&scratch, line, &words);
+    }
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_named() {
+    let scratch = with_all_sorts();
+    for line in [
+        "slice cube.stl -o no/x.tif",
+        "slice cube.stl -o no/x/",
+        "fix cube.tif -o no/x.tif",
+        "tile cube.tif -o no/x.tif",
+        "lamp sample cube -o no/x.stl",
+        "lamp show cube.tif --layer 3 -o no/x.png",
+    ] {
+        is_bad_input(&scratch, line, &["no/x", "there is no folder no"]);
+    }
+    for line in ["slice cube.stl -o folder", "fix cube.tif -o folder/", "dither cube.tif -o folder"]
+    {
+        is_bad_input(&scratch, line, &["folder", "remove it or choose another name"]);
+    }
+    // A file cannot become a folder.
+    is_bad_input(&scratch, "fix cube.tif -o cube.stl/", &["cube.stl"]);
+    let kept: Vec<_> = fs::read_dir(scratch.path("folder")).unwrap().collect();
+    assert_eq!(kept.len(), 1);
+}
+
+#[test]
+fn a_failure_leaves_the_file_that_was_there() {
+    let scratch = with_all_sorts();
+    scratch.write("x.tif", b"precious");
+    for line in
+        ["slice nan.stl -o x.tif", "fix text.stl -o x.tif", "tile cube.tif --copies 99 -o x.tif"]
+    {
+        assert_eq!(fails(&scratch, line).statuses, [Some(1)]);
+        assert_eq!(scratch.bytes("x.tif"), b"precious", "{line}");
+    }
+    scratch.run("fix cube.tif -o x.tif").succeeds_quietly();
+    assert_eq!(scratch.bytes("x.tif"), scratch.bytes("cube.tif"));
+}
+
+#[test]
+fn a_stack_may_replace_the_file_it_is_read_from() {
+    let scratch = with_all_sorts();
+    let before = scratch.layers("cube.tif");
+    scratch.run("fix cube.tif -o cube.tif").succeeds_quietly();
+    assert!(scratch.layers("cube.tif") == before);
+}
+
+#[test]
+fn gray_layers_are_not_tiled() {
+    let scratch = Scratch::new();
+    lamp_tests::write_gray_ramp(&scratch.path("gray.tif"), 64, 16);
+    is_bad_input(&scratch, "tile gray.tif -o x.tif", &["gray.tif: ", "gray", "dither"]);
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    let scratch = Scratch::new();
+    for name in ["lamp", "slice", "fix", "dither", "tile"] {
+        let help = scratch.run(&format!("{name} --help")).succeeds_quietly();
+        let help = String::from_utf8(help.stdout).unwrap();
+        assert!(help.contains("Examples:") && help.contains("--quiet"), "{help}");
+        let version = scratch.run(&format!("{name} --version")).succeeds_quietly();
+        let version = String::from_utf8(version.stdout).unwrap();
+        assert!(version.trim().ends_with(env!("CARGO_PKG_VERSION")), "{version}");
+    }
+}
+
+#[test]
+fn quiet_silences_all_but_errors() {
+    let scratch = Scratch::new();
+    scratch
+        .run("lamp sample tower --facets 5k --defect drop --quiet -o broken.stl")
+        .succeeds_quietly();
+    let line = "slice broken.stl --dpi 100 --thickness 1mm";
+    assert!(scratch.run(&format!("{line} | fix")).succeeds().stderr.contains("do not balance"));
+    scratch.run(&format!("{line} --quiet | fix -q")).succeeds_quietly();
+    scratch.run("slice missing.stl --quiet").is_refused_with(&["missing.stl"]);
+}

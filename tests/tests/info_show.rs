@@ -1,0 +1,163 @@
+//! `lamp info` and `lamp show` against the layers as the library reads them.
+
+use std::io::Cursor;
+
+use lamp_fixtures::Part;
+use lamp_stack::Mask;
+use lamp_tests::{Scratch, mask, masks};
+
+fn with_cube() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Part::Cube, 200);
+    scratch.run("slice cube.stl --dpi 100 --thickness 1mm -o cube.tif").succeeds();
+    scratch
+}
+
+/// The value of a line `key: value` of `lamp info`.
+fn fact<'a>(text: &'a str, key: &str) -> &'a str {
+    let line = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(':'));
+    line.unwrap_or_else(|| panic!("no {key} in {text}")).trim()
+}
+
+fn info(scratch: &Scratch, line: &str) -> String {
+    String::from_utf8(scratch.run(line).succeeds_quietly().stdout).unwrap()
+}
+
+#[test]
+fn info_says_what_the_stack_holds() {
+    let scratch = with_cube();
+    let text = info(&scratch, "lamp info cube.tif");
+    let layers = scratch.layers("cube.tif");
+    assert_eq!(fact(&text, "stack"), "cube.tif");
+    assert_eq!(fact(&text, "part"), "cube");
+    assert!(fact(&text, "made by").starts_with("slice cube.stl --dpi 100 --thickness 1mm "));
+    // 20 mm in layers of 1 mm, and 78.7 pixels a side: 79 or less are
+    // covered, with a margin of one, the width then a multiple of 32.
+    assert_eq!(fact(&text, "layers"), "20 (0 to 19)");
+    assert_eq!(fact(&text, "size"), "96 x 81 pixels");
+    assert_eq!(fact(&text, "resolution"), "100 dpi (24.384 x 20.574 mm)");
+    assert_eq!(fact(&text, "z"), "0.000 to 20.000 mm");
+    let transitions: usize = masks(&layers).iter().map(|mask| mask.rows().flatten().count()).sum();
+    assert_eq!(fact(&text, "runs"), format!("{transitions} transitions"));
+    assert!(fact(&text, "data").ends_with(" bytes, CCITT Group 4"));
+    assert_eq!(fact(&text, "stray rows"), "none known");
+    let digest = &layers[0].info.stack.as_ref().unwrap().digest;
+    assert_eq!(fact(&text, "input"), digest);
+    assert!(digest.starts_with("blake3:") && digest.len() == "blake3:".len() + 64, "{digest}");
+}
+
+#[test]
+fn info_reads_pipes_folders_and_ranges() {
+    let scratch = with_cube();
+    let of_file = info(&scratch, "lamp info cube.tif");
+    let of_pipe = info(&scratch, "slice cube.stl --dpi 100 --thickness 1mm | lamp info");
+    assert_eq!(of_pipe, of_file.replace("cube.tif", "standard input"));
+    scratch.run("fix cube.tif -o pages/").succeeds();
+    let of_folder = info(&scratch, "lamp info pages");
+    assert_eq!(of_folder, of_file.replace("cube.tif", "pages"));
+    let some = info(&scratch, "lamp info cube.tif --layers 5..8");
+    assert_eq!(fact(&some, "layers"), "3 (5 to 7)");
+    assert_eq!(fact(&some, "z"), "5.000 to 8.000 mm");
+}
+
+#[test]
+fn info_counts_stray_rows() {
+    let scratch = Scratch::new();
+    scratch.run("lamp sample tower --facets 5k --defect drop --seed 7 -o broken.stl").succeeds();
+    scratch.run("slice broken.stl --dpi 100 --thickness 1mm -o stray.tif").succeeds();
+    let layers = scratch.layers("stray.tif");
+    let rows: Vec<usize> = layers.iter().map(|layer| layer.info.stray_rows.len()).collect();
+    let (count, of) = (rows.iter().sum::<usize>(), rows.iter().filter(|&&n| n > 0).count());
+    assert!(count > of && of > 1);
+    let text = info(&scratch, "lamp info stray.tif");
+    assert_eq!(fact(&text, "stray rows"), format!("{count} in {of} layers"));
+    let text = info(&scratch, "fix -q stray.tif | lamp info");
+    assert_eq!(fact(&text, "stray rows"), "none known");
+}
+
+/// Rows of gray levels.
+type Picture = Vec<Vec<u8>>;
+
+fn read_png(bytes: Vec<u8>) -> Picture {
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let frame = reader.next_frame(&mut pixels).unwrap();
+    assert_eq!(
+        (frame.color_type, frame.bit_depth),
+        (png::ColorType::Grayscale, png::BitDepth::Eight)
+    );
+    pixels[..frame.buffer_size()].chunks(frame.width as usize).map(<[u8]>::to_vec).collect()
+}
+
+fn show(scratch: &Scratch, options: &str) -> Picture {
+    let line = format!("lamp show blade.tif --layer 45 {options}");
+    read_png(scratch.run(&line).succeeds_quietly().stdout)
+}
+
+fn with_blade() -> (Scratch, Mask) {
+    let scratch = Scratch::new();
+    scratch.part("blade.stl", Part::Blade, 24_000);
+    scratch.run("slice blade.stl --dpi 100 --thickness 1mm -o blade.tif").succeeds();
+    let image = mask(&scratch.layers("blade.tif")[45]).clone();
+    (scratch, image)
+}
+
+/// Some columns and rows of an image as gray levels; black outside.
+fn levels(image: &Mask, columns: std::ops::Range<u32>, rows: std::ops::Range<u32>) -> Picture {
+    let level = |column, row| if image.is_white(column, row) { 255 } else { 0 };
+    rows.map(|row| columns.clone().map(|column| level(column, row)).collect()).collect()
+}
+
+#[test]
+fn show_draws_the_layer_pixel_for_pixel() {
+    let (scratch, image) = with_blade();
+    let all = levels(&image, 0..image.width(), 0..image.height());
+    assert!(show(&scratch, "") == all);
+    assert!(show(&scratch, "--region 100,90,70,50") == levels(&image, 100..170, 90..140));
+    // A region is cut to the image.
+    let (width, height) = (image.width(), image.height());
+    let corner = levels(&image, 200..width, 200..height);
+    assert!(show(&scratch, "--region 200,200,9999,9999") == corner);
+    scratch.run("lamp show blade.tif --layer 45 -o layer.png").succeeds_quietly();
+    assert!(read_png(scratch.bytes("layer.png")) == all);
+    let piped = scratch.run_on("lamp show --layer 45", &scratch.bytes("blade.tif"));
+    assert!(read_png(piped.succeeds_quietly().stdout) == all);
+}
+
+#[test]
+fn show_enlarges_each_pixel_to_a_square() {
+    let (scratch, image) = with_blade();
+    let large = show(&scratch, "--region 100,90,70,50 --scale 4");
+    let small = levels(&image, 100..170, 90..140);
+    assert_eq!((large.len(), large[0].len()), (200, 280));
+    let same = |row: usize, column: usize| large[row][column] == small[row / 4][column / 4];
+    assert!((0..200).all(|row| (0..280).all(|column| same(row, column))));
+}
+
+#[test]
+fn show_reduces_squares_to_their_mean() {
+    let (scratch, image) = with_blade();
+    for (options, left, top, width, height) in [
+        ("--scale 1/8", 0, 0, image.width(), image.height()),
+        ("--scale 1/8 --region 101,93,64,40", 101, 93, 64, 40),
+    ] {
+        let small = show(&scratch, options);
+        let size = (height.div_ceil(8) as usize, width.div_ceil(8) as usize);
+        assert_eq!((small.len(), small[0].len()), size);
+        for (row, column) in (0..size.0).flat_map(|row| (0..size.1).map(move |c| (row, c))) {
+            let (x, y) = (left + 8 * column as u32, top + 8 * row as u32);
+            let square = levels(&image, x..x + 8, y..(y + 8).min(top + height));
+            let sum: u32 = square.concat().into_iter().map(u32::from).sum();
+            assert_eq!(u32::from(small[row][column]), sum / 64, "{options}: {column}, {row}");
+        }
+    }
+}
+
+#[test]
+fn show_draws_gray_levels() {
+    let scratch = Scratch::new();
+    lamp_tests::write_gray_ramp(&scratch.path("ramp.tif"), 256, 3);
+    let line = "lamp show ramp.tif --layer 0";
+    let picture = read_png(scratch.run(line).succeeds_quietly().stdout);
+    assert_eq!(picture, vec![Vec::from_iter(0..=255); 3]);
+}

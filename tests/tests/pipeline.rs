@@ -1,0 +1,230 @@
+//! Whole pipelines of real processes: whichever way the layers travel, the
+//! same ones arrive.
+
+use lamp_fixtures::Part;
+use lamp_stack::{Layer, PageInfo, StackInfo};
+use lamp_tests::{Scratch, masks, read_stack};
+
+/// Coarse, so that a part takes a blink.
+const COARSE: &str = "--dpi 100 --thickness 1mm";
+/// 400 x 400 pixels at 100 dpi: nine towers.
+const AREA: &str = "--area 4x4in";
+
+fn with_tower() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch
+}
+
+/// What the layers hold, but for what only a whole stack can say.
+fn without_stack(layers: &[Layer]) -> Vec<Layer> {
+    let mut layers = layers.to_vec();
+    layers.iter_mut().for_each(|layer| layer.info.stack = None);
+    layers
+}
+
+fn stack_info(layers: &[Layer]) -> &StackInfo {
+    layers[0].info.stack.as_ref().expect("the first page speaks of the stack")
+}
+
+#[test]
+fn four_processes_make_a_build_of_the_right_size() {
+    let scratch = with_tower();
+    let line = format!("slice tower.stl {COARSE} | fix | dither | tile {AREA} > build.tif");
+    scratch.run(&line).succeeds_quietly();
+    let layers = scratch.layers("build.tif");
+    // 76.2 mm in layers of 1 mm.
+    assert_eq!(layers.len(), 76);
+    for (k, layer) in (0..).zip(&layers) {
+        assert_eq!((layer.image.width(), layer.image.height()), (400, 400));
+        let PageInfo { index, z_um, thickness_um, .. } = layer.info;
+        assert_eq!((index, z_um, thickness_um), (k, Some(f64::from(k) * 1e3), Some(1e3)));
+        assert_eq!(layer.dpi.map(lamp_stack::Dpi::get), Some(100.0));
+    }
+    assert_eq!(stack_info(&layers).part, "tower");
+    // Nine copies of a foot of 12.7 mm, of which a circle takes 50² π pixels.
+    let white = masks(&layers)[0].white_pixels() as f64;
+    let circles = 9.0 * 2_500.0 * std::f64::consts::PI;
+    assert!((white / circles - 1.0).abs() < 0.01, "{white} white pixels, not {circles}");
+}
+
+#[test]
+fn a_pipe_makes_the_bytes_that_stages_make_through_files() {
+    let scratch = with_tower();
+    let line = format!("slice tower.stl {COARSE} | fix | dither | tile {AREA} > piped.tif");
+    scratch.run(&line).succeeds();
+    scratch.run(&format!("slice tower.stl {COARSE} -o 1.tif")).succeeds();
+    scratch.run("fix 1.tif -o 2.tif").succeeds();
+    scratch.run("dither 2.tif -o 3.tif").succeeds();
+    scratch.run(&format!("tile 3.tif {AREA} -o 4.tif")).succeeds();
+    assert!(scratch.bytes("piped.tif") == scratch.bytes("4.tif"));
+    // Two stages had nothing to do, and kept every byte.
+    assert!(scratch.bytes("1.tif") == scratch.bytes("2.tif"));
+    assert!(scratch.bytes("2.tif") == scratch.bytes("3.tif"));
+    assert!(scratch.bytes("3.tif") != scratch.bytes("4.tif"));
+}
+
+#[test]
+fn threads_memory_and_the_name_of_the_program_change_no_byte() {
+    let scratch = with_tower();
+    let stages = |slice: &str, more: &str| {
+        let line = format!(
+            "{slice} tower.stl {COARSE} {more} | lamp fix {0} | lamp dither {0} | lamp tile {AREA} {0}",
+            if more.contains("threads") { more } else { "" }
+        );
+        scratch.run(&line).succeeds().stdout
+    };
+    let plain = stages("slice", "");
+    assert_eq!(read_stack(plain.clone()).len(), 76);
+    for more in ["--threads 1", "--threads 2", "--threads 7", "--memory 1MB", "--memory 20kB"] {
+        assert!(stages("slice", more) == plain, "{more} changed the bytes");
+    }
+    assert!(stages("lamp slice", "") == plain);
+}
+
+#[test]
+fn stages_read_files_and_standard_input_alike() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} -o tower.tif")).succeeds();
+    let stack = scratch.bytes("tower.tif");
+    for stage in ["fix", "dither", "tile", "lamp fix"] {
+        let options = if stage == "tile" { AREA } else { "" };
+        let from_file = scratch.run(&format!("{stage} tower.tif {options}")).succeeds().stdout;
+        for dash in ["", "-"] {
+            let line = format!("{stage} {dash} {options}");
+            assert!(scratch.run_on(&line, &stack).succeeds().stdout == from_file, "{line}");
+        }
+        scratch.run(&format!("{stage} tower.tif {options} -o out.tif")).succeeds();
+        assert!(scratch.bytes("out.tif") == from_file, "{stage} -o");
+    }
+}
+
+#[test]
+fn a_part_from_standard_input_gives_the_same_layers() {
+    let scratch = with_tower();
+    let named = scratch.run(&format!("slice tower.stl {COARSE}")).succeeds().stdout;
+    let line = format!("slice - {COARSE}");
+    let piped = scratch.run_on(&line, &scratch.bytes("tower.stl")).succeeds().stdout;
+    let (named, piped) = (read_stack(named), read_stack(piped));
+    assert_eq!(stack_info(&named).digest, stack_info(&piped).digest);
+    assert!(without_stack(&named) == without_stack(&piped));
+}
+
+#[test]
+fn a_folder_of_pages_is_the_same_stack() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} -o tower.tif")).succeeds();
+    scratch.run(&format!("slice tower.stl {COARSE} -o pages/")).succeeds_quietly();
+    let file = scratch.layers("tower.tif");
+    assert!(scratch.layers("pages") == file);
+    assert!(scratch.path("pages/layer_00075.tif").is_file());
+
+    std::fs::create_dir(scratch.path("empty")).unwrap();
+    scratch.run("fix pages -o empty").succeeds_quietly();
+    assert!(scratch.layers("empty") == file);
+
+    let from_folder = scratch.run(&format!("dither empty | tile {AREA}")).succeeds().stdout;
+    let from_file = scratch.run(&format!("tile tower.tif {AREA}")).succeeds().stdout;
+    assert!(from_folder == from_file);
+    assert_eq!(scratch.names(), ["empty", "pages", "tower.stl", "tower.tif"]);
+}
+
+#[test]
+fn a_classic_tiff_holds_the_same_layers() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} -o big.tif")).succeeds();
+    scratch.run(&format!("slice tower.stl {COARSE} --classic -o classic.tif")).succeeds();
+    let [big, classic] = ["big.tif", "classic.tif"].map(|name| scratch.bytes(name));
+    assert_eq!((big[2], classic[2]), (43, 42));
+    assert!(scratch.layers("big.tif") == scratch.layers("classic.tif"));
+    // The stages take one for the other, and turn one into the other.
+    assert!(scratch.run("fix classic.tif").succeeds().stdout == big);
+    assert!(scratch.run("fix big.tif --classic").succeeds().stdout == classic);
+    assert!(scratch.run_on("dither --classic", &classic).succeeds().stdout == classic);
+}
+
+#[test]
+fn a_range_of_layers_is_that_part_of_the_stack() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} -o all.tif")).succeeds();
+    scratch.run(&format!("slice tower.stl {COARSE} -o pages/")).succeeds();
+    let all = without_stack(&scratch.layers("all.tif"));
+    for (range, wanted) in [("20..31", 20..31), ("..3", 0..3), ("74..", 74..76), ("5", 5..6)] {
+        let wanted = &all[wanted];
+        for line in [
+            format!("slice tower.stl {COARSE} --layers {range}"),
+            format!("fix all.tif --layers {range}"),
+            format!("dither pages --layers {range}"),
+            format!("slice tower.stl {COARSE} | fix --layers {range}"),
+        ] {
+            let some = read_stack(scratch.run(&line).succeeds_quietly().stdout);
+            assert!(without_stack(&some) == wanted, "{line}");
+            assert_eq!(stack_info(&some).part, "tower", "{line}");
+        }
+    }
+    let line = format!("tile all.tif {AREA} --layers 20..31");
+    let tiled = read_stack(scratch.run(&line).succeeds().stdout);
+    assert_eq!(
+        tiled.iter().map(|layer| layer.info.index).collect::<Vec<_>>(),
+        Vec::from_iter(20..31)
+    );
+}
+
+#[test]
+fn a_range_of_layers_written_as_a_folder_reads_back() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} -o all.tif")).succeeds();
+    scratch.run("fix all.tif --layers 20..31 -o some/").succeeds();
+    scratch.run(&format!("slice tower.stl {COARSE} --layers 20..31 -o sliced/")).succeeds();
+    let all = without_stack(&scratch.layers("all.tif"));
+    for folder in ["some", "sliced"] {
+        assert!(without_stack(&scratch.layers(folder)) == all[20..31], "{folder}");
+    }
+}
+
+#[test]
+fn tiled_copies_are_the_part_and_nothing_else() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} --layers 60..63 -o part.tif")).succeeds();
+    scratch.run(&format!("tile part.tif {AREA} --gap 2mm -o build.tif")).succeeds();
+    let (part, build) = (scratch.layers("part.tif"), scratch.layers("build.tif"));
+    let copies = stack_info(&build).other["tile"]["copies"].as_array().expect("a list").clone();
+    // Images of 128 x 102 pixels, 8 apart, on 400 x 400.
+    assert_eq!(copies.len(), 9);
+    for (part, build) in masks(&part).into_iter().zip(masks(&build)) {
+        for copy in &copies {
+            let at = |i: usize| copy[i].as_u64().expect("a number of pixels") as u32;
+            let same = |column: u32, row: u32| {
+                part.is_white(column, row) == build.is_white(at(0) + column, at(1) + row)
+            };
+            assert!((0..part.height()).all(|row| (0..part.width()).all(|c| same(c, row))));
+        }
+        assert_eq!(build.white_pixels(), copies.len() as u64 * part.white_pixels());
+    }
+}
+
+#[test]
+fn the_demo_is_what_the_four_binaries_make() {
+    let scratch = Scratch::new();
+    let said = scratch.run("lamp demo shown --facets 24k").succeeds();
+    assert_eq!(said.stderr, "");
+    let said = String::from_utf8(said.stdout).unwrap();
+    assert!(said.contains("24016 facets") && said.contains("1270 layers of 6000 x 6750"), "{said}");
+    let mut names: Vec<_> = std::fs::read_dir(scratch.path("shown"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let pictures = ["layer_00050.png", "layer_00449.png", "layer_00965.png", "layer_01174.png"];
+    assert_eq!(names, [&["blade.stl", "build.tif"], &pictures[..], &["layers.png"]].concat());
+    for name in pictures.iter().chain(&["layers.png"]) {
+        let picture = scratch.bytes(&format!("shown/{name}"));
+        let mut reader = png::Decoder::new(std::io::Cursor::new(picture)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        // A picture of a layer, in black and white and with grays on edges.
+        assert!([0, 255].iter().all(|level| pixels.contains(level)), "{name}");
+    }
+    scratch.run("slice shown/blade.stl | fix | dither | tile > by_hand.tif").succeeds_quietly();
+    assert!(scratch.bytes("shown/build.tif") == scratch.bytes("by_hand.tif"));
+}
