@@ -8,6 +8,7 @@ mod commands;
 mod options;
 mod picture;
 mod report;
+mod signals;
 mod stop;
 mod streams;
 
@@ -17,7 +18,9 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 
 use commands::Command;
 use options::Common;
-use stop::{Stop, stop_on_signals};
+use report::say;
+use signals::clean_up_on_signals;
+use stop::Stop;
 
 /// CAD parts to the layer images of projection photopolymerization.
 #[derive(Parser)]
@@ -61,7 +64,7 @@ pub fn run_stage(name: &str) -> ExitCode {
 }
 
 fn run(command: &Command, common: &Common) -> Result<(), Stop> {
-    stop_on_signals()?;
+    clean_up_on_signals()?;
     common.apply()?;
     command.run(common)
 }
@@ -70,7 +73,7 @@ fn run(command: &Command, common: &Common) -> Result<(), Stop> {
 fn finish(name: &str, result: Result<(), Stop>) -> ExitCode {
     match result {
         Err(stop) if !stop.is_reader_gone() => {
-            eprintln!("{name}: {stop}");
+            say(&format!("{name}: {stop}"));
             ExitCode::from(stop.status())
         }
         _ => ExitCode::SUCCESS,

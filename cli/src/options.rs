@@ -1,6 +1,5 @@
 //! Options that several commands share, and the values people write in them.
 
-use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -18,14 +17,16 @@ pub(crate) struct Common {
 
     /// Work on N threads [default: all processors]
     #[arg(long, value_name = "N", global = true, help_heading = "General options")]
-    threads: Option<NonZeroUsize>,
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
+    threads: Option<u16>,
 }
 
 impl Common {
     /// Sets up the threads. To be called once.
     pub(crate) fn apply(&self) -> Result<(), Stop> {
-        let threads = self.threads.map_or(0, NonZeroUsize::get);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        // Zero lets the pool choose.
+        let threads = self.threads.unwrap_or(0);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
         pool.map_err(|error| Stop::Failed(anyhow::Error::new(error)))
     }
 }
@@ -100,8 +101,16 @@ pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
     }
 }
 
+/// Parses the memory to work in: at least 16 MB.
+pub(crate) fn parse_memory(text: &str) -> Result<u64, String> {
+    match parse_bytes(text)? {
+        bytes @ 16_000_000.. => Ok(bytes),
+        _ => Err(format!("{text} is too little to work in: 16MB is the least")),
+    }
+}
+
 /// Parses a number of bytes: `64MB`, `1.5GiB`, `100000`.
-pub(crate) fn parse_bytes(text: &str) -> Result<u64, String> {
+fn parse_bytes(text: &str) -> Result<u64, String> {
     let wrong = || format!("`{text}` is not an amount of memory: write 64MB, 2GB or 512MiB");
     let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
     let factor = match text[split..].to_ascii_lowercase().as_str() {

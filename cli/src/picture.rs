@@ -69,6 +69,17 @@ pub(crate) enum Scale {
     Down(u32),
 }
 
+impl Scale {
+    /// The longer side of a region's picture, in pixels.
+    pub(crate) fn side(self, region: &Region) -> u64 {
+        let side = region.columns.len().max(region.rows.len()) as u64;
+        match self {
+            Self::Up(up) => side * u64::from(up),
+            Self::Down(down) => side.div_ceil(down.into()),
+        }
+    }
+}
+
 impl FromStr for Scale {
     type Err = String;
 

@@ -1,6 +1,6 @@
 //! What a command says while it works, on standard error.
 
-use std::io::IsTerminal;
+use std::io::{self, IsTerminal, Write};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -17,7 +17,7 @@ impl Report {
     /// A report with a bar, if somebody watches. Of the stages of a pipeline
     /// only the last shows one (`is_last`): they share the terminal.
     pub(crate) fn new(command: &'static str, quiet: bool, is_last: bool) -> Self {
-        let watched = !quiet && is_last && std::io::stderr().is_terminal();
+        let watched = !quiet && is_last && io::stderr().is_terminal();
         let bar = ProgressBar::hidden();
         bar.set_style(style("{prefix} {human_pos} layers {per_sec}"));
         bar.set_prefix(command);
@@ -41,7 +41,7 @@ impl Report {
     /// Says a line, unless quiet.
     pub(crate) fn say(&self, line: &str) {
         if !self.quiet {
-            self.bar.suspend(|| eprintln!("{}: {line}", self.command));
+            self.bar.suspend(|| say(&format!("{}: {line}", self.command)));
         }
     }
 
@@ -49,6 +49,11 @@ impl Report {
     pub(crate) fn done(&self) {
         self.bar.finish_and_clear();
     }
+}
+
+/// Writes a line to standard error. If nobody listens, the work goes on.
+pub(crate) fn say(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 fn style(template: &str) -> ProgressStyle {

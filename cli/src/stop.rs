@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::io;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use lamp_postprocess::TileError;
 use lamp_slicer::SliceError;
@@ -17,26 +16,6 @@ pub(crate) enum Stop {
     Failed(anyhow::Error),
     /// Writing the output failed: status 1, or none if its reader went away.
     Output(anyhow::Error),
-    /// Somebody ended the command: status 130, as shells have it.
-    Interrupted,
-}
-
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-/// Lets Ctrl-C and the signals that end a batch stop the work in order, so
-/// that no temporary file remains; a second one stops it at once.
-pub(crate) fn stop_on_signals() -> Result<(), Stop> {
-    let interrupt = || {
-        if INTERRUPTED.swap(true, Relaxed) {
-            std::process::exit(Stop::Interrupted.status().into());
-        }
-    };
-    ctrlc::set_handler(interrupt).map_err(|error| Stop::Failed(error.into()))
-}
-
-/// Stops between two layers if somebody ended the command.
-pub(crate) fn check_interrupted() -> Result<(), Stop> {
-    if INTERRUPTED.load(Relaxed) { Err(Stop::Interrupted) } else { Ok(()) }
 }
 
 impl Stop {
@@ -54,7 +33,6 @@ impl Stop {
             Self::Usage(message) => Self::Usage(format!("{place}: {message}")),
             Self::Failed(error) => Self::Failed(error.context(place)),
             Self::Output(error) => Self::Output(error.context(place)),
-            Self::Interrupted => Self::Interrupted,
         }
     }
 
@@ -62,7 +40,6 @@ impl Stop {
         match self {
             Self::Usage(_) => 2,
             Self::Failed(_) | Self::Output(_) => 1,
-            Self::Interrupted => 130,
         }
     }
 
@@ -84,7 +61,6 @@ impl fmt::Display for Stop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Usage(message) => f.write_str(message),
-            Self::Interrupted => f.write_str("interrupted"),
             Self::Failed(error) | Self::Output(error) => write!(f, "{error:#}"),
         }
     }

@@ -1,18 +1,19 @@
 //! Where a stage's layers come from and go to.
 
 use std::fmt::Display;
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use lamp_stack::{
-    Destination, Format, Layer, Page, Pages, StackError, StackInfo, file_beside, map_in_order,
+    Destination, FileBeside, Format, Layer, Page, Pages, StackError, StackInfo, map_in_order,
     write_stack,
 };
 
 use crate::options::{Common, Input, Output};
 use crate::report::Report;
-use crate::stop::{Stop, check_interrupted};
+use crate::stop::Stop;
 
 /// Whether a path stands for standard input or output.
 pub(crate) fn is_stream(path: &Path) -> bool {
@@ -134,16 +135,20 @@ pub(crate) fn write_layers(
         }
         Destination::Stream(Box::new(io::stdout().lock()))
     } else if path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir() {
+        if path.file_name().is_none() {
+            return Err(Stop::usage(format!(
+                "{}: name the folder that is to be made",
+                path.display()
+            )));
+        }
         Destination::Folder(path.clone())
+    } else if let Some(device) = open_device(path)? {
+        Destination::Stream(Box::new(device))
     } else {
-        Destination::File(path.clone())
+        Destination::File(behind_links(path))
     };
     let format = if output.classic { Format::Classic } else { Format::Big };
-    let counted = layers.map(|layer| {
-        check_interrupted()?;
-        report.layer_done();
-        layer
-    });
+    let counted = layers.inspect(|_| report.layer_done());
     let written = write_stack(counted, to, format);
     report.done();
     let name =
@@ -151,19 +156,40 @@ pub(crate) fn write_layers(
     written.map_err(|stop| if let Stop::Output(_) = stop { stop.at(name) } else { stop })
 }
 
+/// Opens what stands at `path` if that is no file: a pipe or a device is
+/// written to, not replaced.
+fn open_device(path: &Path) -> Result<Option<File>, Stop> {
+    match fs::metadata(path) {
+        Ok(metadata) if !metadata.is_file() => {
+            let device = OpenOptions::new().write(true).open(path);
+            Ok(Some(device.with_context(|| path.display().to_string())?))
+        }
+        _ => Ok(None),
+    }
+}
+
+/// The file that a link stands for: it is to be replaced, not the link.
+fn behind_links(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+}
+
 /// Writes a file that gets its name only when it is complete.
 pub(crate) fn write_file(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Stop> {
+    if let Some(mut device) = open_device(path)? {
+        let written = write(&mut device);
+        return written.map_err(|error| Stop::Output(error.into()).at(path.display().to_string()));
+    }
+    let path = &behind_links(path);
     let whole = || -> io::Result<()> {
-        let mut file = file_beside(path)?;
-        let mut out = BufWriter::with_capacity(1 << 18, &mut file);
+        let mut file = FileBeside::new(path)?;
+        let mut out = BufWriter::with_capacity(1 << 18, file.file());
         write(&mut out)?;
         out.flush()?;
         drop(out);
-        file.persist(path)?;
-        Ok(())
+        file.persist()
     };
     Ok(whole().with_context(|| path.display().to_string())?)
 }

@@ -38,6 +38,7 @@ pub fn fix<E: Send>(
 
 fn fix_layer(mut layer: Layer) -> (Layer, Vec<Band>) {
     let Image::Mask(mask) = &layer.image else { return (layer, Vec::new()) };
+    layer.info.stray_rows.sort_unstable();
     let (fixed, bands) = fix_mask(mask, &layer.info.stray_rows);
     if !bands.is_empty() {
         layer.image = Image::Mask(fixed);
@@ -51,8 +52,9 @@ fn fix_layer(mut layer: Layer) -> (Layer, Vec<Band>) {
     (layer, bands)
 }
 
-/// Corrects the stray rows of a mask: those that end white, since the part is
-/// black at the image's right edge, and those listed in `known`.
+/// Corrects the stray rows of a mask: those that end white, since every part
+/// leaves the image's last column black, and those listed in `known`, which
+/// increase.
 ///
 /// Each pixel of a band takes the colour that the good rows above and below
 /// the band share, and keeps its own where they differ. Rows outside the

@@ -2,11 +2,17 @@
 //!
 //! Source: 002 section 2.4.2.
 
+use std::sync::Arc;
+
 use lamp_stack::{
     Dpi, Image, Layer, Length, Mask, MaskBuilder, PageInfo, Size, StackInfo, map_in_order,
 };
 use serde_json::json;
 use thiserror::Error;
+
+/// Build areas are at most so wide and high, in pixels, as the images that a
+/// stack's reader takes.
+const LARGEST_SIDE: u32 = 1 << 26;
 
 /// How a part is laid out.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +62,20 @@ pub enum TileError {
         /// The area as lengths.
         area_mm: Size,
     },
+    /// The build area is larger than any reader of stacks takes.
+    #[error("the build area of {area_mm} is more than 2^26 pixels wide or high")]
+    AreaTooLarge {
+        /// The area as lengths.
+        area_mm: Size,
+    },
+    /// The copies have more runs than an image can hold.
+    #[error("{copies} copies of {layer} have more runs than an image can hold: place fewer")]
+    TooManyRuns {
+        /// How many copies.
+        copies: usize,
+        /// The layer's name.
+        layer: String,
+    },
     /// The resolution is not known, so lengths have no meaning in pixels.
     #[error("{layer} has no resolution, so the build area has no size in pixels")]
     NoResolution {
@@ -65,6 +85,12 @@ pub enum TileError {
     /// A gray layer.
     #[error("{layer} is gray: dither the stack first")]
     Gray {
+        /// The layer's name.
+        layer: String,
+    },
+    /// A layer of another resolution than the first.
+    #[error("{layer} has another resolution than the first layer: a stack has one")]
+    OtherResolution {
         /// The layer's name.
         layer: String,
     },
@@ -102,12 +128,12 @@ pub fn tile<E: From<TileError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     options: TileOptions,
 ) -> impl Iterator<Item = Result<Layer, E>> {
-    let mut layout: Option<Layout> = None;
+    let mut layout: Option<Arc<Layout>> = None;
     let placed = layers.map(move |layer| {
         let layer = layer?;
         let layout = match &layout {
-            Some(layout) => layout.clone(),
-            None => layout.insert(Layout::new(&layer, &options)?).clone(),
+            Some(layout) => Arc::clone(layout),
+            None => Arc::clone(layout.insert(Arc::new(Layout::new(&layer, &options)?))),
         };
         Ok((layer, layout))
     });
@@ -115,8 +141,9 @@ pub fn tile<E: From<TileError> + Send>(
 }
 
 /// Where copies stand.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Layout {
+    dpi: Dpi,
     part: Pixels,
     area: Pixels,
     options: TileOptions,
@@ -132,11 +159,16 @@ impl Layout {
             width: whole_pixels(options.area.width, dpi),
             height: whole_pixels(options.area.height, dpi),
         };
+        if area.width.max(area.height) > LARGEST_SIDE {
+            return Err(TileError::AreaTooLarge { area_mm: options.area });
+        }
         if part.width > area.width || part.height > area.height {
             return Err(TileError::TooLarge { part, area, area_mm: options.area });
         }
         let gap = (options.gap.pixels(dpi).max(0.0) - 1e-6).ceil().max(0.0) as u32;
-        let fit = |area: u32, part: u32| (area - part) / part.saturating_add(gap) + 1;
+        // Larger gaps than the area mean one copy a row as well.
+        let gap = gap.min(LARGEST_SIDE);
+        let fit = |area: u32, part: u32| (area - part) / (part + gap) + 1;
         let (columns, rows) = (fit(area.width, part.width), fit(area.height, part.height));
         let most = columns.saturating_mul(rows);
         let copies = options.copies.unwrap_or(most);
@@ -148,7 +180,7 @@ impl Layout {
         let tops = positions(area.height, part.height, gap, copies.div_ceil(columns));
         let in_row = |row: u32| (copies - row * columns).min(columns) as usize;
         let rows = (0..).zip(tops).map(|(row, top)| (top, lefts[..in_row(row)].to_vec())).collect();
-        Ok(Self { part, area, options: *options, rows })
+        Ok(Self { dpi, part, area, options: *options, rows })
     }
 
     fn place(&self, layer: Layer) -> Result<Layer, TileError> {
@@ -156,6 +188,13 @@ impl Layout {
         if found != self.part {
             let layer = layer.info.name();
             return Err(TileError::OtherSize { layer, found, expected: self.part });
+        }
+        if layer.dpi != Some(self.dpi) {
+            return Err(TileError::OtherResolution { layer: layer.info.name() });
+        }
+        let copies: usize = self.rows.iter().map(|(_, lefts)| lefts.len()).sum();
+        if copies.saturating_mul(layer.image.changes() + 1) > u32::MAX as usize {
+            return Err(TileError::TooManyRuns { copies, layer: layer.info.name() });
         }
         match layer.image {
             Image::Gray(_) => Err(TileError::Gray { layer: layer.info.name() }),
@@ -290,6 +329,7 @@ mod tests {
         };
         assert!(error("31x100mm", None).contains("32 x 20 pixels"));
         assert!(error("100x50mm", Some(7)).contains("only 6 fit"));
+        assert!(error("1e7x1e7in", None).contains("2^26 pixels"));
         let mut foreign = layer(Mask::black(1, 1));
         foreign.dpi = None;
         let refused = tile(std::iter::once(Ok(foreign)), options("9x9mm", None, 1.0)).next();
@@ -303,6 +343,20 @@ mod tests {
         let mut build = tile(layers.into_iter().map(Ok), options);
         assert!(build.next().unwrap().is_ok());
         assert!(matches!(build.next(), Some(Err(TileError::OtherSize { .. }))));
+    }
+
+    #[test]
+    fn layers_of_another_resolution_are_refused() {
+        let other = Layer { dpi: Dpi::new(50.8), ..layer(Mask::black(32, 20)) };
+        let layers = [layer(Mask::black(32, 20)), other];
+        let mut build = tile(layers.into_iter().map(Ok), options("100x50mm", None, 2.0));
+        assert!(build.next().unwrap().is_ok());
+        assert!(matches!(build.next(), Some(Err(TileError::OtherResolution { .. }))));
+    }
+
+    #[test]
+    fn a_gap_of_any_size_leaves_one_copy() {
+        assert_eq!(lefts_and_tops(&options("100x50mm", None, 1e30)), [(15, vec![34])]);
     }
 
     #[test]

@@ -1,23 +1,36 @@
 //! ASCII STL.
 
+use std::borrow::Cow;
 use std::io::Cursor;
 
 use crate::error::SliceError;
 use crate::facet::Facet;
 
 /// Whether a file that starts with these bytes is ASCII STL: text that begins
-/// with `solid` and goes on with a facet, or ends at once.
-pub(crate) fn looks_ascii(start: &[u8]) -> bool {
-    let text = start.to_ascii_lowercase();
+/// with `solid` and goes on with a facet, or ends at once, or has a first line
+/// too long to tell.
+pub(crate) fn looks_ascii(start: &[u8], is_whole: bool) -> bool {
+    let text = without_mark(start).to_ascii_lowercase();
     let holds = |word: &[u8]| text.windows(word.len()).any(|window| window == word);
+    let is_text = !text.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace());
     text.trim_ascii_start().starts_with(b"solid")
-        && (holds(b"facet") || holds(b"endsolid"))
-        && !start.contains(&0)
+        && is_text
+        && (holds(b"facet") || holds(b"endsolid") || !is_whole)
+}
+
+/// Text without the byte order mark that some editors put before it.
+fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text)
 }
 
 /// The facets of all solids of an ASCII file.
 pub(crate) fn read(text: &[u8]) -> Result<Vec<Facet>, SliceError> {
     let mut facets = Vec::new();
+    let mut text = Cow::from(without_mark(text));
+    if !text.contains(&b'\n') {
+        // Lines of old Macintosh files end in a carriage return alone.
+        text.to_mut().iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+    }
     let mut rest = text.trim_ascii();
     while !rest.is_empty() {
         let end = end_of_solid(rest);
@@ -87,8 +100,18 @@ mod tests {
     #[test]
     fn several_solids_in_any_case_are_one_part() {
         let text = solid("") + &solid(" Two Words").to_uppercase() + "\r\n" + &solid(" c");
-        assert!(looks_ascii(text.as_bytes()));
+        assert!(looks_ascii(text.as_bytes(), true));
         assert_eq!(read(text.as_bytes()).unwrap(), [FACET; 3]);
+    }
+
+    #[test]
+    fn marks_long_names_and_old_line_ends_are_read() {
+        let long = solid(&format!(" {}", "a".repeat(3000)));
+        for text in [format!("\u{FEFF}{}", solid("")), solid(" a").replace('\n', "\r"), long] {
+            let bytes = text.as_bytes();
+            assert!(looks_ascii(&bytes[..bytes.len().min(1024)], bytes.len() <= 1024));
+            assert_eq!(read(bytes).unwrap(), [FACET]);
+        }
     }
 
     #[test]
@@ -101,8 +124,8 @@ mod tests {
 
     #[test]
     fn other_text_is_refused() {
-        assert!(!looks_ascii(b"solid state physics"));
-        assert!(!looks_ascii(b"solid facet\0"));
+        assert!(!looks_ascii(b"solid state physics", true));
+        assert!(!looks_ascii(b"solid facet\0", true));
         assert!(read((solid(" a") + "more").as_bytes()).is_err());
     }
 }

@@ -161,6 +161,7 @@ fn ceil_clamped(value: f64, most: u32) -> u32 {
 #[derive(Clone, Copy)]
 struct Edge {
     low: Corner,
+    high: Corner,
     pixels_per_um: [f64; 2],
 }
 
@@ -169,12 +170,16 @@ impl Edge {
     fn new(low: Corner, high: Corner) -> Self {
         let rise_um = high.z_um - low.z_um;
         let slope = |axis: usize| (high.pixels[axis] - low.pixels[axis]) / rise_um;
-        Self { low, pixels_per_um: [slope(0), slope(1)] }
+        Self { low, high, pixels_per_um: [slope(0), slope(1)] }
     }
 
     /// The edge's point at a height, in pixels.
     #[inline]
     fn at(&self, z_um: f64) -> [f64; 2] {
+        // No rounding where a plane meets the corner itself.
+        if z_um >= self.high.z_um {
+            return self.high.pixels;
+        }
         let above_um = z_um - self.low.z_um;
         [
             self.low.pixels[0] + self.pixels_per_um[0] * above_um,

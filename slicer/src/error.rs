@@ -12,7 +12,7 @@ pub enum SliceError {
     #[error("the file is empty: export the part again")]
     EmptyFile,
     /// A folder or a device.
-    #[error("this is not a file")]
+    #[error("this is not a file that can be mapped: pipe it in and give - as the part")]
     NotAFile,
     /// Neither binary nor ASCII STL.
     #[error(
@@ -69,8 +69,8 @@ pub enum SliceError {
     },
     /// The part sticks out of the frame given for it.
     #[error(
-        "the part spans x {:.3} to {:.3} and y {:.3} to {:.3} mm, which sticks out of the frame of the images: \
-         move or enlarge the frame",
+        "the part spans x {:.3} to {:.3} and y {:.3} to {:.3} mm, which sticks out of the frame of the images \
+         or leaves no black column on their right: move or enlarge the frame",
         part_mm[0][0], part_mm[1][0], part_mm[0][1], part_mm[1][1]
     )]
     OutsideFrame {

@@ -31,7 +31,8 @@ pub struct PixelGrid {
 
 impl PixelGrid {
     /// The grid around a box (x, y), with `margin` pixels on every side and
-    /// its width rounded up to a multiple of 32 on the right. The origin is
+    /// its width rounded up to a multiple of 32 on the right, where at least
+    /// one column stays black: a row that ends white is a stray row. The origin is
     /// moved outwards to a whole nanometre, so that six decimals state it
     /// exactly.
     ///
@@ -48,9 +49,10 @@ impl PixelGrid {
         let margin_mm = f64::from(margin) * dpi.pitch().mm();
         let x0 = ((min_mm[0] - margin_mm) * 1e6).floor() / 1e6;
         let y1 = ((max_mm[1] + margin_mm) * 1e6).ceil() / 1e6;
-        let pixels = |mm: f64| (mm * pixels_per_127_mm(dpi) / 127.0).ceil() + f64::from(margin);
-        let width = (pixels(max_mm[0] - x0) / 32.0).ceil().max(1.0) * 32.0;
-        let height = pixels(y1 - min_mm[1]).max(1.0);
+        let pixels = |mm: f64| (mm * pixels_per_127_mm(dpi) / 127.0).ceil();
+        let columns = pixels(max_mm[0] - x0) + f64::from(margin.max(1));
+        let width = (columns / 32.0).ceil() * 32.0;
+        let height = (pixels(y1 - min_mm[1]) + f64::from(margin)).max(1.0);
         Self::at([x0, y1], width, height, dpi)
     }
 
@@ -66,14 +68,14 @@ impl PixelGrid {
         Ok(Self { origin_mm, dpi, width: width as u32, height: height as u32 })
     }
 
-    /// Whether a box lies inside the grid.
+    /// Whether a box lies inside the grid and leaves its last column black.
     pub(crate) fn holds(&self, min_mm: [f64; 2], max_mm: [f64; 2]) -> bool {
         // In pixels, the grid's edges lie half a pixel outside its centres.
         let [left, bottom] = self.to_pixels(min_mm[0], min_mm[1]);
         let [right, top] = self.to_pixels(max_mm[0], max_mm[1]);
         left >= -0.5
             && top >= -0.5
-            && right <= f64::from(self.width) - 0.5
+            && right <= f64::from(self.width - 1)
             && bottom <= f64::from(self.height) - 0.5
     }
 

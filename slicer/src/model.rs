@@ -82,7 +82,7 @@ impl Model {
             Some(count) if HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size => {
                 Facets::Binary { file: file.try_clone()?, count: count as usize }
             }
-            _ if ascii::looks_ascii(&start) => {
+            _ if ascii::looks_ascii(&start, start.len() as u64 == size) => {
                 Facets::Memory(ascii::read(&map(file, 0, size as usize)?)?)
             }
             declared => return Err(why_not_stl(&start, declared, size)),

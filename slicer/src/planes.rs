@@ -25,9 +25,9 @@ pub enum PlaneRule {
 /// The planes at which a part is cut, one a layer, bottom first, all the same
 /// thickness apart.
 ///
-/// A part's height is rounded to whole layers, at least one. A last top plane
-/// that then lies above the part is moved down to the part's top, where flat
-/// tops still have their section.
+/// A part's height is rounded to whole layers, at least one. A last plane that
+/// then lies above the part is moved down to the part's top, where flat tops
+/// still have their section.
 #[derive(Clone, Debug)]
 pub struct Planes {
     z_um: Vec<f64>,
@@ -57,7 +57,7 @@ impl Planes {
             let k = f64::from(k);
             match rule {
                 PlaneRule::Top => (bottom_um + (k + 1.0) * thickness_um).min(top_um),
-                PlaneRule::Middle => bottom_um + (k + 0.5) * thickness_um,
+                PlaneRule::Middle => (bottom_um + (k + 0.5) * thickness_um).min(top_um),
                 PlaneRule::Bottom => (bottom_um + k * thickness_um).next_up(),
             }
         };
@@ -138,6 +138,7 @@ mod tests {
         assert_eq!(planes(299.99999, PlaneRule::Top), [100.0, 200.0, 299.99999]);
         assert_eq!(planes(300.00001, PlaneRule::Top), [100.0, 200.0, 300.0]);
         assert_eq!(planes(1.0, PlaneRule::Top), [1.0]);
+        assert_eq!(planes(1.0, PlaneRule::Middle), [1.0]);
         assert_eq!(planes(0.0, PlaneRule::Top), [0.0]);
     }
 

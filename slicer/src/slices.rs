@@ -45,7 +45,8 @@ pub enum Frame {
         /// Black pixels on every side.
         margin: u32,
     },
-    /// A given place, which must hold the whole part.
+    /// A given place, which must hold the whole part and leave the last
+    /// column black.
     At {
         /// The top left corner (x, y) in part coordinates, in millimetres.
         origin_mm: [f64; 2],

@@ -108,7 +108,7 @@ impl Table {
         let mut stray_rows = Vec::new();
         let mut transitions = Vec::new();
         for (row, ends) in starts.windows(2).enumerate() {
-            let places = &mut places[ends[0]..ends[1]];
+            let places = &mut places[ends[0] as usize..ends[1] as usize];
             places.sort_unstable();
             transitions.clear();
             let balanced = match fill {
@@ -132,18 +132,18 @@ impl Table {
 fn sort_by_row<I: Iterator<Item = Crossing>>(
     crossings: impl Fn() -> I,
     height: u32,
-) -> (Vec<usize>, Vec<Place>) {
-    let mut starts = vec![0; height as usize + 2];
+) -> (Vec<u32>, Vec<Place>) {
+    let mut starts = vec![0u32; height as usize + 2];
     for crossing in crossings() {
         starts[crossing.row() + 2] += 1;
     }
     for row in 2..starts.len() {
         starts[row] += starts[row - 1];
     }
-    let mut places = vec![Place::default(); starts[height as usize + 1]];
+    let mut places = vec![Place::default(); starts[height as usize + 1] as usize];
     for crossing in crossings() {
         let at = &mut starts[crossing.row() + 1];
-        places[*at] = crossing.place();
+        places[*at as usize] = crossing.place();
         *at += 1;
     }
     starts.pop();

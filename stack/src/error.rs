@@ -52,12 +52,28 @@ pub enum StackError {
         page: u32,
     },
     /// A strip that does not decode.
-    #[error("layer {layer}: {source}")]
+    #[error("layer {layer}")]
     Strip {
         /// The layer's index.
         layer: u32,
         /// What is wrong with its codes.
         source: G4Error,
+    },
+    /// A file of a folder that cannot be read.
+    #[error("{file}")]
+    InFile {
+        /// The file's name.
+        file: String,
+        /// What is wrong with it.
+        source: Box<StackError>,
+    },
+    /// Layers that do not go up.
+    #[error("layer {layer} stands behind layer {before}: a stack's layers go up")]
+    Order {
+        /// The layer that is out of order.
+        layer: u32,
+        /// The one before it.
+        before: u32,
     },
     /// A folder without pages.
     #[error("the folder holds no .tif page")]
@@ -69,13 +85,8 @@ pub enum StackError {
         layer: u32,
     },
     /// A file of a folder that is a stack of its own.
-    #[error(
-        "file {page} of the folder, by name, has several pages: a folder's files have one page each"
-    )]
-    SeveralPages {
-        /// The file, from 0.
-        page: u32,
-    },
+    #[error("it has several pages: the files of a folder have one page each")]
+    SeveralPages,
     /// The stack does not fit a classic TIFF.
     #[error(
         "the stack passes 4 GiB at layer {layer}: a classic TIFF cannot hold it, write a BigTIFF"

@@ -5,39 +5,44 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::error::StackError;
-use crate::layer::{Layer, PageInfo};
+use crate::layer::Layer;
 use crate::ordered::map_in_order;
 use crate::tiff::{Page, PageReader};
 
 /// The pages of a stack, bottom first.
 #[derive(Debug)]
 pub struct Pages {
-    reader: PageReader,
-    /// The files of a folder that are still to be read, last first.
-    files: Vec<PathBuf>,
-    in_folder: bool,
-    /// How many pages a folder should have, where its first page says so.
-    expected: Option<u32>,
+    source: Source,
     count: u32,
     last_whole: Option<u32>,
 }
 
+#[derive(Debug)]
+enum Source {
+    /// A file or a stream.
+    One(PageReader),
+    /// A folder: the files still to be read, last first, and how many pages
+    /// there should be, where the first says so.
+    Folder { files: Vec<PathBuf>, expected: u32 },
+}
+
 impl Pages {
-    /// Opens a TIFF file, or a folder of TIFF files (in the order of their
-    /// names).
+    /// Opens a TIFF file, or a folder of TIFF files of one page each, in the
+    /// order of their names (numbers in names count as numbers).
     ///
     /// # Errors
     /// Where nothing can be read there, or it is not a TIFF.
     pub fn open(path: &Path) -> Result<Self, StackError> {
-        if !path.is_dir() {
-            return Ok(Self::of(PageReader::from_file(File::open(path)?)?));
-        }
-        let mut files = page_files(path)?;
-        let first = files.pop().ok_or(StackError::NoPages)?;
-        let mut pages = Self::of(PageReader::from_file(File::open(first)?)?);
-        pages.files = files;
-        pages.in_folder = true;
-        Ok(pages)
+        let source = if path.is_dir() {
+            let files = page_files(path)?;
+            if files.is_empty() {
+                return Err(StackError::NoPages);
+            }
+            Source::Folder { files, expected: 0 }
+        } else {
+            Source::One(PageReader::from_file(File::open(path)?)?)
+        };
+        Ok(Self { source, count: 0, last_whole: None })
     }
 
     /// Reads a stack as it arrives, such as from standard input.
@@ -45,18 +50,8 @@ impl Pages {
     /// # Errors
     /// Where nothing arrives, or it is not a TIFF.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
-        Ok(Self::of(PageReader::from_stream(stream)?))
-    }
-
-    fn of(reader: PageReader) -> Self {
-        Self {
-            reader,
-            files: Vec::new(),
-            in_folder: false,
-            expected: None,
-            count: 0,
-            last_whole: None,
-        }
+        let source = Source::One(PageReader::from_stream(stream)?);
+        Ok(Self { source, count: 0, last_whole: None })
     }
 
     /// The pages' layers, decoded on all threads, in order.
@@ -64,37 +59,46 @@ impl Pages {
         map_in_order(self, Page::decode)
     }
 
-    fn next_page(&mut self) -> Result<Option<Page>, StackError> {
-        loop {
-            if let Some(page) = self.reader.next() {
-                let page = page?;
-                if self.in_folder && !self.reader.is_at_end() {
-                    return Err(StackError::SeveralPages { page: self.count });
+    fn next_page(&mut self) -> Option<Result<Page, StackError>> {
+        match &mut self.source {
+            Source::One(reader) => reader.next(),
+            Source::Folder { files, expected } => match files.pop() {
+                None if self.count < *expected => {
+                    *expected = 0;
+                    Some(Err(StackError::CutOff { last_whole: self.last_whole }))
                 }
-                if self.in_folder && !self.follows(page.info()) {
-                    return Err(StackError::MissingPage { layer: page.info().index });
-                }
-                return Ok(Some(page));
-            }
-            match self.files.pop() {
+                None => None,
                 Some(file) => {
-                    self.reader = PageReader::from_file(File::open(file)?)?.numbered(self.count);
+                    Some(one_page(&file, self.count, self.last_whole).map_err(|source| {
+                        let file =
+                            file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                        StackError::InFile { file, source: Box::new(source) }
+                    }))
                 }
-                None if self.expected.is_some_and(|expected| self.count < expected) => {
-                    self.expected = None;
-                    return Err(StackError::CutOff { last_whole: self.last_whole });
-                }
-                None => return Ok(None),
-            }
+            },
         }
     }
 
-    /// Whether a folder's page can be the next. The first of ours states the
-    /// stack.
-    fn follows(&self, info: &PageInfo) -> bool {
+    /// Checks that a page goes on from those before it.
+    fn check(&mut self, page: &Page) -> Result<(), StackError> {
+        let info = page.info();
+        let layer = info.index;
+        if let Source::Folder { expected, .. } = &mut self.source {
+            if self.count == 0 {
+                *expected = info.stack.as_ref().and_then(|stack| stack.layers).unwrap_or(0);
+            }
+            // The first page of ours states the stack.
+            let follows = match self.last_whole {
+                Some(last) => layer == last + 1,
+                None => info.stack.is_some() || info.z_um.is_none(),
+            };
+            if !follows {
+                return Err(StackError::MissingPage { layer });
+            }
+        }
         match self.last_whole {
-            Some(last) => info.index == last + 1,
-            None => info.stack.is_some() || info.z_um.is_none(),
+            Some(before) if layer <= before => Err(StackError::Order { layer, before }),
+            _ => Ok(()),
         }
     }
 }
@@ -102,21 +106,25 @@ impl Pages {
 impl Iterator for Pages {
     type Item = Result<Page, StackError>;
 
-    /// The next page; nothing good follows an error.
+    /// The next page; after an error, none.
     fn next(&mut self) -> Option<Self::Item> {
-        let page = self.next_page().transpose()?;
+        let page = self.next_page()?.and_then(|page| self.check(&page).map(|()| page));
         match &page {
             Ok(page) => {
-                if self.count == 0 && self.in_folder {
-                    self.expected = page.info().stack.as_ref().and_then(|stack| stack.layers);
-                }
                 self.count += 1;
                 self.last_whole = Some(page.info().index);
             }
-            Err(_) => self.files.clear(),
+            Err(_) => self.source = Source::Folder { files: Vec::new(), expected: 0 },
         }
         Some(page)
     }
+}
+
+/// The page of a folder's file.
+fn one_page(file: &Path, number: u32, last_whole: Option<u32>) -> Result<Page, StackError> {
+    let mut reader = PageReader::from_file(File::open(file)?)?.numbered(number, last_whole);
+    let page = reader.next().unwrap_or(Err(StackError::Empty))?;
+    if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
 }
 
 /// The TIFF files of a folder, last name first.
@@ -129,7 +137,57 @@ fn page_files(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
             files.push(path);
         }
     }
-    files.sort();
+    files.sort_by_cached_key(|path| name_key(&path.to_string_lossy()));
     files.reverse();
     Ok(files)
+}
+
+/// A name in pieces, so that `page10` comes behind `page9`: each a text and
+/// the number behind it.
+fn name_key(name: &str) -> Vec<(String, u64)> {
+    let mut pieces = vec![(String::new(), 0u64)];
+    let mut in_number = false;
+    for c in name.chars() {
+        if in_number && !c.is_ascii_digit() {
+            pieces.push((String::new(), 0));
+        }
+        in_number = c.is_ascii_digit();
+        let (text, number) = pieces.last_mut().expect("there is a first piece");
+        match c.to_digit(10) {
+            Some(digit) => *number = number.saturating_mul(10).saturating_add(digit.into()),
+            None => text.push(c),
+        }
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_in_names_count_as_numbers() {
+        let mut names = [
+            "p10.tif",
+            "p9.tif",
+            "p100.tif",
+            "a.tif",
+            "p9b.tif",
+            "layer_100000.tif",
+            "layer_99999.tif",
+        ];
+        names.sort_by_cached_key(|name| name_key(name));
+        assert_eq!(
+            names,
+            [
+                "a.tif",
+                "layer_99999.tif",
+                "layer_100000.tif",
+                "p9.tif",
+                "p9b.tif",
+                "p10.tif",
+                "p100.tif"
+            ]
+        );
+    }
 }

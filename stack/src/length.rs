@@ -66,7 +66,9 @@ pub enum LengthError {
     #[error("`{0}` is not a size: write width x height and a unit, as 4x4.5in or 100x80mm")]
     NotASize(String),
     /// Not a positive number of dots per inch.
-    #[error("`{0}` is not a resolution: write dots per inch between 1 and 100000, as 1500")]
+    #[error(
+        "`{0}` is not a resolution: write dots per inch between 1 and 100000, as 1500, with at most four decimals"
+    )]
     NotAResolution(String),
 }
 
@@ -99,7 +101,8 @@ impl FromStr for Length {
     /// Where the number or the unit is missing or unknown.
     fn from_str(text: &str) -> Result<Self, LengthError> {
         match split_unit(text)? {
-            (number, Some(um)) => Ok(Self::from_um(number * um)),
+            (number, Some(um)) if (number * um).is_finite() => Ok(Self::from_um(number * um)),
+            (_, Some(_)) => Err(LengthError::NotALength(text.trim().to_owned())),
             (_, None) => Err(LengthError::NoUnit { text: text.trim().to_owned() }),
         }
     }
@@ -128,13 +131,12 @@ impl FromStr for Size {
         let (w, w_unit) = split_unit(width).map_err(|_| wrong())?;
         let (h, h_unit) = split_unit(height).map_err(|_| wrong())?;
         let h_unit = h_unit.ok_or_else(wrong)?;
-        if w <= 0.0 || h <= 0.0 {
+        let [width, height] = [w * w_unit.unwrap_or(h_unit), h * h_unit];
+        let possible = |um: f64| um > 0.0 && um.is_finite();
+        if !possible(width) || !possible(height) {
             return Err(wrong());
         }
-        Ok(Self {
-            width: Length::from_um(w * w_unit.unwrap_or(h_unit)),
-            height: Length::from_um(h * h_unit),
-        })
+        Ok(Self { width: Length::from_um(width), height: Length::from_um(height) })
     }
 }
 
@@ -190,6 +192,10 @@ impl FromStr for Dpi {
             .parse()
             .ok()
             .and_then(Self::new)
+            .filter(|dpi| {
+                let (num, den) = dpi.to_rational();
+                f64::from(num) / f64::from(den) == dpi.get()
+            })
             .ok_or_else(|| LengthError::NotAResolution(text.to_owned()))
     }
 }
@@ -223,7 +229,7 @@ mod tests {
 
     #[test]
     fn a_length_needs_a_number_and_a_unit() {
-        for text in ["", "mm", "100", "100furlong", "nanmm", "infmm", "1..2mm"] {
+        for text in ["", "mm", "100", "100furlong", "nanmm", "infmm", "1..2mm", "1e308in"] {
             assert!(text.parse::<Length>().is_err(), "{text}");
         }
     }
@@ -247,6 +253,7 @@ mod tests {
         }
         assert_eq!(Dpi::new(1500.0).unwrap().to_rational(), (1500, 1));
         assert!("0".parse::<Dpi>().is_err());
+        assert!("1500.12345678".parse::<Dpi>().is_err());
         assert!("nan".parse::<Dpi>().is_err());
     }
 }

@@ -33,6 +33,7 @@ mod mask;
 mod ordered;
 mod output;
 mod packbits;
+mod temporary;
 #[cfg(test)]
 mod testing;
 mod tiff;
@@ -44,5 +45,6 @@ pub use layer::{Image, Layer, PageInfo, StackInfo};
 pub use length::{Dpi, Length, LengthError, Size};
 pub use mask::{Mask, MaskBuilder, MaskError, white_in_row};
 pub use ordered::map_in_order;
-pub use output::{Destination, file_beside, write_stack};
+pub use output::{Destination, write_stack};
+pub use temporary::{FileBeside, remove_temporaries};
 pub use tiff::{Compression, EncodedPage, Format, Page, PageReader, PageWriter};

@@ -25,6 +25,10 @@ pub struct Mask {
     transitions: Vec<u32>,
 }
 
+/// An image has at most so many transitions, far more than any layer: what a
+/// reader takes before it gives up.
+pub(crate) const MOST_RUNS: usize = 1 << 27;
+
 /// Why arrays are not a mask.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
@@ -44,6 +48,12 @@ pub enum MaskError {
         column: u32,
         /// The image's width in pixels.
         width: u32,
+    },
+    /// There are more transitions than 32 bits can count.
+    #[error("row {row}: the image has more than 2^32 transitions")]
+    TooMany {
+        /// The row that is too much.
+        row: usize,
     },
     /// The row offsets do not start at 0, go down, or miss the end.
     #[error("the row offsets do not partition the transitions")]
@@ -180,9 +190,14 @@ impl MaskBuilder {
     /// Adds a row below the others.
     ///
     /// # Errors
-    /// Where the transitions do not strictly increase below the width.
+    /// Where the transitions do not strictly increase below the width, or are
+    /// too many altogether.
     pub fn push_row(&mut self, transitions: &[u32]) -> Result<(), MaskError> {
-        check_row(self.rows_so_far(), transitions, self.mask.width)?;
+        let row = self.rows_so_far();
+        check_row(row, transitions, self.mask.width)?;
+        if u32::try_from(self.transition_count() + transitions.len()).is_err() {
+            return Err(MaskError::TooMany { row });
+        }
         self.push_checked(transitions);
         Ok(())
     }
@@ -199,6 +214,11 @@ impl MaskBuilder {
         let end = self.mask.transitions.len() as u32;
         let new_len = self.mask.row_offsets.len() + rows as usize;
         self.mask.row_offsets.resize(new_len, end);
+    }
+
+    /// How many transitions there are so far.
+    pub(crate) fn transition_count(&self) -> usize {
+        self.mask.transitions.len()
     }
 
     fn rows_so_far(&self) -> usize {

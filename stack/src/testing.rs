@@ -17,14 +17,22 @@ pub(crate) fn mask_of<'a>(width: u32, rows: impl IntoIterator<Item = &'a [u32]>)
 /// little: what the modes of T.6 tell apart.
 pub(crate) fn arbitrary_mask() -> impl Strategy<Value = Mask> {
     let width = prop_oneof![0u32..70, Just(2560), Just(2561), 1000u32..9000];
-    let row = (any::<bool>(), prop::collection::vec((any::<u32>(), -4i32..=4), 0..24));
+    let edges =
+        prop_oneof![prop::collection::vec(edge(), 0..24), prop::collection::vec(edge(), 60)];
+    let row = (any::<bool>(), edges);
     (width, prop::collection::vec(row, 0..20)).prop_map(|(width, rows)| {
         let mut mask = MaskBuilder::new(width);
         let mut before: Vec<u32> = Vec::new();
         for (like_above, edges) in rows {
+            let edges: Vec<(u32, i32, u8)> = edges;
             let mut row: Vec<u32> = if like_above {
-                let moved = before.iter().zip(edges.iter().cycle());
-                moved.map(|(&column, edge)| column.saturating_add_signed(edge.1)).collect()
+                // Some edges go, and some come, so that rows fall out of step.
+                let moved = before.iter().zip(edges.iter().cycle()).filter(|(_, edge)| edge.2 > 2);
+                let new = edges.iter().filter(|edge| edge.2 == 0).map(|edge| edge.0 % width.max(1));
+                moved
+                    .map(|(&column, edge)| column.saturating_add_signed(edge.1))
+                    .chain(new)
+                    .collect()
             } else {
                 edges.iter().map(|edge| edge.0 % width.max(1)).collect()
             };
@@ -36,6 +44,11 @@ pub(crate) fn arbitrary_mask() -> impl Strategy<Value = Mask> {
         }
         mask.finish()
     })
+}
+
+/// Where an edge is, how far it moves from row to row, and what becomes of it.
+fn edge() -> impl Strategy<Value = (u32, i32, u8)> {
+    (any::<u32>(), -4i32..=4, 0u8..30)
 }
 
 pub(crate) fn fax_encode(mask: &Mask) -> Vec<u8> {

@@ -182,7 +182,8 @@ fn a_folder_of_stacks_is_no_stack() {
         std::fs::write(folder.path().join(name), write(&layers(2), Format::Big)).unwrap();
     }
     let error = Pages::open(folder.path()).unwrap().layers().next().unwrap().unwrap_err();
-    assert!(matches!(error, StackError::SeveralPages { page: 0 }));
+    let StackError::InFile { file, source } = error else { panic!("{error}") };
+    assert!(file == "a.tif" && matches!(*source, StackError::SeveralPages));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::streams::{read_layers, report, write_layers};
 
 /// Correct stray rows: rows that a gap in the mesh made run to the image's edge
 ///
-/// A row is stray if it ends white, or if `slice` found that its crossings do not balance. Each
+/// A row is stray if it ends white (every part leaves the last column black), or if `slice` found that its crossings do not balance. Each
 /// pixel of a band of stray rows takes the colour that the good rows above and below share. What
 /// was changed is said for each layer and stands on its page. Gray layers pass unchanged.
 #[derive(Args)]

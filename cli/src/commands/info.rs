@@ -104,8 +104,11 @@ impl Totals {
                 rows => format!("{rows} in {} layers", self.stray_layers),
             },
         ));
+        // Names come from files: they must not steer the terminal.
+        let plain = |text: String| text.replace(char::is_control, "?");
         lines
             .into_iter()
+            .map(|(key, value)| (key, plain(value)))
             .map(|(key, value)| format!("{:<12}{value}\n", format!("{key}:")))
             .collect()
     }

@@ -10,6 +10,8 @@ use crate::stop::Stop;
 use crate::streams::{failed_at, input_name, is_stream, open_pages, write_file};
 
 /// Show a layer as a PNG picture, whole or in part
+///
+/// The stack is read up to the layer, and no further: one that was cut off behind it shows, too.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -49,6 +51,11 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Stop> {
             "the region lies outside the image, which is {width} x {height} pixels"
         ))
     })?;
+    if args.scale.side(&region) > LARGEST_PICTURE {
+        return Err(Stop::usage(format!(
+            "the picture would be more than {LARGEST_PICTURE} pixels wide or high: choose a --region or a smaller --scale"
+        )));
+    }
     let picture = Picture::new(&image, region, args.scale);
     if is_stream(&args.output) {
         let written = picture.write_png(BufWriter::new(io::stdout().lock()));
@@ -57,6 +64,9 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Stop> {
         write_file(&args.output, |out| picture.write_png(out))
     }
 }
+
+/// Pictures wider or higher than this cannot be looked at.
+const LARGEST_PICTURE: u64 = 200_000;
 
 fn find_layer(args: &ShowArgs) -> Result<Layer, Stop> {
     let name = input_name(&args.stack);

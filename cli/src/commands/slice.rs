@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use lamp_slicer::{Fill, Frame, Model, PlaneRule, SliceOptions, Slices, Units};
 use lamp_stack::{Dpi, Layer, Length, Size};
 
-use crate::options::{Common, Output, parse_bytes, parse_layers, parse_thickness};
+use crate::options::{Common, Output, parse_layers, parse_memory, parse_thickness};
 use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream, report, write_layers};
@@ -32,9 +32,9 @@ pub(crate) struct SliceArgs {
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     layers: Option<Range<u32>>,
 
-    /// Memory to work in, from 16MB up: less means smaller slabs of layers [default: a quarter of
-    /// the machine's, though no more is used than helps]
-    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    /// Memory for the table of crossings and what goes with it, from 16MB up: less means smaller
+    /// slabs of layers [default: a quarter of the machine's, though no more is used than helps]
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
     #[command(flatten)]
@@ -70,7 +70,8 @@ pub(crate) struct PartOptions {
     #[arg(long, value_name = "PIXELS", default_value_t = 1)]
     margin: u32,
 
-    /// Top left corner of the image in part coordinates, in millimetres, instead of the part's box
+    /// Top left corner of the image in part coordinates, in millimetres, instead of the part's
+    /// box; the image must hold the part, and leave its last column black
     #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
     #[arg(allow_hyphen_values = true)]
     origin: Option<[f64; 2]>,
@@ -129,7 +130,7 @@ impl PartOptions {
     fn frame(&self) -> Frame {
         match (self.origin, self.size) {
             (Some(origin_mm), Some(size)) => {
-                let side = |length: Length| (length.pixels(self.dpi) + 1e-6) as u32;
+                let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
                 Frame::At { origin_mm, pixels: [side(size.width), side(size.height)] }
             }
             _ => Frame::Around { margin: self.margin },

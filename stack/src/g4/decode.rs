@@ -7,7 +7,7 @@ use super::codes::{
     VERTICAL,
 };
 use super::{G4Error, G4Fault};
-use crate::mask::{Mask, MaskBuilder};
+use crate::mask::{MOST_RUNS, Mask, MaskBuilder};
 
 /// Decodes a T.6 (CCITT Group 4) strip of `height` rows, most significant
 /// bit first, into a mask. T.6's white is black (0).
@@ -41,6 +41,9 @@ pub(crate) fn decode_rows(
         decode_row(&mut bits, &above, &mut row, width)
             .map_err(|fault| G4Error { row: index, fault })?;
         mask.push_checked(&row);
+        if mask.transition_count() > MOST_RUNS {
+            return Err(G4Error { row: index, fault: G4Fault::TooManyRuns });
+        }
         above.replace(&mut row);
     }
     Ok(())
@@ -144,7 +147,10 @@ fn take_verticals(
     row: &mut Vec<u32>,
 ) -> Option<usize> {
     let b: &[u32; LOOK] = above.places.get(j..)?.first_chunk()?;
-    let mut wide = b[0] >= a0 + WIDE;
+    // The transition before b1 goes the other way: left of the next a0, it
+    // cannot be the b1 after this one.
+    let alone = j == 0 || b[0] - above.places[j - 1] >= WIDE;
+    let mut wide = alone && b[0] >= a0 + WIDE;
     for k in 1..LOOK {
         wide &= b[k].wrapping_sub(b[k - 1]) >= WIDE;
     }

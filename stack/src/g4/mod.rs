@@ -33,6 +33,10 @@ pub enum G4Fault {
     /// Bits that are no T.6 code (uncompressed mode is not known here).
     #[error("has bits that are no T.6 code")]
     NotACode,
+    /// The image has more runs than any layer: the strip was made to fill
+    /// memory.
+    #[error("makes more runs than an image may have")]
+    TooManyRuns,
     /// A run goes past the width or turns back.
     #[error("has a run outside the image")]
     OutsideRow,
@@ -109,6 +113,14 @@ mod tests {
             let rows = [&alternating, &shifted, &full, &pairs, &alternating, &vec![], &pairs];
             check(&mask_of(width, rows.iter().map(|row| row.as_slice())));
         }
+    }
+
+    #[test]
+    fn a_transition_just_left_of_b1_is_not_passed_over() {
+        // Behind a horizontal code, the b1 after next is left of the next one.
+        let above = [0, 50, 98, 100, 120, 140, 160, 180, 200, 220];
+        let row = [0, 60, 70, 97, 99, 140, 160, 180, 200, 220];
+        check(&mask_of(400, [&above[..], &row]));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::error::StackError;
 use crate::gray::GrayMask;
 use crate::layer::{Image, Layer, PageInfo};
 use crate::length::Dpi;
-use crate::mask::MaskBuilder;
+use crate::mask::{MOST_RUNS, MaskBuilder};
 use crate::tiff::fields::malformed;
 use crate::{g4, packbits};
 
@@ -68,6 +68,7 @@ impl Page {
             } else {
                 self.unpack(strip, self.width.div_ceil(8), rows, |row| {
                     mask.push_checked(&bit_transitions(row, self.width));
+                    mask.transition_count() <= MOST_RUNS
                 })?;
             }
         }
@@ -82,6 +83,7 @@ impl Page {
             self.unpack(strip, self.width, rows, |row| {
                 let levels = row.iter().map(|&(length, byte)| (length, byte ^ flip));
                 gray.push_runs(levels).expect("rows are cut to the width");
+                gray.change_count() <= MOST_RUNS
             })?;
         }
         Ok(Image::Gray(gray))
@@ -93,31 +95,38 @@ impl Page {
         (0..height.div_ceil(whole)).map(move |i| whole.min(height - i * whole))
     }
 
-    /// Gives each row of an uncompressed or PackBits strip as runs of bytes.
+    /// Gives each row of an uncompressed or PackBits strip as runs of bytes,
+    /// until `each` has enough.
     fn unpack(
         &self,
         strip: &[u8],
         row_bytes: u32,
         rows: u32,
-        each: impl FnMut(&[(u32, u8)]),
+        each: impl FnMut(&[(u32, u8)]) -> bool,
     ) -> Result<(), StackError> {
         let cut = if self.compression == Compression::PackBits {
             cut_rows(packbits::Runs::new(strip), row_bytes, rows, each)
         } else {
             cut_rows(strip.iter().map(|&byte| (1, byte)), row_bytes, rows, each)
         };
-        cut.ok_or_else(|| malformed(self.number, "its strip is shorter than its rows"))
+        let whole =
+            cut.ok_or_else(|| malformed(self.number, "its strip is shorter than its rows"))?;
+        if whole {
+            Ok(())
+        } else {
+            Err(malformed(self.number, "it has more runs than an image may have"))
+        }
     }
 }
 
-/// Cuts runs into `rows` rows of `row_bytes` and gives each; `None` where
-/// the runs end early.
+/// Cuts runs into `rows` rows of `row_bytes` and gives each, until one is said
+/// to be enough; `None` where the runs end early.
 fn cut_rows(
     mut runs: impl Iterator<Item = (u32, u8)>,
     row_bytes: u32,
     rows: u32,
-    mut each: impl FnMut(&[(u32, u8)]),
-) -> Option<()> {
+    mut each: impl FnMut(&[(u32, u8)]) -> bool,
+) -> Option<bool> {
     let (mut length, mut byte) = (0, 0);
     let mut row = Vec::new();
     for _ in 0..rows {
@@ -135,9 +144,11 @@ fn cut_rows(
             length -= part;
             room -= part;
         }
-        each(&row);
+        if !each(&row) {
+            return Some(false);
+        }
     }
-    Some(())
+    Some(true)
 }
 
 /// The transitions of a row of bits, given as runs of bytes.

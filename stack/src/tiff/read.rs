@@ -88,9 +88,11 @@ impl PageReader {
         })
     }
 
-    /// Counts pages from `first`, for a folder's later files.
-    pub(crate) fn numbered(mut self, first: u32) -> Self {
+    /// Counts pages from `first`, behind `last_whole`, for a folder's later
+    /// files.
+    pub(crate) fn numbered(mut self, first: u32, last_whole: Option<u32>) -> Self {
         self.number = first;
+        self.last_whole = last_whole;
         self
     }
 
@@ -187,7 +189,13 @@ impl PageReader {
         order.sort_by_key(|&i| offsets[i]);
         page.strips = vec![Vec::new(); strips];
         let reversed = fields.number_or(FILL_ORDER, 1)? == 2;
+        let mut end = 0;
         for i in order {
+            // Strips that overlap would take more memory than the file has.
+            if offsets[i] < end {
+                return Err(malformed(self.number, "its strips overlap"));
+            }
+            end = offsets[i].saturating_add(counts[i]);
             let mut strip = self.read(offsets[i], counts[i])?;
             if reversed {
                 strip.iter_mut().for_each(|byte| *byte = byte.reverse_bits());

@@ -198,6 +198,18 @@ impl<W: Write> PageWriter<W> {
         Ok(self.out)
     }
 
+    /// Writes the page kept back, with a link to a page that will not come:
+    /// what stands is whole, but the stack is cut off.
+    ///
+    /// # Errors
+    /// Where writing fails.
+    pub fn cut_off(mut self) -> Result<(), StackError> {
+        if let Some(last) = self.held.take() {
+            self.write(&last, false)?;
+        }
+        Ok(self.out.flush()?)
+    }
+
     fn write(&mut self, page: &EncodedPage, last: bool) -> Result<(), StackError> {
         if self.offset == 0 {
             self.out.write_all(self.format.header())?;
