@@ -76,7 +76,7 @@ fn threads_memory_and_the_name_of_the_program_change_no_byte() {
     };
     let plain = stages("slice", "");
     assert_eq!(read_stack(plain.clone()).len(), 76);
-    for more in ["--threads 1", "--threads 2", "--threads 7", "--memory 1MB", "--memory 20kB"] {
+    for more in ["--threads 1", "--threads 2", "--threads 7", "--memory 16MB", "--memory 1GB"] {
         assert!(stages("slice", more) == plain, "{more} changed the bytes");
     }
     assert!(stages("lamp slice", "") == plain);
