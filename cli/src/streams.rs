@@ -126,34 +126,38 @@ pub(crate) fn write_layers(
     output: &Output,
     report: &Report,
 ) -> Result<(), Stop> {
-    let path = &output.output;
-    let to = if is_stream(path) {
+    let format = if output.classic { Format::Classic } else { Format::Big };
+    let counted = layers.inspect(|_| report.layer_done());
+    let written = write_stack(counted, destination(&output.output)?, format);
+    report.done();
+    written.map_err(|stop| match stop {
+        Stop::Output(_) if is_stream(&output.output) => stop.at("standard output"),
+        Stop::Output(_) => stop.at(output.output.display().to_string()),
+        stop => stop,
+    })
+}
+
+fn destination(path: &Path) -> Result<Destination, Stop> {
+    if is_stream(path) {
         if io::stdout().is_terminal() {
             return Err(Stop::usage(
                 "a stack is no text for a terminal: name a file with -o, or pipe it on",
             ));
         }
-        Destination::Stream(Box::new(io::stdout().lock()))
-    } else if path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir() {
-        if path.file_name().is_none() {
-            return Err(Stop::usage(format!(
-                "{}: name the folder that is to be made",
-                path.display()
-            )));
-        }
-        Destination::Folder(path.clone())
-    } else if let Some(device) = open_device(path)? {
-        Destination::Stream(Box::new(device))
-    } else {
-        Destination::File(behind_links(path))
-    };
-    let format = if output.classic { Format::Classic } else { Format::Big };
-    let counted = layers.inspect(|_| report.layer_done());
-    let written = write_stack(counted, to, format);
-    report.done();
-    let name =
-        if is_stream(path) { "standard output".to_owned() } else { path.display().to_string() };
-    written.map_err(|stop| if let Stop::Output(_) = stop { stop.at(name) } else { stop })
+        return Ok(Destination::Stream(Box::new(io::stdout().lock())));
+    }
+    if path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir() {
+        return match path.file_name() {
+            Some(_) => Ok(Destination::Folder(path.to_owned())),
+            None => {
+                Err(Stop::usage(format!("{}: name the folder that is to be made", path.display())))
+            }
+        };
+    }
+    Ok(match open_device(path)? {
+        Some(device) => Destination::Stream(Box::new(device)),
+        None => Destination::File(behind_links(path)),
+    })
 }
 
 /// Opens what stands at `path` if that is no file: a pipe or a device is
