@@ -69,7 +69,8 @@ fn a_stream_reads_back() {
     for format in [Format::Big, Format::Classic] {
         let layers = layers(5);
         assert_eq!(read(write(&layers, format)).unwrap(), layers);
-        let gray = [gray_layer(), gray_layer()];
+        let mut gray = [gray_layer(), gray_layer()];
+        gray[1].info.index = 1;
         assert_eq!(read(write(&gray, format)).unwrap(), gray);
     }
 }

@@ -149,7 +149,7 @@ fn take_verticals(
     let b: &[u32; LOOK] = above.places.get(j..)?.first_chunk()?;
     // The transition before b1 goes the other way: left of the next a0, it
     // cannot be the b1 after this one.
-    let alone = j == 0 || b[0] - above.places[j - 1] >= WIDE;
+    let alone = j == 0 || b[0] - above.places[j - 1] > 3;
     let mut wide = alone && b[0] >= a0 + WIDE;
     for k in 1..LOOK {
         wide &= b[k].wrapping_sub(b[k - 1]) >= WIDE;
