@@ -19,7 +19,7 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 use commands::Command;
 use options::Common;
 use report::say;
-use signals::clean_up_on_signals;
+use signals::{clean_up_on_signals, wait_if_ending};
 use stop::Stop;
 
 /// CAD parts to the layer images of projection photopolymerization.
@@ -71,6 +71,7 @@ fn run(command: &Command, common: &Common) -> Result<(), Stop> {
 
 /// Says in one sentence why a command stopped, and turns it into a status.
 fn finish(name: &str, result: Result<(), Stop>) -> ExitCode {
+    wait_if_ending();
     match result {
         Err(stop) if !stop.is_reader_gone() => {
             say(&format!("{name}: {stop}"));

@@ -1,5 +1,6 @@
 //! What happens when somebody ends a command.
 
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
 
 use lamp_stack::remove_temporaries;
@@ -7,6 +8,16 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::stop::Stop;
+
+static CAUGHT: AtomicBool = AtomicBool::new(false);
+
+/// If a signal is ending the process, waits for that: what fails meanwhile,
+/// because its files are gone, is not to be told.
+pub(crate) fn wait_if_ending() {
+    while CAUGHT.load(Relaxed) {
+        thread::park();
+    }
+}
 
 /// Lets Ctrl-C, and the signals that end a batch, take temporary files away
 /// before the process ends, with status 128 + the signal's number, as shells
@@ -18,6 +29,7 @@ pub(crate) fn clean_up_on_signals() -> Result<(), Stop> {
     let mut signals = Signals::new(wanted).map_err(|error| Stop::Failed(error.into()))?;
     thread::spawn(move || {
         if let Some(signal) = signals.forever().next() {
+            CAUGHT.store(true, Relaxed);
             remove_temporaries();
             std::process::exit(128 + signal);
         }

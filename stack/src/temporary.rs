@@ -20,8 +20,10 @@ pub fn remove_temporaries() {
     // A thread that panicked with the lock left the set as good as any.
     let mut live = LIVE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     for path in std::mem::take(&mut *live) {
-        // What is gone or renamed already is as it should be.
-        let _ = fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
+        // What is gone or renamed already is as it should be. A folder that
+        // is still being filled may take several goes.
+        let remove = || fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
+        let _ = (0..100).find(|_| remove().is_ok() || !path.exists());
     }
 }
 

@@ -107,9 +107,9 @@ fn a_slicer_killed_midway_fails_the_stages_after_it() {
 fn an_interrupted_stage_leaves_nothing() {
     let scratch = Scratch::new();
     scratch.part("blade.stl", Part::Blade, 24_000);
-    for (signal, status, output) in
-        [("-INT", 130, "out.tif"), ("-TERM", 143, "out.tif"), ("-INT", 130, "out/")]
-    {
+    // Shells start background jobs with Ctrl-C ignored, which stays so.
+    let (signal, status) = ("-TERM", 143);
+    for output in ["out.tif", "out/"] {
         // Some 12 000 layers, of which only the first few are ever made.
         let line = format!("slice blade.stl --thickness 10um -o {output}");
         let mut slice = scratch.command(&line);
