@@ -46,6 +46,6 @@ pub use error::SliceError;
 pub use facet::{Facet, Units};
 pub use grid::PixelGrid;
 pub use model::Model;
-pub use planes::{PlaneRule, Planes};
+pub use planes::PlaneRule;
 pub use slices::{Frame, SliceOptions, Slices};
 pub use table::Fill;

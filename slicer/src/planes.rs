@@ -29,7 +29,7 @@ pub enum PlaneRule {
 /// then lies above the part is moved down to the part's top, where flat tops
 /// still have their section.
 #[derive(Clone, Debug)]
-pub struct Planes {
+pub(crate) struct Planes {
     z_um: Vec<f64>,
     bottom_um: f64,
     thickness_um: f64,
@@ -40,7 +40,7 @@ impl Planes {
     ///
     /// # Errors
     /// Where there would be more layers than any machine builds.
-    pub fn uniform(
+    pub(crate) fn uniform(
         bottom_um: f64,
         top_um: f64,
         thickness: Length,
@@ -65,28 +65,23 @@ impl Planes {
     }
 
     /// How many layers there are.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.z_um.len()
-    }
-
-    /// Whether there are none. There never are.
-    pub fn is_empty(&self) -> bool {
-        self.z_um.is_empty()
     }
 
     /// The height of a plane, in micrometres.
     #[inline]
-    pub fn z_um(&self, layer: usize) -> f64 {
+    pub(crate) fn z_um(&self, layer: usize) -> f64 {
         self.z_um[layer]
     }
 
     /// The height of a layer's bottom, in micrometres, to the nanometre.
-    pub fn layer_bottom_um(&self, layer: usize) -> f64 {
+    pub(crate) fn layer_bottom_um(&self, layer: usize) -> f64 {
         ((self.bottom_um + layer as f64 * self.thickness_um) * 1000.0).round() / 1000.0
     }
 
     /// The thickness of the layers, in micrometres.
-    pub fn thickness_um(&self) -> f64 {
+    pub(crate) fn thickness_um(&self) -> f64 {
         self.thickness_um
     }
 
@@ -94,13 +89,13 @@ impl Planes {
     /// at or below `high_um`. A vertex is above a plane when its z is at or
     /// above the plane's, so these are the planes that part the two.
     #[inline]
-    pub fn between(&self, low_um: f64, high_um: f64) -> Range<usize> {
+    pub(crate) fn between(&self, low_um: f64, high_um: f64) -> Range<usize> {
         self.at_or_below(low_um)..self.at_or_below(high_um)
     }
 
     /// How many planes lie at or below a height.
     #[inline]
-    pub fn at_or_below(&self, z_um: f64) -> usize {
+    pub(crate) fn at_or_below(&self, z_um: f64) -> usize {
         // The planes are nearly even: guess, then walk to the exact answer.
         let guess = (z_um - self.z_um[0]) / self.thickness_um + 1.0;
         let mut count = (guess as usize).min(self.z_um.len());
