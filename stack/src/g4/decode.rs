@@ -6,6 +6,7 @@ use super::codes::{
     Code, EOL, HORIZONTAL, MAKE_UP_0, MAKE_UP_1, MAKE_UP_LONG, PASS, TERMINATING_0, TERMINATING_1,
     VERTICAL,
 };
+use super::row::{LOOK, Row, TOGETHER, WIDE};
 use super::{G4Error, G4Fault};
 use crate::mask::{MOST_RUNS, Mask, MaskBuilder};
 
@@ -34,75 +35,51 @@ pub(crate) fn decode_rows(
     mask: &mut MaskBuilder,
 ) -> Result<(), G4Error> {
     let mut bits = BitReader::new(strip);
-    let mut above = RowAbove::new(width);
-    let mut row = Vec::new();
-    for index in 0..height {
-        row.clear();
+    let (mut above, mut row) = (Row::black(width), Row::black(width));
+    let mut index = 0;
+    while index < height {
+        if above.len == 0 {
+            let black = bits.take_ones(height - index);
+            mask.push_black(black);
+            index += black;
+            if index == height {
+                break;
+            }
+        }
         decode_row(&mut bits, &above, &mut row, width)
             .map_err(|fault| G4Error { row: index, fault })?;
-        mask.push_checked(&row);
+        mask.push_padded(&row.places, row.len);
         if mask.transition_count() > MOST_RUNS {
             return Err(G4Error { row: index, fault: G4Fault::TooManyRuns });
         }
-        above.replace(&mut row);
+        std::mem::swap(&mut above, &mut row);
+        index += 1;
     }
     Ok(())
-}
-
-/// The row above, with places behind its last transition, so that several can
-/// be looked at together: the width, and on from there in wide steps.
-struct RowAbove {
-    places: Vec<u32>,
-    len: usize,
-    behind: [u32; LOOK],
-}
-
-/// How many vertical codes are taken together, and the place after them.
-const LOOK: usize = 5;
-/// Transitions so far apart stay in order when each moves by three pixels.
-const WIDE: u32 = 7;
-
-impl RowAbove {
-    fn new(width: u32) -> Self {
-        let behind = std::array::from_fn(|k| width + WIDE * k as u32);
-        Self { places: behind.to_vec(), len: 0, behind }
-    }
-
-    /// Takes the row's transitions, leaving it some other ones.
-    fn replace(&mut self, row: &mut Vec<u32>) {
-        std::mem::swap(&mut self.places, row);
-        self.len = self.places.len();
-        self.places.extend_from_slice(&self.behind);
-    }
-
-    /// Transition `i`; the width behind the last.
-    #[inline]
-    fn at(&self, i: usize) -> u32 {
-        if i < self.len { self.places[i] } else { self.behind[0] }
-    }
 }
 
 /// Decodes one row against the row above it. Names are those of
 /// [`encode_row`](super::encode).
 fn decode_row(
     bits: &mut BitReader<'_>,
-    above: &RowAbove,
-    row: &mut Vec<u32>,
+    above: &Row,
+    row: &mut Row,
     width: u32,
 ) -> Result<(), G4Fault> {
+    row.len = 0;
     let (mut a0, mut started) = (0, false);
     let mut white = false;
     // The index of b1; its parity is the colour's.
     let mut j = 0;
     while a0 < width || !started {
-        if let Some(count) = take_verticals(bits, above, j, a0, row) {
-            a0 = row[row.len() - 1];
+        if let Some(count) = take_verticals(bits, above, j, a0, row, width) {
+            a0 = row.places[row.len + count - 1];
+            row.len += count;
+            row.make_room();
             white ^= count % 2 == 1;
             j += count;
             started = true;
-            if a0 == width {
-                row.pop();
-            }
+            row.len -= usize::from(a0 == width);
             continue;
         }
         match bits.mode()? {
@@ -111,7 +88,7 @@ fn decode_row(
                 if a1 < a0 || a1 > width {
                     return Err(G4Fault::OutsideRow);
                 }
-                toggle(row, a1, width);
+                row.toggle(a1, width);
                 a0 = a1;
                 white = !white;
                 j = if j > 0 { j - 1 } else { j + 1 };
@@ -123,7 +100,7 @@ fn decode_row(
             Mode::Horizontal => {
                 for colour in [white, !white] {
                     a0 += bits.run(colour, width - a0)?;
-                    toggle(row, a0, width);
+                    row.toggle(a0, width);
                 }
             }
         }
@@ -132,51 +109,50 @@ fn decode_row(
             j += 2;
         }
     }
+    row.end(width);
     Ok(())
 }
 
-/// Takes up to four vertical codes at once and adds their transitions, where
-/// these lie in order whatever the codes, because the runs above are wide. The
-/// last may be the row's end. Gives how many were taken.
+/// Takes up to four vertical codes at once and writes their transitions behind
+/// the row, where these lie in order whatever the codes, because the runs
+/// above are wide. The last may be the row's end. Gives how many were taken.
 #[inline]
 fn take_verticals(
     bits: &mut BitReader<'_>,
-    above: &RowAbove,
+    above: &Row,
     j: usize,
     a0: u32,
-    row: &mut Vec<u32>,
+    row: &mut Row,
+    width: u32,
 ) -> Option<usize> {
+    if j > above.len {
+        return None;
+    }
     let b: &[u32; LOOK] = above.places.get(j..)?.first_chunk()?;
     // The transition before b1 goes the other way: left of the next a0, it
     // cannot be the b1 after this one.
     let alone = j == 0 || b[0] - above.places[j - 1] > 3;
-    let mut wide = alone && b[0] >= a0 + WIDE;
+    // Any difference that is too small leaves the sign bit.
+    let mut narrow = b[0].wrapping_sub(a0 + WIDE);
     for k in 1..LOOK {
-        wide &= b[k].wrapping_sub(b[k - 1]) >= WIDE;
+        narrow |= b[k].wrapping_sub(b[k - 1] + WIDE);
     }
     let codes = bits.verticals[bits.peek(VERTICALS_BITS)];
     // Behind the last transition stands the row's end, coded once.
     let count = usize::from(codes.count).min(above.len - j + 1);
-    if !wide || count == 0 {
+    if !alone || narrow as i32 <= -1 || count == 0 {
         return None;
     }
-    let moved: [u32; 4] = std::array::from_fn(|k| b[k].wrapping_add_signed(codes.shifts[k].into()));
-    if moved[count - 1] > above.behind[0] {
+    let moved: &mut [u32; TOGETHER] = row.places.get_mut(row.len..)?.first_chunk_mut()?;
+    for k in 0..TOGETHER {
+        moved[k] = b[k].wrapping_add_signed(codes.shifts[k].into());
+    }
+    if moved[count - 1] > width {
         return None;
     }
-    bits.take(codes.ends[count - 1]).ok()?;
-    row.extend_from_slice(&moved[..count]);
+    // A vertical code ends with a 1, which no bit behind the strip is.
+    bits.skip(codes.end(count - 1));
     Some(count)
-}
-
-/// Adds a transition; an empty run cancels the one before it.
-#[inline]
-fn toggle(row: &mut Vec<u32>, column: u32, width: u32) {
-    if row.last() == Some(&column) {
-        row.pop();
-    } else if column < width {
-        row.push(column);
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,19 +194,33 @@ static MODES: LazyLock<Vec<Entry<Mode>>> = LazyLock::new(|| {
 /// The vertical codes that some bits begin with, at most four.
 #[derive(Clone, Copy, Default)]
 struct Verticals {
+    shifts: [i8; TOGETHER],
     count: u8,
-    shifts: [i8; 4],
-    /// How many bits the first code takes, the first two, and so on.
-    ends: [u8; 4],
+    /// How many bits the codes up to each take, in 4 bits each.
+    ends: u16,
 }
 
-const VERTICALS_BITS: u32 = 11;
+impl Verticals {
+    /// How many bits the codes up to `k` take.
+    #[inline]
+    fn end(self, k: usize) -> u32 {
+        u32::from(self.ends) >> (4 * k) & 15
+    }
+
+    fn push(&mut self, shift: i32, end: u32) {
+        self.shifts[usize::from(self.count)] = shift as i8;
+        self.ends |= (end << (4 * self.count)) as u16;
+        self.count += 1;
+    }
+}
+
+const VERTICALS_BITS: u32 = 12;
 
 static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {
     let begin = |bits: usize| {
         let mut found = Verticals::default();
         let mut end = 0;
-        while found.count < 4 {
+        while usize::from(found.count) < TOGETHER {
             let rest = bits << end & ((1 << VERTICALS_BITS) - 1);
             let entry = MODES[rest >> (VERTICALS_BITS - MODE_BITS)];
             let Mode::Vertical(shift) = entry.value else { break };
@@ -238,9 +228,7 @@ static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {
             if entry.len == 0 || end > VERTICALS_BITS {
                 break;
             }
-            found.shifts[usize::from(found.count)] = shift as i8;
-            found.ends[usize::from(found.count)] = end as u8;
-            found.count += 1;
+            found.push(shift, end);
         }
         found
     };
@@ -295,18 +283,40 @@ impl<'a> BitReader<'a> {
 
     #[inline]
     fn refill(&mut self) {
-        if let Some((word, rest)) = self.rest.split_first_chunk::<4>()
+        if let Some(word) = self.rest.first_chunk::<8>()
             && self.count >= 0
         {
-            self.pending |= u64::from(u32::from_be_bytes(*word)) << (32 - self.count);
-            self.count += 32;
-            self.rest = rest;
+            // The bits behind the last whole byte come again next time.
+            self.pending |= u64::from_be_bytes(*word) >> self.count;
+            self.rest = &self.rest[(63 - self.count) as usize / 8..];
+            self.count |= 56;
         } else {
             while (0..=56).contains(&self.count) && !self.rest.is_empty() {
                 self.pending |= u64::from(self.rest[0]) << (56 - self.count);
                 self.count += 8;
                 self.rest = &self.rest[1..];
             }
+        }
+    }
+
+    /// Takes bits that are at hand.
+    #[inline]
+    fn skip(&mut self, len: u32) {
+        self.pending <<= len;
+        self.count -= len as i32;
+    }
+
+    /// Takes as many 1 bits as come next, at most `most`.
+    fn take_ones(&mut self, most: u32) -> u32 {
+        let mut taken = 0;
+        loop {
+            self.peek(1);
+            let ones = self.pending.leading_ones().min(self.count.max(0) as u32).min(most - taken);
+            if ones == 0 {
+                return taken;
+            }
+            self.skip(ones.min(32));
+            taken += ones.min(32);
         }
     }
 

@@ -17,6 +17,10 @@ pub fn encode(mask: &Mask) -> Vec<u8> {
     let mut bits = BitWriter::new(mask.transition_count() / 2 + mask.height() as usize / 8 + 16);
     let mut reference: &[u32] = &[];
     for row in mask.rows() {
+        if row.is_empty() && reference.is_empty() {
+            bits.put(VERTICAL[3]);
+            continue;
+        }
         encode_row(&mut bits, reference, row, mask.width());
         reference = row;
     }
@@ -38,9 +42,8 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
     // Indices of a1 and b1. They agree in parity: both change colour alike.
     let (mut i, mut j) = (0, 0);
     while a0 < width || !started {
-        if let Some(index) = four_near(reference, row, i, j) {
-            let packed = four_verticals[index];
-            bits.put(Code { bits: packed & 0x07FF_FFFF, len: packed >> 27 });
+        if let Some(code) = four_near(reference, row, i, j, width, four_verticals) {
+            bits.put(code);
             (i, j) = (i + 4, j + 4);
             (a0, started) = (row[i - 1], true);
             continue;
@@ -72,25 +75,39 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
 
 /// If the next four transitions all lie within three pixels of the reference
 /// row's, and the reference runs between are wide enough (four pixels) that
-/// no pass mode and no other b1 is possible, the index of their four codes.
+/// no pass mode and no other b1 is possible, their four codes.
 #[inline]
-fn four_near(reference: &[u32], row: &[u32], i: usize, j: usize) -> Option<usize> {
-    let a: &[u32; 4] = row.get(i..i + 4)?.try_into().ok()?;
-    // With b[0] the reference transition before b1: it must lie left of a0's
-    // successor, and b[5] right of the fourth a1.
-    let b: &[u32; 6] = reference.get(j.checked_sub(1)?..j + 5)?.try_into().ok()?;
-    let mut wide = true;
-    for k in 0..5 {
-        wide &= b[k + 1] - b[k] > 3;
+fn four_near(
+    reference: &[u32],
+    row: &[u32],
+    i: usize,
+    j: usize,
+    width: u32,
+    codes: &[u32],
+) -> Option<Code> {
+    let a: &[u32; 4] = row.get(i..)?.first_chunk()?;
+    let b: &[u32; 4] = reference.get(j..)?.first_chunk()?;
+    // The transition before b1 must lie left of the next a0, the one behind
+    // the last of b right of the fourth a1. A difference that is too small
+    // leaves the sign bit, a shift that is too large any bit above the third.
+    let behind = reference.get(j + 4).copied().unwrap_or(width);
+    let before = if j == 0 { b[0].wrapping_sub(4) } else { reference[j - 1] };
+    let mut narrow = b[0].wrapping_sub(before).wrapping_sub(4);
+    narrow |= behind.wrapping_sub(b[3]).wrapping_sub(4);
+    for k in 1..4 {
+        narrow |= b[k].wrapping_sub(b[k - 1]).wrapping_sub(4);
     }
-    let mut near = true;
-    let mut index = 0;
+    let (mut far, mut index) = (0, 0);
     for k in 0..4 {
-        let shift = a[k].wrapping_sub(b[k + 1]).wrapping_add(3);
-        near &= shift <= 6;
-        index |= (shift as usize & 7) << (3 * k);
+        let shift = a[k].wrapping_sub(b[k]).wrapping_add(3);
+        far |= shift;
+        index |= shift << (3 * k);
     }
-    (wide && near).then_some(index)
+    if narrow >> 31 | far >> 3 != 0 {
+        return None;
+    }
+    let code = codes[index as usize];
+    (code != 0).then_some(Code { bits: code & 0x07FF_FFFF, len: code >> 27 })
 }
 
 /// Four vertical codes in one word, indexed by four 3-bit values of

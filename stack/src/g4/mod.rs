@@ -6,6 +6,7 @@
 mod codes;
 mod decode;
 mod encode;
+mod row;
 
 pub use decode::decode;
 pub(crate) use decode::decode_rows;

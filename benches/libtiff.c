@@ -1,0 +1,78 @@
+/* Seconds that libtiff takes to decode, and to encode, every page of a
+ * Group 4 stack in memory: the median of five rounds each.
+ *
+ *   cc -O2 benches/libtiff.c -ltiff -o libtiff && ./libtiff blade.tif */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <tiffio.h>
+
+enum { ROUNDS = 5 };
+
+static double seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return now.tv_sec + now.tv_nsec * 1e-9;
+}
+
+static int by_size(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* A file that forgets what is written to it. */
+static uint64_t at, end;
+static tmsize_t no_read(thandle_t h, void *p, tmsize_t n) { (void)h, (void)p, (void)n; return 0; }
+static tmsize_t sink(thandle_t h, void *p, tmsize_t n) {
+    (void)h, (void)p;
+    at += n;
+    end = at > end ? at : end;
+    return n;
+}
+static toff_t seek(thandle_t h, toff_t to, int whence) {
+    (void)h;
+    return at = to + (whence == SEEK_CUR ? at : whence == SEEK_END ? end : 0);
+}
+static int no_close(thandle_t h) { (void)h; return 0; }
+static toff_t size(thandle_t h) { (void)h; return end; }
+
+int main(int argc, char **argv) {
+    double decode[ROUNDS], encode[ROUNDS];
+    if (argc != 2) return fprintf(stderr, "usage: libtiff STACK\n"), 2;
+    for (int round = 0; round < ROUNDS; round++) {
+        decode[round] = encode[round] = 0;
+        TIFF *in = TIFFOpen(argv[1], "r");
+        if (!in) return 1;
+        uint32_t width, height;
+        TIFFGetField(in, TIFFTAG_IMAGEWIDTH, &width);
+        TIFFGetField(in, TIFFTAG_IMAGELENGTH, &height);
+        tmsize_t bytes = TIFFStripSize(in);
+        void *pixels = malloc(bytes);
+        do {
+            double start = seconds();
+            if (TIFFReadEncodedStrip(in, 0, pixels, bytes) != bytes) return 1;
+            decode[round] += seconds() - start;
+
+            at = end = 0;
+            TIFF *out = TIFFClientOpen("sink", "w", 0, no_read, sink, seek, no_close, size, 0, 0);
+            TIFFSetField(out, TIFFTAG_IMAGEWIDTH, width);
+            TIFFSetField(out, TIFFTAG_IMAGELENGTH, height);
+            TIFFSetField(out, TIFFTAG_ROWSPERSTRIP, height);
+            TIFFSetField(out, TIFFTAG_BITSPERSAMPLE, 1);
+            TIFFSetField(out, TIFFTAG_SAMPLESPERPIXEL, 1);
+            TIFFSetField(out, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+            TIFFSetField(out, TIFFTAG_COMPRESSION, COMPRESSION_CCITTFAX4);
+            start = seconds();
+            if (TIFFWriteEncodedStrip(out, 0, pixels, bytes) < 0) return 1;
+            encode[round] += seconds() - start;
+            TIFFClose(out);
+        } while (TIFFReadDirectory(in));
+        free(pixels);
+        TIFFClose(in);
+    }
+    qsort(decode, ROUNDS, sizeof *decode, by_size);
+    qsort(encode, ROUNDS, sizeof *encode, by_size);
+    printf("decode %f\nencode %f\n", decode[ROUNDS / 2], encode[ROUNDS / 2]);
+    return 0;
+}
