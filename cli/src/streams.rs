@@ -40,6 +40,7 @@ pub(crate) fn open_pages(path: &Path) -> Result<Pages, Stop> {
             "no stack to read: name a file, or pipe one in (--help shows how)",
         ));
     } else {
+        widen_pipe(&io::stdin());
         Pages::from_stream(io::stdin())
     };
     pages.map_err(|error| failed_at(input_name(path), error))
@@ -144,6 +145,7 @@ fn destination(path: &Path) -> Result<Destination, Stop> {
                 "a stack is no text for a terminal: name a file with -o, or pipe it on",
             ));
         }
+        widen_pipe(&io::stdout());
         return Ok(Destination::Stream(Box::new(io::stdout().lock())));
     }
     if path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir() {
@@ -159,6 +161,18 @@ fn destination(path: &Path) -> Result<Destination, Stop> {
         None => Destination::File(behind_links(path)),
     })
 }
+
+/// Gives a pipe room for many layers, so that the stages at its ends seldom
+/// wait for each other.
+#[cfg(target_os = "linux")]
+fn widen_pipe(end: &impl std::os::fd::AsFd) {
+    // Anything else than a pipe, or a system that allows less, stays as it is.
+    let _ = rustix::pipe::fcntl_setpipe_size(end, 1 << 20);
+}
+
+/// Other systems size their pipes themselves.
+#[cfg(not(target_os = "linux"))]
+fn widen_pipe<T>(_: &T) {}
 
 /// Opens what stands at `path` if that is no file: a pipe or a device is
 /// written to, not replaced.

@@ -189,7 +189,8 @@ impl Slices {
 
     /// Makes the next layers of the table into images.
     fn finish_batch(&mut self) {
-        let end = self.pending.end.min(self.pending.start + 2 * rayon::current_num_threads());
+        let layers = self.batch_len().min(self.pending.len());
+        let end = self.pending.start + layers;
         let batch = self.pending.start..end;
         self.pending.start = end;
         let layer = |layer| {
@@ -202,6 +203,14 @@ impl Slices {
             }
         };
         self.ready = batch.into_par_iter().map(layer).collect();
+    }
+
+    /// How many layers become images at once: enough that handing them out
+    /// costs little, but no more than the table takes.
+    fn batch_len(&self) -> usize {
+        let row_offsets = size_of::<u32>() * self.grid.height as usize;
+        let table = size_of::<Crossing>() * self.most_crossings;
+        (table / row_offsets).clamp(1, 16 * rayon::current_num_threads())
     }
 
     fn page_info(&self, layer: usize, stray_rows: Vec<u32>) -> PageInfo {

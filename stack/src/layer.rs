@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 use crate::gray::GrayMask;
 use crate::length::{Dpi, Length};
 use crate::mask::Mask;
+use crate::ordered::Held;
 
 /// What is exposed at one height: an image, and where and how it is exposed.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +18,16 @@ pub struct Layer {
     pub dpi: Option<Dpi>,
     /// The image.
     pub image: Image,
+}
+
+impl Held for Layer {
+    fn bytes(&self) -> usize {
+        let (rows, changes) = (self.image.height() as usize, self.image.changes());
+        match self.image {
+            Image::Mask(_) => 4 * (rows + changes),
+            Image::Gray(_) => 4 * rows + 8 * changes,
+        }
+    }
 }
 
 /// A layer's image: 1-bit or 8-bit.

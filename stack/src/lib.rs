@@ -44,7 +44,7 @@ pub use input::Pages;
 pub use layer::{Image, Layer, PageInfo, StackInfo};
 pub use length::{Dpi, Length, LengthError, Size};
 pub use mask::{Mask, MaskBuilder, MaskError, white_in_row};
-pub use ordered::map_in_order;
+pub use ordered::{Held, map_in_order};
 pub use output::{Destination, write_stack};
 pub use temporary::{FileBeside, remove_temporaries};
 pub use tiff::{Compression, EncodedPage, Format, Page, PageReader, PageWriter};

@@ -17,13 +17,26 @@ use thiserror::Error;
 /// # Guarantees
 /// The transitions of a row strictly increase and are below the width. This
 /// is the only form an image has, so `==` compares images.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Mask {
     width: u32,
     /// Where each row's transitions start, and one entry more: the end.
     row_offsets: Vec<u32>,
     transitions: Vec<u32>,
+    /// The T.6 strip that it was decoded from, so that an image which passes
+    /// through a stage unchanged is not encoded again.
+    strip: Option<Box<[u8]>>,
 }
+
+impl PartialEq for Mask {
+    fn eq(&self, other: &Self) -> bool {
+        self.width == other.width
+            && self.row_offsets == other.row_offsets
+            && self.transitions == other.transitions
+    }
+}
+
+impl Eq for Mask {}
 
 /// An image has at most so many transitions, far more than any layer: what a
 /// reader takes before it gives up.
@@ -77,7 +90,7 @@ impl Mask {
         if !ends_right || !row_offsets.is_sorted() {
             return Err(MaskError::Offsets);
         }
-        let mask = Self { width, row_offsets, transitions };
+        let mask = Self { width, row_offsets, transitions, strip: None };
         for (row, transitions) in mask.rows().enumerate() {
             check_row(row, transitions, width)?;
         }
@@ -86,7 +99,8 @@ impl Mask {
 
     /// An all-black mask.
     pub fn black(width: u32, height: u32) -> Self {
-        Self { width, row_offsets: vec![0; height as usize + 1], transitions: Vec::new() }
+        let row_offsets = vec![0; height as usize + 1];
+        Self { width, row_offsets, transitions: Vec::new(), strip: None }
     }
 
     /// Width in pixels.
@@ -130,6 +144,16 @@ impl Mask {
         column < self.width
             && row < self.height()
             && self.row(row).partition_point(|&t| t <= column) % 2 == 1
+    }
+
+    /// The T.6 strip that the image was decoded from, where it is known.
+    pub(crate) fn strip(&self) -> Option<&[u8]> {
+        self.strip.as_deref()
+    }
+
+    /// The image with the T.6 strip that it was decoded from.
+    pub(crate) fn with_strip(self, strip: Vec<u8>) -> Self {
+        Self { strip: Some(strip.into()), ..self }
     }
 
     /// The image with black and white exchanged.

@@ -4,28 +4,46 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
+/// What waits in a queue, and how much memory it takes there.
+pub trait Held {
+    /// About how many bytes it takes, or will take once it is decoded.
+    fn bytes(&self) -> usize;
+}
+
+impl<T: Held, U> Held for (T, U) {
+    fn bytes(&self) -> usize {
+        self.0.bytes()
+    }
+}
+
+/// Batches are at most so large, in items a thread: enough that handing them
+/// out costs little.
+const MOST_A_THREAD: usize = 16;
+/// From so many bytes on, a batch has no more than an item a thread.
+const ENOUGH_BYTES: usize = 32 << 20;
+
 /// Maps the items of `input` through `work` on all threads of the current
 /// rayon pool, in order. After an error nothing more is taken from `input`.
 ///
-/// Two items a thread are held at once, so memory does not grow with the
-/// length of `input`.
+/// A batch of items is held at once, so memory does not grow with the length
+/// of `input`: up to sixteen a thread, but of large ones only one a thread.
 pub fn map_in_order<I, T, U, E>(
     input: I,
     work: impl Fn(T) -> Result<U, E> + Sync,
 ) -> impl Iterator<Item = Result<U, E>>
 where
     I: Iterator<Item = Result<T, E>>,
-    T: Send,
+    T: Held + Send,
     U: Send,
     E: Send,
 {
-    let batch = 2 * rayon::current_num_threads();
+    let threads = rayon::current_num_threads();
     let mut input = input.fuse();
     let mut failed = false;
     let mut ready = VecDeque::new();
     std::iter::from_fn(move || {
         if ready.is_empty() && !failed {
-            let taken: Vec<_> = input.by_ref().take(batch).collect();
+            let taken = take_batch(&mut input, threads);
             ready = taken.into_par_iter().map(|item| item.and_then(&work)).collect();
         }
         let next: Option<Result<U, E>> = ready.pop_front();
@@ -37,9 +55,38 @@ where
     })
 }
 
+fn take_batch<T: Held, E>(
+    input: &mut impl Iterator<Item = Result<T, E>>,
+    threads: usize,
+) -> Vec<Result<T, E>> {
+    let mut batch = Vec::new();
+    let mut bytes = 0;
+    while batch.len() < threads || (batch.len() < MOST_A_THREAD * threads && bytes < ENOUGH_BYTES) {
+        let Some(item) = input.next() else { break };
+        bytes += item.as_ref().map_or(ENOUGH_BYTES, Held::bytes);
+        batch.push(item);
+    }
+    batch
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl Held for usize {
+        fn bytes(&self) -> usize {
+            *self
+        }
+    }
+
+    #[test]
+    fn a_batch_of_large_items_is_one_a_thread() {
+        let items = |bytes: usize| std::iter::repeat(Ok::<_, ()>(bytes));
+        assert_eq!(take_batch(&mut items(1), 3).len(), 48);
+        assert_eq!(take_batch(&mut items(1 << 30), 3).len(), 3);
+        assert_eq!(take_batch(&mut items(1 << 22), 3).len(), 8);
+        assert_eq!(take_batch(&mut items(1).take(5), 3).len(), 5);
+    }
 
     #[test]
     fn order_is_kept_and_an_error_ends_the_stream() {

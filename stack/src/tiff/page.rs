@@ -5,6 +5,7 @@ use crate::gray::GrayMask;
 use crate::layer::{Image, Layer, PageInfo};
 use crate::length::Dpi;
 use crate::mask::{MOST_RUNS, MaskBuilder};
+use crate::ordered::Held;
 use crate::tiff::fields::malformed;
 use crate::{g4, packbits};
 
@@ -34,6 +35,13 @@ pub struct Page {
     pub(super) strips: Vec<Vec<u8>>,
 }
 
+impl Held for Page {
+    fn bytes(&self) -> usize {
+        // A code of four bits, about what they take, makes four bytes.
+        8 * self.strip_bytes() as usize + 4 * self.height as usize
+    }
+}
+
 impl Page {
     /// What the page's JSON line says (only the page's number, if it has none).
     pub fn info(&self) -> &PageInfo {
@@ -54,13 +62,16 @@ impl Page {
     ///
     /// # Errors
     /// Where a strip does not decode to the size that the directory states.
-    pub fn decode(self) -> Result<Layer, StackError> {
+    pub fn decode(mut self) -> Result<Layer, StackError> {
         let image = if self.gray { self.decode_gray()? } else { self.decode_mask()? };
         Ok(Layer { info: self.info, dpi: self.dpi, image })
     }
 
-    fn decode_mask(&self) -> Result<Image, StackError> {
+    fn decode_mask(&mut self) -> Result<Image, StackError> {
         let mut mask = MaskBuilder::new(self.width);
+        // A transition takes about four bits, a row at least one.
+        let bytes = self.strip_bytes() as usize;
+        mask.reserve(bytes.saturating_mul(8).min(self.height as usize), bytes.saturating_mul(2));
         for (strip, rows) in self.strips.iter().zip(self.strip_heights()) {
             if self.compression == Compression::G4 {
                 g4::decode_rows(strip, self.width, rows, &mut mask)
@@ -73,7 +84,13 @@ impl Page {
             }
         }
         let mask = mask.finish();
-        Ok(Image::Mask(if self.white_is_zero { mask.inverted() } else { mask }))
+        Ok(Image::Mask(if self.white_is_zero {
+            mask.inverted()
+        } else if self.compression == Compression::G4 && self.strips.len() == 1 {
+            mask.with_strip(self.strips.remove(0))
+        } else {
+            mask
+        }))
     }
 
     fn decode_gray(&self) -> Result<Image, StackError> {

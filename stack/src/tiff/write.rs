@@ -61,10 +61,13 @@ pub struct EncodedPage {
 }
 
 impl EncodedPage {
-    /// Encodes a layer: a mask as G4, a gray mask as PackBits.
+    /// Encodes a layer: a mask as G4, a gray mask as PackBits. A mask that is
+    /// as it was read keeps its codes.
     pub fn new(layer: &Layer) -> Self {
         let (gray, strip) = match &layer.image {
-            Image::Mask(mask) => (false, g4::encode(mask)),
+            Image::Mask(mask) => {
+                (false, mask.strip().map_or_else(|| g4::encode(mask), <[u8]>::to_vec))
+            }
             Image::Gray(image) => (true, packbits::encode(image)),
         };
         Self {
