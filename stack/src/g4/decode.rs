@@ -133,9 +133,9 @@ fn take_verticals(
     // cannot be the b1 after this one.
     let alone = j == 0 || b[0] - above.places[j - 1] > 3;
     // Any difference that is too small leaves the sign bit.
-    let mut narrow = b[0].wrapping_sub(a0 + WIDE);
+    let mut narrow = b[0].wrapping_sub(a0).wrapping_sub(WIDE);
     for k in 1..LOOK {
-        narrow |= b[k].wrapping_sub(b[k - 1] + WIDE);
+        narrow |= b[k].wrapping_sub(b[k - 1]).wrapping_sub(WIDE);
     }
     let codes = bits.verticals[bits.peek(VERTICALS_BITS)];
     // Behind the last transition stands the row's end, coded once.
@@ -342,17 +342,17 @@ impl<'a> BitReader<'a> {
     fn run(&mut self, white: bool, room: u32) -> Result<u32, G4Fault> {
         let runs = self.runs;
         let table = &runs[usize::from(white)];
-        let mut length = 0;
+        let mut length = 0u32;
         loop {
             let entry = table[self.peek(RUN_BITS)];
             if entry.len == 0 {
                 return Err(self.no_code());
             }
             self.take(entry.len)?;
-            length += u32::from(entry.value);
-            if length > room {
-                return Err(G4Fault::OutsideRow);
-            }
+            length = length
+                .checked_add(entry.value.into())
+                .filter(|&length| length <= room)
+                .ok_or(G4Fault::OutsideRow)?;
             if entry.value < 64 {
                 return Ok(length);
             }

@@ -53,7 +53,7 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
             bits.put(PASS);
             (a0, j) = (b2, j + 2);
         } else if a1.abs_diff(b1) <= 3 {
-            bits.put(VERTICAL[(a1 + 3 - b1) as usize]);
+            bits.put(VERTICAL[a1.wrapping_sub(b1).wrapping_add(3) as usize]);
             a0 = a1;
             i += 1;
             // The other colour's next transition may stand before this one.

@@ -105,6 +105,15 @@ mod tests {
     }
 
     #[test]
+    fn the_widest_image_survives() {
+        let width = u32::MAX;
+        let row = [0, 9, 20, width - 20, width - 9, width - 1];
+        let near = [0, 7, 23, width - 17, width - 10, width - 2];
+        let mask = mask_of(width, [&row[..], &near, &[], &row]);
+        assert_eq!(decode(&encode(&mask), width, 4).unwrap(), mask);
+    }
+
+    #[test]
     fn adversarial_rows_survive() {
         for width in [1u32, 2, 3, 31, 32, 33, 64, 2560, 2561] {
             let alternating: Vec<u32> = (0..width).collect();

@@ -52,7 +52,7 @@ impl Row {
     pub(super) fn end(&mut self, width: u32) {
         self.make_room();
         for (k, place) in self.places[self.len..][..LOOK].iter_mut().enumerate() {
-            *place = width + WIDE * k as u32;
+            *place = width.saturating_add(WIDE * k as u32);
         }
     }
 }
