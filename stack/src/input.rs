@@ -89,7 +89,7 @@ impl Pages {
             }
             // The first page of ours states the stack.
             let follows = match self.last_whole {
-                Some(last) => layer == last + 1,
+                Some(last) => last.checked_add(1) == Some(layer),
                 None => info.stack.is_some() || info.z_um.is_none(),
             };
             if !follows {

@@ -172,6 +172,12 @@ mod tests {
     }
 
     #[test]
+    fn numbers_of_all_digits_pass_through_unchanged() {
+        let line = r#"{"layer":1,"z_um":31.245270191439438,"who":121.48791951161945}"#;
+        assert_eq!(PageInfo::parse(line.as_bytes()).unwrap().to_line(), line);
+    }
+
+    #[test]
     fn other_descriptions_are_not_taken_for_ours() {
         for text in ["", "a scan", "{}", r#"{"layer":-1}"#, "[1]", "\u{0}"] {
             assert_eq!(PageInfo::parse(text.as_bytes()), None, "{text}");

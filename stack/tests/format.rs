@@ -177,6 +177,18 @@ fn a_file_and_a_folder_read_back() {
 }
 
 #[test]
+fn nothing_follows_the_last_index_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.tif", "b.tif"] {
+        let mut layers = layers(1);
+        layers[0].info.index = u32::MAX;
+        std::fs::write(folder.path().join(name), write(&layers, Format::Big)).unwrap();
+    }
+    let error = Pages::open(folder.path()).unwrap().layers().last().unwrap().unwrap_err();
+    assert!(matches!(error, StackError::MissingPage { layer: u32::MAX }), "{error}");
+}
+
+#[test]
 fn a_folder_of_stacks_is_no_stack() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["a.tif", "b.tif"] {

@@ -12,8 +12,12 @@ use crate::error::StackError;
 
 /// More directory entries than any TIFF writer makes.
 const MOST_ENTRIES: u64 = 4096;
-/// More bytes than any text or table of strips of a page takes.
-const LONGEST_VALUE: u64 = 64 << 20;
+/// More bytes than any text or table of strips of a page takes. Numbers and
+/// JSON take up to a hundred times their bytes once they are read.
+const LONGEST_VALUE: u64 = 2 << 20;
+/// More bytes than the strips of any page take: an endless stream must end.
+const MOST_STRIP_BYTES: u64 = 4 << 30;
+
 /// Reads pages one after the other, from a stream (forward only) or from a
 /// file (any order).
 #[derive(Debug)]
@@ -156,7 +160,10 @@ impl PageReader {
         let mut fields =
             Fields { page: self.number, little_endian: self.little_endian, values: HashMap::new() };
         let mut distant = Vec::new();
-        for entry in entries.iter().filter(|entry| KNOWN.contains(&entry.tag)) {
+        let mut seen = HashSet::new();
+        // The first entry of a tag counts, as for libtiff.
+        let first = |entry: &&Entry| KNOWN.contains(&entry.tag) && seen.insert(entry.tag);
+        for entry in entries.iter().filter(first) {
             let length = entry.count.saturating_mul(type_size(entry.kind));
             if length > LONGEST_VALUE {
                 let what = format!("its tag {} claims {length} bytes", entry.tag);
@@ -184,6 +191,10 @@ impl PageReader {
         if offsets.len() != strips || counts.len() != strips {
             let what = format!("it has {} strips where its rows make {strips}", offsets.len());
             return Err(malformed(self.number, what));
+        }
+        let bytes = counts.iter().fold(0u64, |sum, &count| sum.saturating_add(count));
+        if bytes > MOST_STRIP_BYTES {
+            return Err(malformed(self.number, format!("its strips claim {bytes} bytes")));
         }
         let mut order: Vec<usize> = (0..strips).collect();
         order.sort_by_key(|&i| offsets[i]);

@@ -42,8 +42,14 @@ impl Source {
             }
             Self::File { file, position } => {
                 if let Ok(gap) = i64::try_from(i128::from(offset) - i128::from(*position)) {
-                    file.seek_relative(gap)?;
-                    file.by_ref().take(length).read_to_end(&mut bytes)?;
+                    match file.seek_relative(gap) {
+                        // No file reaches so far.
+                        Err(error) if error.kind() == io::ErrorKind::InvalidInput => {}
+                        sought => {
+                            sought?;
+                            file.by_ref().take(length).read_to_end(&mut bytes)?;
+                        }
+                    }
                 }
                 position
             }
