@@ -1,7 +1,6 @@
 //! ASCII STL.
 
-use std::borrow::Cow;
-use std::io::Cursor;
+use std::io::{self, BufRead, Cursor, Read, Seek, SeekFrom};
 
 use crate::error::SliceError;
 use crate::facet::Facet;
@@ -26,24 +25,22 @@ fn without_mark(text: &[u8]) -> &[u8] {
 /// The facets of all solids of an ASCII file.
 pub(crate) fn read(text: &[u8]) -> Result<Vec<Facet>, SliceError> {
     let mut facets = Vec::new();
-    let mut text = Cow::from(without_mark(text));
-    if !text.contains(&b'\n') {
-        // Lines of old Macintosh files end in a carriage return alone.
-        text.to_mut().iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
-    }
+    let text = without_mark(text);
+    // Lines of old Macintosh files end in a carriage return alone.
+    let end_of_line = if text.contains(&b'\n') { b'\n' } else { b'\r' };
     let mut rest = text.trim_ascii();
     while !rest.is_empty() {
-        let end = end_of_solid(rest);
-        read_solid(&rest[..end], &mut facets)?;
-        rest = rest[end..].trim_ascii_start();
+        let (solid, behind) = rest.split_at(end_of_solid(rest, end_of_line));
+        read_solid(solid, end_of_line, &mut facets)?;
+        rest = behind.trim_ascii_start();
     }
     Ok(facets)
 }
 
 /// Where the solid at the start of `text` ends: behind its `endsolid` line.
-fn end_of_solid(text: &[u8]) -> usize {
+fn end_of_solid(text: &[u8], end_of_line: u8) -> usize {
     let mut end = 0;
-    for line in text.split_inclusive(|&byte| byte == b'\n') {
+    for line in text.split_inclusive(|&byte| byte == end_of_line) {
         end += line.len();
         let word = line.trim_ascii_start();
         if word.len() >= 8 && word[..8].eq_ignore_ascii_case(b"endsolid") {
@@ -53,16 +50,17 @@ fn end_of_solid(text: &[u8]) -> usize {
     end
 }
 
-fn read_solid(text: &[u8], facets: &mut Vec<Facet>) -> Result<(), SliceError> {
-    let failed =
-        |facet, reason: &dyn ToString| SliceError::Ascii { facet, reason: reason.to_string() };
-    let (header, body) = text.split_at(text.iter().position(|&b| b == b'\n').unwrap_or(text.len()));
-    if header.len() < 5 || !header[..5].eq_ignore_ascii_case(b"solid") {
+fn read_solid(text: &[u8], end_of_line: u8, facets: &mut Vec<Facet>) -> Result<(), SliceError> {
+    // The reason may quote all of a line.
+    let failed = |facet, reason: &dyn ToString| SliceError::Ascii {
+        facet,
+        reason: reason.to_string().chars().take(LONGEST_REASON).collect(),
+    };
+    if text.len() < 5 || !text[..5].eq_ignore_ascii_case(b"solid") {
         return Err(failed(facets.len(), &"a line stands where `solid` should"));
     }
-    let mut plain = b"solid part".to_vec();
-    body.split_inclusive(|&byte| byte == b'\n').for_each(|line| push_plain(line, &mut plain));
-    let mut source = Cursor::new(plain);
+    let end_of_header = text.iter().position(|&byte| byte == end_of_line).unwrap_or(text.len());
+    let mut source = PlainText::new(&text[end_of_header..], end_of_line);
     let triangles = stl_io::create_stl_reader(&mut source).map_err(|e| failed(facets.len(), &e))?;
     for triangle in triangles {
         let triangle = triangle.map_err(|e| failed(facets.len(), &e))?;
@@ -71,17 +69,84 @@ fn read_solid(text: &[u8], facets: &mut Vec<Facet>) -> Result<(), SliceError> {
     Ok(())
 }
 
-/// Adds a line as stl_io wants it: in lower case, and without what it would
-/// refuse though nothing here needs it, names that are not UTF-8 and normals
-/// that are no numbers.
-fn push_plain(line: &[u8], out: &mut Vec<u8>) {
-    let line = line.to_ascii_lowercase();
-    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    match (words.next(), words.next(), words.count()) {
-        (Some(b"endsolid"), ..) => out.extend_from_slice(b"endsolid\n"),
-        (Some(b"facet"), Some(b"normal"), 3) => out.extend_from_slice(b"facet normal 0 0 0\n"),
-        _ => out.extend_from_slice(&line),
+/// A solid as stl_io wants it, line by line: in lower case, and without what
+/// it would refuse though nothing here needs it, names that are not UTF-8 and
+/// normals that are no numbers. No line is long, however long the text's are.
+struct PlainText<'a> {
+    /// All but the first line.
+    body: &'a [u8],
+    /// The lines still to come.
+    rest: &'a [u8],
+    end_of_line: u8,
+    line: Cursor<Vec<u8>>,
+}
+
+/// More words than any line has, and more bytes than any number.
+const MOST_WORDS: usize = 6;
+const LONGEST_WORD: usize = 1000;
+/// More characters than a reason needs.
+const LONGEST_REASON: usize = 150;
+
+impl<'a> PlainText<'a> {
+    fn new(body: &'a [u8], end_of_line: u8) -> Self {
+        Self { body, rest: body, end_of_line, line: Self::header() }
     }
+
+    /// The first line, whatever the text's is.
+    fn header() -> Cursor<Vec<u8>> {
+        Cursor::new(b"solid part\n".to_vec())
+    }
+
+    /// Takes the next line off the text.
+    fn next_line(&mut self) {
+        let end = self.rest.iter().position(|&byte| byte == self.end_of_line);
+        let (line, rest) = self.rest.split_at(end.map_or(self.rest.len(), |end| end + 1));
+        self.rest = rest;
+        self.line = Cursor::new(plain(line));
+    }
+}
+
+impl Read for PlainText<'_> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        while self.line.fill_buf()?.is_empty() && !self.rest.is_empty() {
+            self.next_line();
+        }
+        self.line.read(to)
+    }
+}
+
+impl Seek for PlainText<'_> {
+    /// Only to the start, as stl_io does once it knows the format.
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        if to != SeekFrom::Start(0) {
+            return Err(io::ErrorKind::Unsupported.into());
+        }
+        self.rest = self.body;
+        self.line = Self::header();
+        Ok(0)
+    }
+}
+
+fn plain(line: &[u8]) -> Vec<u8> {
+    let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let words: Vec<&[u8]> = words.take(MOST_WORDS).collect();
+    let is = |i: usize, name: &str| {
+        words.get(i).is_some_and(|w| w.eq_ignore_ascii_case(name.as_bytes()))
+    };
+    if is(0, "endsolid") {
+        return b"endsolid\n".to_vec();
+    }
+    if is(0, "facet") && is(1, "normal") && words.len() == 5 {
+        return b"facet normal 0 0 0\n".to_vec();
+    }
+    let mut plain = Vec::new();
+    for word in words {
+        plain.extend_from_slice(if word.len() > LONGEST_WORD { b"..." } else { word });
+        plain.push(b' ');
+    }
+    plain.make_ascii_lowercase();
+    plain.push(b'\n');
+    plain
 }
 
 #[cfg(test)]
@@ -120,6 +185,15 @@ mod tests {
         let cut = &text[..text.len() - 30];
         let message = read(cut.as_bytes()).unwrap_err().to_string();
         assert!(message.starts_with("facet 1 "), "{message}");
+    }
+
+    #[test]
+    fn a_refusal_is_short_however_long_the_line() {
+        for bad in ["endloop\u{8}".repeat(90), "endloop ".repeat(9000), "9".repeat(9000)] {
+            let text = solid(" a").replace("endloop", &bad);
+            let message = read(text.as_bytes()).unwrap_err().to_string();
+            assert!(message.starts_with("facet 0 ") && message.len() < 300, "{message}");
+        }
     }
 
     #[test]
