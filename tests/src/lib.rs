@@ -17,6 +17,7 @@
 
 mod binaries;
 mod golden;
+pub mod hostile;
 mod scratch;
 
 pub use binaries::{bin, target_dir, workspace_root};

@@ -1,0 +1,209 @@
+//! What no input may do to the readers: one function each, for arbitrary
+//! bytes. The fuzz targets in `fuzz/` and ordinary tests run the same ones.
+//!
+//! Each panics where a reader panics or an answer contradicts another; what
+//! is refused must be refused in one line.
+
+mod seeds;
+
+use std::error::Error;
+use std::io::{Cursor, Write};
+use std::path::Path;
+
+use fax::decoder::decode_g4;
+use lamp_slicer::{Fill, Model, SliceError, SliceOptions, Slices};
+use lamp_stack::{
+    Dpi, EncodedPage, Format, Image, Layer, Length, Mask, MaskBuilder, PageWriter, Pages,
+    StackError, g4 as codec,
+};
+use tempfile::NamedTempFile;
+
+pub use seeds::{Seed, classic_tiff, seeds};
+
+/// Parts are sliced only where their images are at most this high: the cost of
+/// a few facets grows with the rows they cross.
+const MOST_ROWS: u32 = 1000;
+/// Images are encoded only where that takes about so many codes at most: a
+/// run costs one for every 2560 pixels.
+const MOST_CODES: u64 = 1 << 20;
+
+/// Reads bytes as STL and slices a few layers of what they hold, by both rules
+/// of filling. The images are in canonical form, their rows end white exactly
+/// where they are said to be stray, and the size of the slabs does not matter.
+///
+/// # Panics
+/// Where that is not so.
+pub fn stl(bytes: &[u8]) {
+    let file = file_of(bytes);
+    for fill in [Fill::EvenOdd, Fill::NonZero] {
+        let [tight, roomy] = [1, 64 << 20].map(|memory| sliced(file.path(), fill, memory));
+        match (tight, roomy) {
+            (Ok(tight), Ok(roomy)) => {
+                assert_eq!(tight, roomy, "layers depend on the size of the slabs");
+                roomy.iter().for_each(check_section);
+            }
+            (Err(tight), Err(roomy)) => assert_eq!(one_line(&tight), one_line(&roomy)),
+            (tight, roomy) => panic!("the outcome depends on memory: {tight:?}, {roomy:?}"),
+        }
+    }
+}
+
+fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError> {
+    let options = SliceOptions {
+        dpi: Dpi::new(25.4).expect("a resolution"),
+        thickness: Length::from_mm(1.0),
+        layers: Some(0..6),
+        fill,
+        memory,
+        ..SliceOptions::default()
+    };
+    let slices = Slices::new(Model::open(path)?, &options)?;
+    if slices.grid().height > MOST_ROWS { Ok(Vec::new()) } else { slices.collect() }
+}
+
+fn check_section(layer: &Layer) {
+    let Image::Mask(mask) = &layer.image else { panic!("slices are masks") };
+    check_canonical(mask);
+    let ends_white = (0..mask.height()).filter(|&row| mask.row(row).len() % 2 == 1);
+    assert_eq!(ends_white.collect::<Vec<_>>(), layer.info.stray_rows);
+}
+
+/// Reads bytes as a stack, as a stream and as a file. Both see the same, and
+/// what decodes is the same again when it was encoded.
+///
+/// # Panics
+/// Where that is not so.
+pub fn tiff(bytes: &[u8]) {
+    let file = file_of(bytes);
+    let from_file = decoded(Pages::open(file.path()));
+    match (decoded(Pages::from_stream(Cursor::new(bytes.to_vec()))), &from_file) {
+        (Err(StackError::NotForward { .. }), _) => {}
+        (Ok(streamed), Ok(from_file)) => assert_eq!(&streamed, from_file),
+        (Err(streamed), Err(from_file)) => assert_eq!(one_line(&streamed), one_line(from_file)),
+        (streamed, from_file) => panic!("a pipe gives {streamed:?}, a file {from_file:?}"),
+    }
+    match from_file {
+        Ok(layers) => check_stack(&layers),
+        Err(error) => drop(one_line(&error)),
+    }
+}
+
+fn decoded(pages: Result<Pages, StackError>) -> Result<Vec<Layer>, StackError> {
+    pages?.layers().collect()
+}
+
+fn check_stack(layers: &[Layer]) {
+    for layer in layers {
+        if let Image::Mask(mask) = &layer.image {
+            check_canonical(mask);
+        }
+    }
+    let codes = |image: &Image| u64::from(image.height()) * u64::from(1 + image.width() / 2560);
+    if layers.is_empty() || layers.iter().map(|layer| codes(&layer.image)).sum::<u64>() > MOST_CODES
+    {
+        return;
+    }
+    for format in [Format::Big, Format::Classic] {
+        let mut pages = PageWriter::new(Vec::new(), format);
+        for layer in layers {
+            pages.push(EncodedPage::new(layer)).expect("memory takes all");
+        }
+        let bytes = pages.finish().expect("there are layers");
+        let again = decoded(Pages::from_stream(Cursor::new(bytes))).expect("a good stack");
+        assert_eq!(again.len(), layers.len());
+        for (again, layer) in again.into_iter().zip(layers) {
+            // Resolutions are written with four decimals.
+            let [new, old] = [again.dpi, layer.dpi].map(|dpi| dpi.map_or(0.0, Dpi::get));
+            assert!((new - old).abs() < 1e-4, "{old} dpi became {new}");
+            assert_eq!(Layer { dpi: layer.dpi, ..again }, *layer);
+        }
+    }
+}
+
+/// Takes bytes as a width, a height and a T.6 strip, and as the runs of an
+/// image. What decodes is canonical, as high as it should be and decodes again
+/// from its own codes, by the `fax` crate too.
+///
+/// # Panics
+/// Where that is not so.
+pub fn g4(bytes: &[u8]) {
+    let Some((size, rest)) = bytes.split_first_chunk::<8>() else { return };
+    let [width, height] = [&size[..4], &size[4..]]
+        .map(|number| u32::from_le_bytes(number.try_into().expect("four bytes")));
+    match codec::decode(rest, width, height) {
+        Ok(mask) => {
+            assert_eq!((mask.width(), mask.height()), (width, height));
+            check_codec(&mask);
+        }
+        Err(error) => drop(one_line(&error)),
+    }
+    check_codec(&mask_of_runs(width % 10_000, rest));
+}
+
+/// An image whose bytes are runs, each of up to 127 pixels, or up to 127 times
+/// 32; a zero ends its row.
+fn mask_of_runs(width: u32, runs: &[u8]) -> Mask {
+    let mut mask = MaskBuilder::new(width);
+    for row in runs.split(|&run| run == 0) {
+        let lengths = row.iter().map(|&run| u32::from(run & 127) << (5 * (run >> 7)));
+        let columns = lengths.scan(0, |end, length| {
+            *end += length;
+            Some(*end)
+        });
+        let mut columns: Vec<u32> = columns.take_while(|&column| column < width).collect();
+        columns.dedup();
+        mask.push_row(&columns).expect("columns in rising order");
+    }
+    mask.finish()
+}
+
+fn check_codec(mask: &Mask) {
+    check_canonical(mask);
+    let (width, height) = (mask.width(), mask.height());
+    if u64::from(height) * u64::from(1 + width / 2560) > MOST_CODES {
+        return;
+    }
+    let strip = codec::encode(mask);
+    assert_eq!(codec::decode(&strip, width, height).as_ref(), Ok(mask));
+    // The fax crate knows no image without pixels.
+    if width > 0 && height > 0 {
+        assert_eq!(decoded_by_fax(&strip, width, height), *mask);
+    }
+}
+
+fn decoded_by_fax(strip: &[u8], width: u32, height: u32) -> Mask {
+    let mut mask = MaskBuilder::new(width);
+    decode_g4(strip.iter().copied(), width, Some(height), |row| {
+        let inside: Vec<u32> = row.iter().copied().filter(|&column| column < width).collect();
+        mask.push_row(&inside).expect("columns in rising order");
+    })
+    .expect("the fax crate reads it");
+    mask.finish()
+}
+
+fn check_canonical(mask: &Mask) {
+    let mut again = MaskBuilder::new(mask.width());
+    for row in mask.rows() {
+        again.push_row(row).expect("the canonical form");
+    }
+    assert_eq!(again.finish(), *mask);
+}
+
+/// What a command says of the error: one line, and not a long one.
+fn one_line(error: &dyn Error) -> String {
+    let mut line = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        line = format!("{line}: {error}");
+        cause = error.source();
+    }
+    assert!(!line.is_empty() && !line.contains(char::is_control), "{line:?}");
+    assert!(line.len() < 400, "{line}");
+    line
+}
+
+fn file_of(bytes: &[u8]) -> NamedTempFile {
+    let mut file = NamedTempFile::new().expect("a temporary file");
+    file.write_all(bytes).expect("the disk has room");
+    file
+}

@@ -1,0 +1,189 @@
+//! The seed corpus of the fuzz targets: small inputs of every kind, good ones
+//! and ones that lie, made by the fixtures.
+
+use lamp_fixtures::{Defect, Mesh, Part, build, inject, sphere, torus};
+use lamp_slicer::{Model, SliceOptions, Slices};
+use lamp_stack::{
+    Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
+};
+
+/// An input that a fuzz target starts from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Seed {
+    /// The target it is for.
+    pub target: &'static str,
+    /// Its file's name.
+    pub name: &'static str,
+    /// What it holds.
+    pub bytes: Vec<u8>,
+}
+
+/// Makes all seeds.
+///
+/// # Panics
+/// Where a fixture cannot be built.
+pub fn seeds() -> Vec<Seed> {
+    let of = |target| move |(name, bytes)| Seed { target, name, bytes };
+    stl()
+        .into_iter()
+        .map(of("stl"))
+        .chain(tiff().into_iter().map(of("tiff")))
+        .chain(g4_codes().into_iter().map(of("g4")))
+        .collect()
+}
+
+type Named = Vec<(&'static str, Vec<u8>)>;
+
+fn binary(mesh: &Mesh) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    mesh.write_stl("part", &mut bytes).expect("memory takes all");
+    bytes
+}
+
+fn text(mesh: &Mesh) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    mesh.write_ascii_stl("part", &mut bytes).expect("memory takes all");
+    bytes
+}
+
+/// Bytes with some of them replaced.
+fn with(mut bytes: Vec<u8>, at: usize, new: &[u8]) -> Vec<u8> {
+    bytes[at..at + new.len()].copy_from_slice(new);
+    bytes
+}
+
+fn stl() -> Named {
+    let cube = build(Part::Cube, 64).expect("enough facets");
+    let ball = sphere(3.0, 24);
+    let mut open = torus(4.0, 1.5, 60);
+    inject(&mut open, Defect::Drop, 4, 7);
+    let touching = Mesh {
+        facets: [ball.facets.clone(), ball.map(|[x, y, z]| [x + 2.0, y, z]).facets].concat(),
+    };
+    let good = binary(&ball);
+    let two = [text(&ball), text(&sphere(1.0, 8)).to_ascii_uppercase()].concat();
+    vec![
+        ("cube.stl", binary(&cube)),
+        ("open.stl", binary(&open)),
+        ("overlap.stl", binary(&touching)),
+        ("called_solid.stl", with(good.clone(), 0, b"solid part\nfacet ")),
+        ("four_billion.stl", with(good.clone(), 80, &[0xFF; 4])),
+        ("nan.stl", with(good.clone(), 84 + 50 * 5 + 12, &f32::NAN.to_le_bytes())),
+        ("huge.stl", with(good.clone(), 84 + 50 * 5 + 12, &f32::MAX.to_le_bytes())),
+        ("cut.stl", good[..good.len() - 17].to_vec()),
+        ("none.stl", binary(&Mesh::default())),
+        ("ball_ascii.stl", text(&ball)),
+        ("two_solids_ascii.stl", two),
+        ("cut_ascii.stl", text(&ball)[..700].to_vec()),
+        ("none_ascii.stl", text(&Mesh::default())),
+    ]
+}
+
+/// Layers of a ball with holes, so that some rows are stray.
+fn layers(dpi: f64) -> Vec<Layer> {
+    let mut ball = sphere(3.0, 100);
+    inject(&mut ball, Defect::Drop, 6, 3);
+    let options = SliceOptions {
+        dpi: Dpi::new(dpi).expect("a resolution"),
+        thickness: Length::from_mm(2.0),
+        ..SliceOptions::default()
+    };
+    let slices = Slices::new(Model::from_facets("ball", ball.facets), &options);
+    slices.and_then(Iterator::collect).expect("a part that can be sliced")
+}
+
+fn gray_layer() -> Layer {
+    let mut gray = GrayMask::new(300);
+    gray.push_runs([(10, 0), (200, 255), (1, 128), (1, 127)]).expect("inside the width");
+    gray.push_runs([]).expect("inside the width");
+    gray.push_runs((0..=255).map(|level| (1, level))).expect("inside the width");
+    Layer { info: PageInfo::default(), dpi: None, image: Image::Gray(gray) }
+}
+
+fn stack(layers: &[Layer], format: Format) -> Vec<u8> {
+    let mut pages = PageWriter::new(Vec::new(), format);
+    for layer in layers {
+        pages.push(EncodedPage::new(layer)).expect("memory takes all");
+    }
+    pages.finish().expect("there are layers")
+}
+
+fn tiff() -> Named {
+    let layers = layers(150.0);
+    let gray = [gray_layer()];
+    let strip: Vec<u8> = (0..24u8).map(|byte| byte.wrapping_mul(37)).collect();
+    let plain = |white_is_zero: u32, order: u32, gray: bool| {
+        let (bits, width) = if gray { (8, 3) } else { (1, 20) };
+        let fields =
+            [(256, width), (257, 8), (258, bits), (259, 1), (262, 1 - white_is_zero), (266, order)];
+        classic_tiff(&fields, &strip)
+    };
+    let lying = |width, height, bytes| {
+        classic_tiff(&[(256, width), (257, height), (259, 4), (262, 1), (279, bytes)], &strip)
+    };
+    let big = stack(&layers, Format::Big);
+    vec![
+        ("cut.tif", big[..big.len() - 60].to_vec()),
+        ("masks.tif", big),
+        ("masks_classic.tif", stack(&layers, Format::Classic)),
+        ("gray.tif", stack(&gray, Format::Big)),
+        ("gray_classic.tif", stack(&gray, Format::Classic)),
+        ("plain.tif", plain(0, 1, false)),
+        ("plain_reversed.tif", plain(1, 2, false)),
+        ("plain_gray.tif", plain(0, 1, true)),
+        ("wide.tif", lying(1 << 31, 8, 24)),
+        ("large.tif", lying(1 << 26, 1 << 26, 24)),
+        ("four_gigabytes.tif", lying(20, 8, u32::MAX)),
+    ]
+}
+
+/// A classic TIFF of one page and one strip, as other programs write: numbers
+/// by their tags, in rising order, and the strip behind them. Its offset, its
+/// length, and one strip for all rows are stated unless the fields do.
+pub fn classic_tiff(fields: &[(u16, u32)], strip: &[u8]) -> Vec<u8> {
+    let mut fields = fields.to_vec();
+    for default in [(273, 0), (279, strip.len() as u32)] {
+        if !fields.iter().any(|field| field.0 == default.0) {
+            fields.push(default);
+        }
+    }
+    fields.sort_by_key(|field| field.0);
+    let end = 8 + 2 + 12 * fields.len() as u32 + 4;
+    let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+    bytes.extend((fields.len() as u16).to_le_bytes());
+    for (tag, value) in fields {
+        let value = if tag == 273 { value.max(end) } else { value };
+        // Type 4: a LONG, of which there is one.
+        bytes.extend([tag.to_le_bytes(), 4u16.to_le_bytes()].concat());
+        bytes.extend([1u32.to_le_bytes(), value.to_le_bytes()].concat());
+    }
+    bytes.extend([0; 4]);
+    bytes.extend(strip);
+    bytes
+}
+
+fn g4_codes() -> Named {
+    let sized = |width: u32, height: u32, strip: &[u8]| {
+        [&width.to_le_bytes(), &height.to_le_bytes(), strip].concat()
+    };
+    let coded = |mask: &Mask| sized(mask.width(), mask.height(), &g4::encode(mask));
+    let section = |dpi| {
+        let layers = layers(dpi);
+        let Image::Mask(mask) = &layers[1].image else { unreachable!("slices are masks") };
+        coded(mask)
+    };
+    let columns: Vec<u32> = (0..60).map(|i| i * i).collect();
+    let comb = Mask::new(
+        5000,
+        vec![0, 60, 90, 90, 120],
+        [&columns[..], &columns[..30], &columns[30..]].concat(),
+    );
+    vec![
+        ("section", section(150.0)),
+        ("section_fine", section(600.0)),
+        ("comb", coded(&comb.expect("columns in rising order"))),
+        ("black", coded(&Mask::black(3000, 40))),
+        ("none", coded(&Mask::black(0, 0))),
+        ("widest", sized(u32::MAX, u32::MAX, &g4::encode(&Mask::black(u32::MAX, 9)))),
+    ]
+}

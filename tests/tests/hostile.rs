@@ -1,0 +1,136 @@
+//! The fuzz targets' entry points on their seeds, on damaged seeds and on
+//! files by other programs; and the checked-in seeds themselves.
+//!
+//! After a change that is meant,
+//! `LAMP_BLESS=1 cargo test -p lamp-tests --test hostile`
+//! rewrites the seeds in `fuzz/seeds`.
+
+use std::fs;
+use std::path::PathBuf;
+
+use lamp_fixtures::SplitMix;
+use lamp_tests::hostile::{self, Seed, classic_tiff, seeds};
+use lamp_tests::{note, read_stack, shared_data, workspace_root};
+
+/// How many damaged seeds each target reads.
+const MUTATIONS: u64 = 3000;
+
+fn seeds_of(target: &str) -> Vec<Seed> {
+    seeds().into_iter().filter(|seed| seed.target == target).collect()
+}
+
+/// Runs a target's entry point on its seeds, whole, cut and damaged.
+fn survives(target: &str, entry: fn(&[u8])) {
+    let seeds = seeds_of(target);
+    for Seed { bytes, .. } in &seeds {
+        entry(bytes);
+        let cuts = (0..bytes.len().min(160)).chain((160..bytes.len()).step_by(97));
+        cuts.for_each(|end| entry(&bytes[..end]));
+    }
+    for number in 0..mutations() {
+        let mut numbers = SplitMix(number);
+        let mut bytes = seeds[numbers.below(seeds.len())].bytes.clone();
+        (0..=numbers.below(4)).for_each(|_| damage(&mut bytes, &mut numbers));
+        entry(&bytes);
+    }
+}
+
+/// More with `LAMP_MUTATIONS` in the environment.
+fn mutations() -> u64 {
+    let asked = std::env::var("LAMP_MUTATIONS");
+    asked.map_or(MUTATIONS, |number| number.parse().expect("LAMP_MUTATIONS is a number"))
+}
+
+/// Changes one place.
+fn damage(bytes: &mut Vec<u8>, numbers: &mut SplitMix) {
+    const EXTREMES: [u32; 8] = [0, 1, 0x7F, 0xFF, 0xFFFF, 1 << 26, 1 << 31, u32::MAX];
+    let at = numbers.below(bytes.len() + 1);
+    let rest = bytes.len() - at;
+    let some = numbers.below(rest.min(60) + 1);
+    match numbers.below(6) {
+        0 if rest > 0 => bytes[at] ^= 1 << numbers.below(8),
+        1 if rest > 0 => bytes[at] = numbers.below(256) as u8,
+        2 if rest >= 4 => {
+            let extreme = EXTREMES[numbers.below(EXTREMES.len())].to_le_bytes();
+            bytes[at..at + 4].copy_from_slice(&extreme);
+        }
+        3 => drop(bytes.drain(at..at + some)),
+        4 => {
+            let copy = bytes[at..at + some].to_vec();
+            let to = numbers.below(bytes.len() + 1);
+            bytes.splice(to..to, copy);
+        }
+        _ => bytes.truncate(at),
+    }
+}
+
+#[test]
+fn no_stl_makes_the_slicer_panic_or_contradict_itself() {
+    survives("stl", hostile::stl);
+}
+
+#[test]
+fn no_tiff_makes_the_reader_panic_or_contradict_itself() {
+    survives("tiff", hostile::tiff);
+}
+
+#[test]
+fn no_codes_make_the_codec_panic_or_contradict_itself() {
+    survives("g4", hostile::g4);
+}
+
+#[test]
+fn files_by_other_programs_hold_no_surprise() {
+    for (kind, entry) in [("stl", hostile::stl as fn(&[u8])), ("tiff", hostile::tiff)] {
+        let Some(folder) = shared_data(kind) else {
+            note(&format!("there is no ../shared/data/{kind}: skipped"));
+            continue;
+        };
+        for file in fs::read_dir(folder).unwrap() {
+            entry(&fs::read(file.unwrap().path()).unwrap());
+        }
+    }
+}
+
+/// As for libtiff: a directory that names a text many times costs it once.
+#[test]
+fn the_first_entry_of_a_tag_counts() {
+    let fields = [(256, 8), (256, 9), (257, 2), (257, 1), (262, 1)];
+    let layer = &read_stack(classic_tiff(&fields, &[0xFF; 2]))[0];
+    assert_eq!((layer.image.width(), layer.image.height()), (8, 2));
+}
+
+fn folder_of_seeds() -> PathBuf {
+    workspace_root().join("fuzz/seeds")
+}
+
+#[test]
+fn the_seeds_are_what_the_fixtures_make() {
+    let bless = std::env::var("LAMP_BLESS").is_ok_and(|value| value == "1");
+    let root = folder_of_seeds();
+    if bless {
+        // Seeds that nothing makes any more go away with the rest.
+        drop(fs::remove_dir_all(&root));
+    }
+    let mut names = Vec::new();
+    for seed in seeds() {
+        let path = root.join(seed.target).join(seed.name);
+        if bless {
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(&path, &seed.bytes).unwrap();
+        }
+        let same = fs::read(&path).is_ok_and(|bytes| bytes == seed.bytes);
+        assert!(
+            same,
+            "{} is not what the fixtures make: LAMP_BLESS=1 cargo test -p lamp-tests --test hostile rewrites it",
+            path.display()
+        );
+        names.push(path);
+    }
+    for target in fs::read_dir(&root).unwrap() {
+        for file in fs::read_dir(target.unwrap().path()).unwrap() {
+            let path = file.unwrap().path();
+            assert!(names.contains(&path), "nothing makes {} any more: remove it", path.display());
+        }
+    }
+}
