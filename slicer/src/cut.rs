@@ -8,8 +8,8 @@
 
 use std::ops::Range;
 
-use crate::facet::{Facet, Units};
 use crate::grid::PixelGrid;
+use crate::placement::PlacedFacet;
 use crate::planes::Planes;
 
 /// A crossing of a row: the row in the high half; in the low half the first
@@ -58,7 +58,6 @@ impl Place {
 pub(crate) struct Cutter<'a> {
     pub(crate) grid: &'a PixelGrid,
     pub(crate) planes: &'a Planes,
-    pub(crate) units: Units,
 }
 
 /// A corner: x and y in pixels, z in micrometres.
@@ -74,11 +73,11 @@ impl Cutter<'_> {
     #[inline]
     pub(crate) fn cut(
         &self,
-        facet: &Facet,
+        facet: &PlacedFacet,
         layers: &Range<usize>,
         lists: &mut [Vec<Crossing>],
     ) -> usize {
-        let [a, b, c] = facet.map(|corner| f64::from(corner[2]) * self.units.um());
+        let [a, b, c] = facet.map(|corner| corner[2]);
         let met = self.planes.between(a.min(b).min(c), a.max(b).max(c));
         let met = met.start.max(layers.start)..met.end.min(layers.end);
         let mut count = 0;
@@ -107,12 +106,9 @@ impl Cutter<'_> {
     /// The corners from the lowest to the highest, and whether putting them
     /// in this order turned the facet over.
     #[inline]
-    fn sorted_corners(&self, facet: &Facet) -> ([Corner; 3], bool) {
-        let mm = self.units.mm();
-        let [mut low, mut middle, mut high] = facet.map(|[x, y, z]| Corner {
-            pixels: self.grid.to_pixels(f64::from(x) * mm, f64::from(y) * mm),
-            z_um: f64::from(z) * self.units.um(),
-        });
+    fn sorted_corners(&self, facet: &PlacedFacet) -> ([Corner; 3], bool) {
+        let [mut low, mut middle, mut high] =
+            facet.map(|[x, y, z_um]| Corner { pixels: self.grid.to_pixels(x, y), z_um });
         let mut odd = false;
         let mut order = |lower: &mut Corner, upper: &mut Corner| {
             if upper.z_um < lower.z_um {

@@ -50,8 +50,18 @@ pub enum SliceError {
         "facet {facet} has a coordinate that is not a finite number: repair or export the part again"
     )]
     NotFinite {
-        /// The facet, from 0.
+        /// The file, from 0, among those joined.
+        file: usize,
+        /// The facet in the file, from 0.
         facet: usize,
+    },
+    /// A part so far away that places are no longer exact.
+    #[error(
+        "the part reaches {mm:e} mm from the origin, and more than 1000 km are not read: check --units, --scale and --translate"
+    )]
+    TooFar {
+        /// The greatest distance along an axis, in millimetres.
+        mm: f64,
     },
     /// There is nothing to slice.
     #[error("the file holds no facets: there is nothing to slice")]

@@ -17,14 +17,15 @@ const HEADER_BYTES: u64 = 84;
 /// A facet of a binary STL: normal, three corners, attributes.
 const FACET_BYTES: usize = 50;
 /// Facets are read in blocks of so many: 200 kB of a binary file.
-pub(crate) const BLOCK_FACETS: usize = 4096;
+const BLOCK_FACETS: usize = 4096;
 
-/// A part: its name and its facets. A binary STL stays in its file, of which
-/// only a few blocks are mapped at a time.
+/// A part: its name and its facets, from one file or several. A binary STL
+/// stays in its file, of which only a few blocks are mapped at a time.
 #[derive(Debug)]
 pub struct Model {
     name: String,
-    facets: Facets,
+    /// The files' facets. No block has facets of two files.
+    files: Vec<Facets>,
     digest: String,
 }
 
@@ -34,6 +35,19 @@ enum Facets {
     Memory(Vec<Facet>),
 }
 
+impl Facets {
+    fn count(&self) -> usize {
+        match self {
+            Self::Binary { count, .. } => *count,
+            Self::Memory(facets) => facets.len(),
+        }
+    }
+
+    fn blocks(&self) -> usize {
+        self.count().div_ceil(BLOCK_FACETS)
+    }
+}
+
 impl Model {
     /// Opens an STL file, binary or ASCII. Which one it is follows from its
     /// size and content: many binary files begin with `solid`, too.
@@ -41,7 +55,8 @@ impl Model {
     /// The file must not change while the model is in use.
     ///
     /// # Errors
-    /// Where the file cannot be read, is no STL, or contradicts itself.
+    /// Where the file cannot be read, is no STL, contradicts itself, or holds
+    /// no facets.
     pub fn open(path: &Path) -> Result<Self, SliceError> {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         Self::from_file(name, &File::open(path)?)
@@ -64,7 +79,27 @@ impl Model {
         for corner in facets.iter().flatten().flatten() {
             hasher.update(&corner.to_le_bytes());
         }
-        Self { name: name.to_owned(), facets: Facets::Memory(facets), digest: digest_text(&hasher) }
+        let files = vec![Facets::Memory(facets)];
+        Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
+    }
+
+    /// One part of several that stand in the same coordinates. Its name joins
+    /// theirs with `+`; its digest is that of theirs, one after another. A
+    /// model that stands alone stays as it is.
+    pub fn joined(models: Vec<Self>) -> Self {
+        let names: Vec<&str> = models.iter().map(Self::name).collect();
+        let name = names.join("+");
+        let digest = match &models[..] {
+            [alone] => alone.digest.clone(),
+            models => {
+                let mut hasher = Hasher::new();
+                for model in models {
+                    hasher.update(model.digest.as_bytes());
+                }
+                digest_text(&hasher)
+            }
+        };
+        Self { name, files: models.into_iter().flat_map(|model| model.files).collect(), digest }
     }
 
     fn from_file(name: String, file: &File) -> Result<Self, SliceError> {
@@ -87,7 +122,10 @@ impl Model {
             }
             declared => return Err(why_not_stl(&start, declared, size)),
         };
-        Ok(Self { name, facets, digest: digest_of(file, size)? })
+        if facets.count() == 0 {
+            return Err(SliceError::NoFacets);
+        }
+        Ok(Self { name, files: vec![facets], digest: digest_of(file, size)? })
     }
 
     /// The part's name: the file's, without folder and extension.
@@ -97,20 +135,29 @@ impl Model {
 
     /// How many facets the part has.
     pub fn facet_count(&self) -> usize {
-        match &self.facets {
-            Facets::Binary { count, .. } => *count,
-            Facets::Memory(facets) => facets.len(),
-        }
+        self.files.iter().map(Facets::count).sum()
     }
 
-    /// The digest of the file (of the coordinates, where there is no file):
-    /// `blake3:` and 64 hexadecimal digits.
+    /// The digest of the file (of the coordinates, where there is no file; of
+    /// the digests, where there are several): `blake3:` and 64 hexadecimal
+    /// digits.
     pub fn digest(&self) -> &str {
         &self.digest
     }
 
     pub(crate) fn block_count(&self) -> usize {
-        self.facet_count().div_ceil(BLOCK_FACETS)
+        self.files.iter().map(Facets::blocks).sum()
+    }
+
+    /// The file that a block is of, and which of its facets are in the block.
+    pub(crate) fn place_of(&self, mut block: usize) -> (usize, Range<usize>) {
+        let mut file = 0;
+        while block >= self.files[file].blocks() {
+            block -= self.files[file].blocks();
+            file += 1;
+        }
+        let start = block * BLOCK_FACETS;
+        (file, start..self.files[file].count().min(start + BLOCK_FACETS))
     }
 
     /// Gives every facet of a block.
@@ -119,9 +166,8 @@ impl Model {
         block: usize,
         mut each: impl FnMut(&Facet),
     ) -> io::Result<()> {
-        let Range { start, end } =
-            block * BLOCK_FACETS..self.facet_count().min((block + 1) * BLOCK_FACETS);
-        match &self.facets {
+        let (file, Range { start, end }) = self.place_of(block);
+        match &self.files[file] {
             Facets::Memory(facets) => facets[start..end].iter().for_each(each),
             Facets::Binary { file, .. } => {
                 let offset = HEADER_BYTES + (start * FACET_BYTES) as u64;

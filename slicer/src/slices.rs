@@ -11,6 +11,7 @@ use crate::error::SliceError;
 use crate::facet::Units;
 use crate::grid::PixelGrid;
 use crate::model::Model;
+use crate::placement::{PlacedModel, Placement};
 use crate::planes::{PlaneRule, Planes};
 use crate::survey::Survey;
 use crate::table::{Fill, Table};
@@ -26,6 +27,8 @@ pub struct SliceOptions {
     pub plane: PlaneRule,
     /// What the file's coordinates mean.
     pub units: Units,
+    /// What is done to the part first.
+    pub placement: Placement,
     /// What is inside.
     pub fill: Fill,
     /// The layers wanted, all where `None`.
@@ -79,6 +82,7 @@ impl Default for SliceOptions {
             thickness: Length::from_um(100.0),
             plane: PlaneRule::default(),
             units: Units::default(),
+            placement: Placement::default(),
             fill: Fill::default(),
             layers: None,
             frame: Frame::Around { margin: 1 },
@@ -95,11 +99,10 @@ impl Default for SliceOptions {
 /// and bytes do not depend on them.
 #[derive(Debug)]
 pub struct Slices {
-    model: Model,
+    model: PlacedModel,
     survey: Survey,
     grid: PixelGrid,
     planes: Planes,
-    units: Units,
     fill: Fill,
     wanted: Range<usize>,
     most_crossings: usize,
@@ -114,27 +117,22 @@ impl Slices {
     /// Prepares to slice a part.
     ///
     /// # Errors
-    /// Where the part is empty or not finite, or the images or layers would
+    /// Where the part is empty, not finite or 1000 km away, or the images or layers would
     /// be too many.
     pub fn new(model: Model, options: &SliceOptions) -> Result<Self, SliceError> {
+        let model = PlacedModel::new(model, &options.placement, options.units);
         let survey = Survey::of(&model)?;
-        let (mm, um) = (options.units.mm(), options.units.um());
-        let [min_mm, max_mm] =
-            [survey.min, survey.max].map(|corner| [0, 1].map(|axis| f64::from(corner[axis]) * mm));
+        survey.check_distance()?;
+        let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.frame.grid(min_mm, max_mm, options.dpi)?;
-        let planes = Planes::uniform(
-            f64::from(survey.min[2]) * um,
-            f64::from(survey.max[2]) * um,
-            options.thickness,
-            options.plane,
-        )?;
+        let (bottom_um, top_um) = (survey.min[2], survey.max[2]);
+        let planes = Planes::uniform(bottom_um, top_um, options.thickness, options.plane)?;
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
-        let expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm(), options.units);
+        let expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
         Ok(Self {
             model,
             survey,
             grid,
-            units: options.units,
             fill: options.fill,
             // A list that grows holds up to twice what it needs.
             most_crossings: (options.memory as usize / (2 * size_of::<Crossing>())).max(1),
@@ -162,9 +160,9 @@ impl Slices {
         let start = self.pending.end;
         let mut end = self.slab_end(start);
         loop {
-            let cutter = Cutter { grid: &self.grid, planes: &self.planes, units: self.units };
+            let cutter = Cutter { grid: &self.grid, planes: &self.planes };
             let (low, high) = (self.planes.z_um(start), self.planes.z_um(end - 1));
-            let blocks = self.survey.blocks_between(low, high, self.units);
+            let blocks = self.survey.blocks_between(low, high);
             let fits =
                 self.table.fill(&self.model, &blocks, cutter, start..end, self.most_crossings)?;
             if fits {
@@ -215,8 +213,8 @@ impl Slices {
 
     fn page_info(&self, layer: usize, stray_rows: Vec<u32>) -> PageInfo {
         let stack = StackInfo {
-            part: self.model.name().to_owned(),
-            digest: self.model.digest().to_owned(),
+            part: self.model.model.name().to_owned(),
+            digest: self.model.model.digest().to_owned(),
             layers: Some(self.wanted.len() as u32),
             ..StackInfo::default()
         };

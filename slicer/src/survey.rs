@@ -6,32 +6,34 @@ use std::io;
 use rayon::prelude::*;
 
 use crate::error::SliceError;
-use crate::facet::{Facet, Units};
-use crate::model::{BLOCK_FACETS, Model};
+use crate::placement::{PlacedFacet, PlacedModel};
 use crate::planes::Planes;
 
-/// A part's box and blocks, in file units.
+/// Places are exact to a nanometre as far as this.
+const FARTHEST_MM: f64 = 1e9;
+
+/// A part's box and blocks: x and y in millimetres, z in micrometres.
 #[derive(Debug)]
 pub(crate) struct Survey {
-    pub(crate) min: [f32; 3],
-    pub(crate) max: [f32; 3],
+    pub(crate) min: [f64; 3],
+    pub(crate) max: [f64; 3],
     blocks: Vec<Block>,
 }
 
 /// A block of consecutive facets of the file.
 #[derive(Clone, Copy, Debug)]
 struct Block {
-    min: [f32; 3],
-    max: [f32; 3],
+    min: [f64; 3],
+    max: [f64; 3],
     /// Half the sum of the facets' boxes in y and z: what the block's
     /// crossings are in proportion to.
     yz_area: f64,
 }
 
 impl Block {
-    const EMPTY: Self = Self { min: [f32::MAX; 3], max: [f32::MIN; 3], yz_area: 0.0 };
+    const EMPTY: Self = Self { min: [f64::MAX; 3], max: [f64::MIN; 3], yz_area: 0.0 };
 
-    fn of(model: &Model, block: usize) -> io::Result<Result<Self, SliceError>> {
+    fn of(model: &PlacedModel, block: usize) -> io::Result<Result<Self, SliceError>> {
         let mut whole = Self::EMPTY;
         let mut finite = true;
         model.for_each_in_block(block, |facet| {
@@ -40,7 +42,7 @@ impl Block {
             whole = whole.joined(Self {
                 min,
                 max,
-                yz_area: 0.5 * f64::from(max[1] - min[1]) * f64::from(max[2] - min[2]),
+                yz_area: 0.5 * (max[1] - min[1]) * (max[2] - min[2]),
             });
         })?;
         Ok(if finite { Ok(whole) } else { Err(not_finite(model, block)?) })
@@ -56,7 +58,7 @@ impl Block {
 }
 
 #[inline]
-fn facet_box([a, b, c]: &Facet) -> ([f32; 3], [f32; 3]) {
+fn facet_box([a, b, c]: &PlacedFacet) -> ([f64; 3], [f64; 3]) {
     (
         std::array::from_fn(|axis| a[axis].min(b[axis]).min(c[axis])),
         std::array::from_fn(|axis| a[axis].max(b[axis]).max(c[axis])),
@@ -64,8 +66,9 @@ fn facet_box([a, b, c]: &Facet) -> ([f32; 3], [f32; 3]) {
 }
 
 /// The error that names a block's first facet without a finite place.
-fn not_finite(model: &Model, block: usize) -> io::Result<SliceError> {
-    let mut facet = block * BLOCK_FACETS;
+fn not_finite(model: &PlacedModel, block: usize) -> io::Result<SliceError> {
+    let (file, facets) = model.model.place_of(block);
+    let mut facet = facets.start;
     let mut found = None;
     model.for_each_in_block(block, |corners| {
         if found.is_none() && !corners.iter().flatten().all(|c| c.is_finite()) {
@@ -73,7 +76,7 @@ fn not_finite(model: &Model, block: usize) -> io::Result<SliceError> {
         }
         facet += 1;
     })?;
-    Ok(SliceError::NotFinite { facet: found.unwrap_or(facet) })
+    Ok(SliceError::NotFinite { file, facet: found.unwrap_or(facet) })
 }
 
 impl Survey {
@@ -81,9 +84,11 @@ impl Survey {
     ///
     /// # Errors
     /// Where there is no facet, or one has a coordinate that is no number.
-    pub(crate) fn of(model: &Model) -> Result<Self, SliceError> {
-        let blocks: Vec<_> =
-            (0..model.block_count()).into_par_iter().map(|block| Block::of(model, block)).collect();
+    pub(crate) fn of(model: &PlacedModel) -> Result<Self, SliceError> {
+        let blocks: Vec<_> = (0..model.model.block_count())
+            .into_par_iter()
+            .map(|block| Block::of(model, block))
+            .collect();
         // In the order of the file, so that the first bad facet is named.
         let mut good = Vec::with_capacity(blocks.len());
         for block in blocks {
@@ -93,33 +98,34 @@ impl Survey {
         Ok(Self { min: whole.min, max: whole.max, blocks: good })
     }
 
+    /// Checks that the part is near enough for places to be exact to a
+    /// nanometre.
+    pub(crate) fn check_distance(&self) -> Result<(), SliceError> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.max[axis].max(-self.min[axis]));
+        let mm = x.max(y).max(z / 1000.0);
+        if mm > FARTHEST_MM { Err(SliceError::TooFar { mm }) } else { Ok(()) }
+    }
+
     /// The blocks that planes part between two heights (micrometres): above
     /// the first, and up to the second.
-    pub(crate) fn blocks_between(&self, low_um: f64, high_um: f64, units: Units) -> Vec<usize> {
-        let um = units.um();
+    pub(crate) fn blocks_between(&self, low_um: f64, high_um: f64) -> Vec<usize> {
         (0..self.blocks.len())
             .filter(|&block| {
                 let Block { min, max, .. } = self.blocks[block];
-                f64::from(min[2]) * um < high_um && f64::from(max[2]) * um >= low_um
+                min[2] < high_um && max[2] >= low_um
             })
             .collect()
     }
 
     /// About how many crossings each layer has, with rows `pitch_mm` apart.
-    pub(crate) fn crossings_per_layer(
-        &self,
-        planes: &Planes,
-        pitch_mm: f64,
-        units: Units,
-    ) -> Vec<f64> {
+    pub(crate) fn crossings_per_layer(&self, planes: &Planes, pitch_mm: f64) -> Vec<f64> {
         // Each block is spread evenly over its layers; summing steps up and
         // down costs nothing for the layers between.
         let mut steps = vec![0.0; planes.len() + 1];
-        let um = units.um();
-        let area_per_crossing = pitch_mm * planes.thickness_um() / 1000.0;
+        let area_per_crossing = pitch_mm * planes.thickness_um();
         for block in &self.blocks {
-            let layers = planes.between(f64::from(block.min[2]) * um, f64::from(block.max[2]) * um);
-            let crossings = block.yz_area * units.mm() * units.mm() / area_per_crossing;
+            let layers = planes.between(block.min[2], block.max[2]);
+            let crossings = block.yz_area / area_per_crossing;
             let share = crossings / layers.len().max(1) as f64;
             steps[layers.start] += share;
             steps[layers.end] -= share;

@@ -12,7 +12,7 @@ use lamp_stack::{Mask, MaskBuilder};
 use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place};
-use crate::model::Model;
+use crate::placement::PlacedModel;
 
 /// What is inside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -64,7 +64,7 @@ impl Table {
     /// `most` in a slab that could be smaller.
     pub(crate) fn fill(
         &mut self,
-        model: &Model,
+        model: &PlacedModel,
         blocks: &[usize],
         cutter: Cutter<'_>,
         layers: Range<usize>,

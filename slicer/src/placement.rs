@@ -1,0 +1,193 @@
+//! Where a part stands on the machine.
+//!
+//! Each corner is placed by itself, in 64 bits: corners that are equal in the
+//! file are equal where they come to stand, so a closed mesh stays closed
+//! however it is turned.
+
+use std::io;
+
+use crate::facet::{Facet, Units};
+use crate::model::Model;
+
+/// An axis of part coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// Along the rows.
+    X,
+    /// Up the columns.
+    Y,
+    /// Up the build.
+    Z,
+}
+
+/// What is done to a part before it is sliced: nothing by default. Each step
+/// follows the ones before, and acts about the origin.
+///
+/// ```
+/// use lamp_slicer::{Axis, Placement};
+///
+/// let placement = Placement::default().scaled([2.0; 3]).rotated(Axis::Z, 90.0);
+/// assert_eq!(placement.at([1.0, 0.0, 0.5]), [0.0, 2.0, 1.0]);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// x, y and z of the result, by x, y, z and one.
+    rows: [[f64; 4]; 3],
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self { rows: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]] }
+    }
+}
+
+impl Placement {
+    /// Scales x, y and z. A factor below zero mirrors, which turns every facet
+    /// over: neither rule of filling sees that.
+    #[must_use]
+    pub fn scaled(mut self, factors: [f64; 3]) -> Self {
+        for (row, factor) in self.rows.iter_mut().zip(factors) {
+            *row = row.map(|entry| entry * factor);
+        }
+        self
+    }
+
+    /// Turns by so many degrees, counter-clockwise as seen from the axis's
+    /// tip. Quarter turns are exact.
+    #[must_use]
+    pub fn rotated(mut self, axis: Axis, degrees: f64) -> Self {
+        let quarters = (degrees / 90.0).round();
+        let (mut sin, mut cos) = (degrees - 90.0 * quarters).to_radians().sin_cos();
+        for _ in 0..quarters.rem_euclid(4.0) as u32 {
+            (sin, cos) = (cos, -sin);
+        }
+        let (i, j) = match axis {
+            Axis::X => (1, 2),
+            Axis::Y => (2, 0),
+            Axis::Z => (0, 1),
+        };
+        let (a, b) = (self.rows[i], self.rows[j]);
+        self.rows[i] = std::array::from_fn(|k| cos * a[k] - sin * b[k]);
+        self.rows[j] = std::array::from_fn(|k| sin * a[k] + cos * b[k]);
+        self
+    }
+
+    /// Moves by so many millimetres.
+    #[must_use]
+    pub fn translated(mut self, by_mm: [f64; 3]) -> Self {
+        for (row, mm) in self.rows.iter_mut().zip(by_mm) {
+            row[3] += mm;
+        }
+        self
+    }
+
+    /// Where a point comes to stand, in millimetres.
+    pub fn at(&self, point_mm: [f64; 3]) -> [f64; 3] {
+        self.rows.map(|row| affine(&row, point_mm))
+    }
+}
+
+#[inline]
+fn affine(row: &[f64; 4], [x, y, z]: [f64; 3]) -> f64 {
+    row[0] * x + row[1] * y + row[2] * z + row[3]
+}
+
+/// A facet in its place: x and y in millimetres, z in micrometres.
+pub(crate) type PlacedFacet = [[f64; 3]; 3];
+
+/// A part in its place.
+#[derive(Debug)]
+pub(crate) struct PlacedModel {
+    pub(crate) model: Model,
+    way: Way,
+}
+
+/// The way from file units to the place.
+#[derive(Debug)]
+enum Way {
+    /// The axes scaled: most parts stay where they are, and pay for no more.
+    Scale([f64; 3]),
+    Affine([[f64; 4]; 3]),
+}
+
+impl PlacedModel {
+    pub(crate) fn new(model: Model, placement: &Placement, units: Units) -> Self {
+        let mut rows = placement.rows;
+        // Straight to micrometres: z in file units times them is exact.
+        for (row, (unit, per_mm)) in
+            rows.iter_mut().zip([(units.mm(), 1.0), (units.mm(), 1.0), (units.um(), 1000.0)])
+        {
+            let [x, y, z, shift] = *row;
+            *row = [x * unit, y * unit, z * unit, shift * per_mm];
+        }
+        let scale = std::array::from_fn(|axis| rows[axis][axis]);
+        let is_scale = (0..12).all(|k| k % 4 == k / 4 || rows[k / 4][k % 4] == 0.0);
+        Self { model, way: if is_scale { Way::Scale(scale) } else { Way::Affine(rows) } }
+    }
+
+    /// Gives every facet of a block.
+    pub(crate) fn for_each_in_block(
+        &self,
+        block: usize,
+        mut each: impl FnMut(&PlacedFacet),
+    ) -> io::Result<()> {
+        // Two loops, so that neither asks at every facet which one it is.
+        match self.way {
+            Way::Scale(scale) => self.model.for_each_in_block(block, |facet| {
+                each(&placed(facet, |[x, y, z]| [x * scale[0], y * scale[1], z * scale[2]]));
+            }),
+            Way::Affine(rows) => self.model.for_each_in_block(block, |facet| {
+                each(&placed(facet, |corner| rows.map(|row| affine(&row, corner))));
+            }),
+        }
+    }
+}
+
+#[inline]
+fn placed(facet: &Facet, place: impl Fn([f64; 3]) -> [f64; 3]) -> PlacedFacet {
+    facet.map(|corner| place(corner.map(f64::from)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quarter_turns_are_exact_and_right_handed() {
+        let point = [0.1, 0.7, -1.3];
+        for (axis, next) in [(Axis::X, [1, 2]), (Axis::Y, [2, 0]), (Axis::Z, [0, 1])] {
+            for (degrees, quarters) in [(90.0, 1), (-270.0, 1), (180.0, 2), (-90.0, 3), (720.0, 0)]
+            {
+                let mut expected = point;
+                for _ in 0..quarters {
+                    let [i, j] = next;
+                    (expected[i], expected[j]) = (-expected[j], expected[i]);
+                }
+                assert_eq!(Placement::default().rotated(axis, degrees).at(point), expected);
+            }
+        }
+    }
+
+    #[test]
+    fn steps_follow_one_another() {
+        let there = Placement::default()
+            .scaled([2.0, 1.0, -1.0])
+            .rotated(Axis::Z, 90.0)
+            .translated([10.0, 0.0, 0.5])
+            .rotated(Axis::X, -90.0);
+        assert_eq!(there.at([1.0, 2.0, 3.0]), [8.0, -2.5, -2.0]);
+    }
+
+    #[test]
+    fn other_angles_keep_lengths_and_add_up() {
+        let turned = Placement::default().rotated(Axis::Y, 30.0);
+        let [x, _, z] = turned.at([1.0, 0.0, 0.0]);
+        assert!((x - 0.75f64.sqrt()).abs() < 1e-15 && (z + 0.5).abs() < 1e-15);
+        let [once, twice] = [turned.rotated(Axis::Y, 107.3), turned]
+            .map(|placement| placement.at([0.3, -2.0, 5.0]));
+        let length = |p: [f64; 3]| p.iter().map(|v| v * v).sum::<f64>().sqrt();
+        assert!((length(once) - length(twice)).abs() < 1e-14);
+        let back = turned.rotated(Axis::Y, 107.3).rotated(Axis::Y, -137.3).at([0.3, -2.0, 5.0]);
+        assert!(back.iter().zip([0.3, -2.0, 5.0]).all(|(a, b)| (a - b).abs() < 1e-14));
+    }
+}
