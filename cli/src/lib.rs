@@ -7,6 +7,7 @@
 mod commands;
 mod options;
 mod picture;
+mod placement;
 mod report;
 mod signals;
 mod stop;

@@ -2,10 +2,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use lamp_slicer::{Fill, Frame, Model, PlaneRule, SliceOptions, Slices, Units};
+use lamp_slicer::{Fill, Frame, Model, PlaneRule, SliceError, SliceOptions, Slices, Units};
 use lamp_stack::{Dpi, Layer, Length, Size};
 
 use crate::options::{Common, Output, parse_layers, parse_memory, parse_thickness};
+use crate::placement::{PlacementOptions, parse_numbers};
 use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream, report, write_layers};
@@ -20,10 +21,13 @@ use crate::streams::{input_name, is_stream, report, write_layers};
 Examples:
   slice blade.stl -o blade.tif
   slice blade.stl --dpi 2400 --thickness 25um --layers 100..200 | fix > part.tif
-  slice core.stl --units inch --fill nonzero -o core/")]
+  slice shell.stl core.stl --fill nonzero --scale 1.02 --rotate x:90,z:-12.5 -o mould.tif
+  slice core.stl --units inch -o core/")]
 pub(crate) struct SliceArgs {
-    /// The part: an STL file, binary or ASCII, or - for standard input
-    part: PathBuf,
+    /// The part: STL files, binary or ASCII, or - for standard input. Several stand in the same
+    /// coordinates; where they overlap they cut each other out, or unite with --fill nonzero
+    #[arg(value_name = "PART", required = true)]
+    parts: Vec<PathBuf>,
 
     #[command(flatten)]
     pub(crate) options: PartOptions,
@@ -60,6 +64,9 @@ pub(crate) struct PartOptions {
     /// What the numbers of the STL mean
     #[arg(long, value_enum, default_value_t)]
     units: UnitsArg,
+
+    #[command(flatten)]
+    placement: PlacementOptions,
 
     /// What is inside: between odd and even crossings, or wherever contours wind around (for
     /// bodies that overlap)
@@ -118,6 +125,7 @@ impl PartOptions {
                 UnitsArg::Mm => Units::Millimetres,
                 UnitsArg::Inch => Units::Inches,
             },
+            placement: self.placement.placement(),
             fill: match self.fill {
                 FillArg::EvenOdd => Fill::EvenOdd,
                 FillArg::NonZero => Fill::NonZero,
@@ -151,6 +159,7 @@ impl PartOptions {
             name(&|| self.units.to_possible_value()),
             name(&|| self.fill.to_possible_value()),
         );
+        line += &self.placement.command_line();
         line += &match (self.origin, self.size) {
             (Some([x, y]), Some(size)) => format!(" --origin {x},{y} --size {size}"),
             _ => format!(" --margin {}", self.margin),
@@ -159,14 +168,14 @@ impl PartOptions {
     }
 
     /// The layers of a part, the first naming this command; `part` is the
-    /// file's name.
+    /// name of its file, or of several.
     pub(crate) fn slices(
         &self,
         model: Model,
         part: &str,
         layers: Option<Range<u32>>,
         memory: Option<u64>,
-    ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Stop> {
+    ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), SliceError> {
         let options = SliceOptions { layers, memory: table_memory(memory), ..self.for_slicing() };
         let slices = Slices::new(model, &options)?;
         let command = self.command_line(part);
@@ -180,13 +189,22 @@ impl PartOptions {
 }
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
-    let name = input_name(&args.part);
-    let model = open_model(&args.part).map_err(|stop| stop.at(name.clone()))?;
-    let file = args.part.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let model = open_models(&args.parts)?;
+    let name = name_of_all(&args.parts);
+    let files: Vec<_> = args
+        .parts
+        .iter()
+        .map(|part| part.file_name().unwrap_or_default().to_string_lossy())
+        .collect();
     let (slices, name_command) = args
         .options
-        .slices(model, &file, args.layers.clone(), args.memory)
-        .map_err(|stop| stop.at(name.clone()))?;
+        .slices(model, &files.join(" "), args.layers.clone(), args.memory)
+        .map_err(|error| match error {
+            SliceError::NotFinite { file, .. } => {
+                Stop::from(error).at(input_name(&args.parts[file]))
+            }
+            error => Stop::from(error).at(name.clone()),
+        })?;
     let report = report("slice", common, &args.output);
     report.expect(slices.layer_count() as u64);
     let (mut stray_layers, mut stray_rows) = (0, 0);
@@ -202,12 +220,29 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     Ok(())
 }
 
-fn open_model(path: &Path) -> Result<Model, Stop> {
-    Ok(if is_stream(path) {
-        Model::from_stream("stdin", std::io::stdin().lock())?
+/// Opens all files of a part.
+fn open_models(paths: &[PathBuf]) -> Result<Model, Stop> {
+    if paths.iter().filter(|path| is_stream(path)).count() > 1 {
+        return Err(Stop::usage("standard input can be read only once: give - for one part"));
+    }
+    let open = |path: &PathBuf| open_model(path).map_err(|e| Stop::from(e).at(input_name(path)));
+    Ok(Model::joined(paths.iter().map(open).collect::<Result<_, _>>()?))
+}
+
+fn open_model(path: &Path) -> Result<Model, SliceError> {
+    if is_stream(path) {
+        Model::from_stream("stdin", std::io::stdin().lock())
     } else {
-        Model::open(path)?
-    })
+        Model::open(path)
+    }
+}
+
+/// What people call the files of a part together.
+fn name_of_all(paths: &[PathBuf]) -> String {
+    match paths {
+        [path] => input_name(path),
+        paths => format!("{} and {} more", input_name(&paths[0]), paths.len() - 1),
+    }
 }
 
 fn say_stray_rows(report: &Report, rows: usize, layers: usize) {
@@ -236,9 +271,6 @@ fn machine_memory() -> u64 {
 
 /// Parses `X,Y` in millimetres.
 fn parse_origin(text: &str) -> Result<[f64; 2], String> {
-    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| n.is_finite());
-    text.trim_end_matches("mm")
-        .split_once(',')
-        .and_then(|(x, y)| Some([number(x)?, number(y)?]))
+    parse_numbers(text.trim_end_matches("mm"))
         .ok_or_else(|| format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2"))
 }

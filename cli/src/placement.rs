@@ -1,0 +1,142 @@
+//! What is done to a part before it is sliced.
+
+use clap::{Args, ValueEnum};
+use lamp_slicer::{Axis, Placement};
+
+/// Options that place a part.
+#[derive(Args, Clone)]
+pub(crate) struct PlacementOptions {
+    /// Make the part larger, by one factor or one for each axis: 1.02 makes up for 2 % of
+    /// shrinkage. Parts are scaled first, then mirrored, rotated and translated
+    #[arg(long, value_name = "F|X,Y,Z", value_parser = parse_scale, allow_hyphen_values = true)]
+    scale: Option<[f64; 3]>,
+
+    /// Mirror the part: x swaps left and right
+    #[arg(long, value_name = "AXIS", value_delimiter = ',')]
+    mirror: Vec<AxisArg>,
+
+    /// Turn the part about an axis, by degrees counter-clockwise seen from the axis's tip; several
+    /// in the order given, as x:90,z:-12.5. Quarter turns are exact
+    #[arg(long, value_name = "AXIS:DEGREES", value_parser = parse_rotation, value_delimiter = ',')]
+    rotate: Vec<(AxisArg, f64)>,
+
+    /// Move the part, in millimetres. The image goes with it, and --origin is where it is then
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, allow_hyphen_values = true)]
+    translate: Option<[f64; 3]>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum AxisArg {
+    X,
+    Y,
+    Z,
+}
+
+impl AxisArg {
+    fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+}
+
+impl From<AxisArg> for Axis {
+    fn from(axis: AxisArg) -> Self {
+        match axis {
+            AxisArg::X => Self::X,
+            AxisArg::Y => Self::Y,
+            AxisArg::Z => Self::Z,
+        }
+    }
+}
+
+impl PlacementOptions {
+    pub(crate) fn placement(&self) -> Placement {
+        let mut placement = Placement::default().scaled(self.scale.unwrap_or([1.0; 3]));
+        for &axis in &self.mirror {
+            let mut factors = [1.0; 3];
+            factors[axis as usize] = -1.0;
+            placement = placement.scaled(factors);
+        }
+        for &(axis, degrees) in &self.rotate {
+            placement = placement.rotated(axis.into(), degrees);
+        }
+        placement.translated(self.translate.unwrap_or([0.0; 3]))
+    }
+
+    /// The options that were given, as the stack remembers them.
+    pub(crate) fn command_line(&self) -> String {
+        let mut line = String::new();
+        if let Some([x, y, z]) = self.scale {
+            line += &format!(" --scale {x},{y},{z}");
+        }
+        if !self.mirror.is_empty() {
+            let axes: Vec<String> = self.mirror.iter().map(|axis| axis.name()).collect();
+            line += &format!(" --mirror {}", axes.join(","));
+        }
+        if !self.rotate.is_empty() {
+            let turn = |(axis, degrees): &(AxisArg, f64)| format!("{}:{degrees}", axis.name());
+            let turns: Vec<String> = self.rotate.iter().map(turn).collect();
+            line += &format!(" --rotate {}", turns.join(","));
+        }
+        if let Some([x, y, z]) = self.translate {
+            line += &format!(" --translate {x},{y},{z}");
+        }
+        line
+    }
+}
+
+/// Parses `X,Y` or `X,Y,Z`.
+pub(crate) fn parse_numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| n.is_finite());
+    text.split(',').map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
+}
+
+fn parse_scale(text: &str) -> Result<[f64; 3], String> {
+    let factors = match parse_numbers(text) {
+        Some([factor]) => Some([factor; 3]),
+        None => parse_numbers(text),
+    };
+    let wrong = || format!("`{text}` is not a scale: write a factor, or X,Y,Z, as 1.02,1.02,1.015");
+    match factors.ok_or_else(wrong)? {
+        factors if factors.contains(&0.0) => Err(format!("`{text}` leaves nothing of the part")),
+        factors if factors.iter().any(|&f| f < 0.0) => {
+            Err(format!("`{text}` is below zero: --mirror turns a part over"))
+        }
+        factors => Ok(factors),
+    }
+}
+
+fn parse_rotation(text: &str) -> Result<(AxisArg, f64), String> {
+    let wrong = || format!("`{text}` is not a rotation: write AXIS:DEGREES, as x:90 or z:-12.5");
+    let (axis, degrees) = text.split_once(':').ok_or_else(wrong)?;
+    let axis = AxisArg::from_str(axis.trim(), true).map_err(|_| wrong())?;
+    let [degrees] = parse_numbers(degrees).ok_or_else(wrong)?;
+    Ok((axis, degrees))
+}
+
+fn parse_translation(text: &str) -> Result<[f64; 3], String> {
+    parse_numbers(text.trim_end_matches("mm"))
+        .ok_or_else(|| format!("`{text}` is not a way: write X,Y,Z in millimetres, as -5,0,12.7"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_people_write() {
+        assert_eq!(parse_scale("1.02"), Ok([1.02; 3]));
+        assert_eq!(parse_scale("1, 2,.5"), Ok([1.0, 2.0, 0.5]));
+        assert_eq!(parse_rotation("x:90"), Ok((AxisArg::X, 90.0)));
+        assert_eq!(parse_rotation("Z: -12.5"), Ok((AxisArg::Z, -12.5)));
+        assert_eq!(parse_translation("-5,0,1e4mm"), Ok([-5.0, 0.0, 1e4]));
+        for wrong in ["", "0", "-1", "1,2", "1,2,0", "1,2,3,4", "nan", "inf", "1e999", "two"] {
+            assert!(parse_scale(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["", "x", "x90", "90", "w:90", "x:", "x:nan", "x:inf", "x:1:2"] {
+            assert!(parse_rotation(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["", "1", "1,2", "1,2,3,4", "1,nan,2", "1,2,inf"] {
+            assert!(parse_translation(wrong).is_err(), "{wrong}");
+        }
+    }
+}
