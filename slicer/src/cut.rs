@@ -5,6 +5,13 @@
 //! plane therefore form closed chains, whatever the rounding; and since a
 //! point is past a row or it is not, every row is crossed an even number of
 //! times. Only the column of a crossing depends on one facet alone.
+//!
+//! That takes no more than equal corners (0 equals -0) coming out equal, and an
+//! even number of facets on each edge. An edge that is cut has its ends on both
+//! sides of the plane, so it rises, however little, and its ends have an order,
+//! whatever third corner ties with them. A facet without area that is cut has
+//! two edges, too. An overflow would move a point to a row's end, the same for
+//! both facets.
 
 use std::ops::Range;
 
@@ -136,9 +143,11 @@ impl Cutter<'_> {
             return 0;
         }
         let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
+        // The last column is black: rounding takes no crossing past it.
+        let last = self.grid.width - 1;
         list.extend((first..end).map(|row| {
             let x = upper[0] + slope * (f64::from(row) - upper[1]);
-            Crossing::new(row, ceil_clamped(x, self.grid.width), rising)
+            Crossing::new(row, ceil_clamped(x, last), rising)
         }));
         (end - first) as usize
     }

@@ -118,9 +118,6 @@ impl Table {
             if !balanced {
                 stray_rows.push(row as u32);
             }
-            while transitions.last().is_some_and(|&column| column >= width) {
-                transitions.pop();
-            }
             mask.push_row(&transitions).expect("sorted places without pairs increase strictly");
         }
         (mask.finish(), stray_rows)
