@@ -6,6 +6,7 @@ mod common;
 mod even_rows;
 mod fill;
 mod layers;
+mod placement;
 mod referee;
 mod same_bytes;
 mod stl;

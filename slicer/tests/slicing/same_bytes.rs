@@ -11,6 +11,37 @@ use crate::common::{
     block, joined, model, options, slice, try_layers, white_pixels, without_stack,
 };
 
+/// A binary file, a text and facets in memory, of which no number fills
+/// blocks.
+#[test]
+fn several_files_are_one_part() {
+    let meshes = [tower(9_000), sphere(30.0, 5_000), block([-20.0; 3], [9.0; 3])];
+    let (mut binary, mut text) = (Vec::new(), Vec::new());
+    meshes[0].write_stl("a", &mut binary).unwrap();
+    meshes[1].write_ascii_stl("b", &mut text).unwrap();
+    let read = || {
+        let [a, b] = [("a", &binary), ("b", &text)]
+            .map(|(name, bytes)| Model::from_stream(name, &bytes[..]).unwrap());
+        [a, b, Model::from_facets("c", meshes[2].facets.clone())]
+    };
+    let whole = joined(&meshes);
+    for fill in [Fill::EvenOdd, Fill::NonZero] {
+        for memory in [30_000, 1 << 30] {
+            let options = SliceOptions { fill, memory, ..coarse() };
+            let layers = try_layers(Model::joined(read().into()), &options).unwrap();
+            assert!(without_stack(layers) == without_stack(slice(&whole, &options)));
+        }
+    }
+    let model = Model::joined(read().into());
+    assert_eq!((model.name(), model.facet_count()), ("a+b+c", whole.facets.len()));
+    let digests = read().map(|model| model.digest().to_owned()).concat();
+    assert_eq!(model.digest(), format!("blake3:{}", blake3::hash(digests.as_bytes()).to_hex()));
+    let [alone, ..] = read();
+    let (name, digest) = (alone.name().to_owned(), alone.digest().to_owned());
+    let alone = Model::joined(vec![alone]);
+    assert_eq!((alone.name(), alone.digest()), (name.as_str(), digest.as_str()));
+}
+
 /// Several blocks of facets, with rows of many crossings.
 fn part() -> Mesh {
     tower(20_000)

@@ -170,6 +170,23 @@ fn the_first_coordinate_that_is_no_number_is_named() {
 }
 
 #[test]
+fn a_coordinate_that_is_no_number_names_its_file() {
+    let good = sphere(3.0, 9_000);
+    for (file, facet) in [(0, 8_000), (1, 3), (2, 4_500)] {
+        let models = (0..3).map(|k| {
+            let mut mesh = good.clone();
+            if k == file {
+                mesh.facets[facet][1][2] = f32::NAN;
+            }
+            read(&binary(&mesh)).unwrap()
+        });
+        let error = try_layers(Model::joined(models.collect()), &options(100.0, 500.0));
+        let told = matches!(error, Err(SliceError::NotFinite { file: f, facet: n }) if (f, n) == (file, facet));
+        assert!(told, "{error:?}");
+    }
+}
+
+#[test]
 fn a_text_file_names_the_facet_that_is_no_number() {
     let mut broken = cube(0.0, 3.0);
     for (facet, value) in [(7, f32::NAN), (5, f32::INFINITY)] {
