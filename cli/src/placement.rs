@@ -3,25 +3,31 @@
 use clap::{Args, ValueEnum};
 use lamp_slicer::{Axis, Placement};
 
+const HEADING: &str = "Placement of the part, in this order";
+
 /// Options that place a part.
 #[derive(Args, Clone)]
 pub(crate) struct PlacementOptions {
-    /// Make the part larger, by one factor or one for each axis: 1.02 makes up for 2 % of
-    /// shrinkage. Parts are scaled first, then mirrored, rotated and translated
-    #[arg(long, value_name = "F|X,Y,Z", value_parser = parse_scale, allow_hyphen_values = true)]
+    /// Make the part larger, by one factor or one for each axis: 1.02 makes up for about 2 % of
+    /// shrinkage
+    #[arg(long, value_name = "F|X,Y,Z", value_parser = parse_scale, help_heading = HEADING)]
+    #[arg(allow_hyphen_values = true)]
     scale: Option<[f64; 3]>,
 
-    /// Mirror the part: x swaps left and right
-    #[arg(long, value_name = "AXIS", value_delimiter = ',')]
+    /// Mirror the part: x swaps its left and its right
+    #[arg(long, value_name = "AXIS", value_delimiter = ',', help_heading = HEADING)]
     mirror: Vec<AxisArg>,
 
-    /// Turn the part about an axis, by degrees counter-clockwise seen from the axis's tip; several
-    /// in the order given, as x:90,z:-12.5. Quarter turns are exact
-    #[arg(long, value_name = "AXIS:DEGREES", value_parser = parse_rotation, value_delimiter = ',')]
+    /// Turn the part about an axis through 0, by degrees counter-clockwise seen from the axis's
+    /// tip; several one after another, as x:90,z:-12.5. Quarter turns are exact
+    #[arg(long, value_name = "AXIS:DEGREES", value_parser = parse_rotation)]
+    #[arg(value_delimiter = ',', help_heading = HEADING)]
     rotate: Vec<(AxisArg, f64)>,
 
-    /// Move the part, in millimetres. The image goes with it, and --origin is where it is then
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, allow_hyphen_values = true)]
+    /// Move the part, in millimetres. The image goes with it: its origin and the heights of the
+    /// layers are in the coordinates that the part then has
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, help_heading = HEADING)]
+    #[arg(allow_hyphen_values = true)]
     translate: Option<[f64; 3]>,
 }
 

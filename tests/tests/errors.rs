@@ -85,6 +85,14 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("slice cube.stl --origin 0 --size 3x3mm -o x.tif", &["`0` is not a point", "X,Y"]),
         ("slice cube.stl --units furlong -o x.tif", &["furlong", "inch"]),
         ("slice cube.stl --fill odd -o x.tif", &["even-odd", "nonzero"]),
+        ("slice cube.stl --scale 0 -o x.tif", &["leaves nothing"]),
+        ("slice cube.stl --scale -1 -o x.tif", &["below zero", "--mirror"]),
+        ("slice cube.stl --scale 1,2 -o x.tif", &["`1,2` is not a scale", "X,Y,Z"]),
+        ("slice cube.stl --mirror w -o x.tif", &["w", "x, y, z"]),
+        ("slice cube.stl --rotate 90 -o x.tif", &["`90` is not a rotation", "x:90"]),
+        ("slice cube.stl --rotate x:inf -o x.tif", &["`x:inf` is not a rotation"]),
+        ("slice cube.stl --translate -5,0 -o x.tif", &["`-5,0` is not a way", "X,Y,Z"]),
+        ("slice - cube.stl - -o x.tif", &["only once"]),
         ("tile cube.tif --area 5mm -o x.tif", &["`5mm` is not a size", "4x4.5in"]),
         ("tile cube.tif --area 0x5mm -o x.tif", &["--area"]),
         ("tile cube.tif --copies 0 -o x.tif", &["--copies"]),
@@ -131,6 +139,19 @@ fn a_part_that_cannot_be_sliced_is_named_with_what_is_wrong() {
 }
 
 #[test]
+fn of_several_parts_the_bad_one_is_named() {
+    let scratch = with_all_sorts();
+    for (parts, words) in [
+        ("cube.stl missing.stl", &["slice: missing.stl: ", "No such file"][..]),
+        ("cube.stl cube.stl nan.stl", &["slice: nan.stl: facet 5 ", "not a finite number"]),
+        ("none.stl cube.stl", &["slice: none.stl: ", "no facets"]),
+        ("cube.stl cube.stl cube.stl --layers 200..", &["slice: cube.stl and 2 more: ", "0..200"]),
+    ] {
+        is_bad_input(&scratch, &format!("slice {parts} -o x.tif"), words);
+    }
+}
+
+#[test]
 fn a_part_that_does_not_fit_the_options_is_refused() {
     let scratch = with_all_sorts();
     for (options, words) in [
@@ -138,6 +159,7 @@ fn a_part_that_does_not_fit_the_options_is_refused() {
         ("--origin 0,0 --size 5x5mm", &["sticks out of the frame", "-10.000 to 10.000"]),
         ("--units inch --dpi 100000 --margin 99999999", &["pixels", "--units", "--dpi"]),
         ("--thickness 0.00001um", &["layers", "--thickness"]),
+        ("--translate 0,-2e9,0", &["2e9 mm from the origin", "--translate"]),
     ] {
         let words = [&["cube.stl: "], words].concat();
         is_bad_input(&scratch, &format!("slice cube.stl {options} -o x.tif"), &words);

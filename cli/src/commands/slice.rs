@@ -65,9 +65,6 @@ pub(crate) struct PartOptions {
     #[arg(long, value_enum, default_value_t)]
     units: UnitsArg,
 
-    #[command(flatten)]
-    placement: PlacementOptions,
-
     /// What is inside: between odd and even crossings, or wherever contours wind around (for
     /// bodies that overlap)
     #[arg(long, value_enum, default_value_t)]
@@ -86,6 +83,9 @@ pub(crate) struct PartOptions {
     /// Size of the image, as 80x80mm or 4x4.5in; goes with --origin
     #[arg(long, value_name = "WxH", requires = "origin")]
     size: Option<Size>,
+
+    #[command(flatten)]
+    placement: PlacementOptions,
 }
 
 #[derive(Clone, Copy, Default, ValueEnum)]
