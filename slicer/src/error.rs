@@ -55,9 +55,9 @@ pub enum SliceError {
         /// The facet in the file, from 0.
         facet: usize,
     },
-    /// A part so far away that places are no longer exact.
+    /// A part more than 1000 km away, where places are no longer exact.
     #[error(
-        "the part reaches {mm:e} mm from the origin, and more than 1000 km are not read: check --units, --scale and --translate"
+        "the part reaches {mm:.3e} mm from the origin, where places are no longer exact: check --units, --scale and --translate"
     )]
     TooFar {
         /// The greatest distance along an axis, in millimetres.

@@ -159,7 +159,7 @@ fn a_part_that_does_not_fit_the_options_is_refused() {
         ("--origin 0,0 --size 5x5mm", &["sticks out of the frame", "-10.000 to 10.000"]),
         ("--units inch --dpi 100000 --margin 99999999", &["pixels", "--units", "--dpi"]),
         ("--thickness 0.00001um", &["layers", "--thickness"]),
-        ("--translate 0,-2e9,0", &["2e9 mm from the origin", "--translate"]),
+        ("--translate 0,-2e9,0", &["2.000e9 mm from the origin", "--translate"]),
     ] {
         let words = [&["cube.stl: "], words].concat();
         is_bad_input(&scratch, &format!("slice cube.stl {options} -o x.tif"), &words);
