@@ -13,8 +13,8 @@ pub enum StackError {
     /// Nothing arrived at all.
     #[error("the input is empty: no stack arrived")]
     Empty,
-    /// The first bytes are not those of a TIFF.
-    #[error("this is not a TIFF stack (it starts with bytes {start:02x?})")]
+    /// The first bytes are those of no TIFF and no PNG.
+    #[error("this is not a TIFF stack or a PNG (it starts with bytes {start:02x?})")]
     NotTiff {
         /// The first bytes of the input.
         start: Vec<u8>,
@@ -33,9 +33,9 @@ pub enum StackError {
         /// What is wrong.
         what: String,
     },
-    /// A page that is valid TIFF but not of a kind that is read here.
+    /// A page that is valid but not of a kind that is read here.
     #[error(
-        "page {page}: {what} is not read here; convert it first (tiffcp -c g4 for 1-bit images, -c packbits for 8-bit)"
+        "page {page}: {what} is not read here; save it as a 1-bit or an 8-bit gray TIFF first, with any lossless compression"
     )]
     Unsupported {
         /// The page, from 0.
@@ -76,8 +76,13 @@ pub enum StackError {
         before: u32,
     },
     /// A folder without pages.
-    #[error("the folder holds no .tif page")]
+    #[error("the folder holds no .tif or .png page")]
     NoPages,
+    /// A folder of pages of both kinds.
+    #[error(
+        "the folder holds .tif and .png pages: keep those that are the stack, and move the others away"
+    )]
+    MixedPages,
     /// A page is missing from a folder.
     #[error("the folder lacks a page: layer {layer} does not follow what was before it")]
     MissingPage {

@@ -72,8 +72,8 @@ impl GrayMask {
         let first = self.changes.len();
         let row = self.row_offsets.len() - 1;
         let (mut column, mut level) = (0u32, 0);
-        for (length, next) in runs.into_iter().chain([(0, 0)]) {
-            if next != level && column < self.width && (length > 0 || next == 0) {
+        for (length, next) in runs {
+            if next != level && length > 0 {
                 self.changes.push(LevelChange { column, level: next });
                 level = next;
             }
@@ -84,6 +84,9 @@ impl GrayMask {
                     return Err(GrayMaskError { row, column });
                 }
             }
+        }
+        if level != 0 && column < self.width {
+            self.changes.push(LevelChange { column, level: 0 });
         }
         self.row_offsets.push(self.changes.len() as u32);
         Ok(())
@@ -133,14 +136,16 @@ mod tests {
         let mut image = GrayMask::new(10);
         image.push_runs([(2, 0), (3, 7), (0, 9), (1, 7), (1, 255)]).unwrap();
         image.push_runs([(10, 1)]).unwrap();
+        image.push_runs([(2, 7), (0, 0), (1, 7), (0, 7)]).unwrap();
         image.push_runs([]).unwrap();
         let rows: Vec<_> = image.rows().collect();
         assert_eq!(rows[0], [change(2, 7), change(6, 255), change(7, 0)]);
         assert_eq!(rows[1], [change(0, 1)]);
-        assert!(rows[2].is_empty());
+        assert_eq!(rows[2], [change(0, 7), change(3, 0)]);
+        assert!(rows[3].is_empty());
         assert!(image.push_runs([(10, 1), (1, 0)]).is_err());
         assert!(image.push_runs([(u32::MAX, 1), (u32::MAX, 0)]).is_err());
-        assert_eq!(image.height(), 3);
+        assert_eq!(image.height(), 4);
     }
 
     #[test]

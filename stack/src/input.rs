@@ -27,11 +27,13 @@ enum Source {
 }
 
 impl Pages {
-    /// Opens a TIFF file, or a folder of TIFF files of one page each, in the
-    /// order of their names (numbers in names count as numbers).
+    /// Opens a TIFF or PNG file, or a folder of TIFF files of one page each or
+    /// of PNG files, in the order of their names (numbers in names count as
+    /// numbers).
     ///
     /// # Errors
-    /// Where nothing can be read there, or it is not a TIFF.
+    /// Where nothing can be read there, or it is neither; where a folder
+    /// holds both.
     pub fn open(path: &Path) -> Result<Self, StackError> {
         let source = if path.is_dir() {
             let files = page_files(path)?;
@@ -48,7 +50,7 @@ impl Pages {
     /// Reads a stack as it arrives, such as from standard input.
     ///
     /// # Errors
-    /// Where nothing arrives, or it is not a TIFF.
+    /// Where nothing arrives, or it is neither a TIFF nor a PNG.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
         let source = Source::One(PageReader::from_stream(stream)?);
         Ok(Self { source, count: 0, last_whole: None })
@@ -127,15 +129,20 @@ fn one_page(file: &Path, number: u32, last_whole: Option<u32>) -> Result<Page, S
     if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
 }
 
-/// The TIFF files of a folder, last name first.
+/// The TIFF or PNG files of a folder, last name first.
 fn page_files(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
-    let mut files = Vec::new();
+    let (mut files, mut tiffs) = (Vec::new(), 0);
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        if matches!(extension.as_deref(), Some("tif" | "tiff")) {
+        let tiff = matches!(extension.as_deref(), Some("tif" | "tiff"));
+        if tiff || extension.as_deref() == Some("png") {
+            tiffs += usize::from(tiff);
             files.push(path);
         }
+    }
+    if tiffs > 0 && tiffs < files.len() {
+        return Err(StackError::MixedPages);
     }
     files.sort_by_cached_key(|path| name_key(&path.to_string_lossy()));
     files.reverse();

@@ -3,7 +3,7 @@
 //! A layer image is never pixels here but runs: each row of a [`Mask`] is the
 //! sorted list of columns where the colour toggles. A [`Layer`] is an image
 //! and what is known of it; a stack is a file, folder or stream of layers,
-//! bottom first, in TIFF. A stage is a function from layers to layers.
+//! bottom first, in TIFF or PNG. A stage is a function from layers to layers.
 //!
 //! ```
 //! use lamp_stack::{Destination, Format, Image, Layer, Mask, PageInfo, Pages, write_stack};
@@ -31,8 +31,10 @@ mod layer;
 mod length;
 mod mask;
 mod ordered;
+mod orient;
 mod output;
 mod packbits;
+mod png_page;
 mod temporary;
 #[cfg(test)]
 mod testing;

@@ -3,6 +3,7 @@
 use fax::{Color, VecWriter, decoder, encoder};
 use proptest::prelude::*;
 
+use crate::gray::GrayMask;
 use crate::mask::{Mask, MaskBuilder};
 
 pub(crate) fn mask_of<'a>(width: u32, rows: impl IntoIterator<Item = &'a [u32]>) -> Mask {
@@ -43,6 +44,25 @@ pub(crate) fn arbitrary_mask() -> impl Strategy<Value = Mask> {
             before = row;
         }
         mask.finish()
+    })
+}
+
+/// Gray masks of random runs, few of them long.
+pub(crate) fn arbitrary_gray() -> impl Strategy<Value = GrayMask> {
+    let run = (prop_oneof![0u32..3, 0u32..200], prop_oneof![Just(0u8), Just(255), any::<u8>()]);
+    let row = prop::collection::vec(run, 0..12);
+    (1u32..400, prop::collection::vec(row, 0..12)).prop_map(|(width, rows)| {
+        let mut gray = GrayMask::new(width);
+        for row in rows {
+            let mut room = width;
+            gray.push_runs(row.into_iter().map(|(length, level)| {
+                let part = length.min(room);
+                room -= part;
+                (part, level)
+            }))
+            .unwrap();
+        }
+        gray
     })
 }
 

@@ -130,7 +130,13 @@ fn stack_lines(stack: &StackInfo) -> Vec<(&'static str, String)> {
 fn compression_name(compression: Compression) -> &'static str {
     match compression {
         Compression::Uncompressed => "uncompressed",
+        Compression::ModifiedHuffman => "CCITT modified Huffman",
+        Compression::Group3 => "CCITT Group 3",
+        Compression::Group3TwoDimensional => "CCITT Group 3, two-dimensional",
         Compression::G4 => "CCITT Group 4",
+        Compression::Lzw => "LZW",
+        Compression::Deflate => "Deflate",
         Compression::PackBits => "PackBits",
+        Compression::Png => "PNG",
     }
 }

@@ -1,4 +1,5 @@
-//! The code words of T.6 and of the run lengths it takes from T.4.
+//! The code words of T.6 and of the run lengths it takes from T.4, and T.4's
+//! end of line.
 
 /// A code word: its bits, right-aligned, and how many there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +31,7 @@ const fn code(digits: &str) -> Code {
 
 pub(super) const PASS: Code = code("0001");
 pub(super) const HORIZONTAL: Code = code("001");
-/// Two of these end a page (EOFB).
+/// T.4's end of line. Two of these end a T.6 page (EOFB).
 pub(super) const EOL: Code = code("000000000001");
 
 /// Vertical codes by `a1 - b1 + 3`: VL3 to VR3.

@@ -60,7 +60,7 @@ pub(crate) fn decode_rows(
 
 /// Decodes one row against the row above it. Names are those of
 /// [`encode_row`](super::encode).
-fn decode_row(
+pub(super) fn decode_row(
     bits: &mut BitReader<'_>,
     above: &Row,
     row: &mut Row,
@@ -249,7 +249,7 @@ static RUNS: LazyLock<[Vec<Entry<u16>>; 2]> = LazyLock::new(|| {
 });
 
 /// Takes code words off a strip.
-struct BitReader<'a> {
+pub(super) struct BitReader<'a> {
     rest: &'a [u8],
     /// The bits at hand, left-aligned.
     pending: u64,
@@ -261,7 +261,7 @@ struct BitReader<'a> {
 }
 
 impl<'a> BitReader<'a> {
-    fn new(strip: &'a [u8]) -> Self {
+    pub(super) fn new(strip: &'a [u8]) -> Self {
         Self {
             rest: strip,
             pending: 0,
@@ -274,7 +274,7 @@ impl<'a> BitReader<'a> {
 
     /// The next `n` bits (zeros past the end).
     #[inline]
-    fn peek(&mut self, n: u32) -> usize {
+    pub(super) fn peek(&mut self, n: u32) -> usize {
         if self.count < 32 {
             self.refill();
         }
@@ -321,7 +321,7 @@ impl<'a> BitReader<'a> {
     }
 
     #[inline]
-    fn take(&mut self, len: u8) -> Result<(), G4Fault> {
+    pub(super) fn take(&mut self, len: u8) -> Result<(), G4Fault> {
         self.pending <<= len;
         self.count -= i32::from(len);
         if self.count < 0 { Err(G4Fault::EndsEarly) } else { Ok(()) }
@@ -339,7 +339,7 @@ impl<'a> BitReader<'a> {
 
     /// A run of at most `room` pixels: any make-up codes and a terminating
     /// code.
-    fn run(&mut self, white: bool, room: u32) -> Result<u32, G4Fault> {
+    pub(super) fn run(&mut self, white: bool, room: u32) -> Result<u32, G4Fault> {
         let runs = self.runs;
         let table = &runs[usize::from(white)];
         let mut length = 0u32;
@@ -357,6 +357,11 @@ impl<'a> BitReader<'a> {
                 return Ok(length);
             }
         }
+    }
+
+    /// Goes on to the next byte, unless a byte has just ended.
+    pub(super) fn align(&mut self) -> Result<(), G4Fault> {
+        self.take((self.count % 8) as u8)
     }
 
     /// Why the next bits are no code: the strip or the page ended, or they

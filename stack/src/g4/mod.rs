@@ -1,22 +1,25 @@
-//! The CCITT Group 4 (T.6) codec, between runs and bits.
+//! The CCITT Group 4 (T.6) codec, between runs and bits, and a decoder of its
+//! forerunner, Group 3 (T.4).
 //!
-//! T.6 is defined on the places where a row changes colour, which is what a
+//! Both are defined on the places where a row changes colour, which is what a
 //! [`Mask`](crate::Mask) holds: neither direction makes a bitmap.
 
 mod codes;
 mod decode;
 mod encode;
+mod group3;
 mod row;
 
 pub use decode::decode;
 pub(crate) use decode::decode_rows;
 pub use encode::encode;
+pub(crate) use group3::{Group3, decode_group3_rows};
 
 use thiserror::Error;
 
-/// A strip that is not T.6, and where.
+/// A strip that is neither T.6 nor T.4, and where.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("row {row} of the G4 strip {fault}")]
+#[error("row {row} of the strip {fault}")]
 pub struct G4Error {
     /// The row that could not be decoded, from the strip's top.
     pub row: u32,
@@ -24,16 +27,19 @@ pub struct G4Error {
     pub fault: G4Fault,
 }
 
-/// What is wrong with a row of T.6 codes.
+/// What is wrong with a row of T.6 or T.4 codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum G4Fault {
     /// The strip, or its EOFB, comes before the row is full.
     #[error("is missing: the codes end early")]
     EndsEarly,
-    /// Bits that are no T.6 code (uncompressed mode is not known here).
-    #[error("has bits that are no T.6 code")]
+    /// Bits that are no code (uncompressed mode is not known here).
+    #[error("has bits that are no T.6 or T.4 code")]
     NotACode,
+    /// A Group 3 row without an end of line before it, where others have one.
+    #[error("has no end of line before it")]
+    NoEndOfLine,
     /// The image has more runs than any layer: the strip was made to fill
     /// memory.
     #[error("makes more runs than an image may have")]

@@ -2,12 +2,15 @@
 
 use std::collections::HashMap;
 
+use super::layout::Layout;
 use super::page::{Compression, Page};
 use super::tags::{
-    BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, FILL_ORDER, IMAGE_DESCRIPTION, IMAGE_LENGTH,
-    IMAGE_WIDTH, LONG, LONG8, ORIENTATION, PACK_BITS, PER_CENTIMETRE, PER_INCH, PHOTOMETRIC,
-    RATIONAL, RESOLUTION_UNIT, ROWS_PER_STRIP, SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS,
-    STRIP_OFFSETS, T6, TILE_OFFSETS, UNCOMPRESSED, WHITE_IS_ZERO, X_RESOLUTION, type_size,
+    BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, DEFLATE, FILL_ORDER, IMAGE_DESCRIPTION,
+    IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, LZW, MODIFIED_HUFFMAN, OLD_DEFLATE, ORIENTATION,
+    PACK_BITS, PER_CENTIMETRE, PER_INCH, PHOTOMETRIC, PREDICTOR, RATIONAL, RESOLUTION_UNIT,
+    ROWS_PER_STRIP, SAMPLE_FORMAT, SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS, STRIP_OFFSETS, T4,
+    T4_OPTIONS, T6, TILE_BYTE_COUNTS, TILE_LENGTH, TILE_OFFSETS, TILE_WIDTH, TWO_DIMENSIONAL,
+    UNCOMPRESSED, UNCOMPRESSED_MODE, WHITE_IS_ZERO, X_RESOLUTION, type_size,
 };
 use crate::error::StackError;
 use crate::layer::PageInfo;
@@ -15,10 +18,10 @@ use crate::length::Dpi;
 
 /// Images are at most this wide and high: columns and their sums fit in 32
 /// bits with room to spare.
-const LARGEST_SIDE: u64 = 1 << 26;
+pub(crate) const LARGEST_SIDE: u64 = 1 << 26;
 
 /// The tags that are looked at.
-pub(super) const KNOWN: [u16; 15] = [
+pub(super) const KNOWN: [u16; 21] = [
     IMAGE_WIDTH,
     IMAGE_LENGTH,
     BITS_PER_SAMPLE,
@@ -33,7 +36,13 @@ pub(super) const KNOWN: [u16; 15] = [
     STRIP_BYTE_COUNTS,
     X_RESOLUTION,
     RESOLUTION_UNIT,
+    T4_OPTIONS,
+    PREDICTOR,
+    TILE_WIDTH,
+    TILE_LENGTH,
     TILE_OFFSETS,
+    TILE_BYTE_COUNTS,
+    SAMPLE_FORMAT,
 ];
 
 /// The values of a page's directory.
@@ -94,48 +103,114 @@ impl Fields {
             .unwrap_or(PageInfo { index: self.page, ..PageInfo::default() })
     }
 
-    /// The page without its strips.
+    /// The page without the data of its strips or tiles.
     pub(super) fn page(&self) -> Result<Page, StackError> {
-        let unsupported = |what: String| StackError::Unsupported { page: self.page, what };
-        if self.values.contains_key(&TILE_OFFSETS) {
-            return Err(unsupported("a tiled image".to_owned()));
-        }
-        let samples = self.number_or(SAMPLES_PER_PIXEL, 1)?;
-        let gray = match self.number_or(BITS_PER_SAMPLE, 1)? {
-            1 if samples == 1 => false,
-            8 if samples == 1 => true,
-            bits => return Err(unsupported(format!("an image of {samples} x {bits} bits"))),
-        };
-        let compression = match self.number_or(COMPRESSION, UNCOMPRESSED)? {
-            UNCOMPRESSED => Compression::Uncompressed,
-            T6 if !gray => Compression::G4,
-            PACK_BITS => Compression::PackBits,
-            other => return Err(unsupported(format!("TIFF compression {other}"))),
-        };
+        let gray = self.is_gray()?;
+        let compression = self.compression(gray)?;
         let white_is_zero = match self.number(PHOTOMETRIC)? {
             WHITE_IS_ZERO => true,
             BLACK_IS_ZERO => false,
-            other => return Err(unsupported(format!("photometric interpretation {other}"))),
+            2 => return Err(self.unsupported("an RGB image")),
+            3 => return Err(self.unsupported("an image with a palette")),
+            other => {
+                return Err(self.unsupported(format!("photometric interpretation {other}")));
+            }
         };
-        match self.number_or(ORIENTATION, 1)? {
-            1 => {}
-            other => return Err(unsupported(format!("orientation {other}"))),
-        }
-        let height = self.side(IMAGE_LENGTH)?;
+        let orientation = match self.number_or(ORIENTATION, 1)? {
+            orientation @ 1..=8 => orientation as u8,
+            other => return Err(malformed(self.page, format!("there is no orientation {other}"))),
+        };
+        let (width, height) = (self.side(IMAGE_WIDTH)?, self.side(IMAGE_LENGTH)?);
         Ok(Page {
             number: self.page,
             info: self.info(),
             dpi: self.dpi(),
-            width: self.side(IMAGE_WIDTH)?,
-            height,
+            width,
             gray,
             white_is_zero,
+            orientation,
             compression,
-            rows_per_strip: self
-                .number_or(ROWS_PER_STRIP, u64::from(height))?
-                .clamp(1, u64::from(height)) as u32,
-            strips: Vec::new(),
+            differences: self.has_differences(gray, compression)?,
+            layout: self.layout(width, height)?,
+            pieces: Vec::new(),
         })
+    }
+
+    fn is_gray(&self) -> Result<bool, StackError> {
+        let samples = self.number_or(SAMPLES_PER_PIXEL, 1)?;
+        let gray = match self.number_or(BITS_PER_SAMPLE, 1)? {
+            1 if samples == 1 => false,
+            8 if samples == 1 => true,
+            bits => return Err(self.unsupported(format!("an image of {samples} x {bits} bits"))),
+        };
+        match self.number_or(SAMPLE_FORMAT, 1)? {
+            // Unsigned, or not stated.
+            1 | 4 => Ok(gray),
+            other => Err(self.unsupported(format!("sample format {other}"))),
+        }
+    }
+
+    fn compression(&self, gray: bool) -> Result<Compression, StackError> {
+        Ok(match self.number_or(COMPRESSION, UNCOMPRESSED)? {
+            UNCOMPRESSED => Compression::Uncompressed,
+            MODIFIED_HUFFMAN if !gray => Compression::ModifiedHuffman,
+            T4 if !gray => match self.number_or(T4_OPTIONS, 0)? {
+                options if options & UNCOMPRESSED_MODE != 0 => {
+                    return Err(self.unsupported("Group 3 with its uncompressed mode"));
+                }
+                options if options & TWO_DIMENSIONAL != 0 => Compression::Group3TwoDimensional,
+                _ => Compression::Group3,
+            },
+            T6 if !gray => Compression::G4,
+            LZW => Compression::Lzw,
+            DEFLATE | OLD_DEFLATE => Compression::Deflate,
+            PACK_BITS => Compression::PackBits,
+            6 | 7 => return Err(self.unsupported("JPEG in a TIFF")),
+            other => return Err(self.unsupported(format!("TIFF compression {other}"))),
+        })
+    }
+
+    /// Whether bytes are stored as what they differ by from the byte before.
+    /// The other compressions have no predictor, whatever the tag says.
+    fn has_differences(&self, gray: bool, compression: Compression) -> Result<bool, StackError> {
+        match self.number_or(PREDICTOR, 1)? {
+            1 => Ok(false),
+            _ if !matches!(compression, Compression::Lzw | Compression::Deflate) => Ok(false),
+            2 if gray => Ok(true),
+            other => {
+                let bits = if gray { 8 } else { 1 };
+                Err(self.unsupported(format!("predictor {other} of {bits}-bit pixels")))
+            }
+        }
+    }
+
+    fn layout(&self, width: u32, height: u32) -> Result<Layout, StackError> {
+        if self.values.contains_key(&TILE_WIDTH) {
+            let tile = (self.side(TILE_WIDTH)?, self.side(TILE_LENGTH)?);
+            return Ok(Layout::tiles(width, height, tile));
+        }
+        let rows = self.number_or(ROWS_PER_STRIP, u64::from(height))?;
+        Ok(Layout::strips(width, height, rows.clamp(1, u64::from(height)) as u32))
+    }
+
+    /// Where the strips or tiles stand, and how many bytes each takes.
+    pub(super) fn places(&self, layout: &Layout) -> Result<Vec<(u64, u64)>, StackError> {
+        let (name, offsets, counts) = if layout.tiled {
+            ("tiles", TILE_OFFSETS, TILE_BYTE_COUNTS)
+        } else {
+            ("strips", STRIP_OFFSETS, STRIP_BYTE_COUNTS)
+        };
+        let (offsets, counts) = (self.numbers(offsets)?, self.numbers(counts)?);
+        let wanted = layout.count();
+        if offsets.len() as u64 != wanted || counts.len() as u64 != wanted {
+            let what = format!("it has {} {name} where its size makes {wanted}", offsets.len());
+            return Err(malformed(self.page, what));
+        }
+        Ok(offsets.into_iter().zip(counts).collect())
+    }
+
+    fn unsupported(&self, what: impl Into<String>) -> StackError {
+        StackError::Unsupported { page: self.page, what: what.into() }
     }
 }
 

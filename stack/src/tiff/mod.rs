@@ -7,18 +7,25 @@
 //! ```
 //!
 //! Everything starts on an 8-byte boundary. The last directory's link is
-//! zero; a stack without that zero was cut off.
+//! zero; a stack without that zero was cut off. TIFFs of other writers are
+//! read, too: strips and tiles, in several compressions, turned upright.
 //!
 //! Sources: TIFF 6.0; for BigTIFF, the AWare Systems description of the
 //! format that libtiff reads.
 
 mod fields;
+mod layout;
 mod page;
 mod read;
 mod source;
 mod tags;
+mod tiles;
+mod unpack;
 mod write;
 
+pub(crate) use fields::LARGEST_SIDE;
+pub(crate) use page::bit_transitions;
 pub use page::{Compression, Page};
 pub use read::PageReader;
+pub(crate) use unpack::byte_runs;
 pub use write::{EncodedPage, Format, PageWriter};

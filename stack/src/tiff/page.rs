@@ -1,23 +1,40 @@
 //! Pages to layers.
 
 use crate::error::StackError;
+use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
 use crate::layer::{Image, Layer, PageInfo};
 use crate::length::Dpi;
-use crate::mask::{MOST_RUNS, MaskBuilder};
+use crate::mask::{MOST_RUNS, Mask, MaskBuilder};
 use crate::ordered::Held;
+use crate::orient::upright;
+use crate::png_page::{self, Header};
 use crate::tiff::fields::malformed;
-use crate::{g4, packbits};
+use crate::tiff::layout::Layout;
+use crate::tiff::tiles::{join_grays, join_masks};
+use crate::tiff::unpack::{Cut, Fault, unpack};
 
-/// How a page's strips are compressed.
+/// How a page's image is compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compression {
     /// Not at all.
     Uncompressed,
+    /// CCITT modified Huffman: Group 3 without ends of lines.
+    ModifiedHuffman,
+    /// CCITT Group 3, one-dimensional.
+    Group3,
+    /// CCITT Group 3, two-dimensional.
+    Group3TwoDimensional,
     /// CCITT Group 4.
     G4,
+    /// TIFF's LZW.
+    Lzw,
+    /// Deflate (zlib).
+    Deflate,
     /// Apple's run lengths.
     PackBits,
+    /// The page is a PNG file.
+    Png,
 }
 
 /// One page as it stands in the file, not yet decoded.
@@ -27,149 +44,201 @@ pub struct Page {
     pub(super) info: PageInfo,
     pub(super) dpi: Option<Dpi>,
     pub(super) width: u32,
-    pub(super) height: u32,
     pub(super) gray: bool,
     pub(super) white_is_zero: bool,
+    /// As in the TIFF tag: 1 to 8, 1 being upright.
+    pub(super) orientation: u8,
     pub(super) compression: Compression,
-    pub(super) rows_per_strip: u32,
-    pub(super) strips: Vec<Vec<u8>>,
+    /// Whether gray levels are stored as differences to the left.
+    pub(super) differences: bool,
+    pub(super) layout: Layout,
+    /// The strips or tiles, row by row.
+    pub(super) pieces: Vec<Vec<u8>>,
 }
 
 impl Held for Page {
     fn bytes(&self) -> usize {
         // A code of four bits, about what they take, makes four bytes.
-        8 * self.strip_bytes() as usize + 4 * self.height as usize
+        8 * self.strip_bytes() as usize + 4 * self.layout.page_height as usize
     }
 }
 
 impl Page {
+    /// A page that is a PNG file.
+    pub(super) fn of_png(number: u32, header: Header, file: Vec<u8>) -> Self {
+        let Header { width, height, gray, dpi, info } = header;
+        Self {
+            number,
+            info: info.unwrap_or(PageInfo { index: number, ..PageInfo::default() }),
+            dpi,
+            width,
+            gray,
+            white_is_zero: false,
+            orientation: 1,
+            compression: Compression::Png,
+            differences: false,
+            layout: Layout::strips(width, height, height),
+            pieces: vec![file],
+        }
+    }
+
     /// What the page's JSON line says (only the page's number, if it has none).
     pub fn info(&self) -> &PageInfo {
         &self.info
     }
 
-    /// How the strips are compressed.
+    /// How the image is compressed.
     pub fn compression(&self) -> Compression {
         self.compression
     }
 
-    /// How many bytes the strips take.
+    /// How many bytes the strips or tiles take.
     pub fn strip_bytes(&self) -> u64 {
-        self.strips.iter().map(|strip| strip.len() as u64).sum()
+        self.pieces.iter().map(|piece| piece.len() as u64).sum()
     }
 
-    /// Decodes the page.
+    /// Decodes the page and turns it upright.
     ///
     /// # Errors
-    /// Where a strip does not decode to the size that the directory states.
+    /// Where a strip or tile does not decode to the size that the directory
+    /// states.
     pub fn decode(mut self) -> Result<Layer, StackError> {
-        let image = if self.gray { self.decode_gray()? } else { self.decode_mask()? };
+        let image = match self.gray {
+            _ if self.compression == Compression::Png => {
+                png_page::decode(&self.pieces[0]).map_err(|fault| fault.on(self.number))?
+            }
+            true => Image::Gray(self.decode_gray()?),
+            false => Image::Mask(self.decode_mask()?),
+        };
+        let image = upright(image, self.orientation).ok_or_else(|| self.too_many_runs())?;
         Ok(Layer { info: self.info, dpi: self.dpi, image })
     }
 
-    fn decode_mask(&mut self) -> Result<Image, StackError> {
+    fn decode_mask(&mut self) -> Result<Mask, StackError> {
         let mut mask = MaskBuilder::new(self.width);
-        // A transition takes about four bits, a row at least one.
-        let bytes = self.strip_bytes() as usize;
-        mask.reserve(bytes.saturating_mul(8).min(self.height as usize), bytes.saturating_mul(2));
-        for (strip, rows) in self.strips.iter().zip(self.strip_heights()) {
-            if self.compression == Compression::G4 {
-                g4::decode_rows(strip, self.width, rows, &mut mask)
-                    .map_err(|source| StackError::Strip { layer: self.info.index, source })?;
-            } else {
-                self.unpack(strip, self.width.div_ceil(8), rows, |row| {
-                    mask.push_checked(&bit_transitions(row, self.width));
-                    mask.transition_count() <= MOST_RUNS
-                })?;
+        if self.compression == Compression::G4 {
+            // A transition takes about four bits.
+            mask.reserve(0, 2 * self.strip_bytes() as usize);
+        }
+        for (band, rows) in self.bands() {
+            if !self.layout.tiled {
+                self.mask_rows(&band[0], rows, &mut mask)?;
+                continue;
             }
+            let mut tiles = Vec::new();
+            for tile in band {
+                let mut rows_of_tile = MaskBuilder::new(self.layout.width);
+                self.mask_rows(tile, rows, &mut rows_of_tile)?;
+                tiles.push(rows_of_tile.finish());
+                self.check_runs(tiles.iter().map(Mask::transition_count).sum())?;
+            }
+            join_masks(&tiles, self.width, &mut mask);
+            self.check_runs(mask.transition_count())?;
         }
         let mask = mask.finish();
-        Ok(Image::Mask(if self.white_is_zero {
+        Ok(if self.white_is_zero {
             mask.inverted()
-        } else if self.compression == Compression::G4 && self.strips.len() == 1 {
-            mask.with_strip(self.strips.remove(0))
+        } else if self.is_in_our_layout() {
+            mask.with_strip(self.pieces.remove(0))
         } else {
             mask
-        }))
+        })
     }
 
-    fn decode_gray(&self) -> Result<Image, StackError> {
+    fn decode_gray(&self) -> Result<GrayMask, StackError> {
         let mut gray = GrayMask::new(self.width);
-        let flip = if self.white_is_zero { 0xFF } else { 0 };
-        for (strip, rows) in self.strips.iter().zip(self.strip_heights()) {
-            self.unpack(strip, self.width, rows, |row| {
-                let levels = row.iter().map(|&(length, byte)| (length, byte ^ flip));
-                gray.push_runs(levels).expect("rows are cut to the width");
-                gray.change_count() <= MOST_RUNS
-            })?;
+        for (band, rows) in self.bands() {
+            if !self.layout.tiled {
+                self.gray_rows(&band[0], rows, &mut gray)?;
+                continue;
+            }
+            let mut tiles = Vec::new();
+            for tile in band {
+                let mut rows_of_tile = GrayMask::new(self.layout.width);
+                self.gray_rows(tile, rows, &mut rows_of_tile)?;
+                tiles.push(rows_of_tile);
+                self.check_runs(tiles.iter().map(GrayMask::change_count).sum())?;
+            }
+            join_grays(&tiles, self.width, &mut gray);
+            self.check_runs(gray.change_count())?;
         }
-        Ok(Image::Gray(gray))
+        Ok(gray)
     }
 
-    /// How many rows each strip holds.
-    pub(super) fn strip_heights(&self) -> impl Iterator<Item = u32> {
-        let (whole, height) = (self.rows_per_strip, self.height);
-        (0..height.div_ceil(whole)).map(move |i| whole.min(height - i * whole))
+    /// Whether a 1-bit page stands as we would write it.
+    fn is_in_our_layout(&self) -> bool {
+        let one_strip = self.pieces.len() == 1 && !self.layout.tiled;
+        one_strip && self.compression == Compression::G4 && self.orientation == 1
     }
 
-    /// Gives each row of an uncompressed or PackBits strip as runs of bytes,
-    /// until `each` has enough.
+    /// The strips, or the tiles side by side, and how many rows of the page
+    /// they hold.
+    fn bands(&self) -> impl Iterator<Item = (&[Vec<u8>], u32)> {
+        self.pieces.chunks(self.layout.across).zip(self.layout.heights())
+    }
+
+    /// Decodes `rows` rows of a 1-bit strip or tile.
+    fn mask_rows(&self, piece: &[u8], rows: u32, mask: &mut MaskBuilder) -> Result<(), StackError> {
+        let width = self.layout.width;
+        let group3 = match self.compression {
+            Compression::ModifiedHuffman => Group3::ModifiedHuffman,
+            Compression::Group3 => Group3::OneDimensional,
+            Compression::Group3TwoDimensional => Group3::TwoDimensional,
+            Compression::G4 => {
+                return g4::decode_rows(piece, width, rows, mask).map_err(|e| self.in_strip(e));
+            }
+            _ => {
+                return self.unpack(piece, width.div_ceil(8), rows, |row| {
+                    mask.push_checked(&bit_transitions(row, width));
+                    mask.transition_count() <= MOST_RUNS
+                });
+            }
+        };
+        g4::decode_group3_rows(group3, piece, width, rows, mask).map_err(|e| self.in_strip(e))
+    }
+
+    /// Decodes `rows` rows of an 8-bit strip or tile.
+    fn gray_rows(&self, piece: &[u8], rows: u32, gray: &mut GrayMask) -> Result<(), StackError> {
+        let flip = if self.white_is_zero { 0xFF } else { 0 };
+        self.unpack(piece, self.layout.width, rows, |row| {
+            let levels = row.iter().map(|&(length, byte)| (length, byte ^ flip));
+            gray.push_runs(levels).expect("rows are cut to the width");
+            gray.change_count() <= MOST_RUNS
+        })
+    }
+
+    /// Gives each row of a piece that no fax code makes, until `each` has
+    /// enough.
     fn unpack(
         &self,
-        strip: &[u8],
+        piece: &[u8],
         row_bytes: u32,
         rows: u32,
         each: impl FnMut(&[(u32, u8)]) -> bool,
     ) -> Result<(), StackError> {
-        let cut = if self.compression == Compression::PackBits {
-            cut_rows(packbits::Runs::new(strip), row_bytes, rows, each)
-        } else {
-            cut_rows(strip.iter().map(|&byte| (1, byte)), row_bytes, rows, each)
-        };
-        let whole =
-            cut.ok_or_else(|| malformed(self.number, "its strip is shorter than its rows"))?;
-        if whole {
-            Ok(())
-        } else {
-            Err(malformed(self.number, "it has more runs than an image may have"))
-        }
+        let cut = Cut { row_bytes, rows, differences: self.differences };
+        unpack(self.compression, piece, &cut, each).map_err(|fault| match fault {
+            Fault::TooShort => malformed(self.number, "its strip is shorter than its rows"),
+            Fault::Damaged => malformed(self.number, "its strip is damaged: it does not decode"),
+            Fault::Enough => self.too_many_runs(),
+        })
     }
-}
 
-/// Cuts runs into `rows` rows of `row_bytes` and gives each, until one is said
-/// to be enough; `None` where the runs end early.
-fn cut_rows(
-    mut runs: impl Iterator<Item = (u32, u8)>,
-    row_bytes: u32,
-    rows: u32,
-    mut each: impl FnMut(&[(u32, u8)]) -> bool,
-) -> Option<bool> {
-    let (mut length, mut byte) = (0, 0);
-    let mut row = Vec::new();
-    for _ in 0..rows {
-        row.clear();
-        let mut room = row_bytes;
-        while room > 0 {
-            if length == 0 {
-                (length, byte) = runs.next()?;
-            }
-            let part = length.min(room);
-            match row.last_mut() {
-                Some((length, before)) if *before == byte => *length += part,
-                _ => row.push((part, byte)),
-            }
-            length -= part;
-            room -= part;
-        }
-        if !each(&row) {
-            return Some(false);
-        }
+    fn in_strip(&self, source: G4Error) -> StackError {
+        StackError::Strip { layer: self.info.index, source }
     }
-    Some(true)
+
+    fn check_runs(&self, runs: usize) -> Result<(), StackError> {
+        if runs > MOST_RUNS { Err(self.too_many_runs()) } else { Ok(()) }
+    }
+
+    fn too_many_runs(&self) -> StackError {
+        malformed(self.number, "it has more runs than an image may have")
+    }
 }
 
 /// The transitions of a row of bits, given as runs of bytes.
-fn bit_transitions(row: &[(u32, u8)], width: u32) -> Vec<u32> {
+pub(crate) fn bit_transitions(row: &[(u32, u8)], width: u32) -> Vec<u32> {
     let mut transitions = Vec::new();
     let (mut column, mut before) = (0, 0u8);
     for &(length, byte) in row {

@@ -7,8 +7,9 @@ use std::io::{BufReader, Read};
 use super::fields::{Fields, KNOWN, malformed, number};
 use super::page::Page;
 use super::source::Source;
-use super::tags::{FILL_ORDER, STRIP_BYTE_COUNTS, STRIP_OFFSETS, type_size};
+use super::tags::{FILL_ORDER, type_size};
 use crate::error::StackError;
+use crate::png_page;
 
 /// More directory entries than any TIFF writer makes.
 const MOST_ENTRIES: u64 = 4096;
@@ -19,10 +20,11 @@ const LONGEST_VALUE: u64 = 2 << 20;
 const MOST_STRIP_BYTES: u64 = 4 << 30;
 
 /// Reads pages one after the other, from a stream (forward only) or from a
-/// file (any order).
+/// file (any order). A PNG is a page of its own.
 #[derive(Debug)]
 pub struct PageReader {
     source: Source,
+    png: bool,
     big: bool,
     little_endian: bool,
     /// Where the next directory stands; 0 behind the last page.
@@ -37,7 +39,7 @@ impl PageReader {
     /// Reads from a stream, such as standard input.
     ///
     /// # Errors
-    /// Where the stream is empty or does not start as a TIFF.
+    /// Where the stream is empty or does not start as a TIFF or a PNG.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
         let stream = BufReader::with_capacity(1 << 18, Box::new(stream) as Box<dyn Read + Send>);
         Self::new(Source::Stream { stream, position: 0 })
@@ -46,7 +48,7 @@ impl PageReader {
     /// Reads from a file.
     ///
     /// # Errors
-    /// Where the file is empty or does not start as a TIFF.
+    /// Where the file is empty or does not start as a TIFF or a PNG.
     pub fn from_file(file: File) -> Result<Self, StackError> {
         Self::new(Source::File { file: BufReader::with_capacity(1 << 18, file), position: 0 })
     }
@@ -56,18 +58,23 @@ impl PageReader {
         if start.is_empty() {
             return Err(StackError::Empty);
         }
+        let png = start == png_page::SIGNATURE;
         let (little_endian, big) = match start.as_slice() {
             [b'I', b'I', 42, 0, ..] => (true, false),
             [b'M', b'M', 0, 42, ..] => (false, false),
             [b'I', b'I', 43, 0, ..] => (true, true),
             [b'M', b'M', 0, 43, ..] => (false, true),
-            // The first bytes of a TIFF, but not all that tell one.
+            _ if png => (false, false),
+            // The first bytes of a TIFF or a PNG, but not all that tell one.
             [b'I']
             | [b'I', b'I']
             | [b'I', b'I', 42 | 43]
             | [b'M']
             | [b'M', b'M']
             | [b'M', b'M', 0] => {
+                return Err(StackError::CutOff { last_whole: None });
+            }
+            start if png_page::SIGNATURE.starts_with(start) => {
                 return Err(StackError::CutOff { last_whole: None });
             }
             _ => return Err(StackError::NotTiff { start }),
@@ -80,9 +87,10 @@ impl PageReader {
         if start.len() < if big { 8 } else { 4 } {
             return Err(StackError::CutOff { last_whole: None });
         }
-        let next = number(&start, little_endian);
+        let next = if png { 8 } else { number(&start, little_endian) };
         Ok(Self {
             source,
+            png,
             big,
             little_endian,
             next,
@@ -106,6 +114,15 @@ impl PageReader {
     }
 
     fn read_page(&mut self) -> Result<Page, StackError> {
+        let (page, next) = if self.png { (self.read_png()?, 0) } else { self.read_tiff_page()? };
+        self.next = next;
+        self.number += 1;
+        self.last_whole = Some(page.info.index);
+        Ok(page)
+    }
+
+    /// The next page, and the link behind it.
+    fn read_tiff_page(&mut self) -> Result<(Page, u64), StackError> {
         if !self.seen.insert(self.next) {
             return Err(malformed(
                 self.number,
@@ -114,11 +131,7 @@ impl PageReader {
         }
         let (entries, next) = self.read_directory()?;
         let fields = self.read_values(&entries)?;
-        let page = self.read_strips(&fields)?;
-        self.next = next;
-        self.number += 1;
-        self.last_whole = Some(page.info.index);
-        Ok(page)
+        Ok((self.read_pieces(&fields)?, next))
     }
 
     /// `length` bytes at `offset`, all of them.
@@ -183,37 +196,51 @@ impl PageReader {
         Ok(fields)
     }
 
-    fn read_strips(&mut self, fields: &Fields) -> Result<Page, StackError> {
+    fn read_pieces(&mut self, fields: &Fields) -> Result<Page, StackError> {
         let mut page = fields.page()?;
-        let offsets = fields.numbers(STRIP_OFFSETS)?;
-        let counts = fields.numbers(STRIP_BYTE_COUNTS)?;
-        let strips = page.strip_heights().count();
-        if offsets.len() != strips || counts.len() != strips {
-            let what = format!("it has {} strips where its rows make {strips}", offsets.len());
-            return Err(malformed(self.number, what));
-        }
-        let bytes = counts.iter().fold(0u64, |sum, &count| sum.saturating_add(count));
+        let mut places: Vec<_> = fields.places(&page.layout)?.into_iter().enumerate().collect();
+        let bytes = places.iter().fold(0u64, |sum, (_, (_, length))| sum.saturating_add(*length));
         if bytes > MOST_STRIP_BYTES {
             return Err(malformed(self.number, format!("its strips claim {bytes} bytes")));
         }
-        let mut order: Vec<usize> = (0..strips).collect();
-        order.sort_by_key(|&i| offsets[i]);
-        page.strips = vec![Vec::new(); strips];
+        page.pieces = vec![Vec::new(); places.len()];
+        places.sort_by_key(|(_, (offset, _))| *offset);
         let reversed = fields.number_or(FILL_ORDER, 1)? == 2;
         let mut end = 0;
-        for i in order {
+        for (i, (offset, length)) in places {
             // Strips that overlap would take more memory than the file has.
-            if offsets[i] < end {
+            if offset < end {
                 return Err(malformed(self.number, "its strips overlap"));
             }
-            end = offsets[i].saturating_add(counts[i]);
-            let mut strip = self.read(offsets[i], counts[i])?;
+            end = offset.saturating_add(length);
+            let mut piece = self.read(offset, length)?;
             if reversed {
-                strip.iter_mut().for_each(|byte| *byte = byte.reverse_bits());
+                piece.iter_mut().for_each(|byte| *byte = byte.reverse_bits());
             }
-            page.strips[i] = strip;
+            page.pieces[i] = piece;
         }
         Ok(page)
+    }
+
+    /// The file's bytes up to its last chunk, as the page that they are.
+    fn read_png(&mut self) -> Result<Page, StackError> {
+        let mut file = png_page::SIGNATURE.to_vec();
+        loop {
+            let head = self.read(file.len() as u64, 8)?;
+            let (length, kind) = (number(&head[..4], false), &head[4..]);
+            if !kind.iter().all(u8::is_ascii_alphabetic) {
+                return Err(malformed(self.number, "its PNG has bytes between its chunks"));
+            }
+            file.extend_from_slice(&head);
+            // The data, and its checksum.
+            let body = self.read(file.len() as u64, length + 4)?;
+            file.extend_from_slice(&body);
+            if kind == b"IEND" {
+                break;
+            }
+        }
+        let header = png_page::header(&file).map_err(|fault| fault.on(self.number))?;
+        Ok(Page::of_png(self.number, header, file))
     }
 }
 

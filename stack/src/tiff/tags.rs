@@ -16,18 +16,34 @@ pub(super) const STRIP_BYTE_COUNTS: u16 = 279;
 pub(super) const X_RESOLUTION: u16 = 282;
 pub(super) const Y_RESOLUTION: u16 = 283;
 pub(super) const PLANAR_CONFIGURATION: u16 = 284;
+pub(super) const T4_OPTIONS: u16 = 292;
 pub(super) const T6_OPTIONS: u16 = 293;
 pub(super) const RESOLUTION_UNIT: u16 = 296;
+pub(super) const PREDICTOR: u16 = 317;
+pub(super) const TILE_WIDTH: u16 = 322;
+pub(super) const TILE_LENGTH: u16 = 323;
 pub(super) const TILE_OFFSETS: u16 = 324;
+pub(super) const TILE_BYTE_COUNTS: u16 = 325;
+pub(super) const SAMPLE_FORMAT: u16 = 339;
 
 /// Compression values.
 pub(super) const UNCOMPRESSED: u64 = 1;
+pub(super) const MODIFIED_HUFFMAN: u64 = 2;
+pub(super) const T4: u64 = 3;
 pub(super) const T6: u64 = 4;
+pub(super) const LZW: u64 = 5;
+pub(super) const DEFLATE: u64 = 8;
+/// Deflate's number before it had one.
+pub(super) const OLD_DEFLATE: u64 = 32_946;
 pub(super) const PACK_BITS: u64 = 32_773;
 
 /// Photometric interpretations.
 pub(super) const WHITE_IS_ZERO: u64 = 0;
 pub(super) const BLACK_IS_ZERO: u64 = 1;
+
+/// Bits of the T.4 options.
+pub(super) const TWO_DIMENSIONAL: u64 = 1;
+pub(super) const UNCOMPRESSED_MODE: u64 = 2;
 
 /// Resolution units.
 pub(super) const PER_INCH: u64 = 2;

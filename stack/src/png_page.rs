@@ -1,0 +1,195 @@
+//! A PNG file as a page: its rows become runs as they are decoded.
+
+use std::io::Cursor;
+
+use png::{BitDepth, ColorType, Decoder, Info, Reader, Unit};
+
+use crate::error::StackError;
+use crate::gray::GrayMask;
+use crate::layer::{Image, PageInfo};
+use crate::length::Dpi;
+use crate::mask::{MOST_RUNS, MaskBuilder};
+use crate::tiff::{LARGEST_SIDE, bit_transitions, byte_runs};
+
+/// What every PNG starts with.
+pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+
+/// The keyword of the text that is a page's JSON line.
+const DESCRIPTION: &str = "Description";
+
+/// What a PNG says of its image.
+pub(crate) struct Header {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) gray: bool,
+    pub(crate) dpi: Option<Dpi>,
+    pub(crate) info: Option<PageInfo>,
+}
+
+/// Why a PNG is no page.
+#[derive(Debug)]
+pub(crate) enum PngFault {
+    Unsupported(&'static str),
+    Malformed(String),
+}
+
+impl PngFault {
+    pub(crate) fn on(self, page: u32) -> StackError {
+        match self {
+            Self::Unsupported(what) => StackError::Unsupported { page, what: what.to_owned() },
+            Self::Malformed(what) => StackError::Malformed { page, what },
+        }
+    }
+}
+
+impl From<png::DecodingError> for PngFault {
+    fn from(error: png::DecodingError) -> Self {
+        Self::Malformed(format!("its PNG is damaged: {error}"))
+    }
+}
+
+/// Reads what stands before the image data.
+pub(crate) fn header(file: &[u8]) -> Result<Header, PngFault> {
+    let (reader, samples) = open(file)?;
+    let info = reader.info();
+    Ok(Header {
+        width: info.width,
+        height: info.height,
+        gray: !samples.are_bits(),
+        dpi: dpi(info),
+        info: description(info).and_then(|text| PageInfo::parse(text.as_bytes())),
+    })
+}
+
+/// Decodes the image.
+pub(crate) fn decode(file: &[u8]) -> Result<Image, PngFault> {
+    let (reader, samples) = open(file)?;
+    if samples.are_bits() { decode_mask(reader, &samples) } else { decode_gray(reader, &samples) }
+}
+
+fn decode_mask(mut reader: Reader<Cursor<&[u8]>>, samples: &Samples) -> Result<Image, PngFault> {
+    let width = reader.info().width;
+    let mut mask = MaskBuilder::new(width);
+    let mut runs = Vec::new();
+    while let Some(row) = reader.next_row()? {
+        byte_runs(row.data(), &mut runs);
+        mask.push_checked(&bit_transitions(&runs, width));
+        check_runs(mask.transition_count())?;
+    }
+    let mask = mask.finish();
+    Ok(Image::Mask(if samples.levels[0] == 0 { mask } else { mask.inverted() }))
+}
+
+fn decode_gray(mut reader: Reader<Cursor<&[u8]>>, samples: &Samples) -> Result<Image, PngFault> {
+    let width = reader.info().width;
+    let mut gray = GrayMask::new(width);
+    let (mut row_samples, mut runs) = (Vec::new(), Vec::new());
+    while let Some(row) = reader.next_row()? {
+        samples.unpack(row.data(), width, &mut row_samples);
+        byte_runs(&row_samples, &mut runs);
+        for (_, sample) in &mut runs {
+            *sample = *samples
+                .levels
+                .get(usize::from(*sample))
+                .ok_or_else(|| PngFault::Malformed(format!("its palette has no entry {sample}")))?;
+        }
+        gray.push_runs(runs.iter().copied()).expect("a row is as long as the width");
+        check_runs(gray.change_count())?;
+    }
+    Ok(Image::Gray(gray))
+}
+
+fn check_runs(runs: usize) -> Result<(), PngFault> {
+    if runs > MOST_RUNS {
+        return Err(PngFault::Malformed("it has more runs than an image may have".to_owned()));
+    }
+    Ok(())
+}
+
+fn open(file: &[u8]) -> Result<(Reader<Cursor<&[u8]>>, Samples), PngFault> {
+    let mut decoder = Decoder::new(Cursor::new(file));
+    decoder.set_ignore_iccp_chunk(true);
+    let reader = decoder.read_info()?;
+    let info = reader.info();
+    let side = u64::from(info.width.max(info.height));
+    if side > LARGEST_SIDE {
+        return Err(PngFault::Malformed(format!("it claims a side of {side} pixels")));
+    }
+    if info.interlaced {
+        return Err(PngFault::Unsupported("an interlaced PNG"));
+    }
+    let samples = Samples::of(info)?;
+    Ok((reader, samples))
+}
+
+/// How a PNG stores gray levels.
+struct Samples {
+    bits: usize,
+    /// By sample: its level.
+    levels: Vec<u8>,
+}
+
+impl Samples {
+    fn of(info: &Info<'_>) -> Result<Self, PngFault> {
+        if info.trns.is_some() {
+            return Err(PngFault::Unsupported("a PNG with transparency"));
+        }
+        let bits = match info.bit_depth {
+            BitDepth::Sixteen => return Err(PngFault::Unsupported("a PNG of 16 bits")),
+            depth => depth as usize,
+        };
+        let levels = match info.color_type {
+            ColorType::Grayscale => {
+                let highest = (1 << bits) - 1;
+                (0..=highest).map(|sample: u32| (sample * 255 / highest) as u8).collect()
+            }
+            ColorType::Indexed => gray_palette(info.palette.as_deref().unwrap_or_default())?,
+            ColorType::GrayscaleAlpha => {
+                return Err(PngFault::Unsupported("a PNG with transparency"));
+            }
+            ColorType::Rgb | ColorType::Rgba => {
+                return Err(PngFault::Unsupported("a PNG in colour"));
+            }
+        };
+        Ok(Self { bits, levels })
+    }
+
+    /// Whether the image is 1-bit, black and white.
+    fn are_bits(&self) -> bool {
+        self.bits == 1 && matches!(*self.levels, [0, 255] | [255, 0])
+    }
+
+    /// The samples of a row, a byte each.
+    fn unpack(&self, row: &[u8], width: u32, samples: &mut Vec<u8>) {
+        samples.clear();
+        let mask = 0xFF >> (8 - self.bits);
+        for byte in row {
+            samples.extend((0..8).step_by(self.bits).map(|b| byte >> (8 - self.bits - b) & mask));
+        }
+        samples.truncate(width as usize);
+    }
+}
+
+/// The levels of a palette of grays.
+fn gray_palette(palette: &[u8]) -> Result<Vec<u8>, PngFault> {
+    let level = |entry: &[u8]| match *entry {
+        [r, g, b] if r == g && g == b => Ok(r),
+        _ => Err(PngFault::Unsupported("a PNG with a palette of colours")),
+    };
+    palette.chunks(3).map(level).collect()
+}
+
+fn dpi(info: &Info<'_>) -> Option<Dpi> {
+    let dims = info.pixel_dims.filter(|dims| dims.unit == Unit::Meter)?;
+    let per_inch = f64::from(dims.xppu) * 0.0254;
+    // Whole pixels a metre say no more than that: 59055 are 1500 dpi.
+    let whole = per_inch.round();
+    let same = (whole / 0.0254).round() == f64::from(dims.xppu);
+    Dpi::new(if same { whole } else { per_inch })
+}
+
+/// The text, where it stands before the image data.
+fn description<'a>(info: &'a Info<'_>) -> Option<&'a str> {
+    let latin = info.uncompressed_latin1_text.iter().find(|text| text.keyword == DESCRIPTION);
+    latin.map(|text| text.text.as_str())
+}

@@ -1,0 +1,37 @@
+//! The pieces that a page is stored in: strips, or tiles.
+
+/// How a page is cut into pieces, which stand row by row. A strip is as wide
+/// as the page.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pub(super) tiled: bool,
+    /// A piece's width; tiles may stick out on the right.
+    pub(super) width: u32,
+    /// A piece's rows; the last strip has fewer, and tiles stick out below.
+    rows: u32,
+    /// How many pieces lie side by side.
+    pub(super) across: usize,
+    pub(super) page_height: u32,
+}
+
+impl Layout {
+    pub(super) fn strips(page_width: u32, page_height: u32, rows: u32) -> Self {
+        Self { tiled: false, width: page_width, rows, across: 1, page_height }
+    }
+
+    pub(super) fn tiles(page_width: u32, page_height: u32, (width, rows): (u32, u32)) -> Self {
+        let across = page_width.div_ceil(width) as usize;
+        Self { tiled: true, width, rows, across, page_height }
+    }
+
+    /// How many pieces the page has.
+    pub(super) fn count(&self) -> u64 {
+        self.across as u64 * u64::from(self.page_height.div_ceil(self.rows))
+    }
+
+    /// How many rows of the page each strip, or row of tiles, holds.
+    pub(super) fn heights(&self) -> impl Iterator<Item = u32> {
+        let (rows, height) = (self.rows, self.page_height);
+        (0..height.div_ceil(rows)).map(move |i| rows.min(height - i * rows))
+    }
+}

@@ -1,0 +1,144 @@
+//! Strips and tiles of bytes to rows of runs of bytes.
+
+use std::io::{self, Read};
+
+use flate2::read::ZlibDecoder;
+use weezl::{BitOrder, LzwStatus, decode::Decoder};
+
+use super::page::Compression;
+use crate::packbits;
+
+/// Why bytes do not make rows.
+#[derive(Debug)]
+pub(super) enum Fault {
+    /// They end before the last row does.
+    TooShort,
+    /// They are not what the compression makes.
+    Damaged,
+    /// A row was said to be one too many.
+    Enough,
+}
+
+/// What bytes are to be cut into.
+pub(super) struct Cut {
+    pub(super) row_bytes: u32,
+    pub(super) rows: u32,
+    /// Whether each byte is stored as what it differs by from the one before
+    /// in its row.
+    pub(super) differences: bool,
+}
+
+/// Gives each row as runs of `(length, byte)`, until `each` has enough. No
+/// more than a row is held at once.
+pub(super) fn unpack(
+    compression: Compression,
+    bytes: &[u8],
+    cut: &Cut,
+    each: impl FnMut(&[(u32, u8)]) -> bool,
+) -> Result<(), Fault> {
+    match compression {
+        Compression::PackBits => cut_runs(packbits::Runs::new(bytes), cut, each),
+        Compression::Lzw => cut_bytes(LzwReader::new(bytes), cut, each),
+        Compression::Deflate => cut_bytes(ZlibDecoder::new(bytes), cut, each),
+        _ => cut_bytes(bytes, cut, each),
+    }
+}
+
+fn cut_runs(
+    mut runs: impl Iterator<Item = (u32, u8)>,
+    cut: &Cut,
+    mut each: impl FnMut(&[(u32, u8)]) -> bool,
+) -> Result<(), Fault> {
+    let (mut length, mut byte) = (0, 0);
+    let mut row = Vec::new();
+    for _ in 0..cut.rows {
+        row.clear();
+        let mut room = cut.row_bytes;
+        while room > 0 {
+            if length == 0 {
+                (length, byte) = runs.next().ok_or(Fault::TooShort)?;
+            }
+            let part = length.min(room);
+            push_run(&mut row, part, byte);
+            length -= part;
+            room -= part;
+        }
+        if !each(&row) {
+            return Err(Fault::Enough);
+        }
+    }
+    Ok(())
+}
+
+fn cut_bytes(
+    mut bytes: impl Read,
+    cut: &Cut,
+    mut each: impl FnMut(&[(u32, u8)]) -> bool,
+) -> Result<(), Fault> {
+    let (mut row, mut runs) = (Vec::new(), Vec::new());
+    for _ in 0..cut.rows {
+        row.clear();
+        // Memory grows with the bytes that come, not with the width claimed.
+        match bytes.by_ref().take(cut.row_bytes.into()).read_to_end(&mut row) {
+            Ok(length) if length == cut.row_bytes as usize => {}
+            Ok(_) => return Err(Fault::TooShort),
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+                return Err(Fault::TooShort);
+            }
+            Err(_) => return Err(Fault::Damaged),
+        }
+        if cut.differences {
+            let mut before = 0u8;
+            for byte in &mut row {
+                before = before.wrapping_add(*byte);
+                *byte = before;
+            }
+        }
+        byte_runs(&row, &mut runs);
+        if !each(&runs) {
+            return Err(Fault::Enough);
+        }
+    }
+    Ok(())
+}
+
+/// The runs `(length, byte)` of a row of bytes.
+pub(crate) fn byte_runs(row: &[u8], runs: &mut Vec<(u32, u8)>) {
+    runs.clear();
+    runs.extend(row.chunk_by(|a, b| a == b).map(|run| (run.len() as u32, run[0])));
+}
+
+/// Adds a run to others, or to the last of them.
+fn push_run(row: &mut Vec<(u32, u8)>, length: u32, byte: u8) {
+    match row.last_mut() {
+        Some((before, same)) if *same == byte => *before += length,
+        _ => row.push((length, byte)),
+    }
+}
+
+/// Takes the bytes out of TIFF's LZW as they are asked for.
+struct LzwReader<'a> {
+    decoder: Decoder,
+    rest: &'a [u8],
+}
+
+impl<'a> LzwReader<'a> {
+    fn new(rest: &'a [u8]) -> Self {
+        Self { decoder: Decoder::with_tiff_size_switch(BitOrder::Msb, 8), rest }
+    }
+}
+
+impl Read for LzwReader<'_> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let done = self.decoder.decode_bytes(self.rest, out);
+            self.rest = &self.rest[done.consumed_in..];
+            match done.status {
+                _ if done.consumed_out > 0 => return Ok(done.consumed_out),
+                Ok(LzwStatus::Ok) if done.consumed_in > 0 => {}
+                Ok(_) => return Ok(0),
+                Err(error) => return Err(io::Error::new(io::ErrorKind::InvalidData, error)),
+            }
+        }
+    }
+}
