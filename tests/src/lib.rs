@@ -18,10 +18,12 @@
 mod binaries;
 mod golden;
 pub mod hostile;
+mod referees;
 mod scratch;
 
 pub use binaries::{bin, target_dir, workspace_root};
 pub use golden::{Change, Golden, Shade, difference};
+pub use referees::{Packed, ask, ask_python, packed, packed_mask, plain_pages};
 pub use scratch::{Ran, Scratch, ends_white, mask, masks, read_stack, write_gray_ramp};
 
 use std::io::Write;

@@ -1,13 +1,9 @@
 //! Other programs open what the pipeline makes, and see the same pixels.
 //! A program that is not installed is skipped, which is said.
 
-use std::fs::File;
-use std::process::Command;
-
 use lamp_fixtures::Part;
 use lamp_stack::{Layer, Mask};
-use lamp_tests::{Scratch, masks, note};
-use tiff::decoder::{Decoder, DecodingResult};
+use lamp_tests::{Scratch, ask, ask_python, masks, packed_mask, plain_pages};
 
 /// A build made by the real pipeline, as `build.tif` (`BigTIFF`) and as
 /// `classic.tif`.
@@ -24,21 +20,6 @@ fn with_build() -> (Scratch, Vec<Layer>) {
 }
 
 const STACKS: [&str; 2] = ["build.tif", "classic.tif"];
-
-/// Runs another program in the folder and returns what it printed; `None`
-/// where it is not installed.
-#[track_caller]
-fn ask(scratch: &Scratch, program: &str, arguments: &[&str]) -> Option<String> {
-    let asked = Command::new(program).args(arguments).current_dir(scratch).output();
-    let Ok(out) = asked else {
-        note(&format!("{program} is not installed: skipped"));
-        return None;
-    };
-    let (said, warned) =
-        (String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
-    assert!(out.status.success() && warned.is_empty(), "{program} {arguments:?}: {said}{warned}");
-    Some(said.into_owned())
-}
 
 /// `width height white`, a line for each page.
 fn sizes_and_areas(layers: &[Layer]) -> String {
@@ -73,40 +54,12 @@ fn libtiff_decodes_every_page_to_the_same_pixels() {
         if ask(&scratch, "tiffcp", &["-c", "none", name, "plain.tif"]).is_none() {
             return;
         }
-        let plain = plain_pages(&scratch);
+        let plain = plain_pages(&scratch.path("plain.tif"));
         assert_eq!(plain.len(), layers.len());
         for (k, (plain, ours)) in plain.iter().zip(masks(&layers)).enumerate() {
-            assert!(*plain == packed(ours), "page {k} of {name}");
+            assert!(*plain == packed_mask(ours), "page {k} of {name}");
         }
     }
-}
-
-/// Rows of bytes of eight pixels each, the first in the highest bit.
-type Packed = Vec<Vec<u8>>;
-
-/// The pages of `plain.tif`, read by a decoder that shares nothing with ours.
-fn plain_pages(scratch: &Scratch) -> Vec<Packed> {
-    let mut decoder = Decoder::new(File::open(scratch.path("plain.tif")).unwrap()).unwrap();
-    let mut pages = Vec::new();
-    loop {
-        let (width, _) = decoder.dimensions().unwrap();
-        let DecodingResult::U8(bytes) = decoder.read_image().unwrap() else {
-            panic!("1-bit pixels come in bytes");
-        };
-        pages.push(bytes.chunks(width.div_ceil(8) as usize).map(<[u8]>::to_vec).collect());
-        if !decoder.more_images() {
-            return pages;
-        }
-        decoder.next_image().unwrap();
-    }
-}
-
-fn packed(mask: &Mask) -> Packed {
-    let byte = |row, first: u32| {
-        (first..first + 8).fold(0, |byte, column| byte << 1 | u8::from(mask.is_white(column, row)))
-    };
-    let row = |row| (0..mask.width()).step_by(8).map(|first| byte(row, first)).collect();
-    (0..mask.height()).map(row).collect()
 }
 
 #[test]
@@ -124,17 +77,6 @@ fn pillow_sees_the_same_pages() {
         );
         assert_eq!(ask_python(&scratch, &script).unwrap(), sizes_and_areas(&layers), "{name}");
     }
-}
-
-/// Runs a script; `None` where there is no Python or it has no Pillow.
-#[track_caller]
-fn ask_python(scratch: &Scratch, script: &str) -> Option<String> {
-    let has_pillow = Command::new("python3").args(["-c", "import PIL"]).output();
-    if !has_pillow.is_ok_and(|out| out.status.success()) {
-        note("python3 with Pillow is not installed: skipped");
-        return None;
-    }
-    ask(scratch, "python3", &["-c", script])
 }
 
 #[test]

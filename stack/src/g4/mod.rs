@@ -19,9 +19,9 @@ use thiserror::Error;
 
 /// A strip that is neither T.6 nor T.4, and where.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("row {row} of the strip {fault}")]
+#[error("row {row} {fault}")]
 pub struct G4Error {
-    /// The row that could not be decoded, from the strip's top.
+    /// The row that could not be decoded, from the image's top.
     pub row: u32,
     /// What is wrong with it.
     pub fault: G4Fault,

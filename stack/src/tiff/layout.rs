@@ -1,5 +1,7 @@
 //! The pieces that a page is stored in: strips, or tiles.
 
+use std::ops::Range;
+
 /// How a page is cut into pieces, which stand row by row. A strip is as wide
 /// as the page.
 #[derive(Clone, Debug)]
@@ -29,9 +31,9 @@ impl Layout {
         self.across as u64 * u64::from(self.page_height.div_ceil(self.rows))
     }
 
-    /// How many rows of the page each strip, or row of tiles, holds.
-    pub(super) fn heights(&self) -> impl Iterator<Item = u32> {
+    /// The rows of the page that each strip, or row of tiles, holds.
+    pub(super) fn row_ranges(&self) -> impl Iterator<Item = Range<u32>> {
         let (rows, height) = (self.rows, self.page_height);
-        (0..height.div_ceil(rows)).map(move |i| rows.min(height - i * rows))
+        (0..height.div_ceil(rows)).map(move |i| i * rows..height.min((i + 1).saturating_mul(rows)))
     }
 }

@@ -1,5 +1,7 @@
 //! Pages to layers.
 
+use std::ops::Range;
+
 use crate::error::StackError;
 use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
@@ -122,13 +124,13 @@ impl Page {
         }
         for (band, rows) in self.bands() {
             if !self.layout.tiled {
-                self.mask_rows(&band[0], rows, &mut mask)?;
+                self.mask_rows(&band[0], &rows, &mut mask)?;
                 continue;
             }
             let mut tiles = Vec::new();
             for tile in band {
                 let mut rows_of_tile = MaskBuilder::new(self.layout.width);
-                self.mask_rows(tile, rows, &mut rows_of_tile)?;
+                self.mask_rows(tile, &rows, &mut rows_of_tile)?;
                 tiles.push(rows_of_tile.finish());
                 self.check_runs(tiles.iter().map(Mask::transition_count).sum())?;
             }
@@ -149,13 +151,13 @@ impl Page {
         let mut gray = GrayMask::new(self.width);
         for (band, rows) in self.bands() {
             if !self.layout.tiled {
-                self.gray_rows(&band[0], rows, &mut gray)?;
+                self.gray_rows(&band[0], rows.len() as u32, &mut gray)?;
                 continue;
             }
             let mut tiles = Vec::new();
             for tile in band {
                 let mut rows_of_tile = GrayMask::new(self.layout.width);
-                self.gray_rows(tile, rows, &mut rows_of_tile)?;
+                self.gray_rows(tile, rows.len() as u32, &mut rows_of_tile)?;
                 tiles.push(rows_of_tile);
                 self.check_runs(tiles.iter().map(GrayMask::change_count).sum())?;
             }
@@ -171,36 +173,43 @@ impl Page {
         one_strip && self.compression == Compression::G4 && self.orientation == 1
     }
 
-    /// The strips, or the tiles side by side, and how many rows of the page
+    /// The strips, or the tiles side by side, and the rows of the page that
     /// they hold.
-    fn bands(&self) -> impl Iterator<Item = (&[Vec<u8>], u32)> {
-        self.pieces.chunks(self.layout.across).zip(self.layout.heights())
+    fn bands(&self) -> impl Iterator<Item = (&[Vec<u8>], Range<u32>)> {
+        self.pieces.chunks(self.layout.across).zip(self.layout.row_ranges())
     }
 
-    /// Decodes `rows` rows of a 1-bit strip or tile.
-    fn mask_rows(&self, piece: &[u8], rows: u32, mask: &mut MaskBuilder) -> Result<(), StackError> {
-        let width = self.layout.width;
-        let group3 = match self.compression {
-            Compression::ModifiedHuffman => Group3::ModifiedHuffman,
-            Compression::Group3 => Group3::OneDimensional,
-            Compression::Group3TwoDimensional => Group3::TwoDimensional,
-            Compression::G4 => {
-                return g4::decode_rows(piece, width, rows, mask).map_err(|e| self.in_strip(e));
-            }
+    /// Decodes those rows of the page that a 1-bit strip or tile holds.
+    fn mask_rows(
+        &self,
+        piece: &[u8],
+        rows: &Range<u32>,
+        mask: &mut MaskBuilder,
+    ) -> Result<(), StackError> {
+        let (width, height) = (self.layout.width, rows.end - rows.start);
+        let group3 = |kind, mask: &mut _| g4::decode_group3_rows(kind, piece, width, height, mask);
+        let decoded = match self.compression {
+            Compression::ModifiedHuffman => group3(Group3::ModifiedHuffman, mask),
+            Compression::Group3 => group3(Group3::OneDimensional, mask),
+            Compression::Group3TwoDimensional => group3(Group3::TwoDimensional, mask),
+            Compression::G4 => g4::decode_rows(piece, width, height, mask),
             _ => {
-                return self.unpack(piece, width.div_ceil(8), rows, |row| {
+                return self.unpack(piece, width.div_ceil(8), height, |row| {
                     mask.push_checked(&bit_transitions(row, width));
                     mask.transition_count() <= MOST_RUNS
                 });
             }
         };
-        g4::decode_group3_rows(group3, piece, width, rows, mask).map_err(|e| self.in_strip(e))
+        decoded.map_err(|G4Error { row, fault }| {
+            let source = G4Error { row: rows.start + row, fault };
+            StackError::Strip { layer: self.info.index, source }
+        })
     }
 
-    /// Decodes `rows` rows of an 8-bit strip or tile.
-    fn gray_rows(&self, piece: &[u8], rows: u32, gray: &mut GrayMask) -> Result<(), StackError> {
+    /// Decodes `height` rows of an 8-bit strip or tile.
+    fn gray_rows(&self, piece: &[u8], height: u32, gray: &mut GrayMask) -> Result<(), StackError> {
         let flip = if self.white_is_zero { 0xFF } else { 0 };
-        self.unpack(piece, self.layout.width, rows, |row| {
+        self.unpack(piece, self.layout.width, height, |row| {
             let levels = row.iter().map(|&(length, byte)| (length, byte ^ flip));
             gray.push_runs(levels).expect("rows are cut to the width");
             gray.change_count() <= MOST_RUNS
@@ -216,16 +225,15 @@ impl Page {
         rows: u32,
         each: impl FnMut(&[(u32, u8)]) -> bool,
     ) -> Result<(), StackError> {
+        let name = if self.layout.tiled { "tile" } else { "strip" };
         let cut = Cut { row_bytes, rows, differences: self.differences };
         unpack(self.compression, piece, &cut, each).map_err(|fault| match fault {
-            Fault::TooShort => malformed(self.number, "its strip is shorter than its rows"),
-            Fault::Damaged => malformed(self.number, "its strip is damaged: it does not decode"),
+            Fault::TooShort => malformed(self.number, format!("a {name} is shorter than its rows")),
+            Fault::Damaged => {
+                malformed(self.number, format!("a {name} does not decode: it is damaged"))
+            }
             Fault::Enough => self.too_many_runs(),
         })
-    }
-
-    fn in_strip(&self, source: G4Error) -> StackError {
-        StackError::Strip { layer: self.info.index, source }
     }
 
     fn check_runs(&self, runs: usize) -> Result<(), StackError> {

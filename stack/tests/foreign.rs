@@ -1,0 +1,294 @@
+//! TIFFs that other programs might write, made here byte by byte.
+
+use std::io::{Cursor, Write};
+
+use lamp_stack::{GrayMask, Image, Layer, MaskBuilder, Pages, StackError};
+use proptest::prelude::*;
+
+const SHORT: u16 = 3;
+const LONG: u16 = 4;
+
+/// A classic, little-endian TIFF of one page: its fields with their numbers,
+/// and its strips or tiles, which stand in `order` behind the directory.
+struct Tiff {
+    fields: Vec<(u16, u32)>,
+    pieces: Vec<Vec<u8>>,
+    order: Vec<usize>,
+}
+
+impl Tiff {
+    /// A page of strips, black being zero.
+    fn new(size: (u32, u32), bits: u32, compression: u32, pieces: Vec<Vec<u8>>) -> Self {
+        let fields = vec![(256, size.0), (257, size.1), (258, bits), (259, compression), (262, 1)];
+        let order = (0..pieces.len()).collect();
+        Self { fields, pieces, order }
+    }
+
+    fn with(mut self, tag: u16, value: u32) -> Self {
+        self.fields.retain(|field| field.0 != tag);
+        self.fields.push((tag, value));
+        self
+    }
+
+    fn tiled(self, width: u32, height: u32) -> Self {
+        self.with(322, width).with(323, height)
+    }
+
+    fn bytes(mut self) -> Vec<u8> {
+        let tiled = self.fields.iter().any(|field| field.0 == 322);
+        let (offsets, counts) = if tiled { (324, 325) } else { (273, 279) };
+        self.fields.extend([(offsets, 0), (counts, 0)]);
+        self.fields.sort_unstable();
+        let count = self.pieces.len();
+        let tables = 8 + 2 + 12 * self.fields.len() + 4;
+        let mut places = vec![0u32; count];
+        let mut data = Vec::new();
+        for i in self.order {
+            places[i] = (tables + 8 * count + data.len()) as u32;
+            data.extend_from_slice(&self.pieces[i]);
+        }
+        let lengths: Vec<u32> = self.pieces.iter().map(|piece| piece.len() as u32).collect();
+
+        let mut out = b"II\x2A\0\x08\0\0\0".to_vec();
+        out.extend((self.fields.len() as u16).to_le_bytes());
+        for (tag, value) in self.fields {
+            let (kind, count, value) = match tag {
+                _ if tag == offsets && count > 1 => (LONG, count, tables as u32),
+                _ if tag == offsets => (LONG, count, places[0]),
+                _ if tag == counts && count > 1 => (LONG, count, (tables + 4 * count) as u32),
+                _ if tag == counts => (LONG, count, lengths[0]),
+                _ if value > 0xFFFF => (LONG, 1, value),
+                _ => (SHORT, 1, value),
+            };
+            out.extend(tag.to_le_bytes());
+            out.extend(kind.to_le_bytes());
+            out.extend((count as u32).to_le_bytes());
+            out.extend(value.to_le_bytes());
+        }
+        out.extend([0; 4]);
+        out.extend(places.iter().chain(&lengths).flat_map(|number| number.to_le_bytes()));
+        out.extend(data);
+        out
+    }
+}
+
+fn read(bytes: Vec<u8>) -> Result<Layer, StackError> {
+    Pages::from_stream(Cursor::new(bytes))?.layers().next().expect("a page or an error")
+}
+
+fn lzw(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = weezl::encode::Encoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8);
+    encoder.encode(bytes).unwrap()
+}
+
+fn deflate(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+/// The compressions of bytes, by TIFF's numbers.
+type Compress = fn(&[u8]) -> Vec<u8>;
+const COMPRESSIONS: [(u32, Compress); 4] =
+    [(1, <[u8]>::to_vec), (5, lzw), (8, deflate), (32946, deflate)];
+
+/// Gray pixels as a page, and each piece's rows as bytes.
+fn gray_of(rows: &[Vec<u8>]) -> Image {
+    let mut gray = GrayMask::new(rows[0].len() as u32);
+    for row in rows {
+        gray.push_runs(row.iter().map(|&level| (1, level))).unwrap();
+    }
+    Image::Gray(gray)
+}
+
+fn mask_of(rows: &[Vec<u8>], width: u32) -> Image {
+    let mut mask = MaskBuilder::new(width);
+    let bit = |row: &[u8], column: u32| row[column as usize / 8] >> (7 - column % 8) & 1;
+    for row in rows {
+        let toggles =
+            (0..width).filter(|&c| bit(row, c) != if c == 0 { 0 } else { bit(row, c - 1) });
+        mask.push_row(&toggles.collect::<Vec<_>>()).unwrap();
+    }
+    Image::Mask(mask.finish())
+}
+
+/// Cuts rows of bytes into tiles, row by row of tiles; those that stick out
+/// are filled up with `0xA5`.
+fn tiles(rows: &[Vec<u8>], width: usize, height: usize) -> Vec<Vec<u8>> {
+    let mut tiles = Vec::new();
+    for top in (0..rows.len()).step_by(height) {
+        for left in (0..rows[0].len()).step_by(width) {
+            let pixel = |row: usize, column: usize| {
+                rows.get(row).and_then(|row| row.get(column)).copied().unwrap_or(0xA5)
+            };
+            let columns = move |row| (left..left + width).map(move |column| (row, column));
+            let tile = (top..top + height).flat_map(columns);
+            tiles.push(tile.map(|(row, column)| pixel(row, column)).collect());
+        }
+    }
+    tiles
+}
+
+/// Each byte less the one before it in its row.
+fn differences(piece: &[u8], width: usize) -> Vec<u8> {
+    let row = |row: &[u8]| -> Vec<u8> {
+        let before = [0].into_iter().chain(row.iter().copied());
+        row.iter().zip(before).map(|(&byte, before)| byte.wrapping_sub(before)).collect()
+    };
+    piece.chunks(width).flat_map(row).collect()
+}
+
+/// Rows of bytes, most of them like their neighbours.
+fn rows_of_bytes() -> impl Strategy<Value = Vec<Vec<u8>>> {
+    (1usize..50, 1usize..40).prop_flat_map(|(width, height)| {
+        let byte = prop_oneof![4 => Just(0u8), 2 => Just(0xFF), 1 => any::<u8>()];
+        prop::collection::vec(prop::collection::vec(byte, width), height)
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn strips_and_tiles_of_every_compression_are_read(
+        rows in rows_of_bytes(),
+        rows_per_strip in 1usize..45,
+        (across, down) in (1usize..4, 1usize..4),
+        spare in 0u32..8,
+    ) {
+        let (width, height) = (rows[0].len(), rows.len());
+        let bits = (8 * width as u32 - spare, height as u32);
+        let grays = (width as u32, height as u32);
+        let strips: Vec<Vec<u8>> = rows.chunks(rows_per_strip).map(<[Vec<u8>]>::concat).collect();
+        let tiles = tiles(&rows, 16 * across, 16 * down);
+        for (number, compress) in COMPRESSIONS {
+            let packed = |pieces: &[Vec<u8>]| pieces.iter().map(|p| compress(p)).collect::<Vec<_>>();
+            let strips_of = |size, depth| {
+                Tiff::new(size, depth, number, packed(&strips)).with(278, rows_per_strip as u32)
+            };
+            let tiles_of = |size, depth, width: usize| {
+                Tiff::new(size, depth, number, packed(&tiles)).tiled(width as u32, 16 * down as u32)
+            };
+            for page in [strips_of(bits, 1), tiles_of(bits, 1, 128 * across)] {
+                prop_assert_eq!(read(page.bytes()).unwrap().image, mask_of(&rows, bits.0));
+            }
+            for page in [strips_of(grays, 8), tiles_of(grays, 8, 16 * across)] {
+                prop_assert_eq!(read(page.bytes()).unwrap().image, gray_of(&rows));
+            }
+            if number == 1 {
+                continue;
+            }
+            let mut page = strips_of(grays, 8).with(317, 2);
+            page.pieces = strips.iter().map(|s| compress(&differences(s, width))).collect();
+            prop_assert_eq!(read(page.bytes()).unwrap().image, gray_of(&rows));
+        }
+    }
+
+    #[test]
+    fn damaged_files_cost_only_an_error(
+        rows in rows_of_bytes(),
+        damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        kind in 0usize..6,
+    ) {
+        let size = (8 * rows[0].len() as u32, rows.len() as u32);
+        let tiles = tiles(&rows, 16, 16);
+        let page = match kind {
+            0..4 => {
+                let (number, compress) = COMPRESSIONS[kind];
+                let tiles = tiles.iter().map(|tile| compress(tile)).collect();
+                Tiff::new(size, 1, number, tiles).tiled(128, 16)
+            }
+            4 => Tiff::new(size, 1, 3, vec![rows.concat()]).with(292, 1),
+            _ => Tiff::new(size, 1, 2, vec![rows.concat()]).with(274, 6),
+        };
+        let mut bytes = page.bytes();
+        for (at, value) in damage {
+            *at.get_mut(&mut bytes) = value;
+        }
+        if let Ok(layer) = read(bytes) {
+            prop_assert!(layer.image.width() > 0 && layer.image.height() > 0);
+        }
+    }
+}
+
+#[test]
+fn tiles_may_stand_in_any_order() {
+    let rows: Vec<Vec<u8>> = (0..40u8).map(|row| (0..6).map(|i| row ^ i * 37).collect()).collect();
+    let mut page = Tiff::new((48, 40), 1, 1, tiles(&rows, 2, 16)).tiled(16, 16);
+    page.order = vec![8, 3, 5, 0, 1, 7, 2, 4, 6];
+    assert_eq!(read(page.bytes()).unwrap().image, mask_of(&rows, 48));
+}
+
+#[test]
+fn orientations_are_turned_upright() {
+    let rows = vec![vec![0b1000_0000], vec![0b1100_0000]];
+    let upright = |orientation| {
+        let page = Tiff::new((3, 2), 1, 1, vec![rows.concat()]).with(274, orientation);
+        let Image::Mask(mask) = read(page.bytes()).unwrap().image else { panic!() };
+        let line = |row| -> String {
+            (0..mask.width()).map(|c| if mask.is_white(c, row) { '#' } else { '.' }).collect()
+        };
+        (0..mask.height()).map(line).collect::<Vec<_>>().join(" ")
+    };
+    let pictures = [
+        "#.. ##.", "..# .##", ".## ..#", "##. #..", "## .# ..", "## #. ..", ".. #. ##", ".. .# ##",
+    ];
+    for (orientation, picture) in (1..).zip(pictures) {
+        assert_eq!(upright(orientation), picture, "orientation {orientation}");
+    }
+}
+
+#[test]
+fn what_is_not_read_is_named() {
+    let page = || Tiff::new((8, 1), 1, 1, vec![vec![0x55]]);
+    assert_eq!(read(page().bytes()).unwrap().image, mask_of(&[vec![0x55]], 8));
+    for (tag, value, words) in [
+        (258, 16, "1 x 16 bits is not read here"),
+        (258, 4, "1 x 4 bits is not read here"),
+        (277, 3, "3 x 1 bits"),
+        (262, 2, "RGB"),
+        (262, 3, "palette"),
+        (262, 5, "photometric interpretation 5"),
+        (259, 7, "JPEG"),
+        (259, 34712, "TIFF compression 34712"),
+        (274, 9, "no orientation 9"),
+        (339, 2, "sample format 2"),
+        (278, 0, ""),
+    ] {
+        match read(page().with(tag, value).bytes()) {
+            Ok(_) => assert_eq!(words, "", "tag {tag} {value}"),
+            Err(error) => assert!(error.to_string().contains(words), "{error}"),
+        }
+    }
+    let garbage = |compression| Tiff::new((8, 1), 1, compression, vec![vec![0xFF; 9]]);
+    for (page, words) in [
+        (page().with(259, 3).with(292, 2), "Group 3 with its uncompressed mode"),
+        (page().with(259, 5).with(317, 2), "predictor 2 of 1-bit pixels"),
+        (page().with(259, 8).with(258, 8).with(317, 3), "predictor 3 of 8-bit pixels"),
+        (page().with(259, 3).with(258, 8), "TIFF compression 3"),
+        (garbage(5), "a strip does not decode"),
+        (garbage(8).tiled(16, 16), "a tile does not decode"),
+        (page().with(257, 2), "shorter than its rows"),
+        (page().tiled(16, 0), "a side of 0 pixels"),
+        (page().with(257, 17).tiled(16, 16), "it has 1 tiles where its size makes 2"),
+    ] {
+        let error = read(page.bytes()).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
+fn sizes_that_lie_cost_only_an_error() {
+    let side = 1 << 26;
+    for (number, compress) in COMPRESSIONS {
+        for bits in [1, 8] {
+            let zeros = compress(&[0; 100_000]);
+            let strip = Tiff::new((side, side), bits, number, vec![zeros.clone()]);
+            let tile = Tiff::new((8, 8), bits, number, vec![zeros]).tiled(side, side);
+            for page in [strip, tile] {
+                let error = read(page.bytes()).unwrap_err().to_string();
+                assert!(error.contains("shorter than its rows"), "{error}");
+            }
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Stacks as other programs write them: libtiff and Pillow write every kind of
+//! TIFF and PNG that is read here, and we see the pixels that they put in.
+
+use lamp_stack::{
+    Destination, Dpi, Format, GrayMask, Image, Layer, MaskBuilder, PageInfo, StackError,
+    write_stack,
+};
+use lamp_tests::{Packed, Scratch, ask, ask_python, packed};
+
+/// Numbers that look random, the same each time.
+struct Dice(u64);
+
+impl Dice {
+    /// A number below `limit`.
+    fn below(&mut self, limit: u32) -> u32 {
+        self.0 = self.0.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
+        ((self.0 >> 33) % u64::from(limit)) as u32
+    }
+}
+
+/// Widths around those of bytes, words, tiles and the longest code.
+const WIDTHS: [u32; 16] = [1, 7, 8, 9, 31, 32, 33, 63, 64, 65, 239, 240, 241, 2559, 2560, 2561];
+
+/// Rows that differ as much as rows can, then rows like those above them.
+fn mask(width: u32, dice: &mut Dice) -> Image {
+    let alternating: Vec<u32> = (0..width).collect();
+    let mut rows = vec![vec![], vec![0], alternating[1..].to_vec(), alternating, vec![width - 1]];
+    for _ in 0..30 {
+        let mut row = if dice.below(3) == 0 { vec![] } else { rows[rows.len() - 1].clone() };
+        for column in &mut row {
+            *column = (*column + dice.below(7)).saturating_sub(3).min(width - 1);
+        }
+        row.extend((0..dice.below(4)).map(|_| dice.below(width)));
+        row.sort_unstable();
+        row.dedup();
+        rows.push(row);
+    }
+    let mut mask = MaskBuilder::new(width);
+    for row in rows {
+        mask.push_row(&row).unwrap();
+    }
+    Image::Mask(mask.finish())
+}
+
+/// Rows of long runs, ramps and noise.
+fn gray(width: u32, dice: &mut Dice) -> Image {
+    let mut gray = GrayMask::new(width);
+    for row in 0..35 {
+        let mut level = 0;
+        let kind = row % 4;
+        let pixel = |_| {
+            level = match kind {
+                0 => dice.below(256) as u8,
+                1 => level.wrapping_add(3),
+                _ if dice.below(20) == 0 => dice.below(256) as u8,
+                _ => level,
+            };
+            (1, level)
+        };
+        gray.push_runs((0..width).map(pixel)).unwrap();
+    }
+    Image::Gray(gray)
+}
+
+/// Writes a stack of such images, and returns its layers.
+fn stack(scratch: &Scratch, name: &str, image: fn(u32, &mut Dice) -> Image) -> Vec<Layer> {
+    let mut dice = Dice(7);
+    let layers: Vec<Layer> = (0..)
+        .zip(WIDTHS)
+        .map(|(index, width)| Layer {
+            info: PageInfo { index, thickness_um: Some(100.0), ..PageInfo::default() },
+            dpi: Dpi::new(300.0),
+            image: image(width, &mut dice),
+        })
+        .collect();
+    let pages = layers.iter().cloned().map(Ok::<_, StackError>);
+    write_stack(pages, Destination::File(scratch.path(name)), Format::Classic).unwrap();
+    layers
+}
+
+const LAYOUTS: [&str; 7] = [
+    "-r 1000",
+    "-r 1",
+    "-r 7 -f lsb2msb",
+    "-t -w 16 -l 16",
+    "-t -w 32 -l 16 -B",
+    "-t -w 240 -l 32 -8",
+    "-t -w 4096 -l 48 -f lsb2msb",
+];
+
+/// Lets libtiff write the stack in all the ways given, and reads each.
+fn libtiff_writes(compressions: &[&str], image: fn(u32, &mut Dice) -> Image) {
+    let scratch = Scratch::new();
+    let layers = stack(&scratch, "ours.tif", image);
+    for compression in compressions {
+        for layout in LAYOUTS {
+            let options = format!("-c {compression} {layout} ours.tif theirs.tif");
+            let options: Vec<&str> = options.split(' ').collect();
+            if ask(&scratch, "tiffcp", &options).is_none() {
+                return;
+            }
+            let read = scratch.layers("theirs.tif");
+            assert_eq!(read.len(), layers.len(), "tiffcp {options:?}");
+            for (read, layer) in read.iter().zip(&layers) {
+                assert!(read == layer, "{}, tiffcp {options:?}", layer.info.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn masks_that_libtiff_writes_are_read() {
+    let group3 = ["g3:1d", "g3:2d", "g3:1d:fill", "g3:2d:fill"];
+    libtiff_writes(&[&group3[..], &["g4", "lzw", "zip", "packbits", "none"]].concat(), mask);
+}
+
+#[test]
+fn gray_pages_that_libtiff_writes_are_read() {
+    libtiff_writes(&["lzw", "lzw:2", "zip", "zip:2", "packbits", "none"], gray);
+}
+
+/// Runs a script that writes images and prints, for each, a file's name, its
+/// size, its mode and its bytes in hexadecimal; checks that we read the same.
+fn python_writes(scratch: &Scratch, script: &str) {
+    let script = format!(
+        "from PIL import Image, ImageSequence, ImageOps, TiffImagePlugin\n\
+         def tell(name, *images):\n    \
+             for image in images: print(name, *image.size, image.mode, image.tobytes().hex())\n\
+         pages = lambda name: [p.copy() for p in ImageSequence.Iterator(Image.open(name))]\n\
+         {script}"
+    );
+    let Some(told) = ask_python(scratch, &script) else { return };
+    let mut last = "";
+    let mut layers = Vec::new().into_iter();
+    for line in told.lines() {
+        let [name, width, height, mode, hex] =
+            line.split(' ').collect::<Vec<_>>().try_into().unwrap();
+        if name != last {
+            assert!(layers.next().is_none(), "{last} has more pages than were written");
+            layers = scratch.layers(name).into_iter();
+            last = name;
+        }
+        let layer: Layer = layers.next().unwrap_or_else(|| panic!("{name} lacks a page"));
+        let size = format!("{width} {height}");
+        assert_eq!(format!("{} {}", layer.image.width(), layer.image.height()), size, "{name}");
+        assert_eq!(mode == "1", matches!(layer.image, Image::Mask(_)), "{name}");
+        assert!(packed(&layer.image) == rows_of_hex(hex, height), "{name}, {size}");
+    }
+    assert!(!last.is_empty(), "the script tells something");
+}
+
+fn rows_of_hex(hex: &str, height: &str) -> Packed {
+    let bytes: Vec<u8> = hex
+        .as_bytes()
+        .chunks(2)
+        .map(|pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap())
+        .collect();
+    let height: usize = height.parse().unwrap();
+    bytes.chunks(bytes.len() / height).map(<[u8]>::to_vec).collect()
+}
+
+#[test]
+fn tiffs_that_pillow_writes_are_read() {
+    let scratch = Scratch::new();
+    stack(&scratch, "masks.tif", mask);
+    stack(&scratch, "grays.tif", gray);
+    let script = r#"
+for source, compressions in (
+    ("masks", ["tiff_ccitt", "group3", "group4", "tiff_lzw", "tiff_adobe_deflate", "packbits", None]),
+    ("grays", ["tiff_lzw", "tiff_adobe_deflate", "tiff_deflate", "packbits", None]),
+):
+    images = pages(source + ".tif")
+    for compression in compressions:
+        name = f"{source}_{compression}.tif"
+        images[0].save(name, compression=compression, save_all=True, append_images=images[1:])
+        tell(name, *images)
+"#;
+    python_writes(&scratch, script);
+}
+
+#[test]
+fn pages_stored_on_their_side_are_turned_as_pillow_turns_them() {
+    let scratch = Scratch::new();
+    stack(&scratch, "masks.tif", mask);
+    stack(&scratch, "grays.tif", gray);
+    let script = r#"
+for source, compression in ("masks", "group4"), ("grays", "tiff_lzw"):
+    for orientation in range(1, 9):
+        for k, image in enumerate(pages(source + ".tif")):
+            name = f"{source}_{orientation}_{k}.tif"
+            image.save(name, compression=compression, tiffinfo={274: orientation})
+            image.getexif()[274] = orientation
+            assert Image.open(name).tag_v2[274] == orientation
+            tell(name, ImageOps.exif_transpose(image))
+"#;
+    python_writes(&scratch, script);
+}
+
+#[test]
+fn pngs_that_pillow_writes_are_read() {
+    let scratch = Scratch::new();
+    stack(&scratch, "masks.tif", mask);
+    stack(&scratch, "grays.tif", gray);
+    let script = r#"
+for k, (mask, gray) in enumerate(zip(pages("masks.tif"), pages("grays.tif"))):
+    mask.save(f"mask_{k}.png", dpi=(1500, 1500))
+    tell(f"mask_{k}.png", mask)
+    gray.save(f"gray_{k}.png")
+    tell(f"gray_{k}.png", gray)
+    for bits in 2, 4:
+        palette = [level for i in range(1 << bits) for level in [(37 * i + 5) % 256] * 3]
+        few = gray.point(lambda level: level % (1 << bits))
+        few.putpalette(palette)
+        few.save(f"few_{k}_{bits}.png", bits=bits)
+        tell(f"few_{k}_{bits}.png", few.convert("L"))
+"#;
+    python_writes(&scratch, script);
+    if scratch.names().iter().any(|name| name == "mask_0.png") {
+        assert_eq!(scratch.layers("mask_0.png")[0].dpi, Dpi::new(1500.0));
+    }
+}
