@@ -270,11 +270,23 @@ fn what_is_not_read_is_named() {
         (garbage(8).tiled(16, 16), "a tile does not decode"),
         (page().with(257, 2), "shorter than its rows"),
         (page().tiled(16, 0), "a side of 0 pixels"),
+        (page().with(256, 1 << 23).with(274, 5), "too many to turn it upright"),
         (page().with(257, 17).tiled(16, 16), "it has 1 tiles where its size makes 2"),
     ] {
         let error = read(page.bytes()).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
+}
+
+#[test]
+fn a_damaged_row_is_named_as_the_page_counts_it() {
+    // Black rows of eight pixels: modified Huffman's 10011 and zeros up to a
+    // byte. One of the last strip is no code.
+    let strips = vec![vec![0x98, 0x98], vec![0x98, 0x00]];
+    let page = Tiff::new((8, 4), 1, 2, strips).with(278, 2);
+    let error = read(page.bytes()).unwrap_err();
+    let StackError::Strip { layer: 0, source } = error else { panic!("{error}") };
+    assert_eq!(source.row, 3);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Stacks as other programs write them: libtiff and Pillow write every kind of
 //! TIFF and PNG that is read here, and we see the pixels that they put in.
 
+use std::fs;
+
 use lamp_stack::{
     Destination, Dpi, Format, GrayMask, Image, Layer, MaskBuilder, PageInfo, StackError,
     write_stack,
@@ -194,6 +196,53 @@ for source, compression in ("masks", "group4"), ("grays", "tiff_lzw"):
             tell(name, ImageOps.exif_transpose(image))
 "#;
     python_writes(&scratch, script);
+}
+
+#[test]
+fn info_names_the_compression() {
+    let scratch = Scratch::new();
+    stack(&scratch, "masks.tif", mask);
+    for (compression, words) in [
+        ("g3:1d", "bytes, CCITT Group 3\n"),
+        ("g3:2d", "bytes, CCITT Group 3, two-dimensional\n"),
+        ("lzw", "bytes, LZW\n"),
+        ("zip", "bytes, Deflate\n"),
+        ("none", "bytes, uncompressed\n"),
+    ] {
+        if ask(&scratch, "tiffcp", &["-c", compression, "masks.tif", "theirs.tif"]).is_none() {
+            return;
+        }
+        let said = scratch.run("lamp info theirs.tif").succeeds_quietly().stdout;
+        let said = String::from_utf8(said).unwrap();
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+#[test]
+fn stages_read_pngs_from_files_folders_and_pipes() {
+    let scratch = Scratch::new();
+    stack(&scratch, "masks.tif", mask);
+    fs::create_dir(scratch.path("pngs")).unwrap();
+    for layer in 0..3 {
+        let show = format!("lamp show masks.tif --layer {layer} -o pngs/{layer}.png");
+        scratch.run(&show).succeeds_quietly();
+    }
+    let images = |name: &str| -> Vec<Image> {
+        scratch.layers(name).into_iter().map(|layer| layer.image).collect()
+    };
+    scratch.run("dither pngs -o all.tif").succeeds_quietly();
+    assert_eq!(images("all.tif"), images("masks.tif")[..3]);
+    scratch.run("dither pngs/2.png -o one.tif").succeeds_quietly();
+    let png = scratch.bytes("pngs/2.png");
+    fs::write(scratch.path("piped.tif"), scratch.run_on("dither", &png).succeeds_quietly().stdout)
+        .unwrap();
+    assert_eq!(images("one.tif"), images("masks.tif")[2..3]);
+    assert_eq!(scratch.bytes("piped.tif"), scratch.bytes("one.tif"));
+
+    fs::copy(scratch.path("one.tif"), scratch.path("pngs/3.tif")).unwrap();
+    let words = ["dither: pngs: ", ".tif and .png", "move the others away"];
+    scratch.run("dither pngs -o x.tif").is_refused_with(&words);
+    scratch.run_on("lamp info", &png[..png.len() - 5]).is_refused_with(&["cut off"]);
 }
 
 #[test]

@@ -18,7 +18,7 @@ Examples:
   lamp show build.tif --layer 600 --scale 1/8 -o layer.png
   lamp show build.tif --layer 600 --region 2000,1500,200,100 --scale 4 -o detail.png")]
 pub(crate) struct ShowArgs {
-    /// The stack: a TIFF file, a folder of pages, or - for standard input
+    /// The stack: a TIFF or PNG file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
     stack: PathBuf,
 

@@ -20,6 +20,10 @@ use crate::length::Dpi;
 /// bits with room to spare.
 pub(crate) const LARGEST_SIDE: u64 = 1 << 26;
 
+/// Images that are turned become at most this high: a row costs memory, and
+/// unlike a row that is stored, no data.
+const HIGHEST_TURNED: u32 = 1 << 22;
+
 /// The tags that are looked at.
 pub(super) const KNOWN: [u16; 21] = [
     IMAGE_WIDTH,
@@ -121,6 +125,10 @@ impl Fields {
             other => return Err(malformed(self.page, format!("there is no orientation {other}"))),
         };
         let (width, height) = (self.side(IMAGE_WIDTH)?, self.side(IMAGE_LENGTH)?);
+        if orientation >= 5 && width > HIGHEST_TURNED {
+            let what = format!("it claims {width} columns, too many to turn it upright");
+            return Err(malformed(self.page, what));
+        }
         Ok(Page {
             number: self.page,
             info: self.info(),
