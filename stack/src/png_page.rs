@@ -48,6 +48,9 @@ impl From<png::DecodingError> for PngFault {
     }
 }
 
+/// Gives a PNG's rows.
+type Rows<'a> = Reader<Cursor<&'a [u8]>>;
+
 /// Reads what stands before the image data.
 pub(crate) fn header(file: &[u8]) -> Result<Header, PngFault> {
     let (reader, samples) = open(file)?;
@@ -67,7 +70,7 @@ pub(crate) fn decode(file: &[u8]) -> Result<Image, PngFault> {
     if samples.are_bits() { decode_mask(reader, &samples) } else { decode_gray(reader, &samples) }
 }
 
-fn decode_mask(mut reader: Reader<Cursor<&[u8]>>, samples: &Samples) -> Result<Image, PngFault> {
+fn decode_mask(mut reader: Rows<'_>, samples: &Samples) -> Result<Image, PngFault> {
     let width = reader.info().width;
     let mut mask = MaskBuilder::new(width);
     let mut runs = Vec::new();
@@ -80,7 +83,7 @@ fn decode_mask(mut reader: Reader<Cursor<&[u8]>>, samples: &Samples) -> Result<I
     Ok(Image::Mask(if samples.levels[0] == 0 { mask } else { mask.inverted() }))
 }
 
-fn decode_gray(mut reader: Reader<Cursor<&[u8]>>, samples: &Samples) -> Result<Image, PngFault> {
+fn decode_gray(mut reader: Rows<'_>, samples: &Samples) -> Result<Image, PngFault> {
     let width = reader.info().width;
     let mut gray = GrayMask::new(width);
     let (mut row_samples, mut runs) = (Vec::new(), Vec::new());
@@ -106,7 +109,7 @@ fn check_runs(runs: usize) -> Result<(), PngFault> {
     Ok(())
 }
 
-fn open(file: &[u8]) -> Result<(Reader<Cursor<&[u8]>>, Samples), PngFault> {
+fn open(file: &[u8]) -> Result<(Rows<'_>, Samples), PngFault> {
     let mut decoder = Decoder::new(Cursor::new(file));
     decoder.set_ignore_iccp_chunk(true);
     let reader = decoder.read_info()?;

@@ -213,7 +213,8 @@ proptest! {
 
 #[test]
 fn tiles_may_stand_in_any_order() {
-    let rows: Vec<Vec<u8>> = (0..40u8).map(|row| (0..6).map(|i| row ^ i * 37).collect()).collect();
+    let rows: Vec<Vec<u8>> =
+        (0..40u8).map(|row| (0..6).map(|i| row ^ (i * 37)).collect()).collect();
     let mut page = Tiff::new((48, 40), 1, 1, tiles(&rows, 2, 16)).tiled(16, 16);
     page.order = vec![8, 3, 5, 0, 1, 7, 2, 4, 6];
     assert_eq!(read(page.bytes()).unwrap().image, mask_of(&rows, 48));
@@ -221,7 +222,7 @@ fn tiles_may_stand_in_any_order() {
 
 #[test]
 fn orientations_are_turned_upright() {
-    let rows = vec![vec![0b1000_0000], vec![0b1100_0000]];
+    let rows = [vec![0b1000_0000], vec![0b1100_0000]];
     let upright = |orientation| {
         let page = Tiff::new((3, 2), 1, 1, vec![rows.concat()]).with(274, orientation);
         let Image::Mask(mask) = read(page.bytes()).unwrap().image else { panic!() };
