@@ -154,6 +154,14 @@ fn a_cut_png_is_cut_off_and_a_damaged_one_damaged() {
 }
 
 #[test]
+fn a_chunk_that_claims_gigabytes_costs_only_an_error() {
+    let mut file = bits();
+    file[33..37].copy_from_slice(&0x7FFF_FFFFu32.to_be_bytes());
+    let error = read(file).unwrap_err().to_string();
+    assert!(error.contains("more than 1073741824 bytes"), "{error}");
+}
+
+#[test]
 fn a_folder_of_pngs_is_a_stack() {
     let folder = tempfile::tempdir().unwrap();
     for column in [2u32, 9, 10] {

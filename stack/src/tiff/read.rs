@@ -18,6 +18,8 @@ const MOST_ENTRIES: u64 = 4096;
 const LONGEST_VALUE: u64 = 2 << 20;
 /// More bytes than the strips of any page take: an endless stream must end.
 const MOST_STRIP_BYTES: u64 = 4 << 30;
+/// More bytes than any PNG of a page has: an endless stream must end.
+const MOST_PNG_BYTES: u64 = 1 << 30;
 
 /// Reads pages one after the other, from a stream (forward only) or from a
 /// file (any order). A PNG is a page of its own.
@@ -232,6 +234,10 @@ impl PageReader {
                 return Err(malformed(self.number, "its PNG has bytes between its chunks"));
             }
             file.extend_from_slice(&head);
+            if file.len() as u64 + length > MOST_PNG_BYTES {
+                let what = format!("its PNG has more than {MOST_PNG_BYTES} bytes");
+                return Err(malformed(self.number, what));
+            }
             // The data, and its checksum.
             let body = self.read(file.len() as u64, length + 4)?;
             file.extend_from_slice(&body);
