@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use lamp_stack::{
-    Dpi, Image, Layer, Length, Mask, MaskBuilder, PageInfo, Size, StackInfo, map_in_order,
+    Dpi, Held, Image, Layer, Length, Mask, MaskBuilder, PageInfo, Size, StackInfo, map_in_order,
 };
 use serde_json::json;
 use thiserror::Error;
@@ -135,9 +135,22 @@ pub fn tile<E: From<TileError> + Send>(
             Some(layout) => Arc::clone(layout),
             None => Arc::clone(layout.insert(Arc::new(Layout::new(&layer, &options)?))),
         };
-        Ok((layer, layout))
+        Ok(ToPlace { layer, layout })
     });
-    map_in_order(placed, |(layer, layout)| Ok(layout.place(layer)?))
+    map_in_order(placed, |ToPlace { layer, layout }| Ok(layout.place(layer)?))
+}
+
+/// A layer and where its copies stand.
+struct ToPlace {
+    layer: Layer,
+    layout: Arc<Layout>,
+}
+
+impl Held for ToPlace {
+    /// What the copies will take.
+    fn bytes(&self) -> usize {
+        self.layer.bytes().saturating_mul(self.layout.copies())
+    }
 }
 
 /// Where copies stand.
@@ -183,6 +196,11 @@ impl Layout {
         Ok(Self { dpi, part, area, options: *options, rows })
     }
 
+    /// How many copies there are.
+    fn copies(&self) -> usize {
+        self.rows.iter().map(|(_, lefts)| lefts.len()).sum()
+    }
+
     fn place(&self, layer: Layer) -> Result<Layer, TileError> {
         let found = size_of_image(&layer.image);
         if found != self.part {
@@ -192,7 +210,7 @@ impl Layout {
         if layer.dpi != Some(self.dpi) {
             return Err(TileError::OtherResolution { layer: layer.info.name() });
         }
-        let copies: usize = self.rows.iter().map(|(_, lefts)| lefts.len()).sum();
+        let copies = self.copies();
         if copies.saturating_mul(layer.image.changes() + 1) > u32::MAX as usize {
             return Err(TileError::TooManyRuns { copies, layer: layer.info.name() });
         }
@@ -207,9 +225,8 @@ impl Layout {
     }
 
     fn place_mask(&self, part: &Mask) -> Mask {
-        let copies: usize = self.rows.iter().map(|(_, lefts)| lefts.len()).sum();
         let mut build = MaskBuilder::new(self.area.width);
-        build.reserve(self.area.height as usize, copies * part.transition_count());
+        build.reserve(self.area.height as usize, self.copies() * part.transition_count());
         let mut done = 0;
         let mut row = Vec::new();
         for (top, lefts) in &self.rows {
