@@ -85,7 +85,12 @@ impl Cutter<'_> {
         lists: &mut [Vec<Crossing>],
     ) -> usize {
         let [a, b, c] = facet.map(|corner| corner[2]);
-        let met = self.planes.between(a.min(b).min(c), a.max(b).max(c));
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        // Most facets of a part in no order lie in another slab.
+        if low >= self.planes.z_um(layers.end - 1) || high < self.planes.z_um(layers.start) {
+            return 0;
+        }
+        let met = self.planes.between(low, high);
         let met = met.start.max(layers.start)..met.end.min(layers.end);
         let mut count = 0;
         if met.is_empty() {

@@ -32,6 +32,7 @@
 //! ```
 
 mod ascii;
+mod buckets;
 mod cut;
 mod error;
 mod facet;

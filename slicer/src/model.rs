@@ -25,17 +25,17 @@ const BLOCK_FACETS: usize = 4096;
 pub struct Model {
     name: String,
     /// The files' facets. No block has facets of two files.
-    files: Vec<Facets>,
+    files: Vec<FileFacets>,
     digest: String,
 }
 
 #[derive(Debug)]
-enum Facets {
+enum FileFacets {
     Binary { file: File, count: usize },
     Memory(Vec<Facet>),
 }
 
-impl Facets {
+impl FileFacets {
     fn count(&self) -> usize {
         match self {
             Self::Binary { count, .. } => *count,
@@ -79,7 +79,7 @@ impl Model {
         for corner in facets.iter().flatten().flatten() {
             hasher.update(&corner.to_le_bytes());
         }
-        let files = vec![Facets::Memory(facets)];
+        let files = vec![FileFacets::Memory(facets)];
         Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
     }
 
@@ -115,10 +115,10 @@ impl Model {
         let declared = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
         let facets = match declared {
             Some(count) if HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size => {
-                Facets::Binary { file: file.try_clone()?, count: count as usize }
+                FileFacets::Binary { file: file.try_clone()?, count: count as usize }
             }
             _ if ascii::looks_ascii(&start, start.len() as u64 == size) => {
-                Facets::Memory(ascii::read(&map(file, 0, size as usize)?)?)
+                FileFacets::Memory(ascii::read(&map(file, 0, size as usize)?)?)
             }
             declared => return Err(why_not_stl(&start, declared, size)),
         };
@@ -135,7 +135,7 @@ impl Model {
 
     /// How many facets the part has.
     pub fn facet_count(&self) -> usize {
-        self.files.iter().map(Facets::count).sum()
+        self.files.iter().map(FileFacets::count).sum()
     }
 
     /// The digest of the file (of the coordinates, where there is no file; of
@@ -146,7 +146,7 @@ impl Model {
     }
 
     pub(crate) fn block_count(&self) -> usize {
-        self.files.iter().map(Facets::blocks).sum()
+        self.files.iter().map(FileFacets::blocks).sum()
     }
 
     /// The file that a block is of, and which of its facets are in the block.
@@ -168,8 +168,8 @@ impl Model {
     ) -> io::Result<()> {
         let (file, Range { start, end }) = self.place_of(block);
         match &self.files[file] {
-            Facets::Memory(facets) => facets[start..end].iter().for_each(each),
-            Facets::Binary { file, .. } => {
+            FileFacets::Memory(facets) => facets[start..end].iter().for_each(each),
+            FileFacets::Binary { file, .. } => {
                 let offset = HEADER_BYTES + (start * FACET_BYTES) as u64;
                 let bytes = map(file, offset, (end - start) * FACET_BYTES)?;
                 let (records, _) = bytes.as_chunks::<FACET_BYTES>();
@@ -214,10 +214,10 @@ fn parse(record: &[u8; FACET_BYTES]) -> Facet {
 
 /// Maps a part of a file.
 #[expect(unsafe_code, reason = "mapping a file is unsafe, since others may change it")]
-fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
+pub(crate) fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
     // SAFETY: the map is private and read only. Its bytes are undefined only
     // if another process changes the file meanwhile, which `Model::open`
-    // forbids; any bytes are valid numbers here.
+    // forbids (temporary files have no name); any bytes are valid numbers here.
     unsafe { MmapOptions::new().offset(offset).len(length).map(file) }
 }
 

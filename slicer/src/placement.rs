@@ -92,6 +92,11 @@ fn affine(row: &[f64; 4], [x, y, z]: [f64; 3]) -> f64 {
     row[0] * x + row[1] * y + row[2] * z + row[3]
 }
 
+#[inline]
+fn scaled(scale: &[f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [x * scale[0], y * scale[1], z * scale[2]]
+}
+
 /// A facet in its place: x and y in millimetres, z in micrometres.
 pub(crate) type PlacedFacet = [[f64; 3]; 3];
 
@@ -134,11 +139,20 @@ impl PlacedModel {
         // Two loops, so that neither asks at every facet which one it is.
         match self.way {
             Way::Scale(scale) => self.model.for_each_in_block(block, |facet| {
-                each(&placed(facet, |[x, y, z]| [x * scale[0], y * scale[1], z * scale[2]]));
+                each(&placed(facet, |corner| scaled(&scale, corner)));
             }),
             Way::Affine(rows) => self.model.for_each_in_block(block, |facet| {
                 each(&placed(facet, |corner| rows.map(|row| affine(&row, corner))));
             }),
+        }
+    }
+
+    /// A facet of the file in its place.
+    #[inline]
+    pub(crate) fn placed(&self, facet: &Facet) -> PlacedFacet {
+        match &self.way {
+            Way::Scale(scale) => placed(facet, |corner| scaled(scale, corner)),
+            Way::Affine(rows) => placed(facet, |corner| rows.map(|row| affine(&row, corner))),
         }
     }
 }

@@ -1,20 +1,22 @@
 //! A part's layers, in order.
 
 use std::collections::VecDeque;
+use std::io;
 use std::ops::Range;
 
 use lamp_stack::{Dpi, Image, Layer, Length, PageInfo, StackInfo};
 use rayon::prelude::*;
 
+use crate::buckets::Buckets;
 use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
 use crate::facet::Units;
 use crate::grid::PixelGrid;
 use crate::model::Model;
-use crate::placement::{PlacedModel, Placement};
+use crate::placement::{PlacedFacet, PlacedModel, Placement};
 use crate::planes::{PlaneRule, Planes};
 use crate::survey::Survey;
-use crate::table::{Fill, Table};
+use crate::table::{Facets, Fill, Table};
 
 /// How a part is sliced.
 #[derive(Clone, Debug)]
@@ -95,7 +97,8 @@ impl Default for SliceOptions {
 ///
 /// The part is looked at once for its box; then z is processed in slabs of as
 /// many layers as the memory holds, each slab reading only those blocks of
-/// the file that it meets. All threads of the current rayon pool work; order
+/// the file that it meets; a file without any order in z is first sorted into a
+/// temporary one. All threads of the current rayon pool work; order
 /// and bytes do not depend on them.
 #[derive(Debug)]
 pub struct Slices {
@@ -106,7 +109,9 @@ pub struct Slices {
     fill: Fill,
     wanted: Range<usize>,
     most_crossings: usize,
-    expected: Vec<f64>,
+    /// Slabs of layers that fit by the estimate.
+    slabs: Vec<Range<usize>>,
+    buckets: Option<Buckets>,
     table: Table,
     /// The layers of the table that are still to be made into images.
     pending: Range<usize>,
@@ -128,18 +133,27 @@ impl Slices {
         let (bottom_um, top_um) = (survey.min[2], survey.max[2]);
         let planes = Planes::uniform(bottom_um, top_um, options.thickness, options.plane)?;
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
+        // A list that grows holds up to twice what it needs.
+        let most_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
         let expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
+        let slabs = slabs(&wanted, &expected, most_crossings);
+        let heights: Vec<_> = slabs.iter().map(|slab| planes_of(slab, &planes)).collect();
+        // Where no temporary file can be written, slabs read all they meet.
+        let buckets = survey
+            .wants_sorting(&heights)
+            .then(|| Buckets::sort(&model, &planes, &slabs, options.memory as usize).ok())
+            .flatten();
         Ok(Self {
             model,
             survey,
             grid,
             fill: options.fill,
-            // A list that grows holds up to twice what it needs.
-            most_crossings: (options.memory as usize / (2 * size_of::<Crossing>())).max(1),
+            most_crossings,
             pending: wanted.start..wanted.start,
             wanted,
             planes,
-            expected,
+            slabs,
+            buckets,
             table: Table::default(),
             ready: VecDeque::new(),
         })
@@ -158,13 +172,20 @@ impl Slices {
     /// Fills the table with the next slab.
     fn fill_slab(&mut self) -> Result<(), SliceError> {
         let start = self.pending.end;
-        let mut end = self.slab_end(start);
+        let slab = self.slabs.partition_point(|slab| slab.end <= start);
+        let mut end = self.slabs[slab].end;
+        let cutter = Cutter { grid: &self.grid, planes: &self.planes };
         loop {
-            let cutter = Cutter { grid: &self.grid, planes: &self.planes };
-            let (low, high) = (self.planes.z_um(start), self.planes.z_um(end - 1));
-            let blocks = self.survey.blocks_between(low, high);
-            let fits =
-                self.table.fill(&self.model, &blocks, cutter, start..end, self.most_crossings)?;
+            let layers = start..end;
+            let fits = if let Some(buckets) = &self.buckets {
+                let facets = buckets.of_slab(slab, &self.model);
+                self.table.fill(&facets, cutter, layers, self.most_crossings)?
+            } else {
+                let (low, high) = planes_of(&layers, &self.planes);
+                let blocks = self.survey.blocks_between(low, high);
+                let facets = Blocks { model: &self.model, blocks };
+                self.table.fill(&facets, cutter, layers, self.most_crossings)?
+            };
             if fits {
                 self.pending = start..end;
                 return Ok(());
@@ -172,17 +193,6 @@ impl Slices {
             // The estimate was too low here: take fewer layers.
             end = start + (end - start) / 2;
         }
-    }
-
-    /// Where a slab that starts at `start` ends by the estimate.
-    fn slab_end(&self, start: usize) -> usize {
-        let mut room = self.most_crossings as f64;
-        let fits = |&&crossings: &&f64| {
-            room -= crossings;
-            room > 0.0
-        };
-        let layers = self.expected[start..self.wanted.end].iter().take_while(fits).count();
-        start + layers.max(1)
     }
 
     /// Makes the next layers of the table into images.
@@ -248,6 +258,44 @@ impl Iterator for Slices {
         }
         self.ready.pop_front().map(Ok)
     }
+}
+
+/// The facets of some blocks of a part.
+struct Blocks<'a> {
+    model: &'a PlacedModel,
+    blocks: Vec<usize>,
+}
+
+impl Facets for Blocks<'_> {
+    fn pieces(&self) -> usize {
+        self.blocks.len()
+    }
+
+    fn for_each_in(&self, piece: usize, each: impl FnMut(&PlacedFacet)) -> io::Result<()> {
+        self.model.for_each_in_block(self.blocks[piece], each)
+    }
+}
+
+/// The heights of the first and the last plane of some layers.
+fn planes_of(layers: &Range<usize>, planes: &Planes) -> (f64, f64) {
+    (planes.z_um(layers.start), planes.z_um(layers.end - 1))
+}
+
+/// Cuts layers into slabs of at most `most` crossings, and at least a layer.
+fn slabs(layers: &Range<usize>, crossings: &[f64], most: usize) -> Vec<Range<usize>> {
+    let mut slabs: Vec<Range<usize>> = Vec::new();
+    let mut room = 0.0;
+    for layer in layers.clone() {
+        match slabs.last_mut() {
+            Some(slab) if crossings[layer] < room => slab.end += 1,
+            _ => {
+                slabs.push(layer..layer + 1);
+                room = most as f64;
+            }
+        }
+        room -= crossings[layer];
+    }
+    slabs
 }
 
 fn wanted_layers(asked: Option<&Range<u32>>, count: usize) -> Result<Range<usize>, SliceError> {

@@ -28,10 +28,14 @@ struct Block {
     /// Half the sum of the facets' boxes in y and z: what the block's
     /// crossings are in proportion to.
     yz_area: f64,
+    facets: usize,
+    /// The sum of the facets' heights.
+    heights_um: f64,
 }
 
 impl Block {
-    const EMPTY: Self = Self { min: [f64::MAX; 3], max: [f64::MIN; 3], yz_area: 0.0 };
+    const EMPTY: Self =
+        Self { min: [f64::MAX; 3], max: [f64::MIN; 3], yz_area: 0.0, facets: 0, heights_um: 0.0 };
 
     fn of(model: &PlacedModel, block: usize) -> io::Result<Result<Self, SliceError>> {
         let mut whole = Self::EMPTY;
@@ -43,6 +47,8 @@ impl Block {
                 min,
                 max,
                 yz_area: 0.5 * (max[1] - min[1]) * (max[2] - min[2]),
+                facets: 1,
+                heights_um: max[2] - min[2],
             });
         })?;
         Ok(if finite { Ok(whole) } else { Err(not_finite(model, block)?) })
@@ -53,6 +59,8 @@ impl Block {
             min: std::array::from_fn(|axis| self.min[axis].min(other.min[axis])),
             max: std::array::from_fn(|axis| self.max[axis].max(other.max[axis])),
             yz_area: self.yz_area + other.yz_area,
+            facets: self.facets + other.facets,
+            heights_um: self.heights_um + other.heights_um,
         }
     }
 }
@@ -115,6 +123,22 @@ impl Survey {
                 min[2] < high_um && max[2] >= low_um
             })
             .collect()
+    }
+
+    /// Whether the blocks lie so much all over the part that sorting the facets
+    /// by slab costs less than reading, for each of `slabs` (their planes'
+    /// heights), all blocks that it meets.
+    pub(crate) fn wants_sorting(&self, slabs: &[(f64, f64)]) -> bool {
+        let height_um = (self.max[2] - self.min[2]) / slabs.len() as f64;
+        let (mut facets, mut visits, mut met) = (0.0, 0.0, 0.0);
+        for &Block { min, max, facets: count, heights_um, .. } in &self.blocks {
+            let slabs = slabs.iter().filter(|(low, high)| min[2] < *high && max[2] >= *low);
+            facets += count as f64;
+            visits += count as f64 * slabs.count() as f64;
+            met += count as f64 + heights_um / height_um;
+        }
+        // Writing a facet and reading it again costs about as much as two looks.
+        visits - met > 2.0 * facets
     }
 
     /// About how many crossings each layer has, with rows `pitch_mm` apart.

@@ -12,7 +12,7 @@ use lamp_stack::{Mask, MaskBuilder};
 use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place};
-use crate::placement::PlacedModel;
+use crate::placement::PlacedFacet;
 
 /// What is inside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,6 +23,14 @@ pub enum Fill {
     /// White where the contours wind around the pixel, for bodies that
     /// overlap; the facets' orientation gives the sign.
     NonZero,
+}
+
+/// Facets in pieces, which threads take one after another.
+pub(crate) trait Facets: Sync {
+    fn pieces(&self) -> usize;
+
+    /// Gives every facet of a piece.
+    fn for_each_in(&self, piece: usize, each: impl FnMut(&PlacedFacet)) -> io::Result<()>;
 }
 
 /// The crossings of a slab of layers.
@@ -59,13 +67,11 @@ impl Budget {
 }
 
 impl Table {
-    /// Fills the table with the crossings of `layers`, from the given blocks
-    /// of the model. Gives up, returning `false`, once the crossings pass
-    /// `most` in a slab that could be smaller.
+    /// Fills the table with the crossings of `layers`. Gives up, returning
+    /// `false`, once the crossings pass `most` in a slab that could be smaller.
     pub(crate) fn fill(
         &mut self,
-        model: &PlacedModel,
-        blocks: &[usize],
+        facets: &impl Facets,
         cutter: Cutter<'_>,
         layers: Range<usize>,
         most: usize,
@@ -77,15 +83,18 @@ impl Table {
             lists.iter_mut().for_each(Vec::clear);
             lists.resize_with(lists.len().max(layers.len()), Vec::new);
             let mut unclaimed = 0;
-            while let Some(&block) = blocks.get(next.fetch_add(1, Relaxed)) {
-                model.for_each_in_block(block, |facet| {
+            loop {
+                let piece = next.fetch_add(1, Relaxed);
+                if piece >= facets.pieces() {
+                    return Ok(());
+                }
+                facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
                         unclaimed += cutter.cut(facet, &layers, lists);
                         budget.claim(&mut unclaimed);
                     }
                 })?;
             }
-            Ok(())
         })?;
         self.layers = layers;
         Ok(!budget.is_spent())

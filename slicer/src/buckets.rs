@@ -1,0 +1,241 @@
+//! Facets in no order of height, sorted once by slab.
+//!
+//! A slab reads the blocks of the file that it meets. Where the facets of each
+//! block lie all over the part, that is the whole file for every slab; then
+//! one pass writes each facet into a bucket of each of its slabs, in a
+//! temporary file, and every slab reads its own. A slab has several buckets,
+//! by the lowest layer met, so that facets which follow one another fill the
+//! same lists.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::ops::Range;
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use crate::facet::Facet;
+use crate::model::map;
+use crate::placement::{PlacedFacet, PlacedModel};
+use crate::planes::Planes;
+use crate::table::Facets;
+
+/// A facet in a bucket: three corners.
+const RECORD_BYTES: usize = 36;
+
+/// All slabs together have at least so many buckets.
+const BUCKETS: usize = 128;
+
+/// A part's facets by slab.
+#[derive(Debug)]
+pub(crate) struct Buckets {
+    file: File,
+    /// By bucket: where its chunks stand in the file.
+    chunks: Vec<Vec<Range<u64>>>,
+    /// How many buckets each slab has.
+    a_slab: usize,
+}
+
+impl Buckets {
+    /// Sorts the facets of a part into `slabs`, which follow one another, with
+    /// about `memory` bytes to gather them in.
+    ///
+    /// # Errors
+    /// Where the part cannot be read or the temporary file not be written.
+    pub(crate) fn sort(
+        model: &PlacedModel,
+        planes: &Planes,
+        slabs: &[Range<usize>],
+        memory: usize,
+    ) -> io::Result<Self> {
+        let order = Order::new(planes, slabs);
+        let count = order.a_slab * slabs.len();
+        let chunk_bytes = (memory / (rayon::current_num_threads() * count)).clamp(1 << 12, 1 << 18);
+        let file = tempfile::tempfile()?;
+        let buckets = Self { file, chunks: vec![Vec::new(); count], a_slab: order.a_slab };
+        let writer = Mutex::new(Writer { buckets, end: 0 });
+        let blocks: Vec<usize> = (0..model.model.block_count()).collect();
+        // One piece a thread, so that each fills its chunks.
+        let piece = blocks.len().div_ceil(rayon::current_num_threads()).max(1);
+        blocks.par_chunks(piece).try_for_each(|blocks| {
+            let mut gathered = vec![Vec::with_capacity(chunk_bytes); count];
+            for &block in blocks {
+                let mut result = Ok(());
+                model.model.for_each_in_block(block, |facet| {
+                    order.for_each_bucket(&model.placed(facet), |bucket| {
+                        let records = &mut gathered[bucket];
+                        records.extend_from_slice(&record(facet));
+                        if records.len() + RECORD_BYTES > chunk_bytes && result.is_ok() {
+                            result = write(&writer, bucket, records);
+                        }
+                    });
+                })?;
+                result?;
+            }
+            let mut rest = gathered.iter_mut().enumerate();
+            rest.try_for_each(|(bucket, records)| write(&writer, bucket, records))
+        })?;
+        Ok(writer.into_inner().expect("no writer panics").buckets)
+    }
+
+    /// The facets of a slab.
+    pub(crate) fn of_slab<'a>(&'a self, slab: usize, model: &'a PlacedModel) -> Bucket<'a> {
+        let buckets = &self.chunks[slab * self.a_slab..][..self.a_slab];
+        Bucket { file: &self.file, chunks: buckets.concat(), model }
+    }
+}
+
+/// Which buckets a facet belongs in.
+struct Order<'a> {
+    planes: &'a Planes,
+    slabs: &'a [Range<usize>],
+    /// How many buckets each slab has.
+    a_slab: usize,
+    /// The bucket of each layer, from the first slab's first layer on.
+    of_layer: Vec<usize>,
+}
+
+impl<'a> Order<'a> {
+    fn new(planes: &'a Planes, slabs: &'a [Range<usize>]) -> Self {
+        let a_slab = BUCKETS.div_ceil(slabs.len());
+        let buckets = |(slab, layers): (usize, &Range<usize>)| {
+            let count = layers.len();
+            (0..count).map(move |layer| slab * a_slab + layer * a_slab / count)
+        };
+        Self {
+            planes,
+            slabs,
+            a_slab,
+            of_layer: slabs.iter().enumerate().flat_map(buckets).collect(),
+        }
+    }
+
+    /// Gives the bucket of the lowest layer met in each slab met.
+    #[inline]
+    fn for_each_bucket(&self, facet: &PlacedFacet, mut each: impl FnMut(usize)) {
+        let [a, b, c] = facet.map(|corner| corner[2]);
+        let met = self.planes.between(a.min(b).min(c), a.max(b).max(c));
+        let first = self.slabs[0].start;
+        let Some(&bucket) = self.of_layer.get(met.start.saturating_sub(first)) else { return };
+        if met.is_empty() || met.end <= first {
+            return;
+        }
+        each(bucket);
+        let slabs_above = self.slabs.iter().enumerate().skip(bucket / self.a_slab + 1);
+        let met_above = slabs_above.take_while(|(_, layers)| layers.start < met.end);
+        met_above.for_each(|(slab, _)| each(slab * self.a_slab));
+    }
+}
+
+fn record(facet: &Facet) -> [u8; RECORD_BYTES] {
+    let mut record = [0; RECORD_BYTES];
+    for (bytes, number) in record.as_chunks_mut::<4>().0.iter_mut().zip(facet.as_flattened()) {
+        *bytes = number.to_le_bytes();
+    }
+    record
+}
+
+struct Writer {
+    buckets: Buckets,
+    end: u64,
+}
+
+fn write(writer: &Mutex<Writer>, bucket: usize, records: &mut Vec<u8>) -> io::Result<()> {
+    if !records.is_empty() {
+        let Writer { buckets, end } = &mut *writer.lock().expect("no writer panics");
+        buckets.file.write_all(records)?;
+        let start = *end;
+        *end += records.len() as u64;
+        buckets.chunks[bucket].push(start..*end);
+        records.clear();
+    }
+    Ok(())
+}
+
+/// The facets of one slab.
+pub(crate) struct Bucket<'a> {
+    file: &'a File,
+    chunks: Vec<Range<u64>>,
+    model: &'a PlacedModel,
+}
+
+impl Facets for Bucket<'_> {
+    fn pieces(&self) -> usize {
+        self.chunks.len()
+    }
+
+    fn for_each_in(&self, piece: usize, mut each: impl FnMut(&PlacedFacet)) -> io::Result<()> {
+        let Range { start, end } = self.chunks[piece];
+        let bytes = map(self.file, start, (end - start) as usize)?;
+        for record in bytes.as_chunks::<RECORD_BYTES>().0 {
+            let (numbers, _) = record.as_chunks::<4>();
+            let number = |i: usize| f32::from_le_bytes(numbers[i]);
+            let facet = std::array::from_fn(|c| std::array::from_fn(|axis| number(3 * c + axis)));
+            each(&self.model.placed(&facet));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::Length;
+
+    use super::*;
+    use crate::facet::Units;
+    use crate::model::Model;
+    use crate::placement::Placement;
+    use crate::planes::PlaneRule;
+    use crate::survey::Survey;
+
+    /// Facets all over 10 mm, of which a few stand through all of it.
+    fn scattered() -> PlacedModel {
+        let facet = |k: usize| {
+            let low = (k * 7919 % 10_000) as f32 / 1000.0;
+            let high = if k.is_multiple_of(1000) { 10.0 } else { (low + 0.3).min(10.0) };
+            [[k as f32, 0.0, low], [0.0, 1.0, low], [1.0, 0.0, high]]
+        };
+        let model = Model::from_facets("scattered", (0..20_000).map(facet).collect());
+        PlacedModel::new(model, &Placement::default(), Units::default())
+    }
+
+    #[test]
+    fn every_slab_has_its_facets_once() {
+        let model = scattered();
+        let survey = Survey::of(&model).unwrap();
+        let thickness = Length::from_um(50.0);
+        let planes = Planes::uniform(0.0, 10_000.0, thickness, PlaneRule::Top).unwrap();
+        // Slabs of one layer and of many, not all of the part.
+        let slabs = [3..4, 4..5, 5..60, 60..150, 150..190];
+        for memory in [0, 1 << 24] {
+            let buckets = Buckets::sort(&model, &planes, &slabs, memory).unwrap();
+            for (slab, layers) in slabs.iter().enumerate() {
+                let mut found = Vec::new();
+                let bucket = buckets.of_slab(slab, &model);
+                for piece in 0..bucket.pieces() {
+                    bucket.for_each_in(piece, |facet| found.push(facet[0][0] as usize)).unwrap();
+                }
+                found.sort_unstable();
+                let mut expected = Vec::new();
+                for block in 0..model.model.block_count() {
+                    let meets = |facet: &PlacedFacet| {
+                        let met = planes.between(facet[0][2], facet[2][2]);
+                        met.start < layers.end && met.end > layers.start && !met.is_empty()
+                    };
+                    let keep =
+                        |facet: &_| expected.extend(meets(facet).then_some(facet[0][0] as usize));
+                    model.for_each_in_block(block, keep).unwrap();
+                }
+                expected.sort_unstable();
+                assert!(found == expected, "slab {slab}");
+            }
+        }
+        assert!(survey.wants_sorting(&[
+            (0.0, 2.0e3),
+            (2.0e3, 4.0e3),
+            (4.0e3, 6.0e3),
+            (6.0e3, 1e4)
+        ]));
+        assert!(!survey.wants_sorting(&[(0.0, 1e4)]));
+    }
+}
