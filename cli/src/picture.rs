@@ -4,8 +4,7 @@ use std::io::{self, Write};
 use std::ops::Range;
 use std::str::FromStr;
 
-use lamp_stack::{Image, gray_runs};
-use png::{BitDepth, ColorType, Encoder, EncodingError};
+use lamp_stack::{Image, gray_runs, write_gray_png};
 
 /// A part of an image, in pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -141,41 +140,7 @@ impl<'a> Picture<'a> {
 
     /// Writes the picture as an 8-bit gray PNG.
     pub(crate) fn write_png(self, out: impl Write) -> io::Result<()> {
-        let mut out = Noting { out, failed: None };
-        let written = self.encode(&mut out).map_err(io::Error::from).and_then(|()| out.flush());
-        written.map_err(|error| match out.failed {
-            Some(kind) => io::Error::new(kind, error.to_string()),
-            None => error,
-        })
-    }
-
-    fn encode(self, out: impl Write) -> Result<(), EncodingError> {
-        let mut encoder = Encoder::new(out, self.width, self.height);
-        encoder.set_color(ColorType::Grayscale);
-        encoder.set_depth(BitDepth::Eight);
-        let mut writer = encoder.write_header()?;
-        let mut pixels = writer.stream_writer()?;
-        for row in self.rows {
-            pixels.write_all(&row)?;
-        }
-        pixels.finish()?;
-        writer.finish()
-    }
-}
-
-/// Notes how writing failed, which the encoder's own errors do not tell.
-struct Noting<W> {
-    out: W,
-    failed: Option<io::ErrorKind>,
-}
-
-impl<W: Write> Write for Noting<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.out.write(bytes).inspect_err(|error| self.failed = Some(error.kind()))
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.out.flush().inspect_err(|error| self.failed = Some(error.kind()))
+        write_gray_png(out, self.width, self.height, self.rows)
     }
 }
 

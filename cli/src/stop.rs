@@ -5,7 +5,7 @@ use std::io;
 
 use lamp_postprocess::TileError;
 use lamp_slicer::SliceError;
-use lamp_stack::StackError;
+use lamp_stack::{JoinError, SplitError, StackError};
 
 /// Why a command stops: whose fault it is decides the exit status.
 #[derive(Debug)]
@@ -74,6 +74,18 @@ impl From<SliceError> for Stop {
 
 impl From<TileError> for Stop {
     fn from(error: TileError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<JoinError> for Stop {
+    fn from(error: JoinError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<SplitError> for Stop {
+    fn from(error: SplitError) -> Self {
         Self::Failed(error.into())
     }
 }

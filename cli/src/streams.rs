@@ -109,9 +109,9 @@ pub(crate) fn read_pages(
             };
             let of_page = page.info().stack.clone();
             let Some(layers) = &layers else { return Some(Ok((page, of_page))) };
-            // How many pages are wanted is not known before the last.
-            stack = of_page.map(|of_page| StackInfo { layers: None, ..of_page }).or(stack.take());
-            if layers.contains(&page.info().index) {
+            let index = page.info().index;
+            stack = of_page.map(|of_page| of_page.of_range(index, layers)).or(stack.take());
+            if layers.contains(&index) {
                 found = true;
                 return Some(Ok((page, stack.take())));
             }
@@ -127,13 +127,27 @@ pub(crate) fn write_layers(
     output: &Output,
     report: &Report,
 ) -> Result<(), Stop> {
-    let format = if output.classic { Format::Classic } else { Format::Big };
+    let to = destination(&output.output)?;
     let counted = layers.inspect(|_| report.layer_done());
-    let written = write_stack(counted, destination(&output.output)?, format);
+    let written = write_stack(counted, to, format(output.classic));
+    written_to(&output.output, written, report)
+}
+
+/// The shape of a TIFF.
+pub(crate) fn format(classic: bool) -> Format {
+    if classic { Format::Classic } else { Format::Big }
+}
+
+/// Takes the bar away, and names the output where writing it failed.
+pub(crate) fn written_to(
+    output: &Path,
+    written: Result<(), Stop>,
+    report: &Report,
+) -> Result<(), Stop> {
     report.done();
     written.map_err(|stop| match stop {
-        Stop::Output(_) if is_stream(&output.output) => stop.at("standard output"),
-        Stop::Output(_) => stop.at(output.output.display().to_string()),
+        Stop::Output(_) if is_stream(output) => stop.at("standard output"),
+        Stop::Output(_) => stop.at(output.display().to_string()),
         stop => stop,
     })
 }
@@ -148,18 +162,26 @@ fn destination(path: &Path) -> Result<Destination, Stop> {
         widen_pipe(&io::stdout());
         return Ok(Destination::Stream(Box::new(io::stdout().lock())));
     }
-    if path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir() {
-        return match path.file_name() {
-            Some(_) => Ok(Destination::Folder(path.to_owned())),
-            None => {
-                Err(Stop::usage(format!("{}: name the folder that is to be made", path.display())))
-            }
-        };
+    if is_folder(path) {
+        return Ok(Destination::Folder(folder_to_make(path)?.to_owned()));
     }
     Ok(match open_device(path)? {
         Some(device) => Destination::Stream(Box::new(device)),
         None => Destination::File(behind_links(path)),
     })
+}
+
+/// Whether an output is to be a folder.
+pub(crate) fn is_folder(path: &Path) -> bool {
+    path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir()
+}
+
+/// Checks that a folder can be made of that name.
+pub(crate) fn folder_to_make(path: &Path) -> Result<&Path, Stop> {
+    match path.file_name() {
+        Some(_) if !is_stream(path) => Ok(path),
+        _ => Err(Stop::usage(format!("{}: name the folder that is to be made", path.display()))),
+    }
 }
 
 /// Gives a pipe room for many layers, so that the stages at its ends seldom

@@ -1,5 +1,7 @@
 //! One layer of a stack: its image and what is known of it.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value};
 
@@ -121,6 +123,18 @@ pub struct StackInfo {
     pub other: Map<String, Value>,
 }
 
+impl StackInfo {
+    /// What it says of a range of the stack's layers, where the first of all
+    /// is `first`. Layers are taken to follow each other.
+    pub fn of_range(self, first: u32, range: &Range<u32>) -> Self {
+        let within = |layers: u32| {
+            let end = first.saturating_add(layers).min(range.end);
+            end.saturating_sub(first.max(range.start))
+        };
+        Self { layers: self.layers.map(within), ..self }
+    }
+}
+
 impl PageInfo {
     /// The height of the layer's bottom, where it is known.
     pub fn z(&self) -> Option<Length> {
@@ -169,6 +183,21 @@ mod tests {
         assert_eq!(info.stray_rows, [1034, 1035]);
         assert_eq!(info.name(), "layer 812 (z 81.20 mm)");
         assert_eq!(info.to_line(), line);
+    }
+
+    #[test]
+    fn a_range_states_how_many_layers_it_has() {
+        let of = |layers, range: Range<u32>| {
+            let stack = StackInfo { layers, ..StackInfo::default() };
+            stack.of_range(100, &range).layers
+        };
+        assert_eq!(of(Some(50), 0..u32::MAX), Some(50));
+        assert_eq!(of(Some(50), 110..120), Some(10));
+        assert_eq!(of(Some(50), 140..200), Some(10));
+        assert_eq!(of(Some(50), 0..100), Some(0));
+        assert_eq!(of(Some(50), 200..300), Some(0));
+        assert_eq!(of(Some(u32::MAX), 90..u32::MAX), Some(u32::MAX - 100));
+        assert_eq!(of(None, 110..120), None);
     }
 
     #[test]

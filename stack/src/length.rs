@@ -151,6 +151,8 @@ impl fmt::Display for Size {
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Dpi(f64);
 
+const METRES_PER_INCH: f64 = 0.0254;
+
 impl Dpi {
     /// A resolution of `dpi` dots per inch, if that is between 1 and 100 000.
     pub fn new(dpi: f64) -> Option<Self> {
@@ -160,6 +162,19 @@ impl Dpi {
     /// Dots per inch.
     pub const fn get(self) -> f64 {
         self.0
+    }
+
+    /// Pixels a metre, to the nearest whole.
+    pub(crate) fn per_metre(self) -> u32 {
+        (self.0 / METRES_PER_INCH).round() as u32
+    }
+
+    /// The resolution that whole pixels a metre stand for: whole dots per inch
+    /// where they would round to it (59055 are 1500 dpi).
+    pub(crate) fn from_per_metre(pixels: u32) -> Option<Self> {
+        let exact = f64::from(pixels) * METRES_PER_INCH;
+        let whole = Self::new(exact.round()).filter(|whole| whole.per_metre() == pixels);
+        whole.or_else(|| Self::new(exact))
     }
 
     /// The distance between two pixel centres, 25.4 mm / dpi.
@@ -243,6 +258,17 @@ mod tests {
         for text in ["4x4", "4in", "x4in", "-4x4in", "0x4in"] {
             assert!(text.parse::<Size>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn whole_resolutions_survive_as_whole_pixels_a_metre() {
+        for dpi in (1..=100_000).map(|dpi| Dpi::new(dpi.into()).unwrap()) {
+            assert_eq!(Dpi::from_per_metre(dpi.per_metre()), Some(dpi));
+        }
+        assert_eq!(Dpi::new(1500.0).unwrap().per_metre(), 59_055);
+        // 203.2 dpi are 8000 pixels a metre.
+        assert_eq!(Dpi::from_per_metre(8000), Dpi::new(203.2));
+        assert_eq!(Dpi::from_per_metre(0), None);
     }
 
     #[test]

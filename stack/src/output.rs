@@ -1,8 +1,8 @@
 //! Where stacks go: a file, a folder of pages, a stream.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::error::StackError;
 use crate::layer::Layer;
@@ -72,10 +72,7 @@ impl Sink {
                 Self::File { pages: PageWriter::new(out, format), temporary }
             }
             Destination::Folder(path) => {
-                if path.exists() && !is_empty_folder(&path) {
-                    return Err(StackError::Exists);
-                }
-                Self::Folder { temporary: FolderBeside::new(&path)?, format, empty: true }
+                Self::Folder { temporary: FolderBeside::over_nothing(&path)?, format, empty: true }
             }
         })
     }
@@ -116,8 +113,4 @@ impl Sink {
         }
         Ok(())
     }
-}
-
-fn is_empty_folder(path: &Path) -> bool {
-    fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
 }

@@ -8,6 +8,8 @@ use std::sync::Mutex;
 
 use tempfile::{Builder, NamedTempFile, TempDir};
 
+use crate::error::StackError;
+
 /// What would remain if the process were ended now.
 static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
@@ -92,12 +94,22 @@ pub(crate) struct FolderBeside {
 }
 
 impl FolderBeside {
-    pub(crate) fn new(path: &Path) -> io::Result<Self> {
+    fn new(path: &Path) -> io::Result<Self> {
         let mut builder = Builder::new();
         set_mode(&mut builder, 0o777);
         let folder = builder.prefix(PREFIX).suffix(".part").tempdir_in(folder_of(path)?)?;
         let registered = Registered::new(folder.path());
         Ok(Self { folder, _registered: registered, path: path.to_owned() })
+    }
+
+    /// A new folder that is to be `path`, where nothing may stand but an
+    /// empty folder.
+    pub(crate) fn over_nothing(path: &Path) -> Result<Self, StackError> {
+        let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+        if path.exists() && !is_empty() {
+            return Err(StackError::Exists);
+        }
+        Ok(Self::new(path)?)
     }
 
     pub(crate) fn path(&self) -> &Path {

@@ -1,12 +1,15 @@
 //! One file a command: its options, and what it does with them.
 
+mod convert;
 mod demo;
 mod dither;
 mod fix;
 mod info;
+mod join;
 mod sample;
 mod show;
 mod slice;
+mod split;
 mod tile;
 
 use clap::{ArgMatches, FromArgMatches, Subcommand};
@@ -24,6 +27,9 @@ pub(crate) enum Command {
     Demo(demo::DemoArgs),
     Info(info::InfoArgs),
     Show(show::ShowArgs),
+    Convert(convert::ConvertArgs),
+    Join(join::JoinArgs),
+    Split(split::SplitArgs),
 }
 
 impl Command {
@@ -48,6 +54,9 @@ impl Command {
             Self::Demo(_) => "demo",
             Self::Info(_) => "info",
             Self::Show(_) => "show",
+            Self::Convert(_) => "convert",
+            Self::Join(_) => "join",
+            Self::Split(_) => "split",
         }
     }
 
@@ -61,6 +70,9 @@ impl Command {
             Self::Demo(args) => demo::run(args, common),
             Self::Info(args) => info::run(args),
             Self::Show(args) => show::run(args),
+            Self::Convert(args) => convert::run(args, common),
+            Self::Join(args) => join::run(args, common),
+            Self::Split(args) => split::run(args, common),
         }
     }
 }

@@ -1,0 +1,65 @@
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+
+use clap::Args;
+use lamp_stack::{Cuts, SplitError, write_split};
+
+use crate::options::{Common, Input};
+use crate::report::Report;
+use crate::stop::Stop;
+use crate::streams::{folder_to_make, format, input_name, read_layers, written_to};
+
+/// Split a stack into files of a range of layers each
+///
+/// Each file is a stack in itself, named after its first and last layer:
+/// `layers_00500-00999.tif`. `lamp join` makes the same bytes of them again.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp split build.tif --every 500 -o ranges/
+  lamp split build.tif --at 500,900 --classic -o ranges/
+  slice blade.stl | fix | lamp split --every 100 -o ranges/
+  lamp join ranges/*.tif -o build.tif")]
+pub(crate) struct SplitArgs {
+    #[command(flatten)]
+    input: Input,
+
+    /// Put N layers into each file; the last takes what is left
+    #[arg(long, value_name = "N", required_unless_present = "at", conflicts_with = "at")]
+    #[arg(value_parser = parse_every)]
+    every: Option<NonZeroU32>,
+
+    /// Start a file with each of these layers
+    #[arg(long, value_name = "LAYER,...", value_delimiter = ',')]
+    at: Vec<u32>,
+
+    /// The folder of files to make; it must not exist, or be empty
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+
+    /// Write classic TIFFs (at most 4 GiB each) instead of BigTIFFs
+    #[arg(long)]
+    classic: bool,
+}
+
+pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Stop> {
+    let cuts = match args.every {
+        Some(layers) => Cuts::Every(layers),
+        None if args.at.is_sorted_by(|a, b| a < b) => Cuts::At(args.at.clone()),
+        None => return Err(Stop::usage("the layers of --at go up: write --at 500,900")),
+    };
+    let folder = folder_to_make(&args.output)?;
+    let report = Report::new("split", common.quiet, true);
+    let layers = read_layers(&args.input, &report)?.inspect(|_| report.layer_done());
+    let written = write_split(layers, &cuts, folder, format(args.classic));
+    written_to(&args.output, written, &report).map_err(|stop| match stop {
+        Stop::Failed(error) if error.is::<SplitError>() => {
+            Stop::Failed(error).at(input_name(&args.input.stack))
+        }
+        stop => stop,
+    })
+}
+
+fn parse_every(text: &str) -> Result<NonZeroU32, String> {
+    text.parse().map_err(|_| format!("`{text}` is not a number of layers: write --every 500"))
+}
