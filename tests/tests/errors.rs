@@ -107,6 +107,19 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("lamp show cube.tif --layer 3 --region 1,2,3 -o x.png", &["is not a region", "X,Y,W,H"]),
         ("lamp show cube.tif --layer 3 --region 96,0,1,1 -o x.png", &["outside", "96 x 81"]),
         ("lamp show cube.tif --layer 3 --region 0,81,1,1 -o x.png", &["outside", "96 x 81"]),
+        ("lamp convert cube.tif --png -o x", &["x: ", "into a folder", "/"]),
+        ("lamp convert cube.tif --png", &["into a folder"]),
+        ("lamp convert cube.tif --png --classic -o x/", &["--classic"]),
+        ("lamp convert cube.tif --classic -o x.png", &["no TIFF"]),
+        ("lamp convert cube.tif --png -o /", &["name the folder"]),
+        ("lamp join -o x.tif", &["<STACK>"]),
+        ("lamp join cube.tif - -o x.tif", &["standard input", "name files"]),
+        ("lamp split cube.tif -o x/", &["--every", "--at"]),
+        ("lamp split cube.tif --every 5 --at 5 -o x/", &["--every", "--at"]),
+        ("lamp split cube.tif --every 0 -o x/", &["`0` is not a number of layers"]),
+        ("lamp split cube.tif --at 9,5 -o x/", &["go up", "--at 500,900"]),
+        ("lamp split cube.tif --every 5", &["--output"]),
+        ("lamp split cube.tif --every 5 -o -", &["name the folder"]),
         ("lamp frobnicate", &["frobnicate"]),
         ("lamp", &["Usage"]),
     ] {
@@ -169,7 +182,16 @@ fn a_part_that_does_not_fit_the_options_is_refused() {
 #[test]
 fn a_stack_that_cannot_be_read_is_named_with_what_is_wrong() {
     let scratch = with_all_sorts();
-    let stages = ["fix", "dither", "tile", "lamp info", "lamp show --layer 0"];
+    let stages = [
+        "fix",
+        "dither",
+        "tile",
+        "lamp info",
+        "lamp show --layer 0",
+        "lamp convert",
+        "lamp join cube.tif",
+        "lamp split --every 5",
+    ];
     for (name, words) in [
         ("missing.tif", &["No such file"][..]),
         ("folder", &["holds no .tif"]),
@@ -195,6 +217,9 @@ fn a_stack_that_does_not_fit_the_options_is_refused() {
         ("fix cube.tif --layers 20.. -o x.tif", &["layer"]),
         ("fix cube.tif --layers 20.. -o x/", &["layer"]),
         ("lamp info cube.tif --layers 20..", &["no layer is in that range"]),
+        ("lamp convert cube.tif --layers 20.. --png -o x/", &["no layer is in that range"]),
+        ("lamp split cube.tif --at 20 -o x/", &["start with layer 20", "layers 0 to 19"]),
+        ("lamp split cube.tif --at 0,5 -o x/", &["start with layer 0"]),
         ("lamp show cube.tif --layer 20 -o x.png", &["no layer 20", "the last is 19"]),
     ] {
         let words = [&["cube.tif: "], words].concat();
@@ -212,11 +237,20 @@ fn an_output_that_cannot_be_written_is_named() {
         "tile cube.tif -o no/x.tif",
         "lamp sample cube -o no/x.stl",
         "lamp show cube.tif --layer 3 -o no/x.png",
+        "lamp convert cube.tif --layers 3 -o no/x.png",
+        "lamp convert cube.tif --png -o no/x/",
+        "lamp join cube.tif -o no/x.tif",
+        "lamp split cube.tif --every 5 -o no/x/",
     ] {
         is_bad_input(&scratch, line, &["no/x", "there is no folder no"]);
     }
-    for line in ["slice cube.stl -o folder", "fix cube.tif -o folder/", "dither cube.tif -o folder"]
-    {
+    for line in [
+        "slice cube.stl -o folder",
+        "fix cube.tif -o folder/",
+        "dither cube.tif -o folder",
+        "lamp convert cube.tif --png -o folder",
+        "lamp split cube.tif --every 5 -o folder",
+    ] {
         is_bad_input(&scratch, line, &["folder", "remove it or choose another name"]);
     }
     // A file cannot become a folder.
@@ -257,10 +291,15 @@ fn gray_layers_are_not_tiled() {
 #[test]
 fn help_and_version_are_no_errors() {
     let scratch = Scratch::new();
-    for name in ["lamp", "slice", "fix", "dither", "tile"] {
+    for name in
+        ["lamp", "slice", "fix", "dither", "tile", "lamp convert", "lamp join", "lamp split"]
+    {
         let help = scratch.run(&format!("{name} --help")).succeeds_quietly();
         let help = String::from_utf8(help.stdout).unwrap();
         assert!(help.contains("Examples:") && help.contains("--quiet"), "{help}");
+        if name.contains(' ') {
+            continue;
+        }
         let version = scratch.run(&format!("{name} --version")).succeeds_quietly();
         let version = String::from_utf8(version.stdout).unwrap();
         assert!(version.trim().ends_with(env!("CARGO_PKG_VERSION")), "{version}");

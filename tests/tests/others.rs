@@ -80,6 +80,30 @@ fn pillow_sees_the_same_pages() {
 }
 
 #[test]
+fn pillow_sees_the_same_pngs() {
+    let (scratch, layers) = with_build();
+    lamp_tests::write_gray_ramp(&scratch.path("ramp.tif"), 256, 3);
+    scratch.run("lamp convert build.tif --png -o pngs/").succeeds_quietly();
+    scratch.run("lamp convert ramp.tif -o ramp.png").succeeds_quietly();
+    // Pages as libtiff decodes them.
+    let script = "\
+        from PIL import Image, ImageSequence\n\
+        def same(png, page, mode):\n    \
+        assert png.mode == page.mode == mode and png.size == page.size\n    \
+        assert png.tobytes() == page.tobytes()\n    \
+        assert [round(dpi, 2) for dpi in png.info['dpi']] == [100, 100]\n    \
+        assert png.text['Description'] == page.tag_v2[270]\n\
+        same(Image.open('ramp.png'), Image.open('ramp.tif'), 'L')\n\
+        pages = 0\n\
+        for page in ImageSequence.Iterator(Image.open('build.tif')):\n    \
+        same(Image.open(f'pngs/layer_{pages:05}.png'), page, '1')\n    \
+        pages += 1\n\
+        print(pages)\n";
+    let Some(pages) = ask_python(&scratch, script) else { return };
+    assert_eq!(pages, format!("{}\n", layers.len()));
+}
+
+#[test]
 fn imagemagick_sees_the_same_pages() {
     let (scratch, layers) = with_build();
     for name in STACKS {

@@ -1,7 +1,7 @@
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use lamp_stack::{Cuts, SplitError, write_split};
 
 use crate::options::{Common, Input};
@@ -14,6 +14,7 @@ use crate::streams::{folder_to_make, format, input_name, read_layers, written_to
 /// Each file is a stack in itself, named after its first and last layer:
 /// `layers_00500-00999.tif`. `lamp join` makes the same bytes of them again.
 #[derive(Args)]
+#[command(group = ArgGroup::new("cuts").required(true))]
 #[command(after_help = "\
 Examples:
   lamp split build.tif --every 500 -o ranges/
@@ -25,12 +26,11 @@ pub(crate) struct SplitArgs {
     input: Input,
 
     /// Put N layers into each file; the last takes what is left
-    #[arg(long, value_name = "N", required_unless_present = "at", conflicts_with = "at")]
-    #[arg(value_parser = parse_every)]
+    #[arg(long, value_name = "N", group = "cuts", value_parser = parse_every)]
     every: Option<NonZeroU32>,
 
     /// Start a file with each of these layers
-    #[arg(long, value_name = "LAYER,...", value_delimiter = ',')]
+    #[arg(long, value_name = "LAYER,...", group = "cuts", value_delimiter = ',')]
     at: Vec<u32>,
 
     /// The folder of files to make; it must not exist, or be empty
