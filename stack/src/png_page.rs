@@ -15,7 +15,11 @@ use crate::tiff::{LARGEST_SIDE, bit_transitions, byte_runs};
 pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
 /// The keyword of the text that is a page's JSON line.
-const DESCRIPTION: &str = "Description";
+pub(crate) const DESCRIPTION: &str = "Description";
+
+/// The key of a PNG's line that is the resolution, where whole pixels a metre
+/// do not tell it.
+pub(crate) const EXACT_DPI: &str = "dpi";
 
 /// What a PNG says of its image.
 pub(crate) struct Header {
@@ -55,12 +59,13 @@ type Rows<'a> = Reader<Cursor<&'a [u8]>>;
 pub(crate) fn header(file: &[u8]) -> Result<Header, PngFault> {
     let (reader, samples) = open(file)?;
     let info = reader.info();
+    let mut line = description(info).and_then(|text| PageInfo::parse(text.as_bytes()));
     Ok(Header {
         width: info.width,
         height: info.height,
         gray: !samples.are_bits(),
-        dpi: dpi(info),
-        info: description(info).and_then(|text| PageInfo::parse(text.as_bytes())),
+        dpi: dpi(info, line.as_mut()),
+        info: line,
     })
 }
 
@@ -182,13 +187,17 @@ fn gray_palette(palette: &[u8]) -> Result<Vec<u8>, PngFault> {
     palette.chunks(3).map(level).collect()
 }
 
-fn dpi(info: &Info<'_>) -> Option<Dpi> {
-    let dims = info.pixel_dims.filter(|dims| dims.unit == Unit::Meter)?;
-    let per_inch = f64::from(dims.xppu) * 0.0254;
-    // Whole pixels a metre say no more than that: 59055 are 1500 dpi.
-    let whole = per_inch.round();
-    let same = (whole / 0.0254).round() == f64::from(dims.xppu);
-    Dpi::new(if same { whole } else { per_inch })
+/// The resolution: whole pixels a metre, or what these were rounded from,
+/// which then goes out of the page's line.
+fn dpi(info: &Info<'_>, line: Option<&mut PageInfo>) -> Option<Dpi> {
+    let pixels = info.pixel_dims.filter(|dims| dims.unit == Unit::Meter)?.xppu;
+    let whole = Dpi::from_per_metre(pixels);
+    let stated = line.and_then(|line| {
+        let dpi = Dpi::new(line.other.get(EXACT_DPI)?.as_f64()?)?;
+        let belongs = dpi.per_metre() == pixels && Some(dpi) != whole;
+        belongs.then(|| line.other.shift_remove(EXACT_DPI)).map(|_| dpi)
+    });
+    stated.or(whole)
 }
 
 /// The text, where it stands before the image data.

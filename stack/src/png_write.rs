@@ -14,6 +14,7 @@ use crate::gray::gray_runs;
 use crate::layer::{Image, Layer};
 use crate::length::Dpi;
 use crate::ordered::map_in_order;
+use crate::png_page::{DESCRIPTION, EXACT_DPI};
 use crate::temporary::FolderBeside;
 
 /// Writes layers as a folder of PNGs, `layer_00812.png` each, encoding them on
@@ -61,7 +62,7 @@ pub fn png_of_layer(layer: &Layer) -> Result<Vec<u8>, StackError> {
     encoder.set_compression(Compression::Fast);
     encoder.set_filter(Filter::Up);
     encoder.set_pixel_dims(layer.dpi.map(pixel_dims));
-    let written = encoder.add_text_chunk("Description".to_owned(), line(layer));
+    let written = encoder.add_text_chunk(DESCRIPTION.to_owned(), line(layer));
     written
         .and_then(|()| match &layer.image {
             Image::Mask(mask) => {
@@ -146,7 +147,7 @@ fn pixel_dims(dpi: Dpi) -> PixelDimensions {
 fn line(layer: &Layer) -> String {
     let mut info = layer.info.clone();
     if let Some(dpi) = layer.dpi.filter(|&dpi| Dpi::from_per_metre(dpi.per_metre()) != Some(dpi)) {
-        info.other.insert("dpi".to_owned(), dpi.get().into());
+        info.other.insert(EXACT_DPI.to_owned(), dpi.get().into());
     }
     let mut line = String::new();
     for c in info.to_line().chars() {

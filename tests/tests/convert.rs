@@ -33,6 +33,8 @@ fn every_shape_goes_back_to_the_same_bytes() {
     scratch.run("lamp convert classic.tif --classic -o classics/").succeeds_quietly();
     assert_eq!(scratch.bytes("classics/layer_00037.tif")[2], 42);
     assert!(scratch.run("lamp convert classics").succeeds_quietly().stdout == build);
+    scratch.run("lamp convert build.tif --png -o pngs/").succeeds_quietly();
+    assert!(scratch.run("lamp convert pngs").succeeds_quietly().stdout == build);
     // A folder of TIFFs may be called what it likes.
     scratch.run("lamp convert build.tif -o odd.png/").succeeds_quietly();
     assert!(scratch.run("lamp convert odd.png").succeeds_quietly().stdout == build);
@@ -104,6 +106,8 @@ fn a_resolution_that_metres_would_lose_stands_in_the_line() {
     assert_eq!(png.per_metre, Some(2844));
     let line = serde_json::to_string(&layer.info).unwrap();
     assert_eq!(png.line, format!("{},\"dpi\":72.25}}", line.strip_suffix('}').unwrap()));
+    let back = scratch.run("lamp convert cube.png").succeeds_quietly().stdout;
+    assert!(back == scratch.bytes("cube.tif"));
 }
 
 #[test]
@@ -114,9 +118,11 @@ fn gray_layers_become_8_bit_pngs() {
     let png = read(scratch.bytes("ramp.PNG"));
     assert_eq!((png.bits, png.line.as_str()), (8, r#"{"layer":0}"#));
     assert_eq!(png.rows, vec![Vec::from_iter(0..=255); 3]);
-    scratch.run("lamp convert ramp.tif -o pages/").succeeds_quietly();
-    let back = scratch.run("lamp convert pages").succeeds_quietly().stdout;
-    assert!(back == scratch.bytes("ramp.tif"));
+    for folder in ["pages/", "pages.png/ --png"] {
+        scratch.run(&format!("lamp convert ramp.tif -o {folder}")).succeeds_quietly();
+        let back = format!("lamp convert {}", folder.trim_end_matches(" --png"));
+        assert!(scratch.run(&back).succeeds_quietly().stdout == scratch.bytes("ramp.tif"));
+    }
 }
 
 #[test]
