@@ -183,7 +183,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{Mask, PageInfo, StackInfo};
+    use crate::{Mask, PageInfo, StackInfo, png_page};
 
     proptest! {
         #[test]
@@ -221,6 +221,23 @@ mod tests {
         let line = line(&layer);
         assert!(line.is_ascii());
         assert_eq!(PageInfo::parse(line.as_bytes()), Some(layer.info));
+    }
+
+    #[test]
+    fn every_resolution_and_line_read_back() {
+        for dpi in [1.0, 72.25, 203.2, 1500.0, 99_999.999] {
+            // What another program may say of its own under the key.
+            for own in [None, Some(0.5), Some(1500.0)] {
+                let mut layer = layer(dpi, "cube");
+                layer.info.other.extend(own.map(|dpi| ("dpi".to_owned(), dpi.into())));
+                let header = png_page::header(&png_of_layer(&layer).unwrap()).unwrap();
+                assert_eq!(header.dpi, layer.dpi);
+                // A page that needs the key for itself takes it.
+                if own.is_none() || dpi.fract() == 0.0 || dpi == 203.2 {
+                    assert_eq!(header.info, Some(layer.info), "{dpi} {own:?}");
+                }
+            }
+        }
     }
 
     #[test]
