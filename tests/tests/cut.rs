@@ -134,6 +134,8 @@ fn a_stage_that_waits_for_its_input_can_be_interrupted() {
     let scratch = Scratch::new();
     let mut fix = scratch.command("fix -o out.tif");
     let mut fix = fix.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // Waiting for the process would close it.
+    let _input = fix.stdin.take();
     // Only a process that has set itself up has a thread for signals.
     let tasks = format!("/proc/{}/task", fix.id());
     while std::fs::read_dir(&tasks).is_ok_and(|tasks| tasks.count() < 2) {
