@@ -1,6 +1,7 @@
 //! Seconds that our codec takes to decode, and to encode, every page of a
 //! stack in memory on one thread: each page the median of five. What
-//! `libtiff.c` is for libtiff.
+//! `libtiff.c` is for libtiff. Every page must first decode alike through
+//! the `fax` crate.
 //!
 //! ```sh
 //! cargo run --release -p lamp-benches --example codec blade.tif
@@ -22,6 +23,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let strips: Vec<_> = masks.iter().map(g4::encode).collect();
+    for (page, (strip, mask)) in strips.iter().zip(&masks).enumerate() {
+        let mut rows = mask.rows();
+        let mut same = true;
+        fax::decoder::decode_g4(strip.iter().copied(), mask.width(), Some(mask.height()), |row| {
+            let row = row.iter().copied().filter(|&column| column < mask.width());
+            same &= rows.next().is_some_and(|ours| row.eq(ours.iter().copied()));
+        })
+        .ok_or("the fax crate cannot decode our strip")?;
+        assert!(same && rows.next().is_none(), "the fax crate decodes page {page} otherwise");
+    }
     println!("transitions {}", masks.iter().map(Mask::transition_count).sum::<usize>());
     let decode = |(strip, mask): (&Vec<u8>, &Mask)| {
         let decoded = g4::decode(strip, mask.width(), mask.height()).expect("our own strip");

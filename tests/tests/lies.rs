@@ -118,9 +118,7 @@ fn streams_without_end() {
 
 fn codes_that_lie() {
     // Four billion rows of four billion pixels.
-    is_cheaply_refused("row 800 is missing", || {
-        Ok(g4::decode(&[0xFF; 100], u32::MAX, u32::MAX)?)
-    });
+    is_cheaply_refused("row 800 is missing", || Ok(g4::decode(&[0xFF; 100], u32::MAX, u32::MAX)?));
 }
 
 fn part_is_refused(path: &Path, words: &str) {

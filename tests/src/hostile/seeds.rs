@@ -5,6 +5,7 @@ use lamp_fixtures::{Defect, Mesh, Part, build, inject, sphere, torus};
 use lamp_slicer::{Model, SliceOptions, Slices};
 use lamp_stack::{
     Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
+    png_of_layer,
 };
 
 /// An input that a fuzz target starts from.
@@ -135,6 +136,59 @@ fn tiff() -> Named {
         ("large.tif", lying(1 << 26, 1 << 26, 24)),
         ("four_gigabytes.tif", lying(20, 8, u32::MAX)),
     ]
+    .into_iter()
+    .chain(foreign())
+    .collect()
+}
+
+/// What only other programs write.
+fn foreign() -> Named {
+    let of = |compression, more: &[(u16, u32)], strip: &[u8]| {
+        let fields = [(256, 20), (257, 8), (259, compression), (262, 0)];
+        classic_tiff(&[&fields[..], more].concat(), strip)
+    };
+    // T.4: an end of line, and a run of 20 pixels; then what stands behind each.
+    let (end, run) = ("000000000001", "0001000");
+    let one = format!("{end}{run}").repeat(8);
+    let two = format!("{end}1{run}{end}01").repeat(4);
+    let rows: Vec<u8> = (0..24u8).map(|byte| byte.wrapping_mul(37)).collect();
+    // zlib: one block as it is, and its Adler sum.
+    let sums = rows.iter().scan(1, |sum, &byte| {
+        *sum += u32::from(byte);
+        Some(*sum)
+    });
+    let adler = (sums.clone().sum::<u32>() % 65_521) << 16 | (sums.last().expect("bytes") % 65_521);
+    let stored = [&[0x78, 1, 1, 24, 0, 231, 255], &rows[..], &adler.to_be_bytes()].concat();
+    // LZW: a code of nine bits for each byte, between a clear and an end.
+    let codes: String = [256]
+        .into_iter()
+        .chain(rows.iter().map(|&byte| u16::from(byte)))
+        .chain([257])
+        .map(|code| format!("{code:09b}"))
+        .collect();
+    let tile =
+        [(256, 16), (257, 9), (259, 1), (262, 1), (322, 16), (323, 16), (324, 200), (325, 32)];
+    let turned = |orientation| of(1, &[(274, orientation)], &rows);
+    let layers = layers(150.0);
+    let png = |layer| png_of_layer(layer).expect("memory takes all");
+    vec![
+        ("huffman.tif", of(2, &[], &bytes(&format!("{run}0").repeat(8)))),
+        ("group3.tif", of(3, &[], &bytes(&one))),
+        ("group3_2d.tif", of(3, &[(292, 1)], &bytes(&two))),
+        ("lzw.tif", of(5, &[], &bytes(&codes))),
+        ("deflate.tif", of(8, &[], &stored)),
+        ("tile.tif", classic_tiff(&tile, &[0x5A; 400])),
+        ("mirrored.tif", turned(2)),
+        ("transposed.tif", turned(5)),
+        ("mask.png", png(&layers[1])),
+        ("gray.png", png(&gray_layer())),
+    ]
+}
+
+/// Bits as bytes, filled up with zeros.
+fn bytes(bits: &str) -> Vec<u8> {
+    let byte = |bits: &[u8]| bits.iter().zip((0..8).rev()).fold(0, |b, (d, i)| b | (d - b'0') << i);
+    bits.as_bytes().chunks(8).map(byte).collect()
 }
 
 /// A classic TIFF of one page and one strip, as other programs write: numbers
