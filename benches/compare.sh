@@ -94,7 +94,7 @@ pipe() { # pipe AREA
         # shellcheck disable=SC2086
         read -r _ _ wall < <(timed 5 $stage -o other.tif) || true
         printf '| `%s` | %.2f s | |\n' "$stage" "$wall"
-        slowest=$(awk -v a="$slowest" -v b="$wall" 'BEGIN {print a > b ? a : b}')
+        slowest=$(awk -v a="$slowest" -v b="$wall" 'BEGIN {print (a > b ? a : b)}')
     done
     read -r _ _ wall < <(timed 5 bash -c "slice blade.stl | fix | dither | tile --area $1 > other.tif") || true
     awk -v w="$wall" -v s="$slowest" -v a="$1" \

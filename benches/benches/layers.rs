@@ -1,7 +1,7 @@
 //! Slicing, encoding and decoding of blade-mould layers, beside the `fax`
 //! crate on the same pixels. Throughput counts transitions.
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use fax::{Color, VecWriter, decoder, encoder};
 use lamp_fixtures::{Part, build};
 use lamp_slicer::{Model, SliceOptions, Slices};
@@ -10,18 +10,26 @@ use lamp_stack::{Image, Mask, g4};
 /// Layers with pins and holes, 1500 dpi.
 const LAYERS: std::ops::Range<u32> = 440..460;
 
-fn slices(facets: usize) -> impl Fn() -> Vec<Mask> {
+fn slices(facets: usize) -> impl Fn() -> Slices {
     let facets = build(Part::Blade, facets).expect("enough facets").facets;
     move || {
         let model = Model::from_facets("blade", facets.clone());
         let options = SliceOptions { layers: Some(LAYERS), ..SliceOptions::default() };
-        let layers = Slices::new(model, &options).expect("the blade slices");
-        let mask = |layer| match layer {
-            Ok(lamp_stack::Layer { image: Image::Mask(mask), .. }) => mask,
-            _ => unreachable!("slices are masks"),
-        };
-        layers.map(mask).collect()
+        Slices::new(model, &options).expect("the blade slices")
     }
+}
+
+fn masks(slices: Slices) -> Vec<Mask> {
+    let mask = |layer| match layer {
+        Ok(lamp_stack::Layer { image: Image::Mask(mask), .. }) => mask,
+        _ => unreachable!("slices are masks"),
+    };
+    slices.map(mask).collect()
+}
+
+fn filled(mut slices: Slices) -> Slices {
+    slices.fill_slab().expect("facets in memory can be read");
+    slices
 }
 
 fn fax_encode(mask: &Mask) -> Vec<u8> {
@@ -41,14 +49,17 @@ fn fax_encode(mask: &Mask) -> Vec<u8> {
 
 fn layers(criterion: &mut Criterion) {
     let slice = slices(100_000);
-    let masks = slice();
+    let masks = masks(slice());
     let transitions: usize = masks.iter().map(Mask::transition_count).sum();
     let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
     let size = (masks[0].width(), masks[0].height());
 
     let mut group = criterion.benchmark_group("blade");
     group.throughput(Throughput::Elements(transitions as u64));
-    group.bench_function("slice", |b| b.iter(&slice));
+    group.bench_function("table", |b| b.iter_batched(&slice, filled, BatchSize::PerIteration));
+    group.bench_function("sort", |b| {
+        b.iter_batched(|| filled(slice()), self::masks, BatchSize::PerIteration);
+    });
     group.bench_function("encode", |b| {
         b.iter(|| masks.iter().map(|mask| g4::encode(mask).len()).sum::<usize>());
     });

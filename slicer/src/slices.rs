@@ -169,8 +169,10 @@ impl Slices {
         self.wanted.len()
     }
 
-    /// Fills the table with the next slab.
-    fn fill_slab(&mut self) -> Result<(), SliceError> {
+    /// Fills the table with the next slab, as the iterator does when it needs
+    /// to. Benchmarks call it, to time the table and the images apart.
+    #[doc(hidden)]
+    pub fn fill_slab(&mut self) -> Result<(), SliceError> {
         let start = self.pending.end;
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;

@@ -8,7 +8,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use lamp_stack::{Mask, MaskBuilder};
+use lamp_stack::Mask;
 use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place};
@@ -112,24 +112,43 @@ impl Table {
         let crossings =
             || self.parts.iter().flat_map(move |lists| &lists[layer - self.layers.start]).copied();
         let (starts, mut places) = sort_by_row(crossings, height);
-        let mut mask = MaskBuilder::new(width);
-        mask.reserve(height as usize, places.len());
+        let mut row_offsets = Vec::with_capacity(starts.len());
+        row_offsets.push(0);
+        let mut transitions = Vec::with_capacity(places.len());
         let mut stray_rows = Vec::new();
-        let mut transitions = Vec::new();
         for (row, ends) in starts.windows(2).enumerate() {
             let places = &mut places[ends[0] as usize..ends[1] as usize];
-            places.sort_unstable();
-            transitions.clear();
-            let balanced = match fill {
-                Fill::EvenOdd => even_odd(places, &mut transitions),
-                Fill::NonZero => non_zero(places, &mut transitions),
-            };
-            if !balanced {
-                stray_rows.push(row as u32);
+            if !places.is_empty() {
+                sort(places);
+                let balanced = match fill {
+                    Fill::EvenOdd => even_odd(places, &mut transitions),
+                    Fill::NonZero => non_zero(places, &mut transitions),
+                };
+                if !balanced {
+                    stray_rows.push(row as u32);
+                }
             }
-            mask.push_row(&transitions).expect("sorted places without pairs increase strictly");
+            row_offsets.push(transitions.len() as u32);
         }
-        (mask.finish(), stray_rows)
+        let mask = Mask::new(width, row_offsets, transitions);
+        (mask.expect("sorted places without pairs increase strictly"), stray_rows)
+    }
+}
+
+/// Sorts the places of a row. Most rows have a few, and need no call.
+#[inline]
+fn sort(places: &mut [Place]) {
+    if places.len() > 16 {
+        return places.sort_unstable();
+    }
+    for end in 1..places.len() {
+        let place = places[end];
+        let mut at = end;
+        while at > 0 && places[at - 1] > place {
+            places[at] = places[at - 1];
+            at -= 1;
+        }
+        places[at] = place;
     }
 }
 
@@ -156,12 +175,13 @@ fn sort_by_row<I: Iterator<Item = Crossing>>(
     (starts, places)
 }
 
-/// Toggles at every place; two at one column cancel. Says whether the number
-/// of places is even.
+/// Adds a row's transitions: it toggles at every place; two at one column
+/// cancel. Says whether the number of places is even.
 #[inline]
 fn even_odd(places: &[Place], transitions: &mut Vec<u32>) -> bool {
+    let start = transitions.len();
     for place in places {
-        if transitions.last() == Some(&place.column()) {
+        if transitions.len() > start && transitions.last() == Some(&place.column()) {
             transitions.pop();
         } else {
             transitions.push(place.column());
@@ -170,8 +190,8 @@ fn even_odd(places: &[Place], transitions: &mut Vec<u32>) -> bool {
     places.len().is_multiple_of(2)
 }
 
-/// Toggles where the winding number leaves or reaches zero. Says whether it
-/// is zero at the end.
+/// Adds a row's transitions: it toggles where the winding number leaves or
+/// reaches zero. Says whether it is zero at the end.
 fn non_zero(places: &[Place], transitions: &mut Vec<u32>) -> bool {
     let mut winding = 0;
     for group in places.chunk_by(|a, b| a.column() == b.column()) {
