@@ -65,9 +65,17 @@ pub fn run_stage(name: &str) -> ExitCode {
 }
 
 fn run(command: &Command, common: &Common) -> Result<(), Stop> {
+    keep_freed_memory();
     clean_up_on_signals()?;
     common.apply()?;
     command.run(common)
+}
+
+/// Lets the allocator keep what one layer frees for the next. GNU's gives freed
+/// memory back to the system from 128 KiB on, and asks for it again, unless it
+/// has seen a larger block come and go: a fifth of a stage's time.
+fn keep_freed_memory() {
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(16 << 20)));
 }
 
 /// Says in one sentence why a command stopped, and turns it into a status.

@@ -119,8 +119,9 @@ impl Page {
     fn decode_mask(&mut self) -> Result<Mask, StackError> {
         let mut mask = MaskBuilder::new(self.width);
         if self.compression == Compression::G4 {
-            // A transition takes about four bits.
-            mask.reserve(0, 2 * self.strip_bytes() as usize);
+            // A row takes a bit at least, a transition about four.
+            let bytes = self.strip_bytes() as usize;
+            mask.reserve(bytes.saturating_mul(8).min(self.layout.page_height as usize), 2 * bytes);
         }
         for (band, rows) in self.bands() {
             if !self.layout.tiled {
