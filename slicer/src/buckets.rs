@@ -230,12 +230,9 @@ mod tests {
                 assert!(found == expected, "slab {slab}");
             }
         }
-        assert!(survey.wants_sorting(&[
-            (0.0, 2.0e3),
-            (2.0e3, 4.0e3),
-            (4.0e3, 6.0e3),
-            (6.0e3, 1e4)
-        ]));
+        let tenths: Vec<_> =
+            (0..10).map(|k| (1e3 * f64::from(k), 1e3 * f64::from(k + 1))).collect();
+        assert!(survey.wants_sorting(&tenths));
         assert!(!survey.wants_sorting(&[(0.0, 1e4)]));
     }
 }

@@ -137,8 +137,8 @@ impl Survey {
             visits += count as f64 * slabs.count() as f64;
             met += count as f64 + heights_um / height_um;
         }
-        // Writing a facet and reading it again costs about as much as two looks.
-        visits - met > 2.0 * facets
+        // Writing a facet and reading it again costs about as much as four looks.
+        visits - met > 4.0 * facets
     }
 
     /// About how many crossings each layer has, with rows `pitch_mm` apart.
