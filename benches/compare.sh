@@ -17,17 +17,18 @@ trap 'rm -rf "$work"' EXIT
 cd "$work"
 PATH=$bin:$PATH
 
-# timed RUNS COMMAND...: median CPU seconds, peak MB and wall seconds
+# timed RUNS COMMAND...: sets cpu, mb and wall to the medians of CPU seconds,
+# peak memory in MB and wall seconds
 timed() {
     local runs=$1
     shift
     for _ in $(seq "$runs"); do
-        /usr/bin/time -f '%U %S %M %e' -o time "$@" >/dev/null 2>&1
+        /usr/bin/time -f '%U %S %M %e' -o time "$@" >/dev/null 2>errors ||
+            { echo "failed: $*" >&2 && cat errors >&2 && exit 1; }
         awk '{print $1 + $2, $3 / 1000, $4}' time
     done >times
-    for column in 1 2 3; do
-        cut -d' ' -f$column times | sort -n | sed -n "$(((runs + 1) / 2))p"
-    done | tr '\n' ' '
+    median() { cut -d' ' -f"$1" times | sort -n | sed -n "$(((runs + 1) / 2))p"; }
+    cpu=$(median 1) mb=$(median 2) wall=$(median 3)
 }
 
 header() { # header TITLE
@@ -40,7 +41,7 @@ row() { # row [-1] NAME COMMAND...
     [ "$1" = -1 ] && { runs=1 && shift; }
     local name=$1 cpu mb wall
     shift
-    read -r cpu mb wall < <(timed $runs "$@") || true
+    timed $runs "$@"
     first=${first:-$cpu}
     awk -v n="$name" -v c="$cpu" -v m="$mb" -v w="$wall" -v f="$first" \
         'BEGIN {printf "| %s | %.2f s | %.2f s | %.0f MB | %.2f |\n", n, c, w, m, c / f}'
@@ -89,14 +90,14 @@ stages() {
 
 # What the pipeline takes beside its slowest stage alone, in wall time.
 pipe() { # pipe AREA
-    local slowest=0 wall
+    local slowest=0 cpu mb wall
     for stage in "slice blade.stl" "fix blade.tif" "dither blade.tif" "tile --area $1 blade.tif"; do
         # shellcheck disable=SC2086
-        read -r _ _ wall < <(timed 5 $stage -o other.tif) || true
+        timed 5 $stage -o other.tif
         printf '| `%s` | %.2f s | |\n' "$stage" "$wall"
         slowest=$(awk -v a="$slowest" -v b="$wall" 'BEGIN {print (a > b ? a : b)}')
     done
-    read -r _ _ wall < <(timed 5 bash -c "slice blade.stl | fix | dither | tile --area $1 > other.tif") || true
+    timed 5 bash -c "slice blade.stl | fix | dither | tile --area $1 > other.tif"
     awk -v w="$wall" -v s="$slowest" -v a="$1" \
         'BEGIN {printf "| `slice blade.stl \\| fix \\| dither \\| tile --area %s` | %.2f s | %.2f |\n", a, w, w / s}'
 }

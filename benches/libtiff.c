@@ -1,5 +1,5 @@
 /* Seconds that libtiff takes to decode, and to encode, every page of a
- * Group 4 stack in memory: the median of five rounds each.
+ * Group 4 stack in memory, each page the median of five.
  *
  *   cc -O2 benches/libtiff.c -ltiff -o libtiff && ./libtiff blade.tif */
 #include <stdio.h>
@@ -37,42 +37,52 @@ static toff_t seek(thandle_t h, toff_t to, int whence) {
 static int no_close(thandle_t h) { (void)h; return 0; }
 static toff_t size(thandle_t h) { (void)h; return end; }
 
+static double median(double *five) {
+    qsort(five, ROUNDS, sizeof *five, by_size);
+    return five[ROUNDS / 2];
+}
+
+static TIFF *open_sink(uint32_t width, uint32_t height) {
+    at = end = 0;
+    TIFF *out = TIFFClientOpen("sink", "w", 0, no_read, sink, seek, no_close, size, 0, 0);
+    TIFFSetField(out, TIFFTAG_IMAGEWIDTH, width);
+    TIFFSetField(out, TIFFTAG_IMAGELENGTH, height);
+    TIFFSetField(out, TIFFTAG_ROWSPERSTRIP, height);
+    TIFFSetField(out, TIFFTAG_BITSPERSAMPLE, 1);
+    TIFFSetField(out, TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(out, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    TIFFSetField(out, TIFFTAG_COMPRESSION, COMPRESSION_CCITTFAX4);
+    return out;
+}
+
 int main(int argc, char **argv) {
-    double decode[ROUNDS], encode[ROUNDS];
     if (argc != 2) return fprintf(stderr, "usage: libtiff STACK\n"), 2;
-    for (int round = 0; round < ROUNDS; round++) {
-        decode[round] = encode[round] = 0;
-        TIFF *in = TIFFOpen(argv[1], "r");
-        if (!in) return 1;
-        uint32_t width, height;
-        TIFFGetField(in, TIFFTAG_IMAGEWIDTH, &width);
-        TIFFGetField(in, TIFFTAG_IMAGELENGTH, &height);
-        tmsize_t bytes = TIFFStripSize(in);
-        void *pixels = malloc(bytes);
-        do {
+    TIFF *in = TIFFOpen(argv[1], "r");
+    if (!in) return 1;
+    uint32_t width, height;
+    TIFFGetField(in, TIFFTAG_IMAGEWIDTH, &width);
+    TIFFGetField(in, TIFFTAG_IMAGELENGTH, &height);
+    tmsize_t bytes = TIFFStripSize(in);
+    void *pixels = malloc(bytes);
+    double decode = 0, encode = 0, five[ROUNDS];
+    do {
+        for (int round = 0; round < ROUNDS; round++) {
             double start = seconds();
             if (TIFFReadEncodedStrip(in, 0, pixels, bytes) != bytes) return 1;
-            decode[round] += seconds() - start;
-
-            at = end = 0;
-            TIFF *out = TIFFClientOpen("sink", "w", 0, no_read, sink, seek, no_close, size, 0, 0);
-            TIFFSetField(out, TIFFTAG_IMAGEWIDTH, width);
-            TIFFSetField(out, TIFFTAG_IMAGELENGTH, height);
-            TIFFSetField(out, TIFFTAG_ROWSPERSTRIP, height);
-            TIFFSetField(out, TIFFTAG_BITSPERSAMPLE, 1);
-            TIFFSetField(out, TIFFTAG_SAMPLESPERPIXEL, 1);
-            TIFFSetField(out, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-            TIFFSetField(out, TIFFTAG_COMPRESSION, COMPRESSION_CCITTFAX4);
-            start = seconds();
+            five[round] = seconds() - start;
+        }
+        decode += median(five);
+        for (int round = 0; round < ROUNDS; round++) {
+            TIFF *out = open_sink(width, height);
+            double start = seconds();
             if (TIFFWriteEncodedStrip(out, 0, pixels, bytes) < 0) return 1;
-            encode[round] += seconds() - start;
+            five[round] = seconds() - start;
             TIFFClose(out);
-        } while (TIFFReadDirectory(in));
-        free(pixels);
-        TIFFClose(in);
-    }
-    qsort(decode, ROUNDS, sizeof *decode, by_size);
-    qsort(encode, ROUNDS, sizeof *encode, by_size);
-    printf("decode %f\nencode %f\n", decode[ROUNDS / 2], encode[ROUNDS / 2]);
+        }
+        encode += median(five);
+    } while (TIFFReadDirectory(in));
+    free(pixels);
+    TIFFClose(in);
+    printf("decode %f\nencode %f\n", decode, encode);
     return 0;
 }

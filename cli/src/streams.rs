@@ -165,6 +165,12 @@ fn destination(path: &Path) -> Result<Destination, Stop> {
     if is_folder(path) {
         return Ok(Destination::Folder(folder_to_make(path)?.to_owned()));
     }
+    if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) {
+        return Err(Stop::usage(format!(
+            "{}: a stack is a TIFF; lamp convert makes PNGs of it",
+            path.display()
+        )));
+    }
     Ok(match open_device(path)? {
         Some(device) => Destination::Stream(Box::new(device)),
         None => Destination::File(behind_links(path)),

@@ -50,15 +50,17 @@ impl Buckets {
     ) -> io::Result<Self> {
         let order = Order::new(planes, slabs);
         let count = order.a_slab * slabs.len();
-        let chunk_bytes = (memory / (rayon::current_num_threads() * count)).clamp(1 << 12, 1 << 18);
+        // As many workers as have room for their chunks.
+        let workers = (memory / (count << 12)).clamp(1, rayon::current_num_threads());
+        let chunk_bytes = (memory / (workers * count)).clamp(1 << 12, 1 << 18);
         let file = tempfile::tempfile()?;
         let buckets = Self { file, chunks: vec![Vec::new(); count], a_slab: order.a_slab };
         let writer = Mutex::new(Writer { buckets, end: 0 });
         let blocks: Vec<usize> = (0..model.model.block_count()).collect();
-        // One piece a thread, so that each fills its chunks.
-        let piece = blocks.len().div_ceil(rayon::current_num_threads()).max(1);
+        let piece = blocks.len().div_ceil(workers).max(1);
         blocks.par_chunks(piece).try_for_each(|blocks| {
-            let mut gathered = vec![Vec::with_capacity(chunk_bytes); count];
+            let mut gathered: Vec<_> =
+                (0..count).map(|_| Vec::with_capacity(chunk_bytes)).collect();
             for &block in blocks {
                 let mut result = Ok(());
                 model.model.for_each_in_block(block, |facet| {

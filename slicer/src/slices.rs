@@ -122,8 +122,8 @@ impl Slices {
     /// Prepares to slice a part.
     ///
     /// # Errors
-    /// Where the part is empty, not finite or 1000 km away, or the images or layers would
-    /// be too many.
+    /// Where the part is empty, not finite or 1000 km away, or the images or
+    /// layers would be too many.
     pub fn new(model: Model, options: &SliceOptions) -> Result<Self, SliceError> {
         let model = PlacedModel::new(model, &options.placement, options.units);
         let survey = Survey::of(&model)?;

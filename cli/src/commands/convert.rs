@@ -68,10 +68,7 @@ impl ConvertArgs {
                 Err(Stop::usage("a PNG is no TIFF: leave --classic out, or name a .tif"))
             }
             (false, _) if named_png => Ok(Shape::Png),
-            (false, true) => Err(Stop::usage(format!(
-                "{}: PNGs go into a folder: put / behind its name",
-                output.display()
-            ))),
+            (false, true) => Err(Stop::usage("PNGs go into a folder: name it, as -o pictures/")),
             (_, false) => Ok(Shape::Tiff),
         }
     }

@@ -12,7 +12,9 @@ use crate::streams::{is_stream, report, write_layers};
 /// Ranges that were made apart, by `slice --layers` and the stages behind it or by `lamp split`,
 /// give the bytes of the stack made at once. They are joined only if they are of one part, size
 /// and resolution, made by the same commands from the same input, and if each starts with the
-/// layer behind the last of the one before it: a build that lacks layers is scrap.
+/// layer behind the last of the one before it: a build that lacks layers is scrap. Whether layers
+/// are missing below the first or above the last, only you can tell: `lamp info` says how many
+/// there are.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

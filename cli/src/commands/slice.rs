@@ -37,7 +37,9 @@ pub(crate) struct SliceArgs {
     layers: Option<Range<u32>>,
 
     /// Memory for the table of crossings and what goes with it, from 16MB up: less means smaller
-    /// slabs of layers [default: a quarter of the machine's, though no more is used than helps]
+    /// slabs of layers [default: a quarter of the machine's, though no more is used than helps]. A
+    /// part whose facets are in no order of height is sorted first, in a temporary file of 36 bytes a
+    /// facet
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 

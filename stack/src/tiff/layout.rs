@@ -31,6 +31,14 @@ impl Layout {
         self.across as u64 * u64::from(self.page_height.div_ceil(self.rows))
     }
 
+    /// More bytes than the pieces take, however they are coded: a pixel never
+    /// takes two, and a row has its ends and fill bits. 4 GiB is the end, since
+    /// an endless stream must have one.
+    pub(super) fn most_bytes(&self) -> u64 {
+        let rows = self.count().saturating_mul(self.rows.into());
+        rows.saturating_mul(2 * u64::from(self.width) + 16).saturating_add(1 << 16).min(4 << 30)
+    }
+
     /// The rows of the page that each strip, or row of tiles, holds.
     pub(super) fn row_ranges(&self) -> impl Iterator<Item = Range<u32>> {
         let (rows, height) = (self.rows, self.page_height);

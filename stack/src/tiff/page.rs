@@ -58,10 +58,19 @@ pub struct Page {
     pub(super) pieces: Vec<Vec<u8>>,
 }
 
+/// Room is made for so many transitions before the codes are read: a strip may
+/// hold fewer than its length promises.
+const MOST_RESERVED: usize = 1 << 20;
+
 impl Held for Page {
     fn bytes(&self) -> usize {
-        // A code of four bits, about what they take, makes four bytes.
-        8 * self.strip_bytes() as usize + 4 * self.layout.page_height as usize
+        // A code of one to four bits makes a transition of four bytes; what is
+        // packed may be anything.
+        let growth = match self.compression {
+            Compression::Lzw | Compression::Deflate | Compression::Png => 64,
+            _ => 16,
+        };
+        growth * self.strip_bytes() as usize + 4 * self.layout.page_height as usize
     }
 }
 
@@ -121,7 +130,10 @@ impl Page {
         if self.compression == Compression::G4 {
             // A row takes a bit at least, a transition about four.
             let bytes = self.strip_bytes() as usize;
-            mask.reserve(bytes.saturating_mul(8).min(self.layout.page_height as usize), 2 * bytes);
+            mask.reserve(
+                bytes.saturating_mul(8).min(self.layout.page_height as usize),
+                (2 * bytes).min(MOST_RESERVED),
+            );
         }
         for (band, rows) in self.bands() {
             if !self.layout.tiled {

@@ -16,8 +16,6 @@ const MOST_ENTRIES: u64 = 4096;
 /// More bytes than any text or table of strips of a page takes. Numbers and
 /// JSON take up to a hundred times their bytes once they are read.
 const LONGEST_VALUE: u64 = 2 << 20;
-/// More bytes than the strips of any page take: an endless stream must end.
-const MOST_STRIP_BYTES: u64 = 4 << 30;
 /// More bytes than any PNG of a page has: an endless stream must end.
 const MOST_PNG_BYTES: u64 = 1 << 30;
 
@@ -202,8 +200,9 @@ impl PageReader {
         let mut page = fields.page()?;
         let mut places: Vec<_> = fields.places(&page.layout)?.into_iter().enumerate().collect();
         let bytes = places.iter().fold(0u64, |sum, (_, (_, length))| sum.saturating_add(*length));
-        if bytes > MOST_STRIP_BYTES {
-            return Err(malformed(self.number, format!("its strips claim {bytes} bytes")));
+        if bytes > page.layout.most_bytes() {
+            let what = format!("its strips claim {bytes} bytes, more than its pixels can take");
+            return Err(malformed(self.number, what));
         }
         page.pieces = vec![Vec::new(); places.len()];
         places.sort_by_key(|(_, (offset, _))| *offset);
