@@ -84,7 +84,7 @@ fn stacks_that_lie(scratch: &Scratch) {
         }
     }
     let fields = [(256, 8), (257, 8), (259, 4), (262, 1), (279, u32::MAX)];
-    stack_is_refused(scratch, "cut off", classic_tiff(&fields, &black));
+    stack_is_refused(scratch, "claim 4294967295 bytes", classic_tiff(&fields, &black));
     let fields = [(256, 8), (257, all), (259, 4), (262, 1), (278, 1)];
     stack_is_refused(
         scratch,
