@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use crate::facet::Facet;
 use crate::model::map;
-use crate::placement::{PlacedFacet, PlacedModel};
+use crate::placement::{PlacedFacet, PlacedModel, heights};
 use crate::planes::Planes;
 use crate::table::Facets;
 
@@ -33,7 +33,7 @@ pub(crate) struct Buckets {
     /// By bucket: where its chunks stand in the file.
     chunks: Vec<Vec<Range<u64>>>,
     /// How many buckets each slab has.
-    a_slab: usize,
+    per_slab: usize,
 }
 
 impl Buckets {
@@ -49,12 +49,12 @@ impl Buckets {
         memory: usize,
     ) -> io::Result<Self> {
         let order = Order::new(planes, slabs);
-        let count = order.a_slab * slabs.len();
+        let count = order.per_slab * slabs.len();
         // As many workers as have room for their chunks.
         let workers = (memory / (count << 12)).clamp(1, rayon::current_num_threads());
         let chunk_bytes = (memory / (workers * count)).clamp(1 << 12, 1 << 18);
         let file = tempfile::tempfile()?;
-        let buckets = Self { file, chunks: vec![Vec::new(); count], a_slab: order.a_slab };
+        let buckets = Self { file, chunks: vec![Vec::new(); count], per_slab: order.per_slab };
         let writer = Mutex::new(Writer { buckets, end: 0 });
         let blocks: Vec<usize> = (0..model.model.block_count()).collect();
         let piece = blocks.len().div_ceil(workers).max(1);
@@ -82,7 +82,7 @@ impl Buckets {
 
     /// The facets of a slab.
     pub(crate) fn of_slab<'a>(&'a self, slab: usize, model: &'a PlacedModel) -> Bucket<'a> {
-        let buckets = &self.chunks[slab * self.a_slab..][..self.a_slab];
+        let buckets = &self.chunks[slab * self.per_slab..][..self.per_slab];
         Bucket { file: &self.file, chunks: buckets.concat(), model }
     }
 }
@@ -92,22 +92,22 @@ struct Order<'a> {
     planes: &'a Planes,
     slabs: &'a [Range<usize>],
     /// How many buckets each slab has.
-    a_slab: usize,
+    per_slab: usize,
     /// The bucket of each layer, from the first slab's first layer on.
     of_layer: Vec<usize>,
 }
 
 impl<'a> Order<'a> {
     fn new(planes: &'a Planes, slabs: &'a [Range<usize>]) -> Self {
-        let a_slab = BUCKETS.div_ceil(slabs.len());
+        let per_slab = BUCKETS.div_ceil(slabs.len());
         let buckets = |(slab, layers): (usize, &Range<usize>)| {
             let count = layers.len();
-            (0..count).map(move |layer| slab * a_slab + layer * a_slab / count)
+            (0..count).map(move |layer| slab * per_slab + layer * per_slab / count)
         };
         Self {
             planes,
             slabs,
-            a_slab,
+            per_slab,
             of_layer: slabs.iter().enumerate().flat_map(buckets).collect(),
         }
     }
@@ -115,17 +115,17 @@ impl<'a> Order<'a> {
     /// Gives the bucket of the lowest layer met in each slab met.
     #[inline]
     fn for_each_bucket(&self, facet: &PlacedFacet, mut each: impl FnMut(usize)) {
-        let [a, b, c] = facet.map(|corner| corner[2]);
-        let met = self.planes.between(a.min(b).min(c), a.max(b).max(c));
+        let (low, high) = heights(facet);
+        let met = self.planes.between(low, high);
         let first = self.slabs[0].start;
         let Some(&bucket) = self.of_layer.get(met.start.saturating_sub(first)) else { return };
         if met.is_empty() || met.end <= first {
             return;
         }
         each(bucket);
-        let slabs_above = self.slabs.iter().enumerate().skip(bucket / self.a_slab + 1);
+        let slabs_above = self.slabs.iter().enumerate().skip(bucket / self.per_slab + 1);
         let met_above = slabs_above.take_while(|(_, layers)| layers.start < met.end);
-        met_above.for_each(|(slab, _)| each(slab * self.a_slab));
+        met_above.for_each(|(slab, _)| each(slab * self.per_slab));
     }
 }
 

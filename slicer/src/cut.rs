@@ -16,7 +16,7 @@
 use std::ops::Range;
 
 use crate::grid::PixelGrid;
-use crate::placement::PlacedFacet;
+use crate::placement::{PlacedFacet, heights};
 use crate::planes::Planes;
 
 /// A crossing of a row: the row in the high half; in the low half the first
@@ -84,8 +84,7 @@ impl Cutter<'_> {
         layers: &Range<usize>,
         lists: &mut [Vec<Crossing>],
     ) -> usize {
-        let [a, b, c] = facet.map(|corner| corner[2]);
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let (low, high) = heights(facet);
         // Most facets of a part in no order lie in another slab.
         if low >= self.planes.z_um(layers.end - 1) || high < self.planes.z_um(layers.start) {
             return 0;

@@ -140,7 +140,7 @@ fn take_verticals(
     let codes = bits.verticals[bits.peek(VERTICALS_BITS)];
     // Behind the last transition stands the row's end, coded once.
     let count = usize::from(codes.count).min(above.len - j + 1);
-    if !alone || narrow as i32 <= -1 || count == 0 {
+    if !alone || narrow >> 31 != 0 || count == 0 {
         return None;
     }
     let moved: &mut [u32; TOGETHER] = row.places.get_mut(row.len..)?.first_chunk_mut()?;
