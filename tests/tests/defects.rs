@@ -166,10 +166,10 @@ fn flipped_facets_are_stray_under_nonzero() {
 }
 
 #[test]
-fn nudged_and_doubled_facets_never_stop_the_pipeline() {
+fn nudged_parted_and_doubled_facets_never_stop_the_pipeline() {
     let scratch = Scratch::new();
-    for defect in ["--defect duplicate --count 40", "--defect nudge --count 40 --by 0.5mm"] {
-        sliced(&scratch, defect);
+    for defect in ["duplicate", "nudge --by 0.5mm", "gap --by 0.5mm"] {
+        sliced(&scratch, &format!("--count 40 --defect {defect}"));
         scratch.run("fix stray.tif | dither | tile -o build.tif").succeeds();
         assert!(masks(&scratch.layers("build.tif")).iter().all(|mask| !ends_white(mask)));
     }

@@ -30,7 +30,8 @@ pub(crate) struct SampleArgs {
     #[arg(long)]
     ascii: bool,
 
-    /// Break the mesh: drop, flip or duplicate facets, or nudge a corner of each
+    /// Break the mesh: drop, flip or duplicate facets, nudge a corner of each, or
+    /// open a gap along an edge of each
     #[arg(long, value_enum)]
     defect: Option<DefectArg>,
 
@@ -42,7 +43,7 @@ pub(crate) struct SampleArgs {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "defect")]
     seed: u64,
 
-    /// How far a nudge moves a corner
+    /// How far a nudge moves a corner, or how wide a gap is
     #[arg(long, value_name = "LENGTH", default_value = "50um", requires = "defect")]
     by: Length,
 
@@ -79,6 +80,7 @@ enum DefectArg {
     Flip,
     Duplicate,
     Nudge,
+    Gap,
 }
 
 pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
@@ -116,6 +118,7 @@ impl SampleArgs {
             DefectArg::Flip => Defect::Flip,
             DefectArg::Duplicate => Defect::Duplicate,
             DefectArg::Nudge => Defect::Nudge { by_mm: self.by.mm() as f32 },
+            DefectArg::Gap => Defect::Gap { by_mm: self.by.mm() as f32 },
         }
     }
 }
