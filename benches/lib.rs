@@ -1,1 +1,5 @@
-//! Benchmarks only: see `benches/layers.rs`, and `README.md` for figures.
+//! What the benches share: breaking a part and slicing it beside the whole one,
+//! and scoring what a correction makes of that. See `README.md` for figures.
+
+pub mod score;
+pub mod sliced;

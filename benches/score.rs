@@ -1,0 +1,169 @@
+//! How near corrected layers come to the part they should show.
+
+use std::ops::AddAssign;
+
+use lamp_stack::{Mask, white_in_row};
+
+/// The classes of bands: the most rows of each. The last takes all wider ones.
+pub const MOST_ROWS: [usize; 4] = [2, 5, 15, usize::MAX];
+
+/// What a correction made of broken layers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Score {
+    /// The broken bands, in the classes of [`MOST_ROWS`].
+    pub bands: [Bands; MOST_ROWS.len()],
+    /// Wrong pixels after the correction in rows that were good before.
+    pub harmed: u64,
+    /// Rows that end white after the correction.
+    pub stray_rows_left: u64,
+}
+
+/// Broken bands of one class. A band is as many neighbouring rows as there are
+/// that all differ from the clean ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Bands {
+    /// How many bands.
+    pub count: u64,
+    /// Their wrong pixels before the correction.
+    pub injected: u64,
+    /// Their wrong pixels after it.
+    pub left: u64,
+}
+
+impl Score {
+    /// Scores one layer: `fixed` is what a correction made of `broken`, which
+    /// should have been `clean`.
+    ///
+    /// # Panics
+    /// If the masks differ in size.
+    pub fn of(clean: &Mask, broken: &Mask, fixed: &Mask) -> Self {
+        let size = |mask: &Mask| (mask.width(), mask.height());
+        assert!([broken, fixed].map(size) == [size(clean); 2], "the masks have one frame");
+        let rows: Vec<_> = clean
+            .rows()
+            .zip(broken.rows())
+            .zip(fixed.rows())
+            .map(|((c, b), f)| [c, b, f])
+            .collect();
+        let is_good = |[clean, broken, _]: &[&[u32]; 3]| clean == broken;
+        let mut score = Self::default();
+        for band in rows.chunk_by(|a, b| is_good(a) == is_good(b)) {
+            let wrong = |which: usize| {
+                band.iter().map(|row| pixels_that_differ(row[0], row[which], clean.width())).sum()
+            };
+            if is_good(&band[0]) {
+                score.harmed += wrong(2);
+            } else {
+                let class = MOST_ROWS.partition_point(|&most| most < band.len());
+                score.bands[class] += Bands { count: 1, injected: wrong(1), left: wrong(2) };
+            }
+        }
+        score.stray_rows_left = fixed.rows().filter(|row| row.len() % 2 == 1).count() as u64;
+        score
+    }
+}
+
+impl AddAssign for Score {
+    fn add_assign(&mut self, other: Self) {
+        self.bands.iter_mut().zip(other.bands).for_each(|(bands, more)| *bands += more);
+        self.harmed += other.harmed;
+        self.stray_rows_left += other.stray_rows_left;
+    }
+}
+
+impl AddAssign for Bands {
+    fn add_assign(&mut self, other: Self) {
+        self.count += other.count;
+        self.injected += other.injected;
+        self.left += other.left;
+    }
+}
+
+/// How many pixels of two rows differ in colour.
+fn pixels_that_differ(a: &[u32], b: &[u32], width: u32) -> u64 {
+    if a == b {
+        return 0;
+    }
+    // Each toggle of either row parts the two or joins them again: of their
+    // exclusive or, these are the transitions, but for empty runs.
+    let mut toggles = [a, b].concat();
+    toggles.sort_unstable();
+    white_in_row(&toggles, width)
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::MaskBuilder;
+
+    use super::*;
+
+    /// `#` is white; all rows as wide as the first.
+    fn picture(rows: &[&str]) -> Mask {
+        let mut mask = MaskBuilder::new(rows[0].len() as u32);
+        for row in rows {
+            let black_before = format!(".{row}");
+            let pairs = black_before.as_bytes().windows(2).zip(0..);
+            let toggles: Vec<u32> =
+                pairs.filter(|(pair, _)| pair[0] != pair[1]).map(|(_, column)| column).collect();
+            mask.push_row(&toggles).unwrap();
+        }
+        mask.finish()
+    }
+
+    fn bands(count: u64, injected: u64, left: u64) -> Bands {
+        Bands { count, injected, left }
+    }
+
+    #[test]
+    fn wrong_pixels_are_told_apart_by_where_they_are() {
+        let clean = picture(&["..##..", "..##..", "..##..", ".####.", "......"]);
+        let broken = picture(&["..####", "..##..", "..##..", ".#####", "..#..."]);
+        // Row 0 is half mended, row 1 spoiled, row 3 still ends white.
+        let fixed = picture(&["..###.", ".###..", "..##..", ".#####", "......"]);
+        let score = Score::of(&clean, &broken, &fixed);
+        let none = Bands::default();
+        let expected = Score {
+            bands: [bands(2, 2 + 2, 1 + 1), none, none, none],
+            harmed: 1,
+            stray_rows_left: 1,
+        };
+        assert_eq!(score, expected);
+    }
+
+    #[test]
+    fn bands_are_classed_by_their_rows() {
+        for (rows, class) in [(1, 0), (2, 0), (3, 1), (5, 1), (6, 2), (15, 2), (16, 3), (40, 3)] {
+            let good = vec!["##.."; 3];
+            let clean = picture(&[good.clone(), vec!["##.."; rows], good.clone()].concat());
+            let broken = picture(&[good.clone(), vec!["####"; rows], good].concat());
+            let mut expected = Score { stray_rows_left: rows as u64, ..Score::default() };
+            expected.bands[class] = bands(1, 2 * rows as u64, 2 * rows as u64);
+            assert_eq!(Score::of(&clean, &broken, &broken), expected);
+            expected.bands[class].left = 0;
+            expected.stray_rows_left = 0;
+            assert_eq!(Score::of(&clean, &broken, &clean), expected);
+        }
+    }
+
+    #[test]
+    fn scores_add_up() {
+        let clean = picture(&["##..", "##.."]);
+        let broken = picture(&["##..", "###."]);
+        let mut score = Score::of(&clean, &broken, &broken);
+        score += Score::of(&clean, &broken, &picture(&["....", "###."]));
+        assert_eq!(score.bands[0], bands(2, 2, 2));
+        assert_eq!((score.harmed, score.stray_rows_left), (2, 0));
+    }
+
+    #[test]
+    fn rows_differ_where_one_alone_is_white() {
+        let differ = |a: &str, b: &str| {
+            let (a, b) = (picture(&[a]), picture(&[b]));
+            pixels_that_differ(a.row(0), b.row(0), a.width())
+        };
+        assert_eq!(differ("..##..", "..##.."), 0);
+        assert_eq!(differ("..####", "......"), 4);
+        assert_eq!(differ("#.#.##", "##.###"), 3);
+        assert_eq!(differ("..##..", "##..##"), 6);
+    }
+}
