@@ -1,0 +1,125 @@
+//! How well corrections mend the layers of broken parts: each part is broken
+//! by each defect and three seeds, and what each method makes of it is held
+//! against the whole part. One Markdown table a method; wrong pixels left are a
+//! share of those that the defects brought into bands so wide.
+//!
+//! ```sh
+//! cargo run --release -p lamp-benches --example repair
+//! ```
+
+use std::convert::Infallible;
+use std::error::Error;
+use std::ops::RangeInclusive;
+use std::time::{Duration, Instant};
+
+use lamp_benches::score::{Bands, Score};
+use lamp_benches::sliced::{Layers, broken, mask, slice};
+use lamp_fixtures::{Defect, Part, build};
+use lamp_postprocess::fix;
+use lamp_slicer::{Fill, SliceOptions};
+
+const PARTS: [(Part, usize); 5] = [
+    (Part::Blade, 24_000),
+    (Part::Blade, 750_000),
+    (Part::Tower, 20_000),
+    (Part::Torus, 20_000),
+    (Part::Sphere, 20_000),
+];
+
+/// One facet of so many is broken.
+const FACETS_PER_DEFECT: usize = 1000;
+const GAPS_PIXELS: [f32; 5] = [0.1, 0.5, 1.0, 2.0, 5.0];
+const SEEDS: RangeInclusive<u32> = 1..=3;
+
+type Method = fn(Layers) -> Layers;
+
+/// The methods to compare.
+const METHODS: [(&str, Method); 1] = [("nearest", |layers| {
+    let Ok(fixed) = fix(layers.into_iter().map(Ok::<_, Infallible>), |_, _| ()).collect();
+    fixed
+})];
+
+const HEADING: &str = "\
+| part | defect | bands of 1-2 rows | 3-5 | 6-15 | more | wrong pixels left in 1-2 rows | 3-5 | 6-15 | more \
+| stray rows left | pixels harmed | time a layer |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut tables = METHODS.map(|(name, _)| format!("### {name}\n\n{HEADING}\n"));
+    for (part, facets) in PARTS {
+        let whole = build(part, facets)?;
+        let count = facets / FACETS_PER_DEFECT;
+        for (defect_name, defect, fill) in defects() {
+            let options = SliceOptions { fill, ..SliceOptions::default() };
+            let (clean, frame) = slice(&whole, &options)?;
+            let options = SliceOptions { frame, ..options };
+            let mut results = METHODS.map(|_| Outcome::default());
+            for seed in SEEDS {
+                let (stray, _) = slice(&broken(&whole, defect, count, seed), &options)?;
+                for (result, (_, method)) in results.iter_mut().zip(METHODS) {
+                    result.add(&clean, &stray, method);
+                }
+            }
+            for (table, result) in tables.iter_mut().zip(results) {
+                let cells = result.cells();
+                *table +=
+                    &format!("| {} {}k | {defect_name} |{cells}\n", part.name(), facets / 1000);
+            }
+        }
+    }
+    println!("{}", tables.join("\n"));
+    Ok(())
+}
+
+/// The defects, and the filling under which each shows: flipped facets change
+/// nothing under even-odd.
+fn defects() -> Vec<(String, Defect, Fill)> {
+    let pixel_mm = SliceOptions::default().dpi.pitch().mm() as f32;
+    let gap = |pixels| {
+        let defect = Defect::Gap { by_mm: pixels * pixel_mm };
+        (format!("gap, {pixels} px"), defect, Fill::EvenOdd)
+    };
+    let others = [
+        ("drop".to_owned(), Defect::Drop, Fill::EvenOdd),
+        ("duplicate".to_owned(), Defect::Duplicate, Fill::EvenOdd),
+        ("flip, non-zero".to_owned(), Defect::Flip, Fill::NonZero),
+    ];
+    GAPS_PIXELS.map(gap).into_iter().chain(others).collect()
+}
+
+/// What a method made of a part with a defect, over all seeds.
+#[derive(Clone, Copy, Default)]
+struct Outcome {
+    score: Score,
+    time: Duration,
+    layers: u32,
+}
+
+impl Outcome {
+    fn add(&mut self, clean: &Layers, stray: &Layers, method: Method) {
+        let input = stray.clone();
+        let start = Instant::now();
+        let fixed = method(input);
+        self.time += start.elapsed();
+        assert_eq!(fixed.len(), clean.len(), "no layer is lost");
+        self.layers += clean.len() as u32;
+        for ((clean, stray), fixed) in clean.iter().zip(stray).zip(&fixed) {
+            self.score += Score::of(mask(clean), mask(stray), mask(fixed));
+        }
+    }
+
+    /// The cells of its line under [`HEADING`], after the names.
+    fn cells(&self) -> String {
+        let Score { bands, harmed, stray_rows_left } = self.score;
+        let count = |bands: Bands| format!(" {} |", bands.count);
+        let left = |bands: Bands| match bands {
+            Bands { injected: 0, .. } => " |".to_owned(),
+            Bands { injected, left, .. } => {
+                format!(" {:.2} % |", 100.0 * left as f64 / injected as f64)
+            }
+        };
+        let (counts, left) = (bands.map(count).concat(), bands.map(left).concat());
+        let ms = self.time.as_secs_f64() * 1e3 / f64::from(self.layers);
+        format!("{counts}{left} {stray_rows_left} | {harmed} | {ms:.3} ms |")
+    }
+}
