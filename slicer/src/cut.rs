@@ -15,9 +15,11 @@
 
 use std::ops::Range;
 
+use crate::ends::EndSum;
 use crate::grid::PixelGrid;
 use crate::placement::{PlacedFacet, heights};
 use crate::planes::Planes;
+use crate::table::Fill;
 
 /// A crossing of a row: the row in the high half; in the low half the first
 /// column whose centre is past it, and in the lowest bit the direction in
@@ -60,11 +62,34 @@ impl Place {
     }
 }
 
-/// Cuts facets into crossings.
+/// Cuts facets into segments, and these into crossings.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cutter<'a> {
     pub(crate) grid: &'a PixelGrid,
     pub(crate) planes: &'a Planes,
+    pub(crate) fill: Fill,
+}
+
+/// What a worker finds of a layer.
+#[derive(Debug, Default)]
+pub(crate) struct Share {
+    pub(crate) crossings: Vec<Crossing>,
+    pub(crate) ends: EndSum,
+}
+
+impl Share {
+    /// Empties it; the list keeps its memory.
+    pub(crate) fn clear(&mut self) {
+        self.crossings.clear();
+        self.ends = EndSum::default();
+    }
+}
+
+/// A facet's section with a plane, between two points in pixels: with the part
+/// on its left, as seen from above, where the facet faces outwards.
+pub(crate) struct Segment {
+    pub(crate) start: [f64; 2],
+    pub(crate) end: [f64; 2],
 }
 
 /// A corner: x and y in pixels, z in micrometres.
@@ -75,25 +100,41 @@ struct Corner {
 }
 
 impl Cutter<'_> {
-    /// Adds the facet's crossings in `layers` to the lists of those layers, and
-    /// says how many there are.
+    /// Adds the facet's crossings in `layers` to the shares of those layers,
+    /// and says how many there are.
     #[inline]
     pub(crate) fn cut(
         &self,
         facet: &PlacedFacet,
         layers: &Range<usize>,
-        lists: &mut [Vec<Crossing>],
+        shares: &mut [Share],
     ) -> usize {
+        let mut count = 0;
+        self.for_each_segment(facet, layers, |layer, segment| {
+            let share = &mut shares[layer - layers.start];
+            share.ends.add(segment.start, segment.end, self.fill);
+            count += self.cross_rows(segment.start, segment.end, &mut share.crossings);
+        });
+        count
+    }
+
+    /// Gives the facet's segments in `layers`, from below.
+    #[inline]
+    pub(crate) fn for_each_segment(
+        &self,
+        facet: &PlacedFacet,
+        layers: &Range<usize>,
+        mut each: impl FnMut(usize, Segment),
+    ) {
         let (low, high) = heights(facet);
         // Most facets of a part in no order lie in another slab.
         if low >= self.planes.z_um(layers.end - 1) || high < self.planes.z_um(layers.start) {
-            return 0;
+            return;
         }
         let met = self.planes.between(low, high);
         let met = met.start.max(layers.start)..met.end.min(layers.end);
-        let mut count = 0;
         if met.is_empty() {
-            return count;
+            return;
         }
         let ([low, middle, high], odd) = self.sorted_corners(facet);
         // The longest edge in z is crossed by every plane met, the other two
@@ -107,11 +148,11 @@ impl Cutter<'_> {
             let short = Edge::new(from, to);
             for layer in met {
                 let z_um = self.planes.z_um(layer);
-                let list = &mut lists[layer - layers.start];
-                count += self.cross_rows(long.at(z_um), short.at(z_um), odd, list);
+                let (long, short) = (long.at(z_um), short.at(z_um));
+                let (start, end) = if odd { (short, long) } else { (long, short) };
+                each(layer, Segment { start, end });
             }
         }
-        count
     }
 
     /// The corners from the lowest to the highest, and whether putting them
@@ -136,13 +177,10 @@ impl Cutter<'_> {
     /// Adds the crossings of rows with a segment between two points of a
     /// plane, in pixels.
     #[inline]
-    fn cross_rows(&self, a: [f64; 2], b: [f64; 2], odd: bool, list: &mut Vec<Crossing>) -> usize {
-        let down = a[1] < b[1];
-        let (upper, lower) = if down { (a, b) } else { (b, a) };
-        let rising = down != odd;
-        // A point is past the rows whose centre is at or below it.
-        let (first, end) =
-            (ceil_clamped(upper[1], self.grid.height), ceil_clamped(lower[1], self.grid.height));
+    fn cross_rows(&self, start: [f64; 2], end: [f64; 2], list: &mut Vec<Crossing>) -> usize {
+        let rising = start[1] < end[1];
+        let (upper, lower) = if rising { (start, end) } else { (end, start) };
+        let (first, end) = (self.first_row(upper), self.first_row(lower));
         if first >= end {
             return 0;
         }
@@ -154,6 +192,13 @@ impl Cutter<'_> {
             Crossing::new(row, ceil_clamped(x, last), rising)
         }));
         (end - first) as usize
+    }
+
+    /// The first row that a point in pixels is past: whose centre is at or
+    /// below it.
+    #[inline]
+    pub(crate) fn first_row(&self, point: [f64; 2]) -> u32 {
+        ceil_clamped(point[1], self.grid.height)
     }
 }
 

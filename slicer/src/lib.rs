@@ -34,6 +34,7 @@
 mod ascii;
 mod buckets;
 mod cut;
+mod ends;
 mod error;
 mod facet;
 mod grid;

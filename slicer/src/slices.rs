@@ -16,7 +16,7 @@ use crate::model::Model;
 use crate::placement::{PlacedFacet, PlacedModel, Placement};
 use crate::planes::{PlaneRule, Planes};
 use crate::survey::Survey;
-use crate::table::{Facets, Fill, Table};
+use crate::table::{Facets, Fill, Section, Table};
 
 /// How a part is sliced.
 #[derive(Clone, Debug)]
@@ -176,7 +176,7 @@ impl Slices {
         let start = self.pending.end;
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;
-        let cutter = Cutter { grid: &self.grid, planes: &self.planes };
+        let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
         loop {
             let layers = start..end;
             let fits = if let Some(buckets) = &self.buckets {
@@ -204,10 +204,10 @@ impl Slices {
         let batch = self.pending.start..end;
         self.pending.start = end;
         let layer = |layer| {
-            let (mask, stray_rows) =
+            let Section { mask, stray_rows, closed } =
                 self.table.layer(layer, self.grid.width, self.grid.height, self.fill);
             Layer {
-                info: self.page_info(layer, stray_rows),
+                info: PageInfo { closed: Some(closed), stray_rows, ..self.page_info(layer) },
                 dpi: Some(self.grid.dpi),
                 image: Image::Mask(mask),
             }
@@ -223,7 +223,8 @@ impl Slices {
         (table / row_offsets).clamp(1, 16 * rayon::current_num_threads())
     }
 
-    fn page_info(&self, layer: usize, stray_rows: Vec<u32>) -> PageInfo {
+    /// What is known of a layer before it is cut.
+    fn page_info(&self, layer: usize) -> PageInfo {
         let stack = StackInfo {
             part: self.model.model.name().to_owned(),
             digest: self.model.model.digest().to_owned(),
@@ -235,7 +236,6 @@ impl Slices {
             z_um: Some(self.planes.layer_bottom_um(layer)),
             thickness_um: Some(self.planes.thickness_um()),
             origin_mm: Some(self.grid.origin_mm),
-            stray_rows,
             stack: (layer == self.wanted.start).then_some(stack),
             ..PageInfo::default()
         }

@@ -11,7 +11,8 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use lamp_stack::Mask;
 use rayon::prelude::*;
 
-use crate::cut::{Crossing, Cutter, Place};
+use crate::cut::{Crossing, Cutter, Place, Share};
+use crate::ends::EndSum;
 use crate::placement::PlacedFacet;
 
 /// What is inside.
@@ -37,9 +38,18 @@ pub(crate) trait Facets: Sync {
 #[derive(Debug, Default)]
 pub(crate) struct Table {
     layers: Range<usize>,
-    /// One table a worker, one list a layer in each. Lists keep their memory
-    /// from slab to slab.
-    parts: Vec<Vec<Vec<Crossing>>>,
+    /// What each worker found of each layer. Lists keep their memory from slab
+    /// to slab.
+    parts: Vec<Vec<Share>>,
+}
+
+/// What a layer's crossings make.
+pub(crate) struct Section {
+    pub(crate) mask: Mask,
+    /// The rows whose crossings do not balance.
+    pub(crate) stray_rows: Vec<u32>,
+    /// Whether every contour closes.
+    pub(crate) closed: bool,
 }
 
 /// How many crossings all workers may make together.
@@ -79,9 +89,9 @@ impl Table {
         self.parts.resize_with(rayon::current_num_threads(), Vec::new);
         let budget = Budget { used: AtomicUsize::new(0), most, must_fit: layers.len() > 1 };
         let next = AtomicUsize::new(0);
-        self.parts.par_iter_mut().try_for_each(|lists| -> io::Result<()> {
-            lists.iter_mut().for_each(Vec::clear);
-            lists.resize_with(lists.len().max(layers.len()), Vec::new);
+        self.parts.par_iter_mut().try_for_each(|shares| -> io::Result<()> {
+            shares.iter_mut().for_each(Share::clear);
+            shares.resize_with(shares.len().max(layers.len()), Share::default);
             let mut unclaimed = 0;
             loop {
                 let piece = next.fetch_add(1, Relaxed);
@@ -90,7 +100,7 @@ impl Table {
                 }
                 facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
-                        unclaimed += cutter.cut(facet, &layers, lists);
+                        unclaimed += cutter.cut(facet, &layers, shares);
                         budget.claim(&mut unclaimed);
                     }
                 })?;
@@ -100,17 +110,11 @@ impl Table {
         Ok(!budget.is_spent())
     }
 
-    /// The image of a layer of the slab, and the rows whose crossings do not
-    /// balance.
-    pub(crate) fn layer(
-        &self,
-        layer: usize,
-        width: u32,
-        height: u32,
-        fill: Fill,
-    ) -> (Mask, Vec<u32>) {
-        let crossings =
-            || self.parts.iter().flat_map(move |lists| &lists[layer - self.layers.start]).copied();
+    /// A layer of the slab.
+    pub(crate) fn layer(&self, layer: usize, width: u32, height: u32, fill: Fill) -> Section {
+        let shares = || self.parts.iter().map(|shares| &shares[layer - self.layers.start]);
+        let crossings = || shares().flat_map(|share| &share.crossings).copied();
+        let ends = shares().fold(EndSum::default(), |sum, share| sum.joined(share.ends, fill));
         let (starts, mut places) = sort_by_row(crossings, height);
         let mut row_offsets = Vec::with_capacity(starts.len());
         row_offsets.push(0);
@@ -131,7 +135,11 @@ impl Table {
             row_offsets.push(transitions.len() as u32);
         }
         let mask = Mask::new(width, row_offsets, transitions);
-        (mask.expect("sorted places without pairs increase strictly"), stray_rows)
+        Section {
+            mask: mask.expect("sorted places without pairs increase strictly"),
+            stray_rows,
+            closed: ends.is_closed(),
+        }
     }
 }
 

@@ -90,6 +90,10 @@ pub struct PageInfo {
     /// How long the layer is exposed, in milliseconds.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
     pub exposure_ms: Option<f64>,
+    /// Whether every contour of the layer's section closes, where the slicer
+    /// knows. One that does not may still leave every row balanced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed: Option<bool>,
     /// Rows whose crossings did not balance, increasing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stray_rows: Vec<u32>,
@@ -176,11 +180,11 @@ mod tests {
 
     #[test]
     fn the_line_of_the_format_reads_and_writes_back() {
-        let line = r#"{"layer":812,"z_um":81200,"thickness_um":100,"origin_mm":[-1.016934,77.216934],"exposure_ms":136.7,"stray_rows":[1034,1035],"who":{"knows":[1,null]}}"#;
+        let line = r#"{"layer":812,"z_um":81200,"thickness_um":100,"origin_mm":[-1.016934,77.216934],"exposure_ms":136.7,"closed":false,"stray_rows":[1034,1035],"who":{"knows":[1,null]}}"#;
         let info = PageInfo::parse(line.as_bytes()).unwrap();
         assert_eq!(info.index, 812);
         assert_eq!(info.z(), Some(Length::from_mm(81.2)));
-        assert_eq!(info.stray_rows, [1034, 1035]);
+        assert_eq!((info.closed, &info.stray_rows[..]), (Some(false), &[1034, 1035][..]));
         assert_eq!(info.name(), "layer 812 (z 81.20 mm)");
         assert_eq!(info.to_line(), line);
     }

@@ -1,6 +1,7 @@
 //! Whole parts through the slicer: against closed forms, against a slow
 //! obvious twin, and against the rules that the layers keep.
 
+mod closed;
 mod closed_forms;
 mod common;
 mod even_rows;

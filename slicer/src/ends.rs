@@ -1,0 +1,129 @@
+//! Whether a layer's contours close, without linking them.
+//!
+//! Every contour is a chain of segments, and closes when each of its points
+//! ends as many of them as it should: an even number under the even-odd rule;
+//! as many as it starts where the facets' orientation counts. Equal points
+//! have equal bits (see `cut.rs`), so that a sum over hashes of the points is
+//! zero when all do, in whatever order it is taken, and some other of 2^64
+//! values otherwise.
+
+use crate::table::Fill;
+
+/// The sum over the ends of a layer's segments.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct EndSum(u64);
+
+impl EndSum {
+    /// Adds a segment's ends.
+    #[inline]
+    pub(crate) fn add(&mut self, start: [f64; 2], end: [f64; 2], fill: Fill) {
+        let (start, end) = (hash(start), hash(end));
+        self.0 = match fill {
+            Fill::EvenOdd => self.0 ^ start ^ end,
+            Fill::NonZero => self.0.wrapping_add(start).wrapping_sub(end),
+        };
+    }
+
+    /// The sum over the segments of both.
+    pub(crate) fn joined(self, other: Self, fill: Fill) -> Self {
+        Self(match fill {
+            Fill::EvenOdd => self.0 ^ other.0,
+            Fill::NonZero => self.0.wrapping_add(other.0),
+        })
+    }
+
+    /// Whether every contour closes.
+    pub(crate) fn is_closed(self) -> bool {
+        self == Self::default()
+    }
+}
+
+/// The bits of a point; those of 0 and -0 are the same.
+#[inline]
+pub(crate) fn bits(point: [f64; 2]) -> [u64; 2] {
+    point.map(|coordinate| (coordinate + 0.0).to_bits())
+}
+
+/// A number that tells points apart: the halves of a product of both
+/// coordinates' bits, one over the other. No sum of a few such numbers is zero
+/// because of the way their points lie, such as at the corners of a rectangle.
+#[inline]
+fn hash(point: [f64; 2]) -> u64 {
+    // Whole numbers end in zeros. These bits, of pi, do not.
+    const PI: [u64; 2] = [0x243f_6a88_85a3_08d3, 0xa409_3822_299f_31d1];
+    let [x, y] = bits(point);
+    let product = u128::from(x ^ PI[0]) * u128::from(y ^ PI[1]);
+    product as u64 ^ (product >> 64) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sum(segments: &[[[f64; 2]; 2]], fill: Fill) -> EndSum {
+        let mut sum = EndSum::default();
+        segments.iter().for_each(|&[start, end]| sum.add(start, end, fill));
+        sum
+    }
+
+    /// A contour around a square of points that are not binary fractions.
+    fn square(side: f64) -> [[[f64; 2]; 2]; 4] {
+        let [a, b, c, d] = [[0.1, 0.2], [side, 0.2], [side, side], [0.1, side]];
+        [[a, b], [b, c], [c, d], [d, a]]
+    }
+
+    #[test]
+    fn a_contour_is_closed_until_a_segment_is_missing_or_comes_twice() {
+        for fill in [Fill::EvenOdd, Fill::NonZero] {
+            for segments in [&square(7.3)[..], &[square(7.3), square(-2.1)].concat()] {
+                assert!(sum(segments, fill).is_closed());
+                for k in 0..segments.len() {
+                    let missing = [&segments[..k], &segments[k + 1..]].concat();
+                    let twice = [segments, &segments[k..=k]].concat();
+                    assert!(!sum(&missing, fill).is_closed() && !sum(&twice, fill).is_closed());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn only_the_nonzero_rule_sees_a_segment_turned_round() {
+        let mut segments = square(7.3);
+        segments[1].reverse();
+        assert!(sum(&segments, Fill::EvenOdd).is_closed());
+        assert!(!sum(&segments, Fill::NonZero).is_closed());
+        segments.iter_mut().for_each(|segment| segment.reverse());
+        segments[1].reverse();
+        assert!(sum(&segments, Fill::NonZero).is_closed());
+    }
+
+    #[test]
+    fn the_sign_of_zero_and_the_share_of_a_worker_do_not_matter() {
+        for fill in [Fill::EvenOdd, Fill::NonZero] {
+            let there = sum(&[[[0.0, 1.0], [3.0, -0.0]]], fill);
+            let back = sum(&[[[3.0, 0.0], [-0.0, 1.0]]], fill);
+            assert!(!there.is_closed() && !back.is_closed());
+            assert!(there.joined(back, fill).is_closed());
+        }
+    }
+
+    /// Neighbouring whole numbers differ in one bit, and their points lie on a
+    /// grid whose rectangles must not cancel.
+    #[test]
+    fn points_of_a_grid_have_hashes_without_pattern() {
+        let points = (0..100).flat_map(|x| (0..100).map(move |y| [f64::from(x), f64::from(y)]));
+        let mut hashes: Vec<_> = points.map(hash).collect();
+        let at = |x: usize, y: usize| hashes[100 * x + y];
+        for (x, y) in (1..100).flat_map(|x| (1..100).map(move |y| (x, y))) {
+            let [a, b, c, d] = [at(0, 0), at(x, 0), at(0, y), at(x, y)];
+            assert_ne!(a ^ b ^ c ^ d, 0);
+            assert_ne!(a.wrapping_add(d), b.wrapping_add(c));
+        }
+        for bit in 0..64 {
+            let ones = hashes.iter().filter(|&hash| hash >> bit & 1 == 1).count();
+            assert!((4_500..5_500).contains(&ones), "bit {bit} is set in {ones}");
+        }
+        hashes.sort_unstable();
+        assert!(hashes.is_sorted_by(|a, b| a < b));
+    }
+}
