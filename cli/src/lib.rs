@@ -12,6 +12,7 @@ mod report;
 mod signals;
 mod stop;
 mod streams;
+mod trace;
 
 use std::process::ExitCode;
 

@@ -85,18 +85,31 @@ impl Share {
     }
 }
 
-/// A facet's section with a plane, between two points in pixels: with the part
-/// on its left, as seen from above, where the facet faces outwards.
+/// A facet's section with a plane. Where the facet faces outwards, and the
+/// segment goes from its start to its end, the part is on its left, as seen
+/// from above.
 pub(crate) struct Segment {
-    pub(crate) start: [f64; 2],
-    pub(crate) end: [f64; 2],
+    pub(crate) ends: [End; 2],
+    /// Whether the second end is the start.
+    pub(crate) turned: bool,
 }
 
-/// A corner: x and y in pixels, z in micrometres.
+/// An end of a segment.
+#[derive(Clone, Copy)]
+pub(crate) struct End {
+    /// In pixels.
+    pub(crate) at: [f64; 2],
+    /// Which corners of the facet its edge joins.
+    pub(crate) edge: [u8; 2],
+}
+
+/// A corner: x and y in pixels, z in micrometres, and which of its facet's it
+/// is.
 #[derive(Clone, Copy)]
 struct Corner {
     pixels: [f64; 2],
     z_um: f64,
+    number: u8,
 }
 
 impl Cutter<'_> {
@@ -112,8 +125,9 @@ impl Cutter<'_> {
         let mut count = 0;
         self.for_each_segment(facet, layers, |layer, segment| {
             let share = &mut shares[layer - layers.start];
-            share.ends.add(segment.start, segment.end, self.fill);
-            count += self.cross_rows(segment.start, segment.end, &mut share.crossings);
+            let [a, b] = segment.ends.map(|end| end.at);
+            share.ends.add(a, b, segment.turned, self.fill);
+            count += self.cross_rows(a, b, segment.turned, &mut share.crossings);
         });
         count
     }
@@ -148,9 +162,8 @@ impl Cutter<'_> {
             let short = Edge::new(from, to);
             for layer in met {
                 let z_um = self.planes.z_um(layer);
-                let (long, short) = (long.at(z_um), short.at(z_um));
-                let (start, end) = if odd { (short, long) } else { (long, short) };
-                each(layer, Segment { start, end });
+                let ends = [long.end(z_um), short.end(z_um)];
+                each(layer, Segment { ends, turned: odd });
             }
         }
     }
@@ -159,8 +172,11 @@ impl Cutter<'_> {
     /// in this order turned the facet over.
     #[inline]
     fn sorted_corners(&self, facet: &PlacedFacet) -> ([Corner; 3], bool) {
-        let [mut low, mut middle, mut high] =
-            facet.map(|[x, y, z_um]| Corner { pixels: self.grid.to_pixels(x, y), z_um });
+        let corner = |number: u8| {
+            let [x, y, z_um] = facet[usize::from(number)];
+            Corner { pixels: self.grid.to_pixels(x, y), z_um, number }
+        };
+        let [mut low, mut middle, mut high] = [0, 1, 2].map(corner);
         let mut odd = false;
         let mut order = |lower: &mut Corner, upper: &mut Corner| {
             if upper.z_um < lower.z_um {
@@ -177,9 +193,16 @@ impl Cutter<'_> {
     /// Adds the crossings of rows with a segment between two points of a
     /// plane, in pixels.
     #[inline]
-    fn cross_rows(&self, start: [f64; 2], end: [f64; 2], list: &mut Vec<Crossing>) -> usize {
-        let rising = start[1] < end[1];
-        let (upper, lower) = if rising { (start, end) } else { (end, start) };
+    fn cross_rows(
+        &self,
+        a: [f64; 2],
+        b: [f64; 2],
+        turned: bool,
+        list: &mut Vec<Crossing>,
+    ) -> usize {
+        let down = a[1] < b[1];
+        let (upper, lower) = if down { (a, b) } else { (b, a) };
+        let rising = down != turned;
         let (first, end) = (self.first_row(upper), self.first_row(lower));
         if first >= end {
             return 0;
@@ -225,6 +248,12 @@ impl Edge {
         let rise_um = high.z_um - low.z_um;
         let slope = |axis: usize| (high.pixels[axis] - low.pixels[axis]) / rise_um;
         Self { low, high, pixels_per_um: [slope(0), slope(1)] }
+    }
+
+    /// The end that a segment has on the edge at a height.
+    #[inline]
+    fn end(&self, z_um: f64) -> End {
+        End { at: self.at(z_um), edge: [self.low.number, self.high.number] }
     }
 
     /// The edge's point at a height, in pixels.

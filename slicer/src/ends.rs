@@ -3,9 +3,10 @@
 //! Every contour is a chain of segments, and closes when each of its points
 //! ends as many of them as it should: an even number under the even-odd rule;
 //! as many as it starts where the facets' orientation counts. Equal points
-//! have equal bits (see `cut.rs`), so that a sum over hashes of the points is
-//! zero when all do, in whatever order it is taken, and some other of 2^64
-//! values otherwise.
+//! have equal bits: `cut.rs` says why, and no coordinate in pixels is -0, for
+//! each is a number less 1/2, or a sum with such a one. A sum over hashes of
+//! the points is therefore zero when all contours close, in whatever order it
+//! is taken, and some other of 2^64 values otherwise.
 
 use crate::table::Fill;
 
@@ -14,13 +15,17 @@ use crate::table::Fill;
 pub(crate) struct EndSum(u64);
 
 impl EndSum {
-    /// Adds a segment's ends.
+    /// Adds the ends of a segment from `a` to `b`, or if `turned` from `b` to
+    /// `a`.
     #[inline]
-    pub(crate) fn add(&mut self, start: [f64; 2], end: [f64; 2], fill: Fill) {
-        let (start, end) = (hash(start), hash(end));
+    pub(crate) fn add(&mut self, a: [f64; 2], b: [f64; 2], turned: bool, fill: Fill) {
+        let (a, b) = (hash(a), hash(b));
         self.0 = match fill {
-            Fill::EvenOdd => self.0 ^ start ^ end,
-            Fill::NonZero => self.0.wrapping_add(start).wrapping_sub(end),
+            Fill::EvenOdd => self.0 ^ a ^ b,
+            Fill::NonZero => {
+                let along = a.wrapping_sub(b);
+                self.0.wrapping_add(if turned { along.wrapping_neg() } else { along })
+            }
         };
     }
 
@@ -38,12 +43,6 @@ impl EndSum {
     }
 }
 
-/// The bits of a point; those of 0 and -0 are the same.
-#[inline]
-pub(crate) fn bits(point: [f64; 2]) -> [u64; 2] {
-    point.map(|coordinate| (coordinate + 0.0).to_bits())
-}
-
 /// A number that tells points apart: the halves of a product of both
 /// coordinates' bits, one over the other. No sum of a few such numbers is zero
 /// because of the way their points lie, such as at the corners of a rectangle.
@@ -51,7 +50,7 @@ pub(crate) fn bits(point: [f64; 2]) -> [u64; 2] {
 fn hash(point: [f64; 2]) -> u64 {
     // Whole numbers end in zeros. These bits, of pi, do not.
     const PI: [u64; 2] = [0x243f_6a88_85a3_08d3, 0xa409_3822_299f_31d1];
-    let [x, y] = bits(point);
+    let [x, y] = point.map(f64::to_bits);
     let product = u128::from(x ^ PI[0]) * u128::from(y ^ PI[1]);
     product as u64 ^ (product >> 64) as u64
 }
@@ -62,7 +61,7 @@ mod tests {
 
     fn sum(segments: &[[[f64; 2]; 2]], fill: Fill) -> EndSum {
         let mut sum = EndSum::default();
-        segments.iter().for_each(|&[start, end]| sum.add(start, end, fill));
+        segments.iter().for_each(|&[start, end]| sum.add(start, end, false, fill));
         sum
     }
 
@@ -98,12 +97,14 @@ mod tests {
     }
 
     #[test]
-    fn the_sign_of_zero_and_the_share_of_a_worker_do_not_matter() {
+    fn the_shares_of_workers_add_up() {
         for fill in [Fill::EvenOdd, Fill::NonZero] {
-            let there = sum(&[[[0.0, 1.0], [3.0, -0.0]]], fill);
-            let back = sum(&[[[3.0, 0.0], [-0.0, 1.0]]], fill);
+            let (mut there, mut back) = (EndSum::default(), EndSum::default());
+            there.add([0.5, 1.0], [3.0, 0.0], true, fill);
+            back.add([0.5, 1.0], [3.0, 0.0], false, fill);
             assert!(!there.is_closed() && !back.is_closed());
             assert!(there.joined(back, fill).is_closed());
+            assert_eq!(there.joined(there, fill).is_closed(), fill == Fill::EvenOdd);
         }
     }
 

@@ -93,6 +93,16 @@ impl PixelGrid {
             (self.origin_mm[1] - y_mm) * scale / 127.0 - 0.5,
         ]
     }
+
+    /// Where a point in pixels lies, in millimetres: what
+    /// [`to_pixels`](Self::to_pixels) undoes.
+    pub fn to_mm(&self, column: f64, row: f64) -> [f64; 2] {
+        let scale = pixels_per_127_mm(self.dpi);
+        [
+            self.origin_mm[0] + (column + 0.5) * 127.0 / scale,
+            self.origin_mm[1] - (row + 0.5) * 127.0 / scale,
+        ]
+    }
 }
 
 /// dpi / 25.4 is five dpi / 127: whole for whole resolutions.
@@ -122,6 +132,8 @@ mod tests {
         for c in 0..64u32 {
             let centre = (f64::from(c) + 0.5) * 0.125;
             assert_eq!(grid.to_pixels(-3.0 + centre, 5.0 - centre), [f64::from(c); 2]);
+            let [column, row] = [f64::from(c), f64::from(63 - c)];
+            assert_eq!(grid.to_mm(column, row), [-3.0 + centre, centre - 3.0]);
         }
     }
 

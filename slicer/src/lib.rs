@@ -44,6 +44,7 @@ mod planes;
 mod slices;
 mod survey;
 mod table;
+mod trace;
 
 pub use error::SliceError;
 pub use facet::{Facet, Units};
@@ -53,3 +54,4 @@ pub use placement::{Axis, Placement};
 pub use planes::PlaneRule;
 pub use slices::{Frame, SliceOptions, Slices};
 pub use table::Fill;
+pub use trace::{EdgeFacet, FaultyEdge, OpenEnd, StrayBand, Trace, TracedBand};

@@ -160,6 +160,18 @@ impl Model {
         (file, start..self.files[file].count().min(start + BLOCK_FACETS))
     }
 
+    /// A facet of a file.
+    pub(crate) fn facet(&self, file: usize, facet: usize) -> io::Result<Facet> {
+        match &self.files[file] {
+            FileFacets::Memory(facets) => Ok(facets[facet]),
+            FileFacets::Binary { file, .. } => {
+                let offset = HEADER_BYTES + (facet * FACET_BYTES) as u64;
+                let bytes = map(file, offset, FACET_BYTES)?;
+                Ok(parse(&bytes.as_chunks().0[0]))
+            }
+        }
+    }
+
     /// Gives every facet of a block.
     pub(crate) fn for_each_in_block(
         &self,

@@ -17,6 +17,7 @@ use crate::placement::{PlacedFacet, PlacedModel, Placement};
 use crate::planes::{PlaneRule, Planes};
 use crate::survey::Survey;
 use crate::table::{Facets, Fill, Section, Table};
+use crate::trace::{StrayBand, Trace, Tracer};
 
 /// How a part is sliced.
 #[derive(Clone, Debug)]
@@ -195,6 +196,31 @@ impl Slices {
             // The estimate was too low here: take fewer layers.
             end = start + (end - start) / 2;
         }
+    }
+
+    /// Finds what is wrong with the mesh where rows of its layers do not
+    /// balance, by a second look at the facets there. `bands` are such rows, of
+    /// any of the part's layers; [`StrayBand::of`] has them from a page.
+    ///
+    /// Threads and memory do not change what is found. The memory allowed
+    /// bounds what is held on the way, but for the layer with the most.
+    ///
+    /// # Errors
+    /// Where a band is of no layer of the part, or the file cannot be read.
+    pub fn trace(&self, bands: &[StrayBand]) -> Result<Trace, SliceError> {
+        let mut bands = bands.to_vec();
+        bands.sort_by_key(|band| (band.layer, band.rows.start));
+        let count = self.planes.len() as u32;
+        if let Some(StrayBand { layer, .. }) = bands.last().filter(|band| band.layer >= count) {
+            return Err(SliceError::NoSuchLayers { start: *layer, end: *layer + 1, count });
+        }
+        let tracer = Tracer {
+            model: &self.model,
+            survey: &self.survey,
+            cutter: Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill },
+            memory: 2 * size_of::<Crossing>() * self.most_crossings,
+        };
+        Ok(tracer.trace(&bands)?)
     }
 
     /// Makes the next layers of the table into images.

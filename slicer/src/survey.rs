@@ -2,6 +2,7 @@
 //! blocks of facets lie.
 
 use std::io;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -123,6 +124,12 @@ impl Survey {
                 min[2] < high_um && max[2] >= low_um
             })
             .collect()
+    }
+
+    /// The layers whose planes a block meets.
+    pub(crate) fn planes_of_block(&self, block: usize, planes: &Planes) -> Range<usize> {
+        let Block { min, max, .. } = self.blocks[block];
+        planes.between(min[2], max[2])
     }
 
     /// Whether the blocks lie so much all over the part that sorting the facets

@@ -1,15 +1,19 @@
+use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use lamp_slicer::{Fill, Frame, Model, PlaneRule, SliceError, SliceOptions, Slices, Units};
+use lamp_slicer::{
+    Fill, Frame, Model, PixelGrid, PlaneRule, SliceError, SliceOptions, Slices, StrayBand, Units,
+};
 use lamp_stack::{Dpi, Layer, Length, Size};
 
 use crate::options::{Common, Output, parse_layers, parse_memory, parse_thickness};
 use crate::placement::{PlacementOptions, parse_numbers};
 use crate::report::Report;
 use crate::stop::Stop;
-use crate::streams::{input_name, is_stream, report, write_layers};
+use crate::streams::{input_name, is_stream, report, write_file, write_layers};
+use crate::trace::{Counts, Rows, Subject, parse_report};
 
 /// Slice an STL part into a stack of layer images
 ///
@@ -22,7 +26,8 @@ Examples:
   slice blade.stl -o blade.tif
   slice blade.stl --dpi 2400 --thickness 25um --layers 100..200 | fix > part.tif
   slice shell.stl core.stl --fill nonzero --scale 1.02 --rotate x:90,z:-12.5 -o mould.tif
-  slice core.stl --units inch -o core/")]
+  slice core.stl --units inch -o core/
+  slice broken.stl -o broken.tif --report gaps.json")]
 pub(crate) struct SliceArgs {
     /// The part: STL files, binary or ASCII, or - for standard input. Several stand in the same
     /// coordinates; where they overlap they cut each other out, or unite with --fill nonzero
@@ -42,6 +47,12 @@ pub(crate) struct SliceArgs {
     /// facet
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
+
+    /// Write what is wrong with the mesh to a file, in JSON: for each band of rows that do not
+    /// balance, the edges that are open or shared by too many, and the facets there by number and
+    /// corners, as they stand in the part's file
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    report: Option<PathBuf>,
 
     #[command(flatten)]
     output: Output,
@@ -150,16 +161,13 @@ impl PartOptions {
     /// The command as the stack remembers it: no paths, no option that leaves
     /// the bytes alone.
     fn command_line(&self, part: &str) -> String {
-        let name = |value: &dyn Fn() -> Option<clap::builder::PossibleValue>| {
-            value().map_or_else(String::new, |value| value.get_name().to_owned())
-        };
         let mut line = format!(
             "slice {part} --dpi {} --thickness {} --plane {} --units {} --fill {}",
             self.dpi,
             self.thickness,
-            name(&|| self.plane.to_possible_value()),
-            name(&|| self.units.to_possible_value()),
-            name(&|| self.fill.to_possible_value()),
+            value_name(&self.plane),
+            value_name(&self.units),
+            value_name(&self.fill),
         );
         line += &self.placement.command_line();
         line += &match (self.origin, self.size) {
@@ -190,7 +198,15 @@ impl PartOptions {
     }
 }
 
+/// What people write for a value.
+fn value_name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
+    if args.report.as_ref() == Some(&args.output.output) {
+        return Err(Stop::usage("the stack and the report need a file each"));
+    }
     let model = open_models(&args.parts)?;
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args
@@ -198,7 +214,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         .iter()
         .map(|part| part.file_name().unwrap_or_default().to_string_lossy())
         .collect();
-    let (slices, name_command) = args
+    let (mut slices, name_command) = args
         .options
         .slices(model, &files.join(" "), args.layers.clone(), args.memory)
         .map_err(|error| match error {
@@ -209,16 +225,29 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         })?;
     let report = report("slice", common, &args.output);
     report.expect(slices.layer_count() as u64);
-    let (mut stray_layers, mut stray_rows) = (0, 0);
-    let layers = slices.map(|layer| {
+    let (mut counts, mut bands) = (Counts::default(), Vec::new());
+    let layers = slices.by_ref().map(|layer| {
         let mut layer = layer.map_err(|error| Stop::from(error).at(name.clone()))?;
         name_command(&mut layer);
-        stray_rows += layer.info.stray_rows.len();
-        stray_layers += usize::from(!layer.info.stray_rows.is_empty());
+        counts.add(&layer.info);
+        if args.report.is_some() {
+            bands.extend(StrayBand::of(&layer.info));
+        }
         Ok(layer)
     });
     write_layers(layers, &args.output, &report)?;
-    say_stray_rows(&report, stray_rows, stray_layers);
+    if let Some(path) = &args.report {
+        let trace = slices.trace(&bands).map_err(|error| Stop::from(error).at(name))?;
+        let subject = Subject {
+            files: files.into_iter().map(Cow::into_owned).collect(),
+            fill: &value_name(&args.options.fill),
+            counts,
+        };
+        let PixelGrid { origin_mm, dpi, .. } = *slices.grid();
+        let rows = Rows { top_mm: origin_mm[1], dpi };
+        write_file(path, |out| subject.write(&trace, rows, out))?;
+    }
+    say_stray_rows(&report, counts, args.report.as_deref());
     Ok(())
 }
 
@@ -247,10 +276,15 @@ fn name_of_all(paths: &[PathBuf]) -> String {
     }
 }
 
-fn say_stray_rows(report: &Report, rows: usize, layers: usize) {
+fn say_stray_rows(report: &Report, counts: Counts, written: Option<&Path>) {
+    let Counts { stray_rows: rows, stray_layers: layers, .. } = counts;
     if rows > 0 {
+        let names = match written {
+            Some(path) => format!("{} names the facets", path.display()),
+            None => "--report FILE.json names the facets".to_owned(),
+        };
         report.say(&format!(
-            "{rows} rows in {layers} layers do not balance: the mesh has gaps; fix corrects them"
+            "{rows} rows in {layers} layers do not balance: the mesh has gaps; fix corrects them, {names}"
         ));
     }
 }

@@ -12,3 +12,4 @@ mod referee;
 mod same_bytes;
 mod stl;
 mod ties;
+mod trace;

@@ -1,0 +1,138 @@
+//! The report of what is wrong with a mesh, as `slice --report` writes it: one
+//! JSON object, with an edge or a band on each line.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
+use lamp_stack::{Dpi, PageInfo};
+use serde::Serialize;
+
+/// What is counted while the layers pass.
+#[derive(Clone, Copy, Default, Serialize)]
+pub(crate) struct Counts {
+    pub(crate) layers: usize,
+    /// Layers whose contours do not all close.
+    pub(crate) open_layers: usize,
+    pub(crate) stray_layers: usize,
+    pub(crate) stray_rows: usize,
+}
+
+impl Counts {
+    pub(crate) fn add(&mut self, info: &PageInfo) {
+        self.layers += 1;
+        self.open_layers += usize::from(info.closed == Some(false));
+        self.stray_layers += usize::from(!info.stray_rows.is_empty());
+        self.stray_rows += info.stray_rows.len();
+    }
+}
+
+/// What the report is of.
+#[derive(Serialize)]
+pub(crate) struct Subject<'a> {
+    pub(crate) files: Vec<String>,
+    pub(crate) fill: &'a str,
+    #[serde(flatten)]
+    pub(crate) counts: Counts,
+}
+
+#[derive(Serialize)]
+struct EdgeLine {
+    edge: usize,
+    fault: &'static str,
+    ends: [[f32; 3]; 2],
+    facets: Vec<FacetLine>,
+}
+
+#[derive(Serialize)]
+struct FacetLine {
+    file: usize,
+    facet: usize,
+    corners: Facet,
+}
+
+#[derive(Serialize)]
+struct BandLine {
+    layer: u32,
+    z_mm: f64,
+    first_row: u32,
+    last_row: u32,
+    y_mm: [f64; 2],
+    ends: Vec<EndLine>,
+}
+
+#[derive(Serialize)]
+struct EndLine {
+    at_mm: [f64; 2],
+    edges: Vec<usize>,
+}
+
+/// Where the rows of the images lie.
+#[derive(Clone, Copy)]
+pub(crate) struct Rows {
+    /// The top of the first.
+    pub(crate) top_mm: f64,
+    pub(crate) dpi: Dpi,
+}
+
+impl Subject<'_> {
+    /// Writes the report.
+    pub(crate) fn write(&self, trace: &Trace, rows: Rows, out: &mut dyn Write) -> io::Result<()> {
+        let head = serde_json::to_string(self)?;
+        write!(out, "{},\n\"edges\":[", head.trim_end_matches('}'))?;
+        write_lines(trace.edges.iter().enumerate().map(edge_line), out)?;
+        write!(out, "],\n\"bands\":[")?;
+        write_lines(trace.bands.iter().map(|band| band_line(band, rows)), out)?;
+        writeln!(out, "]}}")
+    }
+}
+
+fn write_lines(lines: impl Iterator<Item = impl Serialize>, out: &mut dyn Write) -> io::Result<()> {
+    for (k, line) in lines.enumerate() {
+        write!(out, "{}\n{}", if k == 0 { "" } else { "," }, serde_json::to_string(&line)?)?;
+    }
+    Ok(())
+}
+
+fn edge_line((edge, FaultyEdge { ends, facets }): (usize, &FaultyEdge)) -> EdgeLine {
+    let facet = |&EdgeFacet { file, facet, corners, .. }: &_| FacetLine { file, facet, corners };
+    EdgeLine {
+        edge,
+        fault: match &facets[..] {
+            [_] => "open",
+            [a, b] if a.forwards == b.forwards => "turned over",
+            _ => "shared by more than two",
+        },
+        ends: *ends,
+        facets: facets.iter().map(facet).collect(),
+    }
+}
+
+fn band_line(TracedBand { band, plane_mm, ends }: &TracedBand, rows: Rows) -> BandLine {
+    let y_mm = |row: u32| to_nm(rows.top_mm - f64::from(row) * rows.dpi.pitch().mm());
+    let end = |OpenEnd { at_mm, edges }: &OpenEnd| EndLine {
+        at_mm: at_mm.map(to_nm),
+        edges: edges.clone(),
+    };
+    BandLine {
+        layer: band.layer,
+        z_mm: to_nm(*plane_mm),
+        first_row: band.rows.start,
+        last_row: band.rows.end - 1,
+        y_mm: [y_mm(band.rows.end), y_mm(band.rows.start)],
+        ends: ends.iter().map(end).collect(),
+    }
+}
+
+/// To the nanometre: more digits say nothing. Adding zero turns -0 into 0.
+fn to_nm(mm: f64) -> f64 {
+    (mm * 1e6).round() / 1e6 + 0.0
+}
+
+/// Parses the name of a report. Standard output is for the stack.
+pub(crate) fn parse_report(text: &str) -> Result<PathBuf, String> {
+    match text {
+        "-" => Err("standard output is for the stack: name a file, as gaps.json".to_owned()),
+        name => Ok(PathBuf::from(name)),
+    }
+}

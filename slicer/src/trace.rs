@@ -1,0 +1,273 @@
+//! Where in the mesh the rows come from that do not balance.
+//!
+//! From one row to the next, a layer's balance changes only where a contour
+//! has an open end: a point in which an odd number of segments end (see
+//! `cut.rs`), or under [`Fill::NonZero`] not as many as start. A band of stray
+//! rows therefore lies between open ends, and the edges that these lie on are
+//! what is wrong with the mesh. A second look at the blocks that the bands'
+//! planes meet finds them, by the arithmetic that cut the layers. No plane meets
+//! an edge that lies level: a hole's other edges lead to it.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use lamp_stack::PageInfo;
+use rayon::prelude::*;
+
+use crate::cut::{Cutter, End};
+use crate::facet::Facet;
+use crate::placement::PlacedModel;
+use crate::survey::Survey;
+use crate::table::Fill;
+
+/// Rows of a layer that do not balance and follow one another.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StrayBand {
+    /// The layer's index.
+    pub layer: u32,
+    /// The rows.
+    pub rows: Range<u32>,
+}
+
+impl StrayBand {
+    /// The bands of a layer, from the top.
+    pub fn of(info: &PageInfo) -> impl Iterator<Item = Self> {
+        let bands = info.stray_rows.chunk_by(|above, row| above + 1 == *row);
+        bands.map(|rows| Self { layer: info.index, rows: rows[0]..rows[rows.len() - 1] + 1 })
+    }
+}
+
+/// What [`Slices::trace`](crate::Slices::trace) found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// The bands by layer and row, and the open ends that they lie between.
+    pub bands: Vec<TracedBand>,
+    /// The edges that the ends lie on, each once, as the bands come to them.
+    pub edges: Vec<FaultyEdge>,
+}
+
+/// A band of stray rows, and what spoils it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TracedBand {
+    /// The band.
+    pub band: StrayBand,
+    /// The height at which the layer was cut, in part coordinates, in
+    /// millimetres.
+    pub plane_mm: f64,
+    /// The open ends above, in and below it: by y from the top, then by x. At
+    /// least one starts the band, and one ends it.
+    pub ends: Vec<OpenEnd>,
+}
+
+/// A point where contours break off.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpenEnd {
+    /// x and y in part coordinates (the placed part's), in millimetres.
+    pub at_mm: [f64; 2],
+    /// The edges it lies on, as positions in [`Trace::edges`]: one, but where
+    /// edges meet.
+    pub edges: Vec<usize>,
+}
+
+/// An edge that does not join two facets as those of a closed mesh do: one
+/// facet alone has it, or three; or two do that face opposite ways, which
+/// matters under [`Fill::NonZero`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaultyEdge {
+    /// Its ends, in the file's coordinates and units.
+    pub ends: [[f32; 3]; 2],
+    /// All the facets that have the edge, by file and number.
+    pub facets: Vec<EdgeFacet>,
+}
+
+/// A facet at an edge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EdgeFacet {
+    /// The file, from 0, among those joined.
+    pub file: usize,
+    /// The facet in the file, from 0.
+    pub facet: usize,
+    /// Its corners, in the file's coordinates and units.
+    pub corners: Facet,
+    /// Whether its corners go along the edge from the first end to the second.
+    pub forwards: bool,
+}
+
+/// A segment's end close to a band. They sort by point.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Sighting {
+    layer: u32,
+    row: u32,
+    point: [u64; 2],
+    file: u32,
+    facet: u32,
+    edge: [u8; 2],
+    starts: bool,
+}
+
+/// The bits of an edge's corners, the lesser first: its name.
+type EdgeName = [[u32; 3]; 2];
+
+/// Looks at a mesh for the second time.
+pub(crate) struct Tracer<'a> {
+    pub(crate) model: &'a PlacedModel,
+    pub(crate) survey: &'a Survey,
+    pub(crate) cutter: Cutter<'a>,
+    /// About how many bytes it may take for one look.
+    pub(crate) memory: usize,
+}
+
+impl Tracer<'_> {
+    /// Traces bands that are in order of layers and rows.
+    pub(crate) fn trace(&self, bands: &[StrayBand]) -> io::Result<Trace> {
+        let layers: Vec<_> = bands.chunk_by(|a, b| a.layer == b.layer).collect();
+        let mut trace = Trace::default();
+        let mut known = BTreeMap::new();
+        let (mut done, mut count) = (0, layers.len());
+        while done < layers.len() {
+            let some = &layers[done..layers.len().min(done + count)];
+            if let Some(sightings) = self.sightings(some)? {
+                self.explain(some.concat(), &sightings, &mut trace, &mut known)?;
+                done += some.len();
+            } else {
+                count = some.len() / 2;
+            }
+        }
+        Ok(trace)
+    }
+
+    /// The ends of segments close to the bands, sorted; `None` where they are
+    /// too many, and fewer layers would do.
+    fn sightings(&self, layers: &[&[StrayBand]]) -> io::Result<Option<Vec<Sighting>>> {
+        let index = |bands: &[StrayBand]| bands[0].layer as usize;
+        let span = index(layers[0])..index(layers[layers.len() - 1]) + 1;
+        let mut bands_of = vec![&[][..]; span.len()];
+        layers.iter().for_each(|bands| bands_of[index(bands) - span.start] = bands);
+        let meets_some = |block: &usize| {
+            let met = self.survey.planes_of_block(*block, self.cutter.planes);
+            let from = layers.partition_point(|bands| index(bands) < met.start);
+            layers.get(from).is_some_and(|bands| index(bands) < met.end)
+        };
+        let found = AtomicUsize::new(0);
+        let too_many =
+            || layers.len() > 1 && found.load(Relaxed) * 2 * size_of::<Sighting>() > self.memory;
+        let of_block = |block| -> io::Result<Vec<Sighting>> {
+            let (file, mut facets) = self.model.model.place_of(block);
+            let mut sightings = Vec::new();
+            self.model.for_each_in_block(block, |placed| {
+                let facet = facets.next().unwrap_or_default();
+                if too_many() {
+                    return;
+                }
+                let before = sightings.len();
+                self.cutter.for_each_segment(placed, &span, |layer, segment| {
+                    let bands = bands_of[layer - span.start];
+                    let mut look = |end: End, starts| {
+                        let row = self.cutter.first_row(end.at);
+                        let band = bands.partition_point(|band| band.rows.end < row);
+                        if bands.get(band).is_some_and(|band| band.rows.start <= row) {
+                            sightings.push(Sighting {
+                                layer: layer as u32,
+                                row,
+                                point: end.at.map(f64::to_bits),
+                                file: file as u32,
+                                facet: facet as u32,
+                                edge: end.edge,
+                                starts,
+                            });
+                        }
+                    };
+                    let [a, b] = segment.ends;
+                    look(a, !segment.turned);
+                    look(b, segment.turned);
+                });
+                if sightings.len() > before {
+                    found.fetch_add(sightings.len() - before, Relaxed);
+                }
+            })?;
+            Ok(sightings)
+        };
+        let blocks: Vec<usize> = (0..self.model.model.block_count()).filter(meets_some).collect();
+        let sightings = blocks.into_par_iter().map(of_block).collect::<io::Result<Vec<_>>>()?;
+        if too_many() {
+            return Ok(None);
+        }
+        let mut sightings = sightings.concat();
+        sightings.par_sort_unstable();
+        Ok(Some(sightings))
+    }
+
+    /// Adds bands to the trace, with the ends among the sightings that are
+    /// open, and their edges.
+    fn explain(
+        &self,
+        bands: Vec<StrayBand>,
+        mut sightings: &[Sighting],
+        trace: &mut Trace,
+        known: &mut BTreeMap<EdgeName, usize>,
+    ) -> io::Result<()> {
+        for band in bands {
+            let of_band = |s: &Sighting| (s.layer, s.row) <= (band.layer, band.rows.end);
+            let (near, rest) = sightings.split_at(sightings.partition_point(of_band));
+            sightings = rest;
+            let mut ends = Vec::new();
+            for group in near.chunk_by(|a, b| a.point == b.point) {
+                if self.is_open(group) {
+                    let [x, y] = group[0].point.map(f64::from_bits);
+                    let edges = self.edges(group, &mut trace.edges, known)?;
+                    ends.push(OpenEnd { at_mm: self.cutter.grid.to_mm(x, y), edges });
+                }
+            }
+            ends.sort_by(|a, b| {
+                let ([x, y], [other_x, other_y]) = (a.at_mm, b.at_mm);
+                other_y.total_cmp(&y).then(x.total_cmp(&other_x))
+            });
+            let plane_mm = self.cutter.planes.z_um(band.layer as usize) / 1000.0;
+            trace.bands.push(TracedBand { band, plane_mm, ends });
+        }
+        Ok(())
+    }
+
+    /// Whether the segments that meet in a point, or on an edge, leave it open.
+    fn is_open(&self, sightings: &[Sighting]) -> bool {
+        match self.cutter.fill {
+            Fill::EvenOdd => !sightings.len().is_multiple_of(2),
+            Fill::NonZero => 2 * sightings.iter().filter(|s| s.starts).count() != sightings.len(),
+        }
+    }
+
+    /// The edges that leave a point open, as positions in `edges`.
+    fn edges(
+        &self,
+        group: &[Sighting],
+        edges: &mut Vec<FaultyEdge>,
+        known: &mut BTreeMap<EdgeName, usize>,
+    ) -> io::Result<Vec<usize>> {
+        let mut by_edge: BTreeMap<EdgeName, (Vec<Sighting>, FaultyEdge)> = BTreeMap::new();
+        for &sighting in group {
+            let (file, facet) = (sighting.file as usize, sighting.facet as usize);
+            let corners = self.model.model.facet(file, facet)?;
+            let [from, to] = sighting.edge.map(usize::from);
+            // Numbers along the facet: 0 1, 1 2, 2 0.
+            let [from, to] = if (from + 1) % 3 == to { [from, to] } else { [to, from] };
+            let [a, b] = [from, to].map(|k| corners[k].map(|v| v + 0.0));
+            let forwards = a.map(f32::to_bits) <= b.map(f32::to_bits);
+            let ends = if forwards { [a, b] } else { [b, a] };
+            let (sightings, edge) = by_edge
+                .entry(ends.map(|end| end.map(f32::to_bits)))
+                .or_insert_with(|| (Vec::new(), FaultyEdge { ends, facets: Vec::new() }));
+            sightings.push(sighting);
+            edge.facets.push(EdgeFacet { file, facet, corners, forwards });
+        }
+        by_edge.retain(|_, (sightings, _)| self.is_open(sightings));
+        let mut place = |(name, (_, edge))| {
+            *known.entry(name).or_insert_with(|| {
+                edges.push(edge);
+                edges.len() - 1
+            })
+        };
+        Ok(by_edge.into_iter().map(&mut place).collect())
+    }
+}
