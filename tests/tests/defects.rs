@@ -155,6 +155,30 @@ fn flipped_facets_change_no_pixel_under_even_odd() {
     assert_ne!(digest(&whole), digest(&flipped));
 }
 
+/// Nothing but the file's digest shows that facets were flipped: nor how many.
+#[test]
+fn flipped_facets_change_no_byte_but_the_digest() {
+    let scratch = Scratch::new();
+    scratch.run("lamp sample tower --facets 20k -o broken.stl").succeeds();
+    let sliced = || {
+        scratch.run(&format!("slice broken.stl {COARSE} -o part.tif")).succeeds_quietly();
+        let layers = scratch.layers("part.tif");
+        assert!(layers.iter().all(|layer| layer.info.closed == Some(true)));
+        let digest = layers[0].info.stack.clone().unwrap().digest.into_bytes();
+        let mut bytes = scratch.bytes("part.tif");
+        let at = bytes.windows(digest.len()).position(|text| text == digest).unwrap();
+        bytes[at..at + digest.len()].fill(b'0');
+        (digest, bytes)
+    };
+    let (whole_digest, whole) = sliced();
+    for (count, seed) in [(1, 1), (700, 2), (19_000, 3), (1_000_000, 4)] {
+        let line = format!("--facets 20k --defect flip --count {count} --seed {seed}");
+        scratch.run(&format!("lamp sample tower {line} -o broken.stl")).succeeds();
+        let (digest, flipped) = sliced();
+        assert!(digest != whole_digest && flipped == whole, "{count} facets flipped");
+    }
+}
+
 #[test]
 fn flipped_facets_are_stray_under_nonzero() {
     let scratch = Scratch::new();

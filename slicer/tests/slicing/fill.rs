@@ -1,11 +1,13 @@
 //! What is inside where bodies overlap, enclose one another or are turned
 //! inside out.
 
-use lamp_fixtures::{Mesh, blade};
-use lamp_slicer::{Fill, SliceOptions};
+use lamp_fixtures::{Mesh, blade, sphere};
+use lamp_slicer::{Fill, Placement, SliceOptions, Slices};
 use lamp_stack::Layer;
 
-use crate::common::{block, cube, inside_out, joined, mask, masks, options, slice, white_pixels};
+use crate::common::{
+    block, cube, inside_out, joined, mask, masks, model, options, slice, white_pixels,
+};
 
 /// Tenths of a millimetre, in pixels and layers.
 fn filled(mesh: &Mesh, fill: Fill) -> Vec<Layer> {
@@ -89,4 +91,101 @@ fn a_blade_has_no_overlaps_so_both_fills_agree() {
     assert!((counted_mm3 / mesh.volume_mm3() - 1.0).abs() < 0.01, "{counted_mm3}");
     let most = even_odd.iter().flat_map(|l| mask(l).rows()).map(<[u32]>::len).max();
     assert!(most >= Some(8), "{most:?}");
+}
+
+/// Two balls that overlap, and one within the first: every pixel against
+/// the balls' equations, except where a facet's chord leaves it open.
+#[test]
+fn balls_that_overlap_are_their_union() {
+    // Inscribed: no facet is farther inside its sphere than this.
+    const CHORD_MM: f64 = 0.002;
+    let balls = [([0.0, 0.0, 2.0], 2.0), ([1.3, 0.9, 2.4], 1.5), ([-0.4, 0.2, 1.7], 0.9)];
+    let bodies = balls.map(|(centre, radius): ([f64; 3], f64)| {
+        let ball = sphere(radius, 30_000);
+        ball.map(|[x, y, z]| [x + centre[0], y + centre[1], z - radius + centre[2]])
+    });
+    let mesh = joined(&bodies);
+    let options = SliceOptions { fill: Fill::NonZero, ..options(200.0, 100.0) };
+    let grid = *Slices::new(model(&mesh), &options).unwrap().grid();
+    let bottom_mm = mesh.bounds_mm().0[2];
+    let (mut white, mut open) = (0, 0);
+    for (layer, k) in slice(&mesh, &options).iter().zip(1..) {
+        let z = bottom_mm + 0.1 * f64::from(k);
+        for (column, row) in (0..grid.width).flat_map(|c| (0..grid.height).map(move |r| (c, r))) {
+            let [x, y] = grid.to_mm(column.into(), row.into());
+            let inside = |less_mm: f64| {
+                balls.iter().any(|(centre, radius)| {
+                    let squares = [x - centre[0], y - centre[1], z - centre[2]].map(|d| d * d);
+                    squares.iter().sum::<f64>().sqrt() < radius - less_mm
+                })
+            };
+            let is_white = mask(layer).is_white(column, row);
+            assert!(is_white <= inside(-1e-5) && is_white >= inside(CHORD_MM), "{x} {y} {z}");
+            white += u32::from(is_white);
+            open += u32::from(inside(-1e-5) != inside(CHORD_MM));
+        }
+    }
+    assert!(white > 20_000 && open * 100 < white, "{open} of {white} are open");
+}
+
+/// Bodies in one another, by their ways round: the winding number counts.
+#[test]
+fn three_bodies_in_one_another_wind_as_they_face() {
+    let [outer, middle, inner] = [cube(0.0, 3.0), cube(0.5, 2.5), cube(1.0, 2.0)];
+    let (in_middle, in_inner) = (|p| within(p, 50, 250), |p| within(p, 100, 200));
+    for ways in 0..4 {
+        let turned_if = |mesh: &Mesh, turned| if turned { inside_out(mesh) } else { mesh.clone() };
+        let (middle_turned, inner_turned) = (ways & 1 == 1, ways & 2 == 2);
+        let mesh = joined(&[
+            outer.clone(),
+            turned_if(&middle, middle_turned),
+            turned_if(&inner, inner_turned),
+        ]);
+        let way = |turned: bool| if turned { -1 } else { 1 };
+        let winding = |p| {
+            1 + if in_middle(p) { way(middle_turned) } else { 0 }
+                + if in_inner(p) { way(inner_turned) } else { 0 }
+        };
+        for mirrored in [false, true] {
+            // About the middle, so that the expected pixels stay.
+            let scale = if mirrored { [-1.0, 1.0, 1.0] } else { [1.0; 3] };
+            let placement = Placement::default()
+                .translated([-1.5, 0.0, 0.0])
+                .scaled(scale)
+                .translated([1.5, 0.0, 0.0]);
+            let [even_odd, non_zero] = [Fill::EvenOdd, Fill::NonZero].map(|fill| {
+                slice(&mesh, &SliceOptions { fill, placement, ..options(254.0, 100.0) })
+            });
+            assert_pixels(&even_odd, 30, |p| !in_middle(p) || in_inner(p));
+            assert_pixels(&non_zero, 30, |p| winding(p) != 0);
+            let closed =
+                |layer: &Layer| layer.info.closed == Some(true) && layer.info.stray_rows.is_empty();
+            assert!(even_odd.iter().chain(&non_zero).all(closed));
+        }
+    }
+}
+
+#[test]
+fn mirrored_bodies_that_overlap_are_their_mirrored_union() {
+    let bodies = [cube(0.0, 2.0), inside_out(&cube(1.0, 3.0))];
+    for axes in 0..8 {
+        let scale = [0, 1, 2].map(|axis| if axes >> axis & 1 == 1 { -1.0 } else { 1.0 });
+        let back = scale.map(|factor: f64| if factor < 0.0 { 3.0 } else { 0.0 });
+        let placement = Placement::default().scaled(scale).translated(back);
+        let of = |mesh: &Mesh, fill| {
+            slice(mesh, &SliceOptions { fill, placement, ..options(254.0, 100.0) })
+        };
+        // Where the axis is mirrored, the low end is the high end.
+        let side = |axis: usize, v: u32, low: u32, high: u32| {
+            let v = if scale[axis] < 0.0 { 300 - v } else { v };
+            let tie_is_in = axis == 2 && scale[axis] > 0.0;
+            if tie_is_in { low < v && v <= high } else { low <= v && v < high }
+        };
+        let is_in = |p: [u32; 3], low, high| (0..3).all(|axis| side(axis, p[axis], low, high));
+        let (first, second) = (|p| is_in(p, 0, 200), |p| is_in(p, 100, 300));
+        // One faces inwards: where they overlap they cancel.
+        assert_pixels(&of(&joined(&bodies), Fill::NonZero), 30, |p| first(p) != second(p));
+        let facing = [bodies[0].clone(), inside_out(&bodies[1])];
+        assert_pixels(&of(&joined(&facing), Fill::NonZero), 30, |p| first(p) || second(p));
+    }
 }
