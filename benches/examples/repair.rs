@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use lamp_benches::score::{Bands, Score};
 use lamp_benches::sliced::{Layers, broken, mask, slice};
 use lamp_fixtures::{Defect, Part, build};
-use lamp_postprocess::fix;
+use lamp_postprocess::{FixOptions, Method as FixMethod, fix};
 use lamp_slicer::{Fill, SliceOptions};
 
 const PARTS: [(Part, usize); 5] = [
@@ -34,10 +34,29 @@ const SEEDS: RangeInclusive<u32> = 1..=3;
 type Method = fn(Layers) -> Layers;
 
 /// The methods to compare.
-const METHODS: [(&str, Method); 1] = [("nearest", |layers| {
-    let Ok(fixed) = fix(layers.into_iter().map(Ok::<_, Infallible>), |_, _| ()).collect();
+const METHODS: [(&str, Method); 4] = [
+    ("nearest, every band", |layers| {
+        fixed(layers, FixOptions { method: FixMethod::Nearest, ..UNRESTRAINED })
+    }),
+    ("spline, every band", |layers| fixed(layers, UNRESTRAINED)),
+    ("spline with neighbours, every band", |layers| {
+        fixed(layers, FixOptions { use_neighbours: true, ..UNRESTRAINED })
+    }),
+    ("spline, default limits", |layers| fixed(layers, FixOptions::default())),
+];
+
+/// No band is left, however wide or doubtful.
+const UNRESTRAINED: FixOptions = FixOptions {
+    method: FixMethod::Spline,
+    max_width: u32::MAX,
+    min_confidence: 0.0,
+    use_neighbours: false,
+};
+
+fn fixed(layers: Layers, options: FixOptions) -> Layers {
+    let Ok(fixed) = fix(layers.into_iter().map(Ok::<_, Infallible>), options, |_| ()).collect();
     fixed
-})];
+}
 
 const HEADING: &str = "\
 | part | defect | bands of 1-2 rows | 3-5 | 6-15 | more | wrong pixels left in 1-2 rows | 3-5 | 6-15 | more \

@@ -5,6 +5,8 @@
 //! same code under the names of the pipeline.
 
 mod commands;
+mod evidence;
+mod findings;
 mod options;
 mod picture;
 mod placement;

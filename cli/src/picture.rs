@@ -144,6 +144,16 @@ impl<'a> Picture<'a> {
     }
 }
 
+/// The rows of a region, which must lie on the image, level by level.
+pub(crate) fn levels_of_region<'a>(
+    image: &'a Image,
+    region: &Region,
+) -> impl Iterator<Item = Vec<u8>> + 'a {
+    let columns = region.columns.clone();
+    let rows = runs_of_rows(image).skip(region.rows.start as usize).take(region.rows.len());
+    rows.map(move |runs| mean_row(std::iter::once(runs), &columns, 1, columns.len() as u32))
+}
+
 /// The runs of a row that are not black, as (first column, end, level).
 type Runs = Vec<(u32, u32, u8)>;
 

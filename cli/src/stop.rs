@@ -16,6 +16,8 @@ pub(crate) enum Stop {
     Failed(anyhow::Error),
     /// Writing the output failed: status 1, or none if its reader went away.
     Output(anyhow::Error),
+    /// The work is done, but found what needs a person: status 3.
+    Findings(String),
 }
 
 impl Stop {
@@ -33,6 +35,7 @@ impl Stop {
             Self::Usage(message) => Self::Usage(format!("{place}: {message}")),
             Self::Failed(error) => Self::Failed(error.context(place)),
             Self::Output(error) => Self::Output(error.context(place)),
+            Self::Findings(message) => Self::Findings(format!("{place}: {message}")),
         }
     }
 
@@ -40,6 +43,7 @@ impl Stop {
         match self {
             Self::Usage(_) => 2,
             Self::Failed(_) | Self::Output(_) => 1,
+            Self::Findings(_) => 3,
         }
     }
 
@@ -60,7 +64,7 @@ impl Stop {
 impl fmt::Display for Stop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(message) => f.write_str(message),
+            Self::Usage(message) | Self::Findings(message) => f.write_str(message),
             Self::Failed(error) | Self::Output(error) => write!(f, "{error:#}"),
         }
     }

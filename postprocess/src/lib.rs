@@ -5,7 +5,7 @@
 //! area. Both are adaptors from layers to layers.
 //!
 //! ```
-//! use lamp_postprocess::{TileError, TileOptions, fix, tile};
+//! use lamp_postprocess::{FixOptions, TileError, TileOptions, fix, tile};
 //! use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
 //!
 //! // Row 1 missed its second crossing and runs to the image's edge.
@@ -13,8 +13,10 @@
 //! let layer =
 //!     Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: Image::Mask(mask) };
 //!
-//! let fixed = fix(std::iter::once(Ok::<_, TileError>(layer)), |info, bands| {
-//!     assert_eq!((info.index, bands[0].first_row, bands[0].pixels), (0, 1, 3));
+//! let layers = std::iter::once(Ok::<_, TileError>(layer));
+//! let fixed = fix(layers, FixOptions::default(), |fixed| {
+//!     let band = &fixed.bands[0];
+//!     assert_eq!((band.first_row, band.pixels, band.gap.clone()), (1, 3, Some(5..6)));
 //! });
 //! let options = TileOptions { area: "0.2x0.1in".parse()?, ..TileOptions::default() };
 //! let mut build = tile(fixed, options);
@@ -24,8 +26,7 @@
 //! ```
 
 mod fix;
-mod majority;
 mod tile;
 
-pub use fix::{Band, fix, fix_mask};
+pub use fix::{Band, FixOptions, Fixed, Kind, Kinds, Method, Outcome, fix};
 pub use tile::{TileError, TileOptions, tile};

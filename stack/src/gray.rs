@@ -102,6 +102,15 @@ impl GrayMask {
         (self.row_offsets.len() - 1) as u32
     }
 
+    /// The changes of row `row`.
+    ///
+    /// # Panics
+    /// If `row` is not below the height.
+    pub fn row(&self, row: u32) -> &[LevelChange] {
+        let row = row as usize;
+        &self.changes[self.row_offsets[row] as usize..self.row_offsets[row + 1] as usize]
+    }
+
     /// The changes of every row, from the top.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = &[LevelChange]> {
         self.row_offsets.windows(2).map(|ends| &self.changes[ends[0] as usize..ends[1] as usize])

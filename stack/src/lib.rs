@@ -52,7 +52,7 @@ pub use length::{Dpi, Length, LengthError, Size};
 pub use mask::{Mask, MaskBuilder, MaskError, white_in_row};
 pub use ordered::{Held, map_in_order};
 pub use output::{Destination, write_stack};
-pub use png_write::{png_of_layer, write_gray_png, write_png_folder};
+pub use png_write::{png_of_layer, write_gray_png, write_png_folder, write_rgb_png};
 pub use split::{Cuts, SplitError, write_split};
 pub use temporary::{FileBeside, remove_temporaries};
 pub use tiff::{Compression, EncodedPage, Format, Page, PageReader, PageWriter};

@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::{Args, Parser};
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::Method;
-use lamp_postprocess::{TileOptions, fix, tile};
+use lamp_postprocess::{FixOptions, TileOptions, fix, tile};
 use lamp_slicer::Model;
 use lamp_stack::{Layer, Pages};
 
@@ -91,7 +91,9 @@ fn run_pipeline(stl: &Path, stack: &Path, report: &Report) -> Result<StackSize, 
         name_command(&mut layer);
         Ok::<Layer, Stop>(layer)
     });
-    let fixed = fix(layers, |info, _| report.say(&format!("{} had stray rows", info.name())));
+    let fixed = fix(layers, FixOptions::default(), |fixed| {
+        report.say(&format!("{} had stray rows", fixed.before.info.name()));
+    });
     let dithered = lamp_grayscale::dither(fixed, Method::default());
     let mut size = StackSize::default();
     let tiled = tile(dithered, TileOptions::default()).inspect(|layer| {

@@ -1,76 +1,247 @@
-use clap::Args;
-use lamp_postprocess::Band;
-use lamp_stack::{Image, Layer, PageInfo};
+use std::path::PathBuf;
 
+use clap::{Args, ValueEnum};
+use lamp_postprocess::{Band, FixOptions, Fixed, Method, Outcome};
+use lamp_stack::PageInfo;
+
+use crate::evidence::Evidence;
+use crate::findings::{Findings, whereabouts};
 use crate::options::{Common, Input, Output};
 use crate::stop::Stop;
-use crate::streams::{read_layers, report, write_layers};
+use crate::streams::{read_layers, report, write_file, write_layers};
 
-/// Correct stray rows: rows that a gap in the mesh made run to the image's edge
+/// Find and correct stray rows: rows that a gap in the mesh made run across the image
 ///
-/// A row is stray if it ends white (every part leaves the last column black), or if `slice` found that its crossings do not balance. Each
-/// pixel of a band of stray rows takes the colour that the good rows above and below share. What
-/// was changed is said for each layer and stands on its page. Gray layers pass unchanged.
+/// A row is stray if it ends white (every part leaves the last column black), if `slice` found that
+/// its crossings do not balance, if it lacks crossings that the rows above and below have, or if it
+/// has a run that no row or layer beside it has. Only the crossings that were missed are added; what
+/// a row has stays as it is. A band of rows that is too wide, or whose correction is not sure enough,
+/// is left and told of. What was changed is said for each layer and stands on its page; layers
+/// without stray rows pass byte for byte. Gray layers are corrected by their outlines.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   slice blade.stl | fix > blade.tif
-  fix stack.tif -o fixed.tif
-  fix pages/ --layers 100..200 -o fixed/")]
+  fix stack.tif --report fix.json --evidence pictures/ -o fixed.tif
+  fix stack.tif --strict --max-width 8 --use-neighbours -o fixed.tif
+  fix pages/ --layers 100..200 --method nearest -o fixed/")]
 pub(crate) struct FixArgs {
     #[command(flatten)]
     input: Input,
+
+    /// Where the missed crossings come from
+    #[arg(long, value_enum, default_value_t)]
+    method: MethodArg,
+
+    /// Leave bands of more rows: half the part's smallest feature is a good limit
+    #[arg(long, value_name = "ROWS", default_value_t = FixOptions::default().max_width)]
+    max_width: u32,
+
+    /// Leave bands whose correction is less sure than this, from 0 to 1
+    #[arg(long, value_name = "SHARE", default_value_t = FixOptions::default().min_confidence)]
+    #[arg(value_parser = parse_share)]
+    min_confidence: f64,
+
+    /// Let the layers below and above say where contours cross bands of three rows and more
+    #[arg(long)]
+    use_neighbours: bool,
+
+    /// Write what was found and done as JSON
+    #[arg(long, value_name = "FILE.json")]
+    report: Option<PathBuf>,
+
+    /// Write a picture of each band into a new folder: before, after and the difference (what became
+    /// white in blue, what became black in red); of a band that was left, how it is
+    #[arg(long, value_name = "DIR")]
+    evidence: Option<PathBuf>,
+
+    /// End with status 3 if a band was left
+    #[arg(long)]
+    strict: bool,
+
     #[command(flatten)]
     output: Output,
 }
 
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum MethodArg {
+    /// What the good rows above and below share (edges of wide bands become steps)
+    Nearest,
+    /// Smooth curves along the part's contours
+    #[default]
+    Spline,
+}
+
+impl FixArgs {
+    fn options(&self) -> FixOptions {
+        FixOptions {
+            method: match self.method {
+                MethodArg::Nearest => Method::Nearest,
+                MethodArg::Spline => Method::Spline,
+            },
+            max_width: self.max_width,
+            min_confidence: self.min_confidence,
+            use_neighbours: self.use_neighbours,
+        }
+    }
+}
+
 pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Stop> {
     let report = report("fix", common, &args.output);
-    let mut gray = 0;
-    let layers = read_layers(&args.input, &report)?.inspect(|layer| {
-        gray += u64::from(matches!(layer, Ok(Layer { image: Image::Gray(_), .. })));
-    });
-    let fixed = lamp_postprocess::fix(layers, |info, bands| {
-        report.say(&describe(info, bands));
+    let options = args.options();
+    let mut findings = Findings::new(options);
+    let mut evidence = args.evidence.as_deref().map(Evidence::new).transpose()?;
+    let mut layer_count = 0;
+    let layers = read_layers(&args.input, &report)?.inspect(|_| layer_count += 1);
+    let fixed = lamp_postprocess::fix(layers, options, |fixed| {
+        for line in describe(fixed, &options) {
+            report.say(&line);
+        }
+        if let Some(evidence) = &mut evidence {
+            evidence.add(fixed);
+        }
+        findings.add(fixed);
     });
     write_layers(fixed, &args.output, &report)?;
-    if gray > 0 {
-        report.say(&format!(
-            "{gray} gray layers passed unchecked: stray rows are only found in 1-bit layers"
+    if let Some(evidence) = evidence {
+        evidence.finish()?;
+    }
+    if let Some(path) = &args.report {
+        write_file(path, |out| findings.write(layer_count, out))?;
+    }
+    match findings.left() {
+        0 => Ok(()),
+        left if args.strict => Err(Stop::Findings(left_in_all(left))),
+        left => {
+            report.say(&left_in_all(left));
+            Ok(())
+        }
+    }
+}
+
+fn left_in_all(bands: usize) -> String {
+    let (bands, were) =
+        if bands == 1 { ("1 band".to_owned(), "was") } else { (format!("{bands} bands"), "were") };
+    format!(
+        "{bands} of stray rows {were} left: repair the CAD, or look at the report and pictures and change the limits"
+    )
+}
+
+/// What was found in a layer: a line for all that was corrected, and one for
+/// each band that was left.
+fn describe(fixed: &Fixed<'_>, options: &FixOptions) -> Vec<String> {
+    let info = &fixed.before.info;
+    let corrected: Vec<&Band> =
+        fixed.bands.iter().filter(|band| band.outcome == Outcome::Corrected).collect();
+    let mut lines = Vec::new();
+    if !corrected.is_empty() {
+        lines.push(describe_corrected(info, &corrected));
+    }
+    for band in fixed.bands {
+        let why = match band.outcome {
+            Outcome::Corrected => continue,
+            Outcome::TooWide => format!("{} rows wide, limit {}", band.rows, options.max_width),
+            Outcome::Doubtful => {
+                format!("confidence {:.2}, limit {:.2}", band.confidence, options.min_confidence)
+            }
+        };
+        lines.push(format!(
+            "{} {}: {why}; repair the CAD near {}",
+            info.name(),
+            rows_of(band),
+            whereabouts(fixed.before, band)
         ));
     }
-    Ok(())
+    lines
 }
 
 /// `layer 812 (z 81.20 mm): rows 1034-1036, 1070 corrected, 214 pixels changed`.
-fn describe(info: &PageInfo, bands: &[Band]) -> String {
-    let rows: Vec<String> = bands
-        .iter()
-        .map(|&Band { first_row, rows, .. }| match rows {
-            1 => first_row.to_string(),
-            _ => format!("{first_row}-{}", first_row + rows - 1),
-        })
-        .collect();
+fn describe_corrected(info: &PageInfo, bands: &[&Band]) -> String {
     let word = if bands.len() == 1 && bands[0].rows == 1 { "row" } else { "rows" };
+    let rows: Vec<String> = bands.iter().map(|band| range_of(band)).collect();
     let pixels: u64 = bands.iter().map(|band| band.pixels).sum();
     format!("{}: {word} {} corrected, {pixels} pixels changed", info.name(), rows.join(", "))
 }
 
+/// `row 7` or `rows 1034-1071`.
+fn rows_of(band: &Band) -> String {
+    let word = if band.rows == 1 { "row" } else { "rows" };
+    format!("{word} {}", range_of(band))
+}
+
+fn range_of(band: &Band) -> String {
+    match band.rows {
+        1 => band.first_row.to_string(),
+        _ => format!("{}-{}", band.first_row, band.end() - 1),
+    }
+}
+
+/// Parses a share from 0 to 1.
+fn parse_share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err(format!("`{text}` is not a share: write a number from 0 to 1")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use lamp_postprocess::Kinds;
+    use lamp_stack::{Dpi, Image, Layer, Mask};
+
     use super::*;
 
+    fn band(first_row: u32, rows: u32, outcome: Outcome) -> Band {
+        Band {
+            first_row,
+            rows,
+            kinds: Kinds::NONE,
+            columns: 100..400,
+            gap: Some(120..130),
+            pixels: 107,
+            confidence: 0.312,
+            outcome,
+        }
+    }
+
+    fn described(bands: &[Band], info: PageInfo) -> Vec<String> {
+        let layer =
+            Layer { info, dpi: Dpi::new(254.0), image: Image::Mask(Mask::black(500, 2000)) };
+        let fixed = Fixed { before: &layer, after: &layer, bands };
+        describe(&fixed, &FixOptions::default())
+    }
+
     #[test]
-    fn a_layer_is_described_in_one_line() {
+    fn what_was_corrected_is_said_in_one_line() {
         let info = PageInfo { index: 812, z_um: Some(81_200.0), ..PageInfo::default() };
-        let band = |first_row, rows| Band { first_row, rows, pixels: 107 };
+        let bands = [band(1034, 3, Outcome::Corrected), band(1070, 1, Outcome::Corrected)];
         assert_eq!(
-            describe(&info, &[band(1034, 3), band(1070, 1)]),
-            "layer 812 (z 81.20 mm): rows 1034-1036, 1070 corrected, 214 pixels changed"
+            described(&bands, info),
+            ["layer 812 (z 81.20 mm): rows 1034-1036, 1070 corrected, 214 pixels changed"]
         );
         assert_eq!(
-            describe(&PageInfo::default(), &[band(7, 1)]),
-            "layer 0: row 7 corrected, 107 pixels changed"
+            described(&bands[1..], PageInfo::default()),
+            ["layer 0: row 1070 corrected, 107 pixels changed"]
+        );
+    }
+
+    #[test]
+    fn what_was_left_is_said_with_its_place() {
+        let origin_mm = Some([20.0, 120.0]);
+        let info = PageInfo { index: 812, z_um: Some(81_200.0), origin_mm, ..PageInfo::default() };
+        let bands = [band(1034, 38, Outcome::TooWide), band(1080, 1, Outcome::Doubtful)];
+        assert_eq!(
+            described(&bands, info),
+            [
+                "layer 812 (z 81.20 mm) rows 1034-1071: 38 rows wide, limit 15; \
+                 repair the CAD near x 32.0-33.0 y 12.8-16.6 mm",
+                "layer 812 (z 81.20 mm) row 1080: confidence 0.31, limit 0.50; \
+                 repair the CAD near x 32.0-33.0 y 11.9-12.0 mm",
+            ]
+        );
+        assert_eq!(
+            described(&bands[1..], PageInfo::default()),
+            ["layer 0 row 1080: confidence 0.31, limit 0.50; repair the CAD near columns 120-129"]
         );
     }
 }

@@ -1,0 +1,125 @@
+//! Pictures of what `fix` did.
+
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use lamp_postprocess::{Band, Fixed, Outcome};
+use lamp_stack::{Image, write_rgb_png};
+
+use crate::picture::{Region, levels_of_region};
+use crate::stop::Stop;
+use crate::streams::write_file;
+
+/// Good rows and columns around a band that are shown with it.
+const AROUND: u32 = 16;
+/// A stray run may cross the image: so much of it, from the gap on, shows how
+/// it was mended.
+const WIDEST: u32 = 400;
+/// Each pixel is shown as so many.
+const SCALE: usize = 4;
+/// What lies between two panels.
+const GUTTER: [u8; 3] = [128; 3];
+
+/// A folder of pictures, one for each band.
+pub(crate) struct Evidence {
+    folder: PathBuf,
+    failed: Option<Stop>,
+}
+
+impl Evidence {
+    /// Makes the folder, which must not hold anything yet.
+    pub(crate) fn new(folder: &Path) -> Result<Self, Stop> {
+        let name = || folder.display().to_string();
+        fs::create_dir_all(folder).with_context(name)?;
+        if fs::read_dir(folder).with_context(name)?.next().is_some() {
+            return Err(Stop::usage(format!("{}: pictures go to an empty folder", name())));
+        }
+        Ok(Self { folder: folder.to_owned(), failed: None })
+    }
+
+    /// Draws the bands of a layer. After a failure it draws no more.
+    pub(crate) fn add(&mut self, fixed: &Fixed<'_>) {
+        for band in fixed.bands {
+            if self.failed.is_none() {
+                self.failed = self.draw(fixed, band).err();
+            }
+        }
+    }
+
+    /// Says whether all were drawn.
+    pub(crate) fn finish(self) -> Result<(), Stop> {
+        self.failed.map_or(Ok(()), Err)
+    }
+
+    fn draw(&self, fixed: &Fixed<'_>, band: &Band) -> Result<(), Stop> {
+        let region = region(&fixed.before.image, band);
+        let panel = |image: &Image| -> Vec<Vec<u8>> { levels_of_region(image, &region).collect() };
+        let before = panel(&fixed.before.image);
+        let corrected = band.outcome == Outcome::Corrected;
+        let panels = if corrected {
+            let after = panel(&fixed.after.image);
+            vec![plain(&before), plain(&after), difference(&before, &after)]
+        } else {
+            vec![plain(&before)]
+        };
+        let rows = enlarged(&panels);
+        let name = format!(
+            "layer_{:05}_rows_{:05}-{:05}{}.png",
+            fixed.before.info.index,
+            band.first_row,
+            band.end() - 1,
+            if corrected { "" } else { "_left" },
+        );
+        let (width, height) = (rows[0].len() as u32 / 3, rows.len() as u32);
+        write_file(&self.folder.join(name), |out| {
+            write_rgb_png(out, width, height, rows.into_iter())
+        })
+    }
+}
+
+/// What is shown of a band: from a little left of its gap on.
+fn region(image: &Image, band: &Band) -> Region {
+    let around = |range: Range<u32>, end: u32| {
+        range.start.saturating_sub(AROUND)..range.end.saturating_add(AROUND).min(end)
+    };
+    let from = band.gap.clone().unwrap_or(band.columns.clone());
+    let columns =
+        around(from.start.min(band.columns.start)..band.columns.end.max(from.end), image.width());
+    let start = columns.start.max(from.start.saturating_sub(WIDEST / 2));
+    Region {
+        columns: start..columns.end.min(start.saturating_add(WIDEST)),
+        rows: around(band.first_row..band.end(), image.height()),
+    }
+}
+
+/// Rows of red, green and blue.
+type Panel = Vec<Vec<[u8; 3]>>;
+
+fn plain(levels: &[Vec<u8>]) -> Panel {
+    levels.iter().map(|row| row.iter().map(|&level| [level; 3]).collect()).collect()
+}
+
+/// What became brighter in blue, what became darker in red, the rest dimmed.
+fn difference(before: &[Vec<u8>], after: &[Vec<u8>]) -> Panel {
+    let shade = |(&before, &after): (&u8, &u8)| match after.cmp(&before) {
+        std::cmp::Ordering::Equal => [before / 3; 3],
+        std::cmp::Ordering::Greater => [0, 110, 255],
+        std::cmp::Ordering::Less => [230, 30, 30],
+    };
+    before.iter().zip(after).map(|(a, b)| a.iter().zip(b).map(shade).collect()).collect()
+}
+
+/// The panels one below the other, each pixel as a square.
+fn enlarged(panels: &[Panel]) -> Vec<Vec<u8>> {
+    let wide =
+        |row: &[[u8; 3]]| -> Vec<u8> { row.iter().flat_map(|pixel| pixel.repeat(SCALE)).collect() };
+    let width = panels[0][0].len();
+    let gutter = vec![wide(&vec![GUTTER; width]); SCALE];
+    let panels: Vec<Vec<Vec<u8>>> = panels
+        .iter()
+        .map(|panel| panel.iter().flat_map(|row| vec![wide(row); SCALE]).collect())
+        .collect();
+    panels.join(&gutter[..])
+}

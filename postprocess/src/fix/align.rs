@@ -1,0 +1,116 @@
+//! Which crossings of one row belong to which of another.
+
+/// How far from the diagonal a path may stray, in crossings, beyond the
+/// difference of the rows' numbers.
+const REACH: isize = 16;
+/// Rows that take more steps than that are not followed: no part looks so.
+const MOST_STEPS: usize = 1 << 22;
+/// What it costs, in pixels, that a contour closes, besides its width.
+const CLOSING: f64 = 2.0;
+
+/// Gives for each crossing of `a` the one of `b` on the same contour. Both are
+/// sorted and of even number.
+///
+/// Crossings keep their order and their direction: what has no partner does
+/// so in pairs of neighbours, the two sides of a contour that ends or begins
+/// between the rows. Of all such ways the cheapest is taken: partners cost
+/// their distance, pairs without a partner their width.
+pub(crate) fn align(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
+    if a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 2.0) {
+        return (0..a.len()).map(Some).collect();
+    }
+    let more = b.len() as isize - a.len() as isize;
+    let (low, high) = (more.min(0) - REACH, more.max(0) + REACH);
+    let stride = (high - low + 1) as usize;
+    if (a.len() + 1).saturating_mul(stride) > MOST_STEPS {
+        return vec![None; a.len()];
+    }
+    // cost[i][j - i - low]: the cheapest way to account for i and j crossings.
+    let mut cost = vec![f64::INFINITY; (a.len() + 1) * stride];
+    let at = |i: usize, j: usize| {
+        let column = j as isize - i as isize - low;
+        (0..stride as isize).contains(&column).then(|| i * stride + column as usize)
+    };
+    let closing = |row: &[f64], end: usize| row[end - 1] - row[end - 2] + CLOSING;
+    let steps = |cost: &[f64], i: usize, j: usize| {
+        let known = |i: usize, j: usize| at(i, j).map_or(f64::INFINITY, |at| cost[at]);
+        let mut best = (f64::INFINITY, 0, 0);
+        let mut offer = |cost: f64, back_a, back_b| {
+            if cost < best.0 {
+                best = (cost, back_a, back_b);
+            }
+        };
+        if i > 0 && j > 0 {
+            offer(known(i - 1, j - 1) + (a[i - 1] - b[j - 1]).abs(), 1, 1);
+        }
+        if i > 1 {
+            offer(known(i - 2, j) + closing(a, i), 2, 0);
+        }
+        if j > 1 {
+            offer(known(i, j - 2) + closing(b, j), 0, 2);
+        }
+        best
+    };
+    for i in 0..=a.len() {
+        let first = (i as isize + low).max(0) as usize;
+        let last = (i as isize + high).clamp(-1, b.len() as isize);
+        for j in first..(last + 1) as usize {
+            let best = if (i, j) == (0, 0) { 0.0 } else { steps(&cost, i, j).0 };
+            if let Some(at) = at(i, j) {
+                cost[at] = best;
+            }
+        }
+    }
+    let mut partners = vec![None; a.len()];
+    let (mut i, mut j) = (a.len(), b.len());
+    while (i, j) != (0, 0) {
+        let (_, back_a, back_b) = steps(&cost, i, j);
+        if (back_a, back_b) == (1, 1) {
+            partners[i - 1] = Some(j - 1);
+        }
+        (i, j) = (i - back_a, j - back_b);
+    }
+    partners
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn contours_are_followed_ended_and_begun() {
+        assert_eq!(align(&[10.0, 20.0], &[14.0, 25.0]), [Some(0), Some(1)]);
+        // A hole begins in a wide body; a small body ends.
+        assert_eq!(align(&[0.0, 100.0], &[1.0, 40.0, 60.0, 101.0]), [Some(0), Some(3)]);
+        assert_eq!(align(&[0.0, 3.0, 50.0, 90.0], &[51.0, 92.0]), [None, None, Some(0), Some(1)]);
+        // One ends and another begins elsewhere.
+        assert_eq!(align(&[10.0, 20.0], &[300.0, 310.0]), [None, None]);
+        assert_eq!(align(&[], &[1.0, 2.0]), []);
+        assert_eq!(align(&[1.0, 2.0], &[]), [None, None]);
+        let noise: Vec<f64> = (0..100_000).map(f64::from).collect();
+        assert!(align(&noise, &[]).iter().all(Option::is_none));
+    }
+
+    proptest! {
+        #[test]
+        fn order_and_direction_are_kept(
+            a in prop::collection::btree_set(0u16..500, 0..30),
+            b in prop::collection::btree_set(0u16..500, 0..30),
+        ) {
+            let even = |set: std::collections::BTreeSet<u16>| -> Vec<f64> {
+                let len = set.len() / 2 * 2;
+                set.into_iter().take(len).map(f64::from).collect()
+            };
+            let (a, b) = (even(a), even(b));
+            let partners = align(&a, &b);
+            prop_assert_eq!(partners.len(), a.len());
+            let pairs: Vec<_> =
+                partners.iter().enumerate().filter_map(|(i, j)| Some((i, (*j)?))).collect();
+            prop_assert!(pairs.is_sorted_by(|p, q| p.1 < q.1));
+            prop_assert!(pairs.iter().all(|(i, j)| i % 2 == j % 2));
+            prop_assert_eq!(align(&a, &a), (0..a.len()).map(Some).collect::<Vec<_>>());
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Rows out of rows, pixel by pixel, on their transitions.
+
+use lamp_stack::white_in_row;
+
+/// Makes `out` the row whose every pixel is what `colour` makes of the pixels
+/// of `rows` there. `colour` must leave black what is black in all.
+pub(super) fn combine<const N: usize>(
+    mut rows: [&[u32]; N],
+    colour: impl Fn([bool; N]) -> bool,
+    out: &mut Vec<u32>,
+) {
+    out.clear();
+    let mut colours = [false; N];
+    let mut white = false;
+    while let Some(column) = rows.iter().filter_map(|row| row.first().copied()).min() {
+        for (row, colour) in rows.iter_mut().zip(&mut colours) {
+            if row.first() == Some(&column) {
+                *row = &row[1..];
+                *colour = !*colour;
+            }
+        }
+        if white != colour(colours) {
+            white = !white;
+            out.push(column);
+        }
+    }
+}
+
+/// The row whose every pixel has the colour that at least two of three rows
+/// have there.
+pub(super) fn majority(rows: [&[u32]; 3]) -> Vec<u32> {
+    let mut out = Vec::new();
+    combine(rows, |[a, b, c]| a & b | b & c | a & c, &mut out);
+    out
+}
+
+/// The row that is white where two rows differ.
+pub(super) fn difference(a: &[u32], b: &[u32]) -> Vec<u32> {
+    let mut out = Vec::new();
+    combine([a, b], |[a, b]| a != b, &mut out);
+    out
+}
+
+/// How many pixels are white in both of two rows.
+pub(super) fn white_in_both(a: &[u32], b: &[u32], width: u32) -> u64 {
+    let mut out = Vec::new();
+    combine([a, b], |[a, b]| a && b, &mut out);
+    white_in_row(&out, width)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn row() -> impl Strategy<Value = Vec<u32>> {
+        prop::collection::btree_set(0u32..40, 0..12).prop_map(|row| row.into_iter().collect())
+    }
+
+    fn is_white(row: &[u32], column: u32) -> bool {
+        row.iter().filter(|&&t| t <= column).count() % 2 == 1
+    }
+
+    proptest! {
+        #[test]
+        fn every_pixel_is_what_its_rows_make_it(a in row(), b in row(), c in row()) {
+            let (most, differ) = (majority([&a, &b, &c]), difference(&a, &b));
+            prop_assert!(most.is_sorted_by(|a, b| a < b) && differ.is_sorted_by(|a, b| a < b));
+            let mut both = 0;
+            for column in 0..40 {
+                let [a, b, c] = [&a, &b, &c].map(|row| is_white(row, column));
+                prop_assert_eq!(is_white(&most, column), [a, b, c].iter().filter(|&&w| w).count() > 1);
+                prop_assert_eq!(is_white(&differ, column), a != b);
+                both += u64::from(a && b);
+            }
+            prop_assert_eq!(white_in_both(&a, &b, 40), both);
+        }
+    }
+}

@@ -1,0 +1,394 @@
+//! The contours that cross a band of stray rows, and where in its rows they
+//! should cross.
+//!
+//! Source: 002 section 2.4.1 and figure 29c: C1 cubic Hermite curves through
+//! the crossings of the good rows on both sides.
+
+use std::ops::Range;
+
+use lamp_stack::Mask;
+
+use super::align::align;
+use super::curve::{hermite, parabola, slope};
+
+/// So many good rows on each side show where a contour is going.
+pub(super) const DEPTH: u32 = 12;
+
+/// A contour that ends in the band is likely to be there still where it should
+/// be so many pixels wide at least.
+const CLEARLY_OPEN: f64 = 8.0;
+
+/// A crossing that a row of the band should have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Expected {
+    /// The column, as transitions are counted, not rounded.
+    pub(super) column: f64,
+    /// How far off that may be, in pixels.
+    pub(super) slack: f64,
+    /// The contour, and which of its sides.
+    pub(super) side: Side,
+    /// Whether it must be there: the contour crosses the whole band.
+    pub(super) through: bool,
+    /// Whether it is more likely there than not.
+    pub(super) likely: bool,
+}
+
+/// One of the lines that make up the contours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Side {
+    contour: usize,
+    right: bool,
+}
+
+/// What a row of the band should look like.
+#[derive(Debug, Default)]
+pub(super) struct Outlook {
+    /// The crossings, from the left.
+    pub(super) crossings: Vec<Expected>,
+    /// Where contours end or begin somewhere in the band, so that nobody knows
+    /// the colour in this row: from the left, apart from each other.
+    pub(super) unknown: Vec<Range<f64>>,
+}
+
+/// The contours that cross a band or end in it.
+#[derive(Debug)]
+pub(super) struct Contours {
+    /// The rows that are looked at: the band and good rows around it.
+    rows: Range<u32>,
+    band: Range<u32>,
+    contours: Vec<Contour>,
+}
+
+/// Where a line is known to cross the rows looked at.
+type Knots = Vec<Option<f64>>;
+
+/// Where a line should cross a row, and how far off that may be.
+type Guess = (f64, f64);
+
+#[derive(Debug)]
+struct Contour {
+    course: Course,
+    /// Where its lines, one or two, should cross each row of the band.
+    guesses: Vec<Vec<Guess>>,
+}
+
+#[derive(Debug)]
+enum Course {
+    /// It crosses the band from the good row above to the one below, or from
+    /// one of them to the image's edge.
+    Through(Knots),
+    /// Both sides of a contour that comes from above, or from below, and ends
+    /// in the band.
+    Closing { sides: [Knots; 2], from_above: bool },
+}
+
+impl Contours {
+    /// Follows the contours around a band of rows; `is_good` tells rows that
+    /// can be relied on. `None` where the band has no good row beside it.
+    pub(super) fn around(
+        mask: &Mask,
+        band: Range<u32>,
+        is_good: impl Fn(u32) -> bool,
+    ) -> Option<Self> {
+        let rows =
+            band.start.saturating_sub(DEPTH)..band.end.saturating_add(DEPTH).min(mask.height());
+        let lines = |beside: &mut dyn Iterator<Item = u32>| {
+            let rows: Vec<_> = beside.take_while(|&row| is_good(row)).collect();
+            (!rows.is_empty()).then(|| follow(mask, &rows))
+        };
+        let above = lines(&mut (rows.start..band.start).rev());
+        let below = lines(&mut (band.end..rows.end));
+        let mut contours = Self { rows, band, contours: Vec::new() };
+        match (above, below) {
+            (None, None) => return None,
+            (Some(lines), None) | (None, Some(lines)) => {
+                lines
+                    .iter()
+                    .for_each(|line| contours.push(Course::Through(contours.knots(&[line]))));
+            }
+            (Some(above), Some(below)) => contours.join(&above, &below),
+        }
+        contours.guess();
+        Some(contours)
+    }
+
+    /// Joins the lines that cross the band; what is left comes in pairs.
+    fn join(&mut self, above: &[Line], below: &[Line]) {
+        let ahead = f64::from(self.band.end - self.band.start + 1);
+        let reach = |lines: &[Line], rows: f64| -> Vec<f64> {
+            let mut columns: Vec<f64> = lines
+                .iter()
+                .map(|line| line[0].1 + rows * slope(line).clamp(-20.0, 20.0))
+                .collect();
+            // Lines do not pass each other.
+            for i in 1..columns.len() {
+                columns[i] = columns[i].max(columns[i - 1]);
+            }
+            columns
+        };
+        // Halfway, so that both sides have their say.
+        let partners = align(&reach(above, ahead / 2.0), &reach(below, -ahead / 2.0));
+        let mut joined = vec![false; below.len()];
+        let mut pairs = Vec::new();
+        for (line, partner) in above.iter().zip(&partners) {
+            if let Some(partner) = *partner {
+                joined[partner] = true;
+                let knots = self.knots(&[line, &below[partner]]);
+                self.push(Course::Through(knots));
+            } else {
+                pairs.push(line);
+            }
+        }
+        let begun = below.iter().zip(joined).filter(|(_, joined)| !joined).map(|(line, _)| line);
+        for (lines, from_above) in [(pairs, true), (begun.collect(), false)] {
+            for pair in lines.chunks_exact(2) {
+                let sides = [self.knots(&pair[..1]), self.knots(&pair[1..])];
+                self.push(Course::Closing { sides, from_above });
+            }
+        }
+    }
+
+    fn knots(&self, lines: &[&Line]) -> Knots {
+        let mut knots = vec![None; (self.rows.end - self.rows.start) as usize];
+        for &(row, column) in lines.iter().copied().flatten() {
+            knots[(row - f64::from(self.rows.start)) as usize] = Some(column);
+        }
+        knots
+    }
+
+    fn push(&mut self, course: Course) {
+        self.contours.push(Contour { course, guesses: Vec::new() });
+    }
+
+    /// Notes that a line was found in a row of the band. [`Self::guess`] then
+    /// makes use of it.
+    pub(super) fn found(&mut self, side: Side, row: u32, column: u32) {
+        let at = (row - self.rows.start) as usize;
+        let knots = match &mut self.contours[side.contour].course {
+            Course::Through(knots) => knots,
+            Course::Closing { sides, .. } => &mut sides[usize::from(side.right)],
+        };
+        knots[at] = Some(f64::from(column));
+    }
+
+    /// Works out where the lines should cross the band's rows, from all that
+    /// is known by now.
+    pub(super) fn guess(&mut self) {
+        let [start, end] =
+            [self.band.start, self.band.end].map(|row| (row - self.rows.start) as usize);
+        for Contour { course, guesses } in &mut self.contours {
+            *guesses = match course {
+                Course::Through(knots) => vec![through(knots, start..end)],
+                Course::Closing { sides, from_above } => {
+                    let [left, right]: [Vec<_>; 2] = closing(sides, start..end, *from_above);
+                    vec![left, right]
+                }
+            };
+        }
+    }
+
+    /// What a row of the band should look like.
+    pub(super) fn outlook(&self, row: u32) -> Outlook {
+        let at = (row - self.band.start) as usize;
+        let mut outlook = Outlook::default();
+        for (contour, Contour { course, guesses }) in self.contours.iter().enumerate() {
+            let through = matches!(course, Course::Through(_));
+            let apart = match &guesses[..] {
+                [left, right] => right[at].0 - left[at].0 - left[at].1 - right[at].1,
+                _ => f64::INFINITY,
+            };
+            for (line, guesses) in guesses.iter().enumerate() {
+                let (column, slack) = guesses[at];
+                let side = Side { contour, right: line == 1 };
+                let likely = apart > CLEARLY_OPEN;
+                outlook.crossings.push(Expected { column, slack, side, through, likely });
+            }
+            if let Course::Closing { sides, .. } = course {
+                outlook.unknown.push(span(sides, [guesses[0][at], guesses[1][at]]));
+            }
+        }
+        outlook.crossings.sort_by(|a, b| a.column.total_cmp(&b.column));
+        outlook.unknown = apart(outlook.unknown);
+        outlook
+    }
+}
+
+/// Ranges in order, those that overlap as one.
+fn apart(mut ranges: Vec<Range<f64>>) -> Vec<Range<f64>> {
+    ranges.sort_by(|a, b| a.start.total_cmp(&b.start));
+    ranges.dedup_by(|next, last| {
+        let overlap = next.start <= last.end;
+        if overlap {
+            last.end = last.end.max(next.end);
+        }
+        overlap
+    });
+    ranges
+}
+
+/// Columns between which a contour that closes may be anywhere.
+fn span(sides: &[Knots; 2], now: [Guess; 2]) -> Range<f64> {
+    let columns = || sides.iter().flatten().copied().flatten();
+    let slack = now[0].1.max(now[1].1) + 2.0;
+    let low = columns().fold(now[0].0, f64::min) - slack;
+    let high = columns().fold(now[1].0, f64::max) + slack;
+    low..high
+}
+
+/// A line's crossings, from the row beside the band outwards: (row, column).
+type Line = Vec<(f64, f64)>;
+
+/// Follows every crossing of the first row through the others.
+fn follow(mask: &Mask, rows: &[u32]) -> Vec<Line> {
+    let columns = |row: u32| -> Vec<f64> { mask.row(row).iter().map(|&c| c.into()).collect() };
+    let mut last = columns(rows[0]);
+    let mut lines: Vec<Line> = last.iter().map(|&c| vec![(rows[0].into(), c)]).collect();
+    // Which line each crossing of the last row is on.
+    let mut on: Vec<Option<usize>> = (0..lines.len()).map(Some).collect();
+    for &row in &rows[1..] {
+        if on.iter().all(Option::is_none) {
+            break;
+        }
+        let next = columns(row);
+        let mut next_on = vec![None; next.len()];
+        for (line, partner) in on.iter().zip(align(&last, &next)) {
+            if let (&Some(line), Some(partner)) = (line, partner) {
+                lines[line].push((row.into(), next[partner]));
+                next_on[partner] = Some(line);
+            }
+        }
+        (last, on) = (next, next_on);
+    }
+    lines
+}
+
+/// The known points from a row on, in steps of one row, without a gap.
+fn line_from(knots: &Knots, rows: impl Iterator<Item = usize>) -> Line {
+    let point = |row: usize| Some((row as f64, knots[row]?));
+    rows.map_while(point).take(DEPTH as usize).collect()
+}
+
+/// The line upwards of a row that is known.
+fn above(knots: &Knots, row: usize) -> Line {
+    line_from(knots, (0..=row).rev())
+}
+
+/// The line downwards of a row that is known.
+fn below(knots: &Knots, row: usize) -> Line {
+    line_from(knots, row..knots.len())
+}
+
+/// Where a line that crosses the band should cross its rows, and how far off
+/// that may be: where it is known, there; between, along a cubic.
+fn through(knots: &Knots, rows: Range<usize>) -> Vec<Guess> {
+    let mut guesses = Vec::with_capacity(rows.len());
+    let mut row = rows.start;
+    while row < rows.end {
+        if let Some(column) = knots[row] {
+            guesses.push((column, 0.5));
+            row += 1;
+            continue;
+        }
+        let next = (row..knots.len()).find(|&row| knots[row].is_some());
+        let end = next.unwrap_or(rows.end).min(rows.end);
+        // The row before is known, if it is one of those looked at: else it
+        // would be unknown itself, and one with this.
+        let from = row.checked_sub(1).map(|row| above(knots, row)).filter(|line| !line.is_empty());
+        let to = next.map(|row| below(knots, row));
+        let curve = Curve::between(from, to);
+        guesses.extend((row..end).map(|row| curve.at(row as f64)));
+        row = end;
+    }
+    guesses
+}
+
+/// The course of a line between rows where it is known.
+enum Curve {
+    Between {
+        from: (f64, f64),
+        from_slope: f64,
+        to: (f64, f64),
+        to_slope: f64,
+    },
+    /// Known on one side only, it goes straight on.
+    On {
+        from: (f64, f64),
+        slope: f64,
+    },
+}
+
+impl Curve {
+    /// From one line to another; there is at least one.
+    fn between(from: Option<Line>, to: Option<Line>) -> Self {
+        match (from, to) {
+            (Some(from), Some(to)) => Self::Between {
+                from: from[0],
+                from_slope: slope(&from),
+                to: to[0],
+                to_slope: slope(&to),
+            },
+            (Some(line), None) | (None, Some(line)) => Self::on(&line),
+            (None, None) => unreachable!("a line was found in a good row beside the band"),
+        }
+    }
+
+    fn on(line: &Line) -> Self {
+        Self::On { from: line[0], slope: slope(line) }
+    }
+
+    fn at(&self, row: f64) -> Guess {
+        match *self {
+            Self::Between { from, from_slope, to, to_slope } => {
+                let column = hermite(from, from_slope, to, to_slope, row);
+                let chord = (to.1 - from.1) / (to.0 - from.0);
+                let straight = from.1 + chord * (row - from.0);
+                (column, 0.5 + 0.5 * (column - straight).abs() + 0.15 * chord.abs())
+            }
+            Self::On { from, slope } => {
+                let away = row - from.0;
+                (from.1 + slope * away, 0.5 + away.abs() * (0.2 + 0.2 * slope.abs()))
+            }
+        }
+    }
+}
+
+/// Where the two sides of a contour that ends in the band should cross its
+/// rows, and how far off that may be. Where it has ended by then, both lie
+/// where it did.
+///
+/// The square of the width of a circle, an ellipse and a wedge alike is a
+/// polynomial of second degree along the rows; its middle goes on straight.
+fn closing(sides: &[Knots; 2], rows: Range<usize>, from_above: bool) -> [Vec<Guess>; 2] {
+    // The last row where both sides are known, on the way into the band.
+    let both = |row: &usize| sides[0][*row].is_some() && sides[1][*row].is_some();
+    let last = if from_above {
+        (rows.start - 1..rows.end).take_while(both).last()
+    } else {
+        (rows.start..=rows.end).rev().take_while(both).last()
+    };
+    let last = last.expect("both sides were found in the good row beside the band");
+    let [left, right] = [0, 1]
+        .map(|side| if from_above { above(&sides[side], last) } else { below(&sides[side], last) });
+    let points = |value: &dyn Fn(f64, f64) -> f64| -> Line {
+        left.iter().zip(&right).map(|(l, r)| (l.0, value(l.1, r.1))).collect()
+    };
+    let squares = points(&|l, r| (0.5 * (r - l)).powi(2));
+    let middles = points(&|l, r| 0.5 * (l + r));
+    let drift = slope(&middles).clamp(-20.0, 20.0);
+    let mut guesses = [Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len())];
+    for row in rows {
+        let away = row as f64 - last as f64;
+        let middle = middles[0].1 + drift * away;
+        let half = parabola(&squares, row as f64).max(0.0).sqrt();
+        let slack = 1.0 + 0.5 * (half - squares[0].1.sqrt()).abs() + 0.25 * away.abs();
+        let [l, r] = match (sides[0][row], sides[1][row]) {
+            (Some(l), Some(r)) => [(l, 0.5), (r, 0.5)],
+            (Some(l), None) => [(l, 0.5), ((2.0 * middle - l).max(l), slack)],
+            (None, Some(r)) => [((2.0 * middle - r).min(r), slack), (r, 0.5)],
+            (None, None) => [(middle - half, slack), (middle + half, slack)],
+        };
+        guesses[0].push(l);
+        guesses[1].push(r);
+    }
+    guesses
+}

@@ -1,0 +1,110 @@
+//! Gray rows along outlines that were put right.
+
+use std::ops::Range;
+
+use lamp_stack::LevelChange;
+
+/// A gray row, and its outline.
+pub(super) struct GrayRow<'a> {
+    pub(super) levels: &'a [LevelChange],
+    pub(super) outline: &'a [u32],
+}
+
+/// The runs of a gray row that has a new outline: (length, level).
+///
+/// Along an edge that the row had, its levels stay. Along one that is new they
+/// are those of the good row `beside` along its nearest edge of that
+/// direction, up to full exposure or half its run. Where the row had nothing
+/// further in, it takes what the good row has there, or full exposure.
+pub(super) fn levels(had: &GrayRow<'_>, beside: &GrayRow<'_>, outline: &[u32]) -> Vec<(u32, u8)> {
+    let mut runs = Vec::new();
+    let mut end = 0;
+    for run in outline.chunks_exact(2) {
+        runs.push((run[0] - end, 0));
+        white_run(had, beside, run[0]..run[1], &mut runs);
+        end = run[1];
+    }
+    runs
+}
+
+/// Adds the levels of a run of the outline.
+fn white_run(had: &GrayRow<'_>, beside: &GrayRow<'_>, run: Range<u32>, runs: &mut Vec<(u32, u8)>) {
+    let left = Profile::left(beside, run.start);
+    let right = Profile::right(beside, run.end);
+    // An edge of the other direction had its levels on its other side.
+    let is_new = |column: u32, direction: usize| {
+        had.outline.binary_search(&column).map_or(true, |which| which % 2 != direction)
+    };
+    let half = (run.end - run.start) / 2;
+    let left_depth = if is_new(run.start, 0) { left.depth.min(half) } else { 0 };
+    let right_depth = if is_new(run.end, 1) { right.depth.min(half) } else { 0 };
+    let inside = left.at + left.depth..right.at;
+    runs.extend(levels_in(beside.levels, left.at..left.at + left_depth));
+    for (column, length, level) in
+        with_columns(had.levels, run.start + left_depth..run.end - right_depth)
+    {
+        if level > 0 {
+            runs.push((length, level));
+            continue;
+        }
+        for (column, length, level) in with_columns(beside.levels, column..column + length) {
+            let known = level > 0 && inside.start <= column && column + length <= inside.end;
+            runs.push((length, if known { level } else { 255 }));
+        }
+    }
+    let right_end = right.at + right.depth;
+    runs.extend(levels_in(beside.levels, right_end - right_depth..right_end));
+}
+
+/// The gray levels along an edge: `depth` pixels from column `at` on.
+struct Profile {
+    at: u32,
+    depth: u32,
+}
+
+impl Profile {
+    const NONE: Self = Self { at: 0, depth: 0 };
+
+    /// Of the left edge nearest to a column.
+    fn left(row: &GrayRow<'_>, column: u32) -> Self {
+        let runs = row.outline.chunks_exact(2);
+        let Some(run) = runs.min_by_key(|run| run[0].abs_diff(column)) else { return Self::NONE };
+        let half = (run[1] - run[0]).div_ceil(2);
+        let gray = levels_in(row.levels, run[0]..run[0] + half).take_while(|run| run.1 < 255);
+        Self { at: run[0], depth: gray.map(|run| run.0).sum() }
+    }
+
+    /// Of the right edge nearest to a column.
+    fn right(row: &GrayRow<'_>, column: u32) -> Self {
+        let runs = row.outline.chunks_exact(2);
+        let Some(run) = runs.min_by_key(|run| run[1].abs_diff(column)) else { return Self::NONE };
+        let half = (run[1] - run[0]).div_ceil(2);
+        let runs: Vec<_> = levels_in(row.levels, run[1] - half..run[1]).collect();
+        let gray = runs.iter().rev().take_while(|run| run.1 < 255);
+        let depth = gray.map(|run| run.0).sum();
+        Self { at: run[1] - depth, depth }
+    }
+}
+
+/// The runs of a row between two columns: (length, level).
+fn levels_in(row: &[LevelChange], columns: Range<u32>) -> impl Iterator<Item = (u32, u8)> {
+    with_columns(row, columns).map(|(_, length, level)| (length, level))
+}
+
+/// The runs of a row between two columns: (column, length, level).
+fn with_columns(row: &[LevelChange], columns: Range<u32>) -> impl Iterator<Item = (u32, u32, u8)> {
+    let mut next = row.partition_point(|change| change.column <= columns.start);
+    let mut level = next.checked_sub(1).map_or(0, |last| row[last].level);
+    let mut column = columns.start;
+    std::iter::from_fn(move || {
+        let end = row.get(next).map_or(columns.end, |change| change.column.min(columns.end));
+        if column >= columns.end {
+            return None;
+        }
+        let run = (column, end - column, level);
+        column = end;
+        level = row.get(next).map_or(0, |change| change.level);
+        next += 1;
+        Some(run)
+    })
+}

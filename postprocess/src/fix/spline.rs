@@ -1,0 +1,132 @@
+//! A band's rows from the contours that cross it.
+//!
+//! Source: 002 section 2.4.1 and figure 29c.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use lamp_stack::{Image, Mask};
+
+use super::contours::{Contours, Expected, Outlook, Side};
+use super::detect::without_slivers;
+use super::mend::{Mended, mend};
+use super::outline::outline_row;
+
+/// The rows of a band, put right.
+pub(super) struct Rebuilt {
+    /// Their transitions.
+    pub(super) rows: Vec<Vec<u32>>,
+    /// Between which columns crossings were added.
+    pub(super) gap: Option<Range<u32>>,
+    /// How sure it is, from 0 to 1: as sure as the least sure row.
+    pub(super) confidence: f64,
+    /// Whether neighbouring rows lack different contours.
+    pub(super) touching: bool,
+}
+
+/// Rebuilds the rows of a band. `None` where there is no good row beside it.
+///
+/// Crossings that the rows have where a contour is expected stay as they are,
+/// and the contour is then expected to go through them; only crossings that
+/// were missed come from its curve.
+pub(super) fn rebuild(
+    mask: &Mask,
+    band: &Range<u32>,
+    is_good: impl Fn(u32) -> bool,
+    voters: Option<[&Image; 2]>,
+) -> Option<Rebuilt> {
+    let mut contours = Contours::around(mask, band.clone(), is_good)?;
+    let mend_row = |contours: &Contours, row: u32| {
+        let mut outlook = contours.outlook(row);
+        if let Some(voters) = voters {
+            vote(&mut outlook, &voters.map(|image| outline_row(image, row)));
+        }
+        mend(mask.row(row), &outlook, mask.width())
+    };
+    let first: Vec<Mended> = band.clone().map(|row| mend_row(&contours, row)).collect();
+    for (row, mended) in band.clone().zip(first) {
+        for (side, column) in mended.found {
+            contours.found(side, row, column);
+        }
+    }
+    contours.guess();
+    let mended: Vec<Mended> = band.clone().map(|row| mend_row(&contours, row)).collect();
+    let at_edge = band.start == 0 || band.end == mask.height();
+    let least = mended
+        .iter()
+        .zip(band.clone())
+        .map(|(mended, row)| confidence(mended, mask.row(row), mask.width()))
+        .fold(if at_edge { 0.8 } else { 1.0 }, f64::min);
+    Some(Rebuilt {
+        gap: columns_of(mended.iter().flat_map(|mended| &mended.added), mask.width()),
+        confidence: least,
+        touching: mended.windows(2).any(|rows| lack_others(&rows[0], &rows[1])),
+        rows: mended.into_iter().map(|mended| mended.row).collect(),
+    })
+}
+
+/// Takes the slivers out of a row.
+pub(super) fn unsliver(mask: &Mask, row: u32) -> Vec<u32> {
+    let [above, had, below] = [row - 1, row, row + 1].map(|row| mask.row(row));
+    without_slivers(had, above, below)
+}
+
+fn columns_of<'a>(added: impl Iterator<Item = &'a Expected>, width: u32) -> Option<Range<u32>> {
+    let column = |at: f64| at.round().clamp(0.0, f64::from(width - 1)) as u32;
+    added
+        .map(|crossing| column(crossing.column)..column(crossing.column) + 1)
+        .reduce(|a, b| a.start.min(b.start)..a.end.max(b.end))
+}
+
+fn lack_others(a: &Mended, b: &Mended) -> bool {
+    let [a, b] = [a, b]
+        .map(|mended| -> BTreeSet<Side> { mended.added.iter().map(|added| added.side).collect() });
+    !a.is_empty() && !b.is_empty() && a.is_disjoint(&b)
+}
+
+/// How sure a row is, from 0 to 1. It is less so where a contour that was
+/// added may lie further off than the next crossing, where more was changed
+/// than one crossing, or two in a row that ended black, and where the row
+/// still is not what was expected.
+fn confidence(mended: &Mended, had: &[u32], width: u32) -> f64 {
+    /// Crossings nearer than that are no less sure for it.
+    const ROOM: f64 = 8.0;
+    let placed = mended.added.iter().map(|added| {
+        let left = mended.row.partition_point(|&c| f64::from(c) < added.column - 1.0);
+        let right = mended.row.partition_point(|&c| f64::from(c) <= added.column + 1.0);
+        let others = [left.checked_sub(1), Some(right)].into_iter().flatten();
+        let distance = |&column: &u32| (f64::from(column) - added.column).abs();
+        let room = others.filter_map(|which| mended.row.get(which).map(distance));
+        let room = room.fold(f64::from(width), f64::min).max(ROOM);
+        room / (room + added.slack)
+    });
+    let needed = 2 - had.len() % 2;
+    let more = (mended.added.len() + mended.dropped).saturating_sub(needed);
+    let explained = f64::from(mended.gain) / f64::from(mended.gain + mended.off).max(1.0);
+    let explained = if mended.off == 0 { 1.0 } else { explained };
+    let edits = 0.9f64.powi(more as i32) * 0.8f64.powi(mended.dropped as i32);
+    placed.product::<f64>() * edits * 0.8f64.powi(mended.absent as i32) * explained
+}
+
+/// Lets the layers below and above say where contours cross: each crossing
+/// goes between theirs.
+fn vote(outlook: &mut Outlook, rows: &[Cow<'_, [u32]>; 2]) {
+    for crossing in &mut outlook.crossings {
+        let reach = 4.0 + 2.0 * crossing.slack;
+        let near = |row: &[u32]| {
+            let at = row.partition_point(|&column| f64::from(column) < crossing.column);
+            row[at.saturating_sub(1)..row.len().min(at + 1)]
+                .iter()
+                .map(|&column| f64::from(column))
+                .filter(|column| (column - crossing.column).abs() <= reach)
+                .min_by(|a, b| (a - crossing.column).abs().total_cmp(&(b - crossing.column).abs()))
+        };
+        if let (Some(below), Some(above)) = (near(&rows[0]), near(&rows[1])) {
+            let (low, high) = (below.min(above), below.max(above));
+            crossing.column = crossing.column.clamp(low, high);
+            crossing.slack = crossing.slack.min(0.5 + 0.5 * (high - low));
+        }
+    }
+    outlook.crossings.sort_by(|a, b| a.column.total_cmp(&b.column));
+}

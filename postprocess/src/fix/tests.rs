@@ -1,0 +1,428 @@
+use lamp_stack::{LevelChange, PageInfo};
+use proptest::prelude::*;
+
+use super::*;
+
+/// `#` is white; all rows as wide as the first.
+fn picture(rows: &[&str]) -> Mask {
+    let mut mask = MaskBuilder::new(rows[0].len() as u32);
+    for row in rows {
+        let bytes = row.as_bytes();
+        let toggles = |&c: &usize| bytes[c] != if c == 0 { b'.' } else { bytes[c - 1] };
+        let transitions: Vec<u32> = (0..bytes.len()).filter(toggles).map(|c| c as u32).collect();
+        mask.push_row(&transitions).unwrap();
+    }
+    mask.finish()
+}
+
+/// Where a shape is crossed by a row, as real columns.
+type Shape = fn(f64) -> Vec<f64>;
+
+const WIDTH: u32 = 800;
+const HEIGHT: u32 = 500;
+
+/// A disc with a round hole.
+fn ring(row: f64) -> Vec<f64> {
+    let half = |radius: f64| (radius * radius - (row - 250.3).powi(2)).sqrt();
+    let (outer, hole) = (half(210.0), half(60.0));
+    match (outer.is_nan(), hole.is_nan()) {
+        (true, _) => vec![],
+        (_, true) => vec![400.2 - outer, 400.2 + outer],
+        _ => vec![400.2 - outer, 400.2 - hole, 400.2 + hole, 400.2 + outer],
+    }
+}
+
+/// Two bars beside each other, one upright and one leaning.
+fn bars(row: f64) -> Vec<f64> {
+    if !(20.0..480.0).contains(&row) {
+        return vec![];
+    }
+    vec![100.5, 200.5, 300.0 + 0.37 * row, 360.0 + 0.37 * row]
+}
+
+/// The shape as a mask; `miss` says of each row which crossings are lost.
+fn drawn(shape: Shape, miss: impl Fn(u32) -> &'static [usize]) -> Mask {
+    let mut mask = MaskBuilder::new(WIDTH);
+    for row in 0..HEIGHT {
+        let crossings = shape(f64::from(row)).into_iter().enumerate();
+        let kept = crossings.filter(|(which, _)| !miss(row).contains(which));
+        mask.push_row(&kept.map(|(_, column)| column.ceil() as u32).collect::<Vec<_>>()).unwrap();
+    }
+    mask.finish()
+}
+
+fn whole(shape: Shape) -> Mask {
+    drawn(shape, |_| &[])
+}
+
+fn layer(index: u32, mask: Mask) -> Layer {
+    let info = PageInfo { index, ..PageInfo::default() };
+    Layer { info, dpi: None, image: Image::Mask(mask) }
+}
+
+fn fixed(layers: Vec<Layer>, options: FixOptions) -> (Vec<Layer>, Vec<Band>) {
+    let mut found = Vec::new();
+    let layers = layers.into_iter().map(Ok::<_, ()>);
+    let fixed = fix(layers, options, |fixed| found.extend_from_slice(fixed.bands));
+    (fixed.map(Result::unwrap).collect::<Vec<_>>(), found)
+}
+
+fn fixed_mask(mask: &Mask, options: FixOptions) -> (Mask, Vec<Band>) {
+    let (mut layers, bands) = fixed(vec![layer(0, mask.clone())], options);
+    let Image::Mask(fixed) = layers.remove(0).image else { unreachable!() };
+    (fixed, bands)
+}
+
+fn spline(mask: &Mask) -> (Mask, Vec<Band>) {
+    fixed_mask(mask, FixOptions::default())
+}
+
+fn nearest(mask: &Mask) -> (Mask, Vec<Band>) {
+    let options = FixOptions {
+        method: Method::Nearest,
+        max_width: u32::MAX,
+        min_confidence: 0.0,
+        use_neighbours: false,
+    };
+    fixed_mask(mask, options)
+}
+
+fn kinds(kinds: &[Kind]) -> Kinds {
+    kinds.iter().copied().collect()
+}
+
+/// How many pixels of two masks differ, and how many at most in a row.
+fn off(a: &Mask, b: &Mask) -> (u64, u64) {
+    let rows = a.rows().zip(b.rows()).map(|(a, b)| white_in_row(&difference(a, b), WIDTH));
+    rows.fold((0, 0), |(sum, most), pixels| (sum + pixels, most.max(pixels)))
+}
+
+#[test]
+fn nearest_takes_what_the_good_rows_share() {
+    let stray = picture(&["..####....", "..########", "......####", "..##..####", "...####..."]);
+    // The rows above and below differ in columns 2 and 6: there the band
+    // keeps what it has (the edges that figure 29b shows).
+    let expected = picture(&["..####....", "..#####...", "...####...", "..#####...", "...####..."]);
+    let (mended, bands) = nearest(&stray);
+    assert_eq!(mended, expected);
+    assert_eq!((bands[0].first_row, bands[0].rows, bands[0].pixels), (1, 3, 14));
+    assert_eq!((bands.len(), bands[0].columns.clone()), (1, 3..10));
+}
+
+#[test]
+fn nearest_takes_what_lies_outside_for_black() {
+    let (mended, bands) = nearest(&picture(&["..######", "..##....", "....####"]));
+    assert_eq!(mended, picture(&["..##....", "..##....", "........"]));
+    assert!(bands.iter().all(|band| band.kinds == kinds(&[Kind::EndsWhite, Kind::AtEdge])));
+}
+
+#[test]
+fn a_missed_crossing_is_put_back_and_all_others_stay() {
+    let clean = whole(ring);
+    for missed in [&[0][..], &[1], &[2], &[3]] {
+        for rows in [200..201, 205..210, 230..245] {
+            let stray = drawn(ring, |row| if rows.contains(&row) { missed } else { &[] });
+            let (mended, bands) = spline(&stray);
+            let (pixels, most) = off(&mended, &clean);
+            assert!(
+                most <= 1 && pixels <= 1 + rows.len() as u64 / 2,
+                "{missed:?} {rows:?}: {pixels}"
+            );
+            let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
+            assert_eq!((band.first_row..band.end(), band.outcome), (rows, Outcome::Corrected));
+            assert_eq!(band.kinds, kinds(&[Kind::EndsWhite]));
+            assert_eq!(band.pixels, off(&mended, &stray).0);
+            let gap = band.gap.clone().unwrap();
+            let edges: Vec<u32> =
+                (band.first_row..band.end()).map(|row| clean.row(row)[missed[0]]).collect();
+            let (low, high) = (edges.iter().min().unwrap(), edges.iter().max().unwrap());
+            assert!(gap.start.abs_diff(*low) <= 1 && gap.end.abs_diff(*high + 1) <= 1);
+            assert!(band.confidence > 0.9, "{band:?}");
+        }
+    }
+}
+
+#[test]
+fn nearest_leaves_steps_where_spline_leaves_none() {
+    let stray = drawn(bars, |row| if (100..110).contains(&row) { &[3] } else { &[] });
+    let clean = whole(bars);
+    let [(by_spline, _), (by_nearest, _)] =
+        [spline(&stray).0, nearest(&stray).0].map(|mended| off(&mended, &clean));
+    assert!(by_spline * 5 < by_nearest, "{by_spline} pixels off, {by_nearest} by nearest");
+}
+
+#[test]
+fn a_band_where_a_contour_begins_is_mended_on_both_sides_of_it() {
+    // The hole of the ring begins at row 190.3.
+    for (rows, missed) in [(188..193, &[0][..]), (189..194, &[1]), (306..313, &[3])] {
+        let stray = drawn(ring, |row| match ring(row.into()).len() {
+            4 if rows.contains(&row) => missed,
+            2 if rows.contains(&row) => &[0],
+            _ => &[],
+        });
+        let (pixels, most) = off(&spline(&stray).0, &whole(ring));
+        assert!(most <= 12 && pixels <= 24, "{rows:?}: {pixels} pixels off, {most} in a row");
+    }
+}
+
+#[test]
+fn two_crossings_missed_in_a_row_are_found() {
+    let clean = whole(bars);
+    let stray = drawn(bars, |row| if row == 150 { &[1, 2] } else { &[] });
+    let (mended, bands) = spline(&stray);
+    assert_eq!(bands.len(), 1);
+    assert_eq!((bands[0].kinds, bands[0].outcome), (kinds(&[Kind::Paired]), Outcome::Corrected));
+    assert!(off(&mended, &clean).0 <= 1);
+}
+
+#[test]
+fn a_layer_whose_contours_close_keeps_rows_that_look_stray() {
+    let mut odd_looking = layer(0, drawn(bars, |row| if row == 150 { &[1, 2] } else { &[] }));
+    odd_looking.info.closed = Some(true);
+    let (layers, bands) = fixed(vec![odd_looking.clone()], FixOptions::default());
+    assert_eq!((&layers[0], bands), (&odd_looking, vec![]));
+}
+
+#[test]
+fn a_wall_that_other_layers_have_too_stays() {
+    let wall = |index| layer(index, drawn(bars, |row| if row == 150 { &[1, 2] } else { &[] }));
+    let layers: Vec<Layer> = (0..3).map(wall).collect();
+    assert_eq!(fixed(layers.clone(), FixOptions::default()), (layers, vec![]));
+}
+
+#[test]
+fn rows_of_two_gaps_beside_each_other_are_one_band() {
+    let stray = drawn(ring, |row| match row {
+        200..205 => &[0],
+        // Both gaps at once: the row ends black.
+        205..208 => &[0, 3],
+        208..212 => &[3],
+        _ => &[],
+    });
+    let (mended, bands) = spline(&stray);
+    let all = kinds(&[Kind::EndsWhite, Kind::Paired]);
+    assert_eq!(bands.len(), 1, "{bands:?}");
+    assert_eq!((bands[0].first_row, bands[0].rows, bands[0].kinds), (200, 12, all));
+    assert!(off(&mended, &whole(ring)).1 <= 1);
+
+    let touching = drawn(ring, |row| match row {
+        200..205 => &[0],
+        205..209 => &[3],
+        _ => &[],
+    });
+    let (mended, bands) = spline(&touching);
+    assert_eq!(bands[0].kinds, kinds(&[Kind::EndsWhite, Kind::Touching]));
+    assert!(off(&mended, &whole(ring)).1 <= 1);
+}
+
+#[test]
+fn a_sliver_goes_only_if_no_layer_beside_it_has_it() {
+    let clean = || whole(bars);
+    let with_sliver = || {
+        let mut mask = MaskBuilder::new(WIDTH);
+        for (row, transitions) in (0..).zip(clean().rows()) {
+            let sliver: &[u32] = if row == 250 { &[600, 700] } else { &[] };
+            mask.push_row(&[transitions, sliver].concat()).unwrap();
+        }
+        mask.finish()
+    };
+    let of = |masks: Vec<Mask>| -> Vec<Layer> {
+        masks.into_iter().zip(0..).map(|(mask, index)| layer(index, mask)).collect()
+    };
+    let between = of(vec![clean(), with_sliver(), clean()]);
+    let (layers, bands) = fixed(between.clone(), FixOptions::default());
+    assert_eq!(layers[1].image, Image::Mask(clean()));
+    assert_eq!((bands[0].kinds, bands[0].outcome), (kinds(&[Kind::Sliver]), Outcome::Corrected));
+
+    let (layers, bands) = fixed(of(vec![with_sliver()]), FixOptions::default());
+    assert_eq!(layers, of(vec![with_sliver()]));
+    assert_eq!((bands[0].kinds, bands[0].outcome), (kinds(&[Kind::Sliver]), Outcome::Doubtful));
+
+    // Its neighbour above has more of it: the top of a bar that lies there.
+    let top = of(vec![clean(), with_sliver(), with_sliver()]);
+    assert_eq!(fixed(top.clone(), FixOptions::default()), (top, vec![]));
+}
+
+#[test]
+fn a_band_at_the_edge_goes_on_from_its_good_side() {
+    let mut mask = MaskBuilder::new(WIDTH);
+    for row in 0..40 {
+        let right = 300 + row;
+        mask.push_row(&[100, right][..if row < 3 { 1 } else { 2 }]).unwrap();
+    }
+    let (mended, bands) = spline(&mask.finish());
+    assert_eq!(bands[0].kinds, kinds(&[Kind::EndsWhite, Kind::AtEdge]));
+    assert_eq!(bands[0].outcome, Outcome::Corrected);
+    for row in 0..3 {
+        assert_eq!(mended.row(row), [100, 300 + row]);
+    }
+}
+
+#[test]
+fn what_is_too_wide_is_left_and_its_gap_is_named() {
+    let stray = drawn(bars, |row| if (100..116).contains(&row) { &[3] } else { &[] });
+    let (mended, bands) = spline(&stray);
+    assert_eq!(mended, stray);
+    assert_eq!((bands[0].outcome, bands[0].rows), (Outcome::TooWide, 16));
+    let gap = bands[0].gap.clone().unwrap();
+    assert!(gap.start.abs_diff(397) <= 1 && gap.end.abs_diff(404) <= 1, "{gap:?}");
+    let wider = FixOptions { max_width: 16, ..FixOptions::default() };
+    assert!(off(&fixed_mask(&stray, wider).0, &whole(bars)).1 <= 1);
+}
+
+#[test]
+fn an_image_without_a_good_row_is_left() {
+    let stray = drawn(|_| vec![100.0, 200.0], |_| &[1]);
+    let (mended, bands) =
+        fixed_mask(&stray, FixOptions { max_width: u32::MAX, ..FixOptions::default() });
+    assert_eq!((mended, bands[0].outcome, bands[0].confidence), (stray, Outcome::Doubtful, 0.0));
+}
+
+#[test]
+fn neighbours_hold_a_wide_band_between_them() {
+    // In the band the bar has a notch that no good row shows, but the layers do.
+    let notched: Shape = |row| {
+        let dent = (12.0 - (row - 250.0).abs()).max(0.0);
+        vec![100.0, 300.0 - dent]
+    };
+    let stray = drawn(notched, |row| if (244..257).contains(&row) { &[1] } else { &[] });
+    let layers = vec![layer(0, whole(notched)), layer(1, stray), layer(2, whole(notched))];
+    let with = |use_neighbours| {
+        let options = FixOptions { use_neighbours, ..FixOptions::default() };
+        let Image::Mask(mended) = &fixed(layers.clone(), options).0[1].image else {
+            unreachable!()
+        };
+        off(mended, &whole(notched)).0
+    };
+    assert_eq!(with(true), 0);
+    assert!(with(false) > 0);
+}
+
+#[test]
+fn rows_that_the_page_lists_are_looked_at_and_crossed_off() {
+    let mut listed = layer(3, drawn(bars, |row| if row == 150 { &[3] } else { &[] }));
+    // The second of the rows is good, the third does not exist.
+    listed.info.stray_rows = vec![150, 300, 9000];
+    let (layers, bands) = fixed(vec![listed], FixOptions::default());
+    assert_eq!(bands[0].kinds, kinds(&[Kind::EndsWhite, Kind::Unbalanced]));
+    assert_eq!((bands[1].kinds, bands[1].pixels), (kinds(&[Kind::Unbalanced]), 0));
+    let info = &layers[0].info;
+    assert_eq!(info.stray_rows, [9000]);
+    assert_eq!(info.other["fix"]["method"], "spline");
+    assert_eq!(info.other["fix"]["bands"][0]["row"], 150);
+}
+
+/// The bars in gray: levels rise over four pixels at their left edges, fall over
+/// three at their right ones.
+fn gray_bars(miss: impl Fn(u32) -> &'static [usize]) -> GrayMask {
+    let mut gray = GrayMask::new(WIDTH);
+    for row in 0..HEIGHT {
+        let mut crossings: Vec<u32> =
+            bars(row.into()).into_iter().map(|c| c.ceil() as u32).collect();
+        let missed = miss(row);
+        let mut changes: Vec<LevelChange> = Vec::new();
+        let mut white = false;
+        for (which, column) in crossings.drain(..).enumerate() {
+            if missed.contains(&which) {
+                continue;
+            }
+            let mut push = |column, level| changes.push(LevelChange { column, level });
+            if white {
+                (0..3).for_each(|i| push(column - 3 + i, 200 - 60 * i as u8));
+                push(column, 0);
+            } else {
+                (0..4).for_each(|i| push(column + i, 50 * (i as u8 + 1)));
+                push(column + 4, 255);
+            }
+            white = !white;
+        }
+        gray.push_row(&changes).unwrap();
+    }
+    gray
+}
+
+#[test]
+fn gray_rows_take_the_levels_of_the_good_rows_along_new_edges() {
+    for missed in [&[0][..], &[1], &[2], &[3]] {
+        let rows = 140..146;
+        let stray = gray_bars(|row| if rows.contains(&row) { missed } else { &[] });
+        let image = Image::Gray(stray);
+        let stray = Layer { info: PageInfo::default(), dpi: None, image };
+        let (layers, bands) = fixed(vec![stray], FixOptions::default());
+        assert_eq!((bands.len(), bands[0].outcome), (1, Outcome::Corrected));
+        let Image::Gray(mended) = &layers[0].image else { panic!("gray stays gray") };
+        let clean = gray_bars(|_| &[]);
+        for row in rows.clone() {
+            // Of the leaning bar an edge may be a pixel off.
+            let shift =
+                |column: u32, other: u32| column.abs_diff(other) <= u32::from(missed[0] > 1);
+            let same = mended.row(row).len() == clean.row(row).len()
+                && mended
+                    .row(row)
+                    .iter()
+                    .zip(clean.row(row))
+                    .all(|(a, b)| a.level == b.level && shift(a.column, b.column));
+            assert!(same, "{missed:?}: {:?} for {:?}", mended.row(row), clean.row(row));
+        }
+        assert!(
+            (0..HEIGHT)
+                .filter(|row| !rows.contains(row))
+                .all(|row| mended.row(row) == clean.row(row))
+        );
+    }
+}
+
+proptest! {
+    #[test]
+    fn whatever_the_image_good_rows_stay_and_corrected_ones_end_black(
+        rows in prop::collection::vec(prop::collection::btree_set(0u32..60, 0..9), 0..20),
+        min_confidence in 0.0..1.0,
+        by_nearest: bool,
+    ) {
+        let mut mask = MaskBuilder::new(60);
+        for row in &rows {
+            mask.push_row(&row.iter().copied().collect::<Vec<_>>()).unwrap();
+        }
+        let mask = mask.finish();
+        let method = if by_nearest { Method::Nearest } else { Method::Spline };
+        let (mended, bands) = fixed_mask(&mask, FixOptions { method, min_confidence, ..FixOptions::default() });
+        let band_of = |row| bands.iter().find(|band| (band.first_row..band.end()).contains(&row));
+        let mut changed = 0;
+        for row in 0..mask.height() {
+            let pixels = white_in_row(&difference(mask.row(row), mended.row(row)), 60);
+            match band_of(row) {
+                Some(band) if band.outcome == Outcome::Corrected => {
+                    changed += pixels;
+                    prop_assert!(mended.row(row).len().is_multiple_of(2) || by_nearest);
+                }
+                Some(_) => prop_assert_eq!(pixels, 0),
+                None => prop_assert!(pixels == 0 && mask.row(row).len().is_multiple_of(2)),
+            }
+        }
+        let corrected = bands.iter().filter(|band| band.outcome == Outcome::Corrected);
+        prop_assert_eq!(changed, corrected.map(|band| band.pixels).sum::<u64>());
+        prop_assert!(bands.iter().all(|band| (0.0..=1.0).contains(&band.confidence)));
+    }
+
+    #[test]
+    fn smooth_shapes_pass_unchanged_though_nothing_is_known_of_them(
+        discs in prop::collection::vec((20.0..80.0f64, 100.0..400.0f64, 0.3..3.0f64), 1..5),
+    ) {
+        let mut mask = MaskBuilder::new(WIDTH);
+        for row in 0..HEIGHT {
+            let mut crossings = Vec::new();
+            for (i, (radius, centre, stretch)) in discs.iter().enumerate() {
+                let half = (radius * radius - (f64::from(row) - centre).powi(2)).sqrt();
+                let middle = 80.0 + 160.0 * i as f64;
+                let half = (half * stretch).min(79.0_f64);
+                let run = [middle - half, middle + half].map(|column| column.ceil() as u32);
+                if !half.is_nan() && run[0] < run[1] {
+                    crossings.extend(run);
+                }
+            }
+            mask.push_row(&crossings).unwrap();
+        }
+        let mask = mask.finish();
+        prop_assert_eq!(spline(&mask), (mask.clone(), vec![]));
+    }
+}
