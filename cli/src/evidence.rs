@@ -1,7 +1,6 @@
 //! Pictures of what `fix` did.
 
 use std::fs;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -12,8 +11,9 @@ use crate::picture::{Region, levels_of_region};
 use crate::stop::Stop;
 use crate::streams::write_file;
 
-/// Good rows and columns around a band that are shown with it.
-const AROUND: u32 = 16;
+/// Good rows above and below a band that are shown with it, and columns.
+const ROWS_AROUND: u32 = 16;
+const COLUMNS_AROUND: u32 = 48;
 /// A stray run may cross the image: so much of it, from the gap on, shows how
 /// it was mended.
 const WIDEST: u32 = 400;
@@ -81,16 +81,14 @@ impl Evidence {
 
 /// What is shown of a band: from a little left of its gap on.
 fn region(image: &Image, band: &Band) -> Region {
-    let around = |range: Range<u32>, end: u32| {
-        range.start.saturating_sub(AROUND)..range.end.saturating_add(AROUND).min(end)
-    };
-    let from = band.gap.clone().unwrap_or(band.columns.clone());
-    let columns =
-        around(from.start.min(band.columns.start)..band.columns.end.max(from.end), image.width());
-    let start = columns.start.max(from.start.saturating_sub(WIDEST / 2));
+    let gap = band.gap.clone().unwrap_or_else(|| band.columns.clone());
+    let left = gap.start.min(image.width() - 1).saturating_sub(COLUMNS_AROUND);
+    let right = band.columns.end.max(gap.end).saturating_add(COLUMNS_AROUND);
+    let [top, bottom] =
+        [band.first_row.saturating_sub(ROWS_AROUND), band.end().saturating_add(ROWS_AROUND)];
     Region {
-        columns: start..columns.end.min(start.saturating_add(WIDEST)),
-        rows: around(band.first_row..band.end(), image.height()),
+        columns: left..right.min(left.saturating_add(WIDEST)).min(image.width()),
+        rows: top..bottom.min(image.height()),
     }
 }
 

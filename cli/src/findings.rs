@@ -1,17 +1,56 @@
 //! What `fix` found and did, as JSON, and where it was.
 
 use std::io::{self, Write};
+use std::ops::Range;
 
 use lamp_postprocess::{Band, FixOptions, Fixed, Kind, Outcome};
 use lamp_stack::Layer;
-use serde_json::{Value, json};
+use serde::Serialize;
+
+use crate::lines::{to_nm, write_lines};
 
 /// Collects what is found.
 pub(crate) struct Findings {
     options: FixOptions,
-    bands: Vec<Value>,
+    bands: Vec<BandLine>,
     corrected: usize,
     pixels: u64,
+}
+
+#[derive(Serialize)]
+struct Head {
+    method: &'static str,
+    max_width: u32,
+    min_confidence: f64,
+    use_neighbours: bool,
+    layers: usize,
+    bands_corrected: usize,
+    bands_left: usize,
+    pixels_changed: u64,
+}
+
+#[derive(Serialize)]
+struct BandLine {
+    layer: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    z_mm: Option<f64>,
+    first_row: u32,
+    last_row: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_mm: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    columns: Option<[u32; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    x_mm: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gap_columns: Option<[u32; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gap_x_mm: Option<[f64; 2]>,
+    kinds: Vec<&'static str>,
+    method: &'static str,
+    confidence: f64,
+    pixels: u64,
+    outcome: &'static str,
 }
 
 impl Findings {
@@ -26,7 +65,7 @@ impl Findings {
                 self.corrected += 1;
                 self.pixels += band.pixels;
             }
-            self.bands.push(self.entry(fixed.before, band));
+            self.bands.push(self.line(fixed.before, band));
         }
     }
 
@@ -37,114 +76,90 @@ impl Findings {
 
     /// Writes all as one JSON object, a line for each band.
     pub(crate) fn write(&self, layers: usize, out: &mut dyn Write) -> io::Result<()> {
-        let head = json!({
-            "method": self.options.method.name(),
-            "max_width": self.options.max_width,
-            "min_confidence": self.options.min_confidence,
-            "use_neighbours": self.options.use_neighbours,
-            "layers": layers,
-            "bands_corrected": self.corrected,
-            "bands_left": self.left(),
-            "pixels_changed": self.pixels,
-        });
-        write_with_list(&head, "bands", &self.bands, out)
+        let head = serde_json::to_string(&Head {
+            method: self.options.method.name(),
+            max_width: self.options.max_width,
+            min_confidence: self.options.min_confidence,
+            use_neighbours: self.options.use_neighbours,
+            layers,
+            bands_corrected: self.corrected,
+            bands_left: self.left(),
+            pixels_changed: self.pixels,
+        })?;
+        write!(out, "{},\n\"bands\":[", head.trim_end_matches('}'))?;
+        write_lines(self.bands.iter(), out)?;
+        writeln!(out, "]}}")
     }
 
-    fn entry(&self, layer: &Layer, band: &Band) -> Value {
-        let place = Place::of(layer, band);
-        let mut entry = json!({
-            "layer": layer.info.index,
-            "rows": [band.first_row, band.end() - 1],
-            "kinds": band.kinds.iter().map(Kind::name).collect::<Vec<_>>(),
-            "method": self.options.method.name(),
-            "confidence": (band.confidence * 1e4).round() / 1e4,
-            "outcome": match band.outcome {
+    fn line(&self, layer: &Layer, band: &Band) -> BandLine {
+        let place = Place::of(layer);
+        let columns = (!band.columns.is_empty()).then(|| band.columns.clone());
+        let x_mm = |columns: &Option<Range<u32>>| Some(place?.x_mm(columns.as_ref()?).map(to_nm));
+        let first_and_last = |columns: &Range<u32>| [columns.start, columns.end - 1];
+        BandLine {
+            layer: layer.info.index,
+            z_mm: layer.info.z().map(|z| to_nm(z.mm())),
+            first_row: band.first_row,
+            last_row: band.end() - 1,
+            y_mm: place.map(|place| place.y_mm(band).map(to_nm)),
+            x_mm: x_mm(&columns),
+            columns: columns.as_ref().map(first_and_last),
+            gap_x_mm: x_mm(&band.gap),
+            gap_columns: band.gap.as_ref().map(first_and_last),
+            kinds: band.kinds.iter().map(Kind::name).collect(),
+            method: self.options.method.name(),
+            confidence: (band.confidence * 1e4).round() / 1e4,
+            pixels: band.pixels,
+            outcome: match band.outcome {
                 Outcome::Corrected => "corrected",
                 Outcome::TooWide => "left: too wide",
                 Outcome::Doubtful => "left: doubtful",
             },
-            "pixels": band.pixels,
-        });
-        let mut set = |key: &str, value: Option<Value>| {
-            if let Some(value) = value {
-                entry[key] = value;
-            }
-        };
-        set("z_mm", layer.info.z().map(|z| json!(rounded(z.mm()))));
-        set("y_mm", place.y_mm.map(|y| json!(y.map(rounded))));
-        let columns = (!band.columns.is_empty()).then(|| band.columns.clone());
-        for (columns, key, key_mm) in
-            [(columns, "columns", "x_mm"), (band.gap.clone(), "gap_columns", "gap_x_mm")]
-        {
-            let Some(columns) = columns else { continue };
-            set(key, Some(json!([columns.start, columns.end - 1])));
-            set(key_mm, place.x_mm(&columns).map(|x| json!(x.map(rounded))));
         }
-        entry
     }
 }
 
-/// Writes a JSON object and in it, last, a list with a line for each item.
-pub(crate) fn write_with_list(
-    head: &Value,
-    name: &str,
-    list: &[Value],
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    let head = head.to_string();
-    write!(out, "{},\"{name}\":[", head.trim_end_matches('}'))?;
-    for (i, item) in list.iter().enumerate() {
-        write!(out, "{}\n{item}", if i > 0 { "," } else { "" })?;
-    }
-    writeln!(out, "\n]}}")
-}
-
-/// To a micrometre hundredth: what follows is rounding.
-fn rounded(mm: f64) -> f64 {
-    (mm * 1e5).round() / 1e5
-}
-
-/// Where a band lies in part coordinates, if its page says where the image is.
+/// Where the pixels of a layer lie, if its page says so.
+#[derive(Clone, Copy)]
 struct Place {
-    /// The image's left edge, and the pixel pitch.
-    left_mm: Option<[f64; 2]>,
-    /// From the band's lower edge to its upper one.
-    y_mm: Option<[f64; 2]>,
+    left_mm: f64,
+    top_mm: f64,
+    pitch_mm: f64,
 }
 
 impl Place {
-    fn of(layer: &Layer, band: &Band) -> Self {
-        let known = layer.info.origin_mm.zip(layer.dpi.map(|dpi| dpi.pitch().mm()));
-        let y = |([_, top], pitch): ([f64; 2], f64)| {
-            [band.end(), band.first_row].map(|row| top - f64::from(row) * pitch)
-        };
-        Self { left_mm: known.map(|([left, _], pitch)| [left, pitch]), y_mm: known.map(y) }
+    fn of(layer: &Layer) -> Option<Self> {
+        let [left_mm, top_mm] = layer.info.origin_mm?;
+        Some(Self { left_mm, top_mm, pitch_mm: layer.dpi?.pitch().mm() })
     }
 
-    fn x_mm(&self, columns: &std::ops::Range<u32>) -> Option<[f64; 2]> {
-        let [left, pitch] = self.left_mm?;
-        Some([columns.start, columns.end].map(|column| left + f64::from(column) * pitch))
+    /// From a band's lower edge to its upper one.
+    fn y_mm(self, band: &Band) -> [f64; 2] {
+        [band.end(), band.first_row].map(|row| self.top_mm - f64::from(row) * self.pitch_mm)
+    }
+
+    fn x_mm(self, columns: &Range<u32>) -> [f64; 2] {
+        [columns.start, columns.end].map(|c| self.left_mm + f64::from(c) * self.pitch_mm)
     }
 }
 
 /// Where the mesh is to be repaired: `x 31.4-33.0 y 12.1-12.8 mm`.
 pub(crate) fn whereabouts(layer: &Layer, band: &Band) -> String {
-    let place = Place::of(layer, band);
-    let columns = match &band.gap {
-        Some(gap) => gap,
-        None => &band.columns,
+    let columns = band.gap.clone().unwrap_or_else(|| band.columns.clone());
+    let Some(place) = Place::of(layer) else {
+        return match columns.is_empty() {
+            true => "these rows".to_owned(),
+            false => format!("columns {}-{}", columns.start, columns.end - 1),
+        };
     };
-    let millimetres = |[low, high]: [f64; 2]| {
-        let text = format!("{low:.1}-{high:.1}");
-        // A minus after the dash would read as two.
-        if high < 0.0 { format!("{low:.1} to {high:.1}") } else { text }
-    };
-    match (place.y_mm, place.x_mm(columns)) {
-        (Some(y), Some(x)) if !columns.is_empty() => {
-            format!("x {} y {} mm", millimetres(x), millimetres(y))
-        }
-        (Some(y), _) => format!("y {} mm", millimetres(y)),
-        _ if !columns.is_empty() => format!("columns {}-{}", columns.start, columns.end - 1),
-        _ => "these rows".to_owned(),
+    let y = millimetres(place.y_mm(band));
+    match columns.is_empty() {
+        true => format!("y {y} mm"),
+        false => format!("x {} y {y} mm", millimetres(place.x_mm(&columns))),
     }
+}
+
+fn millimetres([low, high]: [f64; 2]) -> String {
+    // Beside a minus a dash would read as another.
+    if low < 0.0 { format!("{low:.1} to {high:.1}") } else { format!("{low:.1}-{high:.1}") }
 }

@@ -7,6 +7,7 @@
 mod commands;
 mod evidence;
 mod findings;
+mod lines;
 mod options;
 mod picture;
 mod placement;

@@ -2,11 +2,12 @@
 //! JSON object, with an edge or a band on each line.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
 
 use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
 use lamp_stack::{Dpi, PageInfo};
 use serde::Serialize;
+
+use crate::lines::{to_nm, write_lines};
 
 /// What is counted while the layers pass.
 #[derive(Clone, Copy, Default, Serialize)]
@@ -54,7 +55,7 @@ struct FacetLine {
 #[derive(Serialize)]
 struct BandLine {
     layer: u32,
-    z_mm: f64,
+    plane_mm: f64,
     first_row: u32,
     last_row: u32,
     y_mm: [f64; 2],
@@ -87,13 +88,6 @@ impl Subject<'_> {
     }
 }
 
-fn write_lines(lines: impl Iterator<Item = impl Serialize>, out: &mut dyn Write) -> io::Result<()> {
-    for (k, line) in lines.enumerate() {
-        write!(out, "{}\n{}", if k == 0 { "" } else { "," }, serde_json::to_string(&line)?)?;
-    }
-    Ok(())
-}
-
 fn edge_line((edge, FaultyEdge { ends, facets }): (usize, &FaultyEdge)) -> EdgeLine {
     let facet = |&EdgeFacet { file, facet, corners, .. }: &_| FacetLine { file, facet, corners };
     EdgeLine {
@@ -116,23 +110,10 @@ fn band_line(TracedBand { band, plane_mm, ends }: &TracedBand, rows: Rows) -> Ba
     };
     BandLine {
         layer: band.layer,
-        z_mm: to_nm(*plane_mm),
+        plane_mm: to_nm(*plane_mm),
         first_row: band.rows.start,
         last_row: band.rows.end - 1,
         y_mm: [y_mm(band.rows.end), y_mm(band.rows.start)],
         ends: ends.iter().map(end).collect(),
-    }
-}
-
-/// To the nanometre: more digits say nothing. Adding zero turns -0 into 0.
-fn to_nm(mm: f64) -> f64 {
-    (mm * 1e6).round() / 1e6 + 0.0
-}
-
-/// Parses the name of a report. Standard output is for the stack.
-pub(crate) fn parse_report(text: &str) -> Result<PathBuf, String> {
-    match text {
-        "-" => Err("standard output is for the stack: name a file, as gaps.json".to_owned()),
-        name => Ok(PathBuf::from(name)),
     }
 }

@@ -122,7 +122,7 @@ fn bands_are_those_of_the_pages_and_lie_between_their_ends() {
                 (&json!(rows[0]), &json!(rows[rows.len() - 1]))
             );
             let top_um = layer.info.z_um.unwrap() + 50.0;
-            assert!((band["z_mm"].as_f64().unwrap() - top_um / 1000.0).abs() < 1e-9);
+            assert!((band["plane_mm"].as_f64().unwrap() - top_um / 1000.0).abs() < 1e-9);
             let [low, high]: [f64; 2] = serde_json::from_value(band["y_mm"].clone()).unwrap();
             let pitch = 25.4 / 600.0;
             assert!(((high - low) / pitch - rows.len() as f64).abs() < 1e-3);

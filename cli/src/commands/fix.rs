@@ -6,6 +6,7 @@ use lamp_stack::PageInfo;
 
 use crate::evidence::Evidence;
 use crate::findings::{Findings, whereabouts};
+use crate::lines::{check_report, parse_report};
 use crate::options::{Common, Input, Output};
 use crate::stop::Stop;
 use crate::streams::{read_layers, report, write_file, write_layers};
@@ -47,7 +48,7 @@ pub(crate) struct FixArgs {
     use_neighbours: bool,
 
     /// Write what was found and done as JSON
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
     /// Write a picture of each band into a new folder: before, after and the difference (what became
@@ -87,6 +88,7 @@ impl FixArgs {
 }
 
 pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Stop> {
+    check_report(args.report.as_deref(), &args.output)?;
     let report = report("fix", common, &args.output);
     let options = args.options();
     let mut findings = Findings::new(options);

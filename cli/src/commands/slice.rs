@@ -8,12 +8,13 @@ use lamp_slicer::{
 };
 use lamp_stack::{Dpi, Layer, Length, Size};
 
+use crate::lines::{check_report, parse_report};
 use crate::options::{Common, Output, parse_layers, parse_memory, parse_thickness};
 use crate::placement::{PlacementOptions, parse_numbers};
 use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream, report, write_file, write_layers};
-use crate::trace::{Counts, Rows, Subject, parse_report};
+use crate::trace::{Counts, Rows, Subject};
 
 /// Slice an STL part into a stack of layer images
 ///
@@ -204,9 +205,7 @@ fn value_name(value: &impl ValueEnum) -> String {
 }
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
-    if args.report.as_ref() == Some(&args.output.output) {
-        return Err(Stop::usage("the stack and the report need a file each"));
-    }
+    check_report(args.report.as_deref(), &args.output)?;
     let model = open_models(&args.parts)?;
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args
