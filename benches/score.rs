@@ -1,6 +1,6 @@
 //! How near corrected layers come to the part they should show.
 
-use std::ops::AddAssign;
+use std::ops::{AddAssign, Range};
 
 use lamp_stack::{Mask, white_in_row};
 
@@ -28,6 +28,20 @@ pub struct Bands {
     pub injected: u64,
     /// Their wrong pixels after it.
     pub left: u64,
+}
+
+impl Bands {
+    /// Scores some rows of a layer as one band, however they differ.
+    ///
+    /// # Panics
+    /// If a mask lacks one of the rows.
+    pub fn of(clean: &Mask, broken: &Mask, fixed: &Mask, rows: Range<u32>) -> Self {
+        let wrong = |mask: &Mask| {
+            let wrong = |row| pixels_that_differ(clean.row(row), mask.row(row), clean.width());
+            rows.clone().map(wrong).sum()
+        };
+        Self { count: 1, injected: wrong(broken), left: wrong(fixed) }
+    }
 }
 
 impl Score {

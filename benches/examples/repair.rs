@@ -1,7 +1,8 @@
 //! How well corrections mend the layers of broken parts: each part is broken
 //! by each defect and three seeds, and what each method makes of it is held
 //! against the whole part. One Markdown table a method; wrong pixels left are a
-//! share of those that the defects brought into bands so wide.
+//! share of those that the defects brought into bands so wide. The last table
+//! shows what the confidence is worth: the bands of up to 15 rows by it.
 //!
 //! ```sh
 //! cargo run --release -p lamp-benches --example repair
@@ -15,7 +16,7 @@ use std::time::{Duration, Instant};
 use lamp_benches::score::{Bands, Score};
 use lamp_benches::sliced::{Layers, broken, mask, slice};
 use lamp_fixtures::{Defect, Part, build};
-use lamp_postprocess::{FixOptions, Method as FixMethod, fix};
+use lamp_postprocess::{Band, FixOptions, Method as FixMethod, Outcome as BandOutcome, fix};
 use lamp_slicer::{Fill, SliceOptions};
 
 const PARTS: [(Part, usize); 5] = [
@@ -59,12 +60,14 @@ fn fixed(layers: Layers, options: FixOptions) -> Layers {
 }
 
 const HEADING: &str = "\
-| part | defect | bands of 1-2 rows | 3-5 | 6-15 | more | wrong pixels left in 1-2 rows | 3-5 | 6-15 | more \
+| part | defect or method | bands of 1-2 rows | 3-5 | 6-15 | more | wrong pixels left in 1-2 rows | 3-5 | 6-15 | more \
 | stray rows left | pixels harmed | time a layer |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut tables = METHODS.map(|(name, _)| format!("### {name}\n\n{HEADING}\n"));
+    let mut totals = METHODS.map(|_| Outcome::default());
+    let mut trust = [Bands::default(); MOST_CONFIDENT.len()];
     for (part, facets) in PARTS {
         let whole = build(part, facets)?;
         let count = facets / FACETS_PER_DEFECT;
@@ -75,18 +78,27 @@ fn main() -> Result<(), Box<dyn Error>> {
             let mut results = METHODS.map(|_| Outcome::default());
             for seed in SEEDS {
                 let (stray, _) = slice(&broken(&whole, defect, count, seed), &options)?;
+                by_confidence(&clean, &stray, &mut trust);
                 for (result, (_, method)) in results.iter_mut().zip(METHODS) {
                     result.add(&clean, &stray, method);
                 }
             }
-            for (table, result) in tables.iter_mut().zip(results) {
+            for ((table, total), result) in tables.iter_mut().zip(&mut totals).zip(results) {
+                total.join(result);
                 let cells = result.cells();
                 *table +=
                     &format!("| {} {}k | {defect_name} |{cells}\n", part.name(), facets / 1000);
             }
         }
     }
-    println!("{}", tables.join("\n"));
+    println!("{}\n### In all\n\n{HEADING}", tables.join("\n"));
+    for ((name, _), total) in METHODS.iter().zip(totals) {
+        println!("| all parts | {name} |{}", total.cells());
+    }
+    println!("\n### Spline, by confidence\n\n| below | bands | wrong pixels left |\n|---|---|---|");
+    for (below, bands) in MOST_CONFIDENT.iter().zip(trust) {
+        println!("| {below} | {} |{}", bands.count, left(bands));
+    }
     Ok(())
 }
 
@@ -127,18 +139,46 @@ impl Outcome {
         }
     }
 
+    fn join(&mut self, other: Self) {
+        self.score += other.score;
+        self.time += other.time;
+        self.layers += other.layers;
+    }
+
     /// The cells of its line under [`HEADING`], after the names.
     fn cells(&self) -> String {
         let Score { bands, harmed, stray_rows_left } = self.score;
         let count = |bands: Bands| format!(" {} |", bands.count);
-        let left = |bands: Bands| match bands {
-            Bands { injected: 0, .. } => " |".to_owned(),
-            Bands { injected, left, .. } => {
-                format!(" {:.2} % |", 100.0 * left as f64 / injected as f64)
-            }
-        };
         let (counts, left) = (bands.map(count).concat(), bands.map(left).concat());
         let ms = self.time.as_secs_f64() * 1e3 / f64::from(self.layers);
         format!("{counts}{left} {stray_rows_left} | {harmed} | {ms:.3} ms |")
     }
+}
+
+/// The cell of the wrong pixels left, as a share of those injected.
+fn left(Bands { injected, left, .. }: Bands) -> String {
+    match injected {
+        0 => " |".to_owned(),
+        _ => format!(" {:.2} % |", 100.0 * left as f64 / injected as f64),
+    }
+}
+
+/// The classes of confidence: what each is below.
+const MOST_CONFIDENT: [f64; 4] = [0.35, 0.7, 0.95, 1.01];
+
+/// Adds the bands of up to 15 rows to their classes of confidence.
+fn by_confidence(clean: &Layers, stray: &Layers, trust: &mut [Bands; MOST_CONFIDENT.len()]) {
+    let options = FixOptions { max_width: 15, ..UNRESTRAINED };
+    let layers = stray.iter().cloned().map(Ok::<_, Infallible>);
+    let first = clean[0].info.index;
+    let fixed = fix(layers, options, |fixed| {
+        let clean = &clean[(fixed.before.info.index - first) as usize];
+        let corrected = |band: &&Band| band.outcome == BandOutcome::Corrected;
+        for band in fixed.bands.iter().filter(corrected) {
+            let class = MOST_CONFIDENT.partition_point(|&below| below <= band.confidence);
+            let rows = band.first_row..band.end();
+            trust[class] += Bands::of(mask(clean), mask(fixed.before), mask(fixed.after), rows);
+        }
+    });
+    fixed.for_each(drop);
 }

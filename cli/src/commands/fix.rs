@@ -237,13 +237,13 @@ mod tests {
             [
                 "layer 812 (z 81.20 mm) rows 1034-1071: 38 rows wide, limit 15; \
                  repair the CAD near x 32.0-33.0 y 12.8-16.6 mm",
-                "layer 812 (z 81.20 mm) row 1080: confidence 0.31, limit 0.50; \
+                "layer 812 (z 81.20 mm) row 1080: confidence 0.31, limit 0.35; \
                  repair the CAD near x 32.0-33.0 y 11.9-12.0 mm",
             ]
         );
         assert_eq!(
             described(&bands[1..], PageInfo::default()),
-            ["layer 0 row 1080: confidence 0.31, limit 0.50; repair the CAD near columns 120-129"]
+            ["layer 0 row 1080: confidence 0.31, limit 0.35; repair the CAD near columns 120-129"]
         );
     }
 }

@@ -56,6 +56,8 @@ pub(super) struct Contours {
     /// The rows that are looked at: the band and good rows around it.
     rows: Range<u32>,
     band: Range<u32>,
+    /// How many good rows there are beside it, on the side that has fewer.
+    pub(super) good_rows: usize,
     contours: Vec<Contour>,
 }
 
@@ -92,21 +94,24 @@ impl Contours {
     ) -> Option<Self> {
         let rows =
             band.start.saturating_sub(DEPTH)..band.end.saturating_add(DEPTH).min(mask.height());
-        let lines = |beside: &mut dyn Iterator<Item = u32>| {
-            let rows: Vec<_> = beside.take_while(|&row| is_good(row)).collect();
-            (!rows.is_empty()).then(|| follow(mask, &rows))
-        };
-        let above = lines(&mut (rows.start..band.start).rev());
-        let below = lines(&mut (band.end..rows.end));
-        let mut contours = Self { rows, band, contours: Vec::new() };
-        match (above, below) {
-            (None, None) => return None,
-            (Some(lines), None) | (None, Some(lines)) => {
-                lines
-                    .iter()
-                    .for_each(|line| contours.push(Course::Through(contours.knots(&[line]))));
+        let above: Vec<_> =
+            (rows.start..band.start).rev().take_while(|&row| is_good(row)).collect();
+        let below: Vec<_> = (band.end..rows.end).take_while(|&row| is_good(row)).collect();
+        // Beyond the image's edge all is black and good.
+        let to_edge = [above.last() == Some(&0), below.last() == Some(&(mask.height() - 1))];
+        let good_rows = [&above, &below]
+            .into_iter()
+            .zip(to_edge)
+            .filter(|(side, _)| !side.is_empty())
+            .map(|(side, to_edge)| if to_edge { DEPTH as usize } else { side.len() })
+            .min()?;
+        let mut contours = Self { rows, band, good_rows, contours: Vec::new() };
+        if above.is_empty() || below.is_empty() {
+            for line in follow(mask, &[above, below].concat()) {
+                contours.push(Course::Through(contours.knots(&[&line])));
             }
-            (Some(above), Some(below)) => contours.join(&above, &below),
+        } else {
+            contours.join(&follow(mask, &above), &follow(mask, &below));
         }
         contours.guess();
         Some(contours)

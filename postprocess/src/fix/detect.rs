@@ -128,19 +128,16 @@ impl Scene<'_> {
             if mended.gain < LONG || mended.added.is_empty() {
                 continue;
             }
-            let believed = beside_strays
+            let is_stray = beside_strays
                 || match (self.votes(row, had, &mended.row), self.closed) {
                     // The layers beside this one have the same there: so has the part.
-                    (Votes { kept: 1.., .. }, None) => continue,
-                    (Votes { kept: 1.., .. }, Some(_)) => false,
+                    (Votes { kept: 1.., .. }, _) => false,
                     (Votes { mended: 1.., .. }, _) | (_, Some(false)) => true,
                     // A wall of several rows may well be the part's own.
-                    _ if !alone => continue,
-                    _ => true,
+                    _ => alone,
                 };
-            strays.kinds[row as usize].insert(Kind::Paired);
-            if !believed {
-                strays.doubtful.push(row);
+            if is_stray {
+                strays.kinds[row as usize].insert(Kind::Paired);
             }
         }
     }

@@ -52,15 +52,16 @@ pub(super) fn rebuild(
     }
     contours.guess();
     let mended: Vec<Mended> = band.clone().map(|row| mend_row(&contours, row)).collect();
-    let at_edge = band.start == 0 || band.end == mask.height();
-    let least = mended
-        .iter()
-        .zip(band.clone())
+    let rows = mended.iter().zip(band.clone());
+    let least = rows
         .map(|(mended, row)| confidence(mended, mask.row(row), mask.width()))
-        .fold(if at_edge { 0.8 } else { 1.0 }, f64::min);
+        .fold(1.0, f64::min);
+    let at_edge = band.start == 0 || band.end == mask.height();
+    // A row or two between bands hardly show where a contour is going.
+    let beside = (contours.good_rows + 1).min(4) as f64 / 4.0;
     Some(Rebuilt {
         gap: columns_of(mended.iter().flat_map(|mended| &mended.added), mask.width()),
-        confidence: least,
+        confidence: least * beside * if at_edge { 0.8 } else { 1.0 },
         touching: mended.windows(2).any(|rows| lack_others(&rows[0], &rows[1])),
         rows: mended.into_iter().map(|mended| mended.row).collect(),
     })
@@ -112,6 +113,10 @@ fn confidence(mended: &Mended, had: &[u32], width: u32) -> f64 {
 /// Lets the layers below and above say where contours cross: each crossing
 /// goes between theirs.
 fn vote(outlook: &mut Outlook, rows: &[Cow<'_, [u32]>; 2]) {
+    // A row that ends white is stray itself.
+    if rows.iter().any(|row| !row.len().is_multiple_of(2)) {
+        return;
+    }
     for crossing in &mut outlook.crossings {
         let reach = 4.0 + 2.0 * crossing.slack;
         let near = |row: &[u32]| {
