@@ -50,8 +50,8 @@ pub struct FixOptions {
 
 impl Default for FixOptions {
     /// Curves; at most 15 rows, half the smallest feature of the seed's blades
-    /// at 1500 dpi. Of the wrong pixels of broken sample parts, bands at least
-    /// as sure as 0.35 keep some 0.05 %, the others 10 % (`benches/README.md`).
+    /// at 1500 dpi. Bands of broken sample parts less sure than 0.35 keep 9 % of
+    /// their wrong pixels, the others 0.2 % at most (`benches/README.md`).
     fn default() -> Self {
         Self { method: Method::Spline, max_width: 15, min_confidence: 0.35, use_neighbours: false }
     }
