@@ -6,7 +6,7 @@ use super::FixOptions;
 use super::band::{Kind, Kinds};
 use super::combine::{difference, majority, white_in_both};
 use super::contours::Contours;
-use super::mend::mend;
+use super::mend::{DROP, mend};
 use super::outline::outline_row;
 
 /// Two crossings missed, or a sliver, show in a run of at least so many
@@ -44,6 +44,12 @@ impl Strays {
 
     pub(super) fn kinds(&self, row: u32) -> Kinds {
         self.kinds[row as usize]
+    }
+
+    /// Whether a row of the mask was ended by a later stage: it did not balance,
+    /// and yet it ends black.
+    pub(super) fn is_ended(&self, mask: &Mask, row: u32) -> bool {
+        self.kinds(row).contains(Kind::Unbalanced) && mask.row(row).len().is_multiple_of(2)
     }
 
     /// The bands of neighbouring stray rows, from the top.
@@ -124,7 +130,7 @@ impl Scene<'_> {
                 continue;
             }
             let had = self.mask.row(row);
-            let mended = mend(had, &contours.outlook(row), self.mask.width());
+            let mended = mend(had, &contours.outlook(row), self.mask.width(), DROP);
             if mended.gain < LONG || mended.added.is_empty() {
                 continue;
             }

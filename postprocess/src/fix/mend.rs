@@ -11,7 +11,10 @@ const ADD: u32 = 2;
 const ADD_CLOSING: u32 = 4;
 /// To drop a crossing that the row has. A gap in a mesh loses crossings; it
 /// makes none.
-const DROP: u32 = 24;
+pub(super) const DROP: u32 = 24;
+/// To drop one of a row that did not balance and yet ends black: `tile` ends
+/// what runs across where the copy's image ends.
+pub(super) const DROP_ENDED: u32 = 8;
 /// A crossing is taken for the one expected from so many pixels off, besides
 /// the expectation's own slack.
 const NEAR: f64 = 1.5;
@@ -47,8 +50,8 @@ struct Event {
 enum What {
     /// A crossing where one was expected.
     Found { through: bool },
-    /// A crossing where none was.
-    Extra,
+    /// A crossing where none was, and what it costs to drop it.
+    Extra { drop: u32 },
     /// None where one was expected: that many of the outlook.
     Missing { which: usize, through: bool },
 }
@@ -58,7 +61,7 @@ impl Event {
     fn prices(&self) -> [Option<u32>; 2] {
         match self.what {
             What::Found { .. } => [None, Some(0)],
-            What::Extra => [Some(DROP), Some(0)],
+            What::Extra { drop } => [Some(drop), Some(0)],
             What::Missing { through: true, .. } => [Some(0), Some(ADD)],
             What::Missing { through: false, .. } => [Some(0), Some(ADD_CLOSING)],
         }
@@ -76,9 +79,10 @@ impl Event {
 }
 
 /// Puts a row right: of all rows that keep the crossings where expected ones
-/// were found, and end black, the cheapest, where each wrong pixel costs one.
-pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32) -> Mended {
-    let (events, found) = events(row, outlook, width);
+/// were found, and end black, the cheapest, where each wrong pixel costs one,
+/// and each crossing that is dropped costs `drop`.
+pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> Mended {
+    let (events, found) = events(row, outlook, width, drop);
     let pixels = wrong_pixels(&events, &outlook.unknown, width);
     let crossings = cheapest(&events, &pixels);
     let mut mended = Mended { found, ..Mended::default() };
@@ -92,7 +96,7 @@ pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32) -> Mended {
             }
         }
         match event.what {
-            What::Extra if !crosses => mended.dropped += 1,
+            What::Extra { .. } if !crosses => mended.dropped += 1,
             What::Missing { which, .. } if crosses => mended.added.push(outlook.crossings[which]),
             What::Missing { which, .. } if outlook.crossings[which].likely => mended.absent += 1,
             _ => {}
@@ -105,14 +109,14 @@ pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32) -> Mended {
 }
 
 /// All crossings, had or expected, from the left, and those that are both.
-fn events(row: &[u32], outlook: &Outlook, width: u32) -> (Vec<Event>, Vec<(Side, u32)>) {
+fn events(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> (Vec<Event>, Vec<(Side, u32)>) {
     let expected = &outlook.crossings;
     let nearest_expected: Vec<Option<usize>> = row
         .iter()
         .map(|&column| nearest(expected.len(), |i| expected[i].column, f64::from(column)))
         .collect();
     let mut events: Vec<Event> =
-        row.iter().map(|&column| Event { column, what: What::Extra }).collect();
+        row.iter().map(|&column| Event { column, what: What::Extra { drop } }).collect();
     let mut found = Vec::new();
     for (which, crossing) in expected.iter().enumerate() {
         let partner = nearest(row.len(), |i| row[i].into(), crossing.column).filter(|&i| {

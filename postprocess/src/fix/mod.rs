@@ -185,6 +185,7 @@ fn fix_band(
         kinds.insert(Kind::AtEdge);
     }
     let is_good = |row| !band.contains(&row) && strays.is_good(row);
+    let is_ended = |row| strays.is_ended(mask, row);
     let voters = match scene.neighbours {
         [Some(below), Some(above)] if options.use_neighbours && band.len() as u32 >= VOTED => {
             Some([below, above])
@@ -196,7 +197,7 @@ fn fix_band(
     if kinds == sliver {
         rows = band.clone().map(|row| spline::unsliver(mask, row)).collect();
         confidence = 0.9;
-    } else if let Some(rebuilt) = spline::rebuild(mask, band, is_good, voters) {
+    } else if let Some(rebuilt) = spline::rebuild(mask, band, is_good, is_ended, voters) {
         if rebuilt.touching {
             kinds.insert(Kind::Touching);
         }

@@ -10,7 +10,7 @@ use lamp_stack::{Image, Mask};
 
 use super::contours::{Contours, Expected, Outlook, Side};
 use super::detect::without_slivers;
-use super::mend::{Mended, mend};
+use super::mend::{DROP, DROP_ENDED, Mended, mend};
 use super::outline::outline_row;
 
 /// The rows of a band, put right.
@@ -34,6 +34,7 @@ pub(super) fn rebuild(
     mask: &Mask,
     band: &Range<u32>,
     is_good: impl Fn(u32) -> bool,
+    is_ended: impl Fn(u32) -> bool,
     voters: Option<[&Image; 2]>,
 ) -> Option<Rebuilt> {
     let mut contours = Contours::around(mask, band.clone(), is_good)?;
@@ -42,7 +43,8 @@ pub(super) fn rebuild(
         if let Some(voters) = voters {
             vote(&mut outlook, &voters.map(|image| outline_row(image, row)));
         }
-        mend(mask.row(row), &outlook, mask.width())
+        let drop = if is_ended(row) { DROP_ENDED } else { DROP };
+        mend(mask.row(row), &outlook, mask.width(), drop)
     };
     let first: Vec<Mended> = band.clone().map(|row| mend_row(&contours, row)).collect();
     for (row, mended) in band.clone().zip(first) {
@@ -54,7 +56,7 @@ pub(super) fn rebuild(
     let mended: Vec<Mended> = band.clone().map(|row| mend_row(&contours, row)).collect();
     let rows = mended.iter().zip(band.clone());
     let least = rows
-        .map(|(mended, row)| confidence(mended, mask.row(row), mask.width()))
+        .map(|(mended, row)| confidence(mended, mask.row(row), mask.width(), is_ended(row)))
         .fold(1.0, f64::min);
     let at_edge = band.start == 0 || band.end == mask.height();
     // A row or two between bands hardly show where a contour is going.
@@ -87,10 +89,10 @@ fn lack_others(a: &Mended, b: &Mended) -> bool {
 }
 
 /// How sure a row is, from 0 to 1. It is less so where a contour that was
-/// added may lie further off than the next crossing, where more was changed
-/// than one crossing, or two in a row that ended black, and where the row
+/// added may lie further off than the next crossing, the least sure of them
+/// counting, where more was changed than a gap explains, and where the row
 /// still is not what was expected.
-fn confidence(mended: &Mended, had: &[u32], width: u32) -> f64 {
+fn confidence(mended: &Mended, had: &[u32], width: u32, is_ended: bool) -> f64 {
     /// Crossings nearer than that are no less sure for it.
     const ROOM: f64 = 8.0;
     let placed = mended.added.iter().map(|added| {
@@ -102,12 +104,16 @@ fn confidence(mended: &Mended, had: &[u32], width: u32) -> f64 {
         let room = room.fold(f64::from(width), f64::min).max(ROOM);
         room / (room + added.slack)
     });
-    let needed = 2 - had.len() % 2;
-    let more = (mended.added.len() + mended.dropped).saturating_sub(needed);
+    let (added, dropped) = (mended.added.len(), mended.dropped);
+    let (more, dropped) = match is_ended {
+        // A crossing more and one less for each copy of the part.
+        true => (added.abs_diff(dropped), 0),
+        false => ((added + dropped).saturating_sub(2 - had.len() % 2), dropped),
+    };
     let explained = f64::from(mended.gain) / f64::from(mended.gain + mended.off).max(1.0);
     let explained = if mended.off == 0 { 1.0 } else { explained };
-    let edits = 0.9f64.powi(more as i32) * 0.8f64.powi(mended.dropped as i32);
-    placed.product::<f64>() * edits * 0.8f64.powi(mended.absent as i32) * explained
+    let edits = 0.9f64.powi(more as i32) * 0.8f64.powi(dropped as i32);
+    placed.fold(1.0, f64::min) * edits * 0.8f64.powi(mended.absent as i32) * explained
 }
 
 /// Lets the layers below and above say where contours cross: each crossing
