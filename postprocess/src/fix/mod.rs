@@ -140,6 +140,12 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
     let mut corrected = Vec::new();
     for band in strays.bands() {
         let (band, rows) = fix_band(&scene, &strays, &band, options);
+        // Rows that only looked stray, and on a closer look are right.
+        let is_known =
+            band.kinds.contains(Kind::EndsWhite) || band.kinds.contains(Kind::Unbalanced);
+        if band.pixels == 0 && !rows.is_empty() && !is_known {
+            continue;
+        }
         if band.outcome == Outcome::Corrected {
             corrected.push((band.first_row, rows));
         }
