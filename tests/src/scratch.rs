@@ -75,6 +75,13 @@ impl Scratch {
         self.write(name, &stl);
     }
 
+    /// Writes layers as a stack.
+    pub fn stack(&self, name: &str, layers: impl IntoIterator<Item = Layer>) {
+        let layers = layers.into_iter().map(Ok::<_, StackError>);
+        let to = Destination::File(self.path(name));
+        write_stack(layers, to, Format::Big).expect("the folder can be written to");
+    }
+
     /// Reads a stack, a file or a folder of pages.
     pub fn layers(&self, name: &str) -> Vec<Layer> {
         let pages = Pages::open(&self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"));

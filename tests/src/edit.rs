@@ -1,0 +1,81 @@
+//! Images made out of others, and what differs between two.
+
+use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo};
+
+/// Returns the mask whose rows are what `edit` makes of the rows, by their
+/// numbers.
+///
+/// # Panics
+/// Where a row is none any more.
+pub fn edited(mask: &Mask, edit: impl Fn(u32, &[u32]) -> Vec<u32>) -> Mask {
+    let mut out = MaskBuilder::new(mask.width());
+    for (row, transitions) in (0..).zip(mask.rows()) {
+        out.push_row(&edit(row, transitions)).expect("columns in rising order");
+    }
+    out.finish()
+}
+
+/// Returns a gray image whose levels rise from the edges of the mask's runs
+/// inwards, over four pixels. Where a run reaches the image's last column,
+/// there is no edge.
+///
+/// # Panics
+/// Never: it is as wide as the mask.
+pub fn with_soft_edges(mask: &Mask) -> GrayMask {
+    let mut gray = GrayMask::new(mask.width());
+    for row in mask.rows() {
+        let level = |column: u32| {
+            let next = row.partition_point(|&edge| edge <= column);
+            let left = next.checked_sub(1).map(|last| column - row[last] + 1);
+            let right = row.get(next).map(|edge| edge - column);
+            let inwards = left.into_iter().chain(right).min();
+            match inwards {
+                Some(pixels) if next % 2 == 1 => (64 * pixels).min(255) as u8,
+                _ => 0,
+            }
+        };
+        gray.push_runs((0..mask.width()).map(|column| (1, level(column)))).expect("its width");
+    }
+    gray
+}
+
+/// Returns where a gray image is of at least so high a level.
+///
+/// # Panics
+/// Never: its columns are those of the gray image.
+pub fn at_least(gray: &GrayMask, level: u8) -> Mask {
+    let mut mask = MaskBuilder::new(gray.width());
+    for row in gray.rows() {
+        let mut white = false;
+        let toggles = row
+            .iter()
+            .filter(|change| std::mem::replace(&mut white, change.level >= level) != white);
+        mask.push_row(&toggles.map(|change| change.column).collect::<Vec<_>>())
+            .expect("columns of a gray row increase");
+    }
+    mask.finish()
+}
+
+/// Returns the layers as a program that knows nothing of ours would write
+/// them: their images alone, numbered from 0.
+pub fn stripped(layers: &[Layer]) -> Vec<Layer> {
+    let bare = |(index, layer): (u32, &Layer)| Layer {
+        info: PageInfo { index, ..PageInfo::default() },
+        dpi: layer.dpi,
+        image: layer.image.clone(),
+    };
+    (0..).zip(layers).map(bare).collect()
+}
+
+/// Returns the columns where a row differs between two images of one size.
+pub fn differing(a: &Image, b: &Image, row: u32) -> Vec<u32> {
+    let level = |image: &Image, column: u32| match image {
+        Image::Mask(mask) => 255 * u8::from(mask.is_white(column, row)),
+        Image::Gray(gray) => {
+            let changes = gray.row(row);
+            let next = changes.partition_point(|change| change.column <= column);
+            next.checked_sub(1).map_or(0, |last| changes[last].level)
+        }
+    };
+    (0..a.width()).filter(|&column| level(a, column) != level(b, column)).collect()
+}

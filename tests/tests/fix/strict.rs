@@ -1,0 +1,96 @@
+//! `--strict`, and where a band that was left says that the mesh has its gap.
+
+use lamp_fixtures::Facet;
+
+use crate::{COARSE, bands, broken_ball, is_corrected, number, report};
+
+#[test]
+fn bands_that_are_left_end_with_status_3_and_the_same_stack() {
+    let (scratch, _) = broken_ball(5, 1, COARSE);
+    let lax = scratch.run("fix stray.tif --max-width 4 -o lax.tif").succeeds();
+    let (report, strict) = report(&scratch, "--max-width 4 --strict");
+    assert_eq!(strict.statuses, [Some(3)]);
+    assert!(scratch.bytes("lax.tif") == scratch.bytes("fixed.tif"));
+    let left = bands(&report).iter().filter(|band| !is_corrected(band)).count();
+    for ran in [lax, strict] {
+        let last = ran.stderr.lines().last().unwrap();
+        assert!(last.contains(&format!("{left} bands of stray rows were left")), "{last}");
+        assert_eq!(ran.stderr.matches("; repair the CAD near ").count(), left);
+    }
+    let ran = scratch.run("fix stray.tif --max-width 4 --strict --quiet -o quiet.tif");
+    assert_eq!(ran.statuses, [Some(3)]);
+    assert!(scratch.bytes("lax.tif") == scratch.bytes("quiet.tif"));
+}
+
+#[test]
+fn if_all_are_corrected_strict_succeeds() {
+    let (scratch, _) = broken_ball(5, 1, COARSE);
+    let (report, ran) = report(&scratch, "--max-width 60 --strict");
+    ran.succeeds();
+    assert!(!bands(&report).is_empty() && bands(&report).iter().all(is_corrected));
+}
+
+/// Where the plane cuts the facet: from the least to the greatest x, and y.
+fn cut(facet: &Facet, z: f64) -> [[f64; 2]; 2] {
+    let corners = facet.map(|corner| corner.map(f64::from));
+    let mut points = Vec::new();
+    for k in 0..3 {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        if (a[2] < z) != (b[2] < z) {
+            let share = (z - a[2]) / (b[2] - a[2]);
+            points.push([0, 1].map(|axis| a[axis] + share * (b[axis] - a[axis])));
+        }
+    }
+    let [a, b] = points[..] else { panic!("the plane at {z} misses {facet:?}") };
+    [0, 1].map(|axis| [a[axis].min(b[axis]), a[axis].max(b[axis])])
+}
+
+/// `31.4-33.0` or, below zero, `-3.1 to -2.5`.
+fn range(text: &str) -> [f64; 2] {
+    let (low, high) = text.split_once(" to ").or_else(|| text.split_once('-')).expect("a range");
+    [low, high].map(|number| number.parse().expect("a number"))
+}
+
+/// Each left band's line, word for word, but for the place, which is that of
+/// the facet that is missing.
+#[test]
+fn a_band_that_is_left_names_the_place_of_the_missing_facet() {
+    /// The place is rounded to 0.1 mm; a curve is a little off the facet, and
+    /// a row or a column is a pixel of 0.04 mm wide.
+    const NEAR: f64 = 0.05 + 0.1;
+    let mut met = 0;
+    for (seed, [dx, dy]) in [(1, [50.0, 40.0]), (2, [0.0, 0.0]), (3, [50.0, 40.0]), (6, [0.0, 9.0])]
+    {
+        let slicing = format!("--dpi 600 --thickness 50um --translate {dx},{dy},0");
+        let (scratch, facets) = broken_ball(1, seed, &slicing);
+        let (report, ran) = report(&scratch, "--strict");
+        let left: Vec<_> = bands(&report).iter().filter(|band| !is_corrected(band)).collect();
+        assert_eq!(ran.statuses, [Some(if left.is_empty() { 0 } else { 3 })]);
+        let stray = scratch.layers("stray.tif");
+        let mut lines = ran.stderr.lines().filter(|line| line.contains("repair the CAD near"));
+        for band in left {
+            let [layer, first, last] =
+                ["layer", "first_row", "last_row"].map(|key| number(&band[key]));
+            let z_mm = stray[layer as usize].info.z_um.unwrap() / 1000.0;
+            assert_eq!(band["outcome"], "left: too wide");
+            let line = lines.next().expect("a line for each band that was left");
+            let start = format!(
+                "fix: layer {layer} (z {z_mm:.2} mm) rows {first}-{last}: {} rows wide, limit 15; \
+                 repair the CAD near x ",
+                last - first + 1
+            );
+            let place = line.strip_prefix(&start).unwrap_or_else(|| panic!("{line}\n{start}"));
+            let place = place.strip_suffix(" mm").expect("millimetres");
+            let (x, y) = place.split_once(" y ").expect("x and y");
+            let [true_x, true_y] = cut(&facets[0], z_mm + 0.05);
+            for (said, real, moved) in [(x, true_x, dx), (y, true_y, dy)] {
+                let said = range(said).map(|value| value - moved);
+                let off = [0, 1].map(|end| (said[end] - real[end]).abs());
+                assert!(off[0] < NEAR && off[1] < NEAR, "{line}: {real:?}");
+            }
+            met += 1;
+        }
+        assert_eq!(lines.next(), None);
+    }
+    assert!(met > 10, "only {met} bands were left");
+}
