@@ -124,7 +124,6 @@ impl Scene<'_> {
         let is_good = |row: u32| !band.contains(&row) && strays.is_good(row);
         let Some(contours) = Contours::around(self.mask, band.clone(), is_good) else { return };
         let beside_strays = band.clone().any(|row| !strays.is_good(row));
-        let alone = band.len() == 1;
         for row in band.clone() {
             if !strays.is_good(row) {
                 continue;
@@ -138,9 +137,9 @@ impl Scene<'_> {
                 || match (self.votes(row, had, &mended.row), self.closed) {
                     // The layers beside this one have the same there: so has the part.
                     (Votes { kept: 1.., .. }, _) => false,
-                    (Votes { mended: 1.., .. }, _) | (_, Some(false)) => true,
-                    // A wall of several rows may well be the part's own.
-                    _ => alone,
+                    (_, Some(false)) => true,
+                    // A slot or wall of several rows may well be the part's own.
+                    _ => band.len() == 1,
                 };
             if is_stray {
                 strays.kinds[row as usize].insert(Kind::Paired);
