@@ -262,12 +262,10 @@ impl Layout {
         if let Some(stack) = &mut info.stack {
             self.describe(stack, info.origin_mm);
         }
-        let part_rows = std::mem::take(&mut info.stray_rows);
-        info.stray_rows = self
-            .rows
-            .iter()
-            .flat_map(|(top, _)| part_rows.iter().map(move |row| top + row))
-            .collect();
+        for part_rows in [&mut info.stray_rows, &mut info.open_rows] {
+            let rows = self.rows.iter().flat_map(|(top, _)| part_rows.iter().map(move |r| top + r));
+            *part_rows = rows.collect();
+        }
         // Build coordinates start at the area's lower left corner.
         info.origin_mm = Some([0.0, self.options.area.height.mm()]);
         info
@@ -380,10 +378,12 @@ mod tests {
     fn stray_rows_are_named_where_they_are_now() {
         let mut part = layer(Mask::black(32, 20));
         part.info.stray_rows = vec![3];
+        part.info.open_rows = vec![3, 4];
         let options = options("100x50mm", None, 2.0);
         let build =
             tile(std::iter::once(Ok::<_, TileError>(part)), options).next().unwrap().unwrap();
         assert_eq!(build.info.stray_rows, [7, 29]);
+        assert_eq!(build.info.open_rows, [7, 8, 29, 30]);
     }
 
     proptest! {

@@ -8,6 +8,8 @@
 //! the points is therefore zero when all contours close, in whatever order it
 //! is taken, and some other of 2^64 values otherwise.
 
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
 use crate::table::Fill;
 
 /// The sum over the ends of a layer's segments.
@@ -40,6 +42,35 @@ impl EndSum {
     /// Whether every contour closes.
     pub(crate) fn is_closed(self) -> bool {
         self == Self::default()
+    }
+}
+
+/// The sums over the ends of segments by row, which all workers add to: not
+/// zero where contours break off in the row.
+#[derive(Debug)]
+pub(crate) struct RowSums(Vec<AtomicU64>);
+
+impl RowSums {
+    /// For rows 0 to `last`, with no ends yet.
+    pub(crate) fn new(last: u32) -> Self {
+        Self((0..=last).map(|_| AtomicU64::new(0)).collect())
+    }
+
+    /// Adds an end of a segment, which starts there or stops.
+    #[inline]
+    pub(crate) fn add(&self, row: u32, point: [f64; 2], starts: bool, fill: Fill) {
+        let (sum, hash) = (&self.0[row as usize], hash(point));
+        match fill {
+            Fill::EvenOdd => sum.fetch_xor(hash, Relaxed),
+            Fill::NonZero if starts => sum.fetch_add(hash, Relaxed),
+            Fill::NonZero => sum.fetch_sub(hash, Relaxed),
+        };
+    }
+
+    /// The rows with ends that leave a contour open, increasing.
+    pub(crate) fn open_rows(&self) -> Vec<u32> {
+        let rows = (0..).zip(&self.0).filter(|(_, sum)| sum.load(Relaxed) != 0);
+        rows.map(|(row, _)| row).collect()
     }
 }
 
@@ -105,6 +136,23 @@ mod tests {
             assert!(!there.is_closed() && !back.is_closed());
             assert!(there.joined(back, fill).is_closed());
             assert_eq!(there.joined(there, fill).is_closed(), fill == Fill::EvenOdd);
+        }
+    }
+
+    #[test]
+    fn rows_are_open_where_an_end_has_no_partner() {
+        for fill in [Fill::EvenOdd, Fill::NonZero] {
+            let sums = RowSums::new(9);
+            let [a, b, c] = [[0.5, 3.0], [8.25, 3.0], [1.5, 7.25]];
+            for (row, point, starts) in
+                [(3, a, true), (3, b, true), (3, a, false), (8, c, false), (8, c, true)]
+            {
+                sums.add(row, point, starts, fill);
+            }
+            assert_eq!(sums.open_rows(), [3]);
+            sums.add(3, b, false, fill);
+            sums.add(8, c, true, fill);
+            assert_eq!(sums.open_rows(), [8]);
         }
     }
 

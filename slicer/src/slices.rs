@@ -16,7 +16,7 @@ use crate::model::Model;
 use crate::placement::{PlacedFacet, PlacedModel, Placement};
 use crate::planes::{PlaneRule, Planes};
 use crate::survey::Survey;
-use crate::table::{Facets, Fill, Section, Table};
+use crate::table::{Facets, Fill, OpenRows, Section, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
 
 /// How a part is sliced.
@@ -114,6 +114,7 @@ pub struct Slices {
     slabs: Vec<Range<usize>>,
     buckets: Option<Buckets>,
     table: Table,
+    open_rows: OpenRows,
     /// The layers of the table that are still to be made into images.
     pending: Range<usize>,
     ready: VecDeque<Layer>,
@@ -156,6 +157,7 @@ impl Slices {
             slabs,
             buckets,
             table: Table::default(),
+            open_rows: OpenRows::new(),
             ready: VecDeque::new(),
         })
     }
@@ -180,16 +182,18 @@ impl Slices {
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
         loop {
             let layers = start..end;
-            let fits = if let Some(buckets) = &self.buckets {
+            let most = self.most_crossings;
+            let open_rows = if let Some(buckets) = &self.buckets {
                 let facets = buckets.of_slab(slab, &self.model);
-                self.table.fill(&facets, cutter, layers, self.most_crossings)?
+                fill(&mut self.table, &facets, cutter, layers, most)?
             } else {
                 let (low, high) = planes_of(&layers, &self.planes);
                 let blocks = self.survey.blocks_between(low, high);
                 let facets = Blocks { model: &self.model, blocks };
-                self.table.fill(&facets, cutter, layers, self.most_crossings)?
+                fill(&mut self.table, &facets, cutter, layers, most)?
             };
-            if fits {
+            if let Some(open_rows) = open_rows {
+                self.open_rows = open_rows;
                 self.pending = start..end;
                 return Ok(());
             }
@@ -232,8 +236,10 @@ impl Slices {
         let layer = |layer| {
             let Section { mask, stray_rows, closed } =
                 self.table.layer(layer, self.grid.width, self.grid.height, self.fill);
+            let open_rows = self.open_rows.get(&layer).cloned().unwrap_or_default();
+            let closed = Some(closed);
             Layer {
-                info: PageInfo { closed: Some(closed), stray_rows, ..self.page_info(layer) },
+                info: PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) },
                 dpi: Some(self.grid.dpi),
                 image: Image::Mask(mask),
             }
@@ -286,6 +292,28 @@ impl Iterator for Slices {
         }
         self.ready.pop_front().map(Ok)
     }
+}
+
+/// Fills the table with the crossings of some layers, and finds the rows where
+/// their contours break off. `None` where the crossings are too many.
+fn fill(
+    table: &mut Table,
+    facets: &impl Facets,
+    cutter: Cutter<'_>,
+    layers: Range<usize>,
+    most_crossings: usize,
+) -> io::Result<Option<OpenRows>> {
+    if !table.fill(facets, cutter, layers, most_crossings)? {
+        return Ok(None);
+    }
+    // A row takes as much memory as a crossing.
+    let open = table.open_layers(cutter.fill);
+    let at_once = (most_crossings / cutter.grid.height as usize).max(1);
+    let mut rows = OpenRows::new();
+    for layers in open.chunks(at_once) {
+        rows.extend(open_rows(facets, cutter, layers)?);
+    }
+    Ok(Some(rows))
 }
 
 /// The facets of some blocks of a part.

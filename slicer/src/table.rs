@@ -4,6 +4,7 @@
 //! Source: 002 section 2.3.4, algorithm 9 and figure 26. The seed keeps the
 //! table of the whole part; here it holds one slab of layers at a time.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -12,7 +13,7 @@ use lamp_stack::Mask;
 use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place, Share};
-use crate::ends::EndSum;
+use crate::ends::{EndSum, RowSums};
 use crate::placement::PlacedFacet;
 
 /// What is inside.
@@ -110,11 +111,23 @@ impl Table {
         Ok(!budget.is_spent())
     }
 
+    /// The layers with a contour that does not close.
+    pub(crate) fn open_layers(&self, fill: Fill) -> Vec<usize> {
+        self.layers.clone().filter(|&layer| !self.is_closed(layer, fill)).collect()
+    }
+
+    fn is_closed(&self, layer: usize, fill: Fill) -> bool {
+        let ends = self.shares(layer).map(|share| share.ends);
+        ends.fold(EndSum::default(), |sum, ends| sum.joined(ends, fill)).is_closed()
+    }
+
+    fn shares(&self, layer: usize) -> impl Iterator<Item = &Share> {
+        self.parts.iter().map(move |shares| &shares[layer - self.layers.start])
+    }
+
     /// A layer of the slab.
     pub(crate) fn layer(&self, layer: usize, width: u32, height: u32, fill: Fill) -> Section {
-        let shares = || self.parts.iter().map(|shares| &shares[layer - self.layers.start]);
-        let crossings = || shares().flat_map(|share| &share.crossings).copied();
-        let ends = shares().fold(EndSum::default(), |sum, share| sum.joined(share.ends, fill));
+        let crossings = || self.shares(layer).flat_map(|share| &share.crossings).copied();
         let (starts, mut places) = sort_by_row(crossings, height);
         let mut row_offsets = Vec::with_capacity(starts.len());
         row_offsets.push(0);
@@ -138,9 +151,39 @@ impl Table {
         Section {
             mask: mask.expect("sorted places without pairs increase strictly"),
             stray_rows,
-            closed: ends.is_closed(),
+            closed: self.is_closed(layer, fill),
         }
     }
+}
+
+/// The rows where contours break off, by layer: the first row that such an end
+/// is past, up to the one below the image.
+pub(crate) type OpenRows = BTreeMap<usize, Vec<u32>>;
+
+/// Finds the rows where the contours of some layers, in order, break off, by a
+/// second look at the facets.
+pub(crate) fn open_rows(
+    facets: &impl Facets,
+    cutter: Cutter<'_>,
+    layers: &[usize],
+) -> io::Result<OpenRows> {
+    let span = layers[0]..layers[layers.len() - 1] + 1;
+    let mut sums_of = vec![None; span.len()];
+    let sums: Vec<RowSums> = layers.iter().map(|_| RowSums::new(cutter.grid.height)).collect();
+    for (layer, sums) in layers.iter().zip(&sums) {
+        sums_of[layer - span.start] = Some(sums);
+    }
+    (0..facets.pieces()).into_par_iter().try_for_each(|piece| {
+        facets.for_each_in(piece, |facet| {
+            cutter.for_each_segment(facet, &span, |layer, segment| {
+                let Some(sums) = sums_of[layer - span.start] else { return };
+                let [a, b] = segment.ends.map(|end| end.at);
+                sums.add(cutter.first_row(a), a, !segment.turned, cutter.fill);
+                sums.add(cutter.first_row(b), b, segment.turned, cutter.fill);
+            });
+        })
+    })?;
+    Ok(layers.iter().copied().zip(sums.iter().map(RowSums::open_rows)).collect())
 }
 
 /// Sorts the places of a row. Most rows have a few, and need no call.

@@ -94,6 +94,12 @@ pub struct PageInfo {
     /// knows. One that does not may still leave every row balanced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub closed: Option<bool>,
+    /// Rows at which contours break off, increasing: each is the first row
+    /// below such an end, which may be the one below the image. Only there does
+    /// a row begin to miss crossings, or cease to. Empty where `closed` is
+    /// not `false`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub open_rows: Vec<u32>,
     /// Rows whose crossings did not balance, increasing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stray_rows: Vec<u32>,

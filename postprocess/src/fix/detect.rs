@@ -1,5 +1,7 @@
 //! Which rows are stray.
 
+use std::ops::Range;
+
 use lamp_stack::{Image, Mask, white_in_row};
 
 use super::FixOptions;
@@ -15,6 +17,9 @@ const LONG: u32 = 16;
 /// Contours that were missed together, and in no row alone, are looked for in
 /// bands of at most so many rows.
 const WIDEST_PAIRED: u32 = 30;
+/// The search for paired rows ends where it has taken so many times what the
+/// layer has in rows and crossings: it is no part's section.
+const EFFORT: usize = 8;
 /// Where so large a share of the pixels of another layer agrees, it agrees.
 const AGREES: f64 = 0.9;
 
@@ -24,8 +29,8 @@ pub(super) struct Scene<'a> {
     pub(super) mask: &'a Mask,
     /// The rows whose crossings did not balance, increasing.
     pub(super) unbalanced: &'a [u32],
-    /// Whether all contours close, where that is known.
-    pub(super) closed: Option<bool>,
+    /// The rows at which contours break off, increasing, where that is known.
+    pub(super) open_rows: Option<&'a [u32]>,
     /// The images of the layers below and above.
     pub(super) neighbours: [Option<&'a Image>; 2],
 }
@@ -53,16 +58,17 @@ impl Strays {
     }
 
     /// The bands of neighbouring stray rows, from the top.
-    pub(super) fn bands(&self) -> Vec<std::ops::Range<u32>> {
-        let rows = (0..self.kinds.len() as u32).filter(|&row| !self.is_good(row));
-        let mut bands: Vec<std::ops::Range<u32>> = Vec::new();
+    pub(super) fn bands(&self) -> Vec<Range<u32>> {
+        runs((0..self.kinds.len() as u32).filter(|&row| !self.is_good(row)))
+    }
+
+    fn mark(&mut self, rows: Range<u32>, kind: Kind, believed: bool) {
         for row in rows {
-            match bands.last_mut() {
-                Some(band) if band.end == row => band.end += 1,
-                _ => bands.push(row..row + 1),
+            self.kinds[row as usize].insert(kind);
+            if !believed {
+                self.doubtful.push(row);
             }
         }
-        bands
     }
 }
 
@@ -70,13 +76,15 @@ impl Scene<'_> {
     /// The stray rows; `None` where all are good, which takes one look at the
     /// number of each row's transitions.
     ///
-    /// In a layer whose contours all close no crossing was missed, so that
-    /// there is nothing to look for but rows that end white.
+    /// A row begins to miss crossings, and ceases to, only where a contour
+    /// breaks off. In a layer whose contours all close there is nothing to look
+    /// for but rows that end white.
     pub(super) fn strays(&self, options: &FixOptions) -> Option<Strays> {
         let crossings: Vec<u32> = self.mask.rows().map(|row| row.len() as u32).collect();
         let parity = crossings.iter().fold(0, |any, crossings| any | crossings);
         let whole = self.unbalanced.is_empty() && parity % 2 == 0;
-        if whole && self.closed == Some(true) {
+        let closed = self.open_rows.is_some_and(<[u32]>::is_empty);
+        if whole && closed {
             return None;
         }
         let kinds = crossings.iter().map(|&crossings| kinds_alone(crossings)).collect();
@@ -86,7 +94,7 @@ impl Scene<'_> {
                 kinds.insert(Kind::Unbalanced);
             }
         }
-        if self.closed != Some(true) {
+        if !closed {
             self.find_pairs(&mut strays, &crossings, options.max_width.min(WIDEST_PAIRED));
             self.find_slivers(&mut strays, &crossings);
             strays.doubtful.sort_unstable();
@@ -96,6 +104,7 @@ impl Scene<'_> {
 
     /// Finds rows that lack contours which cross good rows above and below.
     fn find_pairs(&self, strays: &mut Strays, crossings: &[u32], max_width: u32) {
+        let mut effort = EFFORT * (crossings.len() + self.mask.transition_count());
         for row in 1..crossings.len() {
             // Most rows have as many crossings as the one above.
             if crossings[row] >= crossings[row - 1] && strays.kinds[row - 1].is_empty() {
@@ -111,39 +120,48 @@ impl Scene<'_> {
             let last = crossings.len().min(above + max_width as usize + 2);
             let below = (row + 1..last)
                 .find(|&below| strays.kinds[below].is_empty() && crossings[below] > crossings[row]);
-            if crossings[row] < crossings[above]
-                && let Some(below) = below
-            {
-                self.check_pairs(strays, above as u32 + 1..below as u32);
+            let Some(below) = below.filter(|_| crossings[row] < crossings[above]) else { continue };
+            let band = above as u32 + 1..below as u32;
+            if self.open_rows.is_some_and(|open| !any_in(open, &band)) {
+                continue;
             }
+            let cost = crossings[above].max(crossings[below]) as usize * (band.len() + 24);
+            let Some(left) = effort.checked_sub(cost) else { return };
+            effort = left;
+            self.check_pairs(strays, &band);
         }
     }
 
     /// Marks the rows of a band that are stray though they end black.
-    fn check_pairs(&self, strays: &mut Strays, band: std::ops::Range<u32>) {
+    fn check_pairs(&self, strays: &mut Strays, band: &Range<u32>) {
         let is_good = |row: u32| !band.contains(&row) && strays.is_good(row);
         let Some(contours) = Contours::around(self.mask, band.clone(), is_good) else { return };
-        let beside_strays = band.clone().any(|row| !strays.is_good(row));
-        for row in band.clone() {
-            if !strays.is_good(row) {
-                continue;
-            }
-            let had = self.mask.row(row);
-            let mended = mend(had, &contours.outlook(row), self.mask.width(), DROP);
-            if mended.gain < LONG || mended.added.is_empty() {
-                continue;
-            }
-            let is_stray = beside_strays
-                || match (self.votes(row, had, &mended.row), self.closed) {
-                    // The layers beside this one have the same there: so has the part.
-                    (Votes { kept: 1.., .. }, _) => false,
-                    (_, Some(false)) => true,
-                    // A slot or wall of several rows may well be the part's own.
-                    _ => band.len() == 1,
-                };
-            if is_stray {
-                strays.kinds[row as usize].insert(Kind::Paired);
-            }
+        let lacks_some = |row: &u32| {
+            let mended =
+                mend(self.mask.row(*row), &contours.outlook(*row), self.mask.width(), DROP);
+            strays.is_good(*row) && mended.gain >= LONG && !mended.added.is_empty()
+        };
+        for rows in runs(band.clone().filter(lacks_some)) {
+            let touches = [rows.start.checked_sub(1), Some(rows.end)].into_iter().flatten();
+            let beside_strays = touches.into_iter().any(|row| !strays.is_good(row));
+            let believed = match self.open_rows {
+                // All else is the part's own.
+                Some(open) if !is_between(open, &rows) => continue,
+                Some(_) => true,
+                None if beside_strays => true,
+                // A wall of several rows, or one that another layer has there,
+                // may well be the part's own.
+                None if rows.len() > 1 => continue,
+                None => {
+                    let (row, had) = (rows.start, self.mask.row(rows.start));
+                    let mended = mend(had, &contours.outlook(row), self.mask.width(), DROP);
+                    if self.is_in_another_layer(row, had, &mended.row) {
+                        continue;
+                    }
+                    false
+                }
+            };
+            strays.mark(rows, Kind::Paired, believed);
         }
     }
 
@@ -153,49 +171,58 @@ impl Scene<'_> {
             if crossings[1] <= crossings[0] || crossings[1] <= crossings[2] {
                 continue;
             }
+            let is_between = |open| is_between(open, &(row..row + 1));
+            if self.open_rows.is_some_and(|open| !is_between(open)) {
+                continue;
+            }
             let [above, had, below] = [row - 1, row, row + 1].map(|row| self.mask.row(row));
             if [row - 1, row, row + 1].iter().any(|&row| !strays.is_good(row)) {
                 continue;
             }
             let without = without_slivers(had, above, below);
-            if without == had {
-                continue;
-            }
-            let votes = self.votes(row, had, &without);
             // A hole or a bar whose side just touches this plane looks the
             // same, but the next layer shows more of it.
-            if votes.kept > 0 {
-                continue;
-            }
-            strays.kinds[row as usize].insert(Kind::Sliver);
-            if votes.mended < 2 {
-                strays.doubtful.push(row);
+            if without != had && !self.is_in_another_layer(row, had, &without) {
+                strays.mark(row..row + 1, Kind::Sliver, self.open_rows.is_some());
             }
         }
     }
 
-    /// How many of the layers beside this one have, where two versions of a
-    /// row differ, the colours of the first and of the second.
-    fn votes(&self, row: u32, kept: &[u32], mended: &[u32]) -> Votes {
+    /// Whether one of the layers beside this one has, where two versions of a
+    /// row differ, the colours of the first.
+    fn is_in_another_layer(&self, row: u32, had: &[u32], mended: &[u32]) -> bool {
         let width = self.mask.width();
-        let differ = difference(kept, mended);
+        let differ = difference(had, mended);
         let pixels = white_in_row(&differ, width) as f64;
-        let mut votes = Votes { kept: 0, mended: 0 };
-        for image in self.neighbours.into_iter().flatten() {
-            let there = outline_row(image, row);
-            let as_mended = difference(&there, kept);
+        self.neighbours.into_iter().flatten().any(|image| {
+            let as_mended = difference(&outline_row(image, row), had);
             let share = white_in_both(&differ, &as_mended, width) as f64 / pixels;
-            votes.mended += u32::from(share >= AGREES);
-            votes.kept += u32::from(share <= 1.0 - AGREES);
-        }
-        votes
+            share <= 1.0 - AGREES
+        })
     }
 }
 
-/// How many layers are for which version of a row.
-struct Votes {
-    kept: u32,
-    mended: u32,
+/// Whether one of the increasing rows is in a band, or ends it.
+fn any_in(open: &[u32], band: &Range<u32>) -> bool {
+    let first = open.partition_point(|&row| row < band.start);
+    open.get(first).is_some_and(|&row| row <= band.end)
+}
+
+/// Whether contours break off where rows begin and where they end.
+fn is_between(open: &[u32], rows: &Range<u32>) -> bool {
+    open.binary_search(&rows.start).is_ok() && open.binary_search(&rows.end).is_ok()
+}
+
+/// The runs of neighbouring rows.
+fn runs(rows: impl Iterator<Item = u32>) -> Vec<Range<u32>> {
+    let mut runs: Vec<Range<u32>> = Vec::new();
+    for row in rows {
+        match runs.last_mut() {
+            Some(run) if run.end == row => run.end += 1,
+            _ => runs.push(row..row + 1),
+        }
+    }
+    runs
 }
 
 fn kinds_alone(crossings: u32) -> Kinds {

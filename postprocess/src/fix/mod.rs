@@ -132,7 +132,7 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
     let scene = Scene {
         mask: &outlines,
         unbalanced: &unbalanced,
-        closed: layer.info.closed,
+        open_rows: layer.info.closed.map(|_| &layer.info.open_rows[..]),
         neighbours: window.neighbours(),
     };
     let Some(strays) = scene.strays(options) else { return (None, Vec::new()) };
@@ -209,7 +209,7 @@ fn fix_band(
         }
         (gap, confidence, rows) = (rebuilt.gap, rebuilt.confidence, rebuilt.rows);
     }
-    if options.method == Method::Nearest {
+    if options.method == Method::Nearest && !rows.is_empty() {
         (rows, confidence) = nearest::nearest(mask, band);
     }
     if band.clone().any(|row| strays.doubtful.binary_search(&row).is_ok()) {

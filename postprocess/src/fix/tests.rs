@@ -165,29 +165,51 @@ fn a_band_where_a_contour_begins_is_mended_on_both_sides_of_it() {
     }
 }
 
-#[test]
-fn two_crossings_missed_in_a_row_are_found() {
-    let clean = whole(bars);
-    let stray = drawn(bars, |row| if row == 150 { &[1, 2] } else { &[] });
-    let (mended, bands) = spline(&stray);
-    assert_eq!(bands.len(), 1);
-    assert_eq!((bands[0].kinds, bands[0].outcome), (kinds(&[Kind::Paired]), Outcome::Corrected));
-    assert!(off(&mended, &clean).0 <= 1);
+/// The layer, with what its slicer saw of its contours.
+fn with_open_rows(mut layer: Layer, open_rows: &[u32]) -> Layer {
+    layer.info.closed = Some(open_rows.is_empty());
+    layer.info.open_rows = open_rows.to_vec();
+    layer
+}
+
+/// The bars with a wall between them, or a stray line, in some rows.
+fn barred(index: u32, rows: std::ops::Range<u32>) -> Layer {
+    layer(index, drawn(bars, |row| if rows.contains(&row) { &[1, 2] } else { &[] }))
 }
 
 #[test]
-fn a_layer_whose_contours_close_keeps_rows_that_look_stray() {
-    let mut odd_looking = layer(0, drawn(bars, |row| if row == 150 { &[1, 2] } else { &[] }));
-    odd_looking.info.closed = Some(true);
-    let (layers, bands) = fixed(vec![odd_looking.clone()], FixOptions::default());
-    assert_eq!((&layers[0], bands), (&odd_looking, vec![]));
+fn two_crossings_missed_in_a_row_are_found_where_contours_break_off() {
+    for rows in [150..151, 150..158] {
+        let stray = with_open_rows(barred(0, rows.clone()), &[rows.start, rows.end]);
+        let (layers, bands) = fixed(vec![stray], FixOptions::default());
+        let Image::Mask(mended) = &layers[0].image else { unreachable!() };
+        assert!(off(mended, &whole(bars)).1 <= 1);
+        let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
+        assert_eq!((band.kinds, band.outcome), (kinds(&[Kind::Paired]), Outcome::Corrected));
+        assert_eq!(band.first_row..band.end(), rows);
+    }
 }
 
 #[test]
-fn a_wall_that_other_layers_have_too_stays() {
-    let wall = |index| layer(index, drawn(bars, |row| if row == 150 { &[1, 2] } else { &[] }));
-    let layers: Vec<Layer> = (0..3).map(wall).collect();
-    assert_eq!(fixed(layers.clone(), FixOptions::default()), (layers, vec![]));
+fn walls_stay_where_no_contour_breaks_off() {
+    // All contours close; or they break off, but elsewhere, or on one side only.
+    for open_rows in [&[][..], &[30, 40], &[100, 101], &[150, 300], &[149, 159]] {
+        let wall = with_open_rows(barred(0, 150..158), open_rows);
+        let (layers, bands) = fixed(vec![wall.clone()], FixOptions::default());
+        assert_eq!((&layers[0], bands), (&wall, vec![]), "{open_rows:?}");
+    }
+}
+
+#[test]
+fn where_nothing_is_known_a_row_that_lacks_two_crossings_is_told_of_and_stays() {
+    let alone = vec![barred(0, 150..151)];
+    let (layers, bands) = fixed(alone.clone(), FixOptions::default());
+    assert_eq!(layers, alone);
+    assert_eq!((bands[0].kinds, bands[0].outcome), (kinds(&[Kind::Paired]), Outcome::Doubtful));
+    // Of several rows, or in another layer too, it is the part's own.
+    for own in [vec![barred(0, 150..152)], (0..3).map(|k| barred(k, 150..151)).collect()] {
+        assert_eq!(fixed(own.clone(), FixOptions::default()), (own, vec![]));
+    }
 }
 
 #[test]
@@ -216,7 +238,7 @@ fn rows_of_two_gaps_beside_each_other_are_one_band() {
 }
 
 #[test]
-fn a_sliver_goes_only_if_no_layer_beside_it_has_it() {
+fn a_sliver_goes_only_if_contours_break_off_there_and_no_other_layer_has_it() {
     let clean = || whole(bars);
     let with_sliver = || {
         let mut mask = MaskBuilder::new(WIDTH);
@@ -229,14 +251,22 @@ fn a_sliver_goes_only_if_no_layer_beside_it_has_it() {
     let of = |masks: Vec<Mask>| -> Vec<Layer> {
         masks.into_iter().zip(0..).map(|(mask, index)| layer(index, mask)).collect()
     };
-    let between = of(vec![clean(), with_sliver(), clean()]);
-    let (layers, bands) = fixed(between.clone(), FixOptions::default());
+    let sliver = kinds(&[Kind::Sliver]);
+    let mut broken = of(vec![clean(), with_sliver(), clean()]);
+    broken[1] = with_open_rows(broken[1].clone(), &[250, 251]);
+    let (layers, bands) = fixed(broken.clone(), FixOptions::default());
     assert_eq!(layers[1].image, Image::Mask(clean()));
-    assert_eq!((bands[0].kinds, bands[0].outcome), (kinds(&[Kind::Sliver]), Outcome::Corrected));
+    assert_eq!((bands[0].kinds, bands[0].outcome), (sliver, Outcome::Corrected));
 
-    let (layers, bands) = fixed(of(vec![with_sliver()]), FixOptions::default());
-    assert_eq!(layers, of(vec![with_sliver()]));
-    assert_eq!((bands[0].kinds, bands[0].outcome), (kinds(&[Kind::Sliver]), Outcome::Doubtful));
+    // No contour breaks off there.
+    broken[1] = with_open_rows(broken[1].clone(), &[250, 300]);
+    assert_eq!(fixed(broken.clone(), FixOptions::default()), (broken, vec![]));
+
+    // Nothing is known of the contours.
+    let unknown = of(vec![clean(), with_sliver(), clean()]);
+    let (layers, bands) = fixed(unknown.clone(), FixOptions::default());
+    assert_eq!(layers, unknown);
+    assert_eq!((bands[0].kinds, bands[0].outcome), (sliver, Outcome::Doubtful));
 
     // Its neighbour above has more of it: the top of a bar that lies there.
     let top = of(vec![clean(), with_sliver(), with_sliver()]);
@@ -273,9 +303,14 @@ fn what_is_too_wide_is_left_and_its_gap_is_named() {
 #[test]
 fn an_image_without_a_good_row_is_left() {
     let stray = drawn(|_| vec![100.0, 200.0], |_| &[1]);
-    let (mended, bands) =
-        fixed_mask(&stray, FixOptions { max_width: u32::MAX, ..FixOptions::default() });
-    assert_eq!((mended, bands[0].outcome, bands[0].confidence), (stray, Outcome::Doubtful, 0.0));
+    for (mended, bands) in [
+        fixed_mask(&stray, FixOptions { max_width: u32::MAX, ..FixOptions::default() }),
+        nearest(&stray),
+    ] {
+        let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
+        assert_eq!((band.outcome, band.confidence), (Outcome::Doubtful, 0.0));
+        assert_eq!(mended, stray);
+    }
 }
 
 #[test]
