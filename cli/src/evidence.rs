@@ -14,9 +14,10 @@ use crate::streams::write_file;
 /// Good rows above and below a band that are shown with it, and columns.
 const ROWS_AROUND: u32 = 16;
 const COLUMNS_AROUND: u32 = 48;
-/// A stray run may cross the image: so much of it, from the gap on, shows how
-/// it was mended.
+/// A stray run may cross the image: so many columns of it, from the gap on,
+/// and so many rows, from the first, show how it was mended.
 const WIDEST: u32 = 400;
+const TALLEST: u32 = 200;
 /// Each pixel is shown as so many.
 const SCALE: usize = 4;
 /// What lies between two panels.
@@ -86,6 +87,7 @@ fn region(image: &Image, band: &Band) -> Region {
     let right = band.columns.end.max(gap.end).saturating_add(COLUMNS_AROUND);
     let [top, bottom] =
         [band.first_row.saturating_sub(ROWS_AROUND), band.end().saturating_add(ROWS_AROUND)];
+    let bottom = bottom.min(top.saturating_add(TALLEST));
     Region {
         columns: left..right.min(left.saturating_add(WIDEST)).min(image.width()),
         rows: top..bottom.min(image.height()),

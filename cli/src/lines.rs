@@ -2,12 +2,9 @@
 //! item.
 
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::Serialize;
-
-use crate::options::Output;
-use crate::stop::Stop;
 
 /// Writes the items of a JSON list, each on a line of its own.
 pub(crate) fn write_lines(
@@ -29,14 +26,7 @@ pub(crate) fn to_nm(mm: f64) -> f64 {
 pub(crate) fn parse_report(text: &str) -> Result<PathBuf, String> {
     match text {
         "-" => Err("standard output is for the stack: name a file, as report.json".to_owned()),
+        "" => Err("name a file, as report.json".to_owned()),
         name => Ok(PathBuf::from(name)),
     }
-}
-
-/// Checks that a report does not go where the stack does.
-pub(crate) fn check_report(report: Option<&Path>, stack: &Output) -> Result<(), Stop> {
-    if report == Some(&stack.output) {
-        return Err(Stop::usage("the stack and the report need a file each"));
-    }
-    Ok(())
 }

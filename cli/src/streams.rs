@@ -61,12 +61,18 @@ pub(crate) fn report(command: &'static str, common: &Common, output: &Output) ->
 fn stdout_is_file() -> bool {
     #[cfg(unix)]
     {
-        use std::os::fd::AsFd;
-        let file = io::stdout().as_fd().try_clone_to_owned().map(std::fs::File::from);
-        file.and_then(|file| file.metadata()).is_ok_and(|metadata| metadata.is_file())
+        stdout_metadata().is_some_and(|metadata| metadata.is_file())
     }
     #[cfg(not(unix))]
     false
+}
+
+/// What the system knows of where standard output goes.
+#[cfg(unix)]
+fn stdout_metadata() -> Option<fs::Metadata> {
+    use std::os::fd::AsFd;
+    let stdout = File::from(io::stdout().as_fd().try_clone_to_owned().ok()?);
+    stdout.metadata().ok()
 }
 
 /// Reads the wanted layers of a stack, decoded, in order.
@@ -187,6 +193,53 @@ pub(crate) fn folder_to_make(path: &Path) -> Result<&Path, Stop> {
     match path.file_name() {
         Some(_) if !is_stream(path) => Ok(path),
         _ => Err(Stop::usage(format!("{}: name the folder that is to be made", path.display()))),
+    }
+}
+
+/// Checks, before the work, that what is written beside the stack can be: that
+/// its folder is there, and that it is neither the stack nor an input.
+pub(crate) fn check_beside<'a>(
+    beside: &Path,
+    stack: &Path,
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<(), Stop> {
+    let folder = match beside.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    if !folder.is_dir() {
+        return Err(Stop::Failed(anyhow!("{}: there is no such folder", folder.display())));
+    }
+    let is_same = |other: &Path| !is_stream(other) && place_of(other) == place_of(beside);
+    if is_same(stack) || (is_stream(stack) && is_stdout(beside)) {
+        return Err(Stop::usage(format!("{}: the stack goes there", beside.display())));
+    }
+    match inputs.into_iter().find(|input| is_same(input)) {
+        Some(_) => Err(Stop::usage(format!("{}: that is the input", beside.display()))),
+        None => Ok(()),
+    }
+}
+
+/// A name that two paths to one place share, be there a file yet or not.
+fn place_of(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
+    let absent =
+        || Some(fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?.join(path.file_name()?));
+    fs::canonicalize(path).ok().or_else(absent)
+}
+
+/// Whether standard output goes to that file.
+fn is_stdout(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let same = |a: fs::Metadata, b: fs::Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
+        stdout_metadata().zip(fs::metadata(path).ok()).is_some_and(|(a, b)| same(a, b))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = path;
+        false
     }
 }
 

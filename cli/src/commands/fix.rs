@@ -6,19 +6,20 @@ use lamp_stack::PageInfo;
 
 use crate::evidence::Evidence;
 use crate::findings::{Findings, whereabouts};
-use crate::lines::{check_report, parse_report};
+use crate::lines::parse_report;
 use crate::options::{Common, Input, Output};
 use crate::stop::Stop;
-use crate::streams::{read_layers, report, write_file, write_layers};
+use crate::streams::{check_beside, read_layers, report, write_file, write_layers};
 
 /// Find and correct stray rows: rows that a gap in the mesh made run across the image
 ///
 /// A row is stray if it ends white (every part leaves the last column black), if `slice` found that
-/// its crossings do not balance, if it lacks crossings that the rows above and below have, or if it
-/// has a run that no row or layer beside it has. Only the crossings that were missed are added; what
-/// a row has stays as it is. A band of rows that is too wide, or whose correction is not sure enough,
-/// is left and told of. What was changed is said for each layer and stands on its page; layers
-/// without stray rows pass byte for byte. Gray layers are corrected by their outlines.
+/// its crossings do not balance, or if it lacks crossings that the rows above and below have, or has
+/// a run that they have not, where `slice` found that contours break off. The crossings that were
+/// missed are added; those that a row has stay, unless they contradict the contours around them. A
+/// band of rows that is too wide, or whose correction is not sure enough, is left and told of. What
+/// was changed is said for each layer and stands on its page; all other layers pass byte for byte.
+/// Gray layers are corrected by their outlines.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -88,7 +89,9 @@ impl FixArgs {
 }
 
 pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Stop> {
-    check_report(args.report.as_deref(), &args.output)?;
+    for beside in [&args.report, &args.evidence].into_iter().flatten() {
+        check_beside(beside, &args.output.output, [&args.input.stack])?;
+    }
     let report = report("fix", common, &args.output);
     let options = args.options();
     let mut findings = Findings::new(options);

@@ -8,12 +8,12 @@ use lamp_slicer::{
 };
 use lamp_stack::{Dpi, Layer, Length, Size};
 
-use crate::lines::{check_report, parse_report};
+use crate::lines::parse_report;
 use crate::options::{Common, Output, parse_layers, parse_memory, parse_thickness};
 use crate::placement::{PlacementOptions, parse_numbers};
 use crate::report::Report;
 use crate::stop::Stop;
-use crate::streams::{input_name, is_stream, report, write_file, write_layers};
+use crate::streams::{check_beside, input_name, is_stream, report, write_file, write_layers};
 use crate::trace::{Counts, Rows, Subject};
 
 /// Slice an STL part into a stack of layer images
@@ -205,7 +205,9 @@ fn value_name(value: &impl ValueEnum) -> String {
 }
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
-    check_report(args.report.as_deref(), &args.output)?;
+    if let Some(report) = &args.report {
+        check_beside(report, &args.output.output, &args.parts)?;
+    }
     let model = open_models(&args.parts)?;
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args

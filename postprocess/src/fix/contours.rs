@@ -31,6 +31,8 @@ pub(super) struct Expected {
     pub(super) through: bool,
     /// Whether it is more likely there than not.
     pub(super) likely: bool,
+    /// Whether a row that lacks it can have missed it.
+    pub(super) may_be_missed: bool,
 }
 
 /// One of the lines that make up the contours.
@@ -206,7 +208,14 @@ impl Contours {
                 let (column, slack) = guesses[at];
                 let side = Side { contour, right: line == 1 };
                 let likely = apart > CLEARLY_OPEN;
-                outlook.crossings.push(Expected { column, slack, side, through, likely });
+                outlook.crossings.push(Expected {
+                    column,
+                    slack,
+                    side,
+                    through,
+                    likely,
+                    may_be_missed: true,
+                });
             }
             if let Course::Closing { sides, .. } = course {
                 outlook.unknown.push(span(sides, [guesses[0][at], guesses[1][at]]));

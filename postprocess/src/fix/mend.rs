@@ -9,6 +9,8 @@ use super::contours::{Expected, Outlook, Side};
 const ADD: u32 = 2;
 /// To add one of a contour that ends somewhere here.
 const ADD_CLOSING: u32 = 4;
+/// To add one of a line that the row cannot have missed: no row is as wide.
+const ADD_CROSSED: u32 = 1 << 24;
 /// To drop a crossing that the row has. A gap in a mesh loses crossings; it
 /// makes none.
 pub(super) const DROP: u32 = 24;
@@ -53,7 +55,7 @@ enum What {
     /// A crossing where none was, and what it costs to drop it.
     Extra { drop: u32 },
     /// None where one was expected: that many of the outlook.
-    Missing { which: usize, through: bool },
+    Missing { which: usize, through: bool, price: u32 },
 }
 
 impl Event {
@@ -62,8 +64,7 @@ impl Event {
         match self.what {
             What::Found { .. } => [None, Some(0)],
             What::Extra { drop } => [Some(drop), Some(0)],
-            What::Missing { through: true, .. } => [Some(0), Some(ADD)],
-            What::Missing { through: false, .. } => [Some(0), Some(ADD_CLOSING)],
+            What::Missing { price, .. } => [Some(0), Some(price)],
         }
     }
 
@@ -117,23 +118,43 @@ fn events(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> (Vec<Event>,
         .collect();
     let mut events: Vec<Event> =
         row.iter().map(|&column| Event { column, what: What::Extra { drop } }).collect();
-    let mut found = Vec::new();
+    let (mut found, mut missing) = (Vec::new(), Vec::new());
     for (which, crossing) in expected.iter().enumerate() {
         let partner = nearest(row.len(), |i| row[i].into(), crossing.column).filter(|&i| {
             let distance = (f64::from(row[i]) - crossing.column).abs();
             nearest_expected[i] == Some(which) && distance <= NEAR + crossing.slack
         });
-        let through = crossing.through;
-        if let Some(i) = partner {
-            events[i].what = What::Found { through };
-            found.push((crossing.side, row[i]));
+        match partner {
+            Some(i) => {
+                events[i].what = What::Found { through: crossing.through };
+                found.push((crossing.side, row[i]));
+            }
+            None => missing.push(which),
+        }
+    }
+    let mut missing = &missing[..];
+    while let [which, rest @ ..] = missing {
+        let both = rest.first().filter(|&&next| next == which + 1);
+        if both.is_some_and(|&next| [*which, next].iter().all(|&k| !expected[k].may_be_missed)) {
+            // A slit or a wall of the part's own.
+            missing = &rest[1..];
         } else {
-            let column = crossing.column.round().clamp(0.0, f64::from(width - 1)) as u32;
-            events.push(Event { column, what: What::Missing { which, through } });
+            events.push(missing_at(*which, &expected[*which], width));
+            missing = rest;
         }
     }
     events.sort_by_key(|event| event.column);
     (events, found)
+}
+
+fn missing_at(which: usize, crossing: &Expected, width: u32) -> Event {
+    let price = match crossing {
+        Expected { may_be_missed: false, .. } => ADD_CROSSED,
+        Expected { through: true, .. } => ADD,
+        _ => ADD_CLOSING,
+    };
+    let column = crossing.column.round().clamp(0.0, f64::from(width - 1)) as u32;
+    Event { column, what: What::Missing { which, through: crossing.through, price } }
 }
 
 /// Which of `len` sorted places is the nearest to `place`.

@@ -203,7 +203,9 @@ fn fix_band(
     if kinds == sliver {
         rows = band.clone().map(|row| spline::unsliver(mask, row)).collect();
         confidence = 0.9;
-    } else if let Some(rebuilt) = spline::rebuild(mask, band, is_good, is_ended, voters) {
+    } else if let Some(rebuilt) =
+        spline::rebuild(mask, band, is_good, is_ended, scene.open_rows, voters)
+    {
         if rebuilt.touching {
             kinds.insert(Kind::Touching);
         }

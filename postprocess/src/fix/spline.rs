@@ -30,30 +30,42 @@ pub(super) struct Rebuilt {
 /// Crossings that the rows have where a contour is expected stay as they are,
 /// and the contour is then expected to go through them; only crossings that
 /// were missed come from its curve.
+///
+/// Between two rows of `open_rows`, where contours break off, all rows miss the
+/// same ones. So a line that one of them crosses is missed by none: where it is
+/// not crossed, the part itself has a slit or a wall.
 pub(super) fn rebuild(
     mask: &Mask,
     band: &Range<u32>,
     is_good: impl Fn(u32) -> bool,
     is_ended: impl Fn(u32) -> bool,
+    open_rows: Option<&[u32]>,
     voters: Option<[&Image; 2]>,
 ) -> Option<Rebuilt> {
     let mut contours = Contours::around(mask, band.clone(), is_good)?;
-    let mend_row = |contours: &Contours, row: u32| {
+    let stretch = |row: u32| open_rows.map(|open| open.partition_point(|&open| open <= row));
+    let mut crossed: BTreeSet<(usize, Side)> = BTreeSet::new();
+    let mend_row = |contours: &Contours, crossed: &BTreeSet<_>, row: u32| {
         let mut outlook = contours.outlook(row);
+        for crossing in &mut outlook.crossings {
+            let is_crossed = |stretch| crossed.contains(&(stretch, crossing.side));
+            crossing.may_be_missed = !stretch(row).is_some_and(is_crossed);
+        }
         if let Some(voters) = voters {
             vote(&mut outlook, &voters.map(|image| outline_row(image, row)));
         }
         let drop = if is_ended(row) { DROP_ENDED } else { DROP };
         mend(mask.row(row), &outlook, mask.width(), drop)
     };
-    let first: Vec<Mended> = band.clone().map(|row| mend_row(&contours, row)).collect();
+    let first: Vec<Mended> = band.clone().map(|row| mend_row(&contours, &crossed, row)).collect();
     for (row, mended) in band.clone().zip(first) {
         for (side, column) in mended.found {
             contours.found(side, row, column);
+            crossed.extend(stretch(row).map(|stretch| (stretch, side)));
         }
     }
     contours.guess();
-    let mended: Vec<Mended> = band.clone().map(|row| mend_row(&contours, row)).collect();
+    let mended: Vec<Mended> = band.clone().map(|row| mend_row(&contours, &crossed, row)).collect();
     let rows = mended.iter().zip(band.clone());
     let least = rows
         .map(|(mended, row)| confidence(mended, mask.row(row), mask.width(), is_ended(row)))
@@ -112,7 +124,7 @@ fn confidence(mended: &Mended, had: &[u32], width: u32, is_ended: bool) -> f64 {
     };
     let explained = f64::from(mended.gain) / f64::from(mended.gain + mended.off).max(1.0);
     let explained = if mended.off == 0 { 1.0 } else { explained };
-    let edits = 0.9f64.powi(more as i32) * 0.8f64.powi(dropped as i32);
+    let edits = 0.9f64.powi(more as i32) * 0.3f64.powi(dropped as i32);
     placed.fold(1.0, f64::min) * edits * 0.8f64.powi(mended.absent as i32) * explained
 }
 

@@ -155,3 +155,25 @@ proptest! {
         prop_assert!(flipped == layers);
     }
 }
+
+/// A row begins to be stray, and ceases to, only at an open row.
+#[test]
+fn balance_changes_only_where_contours_break_off() {
+    for (defect, count) in [(Defect::Drop, 9), (Defect::Gap { by_mm: 0.4 }, 20), (Defect::Flip, 9)]
+    {
+        for mut mesh in parts() {
+            inject(&mut mesh, defect, count, 11);
+            for fill in FILLS {
+                for Layer { info, image, .. } in slice(&mesh, &coarse(fill)) {
+                    assert_eq!(info.closed == Some(false), !info.open_rows.is_empty());
+                    assert!(info.open_rows.is_sorted_by(|a, b| a < b));
+                    let is_stray = |row: u32| info.stray_rows.binary_search(&row).is_ok();
+                    for row in 0..=image.height() {
+                        let changes = is_stray(row) != (row > 0 && is_stray(row - 1));
+                        assert!(!changes || info.open_rows.contains(&row), "row {row} of {info:?}");
+                    }
+                }
+            }
+        }
+    }
+}

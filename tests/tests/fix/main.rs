@@ -7,6 +7,7 @@ mod options;
 mod report;
 mod strays;
 mod strict;
+mod thin;
 mod untouched;
 
 use lamp_fixtures::{Defect, Facet, Mesh, inject, sphere};

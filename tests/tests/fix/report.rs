@@ -115,7 +115,7 @@ fn kinds_outcomes_and_limits_are_named() {
     }
     assert_eq!(outcomes.len(), 3, "each outcome is met");
     let (by_default, _) = report(&scratch, "");
-    assert_eq!(head(&by_default), [json!("spline"), json!(15), json!(0.5), json!(false)]);
+    assert_eq!(head(&by_default), [json!("spline"), json!(15), json!(0.35), json!(false)]);
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn a_report_needs_a_file_of_its_own() {
     let (scratch, _) = broken_ball(1, 1, COARSE);
     let names = scratch.names();
     for (options, words) in
-        [("--report -", "name a file"), ("-o a.tif --report a.tif", "a file each")]
+        [("--report -", "name a file"), ("-o a.tif --report a.tif", "the stack goes there")]
     {
         let ran = scratch.run(&format!("fix stray.tif {options}"));
         assert_eq!(ran.statuses, [Some(2)], "{ran:?}");

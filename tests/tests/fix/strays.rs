@@ -1,10 +1,8 @@
 //! Broken parts, corrected.
 
-use std::collections::BTreeSet;
-
 use lamp_tests::{Scratch, ends_white, mask, masks};
 
-use crate::{COARSE, bands, broken_ball, is_corrected, number, pixels_off};
+use crate::{COARSE, broken_ball, pixels_off};
 
 /// A tower that lost facets, sliced to `stray.tif`.
 fn broken_tower() -> Scratch {
@@ -67,26 +65,20 @@ fn fixing_twice_changes_no_byte() {
 }
 
 /// `tile` ends what runs across where the copy's image ends, so that rows end
-/// black; each copy is corrected as the part alone, or left.
+/// black; each copy is corrected as the part alone, but for some pixels where
+/// contours close.
 #[test]
 fn copies_are_corrected_as_the_part_is() {
     for (seed, copies) in [(1, 2), (2, 3), (3, 8)] {
         let (scratch, _) = broken_ball(5, seed, COARSE);
+        let fix = "fix --min-confidence 0 --max-width 30";
         let tile = format!("tile --area 120x16mm --gap 1mm --copies {copies}");
-        scratch.run(&format!("fix stray.tif | {tile} -o expected.tif")).succeeds();
+        scratch.run(&format!("{fix} stray.tif | {tile} -o expected.tif")).succeeds();
         scratch.run(&format!("{tile} stray.tif -o tiled.tif")).succeeds();
-        scratch.run("fix tiled.tif --report fix.json -o fixed.tif").succeeds();
-        let report = serde_json::from_slice(&scratch.bytes("fix.json")).unwrap();
-        let left: BTreeSet<u32> = bands(&report)
-            .iter()
-            .filter(|band| !is_corrected(band))
-            .map(|band| number(&band["layer"]))
-            .collect();
-        let (expected, fixed) = (scratch.layers("expected.tif"), scratch.layers("fixed.tif"));
-        for (expected, fixed) in expected.iter().zip(&fixed) {
-            let same = expected.image == fixed.image;
-            assert!(same || left.contains(&fixed.info.index), "{}", fixed.info.name());
-        }
-        assert!(number(&report["bands_corrected"]) > 10 && left.len() < 6, "{left:?}");
+        scratch.run(&format!("{fix} tiled.tif -o fixed.tif")).succeeds();
+        let [expected, tiled, fixed] =
+            ["expected.tif", "tiled.tif", "fixed.tif"].map(|name| scratch.layers(name));
+        let (stray, left) = (pixels_off(&tiled, &expected), pixels_off(&fixed, &expected));
+        assert!(stray > 1000 && left * 50 < stray, "{left} of {stray} pixels");
     }
 }

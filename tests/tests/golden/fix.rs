@@ -91,6 +91,7 @@ fn paired() -> (String, Mask) {
         _ => had.to_vec(),
     };
     layer.image = Image::Mask(edited(whole, missed));
+    (layer.info.closed, layer.info.open_rows) = (Some(false), vec![50, 51]);
     scratch.stack("stray.tif", [layer]);
     pair("fix_paired", &corrected(&scratch, 1, &["paired"], ""))
 }
@@ -104,6 +105,7 @@ fn sliver() -> (String, Mask) {
         _ => had.to_vec(),
     };
     layers[1].image = Image::Mask(edited(mask(&layers[1]), added));
+    (layers[1].info.closed, layers[1].info.open_rows) = (Some(false), vec![60, 61]);
     scratch.stack("stray.tif", layers);
     pair("fix_sliver", &corrected(&scratch, 1, &["sliver"], ""))
 }
