@@ -59,8 +59,8 @@ pub enum Kind {
     /// rows above and below: two crossings were missed.
     Paired,
     /// A run one row high, between pixels of the other colour above and below
-    /// in this layer, and in the layers below and above (002 section 2.4.1,
-    /// the first algorithm).
+    /// (002 section 2.4.1, the first algorithm), which the layers below and
+    /// above do not have either.
     Sliver,
     /// The band reaches the image's first or last row, so that only one side
     /// shows what belongs there.

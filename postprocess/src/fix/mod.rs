@@ -5,8 +5,9 @@
 //! A gap in a mesh loses crossings, and each crossing that is lost turns over
 //! the colour of all pixels to its right. [`detect`] finds the rows where that
 //! happened; [`contours`] follows the part's contours from the good rows above
-//! and below through the band, [`mend`] finds which of them a row does not
-//! cross, and that is all that is added. What a row has stays as it is.
+//! and below through the band, [`mend`] finds which of them a row should cross
+//! but does not. A row begins to miss crossings, and ceases to, only where a
+//! contour breaks off: that tells stray rows from the part's own slits.
 
 mod align;
 mod band;
@@ -50,7 +51,7 @@ pub struct FixOptions {
 
 impl Default for FixOptions {
     /// Curves; at most 15 rows, half the smallest feature of the seed's blades
-    /// at 1500 dpi. Bands of broken sample parts less sure than 0.35 keep 9 % of
+    /// at 1500 dpi. Bands of broken sample parts less sure than 0.35 keep a tenth of
     /// their wrong pixels, the others 0.2 % at most (`benches/README.md`).
     fn default() -> Self {
         Self { method: Method::Spline, max_width: 15, min_confidence: 0.35, use_neighbours: false }
