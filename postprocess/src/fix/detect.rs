@@ -19,7 +19,7 @@ const LONG: u32 = 16;
 const WIDEST_PAIRED: u32 = 30;
 /// The search for paired rows ends where it has taken so many times what the
 /// layer has in rows and crossings: it is no part's section.
-const EFFORT: usize = 8;
+const EFFORT: usize = 2;
 /// Where so large a share of the pixels of another layer agrees, it agrees.
 const AGREES: f64 = 0.9;
 
