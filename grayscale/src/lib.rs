@@ -20,6 +20,7 @@
 mod diffusion;
 mod dither;
 mod ordered;
+pub mod resin;
 mod row;
 
 pub use dither::{Method, dither, dither_image};

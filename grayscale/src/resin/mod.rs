@@ -1,0 +1,111 @@
+//! What light does to a resin: how deep a dose cures, and back.
+
+mod gray;
+#[cfg(test)]
+mod laws;
+mod model;
+mod two_depth;
+mod units;
+mod working_curve;
+
+use lamp_stack::Length;
+
+pub use gray::{GrayCurve, IntensityLines, Line};
+pub use model::{CureError, CureModel, Depths, ModelError};
+pub use two_depth::TwoDepth;
+pub use units::{Dose, ExposureTime, GrayLevel, Intensity, QuantityError};
+pub use working_curve::WorkingCurve;
+
+/// A cure model under a lamp: gray levels and times instead of doses.
+#[derive(Debug)]
+pub struct Resin {
+    light: Intensity,
+    model: Box<dyn CureModel>,
+}
+
+impl Resin {
+    /// A cure model under a lamp whose full white is `light`, `I_0`.
+    ///
+    /// # Errors
+    /// Where the light is not above zero.
+    pub fn new(light: Intensity, model: Box<dyn CureModel>) -> Result<Self, ModelError> {
+        model::positive(light.mw_per_cm2(), "intensity")?;
+        Ok(Self { light, model })
+    }
+
+    /// The light of full white.
+    pub const fn light(&self) -> Intensity {
+        self.light
+    }
+
+    /// The cure model.
+    pub fn model(&self) -> &dyn CureModel {
+        &*self.model
+    }
+
+    /// Returns the depth that a gray level cures in an exposure (002 eq. 39).
+    pub fn depth(&self, gray: GrayLevel, time: ExposureTime) -> Length {
+        self.model.gray_depth(gray, self.light * time)
+    }
+
+    /// Returns the gray level that cures a depth in an exposure (002 algorithm
+    /// 15, line 14).
+    ///
+    /// # Errors
+    /// Those of [`CureModel::gray_for`]; most of all, where no gray level cures
+    /// as deep.
+    pub fn gray_for(&self, depth: Length, time: ExposureTime) -> Result<GrayLevel, CureError> {
+        self.model.gray_for(depth, self.light * time)
+    }
+
+    /// Returns how long to expose so that full white cures `overcure` times the
+    /// layer's thickness: 1 cures just the layer (002 algorithm 15, line 13),
+    /// more binds it to the one below.
+    ///
+    /// # Errors
+    /// Those of [`CureModel::dose`], for the thickness times `overcure`.
+    pub fn exposure_time(
+        &self,
+        thickness: Length,
+        overcure: f64,
+    ) -> Result<ExposureTime, CureError> {
+        let depth = Length::from_um(thickness.um() * overcure);
+        Ok(self.model.dose(depth)? / self.light)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_cures_the_layer_times_overcure() {
+        let curve = WorkingCurve::new(Dose::from_mj_per_cm2(131.5), Length::from_um(211.0));
+        let light = Intensity::from_mw_per_cm2(1600.0);
+        let resin = Resin::new(light, Box::new(curve.unwrap())).unwrap();
+        let layer = Length::from_um(100.0);
+        // 131.5 mJ/cm² exp(100/211) at 1.6 W/cm², by bc.
+        let time = resin.exposure_time(layer, 1.0).unwrap();
+        assert!((time.ms() - 132.017814).abs() < 1e-6, "{time}");
+        for overcure in [0.5, 1.0, 1.5, 4.0] {
+            let time = resin.exposure_time(layer, overcure).unwrap();
+            let depth = resin.depth(GrayLevel::WHITE, time);
+            assert!((depth.um() - 100.0 * overcure).abs() < 1e-9, "{depth}");
+            let gray = resin.gray_for(depth, time).unwrap();
+            assert!((gray.get() - 1.0).abs() < 1e-12);
+        }
+        for overcure in [-1.0, f64::NAN] {
+            let time = resin.exposure_time(layer, overcure);
+            assert!(matches!(time, Err(CureError::NotADepth(_))));
+        }
+        let deeper = Length::from_um(101.0);
+        assert!(matches!(resin.gray_for(deeper, time), Err(CureError::TooDeep { .. })));
+    }
+
+    #[test]
+    fn a_lamp_gives_light() {
+        let curve = WorkingCurve::new(Dose::from_mj_per_cm2(1.0), Length::from_um(1.0)).unwrap();
+        let dark = Resin::new(Intensity::default(), Box::new(curve));
+        assert_eq!(dark.unwrap_err(), ModelError::NotPositive("intensity"));
+    }
+}

@@ -1,0 +1,151 @@
+//! What every cure model answers.
+
+use std::fmt;
+
+use lamp_stack::Length;
+use thiserror::Error;
+
+use super::units::{Dose, GrayLevel};
+
+/// How deep light cures a resin, and what a depth takes.
+///
+/// # Guarantees
+/// More dose, and a whiter level, never cure less deep. `dose` undoes `depth`
+/// to rounding wherever the depth is above zero and within `depths`, and
+/// `gray_for` undoes `gray_depth`; both rise with the depth.
+pub trait CureModel: fmt::Debug + Send + Sync {
+    /// Returns the depth that a dose of full white cures; zero up to the
+    /// critical dose.
+    fn depth(&self, dose: Dose) -> Length;
+
+    /// Returns the dose of full white that cures a depth. No depth takes no
+    /// dose (000 eq. 3.10), though any up to the critical dose would do.
+    ///
+    /// # Errors
+    /// Where the depth is below zero or no number, outside [`Self::depths`], or
+    /// takes a dose beyond any number.
+    fn dose(&self, depth: Length) -> Result<Dose, CureError>;
+
+    /// Returns the depths that the model holds for. `depth` answers outside
+    /// them too, as its equation has it.
+    fn depths(&self) -> Depths {
+        Depths::ALL
+    }
+
+    /// Returns the depth that a gray level cures in an exposure whose white
+    /// brings the dose `white`.
+    ///
+    /// Unless the model knows better, gray is nothing but less light
+    /// (002 eq. 34).
+    fn gray_depth(&self, gray: GrayLevel, white: Dose) -> Length {
+        self.depth(white * gray)
+    }
+
+    /// Returns the gray level that cures a depth in an exposure whose white
+    /// brings the dose `white`. No depth is black.
+    ///
+    /// # Errors
+    /// Where [`Self::dose`] has none, and where white itself does not cure as
+    /// deep.
+    fn gray_for(&self, depth: Length, white: Dose) -> Result<GrayLevel, CureError> {
+        let dose = self.dose(depth)?;
+        check_reach(depth, self.depth(white))?;
+        if depth.um() == 0.0 {
+            return Ok(GrayLevel::BLACK);
+        }
+        Ok(GrayLevel::clamped(dose.mj_per_cm2() / white.mj_per_cm2()))
+    }
+}
+
+/// Checks that white cures a depth.
+pub(super) fn check_reach(depth: Length, deepest: Length) -> Result<(), CureError> {
+    if depth <= deepest { Ok(()) } else { Err(CureError::TooDeep { depth, deepest }) }
+}
+
+/// The depths that a model holds for, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Depths {
+    /// The shallowest.
+    pub from: Length,
+    /// The deepest, where there is one.
+    pub to: Option<Length>,
+}
+
+impl Depths {
+    /// Every depth.
+    pub const ALL: Self = Self { from: Length::from_um(0.0), to: None };
+
+    /// Checks that a depth is among them, or is zero.
+    pub(super) fn check(&self, depth: Length) -> Result<(), CureError> {
+        if !(depth.um() >= 0.0 && depth.um().is_finite()) {
+            return Err(CureError::NotADepth(depth));
+        }
+        let within = depth >= self.from && self.to.is_none_or(|to| depth <= to);
+        if within || depth.um() == 0.0 {
+            Ok(())
+        } else {
+            Err(CureError::Outside { depth, depths: *self })
+        }
+    }
+}
+
+impl fmt::Display for Depths {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.to {
+            Some(to) => write!(f, "{} to {to}", self.from),
+            None => write!(f, "{} or more", self.from),
+        }
+    }
+}
+
+/// Why a depth has no dose or no gray level.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CureError {
+    /// Below zero, or no number.
+    #[error("a cure depth is zero or more, not {0}")]
+    NotADepth(Length),
+    /// The model does not hold there.
+    #[error("the cure model holds for depths of {depths}, not for {depth}")]
+    Outside {
+        /// The depth asked for.
+        depth: Length,
+        /// Those it holds for.
+        depths: Depths,
+    },
+    /// White does not cure as deep.
+    #[error(
+        "no gray level cures {:.2} um, as full white cures {:.2} um: expose for longer",
+        depth.um(), deepest.um()
+    )]
+    TooDeep {
+        /// The depth asked for.
+        depth: Length,
+        /// The depth that white cures.
+        deepest: Length,
+    },
+    /// The dose is beyond any number.
+    #[error("no dose that can be written down cures {0}")]
+    NoDose(Length),
+}
+
+/// Why numbers make no model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// Not above zero, or no number.
+    #[error("{0} must be above zero")]
+    NotPositive(&'static str),
+    /// Below zero, or no number.
+    #[error("{0} must be zero or more: a model whose value falls towards white has no inverse")]
+    Falls(&'static str),
+    /// The deepest is not above the shallowest.
+    #[error("depths must begin at zero or more and end above where they begin")]
+    NoDepths,
+}
+
+/// Checks what must be above zero.
+pub(super) fn positive(number: f64, what: &'static str) -> Result<(), ModelError> {
+    let fine = number > 0.0 && number.is_finite();
+    if fine { Ok(()) } else { Err(ModelError::NotPositive(what)) }
+}
