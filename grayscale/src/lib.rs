@@ -1,7 +1,8 @@
-//! Gray levels to dots: a machine that can only expose or not realises a gray
-//! level as the share of its pixels that are white (002 section 3.3.1).
+//! Light and resin: how deep a dose cures ([`resin`], [`material`]), and gray
+//! levels to dots: a machine that can only expose or not realises a gray level as
+//! the share of its pixels that are white (002 section 3.3.1).
 //!
-//! Both methods leave solid black and white alone, so their cost follows the
+//! Both dithering methods leave solid black and white alone, so their cost follows the
 //! gray pixels, and no dot appears outside the part.
 //!
 //! ```
@@ -19,6 +20,7 @@
 
 mod diffusion;
 mod dither;
+pub mod material;
 mod ordered;
 pub mod resin;
 mod row;

@@ -1,0 +1,231 @@
+//! Material files: reading, and writing what reads back the same.
+
+use thiserror::Error;
+
+use super::Material;
+use crate::resin::ModelError;
+
+/// Why a text is no material.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum MaterialError {
+    /// No TOML.
+    #[error("line {line}: {problem}: a material is a TOML file (lamp material show prints some)")]
+    Syntax {
+        /// From 1.
+        line: usize,
+        /// What stands there.
+        problem: String,
+    },
+    /// A key is wrong, unknown or missing.
+    #[error("line {line}: {key}: {problem}")]
+    Key {
+        /// From 1.
+        line: usize,
+        /// Its path, as `working-curve.critical-dose`.
+        key: String,
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
+    /// The name is no name.
+    #[error("name: `{0}` is not a name: write small letters, digits and -, as lamp-suspension")]
+    Name(String),
+    /// Numbers that make no model.
+    #[error("{table}.{source}")]
+    Model {
+        /// The model's table.
+        table: &'static str,
+        /// What is wrong with them.
+        source: ModelError,
+    },
+    /// The light of full white is not above zero.
+    #[error("intensity.value must be above zero")]
+    Dark,
+    /// A constant is no number.
+    #[error("constants.{0}.value must be a finite number")]
+    NoNumber(String),
+    /// A dimmed lamp's curve keeps the working curve's penetration depth.
+    #[error("dimmed-lamp needs a working curve: add [working-curve.penetration-depth]")]
+    NoWorkingCurve,
+}
+
+impl Material {
+    /// Reads a material file.
+    ///
+    /// # Errors
+    /// Where the text is no TOML, a key is unknown, missing or wrong, or the
+    /// numbers make no model; the error names the key.
+    pub fn from_toml(text: &str) -> Result<Self, MaterialError> {
+        let syntax = |error: toml::de::Error| MaterialError::Syntax {
+            line: line_of(text, &error),
+            problem: one_line(error.message()),
+        };
+        let file = toml::Deserializer::parse(text).map_err(syntax)?;
+        let material: Self = serde_path_to_error::deserialize(file).map_err(|error| {
+            let key = error.path().to_string();
+            let inner = error.into_inner();
+            wrong_key(line_of(text, &inner), key, inner.message())
+        })?;
+        material.check()?;
+        Ok(material)
+    }
+
+    /// Writes a material file, which reads back as the same material.
+    ///
+    /// # Errors
+    /// Where [`Self::from_toml`] would refuse what was written.
+    ///
+    /// # Panics
+    /// Never: texts and numbers in tables are TOML.
+    pub fn to_toml(&self) -> Result<String, MaterialError> {
+        let text = toml::to_string(self).expect("texts and numbers in tables are TOML");
+        Self::from_toml(&text).map(|_| text)
+    }
+
+    /// Checks what single keys cannot show.
+    fn check(&self) -> Result<(), MaterialError> {
+        let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        if self.name.is_empty() || !self.name.chars().all(letters) {
+            return Err(MaterialError::Name(one_line(&self.name)));
+        }
+        if self.intensity.as_ref().is_some_and(|light| light.value.mw_per_cm2() == 0.0) {
+            return Err(MaterialError::Dark);
+        }
+        if let Some((name, _)) = self.constants.iter().find(|(_, c)| !c.value.is_finite()) {
+            return Err(MaterialError::NoNumber(one_line(name)));
+        }
+        self.working_curve()?;
+        self.dimmed_lamp()?;
+        self.gray_curve()?;
+        self.gray_lines()?;
+        self.two_depth()?;
+        Ok(())
+    }
+}
+
+fn wrong_key(line: usize, key: String, problem: &str) -> MaterialError {
+    // The parser calls the file itself `.`.
+    let key = if key == "." { "the file".to_owned() } else { key };
+    let todo = if problem.starts_with("missing field") { ": add it" } else { "" };
+    let problem = one_line(problem).replace(" field ", " key ") + todo;
+    MaterialError::Key { line, key: one_line(&key), problem }
+}
+
+/// Returns the line of an error, from 1.
+fn line_of(text: &str, error: &toml::de::Error) -> usize {
+    let start = error.span().map_or(0, |span| span.start);
+    1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count()
+}
+
+/// Makes one line of a text from a file: it must not steer the terminal.
+fn one_line(text: &str) -> String {
+    text.replace(char::is_control, " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Builtin;
+    use super::*;
+
+    const WHOLE: &str = r#"name = "mine"
+description = "A resin of mine"
+
+[intensity]
+value = "20 mW/cm2"
+source = "radiometer"
+
+[working-curve.critical-dose]
+value = "9.5 mJ/cm2"
+source = "notebook, page 3"
+
+[working-curve.penetration-depth]
+value = "140 um"
+plus-minus = "4um"
+source = "notebook, page 3"
+"#;
+
+    #[test]
+    fn built_in_materials_are_whole_and_bear_their_names() {
+        for builtin in Builtin::ALL {
+            let material = Material::from_toml(builtin.toml()).unwrap();
+            assert_eq!(material.name, builtin.name());
+            assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material));
+        }
+        assert!(Builtin::ALL.is_sorted_by_key(Builtin::name));
+    }
+
+    #[test]
+    fn errors_name_the_key_and_what_to_do() {
+        assert!(Material::from_toml(WHOLE).is_ok());
+        for (from, to, words) in [
+            (
+                "9.5 mJ/cm2",
+                "9.5",
+                &[
+                    "line 9",
+                    "working-curve.critical-dose.value",
+                    "`9.5` is not a dose",
+                    "131.5 mJ/cm2",
+                ][..],
+            ),
+            (
+                "\"9.5 mJ/cm2\"",
+                "9.5",
+                &["critical-dose.value", "a number and its unit in quotes", "131.5 mJ/cm2"],
+            ),
+            ("9.5 mJ/cm2", "0 mJ/cm2", &["working-curve.critical-dose must be above zero"]),
+            ("140 um", "-140 um", &["working-curve.penetration-depth must be above zero"]),
+            ("140 um", "140 mJ/cm2", &["working-curve.penetration-depth.value", "140"]),
+            ("4um", "4", &["working-curve.penetration-depth.plus-minus", "has no unit"]),
+            ("20 mW/cm2", "0 mW/cm2", &["intensity.value must be above zero"]),
+            (
+                "source = \"radiometer\"",
+                "",
+                &["line 4", "intensity", "missing key `source`: add it"],
+            ),
+            ("radiometer", " ", &["intensity.source", "is empty"]),
+            ("name = \"mine\"", "", &["the file", "missing key `name`: add it"]),
+            ("\"mine\"", "\"My resin\"", &["name: `My resin` is not a name", "lamp-suspension"]),
+            ("[intensity]", "[light]", &["line 4", "unknown key `light`", "`intensity`"]),
+            (
+                "plus-minus",
+                "plusminus",
+                &["line 14", "penetration-depth", "unknown key `plusminus`", "`plus-minus`"],
+            ),
+            ("[intensity]", "[intensity", &["line 4", "TOML", "lamp material show"]),
+        ] {
+            assert!(WHOLE.contains(from), "{from}");
+            let error = Material::from_toml(&WHOLE.replacen(from, to, 1)).unwrap_err().to_string();
+            for word in words {
+                assert!(error.contains(word), "no `{word}` in {error:?}");
+            }
+            assert!(!error.contains('\n'), "{error:?}");
+        }
+    }
+
+    #[test]
+    fn models_need_possible_numbers() {
+        let with = |tables: &str| {
+            let error = Material::from_toml(&format!("{WHOLE}\n{tables}")).unwrap_err();
+            error.to_string()
+        };
+        let line = |table: &str, rise: &str| {
+            format!("[{table}]\nat-zero = \"101.8 um\"\nrise = \"{rise}\"\nsource = \"a\"\n")
+        };
+        let dose = line("gray.critical-dose", "35.6 um").replace(" um", " mJ/cm2");
+        let falls = with(&(dose + &line("gray.penetration-depth", "-1 um")));
+        assert!(falls.starts_with("gray.penetration-depth.rise must be zero or more"), "{falls}");
+        let infinite = with("[constants.a]\nvalue = inf\nunit = \"1\"\nsource = \"a\"\n");
+        assert_eq!(infinite, "constants.a.value must be a finite number");
+        let dimmed = line("dimmed-lamp.critical-dose", "18 um").replace(" um", " mJ/cm2");
+        let text = format!("name = \"a\"\ndescription = \"\"\n{dimmed}");
+        assert_eq!(Material::from_toml(&text), Err(MaterialError::NoWorkingCurve));
+    }
+
+    #[test]
+    fn any_text_is_refused_without_a_panic() {
+        for text in ["", "\0", "name", "name = 1", "[[intensity]]", "a.b.c.d = 1", "\u{feff}"] {
+            assert!(Material::from_toml(text).is_err(), "{text:?}");
+        }
+    }
+}

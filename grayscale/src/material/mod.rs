@@ -1,0 +1,225 @@
+//! Materials: the numbers of a resin, each with its unit and its source, in
+//! TOML files.
+//!
+//! ```
+//! use lamp_grayscale::material::Builtin;
+//! use lamp_stack::Length;
+//!
+//! let material = Builtin::named("lamp-suspension").unwrap().material();
+//! let resin = material.resin()?;
+//! // White cures half as deep again as the layer.
+//! let time = resin.exposure_time(Length::from_um(100.0), 1.5)?;
+//! let gray = resin.gray_for(Length::from_um(60.0), time)?;
+//! assert_eq!((time.ms().round(), gray.to_u8()), (172.0, 152));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod builtin;
+mod file;
+mod number;
+
+use std::collections::BTreeMap;
+
+use lamp_stack::Length;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+pub use builtin::Builtin;
+pub use file::MaterialError;
+pub use number::{Constant, Given, GivenDepths, GivenLine, Written};
+
+use crate::resin::{
+    CureModel, Depths, Dose, GrayCurve, Intensity, IntensityLines, Line, ModelError, Resin,
+    TwoDepth, WorkingCurve,
+};
+
+/// What is known of a resin. What a source does not give is absent.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Material {
+    /// Its name, for commands: small letters, digits and `-`.
+    pub name: String,
+    /// What it is, in a line.
+    pub description: String,
+    /// The light of full white, `I_0`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intensity: Option<Given<Intensity>>,
+    /// The working curve (002 eq. 30).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub working_curve: Option<CurveNumbers>,
+    /// The working curve over the gray level (002 eq. 40).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gray: Option<CurveLines>,
+    /// The working curve over the light that a gray level passes (002 eq. 37
+    /// and 38).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gray_light: Option<CurveLines>,
+    /// The working curve over the lamp's own light (002 eq. 36).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dimmed_lamp: Option<DimmedLines>,
+    /// The model of two penetration depths (000 eq. 3.8).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub two_depth: Option<TwoDepthNumbers>,
+    /// What else its source gives.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub constants: BTreeMap<String, Constant>,
+}
+
+/// The numbers of a working curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct CurveNumbers {
+    /// `E_c`.
+    pub critical_dose: Given<Dose>,
+    /// `D_p`.
+    pub penetration_depth: Given<Length>,
+}
+
+/// The lines of a working curve that moves with the gray level or the light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct CurveLines {
+    /// `E_c`.
+    pub critical_dose: GivenLine<Dose>,
+    /// `D_p`.
+    pub penetration_depth: GivenLine<Length>,
+}
+
+/// The line of a working curve that moves with the lamp's light. `D_p` stays
+/// (002 figure 62).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct DimmedLines {
+    /// `E_c`, which rises for each W/cm².
+    pub critical_dose: GivenLine<Dose>,
+}
+
+/// The numbers of a model of two penetration depths.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct TwoDepthNumbers {
+    /// `E_c`.
+    pub critical_dose: Given<Dose>,
+    /// `D_pL`.
+    pub liquid_depth: Given<Length>,
+    /// `D_pS`.
+    pub solid_depth: Given<Length>,
+    /// What it holds for, if not for all depths.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depths: Option<GivenDepths>,
+}
+
+/// Why a material says nothing of exposures.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ResinError {
+    /// It has no cure model.
+    #[error("{0} has no cure model: add [working-curve], [gray] or [two-depth] to its file")]
+    NoModel(String),
+    /// It does not say the light of full white.
+    #[error("{0} does not say how bright full white is: add [intensity] to its file")]
+    NoLight(String),
+    /// Its numbers make no model.
+    #[error(transparent)]
+    Numbers(#[from] MaterialError),
+}
+
+impl Material {
+    /// Returns its working curve, if it has one.
+    ///
+    /// # Errors
+    /// Where a number is not above zero.
+    pub fn working_curve(&self) -> Result<Option<WorkingCurve>, MaterialError> {
+        let curve = |numbers: &CurveNumbers| {
+            WorkingCurve::new(numbers.critical_dose.value, numbers.penetration_depth.value)
+        };
+        self.working_curve.as_ref().map(curve).transpose().map_err(of("working-curve"))
+    }
+
+    /// Returns how its working curve moves with the lamp's light, if it says.
+    ///
+    /// # Errors
+    /// Where the line falls or does not begin above zero, or there is no
+    /// working curve to keep the penetration depth of.
+    pub fn dimmed_lamp(&self) -> Result<Option<IntensityLines>, MaterialError> {
+        let Some(lines) = &self.dimmed_lamp else { return Ok(None) };
+        let curve = self.working_curve()?.ok_or(MaterialError::NoWorkingCurve)?;
+        let stays = Line { at_zero: curve.penetration_depth(), rise: Length::default() };
+        let lines = IntensityLines::new(lines.critical_dose.line(), stays);
+        lines.map(Some).map_err(of("dimmed-lamp"))
+    }
+
+    /// Returns the working curve of each gray level, if it has them.
+    ///
+    /// # Errors
+    /// Where a line falls or does not begin above zero.
+    pub fn gray_curve(&self) -> Result<Option<GrayCurve>, MaterialError> {
+        let curve = |lines: &CurveLines| {
+            GrayCurve::new(lines.critical_dose.line(), lines.penetration_depth.line())
+        };
+        self.gray.as_ref().map(curve).transpose().map_err(of("gray"))
+    }
+
+    /// Returns how its working curve moves with the light that gray levels
+    /// pass, if it says.
+    ///
+    /// # Errors
+    /// Where a line falls or does not begin above zero.
+    pub fn gray_lines(&self) -> Result<Option<IntensityLines>, MaterialError> {
+        let curve = |lines: &CurveLines| {
+            IntensityLines::new(lines.critical_dose.line(), lines.penetration_depth.line())
+        };
+        self.gray_light.as_ref().map(curve).transpose().map_err(of("gray-light"))
+    }
+
+    /// Returns its model of two penetration depths, if it has one.
+    ///
+    /// # Errors
+    /// Where a number is not above zero, or the depths are none.
+    pub fn two_depth(&self) -> Result<Option<TwoDepth>, MaterialError> {
+        let model = |numbers: &TwoDepthNumbers| {
+            let depths = numbers.depths.as_ref().map_or(Depths::ALL, GivenDepths::depths);
+            let [liquid, solid] = [&numbers.liquid_depth, &numbers.solid_depth];
+            TwoDepth::new(numbers.critical_dose.value, liquid.value, solid.value, depths)
+        };
+        self.two_depth.as_ref().map(model).transpose().map_err(of("two-depth"))
+    }
+
+    /// Whether it has a cure model.
+    fn has_model(&self) -> bool {
+        let gray = self.gray.is_some() || self.gray_light.is_some();
+        gray || self.two_depth.is_some() || self.working_curve.is_some()
+    }
+
+    /// Returns the resin under its lamp, by the model that says most: the gray
+    /// levels' curves, those of the light that gray levels pass, two
+    /// penetration depths, or the working curve.
+    ///
+    /// # Errors
+    /// Where it has no cure model or no intensity, or its numbers make none.
+    pub fn resin(&self) -> Result<Resin, ResinError> {
+        let light = match &self.intensity {
+            Some(light) => light.value,
+            None if self.has_model() => return Err(ResinError::NoLight(self.name.clone())),
+            None => return Err(ResinError::NoModel(self.name.clone())),
+        };
+        let gray = match self.gray_curve()? {
+            Some(curve) => Some(curve),
+            None => self.gray_lines()?.map(|lines| lines.under(light)),
+        };
+        let model: Box<dyn CureModel> = if let Some(gray) = gray {
+            Box::new(gray)
+        } else if let Some(model) = self.two_depth()? {
+            Box::new(model)
+        } else if let Some(curve) = self.working_curve()? {
+            Box::new(curve)
+        } else {
+            return Err(ResinError::NoModel(self.name.clone()));
+        };
+        Ok(Resin::new(light, model).map_err(|_| MaterialError::Dark)?)
+    }
+}
+
+fn of(table: &'static str) -> impl Fn(ModelError) -> MaterialError {
+    move |source| MaterialError::Model { table, source }
+}

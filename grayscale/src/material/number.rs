@@ -1,0 +1,177 @@
+//! The numbers of a material file, each with where it comes from.
+
+use std::fmt;
+use std::marker::PhantomData;
+use std::str::FromStr;
+
+use lamp_stack::Length;
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::resin::{Depths, Dose, Intensity, Line};
+
+/// A number with its unit, and where it comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(bound(serialize = "T: Written", deserialize = "T: Written"))]
+pub struct Given<T> {
+    /// The number.
+    #[serde(with = "written")]
+    pub value: T,
+    /// Half the width of its 95% confidence interval, where it is known.
+    #[serde(with = "written_or_none", default, skip_serializing_if = "Option::is_none")]
+    pub plus_minus: Option<T>,
+    /// The equation, table, figure or measurement.
+    #[serde(deserialize_with = "some_text")]
+    pub source: String,
+}
+
+/// A straight line, and where it comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(bound(serialize = "T: Written", deserialize = "T: Written"))]
+pub struct GivenLine<T> {
+    /// The value in the dark.
+    #[serde(with = "written")]
+    pub at_zero: T,
+    /// What is added by full white, or for each W/cm².
+    #[serde(with = "written")]
+    pub rise: T,
+    /// The equation, table, figure or measurement.
+    #[serde(deserialize_with = "some_text")]
+    pub source: String,
+}
+
+impl<T: Copy> GivenLine<T> {
+    pub(super) fn line(&self) -> Line<T> {
+        Line { at_zero: self.at_zero, rise: self.rise }
+    }
+}
+
+/// The depths that a model holds for, and where that comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct GivenDepths {
+    /// The shallowest.
+    #[serde(with = "written")]
+    pub from: Length,
+    /// The deepest, where there is one.
+    #[serde(with = "written_or_none", default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<Length>,
+    /// The section, figure or measurement.
+    #[serde(deserialize_with = "some_text")]
+    pub source: String,
+}
+
+impl GivenDepths {
+    pub(super) fn depths(&self) -> Depths {
+        Depths { from: self.from, to: self.to }
+    }
+}
+
+/// A number that no cure model reads, kept for who plans by it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Constant {
+    /// The number.
+    pub value: f64,
+    /// Its unit.
+    #[serde(deserialize_with = "some_text")]
+    pub unit: String,
+    /// The equation, table, figure or measurement.
+    #[serde(deserialize_with = "some_text")]
+    pub source: String,
+}
+
+/// A quantity as a material file writes it: a text of a number and its unit.
+pub trait Written: Copy + FromStr<Err: fmt::Display> {
+    /// What a reader is told to write.
+    const EXAMPLE: &'static str;
+
+    /// Writes it so that reading gives the same number to the last bit.
+    fn text(self) -> String;
+}
+
+impl Written for Dose {
+    const EXAMPLE: &'static str = "131.5 mJ/cm2";
+
+    fn text(self) -> String {
+        self.to_string()
+    }
+}
+
+impl Written for Intensity {
+    const EXAMPLE: &'static str = "1.6 W/cm2";
+
+    fn text(self) -> String {
+        self.to_string()
+    }
+}
+
+impl Written for Length {
+    const EXAMPLE: &'static str = "211 um";
+
+    fn text(self) -> String {
+        format!("{} um", self.um())
+    }
+}
+
+struct TextOf<T>(PhantomData<T>);
+
+impl<T: Written> Visitor<'_> for TextOf<T> {
+    type Value = T;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a number and its unit in quotes, as \"{}\"", T::EXAMPLE)
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
+        text.parse().map_err(E::custom)
+    }
+}
+
+mod written {
+    use super::{Deserializer, PhantomData, Serializer, TextOf, Written};
+
+    pub(super) fn serialize<T: Written, S: Serializer>(
+        value: &T,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        to.serialize_str(&value.text())
+    }
+
+    pub(super) fn deserialize<'de, T: Written, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<T, D::Error> {
+        from.deserialize_str(TextOf(PhantomData))
+    }
+}
+
+mod written_or_none {
+    use super::{Deserializer, Serializer, Written, written};
+
+    pub(super) fn serialize<T: Written, S: Serializer>(
+        value: &Option<T>,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        match value {
+            Some(value) => written::serialize(value, to),
+            None => to.serialize_none(),
+        }
+    }
+
+    /// Called only where the key stands.
+    pub(super) fn deserialize<'de, T: Written, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Option<T>, D::Error> {
+        written::deserialize(from).map(Some)
+    }
+}
+
+fn some_text<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    let text = String::deserialize(from)?;
+    if text.trim().is_empty() {
+        return Err(de::Error::custom("this is empty: write what it is for the next reader"));
+    }
+    Ok(text)
+}

@@ -1,0 +1,127 @@
+//! A material survives being written and read; a spoilt file is refused in one
+//! line.
+
+use lamp_grayscale::material::{
+    Builtin, Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine,
+    Material, TwoDepthNumbers, Written,
+};
+use lamp_grayscale::resin::{Dose, Intensity};
+use lamp_stack::Length;
+use proptest::option;
+use proptest::prelude::*;
+
+fn number() -> impl Strategy<Value = f64> + Clone {
+    1e-6..1e9f64
+}
+
+fn um() -> impl Strategy<Value = Length> + Clone {
+    number().prop_map(Length::from_um)
+}
+
+fn mj() -> impl Strategy<Value = Dose> + Clone {
+    number().prop_map(Dose::from_mj_per_cm2)
+}
+
+/// Texts with what TOML must escape.
+fn text() -> impl Strategy<Value = String> {
+    "[ -~äµ²\n\"]{0,12}x"
+}
+
+fn given<T: Written + std::fmt::Debug>(
+    value: impl Strategy<Value = T> + Clone,
+) -> impl Strategy<Value = Given<T>> {
+    (value.clone(), option::of(value), text()).prop_map(|(value, plus_minus, source)| Given {
+        value,
+        plus_minus,
+        source,
+    })
+}
+
+fn lines() -> impl Strategy<Value = CurveLines> {
+    (mj(), mj(), um(), um(), text()).prop_map(|(dose, dose_rise, depth, depth_rise, source)| {
+        CurveLines {
+            critical_dose: GivenLine { at_zero: dose, rise: dose_rise, source: source.clone() },
+            penetration_depth: GivenLine { at_zero: depth, rise: depth_rise, source },
+        }
+    })
+}
+
+fn curve() -> impl Strategy<Value = CurveNumbers> {
+    (given(mj()), given(um())).prop_map(|(critical_dose, penetration_depth)| CurveNumbers {
+        critical_dose,
+        penetration_depth,
+    })
+}
+
+fn two_depth() -> impl Strategy<Value = TwoDepthNumbers> {
+    let depths = (um(), any::<bool>(), text()).prop_map(|(from, ends, source)| {
+        let to = ends.then_some(Length::from_um(2.0 * from.um()));
+        GivenDepths { from, to, source }
+    });
+    (given(mj()), given(um()), given(um()), option::of(depths)).prop_map(
+        |(critical_dose, liquid_depth, solid_depth, depths)| TwoDepthNumbers {
+            critical_dose,
+            liquid_depth,
+            solid_depth,
+            depths,
+        },
+    )
+}
+
+fn constant() -> impl Strategy<Value = Constant> {
+    let finite = any::<f64>().prop_filter("finite", |value| value.is_finite());
+    (finite, text(), text()).prop_map(|(value, unit, source)| Constant { value, unit, source })
+}
+
+fn materials() -> impl Strategy<Value = Material> {
+    let light = given(number().prop_map(Intensity::from_mw_per_cm2));
+    let models = (curve(), option::of(lines()), option::of(lines()), option::of(two_depth()));
+    let constants = proptest::collection::btree_map("[a-z. \"]{0,6}", constant(), 0..3);
+    ("[a-z0-9-]{1,9}", text(), option::of(light), models, constants).prop_map(
+        |(name, description, intensity, (curve, gray, gray_light, two_depth), constants)| {
+            let dimmed = gray.clone();
+            Material {
+                name,
+                description,
+                intensity,
+                working_curve: Some(curve),
+                gray,
+                gray_light,
+                dimmed_lamp: dimmed
+                    .map(|CurveLines { critical_dose, .. }| DimmedLines { critical_dose }),
+                two_depth,
+                constants,
+            }
+        },
+    )
+}
+
+proptest! {
+    #[test]
+    fn what_is_written_reads_back_the_same(material in materials()) {
+        let text = material.to_toml().unwrap();
+        prop_assert_eq!(Material::from_toml(&text), Ok(material), "{}", text);
+    }
+
+    #[test]
+    fn a_spoilt_file_is_refused_in_one_line(
+        which in 0..Builtin::ALL.len(), at in 0..4000usize, length in 0..20usize, junk in "\\PC{0,6}",
+    ) {
+        let mut text: Vec<char> = Builtin::ALL[which].toml().chars().collect();
+        let at = at % text.len();
+        text.splice(at..text.len().min(at + length), junk.chars());
+        // What is spoilt may be a comment.
+        if let Err(error) = Material::from_toml(&String::from_iter(text)) {
+            prop_assert!(!error.to_string().contains(char::is_control), "{}", error);
+        }
+    }
+}
+
+#[test]
+fn nesting_has_a_limit() {
+    for nested in ["[".repeat(100_000), "{a=".repeat(100_000), "a.".repeat(100_000)] {
+        let error = Material::from_toml(&format!("name = {nested}")).unwrap_err();
+        assert!(error.to_string().len() < 1000, "{error}");
+        assert!(Material::from_toml(&nested).is_err());
+    }
+}
