@@ -6,6 +6,7 @@ mod dither;
 mod fix;
 mod info;
 mod join;
+mod material;
 mod sample;
 mod show;
 mod slice;
@@ -30,6 +31,7 @@ pub(crate) enum Command {
     Convert(convert::ConvertArgs),
     Join(join::JoinArgs),
     Split(split::SplitArgs),
+    Material(material::MaterialArgs),
 }
 
 impl Command {
@@ -57,6 +59,7 @@ impl Command {
             Self::Convert(_) => "convert",
             Self::Join(_) => "join",
             Self::Split(_) => "split",
+            Self::Material(_) => "material",
         }
     }
 
@@ -73,6 +76,7 @@ impl Command {
             Self::Convert(args) => convert::run(args, common),
             Self::Join(args) => join::run(args, common),
             Self::Split(args) => split::run(args, common),
+            Self::Material(args) => material::run(args),
         }
     }
 }

@@ -48,8 +48,11 @@ impl TwoDepth {
 impl CureModel for TwoDepth {
     fn depth(&self, dose: Dose) -> Length {
         let above = dose.mj_per_cm2() / self.critical_dose.mj_per_cm2() - 1.0;
-        // Also where the dose is no number.
-        let above = if above > 0.0 { above } else { 0.0 };
+        let cures = above > 0.0;
+        if !cures {
+            // Also where the dose is no number.
+            return Length::default();
+        }
         let [liquid, solid] = [self.liquid_depth.um(), self.solid_depth.um()];
         // ln(1 + x): D_pL/D_pS of 3e-6 (000 appendix E) would drown beside 1.
         Length::from_um(solid * (liquid / solid * above).ln_1p())

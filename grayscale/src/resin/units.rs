@@ -113,7 +113,7 @@ impl Div<Intensity> for Dose {
 
 /// A gray level G: 0 is black and exposes nothing, 1 is white and exposes
 /// fully (002 algorithm 15). It is the share of the light that arrives
-/// (002 eq. 33).
+/// (002 eq. 33, which takes the measured 1.004 G - 0.003 for G).
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct GrayLevel(f64);
 

@@ -1,0 +1,127 @@
+use std::fs::File;
+use std::io::{self, IsTerminal, Read};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::builder::PossibleValuesParser;
+use clap::{Args, Subcommand};
+use lamp_grayscale::material::{Builtin, Material};
+use lamp_grayscale::resin::Depths;
+use lamp_stack::Length;
+
+use crate::stop::Stop;
+use crate::streams::{input_name, is_stream, print};
+
+/// List, show or check materials: how deep light cures a resin
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp material list
+  lamp material show lamp-suspension > mine.toml
+  lamp material check mine.toml")]
+pub(crate) struct MaterialArgs {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// List the built-in materials
+    List,
+    /// Print the file of a built-in material, to read or to start one from
+    Show {
+        /// Which material
+        #[arg(value_parser = PossibleValuesParser::new(Builtin::ALL.map(|builtin| builtin.name())))]
+        name: String,
+    },
+    /// Check a material file and say what it allows
+    Check {
+        /// The file, or - for standard input
+        file: PathBuf,
+    },
+}
+
+pub(crate) fn run(args: &MaterialArgs) -> Result<(), Stop> {
+    match &args.action {
+        Action::List => print(&table()),
+        Action::Show { name } => {
+            let builtin = Builtin::named(name).expect("only their names are parsed");
+            print(builtin.toml())
+        }
+        Action::Check { file } => check(file),
+    }
+}
+
+/// A line for each built-in material.
+fn table() -> String {
+    let mut text = format!("{:<18}{:<18}{:<38}description\n", "name", "full white", "models");
+    for material in Builtin::ALL.map(|builtin| builtin.material()) {
+        let light = material.intensity.as_ref().map(|light| light.value.to_string());
+        let light = light.unwrap_or_else(|| "-".to_owned());
+        let mut models = models(&material).join(", ");
+        if models.is_empty() {
+            models.push('-');
+        }
+        let Material { name, description, .. } = material;
+        text += &format!("{name:<18}{light:<18}{models:<38}{description}\n");
+    }
+    text
+}
+
+/// The cure models of a material, by their tables.
+fn models(material: &Material) -> Vec<&'static str> {
+    let all = [
+        ("working-curve", material.working_curve.is_some()),
+        ("gray", material.gray.is_some() || material.gray_light.is_some()),
+        ("dimmed-lamp", material.dimmed_lamp.is_some()),
+        ("two-depth", material.two_depth.is_some()),
+    ];
+    all.into_iter().filter(|&(_, given)| given).map(|(name, _)| name).collect()
+}
+
+/// A material file is text of a few kilobytes.
+const LARGEST_FILE: u64 = 1 << 20;
+
+fn check(path: &Path) -> Result<(), Stop> {
+    if is_stream(path) && io::stdin().is_terminal() {
+        return Err(Stop::usage("no material to read: name a file, or pipe one in"));
+    }
+    let name = input_name(path);
+    let material = read(path).with_context(|| name.clone())?;
+    print(&format!("{name}: {}\n", allows(&material)))
+}
+
+fn read(path: &Path) -> anyhow::Result<Material> {
+    let from: Box<dyn Read> =
+        if is_stream(path) { Box::new(io::stdin().lock()) } else { Box::new(File::open(path)?) };
+    let mut bytes = Vec::new();
+    from.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(anyhow!("more than 1 MiB is no material file"));
+    }
+    let text = String::from_utf8(bytes)
+        .map_err(|error| anyhow!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to()))?;
+    Ok(Material::from_toml(&text)?)
+}
+
+/// Says in a sentence what a material allows.
+fn allows(material: &Material) -> String {
+    let resin = match material.resin() {
+        Ok(resin) => resin,
+        Err(why) => return format!("in order, but {why}"),
+    };
+    let depths = resin.model().depths();
+    // A layer of the seed's machine (002 table 1), or as thin as can be told.
+    let layer = if depths.from.um() > 100.0 { depths.from } else { Length::from_um(100.0) };
+    let models = models(material).join(", ");
+    let holds =
+        if depths == Depths::ALL { String::new() } else { format!(" (depths of {depths})") };
+    match resin.exposure_time(layer, 1.0) {
+        Ok(time) => format!(
+            "{} gives {models}{holds}; at {}, full white cures {layer} in {time:.1}",
+            material.name,
+            resin.light()
+        ),
+        Err(why) => format!("{} gives {models}{holds}, but {why}", material.name),
+    }
+}

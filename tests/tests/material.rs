@@ -1,0 +1,98 @@
+//! `lamp material`: what it prints and what it refuses.
+
+use std::fs;
+
+use lamp_tests::{Scratch, workspace_root};
+
+const NAMES: [&str; 5] = ["lamp-no-absorber", "lamp-suspension", "pegda-mw700", "sl-5510", "tmpta"];
+
+fn said(scratch: &Scratch, line: &str) -> String {
+    String::from_utf8(scratch.run(line).succeeds_quietly().stdout).unwrap()
+}
+
+#[test]
+fn list_has_a_line_for_each_material() {
+    let text = said(&Scratch::new(), "lamp material list");
+    let rows: Vec<Vec<&str>> =
+        text.lines().skip(1).map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), NAMES);
+    assert_eq!(rows[1][1..6], ["1600", "mW/cm2", "working-curve,", "gray,", "dimmed-lamp"]);
+    // Neither a light nor a model stands where the source has none.
+    assert_eq!(rows[3][1..4], ["-", "working-curve,", "two-depth"]);
+    assert_eq!(rows[4][1..4], ["14", "mW/cm2", "-"]);
+}
+
+#[test]
+fn show_prints_the_file() {
+    for name in NAMES {
+        let file = workspace_root().join(format!("grayscale/materials/{name}.toml"));
+        let text = said(&Scratch::new(), &format!("lamp material show {name}"));
+        assert_eq!(text, fs::read_to_string(file).unwrap());
+    }
+}
+
+#[test]
+fn check_says_in_a_sentence_what_a_file_allows() {
+    let scratch = Scratch::new();
+    for (name, words) in [
+        ("lamp-suspension", "1600 mW/cm2, full white cures 100um in 136.7 ms"),
+        ("pegda-mw700", "depths of 180um or more"),
+        ("sl-5510", "add [intensity]"),
+        ("tmpta", "add [working-curve]"),
+    ] {
+        said(&scratch, &format!("lamp material show {name} > {name}.toml"));
+        let text = said(&scratch, &format!("lamp material check {name}.toml"));
+        assert!(text.starts_with(&format!("{name}.toml: ")), "{text}");
+        assert!(text.contains(words), "{text}");
+        assert_eq!(text.lines().count(), 1, "{text}");
+    }
+    let text = said(&scratch, "lamp material show sl-5510 | lamp material check -");
+    assert!(text.starts_with("standard input: "), "{text}");
+}
+
+#[test]
+fn the_example_of_the_documentation_is_a_material() {
+    let text = fs::read_to_string(workspace_root().join("docs/materials.md")).unwrap();
+    let (_, from) = text.split_once("```toml\n").unwrap();
+    let (example, _) = from.split_once("```").unwrap();
+    let checked = Scratch::new().run_on("lamp material check -", example.as_bytes()).succeeds();
+    let said = String::from_utf8(checked.stdout).unwrap();
+    assert!(said.contains("mine gives working-curve, gray; at 1600 mW/cm2"), "{said}");
+}
+
+#[test]
+fn bad_files_are_refused_and_say_what_to_do() {
+    let scratch = Scratch::new();
+    let good = said(&scratch, "lamp material show lamp-suspension");
+    let spoilt = |from: &str, to: &str| {
+        assert!(good.contains(from));
+        scratch.write("mine.toml", good.replacen(from, to, 1).as_bytes());
+    };
+    for (from, to, words) in [
+        ("131.5 mJ/cm2", "131.5", &["working-curve.critical-dose.value", "`131.5`", "mJ/cm2"][..]),
+        ("211 um", "0 um", &["working-curve.penetration-depth", "above zero"]),
+        ("[intensity]", "[light]", &["unknown key `light`", "`intensity`"]),
+        ("name = ", "name = =", &["line 1", "TOML", "lamp material show"]),
+    ] {
+        spoilt(from, to);
+        let ran = scratch.run("lamp material check mine.toml").is_refused_with(words);
+        assert!(ran.stderr.starts_with("material: mine.toml: "), "{ran:?}");
+        assert!(ran.stdout.is_empty());
+    }
+    scratch.write("image.tif", b"II\x2b\0\x08\0\xff\xfe");
+    scratch.run("lamp material check image.tif").is_refused_with(&["image.tif", "byte 6", "UTF-8"]);
+    scratch.write("long.toml", &vec![b'#'; (1 << 20) + 1]);
+    scratch.run("lamp material check long.toml").is_refused_with(&["1 MiB"]);
+    scratch.run("lamp material check none.toml").is_refused_with(&["none.toml"]);
+    scratch.run("lamp material check .").is_refused_with(&["."]);
+}
+
+#[test]
+fn wrong_usage_is_status_2() {
+    for line in ["lamp material", "lamp material show", "lamp material show teapot"] {
+        let ran = Scratch::new().run(line);
+        assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+    }
+    let ran = Scratch::new().run("lamp material show teapot");
+    assert!(NAMES.iter().all(|name| ran.stderr.contains(name)), "{ran:?}");
+}
