@@ -208,7 +208,8 @@ pub(crate) fn check_beside<'a>(
         _ => Path::new("."),
     };
     if !folder.is_dir() {
-        return Err(Stop::Failed(anyhow!("{}: there is no such folder", folder.display())));
+        let (beside, folder) = (beside.display(), folder.display());
+        return Err(Stop::Failed(anyhow!("{beside}: there is no folder {folder}")));
     }
     let is_same = |other: &Path| !is_stream(other) && place_of(other) == place_of(beside);
     if is_same(stack) || (is_stream(stack) && is_stdout(beside)) {

@@ -228,7 +228,7 @@ fn a_report_needs_a_file_of_its_own() {
     let (broken, _) = spoiled(&ball(), Defect::Drop, 2);
     scratch.mesh("ball.stl", &broken);
     for (options, word) in
-        [("--report -", "name a file"), ("-o a.json --report a.json", "a file each")]
+        [("--report -", "name a file"), ("-o a.json --report a.json", "the stack goes there")]
     {
         let ran = scratch.run(&format!("slice ball.stl {options}"));
         assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
@@ -236,7 +236,7 @@ fn a_report_needs_a_file_of_its_own() {
     }
     let ran = scratch.run("slice ball.stl -o part.tif --report no/such/gaps.json");
     ran.is_refused_with(&["no/such/gaps.json"]);
-    assert_eq!(scratch.names(), ["ball.stl", "part.tif"]);
+    assert_eq!(scratch.names(), ["ball.stl"]);
     let ran = scratch.run("slice ball.stl -o part.tif").succeeds();
     assert!(ran.stderr.ends_with("; fix corrects them, --report FILE.json names the facets\n"));
 }

@@ -161,8 +161,8 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
     };
     let mut info = layer.info.clone();
     let is_corrected = |row: &u32| {
-        let done = |band: &Band| band.outcome == Outcome::Corrected;
-        bands.iter().any(|band| done(band) && (band.first_row..band.end()).contains(row))
+        let band = bands.get(bands.partition_point(|band| band.end() <= *row));
+        band.is_some_and(|b| b.outcome == Outcome::Corrected && b.first_row <= *row)
     };
     info.stray_rows.retain(|row| !is_corrected(row));
     info.other.insert("fix".to_owned(), on_page(&bands, options.method));

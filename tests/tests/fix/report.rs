@@ -137,9 +137,12 @@ fn a_clean_stack_has_an_empty_report_and_no_pictures() {
 fn a_report_needs_a_file_of_its_own() {
     let (scratch, _) = broken_ball(1, 1, COARSE);
     let names = scratch.names();
-    for (options, words) in
-        [("--report -", "name a file"), ("-o a.tif --report a.tif", "the stack goes there")]
-    {
+    for (options, words) in [
+        ("--report -", "name a file"),
+        ("-o a.tif --report a.tif", "the stack goes there"),
+        ("-o a.tif --report ./a.tif", "the stack goes there"),
+        ("-o a.tif --report stray.tif", "that is the input"),
+    ] {
         let ran = scratch.run(&format!("fix stray.tif {options}"));
         assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
         assert!(ran.stderr.contains(words) && ran.stdout.is_empty(), "{ran:?}");
