@@ -31,6 +31,18 @@ pub use scratch::{Ran, Scratch, ends_white, mask, masks, read_stack, write_gray_
 use std::io::Write;
 use std::path::PathBuf;
 
+use lamp_fixtures::{Mesh, sphere};
+
+/// Returns a ball of few facets, each of which many rows and planes meet;
+/// tilted, for no plane meets an edge that lies level.
+pub fn tilted_ball() -> Mesh {
+    let ([sin_x, cos_x], [sin_y, cos_y]) = ([0.6, 0.8], [0.28, 0.96]);
+    sphere(6.0, 600).map(|[x, y, z]| {
+        let (y, z) = (cos_x * y - sin_x * z, sin_x * y + cos_x * z);
+        [cos_y * x + sin_y * z, y, cos_y * z - sin_y * x]
+    })
+}
+
 /// Returns a folder of models or images from elsewhere, `stl` or `tiff`:
 /// `../shared/data` beside the workspace, where it exists.
 pub fn shared_data(kind: &str) -> Option<PathBuf> {

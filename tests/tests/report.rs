@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 use std::fs;
 
-use lamp_fixtures::{Defect, Facet, Mesh, inject, sphere, torus};
-use lamp_tests::{Scratch, note, shared_data};
+use lamp_fixtures::{Defect, Facet, Mesh, inject, torus};
+use lamp_tests::{Scratch, note, shared_data, tilted_ball};
 use serde_json::{Value, json};
 
 const FINE: &str = "--dpi 600 --thickness 50um";
@@ -64,21 +64,11 @@ fn faults(report: &Value) -> BTreeSet<&str> {
     list(report, "edges").iter().map(|edge| edge["fault"].as_str().unwrap()).collect()
 }
 
-/// Few facets, each of which many rows and planes meet; tilted, for no plane
-/// meets an edge that lies level.
-fn ball() -> Mesh {
-    let ([sin_x, cos_x], [sin_y, cos_y]) = ([0.6, 0.8], [0.28, 0.96]);
-    sphere(6.0, 600).map(|[x, y, z]| {
-        let (y, z) = (cos_x * y - sin_x * z, sin_x * y + cos_x * z);
-        [cos_y * x + sin_y * z, y, cos_y * z - sin_y * x]
-    })
-}
-
 #[test]
 fn the_neighbours_of_a_hole_are_named_with_their_corners() {
     for seed in 0..4 {
         let scratch = Scratch::new();
-        let (broken, hole) = spoiled(&ball(), Defect::Drop, seed);
+        let (broken, hole) = spoiled(&tilted_ball(), Defect::Drop, seed);
         scratch.mesh("ball.stl", &broken);
         let report = report(&scratch, "ball.stl", "");
         assert_eq!(named(&report), at_edges_of(&broken, &hole, 0));
@@ -96,7 +86,7 @@ fn the_neighbours_of_a_hole_are_named_with_their_corners() {
 #[test]
 fn bands_are_those_of_the_pages_and_lie_between_their_ends() {
     let scratch = Scratch::new();
-    let (broken, hole) = spoiled(&ball(), Defect::Drop, 2);
+    let (broken, hole) = spoiled(&tilted_ball(), Defect::Drop, 2);
     scratch.mesh("ball.stl", &broken);
     let report = report(&scratch, "ball.stl", "");
     let layers = scratch.layers("part.tif");
@@ -143,7 +133,7 @@ fn bands_are_those_of_the_pages_and_lie_between_their_ends() {
 #[test]
 fn a_doubled_facet_is_named_with_its_copy_and_its_neighbours() {
     let scratch = Scratch::new();
-    let (broken, doubled) = spoiled(&ball(), Defect::Duplicate, 3);
+    let (broken, doubled) = spoiled(&tilted_ball(), Defect::Duplicate, 3);
     scratch.mesh("ball.stl", &broken);
     let report = report(&scratch, "ball.stl", "");
     assert_eq!(named(&report), at_edges_of(&broken, &doubled, 0));
@@ -154,7 +144,7 @@ fn a_doubled_facet_is_named_with_its_copy_and_its_neighbours() {
 #[test]
 fn a_flipped_facet_is_named_under_nonzero_alone() {
     let scratch = Scratch::new();
-    let (broken, flipped) = spoiled(&ball(), Defect::Flip, 5);
+    let (broken, flipped) = spoiled(&tilted_ball(), Defect::Flip, 5);
     scratch.mesh("ball.stl", &broken);
     for fill in ["nonzero", "non-zero"] {
         let report = report(&scratch, "ball.stl", &format!("--fill {fill}"));
@@ -169,7 +159,7 @@ fn a_flipped_facet_is_named_under_nonzero_alone() {
 #[test]
 fn a_whole_part_has_an_empty_report_and_the_same_stack() {
     let scratch = Scratch::new();
-    scratch.mesh("ball.stl", &ball());
+    scratch.mesh("ball.stl", &tilted_ball());
     let report = report(&scratch, "ball.stl", "");
     for key in ["open_layers", "stray_layers", "stray_rows"] {
         assert_eq!(report[key], json!(0), "{key}");
@@ -184,7 +174,7 @@ fn a_whole_part_has_an_empty_report_and_the_same_stack() {
 fn facets_are_numbered_in_their_own_file() {
     let scratch = Scratch::new();
     scratch.mesh("ring.stl", &torus(9.0, 2.0, 700));
-    let (broken, hole) = spoiled(&ball(), Defect::Drop, 6);
+    let (broken, hole) = spoiled(&tilted_ball(), Defect::Drop, 6);
     let mut text = Vec::new();
     broken.write_ascii_stl("ball", &mut text).unwrap();
     scratch.write("ball.stl", &text);
@@ -196,7 +186,7 @@ fn facets_are_numbered_in_their_own_file() {
 #[test]
 fn corners_stay_those_of_the_file_however_the_part_is_placed() {
     let scratch = Scratch::new();
-    let (broken, hole) = spoiled(&ball(), Defect::Drop, 7);
+    let (broken, hole) = spoiled(&tilted_ball(), Defect::Drop, 7);
     scratch.mesh("ball.stl", &broken);
     for placed in [
         "--rotate x:31,z:-12.5 --scale 1.5",
@@ -225,7 +215,7 @@ fn threads_and_memory_do_not_change_the_report() {
 #[test]
 fn a_report_needs_a_file_of_its_own() {
     let scratch = Scratch::new();
-    let (broken, _) = spoiled(&ball(), Defect::Drop, 2);
+    let (broken, _) = spoiled(&tilted_ball(), Defect::Drop, 2);
     scratch.mesh("ball.stl", &broken);
     for (options, word) in
         [("--report -", "name a file"), ("-o a.json --report a.json", "the stack goes there")]

@@ -7,7 +7,7 @@ use lamp_stack::{Image, Mask, white_in_row};
 use super::FixOptions;
 use super::band::{Kind, Kinds};
 use super::combine::{difference, majority, white_in_both};
-use super::contours::Contours;
+use super::contours::{Contours, DEPTH};
 use super::mend::{DROP, mend};
 use super::outline::outline_row;
 
@@ -125,7 +125,8 @@ impl Scene<'_> {
             if self.open_rows.is_some_and(|open| !any_in(open, &band)) {
                 continue;
             }
-            let cost = crossings[above].max(crossings[below]) as usize * (band.len() + 24);
+            let rows = band.len() + 2 * DEPTH as usize;
+            let cost = crossings[above].max(crossings[below]) as usize * rows;
             let Some(left) = effort.checked_sub(cost) else { return };
             effort = left;
             self.check_pairs(strays, &band);
@@ -136,10 +137,13 @@ impl Scene<'_> {
     fn check_pairs(&self, strays: &mut Strays, band: &Range<u32>) {
         let is_good = |row: u32| !band.contains(&row) && strays.is_good(row);
         let Some(contours) = Contours::around(self.mask, band.clone(), is_good) else { return };
+        let mended =
+            |row: u32| mend(self.mask.row(row), &contours.outlook(row), self.mask.width(), DROP);
         let lacks_some = |row: &u32| {
-            let mended =
-                mend(self.mask.row(*row), &contours.outlook(*row), self.mask.width(), DROP);
-            strays.is_good(*row) && mended.gain >= LONG && !mended.added.is_empty()
+            strays.is_good(*row) && {
+                let mended = mended(*row);
+                mended.gain >= LONG && !mended.added.is_empty()
+            }
         };
         for rows in runs(band.clone().filter(lacks_some)) {
             let touches = [rows.start.checked_sub(1), Some(rows.end)].into_iter().flatten();
@@ -153,9 +157,8 @@ impl Scene<'_> {
                 // may well be the part's own.
                 None if rows.len() > 1 => continue,
                 None => {
-                    let (row, had) = (rows.start, self.mask.row(rows.start));
-                    let mended = mend(had, &contours.outlook(row), self.mask.width(), DROP);
-                    if self.is_in_another_layer(row, had, &mended.row) {
+                    let row = rows.start;
+                    if self.is_in_another_layer(row, self.mask.row(row), &mended(row).row) {
                         continue;
                     }
                     false

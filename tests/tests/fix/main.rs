@@ -10,25 +10,15 @@ mod strict;
 mod thin;
 mod untouched;
 
-use lamp_fixtures::{Defect, Facet, Mesh, inject, sphere};
+use lamp_fixtures::{Defect, Facet, inject};
 use lamp_stack::{Image, Layer};
-use lamp_tests::{Ran, Scratch, differing};
+use lamp_tests::{Ran, Scratch, differing, tilted_ball};
 use serde_json::Value;
-
-/// Few facets, each of which many rows and planes meet; tilted, for no plane
-/// meets an edge that lies level.
-fn ball() -> Mesh {
-    let ([sin_x, cos_x], [sin_y, cos_y]) = ([0.6, 0.8], [0.28, 0.96]);
-    sphere(6.0, 600).map(|[x, y, z]| {
-        let (y, z) = (cos_x * y - sin_x * z, sin_x * y + cos_x * z);
-        [cos_y * x + sin_y * z, y, cos_y * z - sin_y * x]
-    })
-}
 
 /// The ball without some of its facets, sliced to `stray.tif`, and the facets.
 fn broken_ball(count: usize, seed: u64, slicing: &str) -> (Scratch, Vec<Facet>) {
     let scratch = Scratch::new();
-    let whole = ball();
+    let whole = tilted_ball();
     let mut mesh = whole.clone();
     let chosen = inject(&mut mesh, Defect::Drop, count, seed);
     scratch.mesh("ball.stl", &mesh);
