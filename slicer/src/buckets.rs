@@ -37,18 +37,20 @@ pub(crate) struct Buckets {
 }
 
 impl Buckets {
-    /// Sorts the facets of a part into `slabs`, which follow one another, with
-    /// about `memory` bytes to gather them in.
+    /// Sorts the facets of a part into `slabs`, which follow one another and look
+    /// `reach_um` below their planes, with about `memory` bytes to gather them
+    /// in.
     ///
     /// # Errors
     /// Where the part cannot be read or the temporary file not be written.
     pub(crate) fn sort(
         model: &PlacedModel,
         planes: &Planes,
+        reach_um: f64,
         slabs: &[Range<usize>],
         memory: usize,
     ) -> io::Result<Self> {
-        let order = Order::new(planes, slabs);
+        let order = Order::new(planes, reach_um, slabs);
         let count = order.per_slab * slabs.len();
         // As many workers as have room for their chunks.
         let workers = (memory / (count << 12)).clamp(1, rayon::current_num_threads());
@@ -90,6 +92,7 @@ impl Buckets {
 /// Which buckets a facet belongs in.
 struct Order<'a> {
     planes: &'a Planes,
+    reach_um: f64,
     slabs: &'a [Range<usize>],
     /// How many buckets each slab has.
     per_slab: usize,
@@ -98,7 +101,7 @@ struct Order<'a> {
 }
 
 impl<'a> Order<'a> {
-    fn new(planes: &'a Planes, slabs: &'a [Range<usize>]) -> Self {
+    fn new(planes: &'a Planes, reach_um: f64, slabs: &'a [Range<usize>]) -> Self {
         let per_slab = BUCKETS.div_ceil(slabs.len());
         let buckets = |(slab, layers): (usize, &Range<usize>)| {
             let count = layers.len();
@@ -106,6 +109,7 @@ impl<'a> Order<'a> {
         };
         Self {
             planes,
+            reach_um,
             slabs,
             per_slab,
             of_layer: slabs.iter().enumerate().flat_map(buckets).collect(),
@@ -116,7 +120,7 @@ impl<'a> Order<'a> {
     #[inline]
     fn for_each_bucket(&self, facet: &PlacedFacet, mut each: impl FnMut(usize)) {
         let (low, high) = heights(facet);
-        let met = self.planes.between(low, high);
+        let met = self.planes.between(low, high + self.reach_um);
         let first = self.slabs[0].start;
         let Some(&bucket) = self.of_layer.get(met.start.saturating_sub(first)) else { return };
         if met.is_empty() || met.end <= first {
@@ -210,7 +214,7 @@ mod tests {
         // Slabs of one layer and of many, not all of the part.
         let slabs = [3..4, 4..5, 5..60, 60..150, 150..190];
         for memory in [0, 1 << 24] {
-            let buckets = Buckets::sort(&model, &planes, &slabs, memory).unwrap();
+            let buckets = Buckets::sort(&model, &planes, 0.0, &slabs, memory).unwrap();
             for (slab, layers) in slabs.iter().enumerate() {
                 let mut found = Vec::new();
                 let bucket = buckets.of_slab(slab, &model);

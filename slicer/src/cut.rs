@@ -16,6 +16,7 @@
 use std::ops::Range;
 
 use crate::ends::EndSum;
+use crate::gray::{Sheet, Span};
 use crate::grid::PixelGrid;
 use crate::placement::{PlacedFacet, heights};
 use crate::planes::Planes;
@@ -75,12 +76,15 @@ pub(crate) struct Cutter<'a> {
 pub(crate) struct Share {
     pub(crate) crossings: Vec<Crossing>,
     pub(crate) ends: EndSum,
+    /// What lies below the section, for gray layers.
+    pub(crate) spans: Vec<Span>,
 }
 
 impl Share {
-    /// Empties it; the list keeps its memory.
+    /// Empties it; the lists keep their memory.
     pub(crate) fn clear(&mut self) {
         self.crossings.clear();
+        self.spans.clear();
         self.ends = EndSum::default();
     }
 }
@@ -130,6 +134,34 @@ impl Cutter<'_> {
             count += self.cross_rows(a, b, segment.turned, &mut share.crossings);
         });
         count
+    }
+
+    /// Adds what the rows of `layers` meet of the facet below their sections, as
+    /// deep as they are exposed, and says how many crossings would take as much
+    /// memory.
+    pub(crate) fn look_down(
+        &self,
+        facet: &PlacedFacet,
+        reach_um: f64,
+        layers: &Range<usize>,
+        shares: &mut [Share],
+    ) -> usize {
+        let (low, high) = heights(facet);
+        let met = self.planes.between(low, high + reach_um);
+        let met = met.start.max(layers.start)..met.end.min(layers.end);
+        if met.is_empty() {
+            return 0;
+        }
+        let Some(sheet) = Sheet::new(self, facet) else { return 0 };
+        let mut count = 0;
+        for layer in met {
+            let spans = &mut shares[layer - layers.start].spans;
+            sheet.for_each_span(self, layer, reach_um, |span| {
+                spans.push(span);
+                count += 1;
+            });
+        }
+        count * size_of::<Span>() / size_of::<Crossing>()
     }
 
     /// Gives the facet's segments in `layers`, from below.
@@ -227,7 +259,7 @@ impl Cutter<'_> {
 
 /// The least whole number that is not below `value`, between 0 and `most`.
 #[inline]
-fn ceil_clamped(value: f64, most: u32) -> u32 {
+pub(crate) fn ceil_clamped(value: f64, most: u32) -> u32 {
     // Casts saturate. `f64::ceil` is a call on processors before SSE4.1.
     let whole = value as i32;
     let ceiling = whole.saturating_add(i32::from(f64::from(whole) < value));

@@ -109,6 +109,9 @@ pub enum SliceError {
         /// How many layers there are.
         count: u32,
     },
+    /// Gray layers with their sections elsewhere than at their tops.
+    #[error("gray layers are as deep as the part below their tops: slice them with --plane top")]
+    GrayPlane,
     /// Reading the file failed.
     #[error(transparent)]
     Io(#[from] io::Error),

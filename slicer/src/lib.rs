@@ -37,6 +37,7 @@ mod cut;
 mod ends;
 mod error;
 mod facet;
+mod gray;
 mod grid;
 mod model;
 mod placement;
@@ -48,6 +49,7 @@ mod trace;
 
 pub use error::SliceError;
 pub use facet::{Facet, Units};
+pub use gray::DepthLevels;
 pub use grid::PixelGrid;
 pub use model::Model;
 pub use placement::{Axis, Placement};

@@ -80,6 +80,17 @@ impl Planes {
         ((self.bottom_um + layer as f64 * self.thickness_um) * 1000.0).round() / 1000.0
     }
 
+    /// The height of a layer's top, where its exposure begins, in micrometres.
+    #[inline]
+    pub(crate) fn top_um(&self, layer: usize) -> f64 {
+        self.bottom_um + (layer as f64 + 1.0) * self.thickness_um
+    }
+
+    /// The height of the first layer's bottom, in micrometres.
+    pub(crate) fn bottom_um(&self) -> f64 {
+        self.bottom_um
+    }
+
     /// The thickness of the layers, in micrometres.
     pub(crate) fn thickness_um(&self) -> f64 {
         self.thickness_um

@@ -4,13 +4,14 @@ use std::collections::VecDeque;
 use std::io;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Image, Layer, Length, PageInfo, StackInfo};
+use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
 use rayon::prelude::*;
 
 use crate::buckets::Buckets;
 use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
 use crate::facet::Units;
+use crate::gray::{DepthLevels, Span};
 use crate::grid::PixelGrid;
 use crate::model::Model;
 use crate::placement::{PlacedFacet, PlacedModel, Placement};
@@ -34,6 +35,10 @@ pub struct SliceOptions {
     pub placement: Placement,
     /// What is inside.
     pub fill: Fill,
+    /// The gray level of each depth below a layer's top, for layers that are
+    /// gray where the part is less deep. They begin at their tops, so the plane
+    /// must be [`PlaneRule::Top`].
+    pub gray: Option<DepthLevels>,
     /// The layers wanted, all where `None`.
     pub layers: Option<Range<u32>>,
     /// The frame of the images.
@@ -87,6 +92,7 @@ impl Default for SliceOptions {
             units: Units::default(),
             placement: Placement::default(),
             fill: Fill::default(),
+            gray: None,
             layers: None,
             frame: Frame::Around { margin: 1 },
             memory: 64 << 20,
@@ -108,6 +114,7 @@ pub struct Slices {
     grid: PixelGrid,
     planes: Planes,
     fill: Fill,
+    gray: Option<DepthLevels>,
     wanted: Range<usize>,
     most_crossings: usize,
     /// Slabs of layers that fit by the estimate.
@@ -125,8 +132,12 @@ impl Slices {
     ///
     /// # Errors
     /// Where the part is empty, not finite or 1000 km away, or the images or
-    /// layers would be too many.
+    /// layers would be too many; where gray layers do not have their sections
+    /// at the top.
     pub fn new(model: Model, options: &SliceOptions) -> Result<Self, SliceError> {
+        if options.gray.is_some() && options.plane != PlaneRule::Top {
+            return Err(SliceError::GrayPlane);
+        }
         let model = PlacedModel::new(model, &options.placement, options.units);
         let survey = Survey::of(&model)?;
         survey.check_distance()?;
@@ -137,19 +148,26 @@ impl Slices {
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
         // A list that grows holds up to twice what it needs.
         let most_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
-        let expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
+        let reach_um = options.gray.as_ref().map_or(0.0, DepthLevels::reach_um);
+        let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
+        if options.gray.is_some() {
+            let per_crossing = spans_per_crossing(reach_um / planes.thickness_um());
+            expected.iter_mut().for_each(|crossings| *crossings *= 1.0 + per_crossing);
+        }
         let slabs = slabs(&wanted, &expected, most_crossings);
-        let heights: Vec<_> = slabs.iter().map(|slab| planes_of(slab, &planes)).collect();
+        let heights: Vec<_> =
+            slabs.iter().map(|slab| heights_of(slab, &planes, reach_um)).collect();
         // Where no temporary file can be written, slabs read all they meet.
         let buckets = survey
             .wants_sorting(&heights)
-            .then(|| Buckets::sort(&model, &planes, &slabs, options.memory as usize).ok())
+            .then(|| Buckets::sort(&model, &planes, reach_um, &slabs, options.memory as usize).ok())
             .flatten();
         Ok(Self {
             model,
             survey,
             grid,
             fill: options.fill,
+            gray: options.gray.clone(),
             most_crossings,
             pending: wanted.start..wanted.start,
             wanted,
@@ -180,17 +198,19 @@ impl Slices {
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
+        let gray = self.gray.as_ref();
+        let reach_um = gray.map_or(0.0, DepthLevels::reach_um);
         loop {
             let layers = start..end;
             let most = self.most_crossings;
             let open_rows = if let Some(buckets) = &self.buckets {
                 let facets = buckets.of_slab(slab, &self.model);
-                fill(&mut self.table, &facets, cutter, layers, most)?
+                fill(&mut self.table, &facets, cutter, gray, layers, most)?
             } else {
-                let (low, high) = planes_of(&layers, &self.planes);
+                let (low, high) = heights_of(&layers, &self.planes, reach_um);
                 let blocks = self.survey.blocks_between(low, high);
                 let facets = Blocks { model: &self.model, blocks };
-                fill(&mut self.table, &facets, cutter, layers, most)?
+                fill(&mut self.table, &facets, cutter, gray, layers, most)?
             };
             if let Some(open_rows) = open_rows {
                 self.open_rows = open_rows;
@@ -233,15 +253,16 @@ impl Slices {
         let end = self.pending.start + layers;
         let batch = self.pending.start..end;
         self.pending.start = end;
+        let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
         let layer = |layer| {
-            let Section { mask, stray_rows, closed } =
-                self.table.layer(layer, self.grid.width, self.grid.height, self.fill);
+            let Section { image, stray_rows, closed } =
+                self.table.layer(layer, cutter, self.gray.as_ref());
             let open_rows = self.open_rows.get(&layer).cloned().unwrap_or_default();
             let closed = Some(closed);
             Layer {
                 info: PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) },
                 dpi: Some(self.grid.dpi),
-                image: Image::Mask(mask),
+                image,
             }
         };
         self.ready = batch.into_par_iter().map(layer).collect();
@@ -300,10 +321,11 @@ fn fill(
     table: &mut Table,
     facets: &impl Facets,
     cutter: Cutter<'_>,
+    gray: Option<&DepthLevels>,
     layers: Range<usize>,
     most_crossings: usize,
 ) -> io::Result<Option<OpenRows>> {
-    if !table.fill(facets, cutter, layers, most_crossings)? {
+    if !table.fill(facets, cutter, gray, layers, most_crossings)? {
         return Ok(None);
     }
     // A row takes as much memory as a crossing.
@@ -332,9 +354,17 @@ impl Facets for Blocks<'_> {
     }
 }
 
-/// The heights of the first and the last plane of some layers.
-fn planes_of(layers: &Range<usize>, planes: &Planes) -> (f64, f64) {
-    (planes.z_um(layers.start), planes.z_um(layers.end - 1))
+/// The heights between which some layers look at facets: from `reach_um` below
+/// their first plane to their last.
+fn heights_of(layers: &Range<usize>, planes: &Planes, reach_um: f64) -> (f64, f64) {
+    (planes.z_um(layers.start) - reach_um, planes.z_um(layers.end - 1))
+}
+
+/// About how much memory what lies below the sections takes for each crossing
+/// in them, where layers are exposed so many times as deep as they are thick. A
+/// facet crosses as many rows between planes as on them.
+fn spans_per_crossing(reach: f64) -> f64 {
+    (1.0 + reach) * (size_of::<Span>() / size_of::<Crossing>()) as f64
 }
 
 /// Cuts layers into slabs of at most `most` crossings, and at least a layer.

@@ -9,11 +9,12 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use lamp_stack::Mask;
+use lamp_stack::{Image, Mask};
 use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place, Share};
 use crate::ends::{EndSum, RowSums};
+use crate::gray::{DepthLevels, Shader, Span};
 use crate::placement::PlacedFacet;
 
 /// What is inside.
@@ -46,7 +47,7 @@ pub(crate) struct Table {
 
 /// What a layer's crossings make.
 pub(crate) struct Section {
-    pub(crate) mask: Mask,
+    pub(crate) image: Image,
     /// The rows whose crossings do not balance.
     pub(crate) stray_rows: Vec<u32>,
     /// Whether every contour closes.
@@ -84,6 +85,7 @@ impl Table {
         &mut self,
         facets: &impl Facets,
         cutter: Cutter<'_>,
+        gray: Option<&DepthLevels>,
         layers: Range<usize>,
         most: usize,
     ) -> io::Result<bool> {
@@ -102,6 +104,10 @@ impl Table {
                 facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
                         unclaimed += cutter.cut(facet, &layers, shares);
+                        if let Some(gray) = gray {
+                            let reach_um = gray.reach_um();
+                            unclaimed += cutter.look_down(facet, reach_um, &layers, shares);
+                        }
                         budget.claim(&mut unclaimed);
                     }
                 })?;
@@ -125,8 +131,25 @@ impl Table {
         self.parts.iter().map(move |shares| &shares[layer - self.layers.start])
     }
 
+    /// What lies below a layer's section, row by row.
+    fn spans(&self, layer: usize) -> Vec<Span> {
+        let mut spans: Vec<_> =
+            self.shares(layer).flat_map(|share| &share.spans).copied().collect();
+        spans.par_sort_unstable_by(|a, b| a.partial_cmp(b).expect("depths are numbers"));
+        spans
+    }
+
     /// A layer of the slab.
-    pub(crate) fn layer(&self, layer: usize, width: u32, height: u32, fill: Fill) -> Section {
+    pub(crate) fn layer(
+        &self,
+        layer: usize,
+        cutter: Cutter<'_>,
+        gray: Option<&DepthLevels>,
+    ) -> Section {
+        let Cutter { grid, planes, fill } = cutter;
+        let (width, height) = (grid.width, grid.height);
+        let spans = self.spans(layer);
+        let mut shader = gray.map(|levels| Shader::new(levels, fill, planes, layer, &spans, width));
         let crossings = || self.shares(layer).flat_map(|share| &share.crossings).copied();
         let (starts, mut places) = sort_by_row(crossings, height);
         let mut row_offsets = Vec::with_capacity(starts.len());
@@ -146,10 +169,14 @@ impl Table {
                 }
             }
             row_offsets.push(transitions.len() as u32);
+            if let Some(shader) = &mut shader {
+                shader.push_row(row as u32, places);
+            }
         }
         let mask = Mask::new(width, row_offsets, transitions);
+        let mask = mask.expect("sorted places without pairs increase strictly");
         Section {
-            mask: mask.expect("sorted places without pairs increase strictly"),
+            image: shader.map_or(Image::Mask(mask), Shader::finish),
             stray_rows,
             closed: self.is_closed(layer, fill),
         }

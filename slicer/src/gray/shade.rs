@@ -1,0 +1,149 @@
+//! A layer's rows of gray levels, from its section and what lies below.
+
+use lamp_stack::{GrayMask, Image, LevelChange, MaskBuilder};
+
+use crate::cut::Place;
+use crate::gray::{DepthLevels, Span};
+use crate::planes::Planes;
+use crate::table::Fill;
+
+/// Makes a layer's rows gray, from the top.
+pub(crate) struct Shader<'a> {
+    levels: &'a DepthLevels,
+    fill: Fill,
+    /// The layer's plane below the layer's top.
+    plane_depth_um: f64,
+    /// Those of the rows to come, by row.
+    spans: &'a [Span],
+    /// Those over a column, in the order of their starts.
+    open: Vec<Span>,
+    met: Vec<(f64, Span)>,
+    changes: Vec<LevelChange>,
+    image: GrayMask,
+}
+
+impl<'a> Shader<'a> {
+    /// For a layer and all that lies below its section, sorted.
+    pub(crate) fn new(
+        levels: &'a DepthLevels,
+        fill: Fill,
+        planes: &Planes,
+        layer: usize,
+        spans: &'a [Span],
+        width: u32,
+    ) -> Self {
+        Self {
+            levels,
+            fill,
+            plane_depth_um: planes.top_um(layer) - planes.z_um(layer),
+            spans,
+            open: Vec::new(),
+            met: Vec::new(),
+            changes: Vec::new(),
+            image: GrayMask::new(width),
+        }
+    }
+
+    /// Adds the next row, given the sorted places where the section's contours
+    /// cross it.
+    pub(crate) fn push_row(&mut self, row: u32, places: &[Place]) {
+        let count = self.spans.partition_point(|span| span.row <= row);
+        let (mut spans, rest) = self.spans.split_at(count);
+        self.spans = rest;
+        self.changes.clear();
+        self.open.clear();
+        let mut winding = 0;
+        for (k, place) in places.iter().enumerate() {
+            winding += place.winding();
+            let end = places.get(k + 1).map_or(self.image.width(), |next| next.column());
+            if place.column() < end {
+                self.shade(place.column(), end, winding, &mut spans);
+            }
+        }
+        self.image.push_row(&self.changes).expect("changes come from the left");
+    }
+
+    /// Adds columns between which no contour crosses the row.
+    fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &[Span]) {
+        let inside = match self.fill {
+            Fill::EvenOdd => winding % 2 != 0,
+            Fill::NonZero => winding != 0,
+        };
+        if !inside {
+            return self.push(start, 0);
+        }
+        let mut column = start;
+        while column < end {
+            let begun = spans.partition_point(|span| span.start <= column);
+            self.open.extend(&spans[..begun]);
+            *spans = &spans[begun..];
+            self.open.retain(|span| span.end > column);
+            let ends = self.open.iter().map(|span| span.end);
+            let next = ends.chain(spans.first().map(|span| span.start)).fold(end, u32::min);
+            self.shade_evenly(column, next, winding);
+            column = next;
+        }
+    }
+
+    /// Adds columns that lie over the same facets.
+    fn shade_evenly(&mut self, start: u32, end: u32, winding: i32) {
+        if self.open.is_empty() {
+            return self.push(start, 255);
+        }
+        let end = if self.open.iter().all(Span::is_level) { start + 1 } else { end };
+        for column in start..end {
+            let level = self.exit_um(column, winding).map_or(255, |um| self.levels.of_um(um));
+            self.push(column, level);
+        }
+    }
+
+    /// The depth at which the line down from a white pixel leaves the part for
+    /// the first time.
+    fn exit_um(&mut self, column: u32, winding: i32) -> Option<f64> {
+        self.met.clear();
+        self.met.extend(self.open.iter().map(|span| (span.depth_um(column), *span)));
+        self.met.sort_by(|a, b| a.partial_cmp(b).expect("depths are numbers"));
+        let touching = |a: &(f64, Span), b: &(f64, Span)| b.0 - a.0 <= a.1.tie_um() + b.1.tie_um();
+        let mut left = winding;
+        for group in self.met.chunk_by(touching) {
+            let (depth, first) = group[0];
+            let lost = group.iter().map(|(_, span)| span.winding()).sum::<i32>();
+            let below = depth > self.plane_depth_um + first.tie_um();
+            // Within rounding of the plane, the section has seen to those that
+            // lead into the part.
+            if !below && lost * winding.signum() <= 0 {
+                continue;
+            }
+            left -= lost;
+            let leaves = match self.fill {
+                Fill::EvenOdd => lost % 2 != 0,
+                Fill::NonZero => left == 0,
+            };
+            if leaves {
+                return Some(if below { depth } else { 0.0 });
+            }
+        }
+        None
+    }
+
+    fn push(&mut self, column: u32, level: u8) {
+        let here = self.changes.last().map_or(0, |change| change.level);
+        if level != here {
+            self.changes.push(LevelChange { column, level });
+        }
+    }
+
+    /// The image: 1-bit where no pixel is gray.
+    pub(crate) fn finish(self) -> Image {
+        let image = self.image;
+        if image.rows().flatten().any(|change| change.level % 255 != 0) {
+            return Image::Gray(image);
+        }
+        let mut mask = MaskBuilder::new(image.width());
+        for row in image.rows() {
+            let transitions: Vec<u32> = row.iter().map(|change| change.column).collect();
+            mask.push_row(&transitions).expect("levels change at increasing columns");
+        }
+        Image::Mask(mask.finish())
+    }
+}
