@@ -8,6 +8,7 @@ mod commands;
 mod evidence;
 mod findings;
 mod lines;
+mod materials;
 mod options;
 mod picture;
 mod placement;

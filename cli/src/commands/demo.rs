@@ -84,7 +84,7 @@ fn run_pipeline(stl: &Path, stack: &Path, report: &Report) -> Result<StackSize, 
     let Defaults { options } = Defaults::parse_from(["slice"]);
     let model = Model::open(stl)?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
-    let (slices, name_command) = options.slices(model, &file, None, None)?;
+    let (slices, name_command) = options.slices(model, &file, None, None, None)?;
     report.expect(slices.layer_count() as u64);
     let layers = slices.map(move |layer| {
         let mut layer = layer?;

@@ -1,5 +1,5 @@
 use clap::Args;
-use lamp_stack::{Compression, Layer, Page, StackInfo, map_in_order};
+use lamp_stack::{Compression, Image, Layer, Page, StackInfo, map_in_order};
 
 use crate::options::Input;
 use crate::stop::Stop;
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Stop> {
     let mut totals: Option<Totals> = None;
     for page in decoded {
         let (layer, bytes, compression) = page?;
-        totals.get_or_insert_with(|| Totals::new(&layer, compression)).add(&layer, bytes);
+        totals.get_or_insert_with(|| Totals::new(&layer)).add(&layer, bytes, compression);
     }
     totals.map_or(Ok(()), |totals| print(&totals.text(&name)))
 }
@@ -36,8 +36,10 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Stop> {
 struct Totals {
     first: Layer,
     last: Layer,
-    compression: Compression,
+    /// Those of the pages, in the order of their first use.
+    compressions: Vec<Compression>,
     pages: u64,
+    gray_pages: u64,
     changes: u64,
     bytes: u64,
     stray_rows: u64,
@@ -46,12 +48,13 @@ struct Totals {
 }
 
 impl Totals {
-    fn new(first: &Layer, compression: Compression) -> Self {
+    fn new(first: &Layer) -> Self {
         Self {
             first: first.clone(),
             last: first.clone(),
-            compression,
+            compressions: Vec::new(),
             pages: 0,
+            gray_pages: 0,
             changes: 0,
             bytes: 0,
             stray_rows: 0,
@@ -60,8 +63,12 @@ impl Totals {
         }
     }
 
-    fn add(&mut self, layer: &Layer, bytes: u64) {
+    fn add(&mut self, layer: &Layer, bytes: u64, compression: Compression) {
         self.pages += 1;
+        self.gray_pages += u64::from(matches!(layer.image, Image::Gray(_)));
+        if !self.compressions.contains(&compression) {
+            self.compressions.push(compression);
+        }
         self.changes += layer.image.changes() as u64;
         self.bytes += bytes;
         self.stray_rows += layer.info.stray_rows.len() as u64;
@@ -78,7 +85,11 @@ impl Totals {
             lines.extend(stack_lines(stack));
         }
         let (first, last) = (info.index, self.last.info.index);
-        lines.push(("layers", format!("{} ({first} to {last})", self.pages)));
+        let gray = match self.gray_pages {
+            0 => String::new(),
+            pages => format!(", {pages} of them gray"),
+        };
+        lines.push(("layers", format!("{} ({first} to {last}){gray}", self.pages)));
         let others = if self.one_size { "" } else { " on the first page; others differ" };
         lines.push(("size", format!("{} x {} pixels{others}", image.width(), image.height())));
         match dpi {
@@ -92,11 +103,13 @@ impl Totals {
         if let (Some(bottom), Some(top)) = (info.z(), self.top_mm()) {
             lines.push(("z", format!("{:.3} to {top:.3} mm", bottom.mm())));
         }
+        if let Some(ms) = info.exposure_ms {
+            let others = if self.last.info.exposure_ms == Some(ms) { "" } else { " at first" };
+            lines.push(("exposure", format!("{ms} ms{others}")));
+        }
         lines.push(("runs", format!("{} transitions", self.changes)));
-        lines.push((
-            "data",
-            format!("{} bytes, {}", self.bytes, compression_name(self.compression)),
-        ));
+        let names: Vec<_> = self.compressions.iter().map(|each| compression_name(*each)).collect();
+        lines.push(("data", format!("{} bytes, {}", self.bytes, names.join(" and "))));
         lines.push((
             "stray rows",
             match self.stray_rows {

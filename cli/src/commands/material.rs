@@ -1,14 +1,14 @@
-use std::fs::File;
-use std::io::{self, IsTerminal, Read};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use lamp_grayscale::material::{Builtin, Material};
 use lamp_grayscale::resin::Depths;
 use lamp_stack::Length;
 
+use crate::materials::read;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream, print};
 
@@ -79,9 +79,6 @@ fn models(material: &Material) -> Vec<&'static str> {
     all.into_iter().filter(|&(_, given)| given).map(|(name, _)| name).collect()
 }
 
-/// A material file is text of a few kilobytes.
-const LARGEST_FILE: u64 = 1 << 20;
-
 fn check(path: &Path) -> Result<(), Stop> {
     if is_stream(path) && io::stdin().is_terminal() {
         return Err(Stop::usage("no material to read: name a file, or pipe one in"));
@@ -89,19 +86,6 @@ fn check(path: &Path) -> Result<(), Stop> {
     let name = input_name(path);
     let material = read(path).with_context(|| name.clone())?;
     print(&format!("{name}: {}\n", allows(&material)))
-}
-
-fn read(path: &Path) -> anyhow::Result<Material> {
-    let from: Box<dyn Read> =
-        if is_stream(path) { Box::new(io::stdin().lock()) } else { Box::new(File::open(path)?) };
-    let mut bytes = Vec::new();
-    from.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST_FILE {
-        return Err(anyhow!("more than 1 MiB is no material file"));
-    }
-    let text = String::from_utf8(bytes)
-        .map_err(|error| anyhow!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to()))?;
-    Ok(Material::from_toml(&text)?)
 }
 
 /// Says in a sentence what a material allows.

@@ -3,12 +3,15 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use lamp_grayscale::resin::ExposureTime;
 use lamp_slicer::{
-    Fill, Frame, Model, PixelGrid, PlaneRule, SliceError, SliceOptions, Slices, StrayBand, Units,
+    DepthLevels, Fill, Frame, Model, PixelGrid, PlaneRule, SliceError, SliceOptions, Slices,
+    StrayBand, Units,
 };
 use lamp_stack::{Dpi, Layer, Length, Size};
 
 use crate::lines::parse_report;
+use crate::materials::material;
 use crate::options::{Common, Output, parse_layers, parse_memory, parse_thickness};
 use crate::placement::{PlacementOptions, parse_numbers};
 use crate::report::Report;
@@ -28,6 +31,7 @@ Examples:
   slice blade.stl --dpi 2400 --thickness 25um --layers 100..200 | fix > part.tif
   slice shell.stl core.stl --fill nonzero --scale 1.02 --rotate x:90,z:-12.5 -o mould.tif
   slice core.stl --units inch -o core/
+  slice blade.stl --gray --material lamp-suspension | fix | dither > blade.tif
   slice broken.stl -o broken.tif --report gaps.json")]
 pub(crate) struct SliceArgs {
     /// The part: STL files, binary or ASCII, or - for standard input. Several stand in the same
@@ -100,7 +104,25 @@ pub(crate) struct PartOptions {
 
     #[command(flatten)]
     placement: PlacementOptions,
+
+    /// The resin: a name of `lamp material list`, or a file. Pages then say how long they are
+    /// exposed
+    #[arg(long, value_name = "NAME|FILE", help_heading = EXPOSURE)]
+    material: Option<String>,
+
+    /// Write gray layers: each pixel as bright as it takes to cure the part below it, down to
+    /// where the part ends. White where it does not end within what white cures
+    #[arg(long, requires = "material", help_heading = EXPOSURE)]
+    gray: bool,
+
+    /// How deep full white cures, in layers: 1 cures just the layer, more binds it to the one
+    /// below
+    #[arg(long, value_name = "LAYERS", default_value = "1", value_parser = parse_overcure)]
+    #[arg(requires = "material", help_heading = EXPOSURE)]
+    overcure: f64,
 }
+
+const EXPOSURE: &str = "Exposure";
 
 #[derive(Clone, Copy, Default, ValueEnum)]
 enum PlaneArg {
@@ -161,7 +183,7 @@ impl PartOptions {
 
     /// The command as the stack remembers it: no paths, no option that leaves
     /// the bytes alone.
-    fn command_line(&self, part: &str) -> String {
+    fn command_line(&self, part: &str, exposure: Option<&Exposure>) -> String {
         let mut line = format!(
             "slice {part} --dpi {} --thickness {} --plane {} --units {} --fill {}",
             self.dpi,
@@ -171,6 +193,11 @@ impl PartOptions {
             value_name(&self.fill),
         );
         line += &self.placement.command_line();
+        if let Some(exposure) = exposure {
+            let gray = if self.gray { " --gray" } else { "" };
+            line +=
+                &format!("{gray} --material {} --overcure {}", exposure.material, self.overcure);
+        }
         line += &match (self.origin, self.size) {
             (Some([x, y]), Some(size)) => format!(" --origin {x},{y} --size {size}"),
             _ => format!(" --margin {}", self.margin),
@@ -186,17 +213,49 @@ impl PartOptions {
         part: &str,
         layers: Option<Range<u32>>,
         memory: Option<u64>,
+        exposure: Option<Exposure>,
     ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), SliceError> {
-        let options = SliceOptions { layers, memory: table_memory(memory), ..self.for_slicing() };
+        let gray = exposure.as_ref().and_then(|exposure| exposure.levels.clone());
+        let memory = table_memory(memory);
+        let options = SliceOptions { layers, gray, memory, ..self.for_slicing() };
         let slices = Slices::new(model, &options)?;
-        let command = self.command_line(part);
+        let command = self.command_line(part, exposure.as_ref());
+        let exposure_ms = exposure.map(|exposure| exposure.time.ms());
         let name_command = move |layer: &mut Layer| {
+            layer.info.exposure_ms = exposure_ms;
             if let Some(stack) = &mut layer.info.stack {
                 stack.commands.push(command.clone());
             }
         };
         Ok((slices, name_command))
     }
+
+    /// How the layers are exposed, where a material says.
+    fn exposure(&self) -> Result<Option<Exposure>, Stop> {
+        let Some(name) = &self.material else { return Ok(None) };
+        if self.gray && !matches!(self.plane, PlaneArg::Top) {
+            return Err(Stop::usage(
+                "--gray takes sections at the layers' tops: leave --plane away",
+            ));
+        }
+        let material = material(name)?;
+        let failed = |error: anyhow::Error| Stop::Failed(error).at(material.name.clone());
+        let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
+        let time = resin.exposure_time(self.thickness, self.overcure);
+        let time = time.map_err(|error| failed(error.into()))?;
+        // To the microsecond, as people read it.
+        let time = ExposureTime::from_ms((time.ms() * 1000.0).round() / 1000.0);
+        let levels = self.gray.then(|| resin.depth_levels(time)).transpose();
+        let levels = levels.map_err(|error| failed(error.into()))?;
+        Ok(Some(Exposure { material: material.name, time, levels }))
+    }
+}
+
+/// How layers are exposed.
+pub(crate) struct Exposure {
+    material: String,
+    time: ExposureTime,
+    levels: Option<DepthLevels>,
 }
 
 /// What people write for a value.
@@ -208,6 +267,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     if let Some(report) = &args.report {
         check_beside(report, &args.output.output, &args.parts)?;
     }
+    let exposure = args.options.exposure()?;
     let model = open_models(&args.parts)?;
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args
@@ -217,7 +277,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         .collect();
     let (mut slices, name_command) = args
         .options
-        .slices(model, &files.join(" "), args.layers.clone(), args.memory)
+        .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure)
         .map_err(|error| match error {
             SliceError::NotFinite { file, .. } => {
                 Stop::from(error).at(input_name(&args.parts[file]))
@@ -304,6 +364,14 @@ fn machine_memory() -> u64 {
     let total = text.lines().find_map(|line| line.strip_prefix("MemTotal:"));
     let kib = total.and_then(|rest| rest.trim().trim_end_matches(" kB").parse::<u64>().ok());
     kib.map_or(4 << 30, |kib| kib * 1024)
+}
+
+/// Parses how many layers deep white cures.
+fn parse_overcure(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(layers) if (0.1..=100.0).contains(&layers) => Ok(layers),
+        _ => Err(format!("`{text}` is not how deep white cures: write 1 for the layer, 1.5 or 2")),
+    }
 }
 
 /// Parses `X,Y` in millimetres.

@@ -8,6 +8,7 @@ mod two_depth;
 mod units;
 mod working_curve;
 
+use lamp_slicer::DepthLevels;
 use lamp_stack::Length;
 
 pub use gray::{GrayCurve, IntensityLines, Line};
@@ -72,11 +73,28 @@ impl Resin {
         let depth = Length::from_um(thickness.um() * overcure);
         Ok(self.model.dose(depth)? / self.light)
     }
+
+    /// Returns the gray levels that cure each depth in an exposure, for slicing:
+    /// what [`Self::gray_for`] gives, to the nearest of 255. Depths from what
+    /// full white cures are white.
+    ///
+    /// # Errors
+    /// Where the model does not hold for all depths up to that of white.
+    pub fn depth_levels(&self, time: ExposureTime) -> Result<DepthLevels, CureError> {
+        let depths = self.model.depths();
+        let reach = self.depth(GrayLevel::WHITE, time);
+        if depths.from.um() > 0.0 || depths.to.is_some_and(|to| to < reach) {
+            return Err(CureError::NotAllTo { reach, depths });
+        }
+        let depth_of = |gray| self.depth(GrayLevel::clamped(gray), time);
+        Ok(DepthLevels::new(reach, depth_of))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::Builtin;
 
     #[test]
     fn white_cures_the_layer_times_overcure() {
@@ -100,6 +118,33 @@ mod tests {
         }
         let deeper = Length::from_um(101.0);
         assert!(matches!(resin.gray_for(deeper, time), Err(CureError::TooDeep { .. })));
+    }
+
+    #[test]
+    fn levels_are_those_of_the_root_finder() {
+        let material = Builtin::named("lamp-suspension").unwrap().material();
+        let resin = material.resin().unwrap();
+        for (um, overcure) in [(25.0, 1.0), (100.0, 1.0), (100.0, 1.7)] {
+            let time = resin.exposure_time(Length::from_um(um), overcure).unwrap();
+            let levels = resin.depth_levels(time).unwrap();
+            let reach = um * overcure;
+            for i in 1..4000 {
+                let depth = Length::from_um(reach * f64::from(i) / 4000.0);
+                let exact = resin.gray_for(depth, time).unwrap().get() * 255.0;
+                let level = f64::from(levels.level(depth));
+                assert!((level - exact).abs() < 0.5 + 1e-9, "{depth}: {level} for {exact}");
+            }
+            let level = |um| levels.level(Length::from_um(um));
+            assert_eq!([level(0.0), level(reach), level(1e9)], [0, 255, 255]);
+        }
+    }
+
+    #[test]
+    fn levels_need_a_model_of_all_depths() {
+        let material = Builtin::named("pegda-mw700").unwrap().material();
+        let resin = material.resin().unwrap();
+        let time = resin.exposure_time(Length::from_um(300.0), 1.0).unwrap();
+        assert!(matches!(resin.depth_levels(time), Err(CureError::NotAllTo { .. })));
     }
 
     #[test]

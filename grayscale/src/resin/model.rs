@@ -113,6 +113,17 @@ pub enum CureError {
         /// Those it holds for.
         depths: Depths,
     },
+    /// The model does not hold for all that a gray layer needs.
+    #[error(
+        "gray layers need a cure model for all depths up to {:.2} um, and this one holds for {depths}",
+        reach.um()
+    )]
+    NotAllTo {
+        /// The depth that white cures.
+        reach: Length,
+        /// Those it holds for.
+        depths: Depths,
+    },
     /// White does not cure as deep.
     #[error(
         "no gray level cures {:.2} um, as full white cures {:.2} um: expose for longer",

@@ -57,58 +57,54 @@ impl Span {
 
 /// A facet seen from above: x and y in pixels, z in micrometres.
 pub(crate) struct Sheet {
+    /// From the top row down.
     corners: [[f64; 3]; 3],
+    /// From the first corner to the last, to the middle one, and from there.
     edges: [Edge; 3],
+    /// The rows that it crosses, and among them the first past the middle.
+    rows: Range<u32>,
+    turn: u32,
     low_um: f64,
     high_um: f64,
     tie_um: f64,
     winding: i32,
 }
 
-/// An edge seen from above, from its first row to its last.
+/// An edge seen from above, from its upper row to its lower.
 #[derive(Clone, Copy)]
 struct Edge {
     upper: [f64; 3],
     /// Columns and micrometres for each row.
     slopes: [f64; 2],
-    rows: [u32; 2],
 }
 
 impl Edge {
-    fn new(cutter: &Cutter<'_>, a: [f64; 3], b: [f64; 3]) -> Self {
-        let (upper, lower) = if a[1] < b[1] { (a, b) } else { (b, a) };
+    fn new(upper: [f64; 3], lower: [f64; 3]) -> Self {
         let fall = lower[1] - upper[1];
-        Self {
-            upper,
-            slopes: [(lower[0] - upper[0]) / fall, (lower[2] - upper[2]) / fall],
-            rows: [upper, lower].map(|end| cutter.first_row([end[0], end[1]])),
-        }
+        Self { upper, slopes: [(lower[0] - upper[0]) / fall, (lower[2] - upper[2]) / fall] }
     }
 
-    fn crosses(&self, row: u32) -> bool {
-        (self.rows[0]..self.rows[1]).contains(&row)
-    }
-
-    /// Column and height where it crosses a row.
+    /// The column where it crosses a row.
     #[inline]
-    fn at(&self, row: u32) -> [f64; 2] {
-        let below = f64::from(row) - self.upper[1];
-        [self.upper[0] + self.slopes[0] * below, self.upper[2] + self.slopes[1] * below]
+    fn column(&self, row: u32) -> f64 {
+        self.upper[0] + self.slopes[0] * (f64::from(row) - self.upper[1])
+    }
+
+    /// The height where it crosses a row, in micrometres.
+    #[inline]
+    fn height(&self, row: u32) -> f64 {
+        self.upper[2] + self.slopes[1] * (f64::from(row) - self.upper[1])
     }
 }
 
 impl Sheet {
     /// A facet as vertical lines see it, where they can meet it.
     pub(crate) fn new(cutter: &Cutter<'_>, facet: &PlacedFacet) -> Option<Self> {
-        let corners = facet.map(|[x, y, z_um]| {
+        let mut corners = facet.map(|[x, y, z_um]| {
             let [column, row] = cutter.grid.to_pixels(x, y);
             [column, row, z_um]
         });
         let [a, b, c] = corners;
-        let edges = [[a, b], [b, c], [c, a]].map(|[a, b]| Edge::new(cutter, a, b));
-        if edges.iter().all(|edge| edge.rows[0] == edge.rows[1]) {
-            return None;
-        }
         let [u, v] = [b, c].map(|to| [0, 1, 2].map(|axis| to[axis] - a[axis]));
         let cross = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
         let area = cross(0, 1);
@@ -116,10 +112,18 @@ impl Sheet {
             return None;
         }
         let um_per_pixel = (cross(1, 2).abs() + cross(2, 0).abs()) / area.abs();
+        corners.sort_unstable_by(|a, b| a[1].total_cmp(&b[1]));
+        let [upper, middle, lower] = corners;
+        let [first, turn, end] = corners.map(|[column, row, _]| cutter.first_row([column, row]));
+        if first == end {
+            return None;
+        }
         let (low_um, high_um) = heights(facet);
         Some(Self {
             corners,
-            edges,
+            edges: [(upper, lower), (upper, middle), (middle, lower)].map(|(a, b)| Edge::new(a, b)),
+            rows: first..end,
+            turn,
             low_um,
             high_um,
             tie_um: TOUCHING_UM + ASIDE_PIXELS * um_per_pixel.min(1e6),
@@ -146,7 +150,7 @@ impl Sheet {
         // What reaches the part's lowest point stands on the platform.
         let end_um = (top_um - reach_um).max(planes.bottom_um());
         let depths = top_um - plane_um - self.tie_um..top_um - end_um;
-        for row in self.rows_between(cutter, end_um, plane_um + self.tie_um) {
+        for row in self.rows_between(end_um, plane_um + self.tie_um) {
             if let Some(span) = self.span(row, top_um, &depths, cutter.grid.width) {
                 each(span);
             }
@@ -155,7 +159,7 @@ impl Sheet {
 
     /// The rows of what lies between two heights, and perhaps one more on each
     /// side.
-    fn rows_between(&self, cutter: &Cutter<'_>, low_um: f64, high_um: f64) -> Range<u32> {
+    fn rows_between(&self, low_um: f64, high_um: f64) -> Range<u32> {
         let (mut first, mut last) = (f64::MAX, f64::MIN);
         let mut reach = |row: f64| (first, last) = (first.min(row), last.max(row));
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
@@ -169,27 +173,30 @@ impl Sheet {
                 }
             }
         }
-        let height = cutter.grid.height;
-        ceil_clamped(first - 0.5, height)..ceil_clamped(last + 0.5, height)
+        let Range { start, end } = self.rows;
+        ceil_clamped(first - 0.5, end).max(start)..ceil_clamped(last + 0.5, end)
     }
 
     /// What a row meets of it at depths from the first, up to before the
     /// second.
     fn span(&self, row: u32, top_um: f64, depths: &Range<f64>, width: u32) -> Option<Span> {
-        let mut crossed = self.edges.iter().filter(|edge| edge.crosses(row));
-        let [a, b] = [crossed.next()?, crossed.next()?].map(|edge| edge.at(row));
-        let [left, right] = if a[0] <= b[0] { [a, b] } else { [b, a] };
-        let [start, end] = [left, right].map(|end| ceil_clamped(end[0], width));
-        if start >= end {
+        let [long, first, second] = &self.edges;
+        let short = if row < self.turn { first } else { second };
+        let columns = [long.column(row), short.column(row)];
+        let [a, b] = columns.map(|column| ceil_clamped(column, width));
+        if a == b {
             return None;
         }
         // Along the row from edge to edge, rounding never leaves the facet.
-        let um_per_column = (left[1] - right[1]) / (right[0] - left[0]);
+        let [left, right] = if a < b { [0, 1] } else { [1, 0] };
+        let heights = [long.height(row), short.height(row)];
+        let um_per_column = (heights[left] - heights[right]) / (columns[right] - columns[left]);
         let depth_at = |column: u32| {
-            let depth = top_um - left[1] + um_per_column * (f64::from(column) - left[0]);
+            let across = f64::from(column) - columns[left];
+            let depth = top_um - heights[left] + um_per_column * across;
             depth.clamp(top_um - self.high_um, top_um - self.low_um)
         };
-        let (start, end) = within(start..end, depth_at, um_per_column, depths)?;
+        let (start, end) = within(a.min(b)..a.max(b), depth_at, um_per_column, depths)?;
         Some(Span {
             row,
             start,
@@ -209,7 +216,8 @@ fn within(
     depths: &Range<f64>,
 ) -> Option<(u32, u32)> {
     let Range { mut start, mut end } = columns;
-    if um_per_column != 0.0 {
+    // Most facets are a few columns wide.
+    if um_per_column != 0.0 && end - start > 4 {
         let first = depth_at(start);
         let ends = [depths.start, depths.end].map(|depth| (depth - first) / um_per_column);
         let [near, far] = if um_per_column > 0.0 { ends } else { [ends[1], ends[0]] };

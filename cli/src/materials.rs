@@ -1,0 +1,42 @@
+//! Materials that people name.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use anyhow::{Context, anyhow};
+use lamp_grayscale::material::{Builtin, Material};
+
+use crate::stop::Stop;
+use crate::streams::{input_name, is_stream};
+
+/// A material file is text of a few kilobytes.
+const LARGEST_FILE: u64 = 1 << 20;
+
+/// The built-in material of a name, or that of a file.
+pub(crate) fn material(name_or_file: &str) -> Result<Material, Stop> {
+    if let Some(builtin) = Builtin::named(name_or_file) {
+        return Ok(builtin.material());
+    }
+    let path = Path::new(name_or_file);
+    if !path.exists() && path.extension().is_none() {
+        let names = Builtin::ALL.map(|builtin| builtin.name()).join(", ");
+        let text = format!("there is no material `{name_or_file}`: name a file, or one of {names}");
+        return Err(Stop::Failed(anyhow!(text)));
+    }
+    Ok(read(path).with_context(|| input_name(path))?)
+}
+
+/// Reads a material file, or standard input.
+pub(crate) fn read(path: &Path) -> anyhow::Result<Material> {
+    let from: Box<dyn Read> =
+        if is_stream(path) { Box::new(io::stdin().lock()) } else { Box::new(File::open(path)?) };
+    let mut bytes = Vec::new();
+    from.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(anyhow!("more than 1 MiB is no material file"));
+    }
+    let text = String::from_utf8(bytes)
+        .map_err(|error| anyhow!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to()))?;
+    Ok(Material::from_toml(&text)?)
+}
