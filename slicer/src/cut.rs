@@ -232,21 +232,36 @@ impl Cutter<'_> {
         turned: bool,
         list: &mut Vec<Crossing>,
     ) -> usize {
+        let before = list.len();
+        // The last column is black: rounding takes no crossing past it.
+        let last = self.grid.width - 1;
+        self.for_each_crossing(a, b, turned, |row, column, rising| {
+            list.push(Crossing::new(row, ceil_clamped(column, last), rising));
+        });
+        list.len() - before
+    }
+
+    /// Gives where a segment between two points of a plane crosses rows: the row,
+    /// the column in pixels and the direction.
+    #[inline]
+    pub(crate) fn for_each_crossing(
+        &self,
+        a: [f64; 2],
+        b: [f64; 2],
+        turned: bool,
+        mut each: impl FnMut(u32, f64, bool),
+    ) {
         let down = a[1] < b[1];
         let (upper, lower) = if down { (a, b) } else { (b, a) };
         let rising = down != turned;
         let (first, end) = (self.first_row(upper), self.first_row(lower));
         if first >= end {
-            return 0;
+            return;
         }
         let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
-        // The last column is black: rounding takes no crossing past it.
-        let last = self.grid.width - 1;
-        list.extend((first..end).map(|row| {
-            let x = upper[0] + slope * (f64::from(row) - upper[1]);
-            Crossing::new(row, ceil_clamped(x, last), rising)
-        }));
-        (end - first) as usize
+        for row in first..end {
+            each(row, upper[0] + slope * (f64::from(row) - upper[1]), rising);
+        }
     }
 
     /// The first row that a point in pixels is past: whose centre is at or

@@ -64,6 +64,11 @@ impl Planes {
         Ok(Self { z_um: (0..count as u32).map(plane).collect(), bottom_um, thickness_um })
     }
 
+    /// A single plane.
+    pub(crate) fn one(z: Length) -> Self {
+        Self { z_um: vec![z.um()], bottom_um: z.um(), thickness_um: 1.0 }
+    }
+
     /// How many layers there are.
     pub(crate) fn len(&self) -> usize {
         self.z_um.len()

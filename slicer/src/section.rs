@@ -1,0 +1,158 @@
+//! One section of a part, along rows, not rounded to pixels.
+
+use lamp_stack::{Dpi, Length};
+use rayon::prelude::*;
+
+use crate::cut::Cutter;
+use crate::error::SliceError;
+use crate::facet::Units;
+use crate::grid::PixelGrid;
+use crate::model::Model;
+use crate::placement::{PlacedModel, Placement};
+use crate::planes::Planes;
+use crate::survey::Survey;
+use crate::table::Fill;
+
+/// How a part is cut once.
+#[derive(Clone, Debug)]
+pub struct SectionOptions {
+    /// What the file's coordinates mean.
+    pub units: Units,
+    /// What is done to the part first.
+    pub placement: Placement,
+    /// What is inside.
+    pub fill: Fill,
+    /// The height of the plane.
+    pub z: Length,
+    /// The rows: their distance, the upper edge of the first in millimetres,
+    /// and how many there are.
+    pub dpi: Dpi,
+    /// See [`Self::dpi`].
+    pub top_mm: f64,
+    /// See [`Self::dpi`].
+    pub rows: u32,
+}
+
+/// Where a line is inside a part: from and to, in millimetres, rising.
+pub type Inside = Vec<[f64; 2]>;
+
+/// Returns where the rows through a part's section are inside it. A crossing
+/// without its fellow, in a row that does not balance, is left out.
+///
+/// # Errors
+/// Where the part is empty, not finite or 1000 km away, or the rows are too
+/// many.
+pub fn section(model: Model, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
+    let model = PlacedModel::new(model, &options.placement, options.units);
+    let survey = Survey::of(&model)?;
+    survey.check_distance()?;
+    let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
+    let planes = Planes::one(options.z);
+    let cutter = Cutter { grid: &grid, planes: &planes, fill: options.fill };
+    let z_um = planes.z_um(0);
+    let found = survey.blocks_between(z_um, z_um).into_par_iter().map(|block| {
+        let mut crossings = Vec::new();
+        model.for_each_in_block(block, |facet| {
+            cutter.for_each_segment(facet, &(0..1), |_, segment| {
+                let [a, b] = segment.ends.map(|end| end.at);
+                cutter.for_each_crossing(a, b, segment.turned, |row, column, rising| {
+                    crossings.push((row, grid.to_mm(column, 0.0)[0], if rising { 1 } else { -1 }));
+                });
+            });
+        })?;
+        Ok(crossings)
+    });
+    let mut crossings = found.collect::<Result<Vec<_>, SliceError>>()?.concat();
+    crossings.par_sort_by(|a, b| a.partial_cmp(b).expect("places are finite"));
+    let mut rows = vec![Inside::new(); options.rows as usize];
+    for row in crossings.chunk_by(|a, b| a.0 == b.0) {
+        rows[row[0].0 as usize] = inside(row, options.fill);
+    }
+    Ok(rows)
+}
+
+/// Pairs the crossings of a row.
+fn inside(crossings: &[(u32, f64, i32)], fill: Fill) -> Inside {
+    let (mut inside, mut entered, mut winding) = (Inside::new(), None, 0);
+    for &(_, x, turn) in crossings {
+        winding += turn;
+        let is_inside = match fill {
+            Fill::EvenOdd => winding % 2 != 0,
+            Fill::NonZero => winding != 0,
+        };
+        match entered {
+            None if is_inside => entered = Some(x),
+            Some(from) if !is_inside => {
+                inside.push([from, x]);
+                entered = None;
+            }
+            _ => {}
+        }
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_fixtures::{sphere, tower};
+
+    use super::*;
+    use crate::slices::{SliceOptions, Slices};
+
+    fn options(z_mm: f64, top_mm: f64, rows: u32) -> SectionOptions {
+        SectionOptions {
+            units: Units::Millimetres,
+            placement: Placement::default(),
+            fill: Fill::EvenOdd,
+            z: Length::from_mm(z_mm),
+            dpi: Dpi::new(254.0).unwrap(),
+            top_mm,
+            rows,
+        }
+    }
+
+    #[test]
+    fn a_sphere_has_chords() {
+        let ball = sphere(5.0, 40_000);
+        let lowest = ball.bounds_mm().0[2];
+        let model = Model::from_facets("ball", ball.facets);
+        let rows = section(model, &options(lowest + 8.0, 6.0, 120)).unwrap();
+        for (row, inside) in rows.iter().enumerate() {
+            let y = 6.0 - (row as f64 + 0.5) * 0.1;
+            let square = 25.0 - 9.0 - y * y;
+            if square < 0.0 {
+                assert!(inside.is_empty());
+            } else if square > 0.5 {
+                let [[from, to]] = inside[..] else { panic!("one chord") };
+                assert!((from + square.sqrt()).abs() < 0.02 && (to - square.sqrt()).abs() < 0.02);
+            }
+        }
+    }
+
+    /// Rounded to columns, they are the layer's transitions.
+    #[test]
+    fn rows_are_those_of_the_layer() {
+        let model = || Model::from_facets("tower", tower(5_000).facets);
+        let slicing = SliceOptions {
+            dpi: Dpi::new(254.0).unwrap(),
+            thickness: Length::from_mm(5.0),
+            ..SliceOptions::default()
+        };
+        let slices = Slices::new(model(), &slicing).unwrap();
+        let grid = *slices.grid();
+        let mut transitions = 0;
+        for (k, layer) in slices.enumerate() {
+            let lamp_stack::Image::Mask(mask) = layer.unwrap().image else { panic!("a mask") };
+            let z_mm = (5.0 * (k as f64 + 1.0)).min(76.2);
+            let rows = section(model(), &options(z_mm, grid.origin_mm[1], grid.height)).unwrap();
+            for (row, inside) in rows.iter().enumerate() {
+                let column = |x: &f64| grid.to_pixels(*x, 0.0)[0].ceil() as u32;
+                let mut rounded: Vec<u32> = inside.as_flattened().iter().map(column).collect();
+                rounded.dedup();
+                assert_eq!(rounded, mask.row(row as u32), "layer {k}, row {row}");
+                transitions += rounded.len();
+            }
+        }
+        assert!(transitions > 2_000);
+    }
+}
