@@ -3,6 +3,7 @@
 use std::fmt;
 use std::io;
 
+use lamp_grayscale::DitherError;
 use lamp_postprocess::TileError;
 use lamp_slicer::SliceError;
 use lamp_stack::{JoinError, SplitError, StackError};
@@ -72,6 +73,12 @@ impl fmt::Display for Stop {
 
 impl From<SliceError> for Stop {
     fn from(error: SliceError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<DitherError> for Stop {
+    fn from(error: DitherError) -> Self {
         Self::Failed(error.into())
     }
 }

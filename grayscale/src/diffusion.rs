@@ -1,11 +1,13 @@
 //! Error diffusion.
 //!
-//! Source: R. W. Floyd and L. Steinberg, An adaptive algorithm for spatial
-//! greyscale, 1976.
+//! Sources: R. W. Floyd and L. Steinberg, An adaptive algorithm for spatial
+//! greyscale, 1976: the shares that neighbours get. R. A. Ulichney, Digital
+//! Halftoning, 1987: thresholds that vary, against worms and checkerboards.
 
-use lamp_stack::{GrayMask, Mask, MaskBuilder, gray_runs};
+use lamp_stack::{GrayMask, Mask, gray_runs};
 
-use crate::row::WhiteRuns;
+use crate::blue_noise::{SCREEN, SIDE};
+use crate::row::{Dots, TooManyRuns};
 
 /// Levels are counted in sixteenths, so that errors divide without loss.
 const WHITE: i32 = 255 * 16;
@@ -13,27 +15,38 @@ const WHITE: i32 = 255 * 16;
 /// Dithers by error diffusion, rows from the top, each from the left. Solid
 /// black and white take no part: error that falls on them is dropped, so that
 /// it cannot make dots where there is no gray.
-pub(crate) fn diffuse(gray: &GrayMask) -> Mask {
+///
+/// A pixel's threshold is that of the blue-noise mask, which starts at `shift`:
+/// other thresholds make other dots of the same density, so layers differ.
+pub(crate) fn diffuse(gray: &GrayMask, shift: [u32; 2]) -> Result<Mask, TooManyRuns> {
     let width = gray.width();
-    let mut mask = MaskBuilder::new(width);
-    let mut white = WhiteRuns::default();
+    let mut dots = Dots::new(width);
     let mut errors = Errors::new(width);
-    for changes in gray.rows() {
+    for (row, changes) in gray.rows().enumerate() {
+        let thresholds = thresholds(SCREEN.row(row + shift[1] as usize));
         for (start, end, level) in gray_runs(changes, width) {
             if level == 255 {
-                white.push(start, end);
+                dots.push_white(start, end);
                 continue;
             }
-            for column in start..end {
-                if errors.settle(column, level) {
-                    white.push(column, column + 1);
-                }
-            }
+            let mut run = errors.of_run(start, end);
+            dots.push_each(start, end, |column| {
+                let place = column.wrapping_add(shift[0]) as usize % SIDE;
+                run.settle(i32::from(level) * 16, thresholds[place])
+            });
+            errors.right = run.right;
         }
         errors.next_row();
-        white.finish(width, |row| mask.push_row(row).expect("runs come from the left"));
+        dots.finish_row()?;
     }
-    mask.finish()
+    Ok(dots.finish())
+}
+
+/// The thresholds of a row, in sixteenths of a level. They keep half of the
+/// mask's distance from the middle: with more windows are less even, with less
+/// more layers have the same dots.
+fn thresholds(least: &[u8]) -> [i32; SIDE] {
+    std::array::from_fn(|column| WHITE / 2 + (i32::from(least[column]) - 128) * 8)
 }
 
 /// The errors that wait for this row's and the next row's pixels. Both hold a
@@ -42,9 +55,9 @@ pub(crate) fn diffuse(gray: &GrayMask) -> Mask {
 struct Errors {
     here: Vec<i32>,
     below: Vec<i32>,
-    /// The columns where something waits below.
-    touched: Vec<u32>,
-    touched_here: Vec<u32>,
+    /// The runs that left something below, first column and end.
+    touched: Vec<(usize, usize)>,
+    touched_here: Vec<(usize, usize)>,
     /// What the last pixel settled gives to its right neighbour.
     right: i32,
     right_column: u32,
@@ -63,30 +76,56 @@ impl Errors {
         }
     }
 
-    /// Whether a pixel becomes white; its error is passed on.
-    fn settle(&mut self, column: u32, level: u8) -> bool {
-        let at = column as usize + 1;
-        let from_left = if self.right_column == column { self.right } else { 0 };
-        let wanted = i32::from(level) * 16 + self.here[at] + from_left;
-        let white = wanted * 2 >= WHITE;
-        let error = wanted - if white { WHITE } else { 0 };
-        let [right, left_below, right_below] = [7, 3, 1].map(|share| error * share / 16);
-        self.below[at - 1] += left_below;
-        self.below[at + 1] += right_below;
-        // What division leaves over goes straight down: nothing is lost.
-        self.below[at] += error - right - left_below - right_below;
-        self.touched.push(column);
-        (self.right, self.right_column) = (right, column + 1);
-        white
+    /// The errors of the pixels from `start` to `end`, which are now settled.
+    fn of_run(&mut self, start: u32, end: u32) -> RunErrors<'_> {
+        let right = if self.right_column == start { self.right } else { 0 };
+        self.right_column = end;
+        let (start, end) = (start as usize, end as usize);
+        self.touched.push((start, end));
+        RunErrors {
+            here: &self.here[start + 1..=end],
+            below: &mut self.below[start..end + 2],
+            right,
+            settled: 0,
+        }
     }
 
     fn next_row(&mut self) {
-        for column in self.touched_here.drain(..) {
-            self.here[column as usize..column as usize + 3].fill(0);
+        for (start, end) in self.touched_here.drain(..) {
+            self.here[start..end + 2].fill(0);
         }
         std::mem::swap(&mut self.here, &mut self.below);
         std::mem::swap(&mut self.touched_here, &mut self.touched);
         self.right_column = u32::MAX;
+    }
+}
+
+/// The errors of a run's pixels, from the left.
+struct RunErrors<'a> {
+    /// What waits for the run's pixels.
+    here: &'a [i32],
+    /// What waits below them, and below their neighbours on both sides.
+    below: &'a mut [i32],
+    /// What waits for the next pixel from its left.
+    right: i32,
+    settled: usize,
+}
+
+impl RunErrors<'_> {
+    /// Whether the next pixel becomes white; its error is passed on.
+    fn settle(&mut self, level: i32, threshold: i32) -> bool {
+        let at = self.settled;
+        let wanted = level + self.here[at] + self.right;
+        let white = wanted >= threshold;
+        let error = wanted - if white { WHITE } else { 0 };
+        let [right, left_below, right_below] = [7, 3, 1].map(|share| error * share / 16);
+        self.below[at] += left_below;
+        // What division leaves over goes straight down: nothing is lost.
+        self.below[at + 1] += error - right - left_below - right_below;
+        self.below[at + 2] += right_below;
+        self.right = right;
+        self.settled += 1;
+        white
     }
 }
 
@@ -105,28 +144,36 @@ mod tests {
     #[test]
     fn the_mean_is_kept() {
         for level in [1, 13, 64, 127, 128, 200, 254] {
-            let white = diffuse(&flat(level, 200, 200)).white_pixels() as f64;
+            let dots = diffuse(&flat(level, 200, 200), [0, 0]).unwrap();
             let expected = f64::from(level) / 255.0 * 40_000.0;
             // Errors leave only over the edges: at most one pixel for each
             // two on the rim.
+            let white = dots.white_pixels() as f64;
             assert!((white - expected).abs() < 400.0, "{level}: {white} for {expected}");
         }
     }
 
     #[test]
-    fn half_gray_is_a_checkerboard_at_its_start() {
-        let dots = diffuse(&flat(128, 8, 2));
-        assert_eq!(dots.row(0), [0, 1, 2, 3, 4, 5, 6, 7]);
-        assert_eq!(dots.row(1), [1, 2, 3, 4, 5, 6, 7]);
+    fn an_error_is_passed_on_whole_in_the_shares_of_the_paper() {
+        let mut errors = Errors::new(3);
+        let mut run = errors.of_run(1, 2);
+        // An error of 160 sixteenths, and one that does not divide.
+        assert!(!run.settle(160, WHITE / 2));
+        assert_eq!((run.right, &*run.below), (70, &[30, 50, 10][..]));
+        let mut run = errors.of_run(0, 1);
+        assert!(run.settle(WHITE - 23, WHITE / 2));
+        assert_eq!((run.right, run.below[0], run.below[2]), (-10, -4, 50 - 1));
+        assert_eq!(run.below.iter().sum::<i32>() + run.right, 30 + 50 - 23);
     }
 
     #[test]
     fn rows_after_a_pause_start_without_error() {
         let mut gray = flat(120, 40, 3);
-        gray.push_runs([]).unwrap();
-        gray.push_runs([]).unwrap();
+        let start = diffuse(&gray, [0, 0]).unwrap();
+        for _ in 3..SIDE {
+            gray.push_runs([]).unwrap();
+        }
         gray.push_runs([(40, 120)]).unwrap();
-        let dots = diffuse(&gray);
-        assert_eq!(dots.row(5), dots.row(0));
+        assert_eq!(diffuse(&gray, [0, 0]).unwrap().row(SIDE as u32), start.row(0));
     }
 }

@@ -1,50 +1,90 @@
 //! Dithering as a stage.
 
-use lamp_stack::{GrayMask, Image, Layer, Mask, map_in_order};
+use lamp_stack::{GrayMask, Image, Layer, MOST_RUNS, Mask, map_in_order};
+use thiserror::Error;
 
-use crate::diffusion::diffuse;
-use crate::ordered::order;
+use crate::row::TooManyRuns;
+use crate::{blue_noise, diffusion, ordered, threshold};
 
 /// How gray becomes dots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// A fixed pattern of 16 x 16 thresholds: the same dots wherever the same
-    /// level stands at the same place, in every layer.
+    /// A mask of 128 x 128 thresholds that keeps dots apart and follows no
+    /// pattern; it moves from layer to layer.
     #[default]
+    BlueNoise,
+    /// Bayer's pattern of 16 x 16 thresholds; it moves from layer to layer.
     Ordered,
-    /// Each pixel's error goes to the gray pixels right of and below it.
+    /// Each pixel's error goes to the gray pixels right of and below it; the
+    /// thresholds are those of the blue-noise mask.
     FloydSteinberg,
+    /// No dots: pixels of at least half the full level (128 of 255) are white.
+    Threshold,
 }
 
 impl Method {
+    /// Every method.
+    pub const ALL: [Self; 4] =
+        [Self::BlueNoise, Self::Ordered, Self::FloydSteinberg, Self::Threshold];
+
     /// The method's name in options and metadata.
     pub fn name(self) -> &'static str {
         match self {
+            Self::BlueNoise => "blue-noise",
             Self::Ordered => "ordered",
             Self::FloydSteinberg => "floyd-steinberg",
+            Self::Threshold => "threshold",
         }
     }
 }
 
+/// Why a layer was not dithered.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum DitherError {
+    /// The dots are more runs than any reader of stacks takes.
+    #[error(
+        "layer {layer}: its dots make more than {MOST_RUNS} runs, too many for any reader of the \
+         stack: expose part of the area at a time, or make fewer pixels gray"
+    )]
+    TooManyRuns {
+        /// The layer's index.
+        layer: u32,
+    },
+}
+
 /// Turns gray layers into masks; their pages then name the method. Masks pass
-/// unchanged.
-pub fn dither<E: Send>(
+/// unchanged. A layer's dots depend on its image and its index alone.
+///
+/// # Errors
+/// Those of `layers` and of [`dither_image`].
+pub fn dither<E: From<DitherError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     method: Method,
 ) -> impl Iterator<Item = Result<Layer, E>> {
     map_in_order(layers, move |mut layer| {
         if let Image::Gray(gray) = &layer.image {
-            layer.image = Image::Mask(dither_image(gray, method));
+            layer.image = Image::Mask(dither_image(gray, method, layer.info.index)?);
             layer.info.other.insert("dither".to_owned(), method.name().into());
         }
         Ok(layer)
     })
 }
 
-/// Turns a gray image into dots. Level 0 stays black and level 255 white.
-pub fn dither_image(gray: &GrayMask, method: Method) -> Mask {
-    match method {
-        Method::Ordered => order(gray),
-        Method::FloydSteinberg => diffuse(gray),
-    }
+/// Turns the gray image of the layer of that index into dots. Level 0 stays
+/// black and level 255 white.
+///
+/// The pattern starts at the image's top left corner, at a place that the index
+/// gives, so that the holes of one layer do not lie on those of the next.
+///
+/// # Errors
+/// Where the dots make more runs than [`MOST_RUNS`].
+pub fn dither_image(gray: &GrayMask, method: Method, layer: u32) -> Result<Mask, DitherError> {
+    let dots = match method {
+        Method::BlueNoise => blue_noise::SCREEN.dither(gray, blue_noise::shift(layer)),
+        Method::Ordered => ordered::SCREEN.dither(gray, ordered::shift(layer)),
+        Method::FloydSteinberg => diffusion::diffuse(gray, blue_noise::shift(layer)),
+        Method::Threshold => threshold::threshold(gray),
+    };
+    dots.map_err(|TooManyRuns| DitherError::TooManyRuns { layer })
 }

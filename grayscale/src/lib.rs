@@ -2,8 +2,9 @@
 //! levels to dots: a machine that can only expose or not realises a gray level as
 //! the share of its pixels that are white (002 section 3.3.1).
 //!
-//! Both dithering methods leave solid black and white alone, so their cost follows the
-//! gray pixels, and no dot appears outside the part.
+//! All dithering methods leave solid black and white alone, so their cost follows the
+//! gray pixels, and no dot appears outside the part. [`homogeneity`] says whether the
+//! resin averages dots of a size.
 //!
 //! ```
 //! use lamp_grayscale::{Method, dither_image};
@@ -13,16 +14,25 @@
 //! for _ in 0..16 {
 //!     gray.push_runs([(16, 0), (16, 64), (16, 255)]).unwrap();
 //! }
-//! let dots = dither_image(&gray, Method::Ordered);
+//! let layer = 7;
+//! let dots = dither_image(&gray, Method::Ordered, layer)?;
 //! // A quarter of the 256 gray pixels, and all the white ones.
 //! assert_eq!(dots.white_pixels(), 64 + 256);
+//! # Ok::<_, lamp_grayscale::DitherError>(())
 //! ```
 
+mod blue_noise;
 mod diffusion;
 mod dither;
+mod homogeneous;
 pub mod material;
 mod ordered;
 pub mod resin;
 mod row;
+mod screen;
+mod threshold;
+#[cfg(test)]
+mod void_and_cluster;
 
-pub use dither::{Method, dither, dither_image};
+pub use dither::{DitherError, Method, dither, dither_image};
+pub use homogeneous::{EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};

@@ -1,29 +1,189 @@
-//! Rows of dots, gathered from the left.
+//! Images of dots, gathered run by run from the top left.
 
-/// A row's transitions, made from its white runs.
-#[derive(Debug, Default)]
-pub(crate) struct WhiteRuns {
-    transitions: Vec<u32>,
+use lamp_stack::{MOST_RUNS, Mask, MaskBuilder};
+
+/// The dots are more runs than a reader of stacks takes.
+#[derive(Debug)]
+pub(crate) struct TooManyRuns;
+
+/// An image of dots in the making. Within a row, runs come from the left and
+/// do not overlap; what lies between them is black.
+pub(crate) struct Dots {
+    mask: MaskBuilder,
+    width: u32,
+    /// The row's transitions so far. Between two calls their number is even.
+    row: Vec<u32>,
+    /// The transitions of the rows above.
+    above: usize,
 }
 
-impl WhiteRuns {
-    /// Makes the pixels from `start` to `end` white. Runs come from the left
-    /// and do not overlap.
-    pub(crate) fn push(&mut self, start: u32, end: u32) {
-        if self.transitions.last() == Some(&start) {
-            self.transitions.pop();
-        } else {
-            self.transitions.push(start);
-        }
-        self.transitions.push(end);
+impl Dots {
+    pub(crate) fn new(width: u32) -> Self {
+        Self { mask: MaskBuilder::new(width), width, row: Vec::new(), above: 0 }
     }
 
-    /// Gives the transitions of a row of `width` pixels, and starts anew.
-    pub(crate) fn finish(&mut self, width: u32, give: impl FnOnce(&[u32])) {
-        if self.transitions.last() == Some(&width) {
-            self.transitions.pop();
+    /// Makes the pixels from `start` to `end` white.
+    pub(crate) fn push_white(&mut self, start: u32, end: u32) {
+        if !self.reopen(start) {
+            self.row.push(start);
         }
-        give(&self.transitions);
-        self.transitions.clear();
+        self.row.push(end);
+    }
+
+    /// Asks for each pixel from `start` to `end` whether it is white.
+    pub(crate) fn push_each(
+        &mut self,
+        start: u32,
+        end: u32,
+        mut is_white: impl FnMut(u32) -> bool,
+    ) {
+        let mut white = self.reopen(start);
+        let mut len = self.row.len();
+        self.row.resize(len + (end - start) as usize + 1, 0);
+        // Half of all dots change colour, at random: no branch foresees that.
+        for column in start..end {
+            let next = is_white(column);
+            self.row[len] = column;
+            len += usize::from(next != white);
+            white = next;
+        }
+        self.row[len] = end;
+        self.row.truncate(len + usize::from(white));
+    }
+
+    /// Repeats a pattern of `period` pixels from `start` to `end`, which
+    /// begins at the pattern's column `phase`.
+    pub(crate) fn push_pattern(
+        &mut self,
+        (start, end): (u32, u32),
+        pattern: Pattern<'_>,
+        phase: u32,
+        period: u32,
+    ) {
+        let mut from = pattern.changes.partition_point(|&column| u32::from(column) <= phase);
+        let white = pattern.ends_white ^ (from % 2 == 1);
+        match (self.reopen(start), white) {
+            (true, false) | (false, true) => self.row.push(start),
+            _ => {}
+        }
+        // The pattern may begin left of the image: then this wraps, and wraps
+        // back when columns are added.
+        let mut origin = start.wrapping_sub(phase);
+        while end.wrapping_sub(origin) > period {
+            self.copy(&pattern.changes[from..], origin);
+            (from, origin) = (0, origin.wrapping_add(period));
+        }
+        let rest = end.wrapping_sub(origin);
+        let to = pattern.changes.partition_point(|&column| u32::from(column) < rest);
+        self.copy(&pattern.changes[from.min(to)..to], origin);
+        if self.row.len() % 2 == 1 {
+            self.row.push(end);
+        }
+    }
+
+    fn copy(&mut self, changes: &[u8], origin: u32) {
+        self.row.extend(changes.iter().map(|&column| origin.wrapping_add(column.into())));
+    }
+
+    /// Whether the pixel left of `start` is white; its run is then open again.
+    fn reopen(&mut self, start: u32) -> bool {
+        self.row.pop_if(|end| *end == start).is_some()
+    }
+
+    /// Ends a row.
+    pub(crate) fn finish_row(&mut self) -> Result<(), TooManyRuns> {
+        self.row.pop_if(|end| *end == self.width);
+        self.above += self.row.len();
+        if self.above > MOST_RUNS {
+            return Err(TooManyRuns);
+        }
+        self.mask.push_row(&self.row).expect("runs come from the left");
+        self.row.clear();
+        Ok(())
+    }
+
+    /// The image of the rows ended.
+    pub(crate) fn finish(self) -> Mask {
+        self.mask.finish()
+    }
+}
+
+/// A row of dots that repeats.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pattern<'a> {
+    /// The columns whose colour is not that of the column left of them; left of
+    /// column 0 is the last one. Their number is even.
+    pub(crate) changes: &'a [u8],
+    /// The colour of the last column.
+    pub(crate) ends_white: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const WIDTH: u32 = 60;
+
+    /// What one run of pixels is given as.
+    #[derive(Clone, Debug)]
+    enum Given {
+        Black,
+        White,
+        Each,
+        Pattern,
+    }
+
+    fn given() -> impl Strategy<Value = Given> {
+        prop_oneof![Just(Given::Black), Just(Given::White), Just(Given::Each), Just(Given::Pattern)]
+    }
+
+    fn changes(period: &[bool]) -> Vec<u8> {
+        let before = |at: usize| period[(at + period.len() - 1) % period.len()];
+        (0..period.len()).filter(|&at| period[at] != before(at)).map(|at| at as u8).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn pixels_are_what_they_were_given_as(
+            runs in prop::collection::vec((1u32..25, given()), 1..12),
+            period in prop::sample::select(vec![1usize, 4, 8, 16]),
+            dots in prop::collection::vec(any::<bool>(), 16),
+            shift in 0u32..16,
+        ) {
+            let tile = &dots[..period];
+            let pattern_at = |column: u32| tile[(column + shift) as usize % period];
+            let changes = changes(tile);
+            let pattern = Pattern { changes: &changes, ends_white: tile[period - 1] };
+            let mut image = Dots::new(WIDTH);
+            let mut wanted = Vec::new();
+            for (length, given) in runs {
+                let start = wanted.len() as u32;
+                let end = (start + length).min(WIDTH);
+                if start == end {
+                    break;
+                }
+                wanted.extend((start..end).map(|column| match given {
+                    Given::Black => false,
+                    Given::White => true,
+                    Given::Each | Given::Pattern => pattern_at(column),
+                }));
+                let phase = (start + shift) % period as u32;
+                match given {
+                    Given::Black => {}
+                    Given::White => image.push_white(start, end),
+                    Given::Each => image.push_each(start, end, pattern_at),
+                    Given::Pattern => {
+                        image.push_pattern((start, end), pattern, phase, period as u32);
+                    }
+                }
+            }
+            wanted.resize(WIDTH as usize, false);
+            image.finish_row().unwrap();
+            let mask = image.finish();
+            let found: Vec<bool> = (0..WIDTH).map(|column| mask.is_white(column, 0)).collect();
+            prop_assert_eq!(found, wanted);
+        }
     }
 }

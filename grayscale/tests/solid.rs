@@ -1,6 +1,6 @@
 //! What dithering must leave alone.
 
-use lamp_grayscale::{Method, dither, dither_image};
+use lamp_grayscale::{DitherError, Method, dither, dither_image};
 use lamp_stack::{GrayMask, Image, Layer, Mask, PageInfo};
 use proptest::prelude::*;
 
@@ -21,9 +21,9 @@ fn level_at(gray: &GrayMask, column: u32, row: usize) -> u8 {
 
 proptest! {
     #[test]
-    fn solid_pixels_keep_their_colour(gray in gray_image()) {
-        for method in [Method::Ordered, Method::FloydSteinberg] {
-            let dots = dither_image(&gray, method);
+    fn solid_pixels_keep_their_colour(gray in gray_image(), layer in any::<u32>()) {
+        for method in Method::ALL {
+            let dots = dither_image(&gray, method, layer).unwrap();
             prop_assert_eq!((dots.width(), dots.height()), (gray.width(), gray.height()));
             for pixel in 0..gray.width() * gray.height() {
                 let (column, row) = (pixel % 100, pixel / 100);
@@ -43,10 +43,21 @@ fn masks_pass_unchanged_and_gray_pages_name_the_method() {
     let mask = Image::Mask(Mask::new(8, vec![0, 2], vec![1, 4]).unwrap());
     let masked = Layer { info: info.clone(), dpi: None, image: mask };
     let gray = Layer { info, dpi: None, image: Image::Gray(GrayMask::new(8)) };
-    let layers = [Ok::<_, ()>(masked.clone()), Ok(gray)];
+    let layers = [Ok::<_, DitherError>(masked.clone()), Ok(gray)];
     let out: Vec<_> =
         dither(layers.into_iter(), Method::FloydSteinberg).map(Result::unwrap).collect();
     assert_eq!(out[0], masked);
     assert!(matches!(out[1].image, Image::Mask(_)));
     assert_eq!(out[1].info.other["dither"], "floyd-steinberg");
+}
+
+/// A row of half gray makes up to a run a pixel: the page is refused, not tried.
+#[test]
+fn dots_that_no_reader_takes_are_refused() {
+    let mut gray = GrayMask::new(1 << 26);
+    for _ in 0..8 {
+        gray.push_runs([(1 << 26, 128)]).unwrap();
+    }
+    let error = dither_image(&gray, Method::BlueNoise, 3).unwrap_err();
+    assert!(error.to_string().starts_with("layer 3: its dots make more than 134217728 runs"));
 }

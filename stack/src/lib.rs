@@ -49,7 +49,7 @@ pub use input::Pages;
 pub use join::{JoinError, join};
 pub use layer::{Image, Layer, PageInfo, StackInfo};
 pub use length::{Dpi, Length, LengthError, Size};
-pub use mask::{Mask, MaskBuilder, MaskError, white_in_row};
+pub use mask::{MOST_RUNS, Mask, MaskBuilder, MaskError, white_in_row};
 pub use ordered::{Held, map_in_order};
 pub use output::{Destination, write_stack};
 pub use png_write::{png_of_layer, write_gray_png, write_png_folder, write_rgb_png};

@@ -40,7 +40,7 @@ impl Eq for Mask {}
 
 /// An image has at most so many transitions, far more than any layer: what a
 /// reader takes before it gives up.
-pub(crate) const MOST_RUNS: usize = 1 << 27;
+pub const MOST_RUNS: usize = 1 << 27;
 
 /// Why arrays are not a mask.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

@@ -97,7 +97,10 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("tile cube.tif --area 0x5mm -o x.tif", &["--area"]),
         ("tile cube.tif --copies 0 -o x.tif", &["--copies"]),
         ("tile cube.tif --gap -1mm -o x.tif", &["below zero"]),
-        ("dither cube.tif --method magic -o x.tif", &["magic", "ordered", "floyd-steinberg"]),
+        (
+            "dither cube.tif --method magic -o x.tif",
+            &["magic", "blue-noise", "ordered", "floyd-steinberg", "threshold"],
+        ),
         ("lamp sample teapot -o x.stl", &["teapot", "blade"]),
         ("lamp sample tower --facets 999 -o x.stl", &["at least 1000 facets, not 999"]),
         ("lamp sample tower --facets some -o x.stl", &["`some` is not a count", "750k"]),

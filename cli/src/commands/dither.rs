@@ -1,5 +1,6 @@
 use clap::{Args, ValueEnum};
-use lamp_grayscale::Method;
+use lamp_grayscale::{EVEN_DOTS, Homogeneity, Method, UNEVEN_DOTS, homogeneity};
+use lamp_stack::{Image, Layer, Length};
 
 use crate::options::{Common, Input, Output};
 use crate::stop::Stop;
@@ -7,17 +8,22 @@ use crate::streams::{read_layers, report, write_layers};
 
 /// Turn gray layers into dots; 1-bit layers pass unchanged
 ///
-/// Solid black and white are left alone: no dot appears outside the part.
+/// A gray level becomes the share of its pixels that are white. Solid black and white are left
+/// alone: no dot appears outside the part. The pattern moves from layer to layer, so that holes do
+/// not stack; the same layer always becomes the same dots. Resin averages dots of 17 um, but not of
+/// 85 um: pixels wider than 17 um are told of.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   slice blade.stl | fix | dither | tile > build.tif
-  dither gray.tif --method floyd-steinberg -o dots.tif")]
+  dither gray.tif --layers 100..200 -o dots.tif
+  dither gray.tif --method floyd-steinberg -o dots.tif
+  dither scans/ --method threshold -o masks/")]
 pub(crate) struct DitherArgs {
     #[command(flatten)]
     input: Input,
 
-    /// How gray becomes dots: by a fixed 16 x 16 pattern, or by error diffusion
+    /// How gray becomes dots
     #[arg(long, value_enum, default_value_t)]
     method: MethodArg,
 
@@ -27,17 +33,88 @@ pub(crate) struct DitherArgs {
 
 #[derive(Clone, Copy, Default, ValueEnum)]
 enum MethodArg {
+    /// Dots far from each other, in no pattern: a mask of 128 x 128 thresholds
     #[default]
+    BlueNoise,
+    /// Bayer's pattern of 16 x 16 thresholds
     Ordered,
+    /// Error diffusion, with the thresholds of blue noise
     FloydSteinberg,
+    /// No dots: levels of 128 and more, of 255, are white
+    Threshold,
+}
+
+impl From<MethodArg> for Method {
+    fn from(method: MethodArg) -> Self {
+        match method {
+            MethodArg::BlueNoise => Self::BlueNoise,
+            MethodArg::Ordered => Self::Ordered,
+            MethodArg::FloydSteinberg => Self::FloydSteinberg,
+            MethodArg::Threshold => Self::Threshold,
+        }
+    }
 }
 
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Stop> {
-    let method = match args.method {
-        MethodArg::Ordered => Method::Ordered,
-        MethodArg::FloydSteinberg => Method::FloydSteinberg,
-    };
+    let method = args.method.into();
     let report = report("dither", common, &args.output);
-    let layers = read_layers(&args.input, &report)?;
+    let mut told = method == Method::Threshold;
+    let layers = read_layers(&args.input, &report)?.inspect(|layer| {
+        if let Some(line) = layer.as_ref().ok().filter(|_| !told).and_then(unevenness) {
+            told = true;
+            report.say(&line);
+        }
+    });
     write_layers(lamp_grayscale::dither(layers, method), &args.output, &report)
+}
+
+/// What is to be feared of the dots of a gray layer, if its pixels are wider
+/// than what is known to cure evenly.
+fn unevenness(layer: &Layer) -> Option<String> {
+    let Image::Gray(_) = layer.image else { return None };
+    let pitch = layer.dpi?.pitch();
+    let fear = match homogeneity(pitch) {
+        Homogeneity::Even => return None,
+        Homogeneity::Unknown => {
+            "between them nothing is known: expose a test film, or slice at 1500 dpi or more"
+        }
+        Homogeneity::Uneven => "gray will cure as spots: slice at 1500 dpi or more",
+    };
+    let [pitch, even, uneven] = [pitch, EVEN_DOTS, UNEVEN_DOTS].map(short);
+    Some(format!(
+        "dots are as wide as pixels, {pitch} um; dots of {even} um cured evenly, those of \
+         {uneven} um did not; {fear}"
+    ))
+}
+
+/// Micrometres with as many digits as matter.
+fn short(length: Length) -> String {
+    let um = (length.um() * 10.0).round() / 10.0;
+    um.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{Dpi, GrayMask, Mask, PageInfo};
+
+    use super::*;
+
+    fn told(dpi: Option<f64>, image: Image) -> Option<String> {
+        let dpi = dpi.map(|dpi| Dpi::new(dpi).unwrap());
+        unevenness(&Layer { info: PageInfo::default(), dpi, image })
+    }
+
+    #[test]
+    fn dots_that_may_cure_unevenly_are_told_of_with_the_figures() {
+        let gray = || Image::Gray(GrayMask::new(8));
+        for dpi in [None, Some(1500.0), Some(2400.0)] {
+            assert_eq!(told(dpi, gray()), None);
+        }
+        assert_eq!(told(Some(100.0), Image::Mask(Mask::black(8, 0))), None);
+        let unknown = told(Some(1000.0), gray()).unwrap();
+        let uneven = told(Some(300.0), gray()).unwrap();
+        assert!(unknown.contains("pixels, 25.4 um; dots of 17 um cured evenly"), "{unknown}");
+        assert!(unknown.contains("those of 85 um did not; between them"), "{unknown}");
+        assert!(uneven.contains("pixels, 84.7 um") && uneven.contains("spots"), "{uneven}");
+    }
 }

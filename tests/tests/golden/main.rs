@@ -110,11 +110,11 @@ fn dithered() -> Images {
     let scratch = Scratch::new();
     write_gray_ramp(&scratch.path("ramp.tif"), 256, 64);
     let dots = |method: &str| {
-        let line = format!("dither ramp.tif --method {method}");
+        let line = format!("dither -q ramp.tif --method {method}");
         let layers = read_stack(scratch.run(&line).succeeds_quietly().stdout);
         (format!("ramp_{method}"), mask(&layers[0]).clone())
     };
-    vec![dots("ordered"), dots("floyd-steinberg")]
+    ["blue-noise", "ordered", "floyd-steinberg", "threshold"].map(dots).to_vec()
 }
 
 #[test]

@@ -1,0 +1,65 @@
+//! Whether the resin averages dots of a size, or cures each by itself.
+//!
+//! Source: 002 section 3.3.6 and figure 57. Checkerboards of one mean level
+//! cured to an even film with squares of 17 um, and to distinct cured and
+//! uncured regions with squares of 85, 170 and 255 um. Between 17 and 85 um
+//! nothing was tried.
+
+use lamp_stack::Length;
+
+/// The widest dots that cured evenly.
+pub const EVEN_DOTS: Length = Length::from_um(17.0);
+/// The narrowest dots that did not.
+pub const UNEVEN_DOTS: Length = Length::from_um(85.0);
+
+/// The source's figures are pixels of 1500 dpi in whole micrometres: 85 stands
+/// for 84.67.
+const ROUNDING: f64 = 0.01;
+
+/// How a film cures under dots of some size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Homogeneity {
+    /// Evenly: the dots are no wider than those that did.
+    Even,
+    /// Not known: the dots are wider than those that cured evenly, but not as
+    /// wide as those that did not.
+    Unknown,
+    /// Each dot by itself.
+    Uneven,
+}
+
+/// Says how a film cures under dots as wide as the pixels of a pitch: the cells
+/// of every method are single pixels.
+pub fn homogeneity(pitch: Length) -> Homogeneity {
+    if pitch.um() <= EVEN_DOTS.um() * (1.0 + ROUNDING) {
+        Homogeneity::Even
+    } else if pitch.um() < UNEVEN_DOTS.um() * (1.0 - ROUNDING) {
+        Homogeneity::Unknown
+    } else {
+        Homogeneity::Uneven
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::Dpi;
+
+    use super::*;
+
+    #[test]
+    fn pixels_of_the_study_and_of_machines() {
+        for (dpi, expected) in [
+            (2400.0, Homogeneity::Even),
+            // 16.93 um, printed as 17.
+            (1500.0, Homogeneity::Even),
+            (1494.0, Homogeneity::Even),
+            (1270.0, Homogeneity::Unknown),
+            (400.0, Homogeneity::Unknown),
+            // 84.67 um, printed as 85.
+            (300.0, Homogeneity::Uneven),
+            (100.0, Homogeneity::Uneven),
+        ] {
+            assert_eq!(homogeneity(Dpi::new(dpi).unwrap().pitch()), expected, "{dpi} dpi");
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! What dots must be, whatever the image: even in density, without clusters,
+//! elsewhere in the next layer. 002 section 3.3.6 is why.
+
+mod density;
+mod layers;
+mod spectrum;
+mod tiles;
+
+use lamp_grayscale::{Method, dither_image};
+use lamp_stack::{GrayMask, Mask};
+
+/// The methods that make dots.
+const DOTS: [Method; 3] = [Method::BlueNoise, Method::Ordered, Method::FloydSteinberg];
+
+/// The period of every method's pattern, in pixels and in layers but for the
+/// ordered one's 256 layers.
+const PERIOD: u32 = 128;
+
+/// Returns a square image of one level.
+fn flat(level: u8, side: u32) -> GrayMask {
+    let mut gray = GrayMask::new(side);
+    for _ in 0..side {
+        gray.push_runs([(side, level)]).unwrap();
+    }
+    gray
+}
+
+/// Returns the dots of a level in a layer.
+fn dots(method: Method, level: u8, side: u32, layer: u32) -> Mask {
+    dither_image(&flat(level, side), method, layer).unwrap()
+}
+
+/// Returns a mask's pixels, row by row.
+fn pixels(mask: &Mask) -> Vec<bool> {
+    let mut pixels = Vec::new();
+    for row in mask.rows() {
+        let start = pixels.len();
+        pixels.resize(start + mask.width() as usize, false);
+        for run in row.chunks(2) {
+            let end = run.get(1).copied().unwrap_or(mask.width());
+            pixels[start + run[0] as usize..start + end as usize].fill(true);
+        }
+    }
+    pixels
+}
