@@ -1,11 +1,13 @@
 //! Slicing, encoding and decoding of blade-mould layers, beside the `fax`
-//! crate on the same pixels. Throughput counts transitions.
+//! crate on the same pixels; throughput counts transitions. Dithering of a
+//! page of 900 megapixels; throughput counts gray pixels.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use fax::{Color, VecWriter, decoder, encoder};
 use lamp_fixtures::{Part, build};
+use lamp_grayscale::{Method, dither_image};
 use lamp_slicer::{Model, SliceOptions, Slices};
-use lamp_stack::{Image, Mask, g4};
+use lamp_stack::{GrayMask, Image, Mask, g4};
 
 /// Layers with pins and holes, 1500 dpi.
 const LAYERS: std::ops::Range<u32> = 440..460;
@@ -84,5 +86,38 @@ fn layers(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, layers);
+/// The page of a large machine, 34,500 x 26,000 pixels: white, with so many
+/// runs of gray in each row.
+fn page(runs: u32, length: u32) -> GrayMask {
+    let mut page = GrayMask::new(34_500);
+    for row in 0..26_000 {
+        let level = |run: u32| (row / 16 + run * 41) % 254 + 1;
+        let pair = |run: u32| [(34_500 / runs - length, 255), (length, level(run) as u8)];
+        page.push_runs((0..runs).flat_map(pair)).expect("as many pixels as the width");
+    }
+    page
+}
+
+fn dither(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("dither");
+    group.sample_size(10);
+    let mut bench = |name: String, page: &GrayMask, runs: u32, length: u32, method| {
+        group.throughput(Throughput::Elements(u64::from(26_000 * runs * length)));
+        group.bench_function(name, |b| b.iter(|| dither_image(page, method, 1)));
+    };
+    for runs in [22, 43, 86] {
+        let name = format!("blue-noise, {runs} runs of 40 gray pixels in a row");
+        bench(name, &page(runs, 40), runs, 40, Method::BlueNoise);
+    }
+    for (runs, length) in [(43, 40), (2, 860), (430, 4)] {
+        let page = page(runs, length);
+        for method in Method::ALL {
+            let name = format!("{}, {runs} runs of {length}", method.name());
+            bench(name, &page, runs, length, method);
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, layers, dither);
 criterion_main!(benches);
