@@ -17,7 +17,7 @@ pub(crate) struct Screen {
 
 /// Runs shorter than this are dithered pixel by pixel: looking the pattern up
 /// costs as much as so many pixels.
-const SHORT: u32 = 12;
+const SHORT: u32 = 16;
 
 impl Screen {
     /// The screen that fills its places in the order of their ranks, which
