@@ -13,6 +13,7 @@ mod options;
 mod picture;
 mod placement;
 mod report;
+mod section;
 mod signals;
 mod stop;
 mod streams;

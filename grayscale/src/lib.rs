@@ -22,6 +22,7 @@
 //! ```
 
 mod blue_noise;
+mod cured;
 mod diffusion;
 mod dither;
 mod homogeneous;
@@ -34,5 +35,6 @@ mod threshold;
 #[cfg(test)]
 mod void_and_cluster;
 
+pub use cured::{CuredLine, Line, Solid, excess};
 pub use dither::{DitherError, Method, dither, dither_image};
 pub use homogeneous::{EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};

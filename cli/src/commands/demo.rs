@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Context;
-use clap::{Args, Parser};
+use clap::Args;
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::Method;
 use lamp_postprocess::{FixOptions, TileOptions, fix, tile};
@@ -76,12 +76,7 @@ struct StackSize {
 
 /// The four stages in one process: no coding in between.
 fn run_pipeline(stl: &Path, stack: &Path, report: &Report) -> Result<StackSize, Stop> {
-    #[derive(Parser)]
-    struct Defaults {
-        #[command(flatten)]
-        options: PartOptions,
-    }
-    let Defaults { options } = Defaults::parse_from(["slice"]);
+    let options = PartOptions::of_command("slice").expect("every option has a default");
     let model = Model::open(stl)?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
     let (slices, name_command) = options.slices(model, &file, None, None, None)?;

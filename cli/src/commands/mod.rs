@@ -1,6 +1,7 @@
 //! One file a command: its options, and what it does with them.
 
 mod convert;
+mod cure;
 mod demo;
 mod dither;
 mod fix;
@@ -9,7 +10,7 @@ mod join;
 mod material;
 mod sample;
 mod show;
-mod slice;
+pub(crate) mod slice;
 mod split;
 mod tile;
 
@@ -32,6 +33,7 @@ pub(crate) enum Command {
     Join(join::JoinArgs),
     Split(split::SplitArgs),
     Material(material::MaterialArgs),
+    Cure(cure::CureArgs),
 }
 
 impl Command {
@@ -60,6 +62,7 @@ impl Command {
             Self::Join(_) => "join",
             Self::Split(_) => "split",
             Self::Material(_) => "material",
+            Self::Cure(_) => "cure",
         }
     }
 
@@ -77,6 +80,7 @@ impl Command {
             Self::Join(args) => join::run(args, common),
             Self::Split(args) => split::run(args, common),
             Self::Material(args) => material::run(args),
+            Self::Cure(args) => cure::run(args, common),
         }
     }
 }

@@ -2,7 +2,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
 use lamp_grayscale::resin::ExposureTime;
 use lamp_slicer::{
     DepthLevels, Fill, Frame, Model, PixelGrid, PlaneRule, SliceError, SliceOptions, Slices,
@@ -148,7 +148,7 @@ enum FillArg {
 }
 
 impl PartOptions {
-    fn for_slicing(&self) -> SliceOptions {
+    pub(crate) fn for_slicing(&self) -> SliceOptions {
         SliceOptions {
             dpi: self.dpi,
             thickness: self.thickness,
@@ -179,6 +179,21 @@ impl PartOptions {
             }
             _ => Frame::Around { margin: self.margin },
         }
+    }
+
+    /// The options of a command as a stack remembers it, where that is a slice
+    /// command.
+    pub(crate) fn of_command(command: &str) -> Option<Self> {
+        #[derive(Parser)]
+        struct Recorded {
+            #[command(flatten)]
+            options: PartOptions,
+        }
+        // The name of the part may hold blanks.
+        let rest = command.strip_prefix("slice")?;
+        let options = rest.find(" --").map_or("", |start| &rest[start..]);
+        let words = ["slice"].into_iter().chain(options.split_whitespace());
+        Recorded::try_parse_from(words).ok().map(|recorded| recorded.options)
     }
 
     /// The command as the stack remembers it: no paths, no option that leaves
@@ -313,7 +328,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
 }
 
 /// Opens all files of a part.
-fn open_models(paths: &[PathBuf]) -> Result<Model, Stop> {
+pub(crate) fn open_models(paths: &[PathBuf]) -> Result<Model, Stop> {
     if paths.iter().filter(|path| is_stream(path)).count() > 1 {
         return Err(Stop::usage("standard input can be read only once: give - for one part"));
     }
@@ -330,7 +345,7 @@ fn open_model(path: &Path) -> Result<Model, SliceError> {
 }
 
 /// What people call the files of a part together.
-fn name_of_all(paths: &[PathBuf]) -> String {
+pub(crate) fn name_of_all(paths: &[PathBuf]) -> String {
     match paths {
         [path] => input_name(path),
         paths => format!("{} and {} more", input_name(&paths[0]), paths.len() - 1),

@@ -1,0 +1,117 @@
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_grayscale::Solid;
+use lamp_stack::StackInfo;
+
+use crate::commands::slice::{PartOptions, name_of_all, open_models};
+use crate::materials::material;
+use crate::options::{Common, Input};
+use crate::picture::Scale;
+use crate::report::Report;
+use crate::section::{Course, Exposures, Panels, Plane, parse_along};
+use crate::stop::Stop;
+use crate::streams::{check_beside, input_name, print, read_layers, write_file};
+
+/// Draw what a stack cures, in a vertical section, against the part
+///
+/// Each exposure cures down from its layer's top, as deep as its gray level reaches under the
+/// material's cure model. A stack with gray layers is drawn twice: on the left with all that is not
+/// black exposed in full, on the right by its gray levels. What is cured outside the part is red,
+/// what of the part is not cured is blue, the part's outline yellow; the areas are printed. Light
+/// does not spread sideways, and exposures do not add up. Dots count as they stand: draw a stack
+/// before `dither`.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp cure gray.tif --material lamp-suspension --section y=12mm --part blade.stl -o section.png
+  lamp cure gray.tif --material mine.toml --section x=3mm --along 10mm..14mm --layers 80..120 \\
+      --scale 4 -o detail.png")]
+pub(crate) struct CureArgs {
+    #[command(flatten)]
+    input: Input,
+
+    /// The resin: a name of `lamp material list`, or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    material: String,
+
+    /// Where to cut, in part coordinates: y=12mm along a row of pixels, x=12mm along a column
+    #[arg(long, value_name = "AXIS=LENGTH")]
+    section: Plane,
+
+    /// The part that the stack was sliced from, for its outline; it is placed as the stack says that
+    /// it was. Several files as they were given to slice
+    #[arg(long, value_name = "FILE")]
+    part: Vec<PathBuf>,
+
+    /// Only what lies between two places along the section
+    #[arg(long, value_name = "A..B", value_parser = parse_along, allow_hyphen_values = true)]
+    along: Option<Range<f64>>,
+
+    /// 4 draws each pixel of the images as 4 x 4, 1/8 only every eighth
+    #[arg(long, value_name = "N|1/N", default_value = "1")]
+    scale: Scale,
+
+    /// Where to write the PNG
+    #[arg(short, long, value_name = "FILE.png")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Stop> {
+    let inputs: Vec<_> = args.part.iter().chain([&args.input.stack]).cloned().collect();
+    check_beside(&args.output, Path::new("-"), &inputs)?;
+    let material = material(&args.material)?;
+    let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
+    let name = input_name(&args.input.stack);
+    let failed = |error: anyhow::Error| Stop::Failed(error).at(name.clone());
+    let report = Report::new("cure", common.quiet, true);
+    let (mut exposures, mut stack) = (None, None);
+    for layer in read_layers(&args.input, &report)? {
+        let layer = layer?;
+        if exposures.is_none() {
+            if layer.info.other.contains_key("dither") {
+                report.say("these layers are dots: gray shows in a stack before dither");
+            }
+            let course = Course::new(args.section, &layer).map_err(failed)?;
+            exposures = Some(Exposures::new(&resin, course));
+            stack = layer.info.stack.clone();
+        }
+        let exposures = exposures.as_mut().expect("it was made for the first layer");
+        exposures.add(&layer).map_err(failed)?;
+        report.layer_done();
+    }
+    report.done();
+    let exposures = exposures.ok_or_else(|| failed(anyhow!("there are no such layers")))?;
+    let outline = match &args.part[..] {
+        [] => None,
+        parts => Some(outline(parts, &exposures.course, stack.as_ref(), &name)?),
+    };
+    let panels = Panels::new(&exposures, outline, args.along.as_ref()).map_err(failed)?;
+    panels.check_size(args.scale).map_err(failed)?;
+    write_file(&args.output, |out| panels.write_png(args.scale, out))?;
+    print(&panels.text(&material.name))
+}
+
+/// The part's outline, placed as the stack says.
+fn outline(
+    parts: &[PathBuf],
+    course: &Course,
+    stack: Option<&StackInfo>,
+    name: &str,
+) -> Result<Vec<Solid>, Stop> {
+    let sliced = stack.and_then(|stack| {
+        let options = PartOptions::of_command(stack.commands.first()?)?;
+        Some((options, &stack.digest))
+    });
+    let (options, digest) = sliced.with_context(|| {
+        format!("{name} does not say how its part was sliced: leave --part away")
+    })?;
+    let model = open_models(parts)?;
+    let part = name_of_all(parts);
+    if model.digest() != digest {
+        return Err(Stop::Failed(anyhow!("{name} was not sliced from {part}, or it has changed")));
+    }
+    course.outline(model, &options).map_err(|error| Stop::from(error).at(part))
+}

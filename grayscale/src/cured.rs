@@ -1,0 +1,205 @@
+//! What a stack cures, seen in a vertical section: where each pixel of a line
+//! is solid.
+//!
+//! An exposure cures down from its layer's top, as deep as its gray level
+//! reaches. Exposures do not add up, light does not spread sideways, and what
+//! is cured stays so: the single-layer experiment of 002 figure 67, layer after
+//! layer.
+
+use lamp_stack::{Image, Length, gray_runs};
+
+/// Heights between which a vertical line is inside something: from and to, in
+/// micrometres, rising, without gaps of nothing between them.
+pub type Solid = Vec<[f64; 2]>;
+
+/// A line of an image's pixels, from the left or from the top.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// A row.
+    Row(u32),
+    /// A column.
+    Column(u32),
+}
+
+impl Line {
+    /// How many pixels of an image are on it.
+    pub fn len(self, image: &Image) -> u32 {
+        match self {
+            Self::Row(_) => image.width(),
+            Self::Column(_) => image.height(),
+        }
+    }
+
+    /// Whether it crosses an image.
+    pub fn crosses(self, image: &Image) -> bool {
+        match self {
+            Self::Row(row) => row < image.height(),
+            Self::Column(column) => column < image.width(),
+        }
+    }
+
+    /// Gives the pixels along it that are not black, as first, end and level.
+    ///
+    /// # Panics
+    /// Where it does not cross the image.
+    fn for_each_run(self, image: &Image, mut each: impl FnMut(u32, u32, u8)) {
+        match self {
+            Self::Row(row) => {
+                for_each_run_of_row(image, row, |start, end, level| each(start, end, level));
+            }
+            Self::Column(column) => {
+                for row in 0..image.height() {
+                    for_each_run_of_row(image, row, |start, end, level| {
+                        if (start..end).contains(&column) {
+                            each(row, row + 1, level);
+                        }
+                    });
+                }
+            }
+        }
+    }
+}
+
+fn for_each_run_of_row(image: &Image, row: u32, mut each: impl FnMut(u32, u32, u8)) {
+    match image {
+        Image::Mask(mask) => {
+            for run in mask.row(row).chunks(2) {
+                each(run[0], run.get(1).copied().unwrap_or(mask.width()), 255);
+            }
+        }
+        Image::Gray(gray) => {
+            for (start, end, level) in gray_runs(gray.row(row), gray.width()) {
+                each(start, end, level);
+            }
+        }
+    }
+}
+
+/// What exposures have cured along a line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CuredLine {
+    pixels: Vec<Solid>,
+}
+
+impl CuredLine {
+    /// Exposes a layer upon those before, whose tops are no higher: each pixel
+    /// from `top` down by the depth of its level.
+    ///
+    /// # Panics
+    /// Where the line does not cross the image.
+    pub fn expose(
+        &mut self,
+        line: Line,
+        image: &Image,
+        top: Length,
+        depth_of: impl Fn(u8) -> Length,
+    ) {
+        let length = line.len(image) as usize;
+        self.pixels.resize(length.max(self.pixels.len()), Solid::new());
+        line.for_each_run(image, |start, end, level| {
+            let depth = depth_of(level).um();
+            if depth > 0.0 {
+                for solid in &mut self.pixels[start as usize..end as usize] {
+                    cure(solid, [top.um() - depth, top.um()]);
+                }
+            }
+        });
+    }
+
+    /// Where each pixel of the line is solid.
+    pub fn pixels(&self) -> &[Solid] {
+        &self.pixels
+    }
+}
+
+/// Adds what an exposure cures to what was cured from below.
+fn cure(solid: &mut Solid, [mut from, to]: [f64; 2]) {
+    while let Some(&[before, reached]) = solid.last() {
+        // A layer and the next touch, but for the last digits of their heights.
+        if reached < from - 1e-6 {
+            break;
+        }
+        from = from.min(before);
+        solid.pop();
+    }
+    solid.push([from, to]);
+}
+
+/// Returns how much of `a` is not in `b`.
+pub fn excess(a: &[[f64; 2]], b: &[[f64; 2]]) -> Length {
+    let mut length = 0.0;
+    for &[from, to] in a {
+        let shared = |&[low, high]: &[f64; 2]| (high.min(to) - low.max(from)).max(0.0);
+        length += to - from - b.iter().map(shared).sum::<f64>();
+    }
+    Length::from_um(length)
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::GrayMask;
+
+    use super::*;
+
+    fn um(um: f64) -> Length {
+        Length::from_um(um)
+    }
+
+    /// Rows of level 0, 100, 200 and 255, each twice.
+    fn image() -> Image {
+        let mut gray = GrayMask::new(9);
+        for _ in 0..4 {
+            gray.push_runs([(2, 0), (2, 100), (2, 200), (2, 255)]).unwrap();
+        }
+        Image::Gray(gray)
+    }
+
+    #[test]
+    fn each_level_reaches_its_depth() {
+        let depth_of = |level| um(f64::from(level));
+        for (line, solids) in [
+            (Line::Row(1), vec![vec![], vec![[900.0, 1000.0]], vec![[745.0, 1000.0]]]),
+            (Line::Column(6), vec![vec![[745.0, 1000.0]]; 3]),
+        ] {
+            let mut cured = CuredLine::default();
+            cured.expose(line, &image(), um(1000.0), depth_of);
+            assert_eq!(cured.pixels().len(), line.len(&image()) as usize);
+            for (pixel, solid) in [0, 3, 7].into_iter().zip(solids) {
+                let of_column = matches!(line, Line::Column(_));
+                let pixel = if of_column { pixel / 3 } else { pixel };
+                assert_eq!(cured.pixels()[pixel], solid, "{line:?} {pixel}");
+            }
+        }
+        assert!(Line::Row(3).crosses(&image()) && !Line::Row(4).crosses(&image()));
+        assert!(Line::Column(8).crosses(&image()) && !Line::Column(9).crosses(&image()));
+    }
+
+    #[test]
+    fn layers_grow_together_or_leave_gaps() {
+        let mut cured = CuredLine::default();
+        for (top, depth) in [(100.0, 100.0), (200.0, 60.0), (300.0, 100.0), (400.0, 350.0)] {
+            cured.expose(Line::Row(0), &image(), um(top), |level| {
+                um(if level == 255 { depth } else { 0.0 })
+            });
+            let expected: &[[f64; 2]] = match top as u32 {
+                100 => &[[0.0, 100.0]],
+                200 => &[[0.0, 100.0], [140.0, 200.0]],
+                300 => &[[0.0, 100.0], [140.0, 300.0]],
+                _ => &[[0.0, 400.0]],
+            };
+            assert_eq!(cured.pixels()[7], expected);
+        }
+        assert!(cured.pixels()[3].is_empty());
+    }
+
+    #[test]
+    fn excess_is_what_the_other_lacks() {
+        let a = [[0.0, 10.0], [20.0, 30.0]];
+        let b = [[5.0, 22.0], [24.0, 25.0]];
+        assert_eq!([excess(&a, &b), excess(&b, &a)].map(Length::um), [12.0, 10.0]);
+        assert_eq!(
+            [excess(&a, &[]), excess(&[], &a), excess(&a, &a)].map(Length::um),
+            [20.0, 0.0, 0.0]
+        );
+    }
+}

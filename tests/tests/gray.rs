@@ -1,0 +1,169 @@
+//! Gray slicing and what it cures, by the commands.
+
+use std::io::Cursor;
+
+use lamp_fixtures::Part;
+use lamp_stack::{Image, gray_runs};
+use lamp_tests::{Ran, Scratch};
+
+const COARSE: &str = "--dpi 300 --thickness 400um";
+
+fn with_tower() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch
+}
+
+fn gray_pixels(image: &Image) -> u64 {
+    let Image::Gray(gray) = image else { return 0 };
+    let runs = gray.rows().flat_map(|row| gray_runs(row, gray.width()));
+    runs.filter(|run| run.2 < 255).map(|run| u64::from(run.1 - run.0)).sum()
+}
+
+#[test]
+fn gray_stacks_go_through_the_pipeline() {
+    let scratch = with_tower();
+    let line = format!("slice tower.stl {COARSE} --gray --material lamp-suspension -o gray.tif");
+    scratch.run(&line).succeeds_quietly();
+    let gray = scratch.layers("gray.tif");
+    assert_eq!(gray.len(), 190);
+    // The cylinder and the cone face no downward slope.
+    assert!(gray[..90].iter().all(|layer| matches!(layer.image, Image::Mask(_))));
+    assert!(gray.iter().map(|layer| gray_pixels(&layer.image)).sum::<u64>() > 1_000);
+    // 137.4 mJ/cm2 exp(400/215.2) at 1.6 W/cm2.
+    assert!(gray.iter().all(|layer| layer.info.exposure_ms == Some(550.942)));
+    let stack = gray[0].info.stack.as_ref().unwrap();
+    assert!(stack.commands[0].contains("--gray --material lamp-suspension --overcure 1"));
+
+    let line = format!(
+        "slice tower.stl {COARSE} --gray --material lamp-suspension | fix | dither -q > dots.tif"
+    );
+    scratch.run(&line).succeeds_quietly();
+    let dots = scratch.layers("dots.tif");
+    assert!(dots.iter().all(|layer| matches!(layer.image, Image::Mask(_))));
+    assert!(dots.iter().all(|layer| layer.info.exposure_ms == Some(550.942)));
+    let said = scratch.run("lamp info gray.tif").succeeds().stdout;
+    let said = String::from_utf8(said).unwrap();
+    for line in ["of them gray", "exposure:   550.942 ms", "CCITT Group 4 and PackBits"] {
+        assert!(said.contains(line), "{said}");
+    }
+}
+
+#[test]
+fn a_material_alone_says_how_long_white_layers_are_exposed() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} -o plain.tif")).succeeds_quietly();
+    let line = format!("slice tower.stl {COARSE} --material mine.toml --overcure 1.5 -o timed.tif");
+    scratch.run("lamp material show lamp-suspension > mine.toml").succeeds();
+    scratch.run(&line).succeeds_quietly();
+    let (plain, timed) = (scratch.layers("plain.tif"), scratch.layers("timed.tif"));
+    for (plain, timed) in plain.iter().zip(&timed) {
+        assert!(plain.image == timed.image);
+        let ms = timed.info.exposure_ms.unwrap();
+        assert!((ms - 1395.5).abs() < 1.0, "{ms}");
+    }
+}
+
+#[track_caller]
+fn is_wrong_usage(ran: &Ran, word: &str) {
+    assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+    assert!(ran.stderr.contains(word), "{ran:?}");
+}
+
+#[test]
+fn what_cannot_be_exposed_is_refused() {
+    let scratch = with_tower();
+    for (options, word) in [
+        ("--gray", "--material"),
+        ("--overcure 2", "--material"),
+        ("--gray --material lamp-suspension --plane middle", "--plane"),
+        ("--gray --material lamp-suspension --overcure 0", "how deep white cures"),
+    ] {
+        let line = format!("slice tower.stl {COARSE} {options} -o out.tif");
+        is_wrong_usage(&scratch.run(&line), word);
+    }
+    for (options, words) in [
+        ("--gray --material none", &["there is no material", "lamp-suspension"][..]),
+        ("--gray --material none.toml", &["none.toml"]),
+        ("--gray --material lamp-no-absorber", &["how bright"]),
+        ("--gray --material tmpta", &["no cure model"]),
+        ("--gray --material pegda-mw700", &["all depths"]),
+    ] {
+        let line = format!("slice tower.stl {COARSE} {options} -o out.tif");
+        scratch.run(&line).is_refused_with(words);
+        assert!(!scratch.path("out.tif").exists());
+    }
+}
+
+/// The areas that `lamp cure` prints, by panel: overshoot and missing.
+fn areas(text: &[u8]) -> Vec<[f64; 2]> {
+    let text = std::str::from_utf8(text).unwrap();
+    let rows = text.lines().filter(|line| line.starts_with("white ") || line.starts_with("gray "));
+    rows.map(|row| {
+        let numbers: Vec<f64> =
+            row.split_whitespace().skip(1).map(|number| number.parse().unwrap()).collect();
+        [numbers[1], numbers[2]]
+    })
+    .collect()
+}
+
+/// A colour picture: its width, and its pixels row by row.
+fn rgb_pixels(png: &[u8]) -> (usize, Vec<[u8; 3]>) {
+    let mut reader = png::Decoder::new(Cursor::new(png)).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    assert_eq!(info.color_type, png::ColorType::Rgb);
+    (info.width as usize, bytes.as_chunks().0.to_vec())
+}
+
+#[test]
+fn a_section_shows_what_gray_saves() {
+    let scratch = with_tower();
+    let placed = "--rotate z:30 --translate 3,-2,5";
+    let line =
+        format!("slice tower.stl {COARSE} {placed} --gray --material lamp-suspension -o gray.tif");
+    scratch.run(&line).succeeds_quietly();
+    for section in ["y=-2mm", "x=3.4mm", "y=1in"] {
+        let line = format!(
+            "lamp cure gray.tif --material lamp-suspension --section {section} --part tower.stl -o s.png"
+        );
+        if section == "y=1in" {
+            scratch.run(&line).is_refused_with(&["y = 25.400 mm", "outside its images"]);
+            continue;
+        }
+        let ran = scratch.run(&line).succeeds();
+        let [white, gray] = areas(&ran.stdout)[..] else { panic!("two panels") };
+        assert!(white[0] > 1.0 && gray[0] < 0.02 * white[0], "{white:?} {gray:?}");
+        assert!((gray[1] - white[1]).abs() < 0.03 * white[0], "{white:?} {gray:?}");
+        let (width, pixels) = rgb_pixels(&scratch.bytes("s.png"));
+        // Red on the left alone, blue on both sides.
+        let count = |colour: [u8; 3], left: bool| {
+            let of_half = |k: usize| (k % width < width / 2) == left;
+            (0..).zip(&pixels).filter(|(k, pixel)| of_half(*k) && **pixel == colour).count()
+        };
+        let [red, blue] = [[226, 72, 52], [52, 130, 226]];
+        assert!(count(red, true) > 50 && count(red, false) < count(red, true) / 20);
+        assert!(count(blue, true) > 50 && count(blue, false) > 50);
+    }
+}
+
+#[test]
+fn a_section_needs_its_own_part() {
+    let scratch = with_tower();
+    scratch.part("cube.stl", Part::Cube, 200);
+    scratch.run(&format!("slice tower.stl {COARSE} -o white.tif")).succeeds_quietly();
+    let cure = "lamp cure white.tif --material lamp-suspension --section y=0mm";
+    scratch.run(&format!("{cure} --part cube.stl -o s.png")).is_refused_with(&["not sliced from"]);
+    let ran =
+        scratch.run(&format!("{cure} --part tower.stl --layers 100..120 -o s.png")).succeeds();
+    assert_eq!(areas(&ran.stdout).len(), 1);
+    let said = scratch.run(&format!("{cure} -o s.png")).succeeds().stdout;
+    assert!(String::from_utf8(said).unwrap().contains("cured 14"));
+    is_wrong_usage(&scratch.run(&format!("{cure} -o white.tif")), "that is the input");
+    let upright = cure.replace("y=0mm", "z=0mm");
+    is_wrong_usage(&scratch.run(&format!("{upright} -o t.png")), "is not a section");
+    let line = format!("{cure} --along 90mm..95mm -o t.png");
+    scratch.run(&line).is_refused_with(&["no pixel of the section"]);
+    scratch.run(&format!("{cure} --scale 1000 -o t.png")).is_refused_with(&["smaller --scale"]);
+    assert!(!scratch.path("t.png").exists());
+}
