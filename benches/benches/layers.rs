@@ -6,19 +6,25 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use fax::{Color, VecWriter, decoder, encoder};
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::{Method, dither_image};
-use lamp_slicer::{Model, SliceOptions, Slices};
-use lamp_stack::{GrayMask, Image, Mask, g4};
+use lamp_slicer::{DepthLevels, Model, SliceOptions, Slices};
+use lamp_stack::{GrayMask, Image, Length, Mask, g4};
 
 /// Layers with pins and holes, 1500 dpi.
 const LAYERS: std::ops::Range<u32> = 440..460;
 
-fn slices(facets: usize) -> impl Fn() -> Slices {
+fn slices(facets: usize, gray: Option<DepthLevels>) -> impl Fn() -> Slices {
     let facets = build(Part::Blade, facets).expect("enough facets").facets;
     move || {
         let model = Model::from_facets("blade", facets.clone());
-        let options = SliceOptions { layers: Some(LAYERS), ..SliceOptions::default() };
+        let gray = gray.clone();
+        let options = SliceOptions { layers: Some(LAYERS), gray, ..SliceOptions::default() };
         Slices::new(model, &options).expect("the blade slices")
     }
+}
+
+/// Gray levels in proportion to depths up to a layer.
+fn depth_levels() -> DepthLevels {
+    DepthLevels::new(Length::from_um(100.0), |gray| Length::from_um(100.0 * gray))
 }
 
 fn masks(slices: Slices) -> Vec<Mask> {
@@ -50,7 +56,7 @@ fn fax_encode(mask: &Mask) -> Vec<u8> {
 }
 
 fn layers(criterion: &mut Criterion) {
-    let slice = slices(100_000);
+    let slice = slices(100_000, None);
     let masks = masks(slice());
     let transitions: usize = masks.iter().map(Mask::transition_count).sum();
     let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
@@ -61,6 +67,14 @@ fn layers(criterion: &mut Criterion) {
     group.bench_function("table", |b| b.iter_batched(&slice, filled, BatchSize::PerIteration));
     group.bench_function("sort", |b| {
         b.iter_batched(|| filled(slice()), self::masks, BatchSize::PerIteration);
+    });
+    let gray = slices(100_000, Some(depth_levels()));
+    group.bench_function("table, gray", |b| {
+        b.iter_batched(&gray, filled, BatchSize::PerIteration);
+    });
+    group.bench_function("sort, gray", |b| {
+        let count = |slices: Slices| slices.filter_map(Result::ok).count();
+        b.iter_batched(|| filled(gray()), count, BatchSize::PerIteration);
     });
     group.bench_function("encode", |b| {
         b.iter(|| masks.iter().map(|mask| g4::encode(mask).len()).sum::<usize>());

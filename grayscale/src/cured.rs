@@ -44,9 +44,7 @@ impl Line {
     /// Where it does not cross the image.
     fn for_each_run(self, image: &Image, mut each: impl FnMut(u32, u32, u8)) {
         match self {
-            Self::Row(row) => {
-                for_each_run_of_row(image, row, |start, end, level| each(start, end, level));
-            }
+            Self::Row(row) => for_each_run_of_row(image, row, each),
             Self::Column(column) => {
                 for row in 0..image.height() {
                     for_each_run_of_row(image, row, |start, end, level| {
