@@ -154,13 +154,10 @@ impl Cutter<'_> {
         }
         let Some(sheet) = Sheet::new(self, facet) else { return 0 };
         let mut count = 0;
-        for layer in met {
-            let spans = &mut shares[layer - layers.start].spans;
-            sheet.for_each_span(self, layer, reach_um, |span| {
-                spans.push(span);
-                count += 1;
-            });
-        }
+        sheet.for_each_span(self, met, reach_um, |layer, span| {
+            shares[layer - layers.start].spans.push(span);
+            count += 1;
+        });
         count * size_of::<Span>() / size_of::<Crossing>()
     }
 

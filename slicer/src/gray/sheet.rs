@@ -132,33 +132,45 @@ impl Sheet {
         })
     }
 
-    /// Gives what the rows of a layer meet of it, from just above the section to
-    /// where the exposure ends.
+    /// Gives what the rows of `layers`, whose planes are above its lowest corner,
+    /// meet of it: from just above the section to where the exposure ends.
     pub(crate) fn for_each_span(
         &self,
         cutter: &Cutter<'_>,
-        layer: usize,
+        layers: Range<usize>,
         reach_um: f64,
-        mut each: impl FnMut(Span),
+        mut each: impl FnMut(usize, Span),
     ) {
         let planes = cutter.planes;
-        let (plane_um, top_um) = (planes.z_um(layer), planes.top_um(layer));
-        // A vertex on the plane is above it.
-        if self.low_um >= plane_um {
-            return;
-        }
-        // What reaches the part's lowest point stands on the platform.
-        let end_um = (top_um - reach_um).max(planes.bottom_um());
-        let depths = top_um - plane_um - self.tie_um..top_um - end_um;
-        for row in self.rows_between(end_um, plane_um + self.tie_um) {
-            if let Some(span) = self.span(row, top_um, &depths, cutter.grid.width) {
-                each(span);
+        let low_um = planes.z_um(layers.start) - reach_um;
+        let high_um = planes.z_um(layers.end - 1) + self.tie_um;
+        for row in self.rows_between(low_um, high_um) {
+            // Most rows of steep facets pass between two columns.
+            let Some(stretch) = self.stretch(row, cutter.grid.width) else { continue };
+            let [low_um, high_um] = stretch.heights();
+            let met = planes.between(low_um - self.tie_um, high_um + reach_um);
+            for layer in met.start.max(layers.start)..met.end.min(layers.end) {
+                let top_um = planes.top_um(layer);
+                // What reaches the part's lowest point stands on the platform.
+                let end_um = (top_um - reach_um).max(planes.bottom_um());
+                let depths = top_um - planes.z_um(layer) - self.tie_um..top_um - end_um;
+                if let Some((columns, depth_um)) = stretch.within(top_um, &depths) {
+                    let span = Span {
+                        row,
+                        start: columns.start,
+                        end: columns.end,
+                        depth_um: depth_um as f32,
+                        um_per_column: -stretch.um_per_column as f32,
+                        signed_tie_um: (f64::from(self.winding) * self.tie_um) as f32,
+                    };
+                    each(layer, span);
+                }
             }
         }
     }
 
     /// The rows of what lies between two heights, and perhaps one more on each
-    /// side.
+    /// side, where rounding could decide.
     fn rows_between(&self, low_um: f64, high_um: f64) -> Range<u32> {
         let (mut first, mut last) = (f64::MAX, f64::MIN);
         let mut reach = |row: f64| (first, last) = (first.min(row), last.max(row));
@@ -174,63 +186,73 @@ impl Sheet {
             }
         }
         let Range { start, end } = self.rows;
-        ceil_clamped(first - 0.5, end).max(start)..ceil_clamped(last + 0.5, end)
+        ceil_clamped(first - 1e-3, end).max(start)..ceil_clamped(last + 1e-3, end)
     }
 
-    /// What a row meets of it at depths from the first, up to before the
-    /// second.
-    fn span(&self, row: u32, top_um: f64, depths: &Range<f64>, width: u32) -> Option<Span> {
+    /// What a row meets of it.
+    #[inline]
+    fn stretch(&self, row: u32, width: u32) -> Option<Stretch> {
         let [long, first, second] = &self.edges;
         let short = if row < self.turn { first } else { second };
-        let columns = [long.column(row), short.column(row)];
-        let [a, b] = columns.map(|column| ceil_clamped(column, width));
+        let ends = [long.column(row), short.column(row)];
+        let [a, b] = ends.map(|column| ceil_clamped(column, width));
         if a == b {
             return None;
         }
-        // Along the row from edge to edge, rounding never leaves the facet.
-        let [left, right] = if a < b { [0, 1] } else { [1, 0] };
-        let heights = [long.height(row), short.height(row)];
-        let um_per_column = (heights[left] - heights[right]) / (columns[right] - columns[left]);
-        let depth_at = |column: u32| {
-            let across = f64::from(column) - columns[left];
-            let depth = top_um - heights[left] + um_per_column * across;
-            depth.clamp(top_um - self.high_um, top_um - self.low_um)
-        };
-        let (start, end) = within(a.min(b)..a.max(b), depth_at, um_per_column, depths)?;
-        Some(Span {
-            row,
-            start,
-            end,
-            depth_um: depth_at(start) as f32,
-            um_per_column: um_per_column as f32,
-            signed_tie_um: (f64::from(self.winding) * self.tie_um) as f32,
-        })
+        let heights =
+            [long.height(row), short.height(row)].map(|z| z.clamp(self.low_um, self.high_um));
+        let um_per_column = (heights[1] - heights[0]) / (ends[1] - ends[0]);
+        Some(Stretch { columns: a.min(b)..a.max(b), ends, heights, um_per_column })
     }
 }
 
-/// The columns where depths along a straight line are in a range.
-fn within(
+/// What a row meets of a facet: columns, of which each is at a height along the
+/// line from edge to edge.
+struct Stretch {
     columns: Range<u32>,
-    depth_at: impl Fn(u32) -> f64,
+    ends: [f64; 2],
+    heights: [f64; 2],
     um_per_column: f64,
-    depths: &Range<f64>,
-) -> Option<(u32, u32)> {
-    let Range { mut start, mut end } = columns;
-    // Most facets are a few columns wide.
-    if um_per_column != 0.0 && end - start > 4 {
-        let first = depth_at(start);
-        let ends = [depths.start, depths.end].map(|depth| (depth - first) / um_per_column);
-        let [near, far] = if um_per_column > 0.0 { ends } else { [ends[1], ends[0]] };
-        // A column more on each side, to be sure; the loops below are exact.
-        let length = f64::from(end - start);
-        end = start + (far + 2.0).clamp(0.0, length) as u32;
-        start += (near - 1.0).clamp(0.0, length) as u32;
+}
+
+impl Stretch {
+    /// The lower and the higher end's height.
+    #[inline]
+    fn heights(&self) -> [f64; 2] {
+        let [a, b] = self.heights;
+        [a.min(b), a.max(b)]
     }
-    while start < end && !depths.contains(&depth_at(start)) {
-        start += 1;
+
+    /// The height at a column, which rounding does not take off the facet.
+    #[inline]
+    fn height(&self, column: u32) -> f64 {
+        let [low, high] = self.heights();
+        let z = self.heights[0] + self.um_per_column * (f64::from(column) - self.ends[0]);
+        z.clamp(low, high)
     }
-    while start < end && !depths.contains(&depth_at(end - 1)) {
-        end -= 1;
+
+    /// The columns where the depth below a height is in a range, and the first
+    /// one's depth.
+    #[inline]
+    fn within(&self, top_um: f64, depths: &Range<f64>) -> Option<(Range<u32>, f64)> {
+        let Range { mut start, mut end } = self.columns;
+        let depth = |column: u32| top_um - self.height(column);
+        // Most facets are a few columns wide.
+        if end - start > 4 && self.um_per_column != 0.0 {
+            let first = depth(start);
+            let ends = [depths.start, depths.end].map(|depth| (first - depth) / self.um_per_column);
+            let [near, far] = if self.um_per_column < 0.0 { ends } else { [ends[1], ends[0]] };
+            // A column more on each side, to be sure; the loops below are exact.
+            let length = f64::from(end - start);
+            end = start + (far + 2.0).clamp(0.0, length) as u32;
+            start += (near - 1.0).clamp(0.0, length) as u32;
+        }
+        while start < end && !depths.contains(&depth(start)) {
+            start += 1;
+        }
+        while start < end && !depths.contains(&depth(end - 1)) {
+            end -= 1;
+        }
+        (start < end).then(|| (start..end, depth(start)))
     }
-    (start < end).then_some((start, end))
 }
