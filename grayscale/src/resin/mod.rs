@@ -1,9 +1,14 @@
 //! What light does to a resin: how deep a dose cures, and back.
 
+mod beam;
+mod broadening;
+mod composition;
+mod filter;
 mod gray;
 #[cfg(test)]
 mod laws;
 mod model;
+pub mod shrinkage;
 mod two_depth;
 mod units;
 mod working_curve;
@@ -11,6 +16,10 @@ mod working_curve;
 use lamp_slicer::DepthLevels;
 use lamp_stack::Length;
 
+pub use beam::GaussianBeam;
+pub use broadening::{broadening_depth, cure_width_of_square};
+pub use composition::{Absorber, Inhibition, Suspension};
+pub use filter::OpticalDensity;
 pub use gray::{GrayCurve, IntensityLines, Line};
 pub use model::{CureError, CureModel, Depths, ModelError};
 pub use two_depth::TwoDepth;
