@@ -3,9 +3,9 @@
 
 use lamp_grayscale::material::{
     Builtin, Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine,
-    Material, TwoDepthNumbers, Written,
+    Material, TwoDepthNumbers, WidthNumbers, Written,
 };
-use lamp_grayscale::resin::{Dose, Intensity};
+use lamp_grayscale::resin::{Dose, Intensity, WidthSensitivity};
 use lamp_stack::Length;
 use proptest::option;
 use proptest::prelude::*;
@@ -68,6 +68,20 @@ fn two_depth() -> impl Strategy<Value = TwoDepthNumbers> {
     )
 }
 
+/// Sizes that differ.
+fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
+    let slope = number().prop_map(WidthSensitivity::from_um_per_mj_per_cm2);
+    let numbers = (0.1..1.0f64, given(mj()), given(slope));
+    proptest::collection::vec(numbers, 0..3).prop_map(|sizes| {
+        let size = |(k, (share, critical_dose, sensitivity))| WidthNumbers {
+            feature_size: Length::from_um(f64::from(k) + share),
+            critical_dose,
+            sensitivity,
+        };
+        (0..).zip(sizes).map(size).collect()
+    })
+}
+
 fn constant() -> impl Strategy<Value = Constant> {
     let finite = any::<f64>().prop_filter("finite", |value| value.is_finite());
     (finite, text(), text()).prop_map(|(value, unit, source)| Constant { value, unit, source })
@@ -75,10 +89,17 @@ fn constant() -> impl Strategy<Value = Constant> {
 
 fn materials() -> impl Strategy<Value = Material> {
     let light = given(number().prop_map(Intensity::from_mw_per_cm2));
-    let models = (curve(), option::of(lines()), option::of(lines()), option::of(two_depth()));
+    let models =
+        (curve(), option::of(lines()), option::of(lines()), option::of(two_depth()), widths());
     let constants = proptest::collection::btree_map("[a-z. \"]{0,6}", constant(), 0..3);
     ("[a-z0-9-]{1,9}", text(), option::of(light), models, constants).prop_map(
-        |(name, description, intensity, (curve, gray, gray_light, two_depth), constants)| {
+        |(
+            name,
+            description,
+            intensity,
+            (curve, gray, gray_light, two_depth, cure_width),
+            constants,
+        )| {
             let dimmed = gray.clone();
             Material {
                 name,
@@ -90,6 +111,7 @@ fn materials() -> impl Strategy<Value = Material> {
                 dimmed_lamp: dimmed
                     .map(|CurveLines { critical_dose, .. }| DimmedLines { critical_dose }),
                 two_depth,
+                cure_width,
                 constants,
             }
         },

@@ -99,6 +99,7 @@ impl Material {
         self.gray_curve()?;
         self.gray_lines()?;
         self.two_depth()?;
+        self.cure_width()?;
         Ok(())
     }
 }
@@ -220,6 +221,35 @@ source = "notebook, page 3"
         let dimmed = line("dimmed-lamp.critical-dose", "18 um").replace(" um", " mJ/cm2");
         let text = format!("name = \"a\"\ndescription = \"\"\n{dimmed}");
         assert_eq!(Material::from_toml(&text), Err(MaterialError::NoWorkingCurve));
+    }
+
+    #[test]
+    fn cure_widths_read_and_write_back() {
+        let size = |size: &str, critical: &str| {
+            format!(
+                "[[cure-width]]\nfeature-size = \"{size}\"\n\
+                 critical-dose = {{ value = \"{critical}\", source = \"a\" }}\n\
+                 sensitivity = {{ value = \"0.2 um/(mJ/cm2)\", plus-minus = \"0.1 um/(mJ/cm2)\", source = \"a\" }}\n"
+            )
+        };
+        let read = |sizes: &[String]| Material::from_toml(&(WHOLE.to_owned() + &sizes.concat()));
+        assert_eq!(read(&[]).unwrap().cure_width(), Ok(None));
+        let two = [size("7.62 mm", "80 mJ/cm2"), size("0.4233 mm", "200 mJ/cm2")];
+        let material = read(&two).unwrap();
+        assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material.clone()));
+        let model = material.cure_width().unwrap().unwrap();
+        assert_eq!(model.lines()[0].feature_size.um(), 423.3);
+        assert_eq!(model.lines()[1].critical_dose.mj_per_cm2(), 80.0);
+        let refused = |sizes: &[String]| read(sizes).unwrap_err().to_string();
+        let zero = refused(&[size("1 mm", "0 mJ/cm2")]);
+        assert_eq!(zero, "cure-width.critical-dose must be above zero");
+        let twice = refused(&[size("1 mm", "1 mJ/cm2"), size("1000 um", "2 mJ/cm2")]);
+        assert!(twice.starts_with("cure-width.feature-size"), "{twice}");
+        let slip = refused(&[two[0].replace("um/(mJ/cm2)", "um")]);
+        assert!(
+            slip.contains("cure-width[0].sensitivity") && slip.contains("a width sensitivity"),
+            "{slip}"
+        );
     }
 
     #[test]

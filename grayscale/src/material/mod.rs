@@ -29,8 +29,8 @@ pub use file::MaterialError;
 pub use number::{Constant, Given, GivenDepths, GivenLine, Written};
 
 use crate::resin::{
-    CureModel, Depths, Dose, GrayCurve, Intensity, IntensityLines, Line, ModelError, Resin,
-    TwoDepth, WorkingCurve,
+    CureModel, CureWidth, Depths, Dose, GrayCurve, Intensity, IntensityLines, Line, ModelError,
+    Resin, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
 };
 
 /// What is known of a resin. What a source does not give is absent.
@@ -60,6 +60,10 @@ pub struct Material {
     /// The model of two penetration depths (000 eq. 3.8).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub two_depth: Option<TwoDepthNumbers>,
+    /// How far cured regions grow beyond their images, by the features' size
+    /// (002 section 3.4.4).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cure_width: Vec<WidthNumbers>,
     /// What else its source gives.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, Constant>,
@@ -107,6 +111,19 @@ pub struct TwoDepthNumbers {
     /// What it holds for, if not for all depths.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depths: Option<GivenDepths>,
+}
+
+/// The numbers of the cure width of features of one size.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct WidthNumbers {
+    /// The side of the squares measured.
+    #[serde(with = "number::written")]
+    pub feature_size: Length,
+    /// `E_c^w`.
+    pub critical_dose: Given<Dose>,
+    /// `D_p^w`.
+    pub sensitivity: Given<WidthSensitivity>,
 }
 
 /// Why a material says nothing of exposures.
@@ -183,6 +200,23 @@ impl Material {
             TwoDepth::new(numbers.critical_dose.value, liquid.value, solid.value, depths)
         };
         self.two_depth.as_ref().map(model).transpose().map_err(of("two-depth"))
+    }
+
+    /// Returns its cure width, if it has one.
+    ///
+    /// # Errors
+    /// Where a number is not above zero, or a size stands twice.
+    pub fn cure_width(&self) -> Result<Option<CureWidth>, MaterialError> {
+        if self.cure_width.is_empty() {
+            return Ok(None);
+        }
+        let line = |numbers: &WidthNumbers| WidthLine {
+            feature_size: numbers.feature_size,
+            critical_dose: numbers.critical_dose.value,
+            sensitivity: numbers.sensitivity.value,
+        };
+        let lines = self.cure_width.iter().map(line).collect();
+        CureWidth::new(lines).map(Some).map_err(of("cure-width"))
     }
 
     /// Whether it has a cure model.

@@ -8,7 +8,7 @@ use lamp_stack::Length;
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::resin::{Depths, Dose, Intensity, Line};
+use crate::resin::{Depths, Dose, Intensity, Line, WidthSensitivity};
 
 /// A number with its unit, and where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -108,6 +108,14 @@ impl Written for Intensity {
     }
 }
 
+impl Written for WidthSensitivity {
+    const EXAMPLE: &'static str = "0.2 um/(mJ/cm2)";
+
+    fn text(self) -> String {
+        format!("{} um/(mJ/cm2)", self.um_per_mj_per_cm2())
+    }
+}
+
 impl Written for Length {
     const EXAMPLE: &'static str = "211 um";
 
@@ -130,17 +138,17 @@ impl<T: Written> Visitor<'_> for TextOf<T> {
     }
 }
 
-mod written {
+pub(super) mod written {
     use super::{Deserializer, PhantomData, Serializer, TextOf, Written};
 
-    pub(super) fn serialize<T: Written, S: Serializer>(
+    pub(in super::super) fn serialize<T: Written, S: Serializer>(
         value: &T,
         to: S,
     ) -> Result<S::Ok, S::Error> {
         to.serialize_str(&value.text())
     }
 
-    pub(super) fn deserialize<'de, T: Written, D: Deserializer<'de>>(
+    pub(in super::super) fn deserialize<'de, T: Written, D: Deserializer<'de>>(
         from: D,
     ) -> Result<T, D::Error> {
         from.deserialize_str(TextOf(PhantomData))

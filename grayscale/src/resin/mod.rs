@@ -11,6 +11,7 @@ mod model;
 pub mod shrinkage;
 mod two_depth;
 mod units;
+mod width;
 mod working_curve;
 
 use lamp_slicer::DepthLevels;
@@ -23,7 +24,8 @@ pub use filter::OpticalDensity;
 pub use gray::{GrayCurve, IntensityLines, Line};
 pub use model::{CureError, CureModel, Depths, ModelError};
 pub use two_depth::TwoDepth;
-pub use units::{Dose, ExposureTime, GrayLevel, Intensity, QuantityError};
+pub use units::{Dose, ExposureTime, GrayLevel, Intensity, QuantityError, WidthSensitivity};
+pub use width::{CureWidth, WidthLine};
 pub use working_curve::WorkingCurve;
 
 /// A cure model under a lamp: gray levels and times instead of doses.

@@ -153,6 +153,9 @@ pub enum ModelError {
     /// The deepest is not above the shallowest.
     #[error("depths must begin at zero or more and end above where they begin")]
     NoDepths,
+    /// No size, or one twice.
+    #[error("feature-size must be there, and another one in each entry")]
+    NoSizes,
 }
 
 /// Checks what must be above zero.

@@ -93,6 +93,15 @@ quantity! {
     [("s", 1000.0, 1.0)]
 }
 
+quantity! {
+    /// How far an edge grows with the dose: the sensitivity `D_p^w` of the cure
+    /// width (002 section 3.4.3). Parsed from `um/(mJ/cm2)` or `mm/(J/cm2)`,
+    /// which is as much.
+    WidthSensitivity, "a width sensitivity", "µm per mJ/cm²",
+    from_um_per_mj_per_cm2, um_per_mj_per_cm2, "um/(mJ/cm2)", "0.2 um/(mJ/cm2)",
+    [("mm/(J/cm2)", 1.0, 1.0)]
+}
+
 /// 002 eq. 27: 1 W/cm² for 1 ms is 1 mJ/cm².
 impl Mul<ExposureTime> for Intensity {
     type Output = Dose;
@@ -179,6 +188,18 @@ mod tests {
         }
         for (text, ms) in [("200ms", 200.0), ("1.2 s", 1200.0)] {
             assert_eq!(text.parse(), Ok(ExposureTime::from_ms(ms)), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_width_sensitivity_is_a_length_for_a_dose() {
+        for text in ["1.2 um/(mJ/cm2)", "1.2um/(mJ/cm²)", "1.2 mm/(J/cm2)"] {
+            let parsed: WidthSensitivity = text.parse().unwrap();
+            assert_eq!(parsed.um_per_mj_per_cm2(), 1.2, "{text}");
+            assert_eq!(parsed.to_string().parse(), Ok(parsed));
+        }
+        for text in ["1.2 um", "1.2 um/mJ/cm2", "1.2 mJ/cm2", "-1 um/(mJ/cm2)"] {
+            assert!(text.parse::<WidthSensitivity>().is_err(), "{text}");
         }
     }
 

@@ -1,0 +1,160 @@
+//! How far a cured region grows beyond its image.
+
+use lamp_stack::Length;
+
+use super::model::{ModelError, positive};
+use super::units::{Dose, WidthSensitivity};
+
+/// The cure width `C_w = D_p^w (E - E_c^w)`, by which every edge of an exposed
+/// region lies outside its image (002 eq. 60 and section 3.4.4: linear in the
+/// dose, not in its logarithm).
+///
+/// Both parameters depend on the feature's size, the side of the squares that
+/// were measured. Between measured sizes they are interpolated linearly, below
+/// the smallest and above the largest they are constant.
+///
+/// The seed says that they level off beyond a size of "450 um" (section 3.4.4)
+/// and of "450 px" (three paragraphs on). It must be pixels, of 1/1500 in,
+/// that is 7.62 mm: 450 um are not 27 pixels, and 25 is the smallest size of
+/// which it has data. Its figures 76 and 77 have the numbers; its text gives
+/// none.
+///
+/// # Guarantees
+/// There is a size; sizes strictly increase; all numbers are above zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CureWidth {
+    lines: Vec<WidthLine>,
+}
+
+/// The cure width over the dose, of features of one size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WidthLine {
+    /// The side of the squares measured.
+    pub feature_size: Length,
+    /// The dose at which they begin to grow sideways, `E_c^w`.
+    pub critical_dose: Dose,
+    /// How much they grow with the dose above that, `D_p^w`.
+    pub sensitivity: WidthSensitivity,
+}
+
+impl WidthLine {
+    /// Returns how far each edge grows; nothing up to the critical dose.
+    pub fn width(&self, dose: Dose) -> Length {
+        let above = dose.mj_per_cm2() - self.critical_dose.mj_per_cm2();
+        // Also where the dose is no number.
+        let above = if above > 0.0 { above } else { 0.0 };
+        Length::from_um(self.sensitivity.um_per_mj_per_cm2() * above)
+    }
+}
+
+impl CureWidth {
+    /// The model of features of these sizes, in any order.
+    ///
+    /// # Errors
+    /// Where there is no size, one stands twice, or a number is not above
+    /// zero.
+    pub fn new(mut lines: Vec<WidthLine>) -> Result<Self, ModelError> {
+        for line in &lines {
+            positive(line.feature_size.um(), "feature-size")?;
+            positive(line.critical_dose.mj_per_cm2(), "critical-dose")?;
+            positive(line.sensitivity.um_per_mj_per_cm2(), "sensitivity")?;
+        }
+        lines.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));
+        let twice = |pair: &[WidthLine]| pair[0].feature_size == pair[1].feature_size;
+        if lines.is_empty() || lines.windows(2).any(twice) {
+            return Err(ModelError::NoSizes);
+        }
+        Ok(Self { lines })
+    }
+
+    /// The sizes that were measured, from the smallest.
+    pub fn lines(&self) -> &[WidthLine] {
+        &self.lines
+    }
+
+    /// Returns the line of features of any size.
+    pub fn at(&self, feature_size: Length) -> WidthLine {
+        let next = self.lines.partition_point(|line| line.feature_size < feature_size);
+        let (low, high) = match (next.checked_sub(1), self.lines.get(next)) {
+            (Some(low), Some(&high)) => (self.lines[low], high),
+            (None, Some(&only)) => return WidthLine { feature_size, ..only },
+            (_, None) => return WidthLine { feature_size, ..self.lines[self.lines.len() - 1] },
+        };
+        let [from, to] = [low, high].map(|line| line.feature_size.um());
+        let share = (feature_size.um() - from) / (to - from);
+        let between = |low: f64, high: f64| low + share * (high - low);
+        let [low_mj, high_mj] = [low, high].map(|line| line.critical_dose.mj_per_cm2());
+        let [low_um, high_um] = [low, high].map(|line| line.sensitivity.um_per_mj_per_cm2());
+        WidthLine {
+            feature_size,
+            critical_dose: Dose::from_mj_per_cm2(between(low_mj, high_mj)),
+            sensitivity: WidthSensitivity::from_um_per_mj_per_cm2(between(low_um, high_um)),
+        }
+    }
+
+    /// Returns how far each edge of features of a size grows by a dose; nothing
+    /// up to the critical dose.
+    pub fn width(&self, dose: Dose, feature_size: Length) -> Length {
+        self.at(feature_size).width(dose)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(size_um: f64, critical_mj: f64, um_per_mj: f64) -> WidthLine {
+        WidthLine {
+            feature_size: Length::from_um(size_um),
+            critical_dose: Dose::from_mj_per_cm2(critical_mj),
+            sensitivity: WidthSensitivity::from_um_per_mj_per_cm2(um_per_mj),
+        }
+    }
+
+    fn um(model: &CureWidth, mj: f64, size_um: f64) -> f64 {
+        model.width(Dose::from_mj_per_cm2(mj), Length::from_um(size_um)).um()
+    }
+
+    #[test]
+    fn it_is_a_line_over_the_dose() {
+        let model = CureWidth::new(vec![line(1000.0, 100.0, 0.25)]).unwrap();
+        for (mj, width) in [(0.0, 0.0), (100.0, 0.0), (104.0, 1.0), (300.0, 50.0)] {
+            for size in [0.0, 1.0, 1000.0, 1e6] {
+                assert_eq!(um(&model, mj, size), width, "{mj}");
+            }
+        }
+        assert_eq!(um(&model, f64::NAN, 1.0), 0.0);
+    }
+
+    #[test]
+    fn both_parameters_lie_between_those_of_the_measured_sizes() {
+        let lines = vec![line(7620.0, 80.0, 0.5), line(420.0, 200.0, 0.25)];
+        let model = CureWidth::new(lines).unwrap();
+        assert!(model.lines()[0].feature_size < model.lines()[1].feature_size);
+        for (size, critical, slope) in [
+            (1.0, 200.0, 0.25),
+            (420.0, 200.0, 0.25),
+            (2220.0, 170.0, 0.3125),
+            (4020.0, 140.0, 0.375),
+            (7620.0, 80.0, 0.5),
+            (15_240.0, 80.0, 0.5),
+        ] {
+            let at = model.at(Length::from_um(size));
+            assert!((at.critical_dose.mj_per_cm2() - critical).abs() < 1e-9, "{at:?}");
+            assert!((at.sensitivity.um_per_mj_per_cm2() - slope).abs() < 1e-12, "{at:?}");
+            assert_eq!(at.feature_size.um(), size);
+            let width = slope * (300.0 - critical);
+            assert!((um(&model, 300.0, size) - width).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_numbers_must_make_a_model() {
+        let refused = |lines| CureWidth::new(lines).unwrap_err();
+        assert_eq!(refused(vec![]), ModelError::NoSizes);
+        assert_eq!(refused(vec![line(1.0, 2.0, 3.0), line(1.0, 4.0, 5.0)]), ModelError::NoSizes);
+        assert_eq!(refused(vec![line(0.0, 2.0, 3.0)]), ModelError::NotPositive("feature-size"));
+        assert_eq!(refused(vec![line(1.0, 0.0, 3.0)]), ModelError::NotPositive("critical-dose"));
+        assert_eq!(refused(vec![line(1.0, 2.0, f64::NAN)]), ModelError::NotPositive("sensitivity"));
+    }
+}
