@@ -1,5 +1,5 @@
-//! Light and resin: how deep a dose cures ([`resin`], [`material`]), and gray
-//! levels to dots: a machine that can only expose or not realises a gray level as
+//! Light and resin: how deep a dose cures ([`resin`], [`material`]), how to find
+//! that from measurements ([`calibrate`]), and gray levels to dots: a machine that can only expose or not realises a gray level as
 //! the share of its pixels that are white (002 section 3.3.1).
 //!
 //! All dithering methods leave solid black and white alone, so their cost follows the
@@ -22,6 +22,7 @@
 //! ```
 
 mod blue_noise;
+pub mod calibrate;
 mod cured;
 mod diffusion;
 mod dither;

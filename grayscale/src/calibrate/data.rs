@@ -1,0 +1,341 @@
+//! Measurements from tables.
+
+use lamp_stack::{Dpi, Length};
+use thiserror::Error;
+
+use super::table::{Row, Table};
+use crate::resin::{Dose, ExposureTime, GrayLevel, Intensity, cure_width_of_square};
+
+/// A measured cure depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthPoint {
+    /// The gray level that was exposed.
+    pub gray: GrayLevel,
+    /// The dose that white has in the same exposure.
+    pub dose: Dose,
+    /// How deep it cured.
+    pub depth: Length,
+}
+
+impl DepthPoint {
+    /// The dose that arrived (002 eq. 34).
+    pub fn arriving(&self) -> Dose {
+        self.dose * self.gray
+    }
+}
+
+/// A measured cure width.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WidthPoint {
+    /// The square's side in the image.
+    pub feature_size: Length,
+    /// The dose that it was exposed with.
+    pub dose: Dose,
+    /// How far each edge lies outside the image.
+    pub width: Length,
+}
+
+/// The points of a table, and the rows that gave none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured<T> {
+    /// What was measured.
+    pub points: Vec<T>,
+    /// How many rows cured nothing, or grew by nothing, and lie on no line.
+    pub none: usize,
+    /// How many rows have an empty measurement.
+    pub blank: usize,
+}
+
+/// Why a table holds no measurements.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum DataError {
+    /// A column is missing.
+    #[error("there is no column {0}")]
+    NoColumn(&'static str),
+    /// Two columns say the same.
+    #[error("columns {0} and {1} say the same thing twice: keep one")]
+    Both(&'static str, &'static str),
+    /// A column that means nothing here.
+    #[error("column `{column}` is not known: the columns are {known}, and note for remarks")]
+    Unknown {
+        /// Its name.
+        column: String,
+        /// Those that are.
+        known: String,
+    },
+    /// Exposures without a light.
+    #[error("exposure_ms needs the light of full white: give --intensity, as 1.6W/cm2")]
+    NoLight,
+    /// A cell that is no number.
+    #[error("line {line}, column {column}: `{text}` is not a number")]
+    NotANumber {
+        /// From 1.
+        line: usize,
+        /// Which column.
+        column: &'static str,
+        /// What stands there.
+        text: String,
+    },
+    /// A number that cannot be.
+    #[error("line {line}, column {column}: {number} is not {wanted}")]
+    Impossible {
+        /// From 1.
+        line: usize,
+        /// Which column.
+        column: &'static str,
+        /// What stands there.
+        number: f64,
+        /// What should.
+        wanted: &'static str,
+    },
+    /// No row.
+    #[error("no row below the header holds a measurement")]
+    NoRows,
+}
+
+const DOSE: &str = "dose_mj_per_cm2";
+const EXPOSURE: &str = "exposure_ms";
+const GRAY: &str = "gray";
+const DEPTH: &str = "depth_um";
+const SIZE_PIXELS: &str = "feature_px";
+const SIZE: &str = "feature_um";
+const CURED: &str = "cured_um";
+const WIDTH: &str = "width_um";
+
+/// Takes cure depths from a table of `dose_mj_per_cm2` or, under a light,
+/// `exposure_ms`; `depth_um`; and `gray`, white where that is absent. The doses are
+/// those of full white. Depths of zero and below cured nothing.
+///
+/// # Errors
+/// Where a column is missing or unknown, or a cell is no possible number.
+pub fn depth_points(
+    table: &Table,
+    light: Option<Intensity>,
+) -> Result<Measured<DepthPoint>, DataError> {
+    check_columns(table, &[DOSE, EXPOSURE, GRAY, DEPTH])?;
+    let dose = DoseColumn::find(table, light)?;
+    let gray = Column::find(table, GRAY);
+    let depth = Column::find(table, DEPTH).ok_or(DataError::NoColumn(DEPTH))?;
+    measured(table, |row| {
+        let dose = dose.of(row)?;
+        let gray = gray.map_or(Ok(GrayLevel::WHITE), |gray| {
+            let level = gray.number(row)?;
+            let wanted = "a gray level from 0 (black) to 1 (white)";
+            GrayLevel::new(level).ok_or_else(|| gray.impossible(row, level, wanted))
+        })?;
+        let Some(um) = depth.number_or_blank(row)? else { return Ok(Read::Blank) };
+        if um <= 0.0 {
+            return Ok(Read::Nothing);
+        }
+        let point = DepthPoint { gray, dose, depth: Length::from_um(um) };
+        if point.arriving().mj_per_cm2() == 0.0 {
+            return Err(depth.impossible(row, um, "what black cures"));
+        }
+        Ok(Read::Point(point))
+    })
+}
+
+/// Takes cure widths from a table of `dose_mj_per_cm2` or, under a light,
+/// `exposure_ms`; `feature_px` or `feature_um`, the squares' side in the image; and
+/// `cured_um`, their side after curing, or `width_um`, the cure width itself (002
+/// eq. 60). Widths of zero and below grew by nothing.
+///
+/// # Errors
+/// Where a column is missing or unknown, or a cell is no possible number.
+pub fn width_points(
+    table: &Table,
+    light: Option<Intensity>,
+    dpi: Dpi,
+) -> Result<Measured<WidthPoint>, DataError> {
+    check_columns(table, &[SIZE_PIXELS, SIZE, DOSE, EXPOSURE, CURED, WIDTH])?;
+    let dose = DoseColumn::find(table, light)?;
+    let (size, in_pixels) = Column::either(table, SIZE_PIXELS, SIZE)?;
+    let (width, is_side) = Column::either(table, CURED, WIDTH)?;
+    measured(table, |row| {
+        let dose = dose.of(row)?;
+        let um = size.positive(row, "a size above zero")?;
+        let pitch = if in_pixels { dpi.pitch().um() } else { 1.0 };
+        let feature_size = Length::from_um(um * pitch);
+        let Some(um) = width.number_or_blank(row)? else { return Ok(Read::Blank) };
+        let um = Length::from_um(um);
+        let width = if is_side { cure_width_of_square(um, feature_size) } else { um };
+        let grew = width.um() > 0.0;
+        Ok(if grew { Read::Point(WidthPoint { feature_size, dose, width }) } else { Read::Nothing })
+    })
+}
+
+/// What a row says.
+enum Read<T> {
+    Point(T),
+    Nothing,
+    Blank,
+}
+
+fn measured<T>(
+    table: &Table,
+    read: impl Fn(&Row) -> Result<Read<T>, DataError>,
+) -> Result<Measured<T>, DataError> {
+    let mut measured = Measured { points: Vec::new(), none: 0, blank: 0 };
+    for row in table.rows() {
+        match read(row)? {
+            Read::Point(point) => measured.points.push(point),
+            Read::Nothing => measured.none += 1,
+            Read::Blank => measured.blank += 1,
+        }
+    }
+    if measured.points.len() + measured.none == 0 {
+        return Err(DataError::NoRows);
+    }
+    Ok(measured)
+}
+
+/// A misspelt column must not be silently left out.
+fn check_columns(table: &Table, known: &[&str]) -> Result<(), DataError> {
+    let is_known = |column: &&String| known.contains(&column.as_str()) || column.as_str() == "note";
+    match table.columns().iter().find(|column| !is_known(column)) {
+        Some(column) => Err(DataError::Unknown { column: column.clone(), known: known.join(", ") }),
+        None => Ok(()),
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Column {
+    name: &'static str,
+    index: usize,
+}
+
+impl Column {
+    fn find(table: &Table, name: &'static str) -> Option<Self> {
+        table.find(name).map(|index| Self { name, index })
+    }
+
+    /// The one of two columns that is there, and whether it is the first.
+    fn either(
+        table: &Table,
+        first: &'static str,
+        second: &'static str,
+    ) -> Result<(Self, bool), DataError> {
+        match (Self::find(table, first), Self::find(table, second)) {
+            (Some(_), Some(_)) => Err(DataError::Both(first, second)),
+            (Some(column), None) => Ok((column, true)),
+            (None, Some(column)) => Ok((column, false)),
+            (None, None) => Err(DataError::NoColumn(first)),
+        }
+    }
+
+    fn number_or_blank(self, row: &Row) -> Result<Option<f64>, DataError> {
+        match row.cell(self.index) {
+            "" => Ok(None),
+            _ => self.number(row).map(Some),
+        }
+    }
+
+    fn number(self, row: &Row) -> Result<f64, DataError> {
+        let text = row.cell(self.index);
+        let (line, column) = (row.line, self.name);
+        let number: Option<f64> = text.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| DataError::NotANumber { line, column, text: text.to_owned() })
+    }
+
+    fn positive(self, row: &Row, wanted: &'static str) -> Result<f64, DataError> {
+        let number = self.number(row)?;
+        if number > 0.0 { Ok(number) } else { Err(self.impossible(row, number, wanted)) }
+    }
+
+    fn impossible(self, row: &Row, number: f64, wanted: &'static str) -> DataError {
+        DataError::Impossible { line: row.line, column: self.name, number, wanted }
+    }
+}
+
+/// The doses, as such or as exposures under a light.
+struct DoseColumn {
+    column: Column,
+    light: Option<Intensity>,
+}
+
+impl DoseColumn {
+    fn find(table: &Table, light: Option<Intensity>) -> Result<Self, DataError> {
+        let (column, is_dose) = Column::either(table, DOSE, EXPOSURE)?;
+        if is_dose {
+            return Ok(Self { column, light: None });
+        }
+        Ok(Self { column, light: Some(light.ok_or(DataError::NoLight)?) })
+    }
+
+    fn of(&self, row: &Row) -> Result<Dose, DataError> {
+        Ok(match self.light {
+            None => Dose::from_mj_per_cm2(self.column.positive(row, "a dose above zero")?),
+            Some(light) => {
+                let ms = self.column.positive(row, "a time above zero")?;
+                light * ExposureTime::from_ms(ms)
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn depths(text: &str) -> Result<Measured<DepthPoint>, DataError> {
+        depth_points(&Table::parse(text).unwrap(), Some(Intensity::from_mw_per_cm2(1600.0)))
+    }
+
+    fn widths(text: &str) -> Result<Measured<WidthPoint>, DataError> {
+        width_points(&Table::parse(text).unwrap(), None, Dpi::new(1500.0).unwrap())
+    }
+
+    #[test]
+    fn depths_over_doses_and_over_times() {
+        let by_dose = depths("dose_mj_per_cm2,depth_um\n320,188\n100,0\n50,-1\n640,\n").unwrap();
+        assert_eq!((by_dose.points.len(), by_dose.none, by_dose.blank), (1, 2, 1));
+        let point = by_dose.points[0];
+        assert_eq!((point.dose.mj_per_cm2(), point.depth.um()), (320.0, 188.0));
+        assert_eq!(point.arriving(), point.dose);
+        // 200 ms at 1.6 W/cm².
+        let by_time = depths("note,gray,depth_um,exposure_ms\nclear,0.5,188,200\n").unwrap();
+        assert_eq!(by_time.points[0].dose, point.dose);
+        assert_eq!(by_time.points[0].arriving().mj_per_cm2(), 160.0);
+    }
+
+    #[test]
+    fn widths_of_sides_and_widths() {
+        // 25 pixels of 1500 dpi are 423.33 um.
+        let sides = "feature_px,dose_mj_per_cm2,cured_um\n25,200,450\n25,100,420\n25,300,\n";
+        let by_side = widths(sides).unwrap();
+        assert_eq!((by_side.points.len(), by_side.none, by_side.blank), (1, 1, 1));
+        let point = by_side.points[0];
+        assert!((point.feature_size.um() - 423.333333).abs() < 1e-6);
+        assert!((point.width.um() - 13.333333).abs() < 1e-6);
+        let by_width = widths("feature_um,dose_mj_per_cm2,width_um\n423,200,13.3\n").unwrap();
+        assert_eq!(by_width.points[0].feature_size.um(), 423.0);
+        assert_eq!(by_width.points[0].width.um(), 13.3);
+    }
+
+    #[test]
+    fn errors_say_where() {
+        for (text, words) in [
+            ("depth_um\n1", "there is no column dose_mj_per_cm2"),
+            ("dose_mj_per_cm2\n1", "there is no column depth_um"),
+            ("dose_mj_per_cm2,exposure_ms,depth_um\n1,1,1", "say the same thing twice"),
+            ("dose_mj_per_cm2,depth_um,grey\n1,1,1", "column `grey` is not known"),
+            ("dose_mj_per_cm2,depth_um\n1,2\nx,1", "line 3, column dose_mj_per_cm2: `x` is not a"),
+            ("dose_mj_per_cm2,depth_um\n1,inf", "line 2, column depth_um: `inf` is not a number"),
+            ("dose_mj_per_cm2,depth_um\n,2", "line 2, column dose_mj_per_cm2: `` is not a number"),
+            ("dose_mj_per_cm2,depth_um\n0,2", "column dose_mj_per_cm2: 0 is not a dose above"),
+            ("exposure_ms,depth_um\n-1,2", "column exposure_ms: -1 is not a time above zero"),
+            ("dose_mj_per_cm2,depth_um,gray\n1,2,50", "column gray: 50 is not a gray level"),
+            ("dose_mj_per_cm2,depth_um,gray\n1,2,0", "column depth_um: 2 is not what black cures"),
+            ("dose_mj_per_cm2,depth_um\n", "no row below the header"),
+            ("dose_mj_per_cm2,depth_um\n1,", "no row below the header"),
+        ] {
+            let error = depths(text).unwrap_err().to_string();
+            assert!(error.contains(words), "{error} for {text:?}");
+        }
+        let error = widths("feature_px,exposure_ms,width_um\n25,1,1").unwrap_err().to_string();
+        assert!(error.contains("--intensity"), "{error}");
+        let error = widths("feature_px,dose_mj_per_cm2,width_um\n0,1,1").unwrap_err();
+        assert!(error.to_string().contains("column feature_px: 0 is not a size"), "{error}");
+    }
+}

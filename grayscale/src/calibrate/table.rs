@@ -1,0 +1,150 @@
+//! Tables of numbers as text: comma-separated values under a header.
+
+use thiserror::Error;
+
+/// A table of measurements.
+///
+/// ```
+/// use lamp_grayscale::calibrate::Table;
+///
+/// let table = Table::parse("dose_mj_per_cm2, depth_um\n# a comment\n320, 187.6\n")?;
+/// assert_eq!(table.columns(), ["dose_mj_per_cm2", "depth_um"]);
+/// # Ok::<(), lamp_grayscale::calibrate::TableError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    columns: Vec<String>,
+    rows: Vec<Row>,
+}
+
+/// A row's texts, as many as there are columns.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Row {
+    /// Its line in the file, from 1.
+    pub(super) line: usize,
+    cells: Vec<String>,
+}
+
+/// Why a text is no table.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// Nothing but blank lines and comments.
+    #[error("the file is empty: write a header, as dose_mj_per_cm2,depth_um, and rows below it")]
+    Empty,
+    /// A header in columns that are not separated by commas.
+    #[error("line {line}: separate columns by commas, and write 1.5 for one and a half")]
+    Separator {
+        /// The header's line, from 1.
+        line: usize,
+    },
+    /// A column that is there twice.
+    #[error("line {line}: column {column} stands twice")]
+    Twice {
+        /// The header's line, from 1.
+        line: usize,
+        /// The column.
+        column: String,
+    },
+    /// A row that does not fit the header.
+    #[error("line {line}: {cells} columns, where the header has {columns}")]
+    Ragged {
+        /// From 1.
+        line: usize,
+        /// How many the row has.
+        cells: usize,
+        /// How many the header has.
+        columns: usize,
+    },
+}
+
+impl Table {
+    /// Reads a table: a header, then rows. Blank lines and those that start with `#`
+    /// are skipped; quotes around a cell are taken off.
+    ///
+    /// # Errors
+    /// Where there is no header, or a row has more or fewer cells than it.
+    pub fn parse(text: &str) -> Result<Self, TableError> {
+        // Spreadsheets mark their files as UTF-8.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| {
+            let line = line.trim();
+            !(line.is_empty() || line.starts_with('#'))
+        });
+        let (line, header) = lines.next().ok_or(TableError::Empty)?;
+        if header.contains([';', '\t']) && !header.contains(',') {
+            return Err(TableError::Separator { line });
+        }
+        let columns = cells(header);
+        if let Some((_, column)) =
+            (0..).zip(&columns).find(|(i, column)| columns[..*i].contains(column))
+        {
+            return Err(TableError::Twice { line, column: column.clone() });
+        }
+        let row = |(line, text)| {
+            let cells = cells(text);
+            if cells.len() == columns.len() {
+                Ok(Row { line, cells })
+            } else {
+                Err(TableError::Ragged { line, cells: cells.len(), columns: columns.len() })
+            }
+        };
+        let rows = lines.map(row).collect::<Result<_, _>>()?;
+        Ok(Self { columns, rows })
+    }
+
+    /// The columns' names, in order.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    pub(super) fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// Which column has a name.
+    pub(super) fn find(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column == name)
+    }
+}
+
+impl Row {
+    /// The text of a column that the table has.
+    pub(super) fn cell(&self, column: usize) -> &str {
+        &self.cells[column]
+    }
+}
+
+/// The cells of a line, none of which steers a terminal.
+fn cells(line: &str) -> Vec<String> {
+    let cell = |cell: &str| cell.trim().trim_matches('"').trim().replace(char::is_control, " ");
+    line.split(',').map(cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spreadsheets_and_hands_write_tables() {
+        let table = Table::parse("\u{feff}\"a\",\"b\"\r\n\r\n# c\r\n1,\r\n 2 , 3 \r\n").unwrap();
+        assert_eq!(table.columns(), ["a", "b"]);
+        let rows: Vec<_> = table.rows().iter().map(|row| (row.line, &row.cells[..])).collect();
+        let text = |texts: [&str; 2]| texts.map(str::to_owned).to_vec();
+        assert_eq!(rows, [(4, &text(["1", ""])[..]), (5, &text(["2", "3"])[..])]);
+        assert_eq!((table.find("b"), table.find("c")), (Some(1), None));
+        assert_eq!(Table::parse("a\n").unwrap().rows(), []);
+    }
+
+    #[test]
+    fn what_is_no_table_is_an_error() {
+        let refused = |text| Table::parse(text).unwrap_err().to_string();
+        for text in ["", "\n \n", "# nothing"] {
+            assert!(refused(text).starts_with("the file is empty"), "{text:?}");
+        }
+        assert!(refused("a;b\n1,5;2").contains("line 1: separate columns by commas"));
+        assert_eq!(refused("\na,b,a"), "line 2: column a stands twice");
+        assert_eq!(refused("a,b\n1,2\n1,2,3"), "line 3: 3 columns, where the header has 2");
+        assert_eq!(refused("a,b\n1"), "line 2: 1 columns, where the header has 2");
+    }
+}

@@ -1,0 +1,348 @@
+//! The two-depth model of measured cure depths.
+
+use lamp_stack::Length;
+
+use super::data::DepthPoint;
+use super::solve::{dot, inverse, product};
+use super::student::t_95;
+use super::{Estimate, FitError};
+use crate::material::TwoDepthNumbers;
+use crate::resin::Dose;
+
+/// A two-depth model found from measurements.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TwoDepthFit {
+    /// `E_c`.
+    pub critical_dose: Estimate<Dose>,
+    /// `D_pL`.
+    pub liquid_depth: Estimate<Length>,
+    /// `D_pS`. Where the points lie on a straight line over the dose, or bend the
+    /// other way, it is 10 000 times the deepest, from where on it makes no
+    /// difference.
+    pub solid_depth: Estimate<Length>,
+    /// Whether that is so.
+    pub straight: bool,
+    /// The share of the depths' scatter that the curve explains.
+    pub r2: f64,
+    /// How many points it is of.
+    pub points: usize,
+    curve: Curve,
+    /// The parameters' covariance, times the square of Student's t.
+    spread: [[f64; 3]; 3],
+}
+
+/// How many times the deepest point a solid's penetration depth is where it makes
+/// no difference any more: a 20 000th of the depth.
+const CLEAR: f64 = 1e4;
+
+/// Fits `z = D_pS ln(D_pL/D_pS (E/E_c - 1) + 1)` (000 eq. 3.8, 003 eq. 2) by
+/// nonlinear least squares (Levenberg and Marquardt).
+///
+/// Its parameters here are `E_c`, the depth that a dose adds at first, `D_pL/E_c`,
+/// and the bend `1/D_pS`: these the points hold as near to straight as can be.
+/// Intervals come from their covariance, by Student's t: for `E_c` as they are,
+/// for `D_pL` on a logarithmic scale, for `D_pS` over its inverse, so that the
+/// interval has no upper end where the solid may be clear.
+///
+/// # Errors
+/// Where there are fewer than four points or three doses, the depth does not rise
+/// with the dose, or no positive numbers fit.
+pub fn fit_two_depth(points: &[DepthPoint]) -> Result<TwoDepthFit, FitError> {
+    let data: Vec<_> = points.iter().map(|p| (p.arriving().mj_per_cm2(), p.depth.um())).collect();
+    check(&data)?;
+    let deepest = data.iter().map(|point| point.1).fold(0.0, f64::max);
+    let bends = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].map(|times| times / deepest);
+    let fits = bends.iter().filter_map(|&bend| Curve::from_line(&data, bend)?.fitted(&data));
+    let best = fits.min_by(|a, b| a.squares(&data).total_cmp(&b.squares(&data)));
+    let curve = best.filter(|curve| curve.onset > 0.0).ok_or(FitError::NoFit)?;
+    TwoDepthFit::of(curve, &data, deepest).ok_or(FitError::NoFit)
+}
+
+fn check(data: &[(f64, f64)]) -> Result<(), FitError> {
+    if data.len() < 4 {
+        return Err(FitError::TooFew { points: data.len(), needed: 4 });
+    }
+    let mut doses: Vec<f64> = data.iter().map(|point| point.0).collect();
+    doses.sort_by(f64::total_cmp);
+    doses.dedup();
+    if doses.len() < 3 {
+        return Err(FitError::TooFewDoses { doses: doses.len(), needed: 3 });
+    }
+    super::line::LineFit::new(data)?.rising("um for each mJ/cm2")?;
+    Ok(())
+}
+
+/// `z = ln(1 + k a (E - E_c))/k`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Curve {
+    /// `E_c`.
+    onset: f64,
+    /// `ln a`, where `a` is `D_pL/E_c`.
+    log_rate: f64,
+    /// `k`, `1/D_pS`; zero is a straight line.
+    bend: f64,
+}
+
+impl Curve {
+    /// The curve of a bend, by the line that `(exp(k z) - 1)/k = a (E - E_c)` is.
+    fn from_line(data: &[(f64, f64)], bend: f64) -> Option<Self> {
+        let straight = |z: f64| if bend > 0.0 { (bend * z).exp_m1() / bend } else { z };
+        let n = data.len() as f64;
+        let mean_x = data.iter().map(|point| point.0).sum::<f64>() / n;
+        let mean_y = data.iter().map(|point| straight(point.1)).sum::<f64>() / n;
+        let xx: f64 = data.iter().map(|point| (point.0 - mean_x).powi(2)).sum();
+        let xy: f64 = data.iter().map(|point| (point.0 - mean_x) * straight(point.1)).sum();
+        let rate = xy / xx;
+        let onset = mean_x - mean_y / rate;
+        // The curve has to reach the lowest dose.
+        let lowest = data.iter().map(|point| point.0).fold(f64::INFINITY, f64::min);
+        let onset = if bend > 0.0 { onset.min(lowest + 0.5 / (bend * rate)) } else { onset };
+        (rate > 0.0).then_some(Self { onset, log_rate: rate.ln(), bend })
+    }
+
+    /// The depth of a dose, and its derivatives over the three parameters; no
+    /// number below where the curve begins.
+    fn at(&self, dose: f64) -> (f64, [f64; 3]) {
+        let (rate, k) = (self.log_rate.exp(), self.bend);
+        let u = rate * (dose - self.onset);
+        let ku = k * u;
+        let grows = 1.0 / (1.0 + ku);
+        let (depth, over_bend) = if ku.abs() < 1e-4 {
+            (u * (1.0 - ku / 2.0 + ku * ku / 3.0), u * u * (-0.5 + 2.0 / 3.0 * ku))
+        } else {
+            (ku.ln_1p() / k, (ku * grows - ku.ln_1p()) / (k * k))
+        };
+        (depth, [-rate * grows, u * grows, over_bend])
+    }
+
+    /// The sum of the squares that the curve leaves; infinite where it does not
+    /// reach a point.
+    fn squares(&self, data: &[(f64, f64)]) -> f64 {
+        let sum: f64 = data.iter().map(|&(dose, z)| (z - self.at(dose).0).powi(2)).sum();
+        if sum.is_nan() { f64::INFINITY } else { sum }
+    }
+
+    /// The products of the derivatives with each other, and with what is left.
+    fn normal(&self, data: &[(f64, f64)]) -> ([[f64; 3]; 3], [f64; 3]) {
+        let (mut matrix, mut vector) = ([[0.0; 3]; 3], [0.0; 3]);
+        for &(dose, z) in data {
+            let (depth, slopes) = self.at(dose);
+            for i in 0..3 {
+                vector[i] += slopes[i] * (z - depth);
+                for j in 0..3 {
+                    matrix[i][j] += slopes[i] * slopes[j];
+                }
+            }
+        }
+        (matrix, vector)
+    }
+
+    /// Steps downhill until no step helps.
+    fn fitted(mut self, data: &[(f64, f64)]) -> Option<Self> {
+        let mut squares = self.squares(data);
+        let mut damping = 1e-3;
+        for _ in 0..500 {
+            let (mut matrix, vector) = self.normal(data);
+            for (i, row) in matrix.iter_mut().enumerate() {
+                row[i] *= 1.0 + damping;
+            }
+            let step = product(&inverse(matrix)?, &vector);
+            let next = Self {
+                onset: self.onset + step[0],
+                log_rate: self.log_rate + step[1],
+                bend: (self.bend + step[2]).max(0.0),
+            };
+            let left = next.squares(data);
+            if left < squares {
+                let ended = squares - left <= 1e-14 * squares;
+                (self, squares) = (next, left);
+                if ended {
+                    break;
+                }
+                damping = (damping / 10.0).max(1e-12);
+            } else if damping > 1e9 {
+                break;
+            } else {
+                damping *= 10.0;
+            }
+        }
+        squares.is_finite().then_some(self)
+    }
+}
+
+impl TwoDepthFit {
+    fn of(curve: Curve, data: &[(f64, f64)], deepest: f64) -> Option<Self> {
+        let straight = curve.bend * deepest < 1.0 / CLEAR;
+        let mean = data.iter().map(|point| point.1).sum::<f64>() / data.len() as f64;
+        let scatter: f64 = data.iter().map(|point| (point.1 - mean).powi(2)).sum();
+        let squares = curve.squares(data);
+        let free = data.len() - 3;
+        let times = t_95(free).powi(2) * squares / free as f64;
+        let (matrix, _) = curve.normal(data);
+        let spread = inverse(matrix)?.map(|row| row.map(|part| part * times));
+        let half = |slopes: [f64; 3]| dot(&slopes, &product(&spread, &slopes)).max(0.0).sqrt();
+        let liquid = curve.log_rate.exp() * curve.onset;
+        let ratio = half([1.0 / curve.onset, 1.0, 0.0]).exp();
+        let bend_half = half([0.0, 0.0, 1.0]);
+        let solid = if straight { CLEAR * deepest } else { 1.0 / curve.bend };
+        let high = if straight || bend_half >= curve.bend {
+            f64::INFINITY
+        } else {
+            1.0 / (curve.bend - bend_half)
+        };
+        Some(Self {
+            critical_dose: Estimate::even(curve.onset, half([1.0, 0.0, 0.0])),
+            liquid_depth: Estimate::new(liquid, liquid / ratio, liquid * ratio),
+            solid_depth: Estimate::new(solid, (1.0 / (curve.bend + bend_half)).min(solid), high),
+            straight,
+            r2: 1.0 - squares / scatter,
+            points: data.len(),
+            curve,
+            spread,
+        })
+    }
+
+    /// Returns the depth of a dose that arrives, below zero up to the critical one,
+    /// and the 95% interval of the curve there; no number far below.
+    pub fn depth(&self, dose: Dose) -> Estimate<Length> {
+        let (depth, slopes) = self.curve.at(dose.mj_per_cm2());
+        let half = dot(&slopes, &product(&self.spread, &slopes)).max(0.0).sqrt();
+        Estimate::even(depth, half)
+    }
+
+    /// Returns the numbers for a material file.
+    pub fn numbers(&self, source: &str) -> TwoDepthNumbers {
+        let clear = "; the points do not bend: clear once solid";
+        let of_solid = format!("{source}{}", if self.straight { clear } else { "" });
+        TwoDepthNumbers {
+            critical_dose: self.critical_dose.given(source),
+            liquid_depth: self.liquid_depth.given(source),
+            solid_depth: self.solid_depth.given(&of_solid),
+            depths: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Noise, depth_points, share_held};
+    use super::*;
+    use crate::resin::{Depths, ExposureTime, GrayLevel, Intensity, TwoDepth};
+
+    const DOSES: [f64; 10] = [5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 30.0, 45.0, 70.0, 100.0];
+
+    fn truth() -> TwoDepth {
+        let um = Length::from_um;
+        TwoDepth::new(Dose::from_mj_per_cm2(4.0), um(80.0), um(150.0), Depths::ALL).unwrap()
+    }
+
+    #[test]
+    fn exact_points_give_the_model_back() {
+        let fit = fit_two_depth(&depth_points(&truth(), &DOSES, |_| 0.0)).unwrap();
+        assert!((fit.critical_dose.value.mj_per_cm2() - 4.0).abs() < 1e-6, "{fit:?}");
+        assert!((fit.liquid_depth.value.um() - 80.0).abs() < 1e-5, "{fit:?}");
+        assert!((fit.solid_depth.value.um() - 150.0).abs() < 1e-5, "{fit:?}");
+        assert!(!fit.straight && fit.r2 > 1.0 - 1e-9 && fit.points == 10);
+    }
+
+    #[test]
+    fn it_agrees_with_another_program() {
+        // scipy.optimize.curve_fit of E_c, ln(D_pL/E_c) and 1/D_pS.
+        let errors = [2.0, -1.5, 0.5, 3.0, -2.5, 1.0, -0.5, -2.0, 2.5, -1.0];
+        let mut error = errors.into_iter();
+        let fit = fit_two_depth(&depth_points(&truth(), &DOSES, |_| error.next().unwrap()));
+        let fit = fit.unwrap();
+        for (found, wanted) in [
+            (fit.critical_dose.value.mj_per_cm2(), 3.936045),
+            (fit.critical_dose.plus_minus().mj_per_cm2(), 0.252660),
+            (fit.liquid_depth.value.um(), 77.975147),
+            (fit.liquid_depth.high.um(), 87.695740),
+            (fit.solid_depth.value.um(), 150.777529),
+            (fit.solid_depth.low.um(), 144.567360),
+            (fit.solid_depth.high.um(), 157.545185),
+        ] {
+            assert!((found - wanted).abs() < 1e-4 * wanted, "{found} for {wanted}");
+        }
+    }
+
+    #[test]
+    fn of_100_intervals_95_hold_the_truth() {
+        let mut noise = Noise::new(5);
+        let fits = std::iter::from_fn(|| {
+            Some(fit_two_depth(&depth_points(&truth(), &DOSES, |_| 3.0 * noise.normal())))
+        });
+        let held = share_held(fits.take(2000), |fit| {
+            [
+                fit.critical_dose.holds(Dose::from_mj_per_cm2(4.0)),
+                fit.liquid_depth.holds(Length::from_um(80.0)),
+                fit.solid_depth.holds(Length::from_um(150.0)),
+            ]
+        });
+        // 95% +- 1.5% is three standard deviations of 2000 trials.
+        assert!(held.iter().all(|share| (share - 0.95).abs() < 0.0147), "{held:?}");
+    }
+
+    #[test]
+    fn the_points_of_appendix_a_are_straight() {
+        // 000 appendix A: seconds at 0.2064 mW/cm² and um. Appendix E has E_c 11.593,
+        // D_pL 302.8253 and a D_pS of 100 m for them.
+        let points = [
+            (170.0, 611.4583333),
+            (160.0, 581.6666667),
+            (150.0, 482.4166667),
+            (140.0, 443.53),
+            (130.0, 401.8055556),
+            (120.0, 348.5555556),
+            (110.0, 299.8055556),
+            (100.0, 241.4444444),
+            (95.0, 199.9722222),
+            (85.0, 154.2833333),
+        ];
+        let points = points.map(|(seconds, um)| {
+            let dose = Intensity::from_mw_per_cm2(0.2064) * ExposureTime::from_ms(1000.0 * seconds);
+            DepthPoint { gray: GrayLevel::WHITE, dose, depth: Length::from_um(um) }
+        });
+        let fit = fit_two_depth(&points).unwrap();
+        assert!(fit.straight, "{fit:?}");
+        assert!((fit.critical_dose.value.mj_per_cm2() - 11.593).abs() < 0.01, "{fit:?}");
+        assert!((fit.liquid_depth.value.um() - 302.8253).abs() < 0.1, "{fit:?}");
+        assert_eq!(fit.solid_depth.high.um(), f64::INFINITY);
+        let numbers = fit.numbers("a test");
+        assert!(numbers.solid_depth.plus_minus.is_none());
+        assert!(numbers.solid_depth.source.contains("do not bend"), "{numbers:?}");
+    }
+
+    #[test]
+    fn too_little_is_refused() {
+        let points = depth_points(&truth(), &DOSES, |_| 0.0);
+        assert_eq!(fit_two_depth(&points[..3]), Err(FitError::TooFew { points: 3, needed: 4 }));
+        let two = depth_points(&truth(), &[5.0, 5.0, 9.0, 9.0], |_| 0.0);
+        assert_eq!(fit_two_depth(&two), Err(FitError::TooFewDoses { doses: 2, needed: 3 }));
+        let falls = depth_points(&truth(), &DOSES, |mj| -8.0 * mj);
+        assert!(matches!(fit_two_depth(&falls), Err(FitError::Falls { .. })));
+    }
+
+    #[test]
+    fn a_bend_of_nothing_is_a_line() {
+        for bend in [0.0, 1e-9, 1e-6, 9e-7, 2e-6] {
+            let curve = Curve { onset: 4.0, log_rate: 3.0, bend };
+            let slopes = curve.at(9.0).1;
+            let moved = |onset, log_rate, bend: f64| {
+                let other = Curve {
+                    onset: curve.onset + onset,
+                    log_rate: curve.log_rate + log_rate,
+                    bend: curve.bend + bend,
+                };
+                other.at(9.0).0
+            };
+            let differences = [
+                (moved(1e-5, 0.0, 0.0) - moved(-1e-5, 0.0, 0.0)) / 2e-5,
+                (moved(0.0, 1e-5, 0.0) - moved(0.0, -1e-5, 0.0)) / 2e-5,
+                (moved(0.0, 0.0, 1e-7) - moved(0.0, 0.0, -1e-7)) / 2e-7,
+            ];
+            for (slope, difference) in slopes.iter().zip(differences) {
+                assert!((slope - difference).abs() < 1e-3 * slope.abs(), "{bend}: {slopes:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! The cure width of measured squares.
+
+use lamp_stack::Length;
+
+use super::data::WidthPoint;
+use super::line::LineFit;
+use super::{Estimate, FitError};
+use crate::material::WidthNumbers;
+use crate::resin::{Dose, WidthSensitivity};
+
+/// The cure width of squares of one size over the dose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WidthFit {
+    /// The squares' side in the image.
+    pub feature_size: Length,
+    /// `E_c^w`, where the line meets width zero.
+    pub critical_dose: Estimate<Dose>,
+    /// `D_p^w`, the line's slope.
+    pub sensitivity: Estimate<WidthSensitivity>,
+    /// The share of the widths' scatter that the line explains.
+    pub r2: f64,
+    /// How many points it is of.
+    pub points: usize,
+    line: LineFit,
+}
+
+/// Fits `C_w = D_p^w (E - E_c^w)` to the squares of each size, from the smallest,
+/// by linear regression of the width on the dose, not on its logarithm (002
+/// section 3.4.4).
+///
+/// Intervals are those of the working curve's fit, by Student's t and Fieller's
+/// theorem.
+///
+/// # Errors
+/// Where a size has fewer than three points or two doses, its width does not rise
+/// with the dose for sure, or begins at no dose above zero; or there is no size.
+pub fn fit_widths(points: &[WidthPoint]) -> Result<Vec<WidthFit>, FitError> {
+    let mut sorted = points.to_vec();
+    sorted.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));
+    if sorted.is_empty() {
+        return Err(FitError::TooFew { points: 0, needed: 3 });
+    }
+    let groups = sorted.chunk_by(|a, b| a.feature_size == b.feature_size);
+    let fit = |group: &[WidthPoint]| {
+        let size = group[0].feature_size;
+        fit_size(size, group).map_err(|error| error.within(format!("squares of {size}")))
+    };
+    groups.map(fit).collect()
+}
+
+fn fit_size(feature_size: Length, points: &[WidthPoint]) -> Result<WidthFit, FitError> {
+    let pairs: Vec<_> = points.iter().map(|p| (p.dose.mj_per_cm2(), p.width.um())).collect();
+    let line = LineFit::new(&pairs)?.rising("um for each mJ/cm2")?;
+    let [value, low, high] = line.zero();
+    if value <= 0.0 {
+        return Err(FitError::NoCriticalDose(value));
+    }
+    Ok(WidthFit {
+        feature_size,
+        critical_dose: Estimate::new(value, low, high),
+        sensitivity: Estimate::even(line.slope, line.slope_half()),
+        r2: line.r2,
+        points: points.len(),
+        line,
+    })
+}
+
+impl WidthFit {
+    /// Returns the width at a dose, below zero up to the critical one, and the 95%
+    /// interval of the line there.
+    pub fn width(&self, dose: Dose) -> Estimate<Length> {
+        let mj = dose.mj_per_cm2();
+        Estimate::even(self.line.at(mj), self.line.half_at(mj))
+    }
+
+    /// Returns the numbers for a material file.
+    pub fn numbers(&self, source: &str) -> WidthNumbers {
+        WidthNumbers {
+            feature_size: self.feature_size,
+            critical_dose: self.critical_dose.given(source),
+            sensitivity: self.sensitivity.given(source),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Noise, share_held};
+    use super::*;
+    use crate::resin::WidthLine;
+
+    const DOSES: [f64; 8] = [150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0];
+
+    fn truth(size: f64, critical: f64, slope: f64) -> WidthLine {
+        WidthLine {
+            feature_size: Length::from_um(size),
+            critical_dose: Dose::from_mj_per_cm2(critical),
+            sensitivity: WidthSensitivity::from_um_per_mj_per_cm2(slope),
+        }
+    }
+
+    fn points(truth: WidthLine, mut error: impl FnMut() -> f64) -> Vec<WidthPoint> {
+        let point = |mj| {
+            let dose = Dose::from_mj_per_cm2(mj);
+            let width = Length::from_um(truth.width(dose).um() + error());
+            WidthPoint { feature_size: truth.feature_size, dose, width }
+        };
+        DOSES.map(point).to_vec()
+    }
+
+    #[test]
+    fn exact_points_give_each_size_back() {
+        let truths = [truth(423.0, 140.0, 0.08), truth(7620.0, 90.0, 0.2)];
+        let [small, large] = truths.map(|truth| points(truth, || 0.0));
+        let fits = fit_widths(&[large, small].concat()).unwrap();
+        assert_eq!(fits.len(), 2);
+        for (fit, truth) in fits.iter().zip(truths) {
+            assert_eq!((fit.feature_size, fit.points), (truth.feature_size, 8));
+            let critical = truth.critical_dose.mj_per_cm2();
+            assert!((fit.critical_dose.value.mj_per_cm2() - critical).abs() < 1e-9);
+            let slope = truth.sensitivity.um_per_mj_per_cm2();
+            assert!((fit.sensitivity.value.um_per_mj_per_cm2() - slope).abs() < 1e-12);
+            let dose = Dose::from_mj_per_cm2(333.0);
+            assert!((fit.width(dose).value.um() - truth.width(dose).um()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn of_100_intervals_95_hold_the_truth() {
+        let truth = truth(423.0, 100.0, 0.1);
+        let mut noise = Noise::new(11);
+        let fits = std::iter::from_fn(|| {
+            let points = points(truth, || 2.0 * noise.normal());
+            Some(fit_widths(&points).map(|fits| fits[0]))
+        });
+        let held = share_held(fits.take(4000), |fit| {
+            [fit.critical_dose.holds(truth.critical_dose), fit.sensitivity.holds(truth.sensitivity)]
+        });
+        assert!(held.iter().all(|share| (share - 0.95).abs() < 0.0104), "{held:?}");
+    }
+
+    #[test]
+    fn errors_name_the_size() {
+        let few = &points(truth(423.0, 100.0, 0.1), || 0.0)[..2];
+        let error = fit_widths(few).unwrap_err().to_string();
+        assert!(error.starts_with("squares of 423um: 2 points are too few"), "{error}");
+        // A line that begins left of no dose at all.
+        let mut early = points(truth(423.0, 100.0, 0.1), || 0.0);
+        for point in &mut early {
+            point.width = Length::from_um(point.width.um() + 50.0);
+        }
+        let error = fit_widths(&early).unwrap_err().to_string();
+        assert!(error.contains("begins at a dose of -400.00 mJ/cm2"), "{error}");
+        assert_eq!(fit_widths(&[]), Err(FitError::TooFew { points: 0, needed: 3 }));
+    }
+}
