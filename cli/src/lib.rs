@@ -12,6 +12,7 @@ mod materials;
 mod options;
 mod picture;
 mod placement;
+mod plots;
 mod report;
 mod section;
 mod signals;

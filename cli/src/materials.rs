@@ -1,4 +1,4 @@
-//! Materials that people name.
+//! Materials by name or file, as options name them.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -19,24 +19,29 @@ pub(crate) fn material(name_or_file: &str) -> Result<Material, Stop> {
         return Ok(builtin.material());
     }
     let path = Path::new(name_or_file);
-    if !path.exists() && path.extension().is_none() {
+    if !is_stream(path) && !path.exists() {
         let names = Builtin::ALL.map(|builtin| builtin.name()).join(", ");
-        let text = format!("there is no material `{name_or_file}`: name a file, or one of {names}");
+        let text =
+            format!("{name_or_file}: there is no such file, nor a built-in material: {names}");
         return Err(Stop::Failed(anyhow!(text)));
     }
     Ok(read(path).with_context(|| input_name(path))?)
 }
 
-/// Reads a material file, or standard input.
+/// Reads a material file.
 pub(crate) fn read(path: &Path) -> anyhow::Result<Material> {
+    Ok(Material::from_toml(&read_text(path, LARGEST_FILE, "a material file")?)?)
+}
+
+/// Reads a text of at most so many bytes; `what` it is to be.
+pub(crate) fn read_text(path: &Path, largest: u64, what: &str) -> anyhow::Result<String> {
     let from: Box<dyn Read> =
         if is_stream(path) { Box::new(io::stdin().lock()) } else { Box::new(File::open(path)?) };
     let mut bytes = Vec::new();
-    from.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST_FILE {
-        return Err(anyhow!("more than 1 MiB is no material file"));
+    from.take(largest + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > largest {
+        return Err(anyhow!("more than {} MiB is not {what}", largest >> 20));
     }
-    let text = String::from_utf8(bytes)
-        .map_err(|error| anyhow!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to()))?;
-    Ok(Material::from_toml(&text)?)
+    String::from_utf8(bytes)
+        .map_err(|error| anyhow!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to()))
 }

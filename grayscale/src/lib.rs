@@ -1,6 +1,7 @@
 //! Light and resin: how deep a dose cures ([`resin`], [`material`]), how to find
-//! that from measurements ([`calibrate`]), and gray levels to dots: a machine that can only expose or not realises a gray level as
-//! the share of its pixels that are white (002 section 3.3.1).
+//! that from measurements ([`calibrate`]), and gray levels to dots: a machine that
+//! can only expose or not realises a gray level as the share of its pixels that are
+//! white (002 section 3.3.1).
 //!
 //! All dithering methods leave solid black and white alone, so their cost follows the
 //! gray pixels, and no dot appears outside the part. [`homogeneity`] says whether the

@@ -1,5 +1,6 @@
 //! One file a command: its options, and what it does with them.
 
+mod calibrate;
 mod convert;
 mod cure;
 mod demo;
@@ -34,6 +35,7 @@ pub(crate) enum Command {
     Split(split::SplitArgs),
     Material(material::MaterialArgs),
     Cure(cure::CureArgs),
+    Calibrate(calibrate::CalibrateArgs),
 }
 
 impl Command {
@@ -63,6 +65,7 @@ impl Command {
             Self::Split(_) => "split",
             Self::Material(_) => "material",
             Self::Cure(_) => "cure",
+            Self::Calibrate(_) => "calibrate",
         }
     }
 
@@ -81,6 +84,7 @@ impl Command {
             Self::Split(args) => split::run(args, common),
             Self::Material(args) => material::run(args),
             Self::Cure(args) => cure::run(args, common),
+            Self::Calibrate(args) => calibrate::run(args, common),
         }
     }
 }

@@ -8,6 +8,8 @@ use super::student::t_95;
 pub(super) struct LineFit {
     mean_x: f64,
     mean_y: f64,
+    /// How many points it is of.
+    pub(super) points: usize,
     /// What all y rise for one x.
     pub(super) slope: f64,
     /// The share of the scatter of y that the line explains.
@@ -40,7 +42,15 @@ impl LineFit {
         let left = sum(&|x, y| (y - slope * x).powi(2));
         let half2 = t_95(points.len() - 2).powi(2) * left / (n - 2.0);
         let r2 = if yy > 0.0 { 1.0 - left / yy } else { 0.0 };
-        Ok(Self { mean_x, mean_y, slope, r2, mean_half2: half2 / n, slope_half2: half2 / xx })
+        Ok(Self {
+            points: points.len(),
+            mean_x,
+            mean_y,
+            slope,
+            r2,
+            mean_half2: half2 / n,
+            slope_half2: half2 / xx,
+        })
     }
 
     /// Returns half the width of the slope's 95% interval.

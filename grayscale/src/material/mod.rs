@@ -33,8 +33,9 @@ use crate::resin::{
     Resin, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
 };
 
-/// What is known of a resin. What a source does not give is absent.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What is known of a resin. What a source does not give is absent. The default
+/// knows nothing, and has no name yet.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Material {
     /// Its name, for commands: small letters, digits and `-`.

@@ -1,0 +1,241 @@
+//! `lamp calibrate depth`.
+
+use clap::{Args, ValueEnum};
+use lamp_grayscale::calibrate::{
+    CurveFit, DepthPoint, Estimate, GrayFit, LevelFit, LineEstimate, Quantity, TwoDepthFit,
+    depth_points, fit_curve, fit_gray, fit_two_depth,
+};
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::{CureModel, Dose, GrayCurve, GrayLevel, Line};
+use lamp_stack::Length;
+
+use super::Files;
+use super::text::{Text, in_legend, short};
+use crate::options::Common;
+use crate::plots::{Axis, Plot, Series, highest};
+use crate::report::Report;
+use crate::stop::Stop;
+
+/// Find the working curve from measured cure depths
+///
+/// The CSV file has a header with the columns dose_mj_per_cm2 (or exposure_ms, with --intensity)
+/// and depth_um, and gray (0 black to 1 white) for the gray model. Doses are those of full white.
+/// Rows of depth 0 or less are uncured: they lie on no curve, and are left out.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp calibrate depth depths.csv
+  lamp calibrate depth times.csv --intensity 1.6W/cm2 -o mine.toml --plot depths.svg
+  lamp calibrate depth depths.csv --model two-depth --material mine.toml -o mine.toml")]
+pub(super) struct DepthArgs {
+    #[command(flatten)]
+    files: Files,
+
+    /// Which model to fit [default: gray where the file has such a column, else jacobs]
+    #[arg(long, value_enum)]
+    model: Option<ModelArg>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ModelArg {
+    /// The working curve Dp ln(E / Ec)
+    Jacobs,
+    /// Own penetration depths for liquid and solid
+    TwoDepth,
+    /// A working curve whose Ec and Dp are lines over the gray level
+    Gray,
+}
+
+enum Fit {
+    Jacobs(CurveFit),
+    TwoDepth(TwoDepthFit),
+    Gray(GrayFit),
+}
+
+pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Stop> {
+    let files = &args.files;
+    files.check()?;
+    let base = files.base()?;
+    let table = files.table()?;
+    let at_place = |stop: Stop| stop.at(files.place());
+    let measured = depth_points(&table, files.light(base.as_ref()));
+    let measured = measured.map_err(|error| at_place(error.into()))?;
+    let has_gray = table.columns().iter().any(|column| column == "gray");
+    let model = args.model.unwrap_or(if has_gray { ModelArg::Gray } else { ModelArg::Jacobs });
+    let points = &measured.points[..];
+    if model != ModelArg::Gray && points.iter().any(|point| point.gray != GrayLevel::WHITE) {
+        return Err(at_place(Stop::usage("some rows are gray: fit them with --model gray")));
+    }
+    let fit = match model {
+        ModelArg::Jacobs => fit_curve(points).map(Fit::Jacobs),
+        ModelArg::TwoDepth => fit_two_depth(points).map(Fit::TwoDepth),
+        ModelArg::Gray => fit_gray(points).map(Fit::Gray),
+    };
+    let fit = fit.map_err(|error| at_place(error.into()))?;
+    say_what_was_changed(&fit, &Report::new("calibrate", common.quiet, true));
+    let mut text = Text::new(&measured, "uncured");
+    fit.write(&mut text);
+    let title = format!("Cure depth: {}", files.source_name());
+    let source = files.source(points.len());
+    let plot = plot(title, &fit, points);
+    files.finish(base, |material| fit.add_to(material, &source), &plot, &text.finish())
+}
+
+/// What is in the material other than measured.
+fn say_what_was_changed(fit: &Fit, report: &Report) {
+    match fit {
+        Fit::Jacobs(_) => {}
+        Fit::TwoDepth(fit) if fit.straight => report.say(&format!(
+            "the points do not bend: the solid is as good as clear, and its penetration depth \
+             stands as {} um, 10000 times the deepest point",
+            short(fit.solid_depth.value.um())
+        )),
+        Fit::TwoDepth(_) => {}
+        Fit::Gray(fit) => {
+            levelled(&fit.critical_dose, "the critical dose", "mJ/cm2", report);
+            levelled(&fit.penetration_depth, "the penetration depth", "um", report);
+        }
+    }
+}
+
+fn levelled<T: Quantity>(line: &LineEstimate<T>, what: &str, unit: &str, report: &Report) {
+    let Some(rise) = line.levelled else { return };
+    let [fall, high, level] =
+        [-rise.number(), line.rise.high.number(), line.at_zero.value.number()].map(short);
+    report.say(&format!(
+        "{what} falls by {fall} {unit} from black to white, which scatter may do (it might as well \
+         rise by {high}): the gray model takes no falling line, so it stands level at {level} {unit}"
+    ));
+}
+
+impl Fit {
+    fn write(&self, text: &mut Text) {
+        match self {
+            Self::Jacobs(fit) => {
+                text.line("R^2", &[&short(fit.r2)]);
+                text.heads();
+                text.estimate("Ec (mJ/cm2)", &fit.critical_dose);
+                text.estimate("Dp (um)", &fit.penetration_depth);
+            }
+            Self::TwoDepth(fit) => {
+                text.line("R^2", &[&short(fit.r2)]);
+                text.heads();
+                text.estimate("Ec (mJ/cm2)", &fit.critical_dose);
+                text.estimate("DpL (um)", &fit.liquid_depth);
+                text.estimate("DpS (um)", &fit.solid_depth);
+            }
+            Self::Gray(fit) => {
+                text.heads();
+                for level in &fit.levels {
+                    let (gray, curve) = (level.gray.get(), &level.curve);
+                    text.estimate(&format!("Ec at {gray} (mJ/cm2)"), &curve.critical_dose);
+                    text.estimate(&format!("Dp at {gray} (um)"), &curve.penetration_depth);
+                    let r2 = format!("R^2 at {gray}, {} points", curve.points);
+                    text.line(&r2, &[&short(curve.r2)]);
+                }
+                write_line(text, "Ec(G)", "mJ/cm2", &fit.critical_dose);
+                write_line(text, "Dp(G)", "um", &fit.penetration_depth);
+            }
+        }
+    }
+
+    fn add_to(&self, material: &mut Material, source: &str) {
+        match self {
+            Self::Jacobs(fit) => material.working_curve = Some(fit.numbers(source)),
+            Self::TwoDepth(fit) => material.two_depth = Some(fit.numbers(source)),
+            Self::Gray(fit) => material.gray = Some(fit.lines(source)),
+        }
+    }
+
+    /// The dose below which nothing is to be seen.
+    fn least_dose(&self) -> f64 {
+        let least = |ec: &Estimate<Dose>| {
+            let [value, low] = [ec.value, ec.low].map(Dose::mj_per_cm2);
+            low.max(value / 2.0)
+        };
+        match self {
+            Self::Jacobs(fit) => least(&fit.critical_dose),
+            Self::TwoDepth(fit) => least(&fit.critical_dose),
+            Self::Gray(fit) => {
+                let of_white =
+                    |level: &LevelFit| least(&level.curve.critical_dose) / level.gray.get();
+                fit.levels.iter().map(of_white).fold(f64::INFINITY, f64::min)
+            }
+        }
+    }
+}
+
+fn write_line<T: Quantity>(text: &mut Text, name: &str, unit: &str, line: &LineEstimate<T>) {
+    text.estimate(&format!("{name} at zero ({unit})"), &line.at_zero);
+    text.estimate(&format!("{name} rise ({unit})"), &line.rise);
+    text.line(&format!("R^2 of {name}"), &[&short(line.r2)]);
+}
+
+fn plot(title: String, fit: &Fit, points: &[DepthPoint]) -> Plot {
+    let most = points.iter().map(|point| point.dose.mj_per_cm2()).fold(0.0, f64::max);
+    let least = points.iter().map(|point| point.dose.mj_per_cm2()).fold(fit.least_dose(), f64::min);
+    let range = least / 1.1..most * 1.1;
+    let step = |i| range.start * (range.end / range.start).powf(f64::from(i) / 120.0);
+    let doses: Vec<_> = (0..=120).map(|i| Dose::from_mj_per_cm2(step(i))).collect();
+    let series = match fit {
+        Fit::Jacobs(fit) => {
+            let dp = in_legend("Dp", "µm", &fit.penetration_depth);
+            let name = format!("{dp}, {}", in_legend("Ec", "mJ/cm²", &fit.critical_dose));
+            let curve = |dose| fit.depth(dose).value;
+            vec![series(name, points, &doses, curve, |dose| fit.depth(dose))]
+        }
+        Fit::TwoDepth(fit) => {
+            let liquid = in_legend("DpL", "µm", &fit.liquid_depth);
+            let solid = in_legend("DpS", "µm", &fit.solid_depth);
+            let ec = in_legend("Ec", "mJ/cm²", &fit.critical_dose);
+            let name = format!("{liquid}, {solid}, {ec}");
+            let curve = |dose| fit.depth(dose).value;
+            vec![series(name, points, &doses, curve, |dose| fit.depth(dose))]
+        }
+        Fit::Gray(fit) => of_levels(fit, points, &doses),
+    };
+    let x = Axis { label: "dose of full white (mJ/cm²)".to_owned(), range, logarithmic: true };
+    let depths = 0.0..1.08 * highest(&series);
+    let y = Axis { label: "cure depth (µm)".to_owned(), range: depths, logarithmic: false };
+    Plot { title, x, y, series }
+}
+
+/// The curves of the gray model in the bands of the single levels.
+fn of_levels(fit: &GrayFit, points: &[DepthPoint], doses: &[Dose]) -> Vec<Series> {
+    let (ec, dp) = (&fit.critical_dose, &fit.penetration_depth);
+    let model = GrayCurve::new(
+        Line { at_zero: ec.at_zero.value, rise: ec.rise.value },
+        Line { at_zero: dp.at_zero.value, rise: dp.rise.value },
+    )
+    .expect("lines that fall are levelled, and begin above zero");
+    let level = |level: &LevelFit| {
+        let gray = level.gray;
+        let of_level: Vec<_> = points.iter().filter(|p| p.gray == gray).copied().collect();
+        let curve = |dose| model.gray_depth(gray, dose);
+        let band = |dose| level.curve.depth(dose * gray);
+        series(format!("gray {}", gray.get()), &of_level, doses, curve, band)
+    };
+    fit.levels.iter().map(level).collect()
+}
+
+/// Points with their curve, drawn where it is above zero.
+fn series(
+    name: String,
+    points: &[DepthPoint],
+    doses: &[Dose],
+    curve: impl Fn(Dose) -> Length,
+    band: impl Fn(Dose) -> Estimate<Length>,
+) -> Series {
+    let curve = doses.iter().map(|&dose| (dose.mj_per_cm2(), curve(dose).um()));
+    let band = doses.iter().map(|&dose| {
+        let band = band(dose);
+        // Below where it begins a curve may have no depth at all: max takes the zero.
+        [dose.mj_per_cm2(), band.low.um().max(0.0), band.high.um().max(0.0)]
+    });
+    Series {
+        name,
+        points: points.iter().map(|p| (p.dose.mj_per_cm2(), p.depth.um())).collect(),
+        curve: curve.filter(|point| point.1 > 0.0).collect(),
+        band: band.filter(|ends| ends[2] > 0.0).collect(),
+    }
+}

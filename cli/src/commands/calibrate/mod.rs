@@ -1,0 +1,200 @@
+//! `lamp calibrate`: what its two kinds share.
+
+mod depth;
+mod text;
+mod width;
+
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::{Args, Subcommand};
+use lamp_grayscale::calibrate::{DataError, FitError, Table};
+use lamp_grayscale::material::{Given, Material, MaterialError};
+use lamp_grayscale::resin::Intensity;
+
+use crate::materials::{load, read_text};
+use crate::options::Common;
+use crate::plots::{self, Plot};
+use crate::stop::Stop;
+use crate::streams::{check_beside, input_name, is_stream, print, write_file};
+
+/// Find a resin's numbers from measured cure depths or widths
+///
+/// Prints each number with its 95% confidence interval; writes them into a material file, and
+/// plots them with the points that they come from.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp calibrate depth depths.csv -o mine.toml --plot depths.svg
+  lamp calibrate width widths.csv --material mine.toml -o mine.toml --plot widths.png")]
+pub(crate) struct CalibrateArgs {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    Depth(depth::DepthArgs),
+    Width(width::WidthArgs),
+}
+
+pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Stop> {
+    match &args.what {
+        What::Depth(args) => depth::run(args, common),
+        What::Width(args) => width::run(args, common),
+    }
+}
+
+/// What both kinds read and write.
+#[derive(Args)]
+struct Files {
+    /// The measurements: a CSV file, or - for standard input
+    #[arg(value_name = "DATA")]
+    data: PathBuf,
+
+    /// The light of full white, which makes doses of exposure_ms; it goes into the material
+    /// [default: the material's]
+    #[arg(long, value_name = "INTENSITY", value_parser = parse_light)]
+    intensity: Option<Intensity>,
+
+    /// Add to what this material says: a file, or a built-in material's name
+    #[arg(long, value_name = "MATERIAL")]
+    material: Option<PathBuf>,
+
+    /// Where to write the material file
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+
+    /// What to call the material [default: as --material, or as the file]
+    #[arg(long, value_name = "NAME", requires = "output")]
+    name: Option<String>,
+
+    /// Plot the points and the curves: a file that ends in .svg or .png
+    #[arg(long, value_name = "PLOT")]
+    plot: Option<PathBuf>,
+}
+
+fn parse_light(text: &str) -> Result<Intensity, String> {
+    match text.parse::<Intensity>() {
+        Ok(light) if light.mw_per_cm2() > 0.0 => Ok(light),
+        Ok(_) => Err("full white has some light".to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Measurements are some thousands of rows.
+const LARGEST_TABLE: u64 = 16 << 20;
+
+impl Files {
+    /// Checks, before the work, that the outputs can be written.
+    fn check(&self) -> Result<(), Stop> {
+        if is_stream(&self.data) && io::stdin().is_terminal() {
+            return Err(Stop::usage("no measurements to read: name a file, or pipe one in"));
+        }
+        if let Some(output) = &self.output {
+            if is_stream(output) {
+                return Err(Stop::usage("the table goes to standard output: name a file with -o"));
+            }
+            check_beside(output, Path::new("-"), [&self.data])?;
+        }
+        let Some(plot) = &self.plot else { return Ok(()) };
+        plots::check_name(plot)?;
+        if self.output.as_ref() == Some(plot) {
+            return Err(Stop::usage(format!("{}: the material goes there", plot.display())));
+        }
+        check_beside(plot, Path::new("-"), self.material.iter().chain([&self.data]))
+    }
+
+    /// The material to add to, with the light given.
+    fn base(&self) -> Result<Option<Material>, Stop> {
+        self.material.as_deref().map(load).transpose()
+    }
+
+    /// The light that makes doses of times.
+    fn light(&self, base: Option<&Material>) -> Option<Intensity> {
+        let of_base = || base?.intensity.as_ref().map(|light| light.value);
+        self.intensity.or_else(of_base)
+    }
+
+    fn table(&self) -> Result<Table, Stop> {
+        let read = || -> anyhow::Result<Table> {
+            Ok(Table::parse(&read_text(&self.data, LARGEST_TABLE, "a table of measurements")?)?)
+        };
+        Ok(read().with_context(|| self.place())?)
+    }
+
+    /// Where errors of the measurements are.
+    fn place(&self) -> String {
+        input_name(&self.data)
+    }
+
+    /// The measurements' name without its folder, which is nobody else's.
+    fn source_name(&self) -> String {
+        match self.data.file_name() {
+            Some(name) if !is_stream(&self.data) => name.to_string_lossy().into_owned(),
+            _ => self.place(),
+        }
+    }
+
+    /// The source line of a number of so many points.
+    fn source(&self, points: usize) -> String {
+        format!("calibrated from {}, {points} points", self.source_name())
+    }
+
+    /// Writes what was asked for, and prints the table. Nothing is written unless
+    /// all of it can be made.
+    fn finish(
+        &self,
+        base: Option<Material>,
+        add: impl FnOnce(&mut Material),
+        plot: &Plot,
+        table: &str,
+    ) -> Result<(), Stop> {
+        if let Some(output) = &self.output {
+            let mut material = base.unwrap_or_else(|| self.new_material(output));
+            if let Some(name) = &self.name {
+                material.name.clone_from(name);
+            }
+            if let Some(value) = self.intensity {
+                let source = format!("given with {}", self.source_name());
+                material.intensity = Some(Given { value, plus_minus: None, source });
+            }
+            add(&mut material);
+            let text = material.to_toml().map_err(|error| self.no_material(output, error))?;
+            write_file(output, |out| out.write_all(text.as_bytes()))?;
+        }
+        if let Some(path) = &self.plot {
+            plot.write(path)?;
+        }
+        print(table)
+    }
+
+    fn new_material(&self, output: &Path) -> Material {
+        let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+        Material {
+            name: stem.into_owned(),
+            description: format!("Calibrated from {}", self.source_name()),
+            ..Material::default()
+        }
+    }
+
+    fn no_material(&self, output: &Path, error: MaterialError) -> Stop {
+        match error {
+            MaterialError::Name(_) => Stop::usage(format!("{error}; give the material a --name")),
+            error => Stop::Failed(anyhow!(error).context(output.display().to_string())),
+        }
+    }
+}
+
+impl From<DataError> for Stop {
+    fn from(error: DataError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<FitError> for Stop {
+    fn from(error: FitError) -> Self {
+        Self::Failed(error.into())
+    }
+}

@@ -1,0 +1,146 @@
+//! `lamp calibrate width`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use lamp_grayscale::calibrate::{WidthFit, WidthPoint, fit_widths, width_points};
+use lamp_grayscale::material::{Material, MaterialError};
+use lamp_grayscale::resin::{CureModel, Dose, broadening_depth};
+use lamp_stack::Dpi;
+
+use super::Files;
+use super::text::{Text, in_legend, short};
+use crate::materials::load;
+use crate::options::Common;
+use crate::plots::{Axis, Plot, Series, highest};
+use crate::report::Report;
+use crate::stop::Stop;
+
+/// Find the cure width of features of several sizes from measured squares
+///
+/// The CSV file has a header with the columns feature_px (the squares' side in the image; or
+/// feature_um), dose_mj_per_cm2 (or exposure_ms, with --intensity), and cured_um (the side after
+/// curing; or width_um, how far each edge lies outside its image). Rows whose square is no larger
+/// than its image lie on no line, and are left out. lamp target squares writes a file to fill in.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp calibrate width squares.csv --depth-material lamp-no-absorber
+  lamp calibrate width squares.csv --material mine.toml -o mine.toml --plot widths.svg")]
+pub(super) struct WidthArgs {
+    #[command(flatten)]
+    files: Files,
+
+    /// The resolution that feature_px is of
+    #[arg(long, default_value = "1500")]
+    dpi: Dpi,
+
+    /// Tell the broadening depth by this material's cure depth [default: that of --material]
+    #[arg(long, value_name = "MATERIAL")]
+    depth_material: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Stop> {
+    let files = &args.files;
+    files.check()?;
+    let base = files.base()?;
+    let of_depths = args.depth_material.as_deref().map(load).transpose()?;
+    let depths = match of_depths.as_ref().or(base.as_ref()) {
+        Some(material) => cure_depths(material).map_err(anyhow::Error::new)?,
+        None => None,
+    };
+    let report = Report::new("calibrate", common.quiet, true);
+    if depths.is_none() {
+        report.say(
+            "no broadening depth, as no cure depth is known: name a material with --depth-material",
+        );
+    }
+    let table = files.table()?;
+    let at_place = |stop: Stop| stop.at(files.place());
+    let measured = width_points(&table, files.light(base.as_ref()), args.dpi);
+    let measured = measured.map_err(|error| at_place(error.into()))?;
+    let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;
+    let mut text = Text::new(&measured, "not wider");
+    for fit in &fits {
+        write(&mut text, fit, args.dpi, depths.as_deref());
+    }
+    let title = format!("Cure width: {}", files.source_name());
+    let plot = plot(title, &fits, &measured.points, args.dpi);
+    let add = |material: &mut Material| {
+        for fit in &fits {
+            add_to(material, fit, &files.source(fit.points));
+        }
+    };
+    files.finish(base, add, &plot, &text.finish())
+}
+
+/// How deep full white cures a material, where that is known.
+fn cure_depths(material: &Material) -> Result<Option<Box<dyn CureModel>>, MaterialError> {
+    if let Some(curve) = material.working_curve()? {
+        return Ok(Some(Box::new(curve)));
+    }
+    if let Some(model) = material.two_depth()? {
+        return Ok(Some(Box::new(model)));
+    }
+    Ok(material.gray_curve()?.map(|curve| Box::new(curve) as Box<dyn CureModel>))
+}
+
+fn write(text: &mut Text, fit: &WidthFit, dpi: Dpi, depths: Option<&dyn CureModel>) {
+    let (size, below) = (size_name(fit, dpi), fit.below);
+    let below = if below > 0 { format!(" ({below} more below Ec^w)") } else { String::new() };
+    text.line(&format!("\n{size}: {} points{below}", fit.points), &[]);
+    text.heads();
+    text.estimate("Ec^w (mJ/cm2)", &fit.critical_dose);
+    text.estimate("Dp^w (um/(mJ/cm2))", &fit.sensitivity);
+    if let Some(depths) = depths {
+        let critical = &fit.critical_dose;
+        let ends = [critical.value, critical.low, critical.high];
+        let [value, low, high] = ends.map(|dose| short(broadening_depth(depths, dose).um()));
+        text.line("Bd (um)", &[&value, &low, &high]);
+    }
+    text.line("R^2", &[&short(fit.r2)]);
+}
+
+/// The squares' side in pixels and um.
+fn size_name(fit: &WidthFit, dpi: Dpi) -> String {
+    let two = |number: f64| (number * 100.0).round() / 100.0;
+    let size = fit.feature_size;
+    format!("{} px ({} um)", two(size.pixels(dpi)), two(size.um()))
+}
+
+/// Adds a size's numbers, in place of those that the material has of that size.
+fn add_to(material: &mut Material, fit: &WidthFit, source: &str) {
+    let um = fit.feature_size.um();
+    material.cure_width.retain(|size| (size.feature_size.um() - um).abs() > 1e-6 * um);
+    material.cure_width.push(fit.numbers(source));
+    material.cure_width.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));
+}
+
+fn plot(title: String, fits: &[WidthFit], points: &[WidthPoint], dpi: Dpi) -> Plot {
+    let most = points.iter().map(|point| point.dose.mj_per_cm2()).fold(0.0, f64::max) * 1.05;
+    let doses: Vec<_> =
+        (0..=120).map(|i| Dose::from_mj_per_cm2(most * f64::from(i) / 120.0)).collect();
+    let series: Vec<_> = fits.iter().map(|fit| series(fit, points, &doses, dpi)).collect();
+    let axis = |label: &str, end: f64| Axis {
+        label: label.to_owned(),
+        range: 0.0..end,
+        logarithmic: false,
+    };
+    let (x, y) = (axis("dose (mJ/cm²)", most), axis("cure width (µm)", 1.08 * highest(&series)));
+    Plot { title, x, y, series }
+}
+
+fn series(fit: &WidthFit, points: &[WidthPoint], doses: &[Dose], dpi: Dpi) -> Series {
+    let of_size = points.iter().filter(|point| point.feature_size == fit.feature_size);
+    let band = doses.iter().map(|&dose| {
+        let width = fit.width(dose);
+        [dose.mj_per_cm2(), width.low.um().max(0.0), width.high.um().max(0.0)]
+    });
+    let (from, to) = (fit.critical_dose.value, doses[doses.len() - 1]);
+    Series {
+        name: format!("{}: {}", size_name(fit, dpi), in_legend("Ec", "mJ/cm²", &fit.critical_dose)),
+        points: of_size.map(|point| (point.dose.mj_per_cm2(), point.width.um())).collect(),
+        curve: vec![(from.mj_per_cm2(), 0.0), (to.mj_per_cm2(), fit.width(to).value.um())],
+        band: band.filter(|ends| ends[2] > 0.0).collect(),
+    }
+}

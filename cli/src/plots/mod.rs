@@ -1,0 +1,270 @@
+//! Curves through measured points, as SVG or PNG.
+
+mod scale;
+
+use std::io::{self, Write};
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Once;
+
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::prelude::*;
+use plotters::style::{FontStyle, register_font};
+
+use scale::Scale;
+
+use crate::stop::Stop;
+use crate::streams::write_file;
+
+/// A plot of curves over one axis.
+#[derive(Debug)]
+pub(crate) struct Plot {
+    pub(crate) title: String,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) series: Vec<Series>,
+}
+
+/// An axis. What lies outside its range is not to be drawn.
+#[derive(Debug)]
+pub(crate) struct Axis {
+    /// What it is, with its unit.
+    pub(crate) label: String,
+    pub(crate) range: Range<f64>,
+    /// Whether equal ratios are equally long; the range is then above zero.
+    pub(crate) logarithmic: bool,
+}
+
+impl Axis {
+    fn scale(&self) -> Scale {
+        Scale { range: self.range.clone(), logarithmic: self.logarithmic }
+    }
+}
+
+/// Measured points, and the curve through them.
+#[derive(Debug)]
+pub(crate) struct Series {
+    /// What stands in the legend.
+    pub(crate) name: String,
+    pub(crate) points: Vec<(f64, f64)>,
+    pub(crate) curve: Vec<(f64, f64)>,
+    /// Where the curve may lie: x, and the lowest and the highest y.
+    pub(crate) band: Vec<[f64; 3]>,
+}
+
+/// The highest place that is drawn of any of them.
+pub(crate) fn highest(series: &[Series]) -> f64 {
+    let points = series.iter().flat_map(|series| &series.points).map(|point| point.1);
+    let bands = series.iter().flat_map(|series| &series.band).map(|ends| ends[2]);
+    points.chain(bands).fold(0.0, f64::max)
+}
+
+/// How plots are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Svg,
+    Png,
+}
+
+/// How large a plot is looked at, in points.
+const SIZE: (u32, u32) = (860, 560);
+/// How many pixels of a PNG, or units of an SVG, a point has: places are whole
+/// numbers of them.
+const SCALE: u32 = 2;
+const PIXELS: (u32, u32) = (SIZE.0 * SCALE, SIZE.1 * SCALE);
+
+/// Checks, before the work, that a plot can have that name.
+pub(crate) fn check_name(path: &Path) -> Result<(), Stop> {
+    format_of(path).map(|_| ())
+}
+
+fn format_of(path: &Path) -> Result<Format, Stop> {
+    let is = |end: &str| path.extension().is_some_and(|have| have.eq_ignore_ascii_case(end));
+    if is("svg") {
+        Ok(Format::Svg)
+    } else if is("png") {
+        Ok(Format::Png)
+    } else {
+        let path = path.display();
+        Err(Stop::usage(format!("{path}: a plot is an SVG or a PNG: end its name in .svg or .png")))
+    }
+}
+
+impl Plot {
+    /// Writes the plot as its name says. Equal plots give equal bytes.
+    pub(crate) fn write(&self, path: &Path) -> Result<(), Stop> {
+        let format = format_of(path)?;
+        write_file(path, |out| match format {
+            Format::Svg => out.write_all(self.svg().as_bytes()),
+            Format::Png => self.write_png(out),
+        })
+    }
+
+    fn svg(&self) -> String {
+        let mut text = String::new();
+        // A text takes all that is drawn on it.
+        self.draw(&SVGBackend::with_string(&mut text, PIXELS).into_drawing_area())
+            .expect("a text takes all");
+        let [fine, shown] =
+            [PIXELS, SIZE].map(|(width, height)| format!(r#"width="{width}" height="{height}""#));
+        text.replacen(&fine, &shown, 1)
+    }
+
+    fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
+        let (width, height) = PIXELS;
+        let mut pixels = vec![0; (width * height * 3) as usize];
+        let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
+        self.draw(&area).map_err(|error| io::Error::other(error.to_string()))?;
+        drop(area);
+        let mut png = png::Encoder::new(out, width, height);
+        png.set_color(png::ColorType::Rgb);
+        png.set_depth(png::BitDepth::Eight);
+        png.write_header()?.write_image_data(&pixels)?;
+        Ok(())
+    }
+
+    fn draw<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, plotters::coord::Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        with_font();
+        area.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(area)
+            .caption(&self.title, font(19))
+            .margin(14 * SCALE)
+            .margin_right(26 * SCALE)
+            .x_label_area_size(44 * SCALE)
+            .y_label_area_size(62 * SCALE)
+            .build_cartesian_2d(self.x.scale(), self.y.scale())?;
+        chart
+            .configure_mesh()
+            .x_desc(&self.x.label)
+            .y_desc(&self.y.label)
+            .axis_desc_style(font(15))
+            .label_style(font(13))
+            .axis_style(GRAY_INK.stroke_width(SCALE))
+            .bold_line_style(GRID.stroke_width(SCALE))
+            .light_line_style(TRANSPARENT)
+            .draw()?;
+        for (series, ink) in self.series.iter().zip(inks()) {
+            let up = series.band.iter().map(|&[x, _, high]| (x, high));
+            let down = series.band.iter().rev().map(|&[x, low, _]| (x, low));
+            chart.draw_series([Polygon::new(up.chain(down).collect::<Vec<_>>(), ink.mix(0.16))])?;
+        }
+        for (series, ink) in self.series.iter().zip(inks()) {
+            let curve = series.curve.iter().copied();
+            let dot = |&point: &(f64, f64)| Circle::new(point, 3 * SCALE, ink.filled());
+            chart.draw_series(LineSeries::new(curve, ink.stroke_width(2 * SCALE)))?;
+            chart.draw_series(series.points.iter().map(dot))?.label(&series.name).legend(
+                move |(x, y)| {
+                    let end = x + 24 * SCALE as i32;
+                    PathElement::new([(x, y), (end, y)], ink.stroke_width(2 * SCALE))
+                },
+            );
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperLeft)
+            .margin(12 * SCALE)
+            .legend_area_size(30 * SCALE)
+            .label_font(font(14))
+            .background_style(WHITE.mix(0.85))
+            .border_style(GRID)
+            .draw()?;
+        area.present()
+    }
+}
+
+const GRAY_INK: RGBColor = RGBColor(90, 90, 90);
+const GRID: RGBColor = RGBColor(222, 222, 222);
+
+/// Colours that can be told apart, also by those who see few (Okabe and Ito), again
+/// from the start after eight.
+fn inks() -> impl Iterator<Item = RGBColor> {
+    const INKS: [RGBColor; 8] = [
+        RGBColor(0, 114, 178),
+        RGBColor(213, 94, 0),
+        RGBColor(0, 158, 115),
+        RGBColor(204, 121, 167),
+        RGBColor(86, 180, 233),
+        RGBColor(230, 159, 0),
+        RGBColor(110, 110, 110),
+        RGBColor(0, 0, 0),
+    ];
+    INKS.into_iter().cycle()
+}
+
+const FAMILY: &str = "sans-serif";
+
+fn font(points: u32) -> TextStyle<'static> {
+    (FAMILY, points * SCALE).into_font().color(&RGBColor(40, 40, 40))
+}
+
+/// Gives plots the one font that they are written in, so that they need none of the
+/// system's.
+fn with_font() {
+    static DONE: Once = Once::new();
+    DONE.call_once(|| {
+        let font = include_bytes!("../../fonts/roboto-subset.ttf");
+        let registered = register_font(FAMILY, FontStyle::Normal, font);
+        assert!(registered.is_ok(), "the font that comes with the program is one");
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(label: &str, range: Range<f64>, logarithmic: bool) -> Axis {
+        Axis { label: label.to_owned(), range, logarithmic }
+    }
+
+    fn plot() -> Plot {
+        let series = Series {
+            name: "a & b".to_owned(),
+            points: vec![(100.0, 10.0), (1000.0, 60.0)],
+            curve: vec![(100.0, 10.0), (1000.0, 60.0)],
+            band: vec![[100.0, 5.0, 15.0], [1000.0, 50.0, 70.0]],
+        };
+        Plot {
+            title: "Cure depth".to_owned(),
+            x: axis("dose (mJ/cm²)", 90.0..1100.0, true),
+            y: axis("depth (µm)", 0.0..75.0, false),
+            series: vec![series],
+        }
+    }
+
+    #[test]
+    fn an_svg_is_the_same_each_time_and_holds_what_is_to_be_seen() {
+        let svg = plot().svg();
+        assert_eq!(svg, plot().svg());
+        for text in ["Cure depth", "dose (mJ/cm²)", "a &amp; b", "500", "<circle", "<polygon"] {
+            assert!(svg.contains(text), "no {text} in {svg}");
+        }
+        assert!(svg.starts_with("<svg width=\"860\" height=\"560\" viewBox=\"0 0 1720 1120\""));
+        assert!(svg.ends_with("</svg>\n"));
+    }
+
+    #[test]
+    fn a_png_has_ink_where_the_curve_is() {
+        let mut bytes = Vec::new();
+        plot().write_png(&mut bytes).unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(bytes)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height), PIXELS);
+        let (colours, _) = pixels.as_chunks::<3>();
+        assert!(colours.contains(&[0, 114, 178]));
+        assert_eq!(colours[0], [255; 3]);
+    }
+
+    #[test]
+    fn a_plot_is_an_svg_or_a_png() {
+        for name in ["a.svg", "b/a.PNG"] {
+            assert!(check_name(Path::new(name)).is_ok(), "{name}");
+        }
+        for name in ["-", "a", "a.pdf", "svg"] {
+            assert_eq!(check_name(Path::new(name)).unwrap_err().status(), 2, "{name}");
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The axes of plots.
+
+use std::ops::Range;
+
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+
+/// Where an axis has its values.
+#[derive(Clone, Debug)]
+pub(super) struct Scale {
+    pub(super) range: Range<f64>,
+    /// Whether equal ratios are equally long.
+    pub(super) logarithmic: bool,
+}
+
+impl Ranged for Scale {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        let along = |value: f64| if self.logarithmic { value.ln() } else { value };
+        let (start, end) = (along(self.range.start), along(self.range.end));
+        let share = (along(*value) - start) / (end - start);
+        limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
+        ticks(&self.range, self.logarithmic)
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
+impl ValueFormatter<f64> for Scale {
+    fn format(value: &f64) -> String {
+        // Ticks are multiples of steps: their last digits are rounding.
+        ((value * 1e9).round() / 1e9).to_string()
+    }
+}
+
+/// Round numbers of a range: multiples of 1, 2 or 5 times a power of ten.
+fn ticks(range: &Range<f64>, logarithmic: bool) -> Vec<f64> {
+    if logarithmic {
+        let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+        let steps = |decade: i32| [1.0, 2.0, 5.0].map(|step| step * 10.0_f64.powi(decade));
+        let ticks: Vec<f64> = decades.flat_map(steps).filter(|tick| range.contains(tick)).collect();
+        if ticks.len() > 2 {
+            return ticks;
+        }
+    }
+    let rough = (range.end - range.start) / 8.0;
+    let power = 10.0_f64.powi(rough.log10().floor() as i32);
+    let step = [1.0, 2.0, 5.0, 10.0].map(|step| step * power).into_iter().find(|&s| s >= rough);
+    let step = step.unwrap_or(rough);
+    let first = (range.start / step).ceil() as i64;
+    let last = (range.end / step).floor() as i64;
+    (first..=last).map(|i| i as f64 * step).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round() {
+        assert_eq!(ticks(&(0.0..75.0), false), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0]);
+        assert_eq!(ticks(&(90.0..1100.0), true), [100.0, 200.0, 500.0, 1000.0]);
+        // Less than a decade has too few of 1, 2 and 5.
+        assert_eq!(ticks(&(210.0..480.0), true), [250.0, 300.0, 350.0, 400.0, 450.0]);
+        let fine = ticks(&(0.0..0.55), false).iter().map(Scale::format).collect::<Vec<_>>();
+        assert_eq!(fine, ["0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
+    }
+}
