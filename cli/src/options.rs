@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_grayscale::resin::Intensity;
 use lamp_stack::{Length, LengthError};
 
 use crate::stop::Stop;
@@ -86,6 +87,15 @@ pub(crate) fn parse_distance(text: &str) -> Result<Length, String> {
 pub(crate) fn parse_thickness(text: &str) -> Result<Length, String> {
     let length = parse_distance(text)?;
     if length.um() == 0.0 { Err("a layer has some thickness".to_owned()) } else { Ok(length) }
+}
+
+/// Parses the light of full white, which is some.
+pub(crate) fn parse_light(text: &str) -> Result<Intensity, String> {
+    match text.parse::<Intensity>() {
+        Ok(light) if light.mw_per_cm2() > 0.0 => Ok(light),
+        Ok(_) => Err("full white has some light".to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 /// Parses a count with an optional `k` or `M`: `750k`, `5.5M`.

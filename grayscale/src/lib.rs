@@ -33,6 +33,7 @@ mod ordered;
 pub mod resin;
 mod row;
 mod screen;
+pub mod target;
 mod threshold;
 #[cfg(test)]
 mod void_and_cluster;

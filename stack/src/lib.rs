@@ -54,5 +54,5 @@ pub use ordered::{Held, map_in_order};
 pub use output::{Destination, write_stack};
 pub use png_write::{png_of_layer, write_gray_png, write_png_folder, write_rgb_png};
 pub use split::{Cuts, SplitError, write_split};
-pub use temporary::{FileBeside, remove_temporaries};
+pub use temporary::{FileBeside, FolderBeside, remove_temporaries};
 pub use tiff::{Compression, EncodedPage, Format, Page, PageReader, PageWriter};

@@ -87,7 +87,7 @@ impl FileBeside {
 }
 
 /// As [`FileBeside`], a folder.
-pub(crate) struct FolderBeside {
+pub struct FolderBeside {
     folder: TempDir,
     _registered: Registered,
     path: PathBuf,
@@ -104,7 +104,10 @@ impl FolderBeside {
 
     /// A new folder that is to be `path`, where nothing may stand but an
     /// empty folder.
-    pub(crate) fn over_nothing(path: &Path) -> Result<Self, StackError> {
+    ///
+    /// # Errors
+    /// Where something does, or no folder can be made there.
+    pub fn over_nothing(path: &Path) -> Result<Self, StackError> {
         let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
         if path.exists() && !is_empty() {
             return Err(StackError::Exists);
@@ -112,11 +115,16 @@ impl FolderBeside {
         Ok(Self::new(path)?)
     }
 
-    pub(crate) fn path(&self) -> &Path {
+    /// Where it is for now: what is put there comes along.
+    pub fn path(&self) -> &Path {
         self.folder.path()
     }
 
-    pub(crate) fn persist(self) -> io::Result<()> {
+    /// Gives the folder its final name.
+    ///
+    /// # Errors
+    /// Where it cannot be renamed.
+    pub fn persist(self) -> io::Result<()> {
         fs::rename(self.folder.path(), &self.path)?;
         // The folder has another name now: there is nothing to remove.
         let _ = self.folder.keep();

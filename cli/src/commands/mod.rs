@@ -13,6 +13,7 @@ mod sample;
 mod show;
 pub(crate) mod slice;
 mod split;
+mod target;
 mod tile;
 
 use clap::{ArgMatches, FromArgMatches, Subcommand};
@@ -36,6 +37,7 @@ pub(crate) enum Command {
     Material(material::MaterialArgs),
     Cure(cure::CureArgs),
     Calibrate(calibrate::CalibrateArgs),
+    Target(target::TargetArgs),
 }
 
 impl Command {
@@ -66,6 +68,7 @@ impl Command {
             Self::Material(_) => "material",
             Self::Cure(_) => "cure",
             Self::Calibrate(_) => "calibrate",
+            Self::Target(_) => "target",
         }
     }
 
@@ -85,6 +88,7 @@ impl Command {
             Self::Material(args) => material::run(args),
             Self::Cure(args) => cure::run(args, common),
             Self::Calibrate(args) => calibrate::run(args, common),
+            Self::Target(args) => target::run(args, common),
         }
     }
 }

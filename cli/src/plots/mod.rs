@@ -169,7 +169,7 @@ impl Plot {
             .legend_area_size(30 * SCALE)
             .label_font(font(14))
             .background_style(WHITE.mix(0.85))
-            .border_style(GRID)
+            .border_style(TRANSPARENT)
             .draw()?;
         area.present()
     }

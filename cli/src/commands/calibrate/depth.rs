@@ -175,22 +175,24 @@ fn plot(title: String, fit: &Fit, points: &[DepthPoint]) -> Plot {
     let most = points.iter().map(|point| point.dose.mj_per_cm2()).fold(0.0, f64::max);
     let least = points.iter().map(|point| point.dose.mj_per_cm2()).fold(fit.least_dose(), f64::min);
     let range = least / 1.1..most * 1.1;
-    let step = |i| range.start * (range.end / range.start).powf(f64::from(i) / 120.0);
-    let doses: Vec<_> = (0..=120).map(|i| Dose::from_mj_per_cm2(step(i))).collect();
+    let step = |i| range.start * (range.end / range.start).powf(f64::from(i) / 30.0);
+    let doses: Vec<_> = (0..=30).map(|i| Dose::from_mj_per_cm2(step(i))).collect();
     let series = match fit {
         Fit::Jacobs(fit) => {
             let dp = in_legend("Dp", "µm", &fit.penetration_depth);
             let name = format!("{dp}, {}", in_legend("Ec", "mJ/cm²", &fit.critical_dose));
+            let begins = begins(&fit.critical_dose);
             let curve = |dose| fit.depth(dose).value;
-            vec![series(name, points, &doses, curve, |dose| fit.depth(dose))]
+            vec![series(name, points, &doses, begins, curve, |dose| fit.depth(dose))]
         }
         Fit::TwoDepth(fit) => {
             let liquid = in_legend("DpL", "µm", &fit.liquid_depth);
             let solid = in_legend("DpS", "µm", &fit.solid_depth);
             let ec = in_legend("Ec", "mJ/cm²", &fit.critical_dose);
             let name = format!("{liquid}, {solid}, {ec}");
+            let begins = begins(&fit.critical_dose);
             let curve = |dose| fit.depth(dose).value;
-            vec![series(name, points, &doses, curve, |dose| fit.depth(dose))]
+            vec![series(name, points, &doses, begins, curve, |dose| fit.depth(dose))]
         }
         Fit::Gray(fit) => of_levels(fit, points, &doses),
     };
@@ -213,9 +215,18 @@ fn of_levels(fit: &GrayFit, points: &[DepthPoint], doses: &[Dose]) -> Vec<Series
         let of_level: Vec<_> = points.iter().filter(|p| p.gray == gray).copied().collect();
         let curve = |dose| model.gray_depth(gray, dose);
         let band = |dose| level.curve.depth(dose * gray);
-        series(format!("gray {}", gray.get()), &of_level, doses, curve, band)
+        let name = format!("gray {}", gray.get());
+        let of_band = level.curve.critical_dose.low;
+        let begins =
+            [model.at(gray).critical_dose(), of_band].map(|dose| dose.mj_per_cm2() / gray.get());
+        series(name, &of_level, doses, begins, curve, band)
     };
     fit.levels.iter().map(level).collect()
+}
+
+/// The doses at which the curve and its band begin.
+fn begins(critical: &Estimate<Dose>) -> [f64; 2] {
+    [critical.value, critical.low].map(Dose::mj_per_cm2)
 }
 
 /// Points with their curve, drawn where it is above zero.
@@ -223,19 +234,23 @@ fn series(
     name: String,
     points: &[DepthPoint],
     doses: &[Dose],
+    begins: [f64; 2],
     curve: impl Fn(Dose) -> Length,
     band: impl Fn(Dose) -> Estimate<Length>,
 ) -> Series {
-    let curve = doses.iter().map(|&dose| (dose.mj_per_cm2(), curve(dose).um()));
-    let band = doses.iter().map(|&dose| {
-        let band = band(dose);
-        // Below where it begins a curve may have no depth at all: max takes the zero.
-        [dose.mj_per_cm2(), band.low.um().max(0.0), band.high.um().max(0.0)]
+    let [curve_begins, band_begins] = begins;
+    let least = doses[0].mj_per_cm2();
+    let above = |begins: f64| doses.iter().copied().filter(move |dose| dose.mj_per_cm2() > begins);
+    let curve = above(curve_begins).map(|dose| (dose.mj_per_cm2(), curve(dose).um()));
+    let band = above(band_begins).map(|dose| {
+        let Estimate { low, high, .. } = band(dose);
+        [dose.mj_per_cm2(), low.um().max(0.0), high.um().max(0.0)]
     });
+    let band_start = (band_begins > least).then_some([band_begins, 0.0, 0.0]);
     Series {
         name,
         points: points.iter().map(|p| (p.dose.mj_per_cm2(), p.depth.um())).collect(),
-        curve: curve.filter(|point| point.1 > 0.0).collect(),
-        band: band.filter(|ends| ends[2] > 0.0).collect(),
+        curve: std::iter::once((curve_begins, 0.0)).chain(curve).collect(),
+        band: band_start.into_iter().chain(band).collect(),
     }
 }

@@ -14,7 +14,7 @@ use lamp_grayscale::material::{Given, Material, MaterialError};
 use lamp_grayscale::resin::Intensity;
 
 use crate::materials::{load, read_text};
-use crate::options::Common;
+use crate::options::{Common, parse_light};
 use crate::plots::{self, Plot};
 use crate::stop::Stop;
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
@@ -73,14 +73,6 @@ struct Files {
     /// Plot the points and the curves: a file that ends in .svg or .png
     #[arg(long, value_name = "PLOT")]
     plot: Option<PathBuf>,
-}
-
-fn parse_light(text: &str) -> Result<Intensity, String> {
-    match text.parse::<Intensity>() {
-        Ok(light) if light.mw_per_cm2() > 0.0 => Ok(light),
-        Ok(_) => Err("full white has some light".to_owned()),
-        Err(error) => Err(error.to_string()),
-    }
 }
 
 /// Measurements are some thousands of rows.

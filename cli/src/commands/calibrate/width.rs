@@ -119,7 +119,7 @@ fn add_to(material: &mut Material, fit: &WidthFit, source: &str) {
 fn plot(title: String, fits: &[WidthFit], points: &[WidthPoint], dpi: Dpi) -> Plot {
     let most = points.iter().map(|point| point.dose.mj_per_cm2()).fold(0.0, f64::max) * 1.05;
     let doses: Vec<_> =
-        (0..=120).map(|i| Dose::from_mj_per_cm2(most * f64::from(i) / 120.0)).collect();
+        (0..=30).map(|i| Dose::from_mj_per_cm2(most * f64::from(i) / 30.0)).collect();
     let series: Vec<_> = fits.iter().map(|fit| series(fit, points, &doses, dpi)).collect();
     let axis = |label: &str, end: f64| Axis {
         label: label.to_owned(),
@@ -132,15 +132,18 @@ fn plot(title: String, fits: &[WidthFit], points: &[WidthPoint], dpi: Dpi) -> Pl
 
 fn series(fit: &WidthFit, points: &[WidthPoint], doses: &[Dose], dpi: Dpi) -> Series {
     let of_size = points.iter().filter(|point| point.feature_size == fit.feature_size);
-    let band = doses.iter().map(|&dose| {
+    let start = fit.critical_dose.low.mj_per_cm2().max(0.0);
+    let band = doses.iter().filter(|dose| dose.mj_per_cm2() > start).map(|&dose| {
         let width = fit.width(dose);
         [dose.mj_per_cm2(), width.low.um().max(0.0), width.high.um().max(0.0)]
     });
     let (from, to) = (fit.critical_dose.value, doses[doses.len() - 1]);
+    let name =
+        format!("{}: {}", size_name(fit, dpi), in_legend("Ec", "mJ/cm²", &fit.critical_dose));
     Series {
-        name: format!("{}: {}", size_name(fit, dpi), in_legend("Ec", "mJ/cm²", &fit.critical_dose)),
+        name: name.replace(" um", " µm"),
         points: of_size.map(|point| (point.dose.mj_per_cm2(), point.width.um())).collect(),
         curve: vec![(from.mj_per_cm2(), 0.0), (to.mj_per_cm2(), fit.width(to).value.um())],
-        band: band.filter(|ends| ends[2] > 0.0).collect(),
+        band: std::iter::once([start, 0.0, 0.0]).chain(band).collect(),
     }
 }

@@ -1,0 +1,47 @@
+//! `lamp target`: what its kinds share.
+
+mod screens;
+mod squares;
+
+use clap::{Args, Subcommand};
+use lamp_grayscale::target::TargetError;
+use lamp_stack::{Dpi, Length};
+
+use crate::options::Common;
+use crate::stop::Stop;
+
+/// Write test images to expose, measure and calibrate by
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp target squares --doses 60..600mJ/cm2 --material lamp-suspension -o targets/
+  lamp target screens -o screens.tif")]
+pub(crate) struct TargetArgs {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    Squares(squares::SquaresArgs),
+    Screens(screens::ScreensArgs),
+}
+
+pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Stop> {
+    match &args.what {
+        What::Squares(args) => squares::run(args, common),
+        What::Screens(args) => screens::run(args, common),
+    }
+}
+
+/// A length in whole pixels, to the nearest.
+fn whole_pixels(length: Length, dpi: Dpi) -> u32 {
+    length.pixels(dpi).round() as u32
+}
+
+/// Impossible targets come from options.
+impl From<TargetError> for Stop {
+    fn from(error: TargetError) -> Self {
+        Self::usage(error.to_string())
+    }
+}

@@ -1,0 +1,90 @@
+//! `lamp target screens`.
+
+use clap::Args;
+use lamp_grayscale::resin::{ExposureTime, GrayLevel};
+use lamp_grayscale::target::screens;
+use lamp_stack::{Dpi, Image, Layer, Length, PageInfo, StackInfo};
+
+use super::whole_pixels;
+use crate::options::{Common, Output, parse_thickness};
+use crate::stop::Stop;
+use crate::streams::{report, write_layers};
+
+/// A gray tile and screens of it in squares of several sizes
+///
+/// The films that they cure show up to which size of squares a screen cures evenly. The first tile
+/// is gray, for lamp dither to make dots of; the others are black and white.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp target screens -o screens.tif
+  lamp target screens --gray 25% --exposure 600ms | dither > screens.tif")]
+pub(super) struct ScreensArgs {
+    /// The resolution
+    #[arg(long, default_value = "1500")]
+    dpi: Dpi,
+
+    /// The gray level of all tiles, to the nearest 64th on the screens; half is a checkerboard
+    #[arg(long, value_name = "PERCENT", default_value = "50%", value_parser = parse_level)]
+    gray: GrayLevel,
+
+    /// The sides of the screens' squares in pixels; 1, 5, 10 and 15 are 17, 85, 170 and 255 um at
+    /// 1500 dpi
+    #[arg(long, value_name = "PIXELS,...", value_delimiter = ',', default_value = "1,5,10,15")]
+    cells: Vec<u32>,
+
+    /// The side of a tile in pixels; a multiple of eight times each square has just the gray level
+    #[arg(long, value_name = "PIXELS", default_value_t = 720)]
+    tile: u32,
+
+    /// How far the tiles stand apart
+    #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_thickness)]
+    gap: Length,
+
+    /// How long to expose
+    #[arg(long, value_name = "TIME")]
+    exposure: Option<ExposureTime>,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Stop> {
+    let gap = whole_pixels(args.gap, args.dpi);
+    let image = screens(args.gray, args.tile, gap, &args.cells)?;
+    let stack = StackInfo {
+        part: "screens".to_owned(),
+        commands: vec![args.command(gap)],
+        layers: Some(1),
+        ..StackInfo::default()
+    };
+    let info = PageInfo {
+        exposure_ms: args.exposure.map(ExposureTime::ms),
+        stack: Some(stack),
+        ..PageInfo::default()
+    };
+    let layer = Layer { info, dpi: Some(args.dpi), image: Image::Gray(image) };
+    let report = report("target", common, &args.output);
+    write_layers(std::iter::once(Ok(layer)), &args.output, &report)
+}
+
+impl ScreensArgs {
+    fn command(&self, gap: u32) -> String {
+        let cells: Vec<String> = self.cells.iter().map(u32::to_string).collect();
+        let Self { dpi, tile, gray, .. } = self;
+        let (cells, percent) = (cells.join(","), 100.0 * gray.get());
+        let gap = f64::from(gap) * dpi.pitch().um();
+        format!(
+            "target screens --dpi {dpi} --gray {percent}% --cells {cells} --tile {tile} --gap {gap}um"
+        )
+    }
+}
+
+/// Parses a gray level in per cent.
+fn parse_level(text: &str) -> Result<GrayLevel, String> {
+    let percent =
+        text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
+    percent
+        .and_then(|percent| GrayLevel::new(percent / 100.0))
+        .ok_or_else(|| format!("`{text}` is not a gray level: write 0% (black) to 100% (white)"))
+}

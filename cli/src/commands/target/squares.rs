@@ -1,0 +1,217 @@
+//! `lamp target squares`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::{ArgGroup, Args};
+use lamp_grayscale::resin::{Dose, Intensity};
+use lamp_grayscale::target::{Exposure, squares};
+use lamp_stack::{
+    Destination, Dpi, FolderBeside, Format, Image, Layer, Length, PageInfo, StackInfo, write_stack,
+};
+
+use super::whole_pixels;
+use crate::materials::load;
+use crate::options::{Common, parse_light, parse_thickness};
+use crate::report::Report;
+use crate::stop::Stop;
+use crate::streams::{folder_to_make, write_file};
+
+/// Squares of several sizes, each at several doses, for the cure width
+///
+/// Writes a stack for each size, squares_00025px.tif and so on, and squares.csv, a table to fill in
+/// for lamp calibrate width. Expose all pages of a stack onto one layer, each for its exposure_ms:
+/// page by page one square fewer is white, so that the k-th square, counted in rows from the top
+/// left, gets the k-th dose in all.
+#[derive(Args)]
+#[command(group = ArgGroup::new("light").required(true))]
+#[command(after_help = "\
+Examples:
+  lamp target squares --doses 60..600mJ/cm2 --material lamp-suspension -o targets/
+  lamp target squares --doses 50,70,100,150mJ/cm2 --sizes 25,450 --intensity 20mW/cm2 -o targets/
+  lamp calibrate width targets/squares.csv")]
+pub(super) struct SquaresArgs {
+    /// The resolution
+    #[arg(long, default_value = "1500")]
+    dpi: Dpi,
+
+    /// The squares' sides in pixels
+    #[arg(long, value_name = "PIXELS,...", value_delimiter = ',')]
+    #[arg(default_value = "25,50,75,100,200,300,450,600,750,900")]
+    sizes: Vec<u32>,
+
+    /// The doses: A..B for ten from A to B in equal steps, or a list that goes up
+    #[arg(long, value_name = "A..BmJ/cm2|A,B,...mJ/cm2", value_parser = parse_doses)]
+    doses: Doses,
+
+    /// The light of full white, which makes times of doses
+    #[arg(long, value_name = "INTENSITY", value_parser = parse_light, group = "light")]
+    intensity: Option<Intensity>,
+
+    /// Take the light from this material: a file, or a built-in material's name
+    #[arg(long, value_name = "MATERIAL", group = "light")]
+    material: Option<PathBuf>,
+
+    /// How far the squares stand apart
+    #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_thickness)]
+    gap: Length,
+
+    /// The folder to make; it must not exist, or be empty
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Stop> {
+    let folder = folder_to_make(&args.output)?;
+    let light = args.light()?;
+    let gap = whole_pixels(args.gap, args.dpi);
+    let mut sizes = args.sizes.clone();
+    sizes.sort_unstable();
+    sizes.dedup();
+    // All of them, before there is a folder: a size may be impossible.
+    let doses = &args.doses.0;
+    let targets: Vec<(u32, Vec<Exposure>)> = sizes
+        .into_iter()
+        .map(|size| Ok((size, squares(size, gap, doses)?)))
+        .collect::<Result<_, Stop>>()?;
+    let to = FolderBeside::over_nothing(folder)
+        .map_err(|error| Stop::Failed(error.into()).at(folder.display().to_string()))?;
+    let mut table = TABLE_HEAD.to_owned();
+    let stacks = targets.len();
+    for (size, exposures) in targets {
+        for dose in doses {
+            let written = writeln!(table, "{size},{},", dose.mj_per_cm2());
+            written.expect("a text takes all");
+        }
+        let path = to.path().join(format!("squares_{size:05}px.tif"));
+        write_stack(
+            args.layers(size, gap, exposures, light),
+            Destination::File(path),
+            Format::Big,
+        )?;
+    }
+    write_file(&to.path().join("squares.csv"), |out| out.write_all(table.as_bytes()))?;
+    to.persist().with_context(|| folder.display().to_string())?;
+    let report = Report::new("target", common.quiet, true);
+    report.say(&format!(
+        "{}: {stacks} stacks of {} exposures each, and squares.csv to fill in",
+        folder.display(),
+        doses.len()
+    ));
+    Ok(())
+}
+
+const TABLE_HEAD: &str = "\
+# Write each square's side after curing into cured_um; leave it empty where none was measured.
+# Then: lamp calibrate width squares.csv
+feature_px,dose_mj_per_cm2,cured_um
+";
+
+impl SquaresArgs {
+    fn light(&self) -> Result<Intensity, Stop> {
+        let Some(path) = &self.material else {
+            return Ok(self.intensity.expect("one of the two is required"));
+        };
+        let material = load(path)?;
+        let name = path.display();
+        material.intensity.map(|light| light.value).ok_or_else(|| {
+            Stop::usage(format!("{name} does not say how bright full white is: give --intensity"))
+        })
+    }
+
+    /// The pages of a size's stack.
+    fn layers(
+        &self,
+        size: u32,
+        gap: u32,
+        exposures: Vec<Exposure>,
+        light: Intensity,
+    ) -> impl Iterator<Item = Result<Layer, Stop>> + use<> {
+        let doses: Vec<f64> = self.doses.0.iter().map(|dose| dose.mj_per_cm2()).collect();
+        let mut stack = Some(StackInfo {
+            part: format!("squares of {size} pixels"),
+            commands: vec![self.command(size, gap, light)],
+            layers: Some(exposures.len() as u32),
+            ..StackInfo::default()
+        });
+        let dpi = self.dpi;
+        (0..).zip(exposures).map(move |(index, exposure)| {
+            let mut info = PageInfo {
+                index,
+                exposure_ms: Some((exposure.dose / light).ms()),
+                stack: stack.take(),
+                ..PageInfo::default()
+            };
+            // The first square that is white has its whole dose after this page.
+            info.other.insert("feature_px".to_owned(), size.into());
+            info.other.insert("dose_mj_per_cm2".to_owned(), doses[index as usize].into());
+            Ok(Layer { info, dpi: Some(dpi), image: Image::Mask(exposure.image) })
+        })
+    }
+
+    /// The command that makes a size's stack alone.
+    fn command(&self, size: u32, gap: u32, light: Intensity) -> String {
+        let doses: Vec<String> = self.doses.0.iter().map(|d| d.mj_per_cm2().to_string()).collect();
+        let (dpi, doses, light) = (self.dpi, doses.join(","), light.mw_per_cm2());
+        let gap = Length::from_um(f64::from(gap) * dpi.pitch().um()).um();
+        format!(
+            "target squares --dpi {dpi} --sizes {size} --doses {doses}mJ/cm2 \
+             --intensity {light}mW/cm2 --gap {gap}um"
+        )
+    }
+}
+
+/// The doses of the squares, from the least.
+#[derive(Clone, Debug, PartialEq)]
+struct Doses(Vec<Dose>);
+
+/// How many doses a range has: as many tiles as figure 73 of 002 has.
+const RANGE_STEPS: u32 = 10;
+
+/// Parses `60..600mJ/cm2` or `60,90,140mJ/cm2`; the last unit serves all.
+fn parse_doses(text: &str) -> Result<Doses, String> {
+    let unit_of = |text: &str| -> String {
+        let number = |c: char| c.is_ascii_digit() || " .+-eE".contains(c);
+        text.trim_start_matches(number).to_owned()
+    };
+    let unit = unit_of(text.rsplit([',', '.']).next().unwrap_or_default());
+    let dose = |text: &str| -> Result<Dose, String> {
+        let unit = if unit_of(text).is_empty() { &unit[..] } else { "" };
+        format!("{}{unit}", text.trim()).parse().map_err(|_| {
+            format!("`{text}` is not a dose: write --doses 60..600mJ/cm2 or 60,90,140mJ/cm2")
+        })
+    };
+    let Some((from, to)) = text.split_once("..") else {
+        return Ok(Doses(text.split(',').map(dose).collect::<Result<_, _>>()?));
+    };
+    let [from, to] = [dose(from)?, dose(to)?].map(Dose::mj_per_cm2);
+    if from >= to {
+        return Err(format!("`{text}` holds no doses: the end must be above the start"));
+    }
+    let step = (to - from) / f64::from(RANGE_STEPS - 1);
+    let dose = |i| Dose::from_mj_per_cm2(from + step * f64::from(i));
+    Ok(Doses((0..RANGE_STEPS).map(dose).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn doses_as_people_write_them() {
+        let mj = |text: &str| -> Vec<f64> {
+            parse_doses(text).unwrap().0.iter().map(|dose| dose.mj_per_cm2()).collect()
+        };
+        let tens: Vec<f64> = (1..=10).map(|i| 60.0 * f64::from(i)).collect();
+        assert_eq!(mj("60..600mJ/cm2"), tens);
+        assert_eq!(mj("60 mJ/cm2..0.6 J/cm2"), tens);
+        assert_eq!(mj("60,90, 1.4e2 mJ/cm2"), [60.0, 90.0, 140.0]);
+        assert_eq!(mj("75mJ/cm2"), [75.0]);
+        for text in
+            ["", "60..600", "60,90", "a..b mJ/cm2", "600..60mJ/cm2", "60..60mJ/cm2", "1,,2J/cm2"]
+        {
+            assert!(parse_doses(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Images to expose and measure: squares for the cure width (002 section 3.4.3,
+//! figure 73), and screens for the homogeneous transition (002 section 3.3.6,
+//! figure 56).
+
+use lamp_stack::{GrayMask, Mask, MaskBuilder};
+use thiserror::Error;
+
+use crate::resin::{Dose, GrayLevel};
+
+/// One exposure of a target. Every square that is white in it gets its dose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exposure {
+    /// What is white.
+    pub image: Mask,
+    /// The dose that the exposure adds.
+    pub dose: Dose,
+}
+
+/// Why there is no such target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum TargetError {
+    /// No dose, too many, or some that do not go up.
+    #[error("the doses must be 1 to 100, above zero, and go up")]
+    Doses,
+    /// A length in pixels that makes no image.
+    #[error("{what} of {pixels} pixels: they have 1 to {most}")]
+    Pixels {
+        /// Of what.
+        what: &'static str,
+        /// How many there are.
+        pixels: u32,
+        /// How many there may be.
+        most: u32,
+    },
+}
+
+/// Squares and gaps are no wider than this; it is 33 in at 1500 dpi.
+const MOST_PIXELS: u32 = 50_000;
+/// Tiles of screens are no wider than this: a screen has many runs.
+const MOST_TILE: u32 = 5_000;
+const MOST_DOSES: usize = 100;
+
+/// Image widths are multiples of this (002 section 2.2.2).
+const WIDTH_STEP: u32 = 32;
+
+/// Makes squares of one side, each of which gets another of `doses` in all.
+///
+/// A machine exposes an image for one time. So there are as many exposures as
+/// doses: the first shows all squares, for the least dose; each further one leaves
+/// out the square that has its dose, and adds to the others what the next dose is
+/// more. The squares stand in two rows from the top left, with `gap` pixels between
+/// and around them.
+///
+/// # Errors
+/// Where the doses are none, too many or do not go up from above zero, or a length
+/// makes no image.
+pub fn squares(side: u32, gap: u32, doses: &[Dose]) -> Result<Vec<Exposure>, TargetError> {
+    check_pixels("squares", side, MOST_PIXELS)?;
+    check_pixels("gaps", gap, MOST_PIXELS)?;
+    let rises =
+        doses.is_sorted_by(|a, b| a < b) && doses.iter().all(|d| d.mj_per_cm2().is_finite());
+    let begins = doses.first().is_some_and(|first| first.mj_per_cm2() > 0.0);
+    if !(rises && begins && doses.len() <= MOST_DOSES) {
+        return Err(TargetError::Doses);
+    }
+    let mut before = 0.0;
+    let expose = |(first, dose): (usize, &Dose)| {
+        let added = Dose::from_mj_per_cm2(dose.mj_per_cm2() - before);
+        before = dose.mj_per_cm2();
+        Exposure { image: squares_from(first, doses.len(), side, gap), dose: added }
+    };
+    Ok(doses.iter().enumerate().map(expose).collect())
+}
+
+fn check_pixels(what: &'static str, pixels: u32, most: u32) -> Result<(), TargetError> {
+    let fine = (1..=most).contains(&pixels);
+    if fine { Ok(()) } else { Err(TargetError::Pixels { what, pixels, most }) }
+}
+
+/// The image of `count` squares of which those before `first` are left out.
+fn squares_from(first: usize, count: usize, side: u32, gap: u32) -> Mask {
+    let columns = count.div_ceil(2);
+    let width = gap + columns as u32 * (side + gap);
+    let mut mask = MaskBuilder::new(width.next_multiple_of(WIDTH_STEP));
+    mask.push_black(gap);
+    for start in (0..count).step_by(columns) {
+        let squares = start.max(first)..count.min(start + columns);
+        let edges = squares.flat_map(|square| {
+            let left = gap + (square - start) as u32 * (side + gap);
+            [left, left + side]
+        });
+        let row: Vec<u32> = edges.collect();
+        for _ in 0..side {
+            mask.push_row(&row).expect("squares stand side by side within the width");
+        }
+        mask.push_black(gap);
+    }
+    mask.finish()
+}
+
+/// Makes tiles of one gray level: the level itself, then screens of it in squares
+/// of each of `cells` pixels that are black or white. At a level of one half the
+/// screens are checkerboards.
+///
+/// The share of white squares is the level to the nearest 64th, on every 8 x 8 of
+/// them: tiles of a multiple of all cells' eightfold have just that share.
+///
+/// # Errors
+/// Where a length makes no image.
+pub fn screens(
+    level: GrayLevel,
+    tile: u32,
+    gap: u32,
+    cells: &[u32],
+) -> Result<GrayMask, TargetError> {
+    check_pixels("tiles", tile, MOST_TILE)?;
+    check_pixels("gaps", gap, MOST_PIXELS)?;
+    for &cell in cells {
+        check_pixels("screen squares", cell, MOST_TILE)?;
+    }
+    let sixty_fourths = (level.get() * 64.0).round() as u32;
+    let tiles = 1 + cells.len().min(MOST_DOSES) as u32;
+    let width = gap + tiles * (tile + gap);
+    let mut image = GrayMask::new(width.next_multiple_of(WIDTH_STEP));
+    let mut push =
+        |runs: Vec<(u32, u8)>| image.push_runs(runs).expect("tiles are within the width");
+    (0..gap).for_each(|_| push(Vec::new()));
+    for y in 0..tile {
+        let mut runs = vec![(gap, 0), (tile, level.to_u8()), (gap, 0)];
+        for &cell in cells {
+            let squares = (0..tile).step_by(cell as usize).map(|x| {
+                let white = threshold(x / cell, y / cell) < sixty_fourths;
+                (cell.min(tile - x), if white { 255 } else { 0 })
+            });
+            runs.extend(squares);
+            runs.push((gap, 0));
+        }
+        push(runs);
+    }
+    (0..gap).for_each(|_| push(Vec::new()));
+    Ok(image)
+}
+
+/// The place of a square among the 64 of its 8 x 8, of which as many are white as
+/// the level has 64ths (Bayer's order: the first 32 make a checkerboard).
+fn threshold(x: u32, y: u32) -> u32 {
+    let bit = |of: u32, i: u32| (of >> i) & 1;
+    (0..3).fold(0, |place, i| place << 2 | (bit(x ^ y, i) << 1) | bit(y, i))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn doses(mj: &[f64]) -> Vec<Dose> {
+        mj.iter().copied().map(Dose::from_mj_per_cm2).collect()
+    }
+
+    #[test]
+    fn each_square_gets_its_dose() {
+        let doses: Vec<Dose> =
+            (1..=10).map(|i| Dose::from_mj_per_cm2(60.0 * f64::from(i))).collect();
+        let (side, gap) = (25, 60);
+        let exposures = squares(side, gap, &doses).unwrap();
+        assert_eq!(exposures.len(), 10);
+        for (j, exposure) in exposures.iter().enumerate() {
+            assert_eq!(exposure.image.white_pixels(), (10 - j as u64) * 25 * 25);
+            assert_eq!((exposure.image.width(), exposure.image.height()), (512, 230));
+        }
+        for (k, dose) in doses.iter().enumerate() {
+            let (column, row) = (k as u32 % 5, k as u32 / 5);
+            let (left, top) = (gap + column * (side + gap), gap + row * (side + gap));
+            // A square is of one dose, and nothing beside it has any.
+            for (x, y, share) in [
+                (left, top, 1.0),
+                (left + side - 1, top + side - 1, 1.0),
+                (left - 1, top, 0.0),
+                (left, top - 1, 0.0),
+                (left + side, top, 0.0),
+                (left, top + side, 0.0),
+            ] {
+                let white = exposures.iter().filter(|e| e.image.is_white(x, y));
+                let sum: f64 = white.map(|exposure| exposure.dose.mj_per_cm2()).sum();
+                assert!((sum - share * dose.mj_per_cm2()).abs() < 1e-9, "{k}: {sum} at {x}, {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn odd_numbers_of_squares_have_a_place_less() {
+        for count in 1..=7 {
+            let rising: Vec<f64> = (1..=count).map(f64::from).collect();
+            let exposures = squares(3, 2, &doses(&rising)).unwrap();
+            let first = &exposures[0].image;
+            assert_eq!(first.white_pixels(), u64::from(count as u32) * 9, "{count}");
+            let last = &exposures[exposures.len() - 1].image;
+            assert_eq!(last.white_pixels(), 9, "{count}");
+        }
+    }
+
+    #[test]
+    fn impossible_targets_are_refused() {
+        for wrong in [&[][..], &[0.0, 1.0], &[2.0, 1.0], &[1.0, 1.0], &[1.0, f64::INFINITY]] {
+            assert_eq!(squares(5, 5, &doses(wrong)), Err(TargetError::Doses), "{wrong:?}");
+        }
+        let error = squares(0, 5, &doses(&[1.0])).unwrap_err();
+        assert_eq!(error.to_string(), "squares of 0 pixels: they have 1 to 50000");
+        assert!(squares(5, 50_001, &doses(&[1.0])).is_err());
+        assert!(screens(GrayLevel::WHITE, 5, 5, &[0]).is_err());
+    }
+
+    fn level_at(image: &GrayMask, x: u32, y: u32) -> u8 {
+        let before = image.row(y).partition_point(|change| change.column <= x);
+        before.checked_sub(1).map_or(0, |change| image.row(y)[change].level)
+    }
+
+    /// The levels of a tile's pixels.
+    fn tile(image: &GrayMask, number: u32, tile: u32, gap: u32) -> Vec<Vec<u8>> {
+        let left = gap + number * (tile + gap);
+        let row = |y| (left..left + tile).map(|x| level_at(image, x, y)).collect();
+        (gap..gap + tile).map(row).collect()
+    }
+
+    #[test]
+    fn half_gray_is_screened_by_checkerboards() {
+        let level = GrayLevel::new(0.5).unwrap();
+        let image = screens(level, 240, 30, &[1, 5, 10, 15]).unwrap();
+        assert_eq!(image.height(), 300);
+        assert!(tile(&image, 0, 240, 30).iter().flatten().all(|&level| level == 128));
+        for (number, cell) in [(1, 1), (2, 5), (3, 10), (4, 15)] {
+            for (y, row) in tile(&image, number, 240, 30).iter().enumerate() {
+                for (x, &level) in row.iter().enumerate() {
+                    let white = (x / cell + y / cell) % 2 == 0;
+                    assert_eq!(level, if white { 255 } else { 0 }, "{cell}: {x}, {y}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn screens_have_the_share_of_their_level() {
+        for sixty_fourths in [0, 1, 7, 16, 33, 48, 64] {
+            let level = GrayLevel::new(f64::from(sixty_fourths) / 64.0).unwrap();
+            let image = screens(level, 240, 30, &[1, 5, 10, 15]).unwrap();
+            for number in 1..=4 {
+                let tile = tile(&image, number, 240, 30);
+                let white = tile.iter().flatten().filter(|&&level| level == 255).count();
+                assert_eq!(white, 240 * 240 / 64 * sixty_fourths as usize, "{number}");
+            }
+        }
+    }
+}
