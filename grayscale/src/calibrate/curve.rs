@@ -30,12 +30,15 @@ pub struct CurveFit {
 ///
 /// # Errors
 /// Where there are fewer than three points or two doses, or the depth does not
-/// rise with the dose for sure.
+/// rise with the dose for sure or leaves no critical dose that can be written down.
 pub fn fit_curve(points: &[DepthPoint]) -> Result<CurveFit, FitError> {
     let log = |p: &DepthPoint| (p.arriving().mj_per_cm2().ln(), p.depth.um());
     let logs: Vec<_> = points.iter().map(log).collect();
     let line = LineFit::new(&logs)?.rising("um for each e-fold of dose")?;
     let [value, low, high] = line.zero().map(f64::exp);
+    if !(value > 0.0 && value.is_finite()) {
+        return Err(FitError::NoCriticalDose(value));
+    }
     Ok(CurveFit {
         critical_dose: Estimate::new(value, low, high),
         penetration_depth: Estimate::even(line.slope, line.slope_half()),

@@ -3,8 +3,9 @@
 use lamp_stack::{Dpi, Length};
 use thiserror::Error;
 
+use super::columns::{Column, DOSE, DoseColumn, EXPOSURE, check_columns};
 use super::table::{Row, Table};
-use crate::resin::{Dose, ExposureTime, GrayLevel, Intensity, cure_width_of_square};
+use crate::resin::{Dose, GrayLevel, Intensity, cure_width_of_square};
 
 /// A measured cure depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,8 +95,6 @@ pub enum DataError {
     NoRows,
 }
 
-const DOSE: &str = "dose_mj_per_cm2";
-const EXPOSURE: &str = "exposure_ms";
 const GRAY: &str = "gray";
 const DEPTH: &str = "depth_um";
 const SIZE_PIXELS: &str = "feature_px";
@@ -188,90 +187,6 @@ fn measured<T>(
         return Err(DataError::NoRows);
     }
     Ok(measured)
-}
-
-/// A misspelt column must not be silently left out.
-fn check_columns(table: &Table, known: &[&str]) -> Result<(), DataError> {
-    let is_known = |column: &&String| known.contains(&column.as_str()) || column.as_str() == "note";
-    match table.columns().iter().find(|column| !is_known(column)) {
-        Some(column) => Err(DataError::Unknown { column: column.clone(), known: known.join(", ") }),
-        None => Ok(()),
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Column {
-    name: &'static str,
-    index: usize,
-}
-
-impl Column {
-    fn find(table: &Table, name: &'static str) -> Option<Self> {
-        table.find(name).map(|index| Self { name, index })
-    }
-
-    /// The one of two columns that is there, and whether it is the first.
-    fn either(
-        table: &Table,
-        first: &'static str,
-        second: &'static str,
-    ) -> Result<(Self, bool), DataError> {
-        match (Self::find(table, first), Self::find(table, second)) {
-            (Some(_), Some(_)) => Err(DataError::Both(first, second)),
-            (Some(column), None) => Ok((column, true)),
-            (None, Some(column)) => Ok((column, false)),
-            (None, None) => Err(DataError::NoColumn(first)),
-        }
-    }
-
-    fn number_or_blank(self, row: &Row) -> Result<Option<f64>, DataError> {
-        match row.cell(self.index) {
-            "" => Ok(None),
-            _ => self.number(row).map(Some),
-        }
-    }
-
-    fn number(self, row: &Row) -> Result<f64, DataError> {
-        let text = row.cell(self.index);
-        let (line, column) = (row.line, self.name);
-        let number: Option<f64> = text.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| DataError::NotANumber { line, column, text: text.to_owned() })
-    }
-
-    fn positive(self, row: &Row, wanted: &'static str) -> Result<f64, DataError> {
-        let number = self.number(row)?;
-        if number > 0.0 { Ok(number) } else { Err(self.impossible(row, number, wanted)) }
-    }
-
-    fn impossible(self, row: &Row, number: f64, wanted: &'static str) -> DataError {
-        DataError::Impossible { line: row.line, column: self.name, number, wanted }
-    }
-}
-
-/// The doses, as such or as exposures under a light.
-struct DoseColumn {
-    column: Column,
-    light: Option<Intensity>,
-}
-
-impl DoseColumn {
-    fn find(table: &Table, light: Option<Intensity>) -> Result<Self, DataError> {
-        let (column, is_dose) = Column::either(table, DOSE, EXPOSURE)?;
-        if is_dose {
-            return Ok(Self { column, light: None });
-        }
-        Ok(Self { column, light: Some(light.ok_or(DataError::NoLight)?) })
-    }
-
-    fn of(&self, row: &Row) -> Result<Dose, DataError> {
-        Ok(match self.light {
-            None => Dose::from_mj_per_cm2(self.column.positive(row, "a dose above zero")?),
-            Some(light) => {
-                let ms = self.column.positive(row, "a time above zero")?;
-                light * ExposureTime::from_ms(ms)
-            }
-        })
-    }
 }
 
 #[cfg(test)]

@@ -85,6 +85,7 @@ fn line<T: Quantity>(
         return Err(FitError::GrayFalls { what, fall: -rise, half, unit });
     }
     let line = if rise < 0.0 {
+        // The sloped line's interval reaches farther than the level one's.
         let mean = values.iter().map(|value| value.1).sum::<f64>() / values.len() as f64;
         LineEstimate {
             at_zero: Estimate::new(mean, mean - fit.half_at(0.0), mean + fit.half_at(0.0)),

@@ -16,6 +16,8 @@
 //! The errors of the measurements are taken to be independent, of one spread and
 //! normal, and the doses to be exact.
 
+mod bent;
+mod columns;
 mod curve;
 mod data;
 mod gray;
@@ -200,24 +202,69 @@ pub enum FitError {
     #[error("the two-depth model does not fit these points: try the working curve")]
     NoFit,
     /// The points of one group.
-    #[error("{group}: {source}")]
+    #[error("{group}: {error}")]
     Within {
         /// Which points, as `gray level 0.4`.
         group: String,
         /// What is wrong with them.
-        source: Box<FitError>,
+        error: Box<FitError>,
     },
 }
 
 impl FitError {
     fn within(self, group: String) -> Self {
-        Self::Within { group, source: Box::new(self) }
+        Self::Within { group, error: Box::new(self) }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::resin::GrayLevel;
+
+    /// A number of any size, often a small round one.
+    fn any_size() -> impl Strategy<Value = f64> {
+        prop_oneof![(1..20i32).prop_map(f64::from), (-300.0..300.0f64).prop_map(|e| 10f64.powf(e))]
+    }
+
+    proptest! {
+        #[test]
+        fn any_numbers_give_positive_ones_or_an_error(
+            rows in vec((any_size(), any_size(), 1..4u8), 0..12),
+        ) {
+            let depth = |&(mj, um, gray): &(f64, f64, u8)| DepthPoint {
+                gray: GrayLevel::from_u8(85 * gray),
+                dose: Dose::from_mj_per_cm2(mj),
+                depth: Length::from_um(um),
+            };
+            let depths: Vec<_> = rows.iter().map(depth).collect();
+            let width = |&(mj, um, size): &(f64, f64, u8)| WidthPoint {
+                feature_size: Length::from_um(size.into()),
+                dose: Dose::from_mj_per_cm2(mj),
+                width: Length::from_um(um),
+            };
+            let widths: Vec<_> = rows.iter().map(width).collect();
+            let mut found = Vec::new();
+            if let Ok(fit) = fit_curve(&depths) {
+                found.extend([fit.critical_dose.value.number(), fit.penetration_depth.value.number()]);
+            }
+            if let Ok(fit) = fit_two_depth(&depths) {
+                found.push(fit.critical_dose.value.number());
+                found.extend([fit.liquid_depth, fit.solid_depth].map(|depth| depth.value.number()));
+            }
+            if let Ok(fit) = fit_gray(&depths) {
+                found.push(fit.critical_dose.at_zero.value.number());
+                found.push(fit.penetration_depth.at_zero.value.number());
+            }
+            for fit in fit_widths(&widths).unwrap_or_default() {
+                found.extend([fit.critical_dose.value.number(), fit.sensitivity.value.number()]);
+            }
+            prop_assert!(found.iter().all(|&n| n > 0.0 && n.is_finite()), "{:?}", found);
+        }
+    }
 
     #[test]
     fn a_material_gets_the_longer_side_of_an_interval() {

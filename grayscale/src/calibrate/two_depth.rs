@@ -2,6 +2,7 @@
 
 use lamp_stack::Length;
 
+use super::bent::Curve;
 use super::data::DepthPoint;
 use super::solve::{dot, inverse, product};
 use super::student::t_95;
@@ -70,104 +71,6 @@ fn check(data: &[(f64, f64)]) -> Result<(), FitError> {
     }
     super::line::LineFit::new(data)?.rising("um for each mJ/cm2")?;
     Ok(())
-}
-
-/// `z = ln(1 + k a (E - E_c))/k`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Curve {
-    /// `E_c`.
-    onset: f64,
-    /// `ln a`, where `a` is `D_pL/E_c`.
-    log_rate: f64,
-    /// `k`, `1/D_pS`; zero is a straight line.
-    bend: f64,
-}
-
-impl Curve {
-    /// The curve of a bend, by the line that `(exp(k z) - 1)/k = a (E - E_c)` is.
-    fn from_line(data: &[(f64, f64)], bend: f64) -> Option<Self> {
-        let straight = |z: f64| if bend > 0.0 { (bend * z).exp_m1() / bend } else { z };
-        let n = data.len() as f64;
-        let mean_x = data.iter().map(|point| point.0).sum::<f64>() / n;
-        let mean_y = data.iter().map(|point| straight(point.1)).sum::<f64>() / n;
-        let xx: f64 = data.iter().map(|point| (point.0 - mean_x).powi(2)).sum();
-        let xy: f64 = data.iter().map(|point| (point.0 - mean_x) * straight(point.1)).sum();
-        let rate = xy / xx;
-        let onset = mean_x - mean_y / rate;
-        // The curve has to reach the lowest dose.
-        let lowest = data.iter().map(|point| point.0).fold(f64::INFINITY, f64::min);
-        let onset = if bend > 0.0 { onset.min(lowest + 0.5 / (bend * rate)) } else { onset };
-        (rate > 0.0).then_some(Self { onset, log_rate: rate.ln(), bend })
-    }
-
-    /// The depth of a dose, and its derivatives over the three parameters; no
-    /// number below where the curve begins.
-    fn at(&self, dose: f64) -> (f64, [f64; 3]) {
-        let (rate, k) = (self.log_rate.exp(), self.bend);
-        let u = rate * (dose - self.onset);
-        let ku = k * u;
-        let grows = 1.0 / (1.0 + ku);
-        let (depth, over_bend) = if ku.abs() < 1e-4 {
-            (u * (1.0 - ku / 2.0 + ku * ku / 3.0), u * u * (-0.5 + 2.0 / 3.0 * ku))
-        } else {
-            (ku.ln_1p() / k, (ku * grows - ku.ln_1p()) / (k * k))
-        };
-        (depth, [-rate * grows, u * grows, over_bend])
-    }
-
-    /// The sum of the squares that the curve leaves; infinite where it does not
-    /// reach a point.
-    fn squares(&self, data: &[(f64, f64)]) -> f64 {
-        let sum: f64 = data.iter().map(|&(dose, z)| (z - self.at(dose).0).powi(2)).sum();
-        if sum.is_nan() { f64::INFINITY } else { sum }
-    }
-
-    /// The products of the derivatives with each other, and with what is left.
-    fn normal(&self, data: &[(f64, f64)]) -> ([[f64; 3]; 3], [f64; 3]) {
-        let (mut matrix, mut vector) = ([[0.0; 3]; 3], [0.0; 3]);
-        for &(dose, z) in data {
-            let (depth, slopes) = self.at(dose);
-            for i in 0..3 {
-                vector[i] += slopes[i] * (z - depth);
-                for j in 0..3 {
-                    matrix[i][j] += slopes[i] * slopes[j];
-                }
-            }
-        }
-        (matrix, vector)
-    }
-
-    /// Steps downhill until no step helps.
-    fn fitted(mut self, data: &[(f64, f64)]) -> Option<Self> {
-        let mut squares = self.squares(data);
-        let mut damping = 1e-3;
-        for _ in 0..500 {
-            let (mut matrix, vector) = self.normal(data);
-            for (i, row) in matrix.iter_mut().enumerate() {
-                row[i] *= 1.0 + damping;
-            }
-            let step = product(&inverse(matrix)?, &vector);
-            let next = Self {
-                onset: self.onset + step[0],
-                log_rate: self.log_rate + step[1],
-                bend: (self.bend + step[2]).max(0.0),
-            };
-            let left = next.squares(data);
-            if left < squares {
-                let ended = squares - left <= 1e-14 * squares;
-                (self, squares) = (next, left);
-                if ended {
-                    break;
-                }
-                damping = (damping / 10.0).max(1e-12);
-            } else if damping > 1e9 {
-                break;
-            } else {
-                damping *= 10.0;
-            }
-        }
-        squares.is_finite().then_some(self)
-    }
 }
 
 impl TwoDepthFit {
@@ -320,29 +223,5 @@ mod tests {
         assert_eq!(fit_two_depth(&two), Err(FitError::TooFewDoses { doses: 2, needed: 3 }));
         let falls = depth_points(&truth(), &DOSES, |mj| -8.0 * mj);
         assert!(matches!(fit_two_depth(&falls), Err(FitError::Falls { .. })));
-    }
-
-    #[test]
-    fn a_bend_of_nothing_is_a_line() {
-        for bend in [0.0, 1e-9, 1e-6, 9e-7, 2e-6] {
-            let curve = Curve { onset: 4.0, log_rate: 3.0, bend };
-            let slopes = curve.at(9.0).1;
-            let moved = |onset, log_rate, bend: f64| {
-                let other = Curve {
-                    onset: curve.onset + onset,
-                    log_rate: curve.log_rate + log_rate,
-                    bend: curve.bend + bend,
-                };
-                other.at(9.0).0
-            };
-            let differences = [
-                (moved(1e-5, 0.0, 0.0) - moved(-1e-5, 0.0, 0.0)) / 2e-5,
-                (moved(0.0, 1e-5, 0.0) - moved(0.0, -1e-5, 0.0)) / 2e-5,
-                (moved(0.0, 0.0, 1e-7) - moved(0.0, 0.0, -1e-7)) / 2e-7,
-            ];
-            for (slope, difference) in slopes.iter().zip(differences) {
-                assert!((slope - difference).abs() < 1e-3 * slope.abs(), "{bend}: {slopes:?}");
-            }
-        }
     }
 }

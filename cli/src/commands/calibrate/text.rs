@@ -46,9 +46,11 @@ impl Text {
     }
 }
 
-/// A value and its interval, in words.
+/// A value and its interval, in words: with the decimals that five digits of the
+/// value have.
 pub(super) fn numbers<T: Quantity>(estimate: &Estimate<T>) -> [String; 3] {
-    [estimate.value, estimate.low, estimate.high].map(|number| short(number.number()))
+    let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(T::number);
+    [value, low, high].map(|number| with_decimals(number, decimals(value)))
 }
 
 /// A value and its interval, for the legend of a plot.
@@ -59,15 +61,21 @@ pub(super) fn in_legend<T: Quantity>(name: &str, unit: &str, estimate: &Estimate
 
 /// A number to five digits, `-` where it has no end.
 pub(super) fn short(number: f64) -> String {
-    if !number.is_finite() {
-        return "-".to_owned();
+    with_decimals(number, decimals(number))
+}
+
+fn with_decimals(number: f64, decimals: usize) -> String {
+    if number.is_finite() { format!("{number:.decimals$}") } else { "-".to_owned() }
+}
+
+/// How many decimals a number of five digits has.
+fn decimals(number: f64) -> usize {
+    // Rounded first: 99.9999 has three digits before the point.
+    let rounded: f64 = format!("{number:.4e}").parse().unwrap_or(0.0);
+    if rounded == 0.0 || !rounded.is_finite() {
+        return 0;
     }
-    if number == 0.0 {
-        return "0".to_owned();
-    }
-    let whole = number.abs().max(1e-9).log10().floor() as i32 + 1;
-    let decimals = (5 - whole).clamp(0, 8) as usize;
-    format!("{number:.decimals$}")
+    (4 - rounded.abs().log10().floor() as i32).clamp(0, 8) as usize
 }
 
 #[cfg(test)]
@@ -79,6 +87,7 @@ mod tests {
         for (number, text) in [
             (131.512_345, "131.51"),
             (0.081_234_56, "0.081235"),
+            (99.999_999, "100.00"),
             (5_000_000.4, "5000000"),
             (-2.0, "-2.0000"),
             (0.0, "0"),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_grayscale::calibrate::{WidthFit, WidthPoint, fit_widths, width_points};
+use lamp_grayscale::calibrate::{Estimate, WidthFit, WidthPoint, fit_widths, width_points};
 use lamp_grayscale::material::{Material, MaterialError};
 use lamp_grayscale::resin::{CureModel, Dose, broadening_depth};
 use lamp_stack::Dpi;
@@ -49,17 +49,17 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Stop> {
         Some(material) => cure_depths(material).map_err(anyhow::Error::new)?,
         None => None,
     };
+    let table = files.table()?;
+    let at_place = |stop: Stop| stop.at(files.place());
+    let measured = width_points(&table, files.light(base.as_ref()), args.dpi);
+    let measured = measured.map_err(|error| at_place(error.into()))?;
+    let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;
     let report = Report::new("calibrate", common.quiet, true);
     if depths.is_none() {
         report.say(
             "no broadening depth, as no cure depth is known: name a material with --depth-material",
         );
     }
-    let table = files.table()?;
-    let at_place = |stop: Stop| stop.at(files.place());
-    let measured = width_points(&table, files.light(base.as_ref()), args.dpi);
-    let measured = measured.map_err(|error| at_place(error.into()))?;
-    let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;
     let mut text = Text::new(&measured, "not wider");
     for fit in &fits {
         write(&mut text, fit, args.dpi, depths.as_deref());
@@ -94,9 +94,9 @@ fn write(text: &mut Text, fit: &WidthFit, dpi: Dpi, depths: Option<&dyn CureMode
     text.estimate("Dp^w (um/(mJ/cm2))", &fit.sensitivity);
     if let Some(depths) = depths {
         let critical = &fit.critical_dose;
-        let ends = [critical.value, critical.low, critical.high];
-        let [value, low, high] = ends.map(|dose| short(broadening_depth(depths, dose).um()));
-        text.line("Bd (um)", &[&value, &low, &high]);
+        let of = |dose| broadening_depth(depths, dose);
+        let (value, low, high) = (of(critical.value), of(critical.low), of(critical.high));
+        text.estimate("Bd (um)", &Estimate { value, low, high });
     }
     text.line("R^2", &[&short(fit.r2)]);
 }

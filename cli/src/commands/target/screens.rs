@@ -54,7 +54,7 @@ pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Stop> {
     let image = screens(args.gray, args.tile, gap, &args.cells)?;
     let stack = StackInfo {
         part: "screens".to_owned(),
-        commands: vec![args.command(gap)],
+        commands: vec![args.command()],
         layers: Some(1),
         ..StackInfo::default()
     };
@@ -69,13 +69,12 @@ pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Stop> {
 }
 
 impl ScreensArgs {
-    fn command(&self, gap: u32) -> String {
+    fn command(&self) -> String {
         let cells: Vec<String> = self.cells.iter().map(u32::to_string).collect();
-        let Self { dpi, tile, gray, .. } = self;
+        let Self { dpi, tile, gray, gap, .. } = self;
         let (cells, percent) = (cells.join(","), 100.0 * gray.get());
-        let gap = f64::from(gap) * dpi.pitch().um();
         format!(
-            "target screens --dpi {dpi} --gray {percent}% --cells {cells} --tile {tile} --gap {gap}um"
+            "target screens --dpi {dpi} --gray {percent}% --cells {cells} --tile {tile} --gap {gap}"
         )
     }
 }

@@ -85,11 +85,7 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Stop> {
             written.expect("a text takes all");
         }
         let path = to.path().join(format!("squares_{size:05}px.tif"));
-        write_stack(
-            args.layers(size, gap, exposures, light),
-            Destination::File(path),
-            Format::Big,
-        )?;
+        write_stack(args.layers(size, exposures, light), Destination::File(path), Format::Big)?;
     }
     write_file(&to.path().join("squares.csv"), |out| out.write_all(table.as_bytes()))?;
     to.persist().with_context(|| folder.display().to_string())?;
@@ -124,14 +120,13 @@ impl SquaresArgs {
     fn layers(
         &self,
         size: u32,
-        gap: u32,
         exposures: Vec<Exposure>,
         light: Intensity,
     ) -> impl Iterator<Item = Result<Layer, Stop>> + use<> {
         let doses: Vec<f64> = self.doses.0.iter().map(|dose| dose.mj_per_cm2()).collect();
         let mut stack = Some(StackInfo {
             part: format!("squares of {size} pixels"),
-            commands: vec![self.command(size, gap, light)],
+            commands: vec![self.command(size, light)],
             layers: Some(exposures.len() as u32),
             ..StackInfo::default()
         });
@@ -151,13 +146,13 @@ impl SquaresArgs {
     }
 
     /// The command that makes a size's stack alone.
-    fn command(&self, size: u32, gap: u32, light: Intensity) -> String {
+    fn command(&self, size: u32, light: Intensity) -> String {
         let doses: Vec<String> = self.doses.0.iter().map(|d| d.mj_per_cm2().to_string()).collect();
-        let (dpi, doses, light) = (self.dpi, doses.join(","), light.mw_per_cm2());
-        let gap = Length::from_um(f64::from(gap) * dpi.pitch().um()).um();
+        let (doses, light) = (doses.join(","), light.mw_per_cm2());
+        let Self { dpi, gap, .. } = self;
         format!(
             "target squares --dpi {dpi} --sizes {size} --doses {doses}mJ/cm2 \
-             --intensity {light}mW/cm2 --gap {gap}um"
+             --intensity {light}mW/cm2 --gap {gap}"
         )
     }
 }

@@ -1,0 +1,307 @@
+//! `lamp calibrate`: from made-up measurements back to the material they are of.
+
+use lamp_tests::{Scratch, workspace_root};
+
+/// Errors of measurements: the same each time, of mean 0 and standard deviation 1.
+struct Noise(u64);
+
+impl Noise {
+    /// Above 0, up to 1 (splitmix64).
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11).wrapping_add(1) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        let (radius, angle) = ((-2.0 * self.uniform().ln()).sqrt(), self.uniform());
+        radius * (std::f64::consts::TAU * angle).cos()
+    }
+}
+
+/// What a command prints.
+fn said(scratch: &Scratch, line: &str) -> String {
+    String::from_utf8(scratch.run(line).succeeds().stdout).unwrap()
+}
+
+fn text(scratch: &Scratch, name: &str) -> String {
+    String::from_utf8(scratch.bytes(name)).unwrap()
+}
+
+/// The value, the lower and the upper end in the `nth` printed line of that name.
+fn estimate(said: &str, name: &str, nth: usize) -> [f64; 3] {
+    let line = said.lines().filter(|line| line.starts_with(name)).nth(nth);
+    let line = line.unwrap_or_else(|| panic!("no {name} in:\n{said}"));
+    let numbers: Vec<f64> =
+        line[name.len()..].split_whitespace().map(|number| number.parse().unwrap()).collect();
+    numbers.try_into().unwrap()
+}
+
+#[track_caller]
+fn holds([value, low, high]: [f64; 3], truth: f64) {
+    assert!(low <= truth && truth <= high, "{truth} is not within {low} to {high}");
+    assert!(low <= value && value <= high && high - low < truth, "{value}: {low} to {high}");
+}
+
+/// Films of the LAMP suspension (002 section 3.3.5) after 60 to 1200 ms, measured to
+/// 5 um.
+fn films() -> String {
+    let mut noise = Noise(35);
+    let mut csv = "exposure_ms,depth_um\n".to_owned();
+    for ms in [60, 200, 300, 400, 600, 800, 1000, 1200] {
+        for _ in 0..3 {
+            let depth = 211.0 * (1.6 * f64::from(ms) / 131.5).ln();
+            let measured = if depth > 0.0 { depth + 5.0 * noise.normal() } else { 0.0 };
+            csv += &format!("{ms},{measured:.1}\n");
+        }
+    }
+    csv
+}
+
+#[test]
+fn a_working_curve_comes_back_from_its_films() {
+    let scratch = Scratch::new();
+    scratch.write("films.csv", films().as_bytes());
+    let line = "lamp calibrate depth films.csv --intensity 1.6W/cm2 -o mine.toml --plot films.svg";
+    let table = said(&scratch, line);
+    assert!(table.starts_with("21 points of 24 rows (3 uncured, 0 blank left out)\n"), "{table}");
+    holds(estimate(&table, "Ec (mJ/cm2)", 0), 131.5);
+    holds(estimate(&table, "Dp (um)", 0), 211.0);
+    // The file says the same, and where it is from.
+    let file = text(&scratch, "mine.toml");
+    for words in [
+        "name = \"mine\"",
+        "value = \"1600 mW/cm2\"",
+        "source = \"given with films.csv\"",
+        "[working-curve.critical-dose]",
+        "plus-minus = \"",
+        "source = \"calibrated from films.csv, 21 points\"",
+    ] {
+        assert!(file.contains(words), "no {words} in:\n{file}");
+    }
+    let checked = said(&scratch, "lamp material check mine.toml");
+    assert!(checked.contains("mine gives working-curve; at 1600 mW/cm2"), "{checked}");
+    // Plots and files are the same each time, and nothing else is left.
+    let svg = scratch.bytes("films.svg");
+    scratch.run(line).succeeds();
+    assert_eq!((scratch.bytes("films.svg"), text(&scratch, "mine.toml")), (svg, file));
+    assert_eq!(scratch.names(), ["films.csv", "films.svg", "mine.toml"]);
+    let svg = text(&scratch, "films.svg");
+    for words in ["Cure depth: films.csv", "cure depth (µm)", "dose of full white (mJ/cm²)", "Ec "]
+    {
+        assert!(svg.contains(words), "no {words}");
+    }
+    assert_eq!(svg.matches("<circle").count(), 21);
+}
+
+#[test]
+fn the_light_may_be_the_materials() {
+    let scratch = Scratch::new();
+    scratch.write("films.csv", films().as_bytes());
+    let by_option = said(&scratch, "lamp calibrate depth films.csv --intensity 1.6W/cm2");
+    let by_material = said(&scratch, "lamp calibrate depth films.csv --material lamp-suspension");
+    assert_eq!(by_option, by_material);
+    let piped = scratch.run_on(
+        "lamp calibrate depth - --intensity 1600mW/cm2 -o a.toml --name of-a-pipe",
+        films().as_bytes(),
+    );
+    assert_eq!(String::from_utf8(piped.succeeds_quietly().stdout).unwrap(), by_option);
+    assert!(text(&scratch, "a.toml").contains("calibrated from standard input, 21 points"));
+    scratch
+        .run("lamp calibrate depth films.csv")
+        .is_refused_with(&["calibrate: films.csv: ", "--intensity, as 1.6W/cm2"]);
+}
+
+#[test]
+fn the_gray_model_comes_back_from_its_films() {
+    let scratch = Scratch::new();
+    let mut noise = Noise(40);
+    let mut csv = "gray,dose_mj_per_cm2,depth_um\n".to_owned();
+    for gray in [0.2, 0.4, 0.5, 0.8, 1.0] {
+        for times in [3.0, 5.0, 8.0, 13.0, 20.0] {
+            // 002 equations 39 and 40.
+            let white: f64 = 131.5 * times / gray;
+            let depth = (193.1 + 22.1 * gray) * (gray * white / (101.8 + 35.6 * gray)).ln();
+            csv += &format!("{gray},{white:.3},{:.2}\n", depth + 2.0 * noise.normal());
+        }
+    }
+    scratch.write("gray.csv", csv.as_bytes());
+    let line = "lamp calibrate depth gray.csv --intensity 1.6W/cm2 -o mine.toml --plot gray.png";
+    let table = said(&scratch, line);
+    holds(estimate(&table, "Ec(G) at zero (mJ/cm2)", 0), 101.8);
+    holds(estimate(&table, "Ec(G) rise (mJ/cm2)", 0), 35.6);
+    holds(estimate(&table, "Dp(G) at zero (um)", 0), 193.1);
+    holds(estimate(&table, "Dp(G) rise (um)", 0), 22.1);
+    assert!(said(&scratch, "lamp material check mine.toml").contains("mine gives gray;"));
+    assert!(text(&scratch, "mine.toml").contains("25 points; at-zero +- "));
+    assert!(scratch.bytes("gray.png").starts_with(b"\x89PNG"));
+    let ran = scratch.run("lamp calibrate depth gray.csv --model jacobs");
+    assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+    assert!(ran.stderr.contains("--model gray"), "{ran:?}");
+}
+
+#[test]
+fn the_two_depth_model_comes_back_from_its_films() {
+    let scratch = Scratch::new();
+    let mut noise = Noise(3);
+    let mut csv = "dose_mj_per_cm2,depth_um\n".to_owned();
+    for mj in [5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 30.0, 45.0, 70.0, 100.0_f64] {
+        // 000 equation 3.8.
+        let depth = 150.0 * (80.0 / 150.0 * (mj / 4.0 - 1.0) + 1.0).ln();
+        csv += &format!("{mj},{:.2}\n", depth + 2.0 * noise.normal());
+    }
+    scratch.write("films.csv", csv.as_bytes());
+    let line = "lamp calibrate depth films.csv --model two-depth --material sl-5510 -o mine.toml";
+    let table = said(&scratch, line);
+    holds(estimate(&table, "Ec (mJ/cm2)", 0), 4.0);
+    holds(estimate(&table, "DpL (um)", 0), 80.0);
+    holds(estimate(&table, "DpS (um)", 0), 150.0);
+    // What the material had else is still there.
+    let file = text(&scratch, "mine.toml");
+    assert!(file.contains("name = \"sl-5510\"") && file.contains("[working-curve.critical-dose]"));
+    assert!(file.contains("calibrated from films.csv, 10 points"));
+    // Straight points tell no penetration depth of the solid.
+    let straight = (1..9).map(|i| format!("{},{}\n", 10 * i, 30 * i - 20)).collect::<String>();
+    scratch.write("straight.csv", format!("dose_mj_per_cm2,depth_um\n{straight}").as_bytes());
+    let ran = scratch.run("lamp calibrate depth straight.csv --model two-depth").succeeds();
+    assert!(ran.stderr.contains("do not bend") && ran.stderr.contains("2200000 um"), "{ran:?}");
+}
+
+/// Squares that grow by lines of these sizes in pixels, `E_c^w` and `D_p^w`, measured
+/// to 2 um.
+fn squares(sizes: &[(f64, f64, f64)]) -> String {
+    let mut noise = Noise(60);
+    let mut csv = "feature_px,dose_mj_per_cm2,cured_um\n".to_owned();
+    for &(pixels, critical, slope) in sizes {
+        for dose in (60..=600).step_by(60).map(f64::from) {
+            let width = (slope * (dose - critical)).max(0.0);
+            let side = pixels * 25_400.0 / 1500.0 + 2.0 * width + 2.0 * noise.normal();
+            csv += &format!("{pixels},{dose},{side:.2}\n");
+        }
+    }
+    csv
+}
+
+#[test]
+fn cure_widths_come_back_from_their_squares() {
+    let scratch = Scratch::new();
+    let sizes = [(25.0, 150.0, 0.08), (100.0, 120.0, 0.11), (450.0, 90.0, 0.16)];
+    scratch.write("squares.csv", squares(&sizes).as_bytes());
+    let line = "lamp calibrate width squares.csv --material lamp-no-absorber --name mine \
+                -o mine.toml --plot squares.svg";
+    let table = said(&scratch, line);
+    for (nth, (pixels, critical, slope)) in sizes.into_iter().enumerate() {
+        assert!(table.contains(&format!("\n{pixels} px (")), "{table}");
+        let found = estimate(&table, "Ec^w (mJ/cm2)", nth);
+        holds(found, critical);
+        holds(estimate(&table, "Dp^w (um/(mJ/cm2))", nth), slope);
+        // 002 equation 61, with the curve of figure 78.
+        let depths = found.map(|mj| 638.51 * (mj / 39.4).ln());
+        for (found, depth) in estimate(&table, "Bd (um)", nth).into_iter().zip(depths) {
+            assert!((found - depth).abs() < 0.05, "{found} for {depth}");
+        }
+    }
+    let file = text(&scratch, "mine.toml");
+    assert_eq!(file.matches("[[cure-width]]").count(), 3);
+    assert!(file.contains("638.51 um") && file.contains("calibrated from squares.csv, "));
+    said(&scratch, "lamp material check mine.toml");
+    // A second series takes the place of the sizes that it has.
+    scratch.write("more.csv", squares(&[(100.0, 110.0, 0.12), (900.0, 90.0, 0.16)]).as_bytes());
+    said(&scratch, "lamp calibrate width more.csv --material mine.toml -o mine.toml");
+    let file = text(&scratch, "mine.toml");
+    assert_eq!(file.matches("[[cure-width]]").count(), 4);
+    assert_eq!(file.matches("calibrated from more.csv").count(), 4);
+    assert_eq!(file.matches("calibrated from squares.csv").count(), 4);
+}
+
+#[test]
+fn without_a_cure_depth_there_is_no_broadening_depth() {
+    let scratch = Scratch::new();
+    scratch.write("squares.csv", squares(&[(450.0, 90.0, 0.16)]).as_bytes());
+    let ran = scratch.run("lamp calibrate width squares.csv").succeeds();
+    assert!(ran.stderr.contains("no broadening depth") && ran.stderr.contains("--depth-material"));
+    assert!(!String::from_utf8(ran.stdout.clone()).unwrap().contains("Bd"));
+    let line = "lamp calibrate width squares.csv --depth-material lamp-no-absorber -o mine.toml";
+    assert!(said(&scratch, line).contains("Bd (um)"));
+    // The depth's material is looked at, not copied.
+    assert!(!text(&scratch, "mine.toml").contains("working-curve"));
+    // At another resolution a pixel is another length.
+    let widths = (1..5).map(|i| format!("450,{},{}\n", 100 * i, 10 * i - 5)).collect::<String>();
+    let head = "feature_px,dose_mj_per_cm2,width_um\n";
+    scratch.write("widths.csv", format!("{head}{widths}").as_bytes());
+    let fine = said(&scratch, "lamp calibrate width widths.csv --dpi 2400 --quiet");
+    assert!(fine.contains("450 px (4762.5 um): 4 points"), "{fine}");
+    assert!(fine.contains("Ec^w (mJ/cm2)                   50.000"), "{fine}");
+    // A line that would begin left of no dose.
+    let early = widths.replace(",5\n", ",105\n").replace(",15\n", ",115\n");
+    let early = early.replace(",25\n", ",125\n").replace(",35\n", ",135\n");
+    scratch.write("early.csv", format!("{head}{early}").as_bytes());
+    let refused = &["early.csv: squares of 7.62mm: the line begins at a dose of -950.00 mJ/cm2"];
+    scratch.run("lamp calibrate width early.csv --quiet").is_refused_with(refused);
+}
+
+#[test]
+fn bad_measurements_get_a_sentence_and_leave_no_file() {
+    let scratch = Scratch::new();
+    let line = "lamp calibrate depth a.csv -o mine.toml --plot a.svg";
+    for (csv, words) in [
+        ("", &["the file is empty"][..]),
+        ("dose_mj_per_cm2;depth_um\n1;2\n", &["line 1", "commas"]),
+        ("dose_mj_per_cm2,depth_um\n100,2\nx,3\n", &["line 3, column dose_mj_per_cm2", "`x`"]),
+        ("dose_mj_per_cm2,depth_um\n100,2,3\n", &["line 2", "3 columns"]),
+        ("dose,depth_um\n100,2\n", &["column `dose` is not known", "dose_mj_per_cm2"]),
+        ("dose_mj_per_cm2,depth_um\n100,2\n200,150\n", &["2 points are too few"]),
+        ("dose_mj_per_cm2,depth_um\n100,2\n100,3\n100,4\n", &["1 different doses", "2 are"]),
+        ("dose_mj_per_cm2,depth_um\n100,90\n200,50\n400,11\n", &["more dose cures less"]),
+        ("dose_mj_per_cm2,depth_um\n100,50\n200,90\n400,51\n", &["scatter too much"]),
+        ("dose_mj_per_cm2,depth_um\n100,0\n200,0\n", &["0 points are too few"]),
+        ("dose_mj_per_cm2,gray,depth_um\n100,2,5\n", &["column gray", "2 is not a gray level"]),
+    ] {
+        scratch.write("a.csv", csv.as_bytes());
+        let ran = scratch.run(line).is_refused_with(words);
+        assert!(ran.stderr.starts_with("calibrate: a.csv: ") && ran.stdout.is_empty(), "{ran:?}");
+    }
+    scratch.write("a.csv", b"\xff");
+    scratch.run(line).is_refused_with(&["a.csv", "byte 0", "UTF-8"]);
+    scratch.run("lamp calibrate depth none.csv").is_refused_with(&["none.csv"]);
+    scratch.write("a.csv", films().as_bytes());
+    let line = "lamp calibrate depth a.csv --material none.toml";
+    scratch.run(line).is_refused_with(&["none.toml", "no such file", "lamp-suspension"]);
+    assert_eq!(scratch.names(), ["a.csv"]);
+}
+
+#[test]
+fn wrong_usage_is_status_2() {
+    let scratch = Scratch::new();
+    scratch.write("a.csv", films().as_bytes());
+    for (line, words) in [
+        ("lamp calibrate", "Usage"),
+        ("lamp calibrate depth a.csv --plot a.pdf", "an SVG or a PNG"),
+        ("lamp calibrate depth a.csv -o -", "name a file with -o"),
+        ("lamp calibrate depth a.csv -o a.csv", "that is the input"),
+        ("lamp calibrate depth a.csv -o a.svg --plot a.svg", "the material goes there"),
+        ("lamp calibrate depth a.csv --intensity 0W/cm2", "some light"),
+        ("lamp calibrate depth a.csv --intensity 1.6W/cm2 -o My_Resin.toml", "--name"),
+        ("lamp calibrate depth a.csv --name mine", "--output"),
+    ] {
+        let ran = scratch.run(line);
+        assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+        assert!(ran.stderr.contains(words), "no `{words}` in {ran:?}");
+    }
+    assert_eq!(scratch.names(), ["a.csv"]);
+}
+
+#[test]
+fn the_example_of_the_documentation_is_what_it_says() {
+    let docs = std::fs::read_to_string(workspace_root().join("docs/calibration.md")).unwrap();
+    let block = |kind: &str| -> &str {
+        let start = docs.split_once(&format!("```{kind}\n")).unwrap().1;
+        start.split_once("```").unwrap().0
+    };
+    let scratch = Scratch::new();
+    scratch.write("depths.csv", block("csv").as_bytes());
+    let (line, printed) = block("text").split_once('\n').unwrap();
+    assert_eq!(said(&scratch, line.strip_prefix("$ ").unwrap()), printed);
+}
