@@ -14,15 +14,14 @@ use crate::streams::{input_name, is_stream};
 const LARGEST_FILE: u64 = 1 << 20;
 
 /// The built-in material of a name, or that of a file.
-pub(crate) fn material(name_or_file: &str) -> Result<Material, Stop> {
-    if let Some(builtin) = Builtin::named(name_or_file) {
+pub(crate) fn material(path: &Path) -> Result<Material, Stop> {
+    if let Some(builtin) = path.to_str().and_then(Builtin::named) {
         return Ok(builtin.material());
     }
-    let path = Path::new(name_or_file);
     if !is_stream(path) && !path.exists() {
         let names = Builtin::ALL.map(|builtin| builtin.name()).join(", ");
-        let text =
-            format!("{name_or_file}: there is no such file, nor a built-in material: {names}");
+        let path = path.display();
+        let text = format!("{path}: there is no such file, nor a built-in material: {names}");
         return Err(Stop::Failed(anyhow!(text)));
     }
     Ok(read(path).with_context(|| input_name(path))?)

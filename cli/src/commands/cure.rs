@@ -35,7 +35,7 @@ pub(crate) struct CureArgs {
 
     /// The resin: a name of `lamp material list`, or a file
     #[arg(long, value_name = "NAME|FILE")]
-    material: String,
+    material: PathBuf,
 
     /// Where to cut, in part coordinates: y=12mm along a row of pixels, x=12mm along a column
     #[arg(long, value_name = "AXIS=LENGTH")]

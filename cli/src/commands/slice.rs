@@ -108,7 +108,7 @@ pub(crate) struct PartOptions {
     /// The resin: a name of `lamp material list`, or a file. Pages then say how long they are
     /// exposed
     #[arg(long, value_name = "NAME|FILE", help_heading = EXPOSURE)]
-    material: Option<String>,
+    material: Option<PathBuf>,
 
     /// Write gray layers: each pixel as bright as it takes to cure the part below it, down to
     /// where the part ends. White where it does not end within what white cures
@@ -247,13 +247,13 @@ impl PartOptions {
 
     /// How the layers are exposed, where a material says.
     fn exposure(&self) -> Result<Option<Exposure>, Stop> {
-        let Some(name) = &self.material else { return Ok(None) };
+        let Some(path) = &self.material else { return Ok(None) };
         if self.gray && !matches!(self.plane, PlaneArg::Top) {
             return Err(Stop::usage(
                 "--gray takes sections at the layers' tops: leave --plane away",
             ));
         }
-        let material = material(name)?;
+        let material = material(path)?;
         let failed = |error: anyhow::Error| Stop::Failed(error).at(material.name.clone());
         let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
         let time = resin.exposure_time(self.thickness, self.overcure);

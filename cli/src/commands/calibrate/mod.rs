@@ -13,7 +13,7 @@ use lamp_grayscale::calibrate::{DataError, FitError, Table};
 use lamp_grayscale::material::{Given, Material, MaterialError};
 use lamp_grayscale::resin::Intensity;
 
-use crate::materials::{load, read_text};
+use crate::materials::{material, read_text};
 use crate::options::{Common, parse_light};
 use crate::plots::{self, Plot};
 use crate::stop::Stop;
@@ -100,7 +100,7 @@ impl Files {
 
     /// The material to add to, with the light given.
     fn base(&self) -> Result<Option<Material>, Stop> {
-        self.material.as_deref().map(load).transpose()
+        self.material.as_deref().map(material).transpose()
     }
 
     /// The light that makes doses of times.

@@ -12,7 +12,7 @@ use lamp_stack::{
 };
 
 use super::whole_pixels;
-use crate::materials::load;
+use crate::materials::material;
 use crate::options::{Common, parse_light, parse_thickness};
 use crate::report::Report;
 use crate::stop::Stop;
@@ -109,7 +109,7 @@ impl SquaresArgs {
         let Some(path) = &self.material else {
             return Ok(self.intensity.expect("one of the two is required"));
         };
-        let material = load(path)?;
+        let material = material(path)?;
         let name = path.display();
         material.intensity.map(|light| light.value).ok_or_else(|| {
             Stop::usage(format!("{name} does not say how bright full white is: give --intensity"))
