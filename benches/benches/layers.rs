@@ -2,12 +2,17 @@
 //! crate on the same pixels; throughput counts transitions. Dithering of a
 //! page of 900 megapixels; throughput counts gray pixels.
 
+use std::io::Cursor;
+
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use fax::{Color, VecWriter, decoder, encoder};
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::{Method, dither_image};
 use lamp_slicer::{DepthLevels, Model, SliceOptions, Slices};
 use lamp_stack::{GrayMask, Image, Length, Mask, g4};
+use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
+use lamp_slicer::{Model, SliceOptions, Slices};
+use lamp_stack::{Dpi, EncodedPage, Format, Image, Layer, Mask, PageInfo, PageWriter, g4};
 
 /// Layers with pins and holes, 1500 dpi.
 const LAYERS: std::ops::Range<u32> = 440..460;
@@ -134,4 +139,88 @@ fn dither(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, layers, dither);
+/// A layer's pixels, eight to a byte, as a program without runs would hold them.
+fn bitmap(strip: &[u8], width: u32, height: u32) -> Vec<u8> {
+    let stride = width.div_ceil(8) as usize;
+    let mut bytes = Vec::with_capacity(stride * height as usize);
+    decoder::decode_g4(strip.iter().copied(), width, Some(height), |row| {
+        let start = bytes.len();
+        bytes.resize(start + stride, 0);
+        for run in row.chunks(2) {
+            let end = run.get(1).copied().unwrap_or(width).min(width);
+            fill(&mut bytes[start..], run[0].min(end) as usize, end as usize);
+        }
+    })
+    .expect("our own strip");
+    bytes
+}
+
+/// Sets the bits from the first up to, but without, the second.
+fn fill(bytes: &mut [u8], first: usize, end: usize) {
+    if first == end {
+        return;
+    }
+    let (from, to) = (first / 8, (end - 1) / 8);
+    let [left, right] = [0xff >> (first % 8), 0xff << (7 - (end - 1) % 8)];
+    if from == to {
+        bytes[from] |= left & right;
+    } else {
+        bytes[from] |= left;
+        bytes[from + 1..to].fill(0xff);
+        bytes[to] |= right;
+    }
+}
+
+/// Cure-width compensation of whole layers, beside decoding them to bitmaps.
+fn compensation(criterion: &mut Criterion) {
+    let masks = masks(slices(100_000)());
+    let transitions: usize = masks.iter().map(Mask::transition_count).sum();
+    let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
+    let size = (masks[0].width(), masks[0].height());
+    let by = 25.0 * 1500.0 / 25_400.0;
+    let widths = Widths::uniform(by);
+    let kept = |mask: &Mask| shrink(mask, &widths, 2.0).0.change_count();
+
+    let mut group = criterion.benchmark_group("compensate");
+    group.throughput(Throughput::Elements(transitions as u64));
+    group.bench_function("walls kept", |b| b.iter(|| masks.iter().map(kept).sum::<usize>()));
+    group.bench_function("gray edges", |b| {
+        b.iter(|| masks.iter().map(|mask| offset(mask, by).change_count()).sum::<usize>());
+    });
+    group.bench_function("1 bit", |b| {
+        let moved = |mask| offset_one_bit(mask, by).transition_count();
+        b.iter(|| masks.iter().map(moved).sum::<usize>());
+    });
+    group.bench_function("decode to bitmaps, fax crate", |b| {
+        b.iter(|| strips.iter().map(|strip| bitmap(strip, size.0, size.1).len()).sum::<usize>());
+    });
+    group.bench_function("decode to bitmaps, tiff crate", |b| {
+        let files: Vec<Vec<u8>> = masks.iter().map(tiff_file).collect();
+        let decode = |file: &Vec<u8>| {
+            let mut decoder = tiff::decoder::Decoder::new(Cursor::new(file)).expect("our own file");
+            match decoder.read_image().expect("our own page") {
+                tiff::decoder::DecodingResult::U8(bytes) => bytes.len(),
+                _ => unreachable!("1-bit pages are read as bytes"),
+            }
+        };
+        b.iter(|| files.iter().map(decode).sum::<usize>());
+    });
+    group.finish();
+}
+
+/// A stack of one page, in memory.
+fn tiff_file(mask: &Mask) -> Vec<u8> {
+    let layer = Layer {
+        info: PageInfo::default(),
+        dpi: Dpi::new(1500.0),
+        image: Image::Mask(mask.clone()),
+    };
+    let mut file = Vec::new();
+    let mut writer = PageWriter::new(&mut file, Format::Classic);
+    writer.push(EncodedPage::new(&layer)).expect("memory takes all");
+    writer.finish().expect("memory takes all");
+    file
+}
+
+criterion_group!(benches, layers, compensation);
 criterion_main!(benches);

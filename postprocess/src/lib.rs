@@ -26,7 +26,12 @@
 //! ```
 
 mod fix;
+mod offset;
 mod tile;
 
 pub use fix::{Band, FixOptions, Fixed, Kind, Kinds, Method, Outcome, fix};
+pub use offset::{
+    CompensateError, CompensateOptions, Compensated, Shrinkage, ThinWall, Widths, compensate,
+    offset, offset_one_bit, shrink,
+};
 pub use tile::{TileError, TileOptions, tile};

@@ -1,0 +1,152 @@
+//! An image near its edges: what lies deep inside, and how far each other
+//! pixel is from the edge.
+
+use super::far::{Disc, Field, Outside, at_least, more_than};
+use super::rows::{Rows, Run, subtract};
+
+/// A region of an image, and how far its edges move.
+#[derive(Debug)]
+pub(super) struct Class {
+    /// Pixels that are no sources of distance.
+    pub(super) region: Rows,
+    /// How far, in pixels; not below zero.
+    pub(super) by: f64,
+}
+
+/// A run of a row of an [`Edge`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    pub(super) run: Run,
+    /// Where its pixels stand in the edge's arrays; a run deep inside has none.
+    pub(super) first: Option<u32>,
+}
+
+/// A pixel along the edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EdgePixel {
+    pub(super) column: i32,
+    pub(super) row: u32,
+    /// Where it stands in the edge's arrays.
+    pub(super) index: u32,
+}
+
+/// The pixels of some regions, from a distance on that leaves nothing of them.
+#[derive(Debug, Default)]
+pub(super) struct Edge {
+    ends: Vec<usize>,
+    pieces: Vec<Piece>,
+    /// The squared distance of each pixel along the edge from the nearest
+    /// source.
+    pub(super) squares: Vec<u32>,
+    /// How much is left of each of these, when the edge has moved.
+    pub(super) levels: Vec<u8>,
+}
+
+impl Edge {
+    /// Where the edges of `classes` lie when they have moved. Pixels from
+    /// `depth` further in on are deep inside. Where `all`, pixels of which
+    /// nothing is left are there, too.
+    pub(super) fn new(field: &Field, classes: &[Class], depth: f64, all: bool) -> Self {
+        let height = classes.first().map_or(0, |class| class.region.height());
+        let discs: Vec<_> = classes
+            .iter()
+            .map(|class| {
+                let outer = if all { 0 } else { more_than(class.by) };
+                let inner = at_least(class.by + depth);
+                [Disc::below(outer, height), Disc::below(inner, height)]
+            })
+            .collect();
+        let mut edge = Self { ends: vec![0], ..Self::default() };
+        let [mut outer, mut inner] = [Outside::default(), Outside::default()];
+        let mut runs = Vec::new();
+        let mut squares = Vec::new();
+        for row in 0..height {
+            let first = edge.pieces.len();
+            for (class, [outer_disc, inner_disc]) in classes.iter().zip(&discs) {
+                field.outside(outer_disc, row, class.region.row(row), &mut outer);
+                field.outside(inner_disc, row, &outer.runs, &mut inner);
+                let deep = inner.runs.iter().map(|&run| Piece { run, first: None });
+                edge.pieces.extend(deep);
+                subtract(&outer.runs, &inner.runs, &mut runs);
+                for &run in &runs {
+                    let limit = at_least(class.by + depth);
+                    field.squares(row, run, limit, &mut squares);
+                    edge.push(run, class.by, &squares);
+                }
+            }
+            edge.pieces[first..].sort_unstable_by_key(|piece| piece.run);
+            edge.ends.push(edge.pieces.len());
+        }
+        edge
+    }
+
+    fn push(&mut self, run: Run, by: f64, squares: &[u32]) {
+        let first = u32::try_from(self.squares.len()).expect("an image has fewer pixels at edges");
+        self.pieces.push(Piece { run, first: Some(first) });
+        self.squares.extend_from_slice(squares);
+        let level = |&square: &u32| level(f64::from(square).sqrt() - by);
+        self.levels.extend(squares.iter().map(level));
+    }
+
+    pub(super) fn height(&self) -> u32 {
+        (self.ends.len() - 1) as u32
+    }
+
+    /// The pieces of a row, from the left; of rows outside the image none.
+    pub(super) fn row(&self, row: i64) -> &[Piece] {
+        match usize::try_from(row) {
+            Ok(row) if row + 1 < self.ends.len() => {
+                &self.pieces[self.ends[row]..self.ends[row + 1]]
+            }
+            _ => &[],
+        }
+    }
+
+    /// Where a pixel of the regions stands in the arrays; deep inside, nowhere.
+    pub(super) fn at(&self, column: i32, row: i64) -> Option<Option<u32>> {
+        let pieces = self.row(row);
+        let next = pieces.partition_point(|piece| piece.run.1 <= column);
+        let piece = pieces.get(next).filter(|piece| piece.run.0 <= column)?;
+        Some(piece.first.map(|first| first + (column - piece.run.0) as u32))
+    }
+
+    /// Shows all pixels along the edge, row by row.
+    pub(super) fn for_each(&self, mut show: impl FnMut(EdgePixel)) {
+        for row in 0..self.height() {
+            for piece in self.row(row.into()) {
+                let Some(first) = piece.first else { continue };
+                for (index, column) in (first..).zip(piece.run.0..piece.run.1) {
+                    show(EdgePixel { column, row, index });
+                }
+            }
+        }
+    }
+
+    /// A row as runs of length and level, where the rest is `level_outside`,
+    /// 0 or 255, and deep inside is the other.
+    pub(super) fn levels_of_row(&self, row: u32, width: u32, level_outside: u8) -> Vec<(u32, u8)> {
+        let mut runs = Vec::new();
+        let mut column = 0;
+        for piece in self.row(row.into()) {
+            let [start, end] = [piece.run.0, piece.run.1].map(|column| column as u32);
+            runs.push((start - column, level_outside));
+            let turned = |level: u8| if level_outside == 0 { level } else { 255 - level };
+            match piece.first {
+                None => runs.push((end - start, turned(255))),
+                Some(first) => {
+                    let levels = &self.levels[first as usize..][..(end - start) as usize];
+                    let equal = levels.chunk_by(|a, b| a == b);
+                    runs.extend(equal.map(|run| (run.len() as u32, turned(run[0]))));
+                }
+            }
+            column = end;
+        }
+        runs.push((width - column, level_outside));
+        runs
+    }
+}
+
+/// The level of which a share is exposed.
+pub(super) fn level(share: f64) -> u8 {
+    (255.0 * share.clamp(0.0, 1.0)).round() as u8
+}

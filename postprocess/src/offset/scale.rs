@@ -1,0 +1,131 @@
+//! Images made larger, for what firing takes away.
+
+use lamp_stack::{GrayMask, Image, LevelChange, MaskBuilder};
+
+/// Along one side: which pixels of the larger image show which of the image.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Side {
+    /// What is left of a length after firing.
+    left: f64,
+    /// The pixels of the image.
+    before: u32,
+}
+
+impl Side {
+    /// Of a side of so many pixels that firing shrinks by a share, from 0 to
+    /// less than 1.
+    pub(super) fn new(before: u32, shrinkage: f64) -> Self {
+        Self { left: 1.0 - shrinkage, before }
+    }
+
+    /// The first pixel whose centre is past a pixel's near edge when it is
+    /// fired. Increases, as pixels become larger.
+    pub(super) fn first_past(&self, before: u32) -> u64 {
+        (f64::from(before) / self.left - 0.5).ceil().max(0.0) as u64
+    }
+
+    /// The pixels of the larger image.
+    pub(super) fn after(&self) -> u64 {
+        self.first_past(self.before)
+    }
+}
+
+/// An image as large as it must be for the fired part to have its size. Each
+/// pixel has the colour of the pixel that its centre then lies in.
+pub(super) fn scaled(image: &Image, columns: &Side, rows: &Side, width: u32) -> Image {
+    let column = |column: u32| columns.first_past(column) as u32;
+    let times = |row: u32| rows.first_past(row + 1) - rows.first_past(row);
+    match image {
+        Image::Mask(mask) => {
+            let mut out = MaskBuilder::new(width);
+            let mut transitions: Vec<u32> = Vec::new();
+            for (row, before) in (0..).zip(mask.rows()) {
+                transitions.clear();
+                transitions.extend(before.iter().map(|&t| column(t)));
+                close(before.len() % 2 == 1, column(mask.width()), width, |end| {
+                    transitions.push(end);
+                });
+                for _ in 0..times(row) {
+                    out.push_row(&transitions).expect("columns move apart");
+                }
+            }
+            Image::Mask(out.finish())
+        }
+        Image::Gray(gray) => Image::Gray(scaled_gray(gray, column, times, width)),
+    }
+}
+
+fn scaled_gray(
+    gray: &GrayMask,
+    column: impl Fn(u32) -> u32,
+    times: impl Fn(u32) -> u64,
+    width: u32,
+) -> GrayMask {
+    let mut out = GrayMask::new(width);
+    for (row, before) in (0..).zip(gray.rows()) {
+        let moved = |change: &LevelChange| LevelChange { column: column(change.column), ..*change };
+        let mut changes: Vec<_> = before.iter().map(moved).collect();
+        let is_open = before.last().is_some_and(|change| change.level > 0);
+        close(is_open, column(gray.width()), width, |column| {
+            changes.push(LevelChange { column, level: 0 });
+        });
+        for _ in 0..times(row) {
+            out.push_row(&changes).expect("columns move apart");
+        }
+    }
+    out
+}
+
+/// Ends a row's last run where the image ended, if the new one is wider.
+fn close(is_open: bool, end: u32, width: u32, push: impl FnOnce(u32)) {
+    if is_open && end < width {
+        push(end);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::Mask;
+
+    use super::*;
+
+    fn made_larger(mask: &Mask, shrinkage: [f64; 2]) -> Image {
+        let columns = Side::new(mask.width(), shrinkage[0]);
+        let rows = Side::new(mask.height(), shrinkage[1]);
+        let width = columns.after() as u32 + 5;
+        scaled(&Image::Mask(mask.clone()), &columns, &rows, width)
+    }
+
+    #[test]
+    fn each_pixel_has_the_colour_where_its_centre_lies() {
+        let offsets = vec![0, 2, 3, 3, 7];
+        let mask = Mask::new(60, offsets, vec![7, 31, 50, 0, 1, 20, 59]).unwrap();
+        for shrinkage in [[0.0, 0.0], [0.021, 0.018], [0.2, 0.0], [0.0, 0.37], [0.9, 0.5]] {
+            let Image::Mask(larger) = made_larger(&mask, shrinkage) else { unreachable!() };
+            for row in 0..larger.height() {
+                for column in 0..larger.width() {
+                    let before = |at: u32, s: f64| ((f64::from(at) + 0.5) * (1.0 - s)) as u32;
+                    let [x, y] = [before(column, shrinkage[0]), before(row, shrinkage[1])];
+                    assert_eq!(larger.is_white(column, row), mask.is_white(x, y));
+                }
+            }
+            let high = f64::from(mask.height()) / (1.0 - shrinkage[1]);
+            assert!((f64::from(larger.height()) - high).abs() <= 0.5);
+        }
+    }
+
+    #[test]
+    fn gray_pixels_go_where_white_ones_do() {
+        let mut gray = GrayMask::new(40);
+        gray.push_runs([(3, 0), (7, 40), (20, 255), (10, 3)]).unwrap();
+        gray.push_runs([(30, 9)]).unwrap();
+        let mask = Mask::new(40, vec![0, 1, 3], vec![3, 0, 30]).unwrap();
+        let [columns, rows] = [40, 2].map(|side| Side::new(side, 0.1));
+        let Image::Gray(larger) = scaled(&Image::Gray(gray), &columns, &rows, 64) else {
+            unreachable!("gray images stay gray")
+        };
+        let white = scaled(&Image::Mask(mask), &columns, &rows, 64);
+        assert_eq!(Image::Mask(super::super::levels::at_least(&larger, 1)), white);
+        assert_eq!(larger.row(0).iter().map(|c| c.level).collect::<Vec<_>>(), [40, 255, 3, 0]);
+    }
+}

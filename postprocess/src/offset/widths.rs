@@ -1,0 +1,98 @@
+//! How far edges move, by the sizes of places.
+
+/// How far the edges of places of each size move inwards, in pixels.
+///
+/// # Guarantees
+/// Sizes increase; there is one distance more than there are sizes, the first
+/// for places smaller than all. Where there are sizes, no distance is below
+/// zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Widths {
+    sizes: Vec<f64>,
+    by: Vec<f64>,
+}
+
+/// From one class of sizes to the next the distance changes by no more.
+const STEP: f64 = 0.25;
+/// Sizes are parted no finer.
+const MOST_STEPS: f64 = 32.0;
+
+impl Widths {
+    /// The same for all places; outwards where below zero.
+    pub fn uniform(inwards: f64) -> Self {
+        Self { sizes: Vec::new(), by: vec![inwards] }
+    }
+
+    /// By size: `width` of the size, inwards, which goes by the first of
+    /// `sizes` below it and by the last above it. All are in pixels.
+    ///
+    /// Between two of `sizes` it is taken at so many places that it changes by a
+    /// quarter of a pixel from one to the next. Widths below zero count as zero.
+    pub fn by_size(sizes: &[f64], width: impl Fn(f64) -> f64) -> Self {
+        let width = |size: f64| width(size).max(0.0);
+        let mut widths = Self::uniform(sizes.first().map_or(0.0, |&size| width(size)));
+        for pair in sizes.windows(2) {
+            let [from, to] = [pair[0], pair[1]];
+            let change = (width(to) - width(from)).abs();
+            let steps = (change / STEP).ceil().clamp(1.0, MOST_STEPS);
+            let size = |step: f64| from + (to - from) * step / steps;
+            for step in 0..steps as u32 {
+                let step = f64::from(step);
+                widths.push(size(step), width(size(step + 0.5)));
+            }
+        }
+        if let Some(&last) = sizes.last() {
+            widths.push(last, width(last));
+        }
+        widths
+    }
+
+    /// Adds a class of larger places, unless it moves as the one before.
+    fn push(&mut self, size: f64, by: f64) {
+        if self.by.last() != Some(&by) {
+            self.sizes.push(size);
+            self.by.push(by);
+        }
+    }
+
+    /// Where classes of sizes begin.
+    pub(super) fn sizes(&self) -> &[f64] {
+        &self.sizes
+    }
+
+    /// How far the edges of each class move.
+    pub(super) fn by(&self) -> &[f64] {
+        &self.by
+    }
+
+    /// The least and the most that edges move.
+    pub fn range(&self) -> [f64; 2] {
+        let least = self.by.iter().copied().fold(f64::INFINITY, f64::min);
+        [least, self.by.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+    }
+
+    /// Whether no edge moves.
+    pub fn are_zero(&self) -> bool {
+        self.by.iter().all(|&by| by == 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn between_two_sizes_it_changes_in_small_steps() {
+        let widths = Widths::by_size(&[20.0, 40.0], |size| size / 20.0);
+        assert_eq!(widths.sizes(), [20.0, 25.0, 30.0, 35.0, 40.0]);
+        assert_eq!(widths.by(), [1.0, 1.125, 1.375, 1.625, 1.875, 2.0]);
+        assert_eq!(widths.range(), [1.0, 2.0]);
+    }
+
+    #[test]
+    fn one_size_is_the_same_for_all() {
+        assert_eq!(Widths::by_size(&[20.0], |_| 1.5), Widths::uniform(1.5));
+        assert_eq!(Widths::by_size(&[20.0, 30.0], |_| 1.5), Widths::uniform(1.5));
+        assert!(Widths::by_size(&[20.0, 30.0], |size| -size).are_zero());
+    }
+}
