@@ -8,6 +8,7 @@ use lamp_stack::Layer;
 use serde::Serialize;
 
 use crate::lines::{to_nm, write_lines};
+use crate::place::{Place, millimetres};
 
 /// Collects what is found.
 pub(crate) struct Findings {
@@ -101,7 +102,7 @@ impl Findings {
             z_mm: layer.info.z().map(|z| to_nm(z.mm())),
             first_row: band.first_row,
             last_row: band.end() - 1,
-            y_mm: place.map(|place| place.y_mm(band).map(to_nm)),
+            y_mm: place.map(|place| place.y_mm(&(band.first_row..band.end())).map(to_nm)),
             x_mm: x_mm(&columns),
             columns: columns.as_ref().map(first_and_last),
             gap_x_mm: x_mm(&band.gap),
@@ -119,30 +120,6 @@ impl Findings {
     }
 }
 
-/// Where the pixels of a layer lie, if its page says so.
-#[derive(Clone, Copy)]
-struct Place {
-    left_mm: f64,
-    top_mm: f64,
-    pitch_mm: f64,
-}
-
-impl Place {
-    fn of(layer: &Layer) -> Option<Self> {
-        let [left_mm, top_mm] = layer.info.origin_mm?;
-        Some(Self { left_mm, top_mm, pitch_mm: layer.dpi?.pitch().mm() })
-    }
-
-    /// From a band's lower edge to its upper one.
-    fn y_mm(self, band: &Band) -> [f64; 2] {
-        [band.end(), band.first_row].map(|row| self.top_mm - f64::from(row) * self.pitch_mm)
-    }
-
-    fn x_mm(self, columns: &Range<u32>) -> [f64; 2] {
-        [columns.start, columns.end].map(|c| self.left_mm + f64::from(c) * self.pitch_mm)
-    }
-}
-
 /// Where the mesh is to be repaired: `x 31.4-33.0 y 12.1-12.8 mm`.
 pub(crate) fn whereabouts(layer: &Layer, band: &Band) -> String {
     let columns = band.gap.clone().unwrap_or_else(|| band.columns.clone());
@@ -152,14 +129,9 @@ pub(crate) fn whereabouts(layer: &Layer, band: &Band) -> String {
             false => format!("columns {}-{}", columns.start, columns.end - 1),
         };
     };
-    let y = millimetres(place.y_mm(band));
+    let y = millimetres(place.y_mm(&(band.first_row..band.end())));
     match columns.is_empty() {
         true => format!("y {y} mm"),
         false => format!("x {} y {y} mm", millimetres(place.x_mm(&columns))),
     }
-}
-
-fn millimetres([low, high]: [f64; 2]) -> String {
-    // Beside a minus a dash would read as another.
-    if low < 0.0 { format!("{low:.1} to {high:.1}") } else { format!("{low:.1}-{high:.1}") }
 }

@@ -11,6 +11,7 @@ mod lines;
 mod materials;
 mod options;
 mod picture;
+mod place;
 mod placement;
 mod plots;
 mod report;
@@ -19,6 +20,7 @@ mod signals;
 mod stop;
 mod streams;
 mod trace;
+mod walls;
 
 use std::process::ExitCode;
 

@@ -5,6 +5,7 @@ use std::io;
 
 use lamp_grayscale::DitherError;
 use lamp_postprocess::TileError;
+use lamp_postprocess::{CompensateError, TileError};
 use lamp_slicer::SliceError;
 use lamp_stack::{JoinError, SplitError, StackError};
 
@@ -85,6 +86,12 @@ impl From<DitherError> for Stop {
 
 impl From<TileError> for Stop {
     fn from(error: TileError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<CompensateError> for Stop {
+    fn from(error: CompensateError) -> Self {
         Self::Failed(error.into())
     }
 }

@@ -1,6 +1,7 @@
 //! One file a command: its options, and what it does with them.
 
 mod calibrate;
+mod compensate;
 mod convert;
 mod cure;
 mod demo;
@@ -26,6 +27,7 @@ pub(crate) enum Command {
     Slice(slice::SliceArgs),
     Fix(fix::FixArgs),
     Dither(dither::DitherArgs),
+    Compensate(compensate::CompensateArgs),
     Tile(tile::TileArgs),
     Sample(sample::SampleArgs),
     Demo(demo::DemoArgs),
@@ -57,6 +59,7 @@ impl Command {
             Self::Slice(_) => "slice",
             Self::Fix(_) => "fix",
             Self::Dither(_) => "dither",
+            Self::Compensate(_) => "compensate",
             Self::Tile(_) => "tile",
             Self::Sample(_) => "sample",
             Self::Demo(_) => "demo",
@@ -77,6 +80,7 @@ impl Command {
             Self::Slice(args) => slice::run(args, common),
             Self::Fix(args) => fix::run(args, common),
             Self::Dither(args) => dither::run(args, common),
+            Self::Compensate(args) => compensate::run(args, common),
             Self::Tile(args) => tile::run(args, common),
             Self::Sample(args) => sample::run(args, common),
             Self::Demo(args) => demo::run(args, common),

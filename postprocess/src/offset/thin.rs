@@ -172,12 +172,13 @@ fn ends(edge: &Edge, around: &[[u32; 8]]) -> Vec<bool> {
     ends
 }
 
-/// Whether a pixel lies in the square around a disc inside the shape, which is
-/// larger than its own by a pixel or deep inside.
+/// Whether a pixel lies within twice the radius of a disc inside the shape, which
+/// is larger than its own by a pixel or deep inside: a corner, a blunt tip or a
+/// knob that is no longer than it is wide.
 fn is_in_corner(edge: &Edge, pixel: &EdgePixel) -> bool {
     let radius = f64::from(edge.squares[pixel.index as usize]).sqrt() + 1.0;
     let larger = far::at_least(radius);
-    let reach = (2f64.sqrt() * radius) as i32;
+    let reach = (2.0 * radius) as i32;
     let is_larger = |column: i32, row: i32| {
         let place = edge.at(pixel.column + column, i64::from(pixel.row) + i64::from(row));
         place.is_some_and(|along| {
@@ -185,7 +186,7 @@ fn is_in_corner(edge: &Edge, pixel: &EdgePixel) -> bool {
         })
     };
     let is_near =
-        |column: i32, row: i32| u64::from((column * column + row * row) as u32) < 2 * larger;
+        |column: i32, row: i32| u64::from((column * column + row * row) as u32) < 4 * larger;
     (-reach..=reach)
         .any(|row| (-reach..=reach).any(|column| is_near(column, row) && is_larger(column, row)))
 }

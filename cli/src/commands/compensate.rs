@@ -1,0 +1,218 @@
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use clap::Args;
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::{CureWidth, Dose, ExposureTime, QuantityError};
+use lamp_postprocess::{CompensateError, CompensateOptions, Shrinkage, Widths};
+use lamp_stack::{Dpi, Layer, Length, LengthError};
+
+use crate::lines::parse_report;
+use crate::materials::material;
+use crate::options::{Common, Input, Output, parse_distance};
+use crate::stop::Stop;
+use crate::streams::{check_beside, input_name, read_layers, report, write_file, write_layers};
+use crate::walls::Walls;
+
+/// Narrow images by what the resin cures beyond them, and make up for firing shrinkage
+///
+/// Edges move by an exact Euclidean distance; what is no whole pixel becomes a gray one, which
+/// dither realises. Walls that would become thinner than --min-feature are narrowed less, none
+/// breaks or is lost, and each such place is told of. Gray layers shrink by their outlines. Shrinkage is
+/// made up for first, by pixels; where the mesh is at hand, slice --scale does it better.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  slice blade.stl | fix | lamp compensate --uniform 25um | dither | tile > build.tif
+  lamp compensate stack.tif --material mine.toml --dose 300mJ/cm2 --report walls.json -o out.tif
+  lamp compensate stack.tif --uniform -10um --one-bit -o wider.tif
+  lamp compensate stack.tif --shrinkage x:2.1%,y:1.8% -o larger.tif")]
+pub(crate) struct CompensateArgs {
+    #[command(flatten)]
+    input: Input,
+
+    /// Move all edges inwards by so much, or outwards if it is below zero
+    #[arg(long, value_name = "LENGTH", value_parser = parse_offset, allow_hyphen_values = true)]
+    uniform: Option<Length>,
+
+    /// Move edges inwards by the cure width of a material: a built-in one or a file (see lamp material)
+    #[arg(long, value_name = "M", conflicts_with = "uniform")]
+    material: Option<String>,
+
+    /// The dose of full white, as 300mJ/cm2 [default: the page's exposure times the material's
+    /// intensity]
+    #[arg(long, value_name = "DOSE", value_parser = parse_dose, requires = "material")]
+    dose: Option<Dose>,
+
+    /// Leave walls so wide, or as they are if they are thinner; 0um lets them go [default: two pixels]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
+    min_feature: Option<Length>,
+
+    /// Make edges of whole pixels, the nearest, without gray
+    #[arg(long)]
+    one_bit: bool,
+
+    /// How much firing shrinks parts, as 2.1% or x:2.1%,y:1.8%: images become larger by 1 / (1 - s)
+    #[arg(long, value_name = "SHARE", value_parser = parse_shrinkage, allow_hyphen_values = true)]
+    shrinkage: Option<Shrinkage>,
+
+    /// Write where walls were narrowed less than asked as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    report: Option<PathBuf>,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Stop> {
+    let by = By::of(args)?;
+    if let Some(beside) = &args.report {
+        check_beside(beside, &args.output.output, [&args.input.stack])?;
+    }
+    let report = report("compensate", common, &args.output);
+    let name = input_name(&args.input.stack);
+    let options = CompensateOptions {
+        min_feature: args.min_feature,
+        one_bit: args.one_bit,
+        shrinkage: args.shrinkage.unwrap_or_default(),
+    };
+    let mut walls = Walls::default();
+    let mut layer_count = 0;
+    let layers = read_layers(&args.input, &report)?.inspect(|_| layer_count += 1);
+    let widths = |layer: &Layer, dpi| by.widths(layer, dpi);
+    let done = lamp_postprocess::compensate(layers, options, widths, |done| walls.add(done));
+    write_layers(done, &args.output, &report).map_err(|stop| match stop {
+        Stop::Failed(error) if error.is::<CompensateError>() || error.is::<NoDose>() => {
+            Stop::Failed(error).at(name)
+        }
+        stop => stop,
+    })?;
+    for line in walls.lines() {
+        report.say(&line);
+    }
+    if let Some(path) = &args.report {
+        write_file(path, |out| walls.write(layer_count, out))?;
+    }
+    Ok(())
+}
+
+/// By what edges move.
+enum By {
+    Uniform(Length),
+    CureWidth { width: CureWidth, material: Box<Material>, dose: Option<Dose> },
+}
+
+/// Why a layer has no dose.
+#[derive(Debug)]
+struct NoDose(String);
+
+impl std::fmt::Display for NoDose {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for NoDose {}
+
+impl By {
+    fn of(args: &CompensateArgs) -> Result<Self, Stop> {
+        let Some(name) = &args.material else {
+            return match (args.uniform, args.shrinkage) {
+                (None, None) => Err(Stop::usage(
+                    "say by how much: --uniform 25um, --material M or --shrinkage 2.1%",
+                )),
+                (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
+            };
+        };
+        let material = material(name)?;
+        let width =
+            material.cure_width().map_err(|error| Stop::Failed(error.into()).at(name.clone()))?;
+        let width = width.ok_or_else(|| {
+            Stop::Failed(anyhow!(
+                "{name} does not say how wide it cures: add [[cure-width]] to its file, or give --uniform"
+            ))
+        })?;
+        Ok(Self::CureWidth { width, material: Box::new(material), dose: args.dose })
+    }
+
+    fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, Stop> {
+        let (width, dose) = match self {
+            Self::Uniform(by) => return Ok(Widths::uniform(by.pixels(dpi))),
+            Self::CureWidth { width, dose: Some(dose), .. } => (width, *dose),
+            Self::CureWidth { width, material, dose: None } => (width, dose_of(layer, material)?),
+        };
+        let sizes: Vec<f64> =
+            width.lines().iter().map(|line| line.feature_size.pixels(dpi)).collect();
+        let pitch = dpi.pitch().um();
+        let size = |pixels: f64| Length::from_um(pixels * pitch);
+        Ok(Widths::by_size(&sizes, |pixels| width.width(dose, size(pixels)).pixels(dpi)))
+    }
+}
+
+/// The dose of a layer by its page.
+fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, Stop> {
+    let no_dose = |text: String| Stop::Failed(NoDose(text).into());
+    let time = layer.info.exposure_ms.filter(|ms| *ms >= 0.0).ok_or_else(|| {
+        no_dose(format!("{} does not say how long it is exposed: give --dose", layer.info.name()))
+    })?;
+    let light = material.intensity.as_ref().ok_or_else(|| {
+        let name = &material.name;
+        no_dose(format!("{name} does not say how bright full white is: give --dose, or add [intensity] to its file"))
+    })?;
+    Ok(light.value * ExposureTime::from_ms(time))
+}
+
+fn parse_offset(text: &str) -> Result<Length, String> {
+    text.parse().map_err(|error: LengthError| error.to_string())
+}
+
+fn parse_dose(text: &str) -> Result<Dose, String> {
+    text.parse().map_err(|error: QuantityError| error.to_string())
+}
+
+/// Parses `2.1%`, or `x:2.1%,y:1.8%`.
+fn parse_shrinkage(text: &str) -> Result<Shrinkage, String> {
+    let wrong = || {
+        format!(
+            "`{text}` is not a shrinkage: write a share from 0% to 50%, as 2.1% or x:2.1%,y:1.8%"
+        )
+    };
+    let share = |text: &str| {
+        let percent: f64 = text.trim().strip_suffix('%')?.trim_end().parse().ok()?;
+        (0.0..=50.0).contains(&percent).then_some(percent / 100.0)
+    };
+    if !text.contains(':') {
+        let both = share(text).ok_or_else(wrong)?;
+        return Ok(Shrinkage { x: both, y: both });
+    }
+    let [mut x, mut y] = [None; 2];
+    for part in text.split(',') {
+        let (axis, value) = part.split_once(':').ok_or_else(wrong)?;
+        let side = match axis.trim() {
+            "x" | "X" => &mut x,
+            "y" | "Y" => &mut y,
+            _ => return Err(wrong()),
+        };
+        if side.replace(share(value).ok_or_else(wrong)?).is_some() {
+            return Err(wrong());
+        }
+    }
+    Ok(Shrinkage { x: x.unwrap_or(0.0), y: y.unwrap_or(0.0) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shrinkages_people_write() {
+        assert_eq!(parse_shrinkage("2%"), Ok(Shrinkage { x: 0.02, y: 0.02 }));
+        assert_eq!(parse_shrinkage("x:2%, y: 50 %"), Ok(Shrinkage { x: 0.02, y: 0.5 }));
+        assert_eq!(parse_shrinkage("Y:0%"), Ok(Shrinkage { x: 0.0, y: 0.0 }));
+        for wrong in
+            ["", "2", "%", "-1%", "51%", "nan%", "x:2", "x2%", "z:2%", "x:1%,x:2%", "1%,2%"]
+        {
+            assert!(parse_shrinkage(wrong).is_err(), "{wrong}");
+        }
+    }
+}

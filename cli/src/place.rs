@@ -1,0 +1,35 @@
+//! Where pixels lie in the part.
+
+use std::ops::Range;
+
+use lamp_stack::Layer;
+
+/// Where the pixels of a layer lie, if its page says so.
+#[derive(Clone, Copy)]
+pub(crate) struct Place {
+    left_mm: f64,
+    top_mm: f64,
+    pitch_mm: f64,
+}
+
+impl Place {
+    pub(crate) fn of(layer: &Layer) -> Option<Self> {
+        let [left_mm, top_mm] = layer.info.origin_mm?;
+        Some(Self { left_mm, top_mm, pitch_mm: layer.dpi?.pitch().mm() })
+    }
+
+    /// From the lower edge of rows to their upper one.
+    pub(crate) fn y_mm(self, rows: &Range<u32>) -> [f64; 2] {
+        [rows.end, rows.start].map(|row| self.top_mm - f64::from(row) * self.pitch_mm)
+    }
+
+    pub(crate) fn x_mm(self, columns: &Range<u32>) -> [f64; 2] {
+        [columns.start, columns.end].map(|c| self.left_mm + f64::from(c) * self.pitch_mm)
+    }
+}
+
+/// Millimetres as people read them: `12.1-12.8`.
+pub(crate) fn millimetres([low, high]: [f64; 2]) -> String {
+    // Beside a minus a dash would read as another.
+    if low < 0.0 { format!("{low:.1} to {high:.1}") } else { format!("{low:.1}-{high:.1}") }
+}

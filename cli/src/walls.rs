@@ -1,0 +1,147 @@
+//! Walls that `compensate` narrowed less than asked, in words and as JSON.
+
+use std::io::{self, Write};
+
+use lamp_postprocess::{Compensated, ThinWall};
+use lamp_stack::Layer;
+use serde::Serialize;
+
+use crate::lines::{to_nm, write_lines};
+use crate::place::{Place, millimetres};
+
+/// So many walls are listed; others are only counted.
+const MOST_LISTED: usize = 10_000;
+
+/// Collects what was found.
+#[derive(Default)]
+pub(crate) struct Walls {
+    changed: usize,
+    layers: usize,
+    walls: usize,
+    lost: usize,
+    listed: Vec<WallLine>,
+    /// The narrowest, where it was and how wide in micrometres.
+    narrowest: Option<(f64, String)>,
+    /// The first layer that its image cut off, and how many.
+    cut_off: Option<(String, usize)>,
+}
+
+#[derive(Serialize)]
+struct Head {
+    layers: usize,
+    layers_changed: usize,
+    layers_cut_off: usize,
+    thin_walls: usize,
+    would_be_lost: usize,
+    not_listed: usize,
+}
+
+#[derive(Serialize)]
+struct WallLine {
+    layer: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    z_mm: Option<f64>,
+    columns: [u32; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    x_mm: Option<[f64; 2]>,
+    rows: [u32; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_mm: Option<[f64; 2]>,
+    width_um: f64,
+    asked_um: f64,
+    made_um: f64,
+    would_be_lost: bool,
+}
+
+impl Walls {
+    /// Adds what was done to a layer.
+    pub(crate) fn add(&mut self, done: &Compensated<'_>) {
+        self.changed += 1;
+        self.layers += usize::from(!done.walls.is_empty());
+        if done.cut_off {
+            let cut_off = self.cut_off.get_or_insert_with(|| (done.layer.info.name(), 0));
+            cut_off.1 += 1;
+        }
+        let pitch_um = done.layer.dpi.map_or(0.0, |dpi| dpi.pitch().um());
+        for wall in done.walls {
+            self.walls += 1;
+            self.lost += usize::from(wall.asked == 0.0);
+            let um = wall.width * pitch_um;
+            if self.narrowest.as_ref().is_none_or(|(narrowest, _)| um < *narrowest) {
+                self.narrowest = Some((um, whereabouts(done.layer, wall)));
+            }
+            if self.listed.len() < MOST_LISTED {
+                self.listed.push(line(done.layer, wall, pitch_um));
+            }
+        }
+    }
+
+    /// What to tell in words.
+    pub(crate) fn lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let Some((um, place)) = &self.narrowest {
+            let s = |count| if count == 1 { "" } else { "s" };
+            let (walls, layers) = (self.walls, self.layers);
+            let lost = match self.lost {
+                0 => "none of them would".to_owned(),
+                lost => format!("{lost} would"),
+            };
+            lines.push(format!(
+                "{walls} thin wall{} in {layers} layer{} narrowed less than asked, {lost} have been lost; the narrowest, {um:.0} um, in {place}",
+                s(walls),
+                s(layers),
+            ));
+        }
+        if let Some((first, count)) = &self.cut_off {
+            lines.push(format!(
+                "{first}, the first of {count}, should grow beyond its image, which cuts it off: slice with a larger --margin"
+            ));
+        }
+        lines
+    }
+
+    /// Writes all as one JSON object, a line for each wall.
+    pub(crate) fn write(&self, layers: usize, out: &mut dyn Write) -> io::Result<()> {
+        let head = serde_json::to_string(&Head {
+            layers,
+            layers_changed: self.changed,
+            layers_cut_off: self.cut_off.as_ref().map_or(0, |(_, count)| *count),
+            thin_walls: self.walls,
+            would_be_lost: self.lost,
+            not_listed: self.walls - self.listed.len(),
+        })?;
+        write!(out, "{},\n\"walls\":[", head.trim_end_matches('}'))?;
+        write_lines(self.listed.iter(), out)?;
+        writeln!(out, "]}}")
+    }
+}
+
+fn line(layer: &Layer, wall: &ThinWall, pitch_um: f64) -> WallLine {
+    let place = Place::of(layer);
+    let um = |pixels: f64| (pixels * pitch_um * 10.0).round() / 10.0;
+    WallLine {
+        layer: layer.info.index,
+        z_mm: layer.info.z().map(|z| to_nm(z.mm())),
+        columns: [wall.columns.start, wall.columns.end - 1],
+        x_mm: place.map(|place| place.x_mm(&wall.columns).map(to_nm)),
+        rows: [wall.rows.start, wall.rows.end - 1],
+        y_mm: place.map(|place| place.y_mm(&wall.rows).map(to_nm)),
+        width_um: um(wall.width),
+        asked_um: um(wall.asked),
+        made_um: um(wall.made),
+        would_be_lost: wall.asked == 0.0,
+    }
+}
+
+/// `layer 812 (z 81.20 mm) near x 31.4-33.0 y 12.1-12.8 mm`.
+fn whereabouts(layer: &Layer, wall: &ThinWall) -> String {
+    let name = layer.info.name();
+    match Place::of(layer) {
+        Some(place) => format!(
+            "{name} near x {} y {} mm",
+            millimetres(place.x_mm(&wall.columns)),
+            millimetres(place.y_mm(&wall.rows))
+        ),
+        None => format!("{name} near column {} row {}", wall.columns.start, wall.rows.start),
+    }
+}
