@@ -1,0 +1,253 @@
+//! `lamp compensate`: edges moved, walls kept and told of, shrinkage made up for.
+
+use lamp_fixtures::Part;
+use lamp_stack::{Dpi, GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo, StackInfo};
+use lamp_tests::{Scratch, mask};
+use serde_json::Value;
+
+/// At 254 dpi a pixel is 100 um.
+fn layer(index: u32, image: Image) -> Layer {
+    let stack = StackInfo { part: "bars".to_owned(), ..StackInfo::default() };
+    let info = PageInfo {
+        index,
+        z_um: Some(f64::from(index) * 100.0),
+        origin_mm: Some([10.0, 20.0]),
+        stack: (index == 0).then_some(stack),
+        ..PageInfo::default()
+    };
+    Layer { info, dpi: Dpi::new(254.0), image }
+}
+
+/// Blocks as columns and rows, each first and end.
+fn blocks(blocks: &[[u32; 4]]) -> Mask {
+    let mut mask = MaskBuilder::new(64);
+    for row in 0..40 {
+        let there = blocks.iter().filter(|b| (b[2]..b[3]).contains(&row));
+        mask.push_row(&there.flat_map(|b| [b[0], b[1]]).collect::<Vec<_>>()).unwrap();
+    }
+    mask.finish()
+}
+
+fn gray(layer: &Layer) -> &GrayMask {
+    match &layer.image {
+        Image::Gray(gray) => gray,
+        Image::Mask(_) => panic!("{} is a mask", layer.info.name()),
+    }
+}
+
+fn levels(layer: &Layer, row: u32) -> Vec<(u32, u8)> {
+    gray(layer).row(row).iter().map(|change| (change.column, change.level)).collect()
+}
+
+fn json(scratch: &Scratch, name: &str) -> Value {
+    serde_json::from_slice(&scratch.bytes(name)).unwrap()
+}
+
+#[test]
+fn edges_move_by_the_length_and_the_rest_becomes_gray() {
+    let scratch = Scratch::new();
+    let bar = blocks(&[[10, 30, 5, 35]]);
+    scratch
+        .stack("in.tif", [layer(0, Image::Mask(bar.clone())), layer(1, Image::Mask(blocks(&[])))]);
+    scratch.run("lamp compensate in.tif --uniform 0.15mm -o out.tif").succeeds_quietly();
+    let layers = scratch.layers("out.tif");
+    assert_eq!(levels(&layers[0], 20), [(11, 128), (12, 255), (28, 128), (29, 0)]);
+    let page = &layers[0].info.other["compensate"];
+    assert_eq!(page["inwards_um"], serde_json::json!([150.0, 150.0]));
+    // Nothing to move: the page passes as it is.
+    assert_eq!(layers[1], layer(1, Image::Mask(blocks(&[]))));
+    scratch.run("lamp compensate in.tif --uniform 2mil --one-bit -o out.tif").succeeds_quietly();
+    assert_eq!(mask(&scratch.layers("out.tif")[0]), &blocks(&[[11, 29, 6, 34]]));
+    scratch.run("lamp compensate in.tif --uniform -0.2mm --one-bit -o out.tif").succeeds_quietly();
+    let grown = scratch.layers("out.tif");
+    assert_eq!(mask(&grown[0]).row(20), [8, 32]);
+    scratch.run("lamp compensate out.tif --uniform 200um --one-bit -o back.tif").succeeds_quietly();
+    assert_eq!(mask(&scratch.layers("back.tif")[0]), &bar);
+}
+
+#[test]
+fn gray_layers_shrink_by_their_outlines() {
+    let scratch = Scratch::new();
+    let mut image = GrayMask::new(64);
+    for row in 0..40 {
+        let inside = (5..35).contains(&row);
+        let runs =
+            [(10, 0), (8, 100), (12, 255)].map(|(n, level)| (n, if inside { level } else { 0 }));
+        image.push_runs(runs).unwrap();
+    }
+    scratch.stack("in.tif", [layer(0, Image::Gray(image))]);
+    scratch.run("lamp compensate in.tif --uniform 150um -o out.tif").succeeds_quietly();
+    let layers = scratch.layers("out.tif");
+    let expected = [(11, 100), (18, 255), (28, 128), (29, 0)];
+    assert_eq!(levels(&layers[0], 20), expected);
+    let grow = "lamp compensate in.tif --uniform -150um -o out.tif";
+    scratch.run(grow).is_refused_with(&["in.tif", "layer 0", "gray", "dither"]);
+}
+
+#[test]
+fn thin_walls_are_kept_and_told_of() {
+    let scratch = Scratch::new();
+    // A block, a wall of one pixel and one of three.
+    let mask = blocks(&[[10, 30, 5, 35], [40, 41, 5, 35], [50, 53, 5, 35]]);
+    scratch.stack("in.tif", [layer(0, Image::Mask(mask.clone())), layer(1, Image::Mask(mask))]);
+    let line = "lamp compensate in.tif --uniform 200um --report walls.json -o out.tif";
+    let said = scratch.run(line).succeeds().stderr;
+    assert!(said.contains("4 thin walls in 2 layers narrowed less than asked, 4 would"), "{said}");
+    assert!(said.contains("100 um, in layer 0 (z 0.00 mm) near x 14.0-14.1 y 16.5-19.5"), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    let out = scratch.layers("out.tif");
+    let row = levels(&out[0], 20);
+    assert_eq!(row[..4], [(12, 255), (28, 0), (40, 255), (41, 0)]);
+    assert_eq!((row[4].0, row[5], row[7]), (50, (51, 255), (53, 0)));
+    let report = json(&scratch, "walls.json");
+    assert_eq!((&report["thin_walls"], &report["would_be_lost"]), (&4.into(), &4.into()));
+    let first = &report["walls"][0];
+    assert_eq!(first["columns"], serde_json::json!([40, 40]));
+    assert_eq!(first["x_mm"], serde_json::json!([14.0, 14.1]));
+    for (key, um) in [("width_um", 100.0), ("asked_um", 0.0), ("made_um", 100.0)] {
+        assert_eq!(first[key].as_f64(), Some(um), "{key}");
+    }
+    let unkept = "lamp compensate in.tif --uniform 200um --min-feature 0um -o out.tif";
+    scratch.run(unkept).succeeds_quietly();
+    assert_eq!(lamp_tests::masks(&scratch.layers("out.tif"))[0].row(20), [12, 28]);
+}
+
+const MATERIAL: &str = r#"name = "mine"
+description = "a resin"
+[intensity]
+value = "1 W/cm2"
+source = "a meter"
+[[cure-width]]
+feature-size = "1 mm"
+critical-dose = { value = "100 mJ/cm2", source = "page 1" }
+sensitivity = { value = "0.5 um/(mJ/cm2)", source = "page 1" }
+[[cure-width]]
+feature-size = "2 mm"
+critical-dose = { value = "100 mJ/cm2", source = "page 2" }
+sensitivity = { value = "1 um/(mJ/cm2)", source = "page 2" }
+"#;
+
+#[test]
+fn a_material_says_how_wide_each_feature_cures() {
+    let scratch = Scratch::new();
+    scratch.write("mine.toml", MATERIAL.as_bytes());
+    let mut exposed = layer(0, Image::Mask(blocks(&[[4, 28, 5, 35], [40, 50, 5, 35]])));
+    exposed.info.exposure_ms = Some(300.0);
+    let mut longer = exposed.clone();
+    (longer.info.index, longer.info.stack, longer.info.exposure_ms) = (1, None, Some(500.0));
+    scratch.stack("in.tif", [exposed, longer]);
+    let with = |options: &str| {
+        let line =
+            format!("lamp compensate in.tif --material mine.toml {options} --one-bit -o out.tif");
+        scratch.run(&line).succeeds_quietly();
+        lamp_tests::masks(&scratch.layers("out.tif"))
+            .iter()
+            .map(|m| m.row(20).to_vec())
+            .collect::<Vec<_>>()
+    };
+    // 300 mJ/cm2 make 100 um of the wall and 200 um of the block; 500 twice that.
+    let by_page = with("");
+    assert_eq!(by_page, [[6, 26, 41, 49], [8, 24, 42, 48]]);
+    assert_eq!(with("--dose 0.3J/cm2"), [[6, 26, 41, 49], [6, 26, 41, 49]]);
+    assert_eq!(with("--dose 100mJ/cm2"), [[4, 28, 40, 50], [4, 28, 40, 50]]);
+    let page = |k: usize| scratch.layers("out.tif")[k].info.other.get("compensate").cloned();
+    assert_eq!(page(0), None);
+}
+
+#[test]
+fn shrinkage_is_made_up_for_and_the_origin_goes_with_it() {
+    let scratch = Scratch::new();
+    scratch.stack("in.tif", [layer(0, Image::Mask(blocks(&[[10, 30, 5, 35]])))]);
+    scratch.run("lamp compensate in.tif --shrinkage x:20%,y:50% -o out.tif").succeeds_quietly();
+    let layers = scratch.layers("out.tif");
+    let large = mask(&layers[0]);
+    assert_eq!((large.width(), large.height()), (96, 80));
+    assert_eq!(
+        (large.row(9), large.row(10), large.row(69)),
+        (&[][..], &[12, 37][..], &[12, 37][..])
+    );
+    assert_eq!(layers[0].info.origin_mm, Some([12.5, 40.0]));
+    assert_eq!(layers[0].info.other["compensate"]["shrinkage"], serde_json::json!([0.2, 0.5]));
+    // The corner (11 mm, 19.5 mm) has gone to (13.75 mm, 39 mm), to half a pixel.
+    let [x, y] = [12.5 + 0.1 * 12.0, 40.0 - 0.1 * 10.0];
+    assert!((x - 13.75f64).abs() <= 0.05 + 1e-9 && (y - 39.0f64).abs() <= 0.05, "{x} {y}");
+    scratch.run("tile out.tif --area 30x30mm -o build.tif").succeeds_quietly();
+    scratch.run("lamp compensate build.tif --shrinkage 2% -o out.tif").is_refused_with(&[
+        "build.tif",
+        "layer 0",
+        "before tile",
+    ]);
+}
+
+#[test]
+fn it_is_a_stage_whatever_the_threads() {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Part::Tower, 2_000);
+    let slice = "slice tower.stl --dpi 200 --thickness 5mm";
+    let rest = "dither | tile --area 200x200mm";
+    for threads in [1, 2, 7] {
+        let line = format!(
+            "{slice} | lamp compensate --uniform 0.3mm --threads {threads} --quiet | {rest} > {threads}.tif"
+        );
+        scratch.run(&line).succeeds_quietly();
+        assert!(scratch.bytes(&format!("{threads}.tif")) == scratch.bytes("1.tif"));
+    }
+    scratch.run(&format!("{slice} | {rest} > plain.tif")).succeeds_quietly();
+    let white = |name| -> u64 {
+        lamp_tests::masks(&scratch.layers(name)).iter().map(|mask| mask.white_pixels()).sum()
+    };
+    assert!(white("1.tif") < white("plain.tif") && white("1.tif") * 2 > white("plain.tif"));
+}
+
+#[test]
+fn growing_out_of_the_image_is_told() {
+    let scratch = Scratch::new();
+    scratch.stack("in.tif", [layer(0, Image::Mask(blocks(&[[1, 30, 5, 35]])))]);
+    let said = scratch.run("lamp compensate in.tif --uniform -150um -o out.tif").succeeds().stderr;
+    assert!(said.contains("layer 0") && said.contains("--margin"), "{said}");
+    scratch.run("lamp compensate in.tif --uniform -100um -o out.tif").succeeds_quietly();
+}
+
+#[test]
+fn what_cannot_be_done_is_said() {
+    let scratch = Scratch::new();
+    scratch.stack("in.tif", [layer(0, Image::Mask(blocks(&[[10, 30, 5, 35]])))]);
+    scratch.write("mine.toml", MATERIAL.as_bytes());
+    let dark = MATERIAL.lines().filter(|line| {
+        !["[intensity]", "value = \"1 W/cm2\"", "source = \"a meter\""].contains(line)
+    });
+    scratch.write("dark.toml", dark.collect::<Vec<_>>().join("\n").as_bytes());
+    let to = "-o out.tif";
+    for (line, words) in [
+        ("--material mine.toml", &["in.tif", "layer 0", "--dose"][..]),
+        ("--material lamp-suspension --dose 300mJ/cm2", &["lamp-suspension", "[[cure-width]]"]),
+        ("--material teapot --dose 300mJ/cm2", &["teapot", "lamp-suspension"]),
+        ("--uniform 1mm --report none/walls.json", &["none/walls.json", "no folder"]),
+        ("--uniform 900mm --min-feature 0um", &["layer 0", "9000 pixels"]),
+        ("--uniform 9mm", &["layer 0", "91 pixels", "--min-feature"]),
+    ] {
+        scratch.run(&format!("lamp compensate in.tif {line} {to}")).is_refused_with(words);
+    }
+    for line in [
+        "",
+        "--uniform 25",
+        "--uniform 25um --material mine.toml",
+        "--dose 300mJ/cm2",
+        "--material mine.toml --dose 300",
+        "--shrinkage 2",
+        "--shrinkage 60%",
+        "--uniform 1mm --min-feature -1um",
+        "--uniform 1mm --report in.tif",
+        "--uniform 1mm --report -",
+    ] {
+        let ran = scratch.run(&format!("lamp compensate in.tif {line} {to}"));
+        assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+    }
+    assert_eq!(scratch.names(), ["dark.toml", "in.tif", "mine.toml"]);
+    let mut bare = layer(0, Image::Mask(blocks(&[])));
+    bare.dpi = None;
+    scratch.stack("bare.tif", [bare]);
+    scratch
+        .run("lamp compensate bare.tif --uniform 1mm -o out.tif")
+        .is_refused_with(&["bare.tif", "no resolution"]);
+}
