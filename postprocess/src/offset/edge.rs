@@ -53,7 +53,8 @@ impl Edge {
             .map(|class| {
                 let outer = if all { 0 } else { more_than(class.by) };
                 let inner = at_least(class.by + depth);
-                [Disc::below(outer, height), Disc::below(inner, height)]
+                let discs = [Disc::below(outer, height), Disc::below(inner, height)];
+                (discs, Levels::new(class.by, inner))
             })
             .collect();
         let mut edge = Self { ends: vec![0], ..Self::default() };
@@ -62,16 +63,15 @@ impl Edge {
         let mut squares = Vec::new();
         for row in 0..height {
             let first = edge.pieces.len();
-            for (class, [outer_disc, inner_disc]) in classes.iter().zip(&discs) {
+            for (class, ([outer_disc, inner_disc], levels)) in classes.iter().zip(&discs) {
                 field.outside(outer_disc, row, class.region.row(row), &mut outer);
                 field.outside(inner_disc, row, &outer.runs, &mut inner);
                 let deep = inner.runs.iter().map(|&run| Piece { run, first: None });
                 edge.pieces.extend(deep);
                 subtract(&outer.runs, &inner.runs, &mut runs);
                 for &run in &runs {
-                    let limit = at_least(class.by + depth);
-                    field.squares(row, run, limit, &mut squares);
-                    edge.push(run, class.by, &squares);
+                    field.squares(row, run, levels.limit, &mut squares);
+                    edge.push(run, levels, &squares);
                 }
             }
             edge.pieces[first..].sort_unstable_by_key(|piece| piece.run);
@@ -80,12 +80,11 @@ impl Edge {
         edge
     }
 
-    fn push(&mut self, run: Run, by: f64, squares: &[u32]) {
+    fn push(&mut self, run: Run, levels: &Levels, squares: &[u32]) {
         let first = u32::try_from(self.squares.len()).expect("an image has fewer pixels at edges");
         self.pieces.push(Piece { run, first: Some(first) });
         self.squares.extend_from_slice(squares);
-        let level = |&square: &u32| level(f64::from(square).sqrt() - by);
-        self.levels.extend(squares.iter().map(level));
+        self.levels.extend(squares.iter().map(|&square| levels.of(square)));
     }
 
     pub(super) fn height(&self) -> u32 {
@@ -110,11 +109,14 @@ impl Edge {
         Some(piece.first.map(|first| first + (column - piece.run.0) as u32))
     }
 
-    /// Shows all pixels along the edge, row by row.
-    pub(super) fn for_each(&self, mut show: impl FnMut(EdgePixel)) {
+    /// Shows all pixels along the edge, row by row, but those of pieces that are
+    /// `plain`.
+    pub(super) fn for_each(&self, plain: &[bool], mut show: impl FnMut(EdgePixel)) {
+        let mut plain = plain.iter();
         for row in 0..self.height() {
             for piece in self.row(row.into()) {
-                let Some(first) = piece.first else { continue };
+                let is_plain = *plain.next().expect("one for each piece");
+                let Some(first) = piece.first.filter(|_| !is_plain) else { continue };
                 for (index, column) in (first..).zip(piece.run.0..piece.run.1) {
                     show(EdgePixel { column, row, index });
                 }
@@ -143,6 +145,31 @@ impl Edge {
         }
         runs.push((width - column, level_outside));
         runs
+    }
+}
+
+/// The levels of pixels by their squared distance.
+struct Levels {
+    by: f64,
+    /// Squares are below.
+    limit: u64,
+    /// Of the first squares.
+    table: Vec<u8>,
+}
+
+impl Levels {
+    fn new(by: f64, limit: u64) -> Self {
+        let table = (0..limit.min(4096) as u32).map(|square| Self::level(square, by)).collect();
+        Self { by, limit, table }
+    }
+
+    fn of(&self, square: u32) -> u8 {
+        let known = self.table.get(square as usize).copied();
+        known.unwrap_or_else(|| Self::level(square, self.by))
+    }
+
+    fn level(square: u32, by: f64) -> u8 {
+        level(f64::from(square).sqrt() - by)
     }
 }
 

@@ -12,12 +12,14 @@
 //!
 //! [`far`] cuts rows by the disc around each pixel of the other colour, row by
 //! row of the disc; [`ring`] measures the pixels that are left in question,
-//! [`edge`] keeps them; [`thin`] keeps thin walls, [`walls`] tells of them;
+//! [`edge`] keeps them; [`thin`] keeps thin walls, where [`plain`] does not
+//! tell that there is none, and [`walls`] tells of them;
 //! [`size`] tells how wide places are; [`scale`] makes up for firing.
 
 mod edge;
 mod far;
 mod levels;
+mod plain;
 mod ring;
 mod rows;
 mod scale;
@@ -73,7 +75,7 @@ pub fn shrink(mask: &Mask, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<
         // Further inside, a wall is wide enough even when it has shrunk.
         let depth = f64::max(1.0, 0.5 + min_feature / 2.0);
         let mut edge = Edge::new(&field, &classes, depth, true);
-        let cores = Cores::of(&edge);
+        let cores = Cores::of(&edge, widths.range()[1] + depth);
         cores.widen(&mut edge, min_feature);
         let by = |pixel: &EdgePixel| {
             let holds = |class: &&Class| class.region.holds(pixel.column, pixel.row);

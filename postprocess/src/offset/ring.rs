@@ -3,16 +3,20 @@
 use super::far::Field;
 use super::rows::Run;
 
+/// Distances along a row are measured up to here: edges move less far, and the
+/// sum of two squares of them is a number of 32 bits.
+const FURTHEST: u32 = 1 << 15;
+
 impl Field {
     /// Makes `squares` the squared distance of each pixel of a run in row
     /// `row` from the nearest source, where that is below `limit`.
     pub(super) fn squares(&self, row: u32, run: Run, limit: u64, squares: &mut Vec<u32>) {
         squares.clear();
-        squares.resize((run.1 - run.0) as usize, u32::try_from(limit).unwrap_or(u32::MAX));
+        let mut furthest = u32::try_from(limit).unwrap_or(u32::MAX);
+        squares.resize((run.1 - run.0) as usize, furthest);
         let row = i64::from(row);
-        let mut furthest = limit;
         for away in 0.. {
-            let square = (away * away) as u64;
+            let square = (away * away) as u32;
             if square >= furthest {
                 return;
             }
@@ -20,32 +24,33 @@ impl Field {
             if away > 0 {
                 nearer(self.row(row + away), run, square, squares);
             }
-            furthest = squares.iter().copied().max().map_or(0, u64::from);
+            furthest = squares.iter().copied().max().unwrap_or(0);
         }
     }
 }
 
 /// Lowers the squares of a run's pixels to those of the way to the nearest
 /// source in a row, whose own distance has the square `away`.
-fn nearer(between: &[Run], (start, end): Run, away: u64, squares: &mut [u32]) {
+fn nearer(between: &[Run], (start, end): Run, away: u32, squares: &mut [u32]) {
     let mut next = between.partition_point(|run| run.1 <= start);
     let mut column = start;
-    let lower = |square: &mut u32, to: u64| {
-        if to < u64::from(*square) {
-            *square = to as u32;
-        }
-    };
     while column < end {
         let (from, to) = between.get(next).map_or((end, end), |run| (run.0.min(end), run.1));
-        for square in &mut squares[(column - start) as usize..(from.max(column) - start) as usize] {
-            lower(square, away);
+        let on_sources = (column - start) as usize..(from.max(column) - start) as usize;
+        for square in &mut squares[on_sources] {
+            *square = away.min(*square);
         }
         column = column.max(from);
         let inside = to.min(end);
-        while column < inside {
-            let aside = (column - between[next].0 + 1).min(to - column) as u64;
-            lower(&mut squares[(column - start) as usize], away + aside * aside);
-            column += 1;
+        if column < inside {
+            let left = (column - between[next].0 + 1) as u32;
+            let right = (to - column) as u32;
+            let places = &mut squares[(column - start) as usize..(inside - start) as usize];
+            for (square, step) in places.iter_mut().zip(0..) {
+                let aside = (left + step).min(right - step).min(FURTHEST);
+                *square = (away + aside * aside).min(*square);
+            }
+            column = inside;
         }
         next += 1;
     }

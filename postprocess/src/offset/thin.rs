@@ -10,19 +10,22 @@
 
 use super::edge::{Edge, EdgePixel, level};
 use super::far;
+use super::plain::plain_pieces;
 
 /// The neighbours, counter-clockwise from the right, as (column, row) steps.
 const AROUND: [(i32, i32); 8] =
     [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
 
-const BLACK: u32 = u32::MAX;
-const DEEP: u32 = u32::MAX - 1;
+/// What a neighbour is: black, deep inside, or from `FIRST` on where it stands
+/// along the edge.
+const BLACK: u32 = 0;
+const DEEP: u32 = 1;
+const FIRST: u32 = 2;
 
 /// The cores of thin walls.
 #[derive(Debug)]
 pub(super) struct Cores {
-    /// Of each pixel along the edge its neighbours: where they stand, or
-    /// `BLACK` or `DEEP`.
+    /// The neighbours of each pixel that is in question.
     around: Vec<[u32; 8]>,
     /// The pixels of each core.
     pub(super) cores: Vec<Vec<EdgePixel>>,
@@ -30,10 +33,19 @@ pub(super) struct Cores {
 
 impl Cores {
     /// Finds the cores.
-    pub(super) fn of(edge: &Edge) -> Self {
-        let around = neighbours(edge);
-        let left = thinned(edge, &around);
-        let cores = group(edge, &around, &left);
+    ///
+    /// Pixels from `depth` on are deep inside.
+    pub(super) fn of(edge: &Edge, depth: f64) -> Self {
+        // Past a corner of 60 degrees, and further than what is taken away of
+        // one place can reach from another.
+        let [beside, margin] = [2.0 * depth, depth + 2.0].map(f64::ceil);
+        let plain = plain_pieces(edge, beside as i32, margin as u32);
+        if plain.iter().all(|plain| *plain) {
+            return Self { around: Vec::new(), cores: Vec::new() };
+        }
+        let around = neighbours(edge, &plain);
+        let left = thinned(edge, &plain, &around);
+        let cores = group(edge, &plain, &around, &left);
         Self { around, cores }
     }
 
@@ -82,11 +94,11 @@ impl Ball {
             }
             for (step, &other) in AROUND.iter().zip(&around[index as usize]) {
                 let [column, row] = [column + step.0, row + step.1];
-                if other < DEEP && column.abs().max(row.abs()) <= self.reach {
+                if other >= FIRST && column.abs().max(row.abs()) <= self.reach {
                     let side = 2 * self.reach + 1;
                     let place = (row + self.reach) * side + column + self.reach;
                     if !std::mem::replace(&mut self.seen[place as usize], true) {
-                        self.open.push((column, row, other));
+                        self.open.push((column, row, other - FIRST));
                     }
                 }
             }
@@ -94,15 +106,16 @@ impl Ball {
     }
 }
 
-/// For each pixel along the edge its neighbours: where they stand, or `BLACK`
-/// or `DEEP`.
-fn neighbours(edge: &Edge) -> Vec<[u32; 8]> {
+/// The neighbours of each pixel that is not in a plain piece.
+fn neighbours(edge: &Edge, plain: &[bool]) -> Vec<[u32; 8]> {
     let mut all = vec![[BLACK; 8]; edge.squares.len()];
+    let mut plain = plain.iter();
     for row in 0..i64::from(edge.height()) {
         let rows = [-1, 0, 1].map(|step| edge.row(row + step));
         let mut next = [0; 3];
         for piece in rows[1] {
-            let Some(first) = piece.first else { continue };
+            let is_plain = *plain.next().expect("one for each piece");
+            let Some(first) = piece.first.filter(|_| !is_plain) else { continue };
             let (start, end) = piece.run;
             // What stands in the columns left of, at and right of the pixel.
             let mut columns = [[BLACK; 3]; 3];
@@ -117,9 +130,9 @@ fn neighbours(edge: &Edge) -> Vec<[u32; 8]> {
                         *next += 1;
                     }
                     *at = match pieces.get(*next) {
-                        Some(piece) if piece.run.0 <= column => {
-                            piece.first.map_or(DEEP, |first| first + (column - piece.run.0) as u32)
-                        }
+                        Some(piece) if piece.run.0 <= column => piece
+                            .first
+                            .map_or(DEEP, |first| FIRST + first + (column - piece.run.0) as u32),
                         _ => BLACK,
                     };
                 }
@@ -134,12 +147,14 @@ fn neighbours(edge: &Edge) -> Vec<[u32; 8]> {
     all
 }
 
-/// Takes away all pixels that may go, and says which are left.
-fn thinned(edge: &Edge, around: &[[u32; 8]]) -> Vec<bool> {
-    let mut left = vec![true; edge.squares.len()];
-    let ends = ends(edge, around);
-    let mut order: Vec<u32> = (0..left.len() as u32).filter(|&i| !ends[i as usize]).collect();
-    order.sort_by_key(|&index| edge.squares[index as usize]);
+/// Takes away all pixels that may go, and says which are left. Those in plain
+/// pieces go.
+fn thinned(edge: &Edge, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
+    let mut left = vec![false; edge.squares.len()];
+    edge.for_each(plain, |pixel| left[pixel.index as usize] = true);
+    let mut order = outside_first(&edge.squares, &left);
+    let ends = ends(edge, plain, around);
+    order.retain(|&index| !ends[index as usize]);
     loop {
         let before = order.len();
         order.retain(|&index| {
@@ -153,16 +168,34 @@ fn thinned(edge: &Edge, around: &[[u32; 8]]) -> Vec<bool> {
     }
 }
 
+/// The pixels that are there by their distance, those of the same as they stand.
+fn outside_first(squares: &[u32], there: &[bool]) -> Vec<u32> {
+    let those = || (0..).zip(squares).zip(there).filter(|(_, there)| **there).map(|(of, _)| of);
+    let most = squares.iter().copied().max().map_or(0, |most| most as usize);
+    let mut places = vec![0u32; most + 2];
+    those().for_each(|(_, &square)| places[square as usize + 1] += 1);
+    for square in 1..places.len() {
+        places[square] += places[square - 1];
+    }
+    let mut order = vec![0; places[most + 1] as usize];
+    for (index, &square) in those() {
+        let place = &mut places[square as usize];
+        order[*place as usize] = index;
+        *place += 1;
+    }
+    order
+}
+
 /// Says which pixels walls must not be shortened beyond: those that lie
 /// furthest inside among their neighbours, but for those in a corner.
-fn ends(edge: &Edge, around: &[[u32; 8]]) -> Vec<bool> {
+fn ends(edge: &Edge, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     let square = |index: u32| match index {
         BLACK => 0,
         DEEP => u32::MAX,
-        index => edge.squares[index as usize],
+        index => edge.squares[(index - FIRST) as usize],
     };
     let mut ends = vec![false; edge.squares.len()];
-    edge.for_each(|pixel| {
+    edge.for_each(plain, |pixel| {
         let index = pixel.index as usize;
         let own = edge.squares[index];
         let is_furthest = around[index].iter().all(|&other| square(other) <= own);
@@ -195,7 +228,7 @@ fn is_simple(around: &[u32; 8], left: &[bool]) -> bool {
     let is_black = |side: usize| match around[side % 8] {
         BLACK => true,
         DEEP => false,
-        index => !left[index as usize],
+        index => !left[(index - FIRST) as usize],
     };
     let number = (0..8)
         .step_by(2)
@@ -204,13 +237,13 @@ fn is_simple(around: &[u32; 8], left: &[bool]) -> bool {
 }
 
 /// Pixels that are left, those together that touch.
-fn group(edge: &Edge, around: &[[u32; 8]], left: &[bool]) -> Vec<Vec<EdgePixel>> {
+fn group(edge: &Edge, plain: &[bool], around: &[[u32; 8]], left: &[bool]) -> Vec<Vec<EdgePixel>> {
     if !left.contains(&true) {
         return Vec::new();
     }
     let mut unseen = left.to_vec();
     let mut groups = Vec::new();
-    edge.for_each(|pixel| {
+    edge.for_each(plain, |pixel| {
         if std::mem::take(&mut unseen[pixel.index as usize]) {
             groups.push(reached(pixel, around, &mut unseen));
         }
@@ -225,9 +258,9 @@ fn reached(from: EdgePixel, around: &[[u32; 8]], unseen: &mut [bool]) -> Vec<Edg
     while let Some(&EdgePixel { column, row, index }) = group.get(next) {
         next += 1;
         for (step, &other) in AROUND.iter().zip(&around[index as usize]) {
-            if other < DEEP && std::mem::take(&mut unseen[other as usize]) {
+            if other >= FIRST && std::mem::take(&mut unseen[(other - FIRST) as usize]) {
                 let row = row.wrapping_add_signed(step.1);
-                group.push(EdgePixel { column: column + step.0, row, index: other });
+                group.push(EdgePixel { column: column + step.0, row, index: other - FIRST });
             }
         }
     }
