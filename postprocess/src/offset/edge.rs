@@ -1,6 +1,7 @@
 //! An image near its edges: what lies deep inside, and how far each other
 //! pixel is from the edge.
 
+use super::along::{Along, Sides};
 use super::far::{Disc, Field, Outside, at_least, more_than};
 use super::rows::{Rows, Run, subtract};
 
@@ -46,7 +47,7 @@ impl Edge {
     /// Where the edges of `classes` lie when they have moved. Pixels from
     /// `depth` further in on are deep inside. Where `all`, pixels of which
     /// nothing is left are there, too.
-    pub(super) fn new(field: &Field, classes: &[Class], depth: f64, all: bool) -> Self {
+    pub(super) fn new(field: &Field, width: u32, classes: &[Class], depth: f64, all: bool) -> Self {
         let height = classes.first().map_or(0, |class| class.region.height());
         let discs: Vec<_> = classes
             .iter()
@@ -61,7 +62,19 @@ impl Edge {
         let [mut outer, mut inner] = [Outside::default(), Outside::default()];
         let mut runs = Vec::new();
         let mut squares = Vec::new();
+        let mut along = match &discs[..] {
+            [([outer, inner], levels)] => Some((Along::new(field, [outer, inner], width), levels)),
+            _ => None,
+        };
+        let mut sides = Vec::new();
         for row in 0..height {
+            if let Some((along, levels)) = &mut along
+                && along.row(row, &mut sides)
+            {
+                edge.push_along(&sides, discs[0].0[1].halves().len(), levels, &mut squares);
+                edge.ends.push(edge.pieces.len());
+                continue;
+            }
             let first = edge.pieces.len();
             for (class, ([outer_disc, inner_disc], levels)) in classes.iter().zip(&discs) {
                 field.outside(outer_disc, row, class.region.row(row), &mut outer);
@@ -78,6 +91,28 @@ impl Edge {
             edge.ends.push(edge.pieces.len());
         }
         edge
+    }
+
+    /// Adds a row of runs whose sides are measured by themselves.
+    fn push_along(
+        &mut self,
+        runs: &[Sides],
+        reach: usize,
+        levels: &Levels,
+        squares: &mut Vec<u32>,
+    ) {
+        for sides in runs {
+            let [outer, inner] = [sides.outer, sides.inner];
+            if outer.0 < inner.0 {
+                sides.squares(reach, true, squares);
+                self.push((outer.0, inner.0), levels, squares);
+            }
+            self.pieces.push(Piece { run: inner, first: None });
+            if inner.1 < outer.1 {
+                sides.squares(reach, false, squares);
+                self.push((inner.1, outer.1), levels, squares);
+            }
+        }
     }
 
     fn push(&mut self, run: Run, levels: &Levels, squares: &[u32]) {
@@ -124,10 +159,16 @@ impl Edge {
         }
     }
 
-    /// A row as runs of length and level, where the rest is `level_outside`,
-    /// 0 or 255, and deep inside is the other.
-    pub(super) fn levels_of_row(&self, row: u32, width: u32, level_outside: u8) -> Vec<(u32, u8)> {
-        let mut runs = Vec::new();
+    /// Makes `runs` a row as runs of length and level, where the rest is
+    /// `level_outside`, 0 or 255, and deep inside is the other.
+    pub(super) fn levels_of_row(
+        &self,
+        row: u32,
+        width: u32,
+        level_outside: u8,
+        runs: &mut Vec<(u32, u8)>,
+    ) {
+        runs.clear();
         let mut column = 0;
         for piece in self.row(row.into()) {
             let [start, end] = [piece.run.0, piece.run.1].map(|column| column as u32);
@@ -144,7 +185,6 @@ impl Edge {
             column = end;
         }
         runs.push((width - column, level_outside));
-        runs
     }
 }
 

@@ -139,6 +139,11 @@ pub(super) fn more_than(radius: f64) -> u64 {
 }
 
 impl Disc {
+    /// How many columns it reaches to each side, so many rows from its centre.
+    pub(super) fn halves(&self) -> &[i32] {
+        &self.halves
+    }
+
     /// The pixels whose squared distance from the centre is below `square`. An
     /// image of `height` rows needs no more.
     pub(super) fn below(square: u64, height: u32) -> Self {

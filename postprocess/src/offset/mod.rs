@@ -11,11 +11,13 @@
 //! or more.
 //!
 //! [`far`] cuts rows by the disc around each pixel of the other colour, row by
-//! row of the disc; [`ring`] measures the pixels that are left in question,
+//! row of the disc; [`ring`] measures the pixels that are left in question
+//! (of plain rows [`along`] does both),
 //! [`edge`] keeps them; [`thin`] keeps thin walls, where [`plain`] does not
 //! tell that there is none, and [`walls`] tells of them;
 //! [`size`] tells how wide places are; [`scale`] makes up for firing.
 
+mod along;
 mod edge;
 mod far;
 mod levels;
@@ -40,12 +42,15 @@ pub use stage::{CompensateError, CompensateOptions, Compensated, Shrinkage, comp
 pub use walls::ThinWall;
 pub use widths::Widths;
 
+/// Edges move by at most so many pixels; more counts as that.
+const FURTHEST: f64 = 30_000.0;
+
 /// Moves all edges of a mask inwards by so many pixels (outwards where below
-/// zero), with what is no whole pixel as gray.
+/// zero; at most 30 000), with what is no whole pixel as gray.
 pub fn offset(mask: &Mask, inwards: f64) -> GrayMask {
     let (sources, outside) = sides(inwards);
-    let classes = [Class { region: region(mask, sources), by: inwards.abs() }];
-    let edge = Edge::new(&Field::new(mask, sources), &classes, 1.0, false);
+    let classes = [Class { region: region(mask, sources), by: inwards.abs().min(FURTHEST) }];
+    let edge = Edge::new(&Field::new(mask, sources), mask.width(), &classes, 1.0, false);
     gray_of(&edge, mask.width(), outside)
 }
 
@@ -74,7 +79,7 @@ pub fn shrink(mask: &Mask, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<
     let edge = if min_feature > 0.0 {
         // Further inside, a wall is wide enough even when it has shrunk.
         let depth = f64::max(1.0, 0.5 + min_feature / 2.0);
-        let mut edge = Edge::new(&field, &classes, depth, true);
+        let mut edge = Edge::new(&field, mask.width(), &classes, depth, true);
         let cores = Cores::of(&edge, widths.range()[1] + depth);
         cores.widen(&mut edge, min_feature);
         let by = |pixel: &EdgePixel| {
@@ -84,7 +89,7 @@ pub fn shrink(mask: &Mask, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<
         walls.extend(cores.cores.iter().filter_map(|core| ThinWall::of(&edge, core, by)));
         edge
     } else {
-        Edge::new(&field, &classes, 1.0, false)
+        Edge::new(&field, mask.width(), &classes, 1.0, false)
     };
     (gray_of(&edge, mask.width(), 0), walls)
 }
@@ -104,8 +109,10 @@ fn region(mask: &Mask, sources: Sources) -> Rows {
 
 fn gray_of(edge: &Edge, width: u32, outside: u8) -> GrayMask {
     let mut gray = GrayMask::new(width);
+    let mut runs = Vec::new();
     for row in 0..edge.height() {
-        gray.push_runs(edge.levels_of_row(row, width, outside)).expect("runs as wide as the image");
+        edge.levels_of_row(row, width, outside, &mut runs);
+        gray.push_runs(runs.iter().copied()).expect("runs as wide as the image");
     }
     gray
 }

@@ -1,0 +1,102 @@
+//! Rows whose edges run along those above and below.
+//!
+//! Most rows of a part do. Where each row of a disc has as many runs as the one
+//! at its centre, and none lies beside another one's neighbour, each side of a run
+//! is measured by itself, against its like in the other rows.
+
+use super::far::{Disc, Field};
+use super::rows::Run;
+
+/// As many rows on each side are looked at.
+const MOST: usize = 16;
+
+/// The rows around one.
+#[derive(Debug)]
+pub(super) struct Along<'a> {
+    field: &'a Field,
+    discs: [&'a Disc; 2],
+    width: i32,
+    /// The rows above and below, from the row itself on.
+    rows: Vec<[&'a [Run]; 2]>,
+}
+
+/// A run of such a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sides {
+    /// What lies outside the sources' outer discs.
+    pub(super) outer: Run,
+    /// What lies outside their inner ones; at least a pixel.
+    pub(super) inner: Run,
+    /// The innermost ends, of rows that are so many rows away.
+    ends: [Run; MOST],
+}
+
+impl<'a> Along<'a> {
+    /// For discs of which the outer is the smaller one.
+    pub(super) fn new(field: &'a Field, discs: [&'a Disc; 2], width: u32) -> Self {
+        Self { field, discs, width: width as i32, rows: Vec::new() }
+    }
+
+    /// Makes `out` the runs of a row, if they run along those of its like.
+    pub(super) fn row(&mut self, row: u32, out: &mut Vec<Sides>) -> bool {
+        out.clear();
+        let reach = self.discs[1].halves().len();
+        let runs = self.field.row(row.into());
+        if reach > MOST {
+            return false;
+        }
+        self.rows.clear();
+        for away in 0..reach as i64 {
+            let rows =
+                [i64::from(row) - away, i64::from(row) + away].map(|row| self.field.row(row));
+            if rows.iter().any(|row| row.len() != runs.len()) {
+                return false;
+            }
+            self.rows.push(rows);
+        }
+        let mut before = i32::MIN;
+        (0..runs.len()).all(|run| {
+            let sides = self.sides(run, &mut before);
+            out.extend(sides);
+            sides.is_some()
+        })
+    }
+
+    /// The sides of a run, if it lies right of where the one before ends.
+    fn sides(&self, run: usize, before: &mut i32) -> Option<Sides> {
+        let mut ends = [(0, 0); MOST];
+        let mut hull = (i32::MAX, i32::MIN);
+        for (end, rows) in ends.iter_mut().zip(&self.rows) {
+            let [a, b] = rows.map(|row| row[run]);
+            *end = (a.0.max(b.0), a.1.min(b.1));
+            hull = (hull.0.min(a.0).min(b.0), hull.1.max(a.1).max(b.1));
+        }
+        if hull.0 < std::mem::replace(before, hull.1) {
+            return None;
+        }
+        let own = (ends[0].0.max(0), ends[0].1.min(self.width));
+        let [outer, inner] = self.discs.map(|disc| {
+            let narrowed = disc.halves().iter().zip(&ends);
+            narrowed
+                .fold(own, |left, (half, end)| (left.0.max(end.0 + half), left.1.min(end.1 - half)))
+        });
+        (inner.0 < inner.1).then_some(Sides { outer, inner, ends })
+    }
+}
+
+impl Sides {
+    /// The squared distances of the pixels left of the inner ones, then of those
+    /// right of them, by how many rows count.
+    pub(super) fn squares(&self, reach: usize, left: bool, squares: &mut Vec<u32>) {
+        squares.clear();
+        let columns = if left { self.outer.0..self.inner.0 } else { self.inner.1..self.outer.1 };
+        squares.extend(columns.map(|column| {
+            let square = |(away, end): (u32, &Run)| {
+                let aside = if left { column - end.0 + 1 } else { end.1 - column };
+                let aside = aside.clamp(0, 1 << 15) as u32;
+                away * away + aside * aside
+            };
+            (0..).zip(&self.ends[..reach]).map(square).min().unwrap_or(0)
+        }));
+    }
+}
