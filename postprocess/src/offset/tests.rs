@@ -268,3 +268,33 @@ fn wide_places_move_by_their_own_width() {
     assert_eq!(of_square[..2], by_three.row(40)[..2]);
     assert_eq!(of_square[2..], offset(&mask, 1.0).row(40)[2..]);
 }
+
+#[test]
+fn a_waist_between_wide_places_does_not_break() {
+    for degrees in [0.0, 20.0, 45.0, 80.0, 90.0] {
+        let (sin, cos) = f64::to_radians(degrees).sin_cos();
+        let bridged = drawn(300, 300, |column, row| {
+            let [x, y] = [column, row].map(|at| f64::from(at) - 150.0);
+            let (along, across) = (x * cos + y * sin, y * cos - x * sin);
+            let is_bridge = along.abs() < 62.0 && across.abs() < 3.4;
+            is_bridge || (along.abs() - 62.0).hypot(across) < 60.0
+        });
+        let squares = drawn(300, 300, |column, row| {
+            let is_in =
+                |x: i32, y: i32| (x..x + 82).contains(&column) && (y..y + 82).contains(&row);
+            is_in(40, 40) || is_in(120, 120)
+        });
+        for (mask, wide) in [(bridged, 4.0), (squares, 2.0)] {
+            assert_eq!(parts(&mask), 1);
+            assert_eq!(parts(&offset_one_bit(&mask, 5.5)), 2, "{degrees} {wide}");
+            let (kept, walls) = shrink(&mask, &Widths::uniform(5.5), 2.0);
+            assert_eq!(parts(&levels::at_least(&kept, 255)), 1, "{degrees}");
+            assert_eq!(walls.len(), 1, "{degrees}: {walls:?}");
+            assert!(walls[0].width > wide && walls[0].asked < 5.0, "{walls:?}");
+            // Elsewhere nothing is kept.
+            let plain = offset(&mask, 5.5);
+            let differs = (0..300).filter(|&row| kept.row(row) != plain.row(row)).count();
+            assert!((2..70).contains(&differs), "{degrees}: {differs} rows");
+        }
+    }
+}
