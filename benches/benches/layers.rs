@@ -8,11 +8,11 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use fax::{Color, VecWriter, decoder, encoder};
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::{Method, dither_image};
-use lamp_slicer::{DepthLevels, Model, SliceOptions, Slices};
-use lamp_stack::{GrayMask, Image, Length, Mask, g4};
 use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
-use lamp_slicer::{Model, SliceOptions, Slices};
-use lamp_stack::{Dpi, EncodedPage, Format, Image, Layer, Mask, PageInfo, PageWriter, g4};
+use lamp_slicer::{DepthLevels, Model, SliceOptions, Slices};
+use lamp_stack::{
+    Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
+};
 
 /// Layers with pins and holes, 1500 dpi.
 const LAYERS: std::ops::Range<u32> = 440..460;
@@ -138,7 +138,6 @@ fn dither(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, layers, dither);
 /// A layer's pixels, eight to a byte, as a program without runs would hold them.
 fn bitmap(strip: &[u8], width: u32, height: u32) -> Vec<u8> {
     let stride = width.div_ceil(8) as usize;
@@ -173,7 +172,7 @@ fn fill(bytes: &mut [u8], first: usize, end: usize) {
 
 /// Cure-width compensation of whole layers, beside decoding them to bitmaps.
 fn compensation(criterion: &mut Criterion) {
-    let masks = masks(slices(100_000)());
+    let masks = masks(slices(100_000, None)());
     let transitions: usize = masks.iter().map(Mask::transition_count).sum();
     let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
     let size = (masks[0].width(), masks[0].height());
@@ -222,5 +221,5 @@ fn tiff_file(mask: &Mask) -> Vec<u8> {
     file
 }
 
-criterion_group!(benches, layers, compensation);
+criterion_group!(benches, layers, dither, compensation);
 criterion_main!(benches);

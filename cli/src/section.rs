@@ -342,8 +342,8 @@ impl Panels {
                     let left = &part[pixel_at(column.saturating_sub(1))];
                     // What lies outside the picture makes no edge.
                     let below_um = z_at(row + 1).max(self.heights_um.start);
-                    let edge = is_part != holds(left, z_um)
-                        || is_part != holds(&part[pixel], below_um);
+                    let edge =
+                        is_part != holds(left, z_um) || is_part != holds(&part[pixel], below_um);
                     match (edge, is_cured, is_part) {
                         (true, ..) => OUTLINE,
                         (_, true, true) => CURED,

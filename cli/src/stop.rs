@@ -4,7 +4,6 @@ use std::fmt;
 use std::io;
 
 use lamp_grayscale::DitherError;
-use lamp_postprocess::TileError;
 use lamp_postprocess::{CompensateError, TileError};
 use lamp_slicer::SliceError;
 use lamp_stack::{JoinError, SplitError, StackError};

@@ -37,7 +37,7 @@ pub(crate) struct CompensateArgs {
 
     /// Move edges inwards by the cure width of a material: a built-in one or a file (see lamp material)
     #[arg(long, value_name = "M", conflicts_with = "uniform")]
-    material: Option<String>,
+    material: Option<PathBuf>,
 
     /// The dose of full white, as 300mJ/cm2 [default: the page's exposure times the material's
     /// intensity]
@@ -116,7 +116,7 @@ impl std::error::Error for NoDose {}
 
 impl By {
     fn of(args: &CompensateArgs) -> Result<Self, Stop> {
-        let Some(name) = &args.material else {
+        let Some(path) = &args.material else {
             return match (args.uniform, args.shrinkage) {
                 (None, None) => Err(Stop::usage(
                     "say by how much: --uniform 25um, --material M or --shrinkage 2.1%",
@@ -124,7 +124,8 @@ impl By {
                 (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
             };
         };
-        let material = material(name)?;
+        let material = material(path)?;
+        let name = &material.name;
         let width =
             material.cure_width().map_err(|error| Stop::Failed(error.into()).at(name.clone()))?;
         let width = width.ok_or_else(|| {
