@@ -135,7 +135,7 @@ impl Table {
     fn spans(&self, layer: usize) -> Vec<Span> {
         let mut spans: Vec<_> =
             self.shares(layer).flat_map(|share| &share.spans).copied().collect();
-        spans.par_sort_unstable_by(|a, b| a.partial_cmp(b).expect("depths are numbers"));
+        spans.sort_unstable_by_key(Span::place);
         spans
     }
 

@@ -16,8 +16,8 @@ pub(crate) struct Shader<'a> {
     /// Those of the rows to come, by row.
     spans: &'a [Span],
     /// Those over a column, in the order of their starts.
-    open: Vec<Span>,
-    met: Vec<(f64, Span)>,
+    open: Vec<&'a Span>,
+    met: Vec<(f64, &'a Span)>,
     changes: Vec<LevelChange>,
     image: GrayMask,
 }
@@ -47,7 +47,7 @@ impl<'a> Shader<'a> {
     /// Adds the next row, given the sorted places where the section's contours
     /// cross it.
     pub(crate) fn push_row(&mut self, row: u32, places: &[Place]) {
-        let count = self.spans.partition_point(|span| span.row <= row);
+        let count = self.spans.iter().take_while(|span| span.row <= row).count();
         let (mut spans, rest) = self.spans.split_at(count);
         self.spans = rest;
         self.changes.clear();
@@ -64,7 +64,7 @@ impl<'a> Shader<'a> {
     }
 
     /// Adds columns between which no contour crosses the row.
-    fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &[Span]) {
+    fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &'a [Span]) {
         let inside = match self.fill {
             Fill::EvenOdd => winding % 2 != 0,
             Fill::NonZero => winding != 0,
@@ -90,7 +90,7 @@ impl<'a> Shader<'a> {
         if self.open.is_empty() {
             return self.push(start, 255);
         }
-        let end = if self.open.iter().all(Span::is_level) { start + 1 } else { end };
+        let end = if self.open.iter().all(|span| span.is_level()) { start + 1 } else { end };
         for column in start..end {
             let level = self.exit_um(column, winding).map_or(255, |um| self.levels.of_um(um));
             self.push(column, level);
@@ -101,9 +101,10 @@ impl<'a> Shader<'a> {
     /// the first time.
     fn exit_um(&mut self, column: u32, winding: i32) -> Option<f64> {
         self.met.clear();
-        self.met.extend(self.open.iter().map(|span| (span.depth_um(column), *span)));
+        self.met.extend(self.open.iter().map(|&span| (span.depth_um(column), span)));
         self.met.sort_by(|a, b| a.partial_cmp(b).expect("depths are numbers"));
-        let touching = |a: &(f64, Span), b: &(f64, Span)| b.0 - a.0 <= a.1.tie_um() + b.1.tie_um();
+        let touching =
+            |a: &(f64, &Span), b: &(f64, &Span)| b.0 - a.0 <= a.1.tie_um() + b.1.tie_um();
         let mut left = winding;
         for group in self.met.chunk_by(touching) {
             let (depth, first) = group[0];

@@ -29,6 +29,12 @@ pub(crate) struct Span {
 }
 
 impl Span {
+    /// Row and first column in one, to sort by.
+    #[inline]
+    pub(crate) fn place(&self) -> u64 {
+        u64::from(self.row) << 32 | u64::from(self.start)
+    }
+
     /// The depth below the layer's top at a column.
     #[inline]
     pub(crate) fn depth_um(&self, column: u32) -> f64 {
