@@ -180,6 +180,13 @@ impl<'a> Exposures<'a> {
         let of_page = layer.info.z_um.zip(layer.info.thickness_um);
         let (z, thickness) =
             of_page.with_context(|| format!("{} does not say its height and thickness", name()))?;
+        let wrong = |number: f64| !(number > 0.0 && number.is_finite());
+        if wrong(thickness) || layer.info.exposure_ms.is_some_and(wrong) {
+            return Err(anyhow!(
+                "{} says a thickness or an exposure that is not above zero",
+                name()
+            ));
+        }
         if !self.course.line.crosses(&layer.image) {
             return Err(anyhow!("{} is smaller than the first", name()));
         }

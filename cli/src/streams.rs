@@ -211,14 +211,26 @@ pub(crate) fn check_beside<'a>(
         let (beside, folder) = (beside.display(), folder.display());
         return Err(Stop::Failed(anyhow!("{beside}: there is no folder {folder}")));
     }
-    let is_same = |other: &Path| !is_stream(other) && place_of(other) == place_of(beside);
-    if is_same(stack) || (is_stream(stack) && is_stdout(beside)) {
+    if is_same(beside, stack) || (is_stream(stack) && is_stdout(beside)) {
         return Err(Stop::usage(format!("{}: the stack goes there", beside.display())));
     }
-    match inputs.into_iter().find(|input| is_same(input)) {
-        Some(_) => Err(Stop::usage(format!("{}: that is the input", beside.display()))),
+    check_not_input(beside, inputs)
+}
+
+/// Checks, before the work, that what is written does not take the place of an
+/// input.
+pub(crate) fn check_not_input<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<(), Stop> {
+    match inputs.into_iter().find(|input| is_same(output, input)) {
+        Some(_) => Err(Stop::usage(format!("{}: that is the input", output.display()))),
         None => Ok(()),
     }
+}
+
+fn is_same(path: &Path, other: &Path) -> bool {
+    !is_stream(path) && !is_stream(other) && place_of(other) == place_of(path)
 }
 
 /// A name that two paths to one place share, be there a file yet or not.

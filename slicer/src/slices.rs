@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
+use lamp_stack::{Dpi, Layer, Length, LevelChange, PageInfo, StackInfo};
 use rayon::prelude::*;
 
 use crate::buckets::Buckets;
@@ -273,7 +273,16 @@ impl Slices {
     fn batch_len(&self) -> usize {
         let row_offsets = size_of::<u32>() * self.grid.height as usize;
         let table = size_of::<Crossing>() * self.most_crossings;
-        (table / row_offsets).clamp(1, 16 * rayon::current_num_threads())
+        let most = (table / row_offsets).clamp(1, 16 * rayon::current_num_threads());
+        // Gray pixels may all differ.
+        let mut room = table / size_of::<LevelChange>();
+        let fits = |layer: &usize| {
+            let pixels = self.table.pixels_over_facets(*layer);
+            let fits = pixels <= room;
+            room = room.saturating_sub(pixels);
+            fits
+        };
+        self.pending.clone().take(most).take_while(fits).count().max(1)
     }
 
     /// What is known of a layer before it is cut.

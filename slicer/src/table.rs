@@ -131,6 +131,12 @@ impl Table {
         self.parts.iter().map(move |shares| &shares[layer - self.layers.start])
     }
 
+    /// How many pixels of a layer lie over facets below, at most.
+    pub(crate) fn pixels_over_facets(&self, layer: usize) -> usize {
+        let spans = self.shares(layer).flat_map(|share| &share.spans);
+        spans.map(|span| (span.end - span.start) as usize).sum()
+    }
+
     /// What lies below a layer's section, row by row.
     fn spans(&self, layer: usize) -> Vec<Span> {
         let mut spans: Vec<_> =

@@ -95,6 +95,43 @@ fn what_cannot_be_exposed_is_refused() {
     }
 }
 
+#[test]
+fn no_input_is_overwritten() {
+    let scratch = with_tower();
+    scratch.run("lamp material show lamp-suspension > mine.toml").succeeds();
+    let gray = format!("slice tower.stl {COARSE} --gray --material mine.toml");
+    scratch.run(&format!("{gray} -o gray.tif")).succeeds_quietly();
+    let cure = "lamp cure gray.tif --material mine.toml --section y=0mm --part tower.stl";
+    for line in [
+        "slice tower.stl -o tower.stl",
+        "slice tower.stl -o t.tif --report ./tower.stl",
+        &format!("{gray} -o mine.toml"),
+        &format!("{gray} -o t.tif --report mine.toml"),
+        &format!("{cure} -o mine.toml"),
+        &format!("{cure} -o tower.stl"),
+        &format!("{cure} -o gray.tif"),
+    ] {
+        is_wrong_usage(&scratch.run(line), "that is the input");
+    }
+    scratch.run(&format!("{cure} -o s.png")).succeeds();
+}
+
+#[test]
+fn exposures_that_are_none_are_refused() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} --layers 0..3 -o t.tif")).succeeds_quietly();
+    for (key, value) in [("exposure_ms", -17.5), ("exposure_ms", 0.0), ("thickness_um", 0.0)] {
+        let mut layers = scratch.layers("t.tif");
+        match key {
+            "exposure_ms" => layers[1].info.exposure_ms = Some(value),
+            _ => layers[1].info.thickness_um = Some(value),
+        }
+        scratch.stack("bad.tif", layers);
+        let line = "lamp cure bad.tif --material lamp-suspension --section y=0mm -o s.png";
+        scratch.run(line).is_refused_with(&["layer 1", "not above zero"]);
+    }
+}
+
 /// The areas that `lamp cure` prints, by panel: overshoot and missing.
 fn areas(text: &[u8]) -> Vec<[f64; 2]> {
     let text = std::str::from_utf8(text).unwrap();

@@ -60,8 +60,8 @@ pub(crate) struct CureArgs {
 }
 
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Stop> {
-    let inputs: Vec<_> = args.part.iter().chain([&args.input.stack]).cloned().collect();
-    check_beside(&args.output, Path::new("-"), &inputs)?;
+    let inputs = args.part.iter().chain([&args.input.stack, &args.material]);
+    check_beside(&args.output, Path::new("-"), inputs)?;
     let material = material(&args.material)?;
     let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
     let name = input_name(&args.input.stack);
@@ -73,6 +73,9 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Stop> {
         if exposures.is_none() {
             if layer.info.other.contains_key("dither") {
                 report.say("these layers are dots: gray shows in a stack before dither");
+            }
+            if layer.info.other.contains_key("compensate") {
+                report.say("these layers were compensated: they differ from the part by that, too");
             }
             let course = Course::new(args.section, &layer).map_err(failed)?;
             exposures = Some(Exposures::new(&resin, course));

@@ -16,7 +16,9 @@ use crate::options::{Common, Output, parse_layers, parse_memory, parse_thickness
 use crate::placement::{PlacementOptions, parse_numbers};
 use crate::report::Report;
 use crate::stop::Stop;
-use crate::streams::{check_beside, input_name, is_stream, report, write_file, write_layers};
+use crate::streams::{
+    check_beside, check_not_input, input_name, is_stream, report, write_file, write_layers,
+};
 use crate::trace::{Counts, Rows, Subject};
 
 /// Slice an STL part into a stack of layer images
@@ -279,9 +281,11 @@ fn value_name(value: &impl ValueEnum) -> String {
 }
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
+    let inputs = || args.parts.iter().chain(&args.options.material);
     if let Some(report) = &args.report {
-        check_beside(report, &args.output.output, &args.parts)?;
+        check_beside(report, &args.output.output, inputs())?;
     }
+    check_not_input(&args.output.output, inputs())?;
     let exposure = args.options.exposure()?;
     let model = open_models(&args.parts)?;
     let name = name_of_all(&args.parts);

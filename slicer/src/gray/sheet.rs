@@ -13,6 +13,10 @@ const TOUCHING_UM: f64 = 1e-3;
 /// off.
 const ASIDE_PIXELS: f64 = 1e-6;
 
+/// What comes so near to the part's lowest point stands on the platform. A flat
+/// underside that was turned into its place is not level to the last digit.
+const STANDING_UM: f64 = 1.0;
+
 /// What a row's vertical lines meet of a facet below a section: columns from
 /// `start` to `end`, at depths along a straight line.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
@@ -157,8 +161,7 @@ impl Sheet {
             let met = planes.between(low_um - self.tie_um, high_um + reach_um);
             for layer in met.start.max(layers.start)..met.end.min(layers.end) {
                 let top_um = planes.top_um(layer);
-                // What reaches the part's lowest point stands on the platform.
-                let end_um = (top_um - reach_um).max(planes.bottom_um());
+                let end_um = (top_um - reach_um).max(planes.bottom_um() + STANDING_UM);
                 let depths = top_um - planes.z_um(layer) - self.tie_um..top_um - end_um;
                 if let Some((columns, depth_um)) = stretch.within(top_um, &depths) {
                     let span = Span {

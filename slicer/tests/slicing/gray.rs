@@ -3,7 +3,9 @@
 //! against the rules that white layers keep.
 
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, torus, tower};
-use lamp_slicer::{DepthLevels, Fill, PixelGrid, PlaneRule, SliceError, SliceOptions, Slices};
+use lamp_slicer::{
+    Axis, DepthLevels, Fill, PixelGrid, Placement, PlaneRule, SliceError, SliceOptions, Slices,
+};
 use lamp_stack::{Image, Layer, Length, gray_runs};
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -99,7 +101,7 @@ fn depth_below(
         }
         winding += if faces_up { 1 } else { -1 };
         if z < plane && at_plane == Some(true) && !inside(winding) {
-            return Some((true, (z > end + 1e-9).then_some(plane - z)));
+            return Some((true, (z > end).then_some(plane - z)));
         }
     }
     Some((at_plane.unwrap_or(false), None))
@@ -119,7 +121,7 @@ fn referee(mesh: &Mesh, options: &SliceOptions, overcure: f64) -> Result<usize, 
     let check = |layer: &Layer| -> Result<(usize, usize, usize), String> {
         let top = low + f64::from(layer.info.index + 1) * thickness;
         let plane = top.min(high);
-        let end = (top - overcure * thickness).max(low);
+        let end = (top - overcure * thickness).max(low + 1e-3);
         let (mut open, mut seen, mut grays) = (0, 0, 0);
         for (row, levels) in levels(layer).iter().enumerate() {
             for (column, &level) in levels.iter().enumerate() {
@@ -358,6 +360,19 @@ fn depths_may_begin_below_a_last_layer_that_is_not_full() {
     // Cured down from 0.2 mm to the ledge's underside at 0.12 mm.
     let ledge: Vec<_> = levels(&layers[1]).concat();
     assert!(ledge.contains(&204) && ledge.iter().all(|level| [0, 204, 255].contains(level)));
+}
+
+/// A foot turned away and back is level but for rounding.
+#[test]
+fn a_foot_that_was_turned_into_place_stands() {
+    for degrees in [10.0, 25.0, 45.0, 63.0] {
+        let turned = cube(0.0, 20.0).map(|p| Placement::default().rotated(Axis::X, degrees).at(p));
+        let placement = Placement::default().rotated(Axis::X, -degrees);
+        let options = SliceOptions { placement, ..gray(2.0, &options(300.0, 100.0)) };
+        let layers = slice(&turned, &options);
+        assert!(matches!(layers[0].image, Image::Mask(_)), "{degrees}");
+        assert!(mask(&layers[0]).white_pixels() > 50_000);
+    }
 }
 
 #[test]
