@@ -1,8 +1,10 @@
-//! Walls that `compensate` narrowed less than asked, in words and as JSON.
+//! Walls that `compensate` narrowed less than asked, and pieces that it lost, in
+//! words and as JSON.
 
 use std::io::{self, Write};
+use std::ops::Range;
 
-use lamp_postprocess::{Compensated, ThinWall};
+use lamp_postprocess::{Compensated, Loss, ThinWall};
 use lamp_stack::Layer;
 use serde::Serialize;
 
@@ -18,7 +20,14 @@ pub(crate) struct Walls {
     changed: usize,
     layers: usize,
     walls: usize,
+    /// Walls that would have been lost, but were kept.
+    kept: usize,
+    /// Pieces that were lost, those that broke apart, and in how many layers.
     lost: usize,
+    broken: usize,
+    layers_with_losses: usize,
+    /// Where the first of these was.
+    first_loss: Option<String>,
     listed: Vec<WallLine>,
     /// The narrowest, where it was and how wide in micrometres.
     narrowest: Option<(f64, String)>,
@@ -33,6 +42,8 @@ struct Head {
     layers_cut_off: usize,
     thin_walls: usize,
     would_be_lost: usize,
+    lost: usize,
+    broken: usize,
     not_listed: usize,
 }
 
@@ -47,10 +58,15 @@ struct WallLine {
     rows: [u32; 2],
     #[serde(skip_serializing_if = "Option::is_none")]
     y_mm: Option<[f64; 2]>,
-    width_um: f64,
-    asked_um: f64,
-    made_um: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    width_um: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    asked_um: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    made_um: Option<f64>,
     would_be_lost: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pieces_left: Option<usize>,
 }
 
 impl Walls {
@@ -65,13 +81,22 @@ impl Walls {
         let pitch_um = done.layer.dpi.map_or(0.0, |dpi| dpi.pitch().um());
         for wall in done.walls {
             self.walls += 1;
-            self.lost += usize::from(wall.asked == 0.0);
+            self.kept += usize::from(wall.asked == 0.0);
             let um = wall.width * pitch_um;
             if self.narrowest.as_ref().is_none_or(|(narrowest, _)| um < *narrowest) {
-                self.narrowest = Some((um, whereabouts(done.layer, wall)));
+                self.narrowest = Some((um, whereabouts(done.layer, &wall.columns, &wall.rows)));
             }
             if self.listed.len() < MOST_LISTED {
-                self.listed.push(line(done.layer, wall, pitch_um));
+                self.listed.push(wall_line(done.layer, wall, pitch_um));
+            }
+        }
+        self.layers_with_losses += usize::from(!done.losses.is_empty());
+        for loss in done.losses {
+            *(if loss.left == 0 { &mut self.lost } else { &mut self.broken }) += 1;
+            let place = || whereabouts(done.layer, &loss.columns, &loss.rows);
+            self.first_loss.get_or_insert_with(place);
+            if self.listed.len() < MOST_LISTED {
+                self.listed.push(loss_line(done.layer, loss));
             }
         }
     }
@@ -79,16 +104,24 @@ impl Walls {
     /// What to tell in words.
     pub(crate) fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
+        let s = |count| if count == 1 { "" } else { "s" };
         if let Some((um, place)) = &self.narrowest {
-            let s = |count| if count == 1 { "" } else { "s" };
             let (walls, layers) = (self.walls, self.layers);
-            let lost = match self.lost {
+            let kept = match self.kept {
                 0 => "none of them would".to_owned(),
-                lost => format!("{lost} would"),
+                kept => format!("{kept} would"),
             };
             lines.push(format!(
-                "{walls} thin wall{} in {layers} layer{} narrowed less than asked, {lost} have been lost; the narrowest, {um:.0} um, in {place}",
+                "{walls} thin wall{} in {layers} layer{} narrowed less than asked, {kept} have been lost; the narrowest, {um:.0} um, in {place}",
                 s(walls),
+                s(layers),
+            ));
+        }
+        if let Some(place) = &self.first_loss {
+            let (lost, broken, layers) = (self.lost, self.broken, self.layers_with_losses);
+            lines.push(format!(
+                "{lost} piece{} lost and {broken} broken apart in {layers} layer{}, as --min-feature 0um keeps no walls; the first in {place}",
+                s(lost),
                 s(layers),
             ));
         }
@@ -107,8 +140,10 @@ impl Walls {
             layers_changed: self.changed,
             layers_cut_off: self.cut_off.as_ref().map_or(0, |(_, count)| *count),
             thin_walls: self.walls,
-            would_be_lost: self.lost,
-            not_listed: self.walls - self.listed.len(),
+            would_be_lost: self.kept + self.lost,
+            lost: self.lost,
+            broken: self.broken,
+            not_listed: self.walls + self.lost + self.broken - self.listed.len(),
         })?;
         write!(out, "{},\n\"walls\":[", head.trim_end_matches('}'))?;
         write_lines(self.listed.iter(), out)?;
@@ -116,32 +151,52 @@ impl Walls {
     }
 }
 
-fn line(layer: &Layer, wall: &ThinWall, pitch_um: f64) -> WallLine {
-    let place = Place::of(layer);
-    let um = |pixels: f64| (pixels * pitch_um * 10.0).round() / 10.0;
+fn wall_line(layer: &Layer, wall: &ThinWall, pitch_um: f64) -> WallLine {
+    let um = |pixels: f64| Some((pixels * pitch_um * 10.0).round() / 10.0);
     WallLine {
-        layer: layer.info.index,
-        z_mm: layer.info.z().map(|z| to_nm(z.mm())),
-        columns: [wall.columns.start, wall.columns.end - 1],
-        x_mm: place.map(|place| place.x_mm(&wall.columns).map(to_nm)),
-        rows: [wall.rows.start, wall.rows.end - 1],
-        y_mm: place.map(|place| place.y_mm(&wall.rows).map(to_nm)),
         width_um: um(wall.width),
         asked_um: um(wall.asked),
         made_um: um(wall.made),
         would_be_lost: wall.asked == 0.0,
+        ..box_line(layer, &wall.columns, &wall.rows)
+    }
+}
+
+fn loss_line(layer: &Layer, loss: &Loss) -> WallLine {
+    WallLine {
+        would_be_lost: loss.left == 0,
+        pieces_left: Some(loss.left),
+        ..box_line(layer, &loss.columns, &loss.rows)
+    }
+}
+
+/// A line that says where.
+fn box_line(layer: &Layer, columns: &Range<u32>, rows: &Range<u32>) -> WallLine {
+    let place = Place::of(layer);
+    WallLine {
+        layer: layer.info.index,
+        z_mm: layer.info.z().map(|z| to_nm(z.mm())),
+        columns: [columns.start, columns.end - 1],
+        x_mm: place.map(|place| place.x_mm(columns).map(to_nm)),
+        rows: [rows.start, rows.end - 1],
+        y_mm: place.map(|place| place.y_mm(rows).map(to_nm)),
+        width_um: None,
+        asked_um: None,
+        made_um: None,
+        would_be_lost: false,
+        pieces_left: None,
     }
 }
 
 /// `layer 812 (z 81.20 mm) near x 31.4-33.0 y 12.1-12.8 mm`.
-fn whereabouts(layer: &Layer, wall: &ThinWall) -> String {
+fn whereabouts(layer: &Layer, columns: &Range<u32>, rows: &Range<u32>) -> String {
     let name = layer.info.name();
     match Place::of(layer) {
         Some(place) => format!(
             "{name} near x {} y {} mm",
-            millimetres(place.x_mm(&wall.columns)),
-            millimetres(place.y_mm(&wall.rows))
+            millimetres(place.x_mm(columns)),
+            millimetres(place.y_mm(rows))
         ),
-        None => format!("{name} near column {} row {}", wall.columns.start, wall.rows.start),
+        None => format!("{name} near column {} row {}", columns.start, rows.start),
     }
 }

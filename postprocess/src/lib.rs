@@ -31,7 +31,7 @@ mod tile;
 
 pub use fix::{Band, FixOptions, Fixed, Kind, Kinds, Method, Outcome, fix};
 pub use offset::{
-    CompensateError, CompensateOptions, Compensated, Shrinkage, ThinWall, Widths, compensate,
+    CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,
     offset, offset_one_bit, shrink,
 };
 pub use tile::{TileError, TileOptions, tile};

@@ -108,8 +108,76 @@ fn thin_walls_are_kept_and_told_of() {
         assert_eq!(first[key].as_f64(), Some(um), "{key}");
     }
     let unkept = "lamp compensate in.tif --uniform 200um --min-feature 0um -o out.tif";
-    scratch.run(unkept).succeeds_quietly();
+    scratch.run(unkept).succeeds();
     assert_eq!(lamp_tests::masks(&scratch.layers("out.tif"))[0].row(20), [12, 28]);
+}
+
+#[test]
+fn what_goes_where_walls_are_not_kept_is_told_of() {
+    let scratch = Scratch::new();
+    // A block with a fin, two blocks with a neck, and a wall; a gray layer of the
+    // wall alone; a block.
+    let fin = [[2, 14, 5, 35], [14, 18, 20, 22]];
+    let necked = [[24, 34, 5, 15], [28, 30, 15, 25], [24, 34, 25, 35]];
+    let mask = blocks(&[&fin[..], &necked[..], &[[50, 53, 5, 35]]].concat());
+    let mut wall = GrayMask::new(64);
+    for row in 0..40 {
+        let level = if (5..35).contains(&row) { 90 } else { 0 };
+        wall.push_runs([(50, 0), (3, level), (11, 0)]).unwrap();
+    }
+    let block = blocks(&[[10, 30, 5, 35]]);
+    let layers = [layer(0, Image::Mask(mask)), layer(1, Image::Gray(wall))];
+    scratch.stack("in.tif", layers.into_iter().chain([layer(2, Image::Mask(block))]));
+    let line = "lamp compensate in.tif --uniform 200um --min-feature 0um --report lost.json";
+    for form in ["", "--one-bit"] {
+        let said = scratch.run(&format!("{line} {form} -o out.tif")).succeeds().stderr;
+        let counts = "2 pieces lost and 1 broken apart in 2 layers";
+        assert!(said.contains(counts) && said.contains("layer 0 (z 0.00 mm) near x"), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+        let report = json(&scratch, "lost.json");
+        for (key, count) in
+            [("thin_walls", 0), ("would_be_lost", 2), ("lost", 2), ("broken", 1), ("not_listed", 0)]
+        {
+            assert_eq!(report[key], count, "{key}");
+        }
+        let listed = report["walls"].as_array().unwrap();
+        let of = |wall: &Value| {
+            let numbers = ["layer", "pieces_left"].map(|key| wall[key].as_u64().unwrap());
+            (numbers, wall["columns"].clone(), wall["would_be_lost"].clone())
+        };
+        let expected =
+            [([0, 2], [24, 33], false), ([0, 0], [50, 52], true), ([1, 0], [50, 52], true)];
+        assert_eq!(
+            listed.iter().map(of).collect::<Vec<_>>(),
+            expected.map(|(numbers, columns, lost)| (
+                numbers,
+                columns.into_iter().collect(),
+                lost.into()
+            ))
+        );
+        assert_eq!(listed[1]["x_mm"], serde_json::json!([15.0, 15.3]));
+        assert_eq!(listed[1].get("width_um"), None);
+        let pages = scratch.layers("out.tif");
+        let told = |k: usize| pages[k].info.other["compensate"].get("losses").cloned();
+        assert_eq!([0, 1, 2].map(told), [Some(2.into()), Some(1.into()), None]);
+    }
+    scratch.run(&format!("{line} --quiet -o out.tif")).succeeds_quietly();
+}
+
+#[test]
+fn a_part_that_goes_whole_is_told_of() {
+    let scratch = Scratch::new();
+    scratch.part("sphere.stl", Part::Sphere, 2_000);
+    let line = "slice sphere.stl --dpi 100 --thickness 2mm \
+        | lamp compensate --uniform 20mm --min-feature 0um --report lost.json > out.tif";
+    let said = scratch.run(line).succeeds().stderr;
+    let report = json(&scratch, "lost.json");
+    let gone = lamp_tests::masks(&scratch.layers("out.tif"))
+        .iter()
+        .filter(|mask| mask.white_pixels() == 0)
+        .count();
+    assert!(gone > 0 && said.contains(&format!("{gone} piece")), "{said}");
+    assert_eq!((&report["lost"], &report["would_be_lost"]), (&gone.into(), &gone.into()));
 }
 
 const MATERIAL: &str = r#"name = "mine"
@@ -224,7 +292,8 @@ fn what_cannot_be_done_is_said() {
         ("--material teapot --dose 300mJ/cm2", &["teapot", "lamp-suspension"]),
         ("--uniform 1mm --report none/walls.json", &["none/walls.json", "no folder"]),
         ("--uniform 900mm --min-feature 0um", &["layer 0", "9000 pixels"]),
-        ("--uniform 9mm", &["layer 0", "91 pixels", "--min-feature"]),
+        ("--uniform 9mm", &["layer 0", "90 pixels", "6300 um", "--min-feature 0um"]),
+        ("--uniform 6mm --min-feature 1mm", &["65 pixels", "64 is the most", "smaller"]),
     ] {
         scratch.run(&format!("lamp compensate in.tif {line} {to}")).is_refused_with(words);
     }

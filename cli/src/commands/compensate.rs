@@ -18,7 +18,8 @@ use crate::walls::Walls;
 ///
 /// Edges move by an exact Euclidean distance; what is no whole pixel becomes a gray one, which
 /// dither realises. Walls that would become thinner than --min-feature are narrowed less, none
-/// breaks or is lost, and each such place is told of. Gray layers shrink by their outlines. Shrinkage is
+/// breaks or is lost, and each such place is told of; with --min-feature 0um walls go, and each
+/// piece that is lost or breaks apart is told of. Gray layers shrink by their outlines. Shrinkage is
 /// made up for first, by pixels; where the mesh is at hand, slice --scale does it better.
 #[derive(Args)]
 #[command(after_help = "\
@@ -56,7 +57,7 @@ pub(crate) struct CompensateArgs {
     #[arg(long, value_name = "SHARE", value_parser = parse_shrinkage, allow_hyphen_values = true)]
     shrinkage: Option<Shrinkage>,
 
-    /// Write where walls were narrowed less than asked as JSON
+    /// Write where walls were narrowed less than asked, or pieces lost, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 

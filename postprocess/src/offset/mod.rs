@@ -15,12 +15,14 @@
 //! (of plain rows [`along`] does both),
 //! [`edge`] keeps them; [`thin`] keeps thin walls, where [`plain`] does not
 //! tell that there is none, and [`walls`] tells of them;
-//! [`size`] tells how wide places are; [`scale`] makes up for firing.
+//! [`pieces`] tells of those that are lost or break apart where walls are not
+//! kept; [`size`] tells how wide places are; [`scale`] makes up for firing.
 
 mod along;
 mod edge;
 mod far;
 mod levels;
+mod pieces;
 mod plain;
 mod ring;
 mod rows;
@@ -38,6 +40,7 @@ use far::{Disc, Field, Sources};
 use rows::Rows;
 use thin::Cores;
 
+pub use pieces::Loss;
 pub use stage::{CompensateError, CompensateOptions, Compensated, Shrinkage, compensate};
 pub use walls::ThinWall;
 pub use widths::Widths;
@@ -66,7 +69,8 @@ pub fn offset_one_bit(mask: &Mask, inwards: f64) -> Mask {
 
 /// Moves the edges of a mask inwards by widths that depend on the places'
 /// sizes, and keeps thin walls: those that were as wide as `min_feature` pixels
-/// stay as wide, others as they are, and none breaks. Zero keeps nothing.
+/// stay as wide, others as they are, and none breaks. What is nowhere half as
+/// bright as white and cut off from the rest goes. Zero keeps nothing.
 ///
 /// Where walls are kept, the cost follows the pixels along the edges, as deep
 /// as they move and half of `min_feature`.
@@ -75,8 +79,7 @@ pub fn shrink(mask: &Mask, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<
     let classes: Vec<Class> =
         regions.into_iter().zip(widths.by()).map(|(region, &by)| Class { region, by }).collect();
     let field = Field::new(mask, Sources::Black);
-    let mut walls = Vec::new();
-    let edge = if min_feature > 0.0 {
+    if min_feature > 0.0 {
         // Further inside, a wall is wide enough even when it has shrunk.
         let depth = f64::max(1.0, 0.5 + min_feature / 2.0);
         let mut edge = Edge::new(&field, mask.width(), &classes, depth, true);
@@ -86,12 +89,12 @@ pub fn shrink(mask: &Mask, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<
             let holds = |class: &&Class| class.region.holds(pixel.column, pixel.row);
             classes.iter().find(holds).map_or(0.0, |class| class.by)
         };
-        walls.extend(cores.cores.iter().filter_map(|core| ThinWall::of(&edge, core, by)));
-        edge
+        let walls = cores.cores.iter().filter_map(|core| ThinWall::of(&edge, core, by)).collect();
+        (pieces::without_specks(gray_of(&edge, mask.width(), 0)), walls)
     } else {
-        Edge::new(&field, mask.width(), &classes, 1.0, false)
-    };
-    (gray_of(&edge, mask.width(), 0), walls)
+        let edge = Edge::new(&field, mask.width(), &classes, 1.0, false);
+        (gray_of(&edge, mask.width(), 0), Vec::new())
+    }
 }
 
 /// From where distances are measured, and the level beyond those pixels.

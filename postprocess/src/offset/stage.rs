@@ -4,6 +4,7 @@ use lamp_stack::{Dpi, Image, Layer, Length, Mask, map_in_order};
 use serde_json::json;
 use thiserror::Error;
 
+use super::pieces::{self, Loss};
 use super::scale::{Side, scaled};
 use super::walls::ThinWall;
 use super::widths::Widths;
@@ -13,7 +14,7 @@ use super::{levels, offset, shrink};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CompensateOptions {
     /// Walls that were as wide stay as wide, others as they are; two pixels
-    /// where `None`, and where zero all may go.
+    /// where `None`. Where zero all may go, and losses are told of.
     pub min_feature: Option<Length>,
     /// Whether edges go to the nearest pixel, without gray ones.
     pub one_bit: bool,
@@ -37,6 +38,9 @@ pub struct Compensated<'a> {
     pub layer: &'a Layer,
     /// The thin walls, from the top, in its pixels.
     pub walls: &'a [ThinWall],
+    /// The pieces that were lost or broke apart, from the top, in its pixels;
+    /// looked for where walls are not kept.
+    pub losses: &'a [Loss],
     /// Whether it should have grown beyond its image.
     pub cut_off: bool,
 }
@@ -78,6 +82,18 @@ pub enum CompensateError {
         pixels: f64,
         /// How deep they may.
         most: f64,
+    },
+    /// Thin walls are looked after only so far, which edges move alone.
+    #[error(
+        "in {layer}, edges would move by {pixels:.0} pixels: walls can be kept where they move by up to {most_um:.0} um at this resolution, and --min-feature 0um lets walls go and tells of what is lost"
+    )]
+    TooFarForWalls {
+        /// The layer's name.
+        layer: String,
+        /// How far they would move.
+        pixels: f64,
+        /// How far they may, in micrometres.
+        most_um: f64,
     },
     /// The larger image is larger than any reader of stacks takes.
     #[error("{layer} would be more than 2^26 pixels wide or high with that shrinkage")]
@@ -125,14 +141,15 @@ pub fn compensate<E: From<CompensateError> + Send>(
         if !is_scaled && done.is_none() {
             return Ok((layer, None));
         }
-        let (walls, cut_off) = done.unwrap_or_default();
-        layer.info.other.insert("compensate".to_owned(), on_page(&widths, &options, dpi, &walls));
-        Ok((layer, Some((walls, cut_off))))
+        let done = done.unwrap_or_default();
+        let page = on_page(&widths, &options, dpi, &done);
+        layer.info.other.insert("compensate".to_owned(), page);
+        Ok((layer, Some(done)))
     });
     done.map(move |done| {
         let (layer, done) = done?;
-        if let Some((walls, cut_off)) = done {
-            report(&Compensated { layer: &layer, walls: &walls, cut_off });
+        if let Some(Done { walls, losses, cut_off }) = done {
+            report(&Compensated { layer: &layer, walls: &walls, losses: &losses, cut_off });
         }
         Ok(layer)
     })
@@ -142,12 +159,14 @@ fn on_page(
     widths: &Widths,
     options: &CompensateOptions,
     dpi: Dpi,
-    walls: &[ThinWall],
+    done: &Done,
 ) -> serde_json::Value {
     let nm = |um: f64| (um * 1e3).round() / 1e3 + 0.0;
     let mut page = json!({"inwards_um": widths.range().map(|by| nm(by * dpi.pitch().um()))});
-    if !walls.is_empty() {
-        page["thin_walls"] = walls.len().into();
+    for (key, count) in [("thin_walls", done.walls.len()), ("losses", done.losses.len())] {
+        if count > 0 {
+            page[key] = count.into();
+        }
     }
     let Shrinkage { x, y } = options.shrinkage;
     if options.shrinkage != Shrinkage::default() {
@@ -182,8 +201,14 @@ fn scale(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensateErro
     Ok(true)
 }
 
-/// Thin walls, and whether the image was too small to grow in.
-type Done = (Vec<ThinWall>, bool);
+/// What is to tell of a layer whose edges moved.
+#[derive(Default)]
+struct Done {
+    walls: Vec<ThinWall>,
+    losses: Vec<Loss>,
+    /// Whether the image was too small to grow in.
+    cut_off: bool,
+}
 
 /// Moves the edges of a layer; `None` where that changes nothing.
 fn move_edges(
@@ -205,27 +230,39 @@ fn move_edges(
     let depth = most + min_feature / 2.0;
     if most > 0.0 && min_feature > 0.0 && depth > DEEPEST {
         let layer = layer.info.name();
+        let most_moved = DEEPEST - min_feature.min(2.0) / 2.0;
+        if most > most_moved {
+            let most_um = (most_moved * dpi.pitch().um()).floor();
+            return Err(CompensateError::TooFarForWalls { layer, pixels: most, most_um });
+        }
         return Err(CompensateError::TooDeep { layer, pixels: depth, most: DEEPEST });
     }
-    let (gray, walls, cut_off) = match &layer.image {
+    let mut done = Done::default();
+    let mut shrunk = |mask: &Mask| {
+        let (gray, walls) = shrink(mask, widths, min_feature);
+        done.walls = walls;
+        if min_feature == 0.0 {
+            done.losses = pieces::losses(mask, &levels::at_least(&gray, 128));
+        }
+        gray
+    };
+    let gray = match &layer.image {
         Image::Mask(mask) if least < 0.0 => {
-            (offset(mask, least), Vec::new(), is_near_border(mask, -least))
+            done.cut_off = is_near_border(mask, -least);
+            offset(mask, least)
         }
-        Image::Mask(mask) => {
-            let (gray, walls) = shrink(mask, widths, min_feature);
-            (gray, walls, false)
-        }
+        Image::Mask(mask) => shrunk(mask),
         Image::Gray(_) if least < 0.0 => {
             return Err(CompensateError::GrayGrows { layer: layer.info.name() });
         }
         Image::Gray(gray) => {
-            let (outline, walls) = shrink(&levels::at_least(gray, 1), widths, min_feature);
+            let outline = shrunk(&levels::at_least(gray, 1));
             let outline = if options.one_bit {
                 levels::gray(&levels::at_least(&outline, 128))
             } else {
                 outline
             };
-            (levels::lower(gray, &outline), walls, false)
+            levels::lower(gray, &outline)
         }
     };
     let image = match &layer.image {
@@ -233,11 +270,11 @@ fn move_edges(
         Image::Mask(_) => levels::mask(&gray).map_or_else(|| Image::Gray(gray), Image::Mask),
         Image::Gray(_) => Image::Gray(gray),
     };
-    if image == layer.image && walls.is_empty() && !cut_off {
+    if image == layer.image && done.walls.is_empty() && !done.cut_off {
         return Ok(None);
     }
     layer.image = image;
-    Ok(Some((walls, cut_off)))
+    Ok(Some(done))
 }
 
 /// Whether there is white so near the image's border that it would grow beyond.
