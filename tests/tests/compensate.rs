@@ -268,6 +268,28 @@ fn it_is_a_stage_whatever_the_threads() {
 }
 
 #[test]
+fn what_was_done_before_is_said_once() {
+    let scratch = Scratch::new();
+    let bar = |index| layer(index, Image::Mask(blocks(&[[10, 30, 5, 35]])));
+    scratch.stack("in.tif", [bar(0), bar(1)]);
+    // Shrinkage, then edges: each once.
+    scratch.run("lamp compensate in.tif --shrinkage 2% -o larger.tif").succeeds_quietly();
+    scratch.run("lamp compensate larger.tif --uniform 100um -o out.tif").succeeds_quietly();
+    let page = &scratch.layers("out.tif")[0].info.other["compensate"];
+    assert_eq!(page["shrinkage"], serde_json::json!([0.02, 0.02]));
+    assert_eq!(page["inwards_um"], serde_json::json!([100.0, 100.0]));
+    for (again, words) in [
+        ("--uniform 100um", "out.tif: its layers were compensated before"),
+        ("--shrinkage 2%", "out.tif: its layers were made larger for shrinkage before"),
+    ] {
+        let line = format!("lamp compensate out.tif {again}");
+        let said = scratch.run(&format!("{line} -o twice.tif")).succeeds().stderr;
+        assert!(said.contains(words) && said.lines().count() == 1, "{said}");
+        scratch.run(&format!("{line} --quiet -o twice.tif")).succeeds_quietly();
+    }
+}
+
+#[test]
 fn growing_out_of_the_image_is_told() {
     let scratch = Scratch::new();
     scratch.stack("in.tif", [layer(0, Image::Mask(blocks(&[[1, 30, 5, 35]])))]);

@@ -79,22 +79,59 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Stop> {
     };
     let mut walls = Walls::default();
     let mut layer_count = 0;
-    let layers = read_layers(&args.input, &report)?.inspect(|_| layer_count += 1);
+    let mut done_before = DoneBefore::default();
+    let layers = read_layers(&args.input, &report)?.inspect(|layer| {
+        layer_count += 1;
+        layer.iter().for_each(|layer| done_before.look_at(layer));
+    });
     let widths = |layer: &Layer, dpi| by.widths(layer, dpi);
     let done = lamp_postprocess::compensate(layers, options, widths, |done| walls.add(done));
     write_layers(done, &args.output, &report).map_err(|stop| match stop {
         Stop::Failed(error) if error.is::<CompensateError>() || error.is::<NoDose>() => {
-            Stop::Failed(error).at(name)
+            Stop::Failed(error).at(name.clone())
         }
         stop => stop,
     })?;
-    for line in walls.lines() {
+    let moves = args.uniform.is_some() || args.material.is_some();
+    let again = done_before.lines(&name, moves, args.shrinkage.is_some());
+    for line in again.into_iter().chain(walls.lines()) {
         report.say(&line);
     }
     if let Some(path) = &args.report {
         write_file(path, |out| walls.write(layer_count, out))?;
     }
     Ok(())
+}
+
+/// What the pages say was done to the layers before.
+#[derive(Default)]
+struct DoneBefore {
+    moved: bool,
+    enlarged: bool,
+}
+
+impl DoneBefore {
+    fn look_at(&mut self, layer: &Layer) {
+        let Some(page) = layer.info.other.get("compensate") else { return };
+        let by = page["inwards_um"].as_array();
+        self.moved |= by.is_some_and(|by| by.iter().any(|by| by.as_f64() != Some(0.0)));
+        self.enlarged |= page.get("shrinkage").is_some();
+    }
+
+    /// What was done before and now again.
+    fn lines(&self, name: &str, moves: bool, enlarges: bool) -> Vec<String> {
+        let again = [
+            (
+                self.moved && moves,
+                "its layers were compensated before, and their edges moved again",
+            ),
+            (
+                self.enlarged && enlarges,
+                "its layers were made larger for shrinkage before, and now again",
+            ),
+        ];
+        again.iter().filter(|(is, _)| *is).map(|(_, text)| format!("{name}: {text}")).collect()
+    }
 }
 
 /// By what edges move.

@@ -1,7 +1,7 @@
 //! Compensation as a stage.
 
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, map_in_order};
-use serde_json::json;
+use serde_json::{Value, json};
 use thiserror::Error;
 
 use super::pieces::{self, Loss};
@@ -142,7 +142,8 @@ pub fn compensate<E: From<CompensateError> + Send>(
             return Ok((layer, None));
         }
         let done = done.unwrap_or_default();
-        let page = on_page(&widths, &options, dpi, &done);
+        let before = layer.info.other.remove("compensate");
+        let page = on_page(before, &widths, &options, dpi, &done);
         layer.info.other.insert("compensate".to_owned(), page);
         Ok((layer, Some(done)))
     });
@@ -155,14 +156,19 @@ pub fn compensate<E: From<CompensateError> + Send>(
     })
 }
 
+/// What a page says; of what was done `before`, the last of its kind.
 fn on_page(
+    before: Option<Value>,
     widths: &Widths,
     options: &CompensateOptions,
     dpi: Dpi,
     done: &Done,
-) -> serde_json::Value {
+) -> Value {
     let nm = |um: f64| (um * 1e3).round() / 1e3 + 0.0;
-    let mut page = json!({"inwards_um": widths.range().map(|by| nm(by * dpi.pitch().um()))});
+    let mut page = before.filter(Value::is_object).unwrap_or_else(|| json!({}));
+    if !widths.are_zero() || page.get("inwards_um").is_none() {
+        page["inwards_um"] = json!(widths.range().map(|by| nm(by * dpi.pitch().um())));
+    }
     for (key, count) in [("thin_walls", done.walls.len()), ("losses", done.losses.len())] {
         if count > 0 {
             page[key] = count.into();
