@@ -61,7 +61,9 @@ fn edges_move_by_the_length_and_the_rest_becomes_gray() {
     scratch.run("lamp compensate in.tif --uniform -0.2mm --one-bit -o out.tif").succeeds_quietly();
     let grown = scratch.layers("out.tif");
     assert_eq!(mask(&grown[0]).row(20), [8, 32]);
-    scratch.run("lamp compensate out.tif --uniform 200um --one-bit -o back.tif").succeeds_quietly();
+    let back = "lamp compensate out.tif --uniform 200um --one-bit -o back.tif";
+    let said = scratch.run(back).succeeds().stderr;
+    assert!(said.contains("compensated before") && said.lines().count() == 1, "{said}");
     assert_eq!(mask(&scratch.layers("back.tif")[0]), &bar);
 }
 
@@ -117,7 +119,7 @@ fn what_goes_where_walls_are_not_kept_is_told_of() {
     let scratch = Scratch::new();
     // A block with a fin, two blocks with a neck, and a wall; a gray layer of the
     // wall alone; a block.
-    let fin = [[2, 14, 5, 35], [14, 18, 20, 22]];
+    let fin = [[2, 14, 5, 20], [2, 18, 20, 22], [2, 14, 22, 35]];
     let necked = [[24, 34, 5, 15], [28, 30, 15, 25], [24, 34, 25, 35]];
     let mask = blocks(&[&fin[..], &necked[..], &[[50, 53, 5, 35]]].concat());
     let mut wall = GrayMask::new(64);
@@ -168,15 +170,18 @@ fn what_goes_where_walls_are_not_kept_is_told_of() {
 fn a_part_that_goes_whole_is_told_of() {
     let scratch = Scratch::new();
     scratch.part("sphere.stl", Part::Sphere, 2_000);
-    let line = "slice sphere.stl --dpi 100 --thickness 2mm \
-        | lamp compensate --uniform 20mm --min-feature 0um --report lost.json > out.tif";
+    scratch.run("slice sphere.stl --dpi 100 --thickness 2mm -o in.tif").succeeds_quietly();
+    let line =
+        "lamp compensate in.tif --uniform 20mm --min-feature 0um --report lost.json -o out.tif";
     let said = scratch.run(line).succeeds().stderr;
     let report = json(&scratch, "lost.json");
-    let gone = lamp_tests::masks(&scratch.layers("out.tif"))
-        .iter()
-        .filter(|mask| mask.white_pixels() == 0)
-        .count();
-    assert!(gone > 0 && said.contains(&format!("{gone} piece")), "{said}");
+    let some = |name| -> usize {
+        let layers = scratch.layers(name);
+        lamp_tests::masks(&layers).iter().filter(|mask| mask.white_pixels() > 0).count()
+    };
+    let gone = some("in.tif");
+    assert_eq!(some("out.tif"), 0);
+    assert!(gone > 10 && said.contains(&format!("{gone} piece")), "{said}");
     assert_eq!((&report["lost"], &report["would_be_lost"]), (&gone.into(), &gone.into()));
 }
 
@@ -329,6 +334,8 @@ fn what_cannot_be_done_is_said() {
         "--shrinkage 60%",
         "--uniform 1mm --min-feature -1um",
         "--uniform 1mm --report in.tif",
+        "--material mine.toml --dose 300mJ/cm2 --report mine.toml",
+        "--material mine.toml --dose 300mJ/cm2 -o mine.toml",
         "--uniform 1mm --report -",
     ] {
         let ran = scratch.run(&format!("lamp compensate in.tif {line} {to}"));

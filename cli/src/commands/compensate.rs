@@ -11,7 +11,9 @@ use crate::lines::parse_report;
 use crate::materials::material;
 use crate::options::{Common, Input, Output, parse_distance};
 use crate::stop::Stop;
-use crate::streams::{check_beside, input_name, read_layers, report, write_file, write_layers};
+use crate::streams::{
+    check_beside, check_not_input, input_name, read_layers, report, write_file, write_layers,
+};
 use crate::walls::Walls;
 
 /// Narrow images by what the resin cures beyond them, and make up for firing shrinkage
@@ -68,8 +70,10 @@ pub(crate) struct CompensateArgs {
 pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Stop> {
     let by = By::of(args)?;
     if let Some(beside) = &args.report {
-        check_beside(beside, &args.output.output, [&args.input.stack])?;
+        let inputs = args.material.iter().chain([&args.input.stack]);
+        check_beside(beside, &args.output.output, inputs)?;
     }
+    check_not_input(&args.output.output, &args.material)?;
     let report = report("compensate", common, &args.output);
     let name = input_name(&args.input.stack);
     let options = CompensateOptions {
