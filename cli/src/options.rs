@@ -92,8 +92,9 @@ pub(crate) fn parse_thickness(text: &str) -> Result<Length, String> {
 /// Parses the light of full white, which is some.
 pub(crate) fn parse_light(text: &str) -> Result<Intensity, String> {
     match text.parse::<Intensity>() {
-        Ok(light) if light.mw_per_cm2() > 0.0 => Ok(light),
-        Ok(_) => Err("full white has some light".to_owned()),
+        Ok(light) if light.mw_per_cm2() == 0.0 => Err("full white has some light".to_owned()),
+        Ok(light) if Intensity::PLAUSIBLE.contains(&light) => Ok(light),
+        Ok(_) => Err("no lamp is that bright or dim: write 1e-6 to 1e9 mW/cm2".to_owned()),
         Err(error) => Err(error.to_string()),
     }
 }

@@ -263,6 +263,10 @@ fn bad_measurements_get_a_sentence_and_leave_no_file() {
         let ran = scratch.run(line).is_refused_with(words);
         assert!(ran.stderr.starts_with("calibrate: a.csv: ") && ran.stdout.is_empty(), "{ran:?}");
     }
+    let beyond = b"dose_mj_per_cm2,depth_um\n320,190\n1e308,900\n640,300\n1000,400\n";
+    scratch.write("a.csv", beyond);
+    let words = ["line 3, column dose_mj_per_cm2: 1e308 is not a dose from 1e-6 to 1e9"];
+    scratch.run(line).is_refused_with(&words);
     scratch.write("a.csv", b"\xff");
     scratch.run(line).is_refused_with(&["a.csv", "byte 0", "UTF-8"]);
     scratch.run("lamp calibrate depth none.csv").is_refused_with(&["none.csv"]);
@@ -270,6 +274,16 @@ fn bad_measurements_get_a_sentence_and_leave_no_file() {
     let line = "lamp calibrate depth a.csv --material none.toml";
     scratch.run(line).is_refused_with(&["none.toml", "no such file", "lamp-suspension"]);
     assert_eq!(scratch.names(), ["a.csv"]);
+}
+
+#[test]
+fn a_plot_that_cannot_be_written_leaves_no_material() {
+    let scratch = Scratch::new();
+    scratch.write("a.csv", films().as_bytes());
+    std::fs::create_dir(scratch.path("folder.svg")).unwrap();
+    let line = "lamp calibrate depth a.csv --intensity 1.6W/cm2 -o mine.toml --plot folder.svg";
+    scratch.run(line).is_refused_with(&["folder.svg"]);
+    assert_eq!(scratch.names(), ["a.csv", "folder.svg"]);
 }
 
 #[test]
@@ -283,6 +297,7 @@ fn wrong_usage_is_status_2() {
         ("lamp calibrate depth a.csv -o a.csv", "that is the input"),
         ("lamp calibrate depth a.csv -o a.svg --plot a.svg", "the material goes there"),
         ("lamp calibrate depth a.csv --intensity 0W/cm2", "some light"),
+        ("lamp calibrate depth a.csv --intensity 1e99W/cm2", "1e-6 to 1e9 mW/cm2"),
         ("lamp calibrate depth a.csv --intensity 1.6W/cm2 -o My_Resin.toml", "--name"),
         ("lamp calibrate depth a.csv --name mine", "--output"),
     ] {

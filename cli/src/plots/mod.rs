@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Once;
 
+use anyhow::Context;
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
@@ -14,7 +15,6 @@ use plotters::style::{FontStyle, register_font};
 use scale::Scale;
 
 use crate::stop::Stop;
-use crate::streams::write_file;
 
 /// A plot of curves over one axis.
 #[derive(Debug)]
@@ -91,13 +91,18 @@ fn format_of(path: &Path) -> Result<Format, Stop> {
 }
 
 impl Plot {
-    /// Writes the plot as its name says. Equal plots give equal bytes.
-    pub(crate) fn write(&self, path: &Path) -> Result<(), Stop> {
-        let format = format_of(path)?;
-        write_file(path, |out| match format {
-            Format::Svg => out.write_all(self.svg().as_bytes()),
-            Format::Png => self.write_png(out),
-        })
+    /// The bytes of the plot, in the format that its name says. Equal plots give equal
+    /// bytes.
+    pub(crate) fn drawn(&self, path: &Path) -> Result<Vec<u8>, Stop> {
+        match format_of(path)? {
+            Format::Svg => Ok(self.svg().into_bytes()),
+            Format::Png => {
+                let mut bytes = Vec::new();
+                let written = self.write_png(&mut bytes);
+                written.with_context(|| path.display().to_string())?;
+                Ok(bytes)
+            }
+        }
     }
 
     fn svg(&self) -> String {
@@ -256,6 +261,20 @@ mod tests {
         let (colours, _) = pixels.as_chunks::<3>();
         assert!(colours.contains(&[0, 114, 178]));
         assert_eq!(colours[0], [255; 3]);
+    }
+
+    #[test]
+    fn no_range_is_too_much_to_draw() {
+        for range in [1e-300..1e300, 1.0..1.0, 0.0..f64::INFINITY, f64::NAN..1.0, 0.0..1e-320] {
+            for logarithmic in [false, true] {
+                let mut plot = plot();
+                plot.x = axis("x", range.clone(), logarithmic);
+                plot.y = axis("y", range.clone(), logarithmic);
+                for name in ["a.svg", "a.png"] {
+                    assert!(plot.drawn(Path::new(name)).is_ok(), "{range:?} {logarithmic}");
+                }
+            }
+        }
     }
 
     #[test]

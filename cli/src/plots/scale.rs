@@ -20,6 +20,8 @@ impl Ranged for Scale {
         let along = |value: f64| if self.logarithmic { value.ln() } else { value };
         let (start, end) = (along(self.range.start), along(self.range.end));
         let share = (along(*value) - start) / (end - start);
+        // Far outside is as good as outside, and no axis is longer than a picture.
+        let share = if share.is_nan() { 0.0 } else { share.clamp(-1.0, 2.0) };
         limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
     }
 
@@ -39,23 +41,44 @@ impl ValueFormatter<f64> for Scale {
     }
 }
 
-/// Round numbers of a range: multiples of 1, 2 or 5 times a power of ten.
+/// An axis has no more ticks than can be read.
+const MOST_TICKS: usize = 30;
+
+/// Round numbers of a range: multiples of 1, 2 or 5 times a power of ten, or over
+/// many decades powers of ten; none where the range is none.
 fn ticks(range: &Range<f64>, logarithmic: bool) -> Vec<f64> {
+    let length = range.end - range.start;
+    if !(length.is_normal() && length > 0.0) {
+        return Vec::new();
+    }
     if logarithmic {
-        let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
-        let steps = |decade: i32| [1.0, 2.0, 5.0].map(|step| step * 10.0_f64.powi(decade));
-        let ticks: Vec<f64> = decades.flat_map(steps).filter(|tick| range.contains(tick)).collect();
+        let ticks = logarithmic_ticks(range);
         if ticks.len() > 2 {
             return ticks;
         }
     }
-    let rough = (range.end - range.start) / 8.0;
+    let rough = length / 8.0;
     let power = 10.0_f64.powi(rough.log10().floor() as i32);
     let step = [1.0, 2.0, 5.0, 10.0].map(|step| step * power).into_iter().find(|&s| s >= rough);
     let step = step.unwrap_or(rough);
-    let first = (range.start / step).ceil() as i64;
-    let last = (range.end / step).floor() as i64;
-    (first..=last).map(|i| i as f64 * step).collect()
+    let first = (range.start / step).ceil();
+    (0..MOST_TICKS)
+        .map(|i| (first + i as f64) * step)
+        .take_while(|tick| *tick <= range.end)
+        .collect()
+}
+
+fn logarithmic_ticks(range: &Range<f64>) -> Vec<f64> {
+    let [first, last] = [range.start.log10().floor(), range.end.log10().ceil()]
+        .map(|power| power.clamp(-330.0, 330.0) as i32);
+    let decades = (last - first).unsigned_abs() as usize;
+    let steps = if decades * 3 <= MOST_TICKS { &[1.0, 2.0, 5.0][..] } else { &[1.0] };
+    let every = decades.div_ceil(MOST_TICKS).max(1);
+    (first..=last)
+        .step_by(every)
+        .flat_map(|decade| steps.iter().map(move |step| step * 10.0_f64.powi(decade)))
+        .filter(|tick| range.contains(tick))
+        .collect()
 }
 
 #[cfg(test)]
@@ -66,6 +89,11 @@ mod tests {
     fn ticks_are_round() {
         assert_eq!(ticks(&(0.0..75.0), false), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0]);
         assert_eq!(ticks(&(90.0..1100.0), true), [100.0, 200.0, 500.0, 1000.0]);
+        let wide = ticks(&(1e-300..1e300), true);
+        assert!((20..=30).contains(&wide.len()) && wide.is_sorted(), "{wide:?}");
+        for none in [1.0..1.0, 0.0..f64::INFINITY, f64::NAN..1.0, 2.0..1.0, 0.0..1e-320] {
+            assert_eq!(ticks(&none, false), [] as [f64; 0], "{none:?}");
+        }
         // Less than a decade has too few of 1, 2 and 5.
         assert_eq!(ticks(&(210.0..480.0), true), [250.0, 300.0, 350.0, 400.0, 450.0]);
         let fine = ticks(&(0.0..0.55), false).iter().map(Scale::format).collect::<Vec<_>>();

@@ -1,11 +1,19 @@
 //! The columns of tables of measurements.
 
+use std::ops::RangeInclusive;
+
+use lamp_stack::Length;
+
 use super::data::DataError;
 use super::table::{Row, Table};
 use crate::resin::{Dose, ExposureTime, Intensity};
 
 pub(super) const DOSE: &str = "dose_mj_per_cm2";
 pub(super) const EXPOSURE: &str = "exposure_ms";
+
+/// Depths, widths and sides in um, from a nanometre to a metre: what no measurement
+/// passes, but a slip of the pen may.
+pub(super) const LENGTHS: RangeInclusive<f64> = 1e-3..=1e6;
 
 /// A misspelt column must not be silently left out.
 pub(super) fn check_columns(table: &Table, known: &[&str]) -> Result<(), DataError> {
@@ -56,13 +64,19 @@ impl Column {
         number.ok_or_else(|| DataError::NotANumber { line, column, text: text.to_owned() })
     }
 
-    pub(super) fn positive(self, row: &Row, wanted: &'static str) -> Result<f64, DataError> {
-        let number = self.number(row)?;
-        if number > 0.0 { Ok(number) } else { Err(self.impossible(row, number, wanted)) }
+    /// A length in um, or a blank. None and less than none are lengths too: a film
+    /// may be uncured, and a balance may show less than nothing.
+    pub(super) fn length_or_blank(self, row: &Row) -> Result<Option<Length>, DataError> {
+        let Some(um) = self.number_or_blank(row)? else { return Ok(None) };
+        if LENGTHS.contains(&um) || (um <= 0.0 && -um <= *LENGTHS.end()) {
+            return Ok(Some(Length::from_um(um)));
+        }
+        Err(self.impossible(row, "a length from 0.001 um to 1 m"))
     }
 
-    pub(super) fn impossible(self, row: &Row, number: f64, wanted: &'static str) -> DataError {
-        DataError::Impossible { line: row.line, column: self.name, number, wanted }
+    pub(super) fn impossible(self, row: &Row, wanted: &'static str) -> DataError {
+        let text = row.cell(self.index).to_owned();
+        DataError::Impossible { line: row.line, column: self.name, text, wanted }
     }
 }
 
@@ -82,12 +96,15 @@ impl DoseColumn {
     }
 
     pub(super) fn of(&self, row: &Row) -> Result<Dose, DataError> {
-        Ok(match self.light {
-            None => Dose::from_mj_per_cm2(self.column.positive(row, "a dose above zero")?),
-            Some(light) => {
-                let ms = self.column.positive(row, "a time above zero")?;
-                light * ExposureTime::from_ms(ms)
-            }
-        })
+        let number = self.column.number(row)?;
+        let (dose, wanted) = match self.light {
+            None => (Dose::from_mj_per_cm2(number), "a dose from 1e-6 to 1e9 mJ/cm2"),
+            Some(light) => (
+                light * ExposureTime::from_ms(number),
+                "a time that makes a dose from 1e-6 to 1e9 mJ/cm2 under that light",
+            ),
+        };
+        let plausible = Dose::PLAUSIBLE.contains(&dose);
+        if plausible { Ok(dose) } else { Err(self.column.impossible(row, wanted)) }
     }
 }

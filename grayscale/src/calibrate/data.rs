@@ -3,7 +3,7 @@
 use lamp_stack::{Dpi, Length};
 use thiserror::Error;
 
-use super::columns::{Column, DOSE, DoseColumn, EXPOSURE, check_columns};
+use super::columns::{Column, DOSE, DoseColumn, EXPOSURE, LENGTHS, check_columns};
 use super::table::{Row, Table};
 use crate::resin::{Dose, GrayLevel, Intensity, cure_width_of_square};
 
@@ -79,14 +79,14 @@ pub enum DataError {
         text: String,
     },
     /// A number that cannot be.
-    #[error("line {line}, column {column}: {number} is not {wanted}")]
+    #[error("line {line}, column {column}: {text} is not {wanted}")]
     Impossible {
         /// From 1.
         line: usize,
         /// Which column.
         column: &'static str,
         /// What stands there.
-        number: f64,
+        text: String,
         /// What should.
         wanted: &'static str,
     },
@@ -121,15 +121,15 @@ pub fn depth_points(
         let gray = gray.map_or(Ok(GrayLevel::WHITE), |gray| {
             let level = gray.number(row)?;
             let wanted = "a gray level from 0 (black) to 1 (white)";
-            GrayLevel::new(level).ok_or_else(|| gray.impossible(row, level, wanted))
+            GrayLevel::new(level).ok_or_else(|| gray.impossible(row, wanted))
         })?;
-        let Some(um) = depth.number_or_blank(row)? else { return Ok(Read::Blank) };
-        if um <= 0.0 {
+        let Some(of_row) = depth.length_or_blank(row)? else { return Ok(Read::Blank) };
+        if of_row.um() <= 0.0 {
             return Ok(Read::Nothing);
         }
-        let point = DepthPoint { gray, dose, depth: Length::from_um(um) };
-        if point.arriving().mj_per_cm2() == 0.0 {
-            return Err(depth.impossible(row, um, "what black cures"));
+        let point = DepthPoint { gray, dose, depth: of_row };
+        if !Dose::PLAUSIBLE.contains(&point.arriving()) {
+            return Err(depth.impossible(row, "what so dark a gray level cures"));
         }
         Ok(Read::Point(point))
     })
@@ -153,13 +153,15 @@ pub fn width_points(
     let (width, is_side) = Column::either(table, CURED, WIDTH)?;
     measured(table, |row| {
         let dose = dose.of(row)?;
-        let um = size.positive(row, "a size above zero")?;
         let pitch = if in_pixels { dpi.pitch().um() } else { 1.0 };
-        let feature_size = Length::from_um(um * pitch);
-        let Some(um) = width.number_or_blank(row)? else { return Ok(Read::Blank) };
-        let um = Length::from_um(um);
-        let width = if is_side { cure_width_of_square(um, feature_size) } else { um };
-        let grew = width.um() > 0.0;
+        let feature_size = Length::from_um(size.number(row)? * pitch);
+        if !LENGTHS.contains(&feature_size.um()) {
+            return Err(size.impossible(row, "a size from 0.001 um to 1 m"));
+        }
+        let Some(of_row) = width.length_or_blank(row)? else { return Ok(Read::Blank) };
+        let width = if is_side { cure_width_of_square(of_row, feature_size) } else { of_row };
+        // Less than the shortest length is what rounding leaves of nothing.
+        let grew = width.um() >= *LENGTHS.start();
         Ok(if grew { Read::Point(WidthPoint { feature_size, dose, width }) } else { Read::Nothing })
     })
 }
@@ -223,6 +225,9 @@ mod tests {
         let point = by_side.points[0];
         assert!((point.feature_size.um() - 423.333333).abs() < 1e-6);
         assert!((point.width.um() - 13.333333).abs() < 1e-6);
+        // Rounding is no growth.
+        let rounded = "feature_px,dose_mj_per_cm2,cured_um\n25,200,423.3333333334\n";
+        assert_eq!(widths(rounded).unwrap().none, 1);
         let by_width = widths("feature_um,dose_mj_per_cm2,width_um\n423,200,13.3\n").unwrap();
         assert_eq!(by_width.points[0].feature_size.um(), 423.0);
         assert_eq!(by_width.points[0].width.um(), 13.3);
@@ -238,10 +243,17 @@ mod tests {
             ("dose_mj_per_cm2,depth_um\n1,2\nx,1", "line 3, column dose_mj_per_cm2: `x` is not a"),
             ("dose_mj_per_cm2,depth_um\n1,inf", "line 2, column depth_um: `inf` is not a number"),
             ("dose_mj_per_cm2,depth_um\n,2", "line 2, column dose_mj_per_cm2: `` is not a number"),
-            ("dose_mj_per_cm2,depth_um\n0,2", "column dose_mj_per_cm2: 0 is not a dose above"),
-            ("exposure_ms,depth_um\n-1,2", "column exposure_ms: -1 is not a time above zero"),
+            ("dose_mj_per_cm2,depth_um\n0,2", "column dose_mj_per_cm2: 0 is not a dose from"),
+            ("dose_mj_per_cm2,depth_um\n1,2\n1e308,2", "line 3, column dose_mj_per_cm2: 1e308 is"),
+            ("dose_mj_per_cm2,depth_um\n1e-7,2", "1e-7 is not a dose from 1e-6 to 1e9 mJ/cm2"),
+            ("dose_mj_per_cm2,depth_um\n1,1e-300", "1e-300 is not a length from 0.001 um to 1 m"),
+            ("dose_mj_per_cm2,depth_um\n1,1e7", "line 2, column depth_um: 1e7 is not a length"),
+            ("dose_mj_per_cm2,depth_um\n1,-1e7", "line 2, column depth_um: -1e7 is not a length"),
+            ("exposure_ms,depth_um\n-1,2", "column exposure_ms: -1 is not a time that makes a"),
+            ("exposure_ms,depth_um\n1e300,2", "column exposure_ms: 1e300 is not a time that"),
+            ("dose_mj_per_cm2,depth_um,gray\n1,2,1e-9", "2 is not what so dark a gray level"),
             ("dose_mj_per_cm2,depth_um,gray\n1,2,50", "column gray: 50 is not a gray level"),
-            ("dose_mj_per_cm2,depth_um,gray\n1,2,0", "column depth_um: 2 is not what black cures"),
+            ("dose_mj_per_cm2,depth_um,gray\n1,2,0", "column depth_um: 2 is not what so dark"),
             ("dose_mj_per_cm2,depth_um\n", "no row below the header"),
             ("dose_mj_per_cm2,depth_um\n1,", "no row below the header"),
         ] {
@@ -252,5 +264,7 @@ mod tests {
         assert!(error.contains("--intensity"), "{error}");
         let error = widths("feature_px,dose_mj_per_cm2,width_um\n0,1,1").unwrap_err();
         assert!(error.to_string().contains("column feature_px: 0 is not a size"), "{error}");
+        let error = widths("feature_um,dose_mj_per_cm2,cured_um\n9,1,1e9").unwrap_err();
+        assert!(error.to_string().contains("column cured_um: 1e9 is not a length"), "{error}");
     }
 }

@@ -2,7 +2,7 @@
 //! write.
 
 use std::fmt;
-use std::ops::{Div, Mul};
+use std::ops::{Div, Mul, RangeInclusive};
 use std::str::FromStr;
 
 use thiserror::Error;
@@ -100,6 +100,17 @@ quantity! {
     WidthSensitivity, "a width sensitivity", "µm per mJ/cm²",
     from_um_per_mj_per_cm2, um_per_mj_per_cm2, "um/(mJ/cm2)", "0.2 um/(mJ/cm2)",
     [("mm/(J/cm2)", 1.0, 1.0)]
+}
+
+impl Dose {
+    /// 1e-6 to 1e9 mJ/cm²: what no resin's measurement passes, but a slip of the pen
+    /// may.
+    pub const PLAUSIBLE: RangeInclusive<Self> = Self(1e-6)..=Self(1e9);
+}
+
+impl Intensity {
+    /// 1e-6 to 1e9 mW/cm²: what no lamp passes, but a slip of the pen may.
+    pub const PLAUSIBLE: RangeInclusive<Self> = Self(1e-6)..=Self(1e9);
 }
 
 /// 002 eq. 27: 1 W/cm² for 1 ms is 1 mJ/cm².

@@ -143,7 +143,9 @@ impl Files {
         plot: &Plot,
         table: &str,
     ) -> Result<(), Stop> {
-        if let Some(output) = &self.output {
+        let plot = self.plot.as_deref().map(|path| plot.drawn(path).map(|bytes| (path, bytes)));
+        let plot = plot.transpose()?;
+        let material = self.output.as_deref().map(|output| -> Result<_, Stop> {
             let mut material = base.unwrap_or_else(|| self.new_material(output));
             if let Some(name) = &self.name {
                 material.name.clone_from(name);
@@ -154,10 +156,11 @@ impl Files {
             }
             add(&mut material);
             let text = material.to_toml().map_err(|error| self.no_material(output, error))?;
-            write_file(output, |out| out.write_all(text.as_bytes()))?;
-        }
-        if let Some(path) = &self.plot {
-            plot.write(path)?;
+            Ok((output, text.into_bytes()))
+        });
+        // The plot first: where it cannot be written, no material is left.
+        for (path, bytes) in plot.into_iter().chain(material.transpose()?) {
+            write_file(path, |out| out.write_all(&bytes))?;
         }
         print(table)
     }
