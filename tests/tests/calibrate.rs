@@ -205,6 +205,7 @@ fn cure_widths_come_back_from_their_squares() {
     }
     let file = text(&scratch, "mine.toml");
     assert_eq!(file.matches("[[cure-width]]").count(), 3);
+    assert!(file.contains("feature-size = \"423.333 um\""), "{file}");
     assert!(file.contains("638.51 um") && file.contains("calibrated from squares.csv, "));
     said(&scratch, "lamp material check mine.toml");
     // A second series takes the place of the sizes that it has.
@@ -238,7 +239,7 @@ fn without_a_cure_depth_there_is_no_broadening_depth() {
     let early = widths.replace(",5\n", ",105\n").replace(",15\n", ",115\n");
     let early = early.replace(",25\n", ",125\n").replace(",35\n", ",135\n");
     scratch.write("early.csv", format!("{head}{early}").as_bytes());
-    let refused = &["early.csv: squares of 7.62mm: the line begins at a dose of -950.00 mJ/cm2"];
+    let refused = &["early.csv: squares of 7.62mm: the line begins at a dose of -950.0 mJ/cm2"];
     scratch.run("lamp calibrate width early.csv --quiet").is_refused_with(refused);
 }
 
@@ -253,10 +254,11 @@ fn bad_measurements_get_a_sentence_and_leave_no_file() {
         ("dose_mj_per_cm2,depth_um\n100,2,3\n", &["line 2", "3 columns"]),
         ("dose,depth_um\n100,2\n", &["column `dose` is not known", "dose_mj_per_cm2"]),
         ("dose_mj_per_cm2,depth_um\n100,2\n200,150\n", &["2 points are too few"]),
-        ("dose_mj_per_cm2,depth_um\n100,2\n100,3\n100,4\n", &["1 different doses", "2 are"]),
+        ("dose_mj_per_cm2,depth_um\n100,2\n100,3\n100,4\n", &["1 dose is too few", "2 different"]),
         ("dose_mj_per_cm2,depth_um\n100,90\n200,50\n400,11\n", &["more dose cures less"]),
         ("dose_mj_per_cm2,depth_um\n100,50\n200,90\n400,51\n", &["scatter too much"]),
-        ("dose_mj_per_cm2,depth_um\n100,0\n200,0\n", &["0 points are too few"]),
+        ("dose_mj_per_cm2,depth_um\n100,9\n200,9\n400,9\n", &["all points measure 9.000 um"]),
+        ("dose_mj_per_cm2,depth_um\n100,0\n200,0\n", &["no row cured or grew"]),
         ("dose_mj_per_cm2,gray,depth_um\n100,2,5\n", &["column gray", "2 is not a gray level"]),
     ] {
         scratch.write("a.csv", csv.as_bytes());

@@ -36,7 +36,7 @@ pub fn fit_curve(points: &[DepthPoint]) -> Result<CurveFit, FitError> {
     let logs: Vec<_> = points.iter().map(log).collect();
     let line = LineFit::new(&logs)?.rising("um for each e-fold of dose")?;
     let [value, low, high] = line.zero().map(f64::exp);
-    if !(value > 0.0 && value.is_finite()) {
+    if !Dose::PLAUSIBLE.contains(&Dose::from_mj_per_cm2(value)) {
         return Err(FitError::NoCriticalDose(value));
     }
     Ok(CurveFit {
@@ -104,6 +104,18 @@ mod tests {
             // 95% +- 1% is three standard deviations of 4000 trials.
             assert!(held.iter().all(|share| (share - 0.95).abs() < 0.0104), "{spread}: {held:?}");
         }
+    }
+
+    #[test]
+    fn a_critical_dose_that_no_resin_has_is_refused() {
+        let errors = [0.001, -0.001, 0.001, -0.001, 0.001, -0.001];
+        let rows = DOSES.iter().zip(errors).map(|(&mj, error)| DepthPoint {
+            gray: crate::resin::GrayLevel::WHITE,
+            dose: Dose::from_mj_per_cm2(mj),
+            depth: Length::from_um(100.0 + 0.01 * mj.ln() + error),
+        });
+        let error = fit_curve(&rows.collect::<Vec<_>>()).unwrap_err();
+        assert!(matches!(error, FitError::NoCriticalDose(_)), "{error}");
     }
 
     #[test]

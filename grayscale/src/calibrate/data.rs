@@ -28,7 +28,7 @@ impl DepthPoint {
 /// A measured cure width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WidthPoint {
-    /// The square's side in the image.
+    /// The square's side in the image, to the nanometre.
     pub feature_size: Length,
     /// The dose that it was exposed with.
     pub dose: Dose,
@@ -154,13 +154,14 @@ pub fn width_points(
     measured(table, |row| {
         let dose = dose.of(row)?;
         let pitch = if in_pixels { dpi.pitch().um() } else { 1.0 };
-        let feature_size = Length::from_um(size.number(row)? * pitch);
-        if !LENGTHS.contains(&feature_size.um()) {
+        let side = Length::from_um(size.number(row)? * pitch);
+        if !LENGTHS.contains(&side.um()) {
             return Err(size.impossible(row, "a size from 0.001 um to 1 m"));
         }
         let Some(of_row) = width.length_or_blank(row)? else { return Ok(Read::Blank) };
-        let width = if is_side { cure_width_of_square(of_row, feature_size) } else { of_row };
+        let width = if is_side { cure_width_of_square(of_row, side) } else { of_row };
         // Less than the shortest length is what rounding leaves of nothing.
+        let feature_size = Length::from_um((side.um() * 1000.0).round() / 1000.0);
         let grew = width.um() >= *LENGTHS.start();
         Ok(if grew { Read::Point(WidthPoint { feature_size, dose, width }) } else { Read::Nothing })
     })
@@ -223,7 +224,7 @@ mod tests {
         let by_side = widths(sides).unwrap();
         assert_eq!((by_side.points.len(), by_side.none, by_side.blank), (1, 1, 1));
         let point = by_side.points[0];
-        assert!((point.feature_size.um() - 423.333333).abs() < 1e-6);
+        assert_eq!(point.feature_size.to_string(), "423.333um");
         assert!((point.width.um() - 13.333333).abs() < 1e-6);
         // Rounding is no growth.
         let rounded = "feature_px,dose_mj_per_cm2,cured_um\n25,200,423.3333333334\n";

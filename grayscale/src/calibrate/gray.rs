@@ -4,8 +4,9 @@ use lamp_stack::Length;
 
 use super::curve::{CurveFit, fit_curve};
 use super::data::DepthPoint;
+use super::digits::to_digits;
 use super::line::LineFit;
-use super::{Estimate, FitError, Quantity, to_digits};
+use super::{Estimate, FitError, Quantity};
 use crate::material::{CurveLines, GivenLine};
 use crate::resin::{Dose, GrayLevel};
 

@@ -10,6 +10,8 @@ pub(super) struct LineFit {
     mean_y: f64,
     /// How many points it is of.
     pub(super) points: usize,
+    /// Whether all y are the same.
+    level: bool,
     /// What all y rise for one x.
     pub(super) slope: f64,
     /// The share of the scatter of y that the line explains.
@@ -44,6 +46,7 @@ impl LineFit {
         let r2 = if yy > 0.0 { 1.0 - left / yy } else { 0.0 };
         Ok(Self {
             points: points.len(),
+            level: points.iter().all(|point| point.1 == points[0].1),
             mean_x,
             mean_y,
             slope,
@@ -71,7 +74,9 @@ impl LineFit {
     /// Checks that the line rises for sure. `unit` is the slope's.
     pub(super) fn rising(self, unit: &'static str) -> Result<Self, FitError> {
         let (slope, half) = (self.slope, self.slope_half());
-        if slope > half {
+        if self.level {
+            Err(FitError::Level(self.mean_y))
+        } else if slope > half {
             Ok(self)
         } else if slope < -half {
             Err(FitError::Falls { slope, unit })
@@ -140,6 +145,6 @@ mod tests {
         let level = [(1.0, 3.0), (2.0, 5.0), (3.0, 3.1)];
         assert!(matches!(refused(&level), FitError::Scatters { .. }));
         let flat = [(1.0, 3.0), (2.0, 3.0), (3.0, 3.0)];
-        assert!(matches!(refused(&flat), FitError::Scatters { .. }));
+        assert_eq!(refused(&flat), FitError::Level(3.0));
     }
 }

@@ -20,6 +20,7 @@ mod bent;
 mod columns;
 mod curve;
 mod data;
+mod digits;
 mod gray;
 mod line;
 mod solve;
@@ -35,9 +36,11 @@ use thiserror::Error;
 
 use crate::material::Given;
 use crate::resin::{Dose, WidthSensitivity};
+use digits::to_digits;
 
 pub use curve::{CurveFit, fit_curve};
 pub use data::{DataError, DepthPoint, Measured, WidthPoint, depth_points, width_points};
+pub use digits::with_digits;
 pub use gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
 pub use table::{Table, TableError};
 pub use two_depth::{TwoDepthFit, fit_two_depth};
@@ -117,18 +120,12 @@ impl<T: Quantity> Estimate<T> {
     }
 }
 
-/// Rounds to so many digits.
-fn to_digits(number: f64, digits: usize) -> f64 {
-    let text = format!("{number:.*e}", digits - 1);
-    text.parse().expect("what is written as a number reads as one")
-}
-
 /// Why measurements give no numbers.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FitError {
     /// Not enough points for an interval.
-    #[error("{points} points are too few: {needed} cured ones are the least")]
+    #[error("{}", too_few_points(*points, *needed))]
     TooFew {
         /// How many there are.
         points: usize,
@@ -136,7 +133,7 @@ pub enum FitError {
         needed: usize,
     },
     /// Not enough doses to tell the model's numbers apart.
-    #[error("{doses} different doses are too few: {needed} are the least")]
+    #[error("{} too few: {needed} different ones are the least", are(*doses, "dose"))]
     TooFewDoses {
         /// How many there are.
         doses: usize,
@@ -144,7 +141,7 @@ pub enum FitError {
         needed: usize,
     },
     /// What is measured falls with the dose.
-    #[error("more dose cures less here ({slope:.4} {unit}): are the columns exchanged?")]
+    #[error("more dose cures less here ({} {unit}): are the columns exchanged?", short(*slope))]
     Falls {
         /// The slope.
         slope: f64,
@@ -154,7 +151,9 @@ pub enum FitError {
     /// The slope might be zero.
     #[error(
         "the points scatter too much to tell how the dose acts: \
-         the slope is {slope:.4} +- {half:.4} {unit}; measure more points or a wider range of doses"
+         the slope is {} +- {} {unit}; measure more points or a wider range of doses",
+        short(*slope),
+        short(*half)
     )]
     Scatters {
         /// The slope.
@@ -164,19 +163,46 @@ pub enum FitError {
         /// Its unit.
         unit: &'static str,
     },
-    /// The line meets zero at no dose above zero.
+    /// What is measured is the same at all doses.
     #[error(
-        "the line begins at a dose of {0:.2} mJ/cm2, and a critical dose is above zero: \
-         measure lower doses"
+        "all points measure {} um, whatever the dose: is it the right column? \
+         Measure lower doses too",
+        short(*.0)
+    )]
+    Level(f64),
+    /// The points leave a number that is above zero open down to zero.
+    #[error(
+        "the points do not tell {what}: {} +- {} {unit} reaches zero; \
+         measure more doses, and several films of each",
+        short(*value),
+        short(*half)
+    )]
+    Vague {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// Half of its 95% confidence interval.
+        half: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// The line meets zero at no dose that a resin has.
+    #[error(
+        "the line begins at a dose of {} mJ/cm2, and a critical dose is above zero, \
+         from 1e-6 to 1e9 mJ/cm2: measure lower doses",
+        short(*.0)
     )]
     NoCriticalDose(f64),
     /// Not enough gray levels.
-    #[error("{0} gray levels are too few: 3 are the least")]
+    #[error("{} too few: 3 are the least", are(*.0, "gray level"))]
     TooFewLevels(usize),
     /// A line of the gray model falls for sure.
     #[error(
-        "{what} falls by {fall:.2} +- {half:.2} {unit} from black to white, but the gray model \
-         takes no falling line, as a whiter level might cure less: fit the working curve of one level"
+        "{what} falls by {} +- {} {unit} from black to white, but the gray model \
+         takes no falling line, as a whiter level might cure less: fit the working curve of one level",
+        short(*fall),
+        short(*half)
     )]
     GrayFalls {
         /// Which number.
@@ -189,7 +215,7 @@ pub enum FitError {
         unit: &'static str,
     },
     /// A line of the gray model begins at no more than zero.
-    #[error("{what} would be {at_zero:.2} {unit} in the dark, and must be above zero")]
+    #[error("{what} would be {} {unit} in the dark, and must be above zero", short(*at_zero))]
     GrayBegins {
         /// Which number.
         what: &'static str,
@@ -209,6 +235,23 @@ pub enum FitError {
         /// What is wrong with them.
         error: Box<FitError>,
     },
+}
+
+/// A number for an error.
+fn short(number: f64) -> String {
+    with_digits(number, 4)
+}
+
+/// So many of something are.
+fn are(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what} is") } else { format!("{count} {what}s are") }
+}
+
+fn too_few_points(points: usize, needed: usize) -> String {
+    match points {
+        0 => format!("no row cured or grew: {needed} that did are the least"),
+        _ => format!("{} too few: {needed} that cured or grew are the least", are(points, "point")),
+    }
 }
 
 impl FitError {
@@ -264,6 +307,17 @@ mod tests {
             }
             prop_assert!(found.iter().all(|&n| n > 0.0 && n.is_finite()), "{:?}", found);
         }
+    }
+
+    #[test]
+    fn errors_count_and_shorten() {
+        let few = |points| FitError::TooFew { points, needed: 3 }.to_string();
+        assert_eq!(few(0), "no row cured or grew: 3 that did are the least");
+        assert_eq!(few(1), "1 point is too few: 3 that cured or grew are the least");
+        assert!(few(2).starts_with("2 points are too few"));
+        assert!(FitError::TooFewLevels(1).to_string().starts_with("1 gray level is too few"));
+        let tiny = FitError::Scatters { slope: 1e-9, half: 2.5e-9, unit: "um" }.to_string();
+        assert!(tiny.contains("1.000e-9 +- 2.500e-9 um"), "{tiny}");
     }
 
     #[test]

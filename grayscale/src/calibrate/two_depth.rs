@@ -47,7 +47,8 @@ const CLEAR: f64 = 1e4;
 ///
 /// # Errors
 /// Where there are fewer than four points or three doses, the depth does not rise
-/// with the dose, or no positive numbers fit.
+/// with the dose, no positive numbers fit, or the interval of `E_c` or `D_pL`
+/// reaches zero.
 pub fn fit_two_depth(points: &[DepthPoint]) -> Result<TwoDepthFit, FitError> {
     let data: Vec<_> = points.iter().map(|p| (p.arriving().mj_per_cm2(), p.depth.um())).collect();
     check(&data)?;
@@ -56,7 +57,7 @@ pub fn fit_two_depth(points: &[DepthPoint]) -> Result<TwoDepthFit, FitError> {
     let fits = bends.iter().filter_map(|&bend| Curve::from_line(&data, bend)?.fitted(&data));
     let best = fits.min_by(|a, b| a.squares(&data).total_cmp(&b.squares(&data)));
     let curve = best.filter(|curve| curve.onset > 0.0).ok_or(FitError::NoFit)?;
-    TwoDepthFit::of(curve, &data, deepest).ok_or(FitError::NoFit)
+    TwoDepthFit::of(curve, &data, deepest).ok_or(FitError::NoFit)?.told()
 }
 
 fn check(data: &[(f64, f64)]) -> Result<(), FitError> {
@@ -103,6 +104,24 @@ impl TwoDepthFit {
             curve,
             spread,
         })
+    }
+
+    /// Checks that the numbers are told apart from zero. `D_pL`'s interval is told
+    /// on a logarithmic scale: it reaches zero where its half is one.
+    fn told(self) -> Result<Self, FitError> {
+        let vague = |what, value, half, unit| Err(FitError::Vague { what, value, half, unit });
+        let onset = self.critical_dose;
+        if onset.low.mj_per_cm2() <= 0.0 {
+            let half = onset.plus_minus().mj_per_cm2();
+            return vague("the critical dose", onset.value.mj_per_cm2(), half, "mJ/cm2");
+        }
+        let liquid = self.liquid_depth;
+        let half = (liquid.high.um() / liquid.value.um()).ln();
+        if half >= 1.0 {
+            let um = liquid.value.um();
+            return vague("the liquid's penetration depth", um, um * half, "um");
+        }
+        Ok(self)
     }
 
     /// Returns the depth of a dose that arrives, below zero up to the critical one,
@@ -213,6 +232,20 @@ mod tests {
         let numbers = fit.numbers("a test");
         assert!(numbers.solid_depth.plus_minus.is_none());
         assert!(numbers.solid_depth.source.contains("do not bend"), "{numbers:?}");
+    }
+
+    #[test]
+    fn an_interval_that_reaches_zero_is_refused() {
+        let rows = [(320.0, 100.0), (640.0, 169.31), (1280.0, 238.63), (2560.0, 300.0)];
+        let points = rows.map(|(mj, um)| DepthPoint {
+            gray: GrayLevel::WHITE,
+            dose: Dose::from_mj_per_cm2(mj),
+            depth: Length::from_um(um),
+        });
+        let error = fit_two_depth(&points).unwrap_err();
+        assert!(matches!(error, FitError::Vague { what: "the critical dose", .. }), "{error}");
+        let text = error.to_string();
+        assert!(text.contains("142.7 +- 250.8 mJ/cm2 reaches zero"), "{text}");
     }
 
     #[test]

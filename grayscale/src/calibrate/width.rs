@@ -57,12 +57,13 @@ fn fit_size(feature_size: Length, points: &[WidthPoint]) -> Result<WidthFit, Fit
     let pairs: Vec<_> = points.iter().map(|p| (p.dose.mj_per_cm2(), p.width.um())).collect();
     let line = line_above_zero(pairs)?;
     let [value, low, high] = line.zero();
-    if value <= 0.0 {
+    if !Dose::PLAUSIBLE.contains(&Dose::from_mj_per_cm2(value)) {
         return Err(FitError::NoCriticalDose(value));
     }
     Ok(WidthFit {
         feature_size,
-        critical_dose: Estimate::new(value, low, high),
+        // No dose is below zero: the interval holds the truth as often without those.
+        critical_dose: Estimate::new(value, low.max(0.0), high),
         sensitivity: Estimate::even(line.slope, line.slope_half()),
         r2: line.r2,
         points: line.points,
@@ -184,7 +185,7 @@ mod tests {
             point.width = Length::from_um(point.width.um() + 50.0);
         }
         let error = fit_widths(&early).unwrap_err().to_string();
-        assert!(error.contains("begins at a dose of -400.00 mJ/cm2"), "{error}");
+        assert!(error.contains("begins at a dose of -400.0 mJ/cm2"), "{error}");
         assert_eq!(fit_widths(&[]), Err(FitError::TooFew { points: 0, needed: 3 }));
     }
 }

@@ -92,11 +92,17 @@ pub trait Written: Copy + FromStr<Err: fmt::Display> {
     fn text(self) -> String;
 }
 
+/// A number to the last bit, with an exponent where it would be long otherwise.
+fn exact(number: f64) -> String {
+    let plain = number == 0.0 || (1e-6..1e15).contains(&number.abs());
+    if plain { number.to_string() } else { format!("{number:e}") }
+}
+
 impl Written for Dose {
     const EXAMPLE: &'static str = "131.5 mJ/cm2";
 
     fn text(self) -> String {
-        self.to_string()
+        format!("{} mJ/cm2", exact(self.mj_per_cm2()))
     }
 }
 
@@ -104,7 +110,7 @@ impl Written for Intensity {
     const EXAMPLE: &'static str = "1.6 W/cm2";
 
     fn text(self) -> String {
-        self.to_string()
+        format!("{} mW/cm2", exact(self.mw_per_cm2()))
     }
 }
 
@@ -112,7 +118,7 @@ impl Written for WidthSensitivity {
     const EXAMPLE: &'static str = "0.2 um/(mJ/cm2)";
 
     fn text(self) -> String {
-        format!("{} um/(mJ/cm2)", self.um_per_mj_per_cm2())
+        format!("{} um/(mJ/cm2)", exact(self.um_per_mj_per_cm2()))
     }
 }
 
@@ -120,7 +126,7 @@ impl Written for Length {
     const EXAMPLE: &'static str = "211 um";
 
     fn text(self) -> String {
-        format!("{} um", self.um())
+        format!("{} um", exact(self.um()))
     }
 }
 
@@ -182,4 +188,18 @@ fn some_text<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
         return Err(de::Error::custom("this is empty: write what it is for the next reader"));
     }
     Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn far_numbers_are_written_short_and_read_back() {
+        for (um, text) in [(423.333, "423.333 um"), (1e-92, "1e-92 um"), (-2.5e20, "-2.5e20 um")] {
+            let length = Length::from_um(um);
+            assert_eq!(length.text(), text);
+            assert_eq!(text.parse(), Ok(length));
+        }
+    }
 }

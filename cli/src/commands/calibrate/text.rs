@@ -1,6 +1,6 @@
 //! The table that calibrations print.
 
-use lamp_grayscale::calibrate::{Estimate, Measured, Quantity};
+use lamp_grayscale::calibrate::{Estimate, Measured, Quantity, with_digits};
 
 /// The numbers of a calibration, a line each.
 pub(super) struct Text {
@@ -47,10 +47,21 @@ impl Text {
 }
 
 /// A value and its interval, in words: with the decimals that five digits of the
-/// value have.
+/// value have, unless that makes them too long or nothing.
 pub(super) fn numbers<T: Quantity>(estimate: &Estimate<T>) -> [String; 3] {
     let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(T::number);
-    [value, low, high].map(|number| with_decimals(number, decimals(value)))
+    let shown = short(value);
+    let decimals = shown.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    [value, low, high].map(|number| {
+        let own = short(number);
+        let alike = format!("{number:.decimals$}");
+        let vanishes = number != 0.0 && alike.parse() == Ok(0.0);
+        if vanishes || [&own, &shown].iter().any(|text| text.contains('e')) || own == "-" {
+            own
+        } else {
+            alike
+        }
+    })
 }
 
 /// A value and its interval, for the legend of a plot.
@@ -61,39 +72,23 @@ pub(super) fn in_legend<T: Quantity>(name: &str, unit: &str, estimate: &Estimate
 
 /// A number to five digits, `-` where it has no end.
 pub(super) fn short(number: f64) -> String {
-    with_decimals(number, decimals(number))
-}
-
-fn with_decimals(number: f64, decimals: usize) -> String {
-    if number.is_finite() { format!("{number:.decimals$}") } else { "-".to_owned() }
-}
-
-/// How many decimals a number of five digits has.
-fn decimals(number: f64) -> usize {
-    // Rounded first: 99.9999 has three digits before the point.
-    let rounded: f64 = format!("{number:.4e}").parse().unwrap_or(0.0);
-    if rounded == 0.0 || !rounded.is_finite() {
-        return 0;
-    }
-    (4 - rounded.abs().log10().floor() as i32).clamp(0, 8) as usize
+    with_digits(number, 5)
 }
 
 #[cfg(test)]
 mod tests {
+    use lamp_grayscale::resin::Dose;
+
     use super::*;
 
     #[test]
-    fn numbers_have_five_digits() {
-        for (number, text) in [
-            (131.512_345, "131.51"),
-            (0.081_234_56, "0.081235"),
-            (99.999_999, "100.00"),
-            (5_000_000.4, "5000000"),
-            (-2.0, "-2.0000"),
-            (0.0, "0"),
-            (f64::INFINITY, "-"),
-        ] {
-            assert_eq!(short(number), text);
-        }
+    fn intervals_have_the_values_decimals_where_that_says_something() {
+        let said = |value, low, high| {
+            let [value, low, high] = [value, low, high].map(Dose::from_mj_per_cm2);
+            numbers(&Estimate { value, low, high })
+        };
+        assert_eq!(said(131.43, 7.126, 1370.57), ["131.43", "7.13", "1370.57"]);
+        assert_eq!(said(131.43, 1e-20, 1e90), ["131.43", "1.0000e-20", "1.0000e90"]);
+        assert_eq!(said(1e-9, 0.0, f64::INFINITY), ["1.0000e-9", "0", "-"]);
     }
 }

@@ -111,7 +111,8 @@ fn size_name(fit: &WidthFit, dpi: Dpi) -> String {
 /// Adds a size's numbers, in place of those that the material has of that size.
 fn add_to(material: &mut Material, fit: &WidthFit, source: &str) {
     let um = fit.feature_size.um();
-    material.cure_width.retain(|size| (size.feature_size.um() - um).abs() > 1e-6 * um);
+    // Sizes are told to the nanometre.
+    material.cure_width.retain(|size| (size.feature_size.um() - um).abs() > 1e-3);
     material.cure_width.push(fit.numbers(source));
     material.cure_width.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));
 }

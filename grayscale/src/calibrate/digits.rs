@@ -1,0 +1,47 @@
+//! Numbers with as many digits as mean something.
+
+/// Writes a number to so many digits, with an exponent where it would be long
+/// otherwise; `-` where it has no end.
+pub fn with_digits(number: f64, digits: usize) -> String {
+    if !number.is_finite() {
+        return "-".to_owned();
+    }
+    let decimals = digits.saturating_sub(1);
+    let text = format!("{number:.decimals$e}");
+    // As written: 99.9999 has three digits before the point.
+    let exponent: i32 = text.split('e').nth(1).and_then(|e| e.parse().ok()).unwrap_or(0);
+    match exponent {
+        _ if number == 0.0 => "0".to_owned(),
+        -4..7 => format!("{number:.*}", (decimals as i32 - exponent).max(0) as usize),
+        _ => text,
+    }
+}
+
+/// Rounds to so many digits.
+pub(super) fn to_digits(number: f64, digits: usize) -> f64 {
+    let text = format!("{number:.*e}", digits - 1);
+    text.parse().expect("what is written as a number reads as one")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_their_digits_and_no_tails() {
+        for (number, text) in [
+            (131.512_345, "131.51"),
+            (0.081_234_56, "0.081235"),
+            (99.999_999, "100.00"),
+            (5_000_000.4, "5000000"),
+            (-2.0, "-2.0000"),
+            (0.0, "0"),
+            (1e-300, "1.0000e-300"),
+            (-1.234_56e92, "-1.2346e92"),
+            (f64::INFINITY, "-"),
+        ] {
+            assert_eq!(with_digits(number, 5), text);
+        }
+        assert_eq!(to_digits(131.512_345, 6), 131.512);
+    }
+}
