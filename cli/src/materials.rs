@@ -15,8 +15,13 @@ const LARGEST_FILE: u64 = 1 << 20;
 
 /// The built-in material of a name, or that of a file.
 pub(crate) fn material(path: &Path) -> Result<Material, Stop> {
+    material_and_text(path).map(|(material, _)| material)
+}
+
+/// A material by name or file, and its file as it was written.
+pub(crate) fn material_and_text(path: &Path) -> Result<(Material, String), Stop> {
     if let Some(builtin) = path.to_str().and_then(Builtin::named) {
-        return Ok(builtin.material());
+        return Ok((builtin.material(), builtin.toml().to_owned()));
     }
     if !is_stream(path) && !path.exists() {
         let names = Builtin::ALL.map(|builtin| builtin.name()).join(", ");
@@ -27,9 +32,10 @@ pub(crate) fn material(path: &Path) -> Result<Material, Stop> {
     Ok(read(path).with_context(|| input_name(path))?)
 }
 
-/// Reads a material file.
-pub(crate) fn read(path: &Path) -> anyhow::Result<Material> {
-    Ok(Material::from_toml(&read_text(path, LARGEST_FILE, "a material file")?)?)
+/// Reads a material file, and its text.
+pub(crate) fn read(path: &Path) -> anyhow::Result<(Material, String)> {
+    let text = read_text(path, LARGEST_FILE, "a material file")?;
+    Ok((Material::from_toml(&text)?, text))
 }
 
 /// Reads a text of at most so many bytes; `what` it is to be.

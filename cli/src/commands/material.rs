@@ -2,13 +2,12 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use lamp_grayscale::material::{Builtin, Material};
 use lamp_grayscale::resin::Depths;
 use lamp_stack::Length;
 
-use crate::materials::read;
+use crate::materials::{material_and_text, read};
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream, print};
 
@@ -28,11 +27,11 @@ pub(crate) struct MaterialArgs {
 enum Action {
     /// List the built-in materials
     List,
-    /// Print the file of a built-in material, to read or to start one from
+    /// Print a material's file as it was written, once it is checked: to read, or to start one from
     Show {
-        /// Which material
-        #[arg(value_parser = PossibleValuesParser::new(Builtin::ALL.map(|builtin| builtin.name())))]
-        name: String,
+        /// Which material: a built-in material's name, a file, or - for standard input
+        #[arg(value_name = "MATERIAL")]
+        material: PathBuf,
     },
     /// Check a material file and say what it allows
     Check {
@@ -44,9 +43,9 @@ enum Action {
 pub(crate) fn run(args: &MaterialArgs) -> Result<(), Stop> {
     match &args.action {
         Action::List => print(&table()),
-        Action::Show { name } => {
-            let builtin = Builtin::named(name).expect("only their names are parsed");
-            print(builtin.toml())
+        Action::Show { material } => {
+            refuse_terminal(material)?;
+            print(&material_and_text(material)?.1)
         }
         Action::Check { file } => check(file),
     }
@@ -68,23 +67,40 @@ fn table() -> String {
     text
 }
 
-/// The cure models of a material, by their tables.
-fn models(material: &Material) -> Vec<&'static str> {
+/// The cure models of a material, by their tables, and its cure widths.
+fn models(material: &Material) -> Vec<String> {
     let all = [
         ("working-curve", material.working_curve.is_some()),
         ("gray", material.gray.is_some() || material.gray_light.is_some()),
         ("dimmed-lamp", material.dimmed_lamp.is_some()),
         ("two-depth", material.two_depth.is_some()),
     ];
-    all.into_iter().filter(|&(_, given)| given).map(|(name, _)| name).collect()
+    let given = all.into_iter().filter(|&(_, given)| given).map(|(name, _)| name.to_owned());
+    given.chain(widths(material)).collect()
 }
 
-fn check(path: &Path) -> Result<(), Stop> {
+/// The sizes of the squares whose cure widths a material has.
+fn widths(material: &Material) -> Option<String> {
+    let sizes = material.cure_width.iter().map(|numbers| numbers.feature_size);
+    let least = sizes.clone().min_by(|a, b| a.um().total_cmp(&b.um()))?;
+    let most = sizes.max_by(|a, b| a.um().total_cmp(&b.um()))?;
+    Some(match material.cure_width.len() {
+        1 => format!("cure-width (1 size, {least})"),
+        count => format!("cure-width ({count} sizes, {least} to {most})"),
+    })
+}
+
+fn refuse_terminal(path: &Path) -> Result<(), Stop> {
     if is_stream(path) && io::stdin().is_terminal() {
         return Err(Stop::usage("no material to read: name a file, or pipe one in"));
     }
+    Ok(())
+}
+
+fn check(path: &Path) -> Result<(), Stop> {
+    refuse_terminal(path)?;
     let name = input_name(path);
-    let material = read(path).with_context(|| name.clone())?;
+    let (material, _) = read(path).with_context(|| name.clone())?;
     print(&format!("{name}: {}\n", allows(&material)))
 }
 
@@ -92,7 +108,10 @@ fn check(path: &Path) -> Result<(), Stop> {
 fn allows(material: &Material) -> String {
     let resin = match material.resin() {
         Ok(resin) => resin,
-        Err(why) => return format!("in order, but {why}"),
+        Err(why) => {
+            let widths = widths(material).map(|widths| format!(" and gives {widths}"));
+            return format!("in order{}, but {why}", widths.unwrap_or_default());
+        }
     };
     let depths = resin.model().depths();
     // A layer of the seed's machine (002 table 1), or as thin as can be told.

@@ -31,12 +31,13 @@ pub enum MaterialError {
     #[error("name: `{0}` is not a name: write small letters, digits and -, as lamp-suspension")]
     Name(String),
     /// Numbers that make no model.
-    #[error("{table}.{source}")]
+    // Not a source: its text is in this one's.
+    #[error("{table}.{problem}")]
     Model {
         /// The model's table.
         table: &'static str,
         /// What is wrong with them.
-        source: ModelError,
+        problem: ModelError,
     },
     /// The light of full white is not above zero.
     #[error("intensity.value must be above zero")]

@@ -256,5 +256,5 @@ impl Material {
 }
 
 fn of(table: &'static str) -> impl Fn(ModelError) -> MaterialError {
-    move |source| MaterialError::Model { table, source }
+    move |problem| MaterialError::Model { table, problem }
 }
