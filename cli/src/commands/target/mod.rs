@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use lamp_grayscale::target::TargetError;
 use lamp_stack::{Dpi, Length};
 
-use crate::options::Common;
+use crate::options::{Common, parse_distance};
 use crate::stop::Stop;
 
 /// Write test images to expose, measure and calibrate by
@@ -37,6 +37,12 @@ pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Stop> {
 /// A length in whole pixels, to the nearest.
 fn whole_pixels(length: Length, dpi: Dpi) -> u32 {
     length.pixels(dpi).round() as u32
+}
+
+/// Parses how far squares stand apart, which is some way.
+fn parse_gap(text: &str) -> Result<Length, String> {
+    let gap = parse_distance(text)?;
+    if gap.um() == 0.0 { Err("a gap has some width".to_owned()) } else { Ok(gap) }
 }
 
 /// Impossible targets come from options.

@@ -5,8 +5,8 @@ use lamp_grayscale::resin::{ExposureTime, GrayLevel};
 use lamp_grayscale::target::screens;
 use lamp_stack::{Dpi, Image, Layer, Length, PageInfo, StackInfo};
 
-use super::whole_pixels;
-use crate::options::{Common, Output, parse_thickness};
+use super::{parse_gap, whole_pixels};
+use crate::options::{Common, Output};
 use crate::stop::Stop;
 use crate::streams::{report, write_layers};
 
@@ -38,7 +38,7 @@ pub(super) struct ScreensArgs {
     tile: u32,
 
     /// How far the tiles stand apart
-    #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_thickness)]
+    #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_gap)]
     gap: Length,
 
     /// How long to expose

@@ -11,9 +11,9 @@ use lamp_stack::{
     Destination, Dpi, FolderBeside, Format, Image, Layer, Length, PageInfo, StackInfo, write_stack,
 };
 
-use super::whole_pixels;
+use super::{parse_gap, whole_pixels};
 use crate::materials::material;
-use crate::options::{Common, parse_light, parse_thickness};
+use crate::options::{Common, parse_light};
 use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{folder_to_make, write_file};
@@ -54,7 +54,7 @@ pub(super) struct SquaresArgs {
     material: Option<PathBuf>,
 
     /// How far the squares stand apart
-    #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_thickness)]
+    #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_gap)]
     gap: Length,
 
     /// The folder to make; it must not exist, or be empty
@@ -68,7 +68,9 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Stop> {
     let gap = whole_pixels(args.gap, args.dpi);
     let mut sizes = args.sizes.clone();
     sizes.sort_unstable();
-    sizes.dedup();
+    if let Some(twice) = sizes.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Stop::usage(format!("--sizes: {} stands twice", twice[0])));
+    }
     // All of them, before there is a folder: a size may be impossible.
     let doses = &args.doses.0;
     let targets: Vec<(u32, Vec<Exposure>)> = sizes
@@ -91,11 +93,16 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Stop> {
     to.persist().with_context(|| folder.display().to_string())?;
     let report = Report::new("target", common.quiet, true);
     report.say(&format!(
-        "{}: {stacks} stacks of {} exposures each, and squares.csv to fill in",
+        "{}: {} of {}, and squares.csv to fill in",
         folder.display(),
-        doses.len()
+        counted(stacks, "stack"),
+        counted(doses.len(), "exposure")
     ));
     Ok(())
+}
+
+fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 const TABLE_HEAD: &str = "\
@@ -173,9 +180,13 @@ fn parse_doses(text: &str) -> Result<Doses, String> {
     let unit = unit_of(text.rsplit([',', '.']).next().unwrap_or_default());
     let dose = |text: &str| -> Result<Dose, String> {
         let unit = if unit_of(text).is_empty() { &unit[..] } else { "" };
-        format!("{}{unit}", text.trim()).parse().map_err(|_| {
+        let dose: Dose = format!("{}{unit}", text.trim()).parse().map_err(|_| {
             format!("`{text}` is not a dose: write --doses 60..600mJ/cm2 or 60,90,140mJ/cm2")
-        })
+        })?;
+        if dose.mj_per_cm2() > 0.0 && !Dose::PLAUSIBLE.contains(&dose) {
+            return Err(format!("`{text}` is beyond any resin: doses are 1e-6 to 1e9 mJ/cm2"));
+        }
+        Ok(dose)
     };
     let Some((from, to)) = text.split_once("..") else {
         return Ok(Doses(text.split(',').map(dose).collect::<Result<_, _>>()?));
@@ -205,6 +216,8 @@ mod tests {
         assert_eq!(mj("75mJ/cm2"), [75.0]);
         for text in
             ["", "60..600", "60,90", "a..b mJ/cm2", "600..60mJ/cm2", "60..60mJ/cm2", "1,,2J/cm2"]
+                .into_iter()
+                .chain(["1e-300..1e300mJ/cm2", "1,1e10mJ/cm2"])
         {
             assert!(parse_doses(text).is_err(), "{text}");
         }
