@@ -28,6 +28,17 @@ pub enum Fill {
     NonZero,
 }
 
+impl Fill {
+    /// Whether a place that contours wind around so often is inside.
+    #[inline]
+    pub(crate) fn holds(self, winding: i32) -> bool {
+        match self {
+            Self::EvenOdd => winding % 2 != 0,
+            Self::NonZero => winding != 0,
+        }
+    }
+}
+
 /// Facets in pieces, which threads take one after another.
 pub(crate) trait Facets: Sync {
     fn pieces(&self) -> usize;

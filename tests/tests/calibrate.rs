@@ -1,25 +1,7 @@
 //! `lamp calibrate`: from made-up measurements back to the material they are of.
 
+use lamp_fixtures::SplitMix;
 use lamp_tests::{Scratch, workspace_root};
-
-/// Errors of measurements: the same each time, of mean 0 and standard deviation 1.
-struct Noise(u64);
-
-impl Noise {
-    /// Above 0, up to 1 (splitmix64).
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11).wrapping_add(1) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let (radius, angle) = ((-2.0 * self.uniform().ln()).sqrt(), self.uniform());
-        radius * (std::f64::consts::TAU * angle).cos()
-    }
-}
 
 /// What a command prints.
 fn said(scratch: &Scratch, line: &str) -> String {
@@ -48,7 +30,7 @@ fn holds([value, low, high]: [f64; 3], truth: f64) {
 /// Films of the LAMP suspension (002 section 3.3.5) after 60 to 1200 ms, measured to
 /// 5 um.
 fn films() -> String {
-    let mut noise = Noise(35);
+    let mut noise = SplitMix(35);
     let mut csv = "exposure_ms,depth_um\n".to_owned();
     for ms in [60, 200, 300, 400, 600, 800, 1000, 1200] {
         for _ in 0..3 {
@@ -117,7 +99,7 @@ fn the_light_may_be_the_materials() {
 #[test]
 fn the_gray_model_comes_back_from_its_films() {
     let scratch = Scratch::new();
-    let mut noise = Noise(40);
+    let mut noise = SplitMix(40);
     let mut csv = "gray,dose_mj_per_cm2,depth_um\n".to_owned();
     for gray in [0.2, 0.4, 0.5, 0.8, 1.0] {
         for times in [3.0, 5.0, 8.0, 13.0, 20.0] {
@@ -145,7 +127,7 @@ fn the_gray_model_comes_back_from_its_films() {
 #[test]
 fn the_two_depth_model_comes_back_from_its_films() {
     let scratch = Scratch::new();
-    let mut noise = Noise(3);
+    let mut noise = SplitMix(3);
     let mut csv = "dose_mj_per_cm2,depth_um\n".to_owned();
     for mj in [5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 30.0, 45.0, 70.0, 100.0_f64] {
         // 000 equation 3.8.
@@ -172,7 +154,7 @@ fn the_two_depth_model_comes_back_from_its_films() {
 /// Squares that grow by lines of these sizes in pixels, `E_c^w` and `D_p^w`, measured
 /// to 2 um.
 fn squares(sizes: &[(f64, f64, f64)]) -> String {
-    let mut noise = Noise(60);
+    let mut noise = SplitMix(60);
     let mut csv = "feature_px,dose_mj_per_cm2,cured_um\n".to_owned();
     for &(pixels, critical, slope) in sizes {
         for dose in (60..=600).step_by(60).map(f64::from) {

@@ -67,7 +67,9 @@ impl CurveFit {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Noise, depth_points, share_held};
+    use lamp_fixtures::SplitMix;
+
+    use super::super::testing::{depth_points, share_held};
     use super::*;
     use crate::resin::{CureModel, WorkingCurve};
 
@@ -93,7 +95,7 @@ mod tests {
         // Depths to 5 um as in 002 section 3.3.5; and far coarser ones, where the
         // interval of E_c is lopsided.
         for spread in [5.0, 40.0] {
-            let mut noise = Noise::new(7);
+            let mut noise = SplitMix(7);
             let fits = std::iter::from_fn(|| {
                 Some(fit_curve(&depth_points(&lamp(), &DOSES, |_| spread * noise.normal())))
             });
@@ -121,7 +123,7 @@ mod tests {
     #[test]
     fn intervals_reach_farther_with_more_scatter_and_fewer_points() {
         let half = |doses: &[f64], spread: f64| {
-            let mut noise = Noise::new(3);
+            let mut noise = SplitMix(3);
             let fit = fit_curve(&depth_points(&lamp(), doses, |_| spread * noise.normal()));
             fit.unwrap().penetration_depth.plus_minus().um()
         };

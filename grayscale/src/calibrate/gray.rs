@@ -129,7 +129,9 @@ fn given<T: Quantity>(line: &LineEstimate<T>, source: &str, unit: &str) -> Given
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Noise, share_held};
+    use lamp_fixtures::SplitMix;
+
+    use super::super::testing::share_held;
     use super::*;
     use crate::resin::{CureModel, GrayCurve, Line};
 
@@ -146,7 +148,7 @@ mod tests {
     /// What a model says of white's doses of three to twenty times 131.5 mJ/cm²
     /// over the level, each depth with an error.
     fn points(depth: impl Fn(GrayLevel, Dose) -> f64, spread: f64, seed: u64) -> Vec<DepthPoint> {
-        let mut noise = Noise::new(seed);
+        let mut noise = SplitMix(seed);
         let mut points = Vec::new();
         for gray in LEVELS.map(|g| GrayLevel::new(g).unwrap()) {
             for times in [3.0, 4.0, 6.0, 9.0, 13.0, 20.0] {

@@ -5,30 +5,6 @@ use lamp_stack::Length;
 use super::{DepthPoint, FitError};
 use crate::resin::{CureModel, Dose, GrayLevel};
 
-/// Random numbers, the same for the same seed.
-pub(super) struct Noise(u64);
-
-impl Noise {
-    pub(super) fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// Above 0, up to 1 (splitmix64).
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11).wrapping_add(1) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Of mean 0 and standard deviation 1 (Box and Muller).
-    pub(super) fn normal(&mut self) -> f64 {
-        let (radius, angle) = ((-2.0 * self.uniform().ln()).sqrt(), self.uniform());
-        radius * (std::f64::consts::TAU * angle).cos()
-    }
-}
-
 /// The depths of white that a model says, each with an error in um.
 pub(super) fn depth_points(
     model: &impl CureModel,

@@ -147,9 +147,11 @@ impl TwoDepthFit {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Noise, depth_points, share_held};
+    use lamp_fixtures::SplitMix;
+
+    use super::super::testing::{depth_points, share_held};
     use super::*;
-    use crate::resin::{Depths, ExposureTime, GrayLevel, Intensity, TwoDepth};
+    use crate::resin::{Depths, ExposureTime, GrayLevel, Intensity, TwoDepth, laws};
 
     const DOSES: [f64; 10] = [5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 30.0, 45.0, 70.0, 100.0];
 
@@ -189,7 +191,7 @@ mod tests {
 
     #[test]
     fn of_100_intervals_95_hold_the_truth() {
-        let mut noise = Noise::new(5);
+        let mut noise = SplitMix(5);
         let fits = std::iter::from_fn(|| {
             Some(fit_two_depth(&depth_points(&truth(), &DOSES, |_| 3.0 * noise.normal())))
         });
@@ -206,21 +208,9 @@ mod tests {
 
     #[test]
     fn the_points_of_appendix_a_are_straight() {
-        // 000 appendix A: seconds at 0.2064 mW/cm² and um. Appendix E has E_c 11.593,
+        // Appendix E has E_c 11.593,
         // D_pL 302.8253 and a D_pS of 100 m for them.
-        let points = [
-            (170.0, 611.4583333),
-            (160.0, 581.6666667),
-            (150.0, 482.4166667),
-            (140.0, 443.53),
-            (130.0, 401.8055556),
-            (120.0, 348.5555556),
-            (110.0, 299.8055556),
-            (100.0, 241.4444444),
-            (95.0, 199.9722222),
-            (85.0, 154.2833333),
-        ];
-        let points = points.map(|(seconds, um)| {
+        let points = laws::APPENDIX_A.map(|(seconds, um)| {
             let dose = Intensity::from_mw_per_cm2(0.2064) * ExposureTime::from_ms(1000.0 * seconds);
             DepthPoint { gray: GrayLevel::WHITE, dose, depth: Length::from_um(um) }
         });

@@ -104,7 +104,9 @@ impl WidthFit {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Noise, share_held};
+    use lamp_fixtures::SplitMix;
+
+    use super::super::testing::share_held;
     use super::*;
     use crate::resin::WidthLine;
 
@@ -147,7 +149,7 @@ mod tests {
     #[test]
     fn of_100_intervals_95_hold_the_truth() {
         let truth = truth(423.0, 100.0, 0.1);
-        let mut noise = Noise::new(11);
+        let mut noise = SplitMix(11);
         let fits = std::iter::from_fn(|| {
             let points = points(truth, || 2.0 * noise.normal());
             Some(fit_widths(&points).map(|fits| fits[0]))
@@ -162,7 +164,7 @@ mod tests {
     fn squares_below_the_critical_dose_do_not_bend_the_line() {
         // Half of those that do not grow are measured as wider, by an error.
         let truth = truth(423.0, 240.0, 0.1);
-        let mut noise = Noise::new(13);
+        let mut noise = SplitMix(13);
         let fits = std::iter::from_fn(|| {
             let mut points = points(truth, || 1.0 * noise.normal());
             points.retain(|point| point.width.um() > 0.0);

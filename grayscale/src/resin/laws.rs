@@ -8,6 +8,21 @@ use proptest::test_runner::TestRunner;
 
 use super::{CureError, CureModel, Dose, GrayLevel};
 
+/// The films of 000 appendix A: seconds at 0.2064 mW/cm², and the height measured in
+/// micrometres.
+pub(crate) const APPENDIX_A: [(f64, f64); 10] = [
+    (170.0, 611.4583333),
+    (160.0, 581.6666667),
+    (150.0, 482.4166667),
+    (140.0, 443.53),
+    (130.0, 401.8055556),
+    (120.0, 348.5555556),
+    (110.0, 299.8055556),
+    (100.0, 241.4444444),
+    (95.0, 199.9722222),
+    (85.0, 154.2833333),
+];
+
 /// Checks the laws for depths of `um`, all of which the model holds for.
 pub(super) fn hold(model: &impl CureModel, um: RangeInclusive<f64>) {
     let nothing = Length::from_um(0.0);

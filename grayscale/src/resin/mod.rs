@@ -6,7 +6,7 @@ mod composition;
 mod filter;
 mod gray;
 #[cfg(test)]
-mod laws;
+pub(crate) mod laws;
 mod model;
 pub mod shrinkage;
 mod two_depth;

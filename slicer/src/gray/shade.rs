@@ -65,11 +65,7 @@ impl<'a> Shader<'a> {
 
     /// Adds columns between which no contour crosses the row.
     fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &'a [Span]) {
-        let inside = match self.fill {
-            Fill::EvenOdd => winding % 2 != 0,
-            Fill::NonZero => winding != 0,
-        };
-        if !inside {
+        if !self.fill.holds(winding) {
             return self.push(start, 0);
         }
         let mut column = start;
