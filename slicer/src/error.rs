@@ -99,6 +99,24 @@ pub enum SliceError {
         /// How many layers that makes.
         layers: f64,
     },
+    /// Heights that make no layers, or too many.
+    #[error("these heights make {layers} layers: give between one and four million")]
+    LayerCount {
+        /// How many layers they make.
+        layers: usize,
+    },
+    /// A layer's top not above its bottom.
+    #[error(
+        "layer {layer} would lie between {bottom_um} and {top_um} um: heights of layers must rise"
+    )]
+    NoThickness {
+        /// The layer, from 0.
+        layer: usize,
+        /// Its bottom in micrometres.
+        bottom_um: f64,
+        /// Its top in micrometres.
+        top_um: f64,
+    },
     /// The layers asked for do not exist.
     #[error("layers {start}..{end} were asked for, but the part has layers 0..{count}")]
     NoSuchLayers {

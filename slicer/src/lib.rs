@@ -54,7 +54,7 @@ pub use gray::DepthLevels;
 pub use grid::PixelGrid;
 pub use model::Model;
 pub use placement::{Axis, Placement};
-pub use planes::PlaneRule;
+pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};
 pub use slices::{Frame, SliceOptions, Slices};
 pub use table::Fill;

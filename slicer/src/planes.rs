@@ -22,17 +22,56 @@ pub enum PlaneRule {
     Bottom,
 }
 
-/// The planes at which a part is cut, one a layer, bottom first, all the same
-/// thickness apart.
+/// Layers of any thickness: the heights between which each one lies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerHeights {
+    boundaries_um: Vec<f64>,
+}
+
+impl LayerHeights {
+    /// Layers between boundaries that rise, in micrometres, the first layer's
+    /// bottom first.
+    ///
+    /// # Errors
+    /// Where there is no layer, one has no thickness or no finite place, or there
+    /// are more than any machine builds.
+    pub fn new(boundaries_um: Vec<f64>) -> Result<Self, SliceError> {
+        let layers = boundaries_um.len().saturating_sub(1);
+        if layers == 0 || layers as f64 >= MOST_LAYERS {
+            return Err(SliceError::LayerCount { layers });
+        }
+        let is_good = |pair: &[f64]| pair[0] < pair[1] && (pair[1] - pair[0]).is_finite();
+        if let Some(layer) = boundaries_um.windows(2).position(|pair| !is_good(pair)) {
+            let [bottom_um, top_um] = [boundaries_um[layer], boundaries_um[layer + 1]];
+            return Err(SliceError::NoThickness { layer, bottom_um, top_um });
+        }
+        Ok(Self { boundaries_um })
+    }
+
+    /// The boundaries: one more than layers, in micrometres.
+    pub fn boundaries_um(&self) -> &[f64] {
+        &self.boundaries_um
+    }
+}
+
+/// The planes at which a part is cut, one a layer, bottom first.
 ///
-/// A part's height is rounded to whole layers, at least one. A last plane that
-/// then lies above the part is moved down to the part's top, where flat tops
-/// still have their section.
+/// Where all layers are of one thickness, a part's height is rounded to whole
+/// layers, at least one. A plane above the part, in a layer that holds the part's
+/// top, is moved down to that top, where flat tops still have their section.
 #[derive(Clone, Debug)]
 pub(crate) struct Planes {
     z_um: Vec<f64>,
-    bottom_um: f64,
-    thickness_um: f64,
+    /// The layers' boundaries.
+    boundaries_um: Vec<f64>,
+    spacing: Spacing,
+}
+
+/// What is known of how far the planes are apart.
+#[derive(Clone, Debug)]
+enum Spacing {
+    Even { thickness_um: f64 },
+    Uneven(Bins),
 }
 
 impl Planes {
@@ -53,20 +92,46 @@ impl Planes {
             let height_mm = (top_um - bottom_um) / 1000.0;
             return Err(SliceError::TooManyLayers { height_mm, thickness_um, layers: count });
         }
+        let height = |k: f64| bottom_um + k * thickness_um;
         let plane = |k: u32| {
             let k = f64::from(k);
             match rule {
-                PlaneRule::Top => (bottom_um + (k + 1.0) * thickness_um).min(top_um),
-                PlaneRule::Middle => (bottom_um + (k + 0.5) * thickness_um).min(top_um),
-                PlaneRule::Bottom => (bottom_um + k * thickness_um).next_up(),
+                PlaneRule::Top => height(k + 1.0).min(top_um),
+                PlaneRule::Middle => height(k + 0.5).min(top_um),
+                PlaneRule::Bottom => height(k).next_up(),
             }
         };
-        Ok(Self { z_um: (0..count as u32).map(plane).collect(), bottom_um, thickness_um })
+        let count = count as u32;
+        Ok(Self {
+            z_um: (0..count).map(plane).collect(),
+            boundaries_um: (0..=count).map(|k| height(f64::from(k))).collect(),
+            spacing: Spacing::Even { thickness_um },
+        })
+    }
+
+    /// The planes of given layers, of a part that ends at `top_um`.
+    pub(crate) fn of(heights: &LayerHeights, top_um: f64, rule: PlaneRule) -> Self {
+        let plane = |layer: &[f64]| {
+            let [bottom, top] = [layer[0], layer[1]];
+            let plane = match rule {
+                PlaneRule::Top => top,
+                PlaneRule::Middle => bottom + 0.5 * (top - bottom),
+                PlaneRule::Bottom => return bottom.next_up(),
+            };
+            if bottom <= top_um { plane.min(top_um) } else { plane }
+        };
+        let boundaries_um = heights.boundaries_um.clone();
+        let z_um: Vec<f64> = boundaries_um.windows(2).map(plane).collect();
+        Self { spacing: Spacing::Uneven(Bins::new(&z_um)), z_um, boundaries_um }
     }
 
     /// A single plane.
     pub(crate) fn one(z: Length) -> Self {
-        Self { z_um: vec![z.um()], bottom_um: z.um(), thickness_um: 1.0 }
+        Self {
+            z_um: vec![z.um()],
+            boundaries_um: vec![z.um() - 1.0, z.um()],
+            spacing: Spacing::Even { thickness_um: 1.0 },
+        }
     }
 
     /// How many layers there are.
@@ -82,23 +147,31 @@ impl Planes {
 
     /// The height of a layer's bottom, in micrometres, to the nanometre.
     pub(crate) fn layer_bottom_um(&self, layer: usize) -> f64 {
-        ((self.bottom_um + layer as f64 * self.thickness_um) * 1000.0).round() / 1000.0
+        to_nanometres(self.boundaries_um[layer])
     }
 
     /// The height of a layer's top, where its exposure begins, in micrometres.
     #[inline]
     pub(crate) fn top_um(&self, layer: usize) -> f64 {
-        self.bottom_um + (layer as f64 + 1.0) * self.thickness_um
+        self.boundaries_um[layer + 1]
     }
 
     /// The height of the first layer's bottom, in micrometres.
     pub(crate) fn bottom_um(&self) -> f64 {
-        self.bottom_um
+        self.boundaries_um[0]
     }
 
-    /// The thickness of the layers, in micrometres.
-    pub(crate) fn thickness_um(&self) -> f64 {
-        self.thickness_um
+    /// The thickness of a layer, in micrometres; of given layers to the nanometre.
+    pub(crate) fn thickness_um(&self, layer: usize) -> f64 {
+        match self.spacing {
+            Spacing::Even { thickness_um } => thickness_um,
+            Spacing::Uneven(_) => to_nanometres(self.depth_um(&(layer..layer + 1))),
+        }
+    }
+
+    /// How high some layers are together, in micrometres.
+    pub(crate) fn depth_um(&self, layers: &Range<usize>) -> f64 {
+        self.boundaries_um[layers.end] - self.boundaries_um[layers.start]
     }
 
     /// The layers whose planes lie between two heights: above `low_um`, and
@@ -112,8 +185,16 @@ impl Planes {
     /// How many planes lie at or below a height.
     #[inline]
     pub(crate) fn at_or_below(&self, z_um: f64) -> usize {
+        match &self.spacing {
+            Spacing::Even { thickness_um } => self.walk_from_guess(z_um, *thickness_um),
+            Spacing::Uneven(bins) => bins.at_or_below(&self.z_um, z_um),
+        }
+    }
+
+    #[inline]
+    fn walk_from_guess(&self, z_um: f64, thickness_um: f64) -> usize {
         // The planes are nearly even: guess, then walk to the exact answer.
-        let guess = (z_um - self.z_um[0]) / self.thickness_um + 1.0;
+        let guess = (z_um - self.z_um[0]) / thickness_um + 1.0;
         let mut count = (guess as usize).min(self.z_um.len());
         while count < self.z_um.len() && self.z_um[count] <= z_um {
             count += 1;
@@ -125,8 +206,59 @@ impl Planes {
     }
 }
 
+fn to_nanometres(um: f64) -> f64 {
+    (um * 1000.0).round() / 1000.0
+}
+
+/// Finds planes that are not evenly apart, by as many even bins.
+#[derive(Clone, Debug)]
+struct Bins {
+    start_um: f64,
+    per_um: f64,
+    /// How many planes lie in the bins before each, and in all of them.
+    before: Vec<u32>,
+}
+
+impl Bins {
+    /// For planes from the lowest to the highest.
+    fn new(planes_um: &[f64]) -> Self {
+        let [start_um, end_um] = [planes_um[0], planes_um[planes_um.len() - 1]];
+        let count = planes_um.len();
+        // All in one bin where they lie at one height.
+        let per_um = if end_um > start_um { count as f64 / (end_um - start_um) } else { 0.0 };
+        let mut bins = Self { start_um, per_um, before: vec![0; count + 1] };
+        for &plane in planes_um {
+            let bin = bins.of(plane);
+            bins.before[bin + 1] += 1;
+        }
+        for bin in 0..count {
+            bins.before[bin + 1] += bins.before[bin];
+        }
+        bins
+    }
+
+    /// The bin of a height; those outside are in the first or the last.
+    #[inline]
+    fn of(&self, z_um: f64) -> usize {
+        let bin = (z_um - self.start_um) * self.per_um;
+        (bin as usize).min(self.before.len() - 2)
+    }
+
+    /// Bins rise with heights, however these are rounded: planes in lower bins
+    /// are lower, those in higher ones higher.
+    #[inline(never)]
+    fn at_or_below(&self, planes_um: &[f64], z_um: f64) -> usize {
+        let bin = self.of(z_um);
+        let [start, end] = [self.before[bin], self.before[bin + 1]].map(|count| count as usize);
+        start + planes_um[start..end].partition_point(|&plane| plane <= z_um)
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+    use proptest::test_runner::Config;
+
     use super::*;
 
     fn planes(height_um: f64, rule: PlaneRule) -> Vec<f64> {
@@ -171,6 +303,74 @@ mod tests {
         for thickness in [1e-9, -100.0, 0.0, f64::NAN] {
             let planes = Planes::uniform(0.0, 1e5, Length::from_um(thickness), PlaneRule::Top);
             assert!(planes.is_err(), "{thickness}");
+        }
+    }
+
+    #[test]
+    fn even_heights_given_one_by_one_are_the_uniform_planes() {
+        let boundaries = |count: u32| (0..=count).map(|k| 0.3 + f64::from(k) * 33.1).collect();
+        for (top_um, count) in [(331.4, 10), (330.0, 10), (345.0, 10), (0.4, 1)] {
+            let heights = LayerHeights::new(boundaries(count)).unwrap();
+            for rule in [PlaneRule::Top, PlaneRule::Middle, PlaneRule::Bottom] {
+                let thickness = Length::from_um(33.1);
+                let uniform = Planes::uniform(0.3, top_um, thickness, rule).unwrap();
+                let given = Planes::of(&heights, top_um, rule);
+                assert_eq!(given.boundaries_um, uniform.boundaries_um, "{top_um}");
+                for (a, b) in given.z_um.iter().zip(&uniform.z_um) {
+                    assert!((a - b).abs() < 1e-12, "{top_um} {rule:?}");
+                }
+                for layer in 0..uniform.len() {
+                    assert_eq!(given.thickness_um(layer), 33.1);
+                    assert_eq!(given.layer_bottom_um(layer), uniform.layer_bottom_um(layer));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn layers_above_the_part_keep_their_planes() {
+        let heights = LayerHeights::new(vec![-10.0, 0.0, 40.0, 100.0, 150.0, 155.0]).unwrap();
+        let planes = Planes::of(&heights, 90.0, PlaneRule::Top);
+        assert_eq!(planes.z_um, [0.0, 40.0, 90.0, 150.0, 155.0]);
+        assert_eq!(planes.top_um(2), 100.0);
+        assert_eq!(planes.depth_um(&(1..4)), 150.0);
+        assert_eq!(planes.thickness_um(4), 5.0);
+    }
+
+    #[test]
+    fn heights_rise() {
+        let nowhere = [vec![], vec![1.0], vec![0.0, 0.0], vec![0.0, 2.0, 1.0], vec![0.0, f64::NAN]];
+        for boundaries in nowhere {
+            assert!(LayerHeights::new(boundaries.clone()).is_err(), "{boundaries:?}");
+        }
+        let error = LayerHeights::new(vec![0.0, 5.0, 5.0]).unwrap_err().to_string();
+        assert_eq!(error, "layer 1 would lie between 5 and 5 um: heights of layers must rise");
+    }
+
+    proptest! {
+        #![proptest_config(Config { failure_persistence: None, ..Config::default() })]
+
+        /// Thicknesses that differ by up to a million times.
+        #[test]
+        fn uneven_planes_are_found_exactly(
+            start in -1e6..1e6f64,
+            powers in prop::collection::vec(-3.0..3.0f64, 1..200),
+            asked in prop::collection::vec(-0.2..1.2f64, 50),
+        ) {
+            let mut boundaries = vec![start];
+            for power in powers {
+                boundaries.push(boundaries[boundaries.len() - 1] + 10f64.powf(power));
+            }
+            let height = boundaries[boundaries.len() - 1] - start;
+            let heights = LayerHeights::new(boundaries).unwrap();
+            for rule in [PlaneRule::Top, PlaneRule::Middle, PlaneRule::Bottom] {
+                let planes = Planes::of(&heights, start + 0.9 * height, rule);
+                let near = planes.z_um.iter().flat_map(|z| [*z, z.next_down(), z.next_up()]);
+                for z in near.chain(asked.iter().map(|share| start + share * height)) {
+                    let counted = planes.z_um.iter().filter(|plane| **plane <= z).count();
+                    prop_assert_eq!(planes.at_or_below(z), counted);
+                }
+            }
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::gray::{DepthLevels, Span};
 use crate::grid::PixelGrid;
 use crate::model::Model;
 use crate::placement::{PlacedFacet, PlacedModel, Placement};
-use crate::planes::{PlaneRule, Planes};
+use crate::planes::{LayerHeights, PlaneRule, Planes};
 use crate::survey::Survey;
 use crate::table::{Facets, Fill, OpenRows, Section, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
@@ -25,8 +25,11 @@ use crate::trace::{StrayBand, Trace, Tracer};
 pub struct SliceOptions {
     /// Resolution in the plane.
     pub dpi: Dpi,
-    /// Thickness of the layers.
+    /// Thickness of the layers, where `heights` does not say.
     pub thickness: Length,
+    /// The layers' heights, where they are not all of one thickness. What of the
+    /// part lies outside them is left out.
+    pub heights: Option<LayerHeights>,
     /// Where in the layer the section is taken.
     pub plane: PlaneRule,
     /// What the file's coordinates mean.
@@ -88,6 +91,7 @@ impl Default for SliceOptions {
         Self {
             dpi: Dpi::new(1500.0).expect("1500 is a resolution"),
             thickness: Length::from_um(100.0),
+            heights: None,
             plane: PlaneRule::default(),
             units: Units::default(),
             placement: Placement::default(),
@@ -144,15 +148,19 @@ impl Slices {
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.frame.grid(min_mm, max_mm, options.dpi)?;
         let (bottom_um, top_um) = (survey.min[2], survey.max[2]);
-        let planes = Planes::uniform(bottom_um, top_um, options.thickness, options.plane)?;
+        let planes = match &options.heights {
+            Some(heights) => Planes::of(heights, top_um, options.plane),
+            None => Planes::uniform(bottom_um, top_um, options.thickness, options.plane)?,
+        };
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
         // A list that grows holds up to twice what it needs.
         let most_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
         let reach_um = options.gray.as_ref().map_or(0.0, DepthLevels::reach_um);
         let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
         if options.gray.is_some() {
-            let per_crossing = spans_per_crossing(reach_um / planes.thickness_um());
-            expected.iter_mut().for_each(|crossings| *crossings *= 1.0 + per_crossing);
+            for (layer, crossings) in expected.iter_mut().enumerate() {
+                *crossings *= 1.0 + spans_per_crossing(reach_um / planes.thickness_um(layer));
+            }
         }
         let slabs = slabs(&wanted, &expected, most_crossings);
         let heights: Vec<_> =
@@ -296,7 +304,7 @@ impl Slices {
         PageInfo {
             index: layer as u32,
             z_um: Some(self.planes.layer_bottom_um(layer)),
-            thickness_um: Some(self.planes.thickness_um()),
+            thickness_um: Some(self.planes.thickness_um(layer)),
             origin_mm: Some(self.grid.origin_mm),
             stack: (layer == self.wanted.start).then_some(stack),
             ..PageInfo::default()

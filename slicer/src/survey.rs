@@ -153,11 +153,12 @@ impl Survey {
         // Each block is spread evenly over its layers; summing steps up and
         // down costs nothing for the layers between.
         let mut steps = vec![0.0; planes.len() + 1];
-        let area_per_crossing = pitch_mm * planes.thickness_um();
         for block in &self.blocks {
             let layers = planes.between(block.min[2], block.max[2]);
-            let crossings = block.yz_area / area_per_crossing;
-            let share = crossings / layers.len().max(1) as f64;
+            if layers.is_empty() {
+                continue;
+            }
+            let share = block.yz_area / (pitch_mm * planes.depth_um(&layers));
             steps[layers.start] += share;
             steps[layers.end] -= share;
         }

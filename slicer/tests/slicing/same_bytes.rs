@@ -4,11 +4,11 @@
 use std::fs;
 
 use lamp_fixtures::{Mesh, sphere, tower};
-use lamp_slicer::{Fill, Model, SliceOptions, Slices};
-use lamp_stack::Layer;
+use lamp_slicer::{DepthLevels, Fill, LayerHeights, Model, SliceOptions, Slices};
+use lamp_stack::{Layer, Length};
 
 use crate::common::{
-    block, joined, model, options, slice, try_layers, white_pixels, without_stack,
+    block, joined, mask, model, options, slice, try_layers, white_pixels, without_stack,
 };
 
 /// A binary file, a text and facets in memory, of which no number fills
@@ -157,4 +157,72 @@ fn files_streams_and_memory_give_the_same_layers() {
         assert_eq!(stack.digest, format!("blake3:{}", blake3::hash(&bytes).to_hex()));
         assert!(without_stack(from_file) == without_stack(expected.clone()));
     }
+}
+
+/// The even layers of 700 um as a list of heights.
+fn even_heights(mesh: &Mesh) -> LayerHeights {
+    let bottom = mesh.bounds_mm().0[2] * 1000.0;
+    let count = slice(mesh, &coarse()).len() as u32;
+    LayerHeights::new((0..=count).map(|k| bottom + f64::from(k) * 700.0).collect()).unwrap()
+}
+
+/// Thick and thin layers, from below the part to above it.
+fn uneven_heights() -> LayerHeights {
+    let mut boundaries = vec![-500.0];
+    while boundaries[boundaries.len() - 1] < 78_000.0 {
+        let k = boundaries.len();
+        let thickness = [700.0, 100.0, 33.3, 1500.0, 12.7][k * k % 5];
+        boundaries.push(boundaries[k - 1] + thickness);
+    }
+    LayerHeights::new(boundaries).unwrap()
+}
+
+#[test]
+fn even_heights_as_a_list_make_the_same_layers() {
+    let mesh = part();
+    let heights = Some(even_heights(&mesh));
+    let gray = DepthLevels::new(Length::from_um(900.0), |g| Length::from_um(900.0 * g));
+    for gray in [None, Some(gray)] {
+        let uniform = SliceOptions { gray: gray.clone(), ..coarse() };
+        let given = SliceOptions { heights: heights.clone(), ..uniform.clone() };
+        assert!(slice(&mesh, &given) == slice(&mesh, &uniform));
+    }
+}
+
+#[test]
+fn uneven_layers_depend_on_the_part_and_their_heights_alone() {
+    let mesh = part();
+    let heights = uneven_heights();
+    let options = SliceOptions { heights: Some(heights.clone()), ..coarse() };
+    let expected = slice(&mesh, &options);
+    for (layer, ends) in expected.iter().zip(heights.boundaries_um().windows(2)) {
+        let (z, thickness) = (layer.info.z_um.unwrap(), layer.info.thickness_um.unwrap());
+        assert!((z - ends[0]).abs() < 1e-3 && (z + thickness - ends[1]).abs() < 2e-3);
+    }
+    let mut reversed = mesh.clone();
+    reversed.facets.reverse();
+    for (threads, memory) in [(1, 1), (2, 3_000), (3, 100_000), (2, 1 << 30)] {
+        let options = SliceOptions { memory, ..options.clone() };
+        let layers = with_threads(threads, || slice(&mesh, &options));
+        assert!(layers == expected, "{threads} threads, {memory} bytes");
+        let layers = with_threads(threads, || slice(&reversed, &options));
+        assert!(without_stack(layers) == without_stack(expected.clone()));
+    }
+}
+
+/// Each layer alone, cut by a plane at its top, is that of the list.
+#[test]
+fn uneven_layers_are_sections_at_their_tops() {
+    let mesh = part();
+    let heights = uneven_heights();
+    let layers = slice(&mesh, &SliceOptions { heights: Some(heights.clone()), ..coarse() });
+    for (layer, ends) in layers.iter().zip(heights.boundaries_um().windows(2)).step_by(7) {
+        let alone = LayerHeights::new(ends.to_vec()).unwrap();
+        let alone = slice(&mesh, &SliceOptions { heights: Some(alone), ..coarse() });
+        assert!(mask(&alone[0]) == mask(layer), "{ends:?}");
+    }
+    assert_eq!(white_pixels(&layers[..1]), 0);
+    assert_eq!(white_pixels(&layers[layers.len() - 1..]), 0);
+    let middle = layers.len() / 2;
+    assert!(white_pixels(&layers[middle..middle + 1]) > 0);
 }
