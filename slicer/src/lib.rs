@@ -32,6 +32,7 @@
 //! ```
 
 mod ascii;
+mod body;
 mod buckets;
 mod cut;
 mod ends;
@@ -48,12 +49,13 @@ mod survey;
 mod table;
 mod trace;
 
+pub use body::Body;
 pub use error::SliceError;
 pub use facet::{Facet, Units};
 pub use gray::DepthLevels;
 pub use grid::PixelGrid;
 pub use model::Model;
-pub use placement::{Axis, Placement};
+pub use placement::{Axis, PlacedFacet, Placement};
 pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};
 pub use slices::{Frame, SliceOptions, Slices};

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use blake3::Hasher;
 use memmap2::{Mmap, MmapOptions};
@@ -20,8 +21,9 @@ const FACET_BYTES: usize = 50;
 const BLOCK_FACETS: usize = 4096;
 
 /// A part: its name and its facets, from one file or several. A binary STL
-/// stays in its file, of which only a few blocks are mapped at a time.
-#[derive(Debug)]
+/// stays in its file, of which only a few blocks are mapped at a time. Clones
+/// share the facets.
+#[derive(Clone, Debug)]
 pub struct Model {
     name: String,
     /// The files' facets. No block has facets of two files.
@@ -29,10 +31,10 @@ pub struct Model {
     digest: String,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum FileFacets {
-    Binary { file: File, count: usize },
-    Memory(Vec<Facet>),
+    Binary { file: Arc<File>, count: usize },
+    Memory(Arc<Vec<Facet>>),
 }
 
 impl FileFacets {
@@ -79,7 +81,7 @@ impl Model {
         for corner in facets.iter().flatten().flatten() {
             hasher.update(&corner.to_le_bytes());
         }
-        let files = vec![FileFacets::Memory(facets)];
+        let files = vec![FileFacets::Memory(Arc::new(facets))];
         Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
     }
 
@@ -115,10 +117,10 @@ impl Model {
         let declared = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
         let facets = match declared {
             Some(count) if HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size => {
-                FileFacets::Binary { file: file.try_clone()?, count: count as usize }
+                FileFacets::Binary { file: Arc::new(file.try_clone()?), count: count as usize }
             }
             _ if ascii::looks_ascii(&start, start.len() as u64 == size) => {
-                FileFacets::Memory(ascii::read(&map(file, 0, size as usize)?)?)
+                FileFacets::Memory(Arc::new(ascii::read(&map(file, 0, size as usize)?)?))
             }
             declared => return Err(why_not_stl(&start, declared, size)),
         };

@@ -98,7 +98,7 @@ fn scaled(scale: &[f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 /// A facet in its place: x and y in millimetres, z in micrometres.
-pub(crate) type PlacedFacet = [[f64; 3]; 3];
+pub type PlacedFacet = [[f64; 3]; 3];
 
 /// The lowest and the highest z of a facet.
 #[inline]

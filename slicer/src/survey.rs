@@ -148,6 +148,12 @@ impl Survey {
         visits - met > 4.0 * facets
     }
 
+    /// How high facets are on average.
+    pub(crate) fn mean_height_um(&self) -> f64 {
+        let facets: usize = self.blocks.iter().map(|block| block.facets).sum();
+        self.blocks.iter().map(|block| block.heights_um).sum::<f64>() / facets as f64
+    }
+
     /// About how many crossings each layer has, with rows `pitch_mm` apart.
     pub(crate) fn crossings_per_layer(&self, planes: &Planes, pitch_mm: f64) -> Vec<f64> {
         // Each block is spread evenly over its layers; summing steps up and

@@ -1,0 +1,112 @@
+//! What thicknesses a machine builds, and where its layers may end.
+
+use std::ops::RangeInclusive;
+
+use lamp_stack::Length;
+
+use crate::error::HeightsError;
+
+/// More choices than these are a step by mistake.
+const MOST_THICKNESSES: f64 = 10_000.0;
+
+/// Thicknesses that a machine builds: whole steps between limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    step_um: f64,
+    steps: RangeInclusive<usize>,
+}
+
+impl Machine {
+    /// A machine that builds layers from `min` to `max`, in whole steps.
+    ///
+    /// # Errors
+    /// Where that is no thickness, or far too many.
+    pub fn new(min: Length, max: Length, step: Length) -> Result<Self, HeightsError> {
+        let [min_um, max_um, step_um] = [min, max, step].map(Length::um);
+        // Limits that are whole steps may miss them by rounding.
+        let first = (min_um / step_um - 1e-6).ceil().max(1.0);
+        let last = (max_um / step_um + 1e-6).floor();
+        // Written so that a step of NaN or zero fails, too.
+        if !(step_um > 0.0 && min_um > 0.0 && first <= last && last.is_finite()) {
+            return Err(HeightsError::NoThickness { min_um, max_um, step_um });
+        }
+        if last > MOST_THICKNESSES {
+            let min_step_um = max_um / MOST_THICKNESSES;
+            return Err(HeightsError::TooManySteps { count: last - first + 1.0, min_step_um });
+        }
+        Ok(Self { step_um, steps: first as usize..=last as usize })
+    }
+
+    /// The step between thicknesses, in micrometres.
+    pub fn step_um(&self) -> f64 {
+        self.step_um
+    }
+
+    /// The thicknesses, in steps.
+    pub(crate) fn steps(&self) -> RangeInclusive<usize> {
+        self.steps.clone()
+    }
+
+    /// Whether layers can fill so many steps.
+    pub(crate) fn can_fill(&self, steps: usize) -> bool {
+        steps.div_ceil(*self.steps.end()) * self.steps.start() <= steps
+    }
+
+    /// The thicknesses that a layer may have below the next of several heights where
+    /// one is to end: those after which layers can fill the rest. Heights that
+    /// cannot be reached are passed over, and the thinnest layer reaches past the
+    /// last, where the part ends; all are in steps.
+    pub(crate) fn choices(&self, bottom: usize, ends: &[usize]) -> Vec<usize> {
+        let ahead = &ends[ends.partition_point(|&end| end <= bottom)..];
+        let Some(end) = ahead.iter().find(|&&end| self.can_fill(end - bottom)) else {
+            let is_last = ahead.last().is_some_and(|end| end - bottom < *self.steps.start());
+            return self.steps().take(if is_last { 1 } else { usize::MAX }).collect();
+        };
+        let room = end - bottom;
+        self.steps().filter(|&step| step <= room && self.can_fill(room - step)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn machine(min: f64, max: f64, step: f64) -> Result<Machine, HeightsError> {
+        let [min, max, step] = [min, max, step].map(Length::from_um);
+        Machine::new(min, max, step)
+    }
+
+    #[test]
+    fn thicknesses_are_whole_steps() {
+        assert_eq!(machine(25.0, 100.0, 1.0).unwrap().steps(), 25..=100);
+        assert_eq!(machine(25.4, 2540.0, 25.4).unwrap().steps(), 1..=100);
+        assert_eq!(machine(30.0, 100.0, 20.0).unwrap().steps(), 2..=5);
+        for (min, max, step) in
+            [(50.0, 25.0, 1.0), (41.0, 59.0, 20.0), (1.0, 2.0, 0.0), (f64::NAN, 9.0, 1.0)]
+        {
+            assert!(machine(min, max, step).is_err(), "{min} {max} {step}");
+        }
+        assert!(matches!(machine(1.0, 1e6, 1.0), Err(HeightsError::TooManySteps { .. })));
+    }
+
+    #[test]
+    fn layers_leave_room_for_the_rest() {
+        let machine = machine(3.0, 10.0, 1.0).unwrap();
+        assert_eq!(machine.choices(0, &[100]), (3..=10).collect::<Vec<_>>());
+        // Two steps could not be filled.
+        assert_eq!(machine.choices(0, &[12]), [3, 4, 5, 6, 7, 8, 9]);
+        assert_eq!(machine.choices(0, &[7]), [3, 4, 7]);
+        assert_eq!(machine.choices(0, &[5]), [5]);
+        // The first end cannot be reached, the second can.
+        assert_eq!(machine.choices(10, &[5, 10, 12, 15]), [5]);
+        assert_eq!(machine.choices(10, &[12, 100]), (3..=10).collect::<Vec<_>>());
+        assert_eq!(machine.choices(10, &[12]), [3]);
+    }
+
+    #[test]
+    fn narrow_limits_leave_gaps() {
+        let machine = machine(6.0, 10.0, 1.0).unwrap();
+        assert!(!machine.can_fill(11) && machine.can_fill(12) && machine.can_fill(0));
+        assert_eq!(machine.choices(0, &[17]), [7, 8, 9, 10]);
+    }
+}

@@ -1,0 +1,179 @@
+//! A part, and the layers that it may be built of.
+
+use lamp_slicer::{Body, Fill, PlacedFacet};
+use lamp_stack::Length;
+use rayon::prelude::*;
+
+use crate::cut::{Cuts, RowFacet, Rows};
+use crate::profile::{Change, Profile};
+use crate::row::Sweep;
+use crate::slab::Slab;
+
+/// Rows are worked on in so many stripes, whatever the threads, so that sums do
+/// not depend on them.
+const STRIPES: u32 = 16;
+
+/// More rows than any image has.
+const MOST_ROWS: f64 = 16_777_216.0;
+
+/// A part as layers see it.
+///
+/// Volumes are exact along x and z, as far as the facets tell; along y they are
+/// sums over rows, as images are.
+#[derive(Debug)]
+pub struct Part {
+    body: Body,
+    rows: Rows,
+    fill: Fill,
+}
+
+impl Part {
+    /// A part seen along rows that are `pitch` apart, the first of which is half a
+    /// pitch below the part's greatest y.
+    pub fn new(body: Body, pitch: Length, fill: Fill) -> Self {
+        let height_mm = body.max()[1] - body.min()[1];
+        let count = (height_mm / pitch.mm()).ceil().clamp(1.0, MOST_ROWS);
+        let rows = Rows { top_mm: body.max()[1], pitch_mm: pitch.mm(), count: count as u32 };
+        Self { body, rows, fill }
+    }
+
+    /// The height of its lowest and its highest point, in micrometres.
+    pub fn heights_um(&self) -> [f64; 2] {
+        [self.body.min()[2], self.body.max()[2]]
+    }
+
+    /// The heights of its flat faces, in micrometres, rising: those of level facets
+    /// of together at least a row's pitch squared.
+    pub fn flat_faces_um(&self) -> Vec<f64> {
+        let mut faces = Vec::new();
+        self.body.for_each(|facet| {
+            let [a, b, c] = facet.map(|corner| corner[2]);
+            if a == b && b == c {
+                faces.push((a, normal(facet)[2].abs() / 2.0));
+            }
+        });
+        faces.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let least_mm2 = self.rows.pitch_mm * self.rows.pitch_mm;
+        let at_one_height = faces.chunk_by(|a, b| a.0 == b.0);
+        let large =
+            at_one_height.filter(|faces| faces.iter().map(|f| f.1).sum::<f64>() >= least_mm2);
+        large.map(|faces| faces[0].0).collect()
+    }
+
+    /// The layers from one height to each of several tops, which rise: all in
+    /// micrometres. A layer that holds the part's top has its section there, as in
+    /// the slicer.
+    ///
+    /// # Panics
+    /// Where there is no top, or one is not above the bottom.
+    pub fn slabs(&self, bottom_um: f64, tops_um: &[f64]) -> Vec<Slab> {
+        assert!(tops_um.first().is_some_and(|&top| top > bottom_um), "a layer has some thickness");
+        let part_top_um = self.body.max()[2];
+        let plane = |top: f64| if bottom_um <= part_top_um { top.min(part_top_um) } else { top };
+        let planes: Vec<f64> = tops_um.iter().map(|&top| plane(top) - bottom_um).collect();
+        let last_um = plane(tops_um[tops_um.len() - 1]);
+        let facets = self.body.between(bottom_um, last_um);
+        let (changes, bottom_width) = self.changes(&facets, [bottom_um, last_um], &planes);
+        let steepest = steepest(&facets, bottom_um, tops_um);
+        let pitch_mm = self.rows.pitch_mm;
+        let slab = |k: usize| {
+            let Change { width, lost, gained } = changes[k];
+            let top_width = (bottom_width + width).max(0.0);
+            let (lost, gained) = (lost.max(0.0), gained.max(0.0));
+            let thickness_um = tops_um[k] - bottom_um;
+            // Above the part's top there is only what the slab has too much.
+            let above = top_width * (thickness_um - planes[k]);
+            Slab {
+                bottom_um,
+                thickness_um,
+                volume_mm3: (top_width * planes[k] + lost - gained).max(0.0) * pitch_mm / 1000.0,
+                lost_mm3: lost * pitch_mm / 1000.0,
+                gained_mm3: (gained + above) * pitch_mm / 1000.0,
+                bottom_area_mm2: bottom_width * pitch_mm,
+                top_area_mm2: top_width * pitch_mm,
+                steepest: steepest[k],
+            }
+        };
+        (0..tops_um.len()).map(slab).collect()
+    }
+
+    /// What changes from the bottom to each plane above it, and the section's width
+    /// at the bottom, over all rows.
+    fn changes(
+        &self,
+        facets: &[PlacedFacet],
+        z_um: [f64; 2],
+        planes: &[f64],
+    ) -> (Vec<Change>, f64) {
+        let facets: Vec<_> =
+            facets.iter().filter_map(|facet| RowFacet::new(facet, &self.rows)).collect();
+        let stripe_rows = self.rows.count.div_ceil(STRIPES);
+        let of_stripe = |stripe: u32| {
+            let rows = [stripe * stripe_rows, (stripe + 1) * stripe_rows];
+            let mut cuts = Cuts::default();
+            for facet in &facets {
+                let [first, end] = facet.rows();
+                if first < rows[1] && end > rows[0] {
+                    facet.cut(rows, z_um, &mut cuts);
+                }
+            }
+            self.sweep(cuts, planes)
+        };
+        let stripes: Vec<_> = (0..STRIPES).into_par_iter().map(of_stripe).collect();
+        let mut sums = vec![Change::default(); planes.len()];
+        let mut bottom_width = 0.0;
+        for (changes, width) in stripes {
+            bottom_width += width;
+            sums.iter_mut().zip(changes).for_each(|(sum, change)| sum.add(change));
+        }
+        (sums, bottom_width)
+    }
+
+    fn sweep(&self, mut cuts: Cuts, planes: &[f64]) -> (Vec<Change>, f64) {
+        let mut profile = Profile::new(planes);
+        let mut sweep = Sweep::new(self.fill);
+        cuts.toggles.sort_unstable_by(|a, b| (a.row, a.x).partial_cmp(&(b.row, b.x)).unwrap());
+        cuts.slopes.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap());
+        let (mut toggles, mut slopes) = (&cuts.toggles[..], &cuts.slopes[..]);
+        loop {
+            let next = [toggles.first().map(|t| t.row), slopes.first().map(|s| s.row)];
+            let Some(row) = next.into_iter().flatten().min() else { break };
+            let [of_toggles, of_slopes] = [
+                toggles.partition_point(|toggle| toggle.row == row),
+                slopes.partition_point(|slope| slope.row == row),
+            ];
+            sweep.add(&toggles[..of_toggles], &slopes[..of_slopes], &mut profile);
+            (toggles, slopes) = (&toggles[of_toggles..], &slopes[of_slopes..]);
+        }
+        (profile.changes(), profile.bottom_width)
+    }
+}
+
+/// A facet's normal, in millimetres squared.
+fn normal(facet: &PlacedFacet) -> [f64; 3] {
+    let [a, b, c] = facet.map(|[x, y, z_um]| [x, y, z_um / 1000.0]);
+    let [u, v] = [b, c].map(|to| [0, 1, 2].map(|axis| to[axis] - a[axis]));
+    let cross = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
+    [cross(1, 2), cross(2, 0), cross(0, 1)]
+}
+
+/// The greatest |N_z| of the facets above a bottom and below each of several tops.
+fn steepest(facets: &[PlacedFacet], bottom_um: f64, tops_um: &[f64]) -> Vec<f64> {
+    let mut steepest = vec![0.0; tops_um.len()];
+    for facet in facets {
+        let [low, high] = [f64::min, f64::max].map(|least| {
+            let [a, b, c] = facet.map(|corner| corner[2]);
+            least(least(a, b), c)
+        });
+        let normal = normal(facet);
+        let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+        let first = tops_um.partition_point(|&top| top <= low);
+        if high > bottom_um && length > 0.0 && first < tops_um.len() {
+            steepest[first] = f64::max(steepest[first], normal[2].abs() / length);
+        }
+    }
+    for k in 1..steepest.len() {
+        steepest[k] = f64::max(steepest[k], steepest[k - 1]);
+    }
+    steepest
+}

@@ -1,0 +1,222 @@
+//! A part between two heights, seen along a row of the image.
+//!
+//! Facets are then lines over x, and the columns between two neighbouring ends of
+//! lines all pass the same lines in the same order. Going up such a column, the
+//! part begins and ends in turn; where a layer's top is, decides which of these
+//! stretches the layer has wrongly. Nothing is sampled along x or z.
+
+use lamp_slicer::Fill;
+
+use crate::profile::{Line, Profile};
+
+/// Where the row's bottom line, at the layer's bottom, passes the part's surface.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub(crate) struct Toggle {
+    pub(crate) row: u32,
+    pub(crate) x: f64,
+    /// +1 where going right enters the part, -1 where it leaves.
+    pub(crate) winding: i8,
+}
+
+/// A facet's line: heights in micrometres above the layer's bottom at two places,
+/// the left one first.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub(crate) struct Slope {
+    pub(crate) row: u32,
+    pub(crate) x: [f64; 2],
+    pub(crate) heights: [f64; 2],
+    /// +1 where going up enters the part, -1 where it leaves.
+    pub(crate) winding: i8,
+}
+
+impl Slope {
+    #[inline]
+    fn height(&self, x: f64) -> f64 {
+        let [a, b] = self.x;
+        if x == b {
+            return self.heights[1];
+        }
+        self.heights[0] + (self.heights[1] - self.heights[0]) * ((x - a) / (b - a))
+    }
+}
+
+/// Adds rows to a profile. It keeps its lists from row to row.
+#[derive(Debug)]
+pub(crate) struct Sweep {
+    fill: Fill,
+    ends: Vec<f64>,
+    open: Vec<Slope>,
+}
+
+/// Surfaces that pass through each other part the columns so often at most.
+const MOST_PARTINGS: u32 = 12;
+
+impl Sweep {
+    pub(crate) fn new(fill: Fill) -> Self {
+        Self { fill, ends: Vec::new(), open: Vec::new() }
+    }
+
+    fn is_inside(&self, winding: i32) -> bool {
+        match self.fill {
+            Fill::EvenOdd => winding % 2 != 0,
+            Fill::NonZero => winding != 0,
+        }
+    }
+
+    /// Adds a row, whose toggles and slopes are sorted from the left. A row that
+    /// does not balance, because the mesh has a gap, is left out.
+    pub(crate) fn add(&mut self, toggles: &[Toggle], slopes: &[Slope], profile: &mut Profile<'_>) {
+        let balance = toggles.iter().map(|toggle| i32::from(toggle.winding)).sum();
+        if self.is_inside(balance) {
+            return;
+        }
+        self.ends.clear();
+        self.ends.extend(toggles.iter().map(|toggle| toggle.x));
+        self.ends.extend(slopes.iter().flat_map(|slope| slope.x));
+        self.ends.sort_unstable_by(f64::total_cmp);
+        self.open.clear();
+        let (mut toggles, mut slopes, mut winding) = (toggles.iter(), slopes.iter(), 0);
+        for k in 1..self.ends.len() {
+            let columns = [self.ends[k - 1], self.ends[k]];
+            if columns[0] == columns[1] {
+                continue;
+            }
+            while let Some(toggle) = next_until(&mut toggles, |toggle| toggle.x <= columns[0]) {
+                winding += i32::from(toggle.winding);
+            }
+            self.open.retain(|slope| slope.x[1] > columns[0]);
+            while let Some(slope) = next_until(&mut slopes, |slope| slope.x[0] <= columns[0]) {
+                if slope.x[1] > columns[0] {
+                    self.open.push(*slope);
+                }
+            }
+            if self.is_inside(winding) {
+                profile.bottom_width += columns[1] - columns[0];
+            }
+            match self.open.len() {
+                0 => {}
+                1 => self.pass(columns, winding, profile),
+                _ => self.part(columns, winding, MOST_PARTINGS, profile),
+            }
+        }
+    }
+
+    /// Adds columns over several lines, apart on both sides of where two of these
+    /// cross.
+    fn part(&mut self, columns: [f64; 2], winding: i32, partings: u32, profile: &mut Profile<'_>) {
+        let [a, b] = columns;
+        let middle = 0.5 * (a + b);
+        self.open.sort_by(|p, q| p.height(middle).total_cmp(&q.height(middle)));
+        let crossing = self.open.windows(2).find_map(|pair| {
+            let gap = |x: f64| pair[1].height(x) - pair[0].height(x);
+            let end = [a, b].into_iter().find(|&end| gap(end) < -1e-9)?;
+            let x = middle + (end - middle) * (gap(middle) / (gap(middle) - gap(end)));
+            (a < x && x < b).then_some(x)
+        });
+        match crossing {
+            Some(x) if partings > 0 => {
+                self.part([a, x], winding, partings - 1, profile);
+                self.part([x, b], winding, partings - 1, profile);
+            }
+            _ => self.pass(columns, winding, profile),
+        }
+    }
+
+    /// Adds columns over lines that are sorted from below.
+    fn pass(&self, columns: [f64; 2], mut winding: i32, profile: &mut Profile<'_>) {
+        let width = columns[1] - columns[0];
+        let mut inside = self.is_inside(winding);
+        // How much of each column, up to the line before, is not as it is after it.
+        let mut unlike = [0.0; 2];
+        for slope in &self.open {
+            winding += i32::from(slope.winding);
+            if self.is_inside(winding) == inside {
+                continue;
+            }
+            let heights = columns.map(|x| slope.height(x));
+            let before = unlike.map(|unlike| -unlike);
+            unlike = [heights[0] - unlike[0], heights[1] - unlike[1]];
+            profile.add(if inside {
+                Line { heights, width: -width, lost: unlike, gained: before }
+            } else {
+                Line { heights, width, lost: before, gained: unlike }
+            });
+            inside = !inside;
+        }
+    }
+}
+
+fn next_until<'a, T>(
+    items: &mut std::slice::Iter<'a, T>,
+    is_due: impl Fn(&T) -> bool,
+) -> Option<&'a T> {
+    let due = items.as_slice().first().is_some_and(is_due);
+    if due { items.next() } else { None }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::Change;
+
+    fn toggle(x: f64, winding: i8) -> Toggle {
+        Toggle { row: 0, x, winding }
+    }
+
+    fn slope(x: [f64; 2], heights: [f64; 2], winding: i8) -> Slope {
+        Slope { row: 0, x, heights, winding }
+    }
+
+    fn changes(fill: Fill, toggles: &[Toggle], slopes: &[Slope]) -> Vec<Change> {
+        let mut profile = Profile::new(&[10.0, 20.0, 40.0]);
+        Sweep::new(fill).add(toggles, slopes, &mut profile);
+        profile.changes()
+    }
+
+    fn change(width: f64, lost: f64, gained: f64) -> Change {
+        Change { width, lost, gained }
+    }
+
+    /// A wall that leans in by 1 over 40, and one that leans out.
+    #[test]
+    fn walls_lose_and_gain() {
+        let toggles = [toggle(0.0, 1), toggle(5.0, -1)];
+        let slopes = [slope([0.0, 4.0], [0.0, 40.0], -1), slope([5.0, 9.0], [0.0, 40.0], 1)];
+        for fill in [Fill::EvenOdd, Fill::NonZero] {
+            let found = changes(fill, &toggles, &slopes);
+            assert_eq!(
+                found,
+                [change(0.0, 5.0, 5.0), change(0.0, 20.0, 20.0), change(0.0, 80.0, 80.0)]
+            );
+        }
+    }
+
+    /// A plate from 12 to 15 is lost by tops above it, and gained from 0 to 12 by
+    /// those in it.
+    #[test]
+    fn columns_that_pass_several_lines_have_what_is_between() {
+        let slopes = [slope([0.0, 2.0], [12.0; 2], 1), slope([0.0, 2.0], [25.0; 2], -1)];
+        for fill in [Fill::EvenOdd, Fill::NonZero] {
+            let found = changes(fill, &[], &slopes);
+            assert_eq!(
+                found,
+                [change(0.0, 0.0, 0.0), change(2.0, 0.0, 24.0), change(0.0, 26.0, 0.0)]
+            );
+        }
+    }
+
+    /// Two bodies that cross like an X: by even-odd, nothing is inside both.
+    #[test]
+    fn lines_that_cross_part_the_columns() {
+        let slopes = [slope([0.0, 4.0], [5.0, 9.0], 1), slope([0.0, 4.0], [9.0, 5.0], -1)];
+        let found = changes(Fill::EvenOdd, &[], &slopes);
+        // Two triangles, 4 high and 2 wide.
+        assert!((found[0].lost - 8.0).abs() < 1e-9 && found[0].width.abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_row_with_a_gap_is_left_out() {
+        let found = changes(Fill::EvenOdd, &[toggle(0.0, 1)], &[slope([0.0, 1.0], [5.0; 2], 1)]);
+        assert!(found.iter().all(|found| *found == Change::default()));
+    }
+}

@@ -1,0 +1,131 @@
+//! Slabs against a slow obvious twin: sections at very many heights, compared
+//! with the one at the top, row by row.
+
+use lamp_adaptive::{Part, Slab};
+use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
+use lamp_slicer::{Axis, Body, Fill, Inside, Model, Placement, SectionOptions, Units, section};
+use lamp_stack::{Dpi, Length};
+
+/// 254 dpi: rows 0.1 mm apart.
+const PITCH_MM: f64 = 0.1;
+const SECTIONS: u32 = 400;
+
+struct Twin {
+    mesh: Mesh,
+    placement: Placement,
+    fill: Fill,
+}
+
+impl Twin {
+    fn model(&self) -> Model {
+        Model::from_facets("part", self.mesh.facets.clone())
+    }
+
+    fn section(&self, z_um: f64, top_mm: f64, rows: u32) -> Vec<Inside> {
+        let options = SectionOptions {
+            units: Units::Millimetres,
+            placement: self.placement,
+            fill: self.fill,
+            z: Length::from_um(z_um),
+            dpi: Dpi::new(254.0).unwrap(),
+            top_mm,
+            rows,
+        };
+        section(self.model(), &options).unwrap()
+    }
+
+    fn check(&self, layers: &[[f64; 2]]) {
+        let body = Body::new(self.model(), &self.placement, Units::Millimetres).unwrap();
+        let [min, max] = [body.min(), body.max()];
+        let rows = ((max[1] - min[1]) / PITCH_MM).ceil() as u32;
+        let part = Part::new(body, Length::from_mm(PITCH_MM), self.fill);
+        let height = max[2] - min[2];
+        for layer in layers {
+            let [bottom, top] = layer.map(|share| min[2] + share * height);
+            // Among other tops, as the search asks.
+            let tops = [0.5, 0.75, 1.0, 1.2].map(|share| bottom + share * (top - bottom));
+            let slab = part.slabs(bottom, &tops)[2];
+            let top_section = self.section(top.min(max[2]), max[1], rows);
+            let (mut lost, mut gained, mut volume) = (0.0, 0.0, 0.0);
+            let each = (top - bottom) / f64::from(SECTIONS) / 1000.0 * PITCH_MM;
+            for k in 0..SECTIONS {
+                let z = bottom + (top - bottom) * (f64::from(k) + 0.5) / f64::from(SECTIONS);
+                for (here, above) in self.section(z, max[1], rows).iter().zip(&top_section) {
+                    let common = common(here, above);
+                    lost += (length(here) - common) * each;
+                    gained += (length(above) - common) * each;
+                    volume += length(here) * each;
+                }
+            }
+            let near = |found: f64, expected: f64| {
+                // A section has a flat face or not: an error of one of them.
+                let face = 0.002 * volume + 2.0 * (lost + gained + volume) / f64::from(SECTIONS);
+                (found - expected).abs() < face
+            };
+            let Slab { lost_mm3, gained_mm3, volume_mm3, .. } = slab;
+            assert!(near(lost_mm3, lost), "{layer:?}: {slab:?}, {lost} lost");
+            assert!(near(gained_mm3, gained), "{layer:?}: {slab:?}, {gained} gained");
+            assert!(near(volume_mm3, volume), "{layer:?}: {slab:?}, {volume}");
+            let area = top_section.iter().map(length).sum::<f64>() * PITCH_MM;
+            assert!((slab.top_area_mm2 - area).abs() < 1e-6 * (1.0 + area), "{layer:?}: {area}");
+        }
+    }
+}
+
+fn length(inside: &Inside) -> f64 {
+    inside.iter().map(|[from, to]| to - from).sum()
+}
+
+fn common(a: &Inside, b: &Inside) -> f64 {
+    let overlap = |[p, q]: [f64; 2], [r, s]: [f64; 2]| (q.min(s) - p.max(r)).max(0.0);
+    a.iter().flat_map(|&p| b.iter().map(move |&q| overlap(p, q))).sum()
+}
+
+/// Layers thin and thick, through all heights.
+const LAYERS: [[f64; 2]; 8] = [
+    [0.0, 0.01],
+    [0.1, 0.13],
+    [0.31, 0.32],
+    [0.45, 0.55],
+    [0.2, 0.9],
+    [0.62, 0.7],
+    [0.9, 0.95],
+    [0.93, 1.0],
+];
+
+fn joined(meshes: &[Mesh]) -> Mesh {
+    Mesh { facets: meshes.iter().flat_map(|mesh| mesh.facets.iter().copied()).collect() }
+}
+
+#[test]
+fn parts_that_stand() {
+    for mesh in [tower(4_000), torus(6.0, 2.0, 2_000), cube_with_hole(8.0, 2.0, 400)] {
+        let placement = Placement::default();
+        Twin { mesh, placement, fill: Fill::EvenOdd }.check(&LAYERS);
+    }
+}
+
+/// Every face leans, columns pass several of them, and holes lie across.
+#[test]
+fn parts_that_lie_and_lean() {
+    let placements = [
+        Placement::default().rotated(Axis::X, 90.0),
+        Placement::default().rotated(Axis::X, 33.0).rotated(Axis::Y, 21.0),
+    ];
+    for placement in placements {
+        for fill in [Fill::EvenOdd, Fill::NonZero] {
+            let mesh = cube_with_hole(8.0, 2.0, 400);
+            Twin { mesh, placement, fill }.check(&LAYERS);
+        }
+    }
+}
+
+/// Two balls that overlap: one cuts the other out, or they unite.
+#[test]
+fn bodies_that_pass_through_each_other() {
+    let balls = [sphere(4.0, 1_000), sphere(4.0, 1_000).map(|[x, y, z]| [x + 2.0, y, z + 3.0])];
+    for fill in [Fill::EvenOdd, Fill::NonZero] {
+        let mesh = joined(&balls);
+        Twin { mesh, placement: Placement::default(), fill }.check(&LAYERS);
+    }
+}
