@@ -39,7 +39,17 @@ impl Edge {
     }
 }
 
+/// The least whole number that is not below `value`, between 0 and `most`.
+#[inline]
+fn ceil_clamped(value: f64, most: u32) -> u32 {
+    // Casts saturate, and cost less than rounding.
+    let whole = value as i32;
+    let ceiling = whole.saturating_add(i32::from(f64::from(whole) < value));
+    ceiling.clamp(0, most as i32) as u32
+}
+
 /// A facet as rows meet it.
+#[derive(Clone, Copy)]
 pub(crate) struct RowFacet {
     /// From the top row down.
     corners: [Corner; 3],
@@ -63,8 +73,7 @@ impl RowFacet {
         order(0, 1);
         order(1, 2);
         order(0, 1);
-        let first_past = |corner: &Corner| corner[1].ceil().clamp(0.0, f64::from(rows.count));
-        let rows = [0, 1, 2].map(|k| first_past(&corners[k]) as u32);
+        let rows = corners.map(|corner| ceil_clamped(corner[1], rows.count));
         (rows[0] < rows[2]).then_some(Self { corners, rows, turned })
     }
 
@@ -106,8 +115,8 @@ impl RowFacet {
                 }
             }
         }
-        let within = |row: f64| row.clamp(f64::from(self.rows[0]), f64::from(self.rows[2]));
-        [within((first - 1e-3).ceil()) as u32, within((last + 1e-3).ceil()) as u32]
+        let within = |row: f64| ceil_clamped(row, self.rows[2]).max(self.rows[0]);
+        [within(first - 1e-3), within(last + 1e-3)]
     }
 }
 

@@ -105,21 +105,23 @@ impl Part {
         z_um: [f64; 2],
         planes: &[f64],
     ) -> (Vec<Change>, f64) {
-        let facets: Vec<_> =
-            facets.iter().filter_map(|facet| RowFacet::new(facet, &self.rows)).collect();
         let stripe_rows = self.rows.count.div_ceil(STRIPES);
-        let of_stripe = |stripe: u32| {
-            let rows = [stripe * stripe_rows, (stripe + 1) * stripe_rows];
+        let mut stripes: Vec<Vec<RowFacet>> = (0..STRIPES).map(|_| Vec::new()).collect();
+        for facet in facets.iter().filter_map(|facet| RowFacet::new(facet, &self.rows)) {
+            let [first, end] = facet.rows();
+            for stripe in first / stripe_rows..=(end - 1) / stripe_rows {
+                stripes[stripe as usize].push(facet);
+            }
+        }
+        let of_stripe = |(stripe, facets): (usize, Vec<RowFacet>)| {
+            let first = stripe as u32 * stripe_rows;
             let mut cuts = Cuts::default();
             for facet in &facets {
-                let [first, end] = facet.rows();
-                if first < rows[1] && end > rows[0] {
-                    facet.cut(rows, z_um, &mut cuts);
-                }
+                facet.cut([first, first + stripe_rows], z_um, &mut cuts);
             }
-            self.sweep(cuts, planes)
+            self.sweep(&cuts, first, stripe_rows, planes)
         };
-        let stripes: Vec<_> = (0..STRIPES).into_par_iter().map(of_stripe).collect();
+        let stripes: Vec<_> = stripes.into_par_iter().enumerate().map(of_stripe).collect();
         let mut sums = vec![Change::default(); planes.len()];
         let mut bottom_width = 0.0;
         for (changes, width) in stripes {
@@ -129,23 +131,47 @@ impl Part {
         (sums, bottom_width)
     }
 
-    fn sweep(&self, mut cuts: Cuts, planes: &[f64]) -> (Vec<Change>, f64) {
+    fn sweep(&self, cuts: &Cuts, first: u32, rows: u32, planes: &[f64]) -> (Vec<Change>, f64) {
         let mut profile = Profile::new(planes);
         let mut sweep = Sweep::new(self.fill);
-        cuts.toggles.sort_unstable_by(|a, b| (a.row, a.x).partial_cmp(&(b.row, b.x)).unwrap());
-        cuts.slopes.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap());
-        let (mut toggles, mut slopes) = (&cuts.toggles[..], &cuts.slopes[..]);
-        loop {
-            let next = [toggles.first().map(|t| t.row), slopes.first().map(|s| s.row)];
-            let Some(row) = next.into_iter().flatten().min() else { break };
-            let [of_toggles, of_slopes] = [
-                toggles.partition_point(|toggle| toggle.row == row),
-                slopes.partition_point(|slope| slope.row == row),
-            ];
-            sweep.add(&toggles[..of_toggles], &slopes[..of_slopes], &mut profile);
-            (toggles, slopes) = (&toggles[of_toggles..], &slopes[of_slopes..]);
+        let mut toggles = ByRow::new(&cuts.toggles, first, rows, |toggle| toggle.row);
+        let mut slopes = ByRow::new(&cuts.slopes, first, rows, |slope| slope.row);
+        for row in 0..rows as usize {
+            let (toggles, slopes) = (toggles.row(row), slopes.row(row));
+            toggles.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
+            slopes.sort_unstable_by(|a, b| a.x[0].total_cmp(&b.x[0]));
+            sweep.add(toggles, slopes, &mut profile);
         }
         (profile.changes(), profile.bottom_width)
+    }
+}
+
+/// Things sorted by row (a counting sort).
+struct ByRow<T> {
+    starts: Vec<u32>,
+    things: Vec<T>,
+}
+
+impl<T: Copy + Default> ByRow<T> {
+    fn new(things: &[T], first: u32, rows: u32, row_of: impl Fn(&T) -> u32) -> Self {
+        let mut starts = vec![0; rows as usize + 2];
+        for thing in things {
+            starts[(row_of(thing) - first) as usize + 2] += 1;
+        }
+        for row in 2..starts.len() {
+            starts[row] += starts[row - 1];
+        }
+        let mut sorted = vec![T::default(); things.len()];
+        for thing in things {
+            let next = &mut starts[(row_of(thing) - first) as usize + 1];
+            sorted[*next as usize] = *thing;
+            *next += 1;
+        }
+        Self { starts, things: sorted }
+    }
+
+    fn row(&mut self, row: usize) -> &mut [T] {
+        &mut self.things[self.starts[row] as usize..self.starts[row + 1] as usize]
     }
 }
 

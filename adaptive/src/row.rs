@@ -10,7 +10,7 @@ use lamp_slicer::Fill;
 use crate::profile::{Line, Profile};
 
 /// Where the row's bottom line, at the layer's bottom, passes the part's surface.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Toggle {
     pub(crate) row: u32,
     pub(crate) x: f64,
@@ -20,7 +20,7 @@ pub(crate) struct Toggle {
 
 /// A facet's line: heights in micrometres above the layer's bottom at two places,
 /// the left one first.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Slope {
     pub(crate) row: u32,
     pub(crate) x: [f64; 2],
@@ -66,6 +66,9 @@ impl Sweep {
     /// Adds a row, whose toggles and slopes are sorted from the left. A row that
     /// does not balance, because the mesh has a gap, is left out.
     pub(crate) fn add(&mut self, toggles: &[Toggle], slopes: &[Slope], profile: &mut Profile<'_>) {
+        if toggles.is_empty() && slopes.is_empty() {
+            return;
+        }
         let balance = toggles.iter().map(|toggle| i32::from(toggle.winding)).sum();
         if self.is_inside(balance) {
             return;
@@ -106,7 +109,7 @@ impl Sweep {
     fn part(&mut self, columns: [f64; 2], winding: i32, partings: u32, profile: &mut Profile<'_>) {
         let [a, b] = columns;
         let middle = 0.5 * (a + b);
-        self.open.sort_by(|p, q| p.height(middle).total_cmp(&q.height(middle)));
+        self.open.sort_unstable_by(|p, q| p.height(middle).total_cmp(&q.height(middle)));
         let crossing = self.open.windows(2).find_map(|pair| {
             let gap = |x: f64| pair[1].height(x) - pair[0].height(x);
             let end = [a, b].into_iter().find(|&end| gap(end) < -1e-9)?;
