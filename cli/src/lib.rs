@@ -6,10 +6,13 @@
 
 mod commands;
 mod evidence;
+mod exposure;
 mod findings;
+mod heights;
 mod lines;
 mod materials;
 mod options;
+mod part;
 mod picture;
 mod place;
 mod placement;
@@ -17,6 +20,7 @@ mod plots;
 mod report;
 mod section;
 mod signals;
+mod solid;
 mod stop;
 mod streams;
 mod trace;

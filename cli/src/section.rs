@@ -11,7 +11,7 @@ use lamp_grayscale::{CuredLine, Line, Solid, excess};
 use lamp_slicer::{Axis, Model, SectionOptions, SliceError, section};
 use lamp_stack::{Dpi, Image, Layer, Length, write_rgb_png};
 
-use crate::commands::slice::PartOptions;
+use crate::part::PartOptions;
 use crate::picture::Scale;
 
 /// Where a stack is cut, in part coordinates.

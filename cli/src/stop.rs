@@ -40,6 +40,12 @@ impl Stop {
         }
     }
 
+    /// The error of one kind that it comes from, if any.
+    pub(crate) fn cause<E: std::error::Error + Send + Sync + 'static>(&self) -> Option<&E> {
+        let Self::Failed(error) = self else { return None };
+        error.chain().find_map(|cause| cause.downcast_ref())
+    }
+
     pub(crate) fn status(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,

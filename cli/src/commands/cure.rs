@@ -6,12 +6,13 @@ use clap::Args;
 use lamp_grayscale::Solid;
 use lamp_stack::StackInfo;
 
-use crate::commands::slice::{PartOptions, name_of_all, open_models};
 use crate::materials::material;
 use crate::options::{Common, Input};
+use crate::part::PartOptions;
 use crate::picture::Scale;
 use crate::report::Report;
 use crate::section::{Course, Exposures, Panels, Plane, parse_along};
+use crate::solid::{name_of_all, open_models};
 use crate::stop::Stop;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 

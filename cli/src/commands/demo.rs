@@ -10,8 +10,8 @@ use lamp_postprocess::{FixOptions, TileOptions, fix, tile};
 use lamp_slicer::Model;
 use lamp_stack::{Layer, Pages};
 
-use crate::commands::slice::PartOptions;
 use crate::options::{Common, Output, parse_count};
+use crate::part::PartOptions;
 use crate::picture::{Picture, Region, Scale};
 use crate::report::Report;
 use crate::stop::Stop;

@@ -7,6 +7,7 @@ mod cure;
 mod demo;
 mod dither;
 mod fix;
+mod heights;
 mod info;
 mod join;
 mod material;
@@ -40,6 +41,7 @@ pub(crate) enum Command {
     Cure(cure::CureArgs),
     Calibrate(calibrate::CalibrateArgs),
     Target(target::TargetArgs),
+    Heights(heights::HeightsArgs),
 }
 
 impl Command {
@@ -72,6 +74,7 @@ impl Command {
             Self::Cure(_) => "cure",
             Self::Calibrate(_) => "calibrate",
             Self::Target(_) => "target",
+            Self::Heights(_) => "heights",
         }
     }
 
@@ -93,6 +96,7 @@ impl Command {
             Self::Cure(args) => cure::run(args, common),
             Self::Calibrate(args) => calibrate::run(args, common),
             Self::Target(args) => target::run(args, common),
+            Self::Heights(args) => heights::run(args),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 mod scale;
 
-use std::io::{self, Write};
+use std::io;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Once;
@@ -41,7 +41,7 @@ impl Axis {
     }
 }
 
-/// Measured points, and the curve through them.
+/// Measured points, the curve through them, or both.
 #[derive(Debug)]
 pub(crate) struct Series {
     /// What stands in the legend.
@@ -90,50 +90,62 @@ fn format_of(path: &Path) -> Result<Format, Stop> {
     }
 }
 
+/// The bytes of plots below each other, in the format that the file's name says.
+/// Equal plots give equal bytes.
+pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, Stop> {
+    match format_of(path)? {
+        Format::Svg => Ok(svg(plots).into_bytes()),
+        Format::Png => Ok(png(plots).with_context(|| path.display().to_string())?),
+    }
+}
+
+fn svg(plots: &[Plot]) -> String {
+    let mut text = String::new();
+    let [pixels, size] = [PIXELS, SIZE].map(|size| all_of(size, plots));
+    // A text takes all that is drawn on it.
+    draw_all(plots, &SVGBackend::with_string(&mut text, pixels).into_drawing_area())
+        .expect("a text takes all");
+    let [fine, shown] =
+        [pixels, size].map(|(width, height)| format!(r#"width="{width}" height="{height}""#));
+    text.replacen(&fine, &shown, 1)
+}
+
+fn png(plots: &[Plot]) -> anyhow::Result<Vec<u8>> {
+    let (width, height) = all_of(PIXELS, plots);
+    let mut pixels = vec![0; (width * height * 3) as usize];
+    let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
+    draw_all(plots, &area).map_err(|error| io::Error::other(error.to_string()))?;
+    drop(area);
+    let mut bytes = Vec::new();
+    let mut png = png::Encoder::new(&mut bytes, width, height);
+    png.set_color(png::ColorType::Rgb);
+    png.set_depth(png::BitDepth::Eight);
+    png.write_header()?.write_image_data(&pixels)?;
+    Ok(bytes)
+}
+
+/// The size of several plots, given that of one.
+fn all_of((width, height): (u32, u32), plots: &[Plot]) -> (u32, u32) {
+    (width, height * plots.len() as u32)
+}
+
+fn draw_all<B: DrawingBackend>(
+    plots: &[Plot],
+    area: &DrawingArea<B, plotters::coord::Shift>,
+) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+    with_font();
+    area.fill(&WHITE)?;
+    for (plot, area) in plots.iter().zip(area.split_evenly((plots.len(), 1))) {
+        plot.draw(&area)?;
+    }
+    area.present()
+}
+
 impl Plot {
-    /// The bytes of the plot, in the format that its name says. Equal plots give equal
-    /// bytes.
-    pub(crate) fn drawn(&self, path: &Path) -> Result<Vec<u8>, Stop> {
-        match format_of(path)? {
-            Format::Svg => Ok(self.svg().into_bytes()),
-            Format::Png => {
-                let mut bytes = Vec::new();
-                let written = self.write_png(&mut bytes);
-                written.with_context(|| path.display().to_string())?;
-                Ok(bytes)
-            }
-        }
-    }
-
-    fn svg(&self) -> String {
-        let mut text = String::new();
-        // A text takes all that is drawn on it.
-        self.draw(&SVGBackend::with_string(&mut text, PIXELS).into_drawing_area())
-            .expect("a text takes all");
-        let [fine, shown] =
-            [PIXELS, SIZE].map(|(width, height)| format!(r#"width="{width}" height="{height}""#));
-        text.replacen(&fine, &shown, 1)
-    }
-
-    fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
-        let (width, height) = PIXELS;
-        let mut pixels = vec![0; (width * height * 3) as usize];
-        let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
-        self.draw(&area).map_err(|error| io::Error::other(error.to_string()))?;
-        drop(area);
-        let mut png = png::Encoder::new(out, width, height);
-        png.set_color(png::ColorType::Rgb);
-        png.set_depth(png::BitDepth::Eight);
-        png.write_header()?.write_image_data(&pixels)?;
-        Ok(())
-    }
-
     fn draw<B: DrawingBackend>(
         &self,
         area: &DrawingArea<B, plotters::coord::Shift>,
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-        with_font();
-        area.fill(&WHITE)?;
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, font(19))
             .margin(14 * SCALE)
@@ -151,7 +163,7 @@ impl Plot {
             .bold_line_style(GRID.stroke_width(SCALE))
             .light_line_style(TRANSPARENT)
             .draw()?;
-        for (series, ink) in self.series.iter().zip(inks()) {
+        for (series, ink) in self.series.iter().zip(inks()).filter(|(s, _)| !s.band.is_empty()) {
             let up = series.band.iter().map(|&[x, _, high]| (x, high));
             let down = series.band.iter().rev().map(|&[x, low, _]| (x, low));
             chart.draw_series([Polygon::new(up.chain(down).collect::<Vec<_>>(), ink.mix(0.16))])?;
@@ -175,8 +187,7 @@ impl Plot {
             .label_font(font(14))
             .background_style(WHITE.mix(0.85))
             .border_style(TRANSPARENT)
-            .draw()?;
-        area.present()
+            .draw()
     }
 }
 
@@ -224,36 +235,35 @@ mod tests {
         Axis { label: label.to_owned(), range, logarithmic }
     }
 
-    fn plot() -> Plot {
+    fn plots() -> [Plot; 1] {
         let series = Series {
             name: "a & b".to_owned(),
             points: vec![(100.0, 10.0), (1000.0, 60.0)],
             curve: vec![(100.0, 10.0), (1000.0, 60.0)],
             band: vec![[100.0, 5.0, 15.0], [1000.0, 50.0, 70.0]],
         };
-        Plot {
+        [Plot {
             title: "Cure depth".to_owned(),
             x: axis("dose (mJ/cm²)", 90.0..1100.0, true),
             y: axis("depth (µm)", 0.0..75.0, false),
             series: vec![series],
-        }
+        }]
     }
 
     #[test]
     fn an_svg_is_the_same_each_time_and_holds_what_is_to_be_seen() {
-        let svg = plot().svg();
-        assert_eq!(svg, plot().svg());
-        for text in ["Cure depth", "dose (mJ/cm²)", "a &amp; b", "500", "<circle", "<polygon"] {
-            assert!(svg.contains(text), "no {text} in {svg}");
+        let text = svg(&plots());
+        assert_eq!(text, svg(&plots()));
+        for part in ["Cure depth", "dose (mJ/cm²)", "a &amp; b", "500", "<circle", "<polygon"] {
+            assert!(text.contains(part), "no {part} in {text}");
         }
-        assert!(svg.starts_with("<svg width=\"860\" height=\"560\" viewBox=\"0 0 1720 1120\""));
-        assert!(svg.ends_with("</svg>\n"));
+        assert!(text.starts_with("<svg width=\"860\" height=\"560\" viewBox=\"0 0 1720 1120\""));
+        assert!(text.ends_with("</svg>\n"));
     }
 
     #[test]
     fn a_png_has_ink_where_the_curve_is() {
-        let mut bytes = Vec::new();
-        plot().write_png(&mut bytes).unwrap();
+        let bytes = drawn(&plots(), Path::new("a.png")).unwrap();
         let mut reader = png::Decoder::new(io::Cursor::new(bytes)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut pixels).unwrap();
@@ -264,14 +274,21 @@ mod tests {
     }
 
     #[test]
+    fn plots_stand_below_each_other() {
+        let two = svg(&plots().into_iter().chain(plots()).collect::<Vec<_>>());
+        assert!(two.starts_with("<svg width=\"860\" height=\"1120\" viewBox=\"0 0 1720 2240\""));
+        assert_eq!(two.matches("Cure depth").count(), 2);
+    }
+
+    #[test]
     fn no_range_is_too_much_to_draw() {
         for range in [1e-300..1e300, 1.0..1.0, 0.0..f64::INFINITY, f64::NAN..1.0, 0.0..1e-320] {
             for logarithmic in [false, true] {
-                let mut plot = plot();
-                plot.x = axis("x", range.clone(), logarithmic);
-                plot.y = axis("y", range.clone(), logarithmic);
+                let mut plots = plots();
+                plots[0].x = axis("x", range.clone(), logarithmic);
+                plots[0].y = axis("y", range.clone(), logarithmic);
                 for name in ["a.svg", "a.png"] {
-                    assert!(plot.drawn(Path::new(name)).is_ok(), "{range:?} {logarithmic}");
+                    assert!(drawn(&plots, Path::new(name)).is_ok(), "{range:?} {logarithmic}");
                 }
             }
         }

@@ -28,6 +28,7 @@ mod student;
 mod table;
 #[cfg(test)]
 mod testing;
+mod times;
 mod two_depth;
 mod width;
 
@@ -43,6 +44,7 @@ pub use data::{DataError, DepthPoint, Measured, WidthPoint, depth_points, width_
 pub use digits::with_digits;
 pub use gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
 pub use table::{Table, TableError};
+pub use times::ExposureTimes;
 pub use two_depth::{TwoDepthFit, fit_two_depth};
 pub use width::{WidthFit, fit_widths};
 

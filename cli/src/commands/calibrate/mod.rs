@@ -6,6 +6,7 @@ mod width;
 
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
@@ -15,7 +16,7 @@ use lamp_grayscale::resin::Intensity;
 
 use crate::materials::{material, read_text};
 use crate::options::{Common, parse_light};
-use crate::plots::{self, Plot};
+use crate::plots::{self, Plot, drawn};
 use crate::stop::Stop;
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
 
@@ -143,8 +144,8 @@ impl Files {
         plot: &Plot,
         table: &str,
     ) -> Result<(), Stop> {
-        let plot = self.plot.as_deref().map(|path| plot.drawn(path).map(|bytes| (path, bytes)));
-        let plot = plot.transpose()?;
+        let draw = |path| drawn(slice::from_ref(plot), path).map(|bytes| (path, bytes));
+        let plot = self.plot.as_deref().map(draw).transpose()?;
         let material = self.output.as_deref().map(|output| -> Result<_, Stop> {
             let mut material = base.unwrap_or_else(|| self.new_material(output));
             if let Some(name) = &self.name {

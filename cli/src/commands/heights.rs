@@ -1,0 +1,178 @@
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lamp_adaptive::{AreaDeviation, Criterion, CuspHeight, Heights, Slab, uniform_heights};
+use lamp_stack::{Dpi, Length};
+
+use crate::exposure::{Exposure, ExposureOptions};
+use crate::heights::{Found, HeightOptions, significant};
+use crate::options::parse_thickness;
+use crate::plots::{self, Axis, Plot, Series, drawn};
+use crate::solid::{SolidOptions, at_part, name_of_all, open_models};
+use crate::stop::Stop;
+use crate::streams::{check_beside, print, write_file};
+
+/// Find how thick each layer of a part may be, and what that saves
+///
+/// Each layer is built as its section at the top, swept down; what that lacks of the part and has
+/// too much is bounded as `slice --adaptive` with the same options does. The layers are compared
+/// with uniform ones; no images are written.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp heights blade.stl
+  lamp heights tower.stl --min 0.001in --max 0.1in --step 0.001in --plot heights.svg
+  lamp heights blade.stl --cusp 10um --report heights.csv
+  lamp heights blade.stl --time-budget 10h --layer-overhead 20s --material lamp-suspension")]
+pub(crate) struct HeightsArgs {
+    /// The part: STL files, binary or ASCII, or - for standard input, as for `slice`
+    #[arg(value_name = "PART", required = true)]
+    parts: Vec<PathBuf>,
+
+    /// Write a table of the layers: for each its height and thickness, the volume lost and gained,
+    /// and its measure by every criterion
+    #[arg(long, value_name = "FILE.csv")]
+    report: Option<PathBuf>,
+
+    /// Plot the layers' thickness and deviation over z: a file that ends in .svg or .png
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+
+    /// The uniform layers to compare with; the first are plotted [default: the thickest]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, value_delimiter = ',')]
+    uniform: Vec<Length>,
+
+    /// Resolution of the images, which decides how far apart the rows are along which the part is
+    /// measured
+    #[arg(long, value_name = "DPI", default_value = "1500")]
+    dpi: Dpi,
+
+    #[command(flatten)]
+    solid: SolidOptions,
+
+    #[command(flatten)]
+    heights: HeightOptions,
+
+    #[command(flatten)]
+    exposure: ExposureOptions,
+}
+
+pub(crate) fn run(args: &HeightsArgs) -> Result<(), Stop> {
+    if let Some(plot) = &args.plot {
+        plots::check_name(plot)?;
+    }
+    for file in args.report.iter().chain(&args.plot) {
+        check_beside(file, Path::new("-"), args.parts.iter().chain(args.exposure.files()))?;
+    }
+    let exposure = args.exposure.exposure()?;
+    let model = open_models(&args.parts)?;
+    let body = args.solid.body(model).map_err(|error| at_part(error.into(), &args.parts))?;
+    let part = args.heights.part(body, args.dpi, args.solid.fill());
+    let found = args.heights.find(&part, exposure.as_ref());
+    let Found { bound, heights } = found.map_err(|stop| at_part(stop, &args.parts))?;
+    let thickest = [args.heights.max()];
+    let uniform = if args.uniform.is_empty() { &thickest[..] } else { &args.uniform };
+    let uniform: Vec<_> = uniform
+        .iter()
+        .map(|thickness| (format!("uniform {thickness}"), uniform_heights(&part, thickness.um())))
+        .collect();
+    if let Some(path) = &args.report {
+        write_file(path, |out| write_table(&heights, exposure.as_ref(), out))?;
+    }
+    let all: Vec<_> = std::iter::once((bound, heights)).chain(uniform).collect();
+    if let Some(path) = &args.plot {
+        let bytes = drawn(&plots(&name_of_all(&args.parts), &all[..2]), path)?;
+        write_file(path, |out| out.write_all(&bytes))?;
+    }
+    print(&summary(&all, exposure.as_ref()))
+}
+
+fn write_table(
+    heights: &Heights,
+    exposure: Option<&Exposure>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    writeln!(
+        out,
+        "layer,z_um,thickness_um,volume_mm3,lost_mm3,gained_mm3,deviation_percent,cusp_um,\
+         area_percent,exposure_ms"
+    )?;
+    for (layer, slab) in heights.slabs.iter().enumerate() {
+        let time = exposure.and_then(|e| e.time(Length::from_um(slab.thickness_um)).ok());
+        writeln!(
+            out,
+            "{layer},{},{},{:.6},{:.6},{:.6},{:.4},{:.3},{:.4},{}",
+            to_nm(slab.bottom_um),
+            to_nm(slab.thickness_um),
+            slab.volume_mm3,
+            slab.lost_mm3,
+            slab.gained_mm3,
+            100.0 * slab.deviation(),
+            CuspHeight.measure(slab),
+            100.0 * AreaDeviation.measure(slab),
+            time.map_or(String::new(), |time| time.ms().to_string()),
+        )?;
+    }
+    Ok(())
+}
+
+fn to_nm(um: f64) -> f64 {
+    (um * 1000.0).round() / 1000.0
+}
+
+/// A line for each choice of layers.
+fn summary(all: &[(String, Heights)], exposure: Option<&Exposure>) -> String {
+    let mut text = format!(
+        "{:<20}{:>8}{:>14}{:>14}{:>12}{:>14}{:>14}\n",
+        "", "layers", "lost (mm3)", "gained (mm3)", "deviation", "worst layer", "exposure (s)"
+    );
+    for (name, heights) in all {
+        let [lost, gained, volume] = heights.volumes_mm3();
+        let worst = heights.slabs.iter().map(Slab::deviation).fold(0.0, f64::max);
+        let time =
+            |slab: &Slab| Some(exposure?.time(Length::from_um(slab.thickness_um)).ok()?.ms());
+        let ms: Option<f64> = heights.slabs.iter().map(time).sum();
+        text += &format!(
+            "{name:<20}{:>8}{:>14}{:>14}{:>12}{:>14}{:>14}\n",
+            heights.slabs.len(),
+            significant(lost),
+            significant(gained),
+            format!("{}%", significant(100.0 * (lost + gained) / volume)),
+            format!("{}%", significant(100.0 * worst)),
+            ms.map_or("-".to_owned(), |ms| format!("{:.1}", ms / 1000.0)),
+        );
+    }
+    text
+}
+
+/// Thickness and deviation over z (002 figures 49 and 50).
+fn plots(part: &str, all: &[(String, Heights)]) -> [Plot; 2] {
+    let percent = |slab: &Slab| 100.0 * slab.deviation();
+    let thickness = |slab: &Slab| slab.thickness_um;
+    let z = |slab: &Slab| [slab.bottom_um, slab.top_um()].map(|um| um / 1000.0);
+    let slabs = &all[0].1.slabs;
+    let (first, last) = (z(&slabs[0])[0], z(&slabs[slabs.len() - 1])[1]);
+    let plot = |title: String, label: &str, value: &dyn Fn(&Slab) -> f64| {
+        let series = |(name, heights): &(String, Heights)| {
+            let stairs = heights.slabs.iter().filter(|slab| value(slab).is_finite());
+            let stairs = stairs.flat_map(|slab| z(slab).map(|z| (z, value(slab))));
+            Series {
+                name: name.clone(),
+                points: Vec::new(),
+                curve: stairs.collect(),
+                band: Vec::new(),
+            }
+        };
+        let series: Vec<_> = all.iter().map(series).collect();
+        let places = series.iter().flat_map(|series| &series.curve).map(|place| place.1);
+        let highest = places.fold(0.0, f64::max);
+        let axis = |label: &str, range| Axis { label: label.to_owned(), range, logarithmic: false };
+        let y = axis(label, 0.0..if highest > 0.0 { 1.25 * highest } else { 1.0 });
+        Plot { title, x: axis("z (mm)", first..last), y, series }
+    };
+    [
+        plot(format!("Layer thickness: {part}"), "thickness (µm)", &thickness),
+        plot(format!("Volume deviation: {part}"), "deviation (%)", &percent),
+    ]
+}

@@ -1,0 +1,124 @@
+//! How long layers are exposed.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_grayscale::calibrate::{ExposureTimes, Table};
+use lamp_grayscale::resin::{ExposureTime, Resin};
+use lamp_slicer::DepthLevels;
+use lamp_stack::Length;
+
+use crate::materials::{material, read_text};
+use crate::stop::Stop;
+use crate::streams::input_name;
+
+pub(crate) const EXPOSURE: &str = "Exposure";
+
+/// A table has a row for each thickness.
+const LARGEST_TABLE: u64 = 1 << 20;
+
+/// Options that say how long layers are exposed.
+#[derive(Args, Clone)]
+pub(crate) struct ExposureOptions {
+    /// The resin: a name of `lamp material list`, or a file. Pages then say how long they are
+    /// exposed
+    #[arg(long, value_name = "NAME|FILE", help_heading = EXPOSURE)]
+    material: Option<PathBuf>,
+
+    /// How deep full white cures, in layers: 1 cures just the layer, more binds it to the one
+    /// below
+    #[arg(long, value_name = "LAYERS", default_value = "1", value_parser = parse_overcure)]
+    #[arg(requires = "material", help_heading = EXPOSURE)]
+    overcure: f64,
+
+    /// How long layers of each thickness are exposed, instead of by a material: a table with the
+    /// columns thickness_um and exposure_ms. Between two thicknesses times go along a straight line
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "material", help_heading = EXPOSURE)]
+    exposure_table: Option<PathBuf>,
+}
+
+/// How long layers are exposed, by their thickness.
+pub(crate) struct Exposure {
+    name: String,
+    source: Source,
+}
+
+enum Source {
+    Resin { resin: Resin, overcure: f64 },
+    Table(ExposureTimes),
+}
+
+impl ExposureOptions {
+    /// The files that it reads.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.material.iter().chain(&self.exposure_table)
+    }
+
+    /// How layers are exposed, where a material or a table says.
+    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Stop> {
+        if let Some(path) = &self.exposure_table {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let times = read_times(path).with_context(|| input_name(path))?;
+            return Ok(Some(Exposure { name, source: Source::Table(times) }));
+        }
+        let Some(path) = &self.material else { return Ok(None) };
+        let material = material(path)?;
+        let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
+        let source = Source::Resin { resin, overcure: self.overcure };
+        Ok(Some(Exposure { name: material.name, source }))
+    }
+}
+
+fn read_times(path: &Path) -> anyhow::Result<ExposureTimes> {
+    let table = Table::parse(&read_text(path, LARGEST_TABLE, "a table of exposure times")?)?;
+    Ok(ExposureTimes::new(&table)?)
+}
+
+impl Exposure {
+    /// How long a layer is exposed, to the microsecond, as people read it.
+    pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, Stop> {
+        // Differences of heights miss the thickness that they stand for by rounding.
+        let thickness = Length::from_um((thickness.um() * 1000.0).round() / 1000.0);
+        let time = match &self.source {
+            Source::Resin { resin, overcure } => {
+                let time = resin.exposure_time(thickness, *overcure);
+                time.map_err(|error| self.failed(error.into()))?
+            }
+            Source::Table(times) => times.of(thickness).ok_or_else(|| {
+                let [least, most] = times.limits();
+                self.failed(anyhow!("the table goes from {least} to {most}, not to {thickness}"))
+            })?,
+        };
+        Ok(ExposureTime::from_ms((time.ms() * 1000.0).round() / 1000.0))
+    }
+
+    /// The gray level of each depth in layers of one thickness, where a resin says.
+    pub(crate) fn levels(&self, thickness: Length) -> Result<Option<DepthLevels>, Stop> {
+        let Source::Resin { resin, .. } = &self.source else { return Ok(None) };
+        let levels = resin.depth_levels(self.time(thickness)?);
+        Ok(Some(levels.map_err(|error| self.failed(error.into()))?))
+    }
+
+    fn failed(&self, error: anyhow::Error) -> Stop {
+        Stop::Failed(error).at(self.name.clone())
+    }
+
+    /// The options as the stack remembers them.
+    pub(crate) fn command_line(&self) -> String {
+        match &self.source {
+            Source::Resin { overcure, .. } => {
+                format!(" --material {} --overcure {overcure}", self.name)
+            }
+            Source::Table(_) => format!(" --exposure-table {}", self.name),
+        }
+    }
+}
+
+/// Parses how many layers deep white cures.
+fn parse_overcure(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(layers) if (0.1..=100.0).contains(&layers) => Ok(layers),
+        _ => Err(format!("`{text}` is not how deep white cures: write 1 for the layer, 1.5 or 2")),
+    }
+}

@@ -1,0 +1,276 @@
+//! How thick each layer is, as options say.
+
+use clap::{Args, ValueEnum};
+use lamp_adaptive::{
+    AreaDeviation, Criterion, CuspHeight, Heights, HeightsError, Machine, Part, Search,
+    VolumeDeviation,
+};
+use lamp_slicer::{Body, Fill};
+use lamp_stack::{Dpi, Length};
+
+use crate::exposure::Exposure;
+use crate::options::parse_thickness;
+use crate::stop::Stop;
+
+pub(crate) const HEADING: &str = "Adaptive layer heights";
+
+/// Rows so many pixels apart are enough: `docs/heights.md` has what that changes.
+const PIXELS_PER_ROW: f64 = 4.0;
+
+/// Options that say how thick each layer may be.
+#[derive(Args, Clone, Default)]
+pub(crate) struct HeightOptions {
+    /// The thinnest layer that the machine builds [default: 25um]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    min: Option<Length>,
+
+    /// The thickest [default: 100um]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    max: Option<Length>,
+
+    /// Layers are whole steps thick [default: 1um]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    step: Option<Length>,
+
+    /// How far a layer is off the part: by the volume it lacks and has too much, by the cusps at
+    /// its edge, or by how the section's area changes [default: volume, or cusp where --cusp is
+    /// given]
+    #[arg(long, value_enum, help_heading = HEADING)]
+    criterion: Option<CriterionArg>,
+
+    /// The most that a layer may be off, as a share of its volume (or, by --criterion area, of its
+    /// section): 2% or 0.02 [default: 2%]
+    #[arg(long, value_name = "SHARE", value_parser = parse_share, help_heading = HEADING)]
+    deviation: Option<f64>,
+
+    /// The highest cusp: how far a layer's edge may be off the surface, along its normal
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    #[arg(conflicts_with = "deviation")]
+    cusp: Option<Length>,
+
+    /// At most so many layers: the smallest bound that needs no more is found, to one percent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(conflicts_with_all = ["deviation", "cusp", "time_budget"], help_heading = HEADING)]
+    layers_budget: Option<u32>,
+
+    /// At most so long for all layers, as 8h, 90min or 1200s: their exposures, by --material or
+    /// --exposure-table, and --layer-overhead
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, help_heading = HEADING)]
+    #[arg(conflicts_with_all = ["deviation", "cusp"])]
+    time_budget: Option<f64>,
+
+    /// What each layer takes besides its exposure, as 30s: recoating, most of all
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, help_heading = HEADING)]
+    #[arg(requires = "time_budget")]
+    layer_overhead: Option<f64>,
+
+    /// End layers at flat faces, wherever the limits allow
+    #[arg(long, help_heading = HEADING)]
+    snap: bool,
+
+    /// How far apart the rows are along which the part is measured [default: four pixels]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    row_pitch: Option<Length>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum CriterionArg {
+    Volume,
+    Cusp,
+    Area,
+}
+
+/// The layers found, and the bound that they keep.
+pub(crate) struct Found {
+    pub(crate) bound: String,
+    pub(crate) heights: Heights,
+}
+
+impl HeightOptions {
+    /// Whether any of them was given.
+    pub(crate) fn are_given(&self) -> bool {
+        !self.command_line().is_empty()
+    }
+
+    pub(crate) fn max(&self) -> Length {
+        self.max.unwrap_or(Length::from_um(100.0))
+    }
+
+    fn min(&self) -> Length {
+        self.min.unwrap_or(Length::from_um(25.0))
+    }
+
+    /// The part as rows see it.
+    pub(crate) fn part(&self, body: Body, dpi: Dpi, fill: Fill) -> Part {
+        let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
+        Part::new(body, self.row_pitch.unwrap_or(pitch), fill)
+    }
+
+    fn criterion(&self) -> Result<CriterionArg, Stop> {
+        let default = if self.cusp.is_some() { CriterionArg::Cusp } else { CriterionArg::Volume };
+        let criterion = self.criterion.unwrap_or(default);
+        let has_budget = self.layers_budget.is_some() || self.time_budget.is_some();
+        match (criterion == CriterionArg::Cusp, self.cusp.is_some()) {
+            (false, true) => Err(Stop::usage("--cusp goes with --criterion cusp")),
+            (true, false) if self.deviation.is_some() || !has_budget => {
+                Err(Stop::usage("--criterion cusp takes its bound from --cusp, as --cusp 10um"))
+            }
+            _ => Ok(criterion),
+        }
+    }
+
+    /// Searches for the heights.
+    pub(crate) fn find(&self, part: &Part, exposure: Option<&Exposure>) -> Result<Found, Stop> {
+        let step = self.step.unwrap_or(Length::from_um(1.0));
+        let machine = Machine::new(self.min(), self.max(), step)
+            .map_err(|error| Stop::usage(error.to_string()))?;
+        let arg = self.criterion()?;
+        let criterion: &dyn Criterion = match arg {
+            CriterionArg::Volume => &VolumeDeviation,
+            CriterionArg::Cusp => &CuspHeight,
+            CriterionArg::Area => &AreaDeviation,
+        };
+        let search = Search { part, machine: &machine, criterion, snap: self.snap };
+        let failed = |error: HeightsError| Stop::Failed(error.into());
+        let (bound, heights) = if let Some(layers) = self.layers_budget {
+            search
+                .within_budget(|_| 1.0, layers.into())
+                .map_err(|error| over(error, "layers", 1.0))?
+        } else if let Some(seconds) = self.time_budget {
+            let cost = self.seconds_of_layers(exposure)?;
+            search.within_budget(cost, seconds).map_err(|error| over(error, "hours", 3600.0))?
+        } else {
+            let bound = self.cusp.map_or(self.deviation.unwrap_or(0.02), Length::um);
+            (bound, search.heights(bound).map_err(failed)?)
+        };
+        if let Some(exposure) = exposure {
+            for slab in &heights.slabs {
+                exposure.time(Length::from_um(slab.thickness_um))?;
+            }
+        }
+        let bound = match arg {
+            CriterionArg::Cusp => format!("cusp {}um", significant(bound)),
+            CriterionArg::Volume => format!("volume {}%", significant(bound * 100.0)),
+            CriterionArg::Area => format!("area {}%", significant(bound * 100.0)),
+        };
+        Ok(Found { bound, heights })
+    }
+
+    /// How many seconds a layer of so many micrometres takes.
+    fn seconds_of_layers<'a>(
+        &self,
+        exposure: Option<&'a Exposure>,
+    ) -> Result<impl Fn(f64) -> f64 + use<'a>, Stop> {
+        let exposure = exposure.ok_or_else(|| {
+            Stop::usage("--time-budget needs exposures: give --material or --exposure-table")
+        })?;
+        // What holds for the limits holds between them.
+        exposure.time(self.min())?;
+        exposure.time(self.max())?;
+        let overhead = self.layer_overhead.unwrap_or(0.0);
+        Ok(move |um: f64| {
+            let time = exposure.time(Length::from_um(um));
+            overhead + time.map_or(f64::INFINITY, |time| time.ms() / 1000.0)
+        })
+    }
+
+    /// The options that were given, as the stack remembers them.
+    pub(crate) fn command_line(&self) -> String {
+        let mut line = String::new();
+        let mut add = |name: &str, value: Option<String>| {
+            line += &value.map_or(String::new(), |value| format!(" --{name} {value}"));
+        };
+        let length = |length: Option<Length>| length.map(|length| length.to_string());
+        add("min", length(self.min));
+        add("max", length(self.max));
+        add("step", length(self.step));
+        let criterion = self.criterion.and_then(|criterion| criterion.to_possible_value());
+        add("criterion", criterion.map(|value| value.get_name().to_owned()));
+        add("deviation", self.deviation.map(|share| share.to_string()));
+        add("cusp", length(self.cusp));
+        add("layers-budget", self.layers_budget.map(|layers| layers.to_string()));
+        add("time-budget", self.time_budget.map(|seconds| format!("{seconds}s")));
+        add("layer-overhead", self.layer_overhead.map(|seconds| format!("{seconds}s")));
+        add("row-pitch", length(self.row_pitch));
+        if self.snap {
+            line += " --snap";
+        }
+        line
+    }
+}
+
+/// Says a budget that cannot be kept in its unit.
+fn over(error: HeightsError, unit: &str, per_unit: f64) -> Stop {
+    Stop::Failed(match error {
+        HeightsError::Budget { least, budget } => {
+            let [least, budget] = [least, budget].map(|number| significant(number / per_unit));
+            anyhow::anyhow!(
+                "the thickest layers take {least} {unit}, more than the budget of {budget}: allow more, or a \
+                 larger --max"
+            )
+        }
+        error => error.into(),
+    })
+}
+
+/// To three digits.
+pub(crate) fn significant(number: f64) -> String {
+    if number == 0.0 || !number.is_finite() {
+        return number.to_string();
+    }
+    let decimals = 2 - number.abs().log10().floor() as i32;
+    let power = 10.0_f64.powi(decimals);
+    format!("{:.*}", decimals.max(0) as usize, (number * power).round() / power)
+}
+
+/// Parses a share: `2%` or `0.02`.
+fn parse_share(text: &str) -> Result<f64, String> {
+    let (number, factor) = match text.trim().strip_suffix('%') {
+        Some(number) => (number.trim_end(), 0.01),
+        None => (text.trim(), 1.0),
+    };
+    match number.parse::<f64>() {
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number * factor),
+        _ => Err(format!("`{text}` is not a share: write 2% or 0.02")),
+    }
+}
+
+/// Parses a time in seconds: `8h`, `90min`, `30s`.
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let wrong = || format!("`{text}` is not a time: write 8h, 90min or 30s");
+    let split = text.find(|c: char| c.is_ascii_alphabetic()).ok_or_else(wrong)?;
+    let factor = match &text[split..] {
+        "h" => 3600.0,
+        "min" => 60.0,
+        "s" => 1.0,
+        "ms" => 0.001,
+        _ => return Err(wrong()),
+    };
+    match text[..split].trim().parse::<f64>() {
+        Ok(number) if (0.0..1e12).contains(&number) => Ok(number * factor),
+        _ => Err(wrong()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_and_times() {
+        assert_eq!(parse_share("2%"), Ok(0.02));
+        assert_eq!(parse_share("0.05"), Ok(0.05));
+        assert_eq!(parse_seconds("8h"), Ok(28_800.0));
+        assert_eq!(parse_seconds("1.5 min"), Ok(90.0));
+        for wrong in ["", "-1%", "nan", "2 percent", "8", "h", "-3s"] {
+            assert!(parse_share(wrong).is_err() || wrong == "8", "{wrong}");
+            assert!(parse_seconds(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_three_digits() {
+        let texts = [2.0, 0.012_345, 123_456.0, 9.999, 0.0].map(significant);
+        assert_eq!(texts, ["2.00", "0.0123", "123000", "10.00", "0"]);
+    }
+}

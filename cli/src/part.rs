@@ -1,0 +1,242 @@
+//! What decides the images of a part.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, ValueEnum};
+use lamp_grayscale::resin::ExposureTime;
+use lamp_slicer::{Frame, LayerHeights, Model, PlaneRule, SliceOptions, Slices};
+use lamp_stack::{Dpi, Layer, Length, Size};
+
+use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
+use crate::heights::{self, HeightOptions};
+use crate::options::parse_thickness;
+use crate::placement::parse_numbers;
+use crate::solid::{SolidOptions, value_name};
+use crate::stop::Stop;
+
+/// What decides the images.
+#[derive(Args, Clone)]
+pub(crate) struct PartOptions {
+    /// Resolution in dots per inch
+    #[arg(long, value_name = "DPI", default_value = "1500")]
+    dpi: Dpi,
+
+    /// Thickness of the layers, as 100um, 0.1mm, 4mil or 0.004in
+    #[arg(long, value_name = "LENGTH", default_value = "100um", value_parser = parse_thickness)]
+    #[arg(allow_hyphen_values = true, conflicts_with = "adaptive")]
+    thickness: Length,
+
+    /// Where in its layer a section is taken
+    #[arg(long, value_enum, default_value_t)]
+    plane: PlaneArg,
+
+    #[command(flatten)]
+    pub(crate) solid: SolidOptions,
+
+    /// Black pixels around the part's box
+    #[arg(long, value_name = "PIXELS", default_value_t = 1)]
+    margin: u32,
+
+    /// Top left corner of the image in part coordinates, in millimetres, instead of the part's
+    /// box; the image must hold the part, and leave its last column black
+    #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
+    #[arg(allow_hyphen_values = true)]
+    origin: Option<[f64; 2]>,
+
+    /// Size of the image, as 80x80mm or 4x4.5in; goes with --origin
+    #[arg(long, value_name = "WxH", requires = "origin")]
+    size: Option<Size>,
+
+    /// Make each layer as thick as the part's slopes allow, by the options below
+    #[arg(long, help_heading = heights::HEADING)]
+    adaptive: bool,
+
+    #[command(flatten)]
+    heights: HeightOptions,
+
+    #[command(flatten)]
+    exposure: ExposureOptions,
+
+    /// Write gray layers: each pixel as bright as it takes to cure the part below it, down to
+    /// where the part ends. White where it does not end within what white cures
+    #[arg(long, requires = "material", conflicts_with = "adaptive", help_heading = EXPOSURE)]
+    gray: bool,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum PlaneArg {
+    #[default]
+    Top,
+    Middle,
+    Bottom,
+}
+
+impl PartOptions {
+    pub(crate) fn for_slicing(&self) -> SliceOptions {
+        SliceOptions {
+            dpi: self.dpi,
+            thickness: self.thickness,
+            plane: match self.plane {
+                PlaneArg::Top => PlaneRule::Top,
+                PlaneArg::Middle => PlaneRule::Middle,
+                PlaneArg::Bottom => PlaneRule::Bottom,
+            },
+            units: self.solid.units(),
+            placement: self.solid.placement(),
+            fill: self.solid.fill(),
+            frame: self.frame(),
+            ..SliceOptions::default()
+        }
+    }
+
+    fn frame(&self) -> Frame {
+        match (self.origin, self.size) {
+            (Some(origin_mm), Some(size)) => {
+                let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
+                Frame::At { origin_mm, pixels: [side(size.width), side(size.height)] }
+            }
+            _ => Frame::Around { margin: self.margin },
+        }
+    }
+
+    /// The options of a command as a stack remembers it, where that is a slice
+    /// command.
+    pub(crate) fn of_command(command: &str) -> Option<Self> {
+        #[derive(Parser)]
+        struct Recorded {
+            #[command(flatten)]
+            options: PartOptions,
+        }
+        // The name of the part may hold blanks.
+        let rest = command.strip_prefix("slice")?;
+        let options = rest.find(" --").map_or("", |start| &rest[start..]);
+        let words = ["slice"].into_iter().chain(options.split_whitespace());
+        Recorded::try_parse_from(words).ok().map(|recorded| recorded.options)
+    }
+
+    /// The command as the stack remembers it: no paths, no option that leaves
+    /// the bytes alone.
+    fn command_line(&self, part: &str, exposure: Option<&Exposure>) -> String {
+        let layers = match self.adaptive {
+            true => format!("--adaptive{}", self.heights.command_line()),
+            false => format!("--thickness {}", self.thickness),
+        };
+        let mut line = format!(
+            "slice {part} --dpi {} {layers} --plane {}{}",
+            self.dpi,
+            value_name(&self.plane),
+            self.solid.command_line(),
+        );
+        if let Some(exposure) = exposure {
+            line += if self.gray { " --gray" } else { "" };
+            line += &exposure.command_line();
+        }
+        line += &match (self.origin, self.size) {
+            (Some([x, y]), Some(size)) => format!(" --origin {x},{y} --size {size}"),
+            _ => format!(" --margin {}", self.margin),
+        };
+        line
+    }
+
+    /// The layers of a part, the first naming this command; `part` is the
+    /// name of its file, or of several.
+    pub(crate) fn slices(
+        &self,
+        model: Model,
+        part: &str,
+        layers: Option<Range<u32>>,
+        memory: Option<u64>,
+        exposure: Option<Exposure>,
+    ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Stop> {
+        let levels = |exposure: &Exposure| exposure.levels(self.thickness);
+        let gray = exposure.as_ref().filter(|_| self.gray).map(levels).transpose()?.flatten();
+        let heights = self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref()));
+        let heights = heights.transpose()?;
+        let memory = table_memory(memory);
+        let options = SliceOptions { layers, heights, gray, memory, ..self.for_slicing() };
+        if let Some(exposure) = exposure.as_ref().filter(|_| !self.adaptive) {
+            exposure.time(self.thickness)?;
+        }
+        let slices = Slices::new(model, &options)?;
+        let command = self.command_line(part, exposure.as_ref());
+        let name_command = move |layer: &mut Layer| {
+            // All thicknesses were tried above.
+            let time = |exposure: &Exposure| {
+                exposure.time(Length::from_um(layer.info.thickness_um?)).ok().map(ExposureTime::ms)
+            };
+            layer.info.exposure_ms = exposure.as_ref().and_then(time);
+            if let Some(stack) = &mut layer.info.stack {
+                stack.commands.push(command.clone());
+            }
+        };
+        Ok((slices, name_command))
+    }
+
+    /// How thick each layer may be.
+    fn layer_heights(
+        &self,
+        model: &Model,
+        exposure: Option<&Exposure>,
+    ) -> Result<LayerHeights, Stop> {
+        let part = self.heights.part(self.solid.body(model.clone())?, self.dpi, self.solid.fill());
+        Ok(self.heights.find(&part, exposure)?.heights.layer_heights()?)
+    }
+
+    /// The files that the options read.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.exposure.files()
+    }
+
+    /// How the layers are exposed, if that is known.
+    ///
+    /// # Errors
+    /// Where options contradict each other, or the material cannot be read.
+    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Stop> {
+        self.check()?;
+        self.exposure.exposure()
+    }
+
+    /// Checks what the parser cannot.
+    fn check(&self) -> Result<(), Stop> {
+        let is_top = matches!(self.plane, PlaneArg::Top);
+        if self.gray && !is_top {
+            return Err(Stop::usage(
+                "--gray takes sections at the layers' tops: leave --plane away",
+            ));
+        }
+        if self.adaptive && !is_top {
+            return Err(Stop::usage(
+                "--adaptive takes sections at the layers' tops: leave --plane away",
+            ));
+        }
+        if self.heights.are_given() && !self.adaptive {
+            let given = self.heights.command_line();
+            let option = given.split_whitespace().next().unwrap_or_default();
+            return Err(Stop::usage(format!("{option} goes with --adaptive")));
+        }
+        Ok(())
+    }
+}
+
+/// How much the table of crossings may take of the memory allowed: its lists
+/// double as they grow, and the rest is for the images on their way. More
+/// than 64 MiB would not make it faster.
+fn table_memory(allowed: Option<u64>) -> u64 {
+    let allowed = allowed.unwrap_or_else(|| machine_memory() / 4);
+    (allowed / 4).min(64 << 20)
+}
+
+/// The machine's memory in bytes; 4 GiB where it does not say.
+fn machine_memory() -> u64 {
+    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let total = text.lines().find_map(|line| line.strip_prefix("MemTotal:"));
+    let kib = total.and_then(|rest| rest.trim().trim_end_matches(" kB").parse::<u64>().ok());
+    kib.map_or(4 << 30, |kib| kib * 1024)
+}
+
+/// Parses `X,Y` in millimetres.
+fn parse_origin(text: &str) -> Result<[f64; 2], String> {
+    parse_numbers(text.trim_end_matches("mm"))
+        .ok_or_else(|| format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2"))
+}
