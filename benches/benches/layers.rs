@@ -9,7 +9,7 @@ use fax::{Color, VecWriter, decoder, encoder};
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::{Method, dither_image};
 use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
-use lamp_slicer::{DepthLevels, Model, SliceOptions, Slices};
+use lamp_slicer::{DepthLevels, LayerLevels, Model, SliceOptions, Slices};
 use lamp_stack::{
     Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
 };
@@ -21,7 +21,7 @@ fn slices(facets: usize, gray: Option<DepthLevels>) -> impl Fn() -> Slices {
     let facets = build(Part::Blade, facets).expect("enough facets").facets;
     move || {
         let model = Model::from_facets("blade", facets.clone());
-        let gray = gray.clone();
+        let gray = gray.clone().map(LayerLevels::from);
         let options = SliceOptions { layers: Some(LAYERS), gray, ..SliceOptions::default() };
         Slices::new(model, &options).expect("the blade slices")
     }

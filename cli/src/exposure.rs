@@ -93,11 +93,15 @@ impl Exposure {
         Ok(ExposureTime::from_ms((time.ms() * 1000.0).round() / 1000.0))
     }
 
-    /// The gray level of each depth in layers of one thickness, where a resin says.
-    pub(crate) fn levels(&self, thickness: Length) -> Result<Option<DepthLevels>, Stop> {
-        let Source::Resin { resin, .. } = &self.source else { return Ok(None) };
-        let levels = resin.depth_levels(self.time(thickness)?);
-        Ok(Some(levels.map_err(|error| self.failed(error.into()))?))
+    /// The gray level of each depth in layers of one thickness.
+    ///
+    /// # Errors
+    /// Where the resin does not say them; a table of times never does.
+    pub(crate) fn levels(&self, thickness: Length) -> Result<DepthLevels, Stop> {
+        let Source::Resin { resin, .. } = &self.source else {
+            return Err(self.failed(anyhow!("gray levels follow from a material, not from times")));
+        };
+        resin.depth_levels(self.time(thickness)?).map_err(|error| self.failed(error.into()))
     }
 
     fn failed(&self, error: anyhow::Error) -> Stop {

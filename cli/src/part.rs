@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
 use lamp_grayscale::resin::ExposureTime;
-use lamp_slicer::{Frame, LayerHeights, Model, PlaneRule, SliceOptions, Slices};
+use lamp_slicer::{Frame, LayerHeights, LayerLevels, Model, PlaneRule, SliceOptions, Slices};
 use lamp_stack::{Dpi, Layer, Length, Size};
 
 use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
@@ -60,7 +60,7 @@ pub(crate) struct PartOptions {
 
     /// Write gray layers: each pixel as bright as it takes to cure the part below it, down to
     /// where the part ends. White where it does not end within what white cures
-    #[arg(long, requires = "material", conflicts_with = "adaptive", help_heading = EXPOSURE)]
+    #[arg(long, requires = "material", help_heading = EXPOSURE)]
     gray: bool,
 }
 
@@ -149,10 +149,14 @@ impl PartOptions {
         memory: Option<u64>,
         exposure: Option<Exposure>,
     ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Stop> {
-        let levels = |exposure: &Exposure| exposure.levels(self.thickness);
-        let gray = exposure.as_ref().filter(|_| self.gray).map(levels).transpose()?.flatten();
         let heights = self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref()));
         let heights = heights.transpose()?;
+        let shown = exposure.as_ref().filter(|_| self.gray);
+        let gray = shown.map(|exposure| match &heights {
+            Some(heights) => LayerLevels::by_thickness(heights, |um| exposure.levels(um)),
+            None => exposure.levels(self.thickness).map(LayerLevels::from),
+        });
+        let gray = gray.transpose()?;
         let memory = table_memory(memory);
         let options = SliceOptions { layers, heights, gray, memory, ..self.for_slicing() };
         if let Some(exposure) = exposure.as_ref().filter(|_| !self.adaptive) {

@@ -27,6 +27,7 @@ fn slices(mesh: &Mesh, overcure: f64, gray: bool) -> Slices {
     let time = resin.exposure_time(thickness, overcure).unwrap();
     let gray = gray.then(|| resin.depth_levels(time).unwrap());
     let dpi = Dpi::new(DPI).unwrap();
+    let gray = gray.map(Into::into);
     Slices::new(model(mesh), &SliceOptions { dpi, thickness, gray, ..SliceOptions::default() })
         .unwrap()
 }

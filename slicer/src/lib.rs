@@ -52,7 +52,7 @@ mod trace;
 pub use body::Body;
 pub use error::SliceError;
 pub use facet::{Facet, Units};
-pub use gray::DepthLevels;
+pub use gray::{DepthLevels, LayerLevels};
 pub use grid::PixelGrid;
 pub use model::Model;
 pub use placement::{Axis, PlacedFacet, Placement};

@@ -52,6 +52,12 @@ impl LayerHeights {
     pub fn boundaries_um(&self) -> &[f64] {
         &self.boundaries_um
     }
+
+    /// How thick each layer is, in micrometres, to the nanometre: differences of
+    /// heights miss what they stand for by rounding.
+    pub fn thicknesses_um(&self) -> impl Iterator<Item = f64> {
+        self.boundaries_um.windows(2).map(|pair| to_nanometres(pair[1] - pair[0]))
+    }
 }
 
 /// The planes at which a part is cut, one a layer, bottom first.

@@ -11,7 +11,7 @@ use crate::buckets::Buckets;
 use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
 use crate::facet::Units;
-use crate::gray::{DepthLevels, Span};
+use crate::gray::{LayerLevels, Span};
 use crate::grid::PixelGrid;
 use crate::model::Model;
 use crate::placement::{PlacedFacet, PlacedModel, Placement};
@@ -41,7 +41,7 @@ pub struct SliceOptions {
     /// The gray level of each depth below a layer's top, for layers that are
     /// gray where the part is less deep. They begin at their tops, so the plane
     /// must be [`PlaneRule::Top`].
-    pub gray: Option<DepthLevels>,
+    pub gray: Option<LayerLevels>,
     /// The layers wanted, all where `None`.
     pub layers: Option<Range<u32>>,
     /// The frame of the images.
@@ -118,7 +118,7 @@ pub struct Slices {
     grid: PixelGrid,
     planes: Planes,
     fill: Fill,
-    gray: Option<DepthLevels>,
+    gray: Option<LayerLevels>,
     wanted: Range<usize>,
     most_crossings: usize,
     /// Slabs of layers that fit by the estimate.
@@ -155,7 +155,7 @@ impl Slices {
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
         // A list that grows holds up to twice what it needs.
         let most_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
-        let reach_um = options.gray.as_ref().map_or(0.0, DepthLevels::reach_um);
+        let reach_um = options.gray.as_ref().map_or(0.0, LayerLevels::reach_um);
         let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
         if options.gray.is_some() {
             for (layer, crossings) in expected.iter_mut().enumerate() {
@@ -206,8 +206,8 @@ impl Slices {
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
-        let gray = self.gray.as_ref();
-        let reach_um = gray.map_or(0.0, DepthLevels::reach_um);
+        let gray = self.gray.as_ref().map(LayerLevels::reach_um);
+        let reach_um = gray.unwrap_or(0.0);
         loop {
             let layers = start..end;
             let most = self.most_crossings;
@@ -338,11 +338,11 @@ fn fill(
     table: &mut Table,
     facets: &impl Facets,
     cutter: Cutter<'_>,
-    gray: Option<&DepthLevels>,
+    reach_um: Option<f64>,
     layers: Range<usize>,
     most_crossings: usize,
 ) -> io::Result<Option<OpenRows>> {
-    if !table.fill(facets, cutter, gray, layers, most_crossings)? {
+    if !table.fill(facets, cutter, reach_um, layers, most_crossings)? {
         return Ok(None);
     }
     // A row takes as much memory as a crossing.

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place, Share};
 use crate::ends::{EndSum, RowSums};
-use crate::gray::{DepthLevels, Shader, Span};
+use crate::gray::{LayerLevels, Shader, Span};
 use crate::placement::PlacedFacet;
 
 /// What is inside.
@@ -96,7 +96,7 @@ impl Table {
         &mut self,
         facets: &impl Facets,
         cutter: Cutter<'_>,
-        gray: Option<&DepthLevels>,
+        reach_um: Option<f64>,
         layers: Range<usize>,
         most: usize,
     ) -> io::Result<bool> {
@@ -115,8 +115,7 @@ impl Table {
                 facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
                         unclaimed += cutter.cut(facet, &layers, shares);
-                        if let Some(gray) = gray {
-                            let reach_um = gray.reach_um();
+                        if let Some(reach_um) = reach_um {
                             unclaimed += cutter.look_down(facet, reach_um, &layers, shares);
                         }
                         budget.claim(&mut unclaimed);
@@ -161,12 +160,13 @@ impl Table {
         &self,
         layer: usize,
         cutter: Cutter<'_>,
-        gray: Option<&DepthLevels>,
+        gray: Option<&LayerLevels>,
     ) -> Section {
         let Cutter { grid, planes, fill } = cutter;
         let (width, height) = (grid.width, grid.height);
         let spans = self.spans(layer);
-        let mut shader = gray.map(|levels| Shader::new(levels, fill, planes, layer, &spans, width));
+        let mut shader = gray
+            .map(|levels| Shader::new(levels.of_layer(layer), fill, planes, layer, &spans, width));
         let crossings = || self.shares(layer).flat_map(|share| &share.crossings).copied();
         let (starts, mut places) = sort_by_row(crossings, height);
         let mut row_offsets = Vec::with_capacity(starts.len());

@@ -1,6 +1,10 @@
 //! The gray level of a depth.
 
+use std::collections::BTreeMap;
+
 use lamp_stack::Length;
+
+use crate::planes::LayerHeights;
 
 /// Which gray level cures how deep, for one time of exposure.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +41,58 @@ impl DepthLevels {
     }
 
     /// From this depth on, all is white.
-    pub(crate) fn reach_um(&self) -> f64 {
+    fn reach_um(&self) -> f64 {
         self.reach_um
+    }
+}
+
+/// The gray levels of every layer of a part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerLevels {
+    distinct: Vec<DepthLevels>,
+    /// Which of them each layer has; the first for layers beyond.
+    of_layer: Vec<u32>,
+}
+
+impl From<DepthLevels> for LayerLevels {
+    /// The same levels in all layers.
+    fn from(levels: DepthLevels) -> Self {
+        Self { distinct: vec![levels], of_layer: Vec::new() }
+    }
+}
+
+impl LayerLevels {
+    /// The levels of layers whose exposures differ: `of_thickness` says them for
+    /// each thickness, to the nanometre.
+    ///
+    /// # Errors
+    /// Those of `of_thickness`.
+    pub fn by_thickness<E>(
+        heights: &LayerHeights,
+        mut of_thickness: impl FnMut(Length) -> Result<DepthLevels, E>,
+    ) -> Result<Self, E> {
+        let mut distinct = Vec::new();
+        let mut known = BTreeMap::new();
+        let of_layer = heights.thicknesses_um().map(|um| -> Result<u32, E> {
+            // Thicknesses are above zero, and so in the order of their bits.
+            if let Some(&index) = known.get(&um.to_bits()) {
+                return Ok(index);
+            }
+            let index = distinct.len() as u32;
+            distinct.push(of_thickness(Length::from_um(um))?);
+            known.insert(um.to_bits(), index);
+            Ok(index)
+        });
+        let of_layer = of_layer.collect::<Result<_, E>>()?;
+        Ok(Self { distinct, of_layer })
+    }
+
+    pub(crate) fn of_layer(&self, layer: usize) -> &DepthLevels {
+        &self.distinct[self.of_layer.get(layer).map_or(0, |&index| index as usize)]
+    }
+
+    /// From this depth on, all is white in all layers.
+    pub(crate) fn reach_um(&self) -> f64 {
+        self.distinct.iter().map(DepthLevels::reach_um).fold(0.0, f64::max)
     }
 }

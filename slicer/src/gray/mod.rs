@@ -18,6 +18,6 @@ mod levels;
 mod shade;
 mod sheet;
 
-pub use levels::DepthLevels;
+pub use levels::{DepthLevels, LayerLevels};
 pub(crate) use shade::Shader;
 pub(crate) use sheet::{Sheet, Span};

@@ -4,7 +4,8 @@
 
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, torus, tower};
 use lamp_slicer::{
-    Axis, DepthLevels, Fill, PixelGrid, Placement, PlaneRule, SliceError, SliceOptions, Slices,
+    Axis, DepthLevels, Fill, LayerHeights, LayerLevels, PixelGrid, Placement, PlaneRule,
+    SliceError, SliceOptions, Slices,
 };
 use lamp_stack::{Image, Layer, Length, gray_runs};
 use proptest::prelude::*;
@@ -18,9 +19,17 @@ type Point = [f64; 3];
 
 /// Depths in proportion to the level, up to so many layers.
 fn gray(overcure: f64, options: &SliceOptions) -> SliceOptions {
-    let reach = Length::from_um(options.thickness.um() * overcure);
-    let levels = DepthLevels::new(reach, |gray| Length::from_um(reach.um() * gray));
+    let of = |thickness: Length| depth_levels(overcure, thickness);
+    let levels = match &options.heights {
+        Some(heights) => LayerLevels::by_thickness(heights, |um| Ok::<_, ()>(of(um))).unwrap(),
+        None => of(options.thickness).into(),
+    };
     SliceOptions { gray: Some(levels), ..options.clone() }
+}
+
+fn depth_levels(overcure: f64, thickness: Length) -> DepthLevels {
+    let reach = Length::from_um(thickness.um() * overcure);
+    DepthLevels::new(reach, |gray| Length::from_um(reach.um() * gray))
 }
 
 /// The levels of every pixel, row by row.
@@ -113,13 +122,18 @@ fn referee(mesh: &Mesh, options: &SliceOptions, overcure: f64) -> Result<usize, 
     let corners = || facets.as_flattened().iter().map(|corner| corner[2]);
     let low = corners().fold(f64::INFINITY, f64::min);
     let high = corners().fold(f64::NEG_INFINITY, f64::max);
-    let thickness = options.thickness.mm();
     let gray_options = gray(overcure, options);
     let grid = *Slices::new(model(mesh), options).unwrap().grid();
-    let of_um = |um: f64| gray_options.gray.as_ref().unwrap().level(Length::from_um(um));
     let layers = slice(mesh, &gray_options);
     let check = |layer: &Layer| -> Result<(usize, usize, usize), String> {
-        let top = low + f64::from(layer.info.index + 1) * thickness;
+        let index = layer.info.index as usize;
+        let [bottom, top] = match &options.heights {
+            Some(heights) => [0, 1].map(|k| heights.boundaries_um()[index + k] / 1000.0),
+            None => [0, 1].map(|k| low + (index + k) as f64 * options.thickness.mm()),
+        };
+        let thickness = top - bottom;
+        let levels_of_depths = depth_levels(overcure, Length::from_mm(thickness));
+        let of_um = |um: f64| levels_of_depths.level(Length::from_um(um));
         let plane = top.min(high);
         let end = (top - overcure * thickness).max(low + 1e-3);
         let (mut open, mut seen, mut grays) = (0, 0, 0);
@@ -180,6 +194,25 @@ fn parts_in_no_position_agree_in_every_pixel() {
             let grays = referee(&mesh, &SliceOptions { fill, ..options(300.0, 290.0) }, overcure);
             assert!(grays.as_ref().is_ok_and(|grays| *grays > 150), "{fill:?}: {grays:?}");
         }
+    }
+}
+
+/// Each layer has the levels of its own thickness, however deep those of others
+/// reach.
+#[test]
+fn layers_of_many_thicknesses_agree_in_every_pixel() {
+    let mesh = turned(&sphere(2.0, 600), [0.1, 0.2, 0.3]);
+    let low = mesh.bounds_mm().0[2] * 1000.0;
+    let mut boundaries = vec![low];
+    while boundaries[boundaries.len() - 1] < low + 3_950.0 {
+        let k = boundaries.len();
+        boundaries.push(boundaries[k - 1] + [290.0, 61.0, 120.5, 455.0][k % 4]);
+    }
+    let heights = Some(LayerHeights::new(boundaries).unwrap());
+    for overcure in [1.0, 2.3] {
+        let options = SliceOptions { heights: heights.clone(), ..options(300.0, 1.0) };
+        let grays = referee(&mesh, &options, overcure);
+        assert!(grays.as_ref().is_ok_and(|grays| *grays > 150), "{grays:?}");
     }
 }
 
