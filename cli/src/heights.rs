@@ -87,11 +87,6 @@ pub(crate) struct Found {
 }
 
 impl HeightOptions {
-    /// Whether any of them was given.
-    pub(crate) fn are_given(&self) -> bool {
-        !self.command_line().is_empty()
-    }
-
     pub(crate) fn max(&self) -> Length {
         self.max.unwrap_or(Length::from_um(100.0))
     }
@@ -104,6 +99,22 @@ impl HeightOptions {
     pub(crate) fn part(&self, body: Body, dpi: Dpi, fill: Fill) -> Part {
         let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
         Part::new(body, self.row_pitch.unwrap_or(pitch), fill)
+    }
+
+    /// What the machine builds.
+    fn machine(&self) -> Result<Machine, Stop> {
+        let step = self.step.unwrap_or(Length::from_um(1.0));
+        Machine::new(self.min(), self.max(), step).map_err(|error| Stop::usage(error.to_string()))
+    }
+
+    /// Checks, before the work, what the parser cannot.
+    pub(crate) fn check(&self, exposure: Option<&Exposure>) -> Result<(), Stop> {
+        self.machine()?;
+        self.criterion()?;
+        if self.time_budget.is_some() {
+            let _ = self.seconds_of_layers(exposure)?;
+        }
+        Ok(())
     }
 
     fn criterion(&self) -> Result<CriterionArg, Stop> {
@@ -121,9 +132,7 @@ impl HeightOptions {
 
     /// Searches for the heights.
     pub(crate) fn find(&self, part: &Part, exposure: Option<&Exposure>) -> Result<Found, Stop> {
-        let step = self.step.unwrap_or(Length::from_um(1.0));
-        let machine = Machine::new(self.min(), self.max(), step)
-            .map_err(|error| Stop::usage(error.to_string()))?;
+        let machine = self.machine()?;
         let arg = self.criterion()?;
         let criterion: &dyn Criterion = match arg {
             CriterionArg::Volume => &VolumeDeviation,
@@ -135,10 +144,11 @@ impl HeightOptions {
         let (bound, heights) = if let Some(layers) = self.layers_budget {
             search
                 .within_budget(|_| 1.0, layers.into())
-                .map_err(|error| over(error, "layers", 1.0))?
+                .map_err(|error| over(error, |layers| format!("{layers} layers")))?
         } else if let Some(seconds) = self.time_budget {
             let cost = self.seconds_of_layers(exposure)?;
-            search.within_budget(cost, seconds).map_err(|error| over(error, "hours", 3600.0))?
+            let hours = |seconds| format!("{} hours", significant(seconds / 3600.0));
+            search.within_budget(cost, seconds).map_err(|error| over(error, hours))?
         } else {
             let bound = self.cusp.map_or(self.deviation.unwrap_or(0.02), Length::um);
             (bound, search.heights(bound).map_err(failed)?)
@@ -199,13 +209,13 @@ impl HeightOptions {
     }
 }
 
-/// Says a budget that cannot be kept in its unit.
-fn over(error: HeightsError, unit: &str, per_unit: f64) -> Stop {
+/// Says a budget that cannot be kept in words.
+fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Stop {
     Stop::Failed(match error {
         HeightsError::Budget { least, budget } => {
-            let [least, budget] = [least, budget].map(|number| significant(number / per_unit));
+            let [least, budget] = [least, budget].map(say);
             anyhow::anyhow!(
-                "the thickest layers take {least} {unit}, more than the budget of {budget}: allow more, or a \
+                "even the thickest layers take {least}, more than the budget of {budget}: allow more, or a \
                  larger --max"
             )
         }

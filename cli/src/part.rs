@@ -197,29 +197,23 @@ impl PartOptions {
     /// # Errors
     /// Where options contradict each other, or the material cannot be read.
     pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Stop> {
-        self.check()?;
-        self.exposure.exposure()
-    }
-
-    /// Checks what the parser cannot.
-    fn check(&self) -> Result<(), Stop> {
-        let is_top = matches!(self.plane, PlaneArg::Top);
-        if self.gray && !is_top {
-            return Err(Stop::usage(
-                "--gray takes sections at the layers' tops: leave --plane away",
-            ));
+        let needs_top = [(self.gray, "--gray"), (self.adaptive, "--adaptive")];
+        if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)
+            && !matches!(self.plane, PlaneArg::Top)
+        {
+            let why = format!("{option} takes sections at the layers' tops: leave --plane away");
+            return Err(Stop::usage(why));
         }
-        if self.adaptive && !is_top {
-            return Err(Stop::usage(
-                "--adaptive takes sections at the layers' tops: leave --plane away",
-            ));
-        }
-        if self.heights.are_given() && !self.adaptive {
-            let given = self.heights.command_line();
-            let option = given.split_whitespace().next().unwrap_or_default();
+        if !self.adaptive
+            && let Some(option) = self.heights.command_line().split_whitespace().next()
+        {
             return Err(Stop::usage(format!("{option} goes with --adaptive")));
         }
-        Ok(())
+        let exposure = self.exposure.exposure()?;
+        if self.adaptive {
+            self.heights.check(exposure.as_ref())?;
+        }
+        Ok(exposure)
     }
 }
 

@@ -66,6 +66,7 @@ pub(crate) fn run(args: &HeightsArgs) -> Result<(), Stop> {
         check_beside(file, Path::new("-"), args.parts.iter().chain(args.exposure.files()))?;
     }
     let exposure = args.exposure.exposure()?;
+    args.heights.check(exposure.as_ref())?;
     let model = open_models(&args.parts)?;
     let body = args.solid.body(model).map_err(|error| at_part(error.into(), &args.parts))?;
     let part = args.heights.part(body, args.dpi, args.solid.fill());

@@ -45,6 +45,30 @@ struct Totals {
     stray_rows: u64,
     stray_layers: u64,
     one_size: bool,
+    thickness_um: Reach,
+    exposure_ms: Reach,
+}
+
+/// From the least to the greatest of the numbers that pages state.
+#[derive(Default)]
+struct Reach {
+    ends: Option<[f64; 2]>,
+    sum: f64,
+}
+
+impl Reach {
+    fn add(&mut self, number: Option<f64>) {
+        let Some(number) = number else { return };
+        let [least, greatest] = self.ends.unwrap_or([number; 2]);
+        self.ends = Some([least.min(number), greatest.max(number)]);
+        self.sum += number;
+    }
+
+    fn text(&self, unit: &str) -> Option<String> {
+        let [least, greatest] = self.ends?;
+        let one = least == greatest;
+        Some(if one { format!("{least} {unit}") } else { format!("{least} to {greatest} {unit}") })
+    }
 }
 
 impl Totals {
@@ -60,6 +84,8 @@ impl Totals {
             stray_rows: 0,
             stray_layers: 0,
             one_size: true,
+            thickness_um: Reach::default(),
+            exposure_ms: Reach::default(),
         }
     }
 
@@ -75,6 +101,8 @@ impl Totals {
         self.stray_layers += u64::from(!layer.info.stray_rows.is_empty());
         let (first, image) = (&self.first.image, &layer.image);
         self.one_size &= first.width() == image.width() && first.height() == image.height();
+        self.thickness_um.add(layer.info.thickness_um);
+        self.exposure_ms.add(layer.info.exposure_ms);
         self.last.info = layer.info.clone();
     }
 
@@ -103,9 +131,10 @@ impl Totals {
         if let (Some(bottom), Some(top)) = (info.z(), self.top_mm()) {
             lines.push(("z", format!("{:.3} to {top:.3} mm", bottom.mm())));
         }
-        if let Some(ms) = info.exposure_ms {
-            let others = if self.last.info.exposure_ms == Some(ms) { "" } else { " at first" };
-            lines.push(("exposure", format!("{ms} ms{others}")));
+        lines.extend(self.thickness_um.text("um").map(|text| ("thickness", text)));
+        if let Some(text) = self.exposure_ms.text("ms") {
+            let seconds = self.exposure_ms.sum / 1000.0;
+            lines.push(("exposure", format!("{text}, {seconds:.1} s in all")));
         }
         lines.push(("runs", format!("{} transitions", self.changes)));
         let names: Vec<_> = self.compressions.iter().map(|each| compression_name(*each)).collect();

@@ -1,0 +1,200 @@
+//! Layers of adaptive heights, by the commands.
+
+use lamp_fixtures::{Mesh, Part, cone};
+use lamp_stack::{Image, Layer};
+use lamp_tests::{Scratch, masks};
+
+/// Layers of 100 um to 2.5 mm.
+const LIMITS: &str = "--min 100um --max 2.5mm --step 10um";
+
+fn with_tower() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch.write("times.csv", b"thickness_um,exposure_ms\n100,200\n500,1000\n2500,9000\n");
+    scratch
+}
+
+fn heights_of(layers: &[Layer]) -> Vec<[f64; 2]> {
+    layers.iter().map(|l| [l.info.z_um.unwrap(), l.info.thickness_um.unwrap()]).collect()
+}
+
+/// The rows of a report, by column.
+fn report(scratch: &Scratch, name: &str) -> Vec<Vec<f64>> {
+    let text = String::from_utf8(scratch.bytes(name)).unwrap();
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next().unwrap(),
+        "layer,z_um,thickness_um,volume_mm3,lost_mm3,gained_mm3,deviation_percent,cusp_um,\
+         area_percent,exposure_ms"
+    );
+    let number = |cell: &str| if cell.is_empty() { f64::NAN } else { cell.parse().unwrap() };
+    lines.map(|line| line.split(',').map(number).collect()).collect()
+}
+
+#[test]
+fn a_stack_has_the_layers_of_the_report() {
+    let scratch = with_tower();
+    let options = format!("{LIMITS} --deviation 2% --exposure-table times.csv");
+    scratch
+        .run(&format!("slice tower.stl --dpi 200 --adaptive {options} -o tower.tif"))
+        .succeeds_quietly();
+    let line = format!(
+        "lamp heights tower.stl --dpi 200 {options} --report heights.csv --plot heights.svg"
+    );
+    let said = String::from_utf8(scratch.run(&line).succeeds().stdout).unwrap();
+    let layers = scratch.layers("tower.tif");
+    let rows = report(&scratch, "heights.csv");
+    assert_eq!(rows.len(), layers.len());
+    assert!(said.contains("volume 2.00%") && said.contains("uniform 2.5mm"), "{said}");
+    assert!(said.contains(&format!("{:>8}", layers.len())), "{said}");
+    let mut top = 0.0;
+    for (layer, row) in layers.iter().zip(&rows) {
+        let info = &layer.info;
+        let (z, thickness) = (info.z_um.unwrap(), info.thickness_um.unwrap());
+        assert_eq!([row[0], row[1], row[2]], [f64::from(info.index), z, thickness]);
+        assert_eq!(info.exposure_ms, Some(row[9]));
+        assert!((z - top).abs() < 1e-9 && thickness % 10.0 == 0.0, "{z} {thickness}");
+        assert!((100.0..=2500.0).contains(&thickness));
+        let expected = if thickness > 500.0 { 4.0 * thickness - 1000.0 } else { 2.0 * thickness };
+        assert!((row[9] - expected).abs() < 2e-3, "{row:?}");
+        assert!(row[6] <= 2.0 || thickness == 100.0, "{row:?}");
+        top = z + thickness;
+    }
+    assert_eq!(top, 76_200.0);
+    let thick = rows.iter().filter(|row| row[2] == 2500.0).count();
+    assert!(thick >= 7 && rows.len() > 100, "{thick} of {}", rows.len());
+    let plot = String::from_utf8(scratch.bytes("heights.svg")).unwrap();
+    for text in ["Layer thickness", "Volume deviation", "volume 2.00%", "uniform 2.5mm", "z (mm)"] {
+        assert!(plot.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn every_stage_keeps_what_layers_say() {
+    let scratch = with_tower();
+    let slice = format!(
+        "slice tower.stl --dpi 200 --adaptive {LIMITS} --deviation 5% --material lamp-suspension"
+    );
+    scratch.run(&format!("{slice} -o plain.tif")).succeeds_quietly();
+    let stages = "fix -q | lamp compensate --uniform 127um -q | dither -q | tile -q > build.tif";
+    scratch.run(&format!("{slice} | {stages}")).succeeds_quietly();
+    let (plain, build) = (scratch.layers("plain.tif"), scratch.layers("build.tif"));
+    assert_eq!(heights_of(&build), heights_of(&plain));
+    for (plain, build) in plain.iter().zip(&build) {
+        assert_eq!(build.info.exposure_ms, plain.info.exposure_ms);
+        // 137.4 mJ/cm2 exp(t / 215.2 um) at 1.6 W/cm2.
+        let ms = 137.4 / 1.6 * (plain.info.thickness_um.unwrap() / 215.2).exp();
+        assert!((plain.info.exposure_ms.unwrap() - ms).abs() < 1e-3 * ms, "{ms}");
+    }
+    // The command on the first page makes the stack again.
+    let command = &plain[0].info.stack.as_ref().unwrap().commands[0];
+    let again = scratch.run(command).succeeds_quietly().stdout;
+    assert!(again == scratch.bytes("plain.tif"));
+    let said = scratch.run("lamp info build.tif").succeeds().stdout;
+    let said = String::from_utf8(said).unwrap();
+    assert!(said.contains("thickness:") && said.contains(" to 2500 um"), "{said}");
+    assert!(said.contains(" s in all"), "{said}");
+}
+
+#[test]
+fn threads_memory_and_the_order_of_facets_change_no_byte() {
+    let scratch = with_tower();
+    let slice = format!("slice tower.stl --dpi 100 --adaptive {LIMITS} --deviation 3%");
+    scratch.run(&format!("{slice} -o a.tif")).succeeds_quietly();
+    for options in ["--threads 1", "--threads 3 --memory 16MB"] {
+        scratch.run(&format!("{slice} {options} -o b.tif")).succeeds_quietly();
+        assert!(scratch.bytes("a.tif") == scratch.bytes("b.tif"), "{options}");
+    }
+    // A range is the same layers.
+    scratch.run(&format!("{slice} --layers 5..9 -o range.tif")).succeeds_quietly();
+    let (all, range) = (scratch.layers("a.tif"), scratch.layers("range.tif"));
+    assert_eq!(masks(&all)[5..9], masks(&range));
+    assert_eq!(heights_of(&all)[5..9], heights_of(&range));
+}
+
+/// Each layer's gray levels and exposure are those of its own thickness, and cure
+/// no deeper than the part.
+#[test]
+fn gray_layers_have_the_levels_of_their_thickness() {
+    let scratch = with_tower();
+    let gray = "--gray --material lamp-suspension";
+    let slice = "slice tower.stl --dpi 200 --adaptive --min 100um --max 600um --step 10um";
+    scratch.run(&format!("{slice} --deviation 3% {gray} -o gray.tif")).succeeds_quietly();
+    let layers = scratch.layers("gray.tif");
+    assert!(layers.iter().filter(|layer| matches!(layer.image, Image::Gray(_))).count() > 20);
+    let line =
+        "lamp cure gray.tif --material lamp-suspension --section y=0mm --part tower.stl -o x.png";
+    let said = String::from_utf8(scratch.run(line).succeeds().stdout).unwrap();
+    let outside = |name: &str| -> f64 {
+        let line = said.lines().find(|line| line.starts_with(name)).expect(&said);
+        line.split_whitespace().nth(2).unwrap().parse().unwrap()
+    };
+    assert!(outside("gray") < 0.05 * outside("white"), "{said}");
+}
+
+/// A plate of 1.03 mm with a narrower one on it.
+fn steps() -> Mesh {
+    let plate = |radius: f64, low: f64, high: f64| {
+        cone(radius, radius, high - low, 400).map(|[x, y, z]| [x, y, z + low])
+    };
+    let facets = [plate(8.0, 0.0, 1.03), plate(3.0, 1.03, 2.0)];
+    Mesh { facets: facets.into_iter().flat_map(|mesh| mesh.facets).collect() }
+}
+
+#[test]
+fn layers_snap_to_flat_faces() {
+    let scratch = Scratch::new();
+    scratch.mesh("steps.stl", &steps());
+    let slice = "slice steps.stl --dpi 300 --adaptive --deviation 90% --fill nonzero";
+    let boundary = |options: &str| {
+        scratch.run(&format!("{slice} {options} -o steps.tif")).succeeds_quietly();
+        let layers = scratch.layers("steps.tif");
+        heights_of(&layers).iter().any(|[z, _]| (1029.0..=1030.0).contains(z))
+    };
+    assert!(boundary("--snap") && !boundary(""));
+}
+
+#[test]
+fn budgets_are_kept() {
+    let scratch = with_tower();
+    let slice = format!("slice tower.stl --dpi 100 --adaptive {LIMITS}");
+    scratch.run(&format!("{slice} --layers-budget 120 -o few.tif")).succeeds_quietly();
+    let count = scratch.layers("few.tif").len();
+    assert!((110..=120).contains(&count), "{count}");
+    let time = "--time-budget 1h --layer-overhead 30s --exposure-table times.csv";
+    scratch.run(&format!("{slice} {time} -o quick.tif")).succeeds_quietly();
+    let layers = scratch.layers("quick.tif");
+    let exposures = layers.iter().map(|layer| layer.info.exposure_ms.unwrap() / 1000.0);
+    let seconds = exposures.sum::<f64>() + 30.0 * layers.len() as f64;
+    assert!((3400.0..=3600.0).contains(&seconds), "{seconds}");
+}
+
+#[test]
+fn what_cannot_be_is_said() {
+    let scratch = with_tower();
+    let usage = |line: &str, word: &str| {
+        let ran = scratch.run(line);
+        assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+        assert!(ran.stderr.contains(word) && !ran.stderr.contains("tower.stl:"), "{ran:?}");
+    };
+    usage("slice tower.stl --deviation 2%", "--deviation goes with --adaptive");
+    usage("slice tower.stl --adaptive --plane middle", "leave --plane away");
+    usage("slice tower.stl --adaptive --thickness 50um", "cannot be used with");
+    usage("slice tower.stl --adaptive --min 50um --max 25um", "between 50 and 25 um thick");
+    usage("slice tower.stl --adaptive --cusp 9um --criterion volume", "--criterion cusp");
+    usage("lamp heights tower.stl --criterion cusp", "takes its bound from --cusp");
+    usage("lamp heights tower.stl --time-budget 1h", "give --material or --exposure-table");
+    usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg or .png");
+    scratch
+        .run("lamp heights tower.stl --layers-budget 9")
+        .is_refused_with(&["take 762 layers, more than the budget of 9 layers"]);
+    scratch
+        .run("lamp heights tower.stl --exposure-table times.csv")
+        .is_refused_with(&["times.csv: the table goes from 100um to 2.5mm"]);
+    scratch.write("bad.csv", b"thickness_um,exposure_ms\n100,soon\n");
+    scratch
+        .run("lamp heights tower.stl --exposure-table bad.csv")
+        .is_refused_with(&["bad.csv", "line 2", "soon"]);
+    let ran = scratch.run("slice tower.stl --adaptive --exposure-table times.csv -o times.csv");
+    assert!(ran.stderr.contains("times.csv: that is the input"), "{ran:?}");
+}
