@@ -140,18 +140,16 @@ impl Cuts {
         // Along the line from start to end, as the facet faces outwards, the part
         // is on the left, where z is up and x to the right.
         let (start, end) = if turned { (short, long) } else { (long, short) };
-        let at = |z: f64| {
-            let share = (z - low[1]) / (high[1] - low[1]);
-            [low[0] + (high[0] - low[0]) * share, z]
-        };
-        let [from_bottom, to_top] = [at(bottom), at(top)];
-        if low[1] <= bottom {
+        let [from, to] = [low, high];
+        let per_um = (to[0] - from[0]) / (to[1] - from[1]);
+        let at = |z: f64| [from[0] + per_um * (z - from[1]), z];
+        if from[1] <= bottom {
+            low = at(bottom);
             let winding = if start[1] > end[1] { 1 } else { -1 };
-            self.toggles.push(Toggle { row, x: from_bottom[0], winding });
-            low = from_bottom;
+            self.toggles.push(Toggle { row, x: low[0], winding });
         }
-        if high[1] > top {
-            high = to_top;
+        if to[1] > top {
+            high = at(top);
         }
         if low[0] != high[0] {
             let (left, right) = if low[0] < high[0] { (low, high) } else { (high, low) };

@@ -1,15 +1,19 @@
 //! Slicing, encoding and decoding of blade-mould layers, beside the `fax`
 //! crate on the same pixels; throughput counts transitions. Dithering of a
-//! page of 900 megapixels; throughput counts gray pixels.
+//! page of 900 megapixels; throughput counts gray pixels. What layers of 25 to 100 um
+//! lack and have too much; throughput counts layers' bottoms.
 
 use std::io::Cursor;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use fax::{Color, VecWriter, decoder, encoder};
+use lamp_adaptive::Part as AdaptivePart;
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::{Method, dither_image};
 use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
-use lamp_slicer::{DepthLevels, LayerLevels, Model, SliceOptions, Slices};
+use lamp_slicer::{
+    Body, DepthLevels, Fill, LayerLevels, Model, Placement, SliceOptions, Slices, Units,
+};
 use lamp_stack::{
     Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
 };
@@ -117,6 +121,28 @@ fn page(runs: u32, length: u32) -> GrayMask {
     page
 }
 
+fn heights(criterion: &mut Criterion) {
+    let facets = build(Part::Blade, 750_000).expect("enough facets").facets;
+    let model = Model::from_facets("blade", facets);
+    let body = Body::new(model, &Placement::default(), Units::Millimetres).expect("it is finite");
+    let part = AdaptivePart::new(body, Length::from_um(68.0), Fill::EvenOdd);
+    let mut group = criterion.benchmark_group("heights");
+    group.throughput(Throughput::Elements(LAYERS.len() as u64));
+    for steps in [1, 76] {
+        group.bench_function(format!("{steps} tops"), |b| {
+            b.iter(|| {
+                for layer in LAYERS {
+                    let bottom_um = f64::from(layer) * 100.0;
+                    let tops: Vec<f64> =
+                        (0..steps).map(|step| bottom_um + 100.0 - f64::from(step)).rev().collect();
+                    std::hint::black_box(part.slabs(bottom_um, &tops));
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
 fn dither(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("dither");
     group.sample_size(10);
@@ -221,5 +247,5 @@ fn tiff_file(mask: &Mask) -> Vec<u8> {
     file
 }
 
-criterion_group!(benches, layers, dither, compensation);
+criterion_group!(benches, layers, heights, dither, compensation);
 criterion_main!(benches);
