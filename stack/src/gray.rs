@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::mask::Mask;
+
 /// An 8-bit image, kept as the places where each row changes its level.
 /// 0 is black, 255 full exposure; pixels lie as in a [`Mask`](crate::Mask).
 ///
@@ -119,6 +121,23 @@ impl GrayMask {
     /// The number of changes in all rows: what the image costs.
     pub fn change_count(&self) -> usize {
         self.changes.len()
+    }
+}
+
+/// A mask as levels 0 and 255.
+impl From<&Mask> for GrayMask {
+    fn from(mask: &Mask) -> Self {
+        let mut gray = Self::new(mask.width());
+        let mut changes = Vec::new();
+        for row in mask.rows() {
+            changes.clear();
+            let levels = [255, 0].into_iter().cycle();
+            changes.extend(
+                row.iter().zip(levels).map(|(&column, level)| LevelChange { column, level }),
+            );
+            gray.push_row(&changes).expect("transitions increase within the mask");
+        }
+        gray
     }
 }
 

@@ -23,7 +23,9 @@
 //! # }
 //! ```
 
+mod combine;
 mod error;
+mod frame;
 pub mod g4;
 mod gray;
 mod input;
@@ -42,8 +44,11 @@ mod temporary;
 #[cfg(test)]
 mod testing;
 mod tiff;
+mod turn;
 
+pub use combine::{Op, combine_levels, combine_rows};
 pub use error::StackError;
+pub use frame::{Frame, place_row};
 pub use gray::{GrayMask, GrayMaskError, LevelChange, gray_runs};
 pub use input::Pages;
 pub use join::{JoinError, join};
@@ -56,3 +61,4 @@ pub use png_write::{png_of_layer, write_gray_png, write_png_folder, write_rgb_pn
 pub use split::{Cuts, SplitError, write_split};
 pub use temporary::{FileBeside, FolderBeside, remove_temporaries};
 pub use tiff::{Compression, EncodedPage, Format, Page, PageReader, PageWriter};
+pub use turn::Turn;

@@ -1,50 +1,26 @@
 //! Rows out of rows, pixel by pixel, on their transitions.
 
-use lamp_stack::white_in_row;
-
-/// Makes `out` the row whose every pixel is what `colour` makes of the pixels
-/// of `rows` there. `colour` must leave black what is black in all.
-pub(super) fn combine<const N: usize>(
-    mut rows: [&[u32]; N],
-    colour: impl Fn([bool; N]) -> bool,
-    out: &mut Vec<u32>,
-) {
-    out.clear();
-    let mut colours = [false; N];
-    let mut white = false;
-    while let Some(column) = rows.iter().filter_map(|row| row.first().copied()).min() {
-        for (row, colour) in rows.iter_mut().zip(&mut colours) {
-            if row.first() == Some(&column) {
-                *row = &row[1..];
-                *colour = !*colour;
-            }
-        }
-        if white != colour(colours) {
-            white = !white;
-            out.push(column);
-        }
-    }
-}
+use lamp_stack::{Op, combine_rows, white_in_row};
 
 /// The row whose every pixel has the colour that at least two of three rows
 /// have there.
 pub(super) fn majority(rows: [&[u32]; 3]) -> Vec<u32> {
     let mut out = Vec::new();
-    combine(rows, |[a, b, c]| a & b | b & c | a & c, &mut out);
+    combine_rows(rows, |[a, b, c]| a & b | b & c | a & c, &mut out);
     out
 }
 
 /// The row that is white where two rows differ.
 pub(super) fn difference(a: &[u32], b: &[u32]) -> Vec<u32> {
     let mut out = Vec::new();
-    combine([a, b], |[a, b]| a != b, &mut out);
+    Op::Xor.rows(a, b, &mut out);
     out
 }
 
 /// How many pixels are white in both of two rows.
 pub(super) fn white_in_both(a: &[u32], b: &[u32], width: u32) -> u64 {
     let mut out = Vec::new();
-    combine([a, b], |[a, b]| a && b, &mut out);
+    Op::Intersect.rows(a, b, &mut out);
     white_in_row(&out, width)
 }
 

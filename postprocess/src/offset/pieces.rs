@@ -77,7 +77,7 @@ pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
         return gray;
     }
     let kept = pieces.filtered(gray.height(), stays).mask(gray.width());
-    levels::lower(&gray, &levels::gray(&kept))
+    levels::lower(&gray, &GrayMask::from(&kept))
 }
 
 /// The runs of a shape, by the pieces that they belong to.

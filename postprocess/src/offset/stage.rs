@@ -1,6 +1,6 @@
 //! Compensation as a stage.
 
-use lamp_stack::{Dpi, Image, Layer, Length, Mask, map_in_order};
+use lamp_stack::{Dpi, GrayMask, Image, Layer, Length, Mask, map_in_order};
 use serde_json::{Value, json};
 use thiserror::Error;
 
@@ -264,7 +264,7 @@ fn move_edges(
         Image::Gray(gray) => {
             let outline = shrunk(&levels::at_least(gray, 1));
             let outline = if options.one_bit {
-                levels::gray(&levels::at_least(&outline, 128))
+                GrayMask::from(&levels::at_least(&outline, 128))
             } else {
                 outline
             };
