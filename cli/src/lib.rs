@@ -10,6 +10,7 @@ mod exposure;
 mod findings;
 mod heights;
 mod lines;
+mod machines;
 mod materials;
 mod options;
 mod part;

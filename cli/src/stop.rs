@@ -4,7 +4,8 @@ use std::fmt;
 use std::io;
 
 use lamp_grayscale::DitherError;
-use lamp_postprocess::{CompensateError, TileError};
+use lamp_postprocess::machine::MachineLimit;
+use lamp_postprocess::{CompensateError, LayoutError, TileError};
 use lamp_slicer::SliceError;
 use lamp_stack::{JoinError, SplitError, StackError};
 
@@ -91,6 +92,18 @@ impl From<DitherError> for Stop {
 
 impl From<TileError> for Stop {
     fn from(error: TileError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<LayoutError> for Stop {
+    fn from(error: LayoutError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<MachineLimit> for Stop {
+    fn from(error: MachineLimit) -> Self {
         Self::Failed(error.into())
     }
 }

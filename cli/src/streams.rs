@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, IsTerminal, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
@@ -33,17 +34,35 @@ pub(crate) fn print(text: &str) -> Result<(), Stop> {
 
 /// Opens a stack's pages.
 pub(crate) fn open_pages(path: &Path) -> Result<Pages, Stop> {
-    let pages = if !is_stream(path) {
+    let pages = if is_stream(path) {
+        refuse_terminal()?;
+        widen_pipe(&io::stdin());
+        Pages::from_stream(io::stdin())
+    } else {
         Pages::open(path)
-    } else if io::stdin().is_terminal() {
+    };
+    pages.map_err(|error| failed_at(input_name(path), error))
+}
+
+fn refuse_terminal() -> Result<(), Stop> {
+    if io::stdin().is_terminal() {
         return Err(Stop::usage(
             "no stack to read: name a file, or pipe one in (--help shows how)",
         ));
-    } else {
-        widen_pipe(&io::stdin());
-        Pages::from_stream(io::stdin())
+    }
+    Ok(())
+}
+
+/// Keeps standard input in a temporary file without a name, to be read twice.
+pub(crate) fn spool_stdin() -> Result<File, Stop> {
+    refuse_terminal()?;
+    widen_pipe(&io::stdin());
+    let spool = || -> io::Result<File> {
+        let mut file = tempfile::tempfile()?;
+        io::copy(&mut io::stdin().lock(), &mut file)?;
+        Ok(file)
     };
-    pages.map_err(|error| failed_at(input_name(path), error))
+    Ok(spool().context("standard input, which is kept in a temporary file")?)
 }
 
 /// A failure to read, and where.
@@ -80,18 +99,34 @@ pub(crate) fn read_layers(
     input: &Input,
     report: &Report,
 ) -> Result<impl Iterator<Item = Result<Layer, Stop>> + use<>, Stop> {
-    let name = input_name(&input.stack);
     let report = report.clone();
+    let name = input_name(&input.stack);
     let pages = read_pages(input)?.inspect(move |page| {
         if let Ok((_, Some(StackInfo { layers: Some(layers), .. }))) = page {
             report.expect((*layers).into());
         }
     });
-    Ok(map_in_order(pages, move |(page, stack): (Page, _)| {
+    Ok(decoded(pages, name))
+}
+
+/// Reads the wanted layers of a stack that is open, decoded, in order.
+pub(crate) fn layers_of(
+    pages: Pages,
+    name: &str,
+    layers: Option<Range<u32>>,
+) -> impl Iterator<Item = Result<Layer, Stop>> + use<> {
+    decoded(pages_of(pages, name.to_owned(), layers), name.to_owned())
+}
+
+fn decoded(
+    pages: impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>>,
+    name: String,
+) -> impl Iterator<Item = Result<Layer, Stop>> {
+    map_in_order(pages, move |(page, stack): (Page, _)| {
         let mut layer = page.decode().map_err(|error| failed_at(name.clone(), error))?;
         layer.info.stack = stack;
         Ok(layer)
-    }))
+    })
 }
 
 /// Reads the pages of the layers wanted. What the first page says of the stack
@@ -99,12 +134,18 @@ pub(crate) fn read_layers(
 pub(crate) fn read_pages(
     input: &Input,
 ) -> Result<impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>> + use<>, Stop> {
-    let name = input_name(&input.stack);
-    let layers = input.layers.clone();
-    let mut pages = open_pages(&input.stack)?;
+    let pages = open_pages(&input.stack)?;
+    Ok(pages_of(pages, input_name(&input.stack), input.layers.clone()))
+}
+
+fn pages_of(
+    mut pages: Pages,
+    name: String,
+    layers: Option<Range<u32>>,
+) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>> {
     let mut stack: Option<StackInfo> = None;
     let mut found = false;
-    Ok(std::iter::from_fn(move || {
+    std::iter::from_fn(move || {
         for page in pages.by_ref() {
             let page = match page {
                 Ok(page) => page,
@@ -124,7 +165,7 @@ pub(crate) fn read_pages(
         }
         let none_found = layers.is_some() && !std::mem::replace(&mut found, true);
         none_found.then(|| Err(Stop::Failed(anyhow!("{name}: no layer is in that range"))))
-    }))
+    })
 }
 
 /// Writes layers where `output` says, counting them in `report`.

@@ -26,6 +26,7 @@
 //! ```
 
 mod fix;
+pub mod machine;
 mod offset;
 mod tile;
 
@@ -34,4 +35,7 @@ pub use offset::{
     CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,
     offset, offset_one_bit, shrink,
 };
-pub use tile::{TileError, TileOptions, tile};
+pub use tile::{
+    CopyName, Heights, Layout, LayoutError, LayoutFile, Pack, PackBy, Part, Pixels, Placement,
+    StrayRows, TileError, TileOptions, Turns, tile,
+};

@@ -47,6 +47,15 @@ impl Pages {
         Ok(Self { source, count: 0, last_whole: None })
     }
 
+    /// Reads a TIFF or PNG file that is open, from its start.
+    ///
+    /// # Errors
+    /// Where nothing can be read there, or it is neither.
+    pub fn from_file(file: File) -> Result<Self, StackError> {
+        let source = Source::One(PageReader::from_file(file)?);
+        Ok(Self { source, count: 0, last_whole: None })
+    }
+
     /// Reads a stack as it arrives, such as from standard input.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ mod fix;
 mod heights;
 mod info;
 mod join;
+mod machine;
 mod material;
 mod sample;
 mod show;
@@ -37,6 +38,7 @@ pub(crate) enum Command {
     Convert(convert::ConvertArgs),
     Join(join::JoinArgs),
     Split(split::SplitArgs),
+    Machine(machine::MachineArgs),
     Material(material::MaterialArgs),
     Cure(cure::CureArgs),
     Calibrate(calibrate::CalibrateArgs),
@@ -70,6 +72,7 @@ impl Command {
             Self::Convert(_) => "convert",
             Self::Join(_) => "join",
             Self::Split(_) => "split",
+            Self::Machine(_) => "machine",
             Self::Material(_) => "material",
             Self::Cure(_) => "cure",
             Self::Calibrate(_) => "calibrate",
@@ -92,6 +95,7 @@ impl Command {
             Self::Convert(args) => convert::run(args, common),
             Self::Join(args) => join::run(args, common),
             Self::Split(args) => split::run(args, common),
+            Self::Machine(args) => machine::run(args),
             Self::Material(args) => material::run(args),
             Self::Cure(args) => cure::run(args, common),
             Self::Calibrate(args) => calibrate::run(args, common),

@@ -1,5 +1,6 @@
 //! Curves through measured points, as SVG or PNG.
 
+mod layout;
 mod scale;
 
 use std::io;
@@ -13,6 +14,8 @@ use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
 use scale::Scale;
+
+pub(crate) use layout::layout_picture;
 
 use crate::stop::Stop;
 
@@ -111,10 +114,19 @@ fn svg(plots: &[Plot]) -> String {
 }
 
 fn png(plots: &[Plot]) -> anyhow::Result<Vec<u8>> {
-    let (width, height) = all_of(PIXELS, plots);
-    let mut pixels = vec![0; (width * height * 3) as usize];
+    png_of(all_of(PIXELS, plots), |area| draw_all(plots, area))
+}
+
+/// The bytes of a PNG of what is drawn.
+fn png_of<E: std::error::Error + Send + Sync>(
+    (width, height): (u32, u32),
+    draw: impl FnOnce(
+        &DrawingArea<BitMapBackend<'_>, plotters::coord::Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<E>>,
+) -> anyhow::Result<Vec<u8>> {
+    let mut pixels = vec![0; width as usize * height as usize * 3];
     let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
-    draw_all(plots, &area).map_err(|error| io::Error::other(error.to_string()))?;
+    draw(&area).map_err(|error| io::Error::other(error.to_string()))?;
     drop(area);
     let mut bytes = Vec::new();
     let mut png = png::Encoder::new(&mut bytes, width, height);

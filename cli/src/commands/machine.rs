@@ -1,0 +1,56 @@
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use lamp_postprocess::machine::{Builtin, Machine};
+
+use crate::machines::machine_and_text;
+use crate::stop::Stop;
+use crate::streams::{is_stream, print};
+
+/// List or show machines: how large a build may be, and in what pixels and layers
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp machine list
+  lamp machine show beta > mine.toml
+  tile blade.tif --machine mine.toml -o build.tif")]
+pub(crate) struct MachineArgs {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// List the built-in machines
+    List,
+    /// Print a machine's file as it was written, once it is checked: to read, or to start one from
+    Show {
+        /// Which machine: a built-in machine's name, or a file
+        #[arg(value_name = "MACHINE")]
+        machine: PathBuf,
+    },
+}
+
+pub(crate) fn run(args: &MachineArgs) -> Result<(), Stop> {
+    match &args.action {
+        Action::List => print(&table()),
+        Action::Show { machine } if is_stream(machine) => {
+            Err(Stop::usage("name a built-in machine or a file"))
+        }
+        Action::Show { machine } => print(&machine_and_text(machine)?.1),
+    }
+}
+
+/// A line for each built-in machine.
+fn table() -> String {
+    let mut text = format!("{:<8}{:<18}{:<14}{:<16}description\n", "name", "area", "dpi", "layers");
+    for machine in Builtin::ALL.map(|builtin| builtin.machine()) {
+        let Machine { name, description, area, dpi, thickness, .. } = machine;
+        let area = area.value.to_string();
+        let dpi = dpi.map_or("any".to_owned(), |dpi| format!("{}-{}", dpi.least, dpi.most));
+        let layers = thickness
+            .map_or("any".to_owned(), |limits| format!("{}-{}", limits.least, limits.most));
+        text += &format!("{name:<8}{area:<18}{dpi:<14}{layers:<16}{description}\n");
+    }
+    text
+}

@@ -1,0 +1,254 @@
+mod stacks;
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::{Args, ValueEnum};
+use lamp_postprocess::{
+    Heights, Layout, LayoutFile, Pack, PackBy, Part, StrayRows, TileOptions, Turns,
+};
+use lamp_stack::{Length, Size};
+
+use crate::lines::parse_report;
+use crate::machines::machine;
+use crate::materials::read_text;
+use crate::options::{Common, Output, parse_distance, parse_layers};
+use crate::plots;
+use crate::report::Report;
+use crate::stop::Stop;
+use crate::streams::{check_beside, check_not_input, report, write_file, write_layers};
+
+use stacks::{Stack, StackArg};
+
+/// Lay copies of parts out on a black build area
+///
+/// Copies of one part stand in rows from the top left, and the whole is centred; --pack outline
+/// places them by their outlines where that gains parts. Where copies stand is written on the first
+/// page. Several stacks are joined by the heights of their layers, and shorter parts end. Gray layers
+/// make a gray build.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  slice blade.stl | fix | dither | tile > build.tif
+  tile blade.tif --machine beta --fit --gap 2mm -o build.tif
+  tile blade.tif:120 core.tif:40 --machine beta --pack outline --layout-out layout.json -o build.tif
+  tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif")]
+pub(crate) struct TileArgs {
+    /// The stacks to read, each with how many copies: TIFF or PNG files, folders of pages, or - for
+    /// standard input [without a count: as many as fit of one stack, one each of several]
+    #[arg(value_name = "STACK[:COPIES]", default_value = "-", value_parser = StackArg::parse)]
+    stacks: Vec<StackArg>,
+
+    /// Only these layers: A..B is A to B - 1; A.. and ..B are open ended
+    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    layers: Option<Range<u32>>,
+
+    /// The machine: alpha, beta or a file (see lamp machine); stacks must be of a resolution and
+    /// thickness that it builds in
+    #[arg(long, value_name = "M")]
+    machine: Option<PathBuf>,
+
+    /// The build area, as 4x4.5in or 100x80mm [default: the machine's, or 4x4.5in]
+    #[arg(long, value_name = "WxH")]
+    area: Option<Size>,
+
+    /// How many copies of the one stack [default: as many as fit]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    copies: Option<u32>,
+
+    /// The least distance between copies [default: 1mm]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
+    gap: Option<Length>,
+
+    /// Place the parts' extents, what is white in any layer, not their whole images. Stacks are
+    /// read twice; standard input is kept in a temporary file
+    #[arg(long)]
+    fit: bool,
+
+    /// By what copies keep apart; outline implies --fit
+    #[arg(long, value_enum, default_value_t)]
+    pack: PackArg,
+
+    /// Which turns packing may use where that gains parts [default: none, or quarters with --pack
+    /// outline]
+    #[arg(long, value_enum)]
+    turns: Option<TurnsArg>,
+
+    /// Place the copies as this file says, instead of packing them
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[arg(conflicts_with_all = ["copies", "gap", "pack", "turns"])]
+    layout: Option<PathBuf>,
+
+    /// Write where the copies stand, for --layout
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    layout_out: Option<PathBuf>,
+
+    /// Draw where the copies stand, with their numbers, as SVG or PNG
+    #[arg(long, value_name = "FILE")]
+    layout_picture: Option<PathBuf>,
+
+    /// Let heights count from each stack's first layer, so that all stand on the platform
+    #[arg(long)]
+    settle: bool,
+
+    /// Take layers that do not match: the build has the heights of the first stack, and of each
+    /// other stack the layer that holds the top of the build's layer
+    #[arg(long)]
+    resample: bool,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
+enum PackArg {
+    /// The boxes around the parts
+    #[default]
+    Box,
+    /// The parts' outlines, where boxes place fewer
+    Outline,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TurnsArg {
+    /// Parts lie as they were sliced
+    None,
+    /// By 180 degrees
+    Half,
+    /// By 90, 180 and 270 degrees
+    Quarters,
+}
+
+pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
+    args.check()?;
+    let report = report("tile", common, &args.output);
+    let machine = args.machine.as_deref().map(machine).transpose()?;
+    let file = args.layout.as_deref().map(read_layout).transpose()?;
+    let mut stacks = Stack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
+    let needs_outlines = args.fit || args.pack == PackArg::Outline;
+    let parts: Vec<Part> =
+        stacks.iter_mut().map(|stack| stack.part(needs_outlines)).collect::<Result<_, _>>()?;
+    let plain = TileOptions::default();
+    let machine_area = machine.map(|machine| machine.area.value);
+    let file_area = file.as_ref().and_then(LayoutFile::area);
+    let area = args.area.or(machine_area).or(file_area).unwrap_or(plain.area);
+    let layout = match &file {
+        Some(file) => place(file, parts, area, args.layout.as_deref())?,
+        None => Layout::packed(
+            parts,
+            &args.counts(),
+            area,
+            args.gap.unwrap_or(plain.gap),
+            args.packing(),
+        )?,
+    };
+    args.tell(&layout)?;
+    stacks
+        .iter()
+        .filter_map(Stack::layer_count)
+        .max()
+        .inspect(|&layers| report.expect(layers.into()));
+    let layers = stacks.into_iter().map(Stack::layers).collect::<Result<Vec<_>, _>>()?;
+    let heights = Heights { settle: args.settle, resample: args.resample };
+    let build = layout.build(layers, heights, |stray| say_stray(&report, stray));
+    write_layers(build, &args.output, &report)
+}
+
+impl TileArgs {
+    /// Checks, before the work, what can be checked.
+    fn check(&self) -> Result<(), Stop> {
+        let counted = self.stacks.iter().any(|stack| stack.copies.is_some());
+        if self.copies.is_some() && (counted || self.stacks.len() > 1) {
+            return Err(Stop::usage(
+                "--copies is for one stack without a count: write blade.tif:120 core.tif:40",
+            ));
+        }
+        if self.layout.is_some() && counted {
+            return Err(Stop::usage(
+                "--layout says how many copies there are: leave the counts out",
+            ));
+        }
+        let inputs =
+            || self.stacks.iter().map(|stack| &stack.path).chain(&self.layout).chain(&self.machine);
+        for beside in [&self.layout_out, &self.layout_picture].into_iter().flatten() {
+            check_beside(beside, &self.output.output, inputs())?;
+        }
+        self.layout_picture.as_deref().map(plots::check_name).transpose()?;
+        check_not_input(&self.output.output, self.layout.iter().chain(&self.machine))
+    }
+
+    fn counts(&self) -> Vec<Option<u32>> {
+        self.stacks.iter().map(|stack| stack.copies.or(self.copies)).collect()
+    }
+
+    fn packing(&self) -> Pack {
+        let (by, turns) = match self.pack {
+            PackArg::Box => (PackBy::Boxes, TurnsArg::None),
+            PackArg::Outline => (PackBy::Outlines, TurnsArg::Quarters),
+        };
+        let turns = match self.turns.unwrap_or(turns) {
+            TurnsArg::None => Turns::None,
+            TurnsArg::Half => Turns::Half,
+            TurnsArg::Quarters => Turns::Quarters,
+        };
+        Pack { by, turns }
+    }
+
+    /// Writes where the copies stand, as was asked.
+    fn tell(&self, layout: &Layout) -> Result<(), Stop> {
+        if let Some(path) = &self.layout_out {
+            write_file(path, |out| out.write_all(layout.to_file().to_json().as_bytes()))?;
+        }
+        if let Some(path) = &self.layout_picture {
+            let picture = plots::layout_picture(layout, path)?;
+            write_file(path, |out| out.write_all(&picture))?;
+        }
+        Ok(())
+    }
+}
+
+/// A layout takes a line for each copy.
+const LARGEST_LAYOUT: u64 = 64 << 20;
+
+fn read_layout(path: &Path) -> Result<LayoutFile, Stop> {
+    let read = || anyhow::Ok(LayoutFile::from_json(&read_text(path, LARGEST_LAYOUT, "a layout")?)?);
+    Ok(read().with_context(|| path.display().to_string())?)
+}
+
+fn place(
+    file: &LayoutFile,
+    parts: Vec<Part>,
+    area: Size,
+    path: Option<&Path>,
+) -> Result<Layout, Stop> {
+    let path = path.unwrap_or(Path::new("-")).display();
+    file.place(parts, area).map_err(|error| Stop::Failed(anyhow!(error)).at(path.to_string()))
+}
+
+/// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
+fn say_stray(report: &Report, StrayRows { part, layer, rows }: &StrayRows) {
+    let word = if rows.len() == 1 { "row" } else { "rows" };
+    report.say(&format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows)));
+}
+
+/// `3, 7-9`.
+fn ranges(rows: &[u32]) -> String {
+    let text = |run: &[u32]| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        _ => run[0].to_string(),
+    };
+    let runs = rows.chunk_by(|a, b| a.checked_add(1) == Some(*b));
+    runs.map(text).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_touch_are_one_range() {
+        assert_eq!(ranges(&[3, 7, 8, 9, 11, 12]), "3, 7-9, 11-12");
+        assert_eq!(ranges(&[u32::MAX]), u32::MAX.to_string());
+    }
+}

@@ -1,0 +1,170 @@
+//! The stacks of a build.
+
+use std::fs::File;
+use std::io::{self, Seek};
+use std::ops::Range;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use lamp_postprocess::Part;
+use lamp_postprocess::machine::Machine;
+use lamp_stack::{Layer, Pages, StackError};
+
+use crate::stop::Stop;
+use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages, spool_stdin};
+
+/// A stack and how many copies there are to be: `blade.tif:120`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct StackArg {
+    pub(super) path: PathBuf,
+    pub(super) copies: Option<u32>,
+}
+
+impl StackArg {
+    /// Takes a number behind the last colon for a count, unless there is a file
+    /// of all of that name.
+    pub(super) fn parse(text: &str) -> Result<Self, String> {
+        let whole = Self { path: PathBuf::from(text), copies: None };
+        match text.rsplit_once(':') {
+            Some((path, count))
+                if !path.is_empty()
+                    && !count.is_empty()
+                    && count.bytes().all(|c| c.is_ascii_digit())
+                    && !whole.path.exists() =>
+            {
+                match count.parse() {
+                    Ok(copies @ 1..) => Ok(Self { path: path.into(), copies: Some(copies) }),
+                    _ => Err(format!("`{count}` is not a number of copies: write 1 or more")),
+                }
+            }
+            _ => Ok(whole),
+        }
+    }
+}
+
+type Layers = Box<dyn Iterator<Item = Result<Layer, Stop>>>;
+
+/// A stack of a build.
+pub(super) struct Stack {
+    name: String,
+    path: PathBuf,
+    range: Option<Range<u32>>,
+    machine: Option<Machine>,
+    /// Standard input, where it is read twice.
+    spool: Option<File>,
+    /// Its layers, where they are read once.
+    layers: Option<Layers>,
+    layer_count: Option<u32>,
+}
+
+impl Stack {
+    /// Sets the stacks up. None is given twice: its counts would be one.
+    pub(super) fn open_all(
+        stacks: &[StackArg],
+        range: &Option<Range<u32>>,
+        machine: Option<&Machine>,
+    ) -> Result<Vec<Self>, Stop> {
+        for (k, stack) in stacks.iter().enumerate() {
+            if stacks[..k].iter().any(|before| before.path == stack.path) {
+                let name = input_name(&stack.path);
+                return Err(Stop::usage(format!(
+                    "{name} is given twice: give it once, with the sum of the counts"
+                )));
+            }
+        }
+        let stack = |StackArg { path, .. }: &StackArg| Self {
+            name: input_name(path),
+            path: path.clone(),
+            range: range.clone(),
+            machine: machine.cloned(),
+            spool: None,
+            layers: None,
+            layer_count: None,
+        };
+        Ok(stacks.iter().map(stack).collect())
+    }
+
+    /// How many layers it has, where it says so.
+    pub(super) fn layer_count(&self) -> Option<u32> {
+        self.layer_count
+    }
+
+    /// Reads what must be known to place the part: its first layer, or all of
+    /// them to find its outline.
+    pub(super) fn part(&mut self, outline: bool) -> Result<Part, Stop> {
+        let no_layers = failed_at(self.name.clone(), StackError::NoLayers);
+        if outline {
+            if is_stream(&self.path) {
+                self.spool = Some(spool_stdin()?);
+            }
+            let mut count = None;
+            let layers = self.read()?.inspect(|layer| {
+                if let Ok(layer) = layer {
+                    count = count.or(count_of(layer));
+                }
+            });
+            let part = Part::of_outline::<Stop>(&self.name, layers)?.ok_or(no_layers);
+            self.layer_count = count;
+            return part;
+        }
+        let mut layers = self.read()?;
+        let first = layers.next().unwrap_or(Err(no_layers))?;
+        let part = Part::of_image(&self.name, &first)?;
+        self.layer_count = count_of(&first);
+        self.layers = Some(Box::new(std::iter::once(Ok(first)).chain(layers)));
+        Ok(part)
+    }
+
+    /// Its layers.
+    pub(super) fn layers(mut self) -> Result<Layers, Stop> {
+        match self.layers.take() {
+            Some(layers) => Ok(layers),
+            None => self.read(),
+        }
+    }
+
+    /// Reads it from its start, checking that the machine builds it.
+    fn read(&mut self) -> Result<Layers, Stop> {
+        let pages = match &mut self.spool {
+            Some(spool) => {
+                let again = |spool: &mut File| -> io::Result<File> {
+                    spool.rewind()?;
+                    spool.try_clone()
+                };
+                let file = again(spool).with_context(|| self.name.clone())?;
+                Pages::from_file(file).map_err(|error| failed_at(self.name.clone(), error))?
+            }
+            None => open_pages(&self.path)?,
+        };
+        let layers = layers_of(pages, &self.name, self.range.clone());
+        let Some(machine) = self.machine.clone() else { return Ok(Box::new(layers)) };
+        let name = self.name.clone();
+        Ok(Box::new(layers.map(move |layer| {
+            let layer = layer?;
+            machine.check(&layer).map_err(|limit| Stop::from(limit).at(name.clone()))?;
+            Ok(layer)
+        })))
+    }
+}
+
+fn count_of(layer: &Layer) -> Option<u32> {
+    layer.info.stack.as_ref()?.layers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_stand_behind_the_last_colon() {
+        let parsed = |text: &str| StackArg::parse(text).map(|arg| (arg.path, arg.copies));
+        let file = |name: &str, copies| Ok((PathBuf::from(name), copies));
+        assert_eq!(parsed("blade.tif:120"), file("blade.tif", Some(120)));
+        assert_eq!(parsed("-:3"), file("-", Some(3)));
+        for name in ["blade.tif", "c:\\blade.tif", "blade:x", "blade:", ":3", "-"] {
+            assert_eq!(parsed(name), file(name, None));
+        }
+        assert!(parsed("blade.tif:0").is_err());
+        assert!(parsed("blade.tif:99999999999").is_err());
+    }
+}

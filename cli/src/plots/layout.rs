@@ -1,0 +1,167 @@
+//! Where copies stand on a build area, as a picture.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use anyhow::Context;
+use lamp_postprocess::{Layout, Part, Pixels, Placement};
+use lamp_stack::{Mask, Turn};
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::{FAMILY, Format, GRAY_INK, format_of, inks, png_of, with_font};
+use crate::stop::Stop;
+
+/// The longer side of a build area, and the room around it, in pixels.
+const SIDE: u32 = 1600;
+const MARGIN: i32 = 24;
+const LEGEND: i32 = 60;
+
+/// The bytes of a picture of a layout: outlines where they are known, boxes, and
+/// each copy's number among those of its part.
+pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, Stop> {
+    let picture = Picture::new(layout);
+    let size = picture.size();
+    match format_of(path)? {
+        Format::Svg => {
+            let mut text = String::new();
+            // A text takes all that is drawn on it.
+            picture
+                .draw(&SVGBackend::with_string(&mut text, size).into_drawing_area())
+                .expect("a text takes all");
+            Ok(text.into_bytes())
+        }
+        Format::Png => {
+            let drawn = png_of(size, |area| picture.draw(area));
+            Ok(drawn.with_context(|| path.display().to_string())?)
+        }
+    }
+}
+
+struct Picture<'a> {
+    layout: &'a Layout,
+    /// Pixels of the picture for one of the build.
+    scale: f64,
+    /// Of parts whose outlines are known, what they look like.
+    outlines: HashMap<(usize, Turn), Mask>,
+}
+
+impl<'a> Picture<'a> {
+    fn new(layout: &'a Layout) -> Self {
+        let Pixels { width, height } = layout.pixels();
+        let scale = f64::from(SIDE) / f64::from(width.max(height).max(1));
+        let mut outlines = layout.silhouettes();
+        outlines.retain(|&(part, _), _| layout.parts()[part].outline().is_some());
+        Self { layout, scale, outlines }
+    }
+
+    fn size(&self) -> (u32, u32) {
+        let Pixels { width, height } = self.layout.pixels();
+        let [width, height] = [width, height].map(|side| self.scaled(side) as u32);
+        (width + 2 * MARGIN as u32, height + (2 * MARGIN + LEGEND) as u32)
+    }
+
+    fn scaled(&self, pixels: u32) -> i32 {
+        (f64::from(pixels) * self.scale).round() as i32
+    }
+
+    /// Where a pixel of the build is in the picture.
+    fn at(&self, column: u32, row: u32) -> (i32, i32) {
+        (MARGIN + self.scaled(column), MARGIN + self.scaled(row))
+    }
+
+    fn draw<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, plotters::coord::Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        with_font();
+        area.fill(&WHITE)?;
+        let colours: Vec<RGBColor> = inks().take(self.layout.parts().len()).collect();
+        for (at, number) in self.layout.placements().iter().zip(self.layout.numbers()) {
+            self.draw_copy(area, at, number, colours[at.part])?;
+        }
+        let Pixels { width, height } = self.layout.pixels();
+        let border = GRAY_INK.stroke_width(3);
+        area.draw(&Rectangle::new([self.at(0, 0), self.at(width, height)], border))?;
+        self.draw_legend(area, &colours)?;
+        area.present()
+    }
+
+    fn draw_copy<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, plotters::coord::Shift>,
+        at: &Placement,
+        number: u32,
+        ink: RGBColor,
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        let Pixels { width, height } = self.layout.parts()[at.part].size(at.turn);
+        let corners = [self.at(at.left, at.top), self.at(at.left + width, at.top + height)];
+        let fill = ink.mix(0.35).filled();
+        match self.outlines.get(&(at.part, at.turn)) {
+            Some(outline) => self.draw_outline(area, at, outline, fill)?,
+            None => area.draw(&Rectangle::new(corners, fill))?,
+        }
+        area.draw(&Rectangle::new(corners, ink.mix(0.7).stroke_width(1)))?;
+        let size = (self.scale * f64::from(width.min(height)) / 2.5).clamp(9.0, 44.0);
+        let middle = ((corners[0].0 + corners[1].0) / 2, (corners[0].1 + corners[1].1) / 2);
+        let style = (FAMILY, size).into_text_style(area).color(&BLACK);
+        area.draw(&Text::new(
+            number.to_string(),
+            middle,
+            style.pos(Pos::new(HPos::Center, VPos::Center)),
+        ))
+    }
+
+    /// Draws the row of an outline that lies at the middle of each of the
+    /// picture's.
+    fn draw_outline<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, plotters::coord::Shift>,
+        at: &Placement,
+        outline: &Mask,
+        fill: ShapeStyle,
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        let (_, top) = self.at(0, at.top);
+        let (_, bottom) = self.at(0, at.top + outline.height());
+        for y in top..bottom {
+            let row = (f64::from(y - MARGIN) + 0.5) / self.scale - f64::from(at.top);
+            let row = outline.row((row.max(0.0) as u32).min(outline.height() - 1));
+            for run in row.chunks(2) {
+                let ends = [run[0], *run.get(1).unwrap_or(&outline.width())];
+                let [from, to] = ends.map(|column| self.at(at.left + column, 0).0);
+                // A rectangle holds both its corners.
+                area.draw(&Rectangle::new([(from, y), ((to - 1).max(from), y)], fill))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_legend<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, plotters::coord::Shift>,
+        colours: &[RGBColor],
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        let Pixels { height, .. } = self.layout.pixels();
+        let (mut x, y) = self.at(0, height);
+        let y = y + 36;
+        let parts = self.layout.parts().iter().enumerate();
+        let entries = parts.map(|(part, about)| (self.entry(part, about), colours[part]));
+        let build = format!("{} at {} dpi", self.layout.area(), self.layout.dpi());
+        for (text, ink) in std::iter::once((build, GRAY_INK)).chain(entries) {
+            let style = (FAMILY, 28).into_text_style(area).color(&ink);
+            let (width, _) = area.estimate_text_size(&text, &style)?;
+            area.draw(&Text::new(text, (x, y), style))?;
+            x += width as i32 + 40;
+        }
+        Ok(())
+    }
+
+    /// `blade.tif: 120 copies`.
+    fn entry(&self, part: usize, about: &Part) -> String {
+        match self.layout.copies_of(part) {
+            1 => format!("{}: 1 copy", about.name()),
+            copies => format!("{}: {copies} copies", about.name()),
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! Machine files.
+
+use std::fmt::Display;
+use std::str::FromStr;
+
+use lamp_stack::{Dpi, Length, Size};
+use serde::de::{self, Deserialize, Deserializer};
+use thiserror::Error;
+
+use super::Machine;
+
+/// Why a text is no machine.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum MachineError {
+    /// No TOML.
+    #[error("line {line}: {problem}: a machine is a TOML file (lamp machine show prints some)")]
+    Syntax {
+        /// From 1.
+        line: usize,
+        /// What stands there.
+        problem: String,
+    },
+    /// A key is wrong, unknown or missing.
+    #[error("line {line}: {key}: {problem}")]
+    Key {
+        /// From 1.
+        line: usize,
+        /// Its path, as `area.value`.
+        key: String,
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
+    /// The name is no name.
+    #[error("name: `{0}` is not a name: write small letters, digits and -, as beta")]
+    Name(String),
+    /// Limits that hold nothing, or no possible resolution.
+    #[error("{0}: least and most must be above zero, and least not above most")]
+    Range(&'static str),
+    /// Swaths without a pixel of their own.
+    #[error("strips: a swath shares less than half its mirrors with the next")]
+    Strips,
+}
+
+impl Machine {
+    /// Reads a machine file.
+    ///
+    /// # Errors
+    /// Where the text is no TOML, a key is unknown, missing or wrong, or its
+    /// numbers make no machine; the error names the key.
+    pub fn from_toml(text: &str) -> Result<Self, MachineError> {
+        let file = toml::Deserializer::parse(text).map_err(|error| MachineError::Syntax {
+            line: line_of(text, &error),
+            problem: one_line(error.message()),
+        })?;
+        let machine: Self = serde_path_to_error::deserialize(file).map_err(|error| {
+            let path = error.path().to_string();
+            // The parser calls the file itself `.`.
+            let key = if path == "." { "the file".to_owned() } else { one_line(&path) };
+            let inner = error.into_inner();
+            MachineError::Key {
+                line: line_of(text, &inner),
+                key,
+                problem: one_line(inner.message()),
+            }
+        })?;
+        machine.check_numbers()?;
+        Ok(machine)
+    }
+
+    /// Checks what single keys cannot show.
+    fn check_numbers(&self) -> Result<(), MachineError> {
+        let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        if self.name.is_empty() || !self.name.chars().all(letters) {
+            return Err(MachineError::Name(one_line(&self.name)));
+        }
+        if let Some(dpi) = &self.dpi
+            && !(Dpi::new(dpi.least).is_some()
+                && Dpi::new(dpi.most).is_some()
+                && dpi.least <= dpi.most)
+        {
+            return Err(MachineError::Range("dpi"));
+        }
+        if let Some(thickness) = &self.thickness
+            && !(thickness.least.um() > 0.0 && thickness.least <= thickness.most)
+        {
+            return Err(MachineError::Range("thickness"));
+        }
+        match &self.strips {
+            Some(strips) if strips.overlap >= strips.mirrors.div_ceil(2) => {
+                Err(MachineError::Strips)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+pub(super) fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Size, D::Error> {
+    parsed(from)
+}
+
+pub(super) fn length<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
+    parsed(from)
+}
+
+fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+    String::deserialize(from)?.parse().map_err(de::Error::custom)
+}
+
+pub(super) fn some_text<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    let text = String::deserialize(from)?;
+    if text.trim().is_empty() {
+        return Err(de::Error::custom("this is empty: write what it is for the next reader"));
+    }
+    Ok(text)
+}
+
+/// Returns the line of an error, from 1.
+fn line_of(text: &str, error: &toml::de::Error) -> usize {
+    let start = error.span().map_or(0, |span| span.start);
+    1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count()
+}
+
+/// Makes one line of a text from a file: it must not steer the terminal.
+fn one_line(text: &str) -> String {
+    text.replace(char::is_control, " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Builtin;
+    use super::*;
+
+    const WHOLE: &str = r#"name = "mine"
+description = "A machine of mine"
+
+[area]
+value = "100x80mm"
+source = "data sheet"
+
+[dpi]
+least = 600
+most = 600
+source = "data sheet"
+
+[thickness]
+least = "20um"
+most = "0.2mm"
+source = "data sheet"
+
+[strips]
+mirrors = 1024
+overlap = 64
+source = "data sheet"
+"#;
+
+    #[test]
+    fn built_in_machines_are_whole_and_bear_their_names() {
+        for builtin in Builtin::ALL {
+            let machine = Machine::from_toml(builtin.toml()).unwrap();
+            assert_eq!(machine.name, builtin.name());
+            assert_eq!(machine.strips, None);
+        }
+        let [alpha, beta] = Builtin::ALL.map(|builtin| builtin.machine().area.value);
+        assert_eq!((alpha.width.mm(), alpha.height.mm()), (101.6, 114.3));
+        assert!((beta.width.mm() - 584.2).abs() < 1e-9 && beta.width == beta.height);
+    }
+
+    #[test]
+    fn errors_name_the_key_and_what_to_do() {
+        assert_eq!(Machine::from_toml(WHOLE).unwrap().strips.unwrap().mirrors, 1024);
+        for (from, to, words) in [
+            ("100x80mm", "100x80", &["line 5", "area.value", "not a size"][..]),
+            ("\"data sheet\"", "\" \"", &["area.source", "is empty"]),
+            ("[area]", "[region]", &["line 4", "region", "area"]),
+            ("least = 600", "least = 700", &["dpi: least and most"]),
+            ("least = 600", "least = 0", &["dpi: least and most"]),
+            ("\"20um\"", "\"20\"", &["thickness.least", "unit"]),
+            ("\"20um\"", "\"-20um\"", &["thickness: least and most"]),
+            ("mirrors = 1024", "mirrors = 128", &["strips", "half its mirrors"]),
+            ("mirrors = 1024", "mirrors = -1", &["line 19", "strips.mirrors"]),
+            ("\"mine\"", "\"My own\"", &["name", "`My own` is not a name"]),
+            ("[area]", "[area", &["line 4", "TOML", "lamp machine show"]),
+        ] {
+            assert!(WHOLE.contains(from), "{from}");
+            let error = Machine::from_toml(&WHOLE.replacen(from, to, 1)).unwrap_err().to_string();
+            for word in words {
+                assert!(error.contains(word), "no `{word}` in {error:?}");
+            }
+            assert!(!error.contains('\n'), "{error:?}");
+        }
+        let missing = Machine::from_toml("name = \"a\"\ndescription = \"\"\n").unwrap_err();
+        assert!(missing.to_string().contains("area"), "{missing}");
+    }
+}

@@ -1,0 +1,359 @@
+//! Stacks read in step, by height.
+//!
+//! A build layer takes from each stack the layer that spans the same heights.
+//! The first stack leads, and where it has ended the next one that goes on; so
+//! shorter parts just end. Of each stack one layer is held.
+
+use std::sync::Arc;
+
+use lamp_stack::{Held, Layer};
+
+use super::TileError;
+
+/// How stacks are joined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heights {
+    /// Whether heights count from each stack's first layer, so that all stand
+    /// on the platform.
+    pub settle: bool,
+    /// Whether layers need not match: the build has the heights of the first
+    /// stack, above it layers as thick as its last, and takes of each other
+    /// stack the layer that holds the top of the build's.
+    pub resample: bool,
+}
+
+/// Heights nearer than this are the same, in micrometres.
+const SAME: f64 = 1.0;
+
+/// The layers of the stacks at one height of the build.
+pub(super) struct Step {
+    pub(super) index: u32,
+    /// The layer's bottom and thickness in micrometres, where they are known.
+    pub(super) z_um: Option<f64>,
+    pub(super) thickness_um: Option<f64>,
+    /// For each stack, its layer here.
+    pub(super) layers: Vec<Option<Arc<Layer>>>,
+    /// How many copies there are of each.
+    pub(super) copies: Arc<[usize]>,
+}
+
+impl Held for Step {
+    /// What the copies will take.
+    fn bytes(&self) -> usize {
+        let layers = self.layers.iter().zip(self.copies.iter());
+        layers
+            .map(|(layer, &copies)| {
+                layer.as_ref().map_or(0, |layer| layer.bytes().saturating_mul(copies + 1))
+            })
+            .fold(0, usize::saturating_add)
+    }
+}
+
+/// Stacks in step.
+pub(super) struct Steps<S> {
+    stacks: Vec<Stack<S>>,
+    heights: Heights,
+    copies: Arc<[usize]>,
+    /// The build layer before: its index, and its bottom and top.
+    last: Option<(u32, Option<[f64; 2]>)>,
+    done: bool,
+}
+
+struct Stack<S> {
+    name: String,
+    layers: S,
+    /// The next layer.
+    next: Option<Arc<Layer>>,
+    /// What is to be added to its heights.
+    up: f64,
+}
+
+impl<S, E> Steps<S>
+where
+    S: Iterator<Item = Result<Layer, E>>,
+    E: From<TileError>,
+{
+    /// Stacks by name, with the number of copies of each.
+    pub(super) fn new(
+        stacks: impl IntoIterator<Item = (String, S)>,
+        copies: Arc<[usize]>,
+        heights: Heights,
+    ) -> Self {
+        let stack = |(name, layers)| Stack { name, layers, next: None, up: 0.0 };
+        let stacks = stacks.into_iter().map(stack).collect();
+        Self { stacks, heights, copies, last: None, done: false }
+    }
+
+    fn step(&mut self) -> Result<Option<Step>, E> {
+        if self.last.is_none() {
+            self.stacks.iter_mut().try_for_each(Stack::advance)?;
+            self.start_together()?;
+        }
+        if self.heights.resample && self.stacks.len() > 1 {
+            return self.resampled();
+        }
+        let Some(leader) = self.stacks.iter().position(|stack| stack.next.is_some()) else {
+            return Ok(None);
+        };
+        self.check_heights(leader)?;
+        let lead = self.stacks[leader].next.clone().expect("the leader has a layer");
+        let span = self.stacks[leader].span();
+        let layers: Vec<_> = self.stacks.iter_mut().map(|stack| stack.next.take()).collect();
+        for (stack, layer) in self.stacks.iter_mut().zip(&layers) {
+            if layer.is_some() {
+                stack.advance()?;
+            }
+        }
+        // Other programs' layers may say one of the two.
+        let z_um = lead.info.z_um.map(|z| z + self.stacks[leader].up);
+        Ok(Some(self.made(lead.info.index, span, z_um, lead.info.thickness_um, layers)))
+    }
+
+    fn made(
+        &mut self,
+        index: u32,
+        span: Option<[f64; 2]>,
+        z_um: Option<f64>,
+        thickness_um: Option<f64>,
+        layers: Vec<Option<Arc<Layer>>>,
+    ) -> Step {
+        let index = match self.last {
+            Some((last, _)) => index.max(last.saturating_add(1)),
+            None => index,
+        };
+        self.last = Some((index, span));
+        Step { index, z_um, thickness_um, layers, copies: Arc::clone(&self.copies) }
+    }
+
+    /// Finds how far each stack must go up, and checks that all start at one
+    /// height.
+    fn start_together(&mut self) -> Result<(), TileError> {
+        let bottom = |stack: &Stack<S>| stack.span().map(|span| span[0]);
+        let Some(first) = self.stacks.first().and_then(bottom) else { return Ok(()) };
+        let first_name = self.stacks[0].name.clone();
+        for stack in &mut self.stacks[1..] {
+            let Some(z) = bottom(stack) else { continue };
+            if self.heights.settle {
+                stack.up = first - z;
+            } else if (z - first).abs() > SAME {
+                let (first_z, z) = (first / 1e3, z / 1e3);
+                return Err(TileError::OtherStart {
+                    first: first_name,
+                    first_z,
+                    name: stack.name.clone(),
+                    z,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that the next layers of all stacks span what the leader's does.
+    fn check_heights(&self, leader: usize) -> Result<(), TileError> {
+        let build = self.stacks[leader].span();
+        let all = self.stacks.iter().filter(|stack| stack.next.is_some());
+        if build.is_none() && all.clone().all(|stack| stack.span().is_none()) {
+            return Ok(());
+        }
+        for stack in all {
+            let spans = stack.known_span()?;
+            let build = build.unwrap_or(spans);
+            if build.iter().zip(spans).any(|(a, b)| (a - b).abs() > SAME) {
+                let layer = stack.layer_name();
+                let first = self.stacks[leader].name.clone();
+                return Err(TileError::OtherHeights {
+                    name: stack.name.clone(),
+                    layer,
+                    spans,
+                    build,
+                    first,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The next layer by the heights of the first stack.
+    fn resampled(&mut self) -> Result<Option<Step>, E> {
+        let first = &self.stacks[0];
+        let (index, span) = match (&first.next, self.last) {
+            (Some(layer), _) => (layer.info.index, first.known_span()?),
+            (None, Some((last, Some([bottom, top])))) => {
+                (last.saturating_add(1), [top, top + top - bottom])
+            }
+            (None, _) => return Ok(None),
+        };
+        let mut layers = Vec::new();
+        for stack in &mut self.stacks {
+            layers.push(stack.layer_at(span[1])?);
+        }
+        if layers.iter().all(Option::is_none) {
+            return Ok(None);
+        }
+        if self.stacks[0].next.is_some() {
+            self.stacks[0].advance()?;
+        }
+        let (z_um, thickness_um) = (Some(span[0]), Some(span[1] - span[0]));
+        Ok(Some(self.made(index, Some(span), z_um, thickness_um, layers)))
+    }
+}
+
+impl<S, E> Stack<S>
+where
+    S: Iterator<Item = Result<Layer, E>>,
+    E: From<TileError>,
+{
+    fn advance(&mut self) -> Result<(), E> {
+        self.next = self.layers.next().transpose()?.map(Arc::new);
+        Ok(())
+    }
+
+    /// Goes on to the layer that holds a height, its top included.
+    fn layer_at(&mut self, height: f64) -> Result<Option<Arc<Layer>>, E> {
+        while self.next.is_some() {
+            let [bottom, top] = self.known_span()?;
+            if top >= height - SAME {
+                return Ok(self.next.clone().filter(|_| bottom < height - SAME));
+            }
+            self.advance()?;
+        }
+        Ok(None)
+    }
+}
+
+impl<S> Stack<S> {
+    /// The next layer's bottom and top on the build, in micrometres.
+    fn span(&self) -> Option<[f64; 2]> {
+        let info = &self.next.as_ref()?.info;
+        let bottom = info.z_um? + self.up;
+        Some([bottom, bottom + info.thickness_um?])
+    }
+
+    fn known_span(&self) -> Result<[f64; 2], TileError> {
+        let unknown = || TileError::NoHeight { name: self.name.clone(), layer: self.layer_name() };
+        self.span().ok_or_else(unknown)
+    }
+
+    fn layer_name(&self) -> String {
+        self.next.as_ref().map_or_else(String::new, |layer| layer.info.name())
+    }
+}
+
+impl<S, E> Iterator for Steps<S>
+where
+    S: Iterator<Item = Result<Layer, E>>,
+    E: From<TileError>,
+{
+    type Item = Result<Step, E>;
+
+    /// The next layers; after an error, none.
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.done {
+            return None;
+        }
+        let step = self.step();
+        self.done = !matches!(step, Ok(Some(_)));
+        step.transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{Image, Mask, PageInfo};
+
+    use super::*;
+
+    type Result<T> = std::result::Result<T, TileError>;
+
+    /// A stack of layers of these thicknesses from a height on.
+    fn stack(from: f64, thicknesses: &[f64]) -> Vec<Result<Layer>> {
+        let mut z = from;
+        let layer = |(index, &thickness): (u32, &f64)| {
+            let info = PageInfo {
+                index,
+                z_um: Some(z),
+                thickness_um: Some(thickness),
+                ..PageInfo::default()
+            };
+            z += thickness;
+            Ok(Layer { info, dpi: None, image: Image::Mask(Mask::black(1, 1)) })
+        };
+        (0..).zip(thicknesses).map(layer).collect()
+    }
+
+    /// Which layers of the stacks each layer of the build has.
+    fn joined(
+        stacks: Vec<Vec<Result<Layer>>>,
+        settle: bool,
+        resample: bool,
+    ) -> Result<Vec<Vec<Option<u32>>>> {
+        let copies = vec![1; stacks.len()].into();
+        let named = ["a", "b", "c"]
+            .map(str::to_owned)
+            .into_iter()
+            .zip(stacks.into_iter().map(Vec::into_iter));
+        let steps = Steps::new(named, copies, Heights { settle, resample });
+        let index = |layer: &Option<Arc<Layer>>| layer.as_ref().map(|layer| layer.info.index);
+        let mut next = 0;
+        steps
+            .map(|step| {
+                let step = step?;
+                assert_eq!(step.index, next);
+                next += 1;
+                Ok(step.layers.iter().map(index).collect())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn shorter_parts_end() {
+        let stacks = vec![stack(0.0, &[100.0; 2]), stack(0.4, &[100.0; 3]), stack(0.0, &[100.0])];
+        assert_eq!(
+            joined(stacks, false, false).unwrap(),
+            [
+                vec![Some(0), Some(0), Some(0)],
+                vec![Some(1), Some(1), None],
+                vec![None, Some(2), None]
+            ]
+        );
+    }
+
+    #[test]
+    fn other_heights_are_named() {
+        let other =
+            joined(vec![stack(0.0, &[100.0; 4]), stack(0.0, &[100.0, 50.0, 50.0])], false, false);
+        assert_eq!(
+            other.unwrap_err().to_string(),
+            "b: layer 1 (z 0.10 mm) spans z 0.1 to 0.15 mm where the build's layer spans 0.1 to 0.2: \
+             slice it again with --thickness 100um, or give --resample to take the layer at each height of a"
+        );
+        let start = joined(vec![stack(0.0, &[100.0]), stack(5000.0, &[100.0])], false, false);
+        let start = start.unwrap_err().to_string();
+        assert!(
+            start.starts_with("b starts at z 5.000 mm and a at 0.000 mm")
+                && start.contains("--settle"),
+            "{start}"
+        );
+        let settled = joined(vec![stack(0.0, &[100.0]), stack(5000.0, &[100.0])], true, false);
+        assert_eq!(settled.unwrap(), [[Some(0), Some(0)]]);
+        let mut unknown = stack(0.0, &[100.0]);
+        unknown[0].as_mut().unwrap().info.z_um = None;
+        let mixed = joined(vec![stack(0.0, &[100.0]), unknown], false, false);
+        assert!(matches!(mixed, Err(TileError::NoHeight { .. })));
+    }
+
+    #[test]
+    fn resampling_takes_the_layer_that_holds_the_top() {
+        // Tops of the build: 100, 200, then 300, 400 as thick as the last.
+        let stacks = vec![stack(0.0, &[100.0; 2]), stack(0.0, &[150.0, 150.0, 90.0, 10.0])];
+        assert_eq!(
+            joined(stacks, false, true).unwrap(),
+            [[Some(0), Some(0)], [Some(1), Some(1)], [None, Some(1)], [None, Some(3)]]
+        );
+        let fine = vec![stack(0.0, &[100.0; 3]), stack(0.0, &[25.0; 10])];
+        assert_eq!(
+            joined(fine, false, true).unwrap(),
+            [[Some(0), Some(3)], [Some(1), Some(7)], [Some(2), None]]
+        );
+    }
+}

@@ -1,0 +1,333 @@
+//! Where copies stand.
+
+use std::collections::HashMap;
+
+use lamp_stack::{Dpi, Image, Length, Mask, Size, Turn};
+
+use super::pack::{self, Pack};
+use super::{CopyName, Part, Pixels, TileError};
+
+/// Build areas are at most so wide and high, in pixels, as the images that a
+/// stack's reader takes.
+const LARGEST_SIDE: u32 = 1 << 26;
+
+/// Where copies of parts stand on a build area.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    pub(super) parts: Vec<Part>,
+    pub(super) placements: Vec<Placement>,
+    pub(super) dpi: Dpi,
+    pub(super) area: Size,
+    pub(super) pixels: Pixels,
+    /// What made it, for the build's first page.
+    pub(super) command: String,
+    /// Whether the build's heights may be others than the parts'.
+    pub(super) resampled: bool,
+}
+
+/// Where a copy stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Placement {
+    /// Which part, from 0.
+    pub part: usize,
+    /// How it lies.
+    pub turn: Turn,
+    /// The column of the build where the turned part's frame begins.
+    pub left: u32,
+    /// The row of the build where it begins.
+    pub top: u32,
+}
+
+/// Where a copy is to stand: as a [`Placement`], perhaps off the area.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wish {
+    pub(super) part: usize,
+    pub(super) turn: Turn,
+    pub(super) left: i64,
+    pub(super) top: i64,
+}
+
+impl Layout {
+    /// Finds places for so many copies of each part, on an area, apart from each
+    /// other by a gap. Without a count there are as many as fit of a part that is
+    /// alone, and one of each otherwise.
+    ///
+    /// # Errors
+    /// Where the parts have different resolutions, or not all copies find a
+    /// place.
+    ///
+    /// # Panics
+    /// If there are not as many counts as parts, or no part.
+    pub fn packed(
+        parts: Vec<Part>,
+        counts: &[Option<u32>],
+        area: Size,
+        gap: Length,
+        pack: Pack,
+    ) -> Result<Self, TileError> {
+        assert_eq!(parts.len(), counts.len(), "a count for each part");
+        let mut layout = Self::empty(parts, area)?;
+        let gap_pixels = (gap.pixels(layout.dpi).max(0.0) - 1e-6).ceil().max(0.0) as u32;
+        // Larger gaps than the area mean one copy a row as well.
+        let gap_pixels = gap_pixels.min(LARGEST_SIDE);
+        layout.placements = pack::pack(&layout, counts, gap_pixels, pack)?;
+        layout.command = layout.packing_command(gap, pack);
+        Ok(layout)
+    }
+
+    /// Places copies where they are wished.
+    pub(super) fn placed(parts: Vec<Part>, wishes: &[Wish], area: Size) -> Result<Self, TileError> {
+        let mut layout = Self::empty(parts, area)?;
+        for (index, wish) in wishes.iter().enumerate() {
+            let Wish { part, turn, left, top } = *wish;
+            let size = layout.parts[part].size(turn);
+            let beyond = layout.beyond(wish, size);
+            if beyond > 0 {
+                let number = wishes[..=index].iter().filter(|other| other.part == part).count();
+                return Err(TileError::OutOfArea {
+                    copy: layout.copy_name(part, number as u32),
+                    beyond: Length::from_um(
+                        (beyond as f64 * layout.dpi.pitch().um() * 10.0).round() / 10.0,
+                    ),
+                    area_mm: area,
+                });
+            }
+            layout.placements.push(Placement { part, turn, left: left as u32, top: top as u32 });
+        }
+        layout.check_apart()?;
+        layout.command = format!("tile --area {area} --layout");
+        layout.note_fit();
+        Ok(layout)
+    }
+
+    fn empty(parts: Vec<Part>, area: Size) -> Result<Self, TileError> {
+        let first = parts.first().expect("a build has a part");
+        let dpi = first.dpi();
+        if let Some(other) = parts.iter().find(|part| part.dpi() != dpi) {
+            return Err(TileError::Resolutions {
+                first: first.name().to_owned(),
+                first_dpi: dpi,
+                name: other.name().to_owned(),
+                dpi: other.dpi(),
+            });
+        }
+        let pixels =
+            Pixels { width: whole_pixels(area.width, dpi), height: whole_pixels(area.height, dpi) };
+        if pixels.width.max(pixels.height) > LARGEST_SIDE {
+            return Err(TileError::AreaTooLarge { area_mm: area });
+        }
+        Ok(Self {
+            parts,
+            placements: Vec::new(),
+            dpi,
+            area,
+            pixels,
+            command: String::new(),
+            resampled: false,
+        })
+    }
+
+    /// The parts, in the order of their stacks.
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// The copies.
+    pub fn placements(&self) -> &[Placement] {
+        &self.placements
+    }
+
+    /// How many copies a part has.
+    pub fn copies_of(&self, part: usize) -> usize {
+        self.placements.iter().filter(|placement| placement.part == part).count()
+    }
+
+    /// The resolution of all parts.
+    pub fn dpi(&self) -> Dpi {
+        self.dpi
+    }
+
+    /// The build area.
+    pub fn area(&self) -> Size {
+        self.area
+    }
+
+    /// The build's images.
+    pub fn pixels(&self) -> Pixels {
+        self.pixels
+    }
+
+    /// The number of each copy among those of its part, from 1.
+    pub fn numbers(&self) -> impl Iterator<Item = u32> {
+        let mut counts = vec![0; self.parts.len()];
+        self.placements.iter().map(move |placement| {
+            counts[placement.part] += 1;
+            counts[placement.part]
+        })
+    }
+
+    /// What each way of laying a part down looks like.
+    pub fn silhouettes(&self) -> HashMap<(usize, Turn), Mask> {
+        let mut all = HashMap::new();
+        for &Placement { part, turn, .. } in &self.placements {
+            all.entry((part, turn)).or_insert_with(|| self.parts[part].silhouette(turn));
+        }
+        all
+    }
+
+    fn copy_name(&self, part: usize, number: u32) -> CopyName {
+        CopyName { name: self.parts[part].name().to_owned(), number }
+    }
+
+    /// By how many pixels a copy reaches beyond the area.
+    fn beyond(&self, wish: &Wish, size: Pixels) -> i64 {
+        let right = wish.left + i64::from(size.width) - i64::from(self.pixels.width);
+        let bottom = wish.top + i64::from(size.height) - i64::from(self.pixels.height);
+        right.max(bottom).max(-wish.left).max(-wish.top)
+    }
+
+    /// Checks that no two copies lie on each other.
+    fn check_apart(&self) -> Result<(), TileError> {
+        let silhouettes = self.silhouettes();
+        let numbers: Vec<u32> = self.numbers().collect();
+        for (k, one) in self.placements.iter().enumerate() {
+            for (l, other) in self.placements.iter().enumerate().take(k) {
+                let masks = [other, one].map(|at| &silhouettes[&(at.part, at.turn)]);
+                let Some((column, row)) = common_pixel(masks, [other, one]) else { continue };
+                let pitch = self.dpi.pitch().mm();
+                return Err(TileError::Overlap {
+                    one: self.copy_name(other.part, numbers[l]),
+                    other: self.copy_name(one.part, numbers[k]),
+                    x_mm: f64::from(column) * pitch,
+                    y_mm: self.area.height.mm() - f64::from(row) * pitch,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn packing_command(&mut self, gap: Length, pack: Pack) -> String {
+        let copies: Vec<String> = match self.parts.len() {
+            1 => vec![self.placements.len().to_string()],
+            parts => (0..parts).map(|part| self.copies_of(part).to_string()).collect(),
+        };
+        let area = self.area;
+        let mut command = format!("tile --area {area} --copies {} --gap {gap}", copies.join(","));
+        command += &pack.options();
+        self.command = command;
+        self.note_fit();
+        std::mem::take(&mut self.command)
+    }
+
+    fn note_fit(&mut self) {
+        if self.parts.iter().any(|part| part.outline().is_some()) {
+            self.command += " --fit";
+        }
+    }
+}
+
+impl Pixels {
+    /// The size of an image.
+    pub fn of(image: &Image) -> Self {
+        Self { width: image.width(), height: image.height() }
+    }
+}
+
+/// A pixel of the build that is white in two placed masks.
+fn common_pixel(masks: [&Mask; 2], at: [&Placement; 2]) -> Option<(u32, u32)> {
+    let [a, b] = at;
+    let top = a.top.max(b.top);
+    let bottom = (a.top + masks[0].height()).min(b.top + masks[1].height());
+    let left = a.left.max(b.left);
+    let right = (a.left + masks[0].width()).min(b.left + masks[1].width());
+    if left >= right {
+        return None;
+    }
+    (top..bottom).find_map(|row| {
+        let rows =
+            [0, 1].map(|k| runs(masks[k].row(row - at[k].top), masks[k].width(), at[k].left));
+        let [mut one, mut other] = rows.map(Iterator::peekable);
+        loop {
+            let (&(a, a_end), &(b, b_end)) = (one.peek()?, other.peek()?);
+            if a.max(b) < a_end.min(b_end) {
+                return Some((a.max(b), row));
+            }
+            if a_end < b_end {
+                one.next()
+            } else {
+                other.next()
+            };
+        }
+    })
+}
+
+/// The white runs of a row that is shifted to the right.
+fn runs(row: &[u32], width: u32, left: u32) -> impl Iterator<Item = (u32, u32)> {
+    row.chunks(2).map(move |run| (left + run[0], left + run.get(1).unwrap_or(&width)))
+}
+
+/// The whole pixels of a length, where one that misses by rounding counts.
+fn whole_pixels(length: Length, dpi: Dpi) -> u32 {
+    (length.pixels(dpi) + 1e-6) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{Layer, PageInfo};
+
+    use super::super::testing::mask_of;
+    use super::*;
+
+    /// At 25.4 dpi, one pixel is one millimetre.
+    fn part(outline: bool) -> Part {
+        let image =
+            Image::Mask(mask_of(&["........", ".##.....", ".##.....", ".####...", "........"]));
+        let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image };
+        if outline {
+            Part::of_outline("l.tif", std::iter::once(Ok::<_, TileError>(layer))).unwrap().unwrap()
+        } else {
+            Part::of_image("l.tif", &layer).unwrap()
+        }
+    }
+
+    fn placed(outline: bool, wishes: &[(i64, i64, &str)]) -> Result<Layout, TileError> {
+        let wish = |&(left, top, turn): &(i64, i64, &str)| Wish {
+            part: 0,
+            turn: turn.parse().unwrap(),
+            left,
+            top,
+        };
+        let wishes: Vec<Wish> = wishes.iter().map(wish).collect();
+        Layout::placed(vec![part(outline)], &wishes, "10x10mm".parse().unwrap())
+    }
+
+    #[test]
+    fn outlines_may_lie_within_each_other_s_boxes() {
+        // An L of 4 x 3, and another turned by half into its corner.
+        assert!(placed(true, &[(0, 1, "0"), (0, 0, "180")]).is_ok());
+        let error = placed(true, &[(0, 1, "0"), (1, 1, "180")]).unwrap_err().to_string();
+        assert!(
+            error.contains("l.tif copy 1 and l.tif copy 2 overlap near x 1.00 y 9.00"),
+            "{error}"
+        );
+        assert!(matches!(
+            placed(false, &[(0, 0, "0"), (2, 4, "0")]),
+            Err(TileError::Overlap { .. })
+        ));
+        assert!(placed(false, &[(0, 0, "0"), (2, 5, "0")]).is_ok());
+    }
+
+    #[test]
+    fn what_is_off_the_area_is_named() {
+        let error = placed(false, &[(0, 0, "0"), (3, 5, "0")]).unwrap_err().to_string();
+        assert!(error.starts_with("l.tif copy 2 reaches 1mm beyond"), "{error}");
+        assert!(placed(true, &[(6, 7, "0")]).is_ok());
+        assert!(placed(true, &[(7, 6, "90")]).is_ok());
+        for wrong in [(7, 0, "0"), (-1, 0, "0"), (0, 8, "0"), (0, -2, "0"), (0, 7, "90")] {
+            assert!(
+                matches!(placed(true, &[wrong]), Err(TileError::OutOfArea { .. })),
+                "{wrong:?}"
+            );
+        }
+    }
+}

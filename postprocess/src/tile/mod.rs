@@ -1,0 +1,182 @@
+//! Copies of parts on a build area.
+//!
+//! Source: 002 section 2.4.2.
+//!
+//! A [`Part`] is what is known of a stack before it is placed, a [`Layout`]
+//! where copies stand: found by [`Layout::packed`], or read from a
+//! [`LayoutFile`]. [`Layout::build`] reads the stacks in step, by height, and
+//! makes of their layers the build's. A layer is turned once for each way it
+//! lies, and a build's row is a merge of shifted rows.
+
+mod error;
+mod file;
+mod heights;
+mod layout;
+mod pack;
+mod page;
+mod part;
+mod rows;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashMap;
+
+use lamp_stack::{Image, Layer, Length, Size, Turn, map_in_order};
+
+use heights::{Step, Steps};
+use rows::{Fault, Placed};
+
+pub use error::{CopyName, TileError};
+pub use file::{LayoutError, LayoutFile};
+pub use heights::Heights;
+pub use layout::{Layout, Placement};
+pub use pack::{Pack, PackBy, Turns};
+pub use page::StrayRows;
+pub use part::Part;
+
+/// How a part is laid out.
+#[derive(Clone, Copy, Debug)]
+pub struct TileOptions {
+    /// The build area.
+    pub area: Size,
+    /// How many copies; as many as fit where `None`.
+    pub copies: Option<u32>,
+    /// The least distance between two copies.
+    pub gap: Length,
+}
+
+impl Default for TileOptions {
+    /// As many copies as fit on the alpha machine (4 x 4.5 in, 002 table 1),
+    /// 1 mm apart. The gap is ours: the seed gives none.
+    fn default() -> Self {
+        let [width, height] = [4.0, 4.5].map(|inch| Length::from_um(inch * 25_400.0));
+        Self { area: Size { width, height }, copies: None, gap: Length::from_mm(1.0) }
+    }
+}
+
+/// A width and a height in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pixels {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl std::fmt::Display for Pixels {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} x {}", self.width, self.height)
+    }
+}
+
+/// Lays copies of each layer of one stack out on a black build area, in rows from
+/// the top left, the whole centred. Where the copies stand follows from the
+/// first layer and is stated on its page, in pixels.
+pub fn tile<'a, E: From<TileError> + Send + 'a>(
+    layers: impl Iterator<Item = Result<Layer, E>> + 'a,
+    options: TileOptions,
+) -> impl Iterator<Item = Result<Layer, E>> + 'a {
+    let mut layers = Some(layers);
+    let mut build: Box<dyn Iterator<Item = Result<Layer, E>> + 'a> = Box::new(std::iter::empty());
+    std::iter::from_fn(move || {
+        if let Some(mut layers) = layers.take() {
+            let layout = match layers.next()?.and_then(|first| Ok((options.layout(&first)?, first)))
+            {
+                Ok((layout, first)) => layers_behind(layout, first, layers),
+                Err(error) => return Some(Err(error)),
+            };
+            build = Box::new(layout);
+        }
+        build.next()
+    })
+}
+
+fn layers_behind<'a, E: From<TileError> + Send + 'a>(
+    layout: Layout,
+    first: Layer,
+    layers: impl Iterator<Item = Result<Layer, E>> + 'a,
+) -> impl Iterator<Item = Result<Layer, E>> + 'a {
+    let all = std::iter::once(Ok(first)).chain(layers);
+    layout.build(vec![all], Heights::default(), |_| {})
+}
+
+impl TileOptions {
+    /// Where copies of a part stand.
+    fn layout(&self, first: &Layer) -> Result<Layout, TileError> {
+        let part = Part::of_image("the stack", first)?;
+        Layout::packed(vec![part], &[self.copies], self.area, self.gap, Pack::default())
+    }
+}
+
+impl Layout {
+    /// Makes the build's layers of the parts', whose stacks come in the order of
+    /// the parts. `stray` is told of rows that the parts' pages call stray.
+    ///
+    /// # Panics
+    /// If there are not as many stacks as parts.
+    pub fn build<E, S>(
+        mut self,
+        stacks: Vec<S>,
+        heights: Heights,
+        mut stray: impl FnMut(&StrayRows),
+    ) -> impl Iterator<Item = Result<Layer, E>>
+    where
+        S: Iterator<Item = Result<Layer, E>>,
+        E: From<TileError> + Send,
+    {
+        assert_eq!(stacks.len(), self.parts.len(), "a stack for each part");
+        self.resampled = heights.resample && stacks.len() > 1;
+        let copies = (0..stacks.len()).map(|part| self.copies_of(part)).collect();
+        let names: Vec<String> = self.parts.iter().map(|part| part.name().to_owned()).collect();
+        let steps = Steps::new(names.into_iter().zip(stacks), copies, heights);
+        let layers = map_in_order(steps, move |step: Step| {
+            let layer =
+                Layer { info: self.page(&step)?, dpi: Some(self.dpi), image: self.image(&step)? };
+            Ok((layer, self.stray_rows(&step)))
+        });
+        layers.map(move |made| {
+            let (layer, rows) = made?;
+            rows.iter().for_each(&mut stray);
+            Ok(layer)
+        })
+    }
+
+    /// The build's image: the parts' rows on the background, which is black.
+    fn image(&self, step: &Step) -> Result<Image, TileError> {
+        self.parts_image(step)
+    }
+
+    /// The copies of all parts, on black.
+    fn parts_image(&self, step: &Step) -> Result<Image, TileError> {
+        let too_many =
+            |copies| TileError::TooManyRuns { copies, layer: step.some_layer().info.name() };
+        let mut turned: Vec<(Image, Vec<(u32, u32)>)> = Vec::new();
+        for (index, part, layer) in self.layers_of(step) {
+            let image = part.framed(layer)?;
+            for (turn, at) in self.places_by_turn(index) {
+                turned.push((image.turned(turn).ok_or_else(|| too_many(1))?, at));
+            }
+        }
+        let placed = turned.iter().map(|(image, at)| Placed { image, at: at.clone() });
+        rows::compose(&placed.collect::<Vec<_>>(), self.pixels).map_err(|fault| match fault {
+            Fault::TooManyRuns => too_many(self.placements.len()),
+            // Outlines were apart, so that a layer is not within its own.
+            Fault::Overlap => {
+                let (_, part, layer) = self.layers_of(step).next().expect("a step has a layer");
+                TileError::Changed { name: part.name().to_owned(), layer: layer.info.name() }
+            }
+        })
+    }
+
+    /// For each way in which copies of a part lie, where they stand.
+    fn places_by_turn(&self, part: usize) -> Vec<(Turn, Vec<(u32, u32)>)> {
+        let mut places: HashMap<Turn, Vec<(u32, u32)>> = HashMap::new();
+        for at in self.placements.iter().filter(|at| at.part == part) {
+            places.entry(at.turn).or_default().push((at.left, at.top));
+        }
+        let turns = Turn::ALL.into_iter();
+        turns.filter_map(|turn| Some((turn, places.remove(&turn)?))).collect()
+    }
+}

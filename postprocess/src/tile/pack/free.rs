@@ -1,0 +1,178 @@
+//! Copy by copy, each where there is room for it.
+
+use std::collections::HashMap;
+
+use lamp_stack::Turn;
+
+use super::super::{Layout, Pixels, Placement};
+use super::Turns;
+use super::shapes::{NoFit, Run, Shapes};
+
+/// Which place is taken of those that are free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    /// The one nearest to the top.
+    Top,
+    /// The one whose copy ends nearest to the top.
+    Bottom,
+}
+
+impl Order {
+    pub(super) const ALL: [Self; 2] = [Self::Top, Self::Bottom];
+}
+
+/// Places up to so many copies of each part, large parts first, from the top
+/// left; then moves the whole to the middle.
+pub(super) fn place(
+    layout: &Layout,
+    shapes: &mut Shapes,
+    wanted: &[u32],
+    turns: Turns,
+    order: Order,
+) -> Vec<Placement> {
+    let mut free = Free { layout, shapes, taken: HashMap::new(), placements: Vec::new() };
+    let area = |part: &usize| {
+        let Pixels { width, height } = layout.parts()[*part].size(Turn::default());
+        std::cmp::Reverse(u64::from(width) * u64::from(height))
+    };
+    let mut parts: Vec<usize> = (0..wanted.len()).collect();
+    parts.sort_by_key(area);
+    for part in parts {
+        let ways: Vec<Turn> =
+            turns.all().iter().map(|&quarters| Turn::new(quarters, false)).collect();
+        for _ in 0..wanted[part] {
+            if !free.place(part, &ways, order) {
+                break;
+            }
+        }
+    }
+    let mut placements = free.placements;
+    centre(layout, &mut placements);
+    placements.sort_by_key(|at| (at.part, at.top, at.left));
+    placements
+}
+
+/// The room that is left on an area.
+struct Free<'a> {
+    layout: &'a Layout,
+    shapes: &'a mut Shapes,
+    /// Of each way a part may lie, the places that are taken.
+    taken: HashMap<(usize, Turn), Taken>,
+    placements: Vec<Placement>,
+}
+
+/// The places, in cells, where a shape may not begin.
+struct Taken {
+    /// For each row, runs of columns apart from each other, from the left.
+    rows: Vec<Vec<Run>>,
+    /// How many columns there are.
+    columns: i32,
+    /// All rows above this one are taken.
+    first: usize,
+    /// How many of the copies it knows of.
+    known: usize,
+}
+
+impl Free<'_> {
+    /// Finds a place for one more copy, if there is one.
+    fn place(&mut self, part: usize, ways: &[Turn], order: Order) -> bool {
+        let cell = self.shapes.cell;
+        let found = ways.iter().filter_map(|&turn| {
+            let (column, row) = self.first_place(part, turn)?;
+            let placement =
+                Placement { part, turn, left: column as u32 * cell, top: row as u32 * cell };
+            let rank = match order {
+                Order::Top => placement.top,
+                Order::Bottom => placement.top + self.layout.parts()[part].size(turn).height,
+            };
+            Some((rank, placement.left, placement))
+        });
+        let best = found.min_by_key(|&(rank, left, _)| (rank, left));
+        self.placements.extend(best.map(|(_, _, placement)| placement));
+        best.is_some()
+    }
+
+    /// The first row, and in it the first column, where a shape may begin.
+    fn first_place(&mut self, part: usize, turn: Turn) -> Option<(i32, i32)> {
+        let key = (part, turn);
+        let (pixels, cell) = (self.layout.pixels(), self.shapes.cell);
+        let size = self.layout.parts()[part].size(turn);
+        let room = Pixels {
+            width: pixels.width.checked_sub(size.width)? / cell + 1,
+            height: pixels.height.checked_sub(size.height)? / cell + 1,
+        };
+        let taken = self.taken.entry(key).or_insert_with(|| Taken::new(room));
+        for at in &self.placements[taken.known..] {
+            let no_fit = self.shapes.no_fit(self.layout, key, (at.part, at.turn));
+            taken.add(&no_fit, (at.left / cell) as i32, (at.top / cell) as i32);
+        }
+        taken.known = self.placements.len();
+        taken.first_free()
+    }
+}
+
+impl Taken {
+    fn new(room: Pixels) -> Self {
+        let rows = vec![Vec::new(); room.height as usize];
+        Self { rows, columns: room.width as i32, first: 0, known: 0 }
+    }
+
+    /// Takes the places at which a shape would meet another that begins at a
+    /// column and a row.
+    fn add(&mut self, no_fit: &NoFit, column: i32, row: i32) {
+        let start = row - no_fit.top;
+        let hidden = (-start).max(0) as usize;
+        let rows = self.rows.iter_mut().skip(start.max(0) as usize);
+        for (taken, runs) in rows.zip(no_fit.rows.iter().skip(hidden)) {
+            for &(from, to) in runs.iter() {
+                let run = ((from + column).max(0), (to + column).min(self.columns));
+                if run.0 < run.1 {
+                    insert(taken, run);
+                }
+            }
+        }
+    }
+
+    fn first_free(&mut self) -> Option<(i32, i32)> {
+        while let Some(runs) = self.rows.get(self.first) {
+            let column = match runs.first() {
+                Some(&(0, end)) => end,
+                _ => 0,
+            };
+            if column < self.columns {
+                return Some((column, self.first as i32));
+            }
+            self.first += 1;
+        }
+        None
+    }
+}
+
+/// Adds a run to runs that are apart from each other, and joins those that it
+/// touches.
+fn insert(runs: &mut Vec<Run>, (mut start, mut end): Run) {
+    let first = runs.partition_point(|run| run.1 < start);
+    let last = first + runs[first..].partition_point(|run| run.0 <= end);
+    if let [met_first, ..] = runs[first..last] {
+        start = start.min(met_first.0);
+        end = end.max(runs[last - 1].1);
+    }
+    runs.splice(first..last, [(start, end)]);
+}
+
+/// Moves all copies together to the middle of the area.
+fn centre(layout: &Layout, placements: &mut [Placement]) {
+    let ends = |at: &Placement| {
+        let size = layout.parts()[at.part].size(at.turn);
+        (at.left + size.width, at.top + size.height)
+    };
+    let right = placements.iter().map(|at| ends(at).0).max().unwrap_or(0);
+    let bottom = placements.iter().map(|at| ends(at).1).max().unwrap_or(0);
+    let left = placements.iter().map(|at| at.left).min().unwrap_or(0);
+    let top = placements.iter().map(|at| at.top).min().unwrap_or(0);
+    let pixels = layout.pixels();
+    for at in placements {
+        at.left = at.left - left + (pixels.width - (right - left)) / 2;
+        at.top = at.top - top + (pixels.height - (bottom - top)) / 2;
+    }
+}

@@ -1,0 +1,33 @@
+//! Copies of one part in rows and columns.
+
+use lamp_stack::Turn;
+
+use super::super::{Layout, Placement};
+
+/// Places up to so many copies of the one part in rows from the top left, the
+/// whole centred.
+pub(super) fn grid(layout: &Layout, turn: Turn, wanted: u32, gap: u32) -> Vec<Placement> {
+    let (part, area) = (layout.parts()[0].size(turn), layout.pixels());
+    let (Some(columns), Some(rows)) =
+        (most(area.width, part.width, gap), most(area.height, part.height, gap))
+    else {
+        return Vec::new();
+    };
+    let copies = columns.saturating_mul(rows).min(wanted);
+    let columns = columns.min(copies);
+    let lefts = positions(area.width, part.width, gap, columns);
+    let tops = positions(area.height, part.height, gap, copies.div_ceil(columns));
+    let all = tops.flat_map(|top| lefts.clone().map(move |left| (left, top)));
+    all.map(|(left, top)| Placement { part: 0, turn, left, top }).take(copies as usize).collect()
+}
+
+/// How many parts stand along a side; `None` where not one does.
+fn most(area: u32, part: u32, gap: u32) -> Option<u32> {
+    Some(area.checked_sub(part)? / (part + gap) + 1)
+}
+
+/// Where `count` parts stand along a side, centred.
+fn positions(area: u32, part: u32, gap: u32, count: u32) -> impl Iterator<Item = u32> + Clone {
+    let used = count * part + (count - 1) * gap;
+    (0..count).map(move |i| (area - used) / 2 + i * (part + gap))
+}

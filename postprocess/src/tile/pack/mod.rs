@@ -1,0 +1,173 @@
+//! Places for as many copies as fit, or as are wanted.
+//!
+//! What is simple comes first: a grid, then boxes wherever they fit, then
+//! outlines, each without turning parts before turning them. A later way is
+//! taken only if it places more copies.
+
+mod free;
+mod grid;
+mod shapes;
+
+use lamp_stack::Turn;
+
+use super::{Layout, Placement, TileError};
+use free::Order;
+use shapes::Shapes;
+
+/// How places are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pack {
+    /// By what parts keep apart.
+    pub by: PackBy,
+    /// Which ways parts may be turned.
+    pub turns: Turns,
+}
+
+/// By what parts keep apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PackBy {
+    /// The boxes around them.
+    #[default]
+    Boxes,
+    /// Their outlines, where boxes do not place all.
+    Outlines,
+}
+
+/// Which ways parts may be turned, where that places more. None is mirrored,
+/// which would be another part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Turns {
+    /// Not at all.
+    #[default]
+    None,
+    /// By 180 degrees.
+    Half,
+    /// By 90, 180 and 270 degrees.
+    Quarters,
+}
+
+impl Turns {
+    fn all(self) -> &'static [u32] {
+        match self {
+            Self::None => &[0],
+            Self::Half => &[0, 2],
+            Self::Quarters => &[0, 2, 1, 3],
+        }
+    }
+}
+
+impl Pack {
+    /// The options that ask for it, as a command has them.
+    pub(super) fn options(self) -> String {
+        let by = match self.by {
+            PackBy::Boxes => "",
+            PackBy::Outlines => " --pack outline",
+        };
+        let turns = match self.turns {
+            Turns::None => "",
+            Turns::Half => " --turns half",
+            Turns::Quarters => " --turns quarters",
+        };
+        [by, turns].concat()
+    }
+
+    /// The ways to try, each with the turns that it may use.
+    fn ways(self, alone: bool) -> Vec<Way> {
+        let mut ways = Vec::new();
+        let quarters = self.turns == Turns::Quarters;
+        if alone {
+            ways.extend(
+                [Some(Way::Grid(0)), quarters.then_some(Way::Grid(1))].into_iter().flatten(),
+            );
+        } else {
+            ways.extend(Order::ALL.map(|order| Way::Free(PackBy::Boxes, Turns::None, order)));
+        }
+        if quarters {
+            ways.extend(Order::ALL.map(|order| Way::Free(PackBy::Boxes, Turns::Quarters, order)));
+        }
+        if self.by == PackBy::Outlines {
+            let turns = [Turns::None, Turns::Half, Turns::Quarters].into_iter();
+            let allowed = turns.filter(|turns| turns.all().len() <= self.turns.all().len());
+            for turns in allowed {
+                ways.extend(Order::ALL.map(|order| Way::Free(PackBy::Outlines, turns, order)));
+            }
+        }
+        ways
+    }
+}
+
+/// One way to find places.
+#[derive(Clone, Copy, Debug)]
+enum Way {
+    /// All copies of the one part in rows and columns, turned by so many right
+    /// angles.
+    Grid(u32),
+    /// Copy by copy, where there is room.
+    Free(PackBy, Turns, Order),
+}
+
+/// Finds places for all copies, or says how many found one.
+pub(super) fn pack(
+    layout: &Layout,
+    counts: &[Option<u32>],
+    gap: u32,
+    how: Pack,
+) -> Result<Vec<Placement>, TileError> {
+    let alone = counts.len() == 1;
+    for part in 0..counts.len() {
+        check_fits(layout, part, how.turns)?;
+    }
+    // As many as fit is more than all.
+    let wanted: Vec<u32> =
+        counts.iter().map(|count| count.unwrap_or(if alone { u32::MAX } else { 1 })).collect();
+    let all = wanted.iter().map(|&count| count as usize).fold(0, usize::saturating_add);
+    let mut best: Vec<Placement> = Vec::new();
+    let mut shapes: Option<Shapes> = None;
+    for way in how.ways(alone) {
+        let found = match way {
+            Way::Grid(quarters) => grid::grid(layout, Turn::new(quarters, false), wanted[0], gap),
+            Way::Free(by, turns, order) => {
+                let current = shapes.take().filter(|shapes| shapes.are_by(by));
+                let shapes = shapes.insert(current.unwrap_or_else(|| Shapes::new(layout, gap, by)));
+                free::place(layout, shapes, &wanted, turns, order)
+            }
+        };
+        if found.len() > best.len() {
+            best = found;
+        }
+        if best.len() >= all {
+            break;
+        }
+    }
+    let short = (0..counts.len()).find_map(|part| {
+        let most = best.iter().filter(|placement| placement.part == part).count() as u32;
+        counts[part]
+            .or((!alone).then_some(1))
+            .filter(|&asked| most < asked)
+            .map(|asked| (part, asked, most))
+    });
+    match short {
+        None => Ok(best),
+        Some((part, asked, most)) => {
+            let name = layout.parts()[part].name().to_owned();
+            Err(TileError::TooMany { name, asked, most, area_mm: layout.area() })
+        }
+    }
+}
+
+fn check_fits(layout: &Layout, part: usize, turns: Turns) -> Result<(), TileError> {
+    let area = layout.pixels();
+    let fits = turns.all().iter().any(|&quarters| {
+        let size = layout.parts()[part].size(Turn::new(quarters, false));
+        size.width <= area.width && size.height <= area.height
+    });
+    if fits {
+        return Ok(());
+    }
+    let name = layout.parts()[part].name().to_owned();
+    let size = layout.parts()[part].size(Turn::default());
+    Err(TileError::TooLarge { name, part: size, area, area_mm: layout.area() })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,177 @@
+//! Which displacements make two parts overlap.
+//!
+//! The displacements of a part from another at which they meet are a region of
+//! its own (the no-fit region): row by row, runs of columns. It is found once
+//! for each two parts and ways they are turned, from their outlines in cells of
+//! some pixels, a cell being white where any of its pixels is. So outlines take
+//! up a little more room than they must, never less.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use lamp_stack::{Frame, Mask, Turn};
+
+use super::super::{Layout, Pixels};
+use super::PackBy;
+use crate::offset::offset_one_bit;
+
+/// The columns from the first up to, but without, the second.
+pub(super) type Run = (i32, i32);
+
+/// A part is so many cells long, the shortest at least, the longest at most.
+const FINE: u32 = 256;
+const COARSE: u32 = 768;
+
+/// Parts as shapes in cells.
+pub(super) struct Shapes {
+    by: PackBy,
+    gap: u32,
+    /// Pixels on a side of a cell.
+    pub(super) cell: u32,
+    turned: HashMap<(usize, Turn), Rc<Shape>>,
+    no_fits: HashMap<[(usize, Turn); 2], Rc<NoFit>>,
+}
+
+/// A part's outline in cells, turned.
+struct Shape {
+    rows: Vec<Vec<Run>>,
+    /// Grown by the gap; its first row and column stand so many cells before
+    /// the shape's.
+    grown: Vec<Vec<Run>>,
+    margin: i32,
+}
+
+/// The displacements at which a shape meets another.
+pub(super) struct NoFit {
+    /// How far up the first row is.
+    pub(super) top: i32,
+    pub(super) rows: Vec<Rc<[Run]>>,
+}
+
+impl Shapes {
+    pub(super) fn new(layout: &Layout, gap: u32, by: PackBy) -> Self {
+        let sides = layout.parts().iter().map(|part| {
+            let Pixels { width, height } = part.size(Turn::default());
+            width.max(height)
+        });
+        let cell = match by {
+            PackBy::Boxes => 1,
+            PackBy::Outlines => {
+                let (least, most) = (sides.clone().min(), sides.max());
+                let fine = least.unwrap_or(0) / FINE;
+                fine.max(most.unwrap_or(0).div_ceil(COARSE)).max(1)
+            }
+        };
+        Self { by, gap, cell, turned: HashMap::new(), no_fits: HashMap::new() }
+    }
+
+    pub(super) fn are_by(&self, by: PackBy) -> bool {
+        self.by == by
+    }
+
+    /// The displacements of `placed`'s shape from which `moving`'s meets it or
+    /// comes nearer than the gap.
+    pub(super) fn no_fit(
+        &mut self,
+        layout: &Layout,
+        moving: (usize, Turn),
+        placed: (usize, Turn),
+    ) -> Rc<NoFit> {
+        if let Some(known) = self.no_fits.get(&[moving, placed]) {
+            return Rc::clone(known);
+        }
+        let no_fit = Rc::new(match self.by {
+            PackBy::Boxes => {
+                let [moving, placed] =
+                    [moving, placed].map(|(part, turn)| layout.parts()[part].size(turn));
+                NoFit::of_boxes(moving, placed, self.gap)
+            }
+            PackBy::Outlines => {
+                let [moving, placed] = [moving, placed].map(|key| self.shape(layout, key));
+                NoFit::of_shapes(&moving, &placed)
+            }
+        });
+        self.no_fits.insert([moving, placed], Rc::clone(&no_fit));
+        no_fit
+    }
+
+    fn shape(&mut self, layout: &Layout, key: (usize, Turn)) -> Rc<Shape> {
+        let (gap, cell) = (self.gap, self.cell);
+        let shape = || Rc::new(Shape::new(&layout.parts()[key.0].silhouette(key.1), gap, cell));
+        Rc::clone(self.turned.entry(key).or_insert_with(shape))
+    }
+}
+
+impl Shape {
+    fn new(outline: &Mask, gap: u32, cell: u32) -> Self {
+        let size = Pixels { width: outline.width(), height: outline.height() };
+        // Growing goes to the nearest pixel, which may be one further.
+        let margin = if gap == 0 { 0 } else { (gap + 1).div_ceil(cell) };
+        let around = margin * cell;
+        let wide = outline.framed(Frame {
+            left: -i64::from(around),
+            top: -i64::from(around),
+            width: size.width + 2 * around,
+            height: size.height + 2 * around,
+        });
+        let grown = if gap == 0 { wide } else { offset_one_bit(&wide, -f64::from(gap)) };
+        Self { rows: cells(outline, cell), grown: cells(&grown, cell), margin: margin as i32 }
+    }
+}
+
+/// The cells that hold a white pixel.
+fn cells(mask: &Mask, cell: u32) -> Vec<Vec<Run>> {
+    let mut rows = vec![Vec::new(); mask.height().div_ceil(cell) as usize];
+    for (index, row) in (0..).zip(mask.rows()) {
+        let runs = row.chunks(2).map(|run| {
+            let end = *run.get(1).unwrap_or(&mask.width());
+            ((run[0] / cell) as i32, end.div_ceil(cell) as i32)
+        });
+        rows[index / cell as usize].extend(runs);
+    }
+    rows.iter_mut().for_each(join_runs);
+    rows
+}
+
+/// Brings runs in order and joins those that touch.
+fn join_runs(runs: &mut Vec<Run>) {
+    runs.sort_unstable();
+    runs.dedup_by(|next, last| {
+        let touch = next.0 <= last.1;
+        if touch {
+            last.1 = last.1.max(next.1);
+        }
+        touch
+    });
+}
+
+impl NoFit {
+    fn of_boxes(moving: Pixels, placed: Pixels, gap: u32) -> Self {
+        let [width, height] = [moving.width, moving.height].map(|side| (side + gap) as i32);
+        let run: Rc<[Run]> = Rc::new([(1 - width, (placed.width + gap) as i32)]);
+        let rows = height - 1 + (placed.height + gap) as i32;
+        Self { top: height - 1, rows: vec![run; rows as usize] }
+    }
+
+    fn of_shapes(moving: &Shape, placed: &Shape) -> Self {
+        let (high, margin) = (moving.rows.len() as i32, placed.margin);
+        let top = high - 1 + margin;
+        let rows = -top..placed.grown.len() as i32 - margin;
+        let rows = rows.map(|down| {
+            let mut runs = Vec::new();
+            for (row, across) in (down + margin..).zip(&moving.rows) {
+                let Some(others) = usize::try_from(row).ok().and_then(|row| placed.grown.get(row))
+                else {
+                    continue;
+                };
+                for &(start, end) in across {
+                    let met = |&(from, to): &Run| (from - margin - end + 1, to - margin - start);
+                    runs.extend(others.iter().map(met));
+                }
+            }
+            join_runs(&mut runs);
+            runs.into()
+        });
+        Self { top, rows: rows.collect() }
+    }
+}

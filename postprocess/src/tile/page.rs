@@ -1,0 +1,215 @@
+//! What a build's pages say.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use lamp_stack::{Layer, PageInfo, StackInfo, Turn};
+use serde_json::{Map, Value, json};
+
+use super::heights::Step;
+use super::{Layout, Part, Placement, TileError};
+
+/// Rows of a part's layer that are stray, told once however many copies there
+/// are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StrayRows {
+    /// The part.
+    pub part: String,
+    /// The layer's name.
+    pub layer: String,
+    /// The rows, in the part's image.
+    pub rows: Vec<u32>,
+}
+
+/// A part, and its layer at a height.
+type Here<'a> = (usize, &'a Part, &'a Layer);
+
+impl Layout {
+    /// The page of the layer that a step makes.
+    pub(super) fn page(&self, step: &Step) -> Result<PageInfo, TileError> {
+        let here: Vec<Here<'_>> = self.layers_of(step).collect();
+        let infos = || here.iter().map(|(_, _, layer)| &layer.info);
+        let closed = infos().map(|info| info.closed).reduce(|a, b| match (a, b) {
+            (Some(false), _) | (_, Some(false)) => Some(false),
+            (Some(true), Some(true)) => Some(true),
+            _ => None,
+        });
+        let (other, stack) = (common(&here, self.parts.len()), self.stack_of(&here));
+        Ok(PageInfo {
+            index: step.index,
+            z_um: step.z_um,
+            thickness_um: step.thickness_um,
+            // Build coordinates start at the area's lower left corner.
+            origin_mm: Some([0.0, self.area.height.mm()]),
+            exposure_ms: exposure(step, &here)?,
+            closed: closed.flatten(),
+            open_rows: self.rows_on_build(&here, true),
+            stray_rows: self.rows_on_build(&here, false),
+            stack,
+            other,
+        })
+    }
+
+    /// The stray rows of each part.
+    pub(super) fn stray_rows(&self, step: &Step) -> Vec<StrayRows> {
+        let stray = self.layers_of(step).filter(|(_, _, layer)| !layer.info.stray_rows.is_empty());
+        let named = stray.map(|(_, part, layer)| StrayRows {
+            part: part.name().to_owned(),
+            layer: layer.info.name(),
+            rows: layer.info.stray_rows.clone(),
+        });
+        named.collect()
+    }
+
+    /// The parts that have a layer at a height.
+    pub(super) fn layers_of<'a>(&'a self, step: &'a Step) -> impl Iterator<Item = Here<'a>> {
+        let layers = self.parts.iter().zip(&step.layers).enumerate();
+        layers.filter_map(|(index, (part, layer))| Some((index, part, layer.as_deref()?)))
+    }
+
+    /// Where rows that the parts' pages list are on the build. Of copies that
+    /// are turned by a right angle they are columns, and none are listed.
+    fn rows_on_build(&self, here: &[Here<'_>], open: bool) -> Vec<u32> {
+        let mut rows = BTreeSet::new();
+        for &(part, _, layer) in here {
+            let listed = if open { &layer.info.open_rows } else { &layer.info.stray_rows };
+            let copies =
+                self.placements.iter().filter(|at| at.part == part && !at.turn.is_across());
+            for at in copies {
+                rows.extend(listed.iter().filter_map(|&row| self.row_on_build(at, row, open)));
+            }
+        }
+        rows.into_iter().collect()
+    }
+
+    /// Where a row of a part's image is. A row at which contours break off is
+    /// the first below an end, so it may be the one below the image.
+    fn row_on_build(&self, at: &Placement, row: u32, open: bool) -> Option<u32> {
+        let frame = self.parts[at.part].frame();
+        let row = u32::try_from(i64::from(row) - frame.top).ok()?;
+        let last = frame.height.checked_sub(if open { 0 } else { 1 })?;
+        let upside_down = at.turn == Turn::new(2, at.turn.is_mirrored());
+        (row <= last).then(|| at.top + if upside_down { last - row } else { row })
+    }
+
+    /// What the first page says of the build, where the parts' say anything.
+    fn stack_of(&self, here: &[Here<'_>]) -> Option<StackInfo> {
+        here.iter().find_map(|(_, _, layer)| layer.info.stack.as_ref())?;
+        if let &[(_, _, layer)] = here
+            && self.parts.len() == 1
+        {
+            let mut stack = layer.info.stack.clone()?;
+            stack.commands.push(self.command.clone());
+            stack.other.insert("tile".to_owned(), Value::Object(self.described(0)));
+            return Some(stack);
+        }
+        let stacks: Vec<StackInfo> =
+            self.parts.iter().map(|part| part.stack.clone().unwrap_or_default()).collect();
+        let texts = |text: fn(&StackInfo) -> &str| stacks.iter().map(text);
+        let described = (0..self.parts.len()).zip(&stacks).map(|(part, stack)| {
+            let mut all = Map::new();
+            all.insert("part".to_owned(), json!(stack.part));
+            all.insert("digest".to_owned(), json!(stack.digest));
+            all.insert("commands".to_owned(), json!(stack.commands));
+            all.append(&mut self.described(part));
+            all
+        });
+        let other = [("tile".to_owned(), json!({ "parts": described.collect::<Vec<_>>() }))];
+        Some(StackInfo {
+            part: texts(|stack| &stack.part).collect::<Vec<_>>().join("+"),
+            commands: vec![self.command.clone()],
+            digest: digest_of(texts(|stack| &stack.digest)),
+            layers: self.layer_count(),
+            other: other.into_iter().collect(),
+        })
+    }
+
+    /// How many layers there are where all stacks say so: all start together,
+    /// and the longest ends last.
+    fn layer_count(&self) -> Option<u32> {
+        if self.resampled {
+            return None;
+        }
+        let counts = self.parts.iter().map(|part| part.stack.as_ref()?.layers);
+        counts.collect::<Option<Vec<u32>>>()?.into_iter().max()
+    }
+
+    /// Where the copies of a part stand.
+    fn described(&self, part: usize) -> Map<String, Value> {
+        let copies = || self.placements.iter().filter(|at| at.part == part);
+        let Part { origin_mm, .. } = self.parts[part];
+        let frame = self.parts[part].frame();
+        let pitch = self.dpi.pitch().mm();
+        let corner = origin_mm.map(|[x, y]| match (frame.left, frame.top) {
+            (0, 0) => [x, y],
+            (left, top) => [x + left as f64 * pitch, y - top as f64 * pitch],
+        });
+        let mut all = Map::new();
+        all.insert("part_pixels".to_owned(), json!([frame.width, frame.height]));
+        all.insert("part_origin_mm".to_owned(), json!(corner));
+        if self.parts[part].outline().is_some() {
+            all.insert("part_corner".to_owned(), json!([frame.left, frame.top]));
+        }
+        let places: Vec<_> = copies().map(|at| [at.left, at.top]).collect();
+        all.insert("copies".to_owned(), json!(places));
+        if copies().any(|at| at.turn != Turn::default()) {
+            let turns: Vec<_> = copies().map(|at| at.turn.to_string()).collect();
+            all.insert("turns".to_owned(), json!(turns));
+        }
+        all
+    }
+}
+
+/// The one exposure of all parts.
+fn exposure(step: &Step, here: &[Here<'_>]) -> Result<Option<f64>, TileError> {
+    let known = here.iter().filter_map(|(_, part, layer)| Some((part, layer.info.exposure_ms?)));
+    let mut known = known.peekable();
+    let Some(&(first, first_ms)) = known.peek() else { return Ok(None) };
+    match known.find(|&(_, ms)| ms != first_ms) {
+        None => Ok(Some(first_ms)),
+        Some((part, ms)) => {
+            let layer = PageInfo { index: step.index, z_um: step.z_um, ..PageInfo::default() };
+            let (first, name) = (first.name().to_owned(), part.name().to_owned());
+            Err(TileError::Exposures { layer: layer.name(), first, first_ms, name, ms })
+        }
+    }
+}
+
+/// Whatever else the parts' pages say: what all say alike as it is, and the
+/// rest under `of_parts`, for each stack in their order.
+fn common(here: &[Here<'_>], parts: usize) -> Map<String, Value> {
+    let Some((_, _, first)) = here.first() else { return Map::new() };
+    let is_common = |key: &str, value: &Value| {
+        here.iter().all(|(_, _, layer)| layer.info.other.get(key) == Some(value))
+    };
+    let mut other = first.info.other.clone();
+    other.retain(|key, value| is_common(key, value));
+    let mut of_parts = vec![Map::new(); parts];
+    for &(part, _, layer) in here {
+        of_parts[part] = layer.info.other.clone();
+        of_parts[part].retain(|key, _| !other.contains_key(key));
+    }
+    if of_parts.iter().any(|own| !own.is_empty()) {
+        other.insert("of_parts".to_owned(), json!(of_parts));
+    }
+    other
+}
+
+/// The digest of several inputs: that of their digests, one after another.
+fn digest_of<'a>(digests: impl Iterator<Item = &'a str>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for digest in digests {
+        if digest.is_empty() {
+            return String::new();
+        }
+        hasher.update(digest.as_bytes());
+    }
+    format!("blake3:{}", hasher.finalize().to_hex())
+}
+
+impl Step {
+    /// The first layer here, which there always is.
+    pub(super) fn some_layer(&self) -> &Arc<Layer> {
+        self.layers.iter().flatten().next().expect("a step has a layer")
+    }
+}

@@ -1,0 +1,206 @@
+//! A part as it is placed: its size, and its outline where that is known.
+
+use lamp_stack::{
+    Dpi, Frame, GrayMask, Image, Layer, LevelChange, Mask, MaskBuilder, Op, StackInfo, Turn,
+};
+
+use super::{Pixels, TileError};
+
+/// What is known of a part before it is placed.
+#[derive(Clone, Debug)]
+pub struct Part {
+    name: String,
+    dpi: Dpi,
+    image: Pixels,
+    /// What is placed of the image.
+    frame: Frame,
+    /// What is white in any layer, within the frame.
+    outline: Option<Mask>,
+    pub(super) origin_mm: Option<[f64; 2]>,
+    pub(super) stack: Option<StackInfo>,
+}
+
+impl Part {
+    /// A part of which the whole image is placed, by its first layer. `name` is
+    /// what people call it.
+    ///
+    /// # Errors
+    /// Where the layer has no resolution.
+    pub fn of_image(name: &str, first: &Layer) -> Result<Self, TileError> {
+        let name = name.to_owned();
+        let Some(dpi) = first.dpi else {
+            return Err(TileError::NoResolution { name, layer: first.info.name() });
+        };
+        let image = Pixels::of(&first.image);
+        let frame = Frame { left: 0, top: 0, width: image.width, height: image.height };
+        let (origin_mm, stack) = (first.info.origin_mm, first.info.stack.clone());
+        Ok(Self { name, dpi, image, frame, outline: None, origin_mm, stack })
+    }
+
+    /// A part of which the extents are placed: the least frame that holds what
+    /// is white in any of its layers. `None` where there are no layers.
+    ///
+    /// # Errors
+    /// Those of the layers; where they have no resolution, or not one and the
+    /// same, or another size, or are all black.
+    pub fn of_outline<E: From<TileError>>(
+        name: &str,
+        layers: impl Iterator<Item = Result<Layer, E>>,
+    ) -> Result<Option<Self>, E> {
+        let mut found: Option<(Self, Mask)> = None;
+        for layer in layers {
+            let layer = layer?;
+            let white = white_of(&layer.image);
+            found = Some(match found.take() {
+                None => (Self::of_image(name, &layer)?, white),
+                Some((part, outline)) => {
+                    part.check(&layer)?;
+                    let union = outline.combined(Op::Union, &white);
+                    let union = union.ok_or_else(|| TileError::TooManyRuns {
+                        copies: 1,
+                        layer: layer.info.name(),
+                    })?;
+                    (part, union)
+                }
+            });
+        }
+        let Some((mut part, outline)) = found else { return Ok(None) };
+        let frame = extents(&outline);
+        part.frame = frame.ok_or_else(|| TileError::Black { name: name.to_owned() })?;
+        part.outline = Some(outline.framed(part.frame));
+        Ok(Some(part))
+    }
+
+    /// What people call it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its resolution.
+    pub fn dpi(&self) -> Dpi {
+        self.dpi
+    }
+
+    /// The part of its image that is placed: all of it, or its extents.
+    pub fn frame(&self) -> Frame {
+        self.frame
+    }
+
+    /// What is white in any layer, within the frame, where that is known.
+    pub fn outline(&self) -> Option<&Mask> {
+        self.outline.as_ref()
+    }
+
+    /// What is placed, in pixels, when it is turned.
+    pub fn size(&self, turn: Turn) -> Pixels {
+        let (width, height) = turn.size(self.frame.width, self.frame.height);
+        Pixels { width, height }
+    }
+
+    /// The size of its layers' images.
+    pub(super) fn image(&self) -> Pixels {
+        self.image
+    }
+
+    /// The outline, or all of the frame where it is not known.
+    pub(super) fn silhouette(&self, turn: Turn) -> Mask {
+        let outline = self.outline.as_ref().and_then(|outline| outline.turned(turn));
+        let size = self.size(turn);
+        outline.unwrap_or_else(|| {
+            let mut mask = MaskBuilder::new(size.width);
+            (0..size.height).for_each(|_| mask.push_row(&[0]).expect("a white row"));
+            mask.finish()
+        })
+    }
+
+    /// Checks that a layer is of the size and resolution of the first.
+    pub(super) fn check(&self, layer: &Layer) -> Result<(), TileError> {
+        let name = self.name.clone();
+        let found = Pixels::of(&layer.image);
+        if found != self.image {
+            let layer = layer.info.name();
+            return Err(TileError::OtherSize { name, layer, found, expected: self.image });
+        }
+        if layer.dpi != Some(self.dpi) {
+            return Err(TileError::OtherResolution { name, layer: layer.info.name() });
+        }
+        Ok(())
+    }
+
+    /// What is placed of a layer.
+    ///
+    /// # Errors
+    /// Where it is not within the extents that were found.
+    pub(super) fn framed(&self, layer: &Layer) -> Result<Image, TileError> {
+        self.check(layer)?;
+        if self.outline.is_some() && !is_within(&layer.image, self.frame) {
+            return Err(TileError::Changed { name: self.name.clone(), layer: layer.info.name() });
+        }
+        Ok(layer.image.framed(self.frame))
+    }
+}
+
+/// What is not black.
+fn white_of(image: &Image) -> Mask {
+    match image {
+        Image::Mask(mask) => mask.clone(),
+        Image::Gray(gray) => white_of_gray(gray),
+    }
+}
+
+fn white_of_gray(gray: &GrayMask) -> Mask {
+    let mut mask = MaskBuilder::new(gray.width());
+    let mut row = Vec::new();
+    for changes in gray.rows() {
+        row.clear();
+        let mut white = false;
+        for &LevelChange { column, level } in changes {
+            if (level > 0) != white {
+                white = !white;
+                row.push(column);
+            }
+        }
+        mask.push_row(&row).expect("changes rise within the width");
+    }
+    mask.finish()
+}
+
+/// The least frame that holds all that is white; `None` where nothing is.
+fn extents(mask: &Mask) -> Option<Frame> {
+    let rows = || (0..).zip(mask.rows()).filter(|(_, row)| !row.is_empty());
+    let (top, bottom) = (rows().next()?.0, rows().last()?.0);
+    let left = rows().map(|(_, row)| row[0]).min()?;
+    let right = rows().map(|(_, row)| end_of(row, mask.width())).max()?;
+    let (width, height) = (right - left, bottom - top + 1);
+    Some(Frame { left: left.into(), top: i64::from(top), width, height })
+}
+
+/// Where the last run of a row that is not black ends.
+fn end_of(row: &[u32], width: u32) -> u32 {
+    match row {
+        [.., last] if row.len().is_multiple_of(2) => *last,
+        _ => width,
+    }
+}
+
+fn is_within(image: &Image, frame: Frame) -> bool {
+    let holds = |row: u32, first: u32, end: u32| {
+        let (row, first, end) = (i64::from(row), i64::from(first), i64::from(end));
+        (frame.top..frame.top + i64::from(frame.height)).contains(&row)
+            && first >= frame.left
+            && end <= frame.left + i64::from(frame.width)
+    };
+    match image {
+        Image::Mask(mask) => (0..)
+            .zip(mask.rows())
+            .all(|(index, row)| row.is_empty() || holds(index, row[0], end_of(row, mask.width()))),
+        Image::Gray(gray) => (0..).zip(gray.rows()).all(|(index, row)| match row {
+            [] => true,
+            [first, ..] => {
+                let last = row[row.len() - 1];
+                let end = if last.level == 0 { last.column } else { gray.width() };
+                holds(index, first.column, end)
+            }
+        }),
+    }
+}
