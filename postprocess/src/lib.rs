@@ -36,6 +36,6 @@ pub use offset::{
     offset, offset_one_bit, shrink,
 };
 pub use tile::{
-    CopyName, Heights, Layout, LayoutError, LayoutFile, Pack, PackBy, Part, Pixels, Placement,
-    StrayRows, TileError, TileOptions, Turns, tile,
+    CellShape, CopyName, Heights, Layout, LayoutError, LayoutFile, MeshOptions, Pack, PackBy, Part,
+    Pattern, Pixels, Placement, StrayRows, TileError, TileOptions, Turns, tile,
 };

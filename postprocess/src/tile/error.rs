@@ -45,6 +45,35 @@ pub enum TileError {
         /// The area as lengths.
         area_mm: Size,
     },
+    /// Cells without holes, or too small for pixels.
+    #[error(
+        "a mesh of cells {cell} apart with walls of {wall} has no holes: give a larger --cell or a smaller --wall"
+    )]
+    NoCells {
+        /// From the middle of a cell to that of the next.
+        cell: Length,
+        /// The thickness of the walls.
+        wall: Length,
+    },
+    /// A mesh that is an image without pixels.
+    #[error("{name}: the mesh's image has no pixels")]
+    NoTemplate {
+        /// The image.
+        name: String,
+    },
+    /// A mesh of more runs than an image can hold.
+    #[error("the mesh has more runs than an image can hold: give it larger cells")]
+    FineMesh,
+    /// A moat that leaves no place for the mesh.
+    #[error(
+        "a clearance of {clearance} is wider than the build area of {area_mm}: give a smaller --clearance, or --mesh none"
+    )]
+    WideMoat {
+        /// How far from a part the mesh would begin.
+        clearance: Length,
+        /// The area as lengths.
+        area_mm: Size,
+    },
     /// The copies have more runs than an image can hold.
     #[error("{copies} copies in {layer} have more runs than an image can hold: place fewer")]
     TooManyRuns {

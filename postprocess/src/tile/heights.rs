@@ -35,6 +35,8 @@ pub(super) struct Step {
     pub(super) layers: Vec<Option<Arc<Layer>>>,
     /// How many copies there are of each.
     pub(super) copies: Arc<[usize]>,
+    /// What the mesh around them takes.
+    pub(super) mesh_bytes: usize,
 }
 
 impl Held for Step {
@@ -45,7 +47,7 @@ impl Held for Step {
             .map(|(layer, &copies)| {
                 layer.as_ref().map_or(0, |layer| layer.bytes().saturating_mul(copies + 1))
             })
-            .fold(0, usize::saturating_add)
+            .fold(self.mesh_bytes, usize::saturating_add)
     }
 }
 
@@ -54,6 +56,7 @@ pub(super) struct Steps<S> {
     stacks: Vec<Stack<S>>,
     heights: Heights,
     copies: Arc<[usize]>,
+    mesh_bytes: usize,
     /// The build layer before: its index, and its bottom and top.
     last: Option<(u32, Option<[f64; 2]>)>,
     done: bool,
@@ -78,10 +81,11 @@ where
         stacks: impl IntoIterator<Item = (String, S)>,
         copies: Arc<[usize]>,
         heights: Heights,
+        mesh_bytes: usize,
     ) -> Self {
         let stack = |(name, layers)| Stack { name, layers, next: None, up: 0.0 };
         let stacks = stacks.into_iter().map(stack).collect();
-        Self { stacks, heights, copies, last: None, done: false }
+        Self { stacks, heights, copies, mesh_bytes, last: None, done: false }
     }
 
     fn step(&mut self) -> Result<Option<Step>, E> {
@@ -122,7 +126,8 @@ where
             None => index,
         };
         self.last = Some((index, span));
-        Step { index, z_um, thickness_um, layers, copies: Arc::clone(&self.copies) }
+        let (copies, mesh_bytes) = (Arc::clone(&self.copies), self.mesh_bytes);
+        Step { index, z_um, thickness_um, layers, copies, mesh_bytes }
     }
 
     /// Finds how far each stack must go up, and checks that all start at one
@@ -292,7 +297,7 @@ mod tests {
             .map(str::to_owned)
             .into_iter()
             .zip(stacks.into_iter().map(Vec::into_iter));
-        let steps = Steps::new(named, copies, Heights { settle, resample });
+        let steps = Steps::new(named, copies, Heights { settle, resample }, 0);
         let index = |layer: &Option<Arc<Layer>>| layer.as_ref().map(|layer| layer.info.index);
         let mut next = 0;
         steps

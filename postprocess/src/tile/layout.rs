@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use lamp_stack::{Dpi, Image, Length, Mask, Size, Turn};
 
+use super::mesh::Mesh;
 use super::pack::{self, Pack};
 use super::{CopyName, Part, Pixels, TileError};
 
@@ -23,6 +24,8 @@ pub struct Layout {
     pub(super) command: String,
     /// Whether the build's heights may be others than the parts'.
     pub(super) resampled: bool,
+    /// What stands around the copies.
+    pub(super) mesh: Option<Mesh>,
 }
 
 /// Where a copy stands.
@@ -124,6 +127,7 @@ impl Layout {
             pixels,
             command: String::new(),
             resampled: false,
+            mesh: None,
         })
     }
 

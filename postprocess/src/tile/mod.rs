@@ -12,6 +12,7 @@ mod error;
 mod file;
 mod heights;
 mod layout;
+mod mesh;
 mod pack;
 mod page;
 mod part;
@@ -23,15 +24,17 @@ mod tests;
 
 use std::collections::HashMap;
 
-use lamp_stack::{Image, Layer, Length, Size, Turn, map_in_order};
+use lamp_stack::{Image, Layer, Length, Op, Size, Turn, map_in_order};
 
 use heights::{Step, Steps};
+use mesh::{Mesh, on_base};
 use rows::{Fault, Placed};
 
 pub use error::{CopyName, TileError};
 pub use file::{LayoutError, LayoutFile};
 pub use heights::Heights;
 pub use layout::{Layout, Placement};
+pub use mesh::{CellShape, MeshOptions, Pattern};
 pub use pack::{Pack, PackBy, Turns};
 pub use page::StrayRows;
 pub use part::Part;
@@ -63,6 +66,13 @@ pub struct Pixels {
     pub width: u32,
     /// Rows.
     pub height: u32,
+}
+
+impl Pixels {
+    /// Larger on every side.
+    fn grown(self, by: u32) -> Self {
+        Self { width: self.width + 2 * by, height: self.height + 2 * by }
+    }
 }
 
 impl std::fmt::Display for Pixels {
@@ -130,44 +140,56 @@ impl Layout {
         self.resampled = heights.resample && stacks.len() > 1;
         let copies = (0..stacks.len()).map(|part| self.copies_of(part)).collect();
         let names: Vec<String> = self.parts.iter().map(|part| part.name().to_owned()).collect();
-        let steps = Steps::new(names.into_iter().zip(stacks), copies, heights);
+        let mesh = self.mesh.clone();
+        let mesh_bytes = mesh.as_ref().map_or(0, Mesh::bytes);
+        let steps = Steps::new(names.into_iter().zip(stacks), copies, heights, mesh_bytes);
         let layers = map_in_order(steps, move |step: Step| {
             let layer =
                 Layer { info: self.page(&step)?, dpi: Some(self.dpi), image: self.image(&step)? };
             Ok((layer, self.stray_rows(&step)))
         });
-        layers.map(move |made| {
+        let layers = layers.map(move |made| {
             let (layer, rows) = made?;
             rows.iter().for_each(&mut stray);
             Ok(layer)
-        })
+        });
+        on_base(layers, mesh)
     }
 
-    /// The build's image: the parts' rows on the background, which is black.
+    /// The build's image: the parts, and the mesh around them.
     fn image(&self, step: &Step) -> Result<Image, TileError> {
-        self.parts_image(step)
-    }
-
-    /// The copies of all parts, on black.
-    fn parts_image(&self, step: &Step) -> Result<Image, TileError> {
+        let layers: Vec<_> = self
+            .layers_of(step)
+            .map(|(index, part, layer)| Ok((self.places_by_turn(index), part.framed(layer)?)))
+            .collect::<Result<_, TileError>>()?;
         let too_many =
             |copies| TileError::TooManyRuns { copies, layer: step.some_layer().info.name() };
-        let mut turned: Vec<(Image, Vec<(u32, u32)>)> = Vec::new();
-        for (index, part, layer) in self.layers_of(step) {
-            let image = part.framed(layer)?;
-            for (turn, at) in self.places_by_turn(index) {
-                turned.push((image.turned(turn).ok_or_else(|| too_many(1))?, at));
+        let mut turned: Vec<(Image, &[(u32, u32)])> = Vec::new();
+        for (places, image) in &layers {
+            for (turn, at) in places {
+                turned.push((image.turned(*turn).ok_or_else(|| too_many(1))?, at));
             }
         }
-        let placed = turned.iter().map(|(image, at)| Placed { image, at: at.clone() });
-        rows::compose(&placed.collect::<Vec<_>>(), self.pixels).map_err(|fault| match fault {
+        let parts = rows::compose(&placed(&turned), self.pixels).map_err(|fault| match fault {
             Fault::TooManyRuns => too_many(self.placements.len()),
             // Outlines were apart, so that a layer is not within its own.
             Fault::Overlap => {
                 let (_, part, layer) = self.layers_of(step).next().expect("a step has a layer");
                 TileError::Changed { name: part.name().to_owned(), layer: layer.info.name() }
             }
-        })
+        })?;
+        let Some(mesh) = &self.mesh else { return Ok(parts) };
+        let mut moats: Vec<(Image, &[(u32, u32)])> = Vec::new();
+        for (places, image) in &layers {
+            let moat = Image::Mask(mesh.moat(image));
+            for (turn, at) in places {
+                moats.push((moat.turned(*turn).ok_or_else(|| too_many(1))?, at));
+            }
+        }
+        let around = rows::united(&placed(&moats), self.pixels.grown(mesh.reach()));
+        let around = around.map(|moats| Image::Mask(mesh.around(&moats)));
+        let around = around.map_err(|_| too_many(self.placements.len()))?;
+        parts.combined(Op::Union, &around).ok_or_else(|| too_many(self.placements.len()))
     }
 
     /// For each way in which copies of a part lie, where they stand.
@@ -179,4 +201,8 @@ impl Layout {
         let turns = Turn::ALL.into_iter();
         turns.filter_map(|turn| Some((turn, places.remove(&turn)?))).collect()
     }
+}
+
+fn placed<'a>(images: &'a [(Image, &'a [(u32, u32)])]) -> Vec<Placed<'a>> {
+    images.iter().map(|(image, at)| Placed { image, at }).collect()
 }

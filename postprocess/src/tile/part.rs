@@ -141,7 +141,7 @@ impl Part {
 }
 
 /// What is not black.
-fn white_of(image: &Image) -> Mask {
+pub(super) fn white_of(image: &Image) -> Mask {
     match image {
         Image::Mask(mask) => mask.clone(),
         Image::Gray(gray) => white_of_gray(gray),

@@ -15,7 +15,7 @@ use super::Pixels;
 pub(super) struct Placed<'a> {
     pub(super) image: &'a Image,
     /// Left column and top row. All of the image is on the build.
-    pub(super) at: Vec<(u32, u32)>,
+    pub(super) at: &'a [(u32, u32)],
 }
 
 /// Why images make no build.
@@ -29,22 +29,43 @@ pub(super) enum Fault {
 
 /// Puts images on a black build: a gray one if any of them is gray.
 pub(super) fn compose(images: &[Placed<'_>], build: Pixels) -> Result<Image, Fault> {
-    let runs =
-        images.iter().map(|placed| placed.at.len().saturating_mul(placed.image.changes() + 1));
-    if runs.fold(0, usize::saturating_add) > MOST_RUNS {
-        return Err(Fault::TooManyRuns);
-    }
+    check_runs(images)?;
     let masks = images.iter().map(|placed| match placed.image {
         Image::Mask(mask) => Some(mask),
         Image::Gray(_) => None,
     });
     match masks.collect::<Option<Vec<_>>>() {
-        Some(masks) => compose_masks(&masks, images, build).map(Image::Mask),
+        Some(masks) => compose_masks(&masks, images, build, false).map(Image::Mask),
         None => compose_grays(images, build).map(Image::Gray),
     }
 }
 
-fn compose_masks(masks: &[&Mask], images: &[Placed<'_>], build: Pixels) -> Result<Mask, Fault> {
+/// What is white in any of some masks, which may lie on each other.
+///
+/// # Panics
+/// If one is gray.
+pub(super) fn united(images: &[Placed<'_>], build: Pixels) -> Result<Mask, Fault> {
+    check_runs(images)?;
+    let masks = images.iter().map(|placed| match placed.image {
+        Image::Mask(mask) => mask,
+        Image::Gray(_) => panic!("gray images are not united"),
+    });
+    compose_masks(&masks.collect::<Vec<_>>(), images, build, true)
+}
+
+fn check_runs(images: &[Placed<'_>]) -> Result<(), Fault> {
+    let runs =
+        images.iter().map(|placed| placed.at.len().saturating_mul(placed.image.changes() + 1));
+    let runs = runs.fold(0, usize::saturating_add);
+    if runs > MOST_RUNS { Err(Fault::TooManyRuns) } else { Ok(()) }
+}
+
+fn compose_masks(
+    masks: &[&Mask],
+    images: &[Placed<'_>],
+    build: Pixels,
+    may_overlap: bool,
+) -> Result<Mask, Fault> {
     let mut mask = MaskBuilder::new(build.width);
     let runs = images.iter().map(|placed| placed.at.len() * placed.image.changes());
     mask.reserve(build.height as usize, runs.sum());
@@ -53,7 +74,10 @@ fn compose_masks(masks: &[&Mask], images: &[Placed<'_>], build: Pixels) -> Resul
     for_each_row(images, build.height, |met| {
         row.row.clear();
         for &Met { image, left, row: index } in met {
-            row.add(masks[image].row(index), masks[image].width(), left)?;
+            let overlaps = row.add(masks[image].row(index), masks[image].width(), left);
+            if overlaps && !may_overlap {
+                return Err(Fault::Overlap);
+            }
         }
         mask.push_row(&row.row).expect("copies stand on the build");
         Ok(())
@@ -108,9 +132,9 @@ struct MaskRow {
 }
 
 impl MaskRow {
-    /// Adds a copy's row.
-    fn add(&mut self, transitions: &[u32], width: u32, left: u32) -> Result<(), Fault> {
-        let Some(first) = transitions.first() else { return Ok(()) };
+    /// Adds a copy's row. Whether a pixel was white before.
+    fn add(&mut self, transitions: &[u32], width: u32, left: u32) -> bool {
+        let Some(first) = transitions.first() else { return false };
         let is_behind = match self.row.last() {
             None => true,
             // White to here, and on.
@@ -119,7 +143,7 @@ impl MaskRow {
         };
         if is_behind {
             place_row(transitions, width, left.into(), self.width, &mut self.row);
-            return Ok(());
+            return false;
         }
         self.one.clear();
         place_row(transitions, width, left.into(), self.width, &mut self.one);
@@ -130,7 +154,7 @@ impl MaskRow {
         };
         combine_rows([&self.row, &self.one], union, &mut self.spare);
         std::mem::swap(&mut self.row, &mut self.spare);
-        if overlap.get() { Err(Fault::Overlap) } else { Ok(()) }
+        overlap.get()
     }
 }
 
@@ -229,7 +253,7 @@ mod tests {
         width: u32,
         height: u32,
     ) -> Result<Vec<String>, Fault> {
-        let placed = images.iter().zip(at).map(|(image, at)| Placed { image, at: at.to_vec() });
+        let placed = images.iter().zip(at).map(|(image, at)| Placed { image, at });
         compose(&placed.collect::<Vec<_>>(), Pixels { width, height }).map(|build| drawn(&build))
     }
 

@@ -1,3 +1,4 @@
+mod mesh;
 mod stacks;
 
 use std::ops::Range;
@@ -19,19 +20,26 @@ use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{check_beside, check_not_input, report, write_file, write_layers};
 
+use mesh::MeshArgs;
 use stacks::{Stack, StackArg};
 
-/// Lay copies of parts out on a black build area
+/// Lay copies of parts out on a build area, in a mesh
 ///
 /// Copies of one part stand in rows from the top left, and the whole is centred; --pack outline
 /// places them by their outlines where that gains parts. Where copies stand is written on the first
 /// page. Several stacks are joined by the heights of their layers, and shorter parts end. Gray layers
 /// make a gray build.
+///
+/// A mesh fills what is left of the area, around a moat that follows each part's outline, and break
+/// lines cut it through; the first layers are mesh alone. All of its measures are this program's
+/// own. --mesh none leaves the area black.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   slice blade.stl | fix | dither | tile > build.tif
-  tile blade.tif --machine beta --fit --gap 2mm -o build.tif
+  tile blade.tif --machine beta --fit --gap 5mm -o build.tif
+  tile blade.tif --mesh square --cell 4mm --clearance 500um --base-layers 10 -o build.tif
+  tile blade.tif --area 200x200mm --copies 4 --mesh none -o build.tif
   tile blade.tif:120 core.tif:40 --machine beta --pack outline --layout-out layout.json -o build.tif
   tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif")]
 pub(crate) struct TileArgs {
@@ -57,7 +65,8 @@ pub(crate) struct TileArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     copies: Option<u32>,
 
-    /// The least distance between copies [default: 1mm]
+    /// The least distance between copies [default: twice the mesh's clearance and 2mm; 1mm with
+    /// --mesh none]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     gap: Option<Length>,
 
@@ -98,6 +107,9 @@ pub(crate) struct TileArgs {
     resample: bool,
 
     #[command(flatten)]
+    mesh: MeshArgs,
+
+    #[command(flatten)]
     output: Output,
 }
 
@@ -122,6 +134,7 @@ enum TurnsArg {
 
 pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     args.check()?;
+    let mesh = args.mesh.options()?;
     let report = report("tile", common, &args.output);
     let machine = args.machine.as_deref().map(machine).transpose()?;
     let file = args.layout.as_deref().map(read_layout).transpose()?;
@@ -139,16 +152,21 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
             parts,
             &args.counts(),
             area,
-            args.gap.unwrap_or(plain.gap),
+            args.gap.or(args.mesh.default_gap()).unwrap_or(plain.gap),
             args.packing(),
         )?,
     };
     args.tell(&layout)?;
+    let layout = match &mesh {
+        Some(mesh) => layout.with_mesh(mesh)?,
+        None => layout,
+    };
+    let base_layers = mesh.map_or(0, |mesh| mesh.base_layers);
     stacks
         .iter()
         .filter_map(Stack::layer_count)
         .max()
-        .inspect(|&layers| report.expect(layers.into()));
+        .inspect(|&layers| report.expect(u64::from(layers) + u64::from(base_layers)));
     let layers = stacks.into_iter().map(Stack::layers).collect::<Result<Vec<_>, _>>()?;
     let heights = Heights { settle: args.settle, resample: args.resample };
     let build = layout.build(layers, heights, |stray| say_stray(&report, stray));
@@ -169,13 +187,21 @@ impl TileArgs {
                 "--layout says how many copies there are: leave the counts out",
             ));
         }
-        let inputs =
-            || self.stacks.iter().map(|stack| &stack.path).chain(&self.layout).chain(&self.machine);
+        self.mesh.check()?;
+        let inputs = || {
+            self.stacks
+                .iter()
+                .map(|stack| &stack.path)
+                .chain(&self.layout)
+                .chain(&self.machine)
+                .chain(self.mesh.file())
+        };
         for beside in [&self.layout_out, &self.layout_picture].into_iter().flatten() {
             check_beside(beside, &self.output.output, inputs())?;
         }
         self.layout_picture.as_deref().map(plots::check_name).transpose()?;
-        check_not_input(&self.output.output, self.layout.iter().chain(&self.machine))
+        let read = self.layout.iter().chain(&self.machine).chain(self.mesh.file());
+        check_not_input(&self.output.output, read)
     }
 
     fn counts(&self) -> Vec<Option<u32>> {

@@ -1,0 +1,135 @@
+//! The mesh around the parts, as options say.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lamp_postprocess::{CellShape, MeshOptions, Pattern};
+use lamp_stack::{Image, Length, StackError};
+
+use crate::options::{parse_distance, parse_thickness};
+use crate::stop::Stop;
+use crate::streams::{failed_at, input_name, layers_of, open_pages};
+
+const HEADING: &str = "Mesh around the parts";
+
+/// Mesh between two copies is at least so wide by the default gap.
+const LEAST_MESH: Length = Length::from_um(2000.0);
+
+/// Options of the mesh.
+#[derive(Args)]
+pub(super) struct MeshArgs {
+    /// What fills the places around the parts, so that the suspension does not slosh: hexagon,
+    /// square, an image that is repeated, or none
+    #[arg(long, value_name = "hexagon|square|none|FILE", default_value = "hexagon")]
+    #[arg(help_heading = HEADING)]
+    mesh: PathBuf,
+
+    /// From the middle of a cell to that of the next [default: 5mm]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    cell: Option<Length>,
+
+    /// The thickness of the walls between cells [default: 500um]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    wall: Option<Length>,
+
+    /// How wide the moat is that stays free around each part, along its outline in each layer
+    /// [default: 1mm]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
+    clearance: Option<Length>,
+
+    /// How wide break lines are, which cut the mesh from each part up, down, left and right to the
+    /// next part or the area's edge; 0um makes none [default: 500um]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
+    break_width: Option<Length>,
+
+    /// How far apart the break lines of a part are [default: 20mm]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    break_pitch: Option<Length>,
+
+    /// So many layers of mesh alone below the parts, which break off it [default: 5]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..100_000))]
+    #[arg(help_heading = HEADING)]
+    base_layers: Option<u32>,
+}
+
+impl MeshArgs {
+    /// The file that it reads, if any.
+    pub(super) fn file(&self) -> Option<&PathBuf> {
+        let is_name = ["hexagon", "square", "none"].iter().any(|name| self.mesh == Path::new(name));
+        (!is_name).then_some(&self.mesh)
+    }
+
+    /// How far apart copies are by default.
+    pub(super) fn default_gap(&self) -> Option<Length> {
+        let clearance = self.clearance.unwrap_or(MeshOptions::default().clearance);
+        let has_mesh = self.mesh != Path::new("none");
+        has_mesh.then(|| Length::from_um(2.0 * clearance.um() + LEAST_MESH.um()))
+    }
+
+    /// Checks that no option is without effect.
+    pub(super) fn check(&self) -> Result<(), Stop> {
+        let lengths = [
+            ("--clearance", self.clearance),
+            ("--break-width", self.break_width),
+            ("--break-pitch", self.break_pitch),
+        ];
+        let of_cells = [("--cell", self.cell), ("--wall", self.wall)];
+        let given = |options: &[(&'static str, Option<Length>)]| {
+            options.iter().find(|(_, length)| length.is_some()).map(|(name, _)| *name)
+        };
+        let base = self.base_layers.map(|_| "--base-layers");
+        if self.mesh == Path::new("none")
+            && let Some(option) = given(&of_cells).or(given(&lengths)).or(base)
+        {
+            return Err(Stop::usage(format!("{option} goes with a mesh, not with --mesh none")));
+        }
+        match (self.file(), given(&of_cells)) {
+            (Some(_), Some(option)) => Err(Stop::usage(format!(
+                "{option} goes with --mesh hexagon or square: an image has its own walls"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// The mesh, unless there is to be none.
+    pub(super) fn options(&self) -> Result<Option<MeshOptions>, Stop> {
+        let shape = match self.mesh.to_str() {
+            Some("none") => return Ok(None),
+            Some("hexagon") => Some(CellShape::Hexagon),
+            Some("square") => Some(CellShape::Square),
+            _ => None,
+        };
+        let plain = MeshOptions::default();
+        let pattern = match (shape, plain.pattern) {
+            (Some(shape), Pattern::Cells { cell, wall, .. }) => {
+                let (cell, wall) = (self.cell.unwrap_or(cell), self.wall.unwrap_or(wall));
+                Pattern::Cells { shape, cell, wall }
+            }
+            _ => template(&self.mesh)?,
+        };
+        Ok(Some(MeshOptions {
+            pattern,
+            clearance: self.clearance.unwrap_or(plain.clearance),
+            break_width: self.break_width.unwrap_or(plain.break_width),
+            break_pitch: self.break_pitch.unwrap_or(plain.break_pitch),
+            base_layers: self.base_layers.unwrap_or(plain.base_layers),
+        }))
+    }
+}
+
+/// The first image of a file.
+fn template(path: &Path) -> Result<Pattern, Stop> {
+    let place = input_name(path);
+    let first = layers_of(open_pages(path)?, &place, None).next();
+    let layer = first.unwrap_or_else(|| Err(failed_at(place.clone(), StackError::NoLayers)))?;
+    match layer.image {
+        Image::Mask(image) => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            Ok(Pattern::Image { name, image })
+        }
+        Image::Gray(_) => {
+            Err(Stop::Failed(anyhow::anyhow!("a mesh is black and white: dither it first"))
+                .at(place))
+        }
+    }
+}

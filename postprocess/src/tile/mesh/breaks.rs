@@ -1,0 +1,153 @@
+//! Break lines: where the mesh is cut through, so that parts come free.
+
+/// A part's place, or a line's: columns and rows from the first to before the last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::tile) struct Rect {
+    pub(in crate::tile) left: u32,
+    pub(in crate::tile) top: u32,
+    pub(in crate::tile) right: u32,
+    pub(in crate::tile) bottom: u32,
+}
+
+impl Rect {
+    /// With columns and rows for each other.
+    fn transposed(self) -> Self {
+        Self { left: self.top, top: self.left, right: self.bottom, bottom: self.right }
+    }
+}
+
+/// Lines from the parts to the edges of the build.
+#[derive(Clone, Debug, Default)]
+pub(in crate::tile) struct Breaks {
+    /// Rows that are alike: before which row they end, and their transitions.
+    bands: Vec<(u32, Vec<u32>)>,
+}
+
+impl Breaks {
+    /// The lines of parts, `width` wide: through the middle of each part's place
+    /// and every `pitch` aside of it, up, down, left and right, until they meet the
+    /// place of another part or the build's edge. All are in pixels.
+    pub(in crate::tile) fn new(parts: &[Rect], area: [u32; 2], width: u32, pitch: u32) -> Self {
+        let transposed: Vec<Rect> = parts.iter().map(|part| part.transposed()).collect();
+        let mut lines = upright(parts, area, width, pitch);
+        let across = upright(&transposed, [area[1], area[0]], width, pitch);
+        lines.extend(across.into_iter().map(Rect::transposed));
+        Self { bands: bands(&lines, area[1]) }
+    }
+
+    /// Gives the transitions of a row.
+    pub(in crate::tile) fn row(&self, row: u32) -> &[u32] {
+        let band = self.bands.partition_point(|band| band.0 <= row);
+        self.bands.get(band).map_or(&[], |band| &band.1)
+    }
+}
+
+/// The lines that go up and down.
+fn upright(parts: &[Rect], [columns, rows]: [u32; 2], width: u32, pitch: u32) -> Vec<Rect> {
+    let mut lines = Vec::new();
+    let pitch = pitch.max(width + 1);
+    for part in parts {
+        let middle = part.left + (part.right - part.left) / 2;
+        let half = (part.right - part.left) / 2;
+        let aside = half / pitch * pitch;
+        for place in (0..=2 * aside).step_by(pitch as usize) {
+            let left = (middle + place).saturating_sub(aside + width / 2);
+            let right = (left + width).min(columns);
+            // Others that the line meets, above and below.
+            let met = || parts.iter().filter(|p| *p != part && p.left < right && left < p.right);
+            let above = met().filter(|p| p.bottom <= part.top).map(|p| p.bottom);
+            let below = met().filter(|p| p.top >= part.bottom).map(|p| p.top);
+            lines.push(Rect {
+                left,
+                right,
+                top: above.max().unwrap_or(0),
+                bottom: below.min().unwrap_or(rows),
+            });
+        }
+    }
+    lines
+}
+
+/// The rows of some rectangles together, those that are alike as one.
+fn bands(lines: &[Rect], height: u32) -> Vec<(u32, Vec<u32>)> {
+    let mut ends: Vec<u32> = lines.iter().flat_map(|line| [line.top, line.bottom]).collect();
+    ends.push(height);
+    ends.sort_unstable();
+    ends.dedup();
+    let mut first = 0;
+    let mut bands = Vec::new();
+    for end in ends.into_iter().filter(|&end| end > 0) {
+        let met = lines.iter().filter(|line| line.top <= first && end <= line.bottom);
+        let mut runs: Vec<[u32; 2]> = met.map(|line| [line.left, line.right]).collect();
+        runs.sort_unstable();
+        let mut row: Vec<u32> = Vec::new();
+        for [left, right] in runs {
+            match row.last_mut() {
+                Some(last) if *last >= left => *last = right.max(*last),
+                _ => row.extend([left, right]),
+            }
+        }
+        bands.push((end, row));
+        first = end;
+    }
+    bands
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rect(left: u32, top: u32, right: u32, bottom: u32) -> Rect {
+        Rect { left, top, right, bottom }
+    }
+
+    fn drawn(breaks: &Breaks, width: u32, height: u32) -> Vec<String> {
+        let rows = (0..height).map(|row| {
+            let row = breaks.row(row);
+            let is_cut = |column| row.partition_point(|&place| place <= column) % 2 == 1;
+            (0..width).map(|column| if is_cut(column) { '|' } else { '.' }).collect()
+        });
+        rows.collect()
+    }
+
+    #[test]
+    fn lines_run_from_a_part_to_the_edge() {
+        let breaks = Breaks::new(&[rect(3, 2, 8, 5)], [10, 7], 1, 100);
+        let expected = [
+            ".....|....",
+            ".....|....",
+            ".....|....",
+            "||||||||||",
+            ".....|....",
+            ".....|....",
+            ".....|....",
+        ];
+        assert_eq!(drawn(&breaks, 10, 7), expected);
+    }
+
+    #[test]
+    fn lines_end_at_other_parts_and_stand_a_pitch_apart() {
+        let parts = [rect(2, 1, 7, 3), rect(1, 6, 6, 8)];
+        let breaks = Breaks::new(&parts, [9, 10], 1, 2);
+        // The upper part's are in columns 2, 4 and 6, the lower one's in 1, 3 and 5;
+        // 1 and 6 pass the other part by.
+        let expected = [
+            ".||.|.|..",
+            ".||.|.|..",
+            "|||||||||",
+            ".||||||..",
+            ".||||||..",
+            ".||||||..",
+            ".|.|.||..",
+            "|||||||||",
+            ".|.|.||..",
+            ".|.|.||..",
+        ];
+        assert_eq!(drawn(&breaks, 9, 10), expected);
+    }
+
+    #[test]
+    fn no_part_has_no_lines() {
+        assert!(Breaks::new(&[], [9, 10], 1, 2).row(4).is_empty());
+    }
+}

@@ -1,0 +1,202 @@
+//! The mesh's walls, row by row.
+
+use lamp_stack::Mask;
+
+/// What stands in the empty places of a build. All lengths are in pixels, from the
+/// build's top left corner.
+#[derive(Clone, Debug)]
+pub(in crate::tile) enum Lattice {
+    /// Walls around cells: holes in an even pattern.
+    Cells(Cells),
+    /// An image that is repeated.
+    Image(Mask),
+}
+
+/// Holes between walls, in rows that repeat.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::tile) struct Cells {
+    shape: Shape,
+    /// From the middle of a hole to that of the next in its row.
+    pitch: f64,
+    /// From the middle of a wall to the middle of a hole, less half a wall: how far
+    /// a hole reaches to the left and to the right.
+    reach: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shape {
+    Square,
+    /// With a corner up, and a wall at the left and at the right.
+    Hexagon,
+}
+
+const SQRT_3: f64 = 1.732_050_807_568_877_2;
+
+impl Cells {
+    /// Square cells, so far apart from middle to middle, with walls of a thickness
+    /// between them.
+    pub(in crate::tile) fn square(pitch: f64, wall: f64) -> Self {
+        Self { shape: Shape::Square, pitch, reach: 0.5 * (pitch - wall) }
+    }
+
+    /// Hexagonal cells.
+    pub(in crate::tile) fn hexagon(pitch: f64, wall: f64) -> Self {
+        Self { shape: Shape::Hexagon, pitch, reach: 0.5 * (pitch - wall) }
+    }
+
+    /// The holes that a line across meets: for the first and for the second of two
+    /// that take turns, where the first's middle is and how far it reaches.
+    fn holes(&self, y: f64) -> [(f64, f64); 2] {
+        let Self { shape, pitch, reach } = *self;
+        match shape {
+            Shape::Square => {
+                let across = (y / pitch).rem_euclid(1.0) - 0.5;
+                let is_met = (across * pitch).abs() < reach;
+                [(0.5 * pitch, if is_met { reach } else { 0.0 }), (pitch, 0.0)]
+            }
+            Shape::Hexagon => {
+                // Rows of holes stand half a cell aside of each other.
+                let row_pitch = 0.5 * SQRT_3 * pitch;
+                let row = (y / row_pitch).floor();
+                let hole = |row: f64| {
+                    let away = (y - (row + 0.5) * row_pitch).abs();
+                    let corner = 2.0 / SQRT_3 * reach;
+                    let half = ((corner - away) * SQRT_3).clamp(0.0, reach);
+                    let is_even = row.rem_euclid(2.0) < 0.5;
+                    (if is_even { 0.5 * pitch } else { pitch }, half)
+                };
+                // The next row whose holes come so near.
+                let next = if y < (row + 0.5) * row_pitch { row - 1.0 } else { row + 1.0 };
+                let [a, b] = [hole(row), hole(next)];
+                if a.0 < b.0 { [a, b] } else { [b, a] }
+            }
+        }
+    }
+
+    fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
+        let holes = self.holes(f64::from(row) + 0.5);
+        // A pixel is a wall's where its middle is not in a hole.
+        let column = |x: f64| (x - 0.5).ceil().clamp(0.0, f64::from(width)) as u32;
+        out.push(0);
+        // The second kind may begin in the cell before the first.
+        let cells = (f64::from(width) / self.pitch).ceil() as i64 + 1;
+        for cell in -1..cells {
+            let cell = cell as f64 * self.pitch;
+            for (middle, half) in holes {
+                let [start, end] = [cell + middle - half, cell + middle + half].map(column);
+                if start < end {
+                    toggle(start, width, out);
+                    toggle(end, width, out);
+                }
+            }
+        }
+    }
+}
+
+impl Lattice {
+    /// Makes `out` a row of the mesh, `width` columns wide.
+    pub(in crate::tile) fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
+        out.clear();
+        match self {
+            Self::Cells(cells) => cells.row(row, width, out),
+            Self::Image(image) => {
+                let transitions = image.row(row % image.height());
+                for left in (0..width).step_by(image.width() as usize) {
+                    for &column in transitions {
+                        toggle(left.saturating_add(column), width, out);
+                    }
+                    if transitions.len() % 2 == 1 {
+                        toggle(left.saturating_add(image.width()), width, out);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Changes the colour from a column on that is not before the last.
+fn toggle(column: u32, width: u32, row: &mut Vec<u32>) {
+    if column < width && row.pop_if(|last| *last == column).is_none() {
+        row.push(column);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::MaskBuilder;
+
+    use super::*;
+
+    fn drawn(lattice: &Lattice, width: u32, height: u32) -> Mask {
+        let mut mask = MaskBuilder::new(width);
+        let mut row = Vec::new();
+        for index in 0..height {
+            lattice.row(index, width, &mut row);
+            mask.push_row(&row).unwrap();
+        }
+        mask.finish()
+    }
+
+    /// How far a point is from the nearest wall's middle: what is on a wall is less
+    /// than half the wall from it.
+    fn from_wall(shape: Shape, pitch: f64, [x, y]: [f64; 2]) -> f64 {
+        // The cell of a point is that of the nearest middle.
+        let around = |place: f64| (place / pitch) as i32 - 2..(place / pitch * 1.2) as i32 + 4;
+        let middles = around(y).flat_map(|row| around(x).map(move |column| (column, row)));
+        let middles = middles.map(|(column, row)| {
+            let (column, row) = (f64::from(column), f64::from(row));
+            match shape {
+                Shape::Square => [(column + 0.5) * pitch, (row + 0.5) * pitch],
+                Shape::Hexagon => {
+                    let aside = if row.rem_euclid(2.0) == 0.0 { 0.5 } else { 1.0 };
+                    [(column + aside) * pitch, (row + 0.5) * pitch * SQRT_3 / 2.0]
+                }
+            }
+        });
+        let near = |[a, b]: &[f64; 2]| (a - x).abs() < 2.0 * pitch && (b - y).abs() < 2.0 * pitch;
+        let square = |[a, b]: &[f64; 2]| (a - x).powi(2) + (b - y).powi(2);
+        let mut near: Vec<_> = middles.filter(near).collect();
+        near.sort_by(|p, q| square(p).total_cmp(&square(q)));
+        // A wall is half way to each other middle around.
+        let own = near[0];
+        let walls = near[1..].iter().map(|other| {
+            let [dx, dy] = [other[0] - own[0], other[1] - own[1]];
+            let length = dx.hypot(dy);
+            0.5 * length - ((x - own[0]) * dx + (y - own[1]) * dy) / length
+        });
+        walls.fold(f64::MAX, f64::min)
+    }
+
+    #[test]
+    fn walls_are_half_way_between_the_middles_of_cells() {
+        for (pitch, wall) in [(17.3, 4.1), (9.0, 1.0), (30.0, 0.4), (11.7, 8.0)] {
+            for (shape, cells) in [
+                (Shape::Square, Cells::square(pitch, wall)),
+                (Shape::Hexagon, Cells::hexagon(pitch, wall)),
+            ] {
+                let mask = drawn(&Lattice::Cells(cells), 150, 110);
+                for row in 0..110 {
+                    for column in 0..150 {
+                        let place = [f64::from(column) + 0.5, f64::from(row) + 0.5];
+                        let away = from_wall(shape, pitch, place) - 0.5 * wall;
+                        if away.abs() > 1e-9 {
+                            let is_white = mask.is_white(column, row);
+                            assert_eq!(is_white, away < 0.0, "{shape:?} {pitch} {wall} {place:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_image_repeats() {
+        let image = drawn(&Lattice::Cells(Cells::square(5.0, 2.0)), 7, 5);
+        let mask = drawn(&Lattice::Image(image.clone()), 33, 23);
+        for row in 0..23 {
+            for column in 0..33 {
+                assert_eq!(mask.is_white(column, row), image.is_white(column % 7, row % 5));
+            }
+        }
+    }
+}

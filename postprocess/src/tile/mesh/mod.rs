@@ -1,0 +1,284 @@
+//! The mesh around the parts of a build.
+//!
+//! Walls fill the empty places of the build area, so that the uncured suspension
+//! there does not slosh when the next layer is spread (002 section 2.4.2, figure
+//! 30). Around each part a moat that follows its outline, layer by layer, stays
+//! free, and break lines cut the mesh through, so that parts come free of it. The
+//! first layers are mesh alone: what the parts stand on, and break from (section
+//! 1.1.3).
+
+mod base;
+mod breaks;
+mod lattice;
+#[cfg(test)]
+mod tests;
+
+use lamp_stack::{
+    Dpi, Frame, Image, Length, MOST_RUNS, Mask, MaskBuilder, combine_rows, place_row,
+};
+
+use self::breaks::{Breaks, Rect};
+use self::lattice::{Cells, Lattice};
+use super::part::white_of;
+use super::{Layout, Pixels, TileError};
+use crate::offset::offset_one_bit;
+
+pub(super) use base::on_base;
+
+/// Smaller cells have no holes worth the name.
+const LEAST_CELL_PIXELS: f64 = 4.0;
+
+/// The mesh of a build. The seed gives no numbers: the defaults are ours.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshOptions {
+    /// Its walls.
+    pub pattern: Pattern,
+    /// How far from a part the mesh begins.
+    pub clearance: Length,
+    /// How wide break lines are; there are none where this is zero.
+    pub break_width: Length,
+    /// How far apart those of one part are.
+    pub break_pitch: Length,
+    /// How many layers of mesh alone there are below the parts.
+    pub base_layers: u32,
+}
+
+/// The walls of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pattern {
+    /// Cells of one shape.
+    Cells {
+        /// Their shape.
+        shape: CellShape,
+        /// From the middle of a cell to that of the next.
+        cell: Length,
+        /// The thickness of the walls between them.
+        wall: Length,
+    },
+    /// An image that is repeated over the area.
+    Image {
+        /// What the build's first page calls it.
+        name: String,
+        /// White is cured.
+        image: Mask,
+    },
+}
+
+/// The shape of a mesh's cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellShape {
+    /// Hexagons.
+    Hexagon,
+    /// Squares.
+    Square,
+}
+
+impl Default for MeshOptions {
+    /// Hexagons of 5 mm with walls of 0.5 mm, 1 mm from the parts; break lines of
+    /// 0.5 mm, 20 mm apart; five layers of mesh alone.
+    fn default() -> Self {
+        let [cell, wall] = [5.0, 0.5].map(Length::from_mm);
+        Self {
+            pattern: Pattern::Cells { shape: CellShape::Hexagon, cell, wall },
+            clearance: Length::from_mm(1.0),
+            break_width: Length::from_mm(0.5),
+            break_pitch: Length::from_mm(20.0),
+            base_layers: 5,
+        }
+    }
+}
+
+impl MeshOptions {
+    /// The options of the command that makes this mesh.
+    fn command(&self) -> String {
+        let Self { clearance, break_width, break_pitch, base_layers, .. } = self;
+        let pattern = match &self.pattern {
+            Pattern::Cells { shape, cell, wall } => {
+                let shape = match shape {
+                    CellShape::Hexagon => "hexagon",
+                    CellShape::Square => "square",
+                };
+                format!("{shape} --cell {cell} --wall {wall}")
+            }
+            Pattern::Image { name, .. } => name.clone(),
+        };
+        format!(
+            " --mesh {pattern} --clearance {clearance} --break-width {break_width} \
+             --break-pitch {break_pitch} --base-layers {base_layers}"
+        )
+    }
+
+    fn lattice(&self, dpi: Dpi, build: Pixels) -> Result<Lattice, TileError> {
+        let runs_of_row = match &self.pattern {
+            Pattern::Cells { cell, wall, .. } => {
+                if cell.pixels(dpi) < LEAST_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
+                    return Err(TileError::NoCells { cell: *cell, wall: *wall });
+                }
+                2.0 * f64::from(build.width) / cell.pixels(dpi)
+            }
+            Pattern::Image { name, image } => {
+                if image.width() == 0 || image.height() == 0 {
+                    return Err(TileError::NoTemplate { name: name.clone() });
+                }
+                let rows = image.rows().map(|row| row.len() + 1).max().unwrap_or(0);
+                rows as f64 * f64::from(build.width) / f64::from(image.width())
+            }
+        };
+        if runs_of_row * f64::from(build.height) > MOST_RUNS as f64 / 2.0 {
+            return Err(TileError::FineMesh);
+        }
+        Ok(match &self.pattern {
+            Pattern::Cells { shape, cell, wall } => {
+                let [cell, wall] = [cell, wall].map(|length| length.pixels(dpi));
+                Lattice::Cells(match shape {
+                    CellShape::Hexagon => Cells::hexagon(cell, wall),
+                    CellShape::Square => Cells::square(cell, wall),
+                })
+            }
+            Pattern::Image { image, .. } => Lattice::Image(image.clone()),
+        })
+    }
+}
+
+/// The mesh of a layout, in pixels.
+#[derive(Clone, Debug)]
+pub(super) struct Mesh {
+    lattice: Lattice,
+    breaks: Breaks,
+    clearance: f64,
+    pub(super) base_layers: u32,
+    build: Pixels,
+    /// How many changes of colour its rows have together, about.
+    changes: usize,
+}
+
+impl Layout {
+    /// Surrounds the copies with a mesh.
+    ///
+    /// # Errors
+    /// Where the mesh would have no holes, or more runs than an image can hold.
+    pub fn with_mesh(mut self, options: &MeshOptions) -> Result<Self, TileError> {
+        let pixels = |length: Length| length.pixels(self.dpi).max(0.0);
+        let clearance = pixels(options.clearance);
+        let longest = self.pixels.width.max(self.pixels.height);
+        if clearance > f64::from(longest) {
+            return Err(TileError::WideMoat { clearance: options.clearance, area_mm: self.area });
+        }
+        let lattice = options.lattice(self.dpi, self.pixels)?;
+        let whole = |length| (pixels(length).round().min(f64::from(longest))) as u32;
+        let breaks = match whole(options.break_width) {
+            0 => Breaks::default(),
+            width => {
+                let area = [self.pixels.width, self.pixels.height];
+                Breaks::new(&self.places(clearance), area, width, whole(options.break_pitch))
+            }
+        };
+        let mut mesh = Mesh {
+            lattice,
+            breaks,
+            clearance,
+            base_layers: options.base_layers,
+            build: self.pixels,
+            changes: 0,
+        };
+        mesh.changes = mesh.count_changes();
+        self.mesh = Some(mesh);
+        self.command += &options.command();
+        Ok(self)
+    }
+
+    /// The places of the copies, with what stays free around them.
+    fn places(&self, clearance: f64) -> Vec<Rect> {
+        let free = clearance.ceil() as u32;
+        let place = |at: &super::Placement| {
+            let Pixels { width, height } = self.parts[at.part].size(at.turn);
+            Rect {
+                left: at.left.saturating_sub(free),
+                top: at.top.saturating_sub(free),
+                right: (at.left + width + free).min(self.pixels.width),
+                bottom: (at.top + height + free).min(self.pixels.height),
+            }
+        };
+        self.placements.iter().map(place).collect()
+    }
+}
+
+impl Mesh {
+    /// How many bytes its image takes, about.
+    pub(super) fn bytes(&self) -> usize {
+        (self.changes + self.build.height as usize) * size_of::<u32>()
+    }
+
+    fn count_changes(&self) -> usize {
+        // Rows are alike for long: one in eight tells.
+        let mut row = Vec::new();
+        let mut count = |index: u32| {
+            self.wall_row(index, &mut row);
+            8 * row.len()
+        };
+        (0..self.build.height).step_by(8).map(&mut count).sum()
+    }
+
+    /// How many pixels a moat may reach beyond its part.
+    pub(super) fn reach(&self) -> u32 {
+        self.clearance.ceil() as u32 + 1
+    }
+
+    /// What stays free around a part's image: an image that is larger by the
+    /// [`reach`](Self::reach) on every side.
+    pub(super) fn moat(&self, image: &Image) -> Mask {
+        let reach = self.reach();
+        let frame = Frame {
+            left: -i64::from(reach),
+            top: -i64::from(reach),
+            width: image.width() + 2 * reach,
+            height: image.height() + 2 * reach,
+        };
+        // Edges round to whole pixels: half of one more leaves no less than the
+        // clearance between the part's last pixel and the mesh's first.
+        offset_one_bit(&white_of(image).framed(frame), -(self.clearance + 0.5))
+    }
+
+    /// The mesh without the moats, which are on a build that is larger by the
+    /// [`reach`](Self::reach) on every side, and without the break lines.
+    pub(super) fn around(&self, moats: &Mask) -> Mask {
+        let Pixels { width, height } = self.build;
+        let reach = self.reach();
+        let mut mask = MaskBuilder::new(width);
+        mask.reserve(height as usize, self.changes);
+        let (mut wall, mut moat, mut row) = (Vec::new(), Vec::new(), Vec::new());
+        for index in 0..height {
+            self.wall_row(index, &mut wall);
+            moat.clear();
+            let transitions = moats.row(index + reach);
+            place_row(transitions, moats.width(), -i64::from(reach), width, &mut moat);
+            let rows = [&wall[..], &moat, self.breaks.row(index)];
+            combine_rows(rows, |[wall, moat, cut]| wall & !moat & !cut, &mut row);
+            mask.push_row(&row).expect("columns rise");
+        }
+        mask.finish()
+    }
+
+    /// The mesh alone.
+    fn whole(&self) -> Mask {
+        let Pixels { width, height } = self.build;
+        let mut mask = MaskBuilder::new(width);
+        mask.reserve(height as usize, self.changes);
+        let mut row = Vec::new();
+        for index in 0..height {
+            self.wall_row(index, &mut row);
+            mask.push_row(&row).expect("columns rise");
+        }
+        mask.finish()
+    }
+
+    /// A row of walls. The last column is black: a row that ends white would be
+    /// taken for a stray one.
+    fn wall_row(&self, index: u32, row: &mut Vec<u32>) {
+        let last = self.build.width - 1;
+        self.lattice.row(index, last, row);
+        if row.len() % 2 == 1 {
+            row.push(last);
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! Meshes against a pixel-by-pixel referee.
+
+use lamp_stack::{GrayMask, Image, Layer, Length, Mask, MaskBuilder, Size, StackInfo};
+use proptest::prelude::*;
+
+use super::super::testing::{layer, mask_of};
+use super::super::{Heights, LayoutFile, Part, Turns};
+use super::*;
+
+/// Millimetres, which are pixels here.
+fn mesh(shape: CellShape, [cell, wall, clearance]: [f64; 3]) -> MeshOptions {
+    let [cell, wall, clearance] = [cell, wall, clearance].map(Length::from_mm);
+    MeshOptions {
+        pattern: Pattern::Cells { shape, cell, wall },
+        clearance,
+        break_width: Length::from_mm(0.0),
+        break_pitch: Length::from_mm(7.0),
+        base_layers: 0,
+    }
+}
+
+fn built(layout: &Layout, stacks: Vec<Vec<Layer>>) -> Vec<Layer> {
+    let stacks = stacks.into_iter().map(|layers| layers.into_iter().map(Ok::<_, TileError>));
+    let build = layout.clone().build(stacks.collect(), Heights::default(), |_| {});
+    build.collect::<Result<_, _>>().unwrap()
+}
+
+fn mask(layer: &Layer) -> &Mask {
+    let Image::Mask(mask) = &layer.image else { panic!("the build is 1-bit") };
+    mask
+}
+
+/// Places of parts: left, top and turn of each copy.
+fn layout(parts: &[Mask], copies: &[(usize, u32, u32, u32, bool)], area: &str) -> Option<Layout> {
+    let named = |k: usize, part: &Mask| {
+        Part::of_image(&format!("p{k}"), &layer(0, Image::Mask(part.clone()))).unwrap()
+    };
+    let parts: Vec<Part> = parts.iter().enumerate().map(|(k, part)| named(k, part)).collect();
+    let lines: Vec<String> = copies
+        .iter()
+        .map(|(part, x, y, turn, mirror)| {
+            format!(
+                r#"{{"part": "p{part}", "x_mm": {x}, "y_mm": {y}, "turn": {turn}, "mirror": {mirror}}}"#
+            )
+        })
+        .collect();
+    let text = format!(r#"{{"copies": [{}]}}"#, lines.join(","));
+    LayoutFile::from_json(&text).unwrap().place(parts, area.parse::<Size>().unwrap()).ok()
+}
+
+fn blobs(width: u32, height: u32) -> impl Strategy<Value = Mask> {
+    let discs = prop::collection::vec((0..width, 0..height, 1..6u32), 1..4);
+    discs.prop_map(move |discs| {
+        let mut mask = MaskBuilder::new(width);
+        for y in 0..height {
+            let is_white = |x: u32| {
+                discs.iter().any(|&(a, b, r)| x.abs_diff(a).pow(2) + y.abs_diff(b).pow(2) < r * r)
+            };
+            let changes = (0..width).filter(|&x| is_white(x) != (x > 0 && is_white(x - 1)));
+            mask.push_row(&changes.collect::<Vec<_>>()).unwrap();
+        }
+        mask.finish()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(60) })]
+
+    /// Parts stand untouched in a moat, and beyond it is all of the mesh that break
+    /// lines leave.
+    #[test]
+    fn no_pixel_of_a_part_is_touched(
+        parts in prop::collection::vec(blobs(16, 13), 1..3),
+        copies in prop::collection::vec((0..2usize, 0..50u32, 0..40u32, 0..4u32, any::<bool>()), 1..4),
+        shape in prop::sample::select(vec![CellShape::Hexagon, CellShape::Square]),
+        lengths in (5.0..14.0, 0.6..4.0, 0.0..6.0).prop_map(|(a, b, c)| [a, b, c]),
+        break_width in 0..3u32,
+    ) {
+        let copies: Vec<_> =
+            copies.iter().map(|&(p, x, y, turn, m)| (p % parts.len(), x, y, 90 * turn, m)).collect();
+        let Some(layout) = layout(&parts, &copies, "70x60mm") else { return Ok(()) };
+        let stacks = || parts.iter().map(|part| vec![layer(0, Image::Mask(part.clone()))]).collect();
+        let alone = built(&layout, stacks());
+        let alone = mask(&alone[0]);
+        let options =
+            MeshOptions { break_width: Length::from_mm(break_width.into()), ..mesh(shape, lengths) };
+        let meshed = layout.clone().with_mesh(&options).unwrap();
+        let (walls, breaks) = (meshed.mesh.as_ref().unwrap().whole(), &meshed.mesh.as_ref().unwrap().breaks);
+        let build = built(&meshed, stacks());
+        // From centre to centre.
+        let moat = lengths[2] + 1.0;
+        let white: Vec<[u32; 2]> =
+            (0..60u32).flat_map(|y| (0..70u32).map(move |x| [x, y])).filter(|&[x, y]| alone.is_white(x, y)).collect();
+        for y in 0..60u32 {
+            for x in 0..70u32 {
+                let near = white.iter().map(|[a, b]| f64::from(x.abs_diff(*a)).hypot(y.abs_diff(*b).into()));
+                let away = near.fold(f64::MAX, f64::min);
+                // On the moat's edge, rounding decides.
+                if (away - moat).abs() < 1e-6 && away > 0.0 {
+                    continue;
+                }
+                let is_cut = breaks.row(y).partition_point(|&column| column <= x) % 2 == 1;
+                let expected = away == 0.0 || (away > moat && walls.is_white(x, y) && !is_cut);
+                prop_assert_eq!(mask(&build[0]).is_white(x, y), expected, "{}, {}: {}", x, y, away);
+            }
+        }
+    }
+}
+
+fn disc() -> Mask {
+    mask_of(&["..##..", ".####.", ".####.", "..##.."])
+}
+
+#[test]
+fn parts_stand_on_layers_of_mesh() {
+    let layout = layout(&[disc()], &[(0, 10, 10, 0, false)], "40x30mm").unwrap();
+    let options = MeshOptions { base_layers: 3, ..mesh(CellShape::Square, [8.0, 2.0, 1.0]) };
+    let layout = layout.with_mesh(&options).unwrap();
+    let stack = StackInfo { part: "disc".to_owned(), layers: Some(2), ..StackInfo::default() };
+    let mut layers = vec![layer(0, Image::Mask(disc())), layer(1, Image::Mask(disc()))];
+    layers[0].info.stack = Some(stack);
+    layers[0].info.exposure_ms = Some(70.0);
+    let build = built(&layout, vec![layers]);
+    let heights = |layer: &Layer| (layer.info.index, layer.info.z_um, layer.info.thickness_um);
+    let expected = (0..5).map(|k| (k, Some(f64::from(k) * 100.0), Some(100.0)));
+    assert!(build.iter().map(heights).eq(expected));
+    let walls = layout.mesh.as_ref().unwrap().whole();
+    assert!(build[..3].iter().all(|layer| *mask(layer) == walls));
+    assert!(build[..4].iter().all(|layer| layer.info.exposure_ms == Some(70.0)));
+    assert!(*mask(&build[3]) != walls && mask(&build[3]) == mask(&build[4]));
+    let stack = build[0].info.stack.as_ref().unwrap();
+    assert_eq!(stack.layers, Some(5));
+    assert!(stack.commands[0].ends_with(
+        "--mesh square --cell 8mm --wall 2mm --clearance 1mm --break-width 0um --break-pitch 7mm --base-layers 3"
+    ), "{:?}", stack.commands);
+    assert!(build[1..].iter().all(|layer| layer.info.stack.is_none()));
+}
+
+#[test]
+fn gray_parts_keep_their_levels() {
+    let mut gray = GrayMask::new(6);
+    (0..4).for_each(|_| gray.push_runs([(2, 0), (2, 90), (2, 0)]).unwrap());
+    let part = layer(0, Image::Gray(gray));
+    let parts = vec![Part::of_image("p", &part).unwrap()];
+    let pack = super::super::Pack { turns: Turns::None, ..Default::default() };
+    let area = "30x30mm".parse().unwrap();
+    let layout = Layout::packed(parts, &[Some(1)], area, Length::from_mm(1.0), pack).unwrap();
+    let layout = layout.with_mesh(&mesh(CellShape::Hexagon, [6.0, 2.0, 3.0])).unwrap();
+    let at = layout.placements()[0];
+    let build = built(&layout, vec![vec![part]]);
+    let Image::Gray(gray) = &build[0].image else { panic!("the build is gray") };
+    let level = |column: u32, row: u32| {
+        gray.row(row).iter().rfind(|change| change.column <= column).map_or(0, |c| c.level)
+    };
+    assert_eq!([1, 2, 3, 4].map(|x| level(at.left + x, at.top + 1)), [0, 90, 90, 0]);
+    let walls = layout.mesh.as_ref().unwrap().whole();
+    assert_eq!(level(0, 0) == 255, walls.is_white(0, 0));
+}
+
+#[test]
+fn meshes_that_are_none_are_refused() {
+    let layout = layout(&[disc()], &[(0, 10, 10, 0, false)], "40x30mm").unwrap();
+    let refused = |options: &MeshOptions| layout.clone().with_mesh(options).unwrap_err();
+    let cells = |lengths| mesh(CellShape::Hexagon, lengths);
+    for lengths in [[3.0, 1.0, 1.0], [8.0, 8.0, 1.0], [8.0, 0.0, 1.0]] {
+        assert!(matches!(refused(&cells(lengths)), TileError::NoCells { .. }));
+    }
+    assert!(matches!(refused(&cells([8.0, 1.0, 41.0])), TileError::WideMoat { .. }));
+    let pattern = Pattern::Image { name: "x".to_owned(), image: Mask::black(0, 0) };
+    let empty = MeshOptions { pattern, ..cells([8.0, 1.0, 1.0]) };
+    assert!(matches!(refused(&empty), TileError::NoTemplate { .. }));
+}
