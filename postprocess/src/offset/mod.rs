@@ -41,6 +41,7 @@ use rows::Rows;
 use thin::Cores;
 
 pub use pieces::Loss;
+pub(crate) use pieces::without_holes;
 pub use stage::{CompensateError, CompensateOptions, Compensated, Shrinkage, compensate};
 pub use walls::ThinWall;
 pub use widths::Widths;

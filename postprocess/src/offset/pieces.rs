@@ -80,6 +80,14 @@ pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
     levels::lower(&gray, &GrayMask::from(&kept))
 }
 
+/// Makes white what is black and does not touch the black of the top left pixel.
+pub(crate) fn without_holes(mask: &Mask) -> Mask {
+    let black = Pieces::of(Rows::white(&mask.inverted()));
+    let outside = black.first.first().copied();
+    let outside = black.filtered(mask.height(), |run| Some(black.first[run]) == outside);
+    outside.mask(mask.width()).inverted()
+}
+
 /// The runs of a shape, by the pieces that they belong to.
 struct Pieces {
     rows: Rows,

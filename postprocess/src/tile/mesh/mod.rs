@@ -3,7 +3,8 @@
 //! Walls fill the empty places of the build area, so that the uncured suspension
 //! there does not slosh when the next layer is spread (002 section 2.4.2, figure
 //! 30). Around each part a moat that follows its outline, layer by layer, stays
-//! free, and break lines cut the mesh through, so that parts come free of it. The
+//! free, with all that it encloses, and break lines cut the mesh through, so that
+//! parts come free of it. The
 //! first layers are mesh alone: what the parts stand on, and break from (section
 //! 1.1.3).
 
@@ -21,7 +22,7 @@ use self::breaks::{Breaks, Rect};
 use self::lattice::{Cells, Lattice};
 use super::part::white_of;
 use super::{Layout, Pixels, TileError};
-use crate::offset::offset_one_bit;
+use crate::offset::{offset_one_bit, without_holes};
 
 pub(super) use base::on_base;
 
@@ -224,8 +225,9 @@ impl Mesh {
         self.clearance.ceil() as u32 + 1
     }
 
-    /// What stays free around a part's image: an image that is larger by the
-    /// [`reach`](Self::reach) on every side.
+    /// What stays free around a part's image, and in its cavities, from which no
+    /// mesh would come free: an image that is larger by the [`reach`](Self::reach) on
+    /// every side.
     pub(super) fn moat(&self, image: &Image) -> Mask {
         let reach = self.reach();
         let frame = Frame {
@@ -236,7 +238,8 @@ impl Mesh {
         };
         // Edges round to whole pixels: half of one more leaves no less than the
         // clearance between the part's last pixel and the mesh's first.
-        offset_one_bit(&white_of(image).framed(frame), -(self.clearance + 0.5))
+        let moat = offset_one_bit(&white_of(image).framed(frame), -(self.clearance + 0.5));
+        without_holes(&moat)
     }
 
     /// The mesh without the moats, which are on a build that is larger by the

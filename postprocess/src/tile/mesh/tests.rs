@@ -79,32 +79,80 @@ proptest! {
         let copies: Vec<_> =
             copies.iter().map(|&(p, x, y, turn, m)| (p % parts.len(), x, y, 90 * turn, m)).collect();
         let Some(layout) = layout(&parts, &copies, "70x60mm") else { return Ok(()) };
-        let stacks = || parts.iter().map(|part| vec![layer(0, Image::Mask(part.clone()))]).collect();
-        let alone = built(&layout, stacks());
-        let alone = mask(&alone[0]);
+        let alone: Vec<Mask> = copies.iter().map(|copy| drawn_alone(&parts, *copy)).collect();
+        let moat = lengths[2] + 1.0;
+        let free: Vec<Vec<bool>> = alone.iter().map(|copy| free(copy, moat)).collect();
         let options =
             MeshOptions { break_width: Length::from_mm(break_width.into()), ..mesh(shape, lengths) };
-        let meshed = layout.clone().with_mesh(&options).unwrap();
-        let (walls, breaks) = (meshed.mesh.as_ref().unwrap().whole(), &meshed.mesh.as_ref().unwrap().breaks);
-        let build = built(&meshed, stacks());
-        // From centre to centre.
-        let moat = lengths[2] + 1.0;
-        let white: Vec<[u32; 2]> =
-            (0..60u32).flat_map(|y| (0..70u32).map(move |x| [x, y])).filter(|&[x, y]| alone.is_white(x, y)).collect();
-        for y in 0..60u32 {
-            for x in 0..70u32 {
-                let near = white.iter().map(|[a, b]| f64::from(x.abs_diff(*a)).hypot(y.abs_diff(*b).into()));
-                let away = near.fold(f64::MAX, f64::min);
-                // On the moat's edge, rounding decides.
-                if (away - moat).abs() < 1e-6 && away > 0.0 {
-                    continue;
-                }
-                let is_cut = breaks.row(y).partition_point(|&column| column <= x) % 2 == 1;
-                let expected = away == 0.0 || (away > moat && walls.is_white(x, y) && !is_cut);
-                prop_assert_eq!(mask(&build[0]).is_white(x, y), expected, "{}, {}: {}", x, y, away);
+        let meshed = layout.with_mesh(&options).unwrap();
+        let Mesh { breaks, .. } = meshed.mesh.as_ref().unwrap();
+        let walls = meshed.mesh.as_ref().unwrap().whole();
+        let stacks = parts.iter().map(|part| vec![layer(0, Image::Mask(part.clone()))]).collect();
+        let build = built(&meshed, stacks);
+        for (x, y) in pixels() {
+            let is_part = alone.iter().any(|copy| copy.is_white(x, y));
+            let is_free = free.iter().any(|free| free[place(x, y)]);
+            let is_cut = breaks.row(y).partition_point(|&column| column <= x) % 2 == 1;
+            let expected = is_part || (walls.is_white(x, y) && !is_free && !is_cut);
+            prop_assert_eq!(mask(&build[0]).is_white(x, y), expected, "{}, {}", x, y);
+        }
+    }
+}
+
+const AREA: (u32, u32) = (70, 60);
+
+fn pixels() -> impl Iterator<Item = (u32, u32)> {
+    (0..AREA.1).flat_map(|y| (0..AREA.0).map(move |x| (x, y)))
+}
+
+fn place(x: u32, y: u32) -> usize {
+    (y * AREA.0 + x) as usize
+}
+
+fn drawn_alone(parts: &[Mask], (part, x, y, turn, mirror): (usize, u32, u32, u32, bool)) -> Mask {
+    let part = parts[part].clone();
+    let layout =
+        layout(std::slice::from_ref(&part), &[(0, x, y, turn, mirror)], "70x60mm").unwrap();
+    mask(&built(&layout, vec![vec![layer(0, Image::Mask(part))]])[0]).clone()
+}
+
+/// What is nearer to a copy than its moat is wide, from centre to centre, and what
+/// that encloses. The moat does not reach the edges of a larger plane.
+fn free(copy: &Mask, moat: f64) -> Vec<bool> {
+    let white: Vec<(u32, u32)> = pixels().filter(|&(x, y)| copy.is_white(x, y)).collect();
+    let away = |x: i32, y: i32| {
+        let away = |&(a, b): &(u32, u32)| f64::from(x - a as i32).hypot(f64::from(y - b as i32));
+        white.iter().map(away).fold(f64::MAX, f64::min)
+    };
+    let [columns, rows] = [-10..AREA.0 as i32 + 10, -10..AREA.1 as i32 + 10];
+    let mut outside = std::collections::HashSet::from([(-10, -10)]);
+    let mut todo = vec![(-10, -10)];
+    while let Some((x, y)) = todo.pop() {
+        for (dx, dy) in (-1..2).flat_map(|dx| (-1..2).map(move |dy| (dx, dy))) {
+            let next = (x + dx, y + dy);
+            let is_inside = columns.contains(&next.0) && rows.contains(&next.1);
+            if is_inside && away(next.0, next.1) >= moat && outside.insert(next) {
+                todo.push(next);
             }
         }
     }
+    pixels().map(|(x, y)| !outside.contains(&(x as i32, y as i32))).collect()
+}
+
+/// No mesh is where it would not come out.
+#[test]
+fn cavities_stay_free() {
+    let ring = mask_of(&["#######", "#.....#", "#.....#", "#.....#", "#######"]);
+    let open = mask_of(&["#######", "#.....#", "#......", "#.....#", "#######"]);
+    let walls = |part: Mask| {
+        let layout =
+            layout(std::slice::from_ref(&part), &[(0, 10, 10, 0, false)], "30x30mm").unwrap();
+        let layout = layout.with_mesh(&mesh(CellShape::Square, [4.0, 3.9, 0.0])).unwrap();
+        let build = built(&layout, vec![vec![layer(0, Image::Mask(part))]]);
+        mask(&build[0]).white_pixels()
+    };
+    // The ring's inside, and the gap that was white before.
+    assert_eq!(walls(open), walls(ring) + 15);
 }
 
 fn disc() -> Mask {
