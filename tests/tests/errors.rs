@@ -286,13 +286,6 @@ fn a_stack_may_replace_the_file_it_is_read_from() {
 }
 
 #[test]
-fn gray_layers_are_not_tiled() {
-    let scratch = Scratch::new();
-    lamp_tests::write_gray_ramp(&scratch.path("gray.tif"), 64, 16);
-    is_bad_input(&scratch, "tile gray.tif -o x.tif", &["gray.tif: ", "gray", "dither"]);
-}
-
-#[test]
 fn help_and_version_are_no_errors() {
     let scratch = Scratch::new();
     for name in

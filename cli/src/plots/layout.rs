@@ -97,7 +97,7 @@ impl<'a> Picture<'a> {
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
         let Pixels { width, height } = self.layout.parts()[at.part].size(at.turn);
         let corners = [self.at(at.left, at.top), self.at(at.left + width, at.top + height)];
-        let fill = ink.mix(0.35).filled();
+        let fill = tint(ink).filled();
         match self.outlines.get(&(at.part, at.turn)) {
             Some(outline) => self.draw_outline(area, at, outline, fill)?,
             None => area.draw(&Rectangle::new(corners, fill))?,
@@ -130,8 +130,7 @@ impl<'a> Picture<'a> {
             for run in row.chunks(2) {
                 let ends = [run[0], *run.get(1).unwrap_or(&outline.width())];
                 let [from, to] = ends.map(|column| self.at(at.left + column, 0).0);
-                // A rectangle holds both its corners.
-                area.draw(&Rectangle::new([(from, y), ((to - 1).max(from), y)], fill))?;
+                area.draw(&Rectangle::new([(from, y), (to, y + 1)], fill))?;
             }
         }
         Ok(())
@@ -164,4 +163,10 @@ impl<'a> Picture<'a> {
             copies => format!("{}: {copies} copies", about.name()),
         }
     }
+}
+
+/// A light tint of a colour, which lies on itself without a trace.
+fn tint(RGBColor(red, green, blue): RGBColor) -> RGBColor {
+    let [red, green, blue] = [red, green, blue].map(|c| 255 - (255 - c) / 3);
+    RGBColor(red, green, blue)
 }

@@ -114,7 +114,7 @@ pub enum TileError {
     },
     /// Two parts of different resolutions.
     #[error(
-        "{name} has {dpi} dpi and {first} has {first_dpi}: slice them at one resolution to build them together"
+        "{name} has {dpi} dpi and {first} has {first_dpi} dpi: slice them at one resolution to build them together"
     )]
     Resolutions {
         /// The first part.
