@@ -190,24 +190,35 @@ impl Layout {
         right.max(bottom).max(-wish.left).max(-wish.top)
     }
 
-    /// Checks that no two copies lie on each other.
+    /// Checks that no two copies lie on each other, from the top to the bottom.
     fn check_apart(&self) -> Result<(), TileError> {
         let silhouettes = self.silhouettes();
-        let numbers: Vec<u32> = self.numbers().collect();
-        for (k, one) in self.placements.iter().enumerate() {
-            for (l, other) in self.placements.iter().enumerate().take(k) {
-                let masks = [other, one].map(|at| &silhouettes[&(at.part, at.turn)]);
-                let Some((column, row)) = common_pixel(masks, [other, one]) else { continue };
-                let pitch = self.dpi.pitch().mm();
-                return Err(TileError::Overlap {
-                    one: self.copy_name(other.part, numbers[l]),
-                    other: self.copy_name(one.part, numbers[k]),
-                    x_mm: f64::from(column) * pitch,
-                    y_mm: self.area.height.mm() - f64::from(row) * pitch,
-                });
+        let silhouette = |at: &Placement| &silhouettes[&(at.part, at.turn)];
+        let bottom = |at: &Placement| at.top + silhouette(at).height();
+        let mut order: Vec<usize> = (0..self.placements.len()).collect();
+        order.sort_by_key(|&k| self.placements[k].top);
+        let mut above: Vec<usize> = Vec::new();
+        for k in order {
+            let one = &self.placements[k];
+            above.retain(|&l| bottom(&self.placements[l]) > one.top);
+            for &l in &above {
+                let other = &self.placements[l];
+                let met = common_pixel([one, other].map(silhouette), [one, other]);
+                if let Some(pixel) = met {
+                    return Err(self.overlap([k.min(l), k.max(l)], pixel));
+                }
             }
+            above.push(k);
         }
         Ok(())
+    }
+
+    fn overlap(&self, copies: [usize; 2], (column, row): (u32, u32)) -> TileError {
+        let numbers: Vec<u32> = self.numbers().collect();
+        let [one, other] = copies.map(|k| self.copy_name(self.placements[k].part, numbers[k]));
+        let pitch = self.dpi.pitch().mm();
+        let y_mm = self.area.height.mm() - f64::from(row) * pitch;
+        TileError::Overlap { one, other, x_mm: f64::from(column) * pitch, y_mm }
     }
 
     fn packing_command(&mut self, gap: Length, pack: Pack) -> String {

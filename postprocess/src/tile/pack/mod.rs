@@ -106,6 +106,10 @@ enum Way {
     Free(PackBy, Turns, Order),
 }
 
+/// More copies than anyone builds: of a part of a pixel, that is how many are
+/// as many as fit.
+const MOST: u32 = 1 << 20;
+
 /// Finds places for all copies, or says how many found one.
 pub(super) fn pack(
     layout: &Layout,
@@ -118,8 +122,10 @@ pub(super) fn pack(
         check_fits(layout, part, how.turns)?;
     }
     // As many as fit is more than all.
-    let wanted: Vec<u32> =
-        counts.iter().map(|count| count.unwrap_or(if alone { u32::MAX } else { 1 })).collect();
+    let wanted: Vec<u32> = counts
+        .iter()
+        .map(|count| count.unwrap_or(if alone { u32::MAX } else { 1 }).min(MOST))
+        .collect();
     let all = wanted.iter().map(|&count| count as usize).fold(0, usize::saturating_add);
     let mut best: Vec<Placement> = Vec::new();
     let mut shapes: Option<Shapes> = None;

@@ -97,6 +97,14 @@ fn what_finds_no_place_is_counted() {
 }
 
 #[test]
+fn no_area_holds_copies_without_end() {
+    let dot = [outlined(&mask_of(&["#"]))];
+    let count = |counts| packed(&dot, counts, "9000x9000mm", 0, Pack::default());
+    assert_eq!(count(&[None]).unwrap().placements().len(), 1 << 20);
+    assert!(matches!(count(&[Some(u32::MAX)]), Err(TileError::TooMany { most: 1_048_576, .. })));
+}
+
+#[test]
 fn outlines_in_cells_are_no_nearer() {
     // Longer than 256 pixels, so that a cell is some pixels.
     let slope: Vec<String> =
