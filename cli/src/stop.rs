@@ -5,7 +5,7 @@ use std::io;
 
 use lamp_grayscale::DitherError;
 use lamp_postprocess::machine::MachineLimit;
-use lamp_postprocess::{CompensateError, LayoutError, TileError};
+use lamp_postprocess::{CompensateError, EditError, LayoutError, TileError};
 use lamp_slicer::SliceError;
 use lamp_stack::{JoinError, SplitError, StackError};
 
@@ -86,6 +86,12 @@ impl From<SliceError> for Stop {
 
 impl From<DitherError> for Stop {
     fn from(error: DitherError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<EditError> for Stop {
+    fn from(error: EditError) -> Self {
         Self::Failed(error.into())
     }
 }

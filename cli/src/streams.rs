@@ -129,6 +129,19 @@ fn decoded(
     })
 }
 
+/// Reads all layers of a stack that is used beside the first, decoded, in order.
+pub(crate) fn read_beside(
+    path: &Path,
+) -> Result<impl Iterator<Item = Result<Layer, Stop>> + use<>, Stop> {
+    let name = input_name(path);
+    let failed = move |error| failed_at(name.clone(), error);
+    let pages = open_pages(path)?.map({
+        let failed = failed.clone();
+        move |page| page.map_err(&failed)
+    });
+    Ok(map_in_order(pages, move |page: Page| page.decode().map_err(&failed)))
+}
+
 /// Reads the pages of the layers wanted. What the first page says of the stack
 /// stands beside the first of them.
 pub(crate) fn read_pages(

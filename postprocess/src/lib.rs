@@ -1,8 +1,8 @@
 //! Images in, images out: what happens to layers between slicing and the
 //! machine. Everything works on runs.
 //!
-//! [`fix`] corrects stray rows, [`tile`] lays copies of a part out on a build
-//! area. Both are adaptors from layers to layers.
+//! [`fix`] corrects stray rows, [`edit`] changes a design, [`tile`] lays copies of a
+//! part out on a build area. All are adaptors from layers to layers.
 //!
 //! ```
 //! use lamp_postprocess::{FixOptions, TileError, TileOptions, fix, tile};
@@ -25,11 +25,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod edit;
 mod fix;
 pub mod machine;
 mod offset;
 mod tile;
 
+pub use edit::{EditError, Edits, OtherLayers, edit};
 pub use fix::{Band, FixOptions, Fixed, Kind, Kinds, Method, Outcome, fix};
 pub use offset::{
     CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,

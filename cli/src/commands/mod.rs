@@ -6,6 +6,7 @@ mod convert;
 mod cure;
 mod demo;
 mod dither;
+mod edit;
 mod fix;
 mod heights;
 mod info;
@@ -30,6 +31,7 @@ pub(crate) enum Command {
     Fix(fix::FixArgs),
     Dither(dither::DitherArgs),
     Compensate(compensate::CompensateArgs),
+    Edit(edit::EditArgs),
     Tile(tile::TileArgs),
     Sample(sample::SampleArgs),
     Demo(demo::DemoArgs),
@@ -64,6 +66,7 @@ impl Command {
             Self::Fix(_) => "fix",
             Self::Dither(_) => "dither",
             Self::Compensate(_) => "compensate",
+            Self::Edit(_) => "edit",
             Self::Tile(_) => "tile",
             Self::Sample(_) => "sample",
             Self::Demo(_) => "demo",
@@ -87,6 +90,7 @@ impl Command {
             Self::Fix(args) => fix::run(args, common),
             Self::Dither(args) => dither::run(args, common),
             Self::Compensate(args) => compensate::run(args, common),
+            Self::Edit(args) => edit::run(args, common),
             Self::Tile(args) => tile::run(args, common),
             Self::Sample(args) => sample::run(args, common),
             Self::Demo(args) => demo::run(args, common),

@@ -1,0 +1,132 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{ArgGroup, Args};
+use lamp_postprocess::{EditError, Edits, OtherLayers};
+use lamp_stack::Op;
+
+use crate::materials::read_text;
+use crate::options::{Common, Input, Output};
+use crate::stop::Stop;
+use crate::streams::{
+    check_not_input, input_name, is_stream, read_beside, read_layers, report, write_layers,
+};
+
+/// A list of edits is text of a few kilobytes.
+const LARGEST_LIST: u64 = 1 << 20;
+
+/// Change a design at image level, without slicing it again
+///
+/// Adds boxes, cylinders, lines, labels and other stacks to a range of heights, or subtracts them;
+/// crops, pads, mirrors and rotates all layers. Lengths and places are the part's. The edits are a
+/// TOML file, done one after the other; docs/edit.md has every key. Layers that no edit is for pass
+/// byte for byte.
+#[derive(Args)]
+#[command(group = ArgGroup::new("what").required(true).args(["edits", "union", "intersect", "difference", "xor"]))]
+#[command(after_help = "\
+Examples:
+  lamp edit blade.tif edits.toml -o variant.tif
+  slice blade.stl | fix | lamp edit - edits.toml | tile > build.tif
+  lamp edit shell.tif --difference core.tif -o hollow.tif
+
+An edits.toml:
+  [[edit]]
+  op = \"subtract\"
+  label = { text = \"SN {n:04}\", start = 17, at = [[\"2mm\", \"1mm\"]], height = \"3mm\" }
+  z = [\"0mm\", \"0.5mm\"]")]
+pub(crate) struct EditArgs {
+    #[command(flatten)]
+    input: Input,
+
+    /// The edits, as TOML
+    #[arg(value_name = "EDITS.toml")]
+    edits: Option<PathBuf>,
+
+    /// White where it or that stack is
+    #[arg(long, value_name = "STACK")]
+    union: Option<PathBuf>,
+
+    /// White where both it and that stack are
+    #[arg(long, value_name = "STACK")]
+    intersect: Option<PathBuf>,
+
+    /// White where it is and that stack is not
+    #[arg(long, value_name = "STACK")]
+    difference: Option<PathBuf>,
+
+    /// White where it or that stack is, but not both
+    #[arg(long, value_name = "STACK")]
+    xor: Option<PathBuf>,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+impl EditArgs {
+    /// The edits, and the files of the stacks that they name.
+    fn edits(&self) -> Result<(Edits, Vec<PathBuf>), Stop> {
+        let ways = [
+            (Op::Union, &self.union),
+            (Op::Intersect, &self.intersect),
+            (Op::Difference, &self.difference),
+            (Op::Xor, &self.xor),
+        ];
+        if let Some((op, file)) = ways.into_iter().find_map(|(op, file)| Some((op, file.clone()?)))
+        {
+            return Ok((Edits::combine(op, file.clone()), vec![file]));
+        }
+        let list = self.edits.as_deref().expect("one of the group is given");
+        let edits = || -> anyhow::Result<Edits> {
+            Ok(Edits::from_toml(&read_text(list, LARGEST_LIST, "a list of edits")?)?)
+        };
+        let edits = edits().with_context(|| input_name(list))?;
+        // Files stand beside the list that names them.
+        let folder = list.parent().unwrap_or(Path::new(""));
+        let files = edits.stacks().map(|file| folder.join(file)).collect();
+        Ok((edits, files))
+    }
+
+    fn check_streams(&self) -> Result<(), Stop> {
+        let all = [
+            Some(&self.input.stack),
+            self.edits.as_ref(),
+            self.union.as_ref(),
+            self.intersect.as_ref(),
+            self.difference.as_ref(),
+            self.xor.as_ref(),
+        ];
+        match all.into_iter().flatten().filter(|path| is_stream(path)).count() {
+            0 | 1 => Ok(()),
+            _ => Err(Stop::usage(
+                "only one input can be standard input (STACK is, unless it is named)",
+            )),
+        }
+    }
+}
+
+pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Stop> {
+    args.check_streams()?;
+    let (edits, files) = args.edits()?;
+    check_not_input(&args.output.output, files.iter().chain(&args.edits))?;
+    let report = report("edit", common, &args.output);
+    let name = input_name(&args.input.stack);
+    let may_reach_beyond = args.input.layers.is_some();
+    let other = |file: &PathBuf| {
+        let layers = Box::new(read_beside(file)?);
+        Ok(OtherLayers { name: input_name(file), layers, may_reach_beyond })
+    };
+    let others = files.iter().map(other).collect::<Result<_, Stop>>()?;
+    let layers = read_layers(&args.input, &report)?;
+    let mut counts = vec![0; edits.count()];
+    let edited = lamp_postprocess::edit(layers, edits, others, |_, done| {
+        done.iter().for_each(|&edit| counts[edit] += 1);
+    });
+    write_layers(edited, &args.output, &report).map_err(|stop| match stop {
+        Stop::Failed(error) if error.is::<EditError>() => Stop::Failed(error).at(name),
+        stop => stop,
+    })?;
+    for (number, _) in (1..).zip(counts).filter(|(_, count)| *count == 0) {
+        report.say(&format!("edit {number} was for no layer: look at its z or layers"));
+    }
+    Ok(())
+}

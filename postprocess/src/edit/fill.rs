@@ -1,0 +1,160 @@
+//! Outlines filled: which pixels have their centres inside.
+
+use lamp_stack::{Mask, MaskBuilder};
+
+/// A point in pixels, as a [`Grid`](super::place::Grid) maps it: column, row.
+pub(super) type Point = [f64; 2];
+
+/// The pixels inside closed lines: those that they wind about, whichever way.
+///
+/// A line crosses a row of centres as in slicing: a point on the row counts as
+/// below it. So lines that share a point, or an edge, leave no gap between.
+pub(super) fn polygons(lines: &[Vec<Point>], width: u32, height: u32) -> Mask {
+    let mut crossings = Vec::new();
+    for line in lines {
+        let next = line.iter().cycle().skip(1);
+        line.iter().zip(next).for_each(|(&a, &b)| cross(a, b, height, &mut crossings));
+    }
+    crossings.sort_unstable_by(|a: &Crossing, b| {
+        (a.row, a.x).partial_cmp(&(b.row, b.x)).expect("places are numbers")
+    });
+    let mut crossings = crossings.as_slice();
+    rows(width, height, |row, out| {
+        let (here, rest) = crossings.split_at(crossings.partition_point(|c| c.row == row));
+        crossings = rest;
+        let (mut winding, mut start) = (0, 0.0);
+        for crossing in here {
+            let before = winding;
+            winding += crossing.winding;
+            if before == 0 {
+                start = crossing.x;
+            } else if winding == 0 {
+                out.push([start, crossing.x]);
+            }
+        }
+    })
+}
+
+/// The pixels within a distance of a point.
+pub(super) fn disc([x, y]: Point, radius: f64, width: u32, height: u32) -> Mask {
+    rows(width, height, |row, out| {
+        let square = radius * radius - (f64::from(row) - y).powi(2);
+        if square > 0.0 {
+            out.push([x - square.sqrt(), x + square.sqrt()]);
+        }
+    })
+}
+
+/// Where a line crosses a row, and whether it goes down (1) or up (-1).
+struct Crossing {
+    row: u32,
+    x: f64,
+    winding: i32,
+}
+
+fn cross(a: Point, b: Point, height: u32, out: &mut Vec<Crossing>) {
+    let ([top, bottom], winding) = if a[1] <= b[1] { ([a, b], 1) } else { ([b, a], -1) };
+    let first = top[1].ceil().max(0.0);
+    let end = bottom[1].ceil().min(height.into());
+    let slope = (bottom[0] - top[0]) / (bottom[1] - top[1]);
+    let mut row = first;
+    while row < end {
+        out.push(Crossing { row: row as u32, x: top[0] + (row - top[1]) * slope, winding });
+        row += 1.0;
+    }
+}
+
+/// An image whose rows are made of ends of runs, in rising order.
+fn rows(width: u32, height: u32, mut of_row: impl FnMut(u32, &mut Vec<[f64; 2]>)) -> Mask {
+    let mut mask = MaskBuilder::new(width);
+    let mut runs = Vec::new();
+    let mut row: Vec<u32> = Vec::new();
+    // Values below zero become zero.
+    let column = |x: f64| (x.ceil() as u32).min(width);
+    for index in 0..height {
+        runs.clear();
+        row.clear();
+        of_row(index, &mut runs);
+        for [start, end] in runs.iter().map(|run| run.map(column)).filter(|[a, b]| a < b) {
+            if row.pop_if(|last| *last == start).is_none() {
+                row.push(start);
+            }
+            row.push(end);
+        }
+        row.pop_if(|last| *last == width);
+        mask.push_row(&row).expect("runs in rising order within the width");
+    }
+    mask.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// How often lines wind about a pixel's centre, by its definition.
+    fn winding(lines: &[Vec<Point>], x: f64, y: f64) -> i32 {
+        let mut winding = 0;
+        for line in lines {
+            for (a, b) in line.iter().zip(line.iter().cycle().skip(1)) {
+                if (a[1] <= y) == (b[1] <= y) {
+                    continue;
+                }
+                let at = a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
+                // No centre is that near to a line by chance.
+                assert!((at - x).abs() > 1e-9);
+                winding += if at > x {
+                    0
+                } else if a[1] < b[1] {
+                    1
+                } else {
+                    -1
+                };
+            }
+        }
+        winding
+    }
+
+    proptest! {
+        #[test]
+        fn pixels_are_white_that_lines_wind_about(
+            lines in prop::collection::vec(
+                prop::collection::vec((-5.0..25.0, -5.0..20.0), 3..8), 1..4),
+        ) {
+            let lines: Vec<Vec<Point>> =
+                lines.into_iter().map(|line| line.into_iter().map(|(x, y)| [x, y]).collect()).collect();
+            let mask = polygons(&lines, 20, 15);
+            for (column, row) in (0..15).flat_map(|row| (0..20).map(move |column| (column, row))) {
+                let inside = winding(&lines, column.into(), row.into()) != 0;
+                prop_assert_eq!(mask.is_white(column, row), inside, "{} {}", column, row);
+            }
+        }
+
+        #[test]
+        fn pixels_are_white_within_the_radius(x in -5.0..25.0, y in -5.0..20.0, radius in 0.0..9.0) {
+            let mask = disc([x, y], radius, 20, 15);
+            for (column, row) in (0..15u32).flat_map(|row| (0..20u32).map(move |column| (column, row))) {
+                let distance = (f64::from(column) - x).hypot(f64::from(row) - y);
+                prop_assert_eq!(mask.is_white(column, row), distance < radius);
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_side_by_side_share_no_pixel_and_leave_none() {
+        let block = |a: f64, b: f64| vec![[a, 1.0], [b, 1.0], [b, 4.0], [a, 4.0]];
+        let [left, right, both] =
+            [vec![block(2.0, 7.0)], vec![block(7.0, 11.0)], vec![block(2.0, 11.0)]]
+                .map(|lines| polygons(&lines, 20, 6));
+        assert_eq!(left.row(1), [2, 7]);
+        assert_eq!((left.row(0), left.row(4)), (&[][..], &[][..]));
+        assert_eq!(left.combined(lamp_stack::Op::Xor, &right).unwrap(), both);
+    }
+
+    #[test]
+    fn what_is_far_outside_costs_nothing() {
+        let far = vec![[-1e300, -1e300], [1e300, -1e300], [1e300, 1e300], [-1e300, 1e300]];
+        assert_eq!(polygons(&[far], 9, 3), Mask::black(9, 3).inverted());
+    }
+}

@@ -1,0 +1,205 @@
+//! The tables of a list of edits, and the values in them.
+
+use std::path::PathBuf;
+
+use lamp_stack::{Length, LengthError, Op, Turn};
+use serde::{Deserialize, Deserializer, de::Error as _};
+
+use super::letters::Align;
+
+/// Lengths are at most so long: machines are smaller.
+const LONGEST: Length = Length::from_um(1e7);
+
+/// One edit: what stands in its table, where exactly one of the keys from `box`
+/// to `rotate` does.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Edit {
+    #[serde(default, deserialize_with = "op")]
+    pub(super) op: Option<Op>,
+    #[serde(default, deserialize_with = "some_span")]
+    pub(super) z: Option<Span>,
+    #[serde(default)]
+    pub(super) layers: Option<[u32; 2]>,
+    #[serde(default)]
+    pub(super) copies: bool,
+    #[serde(rename = "box")]
+    pub(super) block: Option<Block>,
+    pub(super) cylinder: Option<Cylinder>,
+    pub(super) line: Option<Line>,
+    pub(super) label: Option<Label>,
+    pub(super) stack: Option<OtherStack>,
+    pub(super) crop: Option<Block>,
+    pub(super) pad: Option<Pad>,
+    pub(super) mirror: Option<Mirror>,
+    pub(super) rotate: Option<u32>,
+}
+
+/// From the first length up to, but without, the second.
+pub(super) type Span = [Length; 2];
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Block {
+    #[serde(deserialize_with = "span")]
+    pub(super) x: Span,
+    #[serde(deserialize_with = "span")]
+    pub(super) y: Span,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Cylinder {
+    /// Where its axis stands: x and y; of one that lies along x, y and z, or along
+    /// y, x and z.
+    #[serde(deserialize_with = "lengths")]
+    pub(super) at: [Length; 2],
+    #[serde(deserialize_with = "size")]
+    pub(super) diameter: Length,
+    #[serde(default)]
+    pub(super) along: Along,
+    /// From where to where one lies, along its axis.
+    #[serde(default, deserialize_with = "some_span")]
+    pub(super) between: Option<Span>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Along {
+    X,
+    Y,
+    #[default]
+    Z,
+}
+
+/// A straight line with square ends.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Line {
+    #[serde(deserialize_with = "lengths")]
+    pub(super) from: [Length; 2],
+    #[serde(deserialize_with = "lengths")]
+    pub(super) to: [Length; 2],
+    #[serde(deserialize_with = "size")]
+    pub(super) width: Length,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Label {
+    pub(super) text: String,
+    /// The places of its base line's start, middle or end, by `align`.
+    #[serde(deserialize_with = "places")]
+    pub(super) at: Vec<[Length; 2]>,
+    /// How high capitals are.
+    #[serde(deserialize_with = "size")]
+    pub(super) height: Length,
+    #[serde(default)]
+    pub(super) align: Align,
+    #[serde(default, deserialize_with = "turn")]
+    pub(super) turn: Turn,
+    #[serde(default = "one")]
+    pub(super) start: i32,
+    #[serde(default = "one")]
+    pub(super) step: i32,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OtherStack {
+    pub(super) file: PathBuf,
+    /// How far it is moved along x, y and z.
+    #[serde(default, rename = "move", deserialize_with = "lengths")]
+    pub(super) by: [Length; 3],
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Pad {
+    #[serde(deserialize_with = "distance")]
+    pub(super) left: Length,
+    #[serde(deserialize_with = "distance")]
+    pub(super) right: Length,
+    #[serde(deserialize_with = "distance")]
+    pub(super) top: Length,
+    #[serde(deserialize_with = "distance")]
+    pub(super) bottom: Length,
+}
+
+/// Along which axis left and right, or top and bottom, change places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Mirror {
+    X,
+    Y,
+}
+
+fn one() -> i32 {
+    1
+}
+
+fn length<E: serde::de::Error>(text: &str) -> Result<Length, E> {
+    let length: Length = text.parse().map_err(|error: LengthError| E::custom(error))?;
+    if length.um().abs() > LONGEST.um() {
+        return Err(E::custom(format!("{text} is more than 10 m")));
+    }
+    Ok(length)
+}
+
+fn lengths<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[Length; N], D::Error> {
+    let texts = Vec::<String>::deserialize(from)?;
+    let count = texts.len();
+    let lengths = texts.iter().map(|text| length(text)).collect::<Result<Vec<_>, _>>()?;
+    lengths
+        .try_into()
+        .map_err(|_| D::Error::custom(format!("{count} lengths where {N} are needed")))
+}
+
+fn span<'de, D: Deserializer<'de>>(from: D) -> Result<Span, D::Error> {
+    let [start, end] = lengths(from)?;
+    if start < end {
+        Ok([start, end])
+    } else {
+        Err(D::Error::custom(format!("{start} is not below {end}")))
+    }
+}
+
+fn some_span<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Span>, D::Error> {
+    span(from).map(Some)
+}
+
+fn places<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<[Length; 2]>, D::Error> {
+    let texts = Vec::<[String; 2]>::deserialize(from)?;
+    texts.iter().map(|[x, y]| Ok([length(x)?, length(y)?])).collect()
+}
+
+fn distance<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
+    let length: Length = length(&String::deserialize(from)?)?;
+    if length.um() < 0.0 {
+        Err(D::Error::custom(format!("{length} is below zero")))
+    } else {
+        Ok(length)
+    }
+}
+
+fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
+    let length = distance(from)?;
+    if length.um() == 0.0 { Err(D::Error::custom("it must be above zero")) } else { Ok(length) }
+}
+
+fn turn<'de, D: Deserializer<'de>>(from: D) -> Result<Turn, D::Error> {
+    String::deserialize(from)?.parse().map_err(D::Error::custom)
+}
+
+fn op<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Op>, D::Error> {
+    let text = String::deserialize(from)?;
+    match text.as_str() {
+        "add" => Ok(Some(Op::Union)),
+        "subtract" => Ok(Some(Op::Difference)),
+        _ => text.parse().map(Some).map_err(|_: String| {
+            D::Error::custom(format!(
+                "`{text}` is none of add, subtract, union, difference, intersect and xor"
+            ))
+        }),
+    }
+}

@@ -1,0 +1,227 @@
+//! Letters as closed lines.
+
+use lamp_stack::Turn;
+use ttf_parser::{Face, GlyphId, OutlineBuilder};
+
+use super::fill::Point;
+
+const FONT: &[u8] = include_bytes!("../../../fonts/roboto-subset.ttf");
+
+/// Where a text begins at its place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Align {
+    #[default]
+    Left,
+    Center,
+    Right,
+}
+
+/// A text's outlines: closed lines as a pen draws them, x to the right and y up
+/// from where the text stands on its base line, in units of a capital's height.
+/// They bend by pieces of straight lines that are off by at most `tolerance`.
+///
+/// # Errors
+/// The first letter that the font has not.
+pub(super) fn outlines(
+    text: &str,
+    align: Align,
+    turn: Turn,
+    tolerance: f64,
+) -> Result<Vec<Vec<Point>>, char> {
+    let face = Face::parse(FONT, 0).expect("the font that comes with the program is one");
+    let capital = glyph(&face, 'H').expect("the font has capitals");
+    let capital = face.glyph_bounding_box(capital).expect("capitals have outlines");
+    let scale = 1.0 / f64::from(capital.y_max);
+    let mut pen = Pen { lines: Vec::new(), x: 0.0, scale, tolerance };
+    for letter in text.chars() {
+        let id = glyph(&face, letter).ok_or(letter)?;
+        // A blank has no outline.
+        let _ = face.outline_glyph(id, &mut pen);
+        pen.x += f64::from(face.glyph_hor_advance(id).unwrap_or(0)) * scale;
+    }
+    let shift = match align {
+        Align::Left => 0.0,
+        Align::Center => -pen.x / 2.0,
+        Align::Right => -pen.x,
+    };
+    let placed =
+        |line: Vec<Point>| line.into_iter().map(|[x, y]| turned([x + shift, y], turn)).collect();
+    Ok(pen.lines.into_iter().map(placed).collect())
+}
+
+fn glyph(face: &Face<'_>, letter: char) -> Option<GlyphId> {
+    face.glyph_index(letter).filter(|id| id.0 != 0)
+}
+
+/// A point turned about the zero, with y up.
+fn turned([x, y]: Point, turn: Turn) -> Point {
+    let start = if turn.is_mirrored() { [-x, y] } else { [x, y] };
+    (0..turn.quarters()).fold(start, |[x, y], _| [-y, x])
+}
+
+/// Draws a font's curves as straight lines.
+struct Pen {
+    lines: Vec<Vec<Point>>,
+    /// Where the letter begins.
+    x: f64,
+    scale: f64,
+    tolerance: f64,
+}
+
+impl Pen {
+    fn point(&self, x: f32, y: f32) -> Point {
+        [self.x + f64::from(x) * self.scale, f64::from(y) * self.scale]
+    }
+
+    fn last(&self) -> Point {
+        *self.lines.last().and_then(|line| line.last()).expect("a curve starts somewhere")
+    }
+
+    fn draw_to(&mut self, point: Point) {
+        self.lines.last_mut().expect("a curve starts somewhere").push(point);
+    }
+
+    /// Draws a curve of which the second differences are at most `bend`: a piece
+    /// of an `n`th is off by at most `bend / (8 n^2)`.
+    fn draw(&mut self, bend: f64, at: impl Fn(f64) -> Point) {
+        let pieces = (bend / (8.0 * self.tolerance)).sqrt().ceil().clamp(1.0, 1000.0) as u32;
+        for piece in 1..=pieces {
+            self.draw_to(at(f64::from(piece) / f64::from(pieces)));
+        }
+    }
+}
+
+impl OutlineBuilder for Pen {
+    fn move_to(&mut self, x: f32, y: f32) {
+        let point = self.point(x, y);
+        self.lines.push(vec![point]);
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        self.draw_to(self.point(x, y));
+    }
+
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        let (a, b, c) = (self.last(), self.point(x1, y1), self.point(x, y));
+        // The second derivative: twice a - 2 b + c.
+        let bend = 2.0 * (a[0] - 2.0 * b[0] + c[0]).hypot(a[1] - 2.0 * b[1] + c[1]);
+        self.draw(bend, |t| {
+            let at =
+                |k: usize| (1.0 - t).powi(2) * a[k] + 2.0 * t * (1.0 - t) * b[k] + t * t * c[k];
+            [at(0), at(1)]
+        });
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        let (a, b) = (self.last(), self.point(x1, y1));
+        let (c, d) = (self.point(x2, y2), self.point(x, y));
+        // The second derivative is six times what is between these two.
+        let second = |a: Point, b: Point, c: Point| {
+            (a[0] - 2.0 * b[0] + c[0]).hypot(a[1] - 2.0 * b[1] + c[1])
+        };
+        let bend = 6.0 * second(a, b, c).max(second(b, c, d));
+        self.draw(bend, |t| {
+            let s = 1.0 - t;
+            let at = |k: usize| {
+                s.powi(3) * a[k]
+                    + 3.0 * s * s * t * b[k]
+                    + 3.0 * s * t * t * c[k]
+                    + t.powi(3) * d[k]
+            };
+            [at(0), at(1)]
+        });
+    }
+
+    fn close(&mut self) {}
+}
+
+/// A text with the number `n` in it, where it says `{n}`, or `{n:4}` or
+/// `{n:04}` for four places filled with blanks or zeros.
+///
+/// # Errors
+/// What is wrong with the text.
+pub(super) fn numbered(text: &str, n: i64) -> Result<String, String> {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(start) = rest.find(['{', '}']) {
+        out += &rest[..start];
+        let (field, after) = rest[start..]
+            .strip_prefix('{')
+            .and_then(|inside| inside.split_once('}'))
+            .ok_or_else(|| format!("`{text}` has a brace without its other"))?;
+        out += &number(field, n).ok_or_else(|| {
+            format!("`{{{field}}}` is no number's place: write {{n}}, or {{n:04}} for four digits")
+        })?;
+        rest = after;
+    }
+    Ok(out + rest)
+}
+
+/// A number as the field of a text asks for it.
+fn number(field: &str, n: i64) -> Option<String> {
+    let Some(places) = field.strip_prefix("n:") else {
+        return (field == "n").then(|| n.to_string());
+    };
+    let width: usize = places.parse().ok().filter(|width| *width <= 64)?;
+    if !places.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    Some(if places.starts_with('0') { format!("{n:0width$}") } else { format!("{n:width$}") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fill::polygons;
+    use super::*;
+
+    #[test]
+    fn numbers_stand_where_they_are_asked_for() {
+        assert_eq!(numbered("SN {n:04}/{n}", 17).unwrap(), "SN 0017/17");
+        assert_eq!(numbered("{n:3}", -1).unwrap(), " -1");
+        assert_eq!(numbered("plain", 1).unwrap(), "plain");
+        for wrong in ["{", "}", "{n", "{m}", "{n:}", "{n:x}", "{n:+4}", "{n:99999999999}", "{}}"] {
+            assert!(numbered(wrong, 1).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_font_has_what_labels_need() {
+        let letters: String = (' '..='~').collect();
+        assert!(outlines(&letters, Align::Left, Turn::default(), 0.01).is_ok());
+        assert_eq!(outlines("a\u{3a9}", Align::Left, Turn::default(), 0.01), Err('\u{3a9}'));
+    }
+
+    fn drawn(text: &str, align: Align, turn: &str) -> Vec<String> {
+        let lines = outlines(text, align, turn.parse().unwrap(), 0.01).unwrap();
+        let pixel = |[x, y]: Point| [10.0 + 10.0 * x - 0.5, 12.0 - 10.0 * y - 0.5];
+        let lines: Vec<Vec<Point>> =
+            lines.into_iter().map(|line| line.into_iter().map(pixel).collect()).collect();
+        let mask = polygons(&lines, 20, 14);
+        let row = |row| {
+            (0..20).map(|column| if mask.is_white(column, row) { '#' } else { '.' }).collect()
+        };
+        (0..14).map(row).collect()
+    }
+
+    #[test]
+    fn a_capital_is_as_high_as_asked_for() {
+        let picture = drawn("L", Align::Left, "0");
+        let white: Vec<_> = (0..14).filter(|&row: &usize| picture[row].contains('#')).collect();
+        assert_eq!((white[0], white.len()), (2, 10), "{picture:#?}");
+        let mirrored = drawn("L", Align::Left, "0m");
+        let reversed = |row: &String| row.chars().rev().collect::<String>();
+        assert_eq!(mirrored, picture.iter().map(reversed).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_round_letter_has_a_hole() {
+        let picture = drawn("O", Align::Center, "0");
+        let runs = |row: &String| row.split('.').filter(|run| !run.is_empty()).count();
+        assert_eq!(runs(&picture[7]), 2, "{picture:#?}");
+        assert_eq!(runs(&picture[2]), 1, "{picture:#?}");
+        // It stands about its place.
+        let (first, last) = (picture[7].find('#').unwrap(), picture[7].rfind('#').unwrap());
+        assert!((first + last).abs_diff(19) <= 1, "{picture:#?}");
+    }
+}

@@ -1,0 +1,213 @@
+//! Lists of edits as people write them, in TOML.
+
+use std::path::PathBuf;
+
+use lamp_stack::{Length, Op};
+use serde::Deserialize;
+use serde_json::Value;
+use serde_path_to_error::Segment;
+
+use super::error::EditError;
+use super::forms::{Along, Edit, OtherStack};
+
+/// What is to be done to a stack, one after the other.
+#[derive(Clone, Debug)]
+pub struct Edits {
+    pub(super) list: Vec<Edit>,
+    /// The list as it is told of in the output.
+    pub(super) told: Vec<Value>,
+}
+
+impl Edits {
+    /// Reads a list of edits.
+    ///
+    /// # Errors
+    /// Where the text is no TOML, or a key is unknown, missing or wrong; the error
+    /// names the edit and the key.
+    pub fn from_toml(text: &str) -> Result<Self, EditError> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct File {
+            #[serde(default)]
+            edit: Vec<Edit>,
+        }
+        let syntax = |error: toml::de::Error| EditError::Syntax {
+            line: line_of(text, &error),
+            problem: one_line(error.message()),
+        };
+        let file = toml::Deserializer::parse(text).map_err(syntax)?;
+        let file: File = serde_path_to_error::deserialize(file).map_err(|error| {
+            let key = key_of(error.path());
+            let inner = error.into_inner();
+            let problem = one_line(inner.message()).replace(" field ", " key ");
+            EditError::Key { line: line_of(text, &inner), key, problem }
+        })?;
+        let table: toml::Table = toml::from_str(text).map_err(syntax)?;
+        let told = table.get("edit").and_then(|list| list.as_array()).ok_or(EditError::NoEdits)?;
+        let told =
+            told.iter().map(|edit| serde_json::to_value(edit).expect("TOML is JSON, dates apart"));
+        if file.edit.is_empty() {
+            return Err(EditError::NoEdits);
+        }
+        let edits = Self { told: told.collect(), list: file.edit };
+        (1..).zip(&edits.list).try_for_each(|(number, edit)| edit.check(number))?;
+        Ok(edits)
+    }
+
+    /// The one edit that makes of a stack and another what `op` says.
+    pub fn combine(op: Op, file: PathBuf) -> Self {
+        let other = OtherStack { file, by: [Length::default(); 3] };
+        let edit = Edit { op: Some(op), stack: Some(other), ..Edit::default() };
+        Self {
+            list: vec![edit],
+            told: vec![serde_json::json!({ "op": op.to_string(), "stack": {} })],
+        }
+    }
+
+    /// How many edits there are.
+    pub fn count(&self) -> usize {
+        self.list.len()
+    }
+
+    /// The files of the other stacks that it names, in order.
+    pub fn stacks(&self) -> impl Iterator<Item = &PathBuf> {
+        self.list.iter().filter_map(|edit| Some(&edit.stack.as_ref()?.file))
+    }
+}
+
+impl Edit {
+    /// Checks what single keys cannot show.
+    fn check(&self, number: usize) -> Result<(), EditError> {
+        let wrong = |problem: &str| Err(EditError::edit(number, problem));
+        let shapes = [
+            self.block.is_some(),
+            self.cylinder.is_some(),
+            self.line.is_some(),
+            self.label.is_some(),
+        ];
+        let of_all =
+            [self.crop.is_some(), self.pad.is_some(), self.mirror.is_some(), self.rotate.is_some()];
+        let count = |of: [bool; 4]| of.into_iter().filter(|is| *is).count();
+        let (shapes, of_all) = (count(shapes), count(of_all));
+        if shapes + of_all + usize::from(self.stack.is_some()) != 1 {
+            return wrong(
+                "write one of box, cylinder, line, label, stack, crop, pad, mirror and rotate",
+            );
+        }
+        if of_all == 1 && (self.op.is_some() || self.z.is_some() || self.layers.is_some()) {
+            return wrong("it holds for all layers: take op, z and layers out");
+        }
+        if self.z.is_some() && self.layers.is_some() {
+            return wrong("z and layers say the same: write one of them");
+        }
+        if self.copies && shapes == 0 {
+            return wrong("copies are for boxes, cylinders, lines and labels: take it out");
+        }
+        if self.cylinder.is_some_and(|c| (c.along == Along::Z) == c.between.is_some()) {
+            return wrong(
+                "a cylinder along x or y needs between = [from, to], and only one along these",
+            );
+        }
+        if self.rotate.is_some_and(|degrees| degrees % 90 != 0) {
+            return wrong(
+                "images rotate by 90, 180 or 270 degrees: turn the part with slice --rotate",
+            );
+        }
+        Ok(())
+    }
+}
+
+/// A key's path as people count: `edit 2, box.x`.
+fn key_of(path: &serde_path_to_error::Path) -> String {
+    let mut key = String::new();
+    for segment in path {
+        match segment {
+            Segment::Seq { index } if key == "edit" => key += &format!(" {}", index + 1),
+            Segment::Seq { index } => key += &format!("[{index}]"),
+            Segment::Map { key: name } if key.is_empty() => key += &one_line(name),
+            Segment::Map { key: name } => {
+                key += if key.starts_with("edit ") && !key.contains(',') { ", " } else { "." };
+                key += &one_line(name);
+            }
+            _ => {}
+        }
+    }
+    if key.is_empty() { "the file".to_owned() } else { key }
+}
+
+/// The line of an error, from 1.
+fn line_of(text: &str, error: &toml::de::Error) -> usize {
+    let start = error.span().map_or(0, |span| span.start);
+    1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count()
+}
+
+/// A message of a parser without line breaks and control characters.
+fn one_line(text: &str) -> String {
+    let clean: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    clean.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        Edits::from_toml(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_the_edit_and_the_key() {
+        let first = "[[edit]]\nrotate = 90\n[[edit]]\n";
+        for (text, words) in [
+            (
+                "box = { x = [\"1mm\", \"2mm\"], y = [\"1mm\", \"2mm\"], w = 1 }",
+                &["line 4", "edit 2, box", "`w`"][..],
+            ),
+            ("boks = 1", &["edit 2", "`boks`"]),
+            ("box = { x = [\"1mm\", \"2mm\"] }", &["edit 2, box", "`y`"]),
+            ("box = { x = [\"1mm\", \"2\"], y = [\"1mm\", \"2mm\"] }", &["edit 2, box.x", "2"]),
+            (
+                "box = { x = [\"2mm\", \"1mm\"], y = [\"1mm\", \"2mm\"] }",
+                &["edit 2, box.x", "not below"],
+            ),
+            ("z = [\"1mm\"]\nmirror = \"x\"", &["edit 2, z", "1 lengths"]),
+            ("op = \"plus\"", &["edit 2, op", "`plus`"]),
+            ("mirror = \"x\"\nrotate = 90", &["edit 2", "one of"]),
+            ("z = [\"0mm\", \"1mm\"]", &["edit 2", "one of"]),
+            ("z = [\"0mm\", \"1mm\"]\nmirror = \"x\"", &["edit 2", "all layers"]),
+            ("copies = true\nmirror = \"x\"", &["edit 2", "copies"]),
+            ("rotate = 45", &["edit 2", "90"]),
+            (
+                "line = { from = [\"0mm\", \"0mm\"], to = [\"1mm\", \"0mm\"], width = \"0mm\" }",
+                &["edit 2, line.width", "above zero"],
+            ),
+            ("pad = { left = \"-1mm\" }", &["edit 2, pad.left", "below zero"]),
+            ("pad = { left = \"1e9mm\" }", &["edit 2, pad.left", "10 m"]),
+            (
+                "cylinder = { at = [\"0mm\", \"0mm\"], diameter = \"1mm\", along = \"x\" }",
+                &["edit 2", "between"],
+            ),
+            (
+                "label = { text = \"a\", at = [[\"0mm\", \"0mm\"]], height = \"1mm\", turn = \"45\" }",
+                &["edit 2, label.turn", "`45`"],
+            ),
+        ] {
+            let error = error(&format!("{first}{text}\n"));
+            assert!(words.iter().all(|word| error.contains(word)), "{text}: {error}");
+        }
+        assert!(error("[[edits]]\nrotate = 90").contains("`edits`"));
+        assert!(error("edit = 3 =").contains("line 1"));
+    }
+
+    #[test]
+    fn other_stacks_are_found_in_order() {
+        let text = "[[edit]]\nstack = { file = \"b.tif\" }\n[[edit]]\nmirror = \"y\"\n\
+                    [[edit]]\nop = \"xor\"\nstack = { file = \"a.tif\", move = [\"1mm\", \"0mm\", \"-2mm\"] }\n";
+        let edits = Edits::from_toml(text).unwrap();
+        assert_eq!(
+            edits.stacks().map(|file| file.to_str().unwrap()).collect::<Vec<_>>(),
+            ["b.tif", "a.tif"]
+        );
+        assert_eq!(edits.list[2].op, Some(Op::Xor));
+    }
+}

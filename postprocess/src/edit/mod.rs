@@ -1,0 +1,147 @@
+//! Changes to a design at image level, without slicing it again.
+//!
+//! A list of edits, as people write it in TOML, becomes a plan in the pixels of
+//! the stack once its first layer is known; then each layer is edited by itself.
+//!
+//! Source: 002 section 2.4.3.
+
+mod error;
+mod fill;
+mod forms;
+mod letters;
+mod list;
+mod others;
+mod page;
+mod place;
+mod plan;
+mod shape;
+
+use std::sync::Arc;
+
+use lamp_stack::{Held, Layer, PageInfo, map_in_order};
+
+pub use error::EditError;
+pub use list::Edits;
+pub use others::OtherLayers;
+
+use others::Other;
+use plan::Plan;
+
+/// Does edits to every layer of a stack. `others` are the stacks that the edits
+/// name, in order; `done` is told of each layer which edits were for it, by their
+/// numbers from 0.
+///
+/// Shapes and stacks lie in the part's coordinates; a pixel is in a shape when its
+/// centre is, a layer in a range of heights when its middle is.
+///
+/// # Errors
+/// Layers come with errors where they cannot be read, where they differ in size or
+/// place from the first, or where the edits cannot be done to them. Where a stack
+/// is added over all heights and has layers above the last, that is an error at
+/// the end.
+///
+/// # Panics
+/// If there are fewer `others` than the edits name.
+pub fn edit<E: From<EditError> + Send>(
+    layers: impl Iterator<Item = Result<Layer, E>>,
+    edits: Edits,
+    others: Vec<OtherLayers<E>>,
+    mut done: impl FnMut(&Layer, &[usize]),
+) -> impl Iterator<Item = Result<Layer, E>> {
+    let mut beside = Beside::new(&edits, others);
+    let mut plan: Option<Arc<Plan>> = None;
+    let mut layers = layers.fuse();
+    let read = std::iter::from_fn(move || {
+        let layer = match layers.next() {
+            Some(Ok(layer)) => layer,
+            Some(Err(error)) => return Some(Err(error)),
+            None => return beside.left_over().err().map(Err),
+        };
+        let planned = match &plan {
+            Some(plan) => Ok(Arc::clone(plan)),
+            None => Plan::new(&edits, &layer, &mut beside.others)
+                .map(|new| Arc::clone(plan.insert(Arc::new(new)))),
+        };
+        Some(planned.and_then(|plan| Ok(ToEdit { others: beside.at(&layer.info)?, layer, plan })))
+    });
+    let edited =
+        map_in_order(read, |ToEdit { layer, others, plan }| Ok(plan.apply(layer, &others)?));
+    edited.map(move |edited| {
+        let (layer, edits) = edited?;
+        done(&layer, &edits);
+        Ok(layer)
+    })
+}
+
+/// A layer, and those of other stacks at its height.
+struct ToEdit {
+    layer: Layer,
+    others: Vec<Option<Arc<Layer>>>,
+    plan: Arc<Plan>,
+}
+
+impl Held for ToEdit {
+    fn bytes(&self) -> usize {
+        let others = self.others.iter().flatten().map(|layer| layer.bytes());
+        self.layer.bytes() + others.sum::<usize>()
+    }
+}
+
+/// The other stacks, at the height that has been reached.
+struct Beside<E> {
+    others: Vec<Other<E>>,
+    /// For each, the edit's number from 1, if it adds the whole stack.
+    whole: Vec<Option<usize>>,
+    last: Option<PageInfo>,
+}
+
+impl<E: From<EditError>> Beside<E> {
+    fn new(edits: &Edits, others: Vec<OtherLayers<E>>) -> Self {
+        let named = (1..)
+            .zip(&edits.list)
+            .filter_map(|(number, edit)| Some((number, edit, edit.stack.as_ref()?)));
+        let mut beside = Self { others: Vec::new(), whole: Vec::new(), last: None };
+        let mut others = others.into_iter();
+        for (number, edit, stack) in named {
+            let other = others.next().expect("there is a stack for each that is named");
+            let whole = edit.adds_at_all_heights() && !other.may_reach_beyond;
+            beside.whole.push(whole.then_some(number));
+            beside.others.push(Other::new(other, stack.by[2]));
+        }
+        beside
+    }
+
+    /// The layers at the height of one.
+    fn at(&mut self, info: &PageInfo) -> Result<Vec<Option<Arc<Layer>>>, E> {
+        if self.last.is_none() {
+            self.check(|other| other.below(info), "below")?;
+        }
+        self.last = Some(PageInfo { stack: None, ..info.clone() });
+        self.others.iter_mut().map(|other| other.at(info)).collect()
+    }
+
+    /// Checks, once, that no layer of a stack that is added is left.
+    fn left_over(&mut self) -> Result<(), E> {
+        let Some(last) = self.last.take() else { return Ok(()) };
+        self.check(|other| other.above(&last), "above")
+    }
+
+    /// Checks that stacks that are added have no layer that lies outside.
+    fn check(
+        &mut self,
+        outside: impl Fn(&mut Other<E>) -> Result<Option<String>, E>,
+        side: &str,
+    ) -> Result<(), E> {
+        for (other, number) in self.others.iter_mut().zip(&self.whole) {
+            let Some(number) = number else { continue };
+            if let Some(layer) = outside(other)? {
+                let problem = format!(
+                    "{layer} of {} lies {side} the stack and would be lost: write z or layers, or edit the larger stack",
+                    other.name
+                );
+                return Err(EditError::edit(*number, problem).into());
+            }
+        }
+        Ok(())
+    }
+}

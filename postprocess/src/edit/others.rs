@@ -1,0 +1,143 @@
+//! Other stacks, brought to the heights of the one that is edited.
+
+use std::sync::Arc;
+
+use lamp_stack::{Layer, Length, PageInfo};
+
+use super::error::EditError;
+use super::place::Place;
+
+/// A stack that an edit names.
+pub struct OtherLayers<E> {
+    /// Its name in messages.
+    pub name: String,
+    /// Its layers, from the bottom.
+    pub layers: Box<dyn Iterator<Item = Result<Layer, E>>>,
+    /// Whether it may have layers below or above all that are edited, where it is
+    /// added over all heights.
+    pub may_reach_beyond: bool,
+}
+
+/// A stack that is read along with the one that is edited.
+pub(super) struct Other<E> {
+    pub(super) name: String,
+    layers: Box<dyn Iterator<Item = Result<Layer, E>>>,
+    /// How far up it is moved.
+    up: Length,
+    current: Option<Arc<Layer>>,
+    /// Where its layers lie, all of them.
+    place: Option<Place>,
+}
+
+impl<E: From<EditError>> Other<E> {
+    pub(super) fn new(OtherLayers { name, layers, .. }: OtherLayers<E>, up: Length) -> Self {
+        Self { name, layers, up, current: None, place: None }
+    }
+
+    /// Its first layer; an edit of that number names it.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub(super) fn first(&mut self, number: usize) -> Result<&Layer, E> {
+        if self.place.is_none() {
+            self.advance()?;
+        }
+        let none = || EditError::edit(number, format!("{} has no layers", self.name)).into();
+        self.current.as_deref().ok_or_else(none)
+    }
+
+    /// Goes on to its next layer.
+    fn advance(&mut self) -> Result<(), E> {
+        self.current = self.layers.next().transpose()?.map(Arc::new);
+        let Some(layer) = &self.current else { return Ok(()) };
+        let place = Place::of(layer);
+        if *self.place.get_or_insert(place) != place {
+            let layer = format!("{}: {}", self.name, layer.info.name());
+            return Err(EditError::Unlike { layer }.into());
+        }
+        Ok(())
+    }
+
+    /// The layer that holds the middle of one that is edited. Heights must not go
+    /// down from call to call.
+    ///
+    /// # Errors
+    /// Where a layer cannot be read, or does not say where it is.
+    pub(super) fn at(&mut self, info: &PageInfo) -> Result<Option<Arc<Layer>>, E> {
+        let middle = middle(info).map(Length::um);
+        loop {
+            let Some(layer) = &self.current else { return Ok(None) };
+            let [start, end] = self.span(&layer.info, middle.is_some())?;
+            let wanted = middle.unwrap_or(f64::from(info.index));
+            if wanted < start {
+                return Ok(None);
+            }
+            if wanted < end {
+                return Ok(Some(Arc::clone(layer)));
+            }
+            self.advance()?;
+        }
+    }
+
+    /// The name of a layer that lies above all of the last one edited.
+    ///
+    /// # Errors
+    /// Where a layer cannot be read, or does not say where it is.
+    pub(super) fn above(&mut self, last: &PageInfo) -> Result<Option<String>, E> {
+        let top = last.z_um.zip(last.thickness_um).map(|(z, thickness)| z + thickness);
+        while let Some(layer) = &self.current {
+            let [start, _] = self.span(&layer.info, top.is_some())?;
+            if start >= top.unwrap_or(f64::from(last.index) + 1.0) {
+                return Ok(Some(layer.info.name()));
+            }
+            self.advance()?;
+        }
+        Ok(None)
+    }
+
+    /// The name of its first layer, if it lies below all of the first one edited.
+    ///
+    /// # Errors
+    /// Where it does not say where it is.
+    pub(super) fn below(&self, first: &PageInfo) -> Result<Option<String>, E> {
+        let bottom = first.z_um.filter(|_| first.thickness_um.is_some());
+        let Some(layer) = &self.current else { return Ok(None) };
+        let [_, end] = self.span(&layer.info, bottom.is_some())?;
+        let is_below = end <= bottom.unwrap_or(first.index.into());
+        Ok(is_below.then(|| layer.info.name()))
+    }
+
+    /// From where to where a layer reaches: in micrometres, or by its number where
+    /// heights are not known.
+    fn span(&self, info: &PageInfo, by_height: bool) -> Result<[f64; 2], EditError> {
+        match (info.z_um, info.thickness_um) {
+            (Some(z), Some(thickness)) if by_height => {
+                let start = z + self.up.um();
+                Ok([start, start + thickness])
+            }
+            (Some(_), Some(_)) => Err(self
+                .unlike(info, "says at what height it is, and the stack that is edited does not")),
+            _ if by_height => Err(self.unlike(
+                info,
+                "does not say at what height it is, and the stack that is edited does",
+            )),
+            _ if self.up != Length::default() => {
+                Err(self
+                    .unlike(info, "does not say at what height it is, so it cannot be moved up"))
+            }
+            _ => Ok([info.index.into(), f64::from(info.index) + 1.0]),
+        }
+    }
+
+    fn unlike(&self, info: &PageInfo, problem: &str) -> EditError {
+        EditError::Layer {
+            layer: format!("{}: {}", self.name, info.name()),
+            problem: problem.to_owned(),
+        }
+    }
+}
+
+/// The height of a layer's middle, where its page says it.
+pub(super) fn middle(info: &PageInfo) -> Option<Length> {
+    Some(Length::from_um(info.z_um? + info.thickness_um? / 2.0))
+}

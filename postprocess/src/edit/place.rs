@@ -1,0 +1,127 @@
+//! Where a stack's pixels lie, and what becomes of that.
+
+use lamp_stack::{Dpi, Frame, Layer, Length, Turn};
+
+use super::error::EditError;
+
+/// The pixels of every layer in part coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place {
+    /// The top left corner, in millimetres.
+    pub(super) origin_mm: [f64; 2],
+    /// The resolution, where it is known.
+    pub(super) dpi: Option<Dpi>,
+    pub(super) width: u32,
+    pub(super) height: u32,
+}
+
+impl Place {
+    /// Where a layer's pixels lie. Where its page does not say, its lower left
+    /// corner is 0, 0.
+    pub(super) fn of(layer: &Layer) -> Self {
+        let (width, height) = (layer.image.width(), layer.image.height());
+        let height_mm = layer.dpi.map_or(0.0, |dpi| f64::from(height) * dpi.pitch().mm());
+        let origin_mm = layer.info.origin_mm.unwrap_or([0.0, height_mm]);
+        Self { origin_mm, dpi: layer.dpi, width, height }
+    }
+
+    /// The resolution, where lengths need one.
+    pub(super) fn dpi(&self) -> Result<Dpi, EditError> {
+        self.dpi.ok_or(EditError::NoResolution)
+    }
+
+    /// What maps points of the part to pixels.
+    pub(super) fn grid(&self) -> Result<Grid, EditError> {
+        Ok(Grid { origin_mm: self.origin_mm, dpi: self.dpi()?, offset: [0.0; 2] })
+    }
+
+    /// Where the pixels lie that a frame shows.
+    pub(super) fn framed(&self, frame: Frame) -> Self {
+        let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
+        let [x0, y1] = self.origin_mm;
+        Self {
+            origin_mm: [x0 + frame.left as f64 * pitch, y1 - frame.top as f64 * pitch],
+            width: frame.width,
+            height: frame.height,
+            ..*self
+        }
+    }
+
+    /// Where the pixels lie when the part is turned about x = y = 0.
+    pub(super) fn turned(&self, turn: Turn) -> Self {
+        let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
+        let [mut x0, mut y1] = self.origin_mm;
+        let [mut width, mut height] = [self.width, self.height].map(|side| f64::from(side) * pitch);
+        if turn.is_mirrored() {
+            x0 = -(x0 + width);
+        }
+        for _ in 0..turn.quarters() {
+            (x0, y1) = (-y1, x0 + width);
+            (width, height) = (height, width);
+        }
+        let (width, height) = turn.size(self.width, self.height);
+        Self { origin_mm: [x0, y1], width, height, ..*self }
+    }
+}
+
+/// What maps points in millimetres to pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    pub(super) origin_mm: [f64; 2],
+    pub(super) dpi: Dpi,
+    /// How many columns and rows further the pixels stand.
+    pub(super) offset: [f64; 2],
+}
+
+impl Grid {
+    /// A point in pixels: the columns from its first coordinate on have their
+    /// centres right of it or on it, the rows from its second on below it or on
+    /// it. What lies on a centre is a whole number, as in slicing.
+    pub(super) fn to_pixels(self, [x_mm, y_mm]: [f64; 2]) -> [f64; 2] {
+        let pixels = |mm: f64| mm * (self.dpi.get() * 5.0) / 127.0 - 0.5;
+        let [x0, y1] = self.origin_mm;
+        [pixels(x_mm - x0) + self.offset[0], pixels(y1 - y_mm) + self.offset[1]]
+    }
+
+    /// A length in pixels.
+    pub(super) fn length(self, length: Length) -> f64 {
+        length.pixels(self.dpi)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn place(origin_mm: [f64; 2], width: u32, height: u32) -> Place {
+        Place { origin_mm, dpi: Dpi::new(25.4), width, height }
+    }
+
+    #[test]
+    fn turning_moves_the_corner_about_zero() {
+        // One pixel is one millimetre: x 1 to 4, y 3 to 5.
+        let image = place([1.0, 5.0], 3, 2);
+        for (turn, origin) in [
+            ("0", [1.0, 5.0]),
+            ("90", [-5.0, 4.0]),
+            ("180", [-4.0, -3.0]),
+            ("270", [3.0, -1.0]),
+            ("0m", [-4.0, 5.0]),
+            ("90m", [-5.0, -1.0]),
+        ] {
+            let turn: Turn = turn.parse().unwrap();
+            let (width, height) = turn.size(3, 2);
+            assert_eq!(image.turned(turn), place(origin, width, height), "{turn}");
+        }
+    }
+
+    #[test]
+    fn a_point_on_a_centre_is_a_whole_number() {
+        let grid = Grid { origin_mm: [1.0, 5.0], dpi: Dpi::new(25.4).unwrap(), offset: [0.0; 2] };
+        assert_eq!(grid.to_pixels([3.5, 4.5]), [2.0, 0.0]);
+        assert_eq!(
+            place([1.0, 5.0], 9, 9).framed(Frame { left: 2, top: -3, width: 1, height: 1 }),
+            place([3.0, 8.0], 1, 1)
+        );
+    }
+}
