@@ -15,9 +15,7 @@ pub(super) fn polygons(lines: &[Vec<Point>], width: u32, height: u32) -> Mask {
         let next = line.iter().cycle().skip(1);
         line.iter().zip(next).for_each(|(&a, &b)| cross(a, b, height, &mut crossings));
     }
-    crossings.sort_unstable_by(|a: &Crossing, b| {
-        (a.row, a.x).partial_cmp(&(b.row, b.x)).expect("places are numbers")
-    });
+    crossings.sort_unstable_by(|a: &Crossing, b| a.row.cmp(&b.row).then(a.x.total_cmp(&b.x)));
     let mut crossings = crossings.as_slice();
     rows(width, height, |row, out| {
         let (here, rest) = crossings.split_at(crossings.partition_point(|c| c.row == row));
@@ -156,5 +154,7 @@ mod tests {
     fn what_is_far_outside_costs_nothing() {
         let far = vec![[-1e300, -1e300], [1e300, -1e300], [1e300, 1e300], [-1e300, 1e300]];
         assert_eq!(polygons(&[far], 9, 3), Mask::black(9, 3).inverted());
+        let nowhere = vec![[f64::INFINITY, -1.0], [f64::INFINITY, 5.0], [f64::INFINITY, 7.0]];
+        assert_eq!(polygons(&[nowhere], 9, 3).white_pixels(), 0);
     }
 }

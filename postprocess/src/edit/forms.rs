@@ -22,7 +22,7 @@ pub(super) struct Edit {
     #[serde(default)]
     pub(super) layers: Option<[u32; 2]>,
     #[serde(default)]
-    pub(super) copies: bool,
+    pub(super) copies: Copies,
     #[serde(rename = "box")]
     pub(super) block: Option<Block>,
     pub(super) cylinder: Option<Cylinder>,
@@ -33,6 +33,29 @@ pub(super) struct Edit {
     pub(super) pad: Option<Pad>,
     pub(super) mirror: Option<Mirror>,
     pub(super) rotate: Option<u32>,
+}
+
+/// Whether an edit is done to each copy that `tile` made of a part.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, expecting = "write true, or a part's name")]
+pub(super) enum Copies {
+    /// Of the one part, if so.
+    Any(bool),
+    /// Of the part of that name.
+    Of(String),
+}
+
+impl Default for Copies {
+    fn default() -> Self {
+        Self::Any(false)
+    }
+}
+
+impl Copies {
+    /// Whether the edit is done once, to the whole image.
+    pub(super) fn is_none(&self) -> bool {
+        matches!(self, Self::Any(false))
+    }
 }
 
 /// From the first length up to, but without, the second.

@@ -100,7 +100,7 @@ impl Edit {
         if self.z.is_some() && self.layers.is_some() {
             return wrong("z and layers say the same: write one of them");
         }
-        if self.copies && shapes == 0 {
+        if !self.copies.is_none() && shapes == 0 {
             return wrong("copies are for boxes, cylinders, lines and labels: take it out");
         }
         if self.cylinder.is_some_and(|c| (c.along == Along::Z) == c.between.is_some()) {
@@ -176,6 +176,7 @@ mod tests {
             ("z = [\"0mm\", \"1mm\"]", &["edit 2", "one of"]),
             ("z = [\"0mm\", \"1mm\"]\nmirror = \"x\"", &["edit 2", "all layers"]),
             ("copies = true\nmirror = \"x\"", &["edit 2", "copies"]),
+            ("copies = 3\nmirror = \"x\"", &["edit 2, copies", "a part's name"]),
             ("rotate = 45", &["edit 2", "90"]),
             (
                 "line = { from = [\"0mm\", \"0mm\"], to = [\"1mm\", \"0mm\"], width = \"0mm\" }",

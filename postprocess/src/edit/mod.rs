@@ -5,6 +5,7 @@
 //!
 //! Source: 002 section 2.4.3.
 
+mod copies;
 mod error;
 mod fill;
 mod forms;
@@ -15,6 +16,8 @@ mod page;
 mod place;
 mod plan;
 mod shape;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 

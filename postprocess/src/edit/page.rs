@@ -1,10 +1,9 @@
 //! What pages say of images that were cropped, padded or turned.
 
-use lamp_stack::{Frame, PageInfo, Turn};
-use serde_json::{Value, json};
-
+use super::copies::{forget_copies, move_copies};
 use super::error::EditError;
-use super::place::{Grid, Place};
+use super::place::Place;
+use lamp_stack::{Frame, PageInfo, Turn};
 
 /// Makes a page say what holds for the rows that a frame shows, which lie at
 /// `place`.
@@ -18,12 +17,8 @@ pub(super) fn frame_page(info: &mut PageInfo, frame: Frame, place: &Place) {
     info.stray_rows = info.stray_rows.iter().filter_map(|&row| moved(row, height)).collect();
     // One stands below the last row, if contours break off there.
     info.open_rows = info.open_rows.iter().filter_map(|&row| moved(row, height + 1)).collect();
-    let tiled = info.stack.as_mut().and_then(|stack| stack.other.get_mut("tile"));
-    for copy in tiled.and_then(|tile| tile.get_mut("copies")?.as_array_mut()).into_iter().flatten()
-    {
-        if let Some([left, top]) = corner(copy) {
-            *copy = json!([left - frame.left, top - frame.top]);
-        }
+    if let Some(stack) = &mut info.stack {
+        move_copies(stack, frame);
     }
 }
 
@@ -56,7 +51,7 @@ pub(super) fn turn_page(
         info.open_rows.reverse();
     }
     if let Some(stack) = &mut info.stack {
-        stack.other.shift_remove("tile");
+        forget_copies(stack);
     }
     Ok(())
 }
@@ -65,37 +60,10 @@ fn move_to(info: &mut PageInfo, place: &Place) {
     info.origin_mm = info.origin_mm.map(|_| place.origin_mm);
 }
 
-/// What maps the points of a part to the pixels of each copy that `tile` made.
-///
-/// # Errors
-/// What the first page lacks.
-pub(super) fn copies(info: &PageInfo, place: &Place) -> Result<Vec<Grid>, EditError> {
-    let lacks = |what: &str| {
-        EditError::layer(info, format!("{what}: copies are for builds that tile made"))
-    };
-    let tile = info.stack.as_ref().and_then(|stack| stack.other.get("tile"));
-    let tile = tile.ok_or_else(|| lacks("its page does not say where copies stand"))?;
-    let origin_mm = serde_json::from_value(tile["part_origin_mm"].clone())
-        .map_err(|_| lacks("its page does not say where the part lay"))?;
-    let dpi = place.dpi()?;
-    let grid = |copy: &Value| {
-        let [left, top] = corner(copy)?;
-        Some(Grid { origin_mm, dpi, offset: [left as f64, top as f64] })
-    };
-    let copies = tile["copies"].as_array().map(|copies| copies.iter().map(grid).collect());
-    copies
-        .flatten()
-        .ok_or_else(|| lacks("its page says where copies stand in a way that is not known here"))
-}
-
-/// The left column and the top row of a copy.
-fn corner(copy: &Value) -> Option<[i64; 2]> {
-    serde_json::from_value(copy.clone()).ok()
-}
-
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{Dpi, StackInfo};
+    use lamp_stack::StackInfo;
+    use serde_json::json;
 
     use super::*;
 
@@ -120,10 +88,7 @@ mod tests {
         frame_page(&mut page, Frame { left: 2, top: 3, width: 5, height: 6 }, &PLACE);
         assert_eq!((page.origin_mm, &page.stray_rows[..]), (Some([7.0, 8.0]), &[2][..]));
         assert_eq!(page.open_rows, [3]);
-        let place = Place { dpi: Dpi::new(254.0), ..PLACE };
-        let offsets: Vec<_> =
-            copies(&page, &place).unwrap().iter().map(|grid| grid.offset).collect();
-        assert_eq!(offsets, [[1.0, 1.0], [3.0, 3.0]]);
+        assert_eq!(page.stack.unwrap().other["tile"]["copies"], json!([[1, 1], [3, 3]]));
     }
 
     #[test]
@@ -135,7 +100,7 @@ mod tests {
                 (&page.stray_rows[..], &page.open_rows[..]),
                 (&[0, 4, 7][..], &[0, 4, 8][..])
             );
-            assert!(copies(&page, &PLACE).is_err());
+            assert!(page.stack.unwrap().other.is_empty());
         }
         let mut page = info();
         turn_page(&mut page, "0m".parse().unwrap(), 10, &PLACE).unwrap();

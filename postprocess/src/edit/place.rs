@@ -25,14 +25,10 @@ impl Place {
         Self { origin_mm, dpi: layer.dpi, width, height }
     }
 
-    /// The resolution, where lengths need one.
-    pub(super) fn dpi(&self) -> Result<Dpi, EditError> {
-        self.dpi.ok_or(EditError::NoResolution)
-    }
-
     /// What maps points of the part to pixels.
     pub(super) fn grid(&self) -> Result<Grid, EditError> {
-        Ok(Grid { origin_mm: self.origin_mm, dpi: self.dpi()?, offset: [0.0; 2] })
+        let dpi = self.dpi.ok_or(EditError::NoResolution)?;
+        Ok(Grid { origin_mm: self.origin_mm, dpi })
     }
 
     /// Where the pixels lie that a frame shows.
@@ -67,10 +63,8 @@ impl Place {
 /// What maps points in millimetres to pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
-    pub(super) origin_mm: [f64; 2],
-    pub(super) dpi: Dpi,
-    /// How many columns and rows further the pixels stand.
-    pub(super) offset: [f64; 2],
+    origin_mm: [f64; 2],
+    dpi: Dpi,
 }
 
 impl Grid {
@@ -80,7 +74,7 @@ impl Grid {
     pub(super) fn to_pixels(self, [x_mm, y_mm]: [f64; 2]) -> [f64; 2] {
         let pixels = |mm: f64| mm * (self.dpi.get() * 5.0) / 127.0 - 0.5;
         let [x0, y1] = self.origin_mm;
-        [pixels(x_mm - x0) + self.offset[0], pixels(y1 - y_mm) + self.offset[1]]
+        [pixels(x_mm - x0), pixels(y1 - y_mm)]
     }
 
     /// A length in pixels.
@@ -117,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_point_on_a_centre_is_a_whole_number() {
-        let grid = Grid { origin_mm: [1.0, 5.0], dpi: Dpi::new(25.4).unwrap(), offset: [0.0; 2] };
+        let grid = Grid { origin_mm: [1.0, 5.0], dpi: Dpi::new(25.4).unwrap() };
         assert_eq!(grid.to_pixels([3.5, 4.5]), [2.0, 0.0]);
         assert_eq!(
             place([1.0, 5.0], 9, 9).framed(Frame { left: 2, top: -3, width: 1, height: 1 }),

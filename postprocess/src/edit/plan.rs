@@ -1,16 +1,18 @@
 //! Edits in the pixels of one stack.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
 use lamp_stack::{Frame, Image, Layer, Length, Mask, Op, PageInfo, Turn};
 use serde_json::json;
 
+use super::copies::Copy;
 use super::error::EditError;
 use super::forms::{Edit, Mirror, OtherStack, Pad, Span};
 use super::list::Edits;
 use super::others::{Other, middle};
-use super::page::{copies, frame_page, turn_page};
+use super::page::{frame_page, turn_page};
 use super::place::Place;
 use super::shape::Shape;
 
@@ -140,7 +142,7 @@ impl Plan {
                 _ => true,
             };
             if holds {
-                image = step.of_image(image, &info, other).ok_or_else(too_many)?;
+                image = step.of_image(&image, &info, other)?.ok_or_else(too_many)?;
                 step.follow(&mut info)?;
                 done.push(k);
             }
@@ -195,28 +197,36 @@ impl Step {
                 height: (bottom - top) as u32,
             });
         }
-        let grids = if edit.copies { copies(info, place)? } else { vec![place.grid()?] };
-        let shape = Shape::of(edit, number, place, grids)?.expect("an edit does something");
+        let copies = Copy::all(&edit.copies, info, place)?;
+        let shape = Shape::of(edit, number, place, copies)?;
         Ok(Self::Shape { reach: Reach::of(edit), op: edit.op(), shape })
     }
 
     /// What becomes of an image; `None` where that has more runs than any may
     /// have.
-    fn of_image(&self, image: Image, info: &PageInfo, other: Option<&Layer>) -> Option<Image> {
-        let black = || Image::Mask(Mask::black(image.width(), image.height()));
-        match self {
+    ///
+    /// # Errors
+    /// Where a shape's pixels depend on the layer's height, which is not known.
+    fn of_image(
+        &self,
+        image: &Image,
+        info: &PageInfo,
+        other: Option<&Layer>,
+    ) -> Result<Option<Image>, EditError> {
+        let combined = |op, with: &Image| image.combined(op, with);
+        Ok(match self {
             Self::Turn { turn, .. } => image.turned(*turn),
             Self::Frame { frame, .. } => Some(image.framed(*frame)),
-            Self::Shape { op, shape, .. } => match shape.at(middle(info)) {
-                Some(mask) => image.combined(*op, &Image::Mask(mask.into_owned())),
-                None => Some(image),
-            },
+            Self::Shape { op, shape, .. } => {
+                let mask = shape.at(info)?.map(Cow::into_owned);
+                mask.and_then(|mask| combined(*op, &Image::Mask(mask)))
+            }
             Self::Other { op, frame, .. } => match other {
-                Some(other) => image.combined(*op, &other.image.framed(*frame)),
-                None if *op == Op::Intersect => Some(black()),
-                None => Some(image),
+                Some(other) => combined(*op, &other.image.framed(*frame)),
+                // A layer that is not there is black.
+                None => combined(*op, &Image::Mask(Mask::black(image.width(), image.height()))),
             },
-        }
+        })
     }
 
     /// Makes a page say what holds after the step.
@@ -293,7 +303,7 @@ fn frame_of(
     let [x, y] = from.origin_mm;
     let [left, top] = grid.to_pixels([x + by[0].mm(), y + by[1].mm()]);
     // The centres of its first column and row stand half a pixel further.
-    let [left, top] = [left, top].map(|pixels| -((pixels + 0.5).round() as i64));
+    let [left, top] = [left, top].map(|pixels| -(pixels + 0.5).round() as i64);
     Ok(Frame { left, top, width: place.width, height: place.height })
 }
 

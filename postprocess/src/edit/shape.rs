@@ -2,27 +2,29 @@
 
 use std::borrow::Cow;
 
-use lamp_stack::{Length, Mask, Op};
+use lamp_stack::{Length, Mask, PageInfo};
 
+use super::copies::{Copy, composed};
 use super::error::EditError;
 use super::fill::{Point, disc, polygons};
 use super::forms::{Along, Block, Cylinder, Edit, Label, Line};
 use super::letters::{numbered, outlines};
+use super::others::middle;
 use super::place::{Grid, Place};
 
 /// Letters' curves are off by at most so many pixels.
 const TOLERANCE: f64 = 1.0 / 64.0;
 
-/// A shape at all its places, in the pixels of a stack.
+/// A shape in the pixels of a stack.
 pub(super) enum Shape {
     /// One that is the same in each layer.
     Upright(Mask),
     /// A cylinder along x or y.
-    Lying { cylinder: Cylinder, between: [Length; 2], grids: Vec<Grid>, width: u32, height: u32 },
+    Lying { cylinder: Cylinder, copies: Vec<Copy>, place: Place },
 }
 
 impl Shape {
-    /// The shape that an edit names, if it names one, once for each of `grids`.
+    /// The shape that an edit names, in each of `copies`.
     ///
     /// # Errors
     /// Where a letter has no outline, a line no length, or the shape no pixel.
@@ -30,62 +32,89 @@ impl Shape {
         edit: &Edit,
         number: usize,
         place: &Place,
-        grids: Vec<Grid>,
-    ) -> Result<Option<Self>, EditError> {
-        let Place { width, height, .. } = *place;
-        let filled = |lines: &[Vec<Point>]| polygons(lines, width, height);
-        let each = |line: &dyn Fn(Grid) -> Vec<Point>| {
-            grids.iter().map(|grid| line(*grid)).collect::<Vec<_>>()
-        };
-        let mask = if let Some(block) = edit.block {
-            filled(&each(&|grid| rectangle(block, grid)))
-        } else if let Some(line) = edit.line {
-            if line.from == line.to {
-                return Err(EditError::edit(number, "the line ends where it begins"));
+        copies: Vec<Copy>,
+    ) -> Result<Self, EditError> {
+        let wrong = |problem: String| EditError::edit(number, problem);
+        let grids: Vec<Grid> =
+            copies.iter().map(|copy| copy.part.grid()).collect::<Result<_, _>>()?;
+        let mask = if let Some(cylinder) = edit.cylinder {
+            if cylinder.along != Along::Z {
+                return Ok(Self::Lying { cylinder, copies, place: *place });
             }
-            filled(&each(&|grid| stroke(line, grid)))
+            composed(&copies, place, |k, part| round(cylinder, grids[k], part))
         } else if let Some(label) = &edit.label {
-            filled(&letters(label, &grids).map_err(|problem| EditError::edit(number, problem))?)
-        } else if let Some(Cylinder { at, diameter, along: Along::Z, .. }) = edit.cylinder {
-            let discs = grids.iter().map(|grid| {
-                disc(grid.to_pixels(at.map(Length::mm)), grid.length(diameter) / 2.0, width, height)
-            });
-            discs
-                .reduce(|all, disc| all.combined(Op::Union, &disc).expect("circles are few runs"))
-                .unwrap_or_else(|| Mask::black(width, height))
-        } else if let Some(cylinder) = edit.cylinder {
-            let between = cylinder.between.expect("it was checked");
-            return Ok(Some(Self::Lying { cylinder, between, grids, width, height }));
+            let lines: Vec<_> = grids
+                .iter()
+                .zip(0..)
+                .map(|(grid, k)| letters(label, *grid, k))
+                .collect::<Result<_, _>>()
+                .map_err(wrong)?;
+            composed(&copies, place, |k, part| polygons(&lines[k], part.width, part.height))
         } else {
-            return Ok(None);
+            if edit.line.is_some_and(|line| line.from == line.to) {
+                return Err(wrong("the line ends where it begins".to_owned()));
+            }
+            let block = edit.block.map(|block| move |grid| rectangle(block, grid));
+            let line = edit.line.map(|line| move |grid| stroke(line, grid));
+            let corners = |grid| {
+                block
+                    .map(|at| at(grid))
+                    .or_else(|| Some(line?(grid)))
+                    .expect("an edit does something")
+            };
+            composed(&copies, place, |k, part| {
+                polygons(&[corners(grids[k])], part.width, part.height)
+            })
         };
+        let mask =
+            mask.ok_or_else(|| wrong("it has more runs than an image can hold".to_owned()))?;
         if mask.transition_count() == 0 {
-            return Err(EditError::edit(
-                number,
-                format!("no pixel is in it: the image is {place}"),
-            ));
+            let lain = copies.first().map_or(place, |copy| &copy.part);
+            return Err(wrong(format!("no pixel is in it: the image is {lain}")));
         }
-        Ok(Some(Self::Upright(mask)))
+        Ok(Self::Upright(mask))
     }
 
-    /// The pixels of a layer whose middle is at a height.
-    pub(super) fn at(&self, middle: Option<Length>) -> Option<Cow<'_, Mask>> {
-        match self {
-            Self::Upright(mask) => Some(Cow::Borrowed(mask)),
-            Self::Lying { cylinder, between, grids, width, height } => {
-                let [across, z] = cylinder.at.map(Length::um);
-                let [radius, off] = [cylinder.diameter.um() / 2.0, middle?.um() - z];
-                let half = (radius * radius - off * off).max(0.0).sqrt();
-                let across = [across - half, across + half].map(Length::from_um);
-                let block = match cylinder.along {
-                    Along::X => Block { x: *between, y: across },
-                    _ => Block { x: across, y: *between },
-                };
-                let lines: Vec<_> = grids.iter().map(|grid| rectangle(block, *grid)).collect();
-                Some(Cow::Owned(polygons(&lines, *width, *height)))
-            }
-        }
+    /// The pixels of a layer; `None` if they have more runs than an image can hold.
+    ///
+    /// # Errors
+    /// Where the layer's height matters and is not known.
+    pub(super) fn at(&self, info: &PageInfo) -> Result<Option<Cow<'_, Mask>>, EditError> {
+        let (cylinder, copies, place) = match self {
+            Self::Upright(mask) => return Ok(Some(Cow::Borrowed(mask))),
+            Self::Lying { cylinder, copies, place } => (*cylinder, copies, place),
+        };
+        let middle = middle(info).ok_or_else(|| {
+            EditError::layer(
+                info,
+                "it does not say at what height it is, so no cylinder can lie in it",
+            )
+        })?;
+        let block = section(cylinder, middle);
+        let part = |_, part: &Place| {
+            let corners = rectangle(block, part.grid().expect("it was found for each"));
+            polygons(&[corners], part.width, part.height)
+        };
+        Ok(composed(copies, place, part).map(Cow::Owned))
     }
+}
+
+/// What a plane at a height cuts out of a cylinder that lies.
+fn section(cylinder: Cylinder, height: Length) -> Block {
+    let [across, z] = cylinder.at.map(Length::um);
+    let [radius, off] = [cylinder.diameter.um() / 2.0, height.um() - z];
+    let half = (radius * radius - off * off).max(0.0).sqrt();
+    let across = [across - half, across + half].map(Length::from_um);
+    let between = cylinder.between.expect("one that lies has ends");
+    match cylinder.along {
+        Along::X => Block { x: between, y: across },
+        _ => Block { x: across, y: between },
+    }
+}
+
+fn round(cylinder: Cylinder, grid: Grid, part: &Place) -> Mask {
+    let centre = grid.to_pixels(cylinder.at.map(Length::mm));
+    disc(centre, grid.length(cylinder.diameter) / 2.0, part.width, part.height)
 }
 
 fn rectangle(Block { x, y }: Block, grid: Grid) -> Vec<Point> {
@@ -102,23 +131,20 @@ fn stroke(Line { from, to, width }: Line, grid: Grid) -> Vec<Point> {
     vec![corner(from, -half), corner(to, -half), corner(to, half), corner(from, half)]
 }
 
-/// The outlines of a label at each of its places, once for each of `grids`, with
-/// its numbers.
-fn letters(label: &Label, grids: &[Grid]) -> Result<Vec<Vec<Point>>, String> {
+/// The outlines of a label at each of its places in a copy of that number.
+fn letters(label: &Label, grid: Grid, copy: i64) -> Result<Vec<Vec<Point>>, String> {
     let mut lines = Vec::new();
-    let places = grids.iter().flat_map(|grid| label.at.iter().map(move |at| (grid, at)));
-    for (k, (grid, at)) in (0i64..).zip(places) {
+    let size = grid.length(label.height);
+    let before = copy * label.at.len() as i64;
+    for (at, k) in label.at.iter().zip(before..) {
         let text = numbered(&label.text, i64::from(label.start) + k * i64::from(label.step))?;
-        let size = grid.length(label.height);
-        let glyphs =
-            outlines(&text, label.align, label.turn, TOLERANCE / size).map_err(|letter| {
-                format!("`{letter}` is none of the letters that labels have: use those of ASCII")
-            })?;
+        let glyphs = outlines(&text, label.align, label.turn, TOLERANCE / size)
+            .map_err(|letter| format!("labels have no `{letter}`, only the letters of ASCII"))?;
         let [x, y] = grid.to_pixels(at.map(Length::mm));
-        let placed = |line: Vec<Point>| {
-            line.into_iter().map(|[right, up]| [x + size * right, y - size * up]).collect()
-        };
-        lines.extend(glyphs.into_iter().map(placed));
+        let placed = |[right, up]: Point| [x + size * right, y - size * up];
+        lines.extend(
+            glyphs.into_iter().map(|line| line.into_iter().map(placed).collect::<Vec<_>>()),
+        );
     }
     Ok(lines)
 }

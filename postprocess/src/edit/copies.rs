@@ -1,0 +1,268 @@
+//! The copies of parts that `tile` made, by what the first page says of them.
+
+use lamp_stack::{Frame, Mask, MaskBuilder, Op, PageInfo, StackInfo, Turn, place_row};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::error::EditError;
+use super::forms::Copies;
+use super::place::Place;
+
+/// Copies stand within so many pixels of an image's corner.
+const FARTHEST: i64 = 1 << 40;
+/// The images of all copies have at most so many rows together.
+const MOST_ROWS: u64 = 1 << 27;
+
+/// A part's image as it stands in a build, or the whole image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Copy {
+    /// Where the part's pixels lie in it, as it was before it was turned.
+    pub(super) part: Place,
+    pub(super) turn: Turn,
+    pub(super) left: i64,
+    pub(super) top: i64,
+}
+
+/// What the first page says of the copies of a part.
+#[derive(Deserialize)]
+struct Tiled {
+    part: Option<String>,
+    part_pixels: [u32; 2],
+    part_origin_mm: Option<[f64; 2]>,
+    copies: Vec<[i64; 2]>,
+    #[serde(default)]
+    turns: Vec<String>,
+}
+
+impl Copy {
+    /// The copies that an edit is for, in a stack whose first page is `info` and
+    /// whose pixels lie at `place`: the whole image, if it is for none.
+    ///
+    /// # Errors
+    /// What the first page lacks.
+    pub(super) fn all(
+        wanted: &Copies,
+        info: &PageInfo,
+        place: &Place,
+    ) -> Result<Vec<Self>, EditError> {
+        let whole = Self { part: *place, turn: Turn::default(), left: 0, top: 0 };
+        if wanted.is_none() {
+            return Ok(vec![whole]);
+        }
+        let wrong = |problem: String| EditError::layer(info, problem);
+        let tile = info.stack.as_ref().and_then(|stack| stack.other.get("tile"));
+        let tile = tile.ok_or_else(|| {
+            wrong(
+                "its page does not say where copies stand: copies are for builds that tile made"
+                    .to_owned(),
+            )
+        })?;
+        let parts = tile["parts"].as_array().map_or(std::slice::from_ref(tile), Vec::as_slice);
+        let read = |part: &Value| serde_json::from_value(part.clone());
+        let parts: Vec<Tiled> =
+            parts.iter().map(read).collect::<Result<_, _>>().map_err(|error| {
+                wrong(format!("its page does not say where copies stand as tile does ({error})"))
+            })?;
+        let part = chosen(parts, wanted, info).map_err(wrong)?;
+        let origin_mm = part
+            .part_origin_mm
+            .ok_or_else(|| wrong("its page does not say where the part lay".to_owned()))?;
+        let [width, height] = part.part_pixels;
+        let far = part.copies.iter().flatten().any(|place| place.abs() > FARTHEST);
+        if far || u64::from(height.max(width)) * part.copies.len() as u64 > MOST_ROWS {
+            return Err(wrong("its page says that copies stand where no image reaches".to_owned()));
+        }
+        let lain = Place { origin_mm, width, height, ..*place };
+        let turns = part
+            .turns
+            .iter()
+            .map(|turn| turn.parse())
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(wrong)?;
+        let turns = turns.into_iter().chain(std::iter::repeat(Turn::default()));
+        let copy = |([left, top], turn): ([i64; 2], Turn)| Self { part: lain, turn, left, top };
+        Ok(part.copies.into_iter().zip(turns).map(copy).collect())
+    }
+
+    /// Whether it is all of an image, as it is.
+    fn is_whole(&self, place: &Place) -> bool {
+        *self == Self { part: *place, turn: Turn::default(), left: 0, top: 0 }
+    }
+}
+
+/// The part whose copies are wanted.
+fn chosen(mut parts: Vec<Tiled>, wanted: &Copies, info: &PageInfo) -> Result<Tiled, String> {
+    let one = info.stack.as_ref().map(|stack| stack.part.clone());
+    let name = |part: &Tiled| part.part.clone().or_else(|| one.clone()).unwrap_or_default();
+    let names = || parts.iter().map(name).collect::<Vec<_>>().join(", ");
+    let index = match wanted {
+        Copies::Of(wanted) => parts.iter().position(|part| name(part) == *wanted),
+        Copies::Any(_) => (parts.len() == 1).then_some(0),
+    };
+    let index = index.ok_or_else(|| {
+        format!("name one of the build's parts, as copies = \"NAME\": {}", names())
+    })?;
+    Ok(parts.swap_remove(index))
+}
+
+/// An image at `place` that is white where a copy is, of which `mask` gives each
+/// one's image. `None` where that has more runs than any may have.
+pub(super) fn composed(
+    copies: &[Copy],
+    place: &Place,
+    mask: impl Fn(usize, &Place) -> Mask,
+) -> Option<Mask> {
+    if let [copy] = copies
+        && copy.is_whole(place)
+    {
+        return Some(mask(0, place));
+    }
+    let masks: Vec<Mask> = copies
+        .iter()
+        .enumerate()
+        .map(|(k, copy)| mask(k, &copy.part).turned(copy.turn))
+        .collect::<Option<_>>()?;
+    // Which rows of which copies have anything, by the build's rows.
+    let mut rows: Vec<(u32, u32, usize)> = Vec::new();
+    for (k, (copy, mask)) in copies.iter().zip(&masks).enumerate() {
+        let white = (0..mask.height()).filter(|&row| !mask.row(row).is_empty());
+        rows.extend(white.filter_map(|row| {
+            let on_build = u32::try_from(copy.top + i64::from(row)).ok()?;
+            (on_build < place.height).then_some((on_build, row, k))
+        }));
+    }
+    rows.sort_unstable();
+    let mut build = MaskBuilder::new(place.width);
+    let (mut done, mut union, mut next, mut placed) = (0, Vec::new(), Vec::new(), Vec::new());
+    for group in rows.chunk_by(|a, b| a.0 == b.0) {
+        union.clear();
+        for &(_, row, k) in group {
+            placed.clear();
+            place_row(
+                masks[k].row(row),
+                masks[k].width(),
+                copies[k].left,
+                place.width,
+                &mut placed,
+            );
+            Op::Union.rows(&union, &placed, &mut next);
+            std::mem::swap(&mut union, &mut next);
+        }
+        build.push_black(group[0].0 - done);
+        build.push_row(&union).ok()?;
+        done = group[0].0 + 1;
+    }
+    build.push_black(place.height - done);
+    Some(build.finish())
+}
+
+/// Makes a first page say where copies stand in what a frame shows.
+pub(super) fn move_copies(stack: &mut StackInfo, frame: Frame) {
+    let Some(tile) = stack.other.get_mut("tile") else { return };
+    each_part(tile, |part| {
+        let copies = part.get_mut("copies").and_then(Value::as_array_mut);
+        for copy in copies.into_iter().flatten() {
+            if let Ok([left, top]) = serde_json::from_value::<[i64; 2]>(copy.clone()) {
+                *copy = json!([left.saturating_sub(frame.left), top.saturating_sub(frame.top)]);
+            }
+        }
+    });
+}
+
+/// Does something to what is said of each part.
+fn each_part(tile: &mut Value, mut with: impl FnMut(&mut Value)) {
+    match tile.get_mut("parts").and_then(Value::as_array_mut) {
+        Some(parts) => parts.iter_mut().for_each(with),
+        None => with(tile),
+    }
+}
+
+/// Makes a first page say no more where copies stand.
+pub(super) fn forget_copies(stack: &mut StackInfo) {
+    stack.other.shift_remove("tile");
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const PLACE: Place = Place { origin_mm: [0.0, 9.0], dpi: None, width: 40, height: 30 };
+
+    fn info(tile: Value) -> PageInfo {
+        let mut stack = StackInfo { part: "blade".to_owned(), ..StackInfo::default() };
+        stack.other.insert("tile".to_owned(), tile);
+        PageInfo { stack: Some(stack), ..PageInfo::default() }
+    }
+
+    fn part(copies: &[[i64; 2]]) -> Value {
+        json!({ "part_pixels": [7, 5], "part_origin_mm": [1.0, 2.0], "copies": copies })
+    }
+
+    #[test]
+    fn copies_are_those_of_the_page() {
+        let mut page = info(part(&[[3, 4], [5, 6]]));
+        page.stack.as_mut().unwrap().other["tile"]["turns"] = json!(["0", "90m"]);
+        let all = Copy::all(&Copies::Any(true), &page, &PLACE).unwrap();
+        let lain = Place { origin_mm: [1.0, 2.0], width: 7, height: 5, ..PLACE };
+        assert_eq!(all[0], Copy { part: lain, turn: Turn::default(), left: 3, top: 4 });
+        assert_eq!(all[1], Copy { part: lain, turn: Turn::new(1, true), left: 5, top: 6 });
+        assert_eq!(Copy::all(&Copies::Of("blade".to_owned()), &page, &PLACE).unwrap(), all);
+        move_copies(page.stack.as_mut().unwrap(), Frame { left: 2, top: -3, width: 9, height: 9 });
+        let moved = Copy::all(&Copies::Any(true), &page, &PLACE).unwrap();
+        assert_eq!((moved[1].left, moved[1].top), (3, 9));
+    }
+
+    #[test]
+    fn one_of_several_parts_is_named() {
+        let parts = ["blade", "core"].map(|name| {
+            let mut part = part(&[[1, 1]]);
+            part["part"] = json!(name);
+            part
+        });
+        let page = info(json!({ "parts": parts }));
+        assert_eq!(Copy::all(&Copies::Of("core".to_owned()), &page, &PLACE).unwrap().len(), 1);
+        for wanted in [Copies::Any(true), Copies::Of("teapot".to_owned())] {
+            let error = Copy::all(&wanted, &page, &PLACE).unwrap_err().to_string();
+            assert!(error.contains("blade, core"), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_a_page_lacks_is_said() {
+        let error =
+            |page: &PageInfo| Copy::all(&Copies::Any(true), page, &PLACE).unwrap_err().to_string();
+        assert!(error(&PageInfo::default()).contains("builds that tile made"));
+        assert!(error(&info(json!({ "copies": 3 }))).contains("as tile does"));
+        let mut lost = part(&[[1, 1]]);
+        lost["part_origin_mm"] = Value::Null;
+        assert!(error(&info(lost)).contains("where the part lay"));
+    }
+
+    proptest! {
+        #[test]
+        fn an_image_is_white_where_a_copy_is(
+            places in prop::collection::vec((-9i64..45, -9i64..35, 0u32..4, any::<bool>()), 1..6),
+            rows in prop::collection::vec(prop::collection::btree_set(0u32..7, 0..5), 5),
+        ) {
+            let mut mask = MaskBuilder::new(7);
+            for row in &rows {
+                mask.push_row(&row.iter().copied().collect::<Vec<_>>()).unwrap();
+            }
+            let mask = mask.finish();
+            let lain = Place { width: 7, height: 5, ..PLACE };
+            let copies: Vec<Copy> = places.iter().map(|&(left, top, quarters, mirrored)| {
+                Copy { part: lain, turn: Turn::new(quarters, mirrored), left, top }
+            }).collect();
+            let made = composed(&copies, &PLACE, |_, _| mask.clone()).unwrap();
+            let mut expected = Mask::black(40, 30);
+            for copy in &copies {
+                let frame = Frame { left: -copy.left, top: -copy.top, width: 40, height: 30 };
+                let placed = mask.turned(copy.turn).unwrap().framed(frame);
+                expected = expected.combined(Op::Union, &placed).unwrap();
+            }
+            prop_assert_eq!(made, expected);
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! `lamp edit`: shapes, labels and other stacks, and what the pages say then.
+
+use lamp_fixtures::Part;
+use lamp_stack::{Image, Layer, Mask};
+use lamp_tests::{Scratch, mask, workspace_root, write_gray_ramp};
+
+/// The 20 mm cube about zero, with its hole of 10 mm, at 254 dpi: a pixel is
+/// 100 um.
+fn with_cube() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Part::Cube, 2000);
+    scratch.run("slice cube.stl --dpi 254 --thickness 500um -o cube.tif").succeeds_quietly();
+    scratch
+}
+
+/// Whether a layer is white at a place of the part, in millimetres.
+fn white_at(layer: &Layer, [x, y]: [f64; 2]) -> bool {
+    let [x0, y1] = layer.info.origin_mm.unwrap();
+    mask(layer).is_white(((x - x0) * 10.0) as u32, ((y1 - y) * 10.0) as u32)
+}
+
+fn bytes_of_pages(layers: &[Layer]) -> Vec<(&Image, u32)> {
+    layers.iter().map(|layer| (&layer.image, layer.info.index)).collect()
+}
+
+#[test]
+fn the_example_of_the_documentation_does_what_it_says() {
+    let docs = std::fs::read_to_string(workspace_root().join("docs/edit.md")).unwrap();
+    let (_, from) = docs.split_once("```toml\n").unwrap();
+    let (example, _) = from.split_once("```").unwrap();
+    let scratch = with_cube();
+    scratch.write("edits.toml", example.as_bytes());
+    scratch.run("lamp edit cube.tif edits.toml -o out.tif").succeeds_quietly();
+    let (before, after) = (scratch.layers("cube.tif"), scratch.layers("out.tif"));
+    assert_eq!(after.len(), before.len());
+    // Rotated by 90 degrees, what was at x, y is at -y, x.
+    let white = |index: usize, [x, y]: [f64; 2]| white_at(&after[index], [-y, x]);
+    for (index, place, is) in [
+        (0, [-7.5, 7.0], false), // in the pocket
+        (9, [-7.5, 7.0], false),
+        (10, [-7.5, 7.0], true), // above it
+        (28, [7.5, 2.0], false), // in the bore: z 14.0 to 14.5
+        (23, [7.5, 2.0], true),  // below it
+        (39, [0.0, 0.0], true),  // the pin
+        (39, [3.0, 3.0], false), // the hole, above the rib
+        (1, [3.0, 3.0], true),   // the rib
+        (1, [3.0, -3.0], false), // the hole
+    ] {
+        assert_eq!(white(index, place), is, "layer {index} at {place:?}");
+    }
+    // The numbers are in the lowest layer, and nowhere above.
+    let lost = |index: usize, y: [f64; 2]| {
+        let rows = (0..20).map(|k| y[0] + (y[1] - y[0]) * f64::from(k) / 20.0);
+        rows.flat_map(|y| (0..100).map(move |k| [f64::from(k) / 10.0 - 1.0, y]))
+            .filter(|place| !white(index, *place))
+            .count()
+    };
+    for y in [[-9.0, -6.6], [6.6, 8.9]] {
+        assert!(lost(0, y) > 200, "{}", lost(0, y));
+        assert_eq!(lost(1, y), 0);
+    }
+    let stack = after[0].info.stack.as_ref().unwrap();
+    assert!(stack.commands[1].starts_with(r#"edit [{"box":{"x":["-9mm","-6mm"]"#), "{stack:?}");
+    assert_eq!(stack.digest, before[0].info.stack.as_ref().unwrap().digest);
+    let (was, is) = (mask(&before[0]), mask(&after[0]));
+    assert_eq!((is.width(), is.height()), (was.height() + 20, was.width() + 20));
+}
+
+#[test]
+fn layers_that_no_edit_is_for_pass_byte_for_byte() {
+    let scratch = with_cube();
+    scratch.write("one.toml", b"[[edit]]\nz = [\"5mm\", \"5.5mm\"]\nbox = { x = [\"-1mm\", \"1mm\"], y = [\"-1mm\", \"1mm\"] }\n");
+    scratch.run("lamp edit cube.tif one.toml -o files/").succeeds_quietly();
+    scratch.run("lamp convert cube.tif -o same/").succeeds_quietly();
+    let names: Vec<_> =
+        std::fs::read_dir(scratch.path("files")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(names.len(), 40);
+    let differ = names.iter().filter(|name| {
+        let [a, b] = ["files", "same"]
+            .map(|folder| scratch.bytes(&format!("{folder}/{}", name.to_str().unwrap())));
+        a != b
+    });
+    let mut differ: Vec<_> = differ.collect();
+    differ.sort();
+    // The first says what was done; the eleventh is edited.
+    let (before, after) = (scratch.layers("cube.tif"), scratch.layers("files/"));
+    assert_eq!(differ.len(), 2, "{differ:?}");
+    assert_eq!(bytes_of_pages(&before)[..10], bytes_of_pages(&after)[..10]);
+    assert_eq!(mask(&after[10]).white_pixels(), mask(&before[10]).white_pixels() + 400);
+}
+
+#[test]
+fn two_stacks_are_combined() {
+    let scratch = with_cube();
+    let square = "[[edit]]\nop = \"intersect\"\nz = [\"0mm\", \"10mm\"]\nbox = { x = [\"-20mm\", \"0mm\"], y = [\"-20mm\", \"20mm\"] }\n";
+    scratch.write("left.toml", square.as_bytes());
+    scratch.run("lamp edit cube.tif left.toml -o left.tif").succeeds_quietly();
+    scratch.run("lamp edit cube.tif --difference left.tif -o right.tif").succeeds_quietly();
+    scratch.run("lamp edit left.tif --union right.tif -o whole.tif").succeeds_quietly();
+    scratch.run("lamp edit left.tif --intersect right.tif -o none.tif").succeeds_quietly();
+    scratch.run("lamp edit cube.tif --xor cube.tif -o nothing.tif").succeeds_quietly();
+    let white =
+        |name: &str| scratch.layers(name).iter().map(|l| mask(l).white_pixels()).sum::<u64>();
+    assert_eq!(
+        bytes_of_pages(&scratch.layers("whole.tif")),
+        bytes_of_pages(&scratch.layers("cube.tif"))
+    );
+    assert_eq!((white("none.tif"), white("nothing.tif")), (0, 0));
+    // Below 10 mm the right half is left, above nothing.
+    assert_eq!(white("right.tif") * 4, white("cube.tif"));
+    let page = &scratch.layers("whole.tif")[0].info;
+    let commands = &page.stack.as_ref().unwrap().commands;
+    let other = &commands.last().unwrap()[..];
+    assert!(
+        other.contains(r#""op":"union""#) && other.contains("edit [") && other.contains("blake3:"),
+        "{other}"
+    );
+    assert!(!other.contains("right.tif"), "{other}");
+}
+
+#[test]
+fn every_copy_of_a_build_has_its_number_as_if_it_was_edited_before() {
+    let scratch = with_cube();
+    let label = |start: u32, copies: &str| {
+        format!(
+            "[[edit]]\nop = \"subtract\"\nz = [\"0mm\", \"1mm\"]\n{copies}\
+             label = {{ text = \"{{n:03}}\", start = {start}, at = [[\"-9mm\", \"-9mm\"]], height = \"3mm\" }}\n"
+        )
+    };
+    scratch.write("all.toml", label(8, "copies = true\n").as_bytes());
+    let line = "tile cube.tif --area 70x50mm --copies 6 | lamp edit - all.toml > build.tif";
+    scratch.run(line).succeeds_quietly();
+    let build = scratch.layers("build.tif");
+    let tile = &build[0].info.stack.as_ref().unwrap().other["tile"];
+    for k in 0..6 {
+        scratch.write("one.toml", label(8 + k, "").as_bytes());
+        scratch.run("lamp edit cube.tif one.toml -o one.tif").succeeds_quietly();
+        let part = scratch.layers("one.tif");
+        let place = &tile["copies"][k as usize];
+        let frame = lamp_stack::Frame {
+            left: place[0].as_i64().unwrap(),
+            top: place[1].as_i64().unwrap(),
+            width: part[0].image.width(),
+            height: part[0].image.height(),
+        };
+        let cut: Vec<Mask> = build.iter().map(|layer| mask(layer).framed(frame)).collect();
+        assert!(cut.iter().eq(part.iter().map(mask)), "copy {k}");
+    }
+}
+
+#[test]
+fn stray_rows_move_with_the_image_or_stop_it() {
+    let scratch = Scratch::new();
+    scratch.run("lamp sample cube --facets 2000 --defect drop --seed 3 -o cube.stl").succeeds();
+    scratch.run("slice cube.stl --dpi 254 --thickness 500um -o cube.tif").succeeds();
+    let before = scratch.layers("cube.tif");
+    let stray = before.iter().position(|layer| !layer.info.stray_rows.is_empty()).unwrap();
+    scratch.write("pad.toml", b"[[edit]]\npad = { top = \"1mm\" }\n[[edit]]\nmirror = \"y\"\n");
+    scratch.run("lamp edit cube.tif pad.toml -o out.tif").succeeds_quietly();
+    let after = scratch.layers("out.tif");
+    let height = before[0].image.height();
+    let moved: Vec<u32> =
+        before[stray].info.stray_rows.iter().rev().map(|row| height - 1 - row).collect();
+    assert_eq!(after[stray].info.stray_rows, moved);
+    for row in moved {
+        assert_eq!(mask(&after[stray]).row(row), mask(&before[stray]).row(height - 1 - row));
+    }
+    scratch.write("turn.toml", b"[[edit]]\nrotate = 270\n");
+    scratch
+        .run("lamp edit cube.tif turn.toml -o out.tif")
+        .is_refused_with(&["layer", "fix the stack first"]);
+    scratch.run("fix cube.tif --max-width 1000 --min-confidence 0 -o fixed.tif").succeeds();
+    scratch.run("lamp edit fixed.tif turn.toml -o out.tif").succeeds_quietly();
+}
+
+#[test]
+fn gray_pages_are_edited_and_foreign_ones_have_their_corner_at_zero() {
+    let scratch = Scratch::new();
+    write_gray_ramp(&scratch.path("ramp.tif"), 256, 100);
+    scratch.write("box.toml", b"[[edit]]\nop = \"subtract\"\nlayers = [0, 1]\nbox = { x = [\"0in\", \"1in\"], y = [\"0in\", \"0.5in\"] }\n");
+    scratch.run("lamp edit ramp.tif box.toml -o out.tif").succeeds_quietly();
+    let (before, after) = (&scratch.layers("ramp.tif")[0], &scratch.layers("out.tif")[0]);
+    let (Image::Gray(before), Image::Gray(after)) = (&before.image, &after.image) else {
+        panic!("gray")
+    };
+    assert_eq!(after.row(49), before.row(49));
+    assert_eq!((after.row(50)[0].column, after.row(50)[0].level), (100, 100));
+    scratch.write("gone.toml", b"[[edit]]\nz = [\"0mm\", \"1mm\"]\nbox = { x = [\"0in\", \"1in\"], y = [\"0in\", \"1in\"] }\n");
+    scratch
+        .run("lamp edit ramp.tif gone.toml -o out.tif")
+        .is_refused_with(&["ramp.tif", "layers ="]);
+}
+
+#[test]
+fn what_is_wrong_is_said_with_the_edit_and_the_key() {
+    let scratch = with_cube();
+    let before = ["bad.toml", "cube.stl", "cube.tif"];
+    for (list, words) in [
+        (
+            "[[edit]]\nrotate = 90\n[[edit]]\nrotat = 90\n",
+            &["bad.toml", "line 4", "edit 2", "`rotat`"][..],
+        ),
+        (
+            "[[edit]]\nbox = { x = [\"1\", \"2mm\"], y = [\"1mm\", \"2mm\"] }\n",
+            &["edit 1, box.x", "unit"],
+        ),
+        ("rotate = 90\n", &["bad.toml", "`rotate`"]),
+        ("", &["bad.toml", "[[edit]]"]),
+        ("[[edit]", &["bad.toml", "line 1", "TOML"]),
+        ("[[edit]]\nbox = { x = [\"1m\", \"2m\"], y = [\"1mm\", \"2mm\"] }\n", &["edit 1, box.x"]),
+        (
+            "[[edit]]\nbox = { x = [\"30mm\", \"40mm\"], y = [\"1mm\", \"2mm\"] }\n",
+            &["cube.tif", "edit 1", "no pixel"],
+        ),
+        (
+            "[[edit]]\nlabel = { text = \"\u{3a9}\", at = [[\"0mm\", \"0mm\"]], height = \"1mm\" }\n",
+            &["edit 1", "\u{3a9}", "ASCII"],
+        ),
+        (
+            "[[edit]]\nlabel = { text = \"{m}\", at = [[\"0mm\", \"0mm\"]], height = \"1mm\" }\n",
+            &["edit 1", "`{m}`", "{n:04}"],
+        ),
+        (
+            "[[edit]]\ncopies = true\nbox = { x = [\"1mm\", \"2mm\"], y = [\"1mm\", \"2mm\"] }\n",
+            &["cube.tif", "tile"],
+        ),
+        ("[[edit]]\nstack = { file = \"none.tif\" }\n", &["none.tif"]),
+    ] {
+        scratch.write("bad.toml", list.as_bytes());
+        scratch.run("lamp edit cube.tif bad.toml -o out.tif").is_refused_with(words);
+        assert_eq!(scratch.names(), before);
+    }
+    scratch.write("high.toml", b"[[edit]]\nz = [\"1in\", \"2in\"]\nbox = { x = [\"1mm\", \"2mm\"], y = [\"1mm\", \"2mm\"] }\n");
+    let said = scratch.run("lamp edit cube.tif high.toml -o out.tif").succeeds().stderr;
+    assert!(said.contains("edit 1 was for no layer"), "{said}");
+}
+
+#[test]
+fn wrong_usage_is_status_2() {
+    let scratch = with_cube();
+    for line in [
+        "lamp edit cube.tif",
+        "lamp edit cube.tif --union cube.tif --xor cube.tif",
+        "lamp edit cube.tif edits.toml --xor cube.tif",
+        "lamp edit - --xor -",
+        "lamp edit cube.tif --xor cube.tif -o ./cube.tif",
+    ] {
+        let ran = scratch.run(line);
+        assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+    }
+}
