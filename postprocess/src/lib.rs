@@ -2,7 +2,8 @@
 //! machine. Everything works on runs.
 //!
 //! [`fix`] corrects stray rows, [`edit`] changes a design, [`tile`] lays copies of a
-//! part out on a build area. All are adaptors from layers to layers.
+//! part out on a build area. All are adaptors from layers to layers. [`Swaths`] cuts
+//! build layers for a projector that scans.
 //!
 //! ```
 //! use lamp_postprocess::{FixOptions, TileError, TileOptions, fix, tile};
@@ -29,6 +30,7 @@ mod edit;
 mod fix;
 pub mod machine;
 mod offset;
+mod strips;
 mod tile;
 
 pub use edit::{EditError, Edits, OtherLayers, edit};
@@ -37,6 +39,7 @@ pub use offset::{
     CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,
     offset, offset_one_bit, shrink,
 };
+pub use strips::{JoinSwathsError, Swaths, SwathsError};
 pub use tile::{
     CellShape, CopyName, Heights, Layout, LayoutError, LayoutFile, MeshOptions, Pack, PackBy, Part,
     Pattern, Pixels, Placement, StrayRows, TileError, TileOptions, Turns, tile,

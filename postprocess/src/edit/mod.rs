@@ -26,6 +26,8 @@ use lamp_stack::{Held, Layer, PageInfo, map_in_order};
 pub use error::EditError;
 pub use list::Edits;
 pub use others::OtherLayers;
+pub(crate) use page::frame_page;
+pub(crate) use place::Place;
 
 use others::Other;
 use plan::Plan;

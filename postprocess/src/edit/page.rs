@@ -7,7 +7,7 @@ use lamp_stack::{Frame, PageInfo, Turn};
 
 /// Makes a page say what holds for the rows that a frame shows, which lie at
 /// `place`.
-pub(super) fn frame_page(info: &mut PageInfo, frame: Frame, place: &Place) {
+pub(crate) fn frame_page(info: &mut PageInfo, frame: Frame, place: &Place) {
     move_to(info, place);
     let moved = |row: u32, end: i64| {
         let row = i64::from(row).saturating_sub(frame.top);

@@ -6,7 +6,7 @@ use super::error::EditError;
 
 /// The pixels of every layer in part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Place {
+pub(crate) struct Place {
     /// The top left corner, in millimetres.
     pub(super) origin_mm: [f64; 2],
     /// The resolution, where it is known.
@@ -18,7 +18,7 @@ pub(super) struct Place {
 impl Place {
     /// Where a layer's pixels lie. Where its page does not say, its lower left
     /// corner is 0, 0.
-    pub(super) fn of(layer: &Layer) -> Self {
+    pub(crate) fn of(layer: &Layer) -> Self {
         let (width, height) = (layer.image.width(), layer.image.height());
         let height_mm = layer.dpi.map_or(0.0, |dpi| f64::from(height) * dpi.pitch().mm());
         let origin_mm = layer.info.origin_mm.unwrap_or([0.0, height_mm]);
@@ -32,7 +32,7 @@ impl Place {
     }
 
     /// Where the pixels lie that a frame shows.
-    pub(super) fn framed(&self, frame: Frame) -> Self {
+    pub(crate) fn framed(&self, frame: Frame) -> Self {
         let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
         let [x0, y1] = self.origin_mm;
         Self {
