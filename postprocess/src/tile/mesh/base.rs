@@ -6,8 +6,10 @@ use lamp_stack::{Image, Layer, PageInfo, StackInfo};
 
 use super::Mesh;
 
-/// Layers that stand on mesh alone. The base's layers are as thick, and exposed as
-/// long, as the first layer; the others go up.
+/// Layers that stand on mesh alone, which lies below them: heights are still the
+/// parts'. The base's layers are as thick, and exposed as long, as the first layer.
+/// A range of layers that does not begin at the part's first has no base of its
+/// own, but counts with it.
 pub(in crate::tile) fn on_base<I, E>(
     layers: I,
     mesh: Option<Mesh>,
@@ -16,7 +18,7 @@ where
     I: Iterator<Item = Result<Layer, E>>,
 {
     let count = mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
-    OnBase { layers: layers.peekable(), mesh, count, made: 0, up_um: 0.0 }
+    OnBase { layers: layers.peekable(), mesh, count, made: 0 }
 }
 
 struct OnBase<I: Iterator> {
@@ -24,8 +26,6 @@ struct OnBase<I: Iterator> {
     mesh: Option<Mesh>,
     count: u32,
     made: u32,
-    /// How high the base is.
-    up_um: f64,
 }
 
 impl<I, E> Iterator for OnBase<I>
@@ -36,46 +36,35 @@ where
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.made < self.count
-            && let Ok(first) = self.layers.peek()?
+            && let Ok(first) = self.layers.peek_mut()?
             && let Some(mesh) = &self.mesh
+            && first.info.index == 0
         {
-            let mut layer = Layer {
-                info: below(&first.info, self.made),
-                dpi: first.dpi,
-                image: Image::Mask(mesh.whole()),
-            };
-            if self.made == 0 {
-                self.up_um = f64::from(self.count) * first.info.thickness_um.unwrap_or(0.0);
-                layer.info.stack = first.info.stack.clone().map(|stack| self.counted(stack));
+            let mut info = page(&first.info, self.made, self.count - self.made);
+            if let Some(stack) = first.info.stack.take() {
+                let layers = stack.layers.map(|layers| layers + self.count);
+                info.stack = Some(StackInfo { layers, ..stack });
             }
+            let layer = Layer { info, dpi: first.dpi, image: Image::Mask(mesh.whole()) };
             self.made += 1;
             return Some(Ok(layer));
         }
-        self.layers.next().map(|layer| layer.map(|layer| self.raised(layer)))
-    }
-}
-
-impl<I: Iterator> OnBase<I> {
-    fn counted(&self, stack: StackInfo) -> StackInfo {
-        StackInfo { layers: stack.layers.map(|layers| layers + self.count), ..stack }
-    }
-
-    fn raised(&self, mut layer: Layer) -> Layer {
-        if self.count > 0 {
+        let mut layer = self.layers.next()?;
+        if let Ok(layer) = &mut layer {
             layer.info.index += self.count;
-            layer.info.z_um = layer.info.z_um.map(|z| z + self.up_um);
-            layer.info.stack = None;
         }
-        layer
+        // What comes now is no first layer.
+        self.made = self.count;
+        Some(layer)
     }
 }
 
-/// The page of a base's layer, below a build whose first page is given.
-fn below(first: &PageInfo, layer: u32) -> PageInfo {
-    let z_um = first.z_um.zip(first.thickness_um);
+/// The page of a base's layer, so many layers below the first of the parts.
+fn page(first: &PageInfo, index: u32, below: u32) -> PageInfo {
+    let z_um = first.z_um.zip(first.thickness_um).map(|(z, t)| z - f64::from(below) * t);
     PageInfo {
-        index: first.index + layer,
-        z_um: z_um.map(|(z, thickness)| z + f64::from(layer) * thickness),
+        index,
+        z_um: z_um.map(|um| (um * 1000.0).round() / 1000.0),
         thickness_um: first.thickness_um,
         origin_mm: first.origin_mm,
         exposure_ms: first.exposure_ms,

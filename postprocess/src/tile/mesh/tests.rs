@@ -170,7 +170,7 @@ fn parts_stand_on_layers_of_mesh() {
     layers[0].info.exposure_ms = Some(70.0);
     let build = built(&layout, vec![layers]);
     let heights = |layer: &Layer| (layer.info.index, layer.info.z_um, layer.info.thickness_um);
-    let expected = (0..5).map(|k| (k, Some(f64::from(k) * 100.0), Some(100.0)));
+    let expected = (0..5).map(|k| (k, Some(f64::from(k) * 100.0 - 300.0), Some(100.0)));
     assert!(build.iter().map(heights).eq(expected));
     let walls = layout.mesh.as_ref().unwrap().whole();
     assert!(build[..3].iter().all(|layer| *mask(layer) == walls));
@@ -182,6 +182,12 @@ fn parts_stand_on_layers_of_mesh() {
         "--mesh square --cell 8mm --wall 2mm --clearance 1mm --break-width 0um --break-pitch 7mm --base-layers 3"
     ), "{:?}", stack.commands);
     assert!(build[1..].iter().all(|layer| layer.info.stack.is_none()));
+    // A range that begins higher up is what it is in the whole.
+    let upper = built(&layout, vec![vec![layer(1, Image::Mask(disc()))]]);
+    assert_eq!(
+        (upper.len(), &upper[0].info, mask(&upper[0])),
+        (1, &build[4].info, mask(&build[4]))
+    );
 }
 
 #[test]
