@@ -1,38 +1,46 @@
 //! The most accurate layers that a budget allows.
 
 use crate::error::HeightsError;
-use crate::heights::{Heights, Search};
+use crate::heights::{Budget, Heights, Search};
 
 /// Bounds are found to one part in so many.
 const PRECISION: f64 = 100.0;
 
 impl Search<'_> {
     /// Finds the smallest bound, to one percent, whose layers cost at most `most`
-    /// together, and these layers. `cost` says what a layer of so many micrometres
-    /// costs: one for each where layers are counted.
+    /// together, and these layers: each costs least for its thickness among those
+    /// within the bound. `cost` says what a layer of so many micrometres costs: one
+    /// for each where layers are counted.
+    ///
+    /// The bound is infinite where layers keep the budget only if some may be as far
+    /// off as they like.
     ///
     /// # Errors
-    /// Where even the thickest layers cost more, or the layers would be too many.
+    /// Where layers without any bound cost more, or would be too many.
     pub fn within_budget(
         &self,
         cost: impl Fn(f64) -> f64,
         most: f64,
     ) -> Result<(f64, Heights), HeightsError> {
-        let thickest = self.heights(f64::INFINITY)?;
-        let least = thickest.slabs.iter().map(|slab| cost(slab.thickness_um)).sum();
+        let budget = Budget { cost: &cost, most };
+        let within = |bound| self.heights_within(bound, Some(budget));
+        let free = Budget { most: f64::INFINITY, ..budget };
+        let cheapest = self.heights_within(f64::INFINITY, Some(free))?.expect("it may cost all");
+        let least = free.of_all(&cheapest.slabs);
         if least > most {
             return Err(HeightsError::Budget { least, budget: most });
         }
-        if let Some(heights) = self.heights_within(0.0, &cost, most)? {
+        if let Some(heights) = within(0.0)? {
             return Ok((0.0, heights));
         }
-        let measures = thickest.slabs.iter().map(|slab| self.criterion.measure(slab));
+        let measures = cheapest.slabs.iter().map(|slab| self.criterion.measure(slab));
         let mut high = measures.filter(|measure| measure.is_finite()).fold(0.0, f64::max);
-        let (mut low, mut best) = (0.0, thickest);
+        let Some(mut best) = within(high)? else { return Ok((f64::INFINITY, cheapest)) };
+        let mut low = 0.0;
         // By ratios, once the bound is known from below.
         while high > low * (1.0 + 1.0 / PRECISION) && high > f64::MIN_POSITIVE {
-            let middle = if low > 0.0 { (low * high).sqrt() } else { high / 8.0 };
-            match self.heights_within(middle, &cost, most)? {
+            let middle = if low > 0.0 { f64::sqrt(low * high) } else { high / 8.0 };
+            match within(middle)? {
                 Some(heights) => (high, best) = (middle, heights),
                 None => low = middle,
             }

@@ -37,8 +37,14 @@ pub enum HeightsError {
         /// The part's height in millimetres.
         height_mm: f64,
     },
-    /// A budget below what the thickest layers take.
-    #[error("layers as thick as the machine allows take {least}, more than the budget of {budget}")]
+    /// Rows so near to each other that no image has as many.
+    #[error("rows {pitch_um} um apart are more than 2^24: give a wider --row-pitch")]
+    TooManyRows {
+        /// How far apart they would be, in micrometres.
+        pitch_um: f64,
+    },
+    /// A budget below what any layers take.
+    #[error("the layers that take least take {least}, more than the budget of {budget}")]
     Budget {
         /// What they take at least.
         least: f64,

@@ -15,7 +15,7 @@
 //! let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
 //! let model = Model::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
 //! let body = Body::new(model, &Placement::default(), Units::Millimetres)?;
-//! let part = Part::new(body, Length::from_um(10.0), Fill::EvenOdd);
+//! let part = Part::new(body, Length::from_um(10.0), Fill::EvenOdd)?;
 //! let [min, max, step] = [10.0, 100.0, 1.0].map(Length::from_um);
 //! let machine = Machine::new(min, max, step)?;
 //! let search = Search { part: &part, machine: &machine, criterion: &VolumeDeviation, snap: false };
@@ -43,4 +43,4 @@ pub use error::HeightsError;
 pub use heights::{Heights, Search, uniform_heights};
 pub use machine::Machine;
 pub use part::Part;
-pub use slab::Slab;
+pub use slab::{Slab, Slabs, share};

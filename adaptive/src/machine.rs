@@ -54,16 +54,24 @@ impl Machine {
 
     /// The thicknesses that a layer may have below the next of several heights where
     /// one is to end: those after which layers can fill the rest. Heights that
-    /// cannot be reached are passed over, and the thinnest layer reaches past the
-    /// last, where the part ends; all are in steps.
+    /// cannot be reached are passed over; the last, where the part ends, is then
+    /// passed by as little as can be. All are in steps.
     pub(crate) fn choices(&self, bottom: usize, ends: &[usize]) -> Vec<usize> {
         let ahead = &ends[ends.partition_point(|&end| end <= bottom)..];
-        let Some(end) = ahead.iter().find(|&&end| self.can_fill(end - bottom)) else {
-            let is_last = ahead.last().is_some_and(|end| end - bottom < *self.steps.start());
-            return self.steps().take(if is_last { 1 } else { usize::MAX }).collect();
-        };
+        let reached = ahead.iter().find(|&&end| self.can_fill(end - bottom));
+        let Some(end) = reached.or(ahead.last()) else { return self.steps().collect() };
         let room = end - bottom;
-        self.steps().filter(|&step| step <= room && self.can_fill(room - step)).collect()
+        let beyond = self.least_beyond(room);
+        let leads_on = |step: &usize| match room.checked_sub(*step) {
+            Some(rest) => self.least_beyond(rest) == beyond,
+            None => step - room == beyond,
+        };
+        self.steps().filter(leads_on).collect()
+    }
+
+    /// How far layers must reach beyond so many steps, at least.
+    fn least_beyond(&self, steps: usize) -> usize {
+        (steps.div_ceil(*self.steps.end()) * self.steps.start()).saturating_sub(steps)
     }
 }
 
@@ -101,6 +109,17 @@ mod tests {
         assert_eq!(machine.choices(10, &[5, 10, 12, 15]), [5]);
         assert_eq!(machine.choices(10, &[12, 100]), (3..=10).collect::<Vec<_>>());
         assert_eq!(machine.choices(10, &[12]), [3]);
+        assert_eq!(machine.choices(10, &[]), (3..=10).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn layers_pass_the_last_end_by_as_little_as_can_be() {
+        let machine = machine(60.0, 100.0, 1.0).unwrap();
+        // Two of 60 are nearer to 110 than one of 100 and one of 60.
+        assert_eq!(machine.choices(0, &[110]), [60]);
+        assert_eq!(machine.choices(60, &[110]), [60]);
+        assert_eq!(machine.choices(0, &[119]), [60]);
+        assert_eq!(machine.choices(0, &[50, 110]), [60]);
     }
 
     #[test]

@@ -5,13 +5,17 @@ use lamp_stack::Length;
 use rayon::prelude::*;
 
 use crate::cut::{Cuts, RowFacet, Rows};
+use crate::error::HeightsError;
 use crate::profile::{Change, Profile};
 use crate::row::Sweep;
-use crate::slab::Slab;
+use crate::slab::{Slab, Slabs};
 
 /// Rows are worked on in so many stripes, whatever the threads, so that sums do
 /// not depend on them.
 const STRIPES: u32 = 16;
+
+/// Facets of less height are level: far more than rounding, far less than a step.
+const LEVEL_UM: f64 = 0.05;
 
 /// More rows than any image has.
 const MOST_ROWS: f64 = 16_777_216.0;
@@ -29,12 +33,19 @@ pub struct Part {
 
 impl Part {
     /// A part seen along rows that are `pitch` apart, the first of which is half a
-    /// pitch below the part's greatest y.
-    pub fn new(body: Body, pitch: Length, fill: Fill) -> Self {
+    /// pitch below the part's greatest y. What lies between two rows is not seen.
+    ///
+    /// # Errors
+    /// Where there would be more rows than any image has.
+    pub fn new(body: Body, pitch: Length, fill: Fill) -> Result<Self, HeightsError> {
         let height_mm = body.max()[1] - body.min()[1];
-        let count = (height_mm / pitch.mm()).ceil().clamp(1.0, MOST_ROWS);
+        let count = (height_mm / pitch.mm()).ceil().max(1.0);
+        // Written so that a pitch of NaN or zero fails, too.
+        if !(pitch.um() > 0.0 && count <= MOST_ROWS) {
+            return Err(HeightsError::TooManyRows { pitch_um: pitch.um() });
+        }
         let rows = Rows { top_mm: body.max()[1], pitch_mm: pitch.mm(), count: count as u32 };
-        Self { body, rows, fill }
+        Ok(Self { body, rows, fill })
     }
 
     /// The height of its lowest and its highest point, in micrometres.
@@ -43,18 +54,19 @@ impl Part {
     }
 
     /// The heights of its flat faces, in micrometres, rising: those of level facets
-    /// of together at least a row's pitch squared.
+    /// of together at least a row's pitch squared. Faces that were turned into their
+    /// place are level but for rounding; the lowest corner counts.
     pub fn flat_faces_um(&self) -> Vec<f64> {
         let mut faces = Vec::new();
         self.body.for_each(|facet| {
-            let [a, b, c] = facet.map(|corner| corner[2]);
-            if a == b && b == c {
-                faces.push((a, normal(facet)[2].abs() / 2.0));
+            let [low, high] = height_of(facet);
+            if high - low <= LEVEL_UM {
+                faces.push((low, normal(facet)[2].abs() / 2.0));
             }
         });
         faces.sort_by(|a, b| a.0.total_cmp(&b.0));
         let least_mm2 = self.rows.pitch_mm * self.rows.pitch_mm;
-        let at_one_height = faces.chunk_by(|a, b| a.0 == b.0);
+        let at_one_height = faces.chunk_by(|a, b| b.0 - a.0 <= LEVEL_UM);
         let large =
             at_one_height.filter(|faces| faces.iter().map(|f| f.1).sum::<f64>() >= least_mm2);
         large.map(|faces| faces[0].0).collect()
@@ -66,14 +78,15 @@ impl Part {
     ///
     /// # Panics
     /// Where there is no top, or one is not above the bottom.
-    pub fn slabs(&self, bottom_um: f64, tops_um: &[f64]) -> Vec<Slab> {
+    pub fn slabs(&self, bottom_um: f64, tops_um: &[f64]) -> Slabs {
         assert!(tops_um.first().is_some_and(|&top| top > bottom_um), "a layer has some thickness");
         let part_top_um = self.body.max()[2];
         let plane = |top: f64| if bottom_um <= part_top_um { top.min(part_top_um) } else { top };
         let planes: Vec<f64> = tops_um.iter().map(|&top| plane(top) - bottom_um).collect();
         let last_um = plane(tops_um[tops_um.len() - 1]);
         let facets = self.body.between(bottom_um, last_um);
-        let (changes, bottom_width) = self.changes(&facets, [bottom_um, last_um], &planes);
+        let Rise { changes, bottom_width, unavoidable, rows_left_out } =
+            self.rise(&facets, [bottom_um, last_um], &planes);
         let steepest = steepest(&facets, bottom_um, tops_um);
         let pitch_mm = self.rows.pitch_mm;
         let slab = |k: usize| {
@@ -92,19 +105,17 @@ impl Part {
                 bottom_area_mm2: bottom_width * pitch_mm,
                 top_area_mm2: top_width * pitch_mm,
                 steepest: steepest[k],
+                rows_left_out,
             }
         };
-        (0..tops_um.len()).map(slab).collect()
+        Slabs {
+            each: (0..tops_um.len()).map(slab).collect(),
+            unavoidable_mm3: unavoidable * pitch_mm / 1000.0,
+        }
     }
 
-    /// What changes from the bottom to each plane above it, and the section's width
-    /// at the bottom, over all rows.
-    fn changes(
-        &self,
-        facets: &[PlacedFacet],
-        z_um: [f64; 2],
-        planes: &[f64],
-    ) -> (Vec<Change>, f64) {
+    /// What changes from the bottom to each plane above it, over all rows.
+    fn rise(&self, facets: &[PlacedFacet], z_um: [f64; 2], planes: &[f64]) -> Rise {
         let stripe_rows = self.rows.count.div_ceil(STRIPES);
         let mut stripes: Vec<Vec<RowFacet>> = (0..STRIPES).map(|_| Vec::new()).collect();
         for facet in facets.iter().filter_map(|facet| RowFacet::new(facet, &self.rows)) {
@@ -121,29 +132,47 @@ impl Part {
             }
             self.sweep(&cuts, first, stripe_rows, planes)
         };
-        let stripes: Vec<_> = stripes.into_par_iter().enumerate().map(of_stripe).collect();
-        let mut sums = vec![Change::default(); planes.len()];
-        let mut bottom_width = 0.0;
-        for (changes, width) in stripes {
-            bottom_width += width;
-            sums.iter_mut().zip(changes).for_each(|(sum, change)| sum.add(change));
+        let stripes: Vec<Rise> = stripes.into_par_iter().enumerate().map(of_stripe).collect();
+        let mut sum = Rise { changes: vec![Change::default(); planes.len()], ..Rise::default() };
+        for stripe in stripes {
+            sum.bottom_width += stripe.bottom_width;
+            sum.unavoidable += stripe.unavoidable;
+            sum.rows_left_out += stripe.rows_left_out;
+            sum.changes.iter_mut().zip(stripe.changes).for_each(|(sum, change)| sum.add(change));
         }
-        (sums, bottom_width)
+        sum
     }
 
-    fn sweep(&self, cuts: &Cuts, first: u32, rows: u32, planes: &[f64]) -> (Vec<Change>, f64) {
+    fn sweep(&self, cuts: &Cuts, first: u32, rows: u32, planes: &[f64]) -> Rise {
         let mut profile = Profile::new(planes);
         let mut sweep = Sweep::new(self.fill);
         let mut toggles = ByRow::new(&cuts.toggles, first, rows, |toggle| toggle.row);
         let mut slopes = ByRow::new(&cuts.slopes, first, rows, |slope| slope.row);
+        let mut rows_left_out = 0;
         for row in 0..rows as usize {
             let (toggles, slopes) = (toggles.row(row), slopes.row(row));
             toggles.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
             slopes.sort_unstable_by(|a, b| a.x[0].total_cmp(&b.x[0]));
-            sweep.add(toggles, slopes, &mut profile);
+            rows_left_out += u32::from(!sweep.add(toggles, slopes, &mut profile));
         }
-        (profile.changes(), profile.bottom_width)
+        Rise {
+            changes: profile.changes(),
+            bottom_width: profile.bottom_width,
+            unavoidable: profile.unavoidable,
+            rows_left_out,
+        }
     }
+}
+
+/// What rows see of a part from a bottom up, in millimetres and micrometres along
+/// them.
+#[derive(Default)]
+struct Rise {
+    /// For each plane.
+    changes: Vec<Change>,
+    bottom_width: f64,
+    unavoidable: f64,
+    rows_left_out: u32,
 }
 
 /// Things sorted by row (a counting sort).
@@ -183,14 +212,17 @@ fn normal(facet: &PlacedFacet) -> [f64; 3] {
     [cross(1, 2), cross(2, 0), cross(0, 1)]
 }
 
+/// The heights of a facet's lowest and highest corner.
+fn height_of(facet: &PlacedFacet) -> [f64; 2] {
+    let [a, b, c] = facet.map(|corner| corner[2]);
+    [a.min(b).min(c), a.max(b).max(c)]
+}
+
 /// The greatest |N_z| of the facets above a bottom and below each of several tops.
 fn steepest(facets: &[PlacedFacet], bottom_um: f64, tops_um: &[f64]) -> Vec<f64> {
     let mut steepest = vec![0.0; tops_um.len()];
     for facet in facets {
-        let [low, high] = [f64::min, f64::max].map(|least| {
-            let [a, b, c] = facet.map(|corner| corner[2]);
-            least(least(a, b), c)
-        });
+        let [low, high] = height_of(facet);
         let normal = normal(facet);
         let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
         let first = tops_um.partition_point(|&top| top <= low);

@@ -133,6 +133,8 @@ pub(crate) struct Profile<'a> {
     alone: Vec<Change>,
     /// The section's width at the bottom.
     pub(crate) bottom_width: f64,
+    /// What any layer up to the last top or beyond has wrong below it, at least.
+    pub(crate) unavoidable: f64,
 }
 
 impl<'a> Profile<'a> {
@@ -144,6 +146,7 @@ impl<'a> Profile<'a> {
             starts: vec![Polynomials::default(); tops.len() + 1],
             alone: vec![Change::default(); tops.len()],
             bottom_width: 0.0,
+            unavoidable: 0.0,
         }
     }
 
@@ -176,6 +179,18 @@ impl<'a> Profile<'a> {
             self.starts[end].add(&polynomials, -1.0);
         }
         self.starts[end].add(&Polynomials::constant(line.passed(1.0)), 1.0);
+    }
+
+    /// Adds columns of which so much is inside at their two ends, below the last line
+    /// that they pass, and all above it if they end inside.
+    pub(crate) fn add_unavoidable(&mut self, width: f64, within: [f64; 2], ends_inside: bool) {
+        let last = self.tops[self.tops.len() - 1];
+        let lesser = within.map(|within| {
+            let within = if ends_inside { last + within } else { within };
+            within.min(last - within).max(0.0)
+        });
+        // The lesser of two lines bends down between the ends.
+        self.unavoidable += width * 0.5 * (lesser[0] + lesser[1]);
     }
 
     /// The changes from the layer's bottom to each top.

@@ -63,15 +63,21 @@ impl Sweep {
         }
     }
 
-    /// Adds a row, whose toggles and slopes are sorted from the left. A row that
-    /// does not balance, because the mesh has a gap, is left out.
-    pub(crate) fn add(&mut self, toggles: &[Toggle], slopes: &[Slope], profile: &mut Profile<'_>) {
+    /// Adds a row, whose toggles and slopes are sorted from the left. Returns
+    /// whether it balances: a row that does not, because the mesh has a gap, is left
+    /// out.
+    pub(crate) fn add(
+        &mut self,
+        toggles: &[Toggle],
+        slopes: &[Slope],
+        profile: &mut Profile<'_>,
+    ) -> bool {
         if toggles.is_empty() && slopes.is_empty() {
-            return;
+            return true;
         }
         let balance = toggles.iter().map(|toggle| i32::from(toggle.winding)).sum();
         if self.is_inside(balance) {
-            return;
+            return false;
         }
         self.ends.clear();
         self.ends.extend(toggles.iter().map(|toggle| toggle.x));
@@ -102,6 +108,7 @@ impl Sweep {
                 _ => self.part(columns, winding, MOST_PARTINGS, profile),
             }
         }
+        true
     }
 
     /// Adds columns over several lines, apart on both sides of where two of these
@@ -129,6 +136,8 @@ impl Sweep {
     fn pass(&self, columns: [f64; 2], mut winding: i32, profile: &mut Profile<'_>) {
         let width = columns[1] - columns[0];
         let mut inside = self.is_inside(winding);
+        // How much of each column is inside, if it ends as it begins.
+        let mut within = [0.0; 2];
         // How much of each column, up to the line before, is not as it is after it.
         let mut unlike = [0.0; 2];
         for slope in &self.open {
@@ -139,6 +148,8 @@ impl Sweep {
             let heights = columns.map(|x| slope.height(x));
             let before = unlike.map(|unlike| -unlike);
             unlike = [heights[0] - unlike[0], heights[1] - unlike[1]];
+            let sign = if inside { 1.0 } else { -1.0 };
+            within = [within[0] + sign * heights[0], within[1] + sign * heights[1]];
             profile.add(if inside {
                 Line { heights, width: -width, lost: unlike, gained: before }
             } else {
@@ -146,6 +157,7 @@ impl Sweep {
             });
             inside = !inside;
         }
+        profile.add_unavoidable(width, within, inside);
     }
 }
 

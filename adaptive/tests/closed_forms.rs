@@ -13,7 +13,7 @@ use lamp_stack::Length;
 fn part(mesh: &Mesh) -> Part {
     let model = Model::from_facets("part", mesh.facets.clone());
     let body = Body::new(model, &Placement::default(), Units::Millimetres).unwrap();
-    Part::new(body, Length::from_um(5.0), Fill::EvenOdd)
+    Part::new(body, Length::from_um(5.0), Fill::EvenOdd).unwrap()
 }
 
 /// The volumes of a layer in cubic millimetres, of areas by height in millimetres:
@@ -57,7 +57,7 @@ fn check_all(part: &Part, height: f64, of: impl Fn(f64, f64) -> [f64; 3]) {
             .collect();
         if !tops.is_empty() {
             let tops_um: Vec<f64> = tops.iter().map(|top| top * 1000.0).collect();
-            for (slab, top) in part.slabs(bottom * 1000.0, &tops_um).iter().zip(tops) {
+            for (slab, top) in part.slabs(bottom * 1000.0, &tops_um).each.iter().zip(tops) {
                 check(slab, of(bottom, top));
             }
         }
@@ -118,7 +118,7 @@ fn inclined_cylinders() {
 #[test]
 fn the_area_is_blind_to_an_inclined_cylinder() {
     let part = part(&inclined_cylinder());
-    let slab = part.slabs(3000.0, &[4000.0])[0];
+    let slab = part.slabs(3000.0, &[4000.0]).each[0];
     assert!(AreaDeviation.measure(&slab) < 1e-3);
     assert!(VolumeDeviation.measure(&slab) > 0.2);
     // Its walls lean by 45 degrees at the steepest.
@@ -139,7 +139,7 @@ fn the_area_is_blind_to_an_inclined_cylinder() {
 #[test]
 fn the_cusp_of_a_cone_follows_from_its_slope() {
     let part = part(&cone(5.0, 1.0, 4.0, 20_000));
-    let slabs = part.slabs(1000.0, &[1010.0, 1100.0, 2000.0]);
+    let slabs = part.slabs(1000.0, &[1010.0, 1100.0, 2000.0]).each;
     for slab in slabs {
         let expected = slab.thickness_um * 0.5_f64.sqrt();
         assert!((CuspHeight.measure(&slab) / expected - 1.0).abs() < 1e-3, "{slab:?}");

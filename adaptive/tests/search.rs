@@ -1,18 +1,23 @@
 //! The search for heights: bounds kept, degenerate parts, budgets, flat faces.
 
 use lamp_adaptive::{
-    CuspHeight, Heights, HeightsError, Machine, Part, Search, VolumeDeviation, uniform_heights,
+    AreaDeviation, Criterion, CuspHeight, Heights, HeightsError, Machine, Part, Search, Slab,
+    VolumeDeviation, uniform_heights,
 };
-use lamp_fixtures::{Mesh, cone, tower};
-use lamp_slicer::{Body, Fill, Model, Placement, Units};
+use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, tower};
+use lamp_slicer::{Axis, Body, Fill, Model, Placement, Units};
 use lamp_stack::Length;
 
 const INCH_UM: f64 = 25_400.0;
 
 fn part(mesh: &Mesh) -> Part {
+    placed(mesh, &Placement::default())
+}
+
+fn placed(mesh: &Mesh, placement: &Placement) -> Part {
     let model = Model::from_facets("part", mesh.facets.clone());
-    let body = Body::new(model, &Placement::default(), Units::Millimetres).unwrap();
-    Part::new(body, Length::from_um(50.0), Fill::EvenOdd)
+    let body = Body::new(model, placement, Units::Millimetres).unwrap();
+    Part::new(body, Length::from_um(50.0), Fill::EvenOdd).unwrap()
 }
 
 fn machine(min: f64, max: f64, step: f64) -> Machine {
@@ -57,10 +62,8 @@ fn the_part_of_figure_48() {
     for slab in &slabs {
         assert!(slab.deviation() <= 0.02 || slab.thickness_um < 26.0, "{slab:?}");
     }
-    let worst = |slabs: &[lamp_adaptive::Slab]| {
-        slabs.iter().map(lamp_adaptive::Slab::deviation).fold(0.0, f64::max)
-    };
-    let uniform = uniform_heights(&part, 0.1 * INCH_UM);
+    let worst = |slabs: &[Slab]| slabs.iter().map(Slab::deviation).fold(0.0, f64::max);
+    let uniform = uniform_heights(&part, 0.1 * INCH_UM).unwrap();
     assert_eq!(uniform.slabs.len(), 30);
     assert!(worst(&uniform.slabs) > 0.2 && worst(&slabs) <= 0.02);
 }
@@ -109,7 +112,7 @@ fn a_plate_is_a_layer_or_a_few() {
 fn bodies_above_each_other_with_nothing_between() {
     let part = part(&joined(&[plate(0.0, 1.0), plate(1.4321, 2.0), plate(2.0005, 3.0)]));
     let machine = machine(10.0, 100.0, 1.0);
-    for criterion in [&VolumeDeviation as &dyn lamp_adaptive::Criterion, &CuspHeight] {
+    for criterion in [&VolumeDeviation as &dyn Criterion, &CuspHeight] {
         let search = Search { criterion, snap: true, ..by_volume(&part, &machine) };
         let heights = search.heights(0.02).unwrap();
         let [lost, gained, volume] = heights.volumes_mm3();
@@ -166,4 +169,108 @@ fn threads_do_not_change_the_heights() {
         pool.install(|| by_volume(&part, &machine).heights(0.02).unwrap())
     };
     assert_eq!(with(1), with(3));
+}
+
+/// As the volume, without ruling anything out.
+#[derive(Debug)]
+struct LookingAtAll;
+
+impl Criterion for LookingAtAll {
+    fn measure(&self, slab: &Slab) -> f64 {
+        VolumeDeviation.measure(slab)
+    }
+}
+
+#[test]
+fn what_is_ruled_out_would_not_have_been_found() {
+    let lying = Placement::default().rotated(Axis::X, 33.0).rotated(Axis::Y, 21.0);
+    for (mesh, placement) in [
+        (tower(5_000), Placement::default()),
+        (cube_with_hole(8.0, 2.0, 400), lying),
+        (joined(&[plate(0.0, 1.0), plate(1.4, 1.5), plate(4.0, 5.0)]), Placement::default()),
+    ] {
+        let part = placed(&mesh, &placement);
+        let machine = machine(20.0, 4_000.0, 10.0);
+        for bound in [0.001, 0.01, 0.05, 0.4] {
+            let search = by_volume(&part, &machine);
+            let all = Search { criterion: &LookingAtAll, ..by_volume(&part, &machine) };
+            // Volumes may differ in their last digits.
+            let [found, expected] = [search, all].map(|s| thicknesses(&s.heights(bound).unwrap()));
+            assert!(found == expected, "{bound}: {} layers, {}", found.len(), expected.len());
+        }
+    }
+}
+
+/// Where exposures grow faster than layers, many thin ones may be the quickest.
+#[test]
+fn a_budget_of_time_is_kept_by_the_quickest_layers() {
+    let part = part(&plate(0.0, 6.0));
+    let machine = machine(100.0, 1000.0, 10.0);
+    let cost = |um: f64| (um / 150.0).exp();
+    let quickest = 6_000.0 / 150.0 * cost(150.0);
+    let search = by_volume(&part, &machine);
+    let (bound, heights) = search.within_budget(cost, 1.01 * quickest).unwrap();
+    assert!(bound == 0.0 && heights.slabs.iter().all(|slab| slab.thickness_um < 200.0));
+    assert!(search.within_budget(cost, 0.99 * quickest).is_err());
+}
+
+#[test]
+fn a_bound_that_no_budget_keeps_is_infinite() {
+    let part = part(&sphere(5.0, 5_000));
+    let machine = machine(25.0, 100.0, 1.0);
+    // The first layer stands on a point: no share of nothing is finite.
+    let search = Search { criterion: &AreaDeviation, ..by_volume(&part, &machine) };
+    let (bound, heights) = search.within_budget(|_| 1.0, 100.0).unwrap();
+    assert!(bound.is_infinite());
+    assert_eq!(search.heights(bound).unwrap(), heights);
+}
+
+#[test]
+fn faces_that_were_turned_into_place_are_flat() {
+    let mesh = joined(&[plate(0.0, 1.03), plate(1.03, 2.0).map(|[x, y, z]| [x / 2.0, y, z])]);
+    let (sin, cos) = 17f64.to_radians().sin_cos();
+    let leaning = mesh.map(|[x, y, z]| [x, cos * y - sin * z, sin * y + cos * z]);
+    let part = placed(&leaning, &Placement::default().rotated(Axis::X, -17.0));
+    let faces = part.flat_faces_um();
+    assert_eq!(faces.len(), 3, "{faces:?}");
+    assert!((faces[1] - faces[0] - 1030.0).abs() < 0.01);
+}
+
+#[test]
+fn layers_of_which_nothing_is_known_are_the_thinnest() {
+    let mut mesh = cone(4.0, 2.0, 3.0, 200);
+    let whole = part(&mesh);
+    let machine = machine(25.0, 100.0, 1.0);
+    let closed = by_volume(&whole, &machine).heights(0.5).unwrap();
+    assert!(closed.slabs.iter().all(|slab| slab.rows_left_out == 0));
+    // Without the side to the right, no row balances.
+    mesh.facets.retain(|facet| facet.iter().map(|corner| corner[0]).sum::<f32>() < 0.0);
+    let open = part(&mesh);
+    let heights = by_volume(&open, &machine).heights(0.5).unwrap();
+    assert_eq!(heights.slabs.len(), 120);
+    assert!(heights.slabs.iter().all(|slab| slab.rows_left_out > 0));
+}
+
+#[test]
+fn what_is_above_the_last_layer_is_lost() {
+    let part = part(&plate(0.0, 1.013));
+    let heights = uniform_heights(&part, 100.0).unwrap();
+    let [lost, _, volume] = heights.volumes_mm3();
+    assert_eq!(heights.slabs.len(), 10);
+    assert!((lost / volume - 13.0 / 1013.0).abs() < 1e-6, "{lost} of {volume}");
+    assert!(matches!(uniform_heights(&part, 1e-4), Err(HeightsError::TooHigh { .. })));
+}
+
+#[test]
+fn rows_are_not_too_near() {
+    let body = Body::new(
+        Model::from_facets("plate", plate(0.0, 1.0).facets),
+        &Placement::default(),
+        Units::Millimetres,
+    );
+    let error = Part::new(body.unwrap(), Length::from_um(1e-4), Fill::EvenOdd).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "rows 0.0001 um apart are more than 2^24: give a wider --row-pitch"
+    );
 }

@@ -38,13 +38,13 @@ impl Twin {
         let body = Body::new(self.model(), &self.placement, Units::Millimetres).unwrap();
         let [min, max] = [body.min(), body.max()];
         let rows = ((max[1] - min[1]) / PITCH_MM).ceil() as u32;
-        let part = Part::new(body, Length::from_mm(PITCH_MM), self.fill);
+        let part = Part::new(body, Length::from_mm(PITCH_MM), self.fill).unwrap();
         let height = max[2] - min[2];
         for layer in layers {
             let [bottom, top] = layer.map(|share| min[2] + share * height);
             // Among other tops, as the search asks.
             let tops = [0.5, 0.75, 1.0, 1.2].map(|share| bottom + share * (top - bottom));
-            let slab = part.slabs(bottom, &tops)[2];
+            let slab = part.slabs(bottom, &tops).each[2];
             let top_section = self.section(top.min(max[2]), max[1], rows);
             let (mut lost, mut gained, mut volume) = (0.0, 0.0, 0.0);
             let each = (top - bottom) / f64::from(SECTIONS) / 1000.0 * PITCH_MM;

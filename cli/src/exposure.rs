@@ -58,7 +58,8 @@ impl ExposureOptions {
     /// How layers are exposed, where a material or a table says.
     pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Stop> {
         if let Some(path) = &self.exposure_table {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            // Without blanks, as the stack's commands are words.
+            let name = path.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_");
             let times = read_times(path).with_context(|| input_name(path))?;
             return Ok(Some(Exposure { name, source: Source::Table(times) }));
         }

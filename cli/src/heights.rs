@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, Heights, HeightsError, Machine, Part, Search,
+    AreaDeviation, Criterion, CuspHeight, Heights, HeightsError, Machine, Part, Search, Slab,
     VolumeDeviation,
 };
 use lamp_slicer::{Body, Fill};
@@ -10,6 +10,7 @@ use lamp_stack::{Dpi, Length};
 
 use crate::exposure::Exposure;
 use crate::options::parse_thickness;
+use crate::solid::value_name;
 use crate::stop::Stop;
 
 pub(crate) const HEADING: &str = "Adaptive layer heights";
@@ -61,14 +62,14 @@ pub(crate) struct HeightOptions {
 
     /// What each layer takes besides its exposure, as 30s: recoating, most of all
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, help_heading = HEADING)]
-    #[arg(requires = "time_budget")]
-    layer_overhead: Option<f64>,
+    pub(crate) layer_overhead: Option<f64>,
 
     /// End layers at flat faces, wherever the limits allow
     #[arg(long, help_heading = HEADING)]
     snap: bool,
 
-    /// How far apart the rows are along which the part is measured [default: four pixels]
+    /// How far apart the rows are along which the part is measured: what is thinner across them
+    /// may be missed [default: four pixels]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     row_pitch: Option<Length>,
 }
@@ -82,8 +83,61 @@ enum CriterionArg {
 
 /// The layers found, and the bound that they keep.
 pub(crate) struct Found {
-    pub(crate) bound: String,
+    pub(crate) measure: Measure,
+    pub(crate) bound: f64,
     pub(crate) heights: Heights,
+}
+
+/// What is measured of a layer, and in which unit.
+#[derive(Clone, Copy)]
+pub(crate) struct Measure(CriterionArg);
+
+impl Measure {
+    pub(crate) fn criterion(self) -> &'static dyn Criterion {
+        match self.0 {
+            CriterionArg::Volume => &VolumeDeviation,
+            CriterionArg::Cusp => &CuspHeight,
+            CriterionArg::Area => &AreaDeviation,
+        }
+    }
+
+    /// `2.00%`, `10.0um`.
+    pub(crate) fn text(self, measure: f64) -> String {
+        match self.0 {
+            _ if measure.is_infinite() => "none".to_owned(),
+            CriterionArg::Cusp => format!("{}um", significant(measure)),
+            CriterionArg::Volume | CriterionArg::Area => {
+                format!("{}%", significant(measure * 100.0))
+            }
+        }
+    }
+}
+
+impl Found {
+    /// `volume 2.00%`.
+    pub(crate) fn bound(&self) -> String {
+        format!("{} {}", value_name(&self.measure.0), self.measure.text(self.bound))
+    }
+
+    /// How many layers are farther off.
+    pub(crate) fn past(&self, heights: &Heights) -> usize {
+        let is_past = |slab: &&Slab| self.measure.criterion().measure(slab) > self.bound;
+        heights.slabs.iter().filter(is_past).count()
+    }
+
+    /// Tells of rows that told nothing.
+    pub(crate) fn warn(&self, say: &dyn Fn(&str)) {
+        let left_out = self.heights.slabs.iter().filter(|slab| slab.rows_left_out > 0);
+        let (layers, rows) = left_out.fold((0, 0), |(layers, rows), slab| {
+            (layers + 1, rows + u64::from(slab.rows_left_out))
+        });
+        if rows > 0 {
+            say(&format!(
+                "{rows} rows in {layers} layers do not balance: the mesh has gaps; how thick these \
+                 layers are follows from the other rows"
+            ));
+        }
+    }
 }
 
 impl HeightOptions {
@@ -96,9 +150,15 @@ impl HeightOptions {
     }
 
     /// The part as rows see it.
-    pub(crate) fn part(&self, body: Body, dpi: Dpi, fill: Fill) -> Part {
+    pub(crate) fn part(&self, body: Body, dpi: Dpi, fill: Fill) -> Result<Part, Stop> {
         let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
-        Part::new(body, self.row_pitch.unwrap_or(pitch), fill)
+        let part = Part::new(body, self.row_pitch.unwrap_or(pitch), fill);
+        part.map_err(|error| Stop::Failed(error.into()))
+    }
+
+    /// Whether a budget decides the bound.
+    pub(crate) fn has_budget(&self) -> bool {
+        self.layers_budget.is_some() || self.time_budget.is_some()
     }
 
     /// What the machine builds.
@@ -120,10 +180,9 @@ impl HeightOptions {
     fn criterion(&self) -> Result<CriterionArg, Stop> {
         let default = if self.cusp.is_some() { CriterionArg::Cusp } else { CriterionArg::Volume };
         let criterion = self.criterion.unwrap_or(default);
-        let has_budget = self.layers_budget.is_some() || self.time_budget.is_some();
         match (criterion == CriterionArg::Cusp, self.cusp.is_some()) {
             (false, true) => Err(Stop::usage("--cusp goes with --criterion cusp")),
-            (true, false) if self.deviation.is_some() || !has_budget => {
+            (true, false) if self.deviation.is_some() || !self.has_budget() => {
                 Err(Stop::usage("--criterion cusp takes its bound from --cusp, as --cusp 10um"))
             }
             _ => Ok(criterion),
@@ -133,12 +192,8 @@ impl HeightOptions {
     /// Searches for the heights.
     pub(crate) fn find(&self, part: &Part, exposure: Option<&Exposure>) -> Result<Found, Stop> {
         let machine = self.machine()?;
-        let arg = self.criterion()?;
-        let criterion: &dyn Criterion = match arg {
-            CriterionArg::Volume => &VolumeDeviation,
-            CriterionArg::Cusp => &CuspHeight,
-            CriterionArg::Area => &AreaDeviation,
-        };
+        let measure = Measure(self.criterion()?);
+        let criterion = measure.criterion();
         let search = Search { part, machine: &machine, criterion, snap: self.snap };
         let failed = |error: HeightsError| Stop::Failed(error.into());
         let (bound, heights) = if let Some(layers) = self.layers_budget {
@@ -147,8 +202,7 @@ impl HeightOptions {
                 .map_err(|error| over(error, |layers| format!("{layers} layers")))?
         } else if let Some(seconds) = self.time_budget {
             let cost = self.seconds_of_layers(exposure)?;
-            let hours = |seconds| format!("{} hours", significant(seconds / 3600.0));
-            search.within_budget(cost, seconds).map_err(|error| over(error, hours))?
+            search.within_budget(cost, seconds).map_err(|error| over(error, time_text))?
         } else {
             let bound = self.cusp.map_or(self.deviation.unwrap_or(0.02), Length::um);
             (bound, search.heights(bound).map_err(failed)?)
@@ -158,12 +212,7 @@ impl HeightOptions {
                 exposure.time(Length::from_um(slab.thickness_um))?;
             }
         }
-        let bound = match arg {
-            CriterionArg::Cusp => format!("cusp {}um", significant(bound)),
-            CriterionArg::Volume => format!("volume {}%", significant(bound * 100.0)),
-            CriterionArg::Area => format!("area {}%", significant(bound * 100.0)),
-        };
-        Ok(Found { bound, heights })
+        Ok(Found { measure, bound, heights })
     }
 
     /// How many seconds a layer of so many micrometres takes.
@@ -194,8 +243,7 @@ impl HeightOptions {
         add("min", length(self.min));
         add("max", length(self.max));
         add("step", length(self.step));
-        let criterion = self.criterion.and_then(|criterion| criterion.to_possible_value());
-        add("criterion", criterion.map(|value| value.get_name().to_owned()));
+        add("criterion", self.criterion.map(|criterion| value_name(&criterion)));
         add("deviation", self.deviation.map(|share| share.to_string()));
         add("cusp", length(self.cusp));
         add("layers-budget", self.layers_budget.map(|layers| layers.to_string()));
@@ -215,8 +263,8 @@ fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Stop {
         HeightsError::Budget { least, budget } => {
             let [least, budget] = [least, budget].map(say);
             anyhow::anyhow!(
-                "even the thickest layers take {least}, more than the budget of {budget}: allow more, or a \
-                 larger --max"
+                "the layers that take least take {least}, more than the budget of {budget}: allow more, or \
+                 wider limits"
             )
         }
         error => error.into(),
@@ -228,9 +276,20 @@ pub(crate) fn significant(number: f64) -> String {
     if number == 0.0 || !number.is_finite() {
         return number.to_string();
     }
-    let decimals = 2 - number.abs().log10().floor() as i32;
-    let power = 10.0_f64.powi(decimals);
-    format!("{:.*}", decimals.max(0) as usize, (number * power).round() / power)
+    // Rounding may make 9.996 one digit longer.
+    let rounded: f64 = format!("{number:.2e}").parse().expect("it was a number");
+    let decimals = 2 - rounded.abs().log10().floor() as i32;
+    format!("{rounded:.*}", decimals.max(0) as usize)
+}
+
+/// A time in the unit that people would say it in.
+pub(crate) fn time_text(seconds: f64) -> String {
+    let (number, unit) = match seconds {
+        ..200.0 => (seconds, "s"),
+        ..10_000.0 => (seconds / 60.0, "min"),
+        _ => (seconds / 3600.0, "h"),
+    };
+    format!("{}{unit}", significant(number))
 }
 
 /// Parses a share: `2%` or `0.02`.
@@ -240,6 +299,10 @@ fn parse_share(text: &str) -> Result<f64, String> {
         None => (text.trim(), 1.0),
     };
     match number.parse::<f64>() {
+        // 2 is far more often meant to be 2% than 200%.
+        Ok(number) if factor == 1.0 && number >= 1.0 => {
+            Err(format!("`{text}` is not below 1: write {number}% or {}", number / 100.0))
+        }
         Ok(number) if number >= 0.0 && number.is_finite() => Ok(number * factor),
         _ => Err(format!("`{text}` is not a share: write 2% or 0.02")),
     }
@@ -272,15 +335,20 @@ mod tests {
         assert_eq!(parse_share("0.05"), Ok(0.05));
         assert_eq!(parse_seconds("8h"), Ok(28_800.0));
         assert_eq!(parse_seconds("1.5 min"), Ok(90.0));
-        for wrong in ["", "-1%", "nan", "2 percent", "8", "h", "-3s"] {
-            assert!(parse_share(wrong).is_err() || wrong == "8", "{wrong}");
+        assert_eq!(parse_share("150%"), Ok(1.5));
+        for wrong in ["", "-1%", "nan", "2 percent", "2", "inf%"] {
+            assert!(parse_share(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["", "8", "h", "-3s", "nans", "infh"] {
             assert!(parse_seconds(wrong).is_err(), "{wrong}");
         }
     }
 
     #[test]
     fn numbers_of_three_digits() {
-        let texts = [2.0, 0.012_345, 123_456.0, 9.999, 0.0].map(significant);
-        assert_eq!(texts, ["2.00", "0.0123", "123000", "10.00", "0"]);
+        let texts = [2.0, 0.012_345, 123_456.0, 9.999, 99.96, 0.0].map(significant);
+        assert_eq!(texts, ["2.00", "0.0123", "123000", "10.0", "100", "0"]);
+        let times = [12.34, 199.0, 600.0, 9_000.0, 36_000.0].map(time_text);
+        assert_eq!(times, ["12.3s", "199s", "10.0min", "150min", "10.0h"]);
     }
 }

@@ -60,7 +60,8 @@ pub(crate) struct PartOptions {
 
     /// Write gray layers: each pixel as bright as it takes to cure the part below it, down to
     /// where the part ends. White where it does not end within what white cures
-    #[arg(long, requires = "material", help_heading = EXPOSURE)]
+    #[arg(long, requires = "material", conflicts_with = "exposure_table")]
+    #[arg(help_heading = EXPOSURE)]
     gray: bool,
 }
 
@@ -148,8 +149,9 @@ impl PartOptions {
         layers: Option<Range<u32>>,
         memory: Option<u64>,
         exposure: Option<Exposure>,
+        say: &dyn Fn(&str),
     ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Stop> {
-        let heights = self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref()));
+        let heights = self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref(), say));
         let heights = heights.transpose()?;
         let shown = exposure.as_ref().filter(|_| self.gray);
         let gray = shown.map(|exposure| match &heights {
@@ -177,14 +179,22 @@ impl PartOptions {
         Ok((slices, name_command))
     }
 
-    /// How thick each layer may be.
+    /// How thick each layer is to be; `say` is told what people should know of it.
     fn layer_heights(
         &self,
         model: &Model,
         exposure: Option<&Exposure>,
+        say: &dyn Fn(&str),
     ) -> Result<LayerHeights, Stop> {
-        let part = self.heights.part(self.solid.body(model.clone())?, self.dpi, self.solid.fill());
-        Ok(self.heights.find(&part, exposure)?.heights.layer_heights()?)
+        let body = self.solid.body(model.clone())?;
+        let part = self.heights.part(body, self.dpi, self.solid.fill())?;
+        let found = self.heights.find(&part, exposure)?;
+        found.warn(say);
+        if self.heights.has_budget() {
+            let layers = found.heights.slabs.len();
+            say(&format!("{layers} layers keep the budget, within {}", found.bound()));
+        }
+        Ok(found.heights.layer_heights()?)
     }
 
     /// The files that the options read.

@@ -185,6 +185,12 @@ fn what_cannot_be_is_said() {
     usage("lamp heights tower.stl --criterion cusp", "takes its bound from --cusp");
     usage("lamp heights tower.stl --time-budget 1h", "give --material or --exposure-table");
     usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg or .png");
+    usage("lamp heights tower.stl --plot x.svg --report x.svg", "name one file");
+    usage("lamp heights tower.stl --deviation 2", "write 2% or 0.02");
+    usage(
+        "slice tower.stl --adaptive --gray --material lamp-suspension --exposure-table times.csv",
+        "cannot be used with",
+    );
     scratch
         .run("lamp heights tower.stl --layers-budget 9")
         .is_refused_with(&["take 762 layers, more than the budget of 9 layers"]);
@@ -197,4 +203,15 @@ fn what_cannot_be_is_said() {
         .is_refused_with(&["bad.csv", "line 2", "soon"]);
     let ran = scratch.run("slice tower.stl --adaptive --exposure-table times.csv -o times.csv");
     assert!(ran.stderr.contains("times.csv: that is the input"), "{ran:?}");
+}
+
+#[test]
+fn gaps_are_told_of() {
+    let scratch = with_tower();
+    scratch.run("lamp sample tower --facets 5000 --defect drop -o gaps.stl").succeeds();
+    let ran = scratch.run(&format!("lamp heights gaps.stl {LIMITS}")).succeeds();
+    assert!(ran.stderr.contains("do not balance: the mesh has gaps"), "{ran:?}");
+    let ran = scratch.run(&format!("slice gaps.stl --dpi 100 --adaptive {LIMITS} -o gaps.tif"));
+    assert!(ran.stderr.contains("how thick these layers are follows"), "{ran:?}");
+    scratch.run(&format!("lamp heights gaps.stl {LIMITS} -q")).succeeds_quietly();
 }

@@ -79,7 +79,7 @@ fn run_pipeline(stl: &Path, stack: &Path, report: &Report) -> Result<StackSize, 
     let options = PartOptions::of_command("slice").expect("every option has a default");
     let model = Model::open(stl)?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
-    let (slices, name_command) = options.slices(model, &file, None, None, None)?;
+    let (slices, name_command) = options.slices(model, &file, None, None, None, &|_| {})?;
     report.expect(slices.layer_count() as u64);
     let layers = slices.map(move |layer| {
         let mut layer = layer?;

@@ -2,13 +2,16 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_adaptive::{AreaDeviation, Criterion, CuspHeight, Heights, Slab, uniform_heights};
+use lamp_adaptive::{
+    AreaDeviation, Criterion, CuspHeight, Heights, Part, Slab, share, uniform_heights,
+};
 use lamp_stack::{Dpi, Length};
 
 use crate::exposure::{Exposure, ExposureOptions};
-use crate::heights::{Found, HeightOptions, significant};
-use crate::options::parse_thickness;
+use crate::heights::{Found, HeightOptions, significant, time_text};
+use crate::options::{Common, parse_thickness};
 use crate::plots::{self, Axis, Plot, Series, drawn};
+use crate::report::say;
 use crate::solid::{SolidOptions, at_part, name_of_all, open_models};
 use crate::stop::Stop;
 use crate::streams::{check_beside, print, write_file};
@@ -58,35 +61,59 @@ pub(crate) struct HeightsArgs {
     exposure: ExposureOptions,
 }
 
-pub(crate) fn run(args: &HeightsArgs) -> Result<(), Stop> {
-    if let Some(plot) = &args.plot {
-        plots::check_name(plot)?;
-    }
-    for file in args.report.iter().chain(&args.plot) {
-        check_beside(file, Path::new("-"), args.parts.iter().chain(args.exposure.files()))?;
-    }
+pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Stop> {
+    args.check()?;
     let exposure = args.exposure.exposure()?;
     args.heights.check(exposure.as_ref())?;
     let model = open_models(&args.parts)?;
     let body = args.solid.body(model).map_err(|error| at_part(error.into(), &args.parts))?;
-    let part = args.heights.part(body, args.dpi, args.solid.fill());
+    let part = args.heights.part(body, args.dpi, args.solid.fill())?;
     let found = args.heights.find(&part, exposure.as_ref());
-    let Found { bound, heights } = found.map_err(|stop| at_part(stop, &args.parts))?;
-    let thickest = [args.heights.max()];
-    let uniform = if args.uniform.is_empty() { &thickest[..] } else { &args.uniform };
-    let uniform: Vec<_> = uniform
-        .iter()
-        .map(|thickness| (format!("uniform {thickness}"), uniform_heights(&part, thickness.um())))
-        .collect();
-    if let Some(path) = &args.report {
-        write_file(path, |out| write_table(&heights, exposure.as_ref(), out))?;
+    let found = found.map_err(|stop| at_part(stop, &args.parts))?;
+    let uniform = args.uniform(&part).map_err(|stop| at_part(stop, &args.parts))?;
+    if !common.quiet {
+        found.warn(&|line| say(&format!("heights: {line}")));
     }
-    let all: Vec<_> = std::iter::once((bound, heights)).chain(uniform).collect();
+    if let Some(path) = &args.report {
+        write_file(path, |out| write_table(&found.heights, exposure.as_ref(), out))?;
+    }
+    let all: Vec<_> =
+        std::iter::once((found.bound(), found.heights.clone())).chain(uniform).collect();
     if let Some(path) = &args.plot {
         let bytes = drawn(&plots(&name_of_all(&args.parts), &all[..2]), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
     }
-    print(&summary(&all, exposure.as_ref()))
+    let overhead = args.heights.layer_overhead.unwrap_or(0.0);
+    print(&summary(&found, &all, exposure.as_ref(), overhead))
+}
+
+impl HeightsArgs {
+    /// Checks, before the work, what can be checked.
+    fn check(&self) -> Result<(), Stop> {
+        if let Some(plot) = &self.plot {
+            plots::check_name(plot)?;
+        }
+        let inputs = || self.parts.iter().chain(self.exposure.files());
+        for file in self.report.iter().chain(&self.plot) {
+            check_beside(file, Path::new("-"), inputs())?;
+        }
+        if self.report.is_some() && self.report == self.plot {
+            return Err(Stop::usage("--report and --plot name one file"));
+        }
+        Ok(())
+    }
+
+    /// The uniform layers to compare with, by what they are called.
+    fn uniform(&self, part: &Part) -> Result<Vec<(String, Heights)>, Stop> {
+        let thickest = [self.heights.max()];
+        let uniform = if self.uniform.is_empty() { &thickest[..] } else { &self.uniform };
+        let layers = |thickness: &Length| {
+            let heights = uniform_heights(part, thickness.um());
+            let heights = heights.map_err(|error| Stop::Failed(error.into()))?;
+            Ok((format!("uniform {thickness}"), heights))
+        };
+        uniform.iter().map(layers).collect()
+    }
 }
 
 fn write_table(
@@ -122,26 +149,43 @@ fn to_nm(um: f64) -> f64 {
     (um * 1000.0).round() / 1000.0
 }
 
-/// A line for each choice of layers.
-fn summary(all: &[(String, Heights)], exposure: Option<&Exposure>) -> String {
+/// A line for each choice of layers: how many there are, how far they are off by
+/// volume, how far the worst is by the criterion, and how many are past the bound.
+fn summary(
+    found: &Found,
+    all: &[(String, Heights)],
+    exposure: Option<&Exposure>,
+    overhead: f64,
+) -> String {
     let mut text = format!(
-        "{:<20}{:>8}{:>14}{:>14}{:>12}{:>14}{:>14}\n",
-        "", "layers", "lost (mm3)", "gained (mm3)", "deviation", "worst layer", "exposure (s)"
+        "{:<20}{:>8}{:>13}{:>14}{:>12}{:>13}{:>12}{:>10}\n",
+        "",
+        "layers",
+        "lost (mm3)",
+        "gained (mm3)",
+        "deviation",
+        "worst layer",
+        "past bound",
+        "time"
     );
     for (name, heights) in all {
         let [lost, gained, volume] = heights.volumes_mm3();
-        let worst = heights.slabs.iter().map(Slab::deviation).fold(0.0, f64::max);
+        let measures = heights.slabs.iter().map(|slab| found.measure.criterion().measure(slab));
+        let worst = measures.fold(0.0, f64::max);
         let time =
             |slab: &Slab| Some(exposure?.time(Length::from_um(slab.thickness_um)).ok()?.ms());
         let ms: Option<f64> = heights.slabs.iter().map(time).sum();
+        let time = ms.map(|ms| ms / 1000.0 + overhead * heights.slabs.len() as f64);
+        let percent = 100.0 * share(lost + gained, volume);
         text += &format!(
-            "{name:<20}{:>8}{:>14}{:>14}{:>12}{:>14}{:>14}\n",
+            "{name:<20}{:>8}{:>13}{:>14}{:>12}{:>13}{:>12}{:>10}\n",
             heights.slabs.len(),
             significant(lost),
             significant(gained),
-            format!("{}%", significant(100.0 * (lost + gained) / volume)),
-            format!("{}%", significant(100.0 * worst)),
-            ms.map_or("-".to_owned(), |ms| format!("{:.1}", ms / 1000.0)),
+            if percent.is_finite() { significant(percent) + "%" } else { "-".to_owned() },
+            if worst.is_finite() { found.measure.text(worst) } else { "-".to_owned() },
+            found.past(heights),
+            time.map_or("-".to_owned(), time_text),
         );
     }
     text

@@ -104,7 +104,7 @@ impl Command {
             Self::Cure(args) => cure::run(args, common),
             Self::Calibrate(args) => calibrate::run(args, common),
             Self::Target(args) => target::run(args, common),
-            Self::Heights(args) => heights::run(args),
+            Self::Heights(args) => heights::run(args, common),
         }
     }
 }

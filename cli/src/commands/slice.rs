@@ -45,7 +45,7 @@ pub(crate) struct SliceArgs {
     /// Memory for the table of crossings and what goes with it, from 16MB up: less means smaller
     /// slabs of layers [default: a quarter of the machine's, though no more is used than helps]. A
     /// part whose facets are in no order of height is sorted first, in a temporary file of 36 bytes a
-    /// facet
+    /// facet. --adaptive holds the mesh besides, in 45 bytes a facet
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
@@ -68,6 +68,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     let exposure = args.options.exposure()?;
     let model = open_models(&args.parts)?;
     let name = name_of_all(&args.parts);
+    let report = report("slice", common, &args.output);
     let files: Vec<_> = args
         .parts
         .iter()
@@ -75,9 +76,10 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         .collect();
     let (mut slices, name_command) = args
         .options
-        .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure)
+        .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure, &|line| {
+            report.say(line);
+        })
         .map_err(|stop| at_part(stop, &args.parts))?;
-    let report = report("slice", common, &args.output);
     report.expect(slices.layer_count() as u64);
     let (mut counts, mut bands) = (Counts::default(), Vec::new());
     let layers = slices.by_ref().map(|layer| {
