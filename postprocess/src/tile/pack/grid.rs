@@ -23,7 +23,7 @@ pub(super) fn grid(layout: &Layout, turn: Turn, wanted: u32, gap: u32) -> Vec<Pl
 
 /// How many parts stand along a side; `None` where not one does.
 fn most(area: u32, part: u32, gap: u32) -> Option<u32> {
-    Some(area.checked_sub(part)? / (part + gap) + 1)
+    Some(area.checked_sub(part)? / (part + gap).max(1) + 1)
 }
 
 /// Where `count` parts stand along a side, centred.
