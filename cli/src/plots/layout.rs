@@ -113,8 +113,7 @@ impl<'a> Picture<'a> {
         ))
     }
 
-    /// Draws the row of an outline that lies at the middle of each of the
-    /// picture's.
+    /// Draws the rows of an outline that lie at the middles of the picture's.
     fn draw_outline<B: DrawingBackend>(
         &self,
         area: &DrawingArea<B, plotters::coord::Shift>,
@@ -124,14 +123,19 @@ impl<'a> Picture<'a> {
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
         let (_, top) = self.at(0, at.top);
         let (_, bottom) = self.at(0, at.top + outline.height());
+        let mut strips = Strips::default();
         for y in top..bottom {
             let row = (f64::from(y - MARGIN) + 0.5) / self.scale - f64::from(at.top);
             let row = outline.row((row.max(0.0) as u32).min(outline.height() - 1));
-            for run in row.chunks(2) {
+            let runs = row.chunks(2).map(|run| {
                 let ends = [run[0], *run.get(1).unwrap_or(&outline.width())];
                 let [from, to] = ends.map(|column| self.at(at.left + column, 0).0);
-                area.draw(&Rectangle::new([(from, y), (to, y + 1)], fill))?;
-            }
+                (from, to)
+            });
+            strips.add(y, runs.collect());
+        }
+        for strip in strips.finish() {
+            area.draw(&Polygon::new(strip, fill))?;
         }
         Ok(())
     }
@@ -169,4 +173,67 @@ impl<'a> Picture<'a> {
 fn tint(RGBColor(red, green, blue): RGBColor) -> RGBColor {
     let [red, green, blue] = [red, green, blue].map(|c| 255 - (255 - c) / 3);
     RGBColor(red, green, blue)
+}
+
+/// Runs below each other as polygons, which are shorter to write than rows.
+#[derive(Default)]
+struct Strips {
+    /// For each run of the rows that go on, its row and its ends.
+    open: Vec<Vec<(i32, [i32; 2])>>,
+    done: Vec<Vec<(i32, i32)>>,
+}
+
+impl Strips {
+    /// Adds a row: its runs go on those above, if there are as many and each
+    /// meets its own.
+    fn add(&mut self, y: i32, runs: Vec<(i32, i32)>) {
+        let mut both = self.open.iter().zip(&runs);
+        let go_on = both.all(|(strip, &(from, to))| {
+            strip.last().is_some_and(|&(_, [left, right])| left <= to && from <= right)
+        });
+        if runs.len() != self.open.len() || !go_on {
+            self.close();
+            self.open.resize(runs.len(), Vec::new());
+        }
+        for (strip, (from, to)) in self.open.iter_mut().zip(runs) {
+            strip.push((y, [from, to]));
+        }
+    }
+
+    fn close(&mut self) {
+        for strip in self.open.drain(..) {
+            let Some(&(bottom, [left, right])) = strip.last() else { continue };
+            let down = strip.iter().map(|&(y, [from, _])| (from, y));
+            let up = strip.iter().rev().map(|&(y, [_, to])| (to, y));
+            let last = [(left, bottom + 1), (right, bottom + 1)];
+            self.done.push(down.chain(last).chain(up).collect());
+        }
+    }
+
+    fn finish(mut self) -> Vec<Vec<(i32, i32)>> {
+        self.close();
+        self.done
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_go_on_are_one_polygon() {
+        let mut strips = Strips::default();
+        strips.add(0, vec![(2, 5)]);
+        strips.add(1, vec![(1, 6)]);
+        strips.add(2, vec![(1, 3), (4, 6)]);
+        strips.add(3, vec![]);
+        assert_eq!(
+            strips.finish(),
+            [
+                vec![(2, 0), (1, 1), (1, 2), (6, 2), (6, 1), (5, 0)],
+                vec![(1, 2), (1, 3), (3, 3), (3, 2)],
+                vec![(4, 2), (4, 3), (6, 3), (6, 2)],
+            ]
+        );
+    }
 }

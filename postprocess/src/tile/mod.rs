@@ -12,6 +12,7 @@ mod error;
 mod file;
 mod heights;
 mod layout;
+mod meet;
 mod mesh;
 mod pack;
 mod page;

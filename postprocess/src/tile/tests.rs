@@ -320,4 +320,19 @@ proptest! {
         let cut = built.unwrap().unwrap().image.framed(place).turned(turn.inverse()).unwrap();
         prop_assert_eq!(cut, stack[0].clone());
     }
+
+    #[test]
+    fn no_layout_panics(x in any::<f64>(), y in -50.0f64..50.0, turn in 0u32..400, area in any::<f64>()) {
+        let text = format!(
+            r#"{{"area_mm": [{area}, 40], "copies": [{{"part": "p", "x_mm": {x:e}, "y_mm": {y}, "turn": {turn}}}]}}"#
+        );
+        if let Ok(file) = LayoutFile::from_json(&text) {
+            let area = file.area().unwrap();
+            let parts = vec![Part::of_image("p", &black(4, 2)).unwrap()];
+            if let Ok(layout) = file.place(parts, area) {
+                let at = layout.placements()[0];
+                prop_assert!(at.left + 2 <= layout.pixels().width && at.top + 2 <= layout.pixels().height);
+            }
+        }
+    }
 }

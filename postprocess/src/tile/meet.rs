@@ -1,0 +1,38 @@
+//! Whether two copies lie on each other.
+
+use lamp_stack::Mask;
+
+use super::Placement;
+
+/// A pixel of the build that is white in two placed masks.
+pub(super) fn common_pixel(masks: [&Mask; 2], at: [&Placement; 2]) -> Option<(u32, u32)> {
+    let [a, b] = at;
+    let top = a.top.max(b.top);
+    let bottom = (a.top + masks[0].height()).min(b.top + masks[1].height());
+    let left = a.left.max(b.left);
+    let right = (a.left + masks[0].width()).min(b.left + masks[1].width());
+    if left >= right {
+        return None;
+    }
+    (top..bottom).find_map(|row| {
+        let rows =
+            [0, 1].map(|k| runs(masks[k].row(row - at[k].top), masks[k].width(), at[k].left));
+        let [mut one, mut other] = rows.map(Iterator::peekable);
+        loop {
+            let (&(a, a_end), &(b, b_end)) = (one.peek()?, other.peek()?);
+            if a.max(b) < a_end.min(b_end) {
+                return Some((a.max(b), row));
+            }
+            if a_end < b_end {
+                one.next()
+            } else {
+                other.next()
+            };
+        }
+    })
+}
+
+/// The white runs of a row that is shifted to the right.
+fn runs(row: &[u32], width: u32, left: u32) -> impl Iterator<Item = (u32, u32)> {
+    row.chunks(2).map(move |run| (left + run[0], left + run.get(1).unwrap_or(&width)))
+}
