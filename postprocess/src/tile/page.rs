@@ -106,9 +106,10 @@ impl Layout {
         let stacks: Vec<StackInfo> =
             self.parts.iter().map(|part| part.stack.clone().unwrap_or_default()).collect();
         let texts = |text: fn(&StackInfo) -> &str| stacks.iter().map(text);
-        let described = (0..self.parts.len()).zip(&stacks).map(|(part, stack)| {
+        let names = told_apart(texts(|stack| &stack.part));
+        let described = stacks.iter().zip(names).enumerate().map(|(part, (stack, name))| {
             let mut all = Map::new();
-            all.insert("part".to_owned(), json!(stack.part));
+            all.insert("part".to_owned(), json!(name));
             all.insert("digest".to_owned(), json!(stack.digest));
             all.insert("commands".to_owned(), json!(stack.commands));
             all.append(&mut self.described(part));
@@ -195,6 +196,17 @@ fn common(here: &[Here<'_>], parts: usize) -> Map<String, Value> {
     other
 }
 
+/// Names with `-2`, `-3`, ... behind those that were there before.
+fn told_apart<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut told: Vec<String> = Vec::new();
+    for name in names {
+        let numbered = (2..).map(|number| format!("{name}-{number}"));
+        let mut free = std::iter::once(name.to_owned()).chain(numbered);
+        told.extend(free.find(|name| !told.contains(name)));
+    }
+    told
+}
+
 /// The digest of several inputs: that of their digests, one after another.
 fn digest_of<'a>(digests: impl Iterator<Item = &'a str>) -> String {
     let mut hasher = blake3::Hasher::new();
@@ -211,5 +223,16 @@ impl Step {
     /// The first layer here, which there always is.
     pub(super) fn some_layer(&self) -> &Arc<Layer> {
         self.layers.iter().flatten().next().expect("a step has a layer")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_told_apart() {
+        let names = told_apart(["a", "b", "a", "a-2", "a"].into_iter());
+        assert_eq!(names, ["a", "b", "a-2", "a-2-2", "a-3"]);
     }
 }
