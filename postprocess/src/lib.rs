@@ -2,8 +2,9 @@
 //! machine. Everything works on runs.
 //!
 //! [`fix`] corrects stray rows, [`edit`] changes a design, [`tile`] lays copies of a
-//! part out on a build area. All are adaptors from layers to layers. [`Swaths`] cuts
-//! build layers for a projector that scans.
+//! part out on a build area. All are adaptors from layers to layers. A [`Layout`] is
+//! for several parts; a [`Machine`](machine::Machine) says how large a build may be;
+//! [`Swaths`] cuts build layers for a projector that scans.
 //!
 //! ```
 //! use lamp_postprocess::{FixOptions, TileError, TileOptions, fix, tile};
