@@ -217,6 +217,10 @@ fn what_is_wrong_is_said_with_the_edit_and_the_key() {
             &["edit 1", "\u{3a9}", "ASCII"],
         ),
         (
+            "[[edit]]\nlabel = { text = \"SN {n}\", start = 17, at = [[\"5mm\", \"0mm\"]], height = \"3mm\" }\n",
+            &["edit 1", "`SN 17` reaches outside", "x -10."],
+        ),
+        (
             "[[edit]]\nlabel = { text = \"{m}\", at = [[\"0mm\", \"0mm\"]], height = \"1mm\" }\n",
             &["edit 1", "`{m}`", "{n:04}"],
         ),

@@ -23,6 +23,9 @@ const LARGEST_LIST: u64 = 1 << 20;
 /// byte for byte.
 #[derive(Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["edits", "union", "intersect", "difference", "xor"]))]
+#[command(override_usage = "\
+lamp edit [OPTIONS] <STACK> <EDITS.toml>
+       lamp edit [OPTIONS] <STACK> <--union|--intersect|--difference|--xor> <STACK>")]
 #[command(after_help = "\
 Examples:
   lamp edit blade.tif edits.toml -o variant.tif

@@ -69,7 +69,7 @@ impl Copy {
             .ok_or_else(|| wrong("its page does not say where the part lay".to_owned()))?;
         let [width, height] = part.part_pixels;
         let far = part.copies.iter().flatten().any(|place| place.abs() > FARTHEST);
-        if far || u64::from(height.max(width)) * part.copies.len() as u64 > MOST_ROWS {
+        if far || u64::from(height.max(width).max(1)) * part.copies.len() as u64 > MOST_ROWS {
             return Err(wrong("its page says that copies stand where no image reaches".to_owned()));
         }
         let lain = Place { origin_mm, width, height, ..*place };

@@ -9,6 +9,7 @@ mod copies;
 mod error;
 mod fill;
 mod forms;
+mod frames;
 mod letters;
 mod list;
 mod others;

@@ -43,12 +43,14 @@ pub(super) fn turn_page(
     if turn.is_across() {
         info.open_rows.clear();
     }
-    // Turned by half, or mirrored and not: the last row is the first.
+    // Turned by half, be it mirrored or not: the last row is the first.
     if turn.quarters() == 2 {
-        info.stray_rows.iter_mut().for_each(|row| *row = height - 1 - *row);
-        info.open_rows.iter_mut().for_each(|row| *row = height - *row);
-        info.stray_rows.reverse();
-        info.open_rows.reverse();
+        // What stands beyond the image is left out.
+        let upside_down = |rows: &[u32], last: Option<u32>| -> Vec<u32> {
+            rows.iter().rev().filter_map(|row| last?.checked_sub(*row)).collect()
+        };
+        info.stray_rows = upside_down(&info.stray_rows, height.checked_sub(1));
+        info.open_rows = upside_down(&info.open_rows, Some(height));
     }
     if let Some(stack) = &mut info.stack {
         forget_copies(stack);
@@ -105,6 +107,9 @@ mod tests {
         let mut page = info();
         turn_page(&mut page, "0m".parse().unwrap(), 10, &PLACE).unwrap();
         assert_eq!((&page.stray_rows, &page.open_rows), (&info().stray_rows, &info().open_rows));
+        page.stray_rows.push(11);
+        turn_page(&mut page, "180".parse().unwrap(), 10, &PLACE).unwrap();
+        assert_eq!(page.stray_rows, [0, 4, 7]);
         let across = turn_page(&mut page, "90".parse().unwrap(), 10, &PLACE);
         assert!(across.unwrap_err().to_string().contains("fix the stack first"));
     }

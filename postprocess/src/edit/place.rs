@@ -1,5 +1,7 @@
 //! Where a stack's pixels lie, and what becomes of that.
 
+use std::fmt;
+
 use lamp_stack::{Dpi, Frame, Layer, Length, Turn};
 
 use super::error::EditError;
@@ -31,6 +33,12 @@ impl Place {
         Ok(Grid { origin_mm: self.origin_mm, dpi })
     }
 
+    /// Whether a point in pixels is on the image.
+    pub(super) fn holds(&self, [x, y]: [f64; 2]) -> bool {
+        let on = |place: f64, size: u32| (-0.5..=f64::from(size) - 0.5).contains(&place);
+        on(x, self.width) && on(y, self.height)
+    }
+
     /// Where the pixels lie that a frame shows.
     pub(crate) fn framed(&self, frame: Frame) -> Self {
         let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
@@ -57,6 +65,17 @@ impl Place {
         }
         let (width, height) = turn.size(self.width, self.height);
         Self { origin_mm: [x0, y1], width, height, ..*self }
+    }
+}
+
+/// Where the image reaches, in millimetres.
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let pitch = self.dpi.map_or(Length::default(), Dpi::pitch).mm();
+        let [x, y] = self.origin_mm;
+        let (right, bottom) =
+            (x + f64::from(self.width) * pitch, y - f64::from(self.height) * pitch);
+        write!(f, "x {x:.3} to {right:.3} and y {bottom:.3} to {y:.3} mm")
     }
 }
 

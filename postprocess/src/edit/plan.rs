@@ -4,12 +4,13 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Frame, Image, Layer, Length, Mask, Op, PageInfo, Turn};
+use lamp_stack::{Frame, Image, Layer, Mask, Op, PageInfo, Turn};
 use serde_json::json;
 
 use super::copies::Copy;
 use super::error::EditError;
-use super::forms::{Edit, Mirror, OtherStack, Pad, Span};
+use super::forms::{Edit, Mirror, Span};
+use super::frames::{cropped, frame_of, padded};
 use super::list::Edits;
 use super::others::{Other, middle};
 use super::page::{frame_page, turn_page};
@@ -178,24 +179,7 @@ impl Step {
             return framed(padded(pad, place)?);
         }
         if let Some(crop) = edit.crop {
-            let [left, top] = place.grid()?.to_pixels([crop.x[0].mm(), crop.y[1].mm()]);
-            let [right, bottom] = place.grid()?.to_pixels([crop.x[1].mm(), crop.y[0].mm()]);
-            // From the first centre inside to the first that is not.
-            let within = |pixels: f64, size: u32| (pixels.ceil() as i64).clamp(0, size.into());
-            let [left, right] = [left, right].map(|x| within(x, place.width));
-            let [top, bottom] = [top, bottom].map(|y| within(y, place.height));
-            if left == right || top == bottom {
-                return Err(EditError::edit(
-                    number,
-                    format!("nothing is left: the image is {place}"),
-                ));
-            }
-            return framed(Frame {
-                left,
-                top,
-                width: (right - left) as u32,
-                height: (bottom - top) as u32,
-            });
+            return framed(cropped(crop, number, place)?);
         }
         let copies = Copy::all(&edit.copies, info, place)?;
         let shape = Shape::of(edit, number, place, copies)?;
@@ -252,73 +236,8 @@ impl Edit {
     }
 }
 
-/// A frame with so much black around the image, in whole pixels.
-fn padded(pad: Pad, place: &Place) -> Result<Frame, EditError> {
-    let grid = place.grid()?;
-    let [left, right, top, bottom] =
-        [pad.left, pad.right, pad.top, pad.bottom].map(|length| grid.length(length).round() as i64);
-    // Lengths are at most 10 m, so that 32 bits hold all.
-    let side = |size: u32, more: i64| (i64::from(size) + more) as u32;
-    Ok(Frame {
-        left: -left,
-        top: -top,
-        width: side(place.width, left + right),
-        height: side(place.height, top + bottom),
-    })
-}
-
-/// What of another stack's images lies in those at `place`.
-///
-/// # Errors
-/// Why that cannot be said.
-fn frame_of(
-    other: &Layer,
-    OtherStack { by, .. }: &OtherStack,
-    place: &Place,
-    info: &PageInfo,
-) -> Result<Frame, String> {
-    let from = Place::of(other);
-    if from.dpi != place.dpi {
-        let dpi = |place: &Place| {
-            place.dpi.map_or("no resolution".to_owned(), |dpi| format!("{dpi} dpi"))
-        };
-        return Err(format!(
-            "has {}, and the stack that is edited {}: slice both alike",
-            dpi(&from),
-            dpi(place)
-        ));
-    }
-    if other.info.origin_mm.is_some() != info.origin_mm.is_some() {
-        return Err("and the stack that is edited do not both say where they lie".to_owned());
-    }
-    let Ok(grid) = place.grid() else {
-        // Without a size of pixels all images begin at the top left.
-        let moved = by[..2].iter().any(|by| by.um() != 0.0);
-        return if moved {
-            Err(EditError::NoResolution.to_string())
-        } else {
-            Ok(Frame { left: 0, top: 0, width: place.width, height: place.height })
-        };
-    };
-    let [x, y] = from.origin_mm;
-    let [left, top] = grid.to_pixels([x + by[0].mm(), y + by[1].mm()]);
-    // The centres of its first column and row stand half a pixel further.
-    let [left, top] = [left, top].map(|pixels| -(pixels + 0.5).round() as i64);
-    Ok(Frame { left, top, width: place.width, height: place.height })
-}
-
 /// What a stack's first page says of where it comes from.
 fn origin_of(first: &Layer) -> serde_json::Value {
     let stack = first.info.stack.clone().unwrap_or_default();
     json!({ "part": stack.part, "digest": stack.digest, "commands": stack.commands })
-}
-
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let pitch = self.dpi.map_or(Length::default(), lamp_stack::Dpi::pitch).mm();
-        let [x, y] = self.origin_mm;
-        let (right, bottom) =
-            (x + f64::from(self.width) * pitch, y - f64::from(self.height) * pitch);
-        write!(f, "x {x:.3} to {right:.3} and y {bottom:.3} to {y:.3} mm")
-    }
 }

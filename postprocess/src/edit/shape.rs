@@ -43,10 +43,10 @@ impl Shape {
             }
             composed(&copies, place, |k, part| round(cylinder, grids[k], part))
         } else if let Some(label) = &edit.label {
-            let lines: Vec<_> = grids
+            let lines: Vec<_> = copies
                 .iter()
                 .zip(0..)
-                .map(|(grid, k)| letters(label, *grid, k))
+                .map(|(copy, k)| letters(label, &copy.part, k))
                 .collect::<Result<_, _>>()
                 .map_err(wrong)?;
             composed(&copies, place, |k, part| polygons(&lines[k], part.width, part.height))
@@ -131,9 +131,10 @@ fn stroke(Line { from, to, width }: Line, grid: Grid) -> Vec<Point> {
     vec![corner(from, -half), corner(to, -half), corner(to, half), corner(from, half)]
 }
 
-/// The outlines of a label at each of its places in a copy of that number.
-fn letters(label: &Label, grid: Grid, copy: i64) -> Result<Vec<Vec<Point>>, String> {
-    let mut lines = Vec::new();
+/// The outlines of a label at each of its places in the copy of that number.
+fn letters(label: &Label, part: &Place, copy: i64) -> Result<Vec<Vec<Point>>, String> {
+    let grid = part.grid().map_err(|error| error.to_string())?;
+    let mut lines: Vec<Vec<Point>> = Vec::new();
     let size = grid.length(label.height);
     let before = copy * label.at.len() as i64;
     for (at, k) in label.at.iter().zip(before..) {
@@ -145,6 +146,12 @@ fn letters(label: &Label, grid: Grid, copy: i64) -> Result<Vec<Vec<Point>>, Stri
         lines.extend(
             glyphs.into_iter().map(|line| line.into_iter().map(placed).collect::<Vec<_>>()),
         );
+        // Half a number is a wrong one.
+        if !lines.iter().flatten().all(|&point| part.holds(point)) {
+            return Err(format!(
+                "`{text}` reaches outside the image, which is {part}: move it, or pad first"
+            ));
+        }
     }
     Ok(lines)
 }

@@ -1,0 +1,77 @@
+//! The frames that edits ask for, in pixels.
+
+use lamp_stack::{Frame, Layer, PageInfo};
+
+use super::error::EditError;
+use super::forms::{Block, OtherStack, Pad};
+use super::place::Place;
+
+/// A frame with so much black around the image, in whole pixels.
+pub(super) fn padded(pad: Pad, place: &Place) -> Result<Frame, EditError> {
+    let grid = place.grid()?;
+    let [left, right, top, bottom] =
+        [pad.left, pad.right, pad.top, pad.bottom].map(|length| grid.length(length).round() as i64);
+    // Lengths are at most 10 m, so that 32 bits hold all.
+    let side = |size: u32, more: i64| (i64::from(size) + more) as u32;
+    Ok(Frame {
+        left: -left,
+        top: -top,
+        width: side(place.width, left + right),
+        height: side(place.height, top + bottom),
+    })
+}
+
+/// What of another stack's images lies in those at `place`.
+///
+/// # Errors
+/// Why that cannot be said.
+pub(super) fn frame_of(
+    other: &Layer,
+    OtherStack { by, .. }: &OtherStack,
+    place: &Place,
+    info: &PageInfo,
+) -> Result<Frame, String> {
+    let from = Place::of(other);
+    if from.dpi != place.dpi {
+        let dpi = |place: &Place| {
+            place.dpi.map_or("no resolution".to_owned(), |dpi| format!("{dpi} dpi"))
+        };
+        return Err(format!(
+            "has {}, and the stack that is edited {}: slice both alike",
+            dpi(&from),
+            dpi(place)
+        ));
+    }
+    if other.info.origin_mm.is_some() != info.origin_mm.is_some() {
+        return Err("and the stack that is edited do not both say where they lie".to_owned());
+    }
+    let Ok(grid) = place.grid() else {
+        // Without a size of pixels all images begin at the top left.
+        let moved = by[..2].iter().any(|by| by.um() != 0.0);
+        return if moved {
+            Err(EditError::NoResolution.to_string())
+        } else {
+            Ok(Frame { left: 0, top: 0, width: place.width, height: place.height })
+        };
+    };
+    let [x, y] = from.origin_mm;
+    let [left, top] = grid.to_pixels([x + by[0].mm(), y + by[1].mm()]);
+    // The centres of its first column and row stand half a pixel further.
+    let [left, top] = [left, top].map(|pixels| -(pixels + 0.5).round() as i64);
+    Ok(Frame { left, top, width: place.width, height: place.height })
+}
+
+/// What of an image lies in a box: from the first centre inside to the first that
+/// is not.
+pub(super) fn cropped(crop: Block, number: usize, place: &Place) -> Result<Frame, EditError> {
+    let grid = place.grid()?;
+    let [left, top] = grid.to_pixels([crop.x[0].mm(), crop.y[1].mm()]);
+    let [right, bottom] = grid.to_pixels([crop.x[1].mm(), crop.y[0].mm()]);
+    let within = |pixels: f64, size: u32| (pixels.ceil() as i64).clamp(0, size.into());
+    let [left, right] = [left, right].map(|x| within(x, place.width));
+    let [top, bottom] = [top, bottom].map(|y| within(y, place.height));
+    if left == right || top == bottom {
+        return Err(EditError::edit(number, format!("nothing is left: the image is {place}")));
+    }
+    Ok(Frame { left, top, width: (right - left) as u32, height: (bottom - top) as u32 })
+}
