@@ -40,6 +40,26 @@ use plan::Plan;
 /// Shapes and stacks lie in the part's coordinates; a pixel is in a shape when its
 /// centre is, a layer in a range of heights when its middle is.
 ///
+/// ```
+/// use lamp_postprocess::{EditError, Edits, edit};
+/// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
+///
+/// // At 25.4 dpi a pixel is a millimetre, and the lower left corner is 0, 0.
+/// let image = Image::Mask(Mask::black(8, 4).inverted());
+/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image };
+/// let list = r#"
+///     [[edit]]
+///     op = "subtract"
+///     box = { x = ["2mm", "5mm"], y = ["0mm", "1mm"] }
+/// "#;
+///
+/// let layers = std::iter::once(Ok::<_, EditError>(layer));
+/// let mut edited = edit(layers, Edits::from_toml(list)?, vec![], |_, _| {});
+/// let Image::Mask(mask) = edited.next().unwrap()?.image else { unreachable!() };
+/// assert_eq!((mask.row(2), mask.row(3)), (&[0][..], &[0, 2, 5][..]));
+/// # Ok::<(), EditError>(())
+/// ```
+///
 /// # Errors
 /// Layers come with errors where they cannot be read, where they differ in size or
 /// place from the first, or where the edits cannot be done to them. Where a stack
