@@ -9,6 +9,7 @@ use serde_path_to_error::Segment;
 
 use super::error::EditError;
 use super::forms::{Along, Edit, OtherStack};
+use crate::toml_text::{line_of, one_line};
 
 /// What is to be done to a stack, one after the other.
 #[derive(Clone, Debug)]
@@ -133,18 +134,6 @@ fn key_of(path: &serde_path_to_error::Path) -> String {
         }
     }
     if key.is_empty() { "the file".to_owned() } else { key }
-}
-
-/// The line of an error, from 1.
-fn line_of(text: &str, error: &toml::de::Error) -> usize {
-    let start = error.span().map_or(0, |span| span.start);
-    1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count()
-}
-
-/// A message of a parser without line breaks and control characters.
-fn one_line(text: &str) -> String {
-    let clean: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    clean.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use serde::de::{self, Deserialize, Deserializer};
 use thiserror::Error;
 
 use super::Machine;
+use crate::toml_text::{line_of, one_line};
 
 /// Why a text is no machine.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -113,17 +114,6 @@ pub(super) fn some_text<'de, D: Deserializer<'de>>(from: D) -> Result<String, D:
         return Err(de::Error::custom("this is empty: write what it is for the next reader"));
     }
     Ok(text)
-}
-
-/// Returns the line of an error, from 1.
-fn line_of(text: &str, error: &toml::de::Error) -> usize {
-    let start = error.span().map_or(0, |span| span.start);
-    1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count()
-}
-
-/// Makes one line of a text from a file: it must not steer the terminal.
-fn one_line(text: &str) -> String {
-    text.replace(char::is_control, " ")
 }
 
 #[cfg(test)]
