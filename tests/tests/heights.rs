@@ -62,7 +62,7 @@ fn a_stack_has_the_layers_of_the_report() {
     assert_eq!(top, 76_200.0);
     // Where no thickness is within the bound, at the tip of the sphere.
     let past = rows.iter().filter(|row| row[6] > 2.0).count();
-    assert!(past < 8 && said.lines().nth(1).unwrap().contains(&format!("{past:>12}")), "{said}");
+    assert!(past < 15 && said.lines().nth(1).unwrap().contains(&format!("{past:>12}")), "{said}");
     let thick = rows.iter().filter(|row| row[2] == 2500.0).count();
     assert!(thick >= 7 && rows.len() > 100, "{thick} of {}", rows.len());
     let plot = String::from_utf8(scratch.bytes("heights.svg")).unwrap();
