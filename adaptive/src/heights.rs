@@ -83,8 +83,8 @@ const NEAR: f64 = 0.6;
 
 impl Search<'_> {
     /// Finds the layers from the bottom: each the thickest whose measure is at most
-    /// `bound`, or the one of the least measure where none is. They end at the part's
-    /// top, rounded to whole steps.
+    /// `bound`, or the thinnest where none is. They end at the part's top, rounded to
+    /// whole steps.
     ///
     /// Thicker layers are not always worse, so all thicknesses are looked at, except
     /// those that a criterion rules out.
@@ -159,8 +159,7 @@ impl Search<'_> {
                 good.min_by(|a, b| per_um(a).total_cmp(&per_um(b)))
             }
         };
-        let least = || (0..slabs.len()).min_by(|&a, &b| measures[a].total_cmp(&measures[b]));
-        cheapest.or_else(least).expect("there is a top")
+        cheapest.unwrap_or(0)
     }
 
     /// The heights where layers are to end, in steps: flat faces, rounded down so

@@ -57,10 +57,10 @@ fn a_stack_has_the_layers_of_the_report() {
         assert!((100.0..=2500.0).contains(&thickness));
         let expected = if thickness > 500.0 { 4.0 * thickness - 1000.0 } else { 2.0 * thickness };
         assert!((row[9] - expected).abs() < 2e-3, "{row:?}");
+        assert!(row[6] <= 2.0 || thickness == 100.0, "{row:?}");
         top = z + thickness;
     }
     assert_eq!(top, 76_200.0);
-    // Where no thickness is within the bound, at the tip of the sphere.
     let past = rows.iter().filter(|row| row[6] > 2.0).count();
     assert!(past < 15 && said.lines().nth(1).unwrap().contains(&format!("{past:>12}")), "{said}");
     let thick = rows.iter().filter(|row| row[2] == 2500.0).count();
