@@ -11,7 +11,7 @@
 //!
 //! let scratch = Scratch::new();
 //! scratch.part("cube.stl", Part::Cube, 64);
-//! scratch.run("slice cube.stl --dpi 100 | fix | dither | tile > build.tif").succeeds();
+//! scratch.run("slice cube.stl --dpi 100 | fix | dither | tile --mesh none > build.tif").succeeds();
 //! assert_eq!(scratch.layers("build.tif").len(), 200);
 //! ```
 

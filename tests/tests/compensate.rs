@@ -257,7 +257,7 @@ fn it_is_a_stage_whatever_the_threads() {
     let scratch = Scratch::new();
     scratch.part("tower.stl", Part::Tower, 2_000);
     let slice = "slice tower.stl --dpi 200 --thickness 5mm";
-    let rest = "dither --quiet | tile --area 200x200mm";
+    let rest = "dither --quiet | tile --area 200x200mm --mesh none";
     for threads in [1, 2, 7] {
         let line = format!(
             "{slice} | lamp compensate --uniform 0.3mm --threads {threads} --quiet | {rest} > {threads}.tif"

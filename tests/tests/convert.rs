@@ -12,7 +12,7 @@ use lamp_tests::{Scratch, mask};
 fn with_build() -> Scratch {
     let scratch = Scratch::new();
     scratch.run("lamp sample tower --facets 5k --defect drop --count 20 -o t.stl -q").succeeds();
-    let line = "slice t.stl --dpi 100 --thickness 2mm -q | fix -q | tile --area 4x4in -o build.tif";
+    let line = "slice t.stl --dpi 100 --thickness 2mm -q | fix -q | tile --mesh none --area 4x4in -o build.tif";
     scratch.run(line).succeeds();
     assert!(scratch.layers("build.tif").iter().any(|layer| layer.info.other.contains_key("fix")));
     scratch

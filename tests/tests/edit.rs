@@ -128,7 +128,8 @@ fn every_copy_of_a_build_has_its_number_as_if_it_was_edited_before() {
         )
     };
     scratch.write("all.toml", label(8, "copies = true\n").as_bytes());
-    let line = "tile cube.tif --area 70x50mm --copies 6 | lamp edit - all.toml > build.tif";
+    let line =
+        "tile cube.tif --mesh none --area 70x50mm --copies 6 | lamp edit - all.toml > build.tif";
     scratch.run(line).succeeds_quietly();
     let build = scratch.layers("build.tif");
     let tile = &build[0].info.stack.as_ref().unwrap().other["tile"];

@@ -11,7 +11,7 @@ fn with_build() -> (Scratch, Vec<Layer>) {
     let scratch = Scratch::new();
     scratch.part("blade.stl", Part::Blade, 24_000);
     let line = "slice blade.stl --dpi 100 --thickness 5mm | fix | dither \
-                | tile --area 170x80mm > build.tif";
+                | tile --mesh none --area 170x80mm > build.tif";
     scratch.run(line).succeeds_quietly();
     scratch.run("fix build.tif --classic -o classic.tif").succeeds_quietly();
     let layers = scratch.layers("build.tif");

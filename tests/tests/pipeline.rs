@@ -30,7 +30,8 @@ fn stack_info(layers: &[Layer]) -> &StackInfo {
 #[test]
 fn four_processes_make_a_build_of_the_right_size() {
     let scratch = with_tower();
-    let line = format!("slice tower.stl {COARSE} | fix | dither | tile {AREA} > build.tif");
+    let tile = format!("tile {AREA} --mesh none");
+    let line = format!("slice tower.stl {COARSE} | fix | dither | {tile} > build.tif");
     scratch.run(&line).succeeds_quietly();
     let layers = scratch.layers("build.tif");
     // 76.2 mm in layers of 1 mm.
@@ -75,7 +76,8 @@ fn threads_memory_and_the_name_of_the_program_change_no_byte() {
         scratch.run(&line).succeeds().stdout
     };
     let plain = stages("slice", "");
-    assert_eq!(read_stack(plain.clone()).len(), 76);
+    // Five of mesh alone are below the part's 76.
+    assert_eq!(read_stack(plain.clone()).len(), 81);
     for more in ["--threads 1", "--threads 2", "--threads 7", "--memory 16MB", "--memory 1GB"] {
         assert!(stages("slice", more) == plain, "{more} changed the bytes");
     }
@@ -162,7 +164,7 @@ fn a_range_of_layers_is_that_part_of_the_stack() {
             assert_eq!(stack_info(&some).part, "tower", "{line}");
         }
     }
-    let line = format!("tile all.tif {AREA} --layers 20..31");
+    let line = format!("tile all.tif {AREA} --mesh none --layers 20..31");
     let tiled = read_stack(scratch.run(&line).succeeds().stdout);
     assert_eq!(
         tiled.iter().map(|layer| layer.info.index).collect::<Vec<_>>(),
@@ -186,7 +188,7 @@ fn a_range_of_layers_written_as_a_folder_reads_back() {
 fn tiled_copies_are_the_part_and_nothing_else() {
     let scratch = with_tower();
     scratch.run(&format!("slice tower.stl {COARSE} --layers 60..63 -o part.tif")).succeeds();
-    scratch.run(&format!("tile part.tif {AREA} --gap 2mm -o build.tif")).succeeds();
+    scratch.run(&format!("tile part.tif {AREA} --mesh none --gap 2mm -o build.tif")).succeeds();
     let (part, build) = (scratch.layers("part.tif"), scratch.layers("build.tif"));
     let copies = stack_info(&build).other["tile"]["copies"].as_array().expect("a list").clone();
     // Images of 128 x 102 pixels, 8 apart, on 400 x 400.
@@ -225,6 +227,8 @@ fn the_demo_is_what_the_four_binaries_make() {
         // A picture of a layer, in black and white and with grays on edges.
         assert!([0, 255].iter().all(|level| pixels.contains(level)), "{name}");
     }
-    scratch.run("slice shown/blade.stl | fix | dither | tile > by_hand.tif").succeeds_quietly();
+    scratch
+        .run("slice shown/blade.stl | fix | dither | tile --mesh none > by_hand.tif")
+        .succeeds_quietly();
     assert!(scratch.bytes("shown/build.tif") == scratch.bytes("by_hand.tif"));
 }

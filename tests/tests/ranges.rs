@@ -163,7 +163,7 @@ fn stacks_that_do_not_belong_together_are_both_named() {
         ("low input", &["input is \"blake3:"]),
         ("low plain", &[r#"part is unknown, not "t""#]),
         ("low tiled", &["size is "]),
-        ("moved tiled", &["--gap 1mm"]),
+        ("moved tiled", &["--gap 4mm"]),
     ] {
         let files: Vec<_> = names.split(' ').map(|name| format!("{name}.tif")).collect();
         let words = [&["join: ", &files[0], &files[1]], words].concat();

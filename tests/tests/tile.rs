@@ -77,7 +77,7 @@ fn check(scratch: &Scratch, build: &str, stacks: &[&str]) -> usize {
 #[test]
 fn several_stacks_make_one_build_whatever_the_threads() {
     let scratch = with_parts();
-    let line = "tile tower.tif:5 torus.tif:3 --area 150x150mm";
+    let line = "tile tower.tif:5 torus.tif:3 --area 150x150mm --mesh none";
     for (k, more) in ["", "--fit", "--fit --turns quarters"].into_iter().enumerate() {
         let build = format!("build{k}.tif");
         scratch.run(&format!("{line} {more} -o {build}")).succeeds_quietly();
@@ -98,13 +98,16 @@ fn several_stacks_make_one_build_whatever_the_threads() {
 fn standard_input_fits_as_a_file_does() {
     let scratch = with_parts();
     let stack = scratch.bytes("torus.tif");
-    for options in ["--fit", "--pack outline", "--fit --layers 3..9", "--copies 2"] {
+    for options in ["--fit", "--pack outline", "--fit --layers 3..9", "--copies 2 --gap 1mm"] {
         let file = scratch.run(&format!("tile torus.tif {options}")).succeeds_quietly().stdout;
         let line = format!("tile {options}");
         assert!(scratch.run_on(&line, &stack).succeeds_quietly().stdout == file, "{options}");
     }
-    let both = scratch.run("tile tower.tif torus.tif:2").succeeds_quietly().stdout;
-    assert!(scratch.run_on("tile tower.tif -- -:2", &stack).succeeds_quietly().stdout == both);
+    let both = scratch.run("tile tower.tif torus.tif:2 --area 200x200mm").succeeds_quietly().stdout;
+    assert!(
+        scratch.run_on("tile tower.tif --area 200x200mm -- -:2", &stack).succeeds_quietly().stdout
+            == both
+    );
     scratch.run("tile --fit").is_refused_with(&["standard input", "empty"]);
     let cut = scratch.run_on("tile --fit", &stack[..stack.len() / 2]);
     cut.is_refused_with(&["standard input", "cut off"]);
@@ -114,7 +117,8 @@ fn standard_input_fits_as_a_file_does() {
 fn outlines_place_more_round_parts_than_boxes() {
     let scratch = with_parts();
     let count = |options: &str, build: &str| {
-        let line = format!("tile tower.tif --area 95x120mm --gap 0.5mm {options} -o {build}");
+        let line =
+            format!("tile tower.tif --area 95x120mm --mesh none --gap 0.5mm {options} -o {build}");
         scratch.run(&line).succeeds_quietly();
         check(&scratch, build, &["tower.tif"])
     };
@@ -127,10 +131,10 @@ fn outlines_place_more_round_parts_than_boxes() {
 fn a_layout_gives_the_same_build_again() {
     let scratch = with_parts();
     let stacks = "tower.tif torus.tif";
-    let line = "tile tower.tif:4 torus.tif:2 --area 120x150mm --pack outline";
+    let line = "tile tower.tif:4 torus.tif:2 --area 120x150mm --mesh none --pack outline";
     let written = "--layout-out 1.json --layout-picture 1.png -o 1.tif";
     scratch.run(&format!("{line} {written}")).succeeds_quietly();
-    let line = format!("tile {stacks} --fit --layout 1.json");
+    let line = format!("tile {stacks} --fit --mesh none --layout 1.json");
     let written = "--layout-out 2.json --layout-picture 2.svg -o 2.tif";
     scratch.run(&format!("{line} {written}")).succeeds_quietly();
     assert!(scratch.bytes("1.json") == scratch.bytes("2.json"));
@@ -155,7 +159,7 @@ fn a_layout_says_how_copies_lie() {
             copies.iter().map(|copy| format!(r#"{{"part": "l.tif", {copy}}}"#)).collect();
         let text = format!(r#"{{"area_mm": [20, 20], "copies": [{}]}}"#, copies.join(","));
         scratch.write("layout.json", text.as_bytes());
-        scratch.run("tile l.tif --layout layout.json -o build.tif")
+        scratch.run("tile l.tif --layout layout.json --mesh none -o build.tif")
     };
     layout(&[
         r#""x_mm": 0, "y_mm": 0"#,
@@ -231,12 +235,12 @@ fn stray_rows_are_told_once_however_many_copies() {
         Layer { info, dpi: Dpi::new(25.4), image }
     };
     scratch.stack("p.tif", [stray(0, &[]), stray(1, &[1, 2, 3])]);
-    let ran = scratch.run("tile p.tif:200 --area 100x100mm --gap 1mm -o build.tif").succeeds();
+    let ran = scratch.run("tile p.tif:200 --area 100x100mm --mesh none -o build.tif").succeeds();
     assert_eq!(ran.stderr, "tile: p.tif: layer 1 (z 0.10 mm) has 3 stray rows: 1-3\n");
     let build = scratch.layers("build.tif");
     assert!(build[0].info.stray_rows.is_empty());
     assert_eq!(build[1].info.stray_rows.len(), 3 * 10);
-    scratch.run("tile p.tif:200 --area 100x100mm -q -o build.tif").succeeds_quietly();
+    scratch.run("tile p.tif:200 --area 100x100mm --mesh none -q -o build.tif").succeeds_quietly();
 }
 
 #[test]
@@ -249,7 +253,7 @@ fn gray_layers_make_a_gray_build() {
     scratch.stack("gray.tif", [Layer { info, dpi: Dpi::new(25.4), image }]);
     let layout = r#"{"copies": [{"part": "gray.tif", "x_mm": 1, "y_mm": 1, "turn": 270}, {"part": "gray.tif", "x_mm": 20, "y_mm": 1}]}"#;
     scratch.write("layout.json", layout.as_bytes());
-    scratch.run("tile gray.tif --layout layout.json -o build.tif").succeeds_quietly();
+    scratch.run("tile gray.tif --layout layout.json --mesh none -o build.tif").succeeds_quietly();
     let build = scratch.layers("build.tif");
     let Image::Gray(image) = &build[0].image else { panic!("a mask") };
     let places = copies(&about_parts(&build)[0]);
@@ -261,9 +265,10 @@ fn gray_layers_make_a_gray_build() {
     }
     // Thresholds know no place, so that dots are the same before and after.
     let dots = "dither --method threshold";
-    let after = scratch.run(&format!("tile gray.tif --copies 2 | {dots} -o after.tif"));
+    let after = scratch.run(&format!("tile gray.tif --mesh none --copies 2 | {dots} -o after.tif"));
     after.succeeds_quietly();
-    let before = scratch.run(&format!("{dots} gray.tif | tile --copies 2 -o before.tif"));
+    let before =
+        scratch.run(&format!("{dots} gray.tif | tile --mesh none --copies 2 -o before.tif"));
     before.succeeds_quietly();
     assert!(scratch.layers("after.tif")[0].image == scratch.layers("before.tif")[0].image);
 }
@@ -317,7 +322,7 @@ fn what_cannot_be_meant_is_wrong_usage() {
         assert!(!scratch.path("x.tif").exists());
     }
     scratch
-        .run("tile tower.tif:999 -o x.tif")
+        .run("tile tower.tif:999 --mesh none -o x.tif")
         .is_refused_with(&["tower.tif: 999 copies", "only 12 fit"]);
     scratch.run("tile tower.tif --layout l.json -o x.tif").is_refused_with(&["l.json"]);
 }

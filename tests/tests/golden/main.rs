@@ -101,7 +101,7 @@ fn tiled() -> Images {
     let scratch = Scratch::new();
     scratch.part("torus.stl", Part::Torus, 2_000);
     let line = "slice torus.stl --dpi 60 --thickness 1mm --layers 7 | fix | dither \
-                | tile --area 220x150mm --copies 5 --gap 2mm";
+                | tile --mesh none --area 220x150mm --copies 5 --gap 2mm";
     named("tiled", &read_stack(scratch.run(line).succeeds_quietly().stdout), &[7])
 }
 

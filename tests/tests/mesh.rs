@@ -1,0 +1,244 @@
+//! The mesh of `tile`: around the parts, never on them, and below them.
+
+use std::ops::Range;
+
+use lamp_fixtures::Part;
+use lamp_stack::{Frame, Image, Layer, Mask, Op};
+use lamp_tests::{Scratch, ends_white, mask, write_gray_ramp};
+
+/// At 100 dpi, so that a millimetre is a bit less than four pixels.
+const COARSE: &str = "--dpi 100 --thickness 1mm -q";
+/// The default clearance in pixels.
+const CLEARANCE: f64 = 1.0 * 100.0 / 25.4;
+/// The default number of layers of mesh alone.
+const BASE: usize = 5;
+
+/// A tower of 76 layers and a torus of 15.
+fn with_parts() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch.part("torus.stl", Part::Torus, 2_000);
+    for name in ["tower", "torus"] {
+        scratch.run(&format!("slice {name}.stl {COARSE} -o {name}.tif")).succeeds_quietly();
+    }
+    scratch
+}
+
+/// The white runs of an image, as rows and columns.
+fn white_runs(mask: &Mask) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
+    let runs = |row: &[u32]| -> Vec<_> {
+        row.chunks(2).map(|run| run[0] as usize..run[1] as usize).collect()
+    };
+    mask.rows().enumerate().flat_map(move |(k, row)| runs(row).into_iter().map(move |run| (k, run)))
+}
+
+/// Pixel by pixel, what lies nearer to white pixels than leaves `gap` pixels
+/// between them.
+fn nearer_than(mask: &Mask, gap: f64) -> Vec<Vec<bool>> {
+    let (width, height) = (mask.width() as usize, mask.height() as usize);
+    let mut near = vec![vec![false; width]; height];
+    let reach = gap.ceil() as usize + 1;
+    for (row, run) in white_runs(mask) {
+        let first = row.saturating_sub(reach);
+        let lines = near[first..(row + reach + 1).min(height)].iter_mut();
+        for (line, near) in (first..).zip(lines) {
+            // From centre to centre it is a pixel more.
+            let away = |across: usize| (across as f64).hypot(line.abs_diff(row) as f64);
+            let across = (0..=reach).rev().find(|&across| away(across) < gap + 1.0);
+            let Some(across) = across else { continue };
+            near[run.start.saturating_sub(across)..(run.end + across).min(width)].fill(true);
+        }
+    }
+    near
+}
+
+fn minus(a: &Mask, b: &Mask) -> Mask {
+    a.combined(Op::Difference, b).unwrap()
+}
+
+fn pixels_in(mask: &Mask, places: &[Vec<bool>]) -> usize {
+    white_runs(mask).map(|(row, run)| places[row][run].iter().filter(|&&place| place).count()).sum()
+}
+
+#[test]
+fn parts_are_untouched_and_moats_are_as_wide_as_stated() {
+    let scratch = with_parts();
+    let stacks = "tower.tif torus.tif";
+    for (k, packed) in ["", "--pack outline"].into_iter().enumerate() {
+        let line =
+            "tile tower.tif:3 torus.tif:2 --area 120x150mm --layout-out l.json -o meshed.tif";
+        scratch.run(&format!("{line} {packed}")).succeeds_quietly();
+        let fit = if packed.is_empty() { "" } else { "--fit" };
+        let again = format!("tile {stacks} {fit} --layout l.json");
+        scratch.run(&format!("{again} --mesh none -o plain.tif")).succeeds_quietly();
+        scratch.run(&format!("{again} --break-width 0um -o unbroken.tif")).succeeds_quietly();
+        let [meshed, plain, unbroken] =
+            ["meshed.tif", "plain.tif", "unbroken.tif"].map(|name| scratch.layers(name));
+        assert_eq!((plain.len(), meshed.len(), unbroken.len()), (76, 76 + BASE, 76 + BASE));
+        let whole = mask(&unbroken[0]);
+        assert!(mask(&meshed[0]) == whole, "break lines are for the layers of the parts");
+        for layer in [0, 3, 12, 20, 50, 75] {
+            let [parts, meshed, unbroken] =
+                [&plain[layer], &meshed[layer + BASE], &unbroken[layer + BASE]].map(mask);
+            assert_eq!(minus(parts, meshed).white_pixels(), 0, "{k}, layer {layer}");
+            let [mesh, unbroken] = [meshed, unbroken].map(|build| minus(build, parts));
+            assert_eq!(pixels_in(&mesh, &nearer_than(parts, CLEARANCE)), 0, "{k}, layer {layer}");
+            // Mesh is where it would be without parts, as far as no moat is there.
+            assert_eq!(minus(&unbroken, whole).white_pixels(), 0, "{k}, layer {layer}");
+            assert_eq!(minus(&mesh, &unbroken).white_pixels(), 0, "{k}, layer {layer}");
+            let lost = minus(whole, &unbroken);
+            let within = pixels_in(&lost, &nearer_than(parts, CLEARANCE + 2.0));
+            let enclosed = lost.white_pixels() - within as u64;
+            // The hole of a torus, from which no mesh would come free.
+            assert_eq!(enclosed > 0, layer < 15, "{k}, layer {layer}: {enclosed}");
+            let cut = minus(&unbroken, &mesh).white_pixels() as f64 / mesh.white_pixels() as f64;
+            assert!((0.01..0.3).contains(&cut), "{k}, layer {layer}: {cut} is cut by break lines");
+        }
+    }
+}
+
+#[test]
+fn the_base_lies_below_and_heights_stay_the_parts() {
+    let scratch = with_parts();
+    let options = "--copies 1 --area 100x90mm";
+    scratch.run(&format!("tile torus.tif {options} --mesh none -o plain.tif")).succeeds_quietly();
+    for (line, base) in [("", BASE), ("--base-layers 0", 0), ("--base-layers 12", 12)] {
+        scratch.run(&format!("tile torus.tif {options} {line} -o build.tif")).succeeds_quietly();
+        let (build, parts) = (scratch.layers("build.tif"), scratch.layers("plain.tif"));
+        assert_eq!(build.len(), parts.len() + base);
+        let stack = build[0].info.stack.as_ref().unwrap();
+        assert_eq!(stack.layers.map(|layers| layers as usize), Some(build.len()));
+        let facts = |layer: &Layer| (layer.info.z_um, layer.info.thickness_um);
+        for (k, layer) in build.iter().enumerate() {
+            let height = (k as f64 - base as f64) * 1000.0;
+            assert_eq!(facts(layer), (Some(height), Some(1000.0)));
+            assert_eq!((layer.info.index as usize, layer.info.stack.is_some()), (k, k == 0));
+        }
+        assert!(build[base..].iter().map(facts).eq(parts.iter().map(facts)));
+        assert!(build[..base].iter().all(|layer| layer.image == build[0].image));
+        assert!(scratch.run("lamp info build.tif").succeeds_quietly().stdout.len() > 100);
+    }
+}
+
+#[test]
+fn ranges_tiled_apart_join_to_the_whole() {
+    let scratch = with_parts();
+    let place = "tile tower.tif --area 120x110mm --layout-out l.json -o x.tif";
+    scratch.run(place).succeeds_quietly();
+    let line = "tile tower.tif --layout l.json";
+    for (k, range) in ["..30", "30..31", "31.."].iter().enumerate() {
+        scratch.run(&format!("{line} --layers {range} -o {k}.tif")).succeeds_quietly();
+    }
+    scratch.run("lamp join 0.tif 1.tif 2.tif -o joined.tif").succeeds_quietly();
+    let whole = scratch.run(line).succeeds_quietly().stdout;
+    assert!(scratch.bytes("joined.tif") == whole);
+    assert_eq!(scratch.layers("2.tif")[0].info.index as usize, 31 + BASE);
+}
+
+#[test]
+fn an_image_is_repeated_as_the_mesh() {
+    let scratch = with_parts();
+    let text = ["#######", "#......", "#..##..", "#..##..", "#......"];
+    let row = |row: &&str| -> Vec<u32> {
+        let at = |column: usize| row.as_bytes().get(column) == Some(&b'#');
+        (0..7).filter(|&c| at(c) != (c > 0 && at(c - 1))).map(|c| c as u32).collect()
+    };
+    let mut template = lamp_stack::MaskBuilder::new(7);
+    text.iter().for_each(|line| template.push_row(&row(line)).unwrap());
+    let layer = Layer {
+        info: lamp_stack::PageInfo::default(),
+        dpi: None,
+        image: Image::Mask(template.finish()),
+    };
+    scratch.stack("walls.tif", [layer]);
+    scratch.run("tile torus.tif --mesh walls.tif --copies 1 -o build.tif").succeeds_quietly();
+    let build = scratch.layers("build.tif");
+    let base = mask(&build[0]);
+    for (row, column) in (0..20).flat_map(|row| (0..base.width() - 1).map(move |c| (row, c))) {
+        let expected = text[row % 5].as_bytes()[column as usize % 7] == b'#';
+        assert_eq!(base.is_white(column, row as u32), expected, "{column}, {row}");
+    }
+    let command = build[0].info.stack.as_ref().unwrap().commands.last().unwrap();
+    assert!(command.contains("--mesh walls.tif"), "{command}");
+    write_gray_ramp(&scratch.path("gray.tif"), 16, 16);
+    scratch
+        .run("tile torus.tif --mesh gray.tif -o x.tif")
+        .is_refused_with(&["gray.tif", "dither it first"]);
+    scratch
+        .run("tile torus.tif --mesh hexagons -o x.tif")
+        .is_refused_with(&["hexagons", "No such file"]);
+    for (options, words) in [
+        ("--cell 2mm --wall 2mm", "wall"),
+        ("--mesh square --cell 100um", "cell"),
+        ("--clearance 500mm", "clearance"),
+    ] {
+        let line = format!("tile torus.tif {options} --gap 5mm -o x.tif");
+        scratch.run(&line).is_refused_with(&[words]);
+    }
+    assert!(!scratch.path("x.tif").exists());
+}
+
+#[test]
+fn options_that_contradict_each_other_are_wrong_usage() {
+    let scratch = with_parts();
+    let before = scratch.names();
+    for (options, words) in [
+        ("--mesh none --cell 4mm", ["--cell", "--mesh none"]),
+        ("--mesh none --clearance 1mm", ["--clearance", "--mesh none"]),
+        ("--mesh none --break-pitch 9mm", ["--break-pitch", "--mesh none"]),
+        ("--mesh none --base-layers 3", ["--base-layers", "--mesh none"]),
+        ("--mesh torus.tif --wall 1mm", ["--wall", "an image has its own walls"]),
+        ("--base-layers x", ["--base-layers", "invalid"]),
+        ("--cell 4", ["--cell", "unit"]),
+    ] {
+        let ran = scratch.run(&format!("tile tower.tif {options} -o x.tif"));
+        assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+        assert!(words.iter().all(|word| ran.stderr.contains(word)), "{ran:?}");
+    }
+    assert_eq!(scratch.names(), before);
+}
+
+#[test]
+fn threads_change_no_byte_and_fix_nothing() {
+    let scratch = with_parts();
+    let line = "tile tower.tif:3 torus.tif:2 --area 120x150mm --fit --mesh square";
+    let build = scratch.run(&format!("{line} --threads 1")).succeeds_quietly().stdout;
+    assert!(scratch.run(&format!("{line} --threads 3")).succeeds_quietly().stdout == build);
+    scratch.write("build.tif", &build);
+    assert!(scratch.layers("build.tif").iter().all(|layer| !ends_white(mask(layer))));
+    assert!(scratch.run("fix build.tif").succeeds_quietly().stdout == build);
+    assert!(scratch.run_on("fix | dither", &build).succeeds_quietly().stdout == build);
+}
+
+#[test]
+fn edits_of_copies_hit_the_parts() {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Part::Cube, 2000);
+    scratch.run("slice cube.stl --dpi 254 --thickness 500um -o cube.tif").succeeds_quietly();
+    let label = |start: u32, copies: &str| {
+        format!(
+            "[[edit]]\nop = \"subtract\"\nz = [\"0mm\", \"1mm\"]\n{copies}\
+             label = {{ text = \"{{n:03}}\", start = {start}, at = [[\"-9mm\", \"-9mm\"]], height = \"3mm\" }}\n"
+        )
+    };
+    scratch.write("all.toml", label(8, "copies = true\n").as_bytes());
+    scratch
+        .run("tile cube.tif --fit --area 80x60mm --copies 6 | lamp edit - all.toml > build.tif")
+        .succeeds_quietly();
+    let build = scratch.layers("build.tif");
+    let tile = &build[0].info.stack.as_ref().unwrap().other["tile"];
+    let number = |key: &str, side: usize| tile[key][side].as_i64().unwrap();
+    for k in 0..6 {
+        scratch.write("one.toml", label(8 + k, "").as_bytes());
+        scratch.run("lamp edit cube.tif one.toml -o one.tif").succeeds_quietly();
+        let part = scratch.layers("one.tif");
+        let [width, height] = [0, 1].map(|side| number("part_pixels", side) as u32);
+        let frame = |left, top| Frame { left, top, width, height };
+        let at = |side: usize| tile["copies"][k as usize][side].as_i64().unwrap();
+        let (left, top) = (number("part_corner", 0), number("part_corner", 1));
+        let placed = part.iter().map(|layer| mask(layer).framed(frame(left, top)));
+        let copy = build[BASE..].iter().map(|layer| mask(layer).framed(frame(at(0), at(1))));
+        assert!(placed.eq(copy), "copy {k}");
+        assert!(part[0].image != part[2].image);
+    }
+}
