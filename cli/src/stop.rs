@@ -5,7 +5,7 @@ use std::io;
 
 use lamp_grayscale::DitherError;
 use lamp_postprocess::machine::MachineLimit;
-use lamp_postprocess::{CompensateError, EditError, LayoutError, TileError};
+use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, TileError};
 use lamp_slicer::SliceError;
 use lamp_stack::{JoinError, SplitError, StackError};
 
@@ -98,6 +98,12 @@ impl From<EditError> for Stop {
 
 impl From<TileError> for Stop {
     fn from(error: TileError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<StripsError> for Stop {
+    fn from(error: StripsError) -> Self {
         Self::Failed(error.into())
     }
 }

@@ -41,7 +41,9 @@ pub use offset::{
     CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,
     offset, offset_one_bit, shrink,
 };
-pub use strips::{JoinSwathsError, Swaths, SwathsError};
+pub use strips::{
+    JoinSwathsError, StripWriter, StripsError, Swaths, SwathsError, is_strips, join_strips,
+};
 pub use tile::{
     CellShape, CopyName, Heights, Layout, LayoutError, LayoutFile, MeshOptions, Pack, PackBy, Part,
     Pattern, Pixels, Placement, StrayRows, TileError, TileOptions, Turns, tile,

@@ -1,11 +1,13 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_stack::join;
+use lamp_postprocess::{is_strips, join_strips};
+use lamp_stack::{Layer, join};
 
 use crate::options::{Common, Output};
+use crate::report::Report;
 use crate::stop::Stop;
-use crate::streams::{is_stream, report, write_layers};
+use crate::streams::{input_name, is_stream, report, write_layers};
 
 /// Join stacks of ranges of layers to the one stack that they are parts of
 ///
@@ -15,13 +17,16 @@ use crate::streams::{is_stream, report, write_layers};
 /// layer behind the last of the one before it: a build that lacks layers is scrap. Whether layers
 /// are missing below the first or above the last, only you can tell: `lamp info` says how many
 /// there are.
+///
+/// A folder of strips, as `tile --strips` writes it, gives the build that they were cut from.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   slice blade.stl --layers ..600 | fix > low.tif
   slice blade.stl --layers 600.. | fix > high.tif
   lamp join low.tif high.tif -o blade.tif
-  lamp join ranges/*.tif | tile > build.tif")]
+  lamp join ranges/*.tif | tile > build.tif
+  lamp join strips/ -o build.tif")]
 pub(crate) struct JoinArgs {
     /// The stacks, files or folders of pages, in the order of their layers
     #[arg(value_name = "STACK", required = true)]
@@ -38,12 +43,38 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Stop> {
         ));
     }
     let report = report("join", common, &args.output);
-    let layers = join(args.stacks.clone())?.map(|layer| {
-        let layer = layer?;
-        if let Some(layers) = layer.info.stack.as_ref().and_then(|stack| stack.layers) {
+    match &args.stacks[..] {
+        [folder] if is_strips(folder) => return join_one(folder, &args.output, &report),
+        stacks => {
+            if let Some(folder) = stacks.iter().find(|stack| is_strips(stack)) {
+                let folder = folder.display();
+                return Err(Stop::usage(format!(
+                    "{folder} holds the strips of one build: join it by itself first"
+                )));
+            }
+        }
+    }
+    let layers = join(args.stacks.clone())?.map(|layer| Ok(layer?));
+    write_layers(counted(layers, &report), &args.output, &report)
+}
+
+/// Puts the strips of a folder back together.
+fn join_one(folder: &Path, output: &Output, report: &Report) -> Result<(), Stop> {
+    let name = input_name(folder);
+    let failed = |error| Stop::from(error).at(name.clone());
+    let layers = join_strips(folder).map_err(failed)?;
+    write_layers(counted(layers.map(|layer| layer.map_err(failed)), report), output, report)
+}
+
+/// Tells the report how many layers there will be, where the first says so.
+fn counted(
+    layers: impl Iterator<Item = Result<Layer, Stop>>,
+    report: &Report,
+) -> impl Iterator<Item = Result<Layer, Stop>> {
+    layers.inspect(|layer| {
+        let stack = layer.as_ref().ok().and_then(|layer| layer.info.stack.as_ref());
+        if let Some(layers) = stack.and_then(|stack| stack.layers) {
             report.expect(layers.into());
         }
-        Ok(layer)
-    });
-    write_layers(layers, &args.output, &report)
+    })
 }

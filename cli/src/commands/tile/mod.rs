@@ -1,5 +1,6 @@
 mod mesh;
 mod stacks;
+mod strips;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -18,10 +19,11 @@ use crate::options::{Common, Output, parse_distance, parse_layers};
 use crate::plots;
 use crate::report::Report;
 use crate::stop::Stop;
-use crate::streams::{check_beside, check_not_input, report, write_file, write_layers};
+use crate::streams::{check_beside, check_not_input, report, write_file};
 
 use mesh::MeshArgs;
 use stacks::{Stack, StackArg};
+use strips::StripArgs;
 
 /// Lay copies of parts out on a build area, in a mesh
 ///
@@ -41,7 +43,8 @@ Examples:
   tile blade.tif --mesh square --cell 4mm --clearance 500um --base-layers 10 -o build.tif
   tile blade.tif --area 200x200mm --copies 4 --mesh none -o build.tif
   tile blade.tif:120 core.tif:40 --machine beta --pack outline --layout-out layout.json -o build.tif
-  tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif")]
+  tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif
+  tile blade.tif --machine beta --strips strips/ --mirrors 1920 --overlap 64")]
 pub(crate) struct TileArgs {
     /// The stacks to read, each with how many copies: TIFF or PNG files, folders of pages, or - for
     /// standard input [without a count: as many as fit of one stack, one each of several]
@@ -110,7 +113,16 @@ pub(crate) struct TileArgs {
     mesh: MeshArgs,
 
     #[command(flatten)]
-    output: Output,
+    strips: StripArgs,
+
+    /// Where to write the build: a file, a folder of pages (a name that ends in /, or an empty
+    /// folder), or - for standard output [default: -, or nowhere with --strips]
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+
+    /// Write classic TIFFs (at most 4 GiB) instead of BigTIFFs
+    #[arg(long)]
+    classic: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
@@ -135,8 +147,13 @@ enum TurnsArg {
 pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     args.check()?;
     let mesh = args.mesh.options()?;
-    let report = report("tile", common, &args.output);
+    let output = args.output();
+    let report = match &output {
+        Some(output) => report("tile", common, output),
+        None => Report::new("tile", common.quiet, true),
+    };
     let machine = args.machine.as_deref().map(machine).transpose()?;
+    let strips = args.strips.writer(machine.as_ref(), args.classic)?;
     let file = args.layout.as_deref().map(read_layout).transpose()?;
     let mut stacks = Stack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
     let needs_outlines = args.fit || args.pack == PackArg::Outline;
@@ -170,7 +187,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     let layers = stacks.into_iter().map(Stack::layers).collect::<Result<Vec<_>, _>>()?;
     let heights = Heights { settle: args.settle, resample: args.resample };
     let build = layout.build(layers, heights, |stray| say_stray(&report, stray));
-    write_layers(build, &args.output, &report)
+    strips::write(build, strips, output.as_ref(), &report)
 }
 
 impl TileArgs {
@@ -196,12 +213,24 @@ impl TileArgs {
                 .chain(&self.machine)
                 .chain(self.mesh.file())
         };
+        let output = self.output().map(|output| output.output);
+        let main = output.as_ref().or(self.strips.folder()).expect("it goes somewhere");
         for beside in [&self.layout_out, &self.layout_picture].into_iter().flatten() {
-            check_beside(beside, &self.output.output, inputs())?;
+            check_beside(beside, main, inputs())?;
+        }
+        if let (Some(output), Some(folder)) = (&output, self.strips.folder()) {
+            check_beside(folder, output, inputs())?;
         }
         self.layout_picture.as_deref().map(plots::check_name).transpose()?;
         let read = self.layout.iter().chain(&self.machine).chain(self.mesh.file());
-        check_not_input(&self.output.output, read)
+        check_not_input(main, read)
+    }
+
+    /// Where the whole build goes.
+    fn output(&self) -> Option<Output> {
+        let unless_strips = || self.strips.folder().is_none().then(|| PathBuf::from("-"));
+        let output = self.output.clone().or_else(unless_strips)?;
+        Some(Output { output, classic: self.classic })
     }
 
     fn counts(&self) -> Vec<Option<u32>> {

@@ -1,0 +1,113 @@
+//! The build, and its strips beside it, as options say.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lamp_postprocess::machine::Machine;
+use lamp_postprocess::{StripWriter, StripsError};
+use lamp_stack::Layer;
+
+use crate::options::Output;
+use crate::report::Report;
+use crate::stop::Stop;
+use crate::streams::{folder_to_make, format, write_layers};
+
+const HEADING: &str = "Strips of a projector that scans";
+
+/// Options of the strips.
+#[derive(Args)]
+pub(super) struct StripArgs {
+    /// Cut each layer into the swaths that a scanning projector exposes: one stack for each and an
+    /// index of them, strips.json, in this new folder. lamp join makes the build of it again
+    #[arg(long, value_name = "DIR", help_heading = HEADING)]
+    strips: Option<PathBuf>,
+
+    /// How many mirrors lie across the projector's way: pixels of a swath [default: the machine's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(requires = "strips", help_heading = HEADING)]
+    mirrors: Option<u32>,
+
+    /// How many pixels a swath shares with the next, where the one's dose falls as the other's
+    /// rises [default: the machine's, or 0 with --mirrors]
+    #[arg(long, value_name = "N", requires = "strips", help_heading = HEADING)]
+    overlap: Option<u32>,
+}
+
+impl StripArgs {
+    /// The folder of the strips, if there are to be any.
+    pub(super) fn folder(&self) -> Option<&PathBuf> {
+        self.strips.as_ref()
+    }
+
+    /// What writes the strips, if there are to be any.
+    pub(super) fn writer(
+        &self,
+        machine: Option<&Machine>,
+        classic: bool,
+    ) -> Result<Option<Strips>, Stop> {
+        let Some(folder) = &self.strips else { return Ok(None) };
+        let folder = folder_to_make(folder)?;
+        let of_machine = machine.and_then(|machine| machine.strips.as_ref());
+        let mirrors = self.mirrors.or(of_machine.map(|strips| strips.mirrors));
+        let Some(mirrors) = mirrors else {
+            return Err(Stop::usage(match machine {
+                None => "--strips needs --mirrors, or a --machine that has [strips]".to_owned(),
+                Some(Machine { name, .. }) => format!(
+                    "--strips needs --mirrors: the machine {name} has no [strips] (docs/tile.md)"
+                ),
+            }));
+        };
+        let of_machine = of_machine.filter(|_| self.mirrors.is_none());
+        let overlap = self.overlap.or(of_machine.map(|strips| strips.overlap)).unwrap_or(0);
+        match StripWriter::new(folder, mirrors, overlap, format(classic)) {
+            Ok(writer) => Ok(Some(Strips { folder: folder.to_owned(), writer })),
+            Err(error @ (StripsError::Swaths(_) | StripsError::Mirrors { .. })) => {
+                Err(Stop::usage(error.to_string()))
+            }
+            Err(error) => Err(failed(folder, error)),
+        }
+    }
+}
+
+fn failed(folder: &Path, error: StripsError) -> Stop {
+    Stop::Failed(error.into()).at(folder.display().to_string())
+}
+
+/// The strips that are being written.
+pub(super) struct Strips {
+    folder: PathBuf,
+    writer: StripWriter,
+}
+
+/// Writes a build, its strips, or both.
+pub(super) fn write(
+    build: impl Iterator<Item = Result<Layer, Stop>>,
+    strips: Option<Strips>,
+    output: Option<&Output>,
+    report: &Report,
+) -> Result<(), Stop> {
+    let mut strips = strips;
+    let cut = build.map(|layer| {
+        let layer = layer?;
+        if let Some(Strips { folder, writer }) = &mut strips {
+            writer.push(&layer).map_err(|error| failed(folder, error))?;
+        }
+        Ok(layer)
+    });
+    match output {
+        Some(output) => write_layers(cut, output, report)?,
+        None => drain(cut, report)?,
+    }
+    match strips {
+        Some(Strips { folder, writer }) => writer.finish().map_err(|error| failed(&folder, error)),
+        None => Ok(()),
+    }
+}
+
+/// Takes all layers, counting them in `report`.
+fn drain(layers: impl Iterator<Item = Result<Layer, Stop>>, report: &Report) -> Result<(), Stop> {
+    let mut layers = layers.inspect(|_| report.layer_done());
+    let done = layers.try_for_each(|layer| layer.map(drop));
+    report.done();
+    done
+}

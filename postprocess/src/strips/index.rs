@@ -1,0 +1,144 @@
+//! The index of a folder of strips.
+
+use std::fs::File;
+use std::io::Read;
+use std::ops::Range;
+use std::path::Path;
+
+use lamp_stack::StackError;
+use serde::{Deserialize, Serialize};
+
+use super::{StripsError, Swaths};
+
+/// The index's name in its folder.
+pub(super) const INDEX: &str = "strips.json";
+
+/// So many strips are written at most: each is an open file.
+pub(super) const MOST_STRIPS: u32 = 512;
+/// Images are at most so wide, as the readers of stacks take.
+pub(super) const WIDEST: u32 = 1 << 26;
+/// No index is longer, in bytes.
+const LONGEST: u64 = 1 << 20;
+
+/// What the index says of a build and its strips.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Index {
+    /// The build's name.
+    pub(super) name: String,
+    /// Its width and height.
+    pub(super) pixels: [u32; 2],
+    pub(super) layers: u32,
+    pub(super) mirrors: u32,
+    pub(super) overlap: u32,
+    pub(super) strips: Vec<StripLine>,
+}
+
+/// A strip as it stands in the index.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StripLine {
+    pub(super) file: String,
+    /// The first column of the build, and the one behind the last.
+    pub(super) columns: [u32; 2],
+}
+
+impl StripLine {
+    fn of(swaths: &Swaths, swath: u32) -> Self {
+        let Range { start, end } = swaths.columns(swath);
+        Self { file: file_name(swath), columns: [start, end] }
+    }
+}
+
+/// The file of a strip.
+pub(super) fn file_name(swath: u32) -> String {
+    format!("strip_{swath:03}.tif")
+}
+
+impl Index {
+    pub(super) fn new(name: &str, [width, height]: [u32; 2], layers: u32, swaths: &Swaths) -> Self {
+        Self {
+            name: name.to_owned(),
+            pixels: [width, height],
+            layers,
+            mirrors: swaths.mirrors,
+            overlap: swaths.overlap,
+            strips: (0..swaths.count()).map(|swath| StripLine::of(swaths, swath)).collect(),
+        }
+    }
+
+    /// The text, a line for each strip.
+    pub(super) fn to_json(&self) -> String {
+        let Self { name, pixels: [width, height], layers, mirrors, overlap, strips } = self;
+        let line = |strip| serde_json::to_string(strip).expect("texts and numbers are JSON");
+        let strips: Vec<_> = strips.iter().map(|strip| format!("    {}", line(strip))).collect();
+        let name = serde_json::to_string(name).expect("a text is JSON");
+        format!(
+            "{{\n  \"name\": {name},\n  \"pixels\": [{width}, {height}],\n  \"layers\": {layers},\n  \
+             \"mirrors\": {mirrors},\n  \"overlap\": {overlap},\n  \"strips\": [\n{}\n  ]\n}}\n",
+            strips.join(",\n")
+        )
+    }
+
+    /// Reads the index of a folder.
+    pub(super) fn read(folder: &Path) -> Result<Self, StripsError> {
+        let mut text = String::new();
+        let read = File::open(folder.join(INDEX))
+            .and_then(|file| file.take(LONGEST).read_to_string(&mut text));
+        read.map_err(|error| StripsError::In {
+            file: INDEX.to_owned(),
+            source: StackError::Io(error),
+        })?;
+        Self::parse(&text)
+    }
+
+    fn parse(text: &str) -> Result<Self, StripsError> {
+        let no_index = |problem: String| StripsError::Index { problem };
+        let index: Self =
+            serde_json::from_str(text).map_err(|error| no_index(error.to_string()))?;
+        if !index.swaths()?.map(|swaths| index.lists(&swaths)).unwrap_or(false) {
+            return Err(no_index("its strips are not those of such a build".to_owned()));
+        }
+        Ok(index)
+    }
+
+    /// How its strips lie, if they are not too many or too wide.
+    fn swaths(&self) -> Result<Option<Swaths>, StripsError> {
+        let swaths = Swaths::new(self.mirrors, self.overlap, self.pixels[0])?;
+        let is_some = self.mirrors <= WIDEST && swaths.count() <= MOST_STRIPS;
+        Ok(is_some.then_some(swaths))
+    }
+
+    fn lists(&self, swaths: &Swaths) -> bool {
+        let lines = (0..swaths.count()).map(|swath| StripLine::of(swaths, swath));
+        lines.eq(self.strips.iter().cloned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_index_reads_back_and_what_is_none_is_refused() {
+        let swaths = Swaths::new(10, 4, 22).unwrap();
+        let index = Index::new("a \"b\"", [22, 7], 3, &swaths);
+        let text = index.to_json();
+        assert_eq!(Index::parse(&text).unwrap(), index);
+        assert_eq!(text.lines().count(), 11);
+        for (from, to) in [
+            ("\"overlap\": 4", "\"overlap\": 5"),
+            ("\"mirrors\": 10", "\"mirrors\": 11"),
+            ("[22, 7]", "[33, 7]"),
+            ("strip_001", "../strip_001"),
+            ("[6,16]", "[6,15]"),
+            ("\"layers\": 3", "\"layers\": -3"),
+            ("\"mirrors\": 10", "\"mirrors\": 4294967295"),
+            ("\"name\"", "\"nom\""),
+            ("]\n}", "]"),
+        ] {
+            assert!(text.contains(from), "{from} in {text}");
+            assert!(Index::parse(&text.replacen(from, to, 1)).is_err(), "{to}");
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Swaths cut and put back together.
+
+use lamp_stack::{Dpi, Mask, PageInfo};
+use proptest::prelude::*;
+
+use super::*;
+
+fn image(width: u32, rows: &[Vec<(u32, u8)>], levels: bool) -> Image {
+    let mut gray = GrayMask::new(width);
+    for row in rows {
+        let mut room = width;
+        let runs = row.iter().map(|&(length, level)| {
+            let part = length.min(room);
+            room -= part;
+            (part, if levels { level } else { 255 * (level & 1) })
+        });
+        gray.push_runs(runs).unwrap();
+    }
+    if levels {
+        return Image::Gray(gray);
+    }
+    let transitions =
+        |row: &[lamp_stack::LevelChange]| row.iter().map(|c| c.column).collect::<Vec<_>>();
+    let mut mask = lamp_stack::MaskBuilder::new(width);
+    gray.rows().for_each(|row| mask.push_row(&transitions(row)).unwrap());
+    Image::Mask(mask.finish())
+}
+
+fn level(image: &Image, column: u32, row: u32) -> u8 {
+    let gray = join::gray(image);
+    let runs = gray_runs(gray.row(row), gray.width());
+    runs.into_iter().find(|run| (run.0..run.1).contains(&column)).map_or(0, |run| run.2)
+}
+
+proptest! {
+    #[test]
+    fn swaths_add_up_to_the_layer(
+        (mirrors, shared, width) in (1u32..40, 0u32..20, 1u32..120),
+        rows in prop::collection::vec(prop::collection::vec((0u32..30, any::<u8>()), 0..9), 1..5),
+        levels in any::<bool>(),
+    ) {
+        let overlap = shared.min((mirrors - 1) / 2);
+        let swaths = Swaths::new(mirrors, overlap, width).unwrap();
+        let layer = image(width, &rows, levels);
+        let cut: Vec<Image> = (0..swaths.count()).map(|k| swaths.cut(&layer, k)).collect();
+        prop_assert!(cut.iter().all(|swath| swath.width() == mirrors));
+        for row in 0..layer.height() {
+            for column in 0..width {
+                let mut sum = 0;
+                let mut of = 0;
+                for (k, swath) in (0..).zip(&cut) {
+                    if swaths.columns(k).contains(&column) {
+                        of += 1;
+                        sum += u32::from(level(swath, column - swaths.columns(k).start, row));
+                    }
+                }
+                prop_assert!((1..=2).contains(&of));
+                prop_assert_eq!(sum, u32::from(level(&layer, column, row)), "{} {}", column, row);
+            }
+        }
+        prop_assert_eq!(swaths.join(&cut), Ok(join::gray(&layer)));
+    }
+}
+
+#[test]
+fn ramps_rise_in_equal_steps_and_fall_alike() {
+    let swaths = Swaths::new(10, 4, 22).unwrap();
+    assert_eq!((swaths.count(), swaths.columns(1), swaths.columns(2)), (3, 6..16, 12..22));
+    let white = Image::Mask(Mask::black(22, 1).inverted());
+    let levels = |k| {
+        let cut = swaths.cut(&white, k);
+        (0..10).map(|column| level(&cut, column, 0)).collect::<Vec<_>>()
+    };
+    assert_eq!(levels(0), [255, 255, 255, 255, 255, 255, 204, 153, 102, 51]);
+    assert_eq!(levels(1), [51, 102, 153, 204, 255, 255, 204, 153, 102, 51]);
+    assert_eq!(levels(2), [51, 102, 153, 204, 255, 255, 255, 255, 255, 255]);
+}
+
+#[test]
+fn a_column_is_in_one_swath_or_two() {
+    assert!(Swaths::new(10, 5, 22).is_err() && Swaths::new(0, 0, 22).is_err());
+    assert!(Swaths::new(u32::MAX, u32::MAX, 1).is_err());
+    let one = Swaths::new(30, 9, 22).unwrap();
+    assert_eq!((one.count(), one.columns(0)), (1, 0..22));
+}
+
+#[test]
+fn a_page_says_where_its_swath_lies() {
+    let info = PageInfo { origin_mm: Some([1.0, 5.0]), stray_rows: vec![0], ..PageInfo::default() };
+    let image = Image::Mask(Mask::black(22, 1));
+    let layer = Layer { info, dpi: Dpi::new(25.4), image };
+    let swath = Swaths::new(10, 4, 22).unwrap().cut_layer(&layer, 2);
+    assert_eq!(swath.info.origin_mm, Some([13.0, 5.0]));
+    assert_eq!(swath.info.stray_rows, [0]);
+    assert_eq!(
+        swath.info.other["strip"],
+        json!({ "number": 2, "of": 3, "columns": [12, 22], "bits": 1 })
+    );
+}

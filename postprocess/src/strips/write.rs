@@ -1,0 +1,142 @@
+//! A build's layers as a folder of strips.
+
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::Path;
+
+use lamp_stack::{
+    EncodedPage, FolderBeside, Format, Held, Layer, PageWriter, StackError, map_in_order,
+};
+
+use super::index::{INDEX, Index, MOST_STRIPS, WIDEST, file_name};
+use super::{StripsError, Swaths};
+
+/// Enough for the pages of a narrow strip; hundreds of files are open at once.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// Cuts a build's layers into swaths, and writes a stack of each and their index.
+/// The folder gets its name when all are whole.
+pub struct StripWriter {
+    folder: FolderBeside,
+    format: Format,
+    mirrors: u32,
+    overlap: u32,
+    open: Option<Open>,
+}
+
+/// What is known from the first layer on.
+struct Open {
+    swaths: Swaths,
+    name: String,
+    height: u32,
+    layers: u32,
+    files: Vec<PageWriter<BufWriter<File>>>,
+}
+
+impl StripWriter {
+    /// Sets up a folder of strips of so many mirrors, of which each shares
+    /// `overlap` with the next.
+    ///
+    /// # Errors
+    /// Where there are no such swaths, or no folder can be made there: it must not
+    /// exist, or be empty.
+    pub fn new(
+        folder: &Path,
+        mirrors: u32,
+        overlap: u32,
+        format: Format,
+    ) -> Result<Self, StripsError> {
+        Swaths::new(mirrors, overlap, 0)?;
+        if mirrors > WIDEST {
+            return Err(StripsError::Mirrors { mirrors, most: WIDEST });
+        }
+        let folder = FolderBeside::over_nothing(folder)?;
+        Ok(Self { folder, format, mirrors, overlap, open: None })
+    }
+
+    /// Adds a layer to every strip, cut and encoded on all threads.
+    ///
+    /// # Errors
+    /// Where the layer is not as wide and high as the first, there would be too
+    /// many strips, or writing fails.
+    pub fn push(&mut self, layer: &Layer) -> Result<(), StripsError> {
+        if layer.info.other.contains_key("strip") {
+            return Err(StripsError::Already { layer: layer.info.name() });
+        }
+        if self.open.is_none() {
+            self.open = Some(self.open(layer)?);
+        }
+        let open = self.open.as_mut().expect("it is open now");
+        let swaths = open.swaths;
+        let (size, first) = ([layer.image.width(), layer.image.height()], open.size());
+        if size != first {
+            let [size, first] = [size, first].map(|[width, height]| format!("{width} x {height}"));
+            return Err(StripsError::Size { layer: layer.info.name(), size, first });
+        }
+        let cuts = (0..swaths.count()).map(|swath| Ok(Cut { layer, swaths, swath }));
+        let pages = map_in_order(cuts, |Cut { layer, swaths, swath }| {
+            Ok::<_, StripsError>(EncodedPage::new(&swaths.cut_layer(layer, swath)))
+        });
+        for (page, file) in pages.zip(&mut open.files) {
+            file.push(page?)?;
+        }
+        open.layers += 1;
+        Ok(())
+    }
+
+    fn open(&self, first: &Layer) -> Result<Open, StripsError> {
+        let (mirrors, width) = (self.mirrors, first.image.width());
+        let swaths = Swaths::new(mirrors, self.overlap, width)?;
+        let strips = swaths.count();
+        if strips > MOST_STRIPS {
+            return Err(StripsError::TooMany { width, strips, mirrors, most: MOST_STRIPS });
+        }
+        let file = |swath| -> Result<_, StripsError> {
+            let file = File::create_new(self.folder.path().join(file_name(swath)));
+            let out = BufWriter::with_capacity(BUFFER_BYTES, file.map_err(StackError::from)?);
+            Ok(PageWriter::new(out, self.format))
+        };
+        Ok(Open {
+            swaths,
+            name: first.info.stack.as_ref().map(|stack| stack.part.clone()).unwrap_or_default(),
+            height: first.image.height(),
+            layers: 0,
+            files: (0..strips).map(file).collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Ends the strips, writes their index, and gives the folder its name.
+    ///
+    /// # Errors
+    /// Where writing fails, or there was no layer.
+    pub fn finish(self) -> Result<(), StripsError> {
+        let open = self.open.ok_or(StackError::NoLayers)?;
+        let index = Index::new(&open.name, open.size(), open.layers, &open.swaths);
+        for file in open.files {
+            file.finish()?;
+        }
+        fs::write(self.folder.path().join(INDEX), index.to_json()).map_err(StackError::from)?;
+        Ok(self.folder.persist().map_err(StackError::from)?)
+    }
+}
+
+impl Open {
+    fn size(&self) -> [u32; 2] {
+        [self.swaths.width, self.height]
+    }
+}
+
+/// A swath that is to be cut.
+struct Cut<'a> {
+    layer: &'a Layer,
+    swaths: Swaths,
+    swath: u32,
+}
+
+impl Held for Cut<'_> {
+    fn bytes(&self) -> usize {
+        // About its share of the runs, and the levels of its ramps.
+        let ramps = 16 * self.swaths.overlap as usize * self.layer.image.height() as usize;
+        self.layer.bytes() / self.swaths.count() as usize + ramps
+    }
+}

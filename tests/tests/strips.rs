@@ -1,0 +1,309 @@
+//! `tile --strips`: a build cut into the swaths of a scanning projector, and put
+//! back together.
+
+use std::fs;
+
+use lamp_fixtures::Part;
+use lamp_stack::{Dpi, GrayMask, Image, Layer, PageInfo, StackInfo, gray_runs};
+use lamp_tests::{Ran, Scratch};
+use serde_json::{Value, json};
+
+/// A tower of 76 layers, which makes a build of 236 x 236 pixels.
+fn with_tower() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch.run("slice tower.stl --dpi 100 --thickness 1mm -q -o tower.tif").succeeds_quietly();
+    scratch
+}
+
+const TILE: &str = "tile tower.tif --area 60x60mm";
+
+/// The levels of an image, row by row.
+fn levels(image: &Image) -> Vec<Vec<u32>> {
+    let gray = match image {
+        Image::Mask(mask) => GrayMask::from(mask),
+        Image::Gray(gray) => gray.clone(),
+    };
+    let row = |changes: &[_]| {
+        let mut levels = vec![0; gray.width() as usize];
+        for (start, end, level) in gray_runs(changes, gray.width()) {
+            levels[start as usize..end as usize].fill(level.into());
+        }
+        levels
+    };
+    gray.rows().map(row).collect()
+}
+
+fn index(scratch: &Scratch, folder: &str) -> Value {
+    serde_json::from_slice(&scratch.bytes(&format!("{folder}/strips.json"))).unwrap()
+}
+
+fn names(scratch: &Scratch, folder: &str) -> Vec<String> {
+    let entries = fs::read_dir(scratch.path(folder)).unwrap();
+    let mut names: Vec<_> =
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// Checks pixel by pixel that the strips of a folder add up to the build, and
+/// returns them.
+fn check_sum(scratch: &Scratch, folder: &str, build: &str) -> Vec<Vec<Layer>> {
+    let build = scratch.layers(build);
+    let index = index(scratch, folder);
+    let listed = index["strips"].as_array().unwrap();
+    let strips: Vec<Vec<Layer>> = listed
+        .iter()
+        .map(|strip| scratch.layers(&format!("{folder}/{}", strip["file"].as_str().unwrap())))
+        .collect();
+    assert_eq!(index["layers"], build.len());
+    assert!(strips.iter().all(|strip| strip.len() == build.len()));
+    for (k, layer) in build.iter().enumerate() {
+        let expected = levels(&layer.image);
+        let mut sum = vec![vec![0; layer.image.width() as usize]; expected.len()];
+        for (strip, listed) in strips.iter().zip(listed) {
+            let page = &strip[k].info;
+            let facts =
+                |info: &PageInfo| (info.index, info.z_um, info.thickness_um, info.exposure_ms);
+            assert_eq!(facts(page), facts(&layer.info));
+            assert_eq!(page.other["strip"]["columns"], listed["columns"]);
+            let start = listed["columns"][0].as_u64().unwrap() as usize;
+            let x0 =
+                layer.info.origin_mm.unwrap()[0] + start as f64 * 25.4 / layer.dpi.unwrap().get();
+            assert!((page.origin_mm.unwrap()[0] - x0).abs() < 1e-9);
+            for (sum, row) in sum.iter_mut().zip(levels(&strip[k].image)) {
+                for (column, level) in (start..).zip(row).filter(|(_, level)| *level > 0) {
+                    sum[column] += level;
+                }
+            }
+        }
+        assert!(sum == expected, "layer {k} of {folder}");
+    }
+    strips
+}
+
+#[test]
+fn strips_add_up_to_the_build_and_join_to_its_bytes() {
+    let scratch = with_tower();
+    for (k, (options, files, gray)) in [
+        ("--mirrors 100 --overlap 20", 3, true),
+        ("--mirrors 64", 4, false),
+        ("--mirrors 75 --overlap 37", 6, true),
+        ("--mirrors 300 --overlap 40", 1, false),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let folder = format!("strips{k}");
+        let line = format!("{TILE} --strips {folder} {options} -o {k}.tif");
+        scratch.run(&line).succeeds_quietly();
+        let strips = check_sum(&scratch, &folder, &format!("{k}.tif"));
+        assert_eq!(strips.len(), files, "{options}");
+        let is_gray = |layer: &Layer| matches!(layer.image, Image::Gray(_));
+        assert!(strips.iter().flatten().all(|layer| is_gray(layer) == gray), "{options}");
+        let mut expected: Vec<_> = (0..files).map(|k| format!("strip_{k:03}.tif")).collect();
+        expected.push("strips.json".to_owned());
+        assert_eq!(names(&scratch, &folder), expected);
+        scratch.run(&format!("lamp join {folder} -o joined{k}.tif")).succeeds_quietly();
+        let whole = scratch.run(TILE).succeeds_quietly().stdout;
+        assert!(scratch.bytes(&format!("{k}.tif")) == whole);
+        assert!(scratch.bytes(&format!("joined{k}.tif")) == whole, "{options}");
+    }
+    let index = index(&scratch, "strips0");
+    assert_eq!((&index["name"], &index["pixels"]), (&json!("tower"), &json!([236, 236])));
+    assert_eq!((&index["mirrors"], &index["overlap"]), (&json!(100), &json!(20)));
+    let columns: Vec<_> =
+        index["strips"].as_array().unwrap().iter().map(|s| &s["columns"]).collect();
+    assert_eq!(columns, [&json!([0, 100]), &json!([80, 180]), &json!([160, 236])]);
+    let first = scratch.layers("strips0/strip_001.tif").remove(0).info;
+    let commands = first.stack.unwrap().commands;
+    assert_eq!(commands.last().unwrap(), "strip 1 --mirrors 100 --overlap 20");
+    assert_eq!(
+        first.other["strip"],
+        json!({"number": 1, "of": 3, "columns": [80, 180], "bits": 1})
+    );
+}
+
+#[test]
+fn the_machine_knows_its_strips_and_threads_change_no_byte() {
+    let scratch = with_tower();
+    let machine = "name = \"mine\"\ndescription = \"mine\"\n[area]\nvalue = \"60x60mm\"\nsource = \"here\"\n\
+                   [strips]\nmirrors = 100\noverlap = 20\nsource = \"here\"\n";
+    scratch.write("mine.toml", machine.as_bytes());
+    let line = "tile tower.tif --machine mine.toml";
+    scratch.run(&format!("{line} --strips a/ --threads 1")).succeeds_quietly();
+    // The build goes on, too, if it is asked for.
+    let line = format!("{TILE} --strips b --mirrors 100 --overlap 20 --threads 3 -o -");
+    let build = scratch.run(&line).succeeds_quietly().stdout;
+    assert!(build == scratch.run(TILE).succeeds_quietly().stdout);
+    assert_eq!(names(&scratch, "a"), names(&scratch, "b"));
+    for name in names(&scratch, "a") {
+        let [a, b] = ["a", "b"].map(|folder| scratch.bytes(&format!("{folder}/{name}")));
+        assert!(a == b, "{name}");
+    }
+    assert!(scratch.run("lamp join a").succeeds_quietly().stdout == build);
+    scratch.run(&format!("{TILE} --strips c --mirrors 100 --classic")).succeeds_quietly();
+    assert_eq!(scratch.bytes("c/strip_002.tif")[2], 42);
+    assert!(scratch.run("lamp join c").succeeds_quietly().stdout == build);
+}
+
+#[test]
+fn gray_layers_and_ranges_come_back() {
+    let scratch = Scratch::new();
+    let layer = |index: u32| {
+        let mut ramp = GrayMask::new(90);
+        (0..30)
+            .for_each(|row| ramp.push_runs((row..90).map(|l| (1, (l * 2 + index) as u8))).unwrap());
+        let stack = (index == 0).then(StackInfo::default);
+        let info = PageInfo {
+            index,
+            z_um: Some(f64::from(index) * 100.0),
+            thickness_um: Some(100.0),
+            exposure_ms: Some(12.5),
+            stack,
+            ..PageInfo::default()
+        };
+        Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(ramp) }
+    };
+    scratch.stack("gray.tif", (0..9).map(layer));
+    let tile = "tile gray.tif --area 100x80mm";
+    // The base is black and white, the layers above it are not.
+    scratch
+        .run(&format!("{tile} --strips s --mirrors 40 --overlap 11 -o build.tif"))
+        .succeeds_quietly();
+    check_sum(&scratch, "s", "build.tif");
+    scratch.run("lamp join s -o back.tif").succeeds_quietly();
+    assert!(scratch.bytes("back.tif") == scratch.bytes("build.tif"));
+    let back = scratch.layers("back.tif");
+    let grays = back.iter().filter(|layer| matches!(layer.image, Image::Gray(_))).count();
+    assert_eq!((grays, back.len()), (9, 14));
+    let range = format!("{tile} --layers 3..7");
+    scratch.run(&format!("{range} --strips r --mirrors 40 --overlap 11")).succeeds_quietly();
+    assert!(
+        scratch.run("lamp join r").succeeds_quietly().stdout
+            == scratch.run(&range).succeeds_quietly().stdout
+    );
+    // A strip alone is a stack: others join and split it.
+    scratch.run("lamp split s/strip_001.tif --every 4 -o parts/").succeeds_quietly();
+    let files: Vec<_> =
+        names(&scratch, "parts").iter().map(|name| format!("parts/{name}")).collect();
+    let joined = scratch.run(&format!("lamp join {}", files.join(" "))).succeeds_quietly().stdout;
+    assert!(joined == scratch.bytes("s/strip_001.tif"));
+}
+
+#[test]
+fn dithered_strips_give_seams_their_full_dose() {
+    let scratch = Scratch::new();
+    let mut white = GrayMask::new(320);
+    (0..320).for_each(|_| white.push_runs([(320, 255)]).unwrap());
+    let info = PageInfo { stack: Some(StackInfo::default()), ..PageInfo::default() };
+    scratch.stack("white.tif", [Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(white) }]);
+    scratch
+        .run("tile white.tif --area 320x320mm --mesh none --strips s --mirrors 192 --overlap 64")
+        .succeeds_quietly();
+    let dots = |k: u32| {
+        scratch.run(&format!("dither -q s/strip_00{k}.tif -o {k}.tif")).succeeds();
+        levels(&scratch.layers(&format!("{k}.tif"))[0].image)
+    };
+    let [left, right] = [0, 1].map(dots);
+    let white = |rows: &[Vec<u32>], columns: std::ops::Range<usize>| -> f64 {
+        rows.iter().flat_map(|row| &row[columns.clone()]).map(|&l| f64::from(l) / 255.0).sum()
+    };
+    assert_eq!(white(&left, 0..128), 128.0 * 320.0);
+    let seam = (white(&left, 128..192) + white(&right, 0..64)) / (64.0 * 320.0);
+    assert!((seam - 1.0).abs() < 0.01, "the seam has {seam} of the dose");
+    // Rising from edge to edge, not by the half.
+    let falls = [128..144, 176..192].map(|columns| white(&left, columns) / (16.0 * 320.0));
+    assert!(falls[0] > 0.8 && falls[1] < 0.2, "{falls:?}");
+}
+
+fn is_wrong_usage(ran: &Ran, words: &[&str]) {
+    assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+    assert!(words.iter().all(|word| ran.stderr.contains(word)), "{ran:?}");
+}
+
+#[test]
+fn what_cannot_be_cut_leaves_nothing() {
+    let scratch = with_tower();
+    scratch.write("file", b"");
+    fs::create_dir(scratch.path("full")).unwrap();
+    scratch.write("full/file", b"");
+    let before = scratch.names();
+    for (options, words) in [
+        ("--strips s", &["--mirrors", "--machine"][..]),
+        ("--strips s --machine alpha", &["--mirrors", "alpha has no [strips]"]),
+        ("--mirrors 100", &["--strips"]),
+        ("--overlap 3", &["--strips"]),
+        ("--strips s --mirrors 0", &["--mirrors"]),
+        ("--strips s --mirrors 100 --overlap 50", &["share less than half"]),
+        ("--strips s --mirrors 99999999", &["wider than any image"]),
+        ("--strips s --mirrors 100 -o s", &["the stack goes there"]),
+        ("--strips - --mirrors 100", &["name the folder"]),
+        ("--strips s --mirrors 100 --layout-out s", &["the stack goes there"]),
+    ] {
+        is_wrong_usage(&scratch.run(&format!("{TILE} {options}")), words);
+        assert_eq!(scratch.names(), before, "{options}");
+    }
+    let cut = scratch.bytes("tower.tif");
+    scratch.write("tower.tif", &cut[..cut.len() / 2]);
+    for (options, words) in [
+        ("--strips full --mirrors 100", &["full", "remove it or choose another name"][..]),
+        ("--strips no/s --mirrors 100", &["no/s", "there is no folder no"]),
+        ("--strips s --mirrors 100", &["tower.tif", "cut off"]),
+        ("--strips s --mirrors 100 -o build.tif", &["tower.tif", "cut off"]),
+        ("--strips s --mirrors 100 --layers ..3 -o no/build.tif", &["there is no folder no"]),
+    ] {
+        scratch.run(&format!("{TILE} {options}")).is_refused_with(words);
+        assert_eq!(scratch.names(), before, "{options}");
+    }
+    scratch.write("tower.tif", &cut);
+    let many = "tile tower.tif --area 200x60mm --strips s --mirrors 1";
+    scratch.run(many).is_refused_with(&["787 pixels wide", "787 strips", "at most 512"]);
+    scratch.run(&format!("{TILE} --strips s --mirrors 100 --overlap 9")).succeeds_quietly();
+    scratch
+        .run("tile s/strip_000.tif --area 200x200mm --strips t --mirrors 100")
+        .is_refused_with(&["layer", "is a strip already"]);
+}
+
+#[test]
+fn strips_that_do_not_belong_together_are_named() {
+    let scratch = with_tower();
+    let strips = "--mirrors 100 --overlap 20";
+    let cut = |folder: &str, more: &str| {
+        scratch.run(&format!("{TILE} {strips} --strips {folder} {more}")).succeeds_quietly();
+    };
+    cut("other", "--layers ..60");
+    let with = |name: &str, bytes: &[u8]| {
+        fs::remove_dir_all(scratch.path("s")).ok();
+        cut("s", "");
+        scratch.write(&format!("s/{name}"), bytes);
+    };
+    let refused = |words: &[&str]| {
+        scratch.run("lamp join s -o x.tif").is_refused_with(words);
+        assert!(!scratch.path("x.tif").exists());
+    };
+    with("strip_001.tif", &scratch.bytes("other/strip_001.tif"));
+    refused(&["join: s", "strip_001.tif", "it has no layer where strip_000.tif has layer 65"]);
+    with("strip_000.tif", &scratch.bytes("s/strip_001.tif"));
+    refused(&["strip_000.tif", "does not say that it is strip 0"]);
+    with("strip_002.tif", &scratch.bytes("s/strip_001.tif")[..3000]);
+    refused(&["s", "strip_002.tif", "cut off"]);
+    with("strips.json", b"{}");
+    refused(&["strips.json", "no index of strips"]);
+    let index = String::from_utf8(scratch.bytes("other/strips.json")).unwrap();
+    with("strips.json", index.as_bytes());
+    refused(&["strip_000.tif", "of which strips.json does not tell"]);
+    with("strips.json", index.replace("65", "99").as_bytes());
+    refused(&["strip_000.tif", "18 layers that strips.json tells of are missing"]);
+    with("strips.json", index.replace("65", "81").replace("[236, 236]", "[236, 235]").as_bytes());
+    refused(&["layer 0", "not those of such a layer"]);
+    with("more", b"");
+    fs::remove_file(scratch.path("s/strip_001.tif")).unwrap();
+    refused(&["strip_001.tif", "No such file"]);
+    with("more", b"");
+    scratch.run("dither -q --method threshold s/strip_001.tif -o dots.tif").succeeds();
+    with("strip_001.tif", &scratch.bytes("dots.tif"));
+    refused(&["layer 0"]);
+    let both = scratch.run("lamp join s other -o x.tif");
+    is_wrong_usage(&both, &["s holds the strips of one build"]);
+}
