@@ -25,7 +25,7 @@ mod tests;
 
 use std::collections::HashMap;
 
-use lamp_stack::{Image, Layer, Length, Op, Size, Turn, map_in_order};
+use lamp_stack::{Image, Layer, Length, Mask, Op, Size, Turn, map_in_order};
 
 use heights::{Step, Steps};
 use mesh::{Mesh, on_base};
@@ -159,38 +159,46 @@ impl Layout {
 
     /// The build's image: the parts, and the mesh around them.
     fn image(&self, step: &Step) -> Result<Image, TileError> {
-        let layers: Vec<_> = self
-            .layers_of(step)
-            .map(|(index, part, layer)| Ok((self.places_by_turn(index), part.framed(layer)?)))
-            .collect::<Result<_, TileError>>()?;
-        let too_many =
-            |copies| TileError::TooManyRuns { copies, layer: step.some_layer().info.name() };
-        let mut turned: Vec<(Image, &[(u32, u32)])> = Vec::new();
-        for (places, image) in &layers {
-            for (turn, at) in places {
-                turned.push((image.turned(*turn).ok_or_else(|| too_many(1))?, at));
-            }
-        }
+        let layers =
+            self.layers_of(step).map(|(part, known, layer)| Ok((part, known.framed(layer)?)));
+        let layers: Vec<(usize, Image)> = layers.collect::<Result<_, TileError>>()?;
+        let layer = || step.some_layer().info.name();
+        let too_many = || TileError::TooManyRuns { copies: self.placements.len(), layer: layer() };
+        let turned = self.turned(&layers).ok_or_else(too_many)?;
         let parts = rows::compose(&placed(&turned), self.pixels).map_err(|fault| match fault {
-            Fault::TooManyRuns => too_many(self.placements.len()),
+            Fault::TooManyRuns => too_many(),
             // Outlines were apart, so that a layer is not within its own.
             Fault::Overlap => {
-                let (_, part, layer) = self.layers_of(step).next().expect("a step has a layer");
-                TileError::Changed { name: part.name().to_owned(), layer: layer.info.name() }
+                let name = self.parts[layers[0].0].name().to_owned();
+                TileError::Changed { name, layer: layer() }
             }
         })?;
         let Some(mesh) = &self.mesh else { return Ok(parts) };
-        let mut moats: Vec<(Image, &[(u32, u32)])> = Vec::new();
-        for (places, image) in &layers {
-            let moat = Image::Mask(mesh.moat(image));
-            for (turn, at) in places {
-                moats.push((moat.turned(*turn).ok_or_else(|| too_many(1))?, at));
+        let moats: Vec<(usize, Image)> =
+            layers.iter().map(|(part, image)| (*part, Image::Mask(mesh.moat(image)))).collect();
+        let moats = self.turned(&moats).ok_or_else(too_many)?;
+        let moats = rows::united(&placed(&moats), self.pixels.grown(mesh.reach()));
+        let moats = moats.map_err(|_| too_many())?;
+        match &parts {
+            Image::Mask(parts) => Ok(Image::Mask(mesh.around(parts, &moats))),
+            Image::Gray(_) => {
+                let black = Mask::black(self.pixels.width, self.pixels.height);
+                let around = Image::Mask(mesh.around(&black, &moats));
+                parts.combined(Op::Union, &around).ok_or_else(too_many)
             }
         }
-        let around = rows::united(&placed(&moats), self.pixels.grown(mesh.reach()));
-        let around = around.map(|moats| Image::Mask(mesh.around(&moats)));
-        let around = around.map_err(|_| too_many(self.placements.len()))?;
-        parts.combined(Op::Union, &around).ok_or_else(|| too_many(self.placements.len()))
+    }
+
+    /// Images of parts in each way in which copies lie, and where these stand; `None`
+    /// where one has too many runs.
+    fn turned(&self, images: &[(usize, Image)]) -> Option<Vec<Turned>> {
+        let mut turned = Vec::new();
+        for (part, image) in images {
+            for (turn, at) in self.places_by_turn(*part) {
+                turned.push(Turned { image: image.turned(turn)?, at });
+            }
+        }
+        Some(turned)
     }
 
     /// For each way in which copies of a part lie, where they stand.
@@ -204,6 +212,12 @@ impl Layout {
     }
 }
 
-fn placed<'a>(images: &'a [(Image, &'a [(u32, u32)])]) -> Vec<Placed<'a>> {
-    images.iter().map(|(image, at)| Placed { image, at }).collect()
+/// An image, and the left columns and top rows of its copies.
+struct Turned {
+    image: Image,
+    at: Vec<(u32, u32)>,
+}
+
+fn placed(images: &[Turned]) -> Vec<Placed<'_>> {
+    images.iter().map(|Turned { image, at }| Placed { image, at }).collect()
 }

@@ -76,7 +76,7 @@ impl Cells {
     fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
         let holes = self.holes(f64::from(row) + 0.5);
         // A pixel is a wall's where its middle is not in a hole.
-        let column = |x: f64| (x - 0.5).ceil().clamp(0.0, f64::from(width)) as u32;
+        let column = |x: f64| ceil(x - 0.5).min(width);
         out.push(0);
         // The second kind may begin in the cell before the first.
         let cells = (f64::from(width) / self.pitch).ceil() as i64 + 1;
@@ -112,6 +112,14 @@ impl Lattice {
             }
         }
     }
+}
+
+/// The least whole number from 0 on that is not below a number.
+#[inline]
+fn ceil(x: f64) -> u32 {
+    // Casts saturate, and cost less than rounding.
+    let whole = x as u32;
+    whole + u32::from(f64::from(whole) < x)
 }
 
 /// Changes the colour from a column on that is not before the last.

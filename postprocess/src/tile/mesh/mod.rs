@@ -14,9 +14,7 @@ mod lattice;
 #[cfg(test)]
 mod tests;
 
-use lamp_stack::{
-    Dpi, Frame, Image, Length, MOST_RUNS, Mask, MaskBuilder, combine_rows, place_row,
-};
+use lamp_stack::{Dpi, Frame, Image, Length, MOST_RUNS, Mask, MaskBuilder, Op, place_row};
 
 use self::breaks::{Breaks, Rect};
 use self::lattice::{Cells, Lattice};
@@ -242,21 +240,23 @@ impl Mesh {
         without_holes(&moat)
     }
 
-    /// The mesh without the moats, which are on a build that is larger by the
-    /// [`reach`](Self::reach) on every side, and without the break lines.
-    pub(super) fn around(&self, moats: &Mask) -> Mask {
+    /// The parts, and around them the mesh without the moats and the break lines. The
+    /// moats hold the parts, and are on a build that is larger by the
+    /// [`reach`](Self::reach) on every side.
+    pub(super) fn around(&self, parts: &Mask, moats: &Mask) -> Mask {
         let Pixels { width, height } = self.build;
         let reach = self.reach();
         let mut mask = MaskBuilder::new(width);
-        mask.reserve(height as usize, self.changes);
-        let (mut wall, mut moat, mut row) = (Vec::new(), Vec::new(), Vec::new());
+        mask.reserve(height as usize, self.changes + parts.transition_count());
+        let (mut wall, mut moat, mut free) = (Vec::new(), Vec::new(), Vec::new());
+        let mut row = Vec::new();
         for index in 0..height {
             self.wall_row(index, &mut wall);
             moat.clear();
             let transitions = moats.row(index + reach);
             place_row(transitions, moats.width(), -i64::from(reach), width, &mut moat);
-            let rows = [&wall[..], &moat, self.breaks.row(index)];
-            combine_rows(rows, |[wall, moat, cut]| wall & !moat & !cut, &mut row);
+            Op::Union.rows(&moat, self.breaks.row(index), &mut free);
+            inlaid(&wall, &free, parts.row(index), &mut row);
             mask.push_row(&row).expect("columns rise");
         }
         mask.finish()
@@ -283,5 +283,43 @@ impl Mesh {
         if row.len() % 2 == 1 {
             row.push(last);
         }
+    }
+}
+
+/// Makes `out` a row of walls with what is free of them cut out, and the parts, which
+/// lie in what is free, put in.
+fn inlaid(mut wall: &[u32], free: &[u32], mut part: &[u32], out: &mut Vec<u32>) {
+    out.clear();
+    // Whether the walls that are left begin white.
+    let mut is_wall = false;
+    for hole in free.chunks(2) {
+        let before = wall.partition_point(|&column| column < hole[0]);
+        out.extend_from_slice(&wall[..before]);
+        wall = &wall[before..];
+        is_wall ^= before % 2 == 1;
+        if is_wall {
+            toggle(hole[0], out);
+        }
+        let Some(&end) = hole.get(1) else {
+            part.iter().for_each(|&column| toggle(column, out));
+            return;
+        };
+        let within = part.partition_point(|&column| column <= end);
+        part[..within].iter().for_each(|&column| toggle(column, out));
+        part = &part[within..];
+        let hidden = wall.partition_point(|&column| column <= end);
+        wall = &wall[hidden..];
+        is_wall ^= hidden % 2 == 1;
+        if is_wall {
+            toggle(end, out);
+        }
+    }
+    out.extend_from_slice(wall);
+}
+
+/// Changes the colour from a column on that is not before the last.
+fn toggle(column: u32, row: &mut Vec<u32>) {
+    if row.pop_if(|last| *last == column).is_none() {
+        row.push(column);
     }
 }
