@@ -218,8 +218,9 @@ fn the_demo_is_what_the_four_binaries_make() {
         .collect();
     names.sort();
     let pictures = ["layer_00050.png", "layer_00449.png", "layer_00965.png", "layer_01174.png"];
-    assert_eq!(names, [&["blade.stl", "build.tif"], &pictures[..], &["layers.png"]].concat());
-    for name in pictures.iter().chain(&["layers.png"]) {
+    let stacks = ["alpha.png", "alpha.tif", "blade.stl", "build.tif"];
+    assert_eq!(names, [&stacks, &pictures[..], &["layers.png"]].concat());
+    for name in pictures.iter().chain(&["layers.png", "alpha.png"]) {
         let picture = scratch.bytes(&format!("shown/{name}"));
         let mut reader = png::Decoder::new(std::io::Cursor::new(picture)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
@@ -231,4 +232,10 @@ fn the_demo_is_what_the_four_binaries_make() {
         .run("slice shown/blade.stl | fix | dither | tile --mesh none > by_hand.tif")
         .succeeds_quietly();
     assert!(scratch.bytes("shown/build.tif") == scratch.bytes("by_hand.tif"));
+    let (_, line) = said.rsplit_once("slice ").expect("it says how");
+    let (line, _) = line.rsplit_once("> shown/alpha.tif").expect("it says how");
+    let in_mesh = scratch.run(&format!("slice {line}")).succeeds_quietly().stdout;
+    assert!(scratch.bytes("shown/alpha.tif") == in_mesh);
+    let in_mesh = read_stack(in_mesh);
+    assert_eq!((in_mesh.len(), in_mesh[0].info.index), (20, 444));
 }

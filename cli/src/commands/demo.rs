@@ -1,4 +1,5 @@
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -6,9 +7,12 @@ use anyhow::Context;
 use clap::Args;
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::Method;
-use lamp_postprocess::{FixOptions, TileOptions, fix, tile};
+use lamp_postprocess::machine::Builtin;
+use lamp_postprocess::{
+    FixOptions, Heights, Layout, MeshOptions, Pack, Part as PlacedPart, TileOptions, fix, tile,
+};
 use lamp_slicer::Model;
-use lamp_stack::{Layer, Pages};
+use lamp_stack::{Layer, Pages, StackError};
 
 use crate::options::{Common, Output, parse_count};
 use crate::part::PartOptions;
@@ -22,7 +26,8 @@ use crate::streams::{failed_at, print, write_file, write_layers};
 #[command(after_help = "\
 Examples:
   lamp demo
-  lamp demo /tmp/lamp --facets 5.5M")]
+  lamp demo /tmp/lamp --facets 5.5M
+  lamp demo --whole-build")]
 pub(crate) struct DemoArgs {
     /// The folder to work in
     #[arg(value_name = "DIR", default_value = "lamp-demo")]
@@ -31,38 +36,61 @@ pub(crate) struct DemoArgs {
     /// About how many facets the mould has
     #[arg(long, value_name = "N", default_value = "750k", value_parser = parse_count)]
     facets: usize,
+
+    /// Make all layers of the build in its mesh, not twenty of them: the mesh has many more edges
+    /// than the mould, so that this takes many times as long
+    #[arg(long)]
+    whole_build: bool,
 }
 
 /// The heights of the pictures, as shares of the stack: drains in the flange,
 /// a row of pins and holes, the serpentine between them, the tip plate.
 const PICTURED: [f64; 4] = [0.04, 0.354, 0.76, 0.925];
 const SCALE: Scale = Scale::Down(8);
+/// Which of them is pictured in its mesh.
+const IN_MESH: usize = 1;
+/// How many layers are made on either side of it.
+const AROUND: u32 = 10;
 
 pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
     let part = Part::Blade;
     let mesh = build(part, args.facets).map_err(|error| Stop::usage(error.to_string()))?;
     fs::create_dir_all(&args.folder).with_context(|| args.folder.display().to_string())?;
-    let [stl, stack, sheet] =
-        ["blade.stl", "build.tif", "layers.png"].map(|name| args.folder.join(name));
+    let [stl, stack, sheet, meshed, in_mesh] =
+        ["blade.stl", "build.tif", "layers.png", "alpha.tif", "alpha.png"]
+            .map(|name| args.folder.join(name));
     write_file(&stl, |out| mesh.write_stl(part.name(), out))?;
     let report = Report::new("demo", common.quiet, true);
     let started = Instant::now();
     let size = run_pipeline(&stl, &stack, &report)?;
     let seconds = started.elapsed().as_secs_f64();
     let pictures = draw(&stack, &sheet, size.layers)?;
+    let started = Instant::now();
+    let middle = pictured(size.layers)[IN_MESH];
+    let range = (!args.whole_build).then(|| middle - AROUND..middle + AROUND);
+    let made = build_in_mesh(&stl, &meshed, range.clone(), &report)?;
+    let mesh_seconds = started.elapsed().as_secs_f64();
+    let shown = middle + MeshOptions::default().base_layers;
+    draw_in_mesh(&meshed, &in_mesh, shown)?;
     if common.quiet {
         return Ok(());
     }
     let megabytes = fs::metadata(&stack).context("build.tif")?.len() as f64 / 1e6;
-    let [stl, stack, sheet] = [stl, stack, sheet].map(|path| path.display().to_string());
+    let [stl, stack, sheet, meshed, in_mesh] =
+        [stl, stack, sheet, meshed, in_mesh].map(|path| path.display().to_string());
     let StackSize { layers, width, height } = size;
     let facets = mesh.facets.len();
+    let range = range.map(|range| format!(" --layers {}..{}", range.start, range.end));
+    let range = range.unwrap_or_default();
     print(&format!(
         "\
 {stl}: a hollow blade mould, 76 x 76 x 127 mm, {facets} facets
 {stack}: {layers} layers of {width} x {height} pixels at 1500 dpi and 100 um, {megabytes:.1} MB, made in {seconds:.2} s
 {sheet}: layers {pictures}, one pixel for 8 x 8
-The same by hand: slice {stl} | fix | dither | tile > {stack}
+{meshed}: {made} layers of the build on the alpha machine, in its mesh, made in {mesh_seconds:.2} s
+{in_mesh}: layer {shown} of them, one pixel for 8 x 8
+The same by hand: slice {stl} | fix | dither | tile --mesh none > {stack}
+                  slice {stl}{range} | fix | dither | tile --machine alpha > {meshed}
 "
     ))
 }
@@ -74,46 +102,80 @@ struct StackSize {
     height: u32,
 }
 
-/// The four stages in one process: no coding in between.
-fn run_pipeline(stl: &Path, stack: &Path, report: &Report) -> Result<StackSize, Stop> {
+/// The stages before `tile` in one process: no coding in between.
+fn part_layers(
+    stl: &Path,
+    range: Option<Range<u32>>,
+    report: &Report,
+) -> Result<impl Iterator<Item = Result<Layer, Stop>>, Stop> {
     let options = PartOptions::of_command("slice").expect("every option has a default");
     let model = Model::open(stl)?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
-    let (slices, name_command) = options.slices(model, &file, None, None, None, &|_| {})?;
+    let (slices, name_command) = options.slices(model, &file, range, None, None, &|_| {})?;
     report.expect(slices.layer_count() as u64);
     let layers = slices.map(move |layer| {
         let mut layer = layer?;
         name_command(&mut layer);
         Ok::<Layer, Stop>(layer)
     });
-    let fixed = fix(layers, FixOptions::default(), |fixed| {
+    let report = report.clone();
+    let fixed = fix(layers, FixOptions::default(), move |fixed| {
         report.say(&format!("{} had stray rows", fixed.before.info.name()));
     });
-    let dithered = lamp_grayscale::dither(fixed, Method::default());
+    Ok(lamp_grayscale::dither(fixed, Method::default()))
+}
+
+/// All four stages, on a black build area.
+fn run_pipeline(stl: &Path, stack: &Path, report: &Report) -> Result<StackSize, Stop> {
     let mut size = StackSize::default();
-    let tiled = tile(dithered, TileOptions::default()).inspect(|layer| {
+    let tiled = tile(part_layers(stl, None, report)?, TileOptions::default()).inspect(|layer| {
         if let Ok(Layer { image, .. }) = layer {
             size =
                 StackSize { layers: size.layers + 1, width: image.width(), height: image.height() };
         }
     });
-    let output = Output { output: stack.to_owned(), classic: false };
-    write_layers(tiled, &output, report)?;
+    write(tiled, stack, report)?;
     Ok(size)
+}
+
+/// The build of the alpha machine, with its mesh: all of it, or only some of the
+/// part's layers. Returns how many layers that is.
+fn build_in_mesh(
+    stl: &Path,
+    stack: &Path,
+    range: Option<Range<u32>>,
+    report: &Report,
+) -> Result<u32, Stop> {
+    let area = Builtin::named("alpha").expect("it is built in").machine().area.value;
+    let mut layers = part_layers(stl, range, report)?;
+    let first = layers.next().ok_or(StackError::NoLayers)??;
+    let parts = vec![PlacedPart::of_image("the mould", &first)?];
+    let mesh = MeshOptions::default();
+    let layout = Layout::packed(parts, &[None], area, mesh.gap(), Pack::default())?;
+    let layers = std::iter::once(Ok(first)).chain(layers);
+    let build = layout.with_mesh(&mesh)?.build(vec![layers], Heights::default(), |_| {});
+    let mut made = 0;
+    write(build.inspect(|_| made += 1), stack, report)?;
+    Ok(made)
+}
+
+fn write(
+    layers: impl Iterator<Item = Result<Layer, Stop>>,
+    stack: &Path,
+    report: &Report,
+) -> Result<(), Stop> {
+    write_layers(layers, &Output { output: stack.to_owned(), classic: false }, report)
+}
+
+/// The layers of a stack that are pictured.
+fn pictured(layers: u32) -> [u32; 4] {
+    PICTURED.map(|share| (f64::from(layers) * share) as u32)
 }
 
 /// Draws some layers as pictures of their own and on one sheet, and names
 /// them.
 fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Stop> {
-    let wanted = PICTURED.map(|share| (f64::from(layers) * share) as u32);
-    let failed = |error| failed_at(stack.display().to_string(), error);
-    let mut shown = Vec::new();
-    for page in Pages::open(stack).map_err(failed)? {
-        let page = page.map_err(failed)?;
-        if wanted.contains(&page.info().index) {
-            shown.push(page.decode().map_err(failed)?);
-        }
-    }
+    let shown = read(stack, &pictured(layers))?;
     for layer in &shown {
         let name = format!("layer_{:05}.png", layer.info.index);
         let picture = Picture::new(&layer.image, Region::of(&layer.image), SCALE);
@@ -124,6 +186,26 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Stop> {
     let parts = shown.iter().map(|layer| Picture::new(&layer.image, content.clone(), SCALE));
     write_picture(sheet, Picture::side_by_side(parts.collect()))?;
     Ok(shown.iter().map(|layer| layer.info.index.to_string()).collect::<Vec<_>>().join(", "))
+}
+
+/// Draws a layer of the build in its mesh.
+fn draw_in_mesh(stack: &Path, picture: &Path, index: u32) -> Result<(), Stop> {
+    let layers = read(stack, &[index])?;
+    let Layer { image, .. } = layers.first().context("the pictured layer is not there")?;
+    write_picture(picture, Picture::new(image, Region::of(image), SCALE))
+}
+
+/// Some layers of a stack.
+fn read(stack: &Path, wanted: &[u32]) -> Result<Vec<Layer>, Stop> {
+    let failed = |error| failed_at(stack.display().to_string(), error);
+    let mut layers = Vec::new();
+    for page in Pages::open(stack).map_err(failed)? {
+        let page = page.map_err(failed)?;
+        if wanted.contains(&page.info().index) {
+            layers.push(page.decode().map_err(failed)?);
+        }
+    }
+    Ok(layers)
 }
 
 fn write_picture(path: &Path, picture: Picture<'_>) -> Result<(), Stop> {

@@ -12,9 +12,6 @@ use crate::streams::{failed_at, input_name, layers_of, open_pages};
 
 const HEADING: &str = "Mesh around the parts";
 
-/// Mesh between two copies is at least so wide by the default gap.
-const LEAST_MESH: Length = Length::from_um(2000.0);
-
 /// Options of the mesh.
 #[derive(Args)]
 pub(super) struct MeshArgs {
@@ -57,13 +54,6 @@ impl MeshArgs {
     pub(super) fn file(&self) -> Option<&PathBuf> {
         let is_name = ["hexagon", "square", "none"].iter().any(|name| self.mesh == Path::new(name));
         (!is_name).then_some(&self.mesh)
-    }
-
-    /// How far apart copies are by default.
-    pub(super) fn default_gap(&self) -> Option<Length> {
-        let clearance = self.clearance.unwrap_or(MeshOptions::default().clearance);
-        let has_mesh = self.mesh != Path::new("none");
-        has_mesh.then(|| Length::from_um(2.0 * clearance.um() + LEAST_MESH.um()))
     }
 
     /// Checks that no option is without effect.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use lamp_postprocess::{
-    Heights, Layout, LayoutFile, Pack, PackBy, Part, StrayRows, TileOptions, Turns,
+    Heights, Layout, LayoutFile, MeshOptions, Pack, PackBy, Part, StrayRows, TileOptions, Turns,
 };
 use lamp_stack::{Length, Size};
 
@@ -169,7 +169,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
             parts,
             &args.counts(),
             area,
-            args.gap.or(args.mesh.default_gap()).unwrap_or(plain.gap),
+            args.gap.or(mesh.as_ref().map(MeshOptions::gap)).unwrap_or(plain.gap),
             args.packing(),
         )?,
     };

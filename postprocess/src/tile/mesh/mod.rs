@@ -24,6 +24,8 @@ use crate::offset::{offset_one_bit, without_holes};
 
 pub(super) use base::on_base;
 
+/// Mesh between two copies is so wide at least, unless it is asked for less.
+const LEAST_MESH: Length = Length::from_um(2000.0);
 /// Smaller cells have no holes worth the name.
 const LEAST_CELL_PIXELS: f64 = 4.0;
 
@@ -88,6 +90,12 @@ impl Default for MeshOptions {
 }
 
 impl MeshOptions {
+    /// How far apart copies are unless another gap is given: a moat around each, and
+    /// 2 mm of mesh between.
+    pub fn gap(&self) -> Length {
+        Length::from_um(2.0 * self.clearance.um() + LEAST_MESH.um())
+    }
+
     /// The options of the command that makes this mesh.
     fn command(&self) -> String {
         let Self { clearance, break_width, break_pitch, base_layers, .. } = self;
