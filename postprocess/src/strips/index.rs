@@ -125,7 +125,7 @@ mod tests {
         let index = Index::new("a \"b\"", [22, 7], 3, &swaths);
         let text = index.to_json();
         assert_eq!(Index::parse(&text).unwrap(), index);
-        assert_eq!(text.lines().count(), 11);
+        assert_eq!(text.lines().count(), 12);
         for (from, to) in [
             ("\"overlap\": 4", "\"overlap\": 5"),
             ("\"mirrors\": 10", "\"mirrors\": 11"),

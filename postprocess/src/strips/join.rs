@@ -1,5 +1,7 @@
 //! Swaths put back together.
 
+use std::borrow::Cow;
+
 use lamp_stack::{GrayMask, Image, LevelChange};
 use thiserror::Error;
 
@@ -34,7 +36,7 @@ impl Swaths {
         if swaths.len() != self.count() as usize || !swaths.iter().all(fits) {
             return Err(JoinSwathsError::Unlike);
         }
-        let swaths: Vec<GrayMask> = swaths.iter().map(gray).collect();
+        let swaths: Vec<Cow<'_, GrayMask>> = swaths.iter().map(gray).collect();
         let mut layer = GrayMask::new(self.width);
         let mut steps = Vec::new();
         for row in 0..height {
@@ -86,10 +88,10 @@ impl Swaths {
     }
 }
 
-pub(super) fn gray(image: &Image) -> GrayMask {
+pub(super) fn gray(image: &Image) -> Cow<'_, GrayMask> {
     match image {
-        Image::Mask(mask) => mask.into(),
-        Image::Gray(gray) => gray.clone(),
+        Image::Mask(mask) => Cow::Owned(mask.into()),
+        Image::Gray(gray) => Cow::Borrowed(gray),
     }
 }
 

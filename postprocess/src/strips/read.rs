@@ -136,6 +136,7 @@ impl Slice {
         let (mut info, dpi) = pages.swap_remove(0);
         let unlike = |source| StripsError::Join { layer: info.name(), source };
         let gray = self.swaths.join(&images).map_err(unlike)?;
+        drop(images);
         if gray.height() != self.height {
             return Err(unlike(JoinSwathsError::Unlike));
         }

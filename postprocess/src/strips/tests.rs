@@ -58,7 +58,7 @@ proptest! {
                 prop_assert_eq!(sum, u32::from(level(&layer, column, row)), "{} {}", column, row);
             }
         }
-        prop_assert_eq!(swaths.join(&cut), Ok(join::gray(&layer)));
+        prop_assert_eq!(swaths.join(&cut), Ok(join::gray(&layer).into_owned()));
     }
 }
 
