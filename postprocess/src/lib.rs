@@ -45,6 +45,6 @@ pub use strips::{
     JoinSwathsError, StripWriter, StripsError, Swaths, SwathsError, is_strips, join_strips,
 };
 pub use tile::{
-    CellShape, CopyName, Heights, Layout, LayoutError, LayoutFile, MeshOptions, Pack, PackBy, Part,
-    Pattern, Pixels, Placement, StrayRows, TileError, TileOptions, Turns, tile,
+    CellShape, CopyName, Heights, Layout, LayoutError, LayoutFile, MeshOptions, Moat, Pack, PackBy,
+    Part, Pattern, Pixels, Placement, StrayRows, TileError, TileOptions, Turns, tile,
 };

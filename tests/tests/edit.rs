@@ -2,7 +2,7 @@
 
 use lamp_fixtures::Part;
 use lamp_stack::{Image, Layer, Mask};
-use lamp_tests::{Scratch, mask, workspace_root, write_gray_ramp};
+use lamp_tests::{Scratch, mask, masks, workspace_root, write_gray_ramp};
 
 /// The 20 mm cube about zero, with its hole of 10 mm, at 254 dpi: a pixel is
 /// 100 um.
@@ -253,4 +253,39 @@ fn wrong_usage_is_status_2() {
         let ran = scratch.run(line);
         assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
     }
+}
+
+#[test]
+fn a_build_keeps_what_is_not_in_its_copies() {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("torus.stl", Part::Torus, 800);
+    for part in ["cube", "torus"] {
+        let line = format!("slice {part}.stl --dpi 100 --thickness 1mm -o {part}.tif");
+        scratch.run(&line).succeeds_quietly();
+    }
+    scratch.run("tile cube.tif --copies 2 -o build.tif").succeeds_quietly();
+    // An edit of all heights leaves the layers of mesh alone.
+    let rib =
+        "[[edit]]\ncopies = true\nbox = { x = [\"-2mm\", \"2mm\"], y = [\"-1mm\", \"1mm\"] }\n";
+    scratch.write("rib.toml", rib.as_bytes());
+    scratch.run("lamp edit build.tif rib.toml -o ribbed.tif").succeeds_quietly();
+    let (before, after) = (scratch.layers("build.tif"), scratch.layers("ribbed.tif"));
+    assert_eq!(masks(&before)[..5], masks(&after)[..5]);
+    assert!(masks(&before)[5..].iter().zip(&masks(&after)[5..]).all(|(a, b)| a != b));
+    scratch.write("only.toml", rib.replace("copies", "op = \"intersect\"\ncopies").as_bytes());
+    scratch.run("lamp edit build.tif only.toml -o x.tif").is_refused_with(&["intersect", "tile"]);
+    // Nothing is lost beside the image.
+    scratch
+        .run("lamp edit cube.tif --union torus.tif -o x.tif")
+        .is_refused_with(&["beside its image", "pad"]);
+    // Of a stack that says nothing, the build still says where the copies stand.
+    let mut plain = scratch.layers("cube.tif");
+    plain[0].info.stack = None;
+    scratch.stack("plain.tif", plain);
+    scratch.run("tile plain.tif --copies 2 -o build.tif").succeeds_quietly();
+    let build = scratch.layers("build.tif");
+    let stack = build[0].info.stack.as_ref().unwrap();
+    assert_eq!(stack.other["tile"]["copies"].as_array().unwrap().len(), 2);
+    assert_eq!(stack.part, "plain");
 }

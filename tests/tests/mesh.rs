@@ -161,9 +161,14 @@ fn an_image_is_repeated_as_the_mesh() {
     let command = build[0].info.stack.as_ref().unwrap().commands.last().unwrap();
     assert!(command.contains("--mesh walls.tif"), "{command}");
     write_gray_ramp(&scratch.path("gray.tif"), 16, 16);
-    scratch
-        .run("tile torus.tif --mesh gray.tif -o x.tif")
-        .is_refused_with(&["gray.tif", "dither it first"]);
+    // Of gray, what is half as bright as white.
+    scratch.run("tile torus.tif --mesh gray.tif --copies 1 -o build.tif").succeeds_quietly();
+    let build = scratch.layers("build.tif");
+    scratch.run("dither gray.tif --method threshold -q -o dots.tif").succeeds_quietly();
+    let (base, dots) = (mask(&build[0]), scratch.layers("dots.tif"));
+    for (row, column) in (0..16).flat_map(|row| (0..16).map(move |column| (row, column))) {
+        assert_eq!(base.is_white(column, row), mask(&dots[0]).is_white(column, row));
+    }
     scratch
         .run("tile torus.tif --mesh hexagons -o x.tif")
         .is_refused_with(&["hexagons", "No such file"]);
@@ -241,4 +246,30 @@ fn edits_of_copies_hit_the_parts() {
         assert!(placed.eq(copy), "copy {k}");
         assert!(part[0].image != part[2].image);
     }
+}
+
+/// A bore that lies across is free of mesh only if the moat follows the outline.
+#[test]
+fn mesh_keeps_out_of_a_part_that_lies() {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Part::Cube, 64);
+    scratch
+        .run("slice cube.stl --rotate x:90 --dpi 100 --thickness 1mm -o cube.tif")
+        .succeeds_quietly();
+    let tile = "tile cube.tif --fit --area 40x40mm --copies 1";
+    scratch.run(&format!("{tile} --mesh none -o part.tif")).succeeds_quietly();
+    let inside = |options: &str| {
+        scratch.run(&format!("{tile} {options} -o build.tif")).succeeds_quietly();
+        // The middle of the bore, in the middle layer.
+        let (build, part) = (scratch.layers("build.tif"), scratch.layers("part.tif"));
+        let (build, part) = (mask(&build[10]), mask(&part[10]));
+        let frame = 45..113;
+        frame
+            .clone()
+            .flat_map(|y| frame.clone().map(move |x| (x, y)))
+            .filter(|&(x, y)| build.is_white(x, y) && !part.is_white(x, y))
+            .count()
+    };
+    let mesh = "--cell 2mm --base-layers 0";
+    assert!(inside(mesh) > 50 && inside(&format!("{mesh} --moat outline")) == 0);
 }

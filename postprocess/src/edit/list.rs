@@ -104,6 +104,12 @@ impl Edit {
         if !self.copies.is_none() && shapes == 0 {
             return wrong("copies are for boxes, cylinders, lines and labels: take it out");
         }
+        if !self.copies.is_none() && self.op == Some(Op::Intersect) {
+            return wrong(
+                "intersect would take away all of the build but the shapes in these copies: intersect \
+                 the part before tile",
+            );
+        }
         if self.cylinder.is_some_and(|c| (c.along == Along::Z) == c.between.is_some()) {
             return wrong(
                 "a cylinder along x or y needs between = [from, to], and only one along these",

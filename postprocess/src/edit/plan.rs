@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Frame, Image, Layer, Mask, Op, PageInfo, Turn};
+use lamp_stack::{Frame, Image, Layer, Mask, Op, PageInfo, Turn, gray_runs};
 use serde_json::json;
 
 use super::copies::Copy;
@@ -183,7 +183,12 @@ impl Step {
         }
         let copies = Copy::all(&edit.copies, info, place)?;
         let shape = Shape::of(edit, number, place, copies)?;
-        Ok(Self::Shape { reach: Reach::of(edit), op: edit.op(), shape })
+        let reach = match Reach::of(edit) {
+            // Copies begin above the layers of mesh alone.
+            Reach::All if !edit.copies.is_none() => Reach::Layers(base_layers(info)..u32::MAX),
+            reach => reach,
+        };
+        Ok(Self::Shape { reach, op: edit.op(), shape })
     }
 
     /// What becomes of an image; `None` where that has more runs than any may
@@ -206,7 +211,14 @@ impl Step {
                 mask.and_then(|mask| combined(*op, &Image::Mask(mask)))
             }
             Self::Other { op, frame, .. } => match other {
-                Some(other) => combined(*op, &other.image.framed(*frame)),
+                Some(other) => {
+                    let shown = other.image.framed(*frame);
+                    if matches!(op, Op::Union | Op::Xor) && lit(&shown) < lit(&other.image) {
+                        let problem = "what is added to it reaches beside its image: pad it first";
+                        return Err(EditError::layer(info, problem.to_owned()));
+                    }
+                    combined(*op, &shown)
+                }
                 // A layer that is not there is black.
                 None => combined(*op, &Image::Mask(Mask::black(image.width(), image.height()))),
             },
@@ -234,6 +246,24 @@ impl Edit {
     pub(super) fn adds_at_all_heights(&self) -> bool {
         matches!(Reach::of(self), Reach::All) && matches!(self.op(), Op::Union | Op::Xor)
     }
+}
+
+/// How many pixels are not black.
+fn lit(image: &Image) -> u64 {
+    match image {
+        Image::Mask(mask) => mask.white_pixels(),
+        Image::Gray(gray) => {
+            let runs = gray.rows().flat_map(|row| gray_runs(row, gray.width()));
+            runs.filter(|run| run.2 > 0).map(|run| u64::from(run.1 - run.0)).sum()
+        }
+    }
+}
+
+/// How many layers of mesh alone a build begins with.
+fn base_layers(info: &PageInfo) -> u32 {
+    let tile = info.stack.as_ref().and_then(|stack| stack.other.get("tile"));
+    let layers = tile.and_then(|tile| tile["base_layers"].as_u64()).unwrap_or(0);
+    layers.try_into().unwrap_or(u32::MAX)
 }
 
 /// What a stack's first page says of where it comes from.

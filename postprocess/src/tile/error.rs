@@ -64,6 +64,17 @@ pub enum TileError {
     /// A mesh of more runs than an image can hold.
     #[error("the mesh has more runs than an image can hold: give it larger cells")]
     FineMesh,
+    /// Break lines that leave no mesh.
+    #[error(
+        "there would be more than 10000 break lines: give a wider --break-pitch, or --break-width 0um"
+    )]
+    ManyBreaks,
+    /// Moats by outlines that are not known.
+    #[error("{name}: its outline is not known: moats by outline need --fit")]
+    NoOutline {
+        /// The part.
+        name: String,
+    },
     /// A moat that leaves no place for the mesh.
     #[error(
         "a clearance of {clearance} is wider than the build area of {area_mm}: give a smaller --clearance, or --mesh none"

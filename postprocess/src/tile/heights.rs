@@ -37,6 +37,8 @@ pub(super) struct Step {
     pub(super) copies: Arc<[usize]>,
     /// What the mesh around them takes.
     pub(super) mesh_bytes: usize,
+    /// Whether it is the build's first.
+    pub(super) is_first: bool,
 }
 
 impl Held for Step {
@@ -125,9 +127,9 @@ where
             Some((last, _)) => index.max(last.saturating_add(1)),
             None => index,
         };
-        self.last = Some((index, span));
+        let is_first = self.last.replace((index, span)).is_none();
         let (copies, mesh_bytes) = (Arc::clone(&self.copies), self.mesh_bytes);
-        Step { index, z_um, thickness_um, layers, copies, mesh_bytes }
+        Step { index, z_um, thickness_um, layers, copies, mesh_bytes, is_first }
     }
 
     /// Finds how far each stack must go up, and checks that all start at one

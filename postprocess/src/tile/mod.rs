@@ -23,6 +23,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use lamp_stack::{Image, Layer, Length, Mask, Op, Size, Turn, map_in_order};
@@ -35,7 +36,7 @@ pub use error::{CopyName, TileError};
 pub use file::{LayoutError, LayoutFile};
 pub use heights::Heights;
 pub use layout::{Layout, Placement};
-pub use mesh::{CellShape, MeshOptions, Pattern};
+pub use mesh::{CellShape, MeshOptions, Moat, Pattern};
 pub use pack::{Pack, PackBy, Turns};
 pub use page::StrayRows;
 pub use part::Part;
@@ -174,11 +175,10 @@ impl Layout {
             }
         })?;
         let Some(mesh) = &self.mesh else { return Ok(parts) };
-        let moats: Vec<(usize, Image)> =
-            layers.iter().map(|(part, image)| (*part, Image::Mask(mesh.moat(image)))).collect();
-        let moats = self.turned(&moats).ok_or_else(too_many)?;
-        let moats = rows::united(&placed(&moats), self.pixels.grown(mesh.reach()));
-        let moats = moats.map_err(|_| too_many())?;
+        let moats = match &mesh.fixed_moats {
+            Some(moats) => Cow::Borrowed(moats),
+            None => Cow::Owned(self.moats(mesh, &layers).ok_or_else(too_many)?),
+        };
         match &parts {
             Image::Mask(parts) => Ok(Image::Mask(mesh.around(parts, &moats))),
             Image::Gray(_) => {
@@ -187,6 +187,13 @@ impl Layout {
                 parts.combined(Op::Union, &around).ok_or_else(too_many)
             }
         }
+    }
+
+    /// The moats around images of parts; `None` where these have too many runs.
+    fn moats(&self, mesh: &Mesh, images: &[(usize, Image)]) -> Option<Mask> {
+        let moat = |(part, image): &(usize, Image)| (*part, Image::Mask(mesh.moat(image)));
+        let moats = self.turned(&images.iter().map(moat).collect::<Vec<_>>())?;
+        rows::united(&placed(&moats), self.pixels.grown(mesh.reach())).ok()
     }
 
     /// Images of parts in each way in which copies lie, and where these stand; `None`

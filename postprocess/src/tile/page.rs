@@ -1,6 +1,7 @@
 //! What a build's pages say.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::Arc;
 
 use lamp_stack::{Layer, PageInfo, StackInfo, Turn};
@@ -34,7 +35,8 @@ impl Layout {
             (Some(true), Some(true)) => Some(true),
             _ => None,
         });
-        let (other, stack) = (common(&here, self.parts.len()), self.stack_of(&here));
+        let other = common(&here, self.parts.len());
+        let stack = step.is_first.then(|| self.stack_of(&here));
         Ok(PageInfo {
             index: step.index,
             z_um: step.z_um,
@@ -92,19 +94,20 @@ impl Layout {
         (row <= last).then(|| at.top + if upside_down { last - row } else { row })
     }
 
-    /// What the first page says of the build, where the parts' say anything.
-    fn stack_of(&self, here: &[Here<'_>]) -> Option<StackInfo> {
-        here.iter().find_map(|(_, _, layer)| layer.info.stack.as_ref())?;
-        if let &[(_, _, layer)] = here
+    /// What the first page says of the build.
+    fn stack_of(&self, here: &[Here<'_>]) -> StackInfo {
+        if let &[(_, part, layer)] = here
             && self.parts.len() == 1
         {
-            let mut stack = layer.info.stack.clone()?;
+            let mut stack = layer.info.stack.clone().unwrap_or_else(|| unknown(part));
             stack.commands.push(self.command.clone());
-            stack.other.insert("tile".to_owned(), Value::Object(self.described(0)));
-            return Some(stack);
+            let mut tile = self.described(0);
+            tile.append(&mut self.base());
+            stack.other.insert("tile".to_owned(), Value::Object(tile));
+            return stack;
         }
-        let stacks: Vec<StackInfo> =
-            self.parts.iter().map(|part| part.stack.clone().unwrap_or_default()).collect();
+        let known = |part: &Part| part.stack.clone().unwrap_or_else(|| unknown(part));
+        let stacks: Vec<StackInfo> = self.parts.iter().map(known).collect();
         let texts = |text: fn(&StackInfo) -> &str| stacks.iter().map(text);
         let names = told_apart(texts(|stack| &stack.part));
         let described = stacks.iter().zip(names).enumerate().map(|(part, (stack, name))| {
@@ -115,14 +118,24 @@ impl Layout {
             all.append(&mut self.described(part));
             all
         });
-        let other = [("tile".to_owned(), json!({ "parts": described.collect::<Vec<_>>() }))];
-        Some(StackInfo {
+        let mut tile = Map::new();
+        tile.insert("parts".to_owned(), json!(described.collect::<Vec<_>>()));
+        tile.append(&mut self.base());
+        let other = [("tile".to_owned(), Value::Object(tile))];
+        StackInfo {
             part: texts(|stack| &stack.part).collect::<Vec<_>>().join("+"),
             commands: vec![self.command.clone()],
             digest: digest_of(texts(|stack| &stack.digest)),
             layers: self.layer_count(),
             other: other.into_iter().collect(),
-        })
+        }
+    }
+
+    /// How many of the first layers are mesh alone, where any are.
+    fn base(&self) -> Map<String, Value> {
+        let layers = self.mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
+        let base = (layers > 0).then(|| ("base_layers".to_owned(), json!(layers)));
+        base.into_iter().collect()
     }
 
     /// How many layers there are where all stacks say so: all start together,
@@ -224,6 +237,12 @@ impl Step {
     pub(super) fn some_layer(&self) -> &Arc<Layer> {
         self.layers.iter().flatten().next().expect("a step has a layer")
     }
+}
+
+/// What is known of a stack that does not say what it is.
+fn unknown(part: &Part) -> StackInfo {
+    let stem = Path::new(part.name()).file_stem().unwrap_or_default();
+    StackInfo { part: stem.to_string_lossy().into_owned(), ..StackInfo::default() }
 }
 
 #[cfg(test)]

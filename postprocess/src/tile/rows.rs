@@ -1,5 +1,6 @@
 //! A build's rows as a merge of shifted rows.
 
+use std::borrow::Cow;
 use std::cell::Cell;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -110,9 +111,8 @@ fn for_each_row(
             met.row += 1;
             met.row < images[met.image].image.height()
         });
-        while let Some(&Reverse((top, left, image))) = waiting.peek().filter(|at| at.0.0 == index) {
+        while let Some(&Reverse((_, left, image))) = waiting.peek().filter(|at| at.0.0 == index) {
             waiting.pop();
-            let _ = top;
             if images[image].image.height() > 0 {
                 let place = met.partition_point(|met| met.left <= left);
                 met.insert(place, Met { image, left, row: 0 });
@@ -159,7 +159,7 @@ impl MaskRow {
 }
 
 fn compose_grays(images: &[Placed<'_>], build: Pixels) -> Result<GrayMask, Fault> {
-    let grays: Vec<GrayMask> = images.iter().map(|placed| gray_of(placed.image)).collect();
+    let grays: Vec<Cow<'_, GrayMask>> = images.iter().map(|placed| gray_of(placed.image)).collect();
     let mut gray = GrayMask::new(build.width);
     let (mut row, mut one, mut spare) = (Vec::new(), Vec::new(), Vec::new());
     for_each_row(images, build.height, |met| {
@@ -180,10 +180,10 @@ fn compose_grays(images: &[Placed<'_>], build: Pixels) -> Result<GrayMask, Fault
     Ok(gray)
 }
 
-fn gray_of(image: &Image) -> GrayMask {
+fn gray_of(image: &Image) -> Cow<'_, GrayMask> {
     match image {
-        Image::Mask(mask) => GrayMask::from(mask),
-        Image::Gray(gray) => gray.clone(),
+        Image::Mask(mask) => Cow::Owned(GrayMask::from(mask)),
+        Image::Gray(gray) => Cow::Borrowed(gray),
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
-use lamp_postprocess::{CellShape, MeshOptions, Pattern};
+use clap::{Args, ValueEnum};
+use lamp_grayscale::{Method, dither_image};
+use lamp_postprocess::{CellShape, MeshOptions, Moat, Pattern};
 use lamp_stack::{Image, Length, StackError};
 
 use crate::options::{parse_distance, parse_thickness};
@@ -34,6 +35,11 @@ pub(super) struct MeshArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
     clearance: Option<Length>,
 
+    /// Whether the moat follows the part in each layer, or what is white in any layer: then no mesh
+    /// stands on the part's faces or in bores that lie across. It implies --fit [default: layer]
+    #[arg(long, value_enum, value_name = "layer|outline", help_heading = HEADING)]
+    moat: Option<MoatArg>,
+
     /// How wide break lines are, which cut the mesh from each part up, down, left and right to the
     /// next part or the area's edge; 0um makes none [default: 500um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
@@ -49,7 +55,18 @@ pub(super) struct MeshArgs {
     base_layers: Option<u32>,
 }
 
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum MoatArg {
+    Layer,
+    Outline,
+}
+
 impl MeshArgs {
+    /// Whether it must know the parts' outlines.
+    pub(super) fn needs_outlines(&self) -> bool {
+        self.moat == Some(MoatArg::Outline)
+    }
+
     /// The file that it reads, if any.
     pub(super) fn file(&self) -> Option<&PathBuf> {
         let is_name = ["hexagon", "square", "none"].iter().any(|name| self.mesh == Path::new(name));
@@ -67,7 +84,7 @@ impl MeshArgs {
         let given = |options: &[(&'static str, Option<Length>)]| {
             options.iter().find(|(_, length)| length.is_some()).map(|(name, _)| *name)
         };
-        let base = self.base_layers.map(|_| "--base-layers");
+        let base = self.base_layers.map(|_| "--base-layers").or(self.moat.map(|_| "--moat"));
         if self.mesh == Path::new("none")
             && let Some(option) = given(&of_cells).or(given(&lengths)).or(base)
         {
@@ -100,6 +117,7 @@ impl MeshArgs {
         Ok(Some(MeshOptions {
             pattern,
             clearance: self.clearance.unwrap_or(plain.clearance),
+            moat: if self.needs_outlines() { Moat::Outline } else { Moat::Layer },
             break_width: self.break_width.unwrap_or(plain.break_width),
             break_pitch: self.break_pitch.unwrap_or(plain.break_pitch),
             base_layers: self.base_layers.unwrap_or(plain.base_layers),
@@ -107,19 +125,17 @@ impl MeshArgs {
     }
 }
 
-/// The first image of a file.
+/// The first image of a file; of a gray one, what is at least half as bright as white.
 fn template(path: &Path) -> Result<Pattern, Stop> {
     let place = input_name(path);
     let first = layers_of(open_pages(path)?, &place, None).next();
     let layer = first.unwrap_or_else(|| Err(failed_at(place.clone(), StackError::NoLayers)))?;
-    match layer.image {
-        Image::Mask(image) => {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            Ok(Pattern::Image { name, image })
-        }
-        Image::Gray(_) => {
-            Err(Stop::Failed(anyhow::anyhow!("a mesh is black and white: dither it first"))
-                .at(place))
-        }
-    }
+    let image = match layer.image {
+        Image::Mask(image) => image,
+        Image::Gray(gray) => dither_image(&gray, Method::Threshold, 0)
+            .map_err(|error| Stop::Failed(error.into()).at(place))?,
+    };
+    // Without blanks, as the stack's commands are words.
+    let name = path.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_");
+    Ok(Pattern::Image { name, image })
 }

@@ -156,7 +156,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     let strips = args.strips.writer(machine.as_ref(), args.classic)?;
     let file = args.layout.as_deref().map(read_layout).transpose()?;
     let mut stacks = Stack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
-    let needs_outlines = args.fit || args.pack == PackArg::Outline;
+    let needs_outlines = args.fit || args.pack == PackArg::Outline || args.mesh.needs_outlines();
     let parts: Vec<Part> =
         stacks.iter_mut().map(|stack| stack.part(needs_outlines)).collect::<Result<_, _>>()?;
     let plain = TileOptions::default();
@@ -173,7 +173,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
             args.packing(),
         )?,
     };
-    args.tell(&layout)?;
+    let placed = layout.clone();
     let layout = match &mesh {
         Some(mesh) => layout.with_mesh(mesh)?,
         None => layout,
@@ -187,7 +187,8 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     let layers = stacks.into_iter().map(Stack::layers).collect::<Result<Vec<_>, _>>()?;
     let heights = Heights { settle: args.settle, resample: args.resample };
     let build = layout.build(layers, heights, |stray| say_stray(&report, stray));
-    strips::write(build, strips, output.as_ref(), &report)
+    strips::write(build, strips, output.as_ref(), &report)?;
+    args.tell(&placed)
 }
 
 impl TileArgs {

@@ -16,6 +16,9 @@ impl Rect {
     }
 }
 
+/// More lines than the mesh has cells.
+const MOST_LINES: u64 = 10_000;
+
 /// Lines from the parts to the edges of the build.
 #[derive(Clone, Debug, Default)]
 pub(in crate::tile) struct Breaks {
@@ -25,14 +28,27 @@ pub(in crate::tile) struct Breaks {
 
 impl Breaks {
     /// The lines of parts, `width` wide: through the middle of each part's place
-    /// and every `pitch` aside of it, up, down, left and right, until they meet the
-    /// place of another part or the build's edge. All are in pixels.
-    pub(in crate::tile) fn new(parts: &[Rect], area: [u32; 2], width: u32, pitch: u32) -> Self {
+    /// and every `pitch` aside of it, up, down, left and right, to the middle of
+    /// another part's place, whose outline is met before, or to the build's edge. All
+    /// are in pixels. `None` where they are too many.
+    pub(in crate::tile) fn new(
+        parts: &[Rect],
+        area: [u32; 2],
+        width: u32,
+        pitch: u32,
+    ) -> Option<Self> {
+        let of_part = |part: &Rect| {
+            let sides = [part.right - part.left, part.bottom - part.top];
+            sides.map(|side| u64::from(side / pitch.max(width + 1)) + 1).iter().sum::<u64>()
+        };
+        if parts.iter().map(of_part).sum::<u64>() > MOST_LINES {
+            return None;
+        }
         let transposed: Vec<Rect> = parts.iter().map(|part| part.transposed()).collect();
         let mut lines = upright(parts, area, width, pitch);
         let across = upright(&transposed, [area[1], area[0]], width, pitch);
         lines.extend(across.into_iter().map(Rect::transposed));
-        Self { bands: bands(&lines, area[1]) }
+        Some(Self { bands: bands(&lines, area[1]) })
     }
 
     /// Gives the transitions of a row.
@@ -55,8 +71,9 @@ fn upright(parts: &[Rect], [columns, rows]: [u32; 2], width: u32, pitch: u32) ->
             let right = (left + width).min(columns);
             // Others that the line meets, above and below.
             let met = || parts.iter().filter(|p| *p != part && p.left < right && left < p.right);
-            let above = met().filter(|p| p.bottom <= part.top).map(|p| p.bottom);
-            let below = met().filter(|p| p.top >= part.bottom).map(|p| p.top);
+            let middle = |p: &Rect| p.top + (p.bottom - p.top) / 2;
+            let above = met().filter(|p| middle(p) < part.top).map(middle);
+            let below = met().filter(|p| middle(p) > part.bottom).map(middle);
             lines.push(Rect {
                 left,
                 right,
@@ -112,7 +129,7 @@ mod tests {
 
     #[test]
     fn lines_run_from_a_part_to_the_edge() {
-        let breaks = Breaks::new(&[rect(3, 2, 8, 5)], [10, 7], 1, 100);
+        let breaks = Breaks::new(&[rect(3, 2, 8, 5)], [10, 7], 1, 100).unwrap();
         let expected = [
             ".....|....",
             ".....|....",
@@ -128,7 +145,7 @@ mod tests {
     #[test]
     fn lines_end_at_other_parts_and_stand_a_pitch_apart() {
         let parts = [rect(2, 1, 7, 3), rect(1, 6, 6, 8)];
-        let breaks = Breaks::new(&parts, [9, 10], 1, 2);
+        let breaks = Breaks::new(&parts, [9, 10], 1, 2).unwrap();
         // The upper part's are in columns 2, 4 and 6, the lower one's in 1, 3 and 5;
         // 1 and 6 pass the other part by.
         let expected = [
@@ -138,7 +155,7 @@ mod tests {
             ".||||||..",
             ".||||||..",
             ".||||||..",
-            ".|.|.||..",
+            ".||||||..",
             "|||||||||",
             ".|.|.||..",
             ".|.|.||..",
@@ -148,6 +165,13 @@ mod tests {
 
     #[test]
     fn no_part_has_no_lines() {
-        assert!(Breaks::new(&[], [9, 10], 1, 2).row(4).is_empty());
+        assert!(Breaks::new(&[], [9, 10], 1, 2).unwrap().row(4).is_empty());
+    }
+
+    #[test]
+    fn too_many_lines_are_none() {
+        let parts = vec![rect(0, 0, 6_000, 6_000); 2];
+        assert!(Breaks::new(&parts, [6_000; 2], 1, 3).is_some());
+        assert!(Breaks::new(&parts, [6_000; 2], 1, 2).is_none());
     }
 }

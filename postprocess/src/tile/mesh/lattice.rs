@@ -122,8 +122,8 @@ fn ceil(x: f64) -> u32 {
     whole + u32::from(f64::from(whole) < x)
 }
 
-/// Changes the colour from a column on that is not before the last.
-fn toggle(column: u32, width: u32, row: &mut Vec<u32>) {
+/// Changes the colour of a row from a column on that is not before the last change.
+pub(super) fn toggle(column: u32, width: u32, row: &mut Vec<u32>) {
     if column < width && row.pop_if(|last| *last == column).is_none() {
         row.push(column);
     }

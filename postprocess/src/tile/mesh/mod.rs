@@ -11,141 +11,20 @@
 mod base;
 mod breaks;
 mod lattice;
+mod options;
 #[cfg(test)]
 mod tests;
 
-use lamp_stack::{Dpi, Frame, Image, Length, MOST_RUNS, Mask, MaskBuilder, Op, place_row};
+use lamp_stack::{Frame, Image, Length, Mask, MaskBuilder, Op, place_row};
 
 use self::breaks::{Breaks, Rect};
-use self::lattice::{Cells, Lattice};
+use self::lattice::{Lattice, toggle};
 use super::part::white_of;
-use super::{Layout, Pixels, TileError};
+use super::{Layout, Part, Pixels, TileError};
 use crate::offset::{offset_one_bit, without_holes};
 
 pub(super) use base::on_base;
-
-/// Mesh between two copies is so wide at least, unless it is asked for less.
-const LEAST_MESH: Length = Length::from_um(2000.0);
-/// Smaller cells have no holes worth the name.
-const LEAST_CELL_PIXELS: f64 = 4.0;
-
-/// The mesh of a build. The seed gives no numbers: the defaults are ours.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MeshOptions {
-    /// Its walls.
-    pub pattern: Pattern,
-    /// How far from a part the mesh begins.
-    pub clearance: Length,
-    /// How wide break lines are; there are none where this is zero.
-    pub break_width: Length,
-    /// How far apart those of one part are.
-    pub break_pitch: Length,
-    /// How many layers of mesh alone there are below the parts.
-    pub base_layers: u32,
-}
-
-/// The walls of a mesh.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Pattern {
-    /// Cells of one shape.
-    Cells {
-        /// Their shape.
-        shape: CellShape,
-        /// From the middle of a cell to that of the next.
-        cell: Length,
-        /// The thickness of the walls between them.
-        wall: Length,
-    },
-    /// An image that is repeated over the area.
-    Image {
-        /// What the build's first page calls it.
-        name: String,
-        /// White is cured.
-        image: Mask,
-    },
-}
-
-/// The shape of a mesh's cells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CellShape {
-    /// Hexagons.
-    Hexagon,
-    /// Squares.
-    Square,
-}
-
-impl Default for MeshOptions {
-    /// Hexagons of 5 mm with walls of 0.5 mm, 1 mm from the parts; break lines of
-    /// 0.5 mm, 20 mm apart; five layers of mesh alone.
-    fn default() -> Self {
-        let [cell, wall] = [5.0, 0.5].map(Length::from_mm);
-        Self {
-            pattern: Pattern::Cells { shape: CellShape::Hexagon, cell, wall },
-            clearance: Length::from_mm(1.0),
-            break_width: Length::from_mm(0.5),
-            break_pitch: Length::from_mm(20.0),
-            base_layers: 5,
-        }
-    }
-}
-
-impl MeshOptions {
-    /// How far apart copies are unless another gap is given: a moat around each, and
-    /// 2 mm of mesh between.
-    pub fn gap(&self) -> Length {
-        Length::from_um(2.0 * self.clearance.um() + LEAST_MESH.um())
-    }
-
-    /// The options of the command that makes this mesh.
-    fn command(&self) -> String {
-        let Self { clearance, break_width, break_pitch, base_layers, .. } = self;
-        let pattern = match &self.pattern {
-            Pattern::Cells { shape, cell, wall } => {
-                let shape = match shape {
-                    CellShape::Hexagon => "hexagon",
-                    CellShape::Square => "square",
-                };
-                format!("{shape} --cell {cell} --wall {wall}")
-            }
-            Pattern::Image { name, .. } => name.clone(),
-        };
-        format!(
-            " --mesh {pattern} --clearance {clearance} --break-width {break_width} \
-             --break-pitch {break_pitch} --base-layers {base_layers}"
-        )
-    }
-
-    fn lattice(&self, dpi: Dpi, build: Pixels) -> Result<Lattice, TileError> {
-        let runs_of_row = match &self.pattern {
-            Pattern::Cells { cell, wall, .. } => {
-                if cell.pixels(dpi) < LEAST_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
-                    return Err(TileError::NoCells { cell: *cell, wall: *wall });
-                }
-                2.0 * f64::from(build.width) / cell.pixels(dpi)
-            }
-            Pattern::Image { name, image } => {
-                if image.width() == 0 || image.height() == 0 {
-                    return Err(TileError::NoTemplate { name: name.clone() });
-                }
-                let rows = image.rows().map(|row| row.len() + 1).max().unwrap_or(0);
-                rows as f64 * f64::from(build.width) / f64::from(image.width())
-            }
-        };
-        if runs_of_row * f64::from(build.height) > MOST_RUNS as f64 / 2.0 {
-            return Err(TileError::FineMesh);
-        }
-        Ok(match &self.pattern {
-            Pattern::Cells { shape, cell, wall } => {
-                let [cell, wall] = [cell, wall].map(|length| length.pixels(dpi));
-                Lattice::Cells(match shape {
-                    CellShape::Hexagon => Cells::hexagon(cell, wall),
-                    CellShape::Square => Cells::square(cell, wall),
-                })
-            }
-            Pattern::Image { image, .. } => Lattice::Image(image.clone()),
-        })
-    }
-}
+pub use options::{CellShape, MeshOptions, Moat, Pattern};
 
 /// The mesh of a layout, in pixels.
 #[derive(Clone, Debug)]
@@ -153,6 +32,8 @@ pub(super) struct Mesh {
     lattice: Lattice,
     breaks: Breaks,
     clearance: f64,
+    /// The moats around outlines, which are the same in all layers.
+    pub(super) fixed_moats: Option<Mask>,
     pub(super) base_layers: u32,
     build: Pixels,
     /// How many changes of colour its rows have together, about.
@@ -178,17 +59,28 @@ impl Layout {
             width => {
                 let area = [self.pixels.width, self.pixels.height];
                 Breaks::new(&self.places(clearance), area, width, whole(options.break_pitch))
+                    .ok_or(TileError::ManyBreaks)?
             }
         };
         let mut mesh = Mesh {
             lattice,
             breaks,
             clearance,
+            fixed_moats: None,
             base_layers: options.base_layers,
             build: self.pixels,
             changes: 0,
         };
         mesh.changes = mesh.count_changes();
+        if options.moat == Moat::Outline {
+            let outline = |(index, part): (usize, &Part)| match part.outline() {
+                Some(outline) => Ok((index, Image::Mask(outline.clone()))),
+                None => Err(TileError::NoOutline { name: part.name().to_owned() }),
+            };
+            let outlines = self.parts.iter().enumerate().map(outline);
+            let moats = self.moats(&mesh, &outlines.collect::<Result<Vec<_>, _>>()?);
+            mesh.fixed_moats = Some(moats.ok_or(TileError::FineMesh)?);
+        }
         self.mesh = Some(mesh);
         self.command += &options.command();
         Ok(self)
@@ -264,7 +156,7 @@ impl Mesh {
             let transitions = moats.row(index + reach);
             place_row(transitions, moats.width(), -i64::from(reach), width, &mut moat);
             Op::Union.rows(&moat, self.breaks.row(index), &mut free);
-            inlaid(&wall, &free, parts.row(index), &mut row);
+            inlaid(&wall, &free, parts.row(index), width, &mut row);
             mask.push_row(&row).expect("columns rise");
         }
         mask.finish()
@@ -296,7 +188,7 @@ impl Mesh {
 
 /// Makes `out` a row of walls with what is free of them cut out, and the parts, which
 /// lie in what is free, put in.
-fn inlaid(mut wall: &[u32], free: &[u32], mut part: &[u32], out: &mut Vec<u32>) {
+fn inlaid(mut wall: &[u32], free: &[u32], mut part: &[u32], width: u32, out: &mut Vec<u32>) {
     out.clear();
     // Whether the walls that are left begin white.
     let mut is_wall = false;
@@ -306,28 +198,21 @@ fn inlaid(mut wall: &[u32], free: &[u32], mut part: &[u32], out: &mut Vec<u32>) 
         wall = &wall[before..];
         is_wall ^= before % 2 == 1;
         if is_wall {
-            toggle(hole[0], out);
+            toggle(hole[0], width, out);
         }
         let Some(&end) = hole.get(1) else {
-            part.iter().for_each(|&column| toggle(column, out));
+            part.iter().for_each(|&column| toggle(column, width, out));
             return;
         };
         let within = part.partition_point(|&column| column <= end);
-        part[..within].iter().for_each(|&column| toggle(column, out));
+        part[..within].iter().for_each(|&column| toggle(column, width, out));
         part = &part[within..];
         let hidden = wall.partition_point(|&column| column <= end);
         wall = &wall[hidden..];
         is_wall ^= hidden % 2 == 1;
         if is_wall {
-            toggle(end, out);
+            toggle(end, width, out);
         }
     }
     out.extend_from_slice(wall);
-}
-
-/// Changes the colour from a column on that is not before the last.
-fn toggle(column: u32, row: &mut Vec<u32>) {
-    if row.pop_if(|last| *last == column).is_none() {
-        row.push(column);
-    }
 }

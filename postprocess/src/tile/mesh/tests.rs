@@ -4,7 +4,7 @@ use lamp_stack::{GrayMask, Image, Layer, Length, Mask, MaskBuilder, Size, StackI
 use proptest::prelude::*;
 
 use super::super::testing::{layer, mask_of};
-use super::super::{Heights, LayoutFile, Part, Turns};
+use super::super::{Heights, LayoutFile, Pack, Part, Turns};
 use super::*;
 
 /// Millimetres, which are pixels here.
@@ -13,6 +13,7 @@ fn mesh(shape: CellShape, [cell, wall, clearance]: [f64; 3]) -> MeshOptions {
     MeshOptions {
         pattern: Pattern::Cells { shape, cell, wall },
         clearance,
+        moat: Moat::Layer,
         break_width: Length::from_mm(0.0),
         break_pitch: Length::from_mm(7.0),
         base_layers: 0,
@@ -183,7 +184,8 @@ fn parts_stand_on_layers_of_mesh() {
     ), "{:?}", stack.commands);
     assert!(build[1..].iter().all(|layer| layer.info.stack.is_none()));
     // A range that begins higher up is what it is in the whole.
-    let upper = built(&layout, vec![vec![layer(1, Image::Mask(disc()))]]);
+    let mut upper = built(&layout, vec![vec![layer(1, Image::Mask(disc()))]]);
+    assert_eq!(upper[0].info.stack.take().unwrap().other["tile"]["base_layers"], 3);
     assert_eq!(
         (upper.len(), &upper[0].info, mask(&upper[0])),
         (1, &build[4].info, mask(&build[4]))
@@ -196,7 +198,7 @@ fn gray_parts_keep_their_levels() {
     (0..4).for_each(|_| gray.push_runs([(2, 0), (2, 90), (2, 0)]).unwrap());
     let part = layer(0, Image::Gray(gray));
     let parts = vec![Part::of_image("p", &part).unwrap()];
-    let pack = super::super::Pack { turns: Turns::None, ..Default::default() };
+    let pack = Pack { turns: Turns::None, ..Pack::default() };
     let area = "30x30mm".parse().unwrap();
     let layout = Layout::packed(parts, &[Some(1)], area, Length::from_mm(1.0), pack).unwrap();
     let layout = layout.with_mesh(&mesh(CellShape::Hexagon, [6.0, 2.0, 3.0])).unwrap();
@@ -223,4 +225,39 @@ fn meshes_that_are_none_are_refused() {
     let pattern = Pattern::Image { name: "x".to_owned(), image: Mask::black(0, 0) };
     let empty = MeshOptions { pattern, ..cells([8.0, 1.0, 1.0]) };
     assert!(matches!(refused(&empty), TileError::NoTemplate { .. }));
+}
+
+/// A slab with a bore that lies across it: mesh enters the layer where it is open,
+/// unless it keeps away from the outline.
+#[test]
+fn no_mesh_is_within_an_outline() {
+    let slab = mask_of(&["########"; 8]);
+    let open = mask_of(&[
+        "########", "########", "........", "........", "........", "........", "########",
+        "########",
+    ]);
+    let layers = || vec![layer(0, Image::Mask(slab.clone())), layer(1, Image::Mask(open.clone()))];
+    let stack = || layers().into_iter().map(Ok::<_, TileError>);
+    let area: Size = "30x30mm".parse().unwrap();
+    let placed = |part: Part| {
+        let gap = Length::from_mm(1.0);
+        Layout::packed(vec![part], &[Some(1)], area, gap, Pack::default()).unwrap()
+    };
+    let layout = placed(Part::of_outline("p", stack()).unwrap().unwrap());
+    let at = layout.placements()[0];
+    let within = |moat: Moat| {
+        let options = MeshOptions { moat, ..mesh(CellShape::Square, [4.0, 3.9, 0.0]) };
+        let build = built(&layout.clone().with_mesh(&options).unwrap(), vec![layers()]);
+        let white = |k: usize| {
+            let rows = at.top..at.top + 8;
+            let pixels = rows.flat_map(|y| (at.left..at.left + 8).map(move |x| (x, y)));
+            pixels.filter(|&(x, y)| mask(&build[k]).is_white(x, y)).count()
+        };
+        [white(0), white(1)]
+    };
+    assert_eq!(within(Moat::Layer), [64, 64]);
+    assert_eq!(within(Moat::Outline), [64, 32]);
+    let options = MeshOptions { moat: Moat::Outline, ..MeshOptions::default() };
+    let refused = placed(Part::of_image("p", &layers()[0]).unwrap()).with_mesh(&options);
+    assert!(matches!(refused, Err(TileError::NoOutline { .. })));
 }

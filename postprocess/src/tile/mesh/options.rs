@@ -1,0 +1,149 @@
+//! What a mesh is to be.
+
+use lamp_stack::{Dpi, Length, MOST_RUNS, Mask};
+
+use super::super::{Pixels, TileError};
+use super::lattice::{Cells, Lattice};
+
+/// Mesh between two copies is so wide at least, unless it is asked for less.
+const LEAST_MESH: Length = Length::from_um(2000.0);
+/// Smaller cells have no holes worth the name.
+const LEAST_CELL_PIXELS: f64 = 4.0;
+
+/// The mesh of a build. The seed gives no numbers: the defaults are ours.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshOptions {
+    /// Its walls.
+    pub pattern: Pattern,
+    /// How far from a part the mesh begins.
+    pub clearance: Length,
+    /// What it keeps away from.
+    pub moat: Moat,
+    /// How wide break lines are; there are none where this is zero.
+    pub break_width: Length,
+    /// How far apart those of one part are.
+    pub break_pitch: Length,
+    /// How many layers of mesh alone there are below the parts.
+    pub base_layers: u32,
+}
+
+/// What a mesh keeps away from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Moat {
+    /// Each layer of the part: the mesh follows it, stands on its faces that look up,
+    /// carries those that look down, and enters bores that lie across.
+    #[default]
+    Layer,
+    /// What is white in any layer, so that no mesh is above, below or in the part.
+    Outline,
+}
+
+/// The walls of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pattern {
+    /// Cells of one shape.
+    Cells {
+        /// Their shape.
+        shape: CellShape,
+        /// From the middle of a cell to that of the next.
+        cell: Length,
+        /// The thickness of the walls between them.
+        wall: Length,
+    },
+    /// An image that is repeated over the area.
+    Image {
+        /// What the build's first page calls it.
+        name: String,
+        /// White is cured.
+        image: Mask,
+    },
+}
+
+/// The shape of a mesh's cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellShape {
+    /// Hexagons.
+    Hexagon,
+    /// Squares.
+    Square,
+}
+
+impl Default for MeshOptions {
+    /// Hexagons of 5 mm with walls of 0.5 mm, 1 mm from the parts; break lines of
+    /// 0.5 mm, 20 mm apart; five layers of mesh alone.
+    fn default() -> Self {
+        let [cell, wall] = [5.0, 0.5].map(Length::from_mm);
+        Self {
+            pattern: Pattern::Cells { shape: CellShape::Hexagon, cell, wall },
+            clearance: Length::from_mm(1.0),
+            moat: Moat::default(),
+            break_width: Length::from_mm(0.5),
+            break_pitch: Length::from_mm(20.0),
+            base_layers: 5,
+        }
+    }
+}
+
+impl MeshOptions {
+    /// How far apart copies are unless another gap is given: a moat around each, and
+    /// 2 mm of mesh between.
+    pub fn gap(&self) -> Length {
+        Length::from_um(2.0 * self.clearance.um() + LEAST_MESH.um())
+    }
+
+    /// The options of the command that makes this mesh.
+    pub(super) fn command(&self) -> String {
+        let moat = if self.moat == Moat::Outline { " --moat outline" } else { "" };
+        let Self { clearance, break_width, break_pitch, base_layers, .. } = self;
+        let pattern = match &self.pattern {
+            Pattern::Cells { shape, cell, wall } => {
+                let shape = match shape {
+                    CellShape::Hexagon => "hexagon",
+                    CellShape::Square => "square",
+                };
+                format!("{shape} --cell {cell} --wall {wall}")
+            }
+            Pattern::Image { name, .. } => name.clone(),
+        };
+        format!(
+            " --mesh {pattern} --clearance {clearance}{moat} --break-width {break_width} \
+             --break-pitch {break_pitch} --base-layers {base_layers}"
+        )
+    }
+
+    pub(super) fn lattice(&self, dpi: Dpi, build: Pixels) -> Result<Lattice, TileError> {
+        let runs_of_row = match &self.pattern {
+            Pattern::Cells { cell, wall, .. } => {
+                if cell.pixels(dpi) < LEAST_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
+                    return Err(TileError::NoCells { cell: *cell, wall: *wall });
+                }
+                2.0 * f64::from(build.width) / cell.pixels(dpi)
+            }
+            Pattern::Image { name, image } => {
+                if image.width() == 0 || image.height() == 0 {
+                    return Err(TileError::NoTemplate { name: name.clone() });
+                }
+                // Where a row ends white and the next copy begins so, nothing changes.
+                let changes = |row: &[u32]| match row {
+                    [0, ..] if row.len() % 2 == 1 => row.len() - 1,
+                    row => row.len() + row.len() % 2,
+                };
+                let rows = image.rows().map(changes).max().unwrap_or(0);
+                rows as f64 * f64::from(build.width) / f64::from(image.width())
+            }
+        };
+        if runs_of_row * f64::from(build.height) > MOST_RUNS as f64 / 2.0 {
+            return Err(TileError::FineMesh);
+        }
+        Ok(match &self.pattern {
+            Pattern::Cells { shape, cell, wall } => {
+                let [cell, wall] = [cell, wall].map(|length| length.pixels(dpi));
+                Lattice::Cells(match shape {
+                    CellShape::Hexagon => Cells::hexagon(cell, wall),
+                    CellShape::Square => Cells::square(cell, wall),
+                })
+            }
+            Pattern::Image { image, .. } => Lattice::Image(image.clone()),
+        })
+    }
+}
