@@ -43,4 +43,4 @@ pub use error::HeightsError;
 pub use heights::{Heights, Search, uniform_heights};
 pub use machine::Machine;
 pub use part::Part;
-pub use slab::{Slab, Slabs, share};
+pub use slab::{Slab, Slabs};

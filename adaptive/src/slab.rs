@@ -57,6 +57,6 @@ impl Slab {
 }
 
 /// A share, of which nothing of nothing is zero.
-pub fn share(part: f64, whole: f64) -> f64 {
+pub(crate) fn share(part: f64, whole: f64) -> f64 {
     if part == 0.0 { 0.0 } else { part / whole }
 }

@@ -125,7 +125,7 @@ impl Found {
         heights.slabs.iter().filter(is_past).count()
     }
 
-    /// Tells of rows that told nothing.
+    /// Tells of rows that told nothing, or too little.
     pub(crate) fn warn(&self, say: &dyn Fn(&str)) {
         let left_out = self.heights.slabs.iter().filter(|slab| slab.rows_left_out > 0);
         let (layers, rows) = left_out.fold((0, 0), |(layers, rows), slab| {
@@ -136,6 +136,10 @@ impl Found {
                 "{rows} rows in {layers} layers do not balance: the mesh has gaps; how thick these \
                  layers are follows from the other rows"
             ));
+        } else if self.heights.volumes_mm3()[2] == 0.0 {
+            say(
+                "the part has no volume in any row: it is flat, or too thin for such a --row-pitch",
+            );
         }
     }
 }
@@ -279,7 +283,10 @@ pub(crate) fn significant(number: f64) -> String {
     // Rounding may make 9.996 one digit longer.
     let rounded: f64 = format!("{number:.2e}").parse().expect("it was a number");
     let decimals = 2 - rounded.abs().log10().floor() as i32;
-    format!("{rounded:.*}", decimals.max(0) as usize)
+    match decimals {
+        6.. => format!("{rounded:.2e}"),
+        _ => format!("{rounded:.*}", decimals.max(0) as usize),
+    }
 }
 
 /// A time in the unit that people would say it in.
@@ -346,8 +353,8 @@ mod tests {
 
     #[test]
     fn numbers_of_three_digits() {
-        let texts = [2.0, 0.012_345, 123_456.0, 9.999, 99.96, 0.0].map(significant);
-        assert_eq!(texts, ["2.00", "0.0123", "123000", "10.0", "100", "0"]);
+        let texts = [2.0, 0.012_345, 123_456.0, 9.999, 99.96, 0.0, 5.98e-8].map(significant);
+        assert_eq!(texts, ["2.00", "0.0123", "123000", "10.0", "100", "0", "5.98e-8"]);
         let times = [12.34, 199.0, 600.0, 9_000.0, 36_000.0].map(time_text);
         assert_eq!(times, ["12.3s", "199s", "10.0min", "150min", "10.0h"]);
     }

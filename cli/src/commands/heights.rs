@@ -2,9 +2,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, Heights, Part, Slab, share, uniform_heights,
-};
+use lamp_adaptive::{AreaDeviation, Criterion, CuspHeight, Heights, Part, Slab, uniform_heights};
 use lamp_stack::{Dpi, Length};
 
 use crate::exposure::{Exposure, ExposureOptions};
@@ -176,7 +174,7 @@ fn summary(
             |slab: &Slab| Some(exposure?.time(Length::from_um(slab.thickness_um)).ok()?.ms());
         let ms: Option<f64> = heights.slabs.iter().map(time).sum();
         let time = ms.map(|ms| ms / 1000.0 + overhead * heights.slabs.len() as f64);
-        let percent = 100.0 * share(lost + gained, volume);
+        let percent = if volume > 0.0 { 100.0 * (lost + gained) / volume } else { f64::NAN };
         text += &format!(
             "{name:<20}{:>8}{:>13}{:>14}{:>12}{:>13}{:>12}{:>10}\n",
             heights.slabs.len(),
