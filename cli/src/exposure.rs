@@ -79,8 +79,7 @@ fn read_times(path: &Path) -> anyhow::Result<ExposureTimes> {
 impl Exposure {
     /// How long a layer is exposed, to the microsecond, as people read it.
     pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, Stop> {
-        // Differences of heights miss the thickness that they stand for by rounding.
-        let thickness = Length::from_um((thickness.um() * 1000.0).round() / 1000.0);
+        let thickness = thickness.to_whole_nm();
         let time = match &self.source {
             Source::Resin { resin, overcure } => {
                 let time = resin.exposure_time(thickness, *overcure);

@@ -5,6 +5,7 @@ use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, Heights, HeightsError, Machine, Part, Search, Slab,
     VolumeDeviation,
 };
+use lamp_grayscale::calibrate::with_digits;
 use lamp_slicer::{Body, Fill};
 use lamp_stack::{Dpi, Length};
 
@@ -275,18 +276,9 @@ fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Stop {
     })
 }
 
-/// To three digits.
+/// To three digits, as tables of heights say numbers.
 pub(crate) fn significant(number: f64) -> String {
-    if number == 0.0 || !number.is_finite() {
-        return number.to_string();
-    }
-    // Rounding may make 9.996 one digit longer.
-    let rounded: f64 = format!("{number:.2e}").parse().expect("it was a number");
-    let decimals = 2 - rounded.abs().log10().floor() as i32;
-    match decimals {
-        6.. => format!("{rounded:.2e}"),
-        _ => format!("{rounded:.*}", decimals.max(0) as usize),
-    }
+    with_digits(number, 3)
 }
 
 /// A time in the unit that people would say it in.
@@ -352,9 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_three_digits() {
-        let texts = [2.0, 0.012_345, 123_456.0, 9.999, 99.96, 0.0, 5.98e-8].map(significant);
-        assert_eq!(texts, ["2.00", "0.0123", "123000", "10.0", "100", "0", "5.98e-8"]);
+    fn times_have_their_unit() {
         let times = [12.34, 199.0, 600.0, 9_000.0, 36_000.0].map(time_text);
         assert_eq!(times, ["12.3s", "199s", "10.0min", "150min", "10.0h"]);
     }

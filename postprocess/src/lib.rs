@@ -33,7 +33,6 @@ pub mod machine;
 mod offset;
 mod strips;
 mod tile;
-mod toml_text;
 
 pub use edit::{EditError, Edits, OtherLayers, edit};
 pub use fix::{Band, FixOptions, Fixed, Kind, Kinds, Method, Outcome, fix};

@@ -213,7 +213,7 @@ impl Planes {
 }
 
 fn to_nanometres(um: f64) -> f64 {
-    (um * 1000.0).round() / 1000.0
+    Length::from_um(um).to_whole_nm().um()
 }
 
 /// Finds planes that are not evenly apart, by as many even bins.

@@ -32,6 +32,12 @@ impl Length {
         self.um / 1000.0
     }
 
+    /// The same to the nanometre: sums and differences miss what they stand for by
+    /// rounding.
+    pub fn to_whole_nm(self) -> Self {
+        Self { um: (self.um * 1000.0).round() / 1000.0 }
+    }
+
     /// In pixels of a resolution (not rounded).
     pub fn pixels(self, dpi: Dpi) -> f64 {
         self.um * dpi.get() / 25_400.0

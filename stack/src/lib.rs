@@ -43,6 +43,7 @@ mod split;
 mod temporary;
 #[cfg(test)]
 mod testing;
+mod text;
 mod tiff;
 mod turn;
 
@@ -60,5 +61,6 @@ pub use output::{Destination, write_stack};
 pub use png_write::{png_of_layer, write_gray_png, write_png_folder, write_rgb_png};
 pub use split::{Cuts, SplitError, write_split};
 pub use temporary::{FileBeside, FolderBeside, remove_temporaries};
+pub use text::{line_of, one_line};
 pub use tiff::{Compression, EncodedPage, Format, Page, PageReader, PageWriter};
 pub use turn::Turn;

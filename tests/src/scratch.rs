@@ -48,6 +48,22 @@ impl Scratch {
         Self { folder: tempfile::tempdir().expect("a temporary folder") }
     }
 
+    /// With a tower of 76 layers and a torus of 15 to lay out, as `tower.tif` and
+    /// `torus.tif`, 100 dpi and 1 mm.
+    ///
+    /// # Panics
+    /// Where they cannot be made.
+    pub fn with_tower_and_torus() -> Self {
+        let scratch = Self::new();
+        scratch.part("tower.stl", Part::Tower, 5_000);
+        scratch.part("torus.stl", Part::Torus, 2_000);
+        for name in ["tower", "torus"] {
+            let line = format!("slice {name}.stl --dpi 100 --thickness 1mm -q -o {name}.tif");
+            scratch.run(&line).succeeds_quietly();
+        }
+        scratch
+    }
+
     /// Returns the path of something in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
@@ -188,6 +204,20 @@ impl Ran {
         let ran = self.succeeds();
         assert_eq!(ran.stderr, "", "{}", ran.line);
         ran
+    }
+
+    /// Checks that it was wrong usage: status 2, and what was said holds all of
+    /// `words`.
+    ///
+    /// # Panics
+    /// Where that is not so.
+    #[track_caller]
+    pub fn is_wrong_usage(self, words: &[&str]) -> Self {
+        assert_eq!(self.statuses, [Some(2)], "{self:?}");
+        for word in words {
+            assert!(self.stderr.contains(word), "no `{word}` in {self:?}");
+        }
+        self
     }
 
     /// Checks that the last stage refused its input: status 1 and one line

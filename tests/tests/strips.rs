@@ -5,7 +5,7 @@ use std::fs;
 
 use lamp_fixtures::Part;
 use lamp_stack::{Dpi, GrayMask, Image, Layer, PageInfo, StackInfo, gray_runs};
-use lamp_tests::{Ran, Scratch};
+use lamp_tests::Scratch;
 use serde_json::{Value, json};
 
 /// A tower of 76 layers, which makes a build of 236 x 236 pixels.
@@ -217,11 +217,6 @@ fn dithered_strips_give_seams_their_full_dose() {
     assert!(falls[0] > 0.8 && falls[1] < 0.2, "{falls:?}");
 }
 
-fn is_wrong_usage(ran: &Ran, words: &[&str]) {
-    assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
-    assert!(words.iter().all(|word| ran.stderr.contains(word)), "{ran:?}");
-}
-
 #[test]
 fn what_cannot_be_cut_leaves_nothing() {
     let scratch = with_tower();
@@ -241,7 +236,7 @@ fn what_cannot_be_cut_leaves_nothing() {
         ("--strips - --mirrors 100", &["name the folder"]),
         ("--strips s --mirrors 100 --layout-out s", &["the stack goes there"]),
     ] {
-        is_wrong_usage(&scratch.run(&format!("{TILE} {options}")), words);
+        scratch.run(&format!("{TILE} {options}")).is_wrong_usage(words);
         assert_eq!(scratch.names(), before, "{options}");
     }
     let cut = scratch.bytes("tower.tif");
@@ -305,5 +300,5 @@ fn strips_that_do_not_belong_together_are_named() {
     with("strip_001.tif", &scratch.bytes("dots.tif"));
     refused(&["layer 0"]);
     let both = scratch.run("lamp join s other -o x.tif");
-    is_wrong_usage(&both, &["s holds the strips of one build"]);
+    both.is_wrong_usage(&["s holds the strips of one build"]);
 }

@@ -2,30 +2,9 @@
 
 use std::fs;
 
-use lamp_fixtures::Part;
 use lamp_stack::{Dpi, Frame, GrayMask, Image, Layer, Mask, Op, PageInfo, StackInfo, Turn};
-use lamp_tests::{Ran, Scratch, mask};
+use lamp_tests::{Scratch, mask};
 use serde_json::Value;
-
-const COARSE: &str = "--dpi 100 --thickness 1mm -q";
-
-/// A tower of 76 layers and a torus of fewer.
-fn with_parts() -> Scratch {
-    let scratch = Scratch::new();
-    scratch.part("tower.stl", Part::Tower, 5_000);
-    scratch.part("torus.stl", Part::Torus, 2_000);
-    for name in ["tower", "torus"] {
-        scratch.run(&format!("slice {name}.stl {COARSE} -o {name}.tif")).succeeds_quietly();
-    }
-    scratch
-}
-
-fn is_wrong_usage(ran: &Ran, words: &[&str]) {
-    assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
-    for word in words {
-        assert!(ran.stderr.contains(word), "no `{word}` in {ran:?}");
-    }
-}
 
 /// Where the copies of a part stand: left, top and turn.
 fn copies(about: &Value) -> Vec<(u32, u32, Turn)> {
@@ -76,7 +55,7 @@ fn check(scratch: &Scratch, build: &str, stacks: &[&str]) -> usize {
 
 #[test]
 fn several_stacks_make_one_build_whatever_the_threads() {
-    let scratch = with_parts();
+    let scratch = Scratch::with_tower_and_torus();
     let line = "tile tower.tif:5 torus.tif:3 --area 150x150mm --mesh none";
     for (k, more) in ["", "--fit", "--fit --turns quarters"].into_iter().enumerate() {
         let build = format!("build{k}.tif");
@@ -96,7 +75,7 @@ fn several_stacks_make_one_build_whatever_the_threads() {
 
 #[test]
 fn standard_input_fits_as_a_file_does() {
-    let scratch = with_parts();
+    let scratch = Scratch::with_tower_and_torus();
     let stack = scratch.bytes("torus.tif");
     for options in ["--fit", "--pack outline", "--fit --layers 3..9", "--copies 2 --gap 1mm"] {
         let file = scratch.run(&format!("tile torus.tif {options}")).succeeds_quietly().stdout;
@@ -115,7 +94,7 @@ fn standard_input_fits_as_a_file_does() {
 
 #[test]
 fn outlines_place_more_round_parts_than_boxes() {
-    let scratch = with_parts();
+    let scratch = Scratch::with_tower_and_torus();
     let count = |options: &str, build: &str| {
         let line =
             format!("tile tower.tif --area 95x120mm --mesh none --gap 0.5mm {options} -o {build}");
@@ -129,7 +108,7 @@ fn outlines_place_more_round_parts_than_boxes() {
 
 #[test]
 fn a_layout_gives_the_same_build_again() {
-    let scratch = with_parts();
+    let scratch = Scratch::with_tower_and_torus();
     let stacks = "tower.tif torus.tif";
     let line = "tile tower.tif:4 torus.tif:2 --area 120x150mm --mesh none --pack outline";
     let written = "--layout-out 1.json --layout-picture 1.png -o 1.tif";
@@ -188,7 +167,7 @@ fn a_layout_says_how_copies_lie() {
 
 #[test]
 fn other_heights_are_refused_or_resampled() {
-    let scratch = with_parts();
+    let scratch = Scratch::with_tower_and_torus();
     scratch.run("slice torus.stl --dpi 100 --thickness 0.5mm -q -o fine.tif").succeeds();
     scratch
         .run("slice torus.stl --dpi 100 --thickness 1mm --translate 0,0,7 -q -o high.tif")
@@ -275,7 +254,7 @@ fn gray_layers_make_a_gray_build() {
 
 #[test]
 fn machines_have_areas_and_limits() {
-    let scratch = with_parts();
+    let scratch = Scratch::with_tower_and_torus();
     let list = scratch.run("lamp machine list").succeeds_quietly().stdout;
     let list = String::from_utf8(list).unwrap();
     assert!(list.contains("alpha") && list.contains("584.2x584.2mm"), "{list}");
@@ -305,7 +284,7 @@ fn machines_have_areas_and_limits() {
 
 #[test]
 fn what_cannot_be_meant_is_wrong_usage() {
-    let scratch = with_parts();
+    let scratch = Scratch::with_tower_and_torus();
     for (line, words) in [
         ("tile tower.tif:2 --copies 3", &["--copies", "blade.tif:120"][..]),
         ("tile tower.tif torus.tif --copies 3", &["--copies"]),
@@ -318,7 +297,7 @@ fn what_cannot_be_meant_is_wrong_usage() {
         ("tile tower.tif --layout-out tower.tif", &["that is the input"]),
         ("tile tower.tif --pack tight", &["box", "outline"]),
     ] {
-        is_wrong_usage(&scratch.run(&line.replacen("tile", "tile -o x.tif", 1)), words);
+        scratch.run(&line.replacen("tile", "tile -o x.tif", 1)).is_wrong_usage(words);
         assert!(!scratch.path("x.tif").exists());
     }
     scratch

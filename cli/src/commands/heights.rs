@@ -129,8 +129,8 @@ fn write_table(
         writeln!(
             out,
             "{layer},{},{},{:.6},{:.6},{:.6},{:.4},{:.3},{:.4},{}",
-            to_nm(slab.bottom_um),
-            to_nm(slab.thickness_um),
+            Length::from_um(slab.bottom_um).to_whole_nm().um(),
+            Length::from_um(slab.thickness_um).to_whole_nm().um(),
             slab.volume_mm3,
             slab.lost_mm3,
             slab.gained_mm3,
@@ -141,10 +141,6 @@ fn write_table(
         )?;
     }
     Ok(())
-}
-
-fn to_nm(um: f64) -> f64 {
-    (um * 1000.0).round() / 1000.0
 }
 
 /// A line for each choice of layers: how many there are, how far they are off by

@@ -161,7 +161,7 @@ pub fn width_points(
         let Some(of_row) = width.length_or_blank(row)? else { return Ok(Read::Blank) };
         let width = if is_side { cure_width_of_square(of_row, side) } else { of_row };
         // Less than the shortest length is what rounding leaves of nothing.
-        let feature_size = Length::from_um((side.um() * 1000.0).round() / 1000.0);
+        let feature_size = side.to_whole_nm();
         let grew = width.um() >= *LENGTHS.start();
         Ok(if grew { Read::Point(WidthPoint { feature_size, dose, width }) } else { Read::Nothing })
     })

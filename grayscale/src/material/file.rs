@@ -1,5 +1,6 @@
 //! Material files: reading, and writing what reads back the same.
 
+use lamp_stack::{line_of, one_line};
 use thiserror::Error;
 
 use super::Material;
@@ -58,14 +59,14 @@ impl Material {
     /// numbers make no model; the error names the key.
     pub fn from_toml(text: &str) -> Result<Self, MaterialError> {
         let syntax = |error: toml::de::Error| MaterialError::Syntax {
-            line: line_of(text, &error),
+            line: line_of(text, error.span()),
             problem: one_line(error.message()),
         };
         let file = toml::Deserializer::parse(text).map_err(syntax)?;
         let material: Self = serde_path_to_error::deserialize(file).map_err(|error| {
             let key = error.path().to_string();
             let inner = error.into_inner();
-            wrong_key(line_of(text, &inner), key, inner.message())
+            wrong_key(line_of(text, inner.span()), key, inner.message())
         })?;
         material.check()?;
         Ok(material)
@@ -111,17 +112,6 @@ fn wrong_key(line: usize, key: String, problem: &str) -> MaterialError {
     let todo = if problem.starts_with("missing field") { ": add it" } else { "" };
     let problem = one_line(problem).replace(" field ", " key ") + todo;
     MaterialError::Key { line, key: one_line(&key), problem }
-}
-
-/// Returns the line of an error, from 1.
-fn line_of(text: &str, error: &toml::de::Error) -> usize {
-    let start = error.span().map_or(0, |span| span.start);
-    1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count()
-}
-
-/// Makes one line of a text from a file: it must not steer the terminal.
-fn one_line(text: &str) -> String {
-    text.replace(char::is_control, " ")
 }
 
 #[cfg(test)]

@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 
-use lamp_stack::{Length, Op};
+use lamp_stack::{Length, Op, line_of, one_line};
 use serde::Deserialize;
 use serde_json::Value;
 use serde_path_to_error::Segment;
 
 use super::error::EditError;
 use super::forms::{Along, Edit, OtherStack};
-use crate::toml_text::{line_of, one_line};
 
 /// What is to be done to a stack, one after the other.
 #[derive(Clone, Debug)]
@@ -33,7 +32,7 @@ impl Edits {
             edit: Vec<Edit>,
         }
         let syntax = |error: toml::de::Error| EditError::Syntax {
-            line: line_of(text, &error),
+            line: line_of(text, error.span()),
             problem: one_line(error.message()),
         };
         let file = toml::Deserializer::parse(text).map_err(syntax)?;
@@ -41,7 +40,7 @@ impl Edits {
             let key = key_of(error.path());
             let inner = error.into_inner();
             let problem = one_line(inner.message()).replace(" field ", " key ");
-            EditError::Key { line: line_of(text, &inner), key, problem }
+            EditError::Key { line: line_of(text, inner.span()), key, problem }
         })?;
         let table: toml::Table = toml::from_str(text).map_err(syntax)?;
         let told = table.get("edit").and_then(|list| list.as_array()).ok_or(EditError::NoEdits)?;

@@ -3,12 +3,11 @@
 use std::fmt::Display;
 use std::str::FromStr;
 
-use lamp_stack::{Dpi, Length, Size};
+use lamp_stack::{Dpi, Length, Size, line_of, one_line};
 use serde::de::{self, Deserialize, Deserializer};
 use thiserror::Error;
 
 use super::Machine;
-use crate::toml_text::{line_of, one_line};
 
 /// Why a text is no machine.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -51,7 +50,7 @@ impl Machine {
     /// numbers make no machine; the error names the key.
     pub fn from_toml(text: &str) -> Result<Self, MachineError> {
         let file = toml::Deserializer::parse(text).map_err(|error| MachineError::Syntax {
-            line: line_of(text, &error),
+            line: line_of(text, error.span()),
             problem: one_line(error.message()),
         })?;
         let machine: Self = serde_path_to_error::deserialize(file).map_err(|error| {
@@ -60,7 +59,7 @@ impl Machine {
             let key = if path == "." { "the file".to_owned() } else { one_line(&path) };
             let inner = error.into_inner();
             MachineError::Key {
-                line: line_of(text, &inner),
+                line: line_of(text, inner.span()),
                 key,
                 problem: one_line(inner.message()),
             }

@@ -2,7 +2,7 @@
 
 use std::iter::Peekable;
 
-use lamp_stack::{Image, Layer, PageInfo, StackInfo};
+use lamp_stack::{Image, Layer, Length, PageInfo, StackInfo};
 
 use super::Mesh;
 
@@ -64,7 +64,7 @@ fn page(first: &PageInfo, index: u32, below: u32) -> PageInfo {
     let z_um = first.z_um.zip(first.thickness_um).map(|(z, t)| z - f64::from(below) * t);
     PageInfo {
         index,
-        z_um: z_um.map(|um| (um * 1000.0).round() / 1000.0),
+        z_um: z_um.map(|um| Length::from_um(um).to_whole_nm().um()),
         thickness_um: first.thickness_um,
         origin_mm: first.origin_mm,
         exposure_ms: first.exposure_ms,
