@@ -1,0 +1,230 @@
+//! Whether bodies as facets are what the file means.
+
+use std::collections::HashMap;
+
+use crate::kernel::{Facet, Jet, Kernel, Tessellation};
+use crate::vector::{Vec3, cross, dot, length, scale, sub};
+
+/// How far apart the two volumes of a body may be, as a part of it.
+const VOLUMES_APART: f64 = 1e-3;
+
+/// Why a body cannot be sliced as it is.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BodyFault {
+    /// It has no facets.
+    #[error("none of its faces could be made into facets")]
+    Empty,
+    /// Edges of facets that no other facet meets, or too many do.
+    #[error(
+        "{edges} edges of facets are open, the first at ({:.3}, {:.3}, {:.3}) mm on #{entity}",
+        at_mm[0], at_mm[1], at_mm[2]
+    )]
+    Open {
+        /// How many there are.
+        edges: usize,
+        /// Where the first one starts, in millimetres.
+        at_mm: [f64; 3],
+        /// The entity of its face.
+        entity: u64,
+    },
+    /// A face reaches beyond the control points of its surface.
+    #[error("#{entity} reaches {off_mm:.3} mm beyond the control points of its surface")]
+    Outside {
+        /// The entity of the face.
+        entity: u64,
+        /// How far, in millimetres.
+        off_mm: f64,
+    },
+    /// The volume within the facets is not that below the surfaces.
+    #[error(
+        "its facets hold {facets_mm3:.6} mm³, its surfaces {surfaces_mm3:.6} mm³; \
+         a shorter chord may bring them together"
+    )]
+    Volumes {
+        /// By the facets, in cubic millimetres.
+        facets_mm3: f64,
+        /// By the surfaces.
+        surfaces_mm3: f64,
+    },
+    /// Its faces point inwards.
+    #[error("it is inside out: its volume is {volume_mm3:.6} mm³")]
+    InsideOut {
+        /// By the facets, in cubic millimetres.
+        volume_mm3: f64,
+    },
+}
+
+/// A body as facets, measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyReport {
+    /// The body's name in the file.
+    pub name: String,
+    /// How many facets it has.
+    pub facets: usize,
+    /// The volume within the facets, in cubic millimetres.
+    pub volume_mm3: f64,
+    /// The volume below the surfaces over the facets' parameters.
+    pub exact_volume_mm3: f64,
+    /// The area of the facets, in square millimetres.
+    pub area_mm2: f64,
+    /// The least and the greatest corner, in millimetres.
+    pub box_mm: [[f64; 3]; 2],
+    /// What is wrong with it; nothing if it may be sliced.
+    pub faults: Vec<BodyFault>,
+}
+
+/// Checks every body: its facets are closed, every edge shared by exactly two in
+/// opposite directions; no face reaches beyond the control points of its surface;
+/// and the volumes by facets and by surfaces agree within 0.1 %, or as far as the
+/// chord lets facets lie from surfaces.
+pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
+    let report = |body: &crate::kernel::Body| {
+        let facets = mesh.of_faces(&body.faces);
+        let box_mm = bounds(mesh, facets);
+        let middle = scale(crate::vector::add(box_mm[0], box_mm[1]), 0.5);
+        let mut report = BodyReport {
+            name: body.name.clone(),
+            facets: facets.len(),
+            volume_mm3: volume(mesh, facets, middle),
+            exact_volume_mm3: exact_volume(kernel, facets, middle)
+                + exact_volume(kernel, mesh.tips_of_faces(&body.faces), middle),
+            area_mm2: facets.iter().map(|facet| length(doubled(mesh, facet)) / 2.0).sum(),
+            box_mm,
+            faults: Vec::new(),
+        };
+        report.faults = faults(kernel, mesh, facets, &report);
+        report
+    };
+    kernel.bodies().iter().map(report).collect()
+}
+
+fn faults(
+    kernel: &dyn Kernel,
+    mesh: &Tessellation,
+    facets: &[Facet],
+    report: &BodyReport,
+) -> Vec<BodyFault> {
+    if facets.is_empty() {
+        return vec![BodyFault::Empty];
+    }
+    let mut faults: Vec<BodyFault> = open(kernel, mesh, facets).into_iter().collect();
+    faults.extend(outside(kernel, mesh, facets));
+    let (facets_mm3, surfaces_mm3) = (report.volume_mm3, report.exact_volume_mm3);
+    let apart = (facets_mm3 - surfaces_mm3).abs();
+    // Not a number is not within.
+    let is_within =
+        apart <= f64::max(VOLUMES_APART * facets_mm3.abs(), mesh.chord_mm * report.area_mm2);
+    if !is_within {
+        faults.push(BodyFault::Volumes { facets_mm3, surfaces_mm3 });
+    } else if facets_mm3 <= 0.0 {
+        faults.push(BodyFault::InsideOut { volume_mm3: facets_mm3 });
+    }
+    faults
+}
+
+fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for corner in facets.iter().flat_map(|facet| mesh.corners(facet)) {
+        for k in 0..3 {
+            bounds[0][k] = bounds[0][k].min(corner[k]);
+            bounds[1][k] = bounds[1][k].max(corner[k]);
+        }
+    }
+    bounds
+}
+
+/// Across the facet, twice its area long.
+fn doubled(mesh: &Tessellation, facet: &Facet) -> Vec3 {
+    let [a, b, c] = mesh.corners(facet);
+    cross(sub(b, a), sub(c, a))
+}
+
+fn volume(mesh: &Tessellation, facets: &[Facet], middle: Vec3) -> f64 {
+    let six = |facet: &Facet| {
+        let [a, b, c] = mesh.corners(facet).map(|corner| sub(corner, middle));
+        dot(a, cross(b, c))
+    };
+    facets.iter().map(six).sum::<f64>() / 6.0
+}
+
+/// Where a triangle's integral is taken, and with which weight (Strang and Fix,
+/// six points, exact to the fourth degree).
+const GAUSS: [([f64; 2], f64); 6] = {
+    const A: f64 = 0.445_948_490_915_965;
+    const B: f64 = 0.091_576_213_509_771;
+    const W: f64 = 0.223_381_589_678_011;
+    const V: f64 = 0.109_951_743_655_322;
+    [
+        ([A, A], W),
+        ([A, 1.0 - 2.0 * A], W),
+        ([1.0 - 2.0 * A, A], W),
+        ([B, B], V),
+        ([B, 1.0 - 2.0 * B], V),
+        ([1.0 - 2.0 * B, B], V),
+    ]
+};
+
+/// The flux of a third of the place through the surfaces.
+fn exact_volume(kernel: &dyn Kernel, facets: &[Facet], middle: Vec3) -> f64 {
+    let mut sum = 0.0;
+    for of_face in facets.chunk_by(|a, b| a.face == b.face) {
+        let mut at = Vec::with_capacity(GAUSS.len() * of_face.len());
+        for facet in of_face {
+            let [p, q, r] = facet.uv;
+            let place =
+                |[s, t]: [f64; 2]| [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]));
+            at.extend(GAUSS.map(|(part, _)| place(part)));
+        }
+        let mut jets = vec![Jet::default(); at.len()];
+        kernel.evaluate(of_face[0].face, &at, &mut jets);
+        for (facet, jets) in of_face.iter().zip(jets.chunks(GAUSS.len())) {
+            let [p, q, r] = facet.uv;
+            let double = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+            let flux = |jet: &Jet| dot(sub(jet.point, middle), cross(jet.du, jet.dv));
+            let mean: f64 =
+                jets.iter().zip(GAUSS).map(|(jet, (_, weight))| weight * flux(jet)).sum();
+            sum += mean * double / 2.0;
+        }
+    }
+    sum / 3.0
+}
+
+/// Edges that are not shared by exactly two facets, in opposite directions.
+fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
+    // How often each edge is followed upwards and downwards in number.
+    let mut edges: HashMap<[u32; 2], [u32; 2]> = HashMap::with_capacity(facets.len() * 3 / 2);
+    let sides = |facet: &Facet| {
+        let [a, b, c] = facet.corners;
+        [[a, b], [b, c], [c, a]]
+    };
+    for [a, b] in facets.iter().flat_map(sides) {
+        edges.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
+    }
+    let count = edges.values().filter(|uses| **uses != [1, 1]).count();
+    let is_open = |side: &[u32; 2]| edges[&[side[0].min(side[1]), side[0].max(side[1])]] != [1, 1];
+    let first = facets.iter().find_map(|facet| {
+        let side = sides(facet).into_iter().find(is_open)?;
+        Some((facet.face, side[0]))
+    });
+    first.map(|(face, point)| BodyFault::Open {
+        edges: count,
+        at_mm: mesh.points[point as usize],
+        entity: kernel.face(face).entity,
+    })
+}
+
+fn outside(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
+    let of_face = facets.chunk_by(|a, b| a.face == b.face);
+    let off = |facets: &[Facet]| {
+        let info = kernel.face(facets[0].face);
+        let [least, most] = info.control_box_mm?;
+        let [low, high] = bounds(mesh, facets);
+        let over = (0..3).map(|k| (least[k] - low[k]).max(high[k] - most[k]));
+        let off_mm = over.fold(0.0, f64::max);
+        // Points of edges may lie off the surface as far as facets do.
+        let is_off = off_mm > mesh.chord_mm;
+        is_off.then_some(BodyFault::Outside { entity: info.entity, off_mm })
+    };
+    of_face.into_iter().find_map(off)
+}

@@ -1,0 +1,289 @@
+//! The curves of edges.
+
+use std::f64::consts::TAU;
+
+use super::spline::SplineCurve;
+use crate::vector::{Frame, Vec3, along, distance, dot, sub};
+
+/// A curve in space, in millimetres, as ISO 10303-42 gives its parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Curve {
+    Line {
+        point: Vec3,
+        direction: Vec3,
+    },
+    /// A circle has two equal radii.
+    Ellipse {
+        frame: Frame,
+        radii: [f64; 2],
+    },
+    Hyperbola {
+        frame: Frame,
+        axes: [f64; 2],
+    },
+    Parabola {
+        frame: Frame,
+        focal: f64,
+    },
+    Spline(SplineCurve),
+}
+
+/// Steps of the search for the nearest point.
+const MOST_STEPS: usize = 30;
+
+impl Curve {
+    /// The point and the derivative at `t`.
+    pub(crate) fn at(&self, t: f64) -> [Vec3; 2] {
+        let in_frame = |frame: &Frame, p: Vec3, d: Vec3| [frame.point(p), frame.direction(d)];
+        match self {
+            Self::Line { point, direction } => [along(*point, *direction, t), *direction],
+            Self::Ellipse { frame, radii: [a, b] } => {
+                let (sin, cos) = t.sin_cos();
+                in_frame(frame, [a * cos, b * sin, 0.0], [-a * sin, b * cos, 0.0])
+            }
+            Self::Hyperbola { frame, axes: [a, b] } => {
+                let (sinh, cosh) = (t.sinh(), t.cosh());
+                in_frame(frame, [a * cosh, b * sinh, 0.0], [a * sinh, b * cosh, 0.0])
+            }
+            Self::Parabola { frame, focal } => in_frame(
+                frame,
+                [focal * t * t, 2.0 * focal * t, 0.0],
+                [2.0 * focal * t, 2.0 * focal, 0.0],
+            ),
+            Self::Spline(spline) => spline.at(t),
+        }
+    }
+
+    /// Where the curve begins and ends, if it does.
+    pub(crate) fn domain(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Ellipse { .. } => Some([0.0, TAU]),
+            Self::Spline(spline) => Some(spline.knots.domain()),
+            _ => None,
+        }
+    }
+
+    /// The length of the parameter after which the curve comes again.
+    pub(crate) fn period(&self) -> Option<f64> {
+        match self {
+            Self::Ellipse { .. } => Some(TAU),
+            Self::Spline(spline) => {
+                let [start, end] = spline.knots.domain();
+                let apart = distance(spline.at(start)[0], spline.at(end)[0]);
+                (apart < 1e-6).then_some(end - start)
+            }
+            _ => None,
+        }
+    }
+
+    /// Parameters between which the curve bends little.
+    pub(crate) fn samples(&self) -> Vec<f64> {
+        let parts = |breaks: &[f64], n: usize| -> Vec<f64> {
+            let within = |pair: &[f64]| -> Vec<f64> {
+                let [a, b] = [pair[0], pair[1]];
+                (0..n).map(|k| a + (b - a) * k as f64 / n as f64).collect()
+            };
+            breaks.windows(2).flat_map(within).chain(breaks.last().copied()).collect()
+        };
+        match self {
+            Self::Ellipse { .. } => parts(&[0.0, TAU], 16),
+            Self::Spline(spline) => parts(&spline.knots.breaks(), 8),
+            _ => vec![-1.0, 0.0, 1.0],
+        }
+    }
+
+    /// The parameter of the point nearest to `p`.
+    pub(crate) fn project(&self, p: Vec3) -> f64 {
+        match self {
+            Self::Line { point, direction } => {
+                dot(sub(p, *point), *direction) / dot(*direction, *direction)
+            }
+            Self::Ellipse { frame, radii: [a, b] } => {
+                let [x, y, _] = frame.local(p);
+                let t = (y / b).atan2(x / a);
+                if a == b { t } else { self.nearer(p, t) }
+            }
+            Self::Hyperbola { frame, axes } => {
+                self.nearer(p, (frame.local(p)[1] / axes[1]).asinh())
+            }
+            Self::Parabola { frame, focal } => self.nearer(p, frame.local(p)[1] / (2.0 * focal)),
+            Self::Spline(_) => {
+                let far = |t: f64| distance(self.at(t)[0], p);
+                let samples = self.samples();
+                let nearest = samples.iter().copied().min_by(|&a, &b| far(a).total_cmp(&far(b)));
+                self.nearer(p, nearest.unwrap_or(0.0))
+            }
+        }
+    }
+
+    /// Goes from `t` to the foot of `p`; stays where that leads nowhere.
+    fn nearer(&self, p: Vec3, start: f64) -> f64 {
+        let clamp = |t: f64| match self {
+            Self::Spline(spline) => {
+                let [low, high] = spline.knots.domain();
+                t.clamp(low, high)
+            }
+            _ => t,
+        };
+        let (mut t, mut best) = (start, (distance(self.at(start)[0], p), start));
+        for _ in 0..MOST_STEPS {
+            let [at, slope] = self.at(t);
+            let step = dot(sub(p, at), slope) / dot(slope, slope);
+            let next = clamp(t + step);
+            if !next.is_finite() || (next - t).abs() <= 1e-15 * t.abs().max(1.0) {
+                break;
+            }
+            t = next;
+            let apart = distance(self.at(t)[0], p);
+            if apart < best.0 {
+                best = (apart, t);
+            }
+        }
+        best.1
+    }
+
+    /// The part of the curve from one parameter to another as points that lie no
+    /// further than `chord_mm` from it; the ends are among them.
+    pub(crate) fn polyline(&self, [from, to]: [f64; 2], chord_mm: f64) -> Vec<Vec3> {
+        let mut breaks = vec![from];
+        match self {
+            Self::Line { .. } => {}
+            Self::Spline(spline) => {
+                let knots = spline.knots.breaks();
+                let [start, end] = spline.knots.domain();
+                // Closed curves may pass their seam.
+                let turns = [-1.0, 0.0, 1.0].map(|turn| turn * (end - start));
+                let all = turns.iter().flat_map(|turn| knots.iter().map(move |k| k + turn));
+                let (low, high) = (from.min(to), from.max(to));
+                let margin = 1e-9 * (end - start);
+                let mut within: Vec<f64> =
+                    all.filter(|k| (low + margin..high - margin).contains(k)).collect();
+                within.sort_by(f64::total_cmp);
+                within.dedup_by(|a, b| (*a - *b).abs() < margin);
+                if from > to {
+                    within.reverse();
+                }
+                breaks.extend(within);
+            }
+            _ => breaks.extend([0.25, 0.5, 0.75].map(|part| from + (to - from) * part)),
+        }
+        breaks.push(to);
+        let mut points = vec![self.place(from)];
+        for pair in breaks.windows(2) {
+            self.bend([pair[0], pair[1]], chord_mm, 16, &mut points);
+        }
+        points
+    }
+
+    /// The point at `t`, also past the seam of a closed spline.
+    fn place(&self, t: f64) -> Vec3 {
+        match (self, self.domain()) {
+            (Self::Spline(spline), Some([start, end])) if t < start || t > end => {
+                spline.at(start + (t - start).rem_euclid(end - start))[0]
+            }
+            _ => self.at(t)[0],
+        }
+    }
+
+    /// Adds the points after the first of a piece, halving it while it bends too
+    /// much.
+    fn bend(&self, [a, b]: [f64; 2], chord_mm: f64, depth: usize, points: &mut Vec<Vec3>) {
+        let (p, q) = (self.place(a), self.place(b));
+        let straight = |part: f64| {
+            let x = self.place(a + (b - a) * part);
+            let d = sub(q, p);
+            let long = dot(d, d);
+            let t = if long > 0.0 { (dot(sub(x, p), d) / long).clamp(0.0, 1.0) } else { 0.0 };
+            distance(x, along(p, d, t)) <= chord_mm
+        };
+        let is_line = matches!(self, Self::Line { .. });
+        if is_line || depth == 0 || [0.25, 0.5, 0.75].into_iter().all(straight) {
+            points.push(q);
+        } else {
+            let middle = (a + b) / 2.0;
+            self.bend([a, middle], chord_mm, depth - 1, points);
+            self.bend([middle, b], chord_mm, depth - 1, points);
+        }
+    }
+}
+
+/// The parameters at which an edge from `start` to `end` begins and ends on its
+/// curve, which it follows forwards or backwards.
+pub(crate) fn edge_range(curve: &Curve, start: Vec3, end: Vec3, forward: bool) -> [f64; 2] {
+    let is_loop = distance(start, end) < 1e-9;
+    let (mut from, mut to) = (curve.project(start), curve.project(end));
+    if let Some(period) = curve.period() {
+        let tiny = 1e-9 * period;
+        if is_loop {
+            to = if forward { from + period } else { from - period };
+        } else if forward {
+            while to <= from + tiny {
+                to += period;
+            }
+            while to > from + period + tiny {
+                to -= period;
+            }
+        } else {
+            while to >= from - tiny {
+                to -= period;
+            }
+            while to < from - period - tiny {
+                to += period;
+            }
+        }
+    } else if is_loop && let Some([low, high]) = curve.domain() {
+        [from, to] = if forward { [low, high] } else { [high, low] };
+    }
+    [from, to]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::{length, scale};
+
+    fn circle() -> Curve {
+        Curve::Ellipse { frame: Frame::WORLD, radii: [5.0; 2] }
+    }
+
+    #[test]
+    fn an_arc_goes_the_way_its_edge_goes() {
+        let (a, b) = ([5.0, 0.0, 0.0], [0.0, 5.0, 0.0]);
+        for (forward, start, end, turn) in [
+            (true, a, b, 0.25),
+            (true, b, a, 0.75),
+            (false, a, b, -0.75),
+            (false, b, a, -0.25),
+            (true, a, a, 1.0),
+            (false, a, a, -1.0),
+            (true, a, scale(a, -1.0), 0.5),
+        ] {
+            let [from, to] = edge_range(&circle(), start, end, forward);
+            assert!((to - from - turn * TAU).abs() < 1e-12, "{forward} {start:?} {end:?}");
+        }
+    }
+
+    #[test]
+    fn a_polyline_keeps_to_its_chord() {
+        for chord_mm in [0.1, 0.01, 0.001] {
+            let points = circle().polyline([1.0, 4.0], chord_mm);
+            let sag = |pair: &[Vec3]| {
+                5.0 - length(scale([0, 1, 2].map(|k| pair[0][k] + pair[1][k]), 0.5))
+            };
+            let worst = points.windows(2).map(sag).fold(0.0, f64::max);
+            assert!(worst <= chord_mm && worst > chord_mm / 5.0, "{worst}");
+        }
+    }
+
+    #[test]
+    fn projection_finds_the_parameter() {
+        let ellipse = Curve::Ellipse { frame: Frame::WORLD, radii: [5.0, 2.0] };
+        let hyperbola = Curve::Hyperbola { frame: Frame::WORLD, axes: [3.0, 2.0] };
+        let parabola = Curve::Parabola { frame: Frame::WORLD, focal: 1.5 };
+        for curve in [circle(), ellipse, hyperbola, parabola] {
+            for t in [-1.4, -0.2, 0.0, 0.9, 2.0] {
+                assert!((curve.project(curve.at(t)[0]) - t).abs() < 1e-12, "{curve:?} {t}");
+            }
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! What slicing needs of a B-rep kernel.
+
+use crate::error::BrepError;
+use crate::vector::{dot, sub};
+
+/// A point of a surface, in millimetres, and its first derivatives.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Jet {
+    /// The point.
+    pub point: [f64; 3],
+    /// The derivative along u.
+    pub du: [f64; 3],
+    /// The derivative along v.
+    pub dv: [f64; 3],
+}
+
+/// A model as a kernel has read it: bodies in their places, in millimetres.
+///
+/// Faces are numbered through all bodies; each lies on a surface of its own,
+/// which has the face's number.
+pub trait Kernel: Send + Sync {
+    /// The bodies, in the file's order; a body that is placed twice is there twice.
+    fn bodies(&self) -> &[Body];
+
+    /// The face of that number.
+    ///
+    /// # Panics
+    /// Where there is no such face.
+    fn face(&self, face: u32) -> FaceInfo;
+
+    /// The length unit that the file has, for a report.
+    fn unit(&self) -> &str;
+
+    /// The faces as facets no further than `chord_mm` from their surfaces, joined
+    /// along their edges.
+    ///
+    /// What could not be made into facets is missing, and is among the findings:
+    /// whether bodies are closed is for the [gate](crate::check) to say.
+    ///
+    /// # Errors
+    /// Where the chord is not a positive length, or there would be too many facets.
+    fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError>;
+
+    /// Evaluates a face's surface at many parameters at once.
+    ///
+    /// Parameters may lie beyond the face, and outside the surface's domain as far
+    /// as it goes on there; those of closed surfaces come again.
+    ///
+    /// # Panics
+    /// Where there is no such face, or the lists differ in length.
+    fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]);
+}
+
+/// A body and its faces.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Body {
+    /// The name that the file gives it; may be empty.
+    pub name: String,
+    /// The numbers of its faces.
+    pub faces: std::ops::Range<u32>,
+}
+
+/// What a report says of a face.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceInfo {
+    /// The kind of its surface: `plane`, `cylinder`, `B-spline`.
+    pub kind: &'static str,
+    /// The entity of the file, such as 12 for `#12`.
+    pub entity: u64,
+    /// The least and the greatest corner of its surface's control points, in
+    /// millimetres, if it has some: nothing of the surface lies outside.
+    pub control_box_mm: Option<[[f64; 3]; 2]>,
+}
+
+/// A triangle of a face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet {
+    /// Its corners among the points, counter-clockwise seen from outside.
+    pub corners: [u32; 3],
+    /// The corners' parameters on the face's surface. Along a seam or around a pole
+    /// the same point has several.
+    pub uv: [[f64; 2]; 3],
+    /// The face.
+    pub face: u32,
+}
+
+/// Bodies as facets.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tessellation {
+    /// All points, in millimetres. Faces that meet share those of their edge.
+    pub points: Vec<[f64; 3]>,
+    /// The facets, body after body and face after face.
+    pub facets: Vec<Facet>,
+    /// Triangles with two corners at one pole, face after face: they have no area
+    /// in space, and are no facets, but their parameters belong to the faces.
+    pub tips: Vec<Facet>,
+    /// What was found to be wrong with faces.
+    pub findings: Vec<Finding>,
+    /// How far facets may lie from their surfaces, in millimetres.
+    pub chord_mm: f64,
+}
+
+impl Tessellation {
+    /// A facet's corners.
+    pub fn corners(&self, facet: &Facet) -> [[f64; 3]; 3] {
+        facet.corners.map(|corner| self.points[corner as usize])
+    }
+
+    /// The parameters of a point on a facet, as straight between its corners';
+    /// those of the first corner if the facet has no area.
+    pub fn uv_at(&self, facet: &Facet, point: [f64; 3]) -> [f64; 2] {
+        let [a, b, c] = self.corners(facet);
+        let (e, f, d) = (sub(b, a), sub(c, a), sub(point, a));
+        let (ee, ef, ff) = (dot(e, e), dot(e, f), dot(f, f));
+        let (de, df) = (dot(d, e), dot(d, f));
+        let det = ee * ff - ef * ef;
+        let [s, t] = if det > 0.0 {
+            [(ff * de - ef * df) / det, (ee * df - ef * de) / det]
+        } else {
+            [0.0; 2]
+        };
+        let [p, q, r] = facet.uv;
+        [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]))
+    }
+
+    /// The facets of some faces.
+    pub fn of_faces(&self, faces: &std::ops::Range<u32>) -> &[Facet] {
+        of_faces(&self.facets, faces)
+    }
+
+    /// The tips of some faces.
+    pub(crate) fn tips_of_faces(&self, faces: &std::ops::Range<u32>) -> &[Facet] {
+        of_faces(&self.tips, faces)
+    }
+}
+
+fn of_faces<'a>(facets: &'a [Facet], faces: &std::ops::Range<u32>) -> &'a [Facet] {
+    let start = facets.partition_point(|facet| facet.face < faces.start);
+    let end = facets.partition_point(|facet| facet.face < faces.end);
+    &facets[start..end]
+}
+
+/// Something wrong with a face.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// The face's number.
+    pub face: u32,
+    /// The entity of the file.
+    pub entity: u64,
+    /// What is wrong with it.
+    pub fault: Fault,
+}
+
+/// What may be wrong with a face.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// Its loops do not bound a piece of its surface.
+    #[error("its loops bound nothing")]
+    Unbounded,
+    /// Its loops cross each other or themselves.
+    #[error("its loops cross each other or themselves")]
+    Crossing,
+    /// A loop's edges do not follow each other.
+    #[error("the edges of a loop do not follow each other")]
+    Broken,
+    /// An edge lies off the surface.
+    #[error("an edge lies {off_mm:.3} mm off its surface")]
+    Off {
+        /// How far, in millimetres.
+        off_mm: f64,
+    },
+    /// Its loops go clockwise where they should not; they were followed, and the
+    /// face turned over.
+    #[error("its sense is against its loops; the loops were followed")]
+    Sense,
+    /// It bends more than the facets could follow.
+    #[error("facets lie {off_mm:.4} mm off its surface")]
+    Coarse {
+        /// How far, in millimetres.
+        off_mm: f64,
+    },
+}

@@ -1,0 +1,48 @@
+//! Bodies as faces, edges and vertices, in millimetres and in their places.
+
+use crate::geometry::{Curve, Surface};
+use crate::kernel::Body;
+use crate::vector::Vec3;
+
+/// All bodies of a file.
+#[derive(Debug, Default)]
+pub(crate) struct Model {
+    pub(crate) bodies: Vec<Body>,
+    pub(crate) faces: Vec<Face>,
+    pub(crate) edges: Vec<Edge>,
+    pub(crate) vertices: Vec<Vec3>,
+    /// The name of the file's length unit.
+    pub(crate) unit: String,
+}
+
+/// A piece of a surface.
+#[derive(Debug)]
+pub(crate) struct Face {
+    /// The entity of the file.
+    pub(crate) entity: u64,
+    pub(crate) surface: Surface,
+    /// Whether its loops go counter-clockwise seen against the surface's normal.
+    pub(crate) along_normal: bool,
+    /// Whether the surface's normal points out of the body.
+    pub(crate) outwards: bool,
+    pub(crate) loops: Vec<Loop>,
+}
+
+/// A piece of a face's boundary.
+#[derive(Debug)]
+pub(crate) enum Loop {
+    /// A single point, such as the tip of a cone.
+    Vertex(usize),
+    /// Edges by number, each with whether the loop follows it from its start.
+    Edges(Vec<(usize, bool)>),
+}
+
+/// A piece of a curve between two vertices.
+#[derive(Debug)]
+pub(crate) struct Edge {
+    pub(crate) curve: Curve,
+    /// Where it starts and ends, among the vertices.
+    pub(crate) ends: [usize; 2],
+    /// Whether it follows the curve's direction.
+    pub(crate) forward: bool,
+}

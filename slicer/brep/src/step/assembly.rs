@@ -1,0 +1,243 @@
+//! Where an assembly's solids stand.
+
+use std::collections::{HashMap, HashSet};
+
+use super::StepError;
+use super::file::{Entities, Item};
+use super::shape::Shapes;
+use super::units::Units;
+use crate::vector::Frame;
+
+/// A solid or a shell in one of its places.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Placed {
+    pub(crate) solid: u64,
+    pub(crate) units: Units,
+    pub(crate) place: Frame,
+}
+
+/// More parts than any assembly that is built at once.
+const MOST_PARTS: usize = 100_000;
+const MOST_LEVELS: usize = 64;
+
+/// What bodies are made of.
+const SOLIDS: [&str; 4] =
+    ["MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP", "SHELL_BASED_SURFACE_MODEL"];
+
+/// A shape: items in one system of coordinates.
+struct Shape {
+    items: Vec<u64>,
+    units: Option<Units>,
+    /// Shapes that are the same part in the same coordinates.
+    same: Vec<u64>,
+    /// Parts, and where they stand.
+    parts: Vec<Part>,
+}
+
+/// A part of a shape: the shape, and the placement that comes to lie on another.
+struct Part {
+    shape: u64,
+    from: u64,
+    to: u64,
+}
+
+/// All solids of a file in their places.
+pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
+    let mut tree =
+        Tree { entities, shapes: HashMap::new(), order: Vec::new(), is_part: HashSet::new() };
+    tree.read_shapes()?;
+    tree.read_relations()?;
+    tree.read_mapped()?;
+    let mut found = Vec::new();
+    let mut seen = HashSet::new();
+    for &shape in &tree.order {
+        let group = tree.group(shape);
+        if seen.contains(&shape) || group.iter().any(|shape| tree.is_part.contains(shape)) {
+            continue;
+        }
+        seen.extend(group);
+        tree.place(shape, Frame::WORLD, 0, &mut found)?;
+    }
+    if found.is_empty() { Err(StepError::Empty) } else { Ok(found) }
+}
+
+struct Tree<'a> {
+    entities: &'a Entities,
+    shapes: HashMap<u64, Shape>,
+    order: Vec<u64>,
+    /// Shapes that are parts of others.
+    is_part: HashSet<u64>,
+}
+
+impl Tree<'_> {
+    fn read_shapes(&mut self) -> Result<(), StepError> {
+        for item in self.entities.every() {
+            let is_shape = item.name().ends_with("SHAPE_REPRESENTATION")
+                || item.name() == "REPRESENTATION"
+                    && self.entities.find(item.id, "SHAPE_REPRESENTATION").is_some();
+            // In a complex entity only one of the records has the attributes.
+            let (true, Ok(items), Some(context)) = (is_shape, item.references(1), item.optional(2))
+            else {
+                continue;
+            };
+            let units = Units::of_context(self.entities, context)?;
+            let shape = Shape { items, units, same: Vec::new(), parts: Vec::new() };
+            if self.shapes.insert(item.id, shape).is_none() {
+                self.order.push(item.id);
+            }
+        }
+        Ok(())
+    }
+
+    fn read_relations(&mut self) -> Result<(), StepError> {
+        let children = self.children()?;
+        for item in self.entities.every() {
+            let is_relation = matches!(
+                item.name(),
+                "SHAPE_REPRESENTATION_RELATIONSHIP" | "REPRESENTATION_RELATIONSHIP"
+            );
+            let (true, Some(a), Some(b)) = (is_relation, item.optional(2), item.optional(3)) else {
+                continue;
+            };
+            if !(self.shapes.contains_key(&a) && self.shapes.contains_key(&b)) {
+                continue;
+            }
+            let transformed =
+                self.entities.find(item.id, "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION");
+            let Some(transformed) = transformed else {
+                self.shape(a)?.same.push(b);
+                self.shape(b)?.same.push(a);
+                continue;
+            };
+            let transformation = transformed.reference(0)?;
+            let transformation =
+                self.entities.get(transformation, "ITEM_DEFINED_TRANSFORMATION")?;
+            let (first, second) = (transformation.reference(2)?, transformation.reference(3)?);
+            // The first is the part, unless the product structure says otherwise.
+            let is_swapped = children.get(&item.id).is_some_and(|child| {
+                !self.group(a).contains(child) && self.group(b).contains(child)
+            });
+            let (part, whole, from, to) =
+                if is_swapped { (b, a, second, first) } else { (a, b, first, second) };
+            self.is_part.insert(part);
+            self.shape(whole)?.parts.push(Part { shape: part, from, to });
+        }
+        Ok(())
+    }
+
+    /// For each relation between shapes that belongs to a use of a product: the
+    /// shape of the product that is used.
+    fn children(&self) -> Result<HashMap<u64, u64>, StepError> {
+        let entities = self.entities;
+        let definitions: HashMap<u64, u64> = entities
+            .all("PRODUCT_DEFINITION_SHAPE")
+            .filter_map(|item| Some((item.id, item.optional(2)?)))
+            .collect();
+        let mut shapes = HashMap::new();
+        for item in entities.all("SHAPE_DEFINITION_REPRESENTATION") {
+            if let Some(definition) = definitions.get(&item.reference(0)?) {
+                shapes.entry(*definition).or_insert(item.reference(1)?);
+            }
+        }
+        let mut children = HashMap::new();
+        for item in entities.all("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION") {
+            let usage = definitions.get(&item.reference(1)?).copied();
+            let usage = usage.and_then(|id| entities.find(id, "NEXT_ASSEMBLY_USAGE_OCCURRENCE"));
+            let child = usage.and_then(|usage| shapes.get(&usage.optional(4)?).copied());
+            if let Some(child) = child {
+                children.insert(item.reference(0)?, child);
+            }
+        }
+        Ok(children)
+    }
+
+    fn read_mapped(&mut self) -> Result<(), StepError> {
+        for &id in &self.order {
+            for item in &self.shapes[&id].items {
+                let Some(mapped) = self.entities.find(*item, "MAPPED_ITEM") else { continue };
+                let map = self.entities.get(mapped.reference(1)?, "REPRESENTATION_MAP")?;
+                self.is_part.insert(map.reference(1)?);
+            }
+        }
+        Ok(())
+    }
+
+    fn shape(&mut self, id: u64) -> Result<&mut Shape, StepError> {
+        self.shapes.get_mut(&id).ok_or(StepError::Missing { id })
+    }
+
+    /// A shape and all that are the same, in the order in which they are met.
+    fn group(&self, shape: u64) -> Vec<u64> {
+        let mut group = vec![shape];
+        let mut at = 0;
+        while let Some(shape) = group.get(at).and_then(|id| self.shapes.get(id)) {
+            let new: Vec<u64> =
+                shape.same.iter().copied().filter(|id| !group.contains(id)).collect();
+            group.extend(new);
+            at += 1;
+        }
+        group
+    }
+
+    fn place(
+        &self,
+        shape: u64,
+        place: Frame,
+        level: usize,
+        found: &mut Vec<Placed>,
+    ) -> Result<(), StepError> {
+        if level > MOST_LEVELS || found.len() > MOST_PARTS {
+            return Err(StepError::Endless { most: MOST_PARTS });
+        }
+        for id in self.group(shape) {
+            let Some(shape) = self.shapes.get(&id) else { continue };
+            for &item in &shape.items {
+                if SOLIDS.iter().any(|name| self.entities.find(item, name).is_some()) {
+                    let units = shape.units.clone().ok_or(StepError::NoUnit { id })?;
+                    let new = Placed { solid: item, units, place };
+                    // Shapes that carry properties name the solid a second time.
+                    if !found.contains(&new) {
+                        found.push(new);
+                    }
+                } else if let Some(mapped) = self.entities.find(item, "MAPPED_ITEM") {
+                    self.place_mapped(mapped, id, place, level, found)?;
+                }
+            }
+            for part in &shape.parts {
+                let place = self.moved(place, (part.shape, part.from), (id, part.to))?;
+                self.place(part.shape, place, level + 1, found)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn place_mapped(
+        &self,
+        mapped: Item,
+        whole: u64,
+        place: Frame,
+        level: usize,
+        found: &mut Vec<Placed>,
+    ) -> Result<(), StepError> {
+        let map = self.entities.get(mapped.reference(1)?, "REPRESENTATION_MAP")?;
+        let (from, part, to) = (map.reference(0)?, map.reference(1)?, mapped.reference(2)?);
+        let place = self.moved(place, (part, from), (whole, to))?;
+        self.place(part, place, level + 1, found)
+    }
+
+    /// Where a part stands whose placement comes to lie on another of the whole.
+    fn moved(&self, place: Frame, from: (u64, u64), to: (u64, u64)) -> Result<Frame, StepError> {
+        let frame = |(shape, placement): (u64, u64)| {
+            let units = self.shapes.get(&shape).and_then(|shape| shape.units.as_ref());
+            let units = units.ok_or(StepError::NoUnit { id: shape })?;
+            let shapes = Shapes { entities: self.entities, units, place: Frame::WORLD };
+            let item = self.entities.simple(placement)?;
+            if item.name() != "AXIS2_PLACEMENT_3D" {
+                let name = item.name().to_owned();
+                return Err(StepError::Unsupported { id: placement, name });
+            }
+            shapes.frame(placement)
+        };
+        Ok(place.then(&frame(to)?.then(&frame(from)?.inverse())))
+    }
+}

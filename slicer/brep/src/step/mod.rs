@@ -1,0 +1,147 @@
+//! Reading STEP files (ISO 10303-21, AP203, AP214, AP242).
+
+mod assembly;
+mod file;
+mod shape;
+mod token;
+mod topology;
+mod units;
+
+use std::path::Path;
+
+use crate::error::BrepError;
+use crate::kernel::{Body, FaceInfo, Jet, Kernel, Tessellation};
+use crate::model::Model;
+use crate::tessellate;
+
+/// Why a STEP file cannot be read.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// It does not begin as STEP files do.
+    #[error("it is not a STEP file: it does not begin with ISO-10303-21")]
+    NotStep,
+    /// It ends too early.
+    #[error("it is cut off: END-ISO-10303-21 is missing")]
+    CutOff,
+    /// A part of the text makes no sense.
+    #[error("the text makes no sense at byte {offset}")]
+    Unreadable {
+        /// Where, from 0.
+        offset: usize,
+    },
+    /// An entity is given twice.
+    #[error("#{id} is given twice")]
+    Twice {
+        /// The entity.
+        id: u64,
+    },
+    /// An entity is not there.
+    #[error("#{id} is named, but not given")]
+    Missing {
+        /// The entity.
+        id: u64,
+    },
+    /// An entity is of another type.
+    #[error("#{id} is not {expected}")]
+    Unexpected {
+        /// The entity.
+        id: u64,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// An attribute is missing or of another kind.
+    #[error("attribute {attribute} of #{id} is missing or not of its kind")]
+    Attribute {
+        /// The entity.
+        id: u64,
+        /// Which one, from 1.
+        attribute: usize,
+    },
+    /// Numbers that give no shape, such as a negative radius.
+    #[error("the numbers of #{id} give no {what}")]
+    Numbers {
+        /// The entity.
+        id: u64,
+        /// What they should give.
+        what: &'static str,
+    },
+    /// A type that is not read.
+    #[error("#{id} is a {name}, which is not supported")]
+    Unsupported {
+        /// The entity.
+        id: u64,
+        /// Its type.
+        name: String,
+    },
+    /// A shape without a length unit.
+    #[error("the shape #{id} has no length unit")]
+    NoUnit {
+        /// The representation.
+        id: u64,
+    },
+    /// No solid or shell.
+    #[error("it holds no solid")]
+    Empty,
+    /// An assembly that holds itself, or more parts than can be.
+    #[error("its assembly holds itself, or more than {most} parts")]
+    Endless {
+        /// The most parts that are placed.
+        most: usize,
+    },
+}
+
+/// A STEP file in memory, read by this crate alone.
+#[derive(Debug)]
+pub struct StepModel {
+    model: Model,
+}
+
+impl StepModel {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// Where it cannot be read, is not STEP, or holds what is not supported.
+    pub fn open(path: &Path) -> Result<Self, BrepError> {
+        Self::read(&std::fs::read(path)?)
+    }
+
+    /// Reads a file's bytes.
+    ///
+    /// # Errors
+    /// Where they are not STEP, or hold what is not supported.
+    pub fn read(bytes: &[u8]) -> Result<Self, BrepError> {
+        Ok(Self { model: topology::model(&file::Entities::read(bytes)?)? })
+    }
+}
+
+impl Kernel for StepModel {
+    fn bodies(&self) -> &[Body] {
+        &self.model.bodies
+    }
+
+    fn face(&self, face: u32) -> FaceInfo {
+        let face = &self.model.faces[face as usize];
+        FaceInfo {
+            kind: face.surface.kind(),
+            entity: face.entity,
+            control_box_mm: face.surface.control_box(),
+        }
+    }
+
+    fn unit(&self) -> &str {
+        &self.model.unit
+    }
+
+    fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError> {
+        tessellate::model(&self.model, chord_mm)
+    }
+
+    fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]) {
+        assert_eq!(uv.len(), jets.len(), "as many jets as parameters");
+        let surface = &self.model.faces[face as usize].surface;
+        for (jet, &uv) in jets.iter_mut().zip(uv) {
+            *jet = surface.at(uv);
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! The text of a STEP file as tokens (ISO 10303-21).
+
+use super::StepError;
+
+/// A piece of the text.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Token {
+    /// A name: of an entity's type, of a section.
+    Word(String),
+    /// `#12`.
+    Reference(u64),
+    /// A number, whole or not.
+    Number(f64),
+    /// `'text'`, its quotes undone.
+    Text(String),
+    /// `.T.` without its dots.
+    Enumeration(String),
+    /// `$`: left out.
+    Omitted,
+    /// `*`: follows from others.
+    Derived,
+    /// `( ) , ; =`.
+    Sign(u8),
+}
+
+/// Cuts a STEP file into tokens.
+pub(crate) struct Tokens<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Tokens<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, at: 0 }
+    }
+
+    /// Where the next token is looked for, in bytes.
+    pub(crate) fn offset(&self) -> usize {
+        self.at
+    }
+
+    /// The next token; nothing at the end of the text.
+    pub(crate) fn next(&mut self) -> Result<Option<Token>, StepError> {
+        self.skip_blank()?;
+        let Some(&byte) = self.bytes.get(self.at) else { return Ok(None) };
+        let start = self.at;
+        self.at += 1;
+        Ok(Some(match byte {
+            b'(' | b')' | b',' | b';' | b'=' => Token::Sign(byte),
+            b'$' => Token::Omitted,
+            b'*' => Token::Derived,
+            b'#' => Token::Reference(self.number_from(self.at)?),
+            b'\'' => Token::Text(self.text(start)?),
+            b'"' => Token::Text(self.until(b'"', start)?),
+            b'.' if self.peek_is(|b| b.is_ascii_alphabetic()) => {
+                Token::Enumeration(self.until(b'.', start)?)
+            }
+            b'+' | b'-' | b'.' | b'0'..=b'9' => Token::Number(self.number_from(start)?),
+            b'!' | b'_' | b'a'..=b'z' | b'A'..=b'Z' => {
+                self.take_while(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
+                Token::Word(self.slice(start).to_ascii_uppercase())
+            }
+            _ => return Err(StepError::Unreadable { offset: start }),
+        }))
+    }
+
+    fn peek_is(&self, is: impl Fn(u8) -> bool) -> bool {
+        self.bytes.get(self.at).is_some_and(|&b| is(b))
+    }
+
+    fn take_while(&mut self, is: impl Fn(u8) -> bool) {
+        while self.peek_is(&is) {
+            self.at += 1;
+        }
+    }
+
+    fn slice(&self, start: usize) -> String {
+        String::from_utf8_lossy(&self.bytes[start..self.at]).into_owned()
+    }
+
+    /// Spaces and comments.
+    fn skip_blank(&mut self) -> Result<(), StepError> {
+        loop {
+            self.take_while(|b| b.is_ascii_whitespace() || b == 0);
+            if !self.bytes[self.at..].starts_with(b"/*") {
+                return Ok(());
+            }
+            let start = self.at;
+            let end = self.bytes[start..].windows(2).position(|pair| pair == b"*/");
+            self.at += 2 + end.ok_or(StepError::Unreadable { offset: start })?;
+        }
+    }
+
+    fn until(&mut self, end: u8, start: usize) -> Result<String, StepError> {
+        let from = self.at;
+        self.take_while(|b| b != end);
+        if self.at == self.bytes.len() {
+            return Err(StepError::Unreadable { offset: start });
+        }
+        let text = self.slice(from);
+        self.at += 1;
+        Ok(text)
+    }
+
+    /// A quote within a text is written twice.
+    fn text(&mut self, start: usize) -> Result<String, StepError> {
+        let mut text = self.until(b'\'', start)?;
+        while self.peek_is(|b| b == b'\'') {
+            self.at += 1;
+            text.push('\'');
+            text += &self.until(b'\'', start)?;
+        }
+        Ok(text)
+    }
+
+    fn number_from<N: std::str::FromStr>(&mut self, start: usize) -> Result<N, StepError> {
+        // A sign may only stand first or after an exponent's letter.
+        self.take_while(|b| b.is_ascii_digit() || matches!(b, b'.' | b'E' | b'e' | b'+' | b'-'));
+        let text = self.slice(start);
+        text.parse().map_err(|_| StepError::Unreadable { offset: start })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all(text: &str) -> Result<Vec<Token>, StepError> {
+        let mut tokens = Tokens::new(text.as_bytes());
+        let mut list = Vec::new();
+        while let Some(token) = tokens.next()? {
+            list.push(token);
+        }
+        Ok(list)
+    }
+
+    #[test]
+    fn every_kind_of_token() {
+        use Token::{Derived, Enumeration, Number, Omitted, Reference, Sign, Text, Word};
+        let text = "/* #9 */ #12 = b_Spline( 'it''s; (', -1.5E-3, 3, .T., $, *,\r\n\"0F\");";
+        let expected = [
+            Reference(12),
+            Sign(b'='),
+            Word("B_SPLINE".into()),
+            Sign(b'('),
+            Text("it's; (".into()),
+            Sign(b','),
+            Number(-1.5e-3),
+            Sign(b','),
+            Number(3.0),
+            Sign(b','),
+            Enumeration("T".into()),
+            Sign(b','),
+            Omitted,
+            Sign(b','),
+            Derived,
+            Sign(b','),
+            Text("0F".into()),
+            Sign(b')'),
+            Sign(b';'),
+        ];
+        assert_eq!(all(text).unwrap(), expected);
+    }
+
+    #[test]
+    fn what_is_cut_off_or_foreign_is_an_error_at_its_byte() {
+        for (text, offset) in
+            [("  'abc", 2), ("/* a", 0), ("#x", 1), ("1.2.3", 0), ("#1 = ~", 5), (" .T", 1)]
+        {
+            match all(text) {
+                Err(StepError::Unreadable { offset: found }) => assert_eq!(found, offset, "{text}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+    }
+}

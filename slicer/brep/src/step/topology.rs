@@ -1,0 +1,184 @@
+//! Bodies, faces and edges out of entities.
+
+use std::collections::HashMap;
+
+use super::StepError;
+use super::assembly::{Placed, placed};
+use super::file::{Entities, Item};
+use super::shape::Shapes;
+use crate::geometry::Curve;
+use crate::kernel::Body;
+use crate::model::{Edge, Face, Loop, Model};
+use crate::vector::{sub, unit};
+
+/// All bodies of a file.
+pub(crate) fn model(entities: &Entities) -> Result<Model, StepError> {
+    let mut model = Model::default();
+    for placed in placed(entities)? {
+        if model.unit.is_empty() {
+            model.unit.clone_from(&placed.units.name);
+        }
+        let first = model.faces.len() as u32;
+        let mut reader = Reader::new(entities, &placed, &mut model);
+        reader.solid(placed.solid)?;
+        let faces = first..model.faces.len() as u32;
+        let name = entities.simple(placed.solid)?.text(0).to_owned();
+        model.bodies.push(Body { name, faces });
+    }
+    Ok(model)
+}
+
+/// Reads one solid.
+struct Reader<'a> {
+    entities: &'a Entities,
+    shapes: Shapes<'a>,
+    model: &'a mut Model,
+    /// The places of vertices and edges in the model by entity.
+    vertices: HashMap<u64, usize>,
+    edges: HashMap<u64, usize>,
+    /// Edges of polygons by their vertices.
+    sides: HashMap<[usize; 2], usize>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(entities: &'a Entities, placed: &'a Placed, model: &'a mut Model) -> Self {
+        let shapes = Shapes { entities, units: &placed.units, place: placed.place };
+        let (vertices, edges, sides) = (HashMap::new(), HashMap::new(), HashMap::new());
+        Self { entities, shapes, model, vertices, edges, sides }
+    }
+
+    fn solid(&mut self, id: u64) -> Result<(), StepError> {
+        let item = self.entities.simple(id)?;
+        match item.name() {
+            "SHELL_BASED_SURFACE_MODEL" => {
+                item.references(1)?.into_iter().try_for_each(|shell| self.shell(shell, true))
+            }
+            "BREP_WITH_VOIDS" => {
+                self.shell(item.reference(1)?, true)?;
+                item.references(2)?.into_iter().try_for_each(|shell| self.shell(shell, true))
+            }
+            _ => self.shell(item.reference(1)?, true),
+        }
+    }
+
+    fn shell(&mut self, id: u64, outwards: bool) -> Result<(), StepError> {
+        let item = self.entities.simple(id)?;
+        match item.name() {
+            "CLOSED_SHELL" | "OPEN_SHELL" => {
+                let mut faces = item.references(1)?.into_iter();
+                faces.try_for_each(|face| self.face(face, outwards))
+            }
+            "ORIENTED_CLOSED_SHELL" | "ORIENTED_OPEN_SHELL"
+                if !self.is_oriented(item.reference(2)?) =>
+            {
+                self.shell(item.reference(2)?, outwards == item.truth(3)?)
+            }
+            name => Err(StepError::Unsupported { id, name: name.to_owned() }),
+        }
+    }
+
+    /// Whether an entity only turns another one.
+    fn is_oriented(&self, id: u64) -> bool {
+        self.entities.simple(id).is_ok_and(|item| item.name().starts_with("ORIENTED_"))
+    }
+
+    fn face(&mut self, id: u64, outwards: bool) -> Result<(), StepError> {
+        let item = self.entities.simple(id)?;
+        match item.name() {
+            "ADVANCED_FACE" | "FACE_SURFACE" => {
+                let along_normal = item.truth(3)?;
+                let bounds = item.references(1)?;
+                let loops =
+                    bounds.into_iter().map(|bound| self.bound(bound)).collect::<Result<_, _>>()?;
+                let surface = self.shapes.surface(item.reference(2)?)?;
+                let outwards = along_normal == outwards;
+                self.model.faces.push(Face { entity: id, surface, along_normal, outwards, loops });
+                Ok(())
+            }
+            "ORIENTED_FACE" if !self.is_oriented(item.reference(2)?) => {
+                self.face(item.reference(2)?, outwards == item.truth(3)?)
+            }
+            name => Err(StepError::Unsupported { id, name: name.to_owned() }),
+        }
+    }
+
+    fn bound(&mut self, id: u64) -> Result<Loop, StepError> {
+        let item = self.entities.simple(id)?;
+        let is_along = item.truth(2)?;
+        let around = self.entities.simple(item.reference(1)?)?;
+        let mut edges = match around.name() {
+            "VERTEX_LOOP" => return Ok(Loop::Vertex(self.vertex(around.reference(1)?)?)),
+            "EDGE_LOOP" => {
+                let list = around.references(1)?;
+                list.into_iter()
+                    .map(|edge| self.oriented_edge(edge))
+                    .collect::<Result<Vec<_>, _>>()?
+            }
+            "POLY_LOOP" => self.polygon(around)?,
+            name => return Err(StepError::Unsupported { id, name: name.to_owned() }),
+        };
+        if !is_along {
+            edges.reverse();
+            edges.iter_mut().for_each(|(_, is_along)| *is_along = !*is_along);
+        }
+        Ok(Loop::Edges(edges))
+    }
+
+    fn vertex(&mut self, id: u64) -> Result<usize, StepError> {
+        if let Some(&vertex) = self.vertices.get(&id) {
+            return Ok(vertex);
+        }
+        let vertex = self.model.vertices.len();
+        self.model.vertices.push(self.shapes.point(id)?);
+        self.vertices.insert(id, vertex);
+        Ok(vertex)
+    }
+
+    fn oriented_edge(&mut self, id: u64) -> Result<(usize, bool), StepError> {
+        let item = self.entities.simple(id)?;
+        match item.name() {
+            "ORIENTED_EDGE" => Ok((self.edge(item.reference(3)?)?, item.truth(4)?)),
+            _ => Ok((self.edge(id)?, true)),
+        }
+    }
+
+    fn edge(&mut self, id: u64) -> Result<usize, StepError> {
+        if let Some(&edge) = self.edges.get(&id) {
+            return Ok(edge);
+        }
+        let item = self.entities.get(id, "EDGE_CURVE")?;
+        let ends = [self.vertex(item.reference(1)?)?, self.vertex(item.reference(2)?)?];
+        let (curve, forward) = (self.shapes.curve(item.reference(3)?)?, item.truth(4)?);
+        let edge = self.model.edges.len();
+        self.model.edges.push(Edge { curve, ends, forward });
+        self.edges.insert(id, edge);
+        Ok(edge)
+    }
+
+    /// The sides of a polygon, which are shared by their end points.
+    fn polygon(&mut self, item: Item) -> Result<Vec<(usize, bool)>, StepError> {
+        let points = item.references(1)?;
+        let corners: Vec<usize> =
+            points.into_iter().map(|point| self.vertex(point)).collect::<Result<_, _>>()?;
+        let next = corners.iter().cycle().skip(1);
+        let sides = corners.iter().zip(next).filter(|(a, b)| a != b);
+        sides.map(|(&a, &b)| self.side(item.id, a, b)).collect()
+    }
+
+    fn side(&mut self, id: u64, a: usize, b: usize) -> Result<(usize, bool), StepError> {
+        let ends = [a.min(b), a.max(b)];
+        if let Some(&edge) = self.sides.get(&ends) {
+            return Ok((edge, a < b));
+        }
+        let [point, end] = ends.map(|vertex| self.model.vertices[vertex]);
+        let direction = unit(sub(end, point)).ok_or(StepError::Numbers { id, what: "polygon" })?;
+        let edge = self.model.edges.len();
+        self.model.edges.push(Edge {
+            curve: Curve::Line { point, direction },
+            ends,
+            forward: true,
+        });
+        self.sides.insert(ends, edge);
+        Ok((edge, a < b))
+    }
+}

@@ -1,0 +1,269 @@
+//! Triangles between a face's polygons.
+//!
+//! The plane of the triangulation is the surface's parameters, scaled so that a
+//! step along either bends about as much. Its edges along the polygons stay;
+//! others are halved until the surface above them is near.
+
+use std::collections::{HashMap, HashSet};
+
+use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
+
+use super::cells::{Borders, Scale};
+use super::{Node, Points};
+use crate::geometry::Surface;
+use crate::kernel::Fault;
+use crate::model::Face;
+use crate::vector::{Vec3, cross, distance, dot, middle, sub, unit};
+
+type Mesh = ConstrainedDelaunayTriangulation<Point2<f64>>;
+
+/// Rounds of halving.
+const MOST_ROUNDS: usize = 40;
+/// Corners within a face.
+const MOST_INNER: usize = 400_000;
+
+type Filled = (Vec<[Node; 3]>, Option<Fault>);
+
+/// The triangles of a face, counter-clockwise in its parameters.
+pub(super) fn fill(
+    face: &Face,
+    polygons: &[Vec<Node>],
+    points: &mut Points,
+    chord_mm: f64,
+) -> Result<Filled, Fault> {
+    let scale = Scale::new(&face.surface, polygons, chord_mm);
+    let mut work = Work {
+        surface: &face.surface,
+        chord_mm,
+        scale,
+        mesh: Mesh::new(),
+        corners: Vec::new(),
+        borders: HashMap::new(),
+    };
+    work.add_borders(polygons)?;
+    work.add_grid(polygons)?;
+    let coarse = work.refine(points)?;
+    Ok((work.triangles(points), coarse))
+}
+
+struct Work<'a> {
+    surface: &'a Surface,
+    chord_mm: f64,
+    scale: Scale,
+    mesh: Mesh,
+    /// What the mesh's vertices are.
+    corners: Vec<Corner>,
+    /// How often polygons follow an edge.
+    borders: HashMap<[FixedVertexHandle; 2], usize>,
+}
+
+struct Corner {
+    uv: [f64; 2],
+    /// The place on the surface, or that of an edge's point.
+    place: Vec3,
+    point: Option<u32>,
+}
+
+fn ordered(a: FixedVertexHandle, b: FixedVertexHandle) -> [FixedVertexHandle; 2] {
+    if a.index() < b.index() { [a, b] } else { [b, a] }
+}
+
+impl Work<'_> {
+    fn add_borders(&mut self, polygons: &[Vec<Node>]) -> Result<(), Fault> {
+        let mut rings = Vec::new();
+        for polygon in polygons {
+            let ring: Result<Vec<_>, _> = polygon.iter().map(|node| self.corner(node)).collect();
+            rings.push(ring?);
+        }
+        for ring in &rings {
+            let next = ring.iter().cycle().skip(1);
+            for (&a, &b) in ring.iter().zip(next).filter(|(a, b)| a != b) {
+                *self.borders.entry(ordered(a, b)).or_default() += 1;
+                if !self.mesh.can_add_constraint(a, b) {
+                    return Err(Fault::Crossing);
+                }
+                self.mesh.add_constraint(a, b);
+                if !self.mesh.exists_constraint(a, b) {
+                    // Another corner lies on it.
+                    return Err(Fault::Crossing);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn corner(&mut self, node: &Node) -> Result<FixedVertexHandle, Fault> {
+        let handle = self.insert(self.scale.place(node.uv))?;
+        if handle.index() < self.corners.len() {
+            // Two points that have become one would leave a gap.
+            let is_same = self.corners[handle.index()].point == Some(node.point);
+            return if is_same { Ok(handle) } else { Err(Fault::Crossing) };
+        }
+        let place = self.surface.point(node.uv);
+        self.corners.push(Corner { uv: node.uv, place, point: Some(node.point) });
+        Ok(handle)
+    }
+
+    fn insert(&mut self, at: Point2<f64>) -> Result<FixedVertexHandle, Fault> {
+        self.mesh.insert(at).map_err(|_| Fault::Unbounded)
+    }
+
+    /// Adds a corner within the face.
+    fn add_inner(&mut self, at: Point2<f64>) -> Result<(), Fault> {
+        let handle = self.insert(at)?;
+        if handle.index() == self.corners.len() {
+            let uv = self.scale.uv(at);
+            self.corners.push(Corner { uv, place: self.surface.point(uv), point: None });
+        }
+        Ok(())
+    }
+
+    /// Adds corners where the cells meet, away from the polygons.
+    fn add_grid(&mut self, polygons: &[Vec<Node>]) -> Result<(), Fault> {
+        let counts = self.scale.count.map(|count| count.ceil().min(1000.0) as usize);
+        if matches!(self.surface, Surface::Plane(_)) || counts.contains(&1) {
+            return Ok(());
+        }
+        let borders = Borders::new(polygons, &self.scale);
+        for i in 1..counts[0] {
+            for j in 1..counts[1] {
+                let part =
+                    |k: usize, n: usize, axis: usize| self.scale.count[axis] * k as f64 / n as f64;
+                let at = Point2::new(part(i, counts[0], 0), part(j, counts[1], 1));
+                if borders.is_clear(at) && borders.is_within(at) {
+                    self.add_inner(at)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Halves edges until the surface is near all triangles.
+    fn refine(&mut self, points: &Points) -> Result<Option<Fault>, Fault> {
+        for corner in &mut self.corners {
+            if let Some(point) = corner.point {
+                corner.place = points.get(point);
+            }
+        }
+        let mut worst = 0.0;
+        for _ in 0..MOST_ROUNDS {
+            let (list, off) = self.too_far();
+            worst = off;
+            if list.is_empty() || self.corners.len() > MOST_INNER {
+                break;
+            }
+            for at in list {
+                self.add_inner(at)?;
+            }
+        }
+        Ok((worst > 4.0 * self.chord_mm).then_some(Fault::Coarse { off_mm: worst }))
+    }
+
+    /// Where corners are missing, and how far the surface is from the triangles.
+    fn too_far(&self) -> (Vec<Point2<f64>>, f64) {
+        let mut list = Vec::new();
+        let mut seen = HashSet::new();
+        let mut worst: f64 = 0.0;
+        for face in self.inside() {
+            let face = self.mesh.face(face);
+            let corners = face.vertices().map(|v| &self.corners[v.fix().index()]);
+            let flat = face.vertices().map(|v| v.position());
+            let places = corners.map(|corner| corner.place);
+            let is_point = corners[0].point.is_some()
+                && (0..3).any(|k| {
+                    corners[k].point.is_some() && corners[k].point == corners[(k + 1) % 3].point
+                });
+            if is_point {
+                continue;
+            }
+            let across = unit(cross(sub(places[1], places[0]), sub(places[2], places[0])));
+            let off = |p: Point2<f64>, a: Vec3, b: Vec3| {
+                let place = self.surface.point(self.scale.uv(p));
+                let from_plane = across.map(|n| dot(n, sub(place, a)).abs());
+                from_plane.unwrap_or_else(|| distance(place, middle(a, b)))
+            };
+            let mut is_split = false;
+            for edge in face.adjacent_edges() {
+                if edge.is_constraint_edge() {
+                    continue;
+                }
+                let [a, b] = [edge.from(), edge.to()].map(|v| v.fix());
+                let [p, q] = [edge.from(), edge.to()].map(|v| v.position());
+                let half = Point2::new((p.x + q.x) / 2.0, (p.y + q.y) / 2.0);
+                let [at, bt] = [a, b].map(|v| self.corners[v.index()].place);
+                let apart = off(half, at, bt);
+                let is_short = (p.x - q.x).hypot(p.y - q.y) < 1e-3;
+                if apart > self.chord_mm && !is_short {
+                    worst = worst.max(apart);
+                    is_split = true;
+                    if seen.insert(ordered(a, b)) {
+                        list.push(half);
+                    }
+                }
+            }
+            let third = |k: fn(&Point2<f64>) -> f64| flat.iter().map(k).sum::<f64>() / 3.0;
+            let centre = Point2::new(third(|p| p.x), third(|p| p.y));
+            let apart = off(centre, places[0], places[1]);
+            if !is_split && apart > self.chord_mm && size(flat) > 1e-6 {
+                worst = worst.max(apart);
+                list.push(centre);
+            }
+        }
+        (list, worst)
+    }
+
+    /// The triangles within an odd number of polygons.
+    fn inside(&self) -> Vec<FixedFaceHandle<InnerTag>> {
+        let mesh = &self.mesh;
+        let mut is_inside = vec![None; mesh.num_all_faces()];
+        let outer = mesh.outer_face().fix();
+        is_inside[outer.index()] = Some(false);
+        let mut stack = Vec::new();
+        for edge in mesh.convex_hull() {
+            stack.push((edge.fix().rev(), false));
+            stack.push((edge.fix(), false));
+        }
+        let mut list = Vec::new();
+        while let Some((edge, from)) = stack.pop() {
+            let edge = mesh.directed_edge(edge);
+            let Some(face) = edge.face().as_inner() else { continue };
+            let known = &mut is_inside[face.fix().index()];
+            if known.is_some() {
+                continue;
+            }
+            let ends = ordered(edge.from().fix(), edge.to().fix());
+            let is_crossed = edge.is_constraint_edge()
+                && self.borders.get(&ends).is_none_or(|times| times % 2 == 1);
+            let inside = from != is_crossed;
+            *known = Some(inside);
+            if inside {
+                list.push(face.fix());
+            }
+            stack.extend(face.adjacent_edges().map(|edge| (edge.fix().rev(), inside)));
+        }
+        list.sort_by_key(FixedFaceHandle::index);
+        list
+    }
+
+    /// The triangles with their nodes.
+    fn triangles(&mut self, points: &mut Points) -> Vec<[Node; 3]> {
+        let inside = self.inside();
+        let mut list = Vec::with_capacity(inside.len());
+        for face in inside {
+            let handles = self.mesh.face(face).vertices().map(|v| v.fix().index());
+            let nodes = handles.map(|k| {
+                let corner = &mut self.corners[k];
+                let place = corner.place;
+                let point = *corner.point.get_or_insert_with(|| points.push(place));
+                Node { uv: corner.uv, point }
+            });
+            list.push(nodes);
+        }
+        list
+    }
+}
+
+fn size([a, b, c]: [Point2<f64>; 3]) -> f64 {
+    ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)).abs()
+}

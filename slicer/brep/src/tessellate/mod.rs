@@ -1,0 +1,183 @@
+//! Faces as facets that share the points of their edges.
+//!
+//! Each edge is made into a chain of points once, and all faces along it take
+//! these. A face is triangulated in the parameters of its surface, between its
+//! loops; points within it lie on the surface. So facets of neighbouring faces
+//! meet in the same points whatever the surfaces do there.
+
+mod boundary;
+mod cells;
+mod fill;
+mod unwrap;
+
+use rayon::prelude::*;
+
+use crate::error::BrepError;
+use crate::geometry::edge_range;
+use crate::kernel::{Facet, Fault, Finding, Tessellation};
+use crate::model::{Edge, Face, Loop, Model};
+use crate::vector::Vec3;
+
+/// A corner in a face's parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Node {
+    uv: [f64; 2],
+    /// Which point it is; a point may be several corners, along a seam or at a pole.
+    point: u32,
+}
+
+/// More facets than fit into memory by any measure.
+const MOST_FACETS: usize = 200_000_000;
+
+/// Points of a face: those of its edges, which it shares, and its own.
+struct Points<'a> {
+    shared: &'a [Vec3],
+    own: Vec<Vec3>,
+}
+
+impl Points<'_> {
+    fn get(&self, point: u32) -> Vec3 {
+        let point = point as usize;
+        self.shared.get(point).copied().unwrap_or_else(|| self.own[point - self.shared.len()])
+    }
+
+    fn push(&mut self, point: Vec3) -> u32 {
+        self.own.push(point);
+        (self.shared.len() + self.own.len() - 1) as u32
+    }
+}
+
+/// What a face became.
+struct Patch {
+    own: Vec<Vec3>,
+    facets: Vec<Facet>,
+    tips: Vec<Facet>,
+    faults: Vec<Fault>,
+}
+
+/// All faces of a model as facets.
+pub(crate) fn model(model: &Model, chord_mm: f64) -> Result<Tessellation, BrepError> {
+    if !(chord_mm > 0.0 && chord_mm.is_finite()) {
+        return Err(BrepError::Chord { chord_mm });
+    }
+    let mut points = model.vertices.clone();
+    let chains: Vec<Vec<u32>> =
+        model.edges.iter().map(|edge| chain(edge, model, chord_mm, &mut points)).collect();
+    let shared = points.len();
+    let patches: Vec<Patch> = (0u32..)
+        .zip(&model.faces)
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .map(|(number, face)| patch(number, face, &chains, &points, chord_mm))
+        .collect();
+    let (mut facets, mut tips) = (Vec::new(), Vec::new());
+    let mut findings = Vec::new();
+    for (face, patch) in (0u32..).zip(patches) {
+        // A face counts its own points from where the shared ones end.
+        let moved = (points.len() - shared) as u32;
+        points.extend(patch.own);
+        if facets.len() + patch.facets.len() > MOST_FACETS {
+            return Err(BrepError::TooMany { most: MOST_FACETS });
+        }
+        let renumbered = |mut facet: Facet| {
+            for corner in facet.corners.iter_mut().filter(|corner| **corner >= shared as u32) {
+                *corner += moved;
+            }
+            facet
+        };
+        facets.extend(patch.facets.into_iter().map(renumbered));
+        tips.extend(patch.tips.into_iter().map(renumbered));
+        let entity = model.faces[face as usize].entity;
+        findings.extend(patch.faults.into_iter().map(|fault| Finding { face, entity, fault }));
+    }
+    Ok(Tessellation { points, facets, tips, findings, chord_mm })
+}
+
+/// An edge as points, from its start to its end.
+fn chain(edge: &Edge, model: &Model, chord_mm: f64, points: &mut Vec<Vec3>) -> Vec<u32> {
+    let [start, end] = edge.ends;
+    let range = edge_range(&edge.curve, model.vertices[start], model.vertices[end], edge.forward);
+    let line = edge.curve.polyline(range, chord_mm);
+    let first = points.len() as u32;
+    // The vertices stand for the ends, so that all edges of a vertex meet.
+    let inner = line.get(1..line.len() - 1).unwrap_or_default();
+    points.extend(inner);
+    let inner = first..first + inner.len() as u32;
+    [start as u32].into_iter().chain(inner).chain([end as u32]).collect()
+}
+
+fn patch(number: u32, face: &Face, chains: &[Vec<u32>], shared: &[Vec3], chord_mm: f64) -> Patch {
+    let mut points = Points { shared, own: Vec::new() };
+    let mut faults = Vec::new();
+    let mut outwards = face.outwards;
+    let mut fill = || {
+        let polygons = boundary::polygons(face, &rings(face, chains), &mut points, chord_mm)?;
+        faults.extend(off(face, &polygons, &points, chord_mm));
+        if boundary::is_counter_clockwise(&polygons) != face.along_normal {
+            // The loops are what joins faces; neighbours follow them the other way.
+            outwards = !outwards;
+            faults.push(Fault::Sense);
+        }
+        let (corners, coarse) = fill::fill(face, &polygons, &mut points, chord_mm)?;
+        faults.extend(coarse);
+        Ok(corners)
+    };
+    let filled = fill();
+    let corners = filled.unwrap_or_else(|fault| {
+        faults.push(fault);
+        Vec::new()
+    });
+    let facet = |[a, b, c]: [Node; 3]| {
+        let nodes = if outwards { [a, b, c] } else { [a, c, b] };
+        Facet { corners: nodes.map(|node| node.point), uv: nodes.map(|node| node.uv), face: number }
+    };
+    let (facets, tips) = corners.into_iter().map(facet).partition(has_three_corners);
+    Patch { facets, tips, own: points.own, faults }
+}
+
+fn has_three_corners(facet: &Facet) -> bool {
+    let [a, b, c] = facet.corners;
+    a != b && b != c && c != a
+}
+
+/// A face's loops as points, each once.
+enum Ring {
+    Point(u32),
+    /// Nothing if its edges do not follow each other.
+    Points(Option<Vec<u32>>),
+}
+
+fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<Ring> {
+    let ring = |edges: &Vec<(usize, bool)>| {
+        let mut ring: Vec<u32> = Vec::new();
+        let mut end = None;
+        for &(edge, is_along) in edges {
+            let chain = &chains[edge];
+            let mut points: Vec<u32> = chain.clone();
+            if !is_along {
+                points.reverse();
+            }
+            let last = points.pop()?;
+            if end.is_some_and(|end| end != *points.first().unwrap_or(&last)) {
+                return None;
+            }
+            end = Some(last);
+            ring.extend(points);
+        }
+        (end.is_some() && end == ring.first().copied()).then_some(ring)
+    };
+    let rings = face.loops.iter().map(|around| match around {
+        Loop::Vertex(vertex) => Ring::Point(*vertex as u32),
+        Loop::Edges(edges) => Ring::Points(ring(edges)),
+    });
+    rings.collect()
+}
+
+/// How far the points of the edges lie off the surface, if that is more than
+/// facets do.
+fn off(face: &Face, polygons: &[Vec<Node>], points: &Points, chord_mm: f64) -> Option<Fault> {
+    let apart =
+        |node: &Node| crate::vector::distance(points.get(node.point), face.surface.point(node.uv));
+    let off_mm = polygons.iter().flatten().map(apart).fold(0.0, f64::max);
+    (off_mm > chord_mm).then_some(Fault::Off { off_mm })
+}

@@ -1,0 +1,145 @@
+//! Loops in the parameters of their surface, followed through seams and poles.
+
+use super::{Node, Points};
+use crate::geometry::{Pole, Surface};
+use crate::model::Face;
+use crate::vector::distance;
+
+/// A loop of nodes.
+#[derive(Clone, Debug)]
+pub(super) struct Unwrapped {
+    pub(super) nodes: Vec<Node>,
+    /// How often it goes around a closed surface, along u and along v, before it
+    /// is back at its start.
+    pub(super) turns: [i32; 2],
+}
+
+/// How near a point at a pole lies to it, in millimetres.
+const AT_POLE_MM: f64 = 1e-5;
+/// Corners that stand for a pole, for a whole turn around it.
+const POLE_PARTS: f64 = 16.0;
+
+/// Finds a loop's parameters, each as near to those before as periods allow.
+pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &Points) -> Unwrapped {
+    let surface = &face.surface;
+    let periods = surface.periods();
+    let pole_at = |point: u32| {
+        let place = points.get(point);
+        poles.iter().find(|pole| distance(pole.point, place) < AT_POLE_MM)
+    };
+    // Starts away from poles.
+    let start = ring.iter().position(|&point| pole_at(point).is_none()).unwrap_or(0);
+    let order = ring[start..].iter().chain(&ring[..start]).copied();
+    let mut nodes: Vec<Node> = Vec::with_capacity(ring.len() + 1);
+    let mut waiting: Option<(&Pole, u32)> = None;
+    for point in order.chain([ring[start]]) {
+        if let Some(pole) = pole_at(point) {
+            waiting = Some((pole, point));
+            continue;
+        }
+        let before = nodes.last().map(|node| node.uv);
+        let mut uv = surface.project(points.get(point), before);
+        if let Some(before) = before {
+            for axis in 0..2 {
+                uv[axis] = near(uv[axis], before[axis], periods[axis]);
+            }
+            if let Some((pole, tip)) = waiting.take() {
+                uv = around_pole(face, pole, tip, before, uv, &mut nodes);
+            }
+        }
+        nodes.push(Node { uv, point });
+    }
+    let mut turns = [0; 2];
+    if let (Some(first), Some(last)) = (nodes.first(), nodes.last()) {
+        for axis in 0..2 {
+            if let Some(period) = periods[axis] {
+                turns[axis] = ((last.uv[axis] - first.uv[axis]) / period).round() as i32;
+            }
+        }
+    }
+    nodes.pop();
+    Unwrapped { nodes, turns }
+}
+
+/// Of all parameters that mean the same the one nearest to another.
+pub(super) fn near(t: f64, other: f64, period: Option<f64>) -> f64 {
+    match period {
+        Some(period) => t - ((t - other) / period).round() * period,
+        None => t,
+    }
+}
+
+/// Adds the corners that stand for a pole between two nodes, and says where the
+/// second of them lies.
+///
+/// A pole is a side of the domain. The face lies on the left of its loop, which
+/// decides in which direction the side is followed.
+fn around_pole(
+    face: &Face,
+    pole: &Pole,
+    tip: u32,
+    before: [f64; 2],
+    mut after: [f64; 2],
+    nodes: &mut Vec<Node>,
+) -> [f64; 2] {
+    let free = 1 - pole.axis;
+    if let Some(period) = face.surface.periods()[free] {
+        let is_last = pole.at > before[pole.axis];
+        // Counter-clockwise: backwards along the side of the greatest v and along
+        // that of the least u.
+        let is_forward = (is_last == (pole.axis == 0)) == face.along_normal;
+        let way = (after[free] - before[free]).rem_euclid(period);
+        let tiny = 1e-6 * period;
+        let way = if way < tiny || way > period - tiny { period } else { way };
+        let is_whole = way == period;
+        let way = match (is_forward, is_whole) {
+            (true, _) => way,
+            (false, true) => -period,
+            (false, false) => way - period,
+        };
+        after[free] = before[free] + way;
+    }
+    let way = after[free] - before[free];
+    let span = face.surface.periods()[free].unwrap_or(way.abs());
+    let parts = if span > 0.0 { (POLE_PARTS * way.abs() / span).ceil().max(1.0) } else { 1.0 };
+    for k in 0..=parts as usize {
+        let mut uv = [pole.at; 2];
+        uv[free] = before[free] + way * k as f64 / parts;
+        nodes.push(Node { uv, point: tip });
+    }
+    after
+}
+
+/// Parameters on the straight line between two, without these, so that the
+/// surface along it bends less than the chord.
+pub(super) fn between(surface: &Surface, a: [f64; 2], b: [f64; 2], chord_mm: f64) -> Vec<[f64; 2]> {
+    let mut list = Vec::new();
+    halve(surface, [a, b], chord_mm, 0, &mut list);
+    list
+}
+
+fn halve(
+    surface: &Surface,
+    [a, b]: [[f64; 2]; 2],
+    chord_mm: f64,
+    depth: usize,
+    list: &mut Vec<[f64; 2]>,
+) {
+    let at = |part: f64| [0, 1].map(|k| a[k] + (b[k] - a[k]) * part);
+    let [p, q] = [a, b].map(|uv| surface.point(uv));
+    let is_straight = |part: f64| {
+        let chord = crate::vector::along(p, crate::vector::sub(q, p), part);
+        distance(surface.point(at(part)), chord) <= chord_mm
+    };
+    // Two halvings at least where it bends: a whole turn comes back to its start.
+    let is_plain =
+        matches!(surface, Surface::Plane(_) | Surface::Cylinder { .. } | Surface::Cone { .. });
+    let least = if is_plain && a[0] == b[0] { 0 } else { 2 };
+    if depth >= least && (depth > 14 || [0.25, 0.5, 0.75].into_iter().all(is_straight)) {
+        return;
+    }
+    let middle = at(0.5);
+    halve(surface, [a, middle], chord_mm, depth + 1, list);
+    list.push(middle);
+    halve(surface, [middle, b], chord_mm, depth + 1, list);
+}

@@ -1,0 +1,127 @@
+//! Points and directions as three numbers.
+
+/// A point in millimetres, or a direction.
+pub(crate) type Vec3 = [f64; 3];
+
+pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn scale(a: Vec3, s: f64) -> Vec3 {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+/// `a + s b`.
+pub(crate) fn along(a: Vec3, b: Vec3, s: f64) -> Vec3 {
+    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
+}
+
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(crate) fn length(a: Vec3) -> f64 {
+    dot(a, a).sqrt()
+}
+
+pub(crate) fn distance(a: Vec3, b: Vec3) -> f64 {
+    length(sub(a, b))
+}
+
+pub(crate) fn middle(a: Vec3, b: Vec3) -> Vec3 {
+    scale(add(a, b), 0.5)
+}
+
+/// The direction with length 1; nothing if it has no length or is not finite.
+pub(crate) fn unit(a: Vec3) -> Option<Vec3> {
+    let length = length(a);
+    (length > 1e-12 && length.is_finite()).then(|| scale(a, 1.0 / length))
+}
+
+/// A right-handed frame: where it stands, and its axes, each of length 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Frame {
+    pub(crate) origin: Vec3,
+    pub(crate) axes: [Vec3; 3],
+}
+
+impl Frame {
+    pub(crate) const WORLD: Self =
+        Self { origin: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
+
+    /// The frame with this z axis, and the x axis as near to `x` as is at a
+    /// right angle to it. Without a usable `x` it is the first of the world's axes
+    /// that is not along z (ISO 10303-42, `first_proj_axis`).
+    pub(crate) fn new(origin: Vec3, z: Vec3, x: Option<Vec3>) -> Option<Self> {
+        let z = unit(z)?;
+        let across = |x: Vec3| unit(along(x, z, -dot(x, z)));
+        let default = if z[0].abs() < 1.0 - 1e-9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+        let x = x.and_then(unit).and_then(across).or_else(|| across(default))?;
+        Some(Self { origin, axes: [x, cross(z, x), z] })
+    }
+
+    /// Where a point given in this frame lies.
+    pub(crate) fn point(&self, p: Vec3) -> Vec3 {
+        add(self.origin, self.direction(p))
+    }
+
+    /// Where a direction given in this frame points.
+    pub(crate) fn direction(&self, d: Vec3) -> Vec3 {
+        let [x, y, z] = self.axes;
+        along(along(scale(x, d[0]), y, d[1]), z, d[2])
+    }
+
+    /// A point as this frame sees it.
+    pub(crate) fn local(&self, p: Vec3) -> Vec3 {
+        let d = sub(p, self.origin);
+        self.axes.map(|axis| dot(axis, d))
+    }
+
+    /// The frame that `inner`, given in this one, is.
+    pub(crate) fn then(&self, inner: &Frame) -> Frame {
+        let axes = inner.axes.map(|axis| self.direction(axis));
+        Frame { origin: self.point(inner.origin), axes }
+    }
+
+    /// This frame undone: `self.then(&self.inverse())` is the world.
+    pub(crate) fn inverse(&self) -> Frame {
+        let [x, y, z] = self.axes;
+        let axes = [0, 1, 2].map(|k| [x[k], y[k], z[k]]);
+        let origin = self.axes.map(|axis| -dot(axis, self.origin));
+        Frame { origin, axes }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_without_x_is_whole_wherever_z_points() {
+        for z in [[1.0, 0.0, 0.0], [-3.0, 0.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1e-13, 0.0]] {
+            for x in [None, Some(z), Some([0.0; 3])] {
+                let [x, y, z] = Frame::new([0.0; 3], z, x).unwrap().axes;
+                assert!(dot(x, y).abs() < 1e-12 && dot(x, z).abs() < 1e-12);
+                assert!((length(x) - 1.0).abs() < 1e-12 && distance(cross(x, y), z) < 1e-12);
+            }
+        }
+        assert_eq!(Frame::new([0.0; 3], [0.0; 3], None), None);
+        assert_eq!(Frame::new([0.0; 3], [f64::NAN; 3], None), None);
+    }
+
+    #[test]
+    fn a_frame_undone_is_the_world() {
+        let frame = Frame::new([1.0, 2.0, 3.0], [1.0, 1.0, 0.5], Some([0.0, 1.0, 0.0])).unwrap();
+        let p = [4.0, -5.0, 6.0];
+        assert!(distance(frame.local(frame.point(p)), p) < 1e-12);
+        assert!(distance(frame.then(&frame.inverse()).point(p), p) < 1e-12);
+    }
+}
