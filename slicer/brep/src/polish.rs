@@ -1,0 +1,158 @@
+//! Crossings of facets moved onto the exact surfaces.
+
+use crate::kernel::{Jet, Kernel, Tessellation};
+use crate::vector::{cross, unit};
+
+/// Where a facet crosses a plane and a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// The facet, among those of the tessellation.
+    pub facet: u32,
+    /// The place on the facet, as parameters of its surface.
+    pub uv: [f64; 2],
+    /// Where the crossing is, in millimetres: what polishing makes exact.
+    pub x_mm: f64,
+    /// The row, in millimetres.
+    pub y_mm: f64,
+    /// The plane, in millimetres.
+    pub z_mm: f64,
+}
+
+/// What polishing did to crossings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Polished {
+    /// Crossings that lie on their surface now.
+    pub moved: usize,
+    /// Those kept because no point was found: the row touches the surface.
+    pub diverged: usize,
+    /// Those kept because the point found belongs to another facet.
+    pub left: usize,
+    /// Those kept because the point found is further away than the tolerance.
+    pub far: usize,
+    /// The sum of all moves, in millimetres.
+    pub sum_mm: f64,
+    /// The longest move, in millimetres.
+    pub most_mm: f64,
+}
+
+/// Newton steps; two or three are the rule.
+const MOST_STEPS: usize = 12;
+/// How near to the row and the plane a point must come, in millimetres.
+const NEAR_MM: f64 = 1e-10;
+/// How far beyond its facet a point may lie, in facets.
+const BEYOND: f64 = 1.0;
+
+/// Solves y(u, v) = row and z(u, v) = plane on the exact surfaces by Newton's
+/// method from the facets' parameters, and moves the crossings to x(u, v).
+///
+/// A crossing keeps its place on the facet where that diverges, leaves the
+/// surroundings of the facet, or moves it further across the surface than
+/// `tolerance_mm`, which is the chord: facets lie no further from it. (Along a row
+/// that grazes the surface the same error is a longer way.) These are counted.
+/// Crossings are neither added nor taken away, so rows balance as before.
+///
+/// # Panics
+/// Where a crossing's facet does not exist.
+pub fn polish(
+    kernel: &dyn Kernel,
+    mesh: &Tessellation,
+    tolerance_mm: f64,
+    crossings: &mut [Crossing],
+) -> Polished {
+    let face = |k: &usize| mesh.facets[crossings[*k].facet as usize].face;
+    let mut order: Vec<usize> = (0..crossings.len()).collect();
+    order.sort_by_key(face);
+    let batches: Vec<Vec<usize>> =
+        order.chunk_by(|a, b| face(a) == face(b)).map(<[usize]>::to_vec).collect();
+    let mut polished = Polished::default();
+    for batch in batches {
+        let of_face = mesh.facets[crossings[batch[0]].facet as usize].face;
+        for (k, found) in solved(kernel, of_face, &batch, crossings) {
+            let crossing = &mut crossings[k];
+            let Some((uv, jet)) = found else {
+                polished.diverged += 1;
+                continue;
+            };
+            let x_mm = jet.point[0];
+            let by_mm = (x_mm - crossing.x_mm).abs();
+            let across = unit(cross(jet.du, jet.dv)).map_or(1.0, |normal| normal[0].abs());
+            if !is_near(&mesh.facets[crossing.facet as usize].uv, uv) {
+                polished.left += 1;
+            } else if by_mm * across > tolerance_mm {
+                polished.far += 1;
+            } else {
+                polished.moved += 1;
+                polished.sum_mm += by_mm;
+                polished.most_mm = polished.most_mm.max(by_mm);
+                (crossing.uv, crossing.x_mm) = (uv, x_mm);
+            }
+        }
+    }
+    polished
+}
+
+type Found = Option<([f64; 2], Jet)>;
+
+/// Solves the crossings of one face together; each in its own number of steps.
+fn solved(
+    kernel: &dyn Kernel,
+    face: u32,
+    batch: &[usize],
+    crossings: &[Crossing],
+) -> Vec<(usize, Found)> {
+    let mut found = Vec::with_capacity(batch.len());
+    let mut open = batch.to_vec();
+    let mut at: Vec<[f64; 2]> = open.iter().map(|&k| crossings[k].uv).collect();
+    let mut jets = vec![Jet::default(); at.len()];
+    for _ in 0..MOST_STEPS {
+        if open.is_empty() {
+            break;
+        }
+        jets.truncate(at.len());
+        kernel.evaluate(face, &at, &mut jets);
+        let mut kept = 0;
+        for i in 0..open.len() {
+            let (k, uv) = (open[i], at[i]);
+            match step(&crossings[k], &jets[i], uv) {
+                Step::There => found.push((k, Some((uv, jets[i])))),
+                Step::Lost => found.push((k, None)),
+                Step::On(next) => {
+                    (open[kept], at[kept]) = (k, next);
+                    kept += 1;
+                }
+            }
+        }
+        open.truncate(kept);
+        at.truncate(kept);
+    }
+    found.extend(open.into_iter().map(|k| (k, None)));
+    found
+}
+
+enum Step {
+    There,
+    On([f64; 2]),
+    Lost,
+}
+
+fn step(crossing: &Crossing, jet: &Jet, [u, v]: [f64; 2]) -> Step {
+    let [_, y, z] = jet.point;
+    let (e, f) = (crossing.y_mm - y, crossing.z_mm - z);
+    if e.abs() < NEAR_MM && f.abs() < NEAR_MM {
+        return Step::There;
+    }
+    let ([_, yu, zu], [_, yv, zv]) = (jet.du, jet.dv);
+    let det = yu * zv - yv * zu;
+    let next = [u + (e * zv - f * yv) / det, v + (f * yu - e * zu) / det];
+    if next.iter().all(|t| t.is_finite()) { Step::On(next) } else { Step::Lost }
+}
+
+/// Whether parameters lie on a facet or near it.
+fn is_near([p, q, r]: &[[f64; 2]; 3], uv: [f64; 2]) -> bool {
+    let double = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
+    let whole = double(*p, *q, *r);
+    let parts = [double(uv, *q, *r), double(*p, uv, *r), double(*p, *q, uv)];
+    parts.iter().all(|part| part / whole >= -BEYOND)
+}

@@ -1,0 +1,157 @@
+//! Parts of which everything is known, read back from STEP.
+
+use std::f64::consts::PI;
+
+use lamp_brep::{BodyReport, Crossing, Kernel, StepModel, Tessellation, check, polish};
+use lamp_fixtures::{StepPart, StepUnit, step};
+
+fn read(part: StepPart, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessellation) {
+    let model = StepModel::read(step(part, unit).as_bytes()).unwrap();
+    let mesh = model.tessellate(chord_mm).unwrap();
+    (model, mesh)
+}
+
+/// The bodies of a part that must be right.
+fn bodies(part: StepPart, unit: StepUnit, chord_mm: f64) -> Vec<BodyReport> {
+    let (model, mesh) = read(part, unit, chord_mm);
+    let reports = check(&model, &mesh);
+    assert!(mesh.findings.is_empty(), "{part:?}: {:?}", mesh.findings);
+    for report in &reports {
+        assert!(report.faults.is_empty(), "{part:?}: {:?}", report.faults);
+    }
+    reports
+}
+
+#[test]
+fn volumes_come_near_to_closed_forms_in_every_unit() {
+    let parts = [
+        (StepPart::Sphere, 4.0 / 3.0 * PI * 15f64.powi(3)),
+        (StepPart::Torus, 2.0 * PI * PI * 20.0 * 64.0),
+        (StepPart::Cone, PI * 225.0 * 30.0 / 3.0),
+    ];
+    for unit in [StepUnit::Millimetre, StepUnit::Metre, StepUnit::Inch] {
+        for (part, volume_mm3) in parts {
+            for chord_mm in [0.1, 0.005] {
+                let [report] = &bodies(part, unit, chord_mm)[..] else { panic!("one body") };
+                let off = report.volume_mm3 / volume_mm3 - 1.0;
+                assert!(off < 0.0 && off > -0.5 * chord_mm, "{part:?} {chord_mm}: {off}");
+                let off = report.exact_volume_mm3 / volume_mm3 - 1.0;
+                // The edge of the cone's foot is a polygon for both of its faces.
+                let most = if part == StepPart::Cone { 0.05 * chord_mm } else { 1e-6 };
+                assert!(off.abs() < most, "{part:?} {chord_mm}: exact {off}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tower_of_all_kinds_of_surfaces_is_closed() {
+    for chord_mm in [0.2, 0.02] {
+        let [report] = &bodies(StepPart::Tower, StepUnit::Inch, chord_mm)[..] else {
+            panic!("one body")
+        };
+        let [low, high] = report.box_mm;
+        let expected = [(low[2], 0.0), (high[2], 76.2), (high[0], 12.7)];
+        assert!(expected.iter().all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", report.box_mm);
+    }
+}
+
+#[test]
+fn an_assembly_has_its_parts_in_their_places() {
+    let reports = bodies(StepPart::Pair, StepUnit::Inch, 0.01);
+    assert_eq!(reports.len(), 2);
+    // The second stands on x = 50 mm, at the height of the first one's centre.
+    let expected = [[-15.0, -15.0, 0.0], [50.0, -15.0, 0.0]];
+    for (report, least) in reports.iter().zip(expected) {
+        for k in 0..3 {
+            let [low, high] = report.box_mm;
+            assert!((low[k] - least[k]).abs() < 0.02, "{:?}", report.box_mm);
+            assert!((high[k] - low[k] - 30.0).abs() < 0.04);
+        }
+    }
+}
+
+/// All crossings of facets with a plane and with rows every so far.
+fn crossings(mesh: &Tessellation, z_mm: f64, step_mm: f64) -> Vec<Crossing> {
+    let mut list = Vec::new();
+    for (number, facet) in mesh.facets.iter().enumerate() {
+        let corners = mesh.corners(facet);
+        let mut ends = Vec::new();
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            if (a[2] >= z_mm) != (b[2] >= z_mm) {
+                let t = (z_mm - a[2]) / (b[2] - a[2]);
+                ends.push([0, 1].map(|axis| a[axis] + t * (b[axis] - a[axis])));
+            }
+        }
+        let &[a, b] = &ends[..] else { continue };
+        let (low, high) = (a[1].min(b[1]), a[1].max(b[1]));
+        for row in (low / step_mm).ceil() as i64..(high / step_mm).ceil() as i64 {
+            let y_mm = row as f64 * step_mm;
+            let x_mm = a[0] + (y_mm - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
+            let uv = mesh.uv_at(facet, [x_mm, y_mm, z_mm]);
+            list.push(Crossing { facet: number as u32, uv, x_mm, y_mm, z_mm });
+        }
+    }
+    list
+}
+
+/// Polishes the crossings of a part with many planes, and says how far those that
+/// moved are from where they should be, in millimetres, before and after, and
+/// which part of them was kept.
+fn errors(part: StepPart, heights_mm: &[f64], x_mm: impl Fn(&Crossing) -> f64) -> (f64, f64, f64) {
+    let chord_mm = 0.01;
+    let (model, mesh) = read(part, StepUnit::Millimetre, chord_mm);
+    let (mut before, mut after): (f64, f64) = (0.0, 0.0);
+    let (mut kept, mut all) = (0, 0);
+    for &z_mm in heights_mm {
+        let facets = crossings(&mesh, z_mm, 0.127);
+        let mut exact = facets.clone();
+        let polished = polish(&model, &mesh, chord_mm, &mut exact);
+        let other = polished.diverged + polished.left + polished.far;
+        assert_eq!(polished.moved + other, exact.len());
+        for (old, new) in facets.iter().zip(&exact) {
+            assert!((old.facet, old.y_mm, old.z_mm) == (new.facet, new.y_mm, new.z_mm));
+            if old.uv != new.uv {
+                before = before.max((old.x_mm - x_mm(old)).abs());
+                after = after.max((new.x_mm - x_mm(new)).abs());
+            }
+        }
+        kept += other;
+        all += exact.len();
+    }
+    (before, after, f64::from(kept as u32) / f64::from(all as u32))
+}
+
+/// A nanometre, in millimetres.
+const NM: f64 = 1e-6;
+
+#[test]
+fn crossings_of_a_sphere_are_exact_to_a_nanometre() {
+    let x_mm = |at: &Crossing| {
+        let square = 225.0 - at.y_mm.powi(2) - (at.z_mm - 15.0).powi(2);
+        square.max(0.0).sqrt().copysign(at.x_mm)
+    };
+    let heights: Vec<f64> = (1..60).map(|k| 0.5 * f64::from(k) + 0.0123).collect();
+    let (before, after, kept) = errors(StepPart::Sphere, &heights, x_mm);
+    println!("sphere: {before} mm before, {after} after, {kept} kept");
+    assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
+}
+
+#[test]
+fn crossings_of_a_torus_are_exact_to_a_nanometre() {
+    // Of up to four the one that is nearest.
+    let x_mm = |at: &Crossing| {
+        let half = (64.0 - (at.z_mm - 8.0).powi(2)).max(0.0).sqrt();
+        let x = |radius: f64| {
+            let x = (radius * radius - at.y_mm * at.y_mm).max(0.0).sqrt();
+            x.copysign(at.x_mm)
+        };
+        let (outer, inner) = (x(20.0 + half), x(20.0 - half));
+        if (outer - at.x_mm).abs() < (inner - at.x_mm).abs() { outer } else { inner }
+    };
+    let heights: Vec<f64> = (1..32).map(|k| 0.5 * f64::from(k) + 0.0123).collect();
+    let (before, after, kept) = errors(StepPart::Torus, &heights, x_mm);
+    println!("torus: {before} mm before, {after} after, {kept} kept");
+    assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
+}
