@@ -174,6 +174,12 @@ pub enum Fault {
     /// face turned over.
     #[error("its sense is against its loops; the loops were followed")]
     Sense,
+    /// It is too large for the chord, or bends too much.
+    #[error("it takes about {cells:.0} cells of facets; give a longer chord")]
+    Fine {
+        /// How many.
+        cells: f64,
+    },
     /// It bends more than the facets could follow.
     #[error("facets lie {off_mm:.4} mm off its surface")]
     Coarse {

@@ -216,20 +216,11 @@ pub(crate) fn edge_range(curve: &Curve, start: Vec3, end: Vec3, forward: bool) -
         let tiny = 1e-9 * period;
         if is_loop {
             to = if forward { from + period } else { from - period };
-        } else if forward {
-            while to <= from + tiny {
-                to += period;
-            }
-            while to > from + period + tiny {
-                to -= period;
-            }
         } else {
-            while to >= from - tiny {
-                to -= period;
-            }
-            while to < from - period - tiny {
-                to += period;
-            }
+            // Ends that are the same for the period are a whole turn apart.
+            let way = if forward { to - from } else { from - to }.rem_euclid(period);
+            let way = if way < tiny { period } else { way };
+            to = if forward { from + way } else { from - way };
         }
     } else if is_loop && let Some([low, high]) = curve.domain() {
         [from, to] = if forward { [low, high] } else { [high, low] };

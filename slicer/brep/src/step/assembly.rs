@@ -9,7 +9,7 @@ use super::units::Units;
 use crate::vector::Frame;
 
 /// A solid or a shell in one of its places.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct Placed {
     pub(crate) solid: u64,
     pub(crate) units: Units,
@@ -48,7 +48,7 @@ pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
     tree.read_shapes()?;
     tree.read_relations()?;
     tree.read_mapped()?;
-    let mut found = Vec::new();
+    let mut found = Found::default();
     let mut seen = HashSet::new();
     for &shape in &tree.order {
         let group = tree.group(shape);
@@ -58,7 +58,31 @@ pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
         seen.extend(group);
         tree.place(shape, Frame::WORLD, 0, &mut found)?;
     }
-    if found.is_empty() { Err(StepError::Empty) } else { Ok(found) }
+    if found.list.is_empty() { Err(StepError::Empty) } else { Ok(found.list) }
+}
+
+/// Solids as they are found.
+#[derive(Default)]
+struct Found {
+    list: Vec<Placed>,
+    seen: HashSet<(u64, [u64; 12])>,
+    /// Shapes that were placed, with or without solids.
+    visits: usize,
+}
+
+impl Found {
+    /// Shapes that carry properties name a solid a second time in the same place.
+    fn add(&mut self, placed: Placed) {
+        let [x, y, z] = placed.place.axes;
+        let numbers = [placed.place.origin, x, y, z];
+        let mut bits = [0; 12];
+        for (bits, number) in bits.iter_mut().zip(numbers.as_flattened()) {
+            *bits = number.to_bits();
+        }
+        if self.seen.insert((placed.solid, bits)) {
+            self.list.push(placed);
+        }
+    }
 }
 
 struct Tree<'a> {
@@ -184,9 +208,10 @@ impl Tree<'_> {
         shape: u64,
         place: Frame,
         level: usize,
-        found: &mut Vec<Placed>,
+        found: &mut Found,
     ) -> Result<(), StepError> {
-        if level > MOST_LEVELS || found.len() > MOST_PARTS {
+        found.visits += 1;
+        if level > MOST_LEVELS || found.visits > MOST_PARTS {
             return Err(StepError::Endless { most: MOST_PARTS });
         }
         for id in self.group(shape) {
@@ -194,11 +219,7 @@ impl Tree<'_> {
             for &item in &shape.items {
                 if SOLIDS.iter().any(|name| self.entities.find(item, name).is_some()) {
                     let units = shape.units.clone().ok_or(StepError::NoUnit { id })?;
-                    let new = Placed { solid: item, units, place };
-                    // Shapes that carry properties name the solid a second time.
-                    if !found.contains(&new) {
-                        found.push(new);
-                    }
+                    found.add(Placed { solid: item, units, place });
                 } else if let Some(mapped) = self.entities.find(item, "MAPPED_ITEM") {
                     self.place_mapped(mapped, id, place, level, found)?;
                 }
@@ -217,7 +238,7 @@ impl Tree<'_> {
         whole: u64,
         place: Frame,
         level: usize,
-        found: &mut Vec<Placed>,
+        found: &mut Found,
     ) -> Result<(), StepError> {
         let map = self.entities.get(mapped.reference(1)?, "REPRESENTATION_MAP")?;
         let (from, part, to) = (map.reference(0)?, map.reference(1)?, mapped.reference(2)?);

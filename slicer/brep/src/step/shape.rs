@@ -20,10 +20,10 @@ const MOST_NESTED: usize = 8;
 impl Shapes<'_> {
     /// A vertex's or a cartesian point's place.
     pub(crate) fn point(&self, id: u64) -> Result<Vec3, StepError> {
-        let item = self.entities.simple(id)?;
-        if item.name() == "VERTEX_POINT" {
-            return self.point(item.reference(1)?);
-        }
+        let id = match self.entities.find(id, "VERTEX_POINT") {
+            Some(vertex) => vertex.reference(1)?,
+            None => id,
+        };
         let point = self.entities.get(id, "CARTESIAN_POINT")?.numbers(1)?;
         let &[x, y, z] = point.as_slice() else {
             return Err(StepError::Attribute { id, attribute: 2 });

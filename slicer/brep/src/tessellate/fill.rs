@@ -4,6 +4,7 @@
 //! step along either bends about as much. Its edges along the polygons stay;
 //! others are halved until the surface above them is near.
 
+use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
 
 use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
@@ -20,8 +21,10 @@ type Mesh = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
 /// Rounds of halving.
 const MOST_ROUNDS: usize = 40;
-/// Corners within a face.
-const MOST_INNER: usize = 400_000;
+/// Cells of a face: those of a sphere of 100 mm at a chord of 0.3 um.
+const MOST_CELLS: f64 = 1e6;
+/// Corners that halving may add: for each cell, and in any case.
+const MORE: [usize; 2] = [4, 20_000];
 
 type Filled = (Vec<[Node; 3]>, Option<Fault>);
 
@@ -33,6 +36,11 @@ pub(super) fn fill(
     chord_mm: f64,
 ) -> Result<Filled, Fault> {
     let scale = Scale::new(&face.surface, polygons, chord_mm);
+    let cells = scale.count[0] * scale.count[1];
+    // Not a number is too many.
+    if !matches!(cells.partial_cmp(&MOST_CELLS), Some(Ordering::Less)) {
+        return Err(Fault::Fine { cells });
+    }
     let mut work = Work {
         surface: &face.surface,
         chord_mm,
@@ -147,10 +155,12 @@ impl Work<'_> {
             }
         }
         let mut worst = 0.0;
+        let cells = (self.scale.count[0] * self.scale.count[1]) as usize;
+        let most = self.corners.len() + MORE[0] * cells + MORE[1];
         for _ in 0..MOST_ROUNDS {
             let (list, off) = self.too_far();
             worst = off;
-            if list.is_empty() || self.corners.len() > MOST_INNER {
+            if list.is_empty() || self.corners.len() > most {
                 break;
             }
             for at in list {

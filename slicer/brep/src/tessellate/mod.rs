@@ -26,8 +26,10 @@ struct Node {
     point: u32,
 }
 
-/// More facets than fit into memory by any measure.
-const MOST_FACETS: usize = 200_000_000;
+/// More facets than any part that is built takes: about 5 GB of memory.
+const MOST_FACETS: usize = 50_000_000;
+/// Points on edges.
+const MOST_POINTS: usize = 20_000_000;
 
 /// Points of a face: those of its edges, which it shares, and its own.
 struct Points<'a> {
@@ -61,8 +63,13 @@ pub(crate) fn model(model: &Model, chord_mm: f64) -> Result<Tessellation, BrepEr
         return Err(BrepError::Chord { chord_mm });
     }
     let mut points = model.vertices.clone();
-    let chains: Vec<Vec<u32>> =
-        model.edges.iter().map(|edge| chain(edge, model, chord_mm, &mut points)).collect();
+    let mut chains = Vec::with_capacity(model.edges.len());
+    for edge in &model.edges {
+        chains.push(chain(edge, model, chord_mm, &mut points));
+        if points.len() > MOST_POINTS {
+            return Err(BrepError::TooMany { most: MOST_FACETS });
+        }
+    }
     let shared = points.len();
     let patches: Vec<Patch> = (0u32..)
         .zip(&model.faces)
