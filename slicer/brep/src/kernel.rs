@@ -1,7 +1,6 @@
 //! What slicing needs of a B-rep kernel.
 
 use crate::error::BrepError;
-use crate::vector::{dot, sub};
 
 /// A point of a surface, in millimetres, and its first derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -104,23 +103,6 @@ impl Tessellation {
     /// A facet's corners.
     pub fn corners(&self, facet: &Facet) -> [[f64; 3]; 3] {
         facet.corners.map(|corner| self.points[corner as usize])
-    }
-
-    /// The parameters of a point on a facet, as straight between its corners';
-    /// those of the first corner if the facet has no area.
-    pub fn uv_at(&self, facet: &Facet, point: [f64; 3]) -> [f64; 2] {
-        let [a, b, c] = self.corners(facet);
-        let (e, f, d) = (sub(b, a), sub(c, a), sub(point, a));
-        let (ee, ef, ff) = (dot(e, e), dot(e, f), dot(f, f));
-        let (de, df) = (dot(d, e), dot(d, f));
-        let det = ee * ff - ef * ef;
-        let [s, t] = if det > 0.0 {
-            [(ff * de - ef * df) / det, (ee * df - ef * de) / det]
-        } else {
-            [0.0; 2]
-        };
-        let [p, q, r] = facet.uv;
-        [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]))
     }
 
     /// The facets of some faces.

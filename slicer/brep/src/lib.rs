@@ -10,7 +10,9 @@
 //! loops say on which side of them a face lies.
 //!
 //! ```
-//! use lamp_brep::{Crossing, Kernel, StepModel, check, polish};
+//! use std::sync::Arc;
+//!
+//! use lamp_brep::{Crossing, Fate, Kernel, Placed, StepModel, check, polish};
 //! use lamp_fixtures::{StepPart, StepUnit, step};
 //!
 //! // A sphere of radius 15 mm that stands on z = 0, in inches.
@@ -22,15 +24,16 @@
 //! assert!(report.faults.is_empty() && report.volume_mm3 < 14_137.0);
 //!
 //! // A facet is off by up to a tenth of a millimetre; its crossing need not be.
-//! let facet = 100;
-//! let [a, b, c] = mesh.corners(&mesh.facets[facet as usize]);
+//! let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+//! let placed = Placed::new(Arc::new(model), Arc::new(mesh), rows);
+//! let [a, b, c] = placed.mesh().corners(&placed.mesh().facets[100]);
 //! let [x_mm, y_mm, z_mm] = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
-//! let uv = mesh.uv_at(&mesh.facets[facet as usize], [x_mm, y_mm, z_mm]);
-//! let mut crossings = [Crossing { facet, uv, x_mm, y_mm, z_mm }];
-//! assert_eq!(polish(&model, &mesh, 0.1, &mut crossings).moved, 1);
-//! let x_mm = crossings[0].x_mm;
+//! let uv = placed.uv_at(100, [x_mm, y_mm, z_mm]);
+//! let mut crossings = [Crossing { facet: 100, uv, x_mm, y_mm, z_mm, fate: Fate::OnFacet }];
+//! polish(&placed, &mut crossings);
+//! let Crossing { x_mm, fate, .. } = crossings[0];
 //! let radius_mm = (x_mm * x_mm + y_mm * y_mm + (z_mm - 15.0).powi(2)).sqrt();
-//! assert!((radius_mm - 15.0).abs() < 1e-9);
+//! assert!(fate == Fate::Moved && (radius_mm - 15.0).abs() < 1e-9);
 //! # Ok::<(), lamp_brep::BrepError>(())
 //! ```
 
@@ -39,6 +42,7 @@ mod gate;
 mod geometry;
 mod kernel;
 mod model;
+mod placed;
 mod polish;
 mod step;
 mod tessellate;
@@ -47,5 +51,6 @@ mod vector;
 pub use error::BrepError;
 pub use gate::{BodyFault, BodyReport, check};
 pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellation};
-pub use polish::{Crossing, Polished, polish};
+pub use placed::Placed;
+pub use polish::{Crossing, Fate, polish};
 pub use step::{StepError, StepModel};

@@ -1,10 +1,11 @@
 //! Crossings of facets moved onto the exact surfaces.
 
-use crate::kernel::{Jet, Kernel, Tessellation};
+use crate::kernel::Jet;
+use crate::placed::Placed;
 use crate::vector::{cross, unit};
 
 /// Where a facet crosses a plane and a row.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Crossing {
     /// The facet, among those of the tessellation.
     pub facet: u32,
@@ -16,23 +17,25 @@ pub struct Crossing {
     pub y_mm: f64,
     /// The plane, in millimetres.
     pub z_mm: f64,
+    /// What polishing did to it.
+    pub fate: Fate,
 }
 
-/// What polishing did to crossings.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Polished {
-    /// Crossings that lie on their surface now.
-    pub moved: usize,
-    /// Those kept because no point was found: the row touches the surface.
-    pub diverged: usize,
-    /// Those kept because the point found belongs to another facet.
-    pub left: usize,
-    /// Those kept because the point found is further away than the tolerance.
-    pub far: usize,
-    /// The sum of all moves, in millimetres.
-    pub sum_mm: f64,
-    /// The longest move, in millimetres.
-    pub most_mm: f64,
+/// What polishing did to a crossing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Fate {
+    /// Nothing yet.
+    #[default]
+    OnFacet,
+    /// It lies on its surface now.
+    Moved,
+    /// Kept, because no point was found: the row only touches the surface, or passes
+    /// it by.
+    Diverged,
+    /// Kept, because the point found belongs to another facet.
+    Left,
+    /// Kept, because the point found is further away than the tolerance.
+    Far,
 }
 
 /// Newton steps; two or three are the rule.
@@ -46,60 +49,48 @@ const BEYOND: f64 = 1.0;
 /// method from the facets' parameters, and moves the crossings to x(u, v).
 ///
 /// A crossing keeps its place on the facet where that diverges, leaves the
-/// surroundings of the facet, or moves it further across the surface than
-/// `tolerance_mm`, which is the chord: facets lie no further from it. (Along a row
-/// that grazes the surface the same error is a longer way.) These are counted.
-/// Crossings are neither added nor taken away, so rows balance as before.
+/// surroundings of the facet, or moves it further across the surface than facets
+/// may lie from it. (Along a row that grazes the surface the same error is a longer
+/// way.) Its fate says so. Crossings are neither added nor taken away, so rows
+/// balance as before.
 ///
 /// # Panics
 /// Where a crossing's facet does not exist.
-pub fn polish(
-    kernel: &dyn Kernel,
-    mesh: &Tessellation,
-    tolerance_mm: f64,
-    crossings: &mut [Crossing],
-) -> Polished {
-    let face = |k: &usize| mesh.facets[crossings[*k].facet as usize].face;
+pub fn polish(placed: &Placed, crossings: &mut [Crossing]) {
+    let face = |k: &usize| placed.facet(crossings[*k].facet).face;
     let mut order: Vec<usize> = (0..crossings.len()).collect();
-    order.sort_by_key(face);
-    let batches: Vec<Vec<usize>> =
-        order.chunk_by(|a, b| face(a) == face(b)).map(<[usize]>::to_vec).collect();
-    let mut polished = Polished::default();
+    if !order.is_sorted_by_key(face) {
+        order.sort_by_key(face);
+    }
+    let batches: Vec<&[usize]> = order.chunk_by(|a, b| face(a) == face(b)).collect();
     for batch in batches {
-        let of_face = mesh.facets[crossings[batch[0]].facet as usize].face;
-        for (k, found) in solved(kernel, of_face, &batch, crossings) {
+        for (k, found) in solved(placed, batch, crossings) {
             let crossing = &mut crossings[k];
-            let Some((uv, jet)) = found else {
-                polished.diverged += 1;
-                continue;
-            };
-            let x_mm = jet.point[0];
-            let by_mm = (x_mm - crossing.x_mm).abs();
-            let across = unit(cross(jet.du, jet.dv)).map_or(1.0, |normal| normal[0].abs());
-            if !is_near(&mesh.facets[crossing.facet as usize].uv, uv) {
-                polished.left += 1;
-            } else if by_mm * across > tolerance_mm {
-                polished.far += 1;
-            } else {
-                polished.moved += 1;
-                polished.sum_mm += by_mm;
-                polished.most_mm = polished.most_mm.max(by_mm);
-                (crossing.uv, crossing.x_mm) = (uv, x_mm);
+            crossing.fate = fate(placed, crossing, found);
+            if let (Fate::Moved, Some((uv, jet))) = (crossing.fate, found) {
+                (crossing.uv, crossing.x_mm) = (uv, jet.point[0]);
             }
         }
     }
-    polished
+}
+
+fn fate(placed: &Placed, crossing: &Crossing, found: Found) -> Fate {
+    let Some((uv, jet)) = found else { return Fate::Diverged };
+    let across = unit(cross(jet.du, jet.dv)).map_or(1.0, |normal| normal[0].abs());
+    if !is_near(&placed.facet(crossing.facet).uv, uv) {
+        Fate::Left
+    } else if (jet.point[0] - crossing.x_mm).abs() * across > placed.tolerance_mm() {
+        Fate::Far
+    } else {
+        Fate::Moved
+    }
 }
 
 type Found = Option<([f64; 2], Jet)>;
 
 /// Solves the crossings of one face together; each in its own number of steps.
-fn solved(
-    kernel: &dyn Kernel,
-    face: u32,
-    batch: &[usize],
-    crossings: &[Crossing],
-) -> Vec<(usize, Found)> {
+fn solved(placed: &Placed, batch: &[usize], crossings: &[Crossing]) -> Vec<(usize, Found)> {
+    let face = placed.facet(crossings[batch[0]].facet).face;
     let mut found = Vec::with_capacity(batch.len());
     let mut open = batch.to_vec();
     let mut at: Vec<[f64; 2]> = open.iter().map(|&k| crossings[k].uv).collect();
@@ -109,7 +100,7 @@ fn solved(
             break;
         }
         jets.truncate(at.len());
-        kernel.evaluate(face, &at, &mut jets);
+        placed.evaluate(face, &at, &mut jets);
         let mut kept = 0;
         for i in 0..open.len() {
             let (k, uv) = (open[i], at[i]);
@@ -148,7 +139,7 @@ fn step(crossing: &Crossing, jet: &Jet, [u, v]: [f64; 2]) -> Step {
 }
 
 /// Whether parameters lie on a facet or near it.
-fn is_near([p, q, r]: &[[f64; 2]; 3], uv: [f64; 2]) -> bool {
+pub(crate) fn is_near([p, q, r]: &[[f64; 2]; 3], uv: [f64; 2]) -> bool {
     let double = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     };

@@ -1,0 +1,109 @@
+//! Surfaces where they stand on the machine.
+
+use std::sync::Arc;
+
+use crate::kernel::{Facet, Jet, Kernel, Tessellation};
+use crate::vector::{Vec3, cross, dot, length, sub, unit};
+
+/// A model's surfaces and facets in a place: scaled, turned and moved.
+#[derive(Clone)]
+pub struct Placed {
+    kernel: Arc<dyn Kernel>,
+    mesh: Arc<Tessellation>,
+    /// x, y and z of the place in millimetres, by x, y, z of the model and one.
+    rows: [[f64; 4]; 3],
+    tolerance_mm: f64,
+}
+
+impl std::fmt::Debug for Placed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Placed").field("rows", &self.rows).finish_non_exhaustive()
+    }
+}
+
+impl Placed {
+    /// Puts a model into a place: `rows` give x, y and z there, in millimetres, by
+    /// x, y and z of the model in millimetres and one.
+    pub fn new(kernel: Arc<dyn Kernel>, mesh: Arc<Tessellation>, rows: [[f64; 4]; 3]) -> Self {
+        let stretch = |axis: usize| length([rows[0][axis], rows[1][axis], rows[2][axis]]);
+        let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
+        Self { kernel, mesh, rows, tolerance_mm }
+    }
+
+    /// How far facets may lie from their surfaces, in millimetres.
+    pub fn tolerance_mm(&self) -> f64 {
+        self.tolerance_mm
+    }
+
+    /// The facets, in the model's place.
+    pub fn mesh(&self) -> &Tessellation {
+        &self.mesh
+    }
+
+    /// Whether a facet's surface is flat, and the facet therefore exact.
+    pub fn is_flat(&self, facet: u32) -> bool {
+        self.kernel.face(self.mesh.facets[facet as usize].face).kind == "plane"
+    }
+
+    pub(crate) fn facet(&self, number: u32) -> &Facet {
+        &self.mesh.facets[number as usize]
+    }
+
+    /// A facet's corners.
+    pub(crate) fn corners(&self, number: u32) -> [Vec3; 3] {
+        self.mesh.corners(self.facet(number)).map(|corner| self.at(corner))
+    }
+
+    /// Where a point of the model stands.
+    pub(crate) fn at(&self, point: Vec3) -> Vec3 {
+        let moved = self.turned(point);
+        [0, 1, 2].map(|k| moved[k] + self.rows[k][3])
+    }
+
+    fn turned(&self, direction: Vec3) -> Vec3 {
+        self.rows.map(|[x, y, z, _]| x * direction[0] + y * direction[1] + z * direction[2])
+    }
+
+    /// Evaluates a face's surface at many parameters at once.
+    pub(crate) fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]) {
+        self.kernel.evaluate(face, uv, jets);
+        for jet in jets {
+            *jet = Jet {
+                point: self.at(jet.point),
+                du: self.turned(jet.du),
+                dv: self.turned(jet.dv),
+            };
+        }
+    }
+
+    /// Evaluates a facet's surface once.
+    pub(crate) fn jet(&self, facet: u32, uv: [f64; 2]) -> Jet {
+        let mut jet = [Jet::default()];
+        self.evaluate(self.facet(facet).face, &[uv], &mut jet);
+        jet[0]
+    }
+
+    /// The parameters of a point on a facet, as straight between its corners';
+    /// those of the first corner if the facet has no area.
+    pub fn uv_at(&self, facet: u32, point: [f64; 3]) -> [f64; 2] {
+        let [s, t] = parts(&self.corners(facet), point).unwrap_or_default();
+        let [p, q, r] = self.facet(facet).uv;
+        [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]))
+    }
+
+    /// Out of the body across a facet, with length 1, if the facet has an area.
+    pub(crate) fn outwards(&self, facet: u32) -> Option<Vec3> {
+        let [a, b, c] = self.corners(facet);
+        unit(cross(sub(b, a), sub(c, a)))
+    }
+}
+
+/// How much of the second and the third corner a point has that lies on a triangle,
+/// or straight above it; nothing if the triangle has no area.
+pub(crate) fn parts([a, b, c]: &[Vec3; 3], point: Vec3) -> Option<[f64; 2]> {
+    let (e, f, d) = (sub(*b, *a), sub(*c, *a), sub(point, *a));
+    let (ee, ef, ff) = (dot(e, e), dot(e, f), dot(f, f));
+    let (de, df) = (dot(d, e), dot(d, f));
+    let det = ee * ff - ef * ef;
+    (det > 0.0).then(|| [(ff * de - ef * df) / det, (ee * df - ef * de) / det])
+}
