@@ -38,6 +38,7 @@
 //! ```
 
 mod error;
+mod extent;
 mod gate;
 mod geometry;
 mod kernel;
@@ -46,6 +47,7 @@ mod placed;
 mod polish;
 mod step;
 mod tessellate;
+mod turn;
 mod vector;
 
 pub use error::BrepError;
@@ -54,3 +56,4 @@ pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellatio
 pub use placed::Placed;
 pub use polish::{Crossing, Fate, polish};
 pub use step::{StepError, StepModel};
+pub use turn::{Turn, Turns};

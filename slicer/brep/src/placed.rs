@@ -68,11 +68,8 @@ impl Placed {
     pub(crate) fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]) {
         self.kernel.evaluate(face, uv, jets);
         for jet in jets {
-            *jet = Jet {
-                point: self.at(jet.point),
-                du: self.turned(jet.du),
-                dv: self.turned(jet.dv),
-            };
+            *jet =
+                Jet { point: self.at(jet.point), du: self.turned(jet.du), dv: self.turned(jet.dv) };
         }
     }
 

@@ -89,7 +89,11 @@ fn fate(placed: &Placed, crossing: &Crossing, found: Found) -> Fate {
 type Found = Option<([f64; 2], Jet)>;
 
 /// Solves the crossings of one face together; each in its own number of steps.
-fn solved(placed: &Placed, batch: &[usize], crossings: &[Crossing]) -> Vec<(usize, Found)> {
+pub(crate) fn solved(
+    placed: &Placed,
+    batch: &[usize],
+    crossings: &[Crossing],
+) -> Vec<(usize, Found)> {
     let face = placed.facet(crossings[batch[0]].facet).face;
     let mut found = Vec::with_capacity(batch.len());
     let mut open = batch.to_vec();
@@ -139,7 +143,7 @@ fn step(crossing: &Crossing, jet: &Jet, [u, v]: [f64; 2]) -> Step {
 }
 
 /// Whether parameters lie on a facet or near it.
-pub(crate) fn is_near([p, q, r]: &[[f64; 2]; 3], uv: [f64; 2]) -> bool {
+fn is_near([p, q, r]: &[[f64; 2]; 3], uv: [f64; 2]) -> bool {
     let double = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     };

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use lamp_brep::{
-    BodyReport, Crossing, Fate, Kernel, Placed, StepModel, Tessellation, check, polish,
+    BodyReport, Crossing, Fate, Kernel, Placed, StepModel, Tessellation, Turns, check, polish,
 };
 use lamp_fixtures::{StepPart, StepUnit, step};
 
@@ -158,4 +158,69 @@ fn crossings_of_a_torus_are_exact_to_a_nanometre() {
     let (before, after, kept) = errors(StepPart::Torus, &heights, x_mm);
     println!("torus: {before} mm before, {after} after, {kept} kept");
     assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
+}
+
+fn placed(part: StepPart, chord_mm: f64, rows: [[f64; 4]; 3]) -> Placed {
+    let (model, mesh) = read(part, StepUnit::Millimetre, chord_mm);
+    Placed::new(Arc::new(model), Arc::new(mesh), rows)
+}
+
+/// Turned about all axes, so that nothing lies along the rows.
+const ASKEW: [[f64; 4]; 3] =
+    [[0.36, 0.48, -0.8, 3.0], [-0.8, 0.6, 0.0, -1.0], [0.48, 0.64, 0.6, 2.0]];
+
+const AS_IT_IS: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+
+fn at(rows: &[[f64; 4]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    rows.map(|row| row[0] * x + row[1] * y + row[2] * z + row[3])
+}
+
+#[test]
+fn a_sphere_reaches_exactly_as_high_as_it_does() {
+    for rows in [AS_IT_IS, ASKEW] {
+        let placed = placed(StepPart::Sphere, 0.02, rows);
+        let centre = at(&rows, [0.0, 0.0, 15.0]);
+        let [low, high] = placed.z_range_mm().unwrap();
+        assert!((low - centre[2] + 15.0).abs() < NM && (high - centre[2] - 15.0).abs() < NM);
+    }
+    let [low, high] = placed(StepPart::Torus, 0.02, AS_IT_IS).z_range_mm().unwrap();
+    assert!(low.abs() < NM && (high - 16.0).abs() < NM, "{low} {high}");
+    // Upright: a saddle above the hole, the ends on the outer equator.
+    let upright = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
+    let [low, high] = placed(StepPart::Torus, 0.02, upright).z_range_mm().unwrap();
+    assert!((low + 28.0).abs() < NM && (high - 28.0).abs() < NM, "{low} {high}");
+}
+
+#[test]
+fn contours_of_a_sphere_turn_at_its_highest_and_lowest_rows() {
+    for rows in [AS_IT_IS, ASKEW] {
+        let placed = placed(StepPart::Sphere, 0.02, rows);
+        let centre = at(&rows, [0.0, 0.0, 15.0]);
+        let turns = Turns::find(&placed);
+        // The last one is higher than any facet.
+        for z in [-14.999, -14.9, -3.3, 0.0, 7.7, 14.99, 14.9995] {
+            let radius = (225.0 - z * z as f64).sqrt();
+            let found = turns.at(&placed, centre[2] + z);
+            let places: Vec<_> = found.iter().map(|turn| (turn.at_mm, turn.leaves)).collect();
+            let &[(low, up), (high, down)] = &places[..] else { panic!("z {z}: {places:?}") };
+            assert!((low[1] - centre[1] + radius).abs() < NM && up == 1.0);
+            assert!((high[1] - centre[1] - radius).abs() < NM && down == -1.0);
+            assert!((low[0] - centre[0]).abs() < NM && (high[0] - centre[0]).abs() < NM);
+            for by in [1e-6, 1e-4, 0.001] {
+                let y = radius - by;
+                if by > found[1].reach_mm {
+                    continue;
+                }
+                let pair = turns
+                    .pair(&placed, &found[1], centre[1] + y)
+                    .unwrap_or_else(|| panic!("z {z} by {by}: not crossed"));
+                let half = (radius * radius - y * y).max(0.0).sqrt();
+                for (crossing, x) in pair.iter().zip([-half, half]) {
+                    assert!((crossing.x_mm - centre[0] - x).abs() < NM, "z {z} by {by}");
+                    assert_eq!(crossing.enters(&placed), Some(x < 0.0));
+                }
+            }
+            assert!(turns.pair(&placed, &found[1], centre[1] + radius + 1e-4).is_none());
+        }
+    }
 }

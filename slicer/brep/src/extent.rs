@@ -1,0 +1,74 @@
+//! How high and how low surfaces reach.
+
+use crate::kernel::Jet;
+use crate::placed::Placed;
+use crate::turn::is_below;
+
+/// Facets that are looked at for each end; around a level ring all are as high.
+const MOST_FACETS: usize = 64;
+const MOST_STEPS: usize = 30;
+
+impl Placed {
+    /// The lowest and the highest z of the surfaces, in millimetres: that of the
+    /// facets where they end at a corner or an edge, and further by as much as
+    /// facets cut off where they are round. Nothing if there are no facets.
+    pub fn z_range_mm(&self) -> Option<[f64; 2]> {
+        let [low, high] = [-1.0, 1.0].map(|up| Some(up * self.end_mm(up)?));
+        Some([low?, high?])
+    }
+
+    /// How far the surfaces reach upwards, or with `up` -1 downwards.
+    fn end_mm(&self, up: f64) -> Option<f64> {
+        let top = |facet: u32| {
+            self.corners(facet).map(|corner| up * corner[2]).into_iter().fold(f64::MIN, f64::max)
+        };
+        let tops: Vec<f64> = (0..self.mesh().facets.len() as u32).map(top).collect();
+        let of_facets = tops.iter().copied().reduce(f64::max)?;
+        let mut near: Vec<u32> = (0u32..)
+            .zip(&tops)
+            .filter(|(_, top)| **top >= of_facets - self.tolerance_mm())
+            .map(|(facet, _)| facet)
+            .filter(|&facet| !self.is_flat(facet))
+            .collect();
+        near.sort_by(|&a, &b| tops[b as usize].total_cmp(&tops[a as usize]));
+        near.truncate(MOST_FACETS);
+        let ends = near.into_iter().filter_map(|facet| self.end_on(facet, up));
+        let most = of_facets + 2.0 * self.tolerance_mm();
+        Some(ends.filter(|end| *end <= most).fold(of_facets, f64::max))
+    }
+
+    /// Where a facet's surface is level, by Newton's method with differences.
+    fn end_on(&self, facet: u32, up: f64) -> Option<f64> {
+        let uv = self.facet(facet).uv;
+        let size = [0, 1].map(|k| {
+            let of = uv.map(|uv| uv[k]);
+            of.into_iter().fold(f64::MIN, f64::max) - of.into_iter().fold(f64::MAX, f64::min)
+        });
+        let mut at = [0, 1].map(|k| uv.iter().map(|uv| uv[k]).sum::<f64>() / 3.0);
+        for _ in 0..MOST_STEPS {
+            let by = size.map(|size| 1e-5 * size);
+            let places = [at, [at[0] + by[0], at[1]], [at[0], at[1] + by[1]]];
+            let mut jets = [Jet::default(); 3];
+            self.evaluate(self.facet(facet).face, &places, &mut jets);
+            // How z rises over a facet's width, either way.
+            let rise = |jet: &Jet| [up * jet.du[2] * size[0], up * jet.dv[2] * size[1]];
+            let [g, gu, gv] = [rise(&jets[0]), rise(&jets[1]), rise(&jets[2])];
+            if g.iter().all(|g| g.abs() < 1e-11) {
+                let point = jets[0].point;
+                return is_below(self, facet, point).then_some(up * point[2]);
+            }
+            let [a, b, d] = [gu[0] - g[0], (gu[1] - g[1] + gv[0] - g[0]) / 2.0, gv[1] - g[1]]
+                .map(|bend| bend / 1e-5);
+            // Along a level ring there is no bend: a little keeps it in place.
+            let least = 1e-9 * (a.abs() + d.abs());
+            let (a, d) = (a - least, d - least);
+            let det = a * d - b * b;
+            let step = [(b * g[1] - d * g[0]) / det, (b * g[0] - a * g[1]) / det];
+            if !step.iter().all(|step| step.abs() < 4.0) {
+                return None;
+            }
+            at = [0, 1].map(|k| at[k] + step[k] * size[k]);
+        }
+        None
+    }
+}

@@ -1,0 +1,305 @@
+//! Where the contours of a section turn back along y, on the exact surfaces.
+//!
+//! Facets cut corners. Where a contour turns, some rows pass between the corner
+//! that the facets make and the one that the surface makes: facets cross them
+//! twice too often or not at all. Two crossings more or less leave a row in
+//! balance.
+
+use std::collections::{HashMap, HashSet};
+
+use rayon::prelude::*;
+
+use crate::kernel::Jet;
+use crate::placed::{Placed, parts};
+use crate::polish::{Crossing, Fate, solved};
+use crate::vector::{Vec3, add, cross, distance, dot, scale, sub, unit};
+
+/// A point where a contour has a tangent along the rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turn {
+    /// The point, in millimetres.
+    pub at_mm: [f64; 3],
+    /// Which way the contour leaves it, along y: 1 upwards, -1 downwards.
+    pub leaves: f64,
+    /// How far along y facets may be from the contour here, in millimetres.
+    pub reach_mm: f64,
+    facet: u32,
+    uv: [f64; 2],
+    /// The contour is y = y* + bend/2 (x - x*)^2 here.
+    bend_per_mm: f64,
+    /// How the parameters change with x along the contour.
+    along: [f64; 2],
+}
+
+/// A facet on whose surface contours may turn.
+#[derive(Debug)]
+struct Candidate {
+    facet: u32,
+    /// Along x, out of the body, at the corners.
+    outwards_x: [f64; 3],
+    low_mm: f64,
+    high_mm: f64,
+}
+
+/// The facets on whose surfaces contours turn.
+#[derive(Debug, Default)]
+pub struct Turns {
+    candidates: Vec<Candidate>,
+    /// The facets around the points of these.
+    around: HashMap<u32, Vec<u32>>,
+}
+
+/// As good as no angle.
+const LEVEL: f64 = 1e-9;
+/// What faces up or down more than this has contours of less than a pixel here.
+const STEEP: f64 = 1e-4;
+/// Facets are evaluated so many at a time.
+const BATCH: usize = 4096;
+/// How far off its facet a point may be sideways, in facets.
+const BESIDE: f64 = 0.01;
+/// Nearer to each other, turns are the same, in millimetres.
+const SAME_MM: f64 = 1e-6;
+const MOST_STEPS: usize = 20;
+
+impl Turns {
+    /// Looks at every facet once.
+    pub fn find(placed: &Placed) -> Self {
+        let count = placed.mesh().facets.len();
+        let batches: Vec<usize> = (0..count).step_by(BATCH).collect();
+        let found = batches.into_par_iter().flat_map_iter(|start| {
+            candidates(placed, start as u32..count.min(start + BATCH) as u32)
+        });
+        let candidates: Vec<Candidate> = found.collect();
+        let corners = |candidate: &Candidate| placed.facet(candidate.facet).corners;
+        let points: HashSet<u32> = candidates.iter().flat_map(corners).collect();
+        let mut around: HashMap<u32, Vec<u32>> = HashMap::with_capacity(points.len());
+        for (number, facet) in (0..).zip(&placed.mesh().facets) {
+            for corner in facet.corners.iter().filter(|corner| points.contains(corner)) {
+                around.entry(*corner).or_default().push(number);
+            }
+        }
+        Self { candidates, around }
+    }
+
+    /// The turns of a section.
+    pub fn at(&self, placed: &Placed, z_mm: f64) -> Vec<Turn> {
+        let near = |candidate: &&Candidate| (candidate.low_mm..=candidate.high_mm).contains(&z_mm);
+        let mut turns: Vec<Turn> = Vec::new();
+        for candidate in self.candidates.iter().filter(near) {
+            for seed in seeds(placed, candidate, z_mm) {
+                turns.extend(turn(placed, candidate.facet, seed, z_mm));
+            }
+        }
+        let key = |turn: &Turn| (turn.at_mm[1], turn.at_mm[0]);
+        turns.sort_by(|a, b| key(a).partial_cmp(&key(b)).expect("turns are finite"));
+        let mut kept: Vec<Turn> = Vec::with_capacity(turns.len());
+        for turn in turns {
+            let is_near = |other: &&Turn| turn.at_mm[1] - other.at_mm[1] < SAME_MM;
+            let mut near = kept.iter().rev().take_while(is_near);
+            if !near.any(|other| turn.is_same(other, placed)) {
+                kept.push(turn);
+            }
+        }
+        kept
+    }
+
+    /// Where a row crosses the contour on both sides of a turn, from the left;
+    /// nothing where it does not, or not nearby.
+    pub fn pair(&self, placed: &Placed, turn: &Turn, y_mm: f64) -> Option<[Crossing; 2]> {
+        let [x, y, z_mm] = turn.at_mm;
+        let square = 2.0 * (y_mm - y) / turn.bend_per_mm;
+        if square < 0.0 {
+            return None;
+        }
+        let half = square.sqrt();
+        let mut pair = [-half, half].map(|by| {
+            let uv = [0, 1].map(|k| turn.uv[k] + by * turn.along[k]);
+            Crossing { facet: turn.facet, uv, x_mm: x + by, y_mm, z_mm, fate: Fate::OnFacet }
+        });
+        for crossing in &mut pair {
+            self.settle(placed, crossing)?;
+        }
+        (pair[0].x_mm <= x && x <= pair[1].x_mm).then_some(pair)
+    }
+
+    /// Finds where a crossing really is, and on which facet's surface.
+    fn settle(&self, placed: &Placed, crossing: &mut Crossing) -> Option<()> {
+        // A contour that goes on into another face is there once more.
+        for _ in 0..3 {
+            let (uv, jet) = solved(placed, &[0], &[*crossing])[0].1?;
+            let facet = self.facet_below(placed, crossing.facet, jet.point)?;
+            if placed.facet(facet).face == placed.facet(crossing.facet).face {
+                (crossing.x_mm, crossing.fate) = (jet.point[0], Fate::Moved);
+                (crossing.facet, crossing.uv) = (facet, uv);
+                return Some(());
+            }
+            (crossing.facet, crossing.uv) = (facet, placed.uv_at(facet, jet.point));
+        }
+        None
+    }
+
+    /// The facet below a point of a surface, among those around another.
+    fn facet_below(&self, placed: &Placed, facet: u32, point: Vec3) -> Option<u32> {
+        let corners = placed.facet(facet).corners;
+        let others = corners.iter().filter_map(|corner| self.around.get(corner)).flatten();
+        [facet].iter().chain(others).copied().find(|&facet| is_below(placed, facet, point))
+    }
+}
+
+impl Turn {
+    /// Whether it is the same as another that was found from another facet.
+    fn is_same(&self, other: &Self, placed: &Placed) -> bool {
+        let faces = [self, other].map(|turn| placed.outwards(turn.facet).map(|n| n[1] > 0.0));
+        (self.at_mm[0] - other.at_mm[0]).abs() < SAME_MM && faces[0] == faces[1]
+    }
+}
+
+impl Crossing {
+    /// Whether a contour enters the part here along x; where facets are turned over,
+    /// whether it leaves it.
+    pub fn enters(&self, placed: &Placed) -> Option<bool> {
+        let jet = placed.jet(self.facet, self.uv);
+        Some(outwards(placed, self.facet, &jet)?[0] < 0.0)
+    }
+}
+
+/// A surface's normal as the facet has it.
+fn outwards(placed: &Placed, facet: u32, jet: &Jet) -> Option<Vec3> {
+    let (across, flat) = (unit(cross(jet.du, jet.dv))?, placed.outwards(facet)?);
+    Some(scale(across, dot(across, flat).signum()))
+}
+
+fn candidates(placed: &Placed, facets: std::ops::Range<u32>) -> Vec<Candidate> {
+    let mut found = Vec::new();
+    let mut jets = Vec::new();
+    let facets: Vec<u32> = facets.collect();
+    for of_face in facets.chunk_by(|&a, &b| placed.facet(a).face == placed.facet(b).face) {
+        if placed.is_flat(of_face[0]) {
+            continue;
+        }
+        let uv: Vec<[f64; 2]> = of_face.iter().flat_map(|&facet| placed.facet(facet).uv).collect();
+        jets.resize(uv.len(), Jet::default());
+        placed.evaluate(placed.facet(of_face[0]).face, &uv, &mut jets);
+        found.extend(of_face.iter().zip(jets.chunks(3)).filter_map(|(&facet, jets)| {
+            let flat = placed.outwards(facet)?;
+            // At a pole the surface has none.
+            let outwards_x = [0, 1, 2]
+                .map(|k| outwards(placed, facet, &jets[k]).map_or(flat[0], |normal| normal[0]));
+            let (low, high) = range(outwards_x);
+            // The surface may turn within the facet more than its corners show.
+            let more = 0.5 * (high - low) + LEVEL;
+            let turns = high - low > LEVEL && low - more < 0.0 && high + more > 0.0;
+            let (low, high) = range(placed.corners(facet).map(|corner| corner[2]));
+            let off = placed.tolerance_mm();
+            let candidate = Candidate { facet, outwards_x, low_mm: low - off, high_mm: high + off };
+            turns.then_some(candidate)
+        }));
+    }
+    found
+}
+
+fn range(values: [f64; 3]) -> (f64, f64) {
+    let [a, b, c] = values;
+    (a.min(b).min(c), a.max(b).max(c))
+}
+
+/// Where to look from for a facet's turn: on the facet, where its contour would
+/// turn; and from its corners, where the facet does not reach the plane.
+fn seeds(placed: &Placed, candidate: &Candidate, z_mm: f64) -> Vec<[f64; 2]> {
+    let uv = placed.facet(candidate.facet).uv;
+    let corners = placed.corners(candidate.facet);
+    let mut ends: Vec<([f64; 2], f64)> = Vec::with_capacity(2);
+    for k in 0..3 {
+        let (i, j) = (k, (k + 1) % 3);
+        if (corners[i][2] < z_mm) != (corners[j][2] < z_mm) {
+            let t = (z_mm - corners[i][2]) / (corners[j][2] - corners[i][2]);
+            let x = candidate.outwards_x;
+            ends.push((mixed(uv[i], uv[j], t), x[i] + t * (x[j] - x[i])));
+        }
+    }
+    match ends[..] {
+        [(p, a), (q, b)] if a != b => vec![mixed(p, q, (a / (a - b)).clamp(0.0, 1.0))],
+        _ => uv.to_vec(),
+    }
+}
+
+fn mixed(a: [f64; 2], b: [f64; 2], t: f64) -> [f64; 2] {
+    [0, 1].map(|k| a[k] + t * (b[k] - a[k]))
+}
+
+/// Solves z(u, v) = plane, outwards x (u, v) = 0 from a facet's surroundings by
+/// Newton's method; the normal's derivatives are differences.
+fn turn(placed: &Placed, facet: u32, seed: [f64; 2], z_mm: f64) -> Option<Turn> {
+    let uv = placed.facet(facet).uv;
+    let size = [0, 1].map(|k| {
+        let (low, high) = range([uv[0][k], uv[1][k], uv[2][k]]);
+        high - low
+    });
+    let by = size.map(|size| 1e-5 * size);
+    let face = placed.facet(facet).face;
+    let mut at = seed;
+    for _ in 0..MOST_STEPS {
+        let mut jets = [Jet::default(); 3];
+        let places = [at, [at[0] + by[0], at[1]], [at[0], at[1] + by[1]]];
+        placed.evaluate(face, &places, &mut jets);
+        let normals = [0, 1, 2].map(|k| outwards(placed, facet, &jets[k]));
+        let [Some(n), Some(nu), Some(nv)] = normals else { return None };
+        let turned = [scale(sub(nu, n), 1.0 / by[0]), scale(sub(nv, n), 1.0 / by[1])];
+        let jet = jets[0];
+        let (e, f) = (z_mm - jet.point[2], -n[0]);
+        if e.abs() < 1e-10 && f.abs() < 1e-10 {
+            return found(placed, facet, at, &jet, n, turned);
+        }
+        let ([zu, zv], [xu, xv]) = ([jet.du[2], jet.dv[2]], [turned[0][0], turned[1][0]]);
+        let det = zu * xv - zv * xu;
+        let step = [(e * xv - f * zv) / det, (f * zu - e * xu) / det];
+        // A step beyond the next facets leads anywhere.
+        let most = step[0].abs() / size[0] / 2.0;
+        let most = most.max(step[1].abs() / size[1] / 2.0).max(1.0);
+        at = [0, 1].map(|k| at[k] + step[k] / most);
+        if !at.iter().all(|t| t.is_finite()) {
+            return None;
+        }
+    }
+    None
+}
+
+/// The turn at a point where the contour goes along x, if it is one, and on its facet.
+fn found(
+    placed: &Placed,
+    facet: u32,
+    uv: [f64; 2],
+    jet: &Jet,
+    normal: Vec3,
+    turned: [Vec3; 2],
+) -> Option<Turn> {
+    // Along the contour, z stays: (u, v) goes by (zv, -zu).
+    let (zu, zv) = (jet.du[2], jet.dv[2]);
+    let x_speed = jet.du[0] * zv - jet.dv[0] * zu;
+    let along = [zv / x_speed, -zu / x_speed];
+    // dy/dx is -n_x / n_y.
+    let bend_per_mm = -(turned[0][0] * along[0] + turned[1][0] * along[1]) / normal[1];
+    let steep = normal[1].abs();
+    let is_turn = steep > STEEP && bend_per_mm.is_finite() && bend_per_mm != 0.0;
+    (is_turn && is_below(placed, facet, jet.point)).then_some(Turn {
+        at_mm: jet.point,
+        leaves: bend_per_mm.signum(),
+        reach_mm: 2.0 * placed.tolerance_mm() / steep,
+        facet,
+        uv,
+        bend_per_mm,
+        along,
+    })
+}
+
+/// Whether a point lies over a facet, as near as the facet is to its surface.
+pub(crate) fn is_below(placed: &Placed, facet: u32, point: Vec3) -> bool {
+    let corners = placed.corners(facet);
+    let Some([s, t]) = parts(&corners, point) else { return false };
+    let [a, b, c] = corners;
+    let foot = add(a, add(scale(sub(b, a), s), scale(sub(c, a), t)));
+    s > -BESIDE
+        && t > -BESIDE
+        && s + t < 1.0 + BESIDE
+        && distance(foot, point) < 2.0 * placed.tolerance_mm()
+}
