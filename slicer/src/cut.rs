@@ -34,6 +34,18 @@ impl Crossing {
         Self(u64::from(row) << 32 | u64::from(column) << 1 | u64::from(rising))
     }
 
+    /// That of a row at a column in pixels. The last column is black: rounding takes
+    /// no crossing past it.
+    #[inline]
+    pub(crate) fn at(grid: &PixelGrid, row: u32, column: f64, rising: bool) -> Self {
+        Self::new(row, ceil_clamped(column, grid.width - 1), rising)
+    }
+
+    /// The other way round.
+    pub(crate) fn reversed(self) -> Self {
+        Self(self.0 ^ 1)
+    }
+
     #[inline]
     pub(crate) fn row(self) -> usize {
         (self.0 >> 32) as usize
@@ -75,6 +87,8 @@ pub(crate) struct Cutter<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct Share {
     pub(crate) crossings: Vec<Crossing>,
+    /// Those of B-rep facets for which no point of the surface was found.
+    pub(crate) kept: Vec<Crossing>,
     pub(crate) ends: EndSum,
     /// What lies below the section, for gray layers.
     pub(crate) spans: Vec<Span>,
@@ -84,6 +98,7 @@ impl Share {
     /// Empties it; the lists keep their memory.
     pub(crate) fn clear(&mut self) {
         self.crossings.clear();
+        self.kept.clear();
         self.spans.clear();
         self.ends = EndSum::default();
     }
@@ -230,10 +245,8 @@ impl Cutter<'_> {
         list: &mut Vec<Crossing>,
     ) -> usize {
         let before = list.len();
-        // The last column is black: rounding takes no crossing past it.
-        let last = self.grid.width - 1;
         self.for_each_crossing(a, b, turned, |row, column, rising| {
-            list.push(Crossing::new(row, ceil_clamped(column, last), rising));
+            list.push(Crossing::at(self.grid, row, column, rising));
         });
         list.len() - before
     }

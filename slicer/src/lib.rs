@@ -37,6 +37,7 @@ mod buckets;
 mod cut;
 mod ends;
 mod error;
+mod exact;
 mod facet;
 mod gray;
 mod grid;
@@ -51,6 +52,7 @@ mod trace;
 
 pub use body::Body;
 pub use error::SliceError;
+pub use exact::Polished;
 pub use facet::{Facet, Units};
 pub use gray::{DepthLevels, LayerLevels};
 pub use grid::PixelGrid;

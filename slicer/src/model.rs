@@ -1,5 +1,6 @@
 //! A part as a source of facets.
 
+use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Range;
@@ -7,6 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use blake3::Hasher;
+use lamp_brep::{Kernel, Tessellation};
 use memmap2::{Mmap, MmapOptions};
 
 use crate::ascii;
@@ -35,6 +37,27 @@ pub struct Model {
 enum FileFacets {
     Binary { file: Arc<File>, count: usize },
     Memory(Arc<Vec<Facet>>),
+    Surfaces(Surfaces),
+}
+
+/// A B-rep model: its exact surfaces, and the facets made of them.
+#[derive(Clone)]
+pub(crate) struct Surfaces {
+    pub(crate) kernel: Arc<dyn Kernel>,
+    pub(crate) mesh: Arc<Tessellation>,
+}
+
+impl fmt::Debug for Surfaces {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Surfaces").finish_non_exhaustive()
+    }
+}
+
+impl Surfaces {
+    /// A facet, as STL has it.
+    fn facet(&self, facet: &lamp_brep::Facet) -> Facet {
+        self.mesh.corners(facet).map(|corner| corner.map(|c| c as f32))
+    }
 }
 
 impl FileFacets {
@@ -42,6 +65,7 @@ impl FileFacets {
         match self {
             Self::Binary { count, .. } => *count,
             Self::Memory(facets) => facets.len(),
+            Self::Surfaces(surfaces) => surfaces.mesh.facets.len(),
         }
     }
 
@@ -83,6 +107,26 @@ impl Model {
         }
         let files = vec![FileFacets::Memory(Arc::new(facets))];
         Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
+    }
+
+    /// A part of exact surfaces, in millimetres, by the facets made of them. `digest`
+    /// is that of its file.
+    pub fn from_surfaces(
+        name: &str,
+        digest: String,
+        kernel: Arc<dyn Kernel>,
+        mesh: Arc<Tessellation>,
+    ) -> Self {
+        let files = vec![FileFacets::Surfaces(Surfaces { kernel, mesh })];
+        Self { name: name.to_owned(), files, digest }
+    }
+
+    /// The surfaces of each file that has some.
+    pub(crate) fn surfaces(&self) -> impl Iterator<Item = Option<&Surfaces>> {
+        self.files.iter().map(|file| match file {
+            FileFacets::Surfaces(surfaces) => Some(surfaces),
+            _ => None,
+        })
     }
 
     /// One part of several that stand in the same coordinates. Its name joins
@@ -166,6 +210,7 @@ impl Model {
     pub(crate) fn facet(&self, file: usize, facet: usize) -> io::Result<Facet> {
         match &self.files[file] {
             FileFacets::Memory(facets) => Ok(facets[facet]),
+            FileFacets::Surfaces(surfaces) => Ok(surfaces.facet(&surfaces.mesh.facets[facet])),
             FileFacets::Binary { file, .. } => {
                 let offset = HEADER_BYTES + (facet * FACET_BYTES) as u64;
                 let bytes = map(file, offset, FACET_BYTES)?;
@@ -183,6 +228,10 @@ impl Model {
         let (file, Range { start, end }) = self.place_of(block);
         match &self.files[file] {
             FileFacets::Memory(facets) => facets[start..end].iter().for_each(each),
+            FileFacets::Surfaces(surfaces) => {
+                let facets = &surfaces.mesh.facets[start..end];
+                facets.iter().for_each(|facet| each(&surfaces.facet(facet)));
+            }
             FileFacets::Binary { file, .. } => {
                 let offset = HEADER_BYTES + (start * FACET_BYTES) as u64;
                 let bytes = map(file, offset, (end - start) * FACET_BYTES)?;

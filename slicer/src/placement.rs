@@ -6,8 +6,9 @@
 
 use std::io;
 
+use crate::exact::Exact;
 use crate::facet::{Facet, Units};
-use crate::model::Model;
+use crate::model::{Model, Surfaces};
 
 /// An axis of part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,6 +113,8 @@ pub(crate) fn heights(facet: &PlacedFacet) -> (f64, f64) {
 pub(crate) struct PlacedModel {
     pub(crate) model: Model,
     way: Way,
+    /// Of each file that has surfaces: these in their place.
+    exact: Vec<Option<Exact>>,
 }
 
 /// The way from file units to the place.
@@ -124,6 +127,14 @@ enum Way {
 
 impl PlacedModel {
     pub(crate) fn new(model: Model, placement: &Placement, units: Units) -> Self {
+        let exact = |surfaces: Option<&Surfaces>| {
+            let rows = placement.rows.map(|[x, y, z, shift]| {
+                let unit = units.mm();
+                [x * unit, y * unit, z * unit, shift]
+            });
+            surfaces.map(|surfaces| Exact::new(surfaces, rows))
+        };
+        let exact = model.surfaces().map(exact).collect();
         let mut rows = placement.rows;
         // Straight to micrometres: z in file units times them is exact.
         for (row, (unit, per_mm)) in
@@ -134,7 +145,25 @@ impl PlacedModel {
         }
         let scale = std::array::from_fn(|axis| rows[axis][axis]);
         let is_scale = (0..12).all(|k| k % 4 == k / 4 || rows[k / 4][k % 4] == 0.0);
-        Self { model, way: if is_scale { Way::Scale(scale) } else { Way::Affine(rows) } }
+        Self { model, way: if is_scale { Way::Scale(scale) } else { Way::Affine(rows) }, exact }
+    }
+
+    /// Without its surfaces: by facets alone.
+    pub(crate) fn on_facets(mut self) -> Self {
+        self.exact.fill_with(|| None);
+        self
+    }
+
+    /// The surfaces that there are.
+    pub(crate) fn exact(&self) -> impl Iterator<Item = &Exact> {
+        self.exact.iter().flatten()
+    }
+
+    /// The surfaces below a block's facets, if it has some, and its first facet's
+    /// number among theirs.
+    pub(crate) fn exact_of_block(&self, block: usize) -> Option<(&Exact, u32)> {
+        let (file, facets) = self.model.place_of(block);
+        Some((self.exact[file].as_ref()?, facets.start as u32))
     }
 
     /// Gives every facet of a block.

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::buckets::Buckets;
 use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
+use crate::exact::{Exact, Polished};
 use crate::facet::Units;
 use crate::gray::{LayerLevels, Span};
 use crate::grid::PixelGrid;
@@ -42,6 +43,8 @@ pub struct SliceOptions {
     /// gray where the part is less deep. They begin at their tops, so the plane
     /// must be [`PlaneRule::Top`].
     pub gray: Option<LayerLevels>,
+    /// Whether crossings of B-rep parts are moved from facets onto the exact surfaces.
+    pub polish: bool,
     /// The layers wanted, all where `None`.
     pub layers: Option<Range<u32>>,
     /// The frame of the images.
@@ -97,6 +100,7 @@ impl Default for SliceOptions {
             placement: Placement::default(),
             fill: Fill::default(),
             gray: None,
+            polish: true,
             layers: None,
             frame: Frame::Around { margin: 1 },
             memory: 64 << 20,
@@ -145,6 +149,7 @@ impl Slices {
         let model = PlacedModel::new(model, &options.placement, options.units);
         let survey = Survey::of(&model)?;
         survey.check_distance()?;
+        let model = if options.polish { model } else { model.on_facets() };
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.frame.grid(min_mm, max_mm, options.dpi)?;
         let (bottom_um, top_um) = (survey.min[2], survey.max[2]);
@@ -166,8 +171,9 @@ impl Slices {
         let heights: Vec<_> =
             slabs.iter().map(|slab| heights_of(slab, &planes, reach_um)).collect();
         // Where no temporary file can be written, slabs read all they meet.
-        let buckets = survey
-            .wants_sorting(&heights)
+        // Buckets do not say which facet is whose, and B-rep facets are in memory.
+        let wants_sorting = model.exact().next().is_none() && survey.wants_sorting(&heights);
+        let buckets = wants_sorting
             .then(|| Buckets::sort(&model, &planes, reach_um, &slabs, options.memory as usize).ok())
             .flatten();
         Ok(Self {
@@ -196,6 +202,11 @@ impl Slices {
     /// How many layers there will be.
     pub fn layer_count(&self) -> usize {
         self.wanted.len()
+    }
+
+    /// What was done to the crossings of B-rep parts so far, if there are such.
+    pub fn polished(&self) -> Option<Polished> {
+        self.model.exact().map(Exact::polished).reduce(Polished::joined)
     }
 
     /// Fills the table with the next slab, as the iterator does when it needs
@@ -262,9 +273,10 @@ impl Slices {
         let batch = self.pending.start..end;
         self.pending.start = end;
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
+        let surfaces: Vec<_> = self.model.exact().collect();
         let layer = |layer| {
             let Section { image, stray_rows, closed } =
-                self.table.layer(layer, cutter, self.gray.as_ref());
+                self.table.layer(layer, cutter, &surfaces, self.gray.as_ref());
             let open_rows = self.open_rows.get(&layer).cloned().unwrap_or_default();
             let closed = Some(closed);
             Layer {
@@ -368,6 +380,10 @@ impl Facets for Blocks<'_> {
 
     fn for_each_in(&self, piece: usize, each: impl FnMut(&PlacedFacet)) -> io::Result<()> {
         self.model.for_each_in_block(self.blocks[piece], each)
+    }
+
+    fn exact(&self, piece: usize) -> Option<(&Exact, u32)> {
+        self.model.exact_of_block(self.blocks[piece])
     }
 }
 

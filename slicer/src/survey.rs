@@ -104,7 +104,19 @@ impl Survey {
             good.push(block??);
         }
         let whole = good.iter().copied().reduce(Block::joined).ok_or(SliceError::NoFacets)?;
-        Ok(Self { min: whole.min, max: whole.max, blocks: good })
+        let (mut min, mut max) = (whole.min, whole.max);
+        for [low, high] in model.exact().filter_map(|exact| exact.placed.z_range_mm()) {
+            let (low, high) = (low * 1000.0, high * 1000.0);
+            // Not for rounding's sake: a flat end is where its facets are.
+            let rounding = f64::from(f32::EPSILON) * low.abs().max(high.abs());
+            if low < min[2] - rounding {
+                min[2] = low;
+            }
+            if high > max[2] + rounding {
+                max[2] = high;
+            }
+        }
+        Ok(Self { min, max, blocks: good })
     }
 
     /// Checks that the part is near enough for places to be exact to a

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place, Share};
 use crate::ends::{EndSum, RowSums};
+use crate::exact::{Batch, Exact, settle};
 use crate::gray::{LayerLevels, Shader, Span};
 use crate::placement::PlacedFacet;
 
@@ -45,6 +46,12 @@ pub(crate) trait Facets: Sync {
 
     /// Gives every facet of a piece.
     fn for_each_in(&self, piece: usize, each: impl FnMut(&PlacedFacet)) -> io::Result<()>;
+
+    /// The exact surfaces below a piece's facets, if it has some, and its first
+    /// facet's number among theirs.
+    fn exact(&self, _piece: usize) -> Option<(&Exact, u32)> {
+        None
+    }
 }
 
 /// The crossings of a slab of layers.
@@ -112,15 +119,25 @@ impl Table {
                 if piece >= facets.pieces() {
                     return Ok(());
                 }
+                let mut exact = facets
+                    .exact(piece)
+                    .map(|(exact, first)| (Batch::new(exact, cutter, layers.clone()), first..));
                 facets.for_each_in(piece, |facet| {
+                    let number = exact.as_mut().and_then(|(_, numbers)| numbers.next());
                     if !budget.is_spent() {
-                        unclaimed += cutter.cut(facet, &layers, shares);
+                        unclaimed += match (&mut exact, number) {
+                            (Some((batch, _)), Some(number)) => batch.cut(number, facet, shares),
+                            _ => cutter.cut(facet, &layers, shares),
+                        };
                         if let Some(reach_um) = reach_um {
                             unclaimed += cutter.look_down(facet, reach_um, &layers, shares);
                         }
                         budget.claim(&mut unclaimed);
                     }
                 })?;
+                if let Some((batch, _)) = &mut exact {
+                    batch.finish(shares);
+                }
             }
         })?;
         self.layers = layers;
@@ -155,11 +172,28 @@ impl Table {
         spans
     }
 
+    /// The crossings of a layer that are kept on facets or are added where contours
+    /// turn.
+    fn more(
+        &self,
+        layer: usize,
+        cutter: Cutter<'_>,
+        surfaces: &[&Exact],
+        crossings: impl Iterator<Item = Crossing>,
+    ) -> Vec<Crossing> {
+        if surfaces.is_empty() {
+            return Vec::new();
+        }
+        let kept = self.shares(layer).flat_map(|share| &share.kept).copied().collect();
+        settle(surfaces, layer, cutter, crossings, kept)
+    }
+
     /// A layer of the slab.
     pub(crate) fn layer(
         &self,
         layer: usize,
         cutter: Cutter<'_>,
+        surfaces: &[&Exact],
         gray: Option<&LayerLevels>,
     ) -> Section {
         let Cutter { grid, planes, fill } = cutter;
@@ -167,7 +201,9 @@ impl Table {
         let spans = self.spans(layer);
         let mut shader = gray
             .map(|levels| Shader::new(levels.of_layer(layer), fill, planes, layer, &spans, width));
-        let crossings = || self.shares(layer).flat_map(|share| &share.crossings).copied();
+        let of_facets = || self.shares(layer).flat_map(|share| &share.crossings).copied();
+        let more = self.more(layer, cutter, surfaces, of_facets());
+        let crossings = || of_facets().chain(more.iter().copied());
         let (starts, mut places) = sort_by_row(crossings, height);
         let mut row_offsets = Vec::with_capacity(starts.len());
         row_offsets.push(0);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::kernel::{Facet, Jet, Kernel, Tessellation};
-use crate::vector::{Vec3, cross, dot, length, sub, unit};
+use crate::vector::{Vec3, cross, dot, length, scale, sub, unit};
 
 /// A model's surfaces and facets in a place: scaled, turned and moved.
 #[derive(Clone)]
@@ -73,19 +73,15 @@ impl Placed {
         }
     }
 
-    /// Evaluates a facet's surface once.
-    pub(crate) fn jet(&self, facet: u32, uv: [f64; 2]) -> Jet {
-        let mut jet = [Jet::default()];
-        self.evaluate(self.facet(facet).face, &[uv], &mut jet);
-        jet[0]
+    /// A facet, to find the parameters of its points.
+    pub fn chart(&self, facet: u32) -> Chart {
+        Chart::new(&self.corners(facet), self.facet(facet).uv)
     }
 
-    /// The parameters of a point on a facet, as straight between its corners';
-    /// those of the first corner if the facet has no area.
-    pub fn uv_at(&self, facet: u32, point: [f64; 3]) -> [f64; 2] {
-        let [s, t] = parts(&self.corners(facet), point).unwrap_or_default();
-        let [p, q, r] = self.facet(facet).uv;
-        [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]))
+    /// The surface's normal as the facet has it, with length 1, if both have one.
+    pub(crate) fn normal(&self, facet: u32, jet: &Jet) -> Option<Vec3> {
+        let (across, flat) = (unit(cross(jet.du, jet.dv))?, self.outwards(facet)?);
+        Some(scale(across, dot(across, flat).signum()))
     }
 
     /// Out of the body across a facet, with length 1, if the facet has an area.
@@ -95,12 +91,37 @@ impl Placed {
     }
 }
 
-/// How much of the second and the third corner a point has that lies on a triangle,
-/// or straight above it; nothing if the triangle has no area.
-pub(crate) fn parts([a, b, c]: &[Vec3; 3], point: Vec3) -> Option<[f64; 2]> {
-    let (e, f, d) = (sub(*b, *a), sub(*c, *a), sub(point, *a));
-    let (ee, ef, ff) = (dot(e, e), dot(e, f), dot(f, f));
-    let (de, df) = (dot(d, e), dot(d, f));
-    let det = ee * ff - ef * ef;
-    (det > 0.0).then(|| [(ff * de - ef * df) / det, (ee * df - ef * de) / det])
+/// The way from places on a facet to parameters, as straight between its corners.
+#[derive(Clone, Copy, Debug)]
+pub struct Chart {
+    corner: Vec3,
+    /// What of a way along the facet is along its first side, and along its last.
+    shares: [Vec3; 2],
+    uv: [[f64; 2]; 3],
+}
+
+impl Chart {
+    fn new([a, b, c]: &[Vec3; 3], uv: [[f64; 2]; 3]) -> Self {
+        let (e, f) = (sub(*b, *a), sub(*c, *a));
+        let (ee, ef, ff) = (dot(e, e), dot(e, f), dot(f, f));
+        let det = ee * ff - ef * ef;
+        // A facet without area is as good as its first corner.
+        let per = if det > 0.0 { 1.0 / det } else { 0.0 };
+        let share = |a: Vec3, aa: f64, b: Vec3| scale(sub(scale(a, aa), scale(b, ef)), per);
+        Self { corner: *a, shares: [share(e, ff, f), share(f, ee, e)], uv }
+    }
+
+    /// How much of the second and of the third corner a point has that lies on the
+    /// facet, or straight above it.
+    pub(crate) fn parts(&self, point: Vec3) -> [f64; 2] {
+        let way = sub(point, self.corner);
+        self.shares.map(|share| dot(way, share))
+    }
+
+    /// The parameters of a point.
+    pub fn uv_at(&self, point: [f64; 3]) -> [f64; 2] {
+        let [s, t] = self.parts(point);
+        let [p, q, r] = self.uv;
+        [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]))
+    }
 }

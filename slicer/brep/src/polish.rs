@@ -2,7 +2,6 @@
 
 use crate::kernel::Jet;
 use crate::placed::Placed;
-use crate::vector::{cross, unit};
 
 /// Where a facet crosses a plane and a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,6 +16,8 @@ pub struct Crossing {
     pub y_mm: f64,
     /// The plane, in millimetres.
     pub z_mm: f64,
+    /// Whether the contour enters the part here, along x, as the facets go round.
+    pub enters: bool,
     /// What polishing did to it.
     pub fate: Fate,
 }
@@ -32,7 +33,8 @@ pub enum Fate {
     /// Kept, because no point was found: the row only touches the surface, or passes
     /// it by.
     Diverged,
-    /// Kept, because the point found belongs to another facet.
+    /// Kept, because the point found belongs to another facet, or to the other side of
+    /// the part.
     Left,
     /// Kept, because the point found is further away than the tolerance.
     Far,
@@ -42,6 +44,9 @@ pub enum Fate {
 const MOST_STEPS: usize = 12;
 /// How near to the row and the plane a point must come, in millimetres.
 const NEAR_MM: f64 = 1e-10;
+/// How far a crossing may move across the surface, in the distances that facets may
+/// lie from it: the normal is another where it comes from.
+const FAR: f64 = 2.0;
 /// How far beyond its facet a point may lie, in facets.
 const BEYOND: f64 = 1.0;
 
@@ -49,8 +54,8 @@ const BEYOND: f64 = 1.0;
 /// method from the facets' parameters, and moves the crossings to x(u, v).
 ///
 /// A crossing keeps its place on the facet where that diverges, leaves the
-/// surroundings of the facet, or moves it further across the surface than facets
-/// may lie from it. (Along a row that grazes the surface the same error is a longer
+/// surroundings of the facet, or moves it further across the surface than twice
+/// as far as facets may lie from it. (Along a row that grazes the surface the same error is a longer
 /// way.) Its fate says so. Crossings are neither added nor taken away, so rows
 /// balance as before.
 ///
@@ -76,10 +81,12 @@ pub fn polish(placed: &Placed, crossings: &mut [Crossing]) {
 
 fn fate(placed: &Placed, crossing: &Crossing, found: Found) -> Fate {
     let Some((uv, jet)) = found else { return Fate::Diverged };
-    let across = unit(cross(jet.du, jet.dv)).map_or(1.0, |normal| normal[0].abs());
-    if !is_near(&placed.facet(crossing.facet).uv, uv) {
+    // At a pole the surface has no normal.
+    let outwards = placed.normal(crossing.facet, &jet).map_or(0.0, |normal| normal[0]);
+    let is_other_side = outwards != 0.0 && (outwards < 0.0) != crossing.enters;
+    if is_other_side || !is_near(&placed.facet(crossing.facet).uv, uv) {
         Fate::Left
-    } else if (jet.point[0] - crossing.x_mm).abs() * across > placed.tolerance_mm() {
+    } else if (jet.point[0] - crossing.x_mm).abs() * outwards.abs() > FAR * placed.tolerance_mm() {
         Fate::Far
     } else {
         Fate::Moved

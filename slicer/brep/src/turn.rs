@@ -9,10 +9,10 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use crate::kernel::Jet;
-use crate::placed::{Placed, parts};
+use crate::kernel::{Facet, Jet};
+use crate::placed::Placed;
 use crate::polish::{Crossing, Fate, solved};
-use crate::vector::{Vec3, add, cross, distance, dot, scale, sub, unit};
+use crate::vector::{Vec3, add, distance, scale, sub};
 
 /// A point where a contour has a tangent along the rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +45,7 @@ struct Candidate {
 #[derive(Debug, Default)]
 pub struct Turns {
     candidates: Vec<Candidate>,
-    /// The facets around the points of these.
+    /// The facets around the points of these, and of their neighbours.
     around: HashMap<u32, Vec<u32>>,
 }
 
@@ -71,9 +71,14 @@ impl Turns {
         });
         let candidates: Vec<Candidate> = found.collect();
         let corners = |candidate: &Candidate| placed.facet(candidate.facet).corners;
-        let points: HashSet<u32> = candidates.iter().flat_map(corners).collect();
+        let mut points: HashSet<u32> = candidates.iter().flat_map(corners).collect();
+        // And those of the facets around them.
+        let facets = &placed.mesh().facets;
+        let touches = |facet: &&Facet| facet.corners.iter().any(|corner| points.contains(corner));
+        let more: Vec<u32> = facets.iter().filter(touches).flat_map(|facet| facet.corners).collect();
+        points.extend(more);
         let mut around: HashMap<u32, Vec<u32>> = HashMap::with_capacity(points.len());
-        for (number, facet) in (0..).zip(&placed.mesh().facets) {
+        for (number, facet) in (0..).zip(facets) {
             for corner in facet.corners.iter().filter(|corner| points.contains(corner)) {
                 around.entry(*corner).or_default().push(number);
             }
@@ -114,7 +119,8 @@ impl Turns {
         let half = square.sqrt();
         let mut pair = [-half, half].map(|by| {
             let uv = [0, 1].map(|k| turn.uv[k] + by * turn.along[k]);
-            Crossing { facet: turn.facet, uv, x_mm: x + by, y_mm, z_mm, fate: Fate::OnFacet }
+            let (facet, enters) = (turn.facet, false);
+            Crossing { facet, uv, x_mm: x + by, y_mm, z_mm, enters, fate: Fate::OnFacet }
         });
         for crossing in &mut pair {
             self.settle(placed, crossing)?;
@@ -131,42 +137,40 @@ impl Turns {
             if placed.facet(facet).face == placed.facet(crossing.facet).face {
                 (crossing.x_mm, crossing.fate) = (jet.point[0], Fate::Moved);
                 (crossing.facet, crossing.uv) = (facet, uv);
+                crossing.enters = placed.normal(facet, &jet)?[0] < 0.0;
                 return Some(());
             }
-            (crossing.facet, crossing.uv) = (facet, placed.uv_at(facet, jet.point));
+            (crossing.facet, crossing.uv) = (facet, placed.chart(facet).uv_at(jet.point));
         }
         None
     }
 
-    /// The facet below a point of a surface, among those around another.
+    /// The facet below a point of a surface, among another, those around it, and
+    /// those around these.
     fn facet_below(&self, placed: &Placed, facet: u32, point: Vec3) -> Option<u32> {
-        let corners = placed.facet(facet).corners;
-        let others = corners.iter().filter_map(|corner| self.around.get(corner)).flatten();
-        [facet].iter().chain(others).copied().find(|&facet| is_below(placed, facet, point))
+        let is_it = |facet: &u32| is_below(placed, *facet, point);
+        let further = || self.around(placed, facet).flat_map(|facet| self.around(placed, facet));
+        let near = [facet].into_iter().chain(self.around(placed, facet));
+        near.chain(further()).find(is_it)
+    }
+
+    fn around(&self, placed: &Placed, facet: u32) -> impl Iterator<Item = u32> {
+        let corners = placed.facet(facet).corners.into_iter();
+        corners.filter_map(|corner| self.around.get(&corner)).flatten().copied()
     }
 }
 
 impl Turn {
+    /// How far along x facets may be from the contour here, in millimetres.
+    pub fn width_mm(&self) -> f64 {
+        (2.0 * self.reach_mm / self.bend_per_mm.abs()).sqrt()
+    }
+
     /// Whether it is the same as another that was found from another facet.
     fn is_same(&self, other: &Self, placed: &Placed) -> bool {
         let faces = [self, other].map(|turn| placed.outwards(turn.facet).map(|n| n[1] > 0.0));
         (self.at_mm[0] - other.at_mm[0]).abs() < SAME_MM && faces[0] == faces[1]
     }
-}
-
-impl Crossing {
-    /// Whether a contour enters the part here along x; where facets are turned over,
-    /// whether it leaves it.
-    pub fn enters(&self, placed: &Placed) -> Option<bool> {
-        let jet = placed.jet(self.facet, self.uv);
-        Some(outwards(placed, self.facet, &jet)?[0] < 0.0)
-    }
-}
-
-/// A surface's normal as the facet has it.
-fn outwards(placed: &Placed, facet: u32, jet: &Jet) -> Option<Vec3> {
-    let (across, flat) = (unit(cross(jet.du, jet.dv))?, placed.outwards(facet)?);
-    Some(scale(across, dot(across, flat).signum()))
 }
 
 fn candidates(placed: &Placed, facets: std::ops::Range<u32>) -> Vec<Candidate> {
@@ -184,7 +188,7 @@ fn candidates(placed: &Placed, facets: std::ops::Range<u32>) -> Vec<Candidate> {
             let flat = placed.outwards(facet)?;
             // At a pole the surface has none.
             let outwards_x = [0, 1, 2]
-                .map(|k| outwards(placed, facet, &jets[k]).map_or(flat[0], |normal| normal[0]));
+                .map(|k| placed.normal(facet, &jets[k]).map_or(flat[0], |normal| normal[0]));
             let (low, high) = range(outwards_x);
             // The surface may turn within the facet more than its corners show.
             let more = 0.5 * (high - low) + LEVEL;
@@ -242,7 +246,7 @@ fn turn(placed: &Placed, facet: u32, seed: [f64; 2], z_mm: f64) -> Option<Turn> 
         let mut jets = [Jet::default(); 3];
         let places = [at, [at[0] + by[0], at[1]], [at[0], at[1] + by[1]]];
         placed.evaluate(face, &places, &mut jets);
-        let normals = [0, 1, 2].map(|k| outwards(placed, facet, &jets[k]));
+        let normals = [0, 1, 2].map(|k| placed.normal(facet, &jets[k]));
         let [Some(n), Some(nu), Some(nv)] = normals else { return None };
         let turned = [scale(sub(nu, n), 1.0 / by[0]), scale(sub(nv, n), 1.0 / by[1])];
         let jet = jets[0];
@@ -294,9 +298,8 @@ fn found(
 
 /// Whether a point lies over a facet, as near as the facet is to its surface.
 pub(crate) fn is_below(placed: &Placed, facet: u32, point: Vec3) -> bool {
-    let corners = placed.corners(facet);
-    let Some([s, t]) = parts(&corners, point) else { return false };
-    let [a, b, c] = corners;
+    let [s, t] = placed.chart(facet).parts(point);
+    let [a, b, c] = placed.corners(facet);
     let foot = add(a, add(scale(sub(b, a), s), scale(sub(c, a), t)));
     s > -BESIDE
         && t > -BESIDE

@@ -93,8 +93,11 @@ fn crossings(placed: &Placed, z_mm: f64, step_mm: f64) -> Vec<Crossing> {
         for row in (low / step_mm).ceil() as i64..(high / step_mm).ceil() as i64 {
             let y_mm = row as f64 * step_mm;
             let x_mm = a[0] + (y_mm - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
-            let uv = placed.uv_at(number, [x_mm, y_mm, z_mm]);
-            list.push(Crossing { facet: number, uv, x_mm, y_mm, z_mm, fate: Fate::OnFacet });
+            let uv = placed.chart(number).uv_at([x_mm, y_mm, z_mm]);
+            let [p, q, r] = corners;
+            let across_x = (q[1] - p[1]) * (r[2] - p[2]) - (q[2] - p[2]) * (r[1] - p[1]);
+            let enters = across_x < 0.0;
+            list.push(Crossing { facet: number, uv, x_mm, y_mm, z_mm, enters, fate: Fate::OnFacet });
         }
     }
     list
@@ -217,7 +220,7 @@ fn contours_of_a_sphere_turn_at_its_highest_and_lowest_rows() {
                 let half = (radius * radius - y * y).max(0.0).sqrt();
                 for (crossing, x) in pair.iter().zip([-half, half]) {
                     assert!((crossing.x_mm - centre[0] - x).abs() < NM, "z {z} by {by}");
-                    assert_eq!(crossing.enters(&placed), Some(x < 0.0));
+                    assert_eq!(crossing.enters, x < 0.0);
                 }
             }
             assert!(turns.pair(&placed, &found[1], centre[1] + radius + 1e-4).is_none());

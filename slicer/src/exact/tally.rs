@@ -1,0 +1,81 @@
+//! What polishing did, counted by all workers.
+
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use lamp_brep::{Crossing, Fate};
+
+/// What polishing did to the crossings of facets.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Polished {
+    /// Crossings that lie on their surface now.
+    pub moved: u64,
+    /// Those kept on their facet: no point of the surface was found near it.
+    pub kept: u64,
+    /// Crossings added or taken away where contours turn.
+    pub mended: u64,
+    /// How far crossings were moved along their rows on average, in millimetres.
+    pub mean_mm: f64,
+    /// How far at most, in millimetres.
+    pub most_mm: f64,
+}
+
+impl Polished {
+    /// What was done to the crossings of both.
+    pub(crate) fn joined(self, other: Self) -> Self {
+        let moved = self.moved + other.moved;
+        let sum_mm = self.mean_mm * self.moved as f64 + other.mean_mm * other.moved as f64;
+        Self {
+            moved,
+            kept: self.kept + other.kept,
+            mended: self.mended + other.mended,
+            mean_mm: sum_mm / moved.max(1) as f64,
+            most_mm: self.most_mm.max(other.most_mm),
+        }
+    }
+}
+
+/// Sums are whole numbers, so that their order does not matter.
+#[derive(Debug, Default)]
+pub(crate) struct Tally {
+    moved: AtomicU64,
+    kept: AtomicU64,
+    mended: AtomicU64,
+    sum_pm: AtomicU64,
+    most_pm: AtomicU64,
+}
+
+const PM_PER_MM: f64 = 1e9;
+
+impl Tally {
+    /// Counts crossings that were at `facets_mm` along x before.
+    pub(crate) fn add(&self, crossings: &[Crossing], facets_mm: &[f64]) {
+        let (mut moved, mut sum, mut most) = (0, 0, 0);
+        for (crossing, from) in crossings.iter().zip(facets_mm) {
+            if crossing.fate == Fate::Moved {
+                let pm = ((crossing.x_mm - from).abs() * PM_PER_MM) as u64;
+                (moved, sum, most) = (moved + 1, sum + pm, most.max(pm));
+            }
+        }
+        self.moved.fetch_add(moved, Relaxed);
+        self.kept.fetch_add(crossings.len() as u64 - moved, Relaxed);
+        self.sum_pm.fetch_add(sum, Relaxed);
+        self.most_pm.fetch_max(most, Relaxed);
+    }
+
+    /// Counts crossings that were added or taken away, and those that are kept no more.
+    pub(crate) fn mend(&self, mended: usize, kept: usize) {
+        self.mended.fetch_add(mended as u64, Relaxed);
+        self.kept.fetch_sub(kept as u64, Relaxed);
+    }
+
+    pub(crate) fn total(&self) -> Polished {
+        let moved = self.moved.load(Relaxed);
+        Polished {
+            moved,
+            kept: self.kept.load(Relaxed),
+            mended: self.mended.load(Relaxed),
+            mean_mm: self.sum_pm.load(Relaxed) as f64 / PM_PER_MM / moved.max(1) as f64,
+            most_mm: self.most_pm.load(Relaxed) as f64 / PM_PER_MM,
+        }
+    }
+}

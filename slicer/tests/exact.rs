@@ -1,0 +1,103 @@
+//! B-rep parts against closed forms, pixel by pixel.
+
+use std::sync::Arc;
+
+use lamp_brep::{Kernel, StepModel};
+use lamp_fixtures::{StepPart, StepUnit, step};
+use lamp_slicer::{Axis, Model, Placement, SliceOptions, Slices};
+use lamp_stack::{Dpi, Image, Length};
+
+fn model(part: StepPart, chord_mm: f64) -> Model {
+    let kernel = StepModel::read(step(part, StepUnit::Inch).as_bytes()).unwrap();
+    let mesh = kernel.tessellate(chord_mm).unwrap();
+    Model::from_surfaces("part", String::new(), Arc::new(kernel), Arc::new(mesh))
+}
+
+/// Counts the pixels of a part's layers that are not what `is_inside` says of their
+/// centres.
+fn wrong_pixels(
+    model: Model,
+    options: &SliceOptions,
+    is_inside: impl Fn([f64; 3]) -> bool,
+) -> (u64, u64) {
+    let mut slices = Slices::new(model, options).unwrap();
+    let grid = *slices.grid();
+    let (mut wrong, mut white) = (0, 0);
+    for layer in &mut slices {
+        let layer = layer.unwrap();
+        assert!(layer.info.stray_rows.is_empty() && layer.info.closed == Some(true));
+        let z_mm = (layer.info.z_um.unwrap() + layer.info.thickness_um.unwrap()) / 1000.0;
+        let Image::Mask(mask) = layer.image else { panic!("a mask") };
+        for row in 0..grid.height {
+            let mut is_white = false;
+            let mut transitions = mask.row(row).iter().peekable();
+            for column in 0..grid.width {
+                while transitions.next_if_eq(&&column).is_some() {
+                    is_white = !is_white;
+                }
+                let [x, y] = grid.to_mm(f64::from(column), f64::from(row));
+                wrong += u64::from(is_white != is_inside([x, y, z_mm]));
+                white += u64::from(is_white);
+            }
+        }
+    }
+    (wrong, white)
+}
+
+fn options(dpi: f64, thickness_mm: f64, placement: Placement) -> SliceOptions {
+    SliceOptions {
+        dpi: Dpi::new(dpi).unwrap(),
+        thickness: Length::from_mm(thickness_mm),
+        placement,
+        ..SliceOptions::default()
+    }
+}
+
+#[test]
+fn a_sphere_has_no_wrong_pixel() {
+    for dpi in [1500.0, 2400.0] {
+        let options = options(dpi, 3.0, Placement::default());
+        let inside = |[x, y, z]: [f64; 3]| x * x + y * y + (z - 15.0).powi(2) < 225.0;
+        for chord_mm in [0.25 * 25.4 / dpi, 0.05] {
+            let (wrong, white) = wrong_pixels(model(StepPart::Sphere, chord_mm), &options, inside);
+            assert!(wrong == 0 && white > 100_000, "{dpi} dpi, {chord_mm} mm: {wrong} of {white}");
+        }
+    }
+}
+
+/// Turned so that nothing lies along the rows.
+fn askew() -> Placement {
+    Placement::default().rotated(Axis::X, 33.0).rotated(Axis::Z, 71.0).translated([1.0, 2.0, 0.3])
+}
+
+/// Where a point of the machine is on a part that is `askew`.
+fn back([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let turned = Placement::default().rotated(Axis::Z, -71.0).rotated(Axis::X, -33.0);
+    turned.at([x - 1.0, y - 2.0, z - 0.3])
+}
+
+#[test]
+fn a_torus_has_no_wrong_pixel() {
+    let is_inside = |[x, y, z]: [f64; 3]| (x.hypot(y) - 20.0).powi(2) + (z - 8.0).powi(2) < 64.0;
+    for dpi in [1500.0, 2400.0] {
+        let chord_mm = 0.25 * 25.4 / dpi;
+        let flat = options(dpi, 1.7, Placement::default());
+        let (wrong, white) = wrong_pixels(model(StepPart::Torus, chord_mm), &flat, is_inside);
+        assert!(wrong == 0 && white > 100_000, "{dpi} dpi: {wrong} of {white}");
+        let tilted = options(dpi, 4.3, askew());
+        let (wrong, white) =
+            wrong_pixels(model(StepPart::Torus, chord_mm), &tilted, |point| is_inside(back(point)));
+        assert!(wrong == 0 && white > 100_000, "askew, {dpi} dpi: {wrong} of {white}");
+    }
+}
+
+/// The fewer facets, the more their pixels are off; the surfaces stay exact.
+#[test]
+fn facets_alone_have_wrong_pixels() {
+    let is_inside = |[x, y, z]: [f64; 3]| x * x + y * y + (z - 15.0).powi(2) < 225.0;
+    let options = SliceOptions { polish: false, ..options(1500.0, 3.0, Placement::default()) };
+    let wrong = [0.1, 0.01, 0.001]
+        .map(|chord_mm| wrong_pixels(model(StepPart::Sphere, chord_mm), &options, is_inside).0);
+    println!("{wrong:?}");
+    assert!(wrong[0] > 5 * wrong[1] && wrong[1] > 5 * wrong[2] && wrong[2] > 0, "{wrong:?}");
+}
