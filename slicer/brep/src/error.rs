@@ -24,4 +24,12 @@ pub enum BrepError {
         /// The most that are made.
         most: usize,
     },
+    /// A panic: an error of the program, not of the file.
+    #[error("{doing} failed within the program: {what}")]
+    Panicked {
+        /// What was done.
+        doing: &'static str,
+        /// The panic's message.
+        what: String,
+    },
 }

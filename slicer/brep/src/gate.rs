@@ -123,7 +123,7 @@ fn faults(
     faults
 }
 
-fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
+pub(crate) fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for corner in facets.iter().flat_map(|facet| mesh.corners(facet)) {
         for k in 0..3 {
@@ -135,12 +135,12 @@ fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
 }
 
 /// Across the facet, twice its area long.
-fn doubled(mesh: &Tessellation, facet: &Facet) -> Vec3 {
+pub(crate) fn doubled(mesh: &Tessellation, facet: &Facet) -> Vec3 {
     let [a, b, c] = mesh.corners(facet);
     cross(sub(b, a), sub(c, a))
 }
 
-fn volume(mesh: &Tessellation, facets: &[Facet], middle: Vec3) -> f64 {
+pub(crate) fn volume(mesh: &Tessellation, facets: &[Facet], middle: Vec3) -> f64 {
     let six = |facet: &Facet| {
         let [a, b, c] = mesh.corners(facet).map(|corner| sub(corner, middle));
         dot(a, cross(b, c))
@@ -194,10 +194,6 @@ fn exact_volume(kernel: &dyn Kernel, facets: &[Facet], middle: Vec3) -> f64 {
 fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
     // How often each edge is followed upwards and downwards in number.
     let mut edges: HashMap<[u32; 2], [u32; 2]> = HashMap::with_capacity(facets.len() * 3 / 2);
-    let sides = |facet: &Facet| {
-        let [a, b, c] = facet.corners;
-        [[a, b], [b, c], [c, a]]
-    };
     for [a, b] in facets.iter().flat_map(sides) {
         edges.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
     }
@@ -212,6 +208,12 @@ fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<Bo
         at_mm: mesh.points[point as usize],
         entity: kernel.face(face).entity,
     })
+}
+
+/// A facet's edges, from point to point.
+pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
+    let [a, b, c] = facet.corners;
+    [[a, b], [b, c], [c, a]]
 }
 
 fn outside(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {

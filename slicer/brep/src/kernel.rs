@@ -30,6 +30,11 @@ pub trait Kernel: Send + Sync {
     /// The length unit that the file has, for a report.
     fn unit(&self) -> &str;
 
+    /// How far lengths may be off, as the file says for itself, in millimetres.
+    fn uncertainty_mm(&self) -> Option<f64> {
+        None
+    }
+
     /// The faces as facets no further than `chord_mm` from their surfaces, joined
     /// along their edges.
     ///
@@ -156,6 +161,20 @@ pub enum Fault {
     /// face turned over.
     #[error("its sense is against its loops; the loops were followed")]
     Sense,
+    /// Edges that it gives apart from its neighbours were joined with theirs.
+    #[error("{joints} of its edges were joined, up to {off_mm:.6} mm apart")]
+    Joined {
+        /// How many edges, each end or its whole length.
+        joints: usize,
+        /// How far apart they were, in millimetres.
+        off_mm: f64,
+    },
+    /// It points inwards where its neighbours point outwards.
+    #[error("it is inside out beside its neighbours; it was turned over")]
+    Inverted,
+    /// All faces of its body point inwards.
+    #[error("its body is inside out; all of it was turned over")]
+    InsideOut,
     /// It is too large for the chord, or bends too much.
     #[error("it takes about {cells:.0} cells of facets; give a longer chord")]
     Fine {

@@ -7,7 +7,8 @@
 //!
 //! [`StepModel`] is the kernel that reads STEP in pure Rust. It has to decide little
 //! by itself: the facets close because faces share the points of their edges, and
-//! loops say on which side of them a face lies.
+//! loops say on which side of them a face lies. [`prepare`] opens, heals and checks a
+//! file in as many ways as it takes.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -42,10 +43,13 @@ mod error;
 mod extent;
 mod gate;
 mod geometry;
+mod heal;
 mod kernel;
 mod model;
+mod orient;
 mod placed;
 mod polish;
+mod prepare;
 mod step;
 mod tessellate;
 mod turn;
@@ -56,5 +60,6 @@ pub use gate::{BodyFault, BodyReport, check};
 pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellation};
 pub use placed::{Chart, Placed};
 pub use polish::{Crossing, Fate, polish};
+pub use prepare::{KernelName, Prepared, Try, prepare};
 pub use step::{StepError, StepModel};
 pub use turn::{Turn, Turns};

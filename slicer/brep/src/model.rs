@@ -13,6 +13,8 @@ pub(crate) struct Model {
     pub(crate) vertices: Vec<Vec3>,
     /// The name of the file's length unit.
     pub(crate) unit: String,
+    /// How far lengths may be off, as the file says, in millimetres.
+    pub(crate) uncertainty_mm: Option<f64>,
 }
 
 /// A piece of a surface.

@@ -201,8 +201,8 @@ fn contours_of_a_sphere_turn_at_its_highest_and_lowest_rows() {
         let centre = at(&rows, [0.0, 0.0, 15.0]);
         let turns = Turns::find(&placed);
         // The last one is higher than any facet.
-        for z in [-14.999, -14.9, -3.3, 0.0, 7.7, 14.99, 14.9995] {
-            let radius = (225.0 - z * z as f64).sqrt();
+        for z in [-14.999f64, -14.9, -3.3, 0.0, 7.7, 14.99, 14.9995] {
+            let radius = (225.0 - z * z).sqrt();
             let found = turns.at(&placed, centre[2] + z);
             let places: Vec<_> = found.iter().map(|turn| (turn.at_mm, turn.leaves)).collect();
             let &[(low, up), (high, down)] = &places[..] else { panic!("z {z}: {places:?}") };

@@ -176,7 +176,7 @@ impl Curve {
     }
 
     /// The point at `t`, also past the seam of a closed spline.
-    fn place(&self, t: f64) -> Vec3 {
+    pub(crate) fn place(&self, t: f64) -> Vec3 {
         match (self, self.domain()) {
             (Self::Spline(spline), Some([start, end])) if t < start || t > end => {
                 spline.at(start + (t - start).rem_euclid(end - start))[0]

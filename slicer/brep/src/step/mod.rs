@@ -10,7 +10,8 @@ mod units;
 use std::path::Path;
 
 use crate::error::BrepError;
-use crate::kernel::{Body, FaceInfo, Jet, Kernel, Tessellation};
+use crate::heal::heal;
+use crate::kernel::{Body, FaceInfo, Finding, Jet, Kernel, Tessellation};
 use crate::model::Model;
 use crate::tessellate;
 
@@ -95,23 +96,49 @@ pub enum StepError {
 #[derive(Debug)]
 pub struct StepModel {
     model: Model,
+    /// What was joined.
+    healed: Vec<Finding>,
 }
 
 impl StepModel {
-    /// Reads a file.
+    /// Reads a file as it is.
     ///
     /// # Errors
     /// Where it cannot be read, is not STEP, or holds what is not supported.
     pub fn open(path: &Path) -> Result<Self, BrepError> {
-        Self::read(&std::fs::read(path)?)
+        Self::open_healed(path, 0.0)
     }
 
-    /// Reads a file's bytes.
+    /// Reads a file's bytes as they are.
     ///
     /// # Errors
     /// Where they are not STEP, or hold what is not supported.
     pub fn read(bytes: &[u8]) -> Result<Self, BrepError> {
-        Ok(Self { model: topology::model(&file::Entities::read(bytes)?)? })
+        Self::read_healed(bytes, 0.0)
+    }
+
+    /// Reads a file, and joins edges that faces give apart where they run within
+    /// `heal_mm` of each other. The tessellation's findings say where.
+    ///
+    /// # Errors
+    /// Where it cannot be read, is not STEP, or holds what is not supported.
+    pub fn open_healed(path: &Path, heal_mm: f64) -> Result<Self, BrepError> {
+        Self::read_healed(&std::fs::read(path)?, heal_mm)
+    }
+
+    /// Reads a file's bytes as [`StepModel::open_healed`] does.
+    ///
+    /// # Errors
+    /// Where they are not STEP, or hold what is not supported.
+    pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
+        let mut model = topology::model(&file::Entities::read(bytes)?)?;
+        let healed = if heal_mm > 0.0 { heal(&mut model, heal_mm) } else { Vec::new() };
+        Ok(Self { model, healed })
+    }
+
+    /// Whether anything was joined.
+    pub fn is_healed(&self) -> bool {
+        !self.healed.is_empty()
     }
 }
 
@@ -133,8 +160,14 @@ impl Kernel for StepModel {
         &self.model.unit
     }
 
+    fn uncertainty_mm(&self) -> Option<f64> {
+        self.model.uncertainty_mm
+    }
+
     fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError> {
-        tessellate::model(&self.model, chord_mm)
+        let mut mesh = tessellate::model(&self.model, chord_mm)?;
+        mesh.findings.extend_from_slice(&self.healed);
+        Ok(mesh)
     }
 
     fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]) {

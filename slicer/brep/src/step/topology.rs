@@ -17,6 +17,7 @@ pub(crate) fn model(entities: &Entities) -> Result<Model, StepError> {
     for placed in placed(entities)? {
         if model.unit.is_empty() {
             model.unit.clone_from(&placed.units.name);
+            model.uncertainty_mm = placed.units.uncertainty_mm;
         }
         let first = model.faces.len() as u32;
         let mut reader = Reader::new(entities, &placed, &mut model);

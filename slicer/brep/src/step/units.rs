@@ -12,6 +12,8 @@ pub(crate) struct Units {
     pub(crate) radians: f64,
     /// The unit of length by name.
     pub(crate) name: String,
+    /// How far lengths may be off, in millimetres, if that is said.
+    pub(crate) uncertainty_mm: Option<f64>,
 }
 
 /// Conversions that follow from each other; more are a circle.
@@ -31,8 +33,22 @@ impl Units {
                 radians = size(entities, unit, 0)?;
             }
         }
-        Ok(length.map(|(mm, name)| Self { mm, radians, name }))
+        let uncertainty_mm = uncertainty_mm(entities, context);
+        Ok(length.map(|(mm, name)| Self { mm, radians, name, uncertainty_mm }))
     }
+}
+
+/// The greatest of a context's uncertainties of length, in millimetres.
+fn uncertainty_mm(entities: &Entities, context: u64) -> Option<f64> {
+    let assigned = entities.find(context, "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT")?;
+    let mm = |measure: u64| {
+        let measure = entities.find(measure, "UNCERTAINTY_MEASURE_WITH_UNIT")?;
+        let unit = measure.reference(1).ok()?;
+        entities.find(unit, "LENGTH_UNIT")?;
+        let mm = 1000.0 * measure.number(0).ok()? * size(entities, unit, 0).ok()?;
+        (mm > 0.0 && mm.is_finite()).then_some(mm)
+    };
+    assigned.references(0).ok()?.into_iter().filter_map(mm).reduce(f64::max)
 }
 
 /// The SI units (metres, radians) in one unit.
@@ -101,7 +117,8 @@ mod tests {
         let radian = "#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));";
         let of = |length: &str| units(&format!("{context}{radian}{length}")).unwrap().unwrap();
         let milli = of("#2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));");
-        assert_eq!(milli, Units { mm: 1.0, radians: 1.0, name: "millimetre".into() });
+        let name = "millimetre".into();
+        assert_eq!(milli, Units { mm: 1.0, radians: 1.0, name, uncertainty_mm: None });
         assert_eq!(of("#2=(LENGTH_UNIT()SI_UNIT($,.METRE.));").mm, 1000.0);
         let inch = "#2=(CONVERSION_BASED_UNIT('INCH',#4)LENGTH_UNIT()NAMED_UNIT(#9));
             #4=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(2.54),#5);
@@ -113,6 +130,19 @@ mod tests {
             #4=PLANE_ANGLE_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE(0.5),#5);
             #5=(PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));";
         assert_eq!(units(&format!("{context}{degree}")).unwrap().unwrap().radians, 0.5);
+    }
+
+    #[test]
+    fn uncertainty_has_a_unit_of_its_own() {
+        let context = "#1=(GLOBAL_UNIT_ASSIGNED_CONTEXT((#2))
+            GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#3)));
+            #2=(LENGTH_UNIT()SI_UNIT($,.METRE.));#4=(LENGTH_UNIT()SI_UNIT(.MICRO.,.METRE.));
+            #3=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(5.),#4,'','');";
+        let uncertainty_mm = units(context).unwrap().unwrap().uncertainty_mm.unwrap();
+        assert!((uncertainty_mm - 0.005).abs() < 1e-15);
+        // One that makes no sense is none.
+        let none = units(&context.replace("(5.)", "(-5.)")).unwrap().unwrap();
+        assert_eq!(none.uncertainty_mm, None);
     }
 
     #[test]

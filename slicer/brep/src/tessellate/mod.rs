@@ -120,12 +120,12 @@ fn patch(number: u32, face: &Face, chains: &[Vec<u32>], shared: &[Vec3], chord_m
     let mut fill = || {
         let polygons = boundary::polygons(face, &rings(face, chains), &mut points, chord_mm)?;
         faults.extend(off(face, &polygons, &points, chord_mm));
+        let (corners, coarse) = fill::fill(face, &polygons, &mut points, chord_mm)?;
         if boundary::is_counter_clockwise(&polygons) != face.along_normal {
             // The loops are what joins faces; neighbours follow them the other way.
             outwards = !outwards;
             faults.push(Fault::Sense);
         }
-        let (corners, coarse) = fill::fill(face, &polygons, &mut points, chord_mm)?;
         faults.extend(coarse);
         Ok(corners)
     };

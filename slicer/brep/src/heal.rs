@@ -1,0 +1,329 @@
+//! Edges that faces give apart instead of sharing them, joined within a tolerance.
+//!
+//! Only what is open is touched: edges that one face alone follows, their ends, and
+//! places where the edges of a loop do not meet. Vertices that lie within the
+//! tolerance become one; edges are cut where a vertex of another lies on them; of
+//! two between the same vertices that run within the tolerance of each other one
+//! stays. What a body's facets are worth then is for the gate to say.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::geometry::{Curve, edge_range};
+use crate::kernel::{Fault, Finding};
+use crate::model::{Edge, Face, Loop, Model};
+use crate::vector::{Vec3, distance};
+
+/// Joins what lies within a tolerance, and says at which faces.
+pub(crate) fn heal(model: &mut Model, tolerance_mm: f64) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for body in model.bodies.clone() {
+        let faces = body.faces.start as usize..body.faces.end as usize;
+        let mut healing = Healing {
+            faces: &mut model.faces[faces],
+            edges: &mut model.edges,
+            vertices: &model.vertices,
+            tolerance_mm,
+            widest_mm: HashMap::new(),
+        };
+        healing.join_vertices();
+        healing.cut_edges();
+        healing.join_edges();
+        for (face, (joints, off_mm)) in healing.joined() {
+            let face = body.faces.start + face as u32;
+            let entity = model.faces[face as usize].entity;
+            findings.push(Finding { face, entity, fault: Fault::Joined { joints, off_mm } });
+        }
+    }
+    findings
+}
+
+/// One body.
+struct Healing<'a> {
+    faces: &'a mut [Face],
+    edges: &'a mut Vec<Edge>,
+    vertices: &'a [Vec3],
+    tolerance_mm: f64,
+    /// For edges that were joined or whose ends were, how far apart that was.
+    widest_mm: HashMap<usize, f64>,
+}
+
+impl Healing<'_> {
+    fn loops(&self) -> impl Iterator<Item = &Vec<(usize, bool)>> {
+        self.faces.iter().flat_map(|face| &face.loops).filter_map(|around| match around {
+            Loop::Edges(edges) => Some(edges),
+            Loop::Vertex(_) => None,
+        })
+    }
+
+    /// Edges that are followed once, in the order of their numbers.
+    fn open(&self) -> Vec<usize> {
+        let mut uses: HashMap<usize, usize> = HashMap::new();
+        self.loops().flatten().for_each(|(edge, _)| *uses.entry(*edge).or_default() += 1);
+        let mut open: Vec<usize> =
+            uses.into_iter().filter(|(_, uses)| *uses == 1).map(|(edge, _)| edge).collect();
+        open.sort_unstable();
+        open
+    }
+
+    /// Where an edge of a loop ends and the next one begins, if they do not meet.
+    fn breaks(&self) -> Vec<[usize; 2]> {
+        let end = |&(edge, is_along): &(usize, bool)| self.edges[edge].ends[usize::from(is_along)];
+        let start = |&(edge, is_along): &(usize, bool)| end(&(edge, !is_along));
+        let pairs = self.loops().flat_map(|edges| {
+            let next = edges.iter().cycle().skip(1);
+            edges.iter().zip(next).map(|(a, b)| [end(a), start(b)]).collect::<Vec<_>>()
+        });
+        pairs.filter(|[a, b]| a != b).collect()
+    }
+
+    /// Ends of open edges, and of those that do not meet in a loop.
+    fn loose(&self) -> Vec<usize> {
+        let ends = self.open().into_iter().flat_map(|edge| self.edges[edge].ends);
+        let mut loose: Vec<usize> = ends
+            .chain(self.breaks().into_iter().flatten())
+            .collect::<HashSet<_>>()
+            .into_iter()
+            .collect();
+        loose.sort_unstable();
+        loose
+    }
+
+    /// Makes one of vertices that lie within the tolerance.
+    fn join_vertices(&mut self) {
+        let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+        // Which vertex each becomes: the first within the tolerance.
+        let mut becomes: HashMap<usize, usize> = HashMap::new();
+        for vertex in self.loose() {
+            let place = self.vertices[vertex];
+            let cell = place.map(|x| (x / self.tolerance_mm).floor() as i64);
+            let around = (0..27).map(|k| {
+                [0, 1, 2].map(|axis| cell[axis].saturating_add(k / 3i64.pow(axis as u32) % 3 - 1))
+            });
+            let near = around
+                .filter_map(|cell| cells.get(&cell))
+                .flatten()
+                .copied()
+                .find(|&other| distance(self.vertices[other], place) <= self.tolerance_mm);
+            match near {
+                Some(other) => drop(becomes.insert(vertex, other)),
+                None => cells.entry(cell).or_default().push(vertex),
+            }
+        }
+        self.collapse(&becomes);
+        self.rename(&becomes);
+    }
+
+    /// Takes edges out of loops whose ends become one vertex and which are as short
+    /// as that.
+    fn collapse(&mut self, becomes: &HashMap<usize, usize>) {
+        let at = |vertex: &usize| *becomes.get(vertex).unwrap_or(vertex);
+        let is_tiny = |&(edge, _): &(usize, bool)| {
+            let edge = &self.edges[edge];
+            let [a, b] = edge.ends;
+            a != b && at(&a) == at(&b) && {
+                let line = edge.curve.polyline(self.range(edge), self.tolerance_mm);
+                line.iter().all(|p| distance(*p, line[0]) <= 2.0 * self.tolerance_mm)
+            }
+        };
+        let tiny: HashSet<usize> =
+            self.loops().flatten().filter(|edge| is_tiny(edge)).map(|(edge, _)| *edge).collect();
+        for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
+            if let Loop::Edges(edges) = around
+                && edges.iter().any(|(edge, _)| !tiny.contains(edge))
+            {
+                edges.retain(|(edge, _)| !tiny.contains(edge));
+            }
+        }
+    }
+
+    fn rename(&mut self, becomes: &HashMap<usize, usize>) {
+        let used: HashSet<usize> = self.loops().flatten().map(|(edge, _)| *edge).collect();
+        for edge in used {
+            for end in &mut self.edges[edge].ends {
+                if let Some(&other) = becomes.get(end) {
+                    let apart = distance(self.vertices[*end], self.vertices[other]);
+                    let widest = self.widest_mm.entry(edge).or_default();
+                    *widest = widest.max(apart);
+                    *end = other;
+                }
+            }
+        }
+        for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
+            if let Loop::Vertex(vertex) = around {
+                *vertex = *becomes.get(vertex).unwrap_or(vertex);
+            }
+        }
+    }
+
+    fn range(&self, edge: &Edge) -> [f64; 2] {
+        let [start, end] = edge.ends.map(|vertex| self.vertices[vertex]);
+        edge_range(&edge.curve, start, end, edge.forward)
+    }
+
+    /// Cuts open edges where ends of others lie on them.
+    fn cut_edges(&mut self) {
+        let mut ends: Vec<usize> = self.loose();
+        ends.sort_by(|&a, &b| self.vertices[a][0].total_cmp(&self.vertices[b][0]));
+        let mut pieces: HashMap<usize, Vec<usize>> = HashMap::new();
+        for edge in self.open() {
+            let cuts = self.cuts(&self.edges[edge], &ends);
+            if cuts.is_empty() {
+                continue;
+            }
+            let Edge { ref curve, ends: [first, last], forward } = self.edges[edge];
+            let curve = curve.clone();
+            let stops: Vec<usize> = [first].into_iter().chain(cuts).chain([last]).collect();
+            let new = self.edges.len();
+            let parts = stops.windows(2).map(|pair| Edge {
+                curve: curve.clone(),
+                ends: [pair[0], pair[1]],
+                forward,
+            });
+            self.edges.extend(parts);
+            pieces.insert(edge, (new..self.edges.len()).collect());
+        }
+        for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
+            if let Loop::Edges(edges) = around {
+                let cut = |&(edge, is_along): &(usize, bool)| {
+                    let mut parts = pieces.get(&edge).cloned().unwrap_or_else(|| vec![edge]);
+                    if !is_along {
+                        parts.reverse();
+                    }
+                    parts.into_iter().map(move |part| (part, is_along))
+                };
+                *edges = edges.iter().flat_map(cut).collect();
+            }
+        }
+    }
+
+    /// The vertices that lie on an edge away from its ends, in its order. `ends`
+    /// go along x.
+    fn cuts(&self, edge: &Edge, ends: &[usize]) -> Vec<usize> {
+        let span = Span::new(edge, self.range(edge), self.tolerance_mm);
+        let low = span.low[0] - 2.0 * self.tolerance_mm;
+        let high = span.high[0] + 2.0 * self.tolerance_mm;
+        let first = ends.partition_point(|&end| self.vertices[end][0] < low);
+        let near = ends[first..].iter().take_while(|&&end| self.vertices[end][0] <= high);
+        let mut cuts: Vec<(f64, usize)> = near
+            .filter(|end| !edge.ends.contains(end))
+            .filter_map(|&end| Some((span.part(self.vertices[end])?, end)))
+            .collect();
+        cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        cuts.into_iter().map(|(_, end)| end).collect()
+    }
+
+    /// Makes one of open edges that run within the tolerance of each other.
+    fn join_edges(&mut self) {
+        let mut between: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
+        let mut becomes: HashMap<usize, (usize, bool)> = HashMap::new();
+        for edge in self.open() {
+            let [a, b] = self.edges[edge].ends;
+            let waiting = between.entry([a.min(b), a.max(b)]).or_default();
+            let twin = waiting.iter().enumerate().find_map(|(k, &other)| {
+                let (is_along, apart) = self.is_twin(&self.edges[other], &self.edges[edge])?;
+                Some((k, other, is_along, apart))
+            });
+            match twin {
+                Some((k, other, is_along, apart)) => {
+                    waiting.swap_remove(k);
+                    becomes.insert(edge, (other, is_along));
+                    let widest = self.widest_mm.remove(&edge).unwrap_or(0.0).max(apart);
+                    let of_other = self.widest_mm.entry(other).or_default();
+                    *of_other = of_other.max(widest);
+                }
+                None => waiting.push(edge),
+            }
+        }
+        for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
+            let Loop::Edges(edges) = around else { continue };
+            for (edge, is_along) in edges {
+                if let Some(&(other, is_same)) = becomes.get(edge) {
+                    (*edge, *is_along) = (other, *is_along == is_same);
+                }
+            }
+        }
+    }
+
+    /// Whether an edge runs within the tolerance of another between the same
+    /// vertices: then in the same direction or not, and how far away.
+    fn is_twin(&self, edge: &Edge, other: &Edge) -> Option<(bool, f64)> {
+        let span = Span::new(edge, self.range(edge), self.tolerance_mm);
+        let [from, to] = self.range(other);
+        let (mut parts, mut widest) = (Vec::new(), 0.0f64);
+        for k in 1..SAMPLES {
+            let at = other.curve.place(from + (to - from) * k as f64 / SAMPLES as f64);
+            parts.push(span.part(at)?);
+            widest = widest.max(span.apart(at));
+        }
+        let is_along = parts.first() < parts.last();
+        Some((is_along, widest))
+    }
+
+    /// How many places of each face were joined, and how far apart they were.
+    fn joined(&self) -> Vec<(usize, (usize, f64))> {
+        let mut joined = Vec::new();
+        for (number, face) in self.faces.iter().enumerate() {
+            let edges = face.loops.iter().flat_map(|around| match around {
+                Loop::Edges(edges) => edges.as_slice(),
+                Loop::Vertex(_) => &[],
+            });
+            let widths: Vec<f64> =
+                edges.filter_map(|(edge, _)| self.widest_mm.get(edge).copied()).collect();
+            if !widths.is_empty() {
+                joined.push((number, (widths.len(), widths.iter().copied().fold(0.0, f64::max))));
+            }
+        }
+        joined
+    }
+}
+
+/// Pieces of an edge between which it is compared.
+const SAMPLES: usize = 8;
+
+/// An edge's part of its curve.
+struct Span<'a> {
+    curve: &'a Curve,
+    range: [f64; 2],
+    low: Vec3,
+    high: Vec3,
+    tolerance_mm: f64,
+}
+
+impl<'a> Span<'a> {
+    fn new(edge: &'a Edge, range: [f64; 2], tolerance_mm: f64) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in edge.curve.polyline(range, tolerance_mm) {
+            for k in 0..3 {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
+            }
+        }
+        Self { curve: &edge.curve, range, low, high, tolerance_mm }
+    }
+
+    fn apart(&self, p: Vec3) -> f64 {
+        distance(self.curve.place(self.curve.project(p)), p)
+    }
+
+    /// Where along the edge a point lies, from 0 to 1; nothing if it lies further
+    /// away than the tolerance, or no further from an end.
+    fn part(&self, p: Vec3) -> Option<f64> {
+        let near = 2.0 * self.tolerance_mm;
+        if (0..3).any(|k| p[k] < self.low[k] - near || p[k] > self.high[k] + near) {
+            return None;
+        }
+        let [from, to] = self.range;
+        let mut t = self.curve.project(p);
+        if let Some(period) = self.curve.period() {
+            let low = from.min(to);
+            t = low + (t - low).rem_euclid(period);
+        }
+        let at = self.curve.place(t);
+        let ends = [from, to].map(|end| distance(self.curve.place(end), at));
+        let part = (t - from) / (to - from);
+        let is_on = distance(at, p) <= self.tolerance_mm
+            && (0.0..=1.0).contains(&part)
+            && ends.iter().all(|&apart| apart > self.tolerance_mm);
+        is_on.then_some(part)
+    }
+}

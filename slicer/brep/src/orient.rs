@@ -1,0 +1,163 @@
+//! Faces that are inside out, found by their neighbours and turned over.
+
+use std::collections::HashMap;
+
+use crate::gate::{BodyReport, bounds, doubled, sides, volume};
+use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
+use crate::vector::{length, middle};
+
+/// Of two groups of faces that contradict each other the smaller one is inside out,
+/// if its area is less than this part of the other's.
+const CLEARLY_SMALLER: f64 = 0.8;
+
+/// Turns over faces whose facets follow their edges in the same direction as those
+/// of their neighbours, and bodies that are inside out; says whether it did.
+///
+/// Of faces that contradict each other those with less area are turned. A body in
+/// one piece has a positive volume: that decides if the areas are alike. What was
+/// turned is added to the findings.
+pub(crate) fn turn_over(
+    kernel: &dyn Kernel,
+    mesh: &mut Tessellation,
+    reports: &[BodyReport],
+) -> bool {
+    let mut is_turned = false;
+    for (body, report) in kernel.bodies().iter().zip(reports) {
+        if report.faults.is_empty() || report.facets == 0 {
+            continue;
+        }
+        let turned = inverted(mesh, body);
+        if turned.contains(&true) {
+            is_turned = true;
+            turn(kernel, mesh, body, &turned);
+        }
+    }
+    is_turned
+}
+
+fn turn(kernel: &dyn Kernel, mesh: &mut Tessellation, body: &Body, turned: &[bool]) {
+    let is_turned = |facet: &&mut Facet| {
+        body.faces.contains(&facet.face) && turned[(facet.face - body.faces.start) as usize]
+    };
+    for facet in mesh.facets.iter_mut().chain(&mut mesh.tips).filter(is_turned) {
+        facet.corners.swap(1, 2);
+        facet.uv.swap(1, 2);
+    }
+    let finding = |face: u32, fault| Finding { face, entity: kernel.face(face).entity, fault };
+    if turned.iter().all(|&turned| turned) {
+        mesh.findings.push(finding(body.faces.start, Fault::InsideOut));
+    } else {
+        let faces = body.faces.clone().zip(turned).filter(|(_, turned)| **turned);
+        mesh.findings.extend(faces.map(|(face, _)| finding(face, Fault::Inverted)));
+    }
+}
+
+/// Which faces of a body are inside out.
+fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
+    let facets = mesh.of_faces(&body.faces);
+    let count = body.faces.len();
+    let index = |facet: &Facet| (facet.face - body.faces.start) as usize;
+    let mut areas = vec![0.0; count];
+    facets.iter().for_each(|facet| areas[index(facet)] += length(doubled(mesh, facet)));
+    let pieces = pieces(&neighbours(facets, count, index));
+    let mut turned = vec![false; count];
+    for piece in &pieces {
+        let area = |side: bool| -> f64 {
+            piece.iter().filter(|(_, other)| *other == side).map(|(face, _)| areas[*face]).sum()
+        };
+        let [one, other] = [area(false), area(true)];
+        let is_clear = one.min(other) < CLEARLY_SMALLER * one.max(other);
+        if is_clear || pieces.len() == 1 {
+            let smaller = other <= one;
+            piece.iter().for_each(|(face, side)| turned[*face] = *side == smaller);
+        }
+    }
+    // Facets without volume have none to turn.
+    let [low, high] = bounds(mesh, facets);
+    let about = middle(low, high);
+    let signed = |facet: &Facet| {
+        let volume = volume(mesh, std::slice::from_ref(facet), about);
+        if turned[index(facet)] { -volume } else { volume }
+    };
+    if facets.iter().map(signed).sum::<f64>() < 0.0 {
+        turned.iter_mut().for_each(|turned| *turned = !*turned);
+    }
+    turned
+}
+
+/// For each face those that it shares edges with, and whether they contradict it:
+/// both follow the same edge in one direction.
+fn neighbours(
+    facets: &[Facet],
+    count: usize,
+    index: impl Fn(&Facet) -> usize,
+) -> Vec<Vec<(usize, bool)>> {
+    let mut edges: HashMap<[u32; 2], Vec<(usize, bool)>> = HashMap::new();
+    for facet in facets {
+        for [a, b] in sides(facet) {
+            edges.entry([a.min(b), a.max(b)]).or_default().push((index(facet), a > b));
+        }
+    }
+    let mut list = vec![Vec::new(); count];
+    for uses in edges.values() {
+        if let &[(a, down), (b, other)] = uses.as_slice()
+            && a != b
+        {
+            list[a].push((b, down == other));
+            list[b].push((a, down == other));
+        }
+    }
+    for list in &mut list {
+        list.sort_unstable();
+        list.dedup();
+    }
+    list
+}
+
+/// Faces that hang together, each with the side that it is on: two on different
+/// sides contradict each other. Faces without neighbours are pieces too.
+fn pieces(neighbours: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
+    let mut pieces = Vec::new();
+    let mut seen = vec![false; neighbours.len()];
+    for first in 0..neighbours.len() {
+        if std::mem::replace(&mut seen[first], true) {
+            continue;
+        }
+        let mut piece = vec![(first, false)];
+        let mut at = 0;
+        while let Some(&(face, side)) = piece.get(at) {
+            for &(other, is_contrary) in &neighbours[face] {
+                if !std::mem::replace(&mut seen[other], true) {
+                    piece.push((other, side != is_contrary));
+                }
+            }
+            at += 1;
+        }
+        pieces.push(piece);
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_have_sides() {
+        // A ring of four, the third of which contradicts its neighbours, and one
+        // that stands alone.
+        let neighbours = vec![
+            vec![(1, false), (3, false)],
+            vec![(0, false), (2, true)],
+            vec![(1, true), (3, true)],
+            vec![(0, false), (2, true)],
+            vec![],
+        ];
+        let pieces = pieces(&neighbours);
+        assert_eq!(pieces.len(), 2);
+        let mut ring = pieces[0].clone();
+        ring.sort_unstable();
+        assert_eq!(ring, [(0, false), (1, false), (2, true), (3, false)]);
+        assert_eq!(pieces[1], [(4, false)]);
+    }
+}

@@ -1,0 +1,240 @@
+//! A file opened, made into facets and checked, in several ways if it must be.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use crate::error::BrepError;
+use crate::gate::{BodyFault, BodyReport, check};
+use crate::kernel::{Kernel, Tessellation};
+use crate::orient::turn_over;
+use crate::step::StepModel;
+
+/// Which program reads the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KernelName {
+    /// This crate's own, in Rust.
+    #[default]
+    Lamp,
+}
+
+/// A model that is ready to be sliced, unless its reports have faults.
+pub struct Prepared {
+    /// The model.
+    pub kernel: Box<dyn Kernel>,
+    /// Its facets. What was found and done is among their findings.
+    pub mesh: Tessellation,
+    /// What the gate says of each body.
+    pub reports: Vec<BodyReport>,
+    /// What was tried before and was worse, in order.
+    pub tries: Vec<Try>,
+    /// Within which distance what belongs together was joined, in millimetres;
+    /// 0 if the file was taken as it is.
+    pub heal_mm: f64,
+    /// How far facets may lie from their surfaces, in millimetres.
+    pub chord_mm: f64,
+}
+
+/// A way in which a model could not be prepared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Try {
+    /// As in [`Prepared`].
+    pub heal_mm: f64,
+    /// As in [`Prepared`].
+    pub chord_mm: f64,
+    /// What came of it.
+    pub why: String,
+}
+
+/// How much exactness files without a word about it have, in millimetres.
+const USUAL_MM: f64 = 1e-3;
+/// Healing tolerances in parts of the file's own: that, tighter, looser.
+const HEALS: [f64; 3] = [1.0, 0.1, 10.0];
+/// And in parts of the chord, which none may exceed.
+const LOOSEST: [f64; 2] = [0.1, 1.0];
+/// Chords in parts of the one that is wanted.
+const CHORDS: [f64; 2] = [4.0, 16.0];
+
+/// Opens a file, makes its bodies into facets and checks them.
+///
+/// What does not pass is healed first with the tolerance that the file gives for
+/// itself, then with a tighter and with looser ones, never more than the chord;
+/// and then made into facets with chords 4 and 16 times as long. Faces that are
+/// inside out are turned over, which the findings say. The first try without
+/// faults is returned, or else the one with the fewest, whose reports have them:
+/// it is not to be sliced. A panic is caught. There is no time limit.
+///
+/// # Errors
+/// Where the file cannot be read, or no try gives facets.
+pub fn prepare(path: &Path, name: KernelName, chord_mm: f64) -> Result<Prepared, BrepError> {
+    if !(chord_mm > 0.0 && chord_mm.is_finite()) {
+        return Err(BrepError::Chord { chord_mm });
+    }
+    let opened = open(path, name, 0.0)?;
+    let own_mm = opened.kernel.uncertainty_mm().unwrap_or(USUAL_MM);
+    let first = facets(opened.kernel, 0.0, chord_mm);
+    let first_try = Try::of(&first, 0.0, chord_mm);
+    let mut search =
+        Search { path, name, tries: vec![first_try], best: first.map(|made| (0, made)) };
+    let heals = HEALS.map(|by| by * own_mm).into_iter().chain(LOOSEST.map(|by| by * chord_mm));
+    for heal_mm in heals.filter(|heal_mm| *heal_mm <= chord_mm) {
+        search.healed(heal_mm, chord_mm)?;
+    }
+    for by in CHORDS {
+        search.longer(by * chord_mm)?;
+    }
+    let (best, prepared) = search.best?;
+    search.tries.remove(best);
+    Ok(Prepared { tries: search.tries, ..prepared })
+}
+
+/// What was tried so far.
+struct Search<'a> {
+    path: &'a Path,
+    name: KernelName,
+    /// All, the best one too.
+    tries: Vec<Try>,
+    /// Which one it is; an error if none gave facets, that of the first.
+    best: Result<(usize, Prepared), BrepError>,
+}
+
+impl Search<'_> {
+    fn is_done(&self) -> bool {
+        self.best.as_ref().is_ok_and(|(_, best)| best.is_good())
+    }
+
+    fn healed(&mut self, heal_mm: f64, chord_mm: f64) -> Result<(), BrepError> {
+        if !self.is_done() {
+            let opened = open(self.path, self.name, heal_mm)?;
+            if opened.is_changed {
+                self.take(opened.kernel, heal_mm, chord_mm);
+            }
+        }
+        Ok(())
+    }
+
+    /// Tries a longer chord with the healing that was best.
+    fn longer(&mut self, chord_mm: f64) -> Result<(), BrepError> {
+        if !self.is_done() {
+            let heal_mm = self.best.as_ref().map_or(0.0, |(_, best)| best.heal_mm);
+            self.take(open(self.path, self.name, heal_mm)?.kernel, heal_mm, chord_mm);
+        }
+        Ok(())
+    }
+
+    /// Makes facets, and keeps them if they are less wrong than those before.
+    fn take(&mut self, kernel: Box<dyn Kernel>, heal_mm: f64, chord_mm: f64) {
+        let made = facets(kernel, heal_mm, chord_mm);
+        self.tries.push(Try::of(&made, heal_mm, chord_mm));
+        let Ok(made) = made else { return };
+        let is_better = match &self.best {
+            Ok((_, best)) => wrong(&made.reports) < wrong(&best.reports),
+            Err(_) => true,
+        };
+        if is_better {
+            self.best = Ok((self.tries.len() - 1, made));
+        }
+    }
+}
+
+/// Makes facets of a model and checks them.
+fn facets(kernel: Box<dyn Kernel>, heal_mm: f64, chord_mm: f64) -> Result<Prepared, BrepError> {
+    let (mesh, reports) = caught("making facets", || {
+        let mut mesh = kernel.tessellate(chord_mm)?;
+        let mut reports = check(kernel.as_ref(), &mesh);
+        if turn_over(kernel.as_ref(), &mut mesh, &reports) {
+            reports = check(kernel.as_ref(), &mesh);
+        }
+        Ok((mesh, reports))
+    })?;
+    Ok(Prepared { kernel, mesh, reports, tries: Vec::new(), heal_mm, chord_mm })
+}
+
+impl Prepared {
+    /// Whether all bodies may be sliced.
+    pub fn is_good(&self) -> bool {
+        wrong(&self.reports) == [0; 3]
+    }
+}
+
+impl Try {
+    fn of(made: &Result<Prepared, BrepError>, heal_mm: f64, chord_mm: f64) -> Self {
+        let why = match made {
+            Ok(made) => faults(&made.reports),
+            Err(error) => error.to_string(),
+        };
+        Self { heal_mm, chord_mm, why }
+    }
+}
+
+/// What is wrong with bodies, in one line.
+fn faults(reports: &[BodyReport]) -> String {
+    let of_body = |(body, report): (usize, &BodyReport)| {
+        report.faults.iter().map(move |fault| format!("body {body}: {fault}")).collect::<Vec<_>>()
+    };
+    (1..).zip(reports).flat_map(of_body).collect::<Vec<_>>().join("; ")
+}
+
+/// How wrong bodies are: the more, the greater. Bodies with faults, then open
+/// edges, then faults of any kind.
+fn wrong(reports: &[BodyReport]) -> [usize; 3] {
+    let open = |fault: &BodyFault| match fault {
+        BodyFault::Open { edges, .. } => *edges,
+        _ => 0,
+    };
+    let faults = || reports.iter().flat_map(|report| &report.faults);
+    let bodies = reports.iter().filter(|report| !report.faults.is_empty()).count();
+    [bodies, faults().map(open).sum(), faults().count()]
+}
+
+/// A file as a kernel has read it.
+struct Opened {
+    kernel: Box<dyn Kernel>,
+    /// Whether healing changed anything.
+    is_changed: bool,
+}
+
+/// Opens a file, and joins what lies within a tolerance; with 0 it is taken as it
+/// is.
+fn open(path: &Path, name: KernelName, heal_mm: f64) -> Result<Opened, BrepError> {
+    caught("reading the file", || match name {
+        KernelName::Lamp => {
+            let model = StepModel::open_healed(path, heal_mm)?;
+            let is_changed = model.is_healed();
+            Ok(Opened { kernel: Box::new(model), is_changed })
+        }
+    })
+}
+
+/// Does something that may panic, and makes the panic an error.
+fn caught<T>(
+    doing: &'static str,
+    work: impl FnOnce() -> Result<T, BrepError>,
+) -> Result<T, BrepError> {
+    // Nothing that the work changes is looked at after a panic.
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|panic| Err(BrepError::Panicked { doing, what: message(panic.as_ref()) }))
+}
+
+fn message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_a_sentence() {
+        let hook = std::panic::take_hook();
+        std::panic::set_hook(Box::new(|_| {}));
+        let row = 7;
+        let error = caught::<()>("making facets", || panic!("row {row}")).unwrap_err();
+        let text = caught::<()>("making facets", || panic!("no rows")).unwrap_err().to_string();
+        std::panic::set_hook(hook);
+        assert_eq!(error.to_string(), "making facets failed within the program: row 7");
+        assert_eq!(text, "making facets failed within the program: no rows");
+        assert_eq!(caught("making facets", || Ok(3)).unwrap(), 3);
+    }
+}

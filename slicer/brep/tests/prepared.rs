@@ -1,0 +1,128 @@
+//! Files that are healed, or refused for the right reason and at the right place.
+
+use std::path::PathBuf;
+
+use lamp_brep::{BodyFault, Fault, KernelName, Prepared, prepare};
+use lamp_fixtures::{StepDefect, StepPart, StepUnit, broken_step, step};
+
+/// The block's volume, in cubic millimetres.
+const BLOCK_MM3: f64 = 6000.0;
+
+/// A file that is gone when the test is over.
+struct File(PathBuf);
+
+impl File {
+    fn new(name: &str, text: &str) -> Self {
+        let name = format!("lamp-prepared-{}-{name}.step", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, text).unwrap();
+        Self(path)
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+fn prepared(name: &str, text: &str, chord_mm: f64) -> Prepared {
+    let file = File::new(name, text);
+    prepare(&file.0, KernelName::Lamp, chord_mm).unwrap()
+}
+
+fn broken(defect: StepDefect, chord_mm: f64) -> Prepared {
+    prepared(&format!("{defect:?}-{chord_mm}"), &broken_step(defect), chord_mm)
+}
+
+/// The volume of the only body.
+fn volume_mm3(prepared: &Prepared) -> f64 {
+    let [report] = &prepared.reports[..] else { panic!("one body") };
+    assert!(report.faults.is_empty(), "{:?} {:?}", report.faults, prepared.tries);
+    report.volume_mm3
+}
+
+#[test]
+fn what_is_right_is_taken_as_it_is() {
+    for part in StepPart::ALL {
+        let prepared = prepared(&format!("{part:?}"), &step(part, StepUnit::Inch), 0.05);
+        assert!(prepared.is_good(), "{part:?}: {:?}", prepared.reports);
+        assert_eq!((prepared.heal_mm, prepared.chord_mm), (0.0, 0.05));
+        assert!(prepared.tries.is_empty() && prepared.mesh.findings.is_empty(), "{part:?}");
+    }
+}
+
+#[test]
+fn edges_that_faces_do_not_share_are_joined() {
+    // The usual tolerance, one that is tighter would do too; a looser one; one as
+    // long as the chord.
+    for (gap_nm, heal_mm) in [(0, 0.001), (1000, 0.01), (20_000, 0.05)] {
+        let prepared = broken(StepDefect::Apart { gap_nm }, 0.05);
+        let volume_mm3 = volume_mm3(&prepared);
+        let most = f64::from(gap_nm) * 1e-6 * 2200.0;
+        assert!((volume_mm3 - BLOCK_MM3).abs() <= most + 1e-9, "{gap_nm}: {volume_mm3}");
+        assert!((prepared.heal_mm - heal_mm).abs() < 1e-12, "{gap_nm}: {}", prepared.heal_mm);
+        assert!(!prepared.tries.is_empty() && prepared.tries[0].heal_mm == 0.0);
+        let faces: Vec<u32> = prepared.mesh.findings.iter().map(|finding| finding.face).collect();
+        assert_eq!(faces, [0, 1, 2, 3, 4, 5]);
+        for finding in &prepared.mesh.findings {
+            let Fault::Joined { joints: 4, off_mm } = finding.fault else { panic!("{finding:?}") };
+            assert!((off_mm - f64::from(gap_nm) * 1e-6).abs() < 1e-9, "{gap_nm}: {off_mm}");
+        }
+    }
+}
+
+#[test]
+fn a_gap_wider_than_the_chord_stays_open() {
+    let prepared = broken(StepDefect::Apart { gap_nm: 100_000 }, 0.02);
+    let [BodyFault::Open { edges, .. }] = prepared.reports[0].faults[..] else {
+        panic!("{:?}", prepared.reports)
+    };
+    // Four sides of each of six faces.
+    assert_eq!(edges, 24);
+    assert!(prepared.tries.iter().all(|a_try| a_try.heal_mm <= 0.02));
+    assert!(prepared.mesh.findings.is_empty());
+    // Longer chords do not help.
+    assert_eq!(prepared.tries.last().unwrap().chord_mm, 0.32);
+    // With a chord as long as the gap it is healed, and that is said.
+    let prepared = broken(StepDefect::Apart { gap_nm: 100_000 }, 0.2);
+    assert!(prepared.is_good() && prepared.mesh.findings.len() == 6);
+}
+
+#[test]
+fn a_missing_face_is_refused_where_it_is() {
+    let prepared = broken(StepDefect::Missing, 0.05);
+    let [BodyFault::Open { edges: 4, at_mm, .. }] = prepared.reports[0].faults[..] else {
+        panic!("{:?}", prepared.reports)
+    };
+    assert_eq!(at_mm[2], 10.0);
+}
+
+#[test]
+fn an_inverted_face_is_turned_over_and_named() {
+    let prepared = broken(StepDefect::Inverted, 0.05);
+    assert!((volume_mm3(&prepared) - BLOCK_MM3).abs() < 1e-9);
+    let [finding] = &prepared.mesh.findings[..] else { panic!("{:?}", prepared.mesh.findings) };
+    assert_eq!((finding.face, &finding.fault), (2, &Fault::Inverted));
+    assert_eq!(finding.entity, prepared.kernel.face(2).entity);
+}
+
+#[test]
+fn a_body_that_is_inside_out_is_turned_over() {
+    let prepared = broken(StepDefect::InsideOut, 0.05);
+    assert!((volume_mm3(&prepared) - BLOCK_MM3).abs() < 1e-9);
+    let [finding] = &prepared.mesh.findings[..] else { panic!("{:?}", prepared.mesh.findings) };
+    assert_eq!(finding.fault, Fault::InsideOut);
+}
+
+#[test]
+fn loops_that_cross_themselves_are_named() {
+    let prepared = broken(StepDefect::Crossing, 0.05);
+    assert!(!prepared.is_good());
+    // Bottom and top.
+    let named: Vec<(u32, &Fault)> =
+        prepared.mesh.findings.iter().map(|finding| (finding.face, &finding.fault)).collect();
+    assert_eq!(named, [(0, &Fault::Crossing), (5, &Fault::Crossing)]);
+    let entities = prepared.mesh.findings.iter().map(|finding| finding.entity);
+    assert!(entities.eq([0, 5].map(|face| prepared.kernel.face(face).entity)));
+}
