@@ -91,6 +91,12 @@ impl Frame {
         Frame { origin: self.point(inner.origin), axes }
     }
 
+    /// This frame, turned by half a turn about its first axis.
+    pub(crate) fn turned(&self) -> Frame {
+        let [x, y, z] = self.axes;
+        Frame { origin: self.origin, axes: [x, scale(y, -1.0), scale(z, -1.0)] }
+    }
+
     /// This frame undone: `self.then(&self.inverse())` is the world.
     pub(crate) fn inverse(&self) -> Frame {
         let [x, y, z] = self.axes;

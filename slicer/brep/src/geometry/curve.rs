@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use super::chain::Chain;
 use super::spline::SplineCurve;
-use crate::vector::{Frame, Vec3, along, distance, dot, sub};
+use crate::vector::{Frame, Vec3, along, distance, dot, scale, sub};
 
 /// A curve in space, in millimetres, as ISO 10303-42 gives its parameter.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +27,7 @@ pub(crate) enum Curve {
         focal: f64,
     },
     Spline(SplineCurve),
+    Chain(Chain),
 }
 
 /// Steps of the search for the nearest point.
@@ -51,6 +53,21 @@ impl Curve {
                 [2.0 * focal * t, 2.0 * focal, 0.0],
             ),
             Self::Spline(spline) => spline.at(t),
+            Self::Chain(chain) => chain.at(t),
+        }
+    }
+
+    /// The same curve, followed the other way.
+    pub(crate) fn reversed(self) -> Self {
+        match self {
+            Self::Line { point, direction } => {
+                Self::Line { point, direction: scale(direction, -1.0) }
+            }
+            Self::Ellipse { frame, radii } => Self::Ellipse { frame: frame.turned(), radii },
+            Self::Hyperbola { frame, axes } => Self::Hyperbola { frame: frame.turned(), axes },
+            Self::Parabola { frame, focal } => Self::Parabola { frame: frame.turned(), focal },
+            Self::Spline(spline) => Self::Spline(spline.reversed()),
+            Self::Chain(chain) => Self::Chain(chain.reversed()),
         }
     }
 
@@ -59,6 +76,16 @@ impl Curve {
         match self {
             Self::Ellipse { .. } => Some([0.0, TAU]),
             Self::Spline(spline) => Some(spline.knots.domain()),
+            Self::Chain(chain) => Some(chain.domain()),
+            _ => None,
+        }
+    }
+
+    /// Where a piece ends: between them the curve is smooth.
+    pub(super) fn breaks(&self) -> Option<Vec<f64>> {
+        match self {
+            Self::Spline(spline) => Some(spline.knots.breaks()),
+            Self::Chain(chain) => Some(chain.breaks()),
             _ => None,
         }
     }
@@ -67,12 +94,11 @@ impl Curve {
     pub(crate) fn period(&self) -> Option<f64> {
         match self {
             Self::Ellipse { .. } => Some(TAU),
-            Self::Spline(spline) => {
-                let [start, end] = spline.knots.domain();
-                let apart = distance(spline.at(start)[0], spline.at(end)[0]);
+            _ => {
+                let [start, end] = self.domain()?;
+                let apart = distance(self.at(start)[0], self.at(end)[0]);
                 (apart < 1e-6).then_some(end - start)
             }
-            _ => None,
         }
     }
 
@@ -87,8 +113,7 @@ impl Curve {
         };
         match self {
             Self::Ellipse { .. } => parts(&[0.0, TAU], 16),
-            Self::Spline(spline) => parts(&spline.knots.breaks(), 8),
-            _ => vec![-1.0, 0.0, 1.0],
+            _ => self.breaks().map_or(vec![-1.0, 0.0, 1.0], |breaks| parts(&breaks, 8)),
         }
     }
 
@@ -107,6 +132,7 @@ impl Curve {
                 self.nearer(p, (frame.local(p)[1] / axes[1]).asinh())
             }
             Self::Parabola { frame, focal } => self.nearer(p, frame.local(p)[1] / (2.0 * focal)),
+            Self::Chain(chain) => chain.project(p),
             Self::Spline(_) => {
                 let far = |t: f64| distance(self.at(t)[0], p);
                 let samples = self.samples();
@@ -146,11 +172,10 @@ impl Curve {
     /// further than `chord_mm` from it; the ends are among them.
     pub(crate) fn polyline(&self, [from, to]: [f64; 2], chord_mm: f64) -> Vec<Vec3> {
         let mut breaks = vec![from];
-        match self {
-            Self::Line { .. } => {}
-            Self::Spline(spline) => {
-                let knots = spline.knots.breaks();
-                let [start, end] = spline.knots.domain();
+        match (self, self.breaks()) {
+            (Self::Line { .. }, _) => {}
+            (_, Some(knots)) => {
+                let [start, end] = [knots[0], knots[knots.len() - 1]];
                 // Closed curves may pass their seam.
                 let turns = [-1.0, 0.0, 1.0].map(|turn| turn * (end - start));
                 let all = turns.iter().flat_map(|turn| knots.iter().map(move |k| k + turn));
@@ -178,8 +203,8 @@ impl Curve {
     /// The point at `t`, also past the seam of a closed spline.
     pub(crate) fn place(&self, t: f64) -> Vec3 {
         match (self, self.domain()) {
-            (Self::Spline(spline), Some([start, end])) if t < start || t > end => {
-                spline.at(start + (t - start).rem_euclid(end - start))[0]
+            (Self::Spline(_) | Self::Chain(_), Some([start, end])) if t < start || t > end => {
+                self.at(start + (t - start).rem_euclid(end - start))[0]
             }
             _ => self.at(t)[0],
         }
@@ -231,7 +256,7 @@ pub(crate) fn edge_range(curve: &Curve, start: Vec3, end: Vec3, forward: bool) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::{length, scale};
+    use crate::vector::length;
 
     fn circle() -> Curve {
         Curve::Ellipse { frame: Frame::WORLD, radii: [5.0; 2] }
@@ -274,6 +299,9 @@ mod tests {
         for curve in [circle(), ellipse, hyperbola, parabola] {
             for t in [-1.4, -0.2, 0.0, 0.9, 2.0] {
                 assert!((curve.project(curve.at(t)[0]) - t).abs() < 1e-12, "{curve:?} {t}");
+                let back = curve.clone().reversed();
+                assert!(distance(back.at(-t)[0], curve.at(t)[0]) < 1e-12);
+                assert!(distance(back.at(-t)[1], scale(curve.at(t)[1], -1.0)) < 1e-12);
             }
         }
     }

@@ -1,9 +1,13 @@
 //! Curves and surfaces: points, derivatives, and the way back from a point to
 //! its parameters.
 
+pub(crate) mod chain;
 pub(crate) mod curve;
+mod offset;
+mod project;
 pub(crate) mod spline;
 pub(crate) mod surface;
 
+pub(crate) use chain::{Chain, Link};
 pub(crate) use curve::{Curve, edge_range};
 pub(crate) use surface::{Pole, Surface, TorusPart};

@@ -38,6 +38,13 @@ impl Knots {
         [self.knots[self.degree], self.knots[self.knots.len() - 1 - self.degree]]
     }
 
+    /// The knots backwards: for control points that are turned over.
+    fn reversed(&self) -> Self {
+        let [start, end] = self.domain();
+        let knots = self.knots.iter().rev().map(|knot| start + end - knot).collect();
+        Self { degree: self.degree, knots }
+    }
+
     /// The knots of the domain, each once.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let mut breaks = self.knots[self.degree..self.knots.len() - self.degree].to_vec();
@@ -128,6 +135,13 @@ pub(crate) struct SplineCurve {
 }
 
 impl SplineCurve {
+    /// The same curve, followed the other way.
+    pub(crate) fn reversed(mut self) -> Self {
+        self.knots = self.knots.reversed();
+        self.points.reverse();
+        self
+    }
+
     /// The point and the derivative at `t`.
     pub(crate) fn at(&self, t: f64) -> [Vec3; 2] {
         let basis = self.knots.basis(t);
@@ -254,6 +268,7 @@ mod tests {
             let by_difference =
                 [0, 1, 2].map(|k| (curve.at(t + step)[0][k] - curve.at(t - step)[0][k]) / 2e-6);
             assert!(distance(d, by_difference) < 1e-8, "{d:?} {by_difference:?}");
+            assert!(distance(curve.clone().reversed().at(1.0 - t)[0], p) < 1e-14);
         }
     }
 

@@ -3,9 +3,10 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::curve::Curve;
+use super::offset;
 use super::spline::SplineSurface;
 use crate::kernel::Jet;
-use crate::vector::{Frame, Vec3, add, distance, dot, length, scale, sub};
+use crate::vector::{Frame, Vec3, add, scale};
 
 /// A surface in millimetres, as ISO 10303-42 gives its parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +42,11 @@ pub(crate) enum Surface {
         curve: Curve,
     },
     Spline(Box<SplineSurface>),
+    /// Another surface, moved along its normals.
+    Offset {
+        basis: Box<Surface>,
+        by_mm: f64,
+    },
 }
 
 /// What of a torus is meant: a tube wider than its way round meets itself.
@@ -54,7 +60,7 @@ pub(crate) enum TorusPart {
 }
 
 /// How far apart points are held to be one, in millimetres.
-const SAME_MM: f64 = 1e-6;
+pub(super) const SAME_MM: f64 = 1e-6;
 
 impl Surface {
     /// The name of its kind.
@@ -68,6 +74,7 @@ impl Surface {
             Self::Extrusion { .. } => "extrusion",
             Self::Revolution { .. } => "revolution",
             Self::Spline(_) => "B-spline",
+            Self::Offset { .. } => "offset",
         }
     }
 
@@ -114,6 +121,7 @@ impl Surface {
                 let [point, du, dv] = spline.at(u, v);
                 Jet { point, du, dv }
             }
+            Self::Offset { basis, by_mm } => offset::at(basis, *by_mm, [u, v]),
         }
     }
 
@@ -131,6 +139,7 @@ impl Surface {
             Self::Extrusion { curve, .. } => [curve.period(), None],
             Self::Revolution { curve, .. } => [Some(TAU), curve.period()],
             Self::Spline(spline) => spline.periods,
+            Self::Offset { basis, .. } => basis.periods(),
         }
     }
 
@@ -151,6 +160,7 @@ impl Surface {
             Self::Extrusion { curve, .. } => [curve.domain(), None],
             Self::Revolution { curve, .. } => [round, curve.domain()],
             Self::Spline(spline) => [Some(spline.u.domain()), Some(spline.v.domain())],
+            Self::Offset { basis, .. } => basis.domain(),
         }
     }
 
@@ -183,6 +193,10 @@ impl Surface {
                 let poles = sides.into_iter().filter(is_pole);
                 poles.map(|(axis, last)| pole(axis, ends[axis][usize::from(last)])).collect()
             }
+            // A pole with one normal stays one.
+            Self::Offset { basis, .. } => {
+                basis.poles().into_iter().map(|at| pole(at.axis, at.at)).collect()
+            }
             _ => Vec::new(),
         }
     }
@@ -200,130 +214,6 @@ impl Surface {
         }
         Some(bounds)
     }
-
-    /// Parameters from which the nearest point to `p` is looked for.
-    fn seeds(&self, p: Vec3) -> Vec<[f64; 2]> {
-        match self {
-            Self::Extrusion { curve: curve @ Curve::Line { .. }, .. } => {
-                vec![[curve.project(p), 0.0]]
-            }
-            Self::Extrusion { curve, direction } => {
-                let along = |&u: &f64| {
-                    let d = sub(p, curve.at(u)[0]);
-                    [u, dot(d, *direction) / dot(*direction, *direction)]
-                };
-                curve.samples().iter().map(along).collect()
-            }
-            Self::Revolution { frame, curve } => {
-                let [x, y, z] = frame.local(p);
-                let mut samples = curve.samples();
-                let around = (0..8).map(|k| f64::from(k) * TAU / 8.0);
-                samples.extend(around.map(|turn| {
-                    let (sin, cos) = turn.sin_cos();
-                    curve.project([x * cos - y * sin, x * sin + y * cos, z])
-                }));
-                let turn = |v: f64| {
-                    let at = curve.at(v)[0];
-                    [y.atan2(x) - at[1].atan2(at[0]), v]
-                };
-                samples.into_iter().map(turn).collect()
-            }
-            Self::Spline(spline) => spline.seeds(),
-            _ => Vec::new(),
-        }
-    }
-
-    /// The parameters of the point nearest to `p`, looked for near `hint` first.
-    ///
-    /// At a pole the parameter that has no meaning there is any. What comes
-    /// again after a period lies in any of them.
-    pub(crate) fn project(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
-        let azimuth = |q: Vec3| q[1].atan2(q[0]);
-        match self {
-            Self::Plane(frame) => {
-                let [u, v, _] = frame.local(p);
-                [u, v]
-            }
-            Self::Cylinder { frame, .. } => {
-                let q = frame.local(p);
-                [azimuth(q), q[2]]
-            }
-            Self::Cone { frame, radius, slope } => {
-                let q = frame.local(p);
-                let off = q[0].hypot(q[1]) - radius;
-                let v = (q[2] + slope * off) / (1.0 + slope * slope);
-                [azimuth(q), v]
-            }
-            Self::Sphere { frame, .. } => {
-                let q = frame.local(p);
-                [azimuth(q), q[2].atan2(q[0].hypot(q[1]))]
-            }
-            Self::Torus { frame, major, part, .. } => {
-                let q = frame.local(p);
-                let out = q[0].hypot(q[1]);
-                if *part == TorusPart::Lemon {
-                    // The tube's far side: behind the axis, as seen from u.
-                    return [azimuth(q) + TAU / 2.0, q[2].atan2(-out - major).rem_euclid(TAU)];
-                }
-                [azimuth(q), q[2].atan2(out - major)]
-            }
-            _ => self.search(p, hint),
-        }
-    }
-
-    fn search(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
-        let near = hint.map(|hint| self.nearer(p, hint));
-        if let Some((apart, uv)) = near
-            && apart < SAME_MM
-        {
-            return uv;
-        }
-        let mut seeds: Vec<_> =
-            self.seeds(p).into_iter().map(|uv| (distance(self.point(uv), p), uv)).collect();
-        seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let found = seeds.into_iter().take(6).map(|(_, uv)| self.nearer(p, uv));
-        // The hint wins what is as good as even.
-        let better = |a: (f64, [f64; 2]), b: (f64, [f64; 2])| if b.0 < a.0 * 0.99 { b } else { a };
-        near.into_iter().chain(found).reduce(better).map_or([0.0; 2], |(_, uv)| uv)
-    }
-
-    /// Goes from parameters to the foot of `p` (Gauss-Newton), and says how far
-    /// `p` lies from it.
-    fn nearer(&self, p: Vec3, start: [f64; 2]) -> (f64, [f64; 2]) {
-        let (domain, periods) = (self.domain(), self.periods());
-        let clamp = |x: f64, axis: usize| match (domain[axis], periods[axis]) {
-            (Some([low, high]), None) => x.clamp(low, high),
-            _ => x,
-        };
-        let mut uv = start;
-        let mut best = (f64::INFINITY, start);
-        for _ in 0..30 {
-            let jet = self.at(uv);
-            let d = sub(p, jet.point);
-            let apart = length(d);
-            if apart >= best.0 * (1.0 - 1e-9) && best.0 < SAME_MM {
-                break;
-            }
-            if apart < best.0 {
-                best = (apart, uv);
-            }
-            let (a, b, c) = (dot(jet.du, jet.du), dot(jet.du, jet.dv), dot(jet.dv, jet.dv));
-            let (e, f) = (dot(d, jet.du), dot(d, jet.dv));
-            let det = a * c - b * b;
-            let step = if det > 1e-14 * a * c {
-                [(e * c - f * b) / det, (f * a - e * b) / det]
-            } else {
-                // At a pole only one parameter has a meaning.
-                [if a > c { e / a } else { 0.0 }, if c >= a && c > 0.0 { f / c } else { 0.0 }]
-            };
-            let next = [clamp(uv[0] + step[0], 0), clamp(uv[1] + step[1], 1)];
-            if !(next[0].is_finite() && next[1].is_finite()) || next == uv {
-                break;
-            }
-            uv = next;
-        }
-        best
-    }
 }
 
 /// A side of a surface's domain that is one point.
@@ -337,7 +227,7 @@ pub(crate) struct Pole {
 }
 
 /// A parameter within the domain, where it comes again.
-fn inside(t: f64, domain: Option<[f64; 2]>, period: Option<f64>) -> f64 {
+pub(super) fn inside(t: f64, domain: Option<[f64; 2]>, period: Option<f64>) -> f64 {
     match (domain, period) {
         (Some([low, high]), Some(period)) if t < low || t > high => {
             low + (t - low).rem_euclid(period)

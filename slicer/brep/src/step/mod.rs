@@ -1,8 +1,11 @@
 //! Reading STEP files (ISO 10303-21, AP203, AP214, AP242).
 
 mod assembly;
+mod curve;
 mod file;
 mod shape;
+mod spline;
+mod surface;
 mod token;
 mod topology;
 mod units;

@@ -1,0 +1,132 @@
+//! Surfaces moved along the normals of others.
+
+use super::surface::{Surface, TorusPart};
+use crate::kernel::Jet;
+use crate::vector::{Vec3, along, cross, scale, sub, unit};
+
+/// Steps by which the normal's slopes are taken, in parts of the domain: their
+/// errors only make the search for a point take longer.
+const STEP: f64 = 1e-5;
+
+impl Surface {
+    /// The surface moved along its normals (du × dv); nothing if it would vanish.
+    pub(crate) fn offset(self, by_mm: f64) -> Option<Surface> {
+        if !by_mm.is_finite() {
+            return None;
+        }
+        let moved = match self {
+            Self::Plane(mut frame) => {
+                frame.origin = along(frame.origin, frame.axes[2], by_mm);
+                Self::Plane(frame)
+            }
+            Self::Cylinder { frame, radius } => Self::Cylinder { frame, radius: radius + by_mm },
+            Self::Sphere { frame, radius } => Self::Sphere { frame, radius: radius + by_mm },
+            Self::Torus { frame, major, minor, part: TorusPart::Whole }
+                if minor + by_mm <= major =>
+            {
+                Self::Torus { frame, major, minor: minor + by_mm, part: TorusPart::Whole }
+            }
+            Self::Cone { frame, radius, slope } => {
+                let radius = radius + by_mm * (1.0 + slope * slope).sqrt();
+                Self::Cone { frame, radius, slope }
+            }
+            basis => Self::Offset { basis: Box::new(basis), by_mm },
+        };
+        let size = match &moved {
+            Self::Cylinder { radius, .. } | Self::Sphere { radius, .. } => *radius,
+            Self::Torus { minor, .. } => *minor,
+            _ => 1.0,
+        };
+        (size > 0.0).then_some(moved)
+    }
+}
+
+/// The point and the derivatives of a surface moved along the normals of `basis`.
+pub(super) fn at(basis: &Surface, by_mm: f64, uv: [f64; 2]) -> Jet {
+    let jet = basis.at(uv);
+    let here = normal(basis, uv);
+    // Where there is none, at a pole or an edge, that beside it.
+    let [u, v] = uv;
+    let steps = steps(basis);
+    let moved = |axis: usize, by: f64| {
+        let mut uv = [u, v];
+        uv[axis] += by * steps[axis];
+        uv
+    };
+    let slope = |axis: usize| -> Vec3 {
+        let sides = [-1.0, 1.0].map(|by| normal(basis, moved(axis, by)));
+        let [Some(low), Some(high)] = sides else { return [0.0; 3] };
+        scale(sub(high, low), by_mm / (2.0 * steps[axis]))
+    };
+    let beside = || {
+        let all = [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)];
+        all.into_iter().find_map(|(axis, by)| normal(basis, moved(axis, by)))
+    };
+    let Some(normal) = here.or_else(beside) else { return jet };
+    Jet {
+        point: along(jet.point, normal, by_mm),
+        du: along(jet.du, slope(0), 1.0),
+        dv: along(jet.dv, slope(1), 1.0),
+    }
+}
+
+fn normal(basis: &Surface, uv: [f64; 2]) -> Option<Vec3> {
+    let jet = basis.at(uv);
+    // A product of short vectors is shorter still.
+    unit(cross(unit(jet.du)?, unit(jet.dv)?))
+}
+
+fn steps(basis: &Surface) -> [f64; 2] {
+    basis.domain().map(|domain| STEP * domain.map_or(1.0, |[low, high]| high - low))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Curve;
+    use crate::vector::{Frame, distance};
+
+    /// A cylinder of radius 3 as a circle that is moved up.
+    fn drum() -> Surface {
+        let curve = Curve::Ellipse { frame: Frame::WORLD, radii: [3.0; 2] };
+        Surface::Extrusion { curve, direction: [0.0, 0.0, 1.0] }
+    }
+
+    #[test]
+    fn an_offset_lies_on_the_normals() {
+        let offset = drum().offset(1.5).unwrap();
+        let plain = Surface::Cylinder { frame: Frame::WORLD, radius: 3.0 }.offset(1.5).unwrap();
+        for uv in [[0.0, 0.0], [1.0, 2.0], [4.0, -3.0]] {
+            let (a, b) = (offset.at(uv), plain.at(uv));
+            assert!(distance(a.point, b.point) < 1e-14);
+            assert!(distance(a.du, b.du) < 1e-8 && distance(a.dv, b.dv) < 1e-8);
+            let found = offset.project(a.point, None);
+            assert!(distance(offset.point(found), a.point) < 1e-9);
+        }
+        assert_eq!(offset.kind(), "offset");
+    }
+
+    #[test]
+    fn cones_and_tori_stay_what_they_are() {
+        let cone = Surface::Cone { frame: Frame::WORLD, radius: 3.0, slope: 0.5 };
+        let torus =
+            Surface::Torus { frame: Frame::WORLD, major: 5.0, minor: 2.0, part: TorusPart::Whole };
+        for surface in [cone, torus] {
+            let offset = surface.clone().offset(0.7).unwrap();
+            assert_eq!(offset.kind(), surface.kind());
+            for uv in [[0.3, 0.2], [2.0, 1.0]] {
+                let foot = surface.at(uv);
+                let normal = unit(cross(foot.du, foot.dv)).unwrap();
+                let p = along(foot.point, normal, 0.7);
+                assert!(distance(offset.point(offset.project(p, None)), p) < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn what_vanishes_is_nothing() {
+        let ball = Surface::Sphere { frame: Frame::WORLD, radius: 3.0 };
+        assert_eq!(ball.clone().offset(-3.0), None);
+        assert_eq!(ball.offset(f64::NAN), None);
+    }
+}

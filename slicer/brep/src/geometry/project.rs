@@ -1,0 +1,140 @@
+//! The way from a point back to a surface's parameters.
+
+use std::f64::consts::TAU;
+
+use super::curve::Curve;
+use super::surface::{SAME_MM, Surface, TorusPart};
+use crate::vector::{Vec3, distance, dot, length, sub};
+
+impl Surface {
+    /// Parameters from which the nearest point to `p` is looked for.
+    fn seeds(&self, p: Vec3) -> Vec<[f64; 2]> {
+        match self {
+            Self::Extrusion { curve: curve @ Curve::Line { .. }, .. } => {
+                vec![[curve.project(p), 0.0]]
+            }
+            Self::Extrusion { curve, direction } => {
+                let along = |&u: &f64| {
+                    let d = sub(p, curve.at(u)[0]);
+                    [u, dot(d, *direction) / dot(*direction, *direction)]
+                };
+                curve.samples().iter().map(along).collect()
+            }
+            Self::Revolution { frame, curve } => {
+                let [x, y, z] = frame.local(p);
+                let mut samples = curve.samples();
+                let around = (0..8).map(|k| f64::from(k) * TAU / 8.0);
+                samples.extend(around.map(|turn| {
+                    let (sin, cos) = turn.sin_cos();
+                    curve.project([x * cos - y * sin, x * sin + y * cos, z])
+                }));
+                let turn = |v: f64| {
+                    let at = curve.at(v)[0];
+                    [y.atan2(x) - at[1].atan2(at[0]), v]
+                };
+                samples.into_iter().map(turn).collect()
+            }
+            Self::Spline(spline) => spline.seeds(),
+            Self::Offset { basis, .. } => basis.offset_seeds(p),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The same for a surface moved along its normals: the foot of a point stays.
+    fn offset_seeds(&self, p: Vec3) -> Vec<[f64; 2]> {
+        let foot = self.project(p, None);
+        self.seeds(p).into_iter().chain([foot]).collect()
+    }
+
+    /// The parameters of the point nearest to `p`, looked for near `hint` first.
+    ///
+    /// At a pole the parameter that has no meaning there is any. What comes
+    /// again after a period lies in any of them.
+    pub(crate) fn project(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
+        let azimuth = |q: Vec3| q[1].atan2(q[0]);
+        match self {
+            Self::Plane(frame) => {
+                let [u, v, _] = frame.local(p);
+                [u, v]
+            }
+            Self::Cylinder { frame, .. } => {
+                let q = frame.local(p);
+                [azimuth(q), q[2]]
+            }
+            Self::Cone { frame, radius, slope } => {
+                let q = frame.local(p);
+                let off = q[0].hypot(q[1]) - radius;
+                let v = (q[2] + slope * off) / (1.0 + slope * slope);
+                [azimuth(q), v]
+            }
+            Self::Sphere { frame, .. } => {
+                let q = frame.local(p);
+                [azimuth(q), q[2].atan2(q[0].hypot(q[1]))]
+            }
+            Self::Torus { frame, major, part, .. } => {
+                let q = frame.local(p);
+                let out = q[0].hypot(q[1]);
+                if *part == TorusPart::Lemon {
+                    // The tube's far side: behind the axis, as seen from u.
+                    return [azimuth(q) + TAU / 2.0, q[2].atan2(-out - major).rem_euclid(TAU)];
+                }
+                [azimuth(q), q[2].atan2(out - major)]
+            }
+            _ => self.search(p, hint),
+        }
+    }
+
+    fn search(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
+        let near = hint.map(|hint| self.nearer(p, hint));
+        if let Some((apart, uv)) = near
+            && apart < SAME_MM
+        {
+            return uv;
+        }
+        let mut seeds: Vec<_> =
+            self.seeds(p).into_iter().map(|uv| (distance(self.point(uv), p), uv)).collect();
+        seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let found = seeds.into_iter().take(6).map(|(_, uv)| self.nearer(p, uv));
+        // The hint wins what is as good as even.
+        let better = |a: (f64, [f64; 2]), b: (f64, [f64; 2])| if b.0 < a.0 * 0.99 { b } else { a };
+        near.into_iter().chain(found).reduce(better).map_or([0.0; 2], |(_, uv)| uv)
+    }
+
+    /// Goes from parameters to the foot of `p` (Gauss-Newton), and says how far
+    /// `p` lies from it.
+    fn nearer(&self, p: Vec3, start: [f64; 2]) -> (f64, [f64; 2]) {
+        let (domain, periods) = (self.domain(), self.periods());
+        let clamp = |x: f64, axis: usize| match (domain[axis], periods[axis]) {
+            (Some([low, high]), None) => x.clamp(low, high),
+            _ => x,
+        };
+        let mut uv = start;
+        let mut best = (f64::INFINITY, start);
+        for _ in 0..30 {
+            let jet = self.at(uv);
+            let d = sub(p, jet.point);
+            let apart = length(d);
+            if apart >= best.0 * (1.0 - 1e-9) && best.0 < SAME_MM {
+                break;
+            }
+            if apart < best.0 {
+                best = (apart, uv);
+            }
+            let (a, b, c) = (dot(jet.du, jet.du), dot(jet.du, jet.dv), dot(jet.dv, jet.dv));
+            let (e, f) = (dot(d, jet.du), dot(d, jet.dv));
+            let det = a * c - b * b;
+            let step = if det > 1e-14 * a * c {
+                [(e * c - f * b) / det, (f * a - e * b) / det]
+            } else {
+                // At a pole only one parameter has a meaning.
+                [if a > c { e / a } else { 0.0 }, if c >= a && c > 0.0 { f / c } else { 0.0 }]
+            };
+            let next = [clamp(uv[0] + step[0], 0), clamp(uv[1] + step[1], 1)];
+            if !(next[0].is_finite() && next[1].is_finite()) || next == uv {
+                break;
+            }
+            uv = next;
+        }
+        best
+    }
+}

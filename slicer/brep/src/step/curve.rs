@@ -1,0 +1,138 @@
+//! Curves out of entities.
+
+use super::StepError;
+use super::file::{Item, Value};
+use super::shape::{MOST_NESTED, Shapes};
+use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
+use crate::geometry::{Chain, Curve, Link, edge_range};
+use crate::vector::unit;
+
+impl Shapes<'_> {
+    /// The curve of an edge.
+    pub(crate) fn curve(&self, id: u64) -> Result<Curve, StepError> {
+        self.curve_within(id, 0)
+    }
+
+    fn curve_within(&self, id: u64, depth: usize) -> Result<Curve, StepError> {
+        if let Some(spline) = self.spline_curve(id)? {
+            return Ok(Curve::Spline(spline));
+        }
+        let item = self.entities.simple(id)?;
+        let unsupported = || StepError::Unsupported { id, name: item.name().to_owned() };
+        match item.name() {
+            "LINE" => {
+                let vector = self.entities.get(item.reference(2)?, "VECTOR")?;
+                let direction = unit(self.direction(vector.reference(1)?)?);
+                Ok(Curve::Line {
+                    point: self.point(item.reference(1)?)?,
+                    direction: direction.ok_or(StepError::Numbers { id, what: "direction" })?,
+                })
+            }
+            "CIRCLE" => {
+                let radius = self.length(item, 2)?;
+                Ok(Curve::Ellipse { frame: self.frame(item.reference(1)?)?, radii: [radius; 2] })
+            }
+            "ELLIPSE" => Ok(Curve::Ellipse {
+                frame: self.frame(item.reference(1)?)?,
+                radii: [self.length(item, 2)?, self.length(item, 3)?],
+            }),
+            "HYPERBOLA" => Ok(Curve::Hyperbola {
+                frame: self.frame(item.reference(1)?)?,
+                axes: [self.length(item, 2)?, self.length(item, 3)?],
+            }),
+            "PARABOLA" => Ok(Curve::Parabola {
+                frame: self.frame(item.reference(1)?)?,
+                focal: self.length(item, 2)?,
+            }),
+            "POLYLINE" => self.polyline(item),
+            "SURFACE_CURVE" | "SEAM_CURVE" | "INTERSECTION_CURVE" if depth < MOST_NESTED => {
+                self.curve_within(item.reference(1)?, depth + 1)
+            }
+            // An edge's vertices say where it ends, but it may go the other way.
+            "TRIMMED_CURVE" if depth < MOST_NESTED => {
+                let curve = self.curve_within(item.reference(1)?, depth + 1)?;
+                Ok(if item.truth(4)? { curve } else { curve.reversed() })
+            }
+            "COMPOSITE_CURVE" if depth < MOST_NESTED => self.composite(item, depth),
+            _ => Err(unsupported()),
+        }
+    }
+
+    fn polyline(&self, item: Item) -> Result<Curve, StepError> {
+        let points = item.references(1)?;
+        let points: Vec<Weighted> = points
+            .iter()
+            .map(|&id| Ok(weighted(self.point(id)?, 1.0)))
+            .collect::<Result<_, _>>()?;
+        let count = points.len();
+        let knots = (0..count + 2).map(|k| k.clamp(1, count) as f64).collect();
+        let knots = Knots::new(1, knots, count);
+        let knots = knots.ok_or(StepError::Numbers { id: item.id, what: "curve" })?;
+        Ok(Curve::Spline(SplineCurve { knots, points }))
+    }
+
+    /// Bounded curves, one after the other.
+    fn composite(&self, item: Item, depth: usize) -> Result<Curve, StepError> {
+        let link = |id: u64| {
+            let segment = self.entities.get(id, "COMPOSITE_CURVE_SEGMENT")?;
+            let mut link = self.bounded(segment.reference(2)?, depth + 1)?;
+            if !segment.truth(1)? {
+                link.range.reverse();
+            }
+            Ok(link)
+        };
+        let links = item.references(1)?.into_iter().map(link).collect::<Result<_, StepError>>()?;
+        let bad = StepError::Numbers { id: item.id, what: "chain of curves" };
+        Chain::new(links).map(Curve::Chain).ok_or(bad)
+    }
+
+    /// A curve that ends.
+    fn bounded(&self, id: u64, depth: usize) -> Result<Link, StepError> {
+        if let Some(trimmed) = self.entities.find(id, "TRIMMED_CURVE") {
+            return self.trimmed(trimmed, depth);
+        }
+        let curve = self.curve_within(id, depth)?;
+        let range = curve.domain().ok_or(StepError::Numbers { id, what: "bounded curve" })?;
+        Ok(Link { curve, range })
+    }
+
+    /// A part of a curve, between points or parameters.
+    fn trimmed(&self, item: Item, depth: usize) -> Result<Link, StepError> {
+        let basis = item.reference(1)?;
+        let curve = self.curve_within(basis, depth + 1)?;
+        let forward = item.truth(4)?;
+        let point = |k: usize| {
+            let mut all = item.list(k)?.iter().filter_map(Value::reference);
+            let id = all.find(|id| self.entities.find(*id, "CARTESIAN_POINT").is_some());
+            id.map(|id| self.point(id)).transpose()
+        };
+        if let (Some(start), Some(end)) = (point(2)?, point(3)?) {
+            let range = edge_range(&curve, start, end, forward);
+            return Ok(Link { curve, range });
+        }
+        let scale = self.parameter(basis, &curve)?;
+        let parameter = |k: usize| {
+            let number = item.list(k)?.iter().find_map(Value::number);
+            number.map(|t| t * scale).ok_or(StepError::Attribute { id: item.id, attribute: k + 1 })
+        };
+        let [from, mut to] = [parameter(2)?, parameter(3)?];
+        if let Some(period) = curve.period() {
+            let way = if forward { to - from } else { from - to }.rem_euclid(period);
+            let way = if way > 0.0 { way } else { period };
+            to = if forward { from + way } else { from - way };
+        }
+        Ok(Link { curve, range: [from, to] })
+    }
+
+    /// A curve's parameter for one of the file's.
+    fn parameter(&self, id: u64, curve: &Curve) -> Result<f64, StepError> {
+        match curve {
+            Curve::Line { .. } => {
+                let line = self.entities.get(id, "LINE")?;
+                self.length(self.entities.get(line.reference(2)?, "VECTOR")?, 2)
+            }
+            Curve::Ellipse { .. } => Ok(self.units.radians),
+            _ => Ok(1.0),
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! B-splines out of entities.
+
+use super::StepError;
+use super::file::{Entities, Item, Value};
+use super::shape::Shapes;
+use crate::geometry::spline::{Knots, SplineCurve, SplineSurface, Weighted, weighted};
+
+impl Shapes<'_> {
+    /// A `B_SPLINE_CURVE` of any kind, simple or complex.
+    pub(super) fn spline_curve(&self, id: u64) -> Result<Option<SplineCurve>, StepError> {
+        let Some(part) = Spline::find(self.entities, id, Shape::Curve) else { return Ok(None) };
+        let bad = StepError::Numbers { id, what: "curve" };
+        let degree = part.base.count(part.skip)?;
+        let points = part.base.references(part.skip + 1)?;
+        let weights = match part.weights(self.entities) {
+            Some(weights) => weights.numbers(0)?,
+            None => vec![1.0; points.len()],
+        };
+        let points = self.weighted(&points, &weights, id)?;
+        // Degree, points, form, closed, self-intersecting.
+        let knots = part.knots(self.entities, degree, points.len(), 5, 0, 1)?;
+        let knots = knots.ok_or(bad)?;
+        Ok(Some(SplineCurve { knots, points }))
+    }
+
+    fn weighted(&self, ids: &[u64], weights: &[f64], of: u64) -> Result<Vec<Weighted>, StepError> {
+        let is_weight = |w: &f64| *w > 0.0 && w.is_finite();
+        if ids.len() != weights.len() || !weights.iter().all(is_weight) {
+            return Err(StepError::Numbers { id: of, what: "spline" });
+        }
+        ids.iter().zip(weights).map(|(&id, &w)| Ok(weighted(self.point(id)?, w))).collect()
+    }
+
+    pub(super) fn spline_surface(&self, id: u64) -> Result<Option<SplineSurface>, StepError> {
+        let Some(part) = Spline::find(self.entities, id, Shape::Surface) else { return Ok(None) };
+        let bad = || StepError::Numbers { id, what: "surface" };
+        let degrees = [part.base.count(part.skip)?, part.base.count(part.skip + 1)?];
+        let rows = part.base.list(part.skip + 2)?;
+        let flat = |value: &Value| value.list().map(<[Value]>::to_vec);
+        let cells: Option<Vec<Vec<Value>>> = rows.iter().map(flat).collect();
+        let cells = cells.ok_or_else(bad)?;
+        let columns = cells.first().map_or(0, Vec::len);
+        let ids: Option<Vec<u64>> = cells.iter().flatten().map(Value::reference).collect();
+        let ids = ids.ok_or_else(bad)?;
+        let weights = match part.weights(self.entities) {
+            Some(weights) => {
+                let rows = weights.list(0)?.iter().filter_map(Value::list).flatten();
+                rows.filter_map(Value::number).collect()
+            }
+            None => vec![1.0; ids.len()],
+        };
+        let points = self.weighted(&ids, &weights, id)?;
+        // Degrees, points, form, closed twice, self-intersecting.
+        let u = part.knots(self.entities, degrees[0], cells.len(), 7, 0, 2)?;
+        let v = part.knots(self.entities, degrees[1], columns, 7, 1, 3)?;
+        let surface = SplineSurface::new(u.ok_or_else(bad)?, v.ok_or_else(bad)?, points);
+        surface.ok_or_else(bad).map(Some)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Shape {
+    Curve,
+    Surface,
+}
+
+/// The records of a B-spline, which stand in one or in several.
+struct Spline<'a> {
+    id: u64,
+    shape: Shape,
+    /// The record with degree and points, after how many other attributes.
+    base: Item<'a>,
+    skip: usize,
+    /// How the knots are given.
+    kind: &'static str,
+}
+
+impl<'a> Spline<'a> {
+    fn find(entities: &'a Entities, id: u64, shape: Shape) -> Option<Self> {
+        let (base, kinds) = match shape {
+            Shape::Curve => (
+                "B_SPLINE_CURVE",
+                [
+                    "B_SPLINE_CURVE_WITH_KNOTS",
+                    "UNIFORM_CURVE",
+                    "QUASI_UNIFORM_CURVE",
+                    "BEZIER_CURVE",
+                ],
+            ),
+            Shape::Surface => (
+                "B_SPLINE_SURFACE",
+                [
+                    "B_SPLINE_SURFACE_WITH_KNOTS",
+                    "UNIFORM_SURFACE",
+                    "QUASI_UNIFORM_SURFACE",
+                    "BEZIER_SURFACE",
+                ],
+            ),
+        };
+        let kind = kinds.into_iter().find(|kind| entities.find(id, kind).is_some())?;
+        let (base, skip) = match entities.find(id, base) {
+            Some(base) => (base, 0),
+            // A simple entity has them all in one, after its name.
+            None => (entities.find(id, kind)?, 1),
+        };
+        Some(Self { id, shape, base, skip, kind })
+    }
+
+    fn weights(&self, entities: &'a Entities) -> Option<Item<'a>> {
+        let name = match self.shape {
+            Shape::Curve => "RATIONAL_B_SPLINE_CURVE",
+            Shape::Surface => "RATIONAL_B_SPLINE_SURFACE",
+        };
+        entities.find(self.id, name)
+    }
+
+    /// The knots along one parameter: `before` attributes stand before the first
+    /// list, and `multiplicities` and `values` are the places of the two.
+    fn knots(
+        &self,
+        entities: &Entities,
+        degree: usize,
+        count: usize,
+        before: usize,
+        multiplicities: usize,
+        values: usize,
+    ) -> Result<Option<Knots>, StepError> {
+        if degree == 0 || count <= degree {
+            return Ok(None);
+        }
+        let knots = match self.kind {
+            "B_SPLINE_CURVE_WITH_KNOTS" | "B_SPLINE_SURFACE_WITH_KNOTS" => {
+                let Some(given) = entities.find(self.id, self.kind) else { return Ok(None) };
+                let first = if self.skip == 1 { 1 + before } else { 0 };
+                let times = given.numbers(first + multiplicities)?;
+                let values = given.numbers(first + values)?;
+                let most = (count + degree + 1) as f64;
+                if times.len() != values.len() || times.iter().sum::<f64>() > most {
+                    return Ok(None);
+                }
+                let repeat = |(t, n): (f64, f64)| std::iter::repeat_n(t, n.max(0.0) as usize);
+                values.into_iter().zip(times).flat_map(repeat).collect()
+            }
+            "UNIFORM_CURVE" | "UNIFORM_SURFACE" => {
+                (0..count + degree + 1).map(|k| k as f64 - degree as f64).collect()
+            }
+            // Quasi-uniform; a Bézier curve is one piece of it, or several.
+            kind => {
+                let pieces =
+                    if kind.starts_with("BEZIER") { (count - 1) / degree } else { count - degree };
+                let times = if kind.starts_with("BEZIER") { degree } else { 1 };
+                let mut knots = vec![0.0; degree + 1];
+                for k in 1..pieces {
+                    knots.extend(std::iter::repeat_n(k as f64, times));
+                }
+                knots.extend(std::iter::repeat_n(pieces as f64, degree + 1));
+                knots
+            }
+        };
+        Ok(Knots::new(degree, knots, count))
+    }
+}

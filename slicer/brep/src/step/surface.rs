@@ -1,0 +1,78 @@
+//! Surfaces out of entities.
+
+use super::StepError;
+use super::file::Item;
+use super::shape::{MOST_NESTED, Shapes};
+use crate::geometry::{Surface, TorusPart};
+use crate::vector::{Frame, unit};
+
+impl Shapes<'_> {
+    /// The surface of a face.
+    pub(crate) fn surface(&self, id: u64) -> Result<Surface, StepError> {
+        self.surface_within(id, 0)
+    }
+
+    fn surface_within(&self, id: u64, depth: usize) -> Result<Surface, StepError> {
+        if let Some(spline) = self.spline_surface(id)? {
+            return Ok(Surface::Spline(Box::new(spline)));
+        }
+        let item = self.entities.simple(id)?;
+        let frame = || self.frame(item.reference(1)?);
+        Ok(match item.name() {
+            "PLANE" => Surface::Plane(frame()?),
+            "CYLINDRICAL_SURFACE" => {
+                Surface::Cylinder { frame: frame()?, radius: self.length(item, 2)? }
+            }
+            "CONICAL_SURFACE" => {
+                let radius = item.number(2)? * self.units.mm;
+                let slope = (item.number(3)? * self.units.radians).tan();
+                if !(radius >= 0.0 && slope.is_finite() && radius.is_finite()) {
+                    return Err(StepError::Numbers { id, what: "cone" });
+                }
+                Surface::Cone { frame: frame()?, radius, slope }
+            }
+            "SPHERICAL_SURFACE" => {
+                Surface::Sphere { frame: frame()?, radius: self.length(item, 2)? }
+            }
+            "TOROIDAL_SURFACE" | "DEGENERATE_TOROIDAL_SURFACE" => {
+                let (major, minor) = (self.length(item, 2)?, self.length(item, 3)?);
+                let part = match item.truth(4) {
+                    _ if minor <= major => TorusPart::Whole,
+                    Ok(false) => TorusPart::Lemon,
+                    _ => TorusPart::Apple,
+                };
+                Surface::Torus { frame: frame()?, major, minor, part }
+            }
+            "SURFACE_OF_LINEAR_EXTRUSION" => {
+                let vector = self.entities.get(item.reference(2)?, "VECTOR")?;
+                let direction = unit(self.direction(vector.reference(1)?)?);
+                let direction = direction.ok_or(StepError::Numbers { id, what: "direction" })?;
+                // v is in units of the vector's length, which is not kept.
+                Surface::Extrusion { curve: self.curve(item.reference(1)?)?, direction }
+            }
+            "SURFACE_OF_REVOLUTION" => self.revolution(item)?,
+            // The face's own loops say where it ends.
+            "RECTANGULAR_TRIMMED_SURFACE" | "CURVE_BOUNDED_SURFACE" if depth < MOST_NESTED => {
+                self.surface_within(item.reference(1)?, depth + 1)?
+            }
+            "OFFSET_SURFACE" if depth < MOST_NESTED => {
+                let basis = self.surface_within(item.reference(1)?, depth + 1)?;
+                let by_mm = item.number(2)? * self.units.mm;
+                let bad = StepError::Numbers { id, what: "offset surface" };
+                basis.offset(by_mm).ok_or(bad)?
+            }
+            name => return Err(StepError::Unsupported { id, name: name.to_owned() }),
+        })
+    }
+
+    fn revolution(&self, item: Item) -> Result<Surface, StepError> {
+        let axis = self.entities.get(item.reference(2)?, "AXIS1_PLACEMENT")?;
+        let z = self.optional_direction(axis.optional(2))?.unwrap_or(self.place.axes[2]);
+        let frame = Frame::new(self.point(axis.reference(1)?)?, z, None);
+        let frame = frame.ok_or(StepError::Numbers { id: item.id, what: "axis" })?;
+        // The curve is read as the frame sees it.
+        let place = frame.inverse().then(&self.place);
+        let seen = Shapes { entities: self.entities, units: self.units, place };
+        Ok(Surface::Revolution { frame, curve: seen.curve(item.reference(1)?)? })
+    }
+}
