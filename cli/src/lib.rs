@@ -4,6 +4,7 @@
 //! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` are the
 //! same code under the names of the pipeline.
 
+mod brep;
 mod commands;
 mod evidence;
 mod exposure;

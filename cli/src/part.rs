@@ -8,6 +8,7 @@ use lamp_grayscale::resin::ExposureTime;
 use lamp_slicer::{Frame, LayerHeights, LayerLevels, Model, PlaneRule, SliceOptions, Slices};
 use lamp_stack::{Dpi, Layer, Length, Size};
 
+use crate::brep::HEADING;
 use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
 use crate::heights::{self, HeightOptions};
 use crate::options::parse_thickness;
@@ -20,7 +21,7 @@ use crate::stop::Stop;
 pub(crate) struct PartOptions {
     /// Resolution in dots per inch
     #[arg(long, value_name = "DPI", default_value = "1500")]
-    dpi: Dpi,
+    pub(crate) dpi: Dpi,
 
     /// Thickness of the layers, as 100um, 0.1mm, 4mil or 0.004in
     #[arg(long, value_name = "LENGTH", default_value = "100um", value_parser = parse_thickness)]
@@ -33,6 +34,11 @@ pub(crate) struct PartOptions {
 
     #[command(flatten)]
     pub(crate) solid: SolidOptions,
+
+    /// Leave crossings on the facets of STEP parts, instead of moving them onto the exact
+    /// surfaces
+    #[arg(long, help_heading = HEADING)]
+    no_polish: bool,
 
     /// Black pixels around the part's box
     #[arg(long, value_name = "PIXELS", default_value_t = 1)]
@@ -87,6 +93,7 @@ impl PartOptions {
             placement: self.solid.placement(),
             fill: self.solid.fill(),
             frame: self.frame(),
+            polish: !self.no_polish,
             ..SliceOptions::default()
         }
     }
@@ -129,6 +136,7 @@ impl PartOptions {
             value_name(&self.plane),
             self.solid.command_line(),
         );
+        line += if self.no_polish { " --no-polish" } else { "" };
         if let Some(exposure) = exposure {
             line += if self.gray { " --gray" } else { "" };
             line += &exposure.command_line();

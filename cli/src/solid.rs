@@ -1,10 +1,15 @@
 //! The solid that is sliced: its files, and what is inside.
 
+use std::fs::File;
+use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use lamp_slicer::{Body, Fill, Model, Placement, SliceError, Units};
+use lamp_stack::Dpi;
+use tempfile::NamedTempFile;
 
+use crate::brep::{BrepOptions, is_step, part_of};
 use crate::placement::PlacementOptions;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream};
@@ -12,7 +17,7 @@ use crate::streams::{input_name, is_stream};
 /// What decides the solid that is sliced.
 #[derive(Args, Clone)]
 pub(crate) struct SolidOptions {
-    /// What the numbers of the STL mean
+    /// What the numbers of an STL mean; a STEP file says so itself
     #[arg(long, value_enum, default_value_t)]
     units: UnitsArg,
 
@@ -23,6 +28,9 @@ pub(crate) struct SolidOptions {
 
     #[command(flatten)]
     placement: PlacementOptions,
+
+    #[command(flatten)]
+    pub(crate) brep: BrepOptions,
 }
 
 impl SolidOptions {
@@ -57,7 +65,54 @@ impl SolidOptions {
     /// The options as the stack remembers them.
     pub(crate) fn command_line(&self) -> String {
         let placement = self.placement.command_line();
-        format!(" --units {} --fill {}{placement}", value_name(&self.units), self.fill_name())
+        let brep = self.brep.command_line();
+        format!(" --units {} --fill {}{placement}{brep}", value_name(&self.units), self.fill_name())
+    }
+
+    /// Opens all files of a part.
+    pub(crate) fn open(&self, paths: &[PathBuf], reading: &Reading<'_>) -> Result<Model, Stop> {
+        if paths.iter().filter(|path| is_stream(path)).count() > 1 {
+            return Err(Stop::usage("standard input can be read only once: give - for one part"));
+        }
+        let open =
+            |path: &PathBuf| self.open_one(path, reading).map_err(|stop| stop.at(input_name(path)));
+        Ok(Model::joined(paths.iter().map(open).collect::<Result<_, _>>()?))
+    }
+
+    fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Model, Stop> {
+        let failed = |error: io::Error| Stop::from(SliceError::from(error));
+        if is_stream(path) {
+            let mut start = Vec::new();
+            let mut stdin = io::stdin().lock();
+            stdin.by_ref().take(START_BYTES).read_to_end(&mut start).map_err(failed)?;
+            let is_step = is_step(&start);
+            let mut stream = Cursor::new(start).chain(stdin);
+            if !is_step {
+                return Ok(Model::from_stream("stdin", stream)?);
+            }
+            let mut file = NamedTempFile::new().map_err(failed)?;
+            io::copy(&mut stream, &mut file).map_err(failed)?;
+            return self.step(file.path(), "stdin", reading);
+        }
+        let mut start = Vec::new();
+        let file = File::open(path).map_err(failed)?;
+        // What is no file is for the slicer to refuse.
+        let read = file.take(START_BYTES).read_to_end(&mut start);
+        if read.is_err() || !is_step(&start) {
+            return Ok(Model::open(path)?);
+        }
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        self.step(path, &name, reading)
+    }
+
+    fn step(&self, path: &Path, name: &str, reading: &Reading<'_>) -> Result<Model, Stop> {
+        if let UnitsArg::Inch = self.units {
+            let why = "a STEP file says itself what its numbers mean: leave --units away";
+            return Err(Stop::usage(why));
+        }
+        let prepared = self.brep.read(path, reading.dpi)?;
+        let file = File::open(path).map_err(SliceError::from)?;
+        part_of(prepared, name, &file, reading.may_be_open, reading.say)
     }
 }
 
@@ -81,14 +136,18 @@ pub(crate) fn value_name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
-/// Opens all files of a part.
-pub(crate) fn open_models(paths: &[PathBuf]) -> Result<Model, Stop> {
-    if paths.iter().filter(|path| is_stream(path)).count() > 1 {
-        return Err(Stop::usage("standard input can be read only once: give - for one part"));
-    }
-    let open = |path: &PathBuf| open_model(path).map_err(|e| Stop::from(e).at(input_name(path)));
-    Ok(Model::joined(paths.iter().map(open).collect::<Result<_, _>>()?))
+/// What files are read for.
+pub(crate) struct Reading<'a> {
+    /// The resolution of the images.
+    pub(crate) dpi: Dpi,
+    /// Whether bodies of STEP files may have gaps.
+    pub(crate) may_be_open: bool,
+    /// Who is told what was found in STEP files.
+    pub(crate) say: &'a dyn Fn(&str),
 }
+
+/// Enough to tell a STEP file by.
+const START_BYTES: u64 = 256;
 
 /// Puts before a message the file whose facet it is about, or all files.
 pub(crate) fn at_part(stop: Stop, paths: &[PathBuf]) -> Stop {
@@ -97,14 +156,6 @@ pub(crate) fn at_part(stop: Stop, paths: &[PathBuf]) -> Stop {
         _ => name_of_all(paths),
     };
     stop.at(place)
-}
-
-fn open_model(path: &Path) -> Result<Model, SliceError> {
-    if is_stream(path) {
-        Model::from_stream("stdin", std::io::stdin().lock())
-    } else {
-        Model::open(path)
-    }
 }
 
 /// What people call the files of a part together.

@@ -110,7 +110,7 @@ impl Model {
     }
 
     /// A part of exact surfaces, in millimetres, by the facets made of them. `digest`
-    /// is that of its file.
+    /// is that of its file ([`digest_of_file`]).
     pub fn from_surfaces(
         name: &str,
         digest: String,
@@ -282,6 +282,14 @@ pub(crate) fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
     // if another process changes the file meanwhile, which `Model::open`
     // forbids (temporary files have no name); any bytes are valid numbers here.
     unsafe { MmapOptions::new().offset(offset).len(length).map(file) }
+}
+
+/// The digest of a file: `blake3:` and 64 hexadecimal digits.
+///
+/// # Errors
+/// Where it cannot be mapped.
+pub fn digest_of_file(file: &File) -> io::Result<String> {
+    digest_of(file, file.metadata()?.len())
 }
 
 fn digest_of(file: &File, size: u64) -> io::Result<String> {

@@ -12,7 +12,7 @@ use crate::part::PartOptions;
 use crate::picture::Scale;
 use crate::report::Report;
 use crate::section::{Course, Exposures, Panels, Plane, parse_along};
-use crate::solid::{name_of_all, open_models};
+use crate::solid::{Reading, name_of_all};
 use crate::stop::Stop;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 
@@ -112,7 +112,8 @@ fn outline(
     let (options, digest) = sliced.with_context(|| {
         format!("{name} does not say how its part was sliced: leave --part away")
     })?;
-    let model = open_models(parts)?;
+    let reading = Reading { dpi: options.dpi, may_be_open: false, say: &|_| () };
+    let model = options.solid.open(parts, &reading)?;
     let part = name_of_all(parts);
     if model.digest() != digest {
         return Err(Stop::Failed(anyhow!("{name} was not sliced from {part}, or it has changed")));

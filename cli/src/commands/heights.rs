@@ -10,7 +10,7 @@ use crate::heights::{Found, HeightOptions, significant, time_text};
 use crate::options::{Common, parse_thickness};
 use crate::plots::{self, Axis, Plot, Series, drawn};
 use crate::report::say;
-use crate::solid::{SolidOptions, at_part, name_of_all, open_models};
+use crate::solid::{Reading, SolidOptions, at_part, name_of_all};
 use crate::stop::Stop;
 use crate::streams::{check_beside, print, write_file};
 
@@ -27,7 +27,7 @@ Examples:
   lamp heights blade.stl --cusp 10um --report heights.csv
   lamp heights blade.stl --time-budget 10h --layer-overhead 20s --material lamp-suspension")]
 pub(crate) struct HeightsArgs {
-    /// The part: STL files, binary or ASCII, or - for standard input, as for `slice`
+    /// The part: STL or STEP files, or - for standard input, as for `slice`
     #[arg(value_name = "PART", required = true)]
     parts: Vec<PathBuf>,
 
@@ -63,15 +63,19 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Stop> {
     args.check()?;
     let exposure = args.exposure.exposure()?;
     args.heights.check(exposure.as_ref())?;
-    let model = open_models(&args.parts)?;
+    let say = |line: &str| {
+        if !common.quiet {
+            say(&format!("heights: {line}"));
+        }
+    };
+    let model =
+        args.solid.open(&args.parts, &Reading { dpi: args.dpi, may_be_open: false, say: &say })?;
     let body = args.solid.body(model).map_err(|error| at_part(error.into(), &args.parts))?;
     let part = args.heights.part(body, args.dpi, args.solid.fill())?;
     let found = args.heights.find(&part, exposure.as_ref());
     let found = found.map_err(|stop| at_part(stop, &args.parts))?;
     let uniform = args.uniform(&part).map_err(|stop| at_part(stop, &args.parts))?;
-    if !common.quiet {
-        found.warn(&|line| say(&format!("heights: {line}")));
-    }
+    found.warn(&say);
     if let Some(path) = &args.report {
         write_file(path, |out| write_table(&found.heights, exposure.as_ref(), out))?;
     }

@@ -3,18 +3,19 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_slicer::{PixelGrid, StrayBand};
+use lamp_slicer::{PixelGrid, Polished, StrayBand};
 
+use crate::brep::length;
 use crate::lines::parse_report;
 use crate::options::{Common, Output, parse_layers, parse_memory};
 use crate::part::PartOptions;
 use crate::report::Report;
-use crate::solid::{at_part, name_of_all, open_models};
+use crate::solid::{Reading, at_part, name_of_all};
 use crate::stop::Stop;
 use crate::streams::{check_beside, check_not_input, report, write_file, write_layers};
 use crate::trace::{Counts, Rows, Subject};
 
-/// Slice an STL part into a stack of layer images
+/// Slice an STL or STEP part into a stack of layer images
 ///
 /// A pixel is white (cured) exactly when its centre is inside the part's section at the layer's
 /// plane. Rows whose crossings do not balance, because the mesh has a gap, are listed on their
@@ -26,11 +27,12 @@ Examples:
   slice blade.stl --dpi 2400 --thickness 25um --layers 100..200 | fix > part.tif
   slice shell.stl core.stl --fill nonzero --scale 1.02 --rotate x:90,z:-12.5 -o mould.tif
   slice core.stl --units inch -o core/
+  slice blade.step --dpi 2400 -o blade.tif
   slice blade.stl --adaptive --deviation 1% --material lamp-suspension -o blade.tif
   slice blade.stl --gray --material lamp-suspension | fix | dither > blade.tif
   slice broken.stl -o broken.tif --report gaps.json")]
 pub(crate) struct SliceArgs {
-    /// The part: STL files, binary or ASCII, or - for standard input. Several stand in the same
+    /// The part: STL files, binary or ASCII, STEP files, or - for standard input. Several stand in the same
     /// coordinates; where they overlap they cut each other out, or unite with --fill nonzero
     #[arg(value_name = "PART", required = true)]
     parts: Vec<PathBuf>,
@@ -66,9 +68,11 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     }
     check_not_input(&args.output.output, inputs())?;
     let exposure = args.options.exposure()?;
-    let model = open_models(&args.parts)?;
-    let name = name_of_all(&args.parts);
     let report = report("slice", common, &args.output);
+    let say = |line: &str| report.say(line);
+    let reading = Reading { dpi: args.options.dpi, may_be_open: false, say: &say };
+    let model = args.options.solid.open(&args.parts, &reading)?;
+    let name = name_of_all(&args.parts);
     let files: Vec<_> = args
         .parts
         .iter()
@@ -76,9 +80,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         .collect();
     let (mut slices, name_command) = args
         .options
-        .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure, &|line| {
-            report.say(line);
-        })
+        .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure, &say)
         .map_err(|stop| at_part(stop, &args.parts))?;
     report.expect(slices.layer_count() as u64);
     let (mut counts, mut bands) = (Counts::default(), Vec::new());
@@ -103,8 +105,26 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         let rows = Rows { top_mm: origin_mm[1], dpi };
         write_file(path, |out| subject.write(&trace, rows, out))?;
     }
+    if let Some(polished) = slices.polished() {
+        report.say(&polish_text(polished));
+    }
     say_stray_rows(&report, counts, args.report.as_deref());
     Ok(())
+}
+
+/// What polishing did, in a line.
+fn polish_text(polished: Polished) -> String {
+    let Polished { moved, kept, mended, mean_mm, most_mm } = polished;
+    let mean = length(mean_mm);
+    let most = length(most_mm);
+    let kept = match kept {
+        0 => String::new(),
+        kept => format!(", {kept} stayed on their facets"),
+    };
+    format!(
+        "{moved} crossings were moved from facets to surfaces, by {mean} on average and {most} at \
+         most along their rows{kept}; where contours turn, {mended} were added or taken away"
+    )
 }
 
 fn say_stray_rows(report: &Report, counts: Counts, written: Option<&Path>) {

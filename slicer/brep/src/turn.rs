@@ -75,7 +75,8 @@ impl Turns {
         // And those of the facets around them.
         let facets = &placed.mesh().facets;
         let touches = |facet: &&Facet| facet.corners.iter().any(|corner| points.contains(corner));
-        let more: Vec<u32> = facets.iter().filter(touches).flat_map(|facet| facet.corners).collect();
+        let more: Vec<u32> =
+            facets.iter().filter(touches).flat_map(|facet| facet.corners).collect();
         points.extend(more);
         let mut around: HashMap<u32, Vec<u32>> = HashMap::with_capacity(points.len());
         for (number, facet) in (0..).zip(facets) {

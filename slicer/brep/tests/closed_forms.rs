@@ -97,7 +97,15 @@ fn crossings(placed: &Placed, z_mm: f64, step_mm: f64) -> Vec<Crossing> {
             let [p, q, r] = corners;
             let across_x = (q[1] - p[1]) * (r[2] - p[2]) - (q[2] - p[2]) * (r[1] - p[1]);
             let enters = across_x < 0.0;
-            list.push(Crossing { facet: number, uv, x_mm, y_mm, z_mm, enters, fate: Fate::OnFacet });
+            list.push(Crossing {
+                facet: number,
+                uv,
+                x_mm,
+                y_mm,
+                z_mm,
+                enters,
+                fate: Fate::OnFacet,
+            });
         }
     }
     list

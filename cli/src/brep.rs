@@ -1,0 +1,186 @@
+//! B-rep parts: how their files are read, and what is said of them.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use anyhow::{Context, anyhow};
+use clap::{Args, ValueEnum};
+use lamp_brep::{BodyFault, BodyReport, Finding, KernelName, Prepared, prepare};
+use lamp_slicer::{Model, digest_of_file};
+use lamp_stack::{Dpi, Length};
+
+use crate::options::parse_distance;
+use crate::stop::Stop;
+
+pub(crate) const HEADING: &str = "STEP parts";
+
+/// How B-rep parts are read.
+#[derive(Args, Clone)]
+pub(crate) struct BrepOptions {
+    /// How far the facets of a STEP part may lie from its surfaces [default: a quarter of a
+    /// pixel]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_tolerance, help_heading = HEADING)]
+    tolerance: Option<Length>,
+
+    /// What reads STEP parts: LAMP itself, or OpenCASCADE where it is built in
+    #[arg(long, value_enum, default_value_t, help_heading = HEADING)]
+    kernel: KernelArg,
+
+    /// Give up on a STEP part that takes longer to read, in seconds
+    #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = parse_seconds)]
+    #[arg(help_heading = HEADING)]
+    timeout: Duration,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum KernelArg {
+    #[default]
+    Lamp,
+}
+
+impl BrepOptions {
+    /// The options as the stack remembers them.
+    pub(crate) fn command_line(&self) -> String {
+        let tolerance = self.tolerance.map(|tolerance| format!(" --tolerance {tolerance}"));
+        let kernel = match self.kernel {
+            KernelArg::Lamp => String::new(),
+        };
+        tolerance.unwrap_or_default() + &kernel
+    }
+
+    /// Reads a STEP file, for images of some resolution. Faults of its bodies are in
+    /// the reports.
+    pub(crate) fn read(&self, path: &Path, dpi: Dpi) -> Result<Prepared, Stop> {
+        let tolerance = self.tolerance.unwrap_or_else(|| Length::from_um(dpi.pitch().um() / 4.0));
+        let kernel = match self.kernel {
+            KernelArg::Lamp => KernelName::Lamp,
+        };
+        // Nothing has been written yet: if it hangs, the process ends without it.
+        let (sender, receiver) = channel();
+        let owned: PathBuf = path.to_owned();
+        std::thread::Builder::new()
+            .stack_size(STACK_BYTES)
+            .spawn(move || sender.send(prepare(&owned, kernel, tolerance.mm())))
+            .context("no thread to read it")?;
+        match receiver.recv_timeout(self.timeout) {
+            Ok(prepared) => Ok(prepared.map_err(anyhow::Error::from)?),
+            Err(RecvTimeoutError::Timeout) => Err(Stop::Failed(anyhow!(
+                "reading it takes longer than {} s: give it more with --timeout, or facets a \
+                 longer --tolerance than {tolerance}",
+                self.timeout.as_secs_f64()
+            ))),
+            Err(RecvTimeoutError::Disconnected) => {
+                Err(Stop::Failed(anyhow!("reading it failed within the program")))
+            }
+        }
+    }
+}
+
+/// Files nest entities as deep as they like.
+const STACK_BYTES: usize = 64 << 20;
+
+fn parse_tolerance(text: &str) -> Result<Length, String> {
+    let length = parse_distance(text)?;
+    let has_some = length.um() > 0.0;
+    if has_some { Ok(length) } else { Err("facets lie some way from surfaces".to_owned()) }
+}
+
+fn parse_seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.trim_end_matches('s').parse().ok();
+    let seconds = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    seconds
+        .filter(|seconds| !seconds.is_zero())
+        .ok_or_else(|| format!("`{text}` is not a time: write seconds, as 60"))
+}
+
+/// The part of a STEP file; refused where bodies have faults, but for gaps if these
+/// `may_be_open`. `say` is told what was found and done.
+pub(crate) fn part_of(
+    prepared: Prepared,
+    name: &str,
+    file: &File,
+    may_be_open: bool,
+    say: &dyn Fn(&str),
+) -> Result<Model, Stop> {
+    refuse(&prepared, may_be_open)?;
+    notes(&prepared).iter().for_each(|note| say(note));
+    let digest = digest_of_file(file).context("cannot read it")?;
+    let Prepared { kernel, mesh, .. } = prepared;
+    Ok(Model::from_surfaces(name, digest, Arc::from(kernel), Arc::new(mesh)))
+}
+
+fn refuse(prepared: &Prepared, may_be_open: bool) -> Result<(), Stop> {
+    let is_borne = |fault: &BodyFault| may_be_open && matches!(fault, BodyFault::Open { .. });
+    let bodies = (1..).zip(&prepared.reports);
+    let faults = bodies.flat_map(|(number, report)| {
+        let faults = report.faults.iter().filter(|fault| !is_borne(fault));
+        faults.map(move |fault| format!("{}: {fault}", body_name(number, report)))
+    });
+    let faults: Vec<_> = faults.collect();
+    let Some(first) = faults.first() else { return Ok(()) };
+    let more = match faults.len() {
+        1 => String::new(),
+        count => format!(", and {} faults more", count - 1),
+    };
+    let found = prepared.mesh.findings.first();
+    let found = found.map_or_else(String::new, |it| format!(" (#{}: {})", it.entity, it.fault));
+    Err(Stop::Failed(anyhow!(
+        "it is not sliced, for its sections would be wrong: {first}{found}{more}; \
+         lamp brep tells more, OpenCASCADE (--kernel occt, where it is built in) may read it, \
+         and gaps can be bridged with --fallback part.stl"
+    )))
+}
+
+/// What people call a body.
+pub(crate) fn body_name(number: usize, report: &BodyReport) -> String {
+    match report.name.trim() {
+        "" => format!("body {number}"),
+        name => format!("body {number} ({})", lamp_stack::one_line(name)),
+    }
+}
+
+/// What people should know of how a file was read.
+pub(crate) fn notes(prepared: &Prepared) -> Vec<String> {
+    let mut notes = findings(&prepared.mesh.findings);
+    if prepared.heal_mm > 0.0 {
+        notes.push(format!("edges that lie within {} were joined", length(prepared.heal_mm)));
+    }
+    let wanted_mm = prepared.tries.first().map_or(prepared.chord_mm, |first| first.chord_mm);
+    if prepared.chord_mm > wanted_mm {
+        notes.push(format!(
+            "its facets lie up to {} from their surfaces, for with less some were wrong",
+            length(prepared.chord_mm)
+        ));
+    }
+    notes
+}
+
+/// Findings, those of one kind in one line.
+fn findings(findings: &[Finding]) -> Vec<String> {
+    let mut kinds: Vec<(String, Vec<u64>)> = Vec::new();
+    for finding in findings {
+        let fault = finding.fault.to_string();
+        match kinds.iter_mut().find(|(kind, _)| *kind == fault) {
+            Some((_, entities)) => entities.push(finding.entity),
+            None => kinds.push((fault, vec![finding.entity])),
+        }
+    }
+    let line = |(fault, entities): (String, Vec<u64>)| match &entities[..] {
+        [entity] => format!("#{entity}: {fault}"),
+        entities => format!("#{} and {} faces more: {fault}", entities[0], entities.len() - 1),
+    };
+    kinds.into_iter().map(line).collect()
+}
+
+/// A length as people read it.
+pub(crate) fn length(mm: f64) -> String {
+    Length::from_mm(mm).to_whole_nm().to_string()
+}
+
+/// Whether a file's first bytes are those of STEP.
+pub(crate) fn is_step(start: &[u8]) -> bool {
+    start.trim_ascii_start().starts_with(b"ISO-10303-21")
+}
