@@ -13,6 +13,8 @@ pub struct Placed {
     /// x, y and z of the place in millimetres, by x, y, z of the model and one.
     rows: [[f64; 4]; 3],
     tolerance_mm: f64,
+    /// Of each face, whether it is flat.
+    is_flat: Vec<bool>,
 }
 
 impl std::fmt::Debug for Placed {
@@ -27,7 +29,9 @@ impl Placed {
     pub fn new(kernel: Arc<dyn Kernel>, mesh: Arc<Tessellation>, rows: [[f64; 4]; 3]) -> Self {
         let stretch = |axis: usize| length([rows[0][axis], rows[1][axis], rows[2][axis]]);
         let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
-        Self { kernel, mesh, rows, tolerance_mm }
+        let faces = kernel.bodies().iter().map(|body| body.faces.end).max().unwrap_or(0);
+        let is_flat = (0..faces).map(|face| kernel.face(face).kind == "plane").collect();
+        Self { kernel, mesh, rows, tolerance_mm, is_flat }
     }
 
     /// How far facets may lie from their surfaces, in millimetres.
@@ -42,7 +46,7 @@ impl Placed {
 
     /// Whether a facet's surface is flat, and the facet therefore exact.
     pub fn is_flat(&self, facet: u32) -> bool {
-        self.kernel.face(self.mesh.facets[facet as usize].face).kind == "plane"
+        self.is_flat[self.facet(facet).face as usize]
     }
 
     pub(crate) fn facet(&self, number: u32) -> &Facet {
@@ -50,7 +54,7 @@ impl Placed {
     }
 
     /// A facet's corners.
-    pub(crate) fn corners(&self, number: u32) -> [Vec3; 3] {
+    pub fn corners(&self, number: u32) -> [Vec3; 3] {
         self.mesh.corners(self.facet(number)).map(|corner| self.at(corner))
     }
 

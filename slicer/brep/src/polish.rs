@@ -44,9 +44,13 @@ pub enum Fate {
 const MOST_STEPS: usize = 12;
 /// How near to the row and the plane a point must come, in millimetres.
 const NEAR_MM: f64 = 1e-10;
+/// And how near is enough where rounding allows no more.
+const ENOUGH_MM: f64 = 1e-7;
 /// How far a crossing may move across the surface, in the distances that facets may
 /// lie from it: the normal is another where it comes from.
 const FAR: f64 = 2.0;
+/// A surface that goes along the row as much as this faces either side.
+const LEVEL: f64 = 1e-6;
 /// How far beyond its facet a point may lie, in facets.
 const BEYOND: f64 = 1.0;
 
@@ -83,7 +87,7 @@ fn fate(placed: &Placed, crossing: &Crossing, found: Found) -> Fate {
     let Some((uv, jet)) = found else { return Fate::Diverged };
     // At a pole the surface has no normal.
     let outwards = placed.normal(crossing.facet, &jet).map_or(0.0, |normal| normal[0]);
-    let is_other_side = outwards != 0.0 && (outwards < 0.0) != crossing.enters;
+    let is_other_side = outwards.abs() > LEVEL && (outwards < 0.0) != crossing.enters;
     if is_other_side || !is_near(&placed.facet(crossing.facet).uv, uv) {
         Fate::Left
     } else if (jet.point[0] - crossing.x_mm).abs() * outwards.abs() > FAR * placed.tolerance_mm() {
@@ -106,7 +110,7 @@ pub(crate) fn solved(
     let mut open = batch.to_vec();
     let mut at: Vec<[f64; 2]> = open.iter().map(|&k| crossings[k].uv).collect();
     let mut jets = vec![Jet::default(); at.len()];
-    for _ in 0..MOST_STEPS {
+    for steps in 1..=MOST_STEPS {
         if open.is_empty() {
             break;
         }
@@ -115,7 +119,8 @@ pub(crate) fn solved(
         let mut kept = 0;
         for i in 0..open.len() {
             let (k, uv) = (open[i], at[i]);
-            match step(&crossings[k], &jets[i], uv) {
+            let near_mm = if steps < MOST_STEPS { NEAR_MM } else { ENOUGH_MM };
+            match step(&crossings[k], &jets[i], uv, near_mm) {
                 Step::There => found.push((k, Some((uv, jets[i])))),
                 Step::Lost => found.push((k, None)),
                 Step::On(next) => {
@@ -137,10 +142,10 @@ enum Step {
     Lost,
 }
 
-fn step(crossing: &Crossing, jet: &Jet, [u, v]: [f64; 2]) -> Step {
+fn step(crossing: &Crossing, jet: &Jet, [u, v]: [f64; 2], near_mm: f64) -> Step {
     let [_, y, z] = jet.point;
     let (e, f) = (crossing.y_mm - y, crossing.z_mm - z);
-    if e.abs() < NEAR_MM && f.abs() < NEAR_MM {
+    if e.abs() < near_mm && f.abs() < near_mm {
         return Step::There;
     }
     let ([_, yu, zu], [_, yv, zv]) = (jet.du, jet.dv);

@@ -32,6 +32,7 @@ impl<'a> Batch<'a> {
     /// Adds a facet's crossings, and says how many there are.
     pub(crate) fn cut(&mut self, number: u32, facet: &PlacedFacet, shares: &mut [Share]) -> usize {
         let cutter = self.cutter;
+        let flat = self.exact.placed.is_flat(number).then(|| Flat::new(self.exact, number));
         let mut chart = None;
         let mut count = 0;
         cutter.for_each_segment(facet, &self.layers.clone(), |layer, segment| {
@@ -40,6 +41,14 @@ impl<'a> Batch<'a> {
             share.ends.add(a, b, segment.turned, cutter.fill);
             let z_mm = cutter.planes.z_um(layer) / 1000.0;
             cutter.for_each_crossing(a, b, segment.turned, |row, column, rising| {
+                count += 1;
+                if let Some(flat) = &flat {
+                    let [x_mm, y_mm] = cutter.grid.to_mm(column, f64::from(row));
+                    let x_mm = flat.x_mm(x_mm, y_mm, z_mm);
+                    let [column, _] = cutter.grid.to_pixels(x_mm, y_mm);
+                    share.crossings.push(Crossing::at(cutter.grid, row, column, rising));
+                    return;
+                }
                 let chart = chart.get_or_insert_with(|| self.exact.placed.chart(number));
                 let [x_mm, y_mm] = cutter.grid.to_mm(column, f64::from(row));
                 self.crossings.push(lamp_brep::Crossing {
@@ -53,7 +62,6 @@ impl<'a> Batch<'a> {
                 });
                 self.facets_mm.push(x_mm);
                 self.cells.push((layer, row, rising));
-                count += 1;
             });
         });
         if self.crossings.len() >= BATCH {
@@ -80,3 +88,31 @@ impl<'a> Batch<'a> {
         self.cells.clear();
     }
 }
+
+/// The plane of a facet that is exact, but for the rounding of its corners.
+struct Flat {
+    corner: [f64; 3],
+    /// Across it.
+    normal: [f64; 3],
+}
+
+impl Flat {
+    fn new(exact: &Exact, facet: u32) -> Self {
+        let [a, b, c] = exact.placed.corners(facet);
+        let [e, f] = [b, c].map(|to| [0, 1, 2].map(|k| to[k] - a[k]));
+        let across = |i: usize, j: usize| e[i] * f[j] - e[j] * f[i];
+        Self { corner: a, normal: [across(1, 2), across(2, 0), across(0, 1)] }
+    }
+
+    /// Where a row crosses it, which on the rounded facet is at `x_mm`.
+    fn x_mm(&self, x_mm: f64, y_mm: f64, z_mm: f64) -> f64 {
+        let [nx, ny, nz] = self.normal;
+        let [x, y, z] = self.corner;
+        let exact = x - (ny * (y_mm - y) + nz * (z_mm - z)) / nx;
+        // Where the row goes along the plane, its rounding is all there is.
+        if (exact - x_mm).abs() < ROUNDING_MM { exact } else { x_mm }
+    }
+}
+
+/// Corners are rounded by less than this where parts are smaller than 10 m.
+const ROUNDING_MM: f64 = 1e-3;

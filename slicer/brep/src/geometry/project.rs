@@ -108,6 +108,11 @@ impl Surface {
             (Some([low, high]), None) => x.clamp(low, high),
             _ => x,
         };
+        // Near a pole a step may go round and round, until no digits are left.
+        let short = |step: f64, axis: usize| match periods[axis] {
+            Some(period) => step.clamp(-period / 4.0, period / 4.0),
+            None => step,
+        };
         let mut uv = start;
         let mut best = (f64::INFINITY, start);
         for _ in 0..30 {
@@ -129,7 +134,7 @@ impl Surface {
                 // At a pole only one parameter has a meaning.
                 [if a > c { e / a } else { 0.0 }, if c >= a && c > 0.0 { f / c } else { 0.0 }]
             };
-            let next = [clamp(uv[0] + step[0], 0), clamp(uv[1] + step[1], 1)];
+            let next = [0, 1].map(|axis| clamp(uv[axis] + short(step[axis], axis), axis));
             if !(next[0].is_finite() && next[1].is_finite()) || next == uv {
                 break;
             }
