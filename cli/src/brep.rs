@@ -1,6 +1,7 @@
 //! B-rep parts: how their files are read, and what is said of them.
 
 use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -11,6 +12,7 @@ use clap::{Args, ValueEnum};
 use lamp_brep::{BodyFault, BodyReport, Finding, KernelName, Prepared, prepare};
 use lamp_slicer::{Model, digest_of_file};
 use lamp_stack::{Dpi, Length};
+use tempfile::NamedTempFile;
 
 use crate::options::parse_distance;
 use crate::stop::Stop;
@@ -25,6 +27,13 @@ pub(crate) struct BrepOptions {
     #[arg(long, value_name = "LENGTH", value_parser = parse_tolerance, help_heading = HEADING)]
     tolerance: Option<Length>,
 
+    #[command(flatten)]
+    pub(crate) reader: ReaderOptions,
+}
+
+/// What reads B-rep parts, and for how long.
+#[derive(Args, Clone)]
+pub(crate) struct ReaderOptions {
     /// What reads STEP parts: LAMP itself, or OpenCASCADE where it is built in
     #[arg(long, value_enum, default_value_t, help_heading = HEADING)]
     kernel: KernelArg,
@@ -45,16 +54,24 @@ impl BrepOptions {
     /// The options as the stack remembers them.
     pub(crate) fn command_line(&self) -> String {
         let tolerance = self.tolerance.map(|tolerance| format!(" --tolerance {tolerance}"));
-        let kernel = match self.kernel {
-            KernelArg::Lamp => String::new(),
-        };
-        tolerance.unwrap_or_default() + &kernel
+        tolerance.unwrap_or_default() + &self.reader.command_line()
     }
 
-    /// Reads a STEP file, for images of some resolution. Faults of its bodies are in
-    /// the reports.
-    pub(crate) fn read(&self, path: &Path, dpi: Dpi) -> Result<Prepared, Stop> {
-        let tolerance = self.tolerance.unwrap_or_else(|| Length::from_um(dpi.pitch().um() / 4.0));
+    /// How far facets may lie from surfaces, for images of some resolution.
+    pub(crate) fn tolerance(&self, dpi: Dpi) -> Length {
+        self.tolerance.unwrap_or_else(|| Length::from_um(dpi.pitch().um() / 4.0))
+    }
+}
+
+impl ReaderOptions {
+    fn command_line(&self) -> String {
+        match self.kernel {
+            KernelArg::Lamp => String::new(),
+        }
+    }
+
+    /// Reads a STEP file. Faults of its bodies are in the reports.
+    pub(crate) fn read(&self, path: &Path, tolerance: Length) -> Result<Prepared, Stop> {
         let kernel = match self.kernel {
             KernelArg::Lamp => KernelName::Lamp,
         };
@@ -82,7 +99,7 @@ impl BrepOptions {
 /// Files nest entities as deep as they like.
 const STACK_BYTES: usize = 64 << 20;
 
-fn parse_tolerance(text: &str) -> Result<Length, String> {
+pub(crate) fn parse_tolerance(text: &str) -> Result<Length, String> {
     let length = parse_distance(text)?;
     let has_some = length.um() > 0.0;
     if has_some { Ok(length) } else { Err("facets lie some way from surfaces".to_owned()) }
@@ -112,7 +129,8 @@ pub(crate) fn part_of(
     Ok(Model::from_surfaces(name, digest, Arc::from(kernel), Arc::new(mesh)))
 }
 
-fn refuse(prepared: &Prepared, may_be_open: bool) -> Result<(), Stop> {
+/// Refuses bodies with faults, but for gaps if these `may_be_open`.
+pub(crate) fn refuse(prepared: &Prepared, may_be_open: bool) -> Result<(), Stop> {
     let is_borne = |fault: &BodyFault| may_be_open && matches!(fault, BodyFault::Open { .. });
     let bodies = (1..).zip(&prepared.reports);
     let faults = bodies.flat_map(|(number, report)| {
@@ -178,6 +196,13 @@ fn findings(findings: &[Finding]) -> Vec<String> {
 /// A length as people read it.
 pub(crate) fn length(mm: f64) -> String {
     Length::from_mm(mm).to_whole_nm().to_string()
+}
+
+/// A STEP file that comes from a stream, kept as long as it is needed.
+pub(crate) fn kept(mut stream: impl Read) -> io::Result<NamedTempFile> {
+    let mut file = NamedTempFile::new()?;
+    io::copy(&mut stream, &mut file)?;
+    Ok(file)
 }
 
 /// Whether a file's first bytes are those of STEP.

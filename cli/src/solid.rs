@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use lamp_slicer::{Body, Fill, Model, Placement, SliceError, Units};
 use lamp_stack::Dpi;
-use tempfile::NamedTempFile;
 
-use crate::brep::{BrepOptions, is_step, part_of};
+use crate::brep::{BrepOptions, is_step, kept, part_of};
 use crate::placement::PlacementOptions;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream};
@@ -86,12 +85,11 @@ impl SolidOptions {
             let mut stdin = io::stdin().lock();
             stdin.by_ref().take(START_BYTES).read_to_end(&mut start).map_err(failed)?;
             let is_step = is_step(&start);
-            let mut stream = Cursor::new(start).chain(stdin);
+            let stream = Cursor::new(start).chain(stdin);
             if !is_step {
                 return Ok(Model::from_stream("stdin", stream)?);
             }
-            let mut file = NamedTempFile::new().map_err(failed)?;
-            io::copy(&mut stream, &mut file).map_err(failed)?;
+            let file = kept(stream).map_err(failed)?;
             return self.step(file.path(), "stdin", reading);
         }
         let mut start = Vec::new();
@@ -110,7 +108,7 @@ impl SolidOptions {
             let why = "a STEP file says itself what its numbers mean: leave --units away";
             return Err(Stop::usage(why));
         }
-        let prepared = self.brep.read(path, reading.dpi)?;
+        let prepared = self.brep.reader.read(path, self.brep.tolerance(reading.dpi))?;
         let file = File::open(path).map_err(SliceError::from)?;
         part_of(prepared, name, &file, reading.may_be_open, reading.say)
     }

@@ -46,6 +46,7 @@ mod placement;
 mod planes;
 mod section;
 mod slices;
+mod stl;
 mod survey;
 mod table;
 mod trace;

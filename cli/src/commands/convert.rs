@@ -1,15 +1,22 @@
-use anyhow::anyhow;
-use clap::Args;
-use lamp_stack::{Layer, StackError, png_of_layer, write_png_folder};
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
 
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_stack::{Layer, Length, StackError, png_of_layer, write_png_folder};
+use tempfile::NamedTempFile;
+
+use crate::brep::{HEADING, ReaderOptions, kept, parse_tolerance, part_of};
 use crate::options::{Common, Input, Output};
+use crate::report::say;
 use crate::stop::Stop;
 use crate::streams::{
-    folder_to_make, input_name, is_folder, read_layers, report, write_file, write_layers,
-    written_to,
+    check_beside, folder_to_make, input_name, is_folder, is_stream, read_layers, report,
+    write_file, write_layers, written_to,
 };
 
-/// Write a stack in another shape: a file, a folder of pages, PNGs
+/// Write a stack in another shape: a file, a folder of pages, PNGs; or a STEP part as STL
 ///
 /// The images and what is known of them stay as they are, so nothing is added to the commands
 /// that made the stack: a stack that goes from file to folder and back has the same bytes.
@@ -19,12 +26,25 @@ Examples:
   lamp convert build.tif -o pages/
   lamp convert pages/ --classic -o build.tif
   lamp convert build.tif --layers 100..200 --png -o pictures/
-  lamp convert build.tif --layers 600 -o layer.png")]
+  lamp convert build.tif --layers 600 -o layer.png
+  lamp convert part.step part.stl --chord 5um")]
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     input: Input,
+    /// Where the facets of a STEP part go, as binary STL in millimetres
+    #[arg(value_name = "PART.stl", value_parser = parse_stl)]
+    stl: Option<PathBuf>,
+
     #[command(flatten)]
     output: Output,
+
+    /// How far the facets of a STEP part may lie from its surfaces
+    #[arg(long, value_name = "LENGTH", default_value = "5um", value_parser = parse_tolerance)]
+    #[arg(help_heading = HEADING)]
+    chord: Length,
+
+    #[command(flatten)]
+    reader: ReaderOptions,
 
     /// Write a folder of PNGs instead of TIFFs; a single layer may be a file that ends in .png
     #[arg(long, conflicts_with = "classic")]
@@ -32,6 +52,9 @@ pub(crate) struct ConvertArgs {
 }
 
 pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Stop> {
+    if let Some(stl) = &args.stl {
+        return args.write_stl(stl, common);
+    }
     let output = args.output.output.as_path();
     let report = report("convert", common, &args.output);
     let shape = args.shape()?;
@@ -59,6 +82,27 @@ enum Shape {
 }
 
 impl ConvertArgs {
+    /// Writes a STEP part as facets.
+    fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), Stop> {
+        let path = &self.input.stack;
+        check_beside(stl, Path::new("-"), [path].into_iter())?;
+        let name = input_name(path);
+        let spooled = is_stream(path).then(|| kept(io::stdin().lock())).transpose();
+        let spooled = spooled.with_context(|| name.clone())?;
+        let path = spooled.as_ref().map_or(path.as_path(), NamedTempFile::path);
+        let say = |line: &str| {
+            if !common.quiet {
+                say(&format!("convert: {line}"));
+            }
+        };
+        let model = || {
+            let prepared = self.reader.read(path, self.chord)?;
+            part_of(prepared, &name, &File::open(path).context("cannot read it")?, false, &say)
+        };
+        let model = model().map_err(|stop| stop.at(name.clone()))?;
+        write_file(stl, |out| model.write_stl(out))
+    }
+
     fn shape(&self) -> Result<Shape, Stop> {
         let Output { output, classic } = &self.output;
         let named_png = output.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
@@ -87,4 +131,10 @@ fn only_layer(
             "{name}: a PNG holds one layer: choose it with --layers, or write a folder of them with --png"
         ))),
     }
+}
+
+fn parse_stl(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_stl = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("stl"));
+    if is_stl { Ok(path) } else { Err(format!("`{text}` does not end in .stl")) }
 }

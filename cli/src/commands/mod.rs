@@ -1,5 +1,6 @@
 //! One file a command: its options, and what it does with them.
 
+mod brep;
 mod calibrate;
 mod compensate;
 mod convert;
@@ -46,6 +47,7 @@ pub(crate) enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Target(target::TargetArgs),
     Heights(heights::HeightsArgs),
+    Brep(brep::BrepArgs),
 }
 
 impl Command {
@@ -81,6 +83,7 @@ impl Command {
             Self::Calibrate(_) => "calibrate",
             Self::Target(_) => "target",
             Self::Heights(_) => "heights",
+            Self::Brep(_) => "brep",
         }
     }
 
@@ -105,6 +108,7 @@ impl Command {
             Self::Calibrate(args) => calibrate::run(args, common),
             Self::Target(args) => target::run(args, common),
             Self::Heights(args) => heights::run(args, common),
+            Self::Brep(args) => brep::run(args),
         }
     }
 }

@@ -1,0 +1,120 @@
+use std::fmt::Write;
+use std::io;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use lamp_brep::{Body, BodyReport, Prepared};
+use lamp_stack::Dpi;
+use tempfile::NamedTempFile;
+
+use crate::brep::{BrepOptions, body_name, kept, length, notes};
+use crate::stop::Stop;
+use crate::streams::{input_name, is_stream, print};
+
+/// Say what a STEP part holds, and whether it can be sliced
+///
+/// For each body its faces by their surfaces, its box, volume and area, by the facets that `slice`
+/// would make. A body is sliced only if these close, keep inside the control points of its
+/// surfaces, and hold the same volume as the surfaces.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp brep blade.step
+  lamp brep blade.step --tolerance 1um --strict")]
+pub(crate) struct BrepArgs {
+    /// The part: a STEP file, or - for standard input
+    #[arg(value_name = "PART")]
+    part: PathBuf,
+
+    /// Resolution of the images that the part is checked for, of which the tolerance is a quarter
+    /// of a pixel
+    #[arg(long, value_name = "DPI", default_value = "1500")]
+    dpi: Dpi,
+
+    #[command(flatten)]
+    brep: BrepOptions,
+
+    /// End with status 3 if a body would not be sliced
+    #[arg(long)]
+    strict: bool,
+}
+
+pub(crate) fn run(args: &BrepArgs) -> Result<(), Stop> {
+    let name = input_name(&args.part);
+    let spooled = is_stream(&args.part).then(|| kept(io::stdin().lock())).transpose();
+    let spooled = spooled.with_context(|| name.clone())?;
+    let path = spooled.as_ref().map_or(args.part.as_path(), NamedTempFile::path);
+    let prepared = args.brep.reader.read(path, args.brep.tolerance(args.dpi));
+    let prepared = prepared.map_err(|stop| stop.at(name.clone()))?;
+    print(&text(&name, &prepared))?;
+    let refused = prepared.reports.iter().filter(|report| !report.faults.is_empty()).count();
+    if args.strict && refused > 0 {
+        let bodies = if refused == 1 { "body" } else { "bodies" };
+        return Err(Stop::Findings(format!("{name}: {refused} {bodies} would not be sliced")));
+    }
+    Ok(())
+}
+
+fn text(name: &str, prepared: &Prepared) -> String {
+    let facets = prepared.mesh.facets.len();
+    let mut text = format!(
+        "part:       {name}\nunit:       {}\nfacets:     {facets}, up to {} from the surfaces\n\
+         bodies:     {}\n",
+        prepared.kernel.unit(),
+        length(prepared.chord_mm),
+        prepared.reports.len(),
+    );
+    for note in notes(prepared) {
+        writeln!(text, "found:      {note}").expect("a string takes all");
+    }
+    for attempt in &prepared.tries {
+        let (chord, heal) = (length(attempt.chord_mm), attempt.heal_mm);
+        let healed =
+            if heal > 0.0 { format!(", joined within {}", length(heal)) } else { String::new() };
+        writeln!(text, "tried:      facets up to {chord} away{healed}: {}", attempt.why)
+            .expect("a string takes all");
+    }
+    let bodies = (1..).zip(prepared.kernel.bodies().iter().zip(&prepared.reports));
+    for (number, (body, report)) in bodies {
+        text += &body_text(number, body, report, prepared);
+    }
+    text
+}
+
+fn body_text(number: usize, body: &Body, report: &BodyReport, prepared: &Prepared) -> String {
+    let [low, high] = report.box_mm;
+    let side = |k: usize| format!("{:.3} to {:.3}", low[k], high[k]);
+    let sliced = if report.faults.is_empty() {
+        "  sliced:   yes, it is closed\n".to_owned()
+    } else {
+        report.faults.iter().map(|fault| format!("  sliced:   no: {fault}\n")).collect()
+    };
+    format!(
+        "{}\n  faces:    {}\n  box:      x {}, y {}, z {} mm\n\
+         \x20 volume:   {:.6} mm3 (by facets {:.6})\n  area:     {:.6} mm2\n{sliced}",
+        body_name(number, report),
+        faces(body, prepared),
+        side(0),
+        side(1),
+        side(2),
+        report.exact_volume_mm3,
+        report.volume_mm3,
+        report.area_mm2,
+    )
+}
+
+/// How many faces a body has of each kind, the most frequent first.
+fn faces(body: &Body, prepared: &Prepared) -> String {
+    let mut kinds: Vec<(&str, usize)> = Vec::new();
+    for face in body.faces.clone() {
+        let kind = prepared.kernel.face(face).kind;
+        match kinds.iter_mut().find(|(known, _)| *known == kind) {
+            Some((_, count)) => *count += 1,
+            None => kinds.push((kind, 1)),
+        }
+    }
+    kinds.sort_by_key(|&(kind, count)| (std::cmp::Reverse(count), kind));
+    let kinds: Vec<_> = kinds.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+    format!("{} ({})", body.faces.len(), kinds.join(", "))
+}
