@@ -5,6 +5,7 @@
 //! same code under the names of the pipeline.
 
 mod brep;
+mod bridge;
 mod commands;
 mod evidence;
 mod exposure;

@@ -31,6 +31,7 @@
 //! # Ok::<(), lamp_slicer::SliceError>(())
 //! ```
 
+mod again;
 mod ascii;
 mod body;
 mod buckets;

@@ -140,6 +140,24 @@ impl Planes {
         }
     }
 
+    /// The same with one plane moved, by no more than half of the way to its neighbours.
+    pub(crate) fn moved(&self, layer: usize, by_um: f64) -> Self {
+        let mut planes = self.clone();
+        let here = self.z_um[layer];
+        let below = layer.checked_sub(1).map_or(f64::MIN, |below| self.z_um[below]);
+        let above = self.z_um.get(layer + 1).copied().unwrap_or(f64::MAX);
+        planes.z_um[layer] = here + by_um.clamp((below - here) / 2.0, (above - here) / 2.0);
+        if let Spacing::Uneven(bins) = &mut planes.spacing {
+            *bins = Bins::new(&planes.z_um);
+        }
+        planes
+    }
+
+    /// The heights of the layers.
+    pub(crate) fn heights(&self) -> LayerHeights {
+        LayerHeights { boundaries_um: self.boundaries_um.clone() }
+    }
+
     /// How many layers there are.
     pub(crate) fn len(&self) -> usize {
         self.z_um.len()

@@ -117,12 +117,12 @@ impl Default for SliceOptions {
 /// and bytes do not depend on them.
 #[derive(Debug)]
 pub struct Slices {
-    model: PlacedModel,
-    survey: Survey,
-    grid: PixelGrid,
-    planes: Planes,
-    fill: Fill,
-    gray: Option<LayerLevels>,
+    pub(crate) model: PlacedModel,
+    pub(crate) survey: Survey,
+    pub(crate) grid: PixelGrid,
+    pub(crate) planes: Planes,
+    pub(crate) fill: Fill,
+    pub(crate) gray: Option<LayerLevels>,
     wanted: Range<usize>,
     most_crossings: usize,
     /// Slabs of layers that fit by the estimate.
@@ -226,9 +226,7 @@ impl Slices {
                 let facets = buckets.of_slab(slab, &self.model);
                 fill(&mut self.table, &facets, cutter, gray, layers, most)?
             } else {
-                let (low, high) = heights_of(&layers, &self.planes, reach_um);
-                let blocks = self.survey.blocks_between(low, high);
-                let facets = Blocks { model: &self.model, blocks };
+                let facets = Blocks::of(&self.model, &self.survey, &layers, &self.planes, reach_um);
                 fill(&mut self.table, &facets, cutter, gray, layers, most)?
             };
             if let Some(open_rows) = open_rows {
@@ -273,19 +271,28 @@ impl Slices {
         let batch = self.pending.start..end;
         self.pending.start = end;
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
-        let surfaces: Vec<_> = self.model.exact().collect();
-        let layer = |layer| {
-            let Section { image, stray_rows, closed } =
-                self.table.layer(layer, cutter, &surfaces, self.gray.as_ref());
-            let open_rows = self.open_rows.get(&layer).cloned().unwrap_or_default();
-            let closed = Some(closed);
-            Layer {
-                info: PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) },
-                dpi: Some(self.grid.dpi),
-                image,
-            }
-        };
+        let layer = |layer| self.image_of(layer, &self.table, cutter, &self.open_rows);
         self.ready = batch.into_par_iter().map(layer).collect();
+    }
+
+    /// Makes a layer of a table into an image.
+    pub(crate) fn image_of(
+        &self,
+        layer: usize,
+        table: &Table,
+        cutter: Cutter<'_>,
+        open_rows: &OpenRows,
+    ) -> Layer {
+        let surfaces: Vec<_> = self.model.exact().collect();
+        let Section { image, stray_rows, closed } =
+            table.layer(layer, cutter, &surfaces, self.gray.as_ref());
+        let open_rows = open_rows.get(&layer).cloned().unwrap_or_default();
+        let closed = Some(closed);
+        Layer {
+            info: PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) },
+            dpi: Some(self.grid.dpi),
+            image,
+        }
     }
 
     /// How many layers become images at once: enough that handing them out
@@ -346,7 +353,7 @@ impl Iterator for Slices {
 
 /// Fills the table with the crossings of some layers, and finds the rows where
 /// their contours break off. `None` where the crossings are too many.
-fn fill(
+pub(crate) fn fill(
     table: &mut Table,
     facets: &impl Facets,
     cutter: Cutter<'_>,
@@ -368,9 +375,23 @@ fn fill(
 }
 
 /// The facets of some blocks of a part.
-struct Blocks<'a> {
+pub(crate) struct Blocks<'a> {
     model: &'a PlacedModel,
     blocks: Vec<usize>,
+}
+
+impl<'a> Blocks<'a> {
+    /// Those that some layers meet, which look so far below their planes.
+    pub(crate) fn of(
+        model: &'a PlacedModel,
+        survey: &Survey,
+        layers: &Range<usize>,
+        planes: &Planes,
+        reach_um: f64,
+    ) -> Self {
+        let (low, high) = heights_of(layers, planes, reach_um);
+        Self { model, blocks: survey.blocks_between(low, high) }
+    }
 }
 
 impl Facets for Blocks<'_> {

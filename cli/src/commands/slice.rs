@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lamp_slicer::{PixelGrid, Polished, StrayBand};
 
-use crate::brep::length;
+use crate::brep::{HEADING, length};
+use crate::bridge::Bridged;
 use crate::lines::parse_report;
 use crate::options::{Common, Output, parse_layers, parse_memory};
 use crate::part::PartOptions;
@@ -51,6 +52,11 @@ pub(crate) struct SliceArgs {
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
+    /// An STL of the same STEP part, in millimetres: where the STEP part has gaps, layers are cut up
+    /// to 10 um beside their planes, or else taken from here
+    #[arg(long, value_name = "PART.stl", help_heading = HEADING)]
+    fallback: Option<PathBuf>,
+
     /// Write what is wrong with the mesh to a file, in JSON: for each band of rows that do not
     /// balance, the edges that are open or shared by too many, and the facets there by number and
     /// corners, as they stand in the part's file
@@ -62,7 +68,7 @@ pub(crate) struct SliceArgs {
 }
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
-    let inputs = || args.parts.iter().chain(args.options.files());
+    let inputs = || args.parts.iter().chain(args.options.files()).chain(&args.fallback);
     if let Some(report) = &args.report {
         check_beside(report, &args.output.output, inputs())?;
     }
@@ -70,7 +76,8 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     let exposure = args.options.exposure()?;
     let report = report("slice", common, &args.output);
     let say = |line: &str| report.say(line);
-    let reading = Reading { dpi: args.options.dpi, may_be_open: false, say: &say };
+    let reading =
+        Reading { dpi: args.options.dpi, may_be_open: args.fallback.is_some(), say: &say };
     let model = args.options.solid.open(&args.parts, &reading)?;
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args
@@ -78,13 +85,14 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         .iter()
         .map(|part| part.file_name().unwrap_or_default().to_string_lossy())
         .collect();
-    let (mut slices, name_command) = args
+    let (slices, name_command) = args
         .options
         .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure, &say)
         .map_err(|stop| at_part(stop, &args.parts))?;
     report.expect(slices.layer_count() as u64);
+    let mut bridged = Bridged::new(slices, args.fallback.as_ref(), &args.options)?;
     let (mut counts, mut bands) = (Counts::default(), Vec::new());
-    let layers = slices.by_ref().map(|layer| {
+    let layers = bridged.by_ref().map(|layer| {
         let mut layer = layer.map_err(|error| Stop::from(error).at(name.clone()))?;
         name_command(&mut layer);
         counts.add(&layer.info);
@@ -94,6 +102,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         Ok(layer)
     });
     write_layers(layers, &args.output, &report)?;
+    let slices = &bridged.slices;
     if let Some(path) = &args.report {
         let trace = slices.trace(&bands).map_err(|error| Stop::from(error).at(name))?;
         let subject = Subject {
@@ -107,6 +116,9 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     }
     if let Some(polished) = slices.polished() {
         report.say(&polish_text(polished));
+    }
+    if let Some(text) = bridged.text() {
+        report.say(&text);
     }
     say_stray_rows(&report, counts, args.report.as_deref());
     Ok(())
