@@ -129,6 +129,8 @@ pub struct Slices {
     slabs: Vec<Range<usize>>,
     buckets: Option<Buckets>,
     table: Table,
+    /// What was done to the crossings of slabs before.
+    polished: Polished,
     open_rows: OpenRows,
     /// The layers of the table that are still to be made into images.
     pending: Range<usize>,
@@ -189,6 +191,7 @@ impl Slices {
             slabs,
             buckets,
             table: Table::default(),
+            polished: Polished::default(),
             open_rows: OpenRows::new(),
             ready: VecDeque::new(),
         })
@@ -206,7 +209,7 @@ impl Slices {
 
     /// What was done to the crossings of B-rep parts so far, if there are such.
     pub fn polished(&self) -> Option<Polished> {
-        self.model.exact().map(Exact::polished).reduce(Polished::joined)
+        self.model.exact().next().map(|_| self.polished.joined(self.table.polished()))
     }
 
     /// Fills the table with the next slab, as the iterator does when it needs
@@ -219,6 +222,7 @@ impl Slices {
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
         let gray = self.gray.as_ref().map(LayerLevels::reach_um);
         let reach_um = gray.unwrap_or(0.0);
+        self.polished = self.polished.joined(self.table.polished());
         loop {
             let layers = start..end;
             let most = self.most_crossings;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place, Share};
 use crate::ends::{EndSum, RowSums};
-use crate::exact::{Batch, Exact, settle};
+use crate::exact::{Exact, ExactCut, Polished, Tally, settle};
 use crate::gray::{LayerLevels, Shader, Span};
 use crate::placement::PlacedFacet;
 
@@ -61,6 +61,8 @@ pub(crate) struct Table {
     /// What each worker found of each layer. Lists keep their memory from slab
     /// to slab.
     parts: Vec<Vec<Share>>,
+    /// What polishing did to the crossings of these layers.
+    tally: Tally,
 }
 
 /// What a layer's crossings make.
@@ -110,6 +112,8 @@ impl Table {
         self.parts.resize_with(rayon::current_num_threads(), Vec::new);
         let budget = Budget { used: AtomicUsize::new(0), most, must_fit: layers.len() > 1 };
         let next = AtomicUsize::new(0);
+        self.tally = Tally::default();
+        let tally = &self.tally;
         self.parts.par_iter_mut().try_for_each(|shares| -> io::Result<()> {
             shares.iter_mut().for_each(Share::clear);
             shares.resize_with(shares.len().max(layers.len()), Share::default);
@@ -119,29 +123,36 @@ impl Table {
                 if piece >= facets.pieces() {
                     return Ok(());
                 }
-                let mut exact = facets
-                    .exact(piece)
-                    .map(|(exact, first)| (Batch::new(exact, cutter, layers.clone()), first..));
+                if let Some((exact, first)) = facets.exact(piece) {
+                    let mut cut =
+                        ExactCut::new(exact, first, tally, cutter, layers.clone(), reach_um);
+                    facets.for_each_in(piece, |facet| {
+                        if !budget.is_spent() {
+                            unclaimed += cut.cut(facet, shares);
+                            budget.claim(&mut unclaimed);
+                        }
+                    })?;
+                    cut.finish(shares);
+                    continue;
+                }
                 facets.for_each_in(piece, |facet| {
-                    let number = exact.as_mut().and_then(|(_, numbers)| numbers.next());
                     if !budget.is_spent() {
-                        unclaimed += match (&mut exact, number) {
-                            (Some((batch, _)), Some(number)) => batch.cut(number, facet, shares),
-                            _ => cutter.cut(facet, &layers, shares),
-                        };
+                        unclaimed += cutter.cut(facet, &layers, shares);
                         if let Some(reach_um) = reach_um {
                             unclaimed += cutter.look_down(facet, reach_um, &layers, shares);
                         }
                         budget.claim(&mut unclaimed);
                     }
                 })?;
-                if let Some((batch, _)) = &mut exact {
-                    batch.finish(shares);
-                }
             }
         })?;
         self.layers = layers;
         Ok(!budget.is_spent())
+    }
+
+    /// What polishing did to the crossings of its layers so far.
+    pub(crate) fn polished(&self) -> Polished {
+        self.tally.total()
     }
 
     /// The layers with a contour that does not close.
@@ -185,7 +196,7 @@ impl Table {
             return Vec::new();
         }
         let kept = self.shares(layer).flat_map(|share| &share.kept).copied().collect();
-        settle(surfaces, layer, cutter, crossings, kept)
+        settle(surfaces, &self.tally, layer, cutter, crossings, kept)
     }
 
     /// A layer of the slab.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lamp_brep::{Kernel, StepModel};
 use lamp_fixtures::{StepPart, StepUnit, step};
-use lamp_slicer::{Axis, Model, Placement, SliceOptions, Slices};
+use lamp_slicer::{Axis, DepthLevels, LayerLevels, Model, Placement, SliceOptions, Slices};
 use lamp_stack::{Dpi, Image, Length};
 
 fn model(part: StepPart, chord_mm: f64) -> Model {
@@ -81,10 +81,10 @@ fn a_torus_has_no_wrong_pixel() {
     let is_inside = |[x, y, z]: [f64; 3]| (x.hypot(y) - 20.0).powi(2) + (z - 8.0).powi(2) < 64.0;
     for dpi in [1500.0, 2400.0] {
         let chord_mm = 0.25 * 25.4 / dpi;
-        let flat = options(dpi, 1.7, Placement::default());
+        let flat = options(dpi, 2.3, Placement::default());
         let (wrong, white) = wrong_pixels(model(StepPart::Torus, chord_mm), &flat, is_inside);
         assert!(wrong == 0 && white > 100_000, "{dpi} dpi: {wrong} of {white}");
-        let tilted = options(dpi, 4.3, askew());
+        let tilted = options(dpi, 9.1, askew());
         let (wrong, white) =
             wrong_pixels(model(StepPart::Torus, chord_mm), &tilted, |point| is_inside(back(point)));
         assert!(wrong == 0 && white > 100_000, "askew, {dpi} dpi: {wrong} of {white}");
@@ -100,4 +100,43 @@ fn facets_alone_have_wrong_pixels() {
         .map(|chord_mm| wrong_pixels(model(StepPart::Sphere, chord_mm), &options, is_inside).0);
     println!("{wrong:?}");
     assert!(wrong[0] > 5 * wrong[1] && wrong[1] > 5 * wrong[2] && wrong[2] > 0, "{wrong:?}");
+}
+
+/// A gray pixel is as deep as the sphere is below it, to a level.
+#[test]
+fn gray_levels_are_those_of_the_exact_depth() {
+    // A level for each micrometre.
+    let levels = DepthLevels::new(Length::from_um(255.0), |part| Length::from_um(255.0 * part));
+    let gray = Some(LayerLevels::from(levels));
+    let options = SliceOptions { gray, ..options(600.0, 0.1, Placement::default()) };
+    // Facets are off by up to 60 levels.
+    for (chord_mm, polish) in [(0.01, true), (0.05, true), (0.05, false)] {
+        let options = SliceOptions { polish, layers: Some(10..40), ..options.clone() };
+        let slices = Slices::new(model(StepPart::Sphere, chord_mm), &options).unwrap();
+        let grid = *slices.grid();
+        let (mut off, mut gray) = (0, 0);
+        for layer in slices {
+            let layer = layer.unwrap();
+            let top_mm = (layer.info.z_um.unwrap() + layer.info.thickness_um.unwrap()) / 1000.0;
+            let Image::Gray(image) = layer.image else { panic!("a gray layer") };
+            for (row, changes) in (0..).zip(image.rows()) {
+                let ends = changes.iter().skip(1).map(|change| change.column);
+                for (change, end) in changes.iter().zip(ends.chain([grid.width])) {
+                    for column in change.column..end {
+                        let [x, y] = grid.to_mm(f64::from(column), f64::from(row));
+                        let under = 15.0 - (225.0 - x * x - y * y).max(0.0).sqrt();
+                        let depth_um = 1000.0 * (top_mm - under);
+                        let expected = depth_um.clamp(0.0, 255.0);
+                        let is_gray = change.level > 0 && change.level < 255;
+                        gray += u32::from(is_gray);
+                        let apart = (f64::from(change.level) - expected).abs();
+                        off += u32::from(is_gray && apart > 0.51);
+                    }
+                }
+            }
+        }
+        println!("{chord_mm} {polish}: {off} of {gray}");
+        assert!(gray > 10_000);
+        assert!((off == 0) == polish, "{chord_mm} mm: {off} of {gray}");
+    }
 }

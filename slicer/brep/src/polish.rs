@@ -2,6 +2,7 @@
 
 use crate::kernel::Jet;
 use crate::placed::Placed;
+use crate::solve::{Found, Wanted, solved};
 
 /// Where a facet crosses a plane and a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,12 +41,6 @@ pub enum Fate {
     Far,
 }
 
-/// Newton steps; two or three are the rule.
-const MOST_STEPS: usize = 12;
-/// How near to the row and the plane a point must come, in millimetres.
-const NEAR_MM: f64 = 1e-10;
-/// And how near is enough where rounding allows no more.
-const ENOUGH_MM: f64 = 1e-7;
 /// How far a crossing may move across the surface, in the distances that facets may
 /// lie from it: the normal is another where it comes from.
 const FAR: f64 = 2.0;
@@ -66,92 +61,112 @@ const BEYOND: f64 = 1.0;
 /// # Panics
 /// Where a crossing's facet does not exist.
 pub fn polish(placed: &Placed, crossings: &mut [Crossing]) {
-    let face = |k: &usize| placed.facet(crossings[*k].facet).face;
-    let mut order: Vec<usize> = (0..crossings.len()).collect();
-    if !order.is_sorted_by_key(face) {
-        order.sort_by_key(face);
-    }
-    let batches: Vec<&[usize]> = order.chunk_by(|a, b| face(a) == face(b)).collect();
-    for batch in batches {
-        for (k, found) in solved(placed, batch, crossings) {
-            let crossing = &mut crossings[k];
-            crossing.fate = fate(placed, crossing, found);
-            if let (Fate::Moved, Some((uv, jet))) = (crossing.fate, found) {
-                (crossing.uv, crossing.x_mm) = (uv, jet.point[0]);
+    by_face(
+        placed,
+        crossings,
+        |crossing| crossing.facet,
+        |face, crossings| {
+            let wanted = |crossing: &&mut Crossing| Wanted {
+                uv: crossing.uv,
+                known_mm: [crossing.y_mm, crossing.z_mm],
+            };
+            let wanted: Vec<Wanted> = crossings.iter().map(wanted).collect();
+            for (crossing, found) in crossings.iter_mut().zip(solved(placed, face, [1, 2], &wanted))
+            {
+                crossing.fate = fate(placed, crossing, found);
+                if let (Fate::Moved, Some((uv, jet))) = (crossing.fate, found) {
+                    (crossing.uv, crossing.x_mm) = (uv, jet.point[0]);
+                }
             }
-        }
+        },
+    );
+}
+
+/// Gives the items on each face together.
+fn by_face<T>(
+    placed: &Placed,
+    items: &mut [T],
+    facet: impl Fn(&T) -> u32,
+    mut each: impl FnMut(u32, &mut [&mut T]),
+) {
+    let face = |item: &&mut T| placed.facet(facet(item)).face;
+    let mut items: Vec<&mut T> = items.iter_mut().collect();
+    if !items.is_sorted_by_key(face) {
+        items.sort_by_key(face);
+    }
+    for items in items.chunk_by_mut(|a, b| face(a) == face(b)) {
+        each(face(&items[0]), items);
     }
 }
 
 fn fate(placed: &Placed, crossing: &Crossing, found: Found) -> Fate {
     let Some((uv, jet)) = found else { return Fate::Diverged };
+    let by_mm = jet.point[0] - crossing.x_mm;
+    fate_of(placed, crossing.facet, uv, &jet, 0, by_mm, !crossing.enters)
+}
+
+/// What becomes of a point of a facet that is found to be `by_mm` further along an
+/// axis, where the part should be before or behind it.
+fn fate_of(
+    placed: &Placed,
+    facet: u32,
+    uv: [f64; 2],
+    jet: &Jet,
+    axis: usize,
+    by_mm: f64,
+    is_before: bool,
+) -> Fate {
     // At a pole the surface has no normal.
-    let outwards = placed.normal(crossing.facet, &jet).map_or(0.0, |normal| normal[0]);
-    let is_other_side = outwards.abs() > LEVEL && (outwards < 0.0) != crossing.enters;
-    if is_other_side || !is_near(&placed.facet(crossing.facet).uv, uv) {
+    let outwards = placed.normal(facet, jet).map_or(0.0, |normal| normal[axis]);
+    let is_other_side = outwards.abs() > LEVEL && (outwards > 0.0) != is_before;
+    if is_other_side || !is_near(&placed.facet(facet).uv, uv) {
         Fate::Left
-    } else if (jet.point[0] - crossing.x_mm).abs() * outwards.abs() > FAR * placed.tolerance_mm() {
+    } else if by_mm.abs() * outwards.abs() > FAR * placed.tolerance_mm() {
         Fate::Far
     } else {
         Fate::Moved
     }
 }
 
-type Found = Option<([f64; 2], Jet)>;
+/// A place on a facet, seen from above.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Probe {
+    /// The facet, among those of the tessellation.
+    pub facet: u32,
+    /// The place on the facet, as parameters of its surface.
+    pub uv: [f64; 2],
+    /// The place, in millimetres, of which z is made exact.
+    pub at_mm: [f64; 3],
+    /// Whether the part is below the facet.
+    pub is_above: bool,
+}
 
-/// Solves the crossings of one face together; each in its own number of steps.
-pub(crate) fn solved(
-    placed: &Placed,
-    batch: &[usize],
-    crossings: &[Crossing],
-) -> Vec<(usize, Found)> {
-    let face = placed.facet(crossings[batch[0]].facet).face;
-    let mut found = Vec::with_capacity(batch.len());
-    let mut open = batch.to_vec();
-    let mut at: Vec<[f64; 2]> = open.iter().map(|&k| crossings[k].uv).collect();
-    let mut jets = vec![Jet::default(); at.len()];
-    for steps in 1..=MOST_STEPS {
-        if open.is_empty() {
-            break;
-        }
-        jets.truncate(at.len());
-        placed.evaluate(face, &at, &mut jets);
-        let mut kept = 0;
-        for i in 0..open.len() {
-            let (k, uv) = (open[i], at[i]);
-            let near_mm = if steps < MOST_STEPS { NEAR_MM } else { ENOUGH_MM };
-            match step(&crossings[k], &jets[i], uv, near_mm) {
-                Step::There => found.push((k, Some((uv, jets[i])))),
-                Step::Lost => found.push((k, None)),
-                Step::On(next) => {
-                    (open[kept], at[kept]) = (k, next);
-                    kept += 1;
+/// Solves x(u, v) and y(u, v) on the exact surfaces as [`polish`] does, and moves the
+/// places to z(u, v); those without a point keep theirs on the facet.
+///
+/// # Panics
+/// Where a place's facet does not exist.
+pub fn polish_heights(placed: &Placed, probes: &mut [Probe]) {
+    by_face(
+        placed,
+        probes,
+        |probe| probe.facet,
+        |face, probes| {
+            let wanted = |probe: &&mut Probe| Wanted {
+                uv: probe.uv,
+                known_mm: [probe.at_mm[0], probe.at_mm[1]],
+            };
+            let wanted: Vec<Wanted> = probes.iter().map(wanted).collect();
+            for (probe, found) in probes.iter_mut().zip(solved(placed, face, [0, 1], &wanted)) {
+                let Some((uv, jet)) = found else { continue };
+                let by_mm = jet.point[2] - probe.at_mm[2];
+                let fate = fate_of(placed, probe.facet, uv, &jet, 2, by_mm, probe.is_above);
+                if fate == Fate::Moved {
+                    (probe.uv, probe.at_mm[2]) = (uv, jet.point[2]);
                 }
             }
-        }
-        open.truncate(kept);
-        at.truncate(kept);
-    }
-    found.extend(open.into_iter().map(|k| (k, None)));
-    found
-}
-
-enum Step {
-    There,
-    On([f64; 2]),
-    Lost,
-}
-
-fn step(crossing: &Crossing, jet: &Jet, [u, v]: [f64; 2], near_mm: f64) -> Step {
-    let [_, y, z] = jet.point;
-    let (e, f) = (crossing.y_mm - y, crossing.z_mm - z);
-    if e.abs() < near_mm && f.abs() < near_mm {
-        return Step::There;
-    }
-    let ([_, yu, zu], [_, yv, zv]) = (jet.du, jet.dv);
-    let det = yu * zv - yv * zu;
-    let next = [u + (e * zv - f * yv) / det, v + (f * yu - e * zu) / det];
-    if next.iter().all(|t| t.is_finite()) { Step::On(next) } else { Step::Lost }
+        },
+    );
 }
 
 /// Whether parameters lie on a facet or near it.

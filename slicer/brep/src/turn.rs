@@ -11,7 +11,8 @@ use rayon::prelude::*;
 
 use crate::kernel::{Facet, Jet};
 use crate::placed::Placed;
-use crate::polish::{Crossing, Fate, solved};
+use crate::polish::{Crossing, Fate};
+use crate::solve::{Wanted, solved};
 use crate::vector::{Vec3, add, distance, scale, sub};
 
 /// A point where a contour has a tangent along the rows.
@@ -133,9 +134,12 @@ impl Turns {
     fn settle(&self, placed: &Placed, crossing: &mut Crossing) -> Option<()> {
         // A contour that goes on into another face is there once more.
         for _ in 0..3 {
-            let (uv, jet) = solved(placed, &[0], &[*crossing])[0].1?;
+            let face = placed.facet(crossing.facet).face;
+            let known_mm = [crossing.y_mm, crossing.z_mm];
+            let wanted = Wanted { uv: crossing.uv, known_mm };
+            let (uv, jet) = solved(placed, face, [1, 2], &[wanted])[0]?;
             let facet = self.facet_below(placed, crossing.facet, jet.point)?;
-            if placed.facet(facet).face == placed.facet(crossing.facet).face {
+            if placed.facet(facet).face == face {
                 (crossing.x_mm, crossing.fate) = (jet.point[0], Fate::Moved);
                 (crossing.facet, crossing.uv) = (facet, uv);
                 crossing.enters = placed.normal(facet, &jet)?[0] < 0.0;

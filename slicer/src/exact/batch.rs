@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use lamp_brep::{Fate, polish};
 
-use super::Exact;
+use super::{Exact, Tally};
 use crate::cut::{Crossing, Cutter, Share};
 use crate::placement::PlacedFacet;
 
@@ -14,6 +14,7 @@ const BATCH: usize = 4096;
 /// Crossings with where they go in the table.
 pub(crate) struct Batch<'a> {
     exact: &'a Exact,
+    tally: &'a Tally,
     cutter: Cutter<'a>,
     layers: Range<usize>,
     crossings: Vec<lamp_brep::Crossing>,
@@ -24,9 +25,14 @@ pub(crate) struct Batch<'a> {
 }
 
 impl<'a> Batch<'a> {
-    pub(crate) fn new(exact: &'a Exact, cutter: Cutter<'a>, layers: Range<usize>) -> Self {
+    pub(crate) fn new(
+        exact: &'a Exact,
+        tally: &'a Tally,
+        cutter: Cutter<'a>,
+        layers: Range<usize>,
+    ) -> Self {
         let (crossings, facets_mm, cells) = (Vec::new(), Vec::new(), Vec::new());
-        Self { exact, cutter, layers, crossings, facets_mm, cells }
+        Self { exact, tally, cutter, layers, crossings, facets_mm, cells }
     }
 
     /// Adds a facet's crossings, and says how many there are.
@@ -73,7 +79,7 @@ impl<'a> Batch<'a> {
     /// Polishes what was gathered, and puts it into the table.
     pub(crate) fn finish(&mut self, shares: &mut [Share]) {
         polish(&self.exact.placed, &mut self.crossings);
-        self.exact.tally.add(&self.crossings, &self.facets_mm);
+        self.tally.add(&self.crossings, &self.facets_mm);
         for (crossing, &(layer, row, rising)) in self.crossings.iter().zip(&self.cells) {
             let [column, _] = self.cutter.grid.to_pixels(crossing.x_mm, crossing.y_mm);
             let share = &mut shares[layer - self.layers.start];

@@ -5,7 +5,7 @@ use std::ops::{Range, RangeInclusive};
 
 use lamp_brep::Turn;
 
-use super::Exact;
+use super::{Exact, Tally};
 use crate::cut::{Crossing, Cutter};
 
 /// A row near a turn.
@@ -24,6 +24,7 @@ struct Row {
 /// and the pairs there that facets do not make.
 pub(crate) fn settle(
     surfaces: &[&Exact],
+    tally: &Tally,
     layer: usize,
     cutter: Cutter<'_>,
     crossings: impl Iterator<Item = Crossing>,
@@ -57,7 +58,7 @@ pub(crate) fn settle(
         }
     }
     for (exact, turn, near) in turns {
-        near.settle(exact, &turn, cutter, &mut rows);
+        near.settle(exact, tally, &turn, cutter, &mut rows);
     }
     // A map has no order; the table sorts.
     rest.extend(rows.into_values().flat_map(|row| row.kept.into_iter().chain(row.added)));
@@ -91,16 +92,23 @@ impl Near {
         Self { columns, inside, beyond, down }
     }
 
-    fn settle(&self, exact: &Exact, turn: &Turn, cutter: Cutter<'_>, rows: &mut HashMap<u32, Row>) {
+    fn settle(
+        &self,
+        exact: &Exact,
+        tally: &Tally,
+        turn: &Turn,
+        cutter: Cutter<'_>,
+        rows: &mut HashMap<u32, Row>,
+    ) {
         for row in self.beyond.clone() {
             let row = rows.get_mut(&row).expect("rows near turns are in the map");
-            self.take(exact, row);
+            self.take(tally, row);
         }
         let mut inside = self.inside.clone();
         while let Some(number) = if self.down { inside.next() } else { inside.next_back() } {
             let row = rows.get_mut(&number).expect("rows near turns are in the map");
             let Some(pair) = pair(exact, turn, cutter, number) else { return };
-            self.put(exact, pair, row);
+            self.put(tally, pair, row);
         }
     }
 
@@ -112,16 +120,16 @@ impl Near {
     }
 
     /// Takes the crossings of a row away that facets make beyond the turn.
-    fn take(&self, exact: &Exact, row: &mut Row) {
+    fn take(&self, tally: &Tally, row: &mut Row) {
         let kept = self.kept(row);
         if winding(&kept) == 0 {
             row.kept.retain(|crossing| !kept.contains(crossing));
-            exact.tally.mend(kept.len(), kept.len());
+            tally.mend(kept.len(), kept.len());
         }
     }
 
     /// Sees to it that a row has a pair of crossings near the turn, each once.
-    fn put(&self, exact: &Exact, pair: [Crossing; 2], row: &mut Row) {
+    fn put(&self, tally: &Tally, pair: [Crossing; 2], row: &mut Row) {
         let kept = self.kept(row);
         let there = pair.map(|crossing| {
             let others = row.exact.iter().chain(&row.added).copied();
@@ -139,7 +147,7 @@ impl Near {
                 [_, again @ ..] => row.added.extend(again.iter().map(|it| it.reversed())),
             }
         }
-        exact.tally.mend(row.added.len() - before, kept.len());
+        tally.mend(row.added.len() - before, kept.len());
     }
 }
 

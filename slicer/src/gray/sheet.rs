@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::cut::{Cutter, ceil_clamped};
 use crate::placement::{PlacedFacet, heights};
+use crate::planes::Planes;
 
 /// Closer than this to a layer's plane, and to each other, facets are taken to
 /// touch: far more than rounding, far less than anything cures.
@@ -58,11 +59,30 @@ impl Span {
         f64::from(self.signed_tie_um.abs())
     }
 
+    /// The same at another depth.
+    pub(crate) fn at_depth(self, depth_um: f64) -> Self {
+        Self { depth_um: depth_um as f32, ..self }
+    }
+
+    /// The depths at which a layer looks at it: from just above the section to where
+    /// the exposure ends.
+    pub(crate) fn depths(&self, planes: &Planes, layer: usize, reach_um: f64) -> Range<f64> {
+        depths(planes, layer, reach_um, self.tie_um())
+    }
+
     /// The level that its depth has along all of its columns, where it has one.
     #[inline]
     pub(crate) fn is_level(&self) -> bool {
         self.um_per_column == 0.0
     }
+}
+
+/// The depths below a layer's top at which it looks at facets: from just above the
+/// section to where the exposure ends.
+fn depths(planes: &Planes, layer: usize, reach_um: f64, tie_um: f64) -> Range<f64> {
+    let top_um = planes.top_um(layer);
+    let end_um = (top_um - reach_um).max(planes.bottom_um() + STANDING_UM);
+    top_um - planes.z_um(layer) - tie_um..top_um - end_um
 }
 
 /// A facet seen from above: x and y in pixels, z in micrometres.
@@ -77,6 +97,8 @@ pub(crate) struct Sheet {
     low_um: f64,
     high_um: f64,
     tie_um: f64,
+    /// How much longer a way down to it is than one across.
+    steepness: f64,
     winding: i32,
 }
 
@@ -136,6 +158,7 @@ impl Sheet {
             turn,
             low_um,
             high_um,
+            steepness: 1.0 + um_per_pixel / cutter.grid.dpi.pitch().um(),
             tie_um: TOUCHING_UM + ASIDE_PIXELS * um_per_pixel.min(1e6),
             // Rows count downwards: facets that face down turn clockwise in y.
             winding: if area > 0.0 { 1 } else { -1 },
@@ -161,21 +184,50 @@ impl Sheet {
             let met = planes.between(low_um - self.tie_um, high_um + reach_um);
             for layer in met.start.max(layers.start)..met.end.min(layers.end) {
                 let top_um = planes.top_um(layer);
-                let end_um = (top_um - reach_um).max(planes.bottom_um() + STANDING_UM);
-                let depths = top_um - planes.z_um(layer) - self.tie_um..top_um - end_um;
+                let depths = depths(planes, layer, reach_um, self.tie_um);
                 if let Some((columns, depth_um)) = stretch.within(top_um, &depths) {
-                    let span = Span {
-                        row,
-                        start: columns.start,
-                        end: columns.end,
-                        depth_um: depth_um as f32,
-                        um_per_column: -stretch.um_per_column as f32,
-                        signed_tie_um: (f64::from(self.winding) * self.tie_um) as f32,
-                    };
-                    each(layer, span);
+                    let um_per_column = -stretch.um_per_column as f32;
+                    each(layer, Span { um_per_column, ..self.span(row, columns, depth_um) });
                 }
             }
         }
+    }
+
+    /// What a row meets of it at one depth.
+    fn span(&self, row: u32, columns: Range<u32>, depth_um: f64) -> Span {
+        Span {
+            row,
+            start: columns.start,
+            end: columns.end,
+            depth_um: depth_um as f32,
+            um_per_column: 0.0,
+            signed_tie_um: (f64::from(self.winding) * self.tie_um) as f32,
+        }
+    }
+
+    /// Gives each pixel that meets it between two heights, and the height there.
+    pub(crate) fn for_each_pixel(
+        &self,
+        cutter: &Cutter<'_>,
+        heights_um: Range<f64>,
+        mut each: impl FnMut(Span, f64),
+    ) {
+        for row in self.rows_between(heights_um.start, heights_um.end) {
+            let Some(stretch) = self.stretch(row, cutter.grid.width) else { continue };
+            for column in stretch.columns.clone() {
+                let z_um = stretch.height(column);
+                if heights_um.contains(&z_um) {
+                    each(self.span(row, column..column + 1, 0.0), z_um);
+                }
+            }
+        }
+    }
+
+    /// How much higher or lower a surface may be that is so near to it.
+    pub(crate) fn slack_um(&self, near_um: f64) -> f64 {
+        // Not more than the facet itself, twice: steeper ones are met by few lines.
+        let most = near_um + 2.0 * (self.high_um - self.low_um);
+        (near_um * self.steepness).min(most)
     }
 
     /// The rows of what lies between two heights, and perhaps one more on each
