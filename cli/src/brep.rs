@@ -80,7 +80,10 @@ impl ReaderOptions {
         let owned: PathBuf = path.to_owned();
         std::thread::Builder::new()
             .stack_size(STACK_BYTES)
-            .spawn(move || sender.send(prepare(&owned, kernel, tolerance.mm())))
+            .spawn(move || {
+                // Nobody listens any more once time is up.
+                let _ = sender.send(prepare(&owned, kernel, tolerance.mm()));
+            })
             .context("no thread to read it")?;
         match receiver.recv_timeout(self.timeout) {
             Ok(prepared) => Ok(prepared.map_err(anyhow::Error::from)?),

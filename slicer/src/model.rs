@@ -21,6 +21,8 @@ const HEADER_BYTES: u64 = 84;
 const FACET_BYTES: usize = 50;
 /// Facets are read in blocks of so many: 200 kB of a binary file.
 const BLOCK_FACETS: usize = 4096;
+/// Those of surfaces are fewer and cost more: all threads should have some.
+const BLOCK_SURFACE_FACETS: usize = 128;
 
 /// A part: its name and its facets, from one file or several. A binary STL
 /// stays in its file, of which only a few blocks are mapped at a time. Clones
@@ -70,7 +72,14 @@ impl FileFacets {
     }
 
     fn blocks(&self) -> usize {
-        self.count().div_ceil(BLOCK_FACETS)
+        self.count().div_ceil(self.block_facets())
+    }
+
+    fn block_facets(&self) -> usize {
+        match self {
+            Self::Surfaces(_) => BLOCK_SURFACE_FACETS,
+            _ => BLOCK_FACETS,
+        }
     }
 }
 
@@ -202,8 +211,9 @@ impl Model {
             block -= self.files[file].blocks();
             file += 1;
         }
-        let start = block * BLOCK_FACETS;
-        (file, start..self.files[file].count().min(start + BLOCK_FACETS))
+        let length = self.files[file].block_facets();
+        let start = block * length;
+        (file, start..self.files[file].count().min(start + length))
     }
 
     /// A facet of a file.

@@ -85,7 +85,7 @@ impl ConvertArgs {
     /// Writes a STEP part as facets.
     fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), Stop> {
         let path = &self.input.stack;
-        check_beside(stl, Path::new("-"), [path].into_iter())?;
+        check_beside(stl, Path::new("-"), [path])?;
         let name = input_name(path);
         let spooled = is_stream(path).then(|| kept(io::stdin().lock())).transpose();
         let spooled = spooled.with_context(|| name.clone())?;
