@@ -86,7 +86,7 @@ fn back([x, y, z]: [f64; 3]) -> [f64; 3] {
 
 #[test]
 fn a_torus_has_no_wrong_pixel() {
-    let is_inside = |[x, y, z]: [f64; 3]| (x.hypot(y) - 20.0).powi(2) + (z - 8.0).powi(2) < 64.0;
+    let outside = |[x, y, z]: [f64; 3]| (x.hypot(y) - 20.0).hypot(z - 8.0) - 8.0;
     for dpi in [1500.0, 2400.0] {
         let chord_mm = 0.25 * 25.4 / dpi;
         let flat = options(dpi, 2.3, Placement::default());
