@@ -152,7 +152,7 @@ pub enum Fault {
     #[error("the edges of a loop do not follow each other")]
     Broken,
     /// An edge lies off the surface.
-    #[error("an edge lies {off_mm:.3} mm off its surface")]
+    #[error("an edge lies {off_mm:.6} mm off its surface")]
     Off {
         /// How far, in millimetres.
         off_mm: f64,

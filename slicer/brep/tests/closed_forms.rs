@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use lamp_brep::{
-    BodyReport, Crossing, Fate, Kernel, Placed, StepModel, Tessellation, Turns, check, polish,
+    BodyReport, Crossing, Facet, Fate, Kernel, Placed, StepModel, Tessellation, Turns, check,
+    polish,
 };
-use lamp_fixtures::{StepPart, StepUnit, step};
+use lamp_fixtures::{StepPart, StepUnit, blade_area_mm2, blade_volume_mm3, step};
 
 fn read(part: StepPart, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessellation) {
     let model = StepModel::read(step(part, unit).as_bytes()).unwrap();
@@ -45,6 +46,100 @@ fn volumes_come_near_to_closed_forms_in_every_unit() {
             }
         }
     }
+}
+
+#[test]
+fn parts_of_a_torus_that_meets_itself_are_told_apart() {
+    // The profile x = R + a cos v turned around z = a sin v, between the points
+    // where x is 0, for the apple; the lemon is what is missing to the whole turn.
+    let (major, minor): (f64, f64) = (5.0, 8.0);
+    let end = (-major / minor).acos();
+    let (sin, cos) = end.sin_cos();
+    let apple = PI
+        * minor
+        * (major * major * 2.0 * sin
+            + 2.0 * major * minor * (end + sin * cos)
+            + minor * minor * (2.0 * sin - 2.0 / 3.0 * sin.powi(3)));
+    let lemon = apple - 2.0 * PI * PI * major * minor * minor;
+    for (part, volume_mm3) in [(StepPart::Apple, apple), (StepPart::Lemon, lemon)] {
+        for chord_mm in [0.1, 0.005] {
+            let [report] = &bodies(part, StepUnit::Inch, chord_mm)[..] else { panic!("one body") };
+            let off = report.volume_mm3 / volume_mm3 - 1.0;
+            assert!(off < 0.0 && off > -chord_mm, "{part:?} {chord_mm}: {off}");
+            let off = report.exact_volume_mm3 / volume_mm3 - 1.0;
+            assert!(off.abs() < 1e-6, "{part:?} {chord_mm}: exact {off}");
+        }
+    }
+}
+
+#[test]
+fn flat_and_slanted_walls_hold_what_they_should() {
+    let frustum = PI * 30.0 / 3.0 * (225.0 + 112.5 + 56.25);
+    for (part, volume_mm3, most) in
+        [(StepPart::Block, 6000.0, 1e-12), (StepPart::Frustum, frustum, 1e-3)]
+    {
+        let [report] = &bodies(part, StepUnit::Metre, 0.01)[..] else { panic!("one body") };
+        for volume in [report.volume_mm3, report.exact_volume_mm3] {
+            assert!((volume / volume_mm3 - 1.0).abs() < most, "{part:?}: {volume}");
+        }
+    }
+}
+
+#[test]
+fn a_lofted_blade_has_its_sections() {
+    let mut before = f64::INFINITY;
+    for chord_mm in [0.05, 0.005] {
+        let (model, mesh) = read(StepPart::Blade, StepUnit::Inch, chord_mm);
+        let report = &check(&model, &mesh)[0];
+        assert!(report.faults.is_empty() && mesh.findings.is_empty(), "{report:?}");
+        let off = (report.volume_mm3 / blade_volume_mm3() - 1.0).abs();
+        // Facets within the chord of a blade that is about 4 mm thick.
+        assert!(off < chord_mm / 4.0 && off < before / 3.0, "{chord_mm}: {off}");
+        before = off;
+        for part in 1..20 {
+            let z_mm = 60.0 * f64::from(part) / 20.0 + 0.0123;
+            let off = area_mm2(&mesh, z_mm) / blade_area_mm2(z_mm) - 1.0;
+            assert!(off.abs() < chord_mm / 2.0, "{chord_mm}, z = {z_mm}: {off}");
+        }
+    }
+}
+
+#[test]
+fn crossings_of_a_blade_give_its_sections_exactly() {
+    // The length of rows within the section, times their distance. Rows that touch
+    // the section but no facet are missing.
+    let placed = placed(StepPart::Blade, 0.02, AS_IT_IS);
+    let (step_mm, z_mm) = (0.002, 17.0123);
+    let length = |crossings: &[Crossing]| {
+        let mut rows: Vec<(f64, f64)> = crossings.iter().map(|at| (at.y_mm, at.x_mm)).collect();
+        rows.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        let runs = rows.chunks(2).map(|run| run[1].1 - run[0].1);
+        runs.sum::<f64>() * step_mm
+    };
+    let facets = crossings(&placed, z_mm, step_mm);
+    let mut exact = facets.clone();
+    polish(&placed, &mut exact);
+    let [before, after] = [&facets, &exact].map(|all| length(all) / blade_area_mm2(z_mm) - 1.0);
+    println!("blade: area {before:+.1e} before, {after:+.1e} after");
+    assert!(before.abs() > 1e-3 && after.abs() < 1e-4, "{before} {after}");
+}
+
+/// The area between the crossings of facets with a plane.
+fn area_mm2(mesh: &Tessellation, z_mm: f64) -> f64 {
+    let double = |facet: &Facet| {
+        let corners = mesh.corners(facet);
+        let is_above = corners.map(|corner| corner[2] >= z_mm);
+        let cross = |from_above: bool| {
+            let k = (0..3)
+                .find(|&k| is_above[k] == from_above && is_above[(k + 1) % 3] != from_above)?;
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            let t = (z_mm - a[2]) / (b[2] - a[2]);
+            Some([0, 1].map(|axis| a[axis] + t * (b[axis] - a[axis])))
+        };
+        let (Some(p), Some(q)) = (cross(true), cross(false)) else { return 0.0 };
+        p[0] * q[1] - q[0] * p[1]
+    };
+    (mesh.facets.iter().map(double).sum::<f64>() / 2.0).abs()
 }
 
 #[test]

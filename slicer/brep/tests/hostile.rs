@@ -3,9 +3,8 @@
 
 use std::time::{Duration, Instant};
 
-use lamp_brep::Kernel;
-use lamp_brep::{StepModel, check};
-use lamp_fixtures::{SplitMix, StepPart, StepUnit, step};
+use lamp_brep::{BrepError, Kernel, StepError, StepModel, check};
+use lamp_fixtures::{SplitMix, StepDefect, StepPart, StepUnit, broken_step, step};
 
 /// Numbers that geometry does not like.
 const NUMBERS: [&str; 10] =
@@ -57,10 +56,13 @@ fn broken_files_are_refused_or_read_in_time() {
     let rounds = std::env::var("LAMP_ROUNDS").ok().and_then(|n| n.parse().ok()).unwrap_or(150);
     let (mut refused, mut passed) = (0, 0);
     let mut slowest = Duration::ZERO;
-    let parts =
-        [StepPart::Sphere, StepPart::Torus, StepPart::Cone, StepPart::Tower, StepPart::Pair];
-    for (seed, part) in (0u64..).zip(parts) {
-        let text = step(part, StepUnit::Inch);
+    let gaps = StepDefect::Apart { gap_nm: 1000 };
+    let mut texts: Vec<(String, String)> = StepPart::ALL
+        .iter()
+        .map(|part| (format!("{part:?}"), step(*part, StepUnit::Inch)))
+        .collect();
+    texts.push((format!("{gaps:?}"), broken_step(gaps)));
+    for (seed, (part, text)) in (0u64..).zip(texts) {
         let mut random = SplitMix(seed);
         for round in 0..rounds {
             let text = broken(&text, &mut random);
@@ -69,7 +71,8 @@ fn broken_files_are_refused_or_read_in_time() {
                 // The last one is what to look at after a crash.
                 std::fs::write(path, &text).unwrap();
             }
-            let model = StepModel::read(text.as_bytes());
+            let heal_mm = if round % 2 == 0 { 0.0 } else { 0.01 };
+            let model = StepModel::read_healed(text.as_bytes(), heal_mm);
             let mesh = model.as_ref().ok().and_then(|model| model.tessellate(1.0).ok());
             let is_good = model.ok().zip(mesh).is_some_and(|(model, mesh)| {
                 check(&model, &mesh).iter().all(|report| report.faults.is_empty())
@@ -77,9 +80,118 @@ fn broken_files_are_refused_or_read_in_time() {
             *(if is_good { &mut passed } else { &mut refused }) += 1;
             let took = start.elapsed();
             slowest = slowest.max(took);
-            assert!(took < Duration::from_secs(60), "{part:?} {round} takes {took:?}");
+            assert!(took < Duration::from_secs(60), "{part} {round} takes {took:?}");
         }
     }
     println!("{refused} refused, {passed} passed, {slowest:?} at most");
     assert!(refused > 0 && passed > 0);
+}
+
+/// The longest that a file of a few megabytes may take to be refused.
+const SOON: Duration = Duration::from_secs(20);
+/// How many shapes a file has that goes deep.
+const DEEP: usize = 100_000;
+
+/// What is said of the sphere's file with more entities.
+fn said_of(more: &str) -> Result<usize, BrepError> {
+    let text = step(StepPart::Sphere, StepUnit::Millimetre);
+    let text = text.replace("ENDSEC;\nEND-ISO", &format!("{more}ENDSEC;\nEND-ISO"));
+    let start = Instant::now();
+    let said = StepModel::read(text.as_bytes()).map(|model| model.bodies().len());
+    assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
+    said
+}
+
+/// The entity of a type in the sphere's file, such as `#7`.
+fn number_of(name: &str) -> String {
+    let text = step(StepPart::Sphere, StepUnit::Millimetre);
+    let line = text.lines().find(|line| line.contains(&format!("={name}("))).unwrap();
+    line.split('=').next().unwrap().to_owned()
+}
+
+/// Shapes one after the other, from the sphere's on, each related to the next.
+fn chain(relation: impl Fn(&str, &str, usize) -> String) -> String {
+    let mut before = number_of("ADVANCED_BREP_SHAPE_REPRESENTATION");
+    let context = number_of("(GEOMETRIC_REPRESENTATION_CONTEXT");
+    let mut text = String::new();
+    for k in 0..DEEP {
+        let id = 1_000_000 + 10 * k;
+        let shape = format!("#{id}");
+        text += &format!("{shape}=SHAPE_REPRESENTATION('',(),{context});\n");
+        text += &relation(&before, &shape, id + 1);
+        before = shape;
+    }
+    text
+}
+
+#[test]
+fn assemblies_may_not_go_on_for_ever() {
+    let place = number_of("AXIS2_PLACEMENT_3D");
+    let moved = format!("#900000=ITEM_DEFINED_TRANSFORMATION('','',{place},{place});\n");
+    let part_of = |part: &str, whole: &str, id: usize| {
+        format!(
+            "#{id}=(REPRESENTATION_RELATIONSHIP('','',{part},{whole})\
+             REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#900000)\
+             SHAPE_REPRESENTATION_RELATIONSHIP());\n"
+        )
+    };
+    let endless = said_of(&(moved.clone() + &chain(part_of)));
+    assert!(matches!(endless, Err(BrepError::Step(StepError::Endless { .. }))), "{endless:?}");
+    // An assembly that is a part of itself stands nowhere.
+    let own = number_of("ADVANCED_BREP_SHAPE_REPRESENTATION");
+    let nowhere = said_of(&(moved + &part_of(&own, &own, 900_001)));
+    assert!(matches!(nowhere, Err(BrepError::Step(StepError::Empty))), "{nowhere:?}");
+}
+
+#[test]
+fn shapes_that_are_the_same_are_read_once() {
+    let same = |a: &str, b: &str, id: usize| {
+        format!("#{id}=SHAPE_REPRESENTATION_RELATIONSHIP('','',{a},{b});\n")
+    };
+    let own = number_of("ADVANCED_BREP_SHAPE_REPRESENTATION");
+    assert_eq!(said_of(&same(&own, &own, 900_001)).unwrap(), 1);
+    let endless = said_of(&chain(same));
+    assert!(matches!(endless, Err(BrepError::Step(StepError::Endless { .. }))), "{endless:?}");
+}
+
+#[test]
+fn entities_that_hold_themselves_are_refused() {
+    let surface = number_of("SPHERICAL_SURFACE");
+    let face = number_of("ADVANCED_FACE");
+    let own = "#2000000";
+    let many = vec!["#2000001"; 1000].join(",");
+    let circles = [
+        (surface.clone(), format!("{own}=OFFSET_SURFACE('',{own},1.,.F.);")),
+        (
+            surface.clone(),
+            format!("{own}=RECTANGULAR_TRIMMED_SURFACE('',{own},0.,1.,0.,1.,.T.,.T.);"),
+        ),
+        (
+            surface,
+            format!(
+                "{own}=SURFACE_OF_LINEAR_EXTRUSION('',#2000002,#2000003);\n\
+                 #2000003=VECTOR('',#2000004,1.);\n#2000004=DIRECTION('',(0.,0.,1.));\n\
+                 #2000002=COMPOSITE_CURVE('',({many}),.F.);\n\
+                 #2000001=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#2000002);"
+            ),
+        ),
+        (face, format!("{own}=ORIENTED_FACE('',*,{own},.T.);")),
+    ];
+    for (old, entity) in circles {
+        let text = step(StepPart::Sphere, StepUnit::Millimetre);
+        let text: Vec<String> = text
+            .lines()
+            .map(|line| {
+                let end = line.starts_with("END-ISO");
+                // Whoever named the old one names the new one.
+                let line = line.replace(&format!("{old},"), &format!("{own},"));
+                let line = line.replace(&format!("{old})"), &format!("{own})"));
+                if end { format!("DATA;\n{entity}\nENDSEC;\n{line}") } else { line }
+            })
+            .collect();
+        let start = Instant::now();
+        let error = StepModel::read(text.join("\n").as_bytes()).unwrap_err();
+        assert!(matches!(error, BrepError::Step(StepError::Unsupported { .. })), "{error}");
+        assert!(start.elapsed() < SOON);
+    }
 }

@@ -1,12 +1,11 @@
 //! STEP files of other programs, where they are at hand: each is right or refused
 //! for a reason, within a time limit.
 
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use lamp_brep::{Facet, Kernel, StepModel, Tessellation, check};
+use lamp_brep::{Facet, Finding, KernelName, Tessellation, prepare};
 
 /// Longer than any file takes, many times over.
 const LIMIT: Duration = Duration::from_secs(300);
@@ -14,12 +13,18 @@ const LIMIT: Duration = Duration::from_secs(300);
 const SAME: f64 = 1e-3;
 /// The areas of sections agree within this part.
 const SAME_AREA: f64 = 2e-3;
-/// Files of which one figure is not known well enough: at others this reader agrees
-/// with it within 0.01 %, and its facets and its surfaces hold the same volume.
-/// The first one's volume is 0.2 % off that of its five sections; the second one's
-/// section at z = -160.68 mm lacks a third of those just beside it.
-const UNSURE_VOLUME: &str = "axom_boxed_sphere.step";
-const UNSURE_SECTION: (&str, usize) = ("nist_ctc_02_asme1_ap242.stp", 2);
+/// A file whose volume at hand, 732.189 mm³, is OpenCASCADE's integral over the
+/// surfaces. That is bounded by curves in the parameters of its B-spline faces, which
+/// OpenCASCADE makes, up to 0.059 mm from the file's edges; the edges themselves lie
+/// within 0.03 µm of the surfaces. OpenCASCADE's facets follow the edges: this is
+/// their volume at a chord of 0.5 µm.
+const LOOSE_VOLUME: (&str, f64) = ("axom_boxed_sphere.step", 733.601);
+/// A section whose area at hand, 64 791 mm², is that of OpenCASCADE's Boolean
+/// operation, which gives about as much at least 1 mm below and 0.1 mm above. Its
+/// facets at a chord of 0.02 mm have this area, and change steadily there; its
+/// classifier finds 20 000 random points of the plane to lie in
+/// 101 300 ± 1600 mm².
+const WRONG_SECTION: (&str, usize, f64) = ("nist_ctc_02_asme1_ap242.stp", 2, 103_560.4);
 /// Files that must be read right; the others may be refused.
 const LEAST_RIGHT: f64 = 0.95;
 
@@ -30,43 +35,38 @@ fn data() -> PathBuf {
 
 /// What became of a file.
 enum Outcome {
-    Read { volume_mm3: f64, areas_mm2: Vec<f64>, bodies: usize, facets: usize },
+    Read { volume_mm3: f64, areas_mm2: Vec<f64>, bodies: usize, facets: usize, said: String },
     Refused(String),
 }
 
-fn read(path: &Path, chord_mm: f64, heights_mm: &[f64]) -> Outcome {
-    let model = match StepModel::open(path) {
-        Ok(model) => model,
+fn read(path: &Path, kernel: KernelName, chord_mm: f64, heights_mm: &[f64]) -> Outcome {
+    let prepared = match prepare(path, kernel, chord_mm) {
+        Ok(prepared) => prepared,
         Err(error) => return Outcome::Refused(error.to_string()),
     };
-    let mesh = match model.tessellate(chord_mm) {
-        Ok(mesh) => mesh,
-        Err(error) => return Outcome::Refused(error.to_string()),
-    };
-    let reports = check(&model, &mesh);
-    let mut why = String::new();
-    for (body, report) in reports.iter().enumerate() {
-        report.faults.iter().for_each(|fault| write!(why, "body {body}: {fault}; ").unwrap());
+    let mesh = &prepared.mesh;
+    let mut said: Vec<String> =
+        prepared.tries.iter().map(|a_try| format!("before: {}", a_try.why)).collect();
+    for report in &prepared.reports {
+        said.extend(report.faults.iter().map(|fault| format!("{}: {fault}", report.name)));
     }
-    if !why.is_empty() {
-        for finding in mesh.findings.iter().take(4) {
-            write!(
-                why,
-                "#{} ({}): {}; ",
-                finding.entity,
-                model.face(finding.face).kind,
-                finding.fault
-            )
-            .unwrap();
-        }
-        return Outcome::Refused(why);
+    said.extend(findings(&mesh.findings));
+    if !prepared.is_good() {
+        return Outcome::Refused(said.join("; "));
     }
     Outcome::Read {
-        volume_mm3: reports.iter().map(|report| report.volume_mm3).sum(),
-        areas_mm2: heights_mm.iter().map(|&z| section_area(&mesh, z)).collect(),
-        bodies: reports.len(),
+        volume_mm3: prepared.reports.iter().map(|report| report.volume_mm3).sum(),
+        areas_mm2: heights_mm.iter().map(|&z| section_area(mesh, z)).collect(),
+        bodies: prepared.reports.len(),
         facets: mesh.facets.len(),
+        said: said.join("; "),
     }
+}
+
+/// How many findings there are, and the first.
+fn findings(list: &[Finding]) -> Option<String> {
+    let first = list.first()?;
+    Some(format!("{} findings, the first #{}: {}", list.len(), first.entity, first.fault))
 }
 
 /// The area of the facets' section with a plane.
@@ -91,12 +91,12 @@ fn section_area(mesh: &Tessellation, z: f64) -> f64 {
 }
 
 /// Reads a file on a thread of its own; one that hangs is left behind.
-fn within_limit(path: &Path, chord_mm: f64, heights_mm: Vec<f64>) -> Outcome {
+fn within_limit(path: &Path, kernel: KernelName, chord_mm: f64, heights_mm: Vec<f64>) -> Outcome {
     let (sender, receiver) = mpsc::channel();
     let path = path.to_owned();
     std::thread::spawn(move || {
         // Nobody listens any more when time is up.
-        let _ = sender.send(read(&path, chord_mm, &heights_mm));
+        let _ = sender.send(read(&path, kernel, chord_mm, &heights_mm));
     });
     match receiver.recv_timeout(LIMIT) {
         Ok(outcome) => outcome,
@@ -107,6 +107,11 @@ fn within_limit(path: &Path, chord_mm: f64, heights_mm: Vec<f64>) -> Outcome {
 
 #[test]
 fn every_file_is_right_or_refused() {
+    every_file(KernelName::Lamp, LEAST_RIGHT);
+}
+
+/// Reads every file of the folder, if it is there, and prints a table of them.
+fn every_file(kernel: KernelName, least_right: f64) {
     let Ok(figures) = std::fs::read(data().join("step_oracle.json")) else {
         println!("no files at hand");
         return;
@@ -116,7 +121,6 @@ fn every_file_is_right_or_refused() {
     let only = std::env::var("LAMP_STEP_FILE").unwrap_or_default();
     let (mut right, mut wrong, mut all) = (0u32, Vec::new(), 0u32);
     for (name, of_file) in figures.iter().filter(|(name, _)| name.contains(&only)) {
-        let expected = of_file["volume_mm3"].as_f64().unwrap();
         let corner = |k: usize| of_file["box_mm"][k].as_f64().unwrap();
         let size = (0..3).map(|k| corner(k + 3) - corner(k)).fold(0.0, f64::max);
         let start = Instant::now();
@@ -124,37 +128,42 @@ fn every_file_is_right_or_refused() {
             of_file[key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
         };
         let path = data().join("step").join(name);
-        let outcome = within_limit(&path, size / 40_000.0, list("section_z_mm"));
+        let mut volume = of_file["volume_mm3"].as_f64().unwrap();
+        let mut areas = list("section_area_mm2");
+        if name == LOOSE_VOLUME.0 {
+            volume = LOOSE_VOLUME.1;
+        }
+        if name == WRONG_SECTION.0 {
+            areas[WRONG_SECTION.1] = WRONG_SECTION.2;
+        }
+        let outcome = within_limit(&path, kernel, size / 40_000.0, list("section_z_mm"));
         let seconds = start.elapsed().as_secs_f64();
         all += 1;
-        let said = match outcome {
-            Outcome::Read { volume_mm3, areas_mm2, bodies, facets } => {
-                let off = volume_mm3 / expected - 1.0;
-                let expected = list("section_area_mm2");
+        let row = match outcome {
+            Outcome::Read { volume_mm3, areas_mm2, bodies, facets, said } => {
+                let off = volume_mm3 / volume - 1.0;
                 let least = 1e-9 * size * size;
-                let is_known = |k: usize| (name.as_str(), k) != UNSURE_SECTION;
-                let area_off = areas_mm2.iter().zip(&expected).enumerate();
-                let area_off = area_off
-                    .filter(|(k, _)| is_known(*k))
-                    .map(|(_, (a, b))| (a - b).abs() / b.max(least))
+                let area_off = areas_mm2
+                    .iter()
+                    .zip(&areas)
+                    .map(|(a, b)| (a - b).abs() / b.max(least))
                     .fold(0.0, f64::max);
-                let is_right =
-                    (name == UNSURE_VOLUME || off.abs() <= SAME) && area_off <= SAME_AREA;
+                let is_right = off.abs() <= SAME && area_off <= SAME_AREA;
                 right += u32::from(is_right);
                 if !is_right {
                     wrong.push(name.clone());
                 }
-                let word = if is_right { "right" } else { "WRONG" };
+                let word = if is_right { "" } else { "WRONG " };
+                let [off, area_off] = [off, area_off].map(|off| 100.0 * off);
                 format!(
-                    "{word}: {volume_mm3:.4} mm³ ({off:+.1e}), sections {area_off:.1e}, \
-                     {bodies} bodies, {facets} facets"
+                    "{bodies} | {facets} | {word}{off:+.4} % | {area_off:.4} % | {seconds:.1} | {said}"
                 )
             }
-            Outcome::Refused(why) => format!("refused: {why}"),
+            Outcome::Refused(why) => format!("refused | | | | {seconds:.1} | {why}"),
         };
-        println!("{name} | {seconds:.1} s | {said}");
+        println!("| `{name}` | {row} |");
     }
     println!("{right} of {all} right");
     assert!(wrong.is_empty(), "wrong: {wrong:?}");
-    assert!(f64::from(right) >= LEAST_RIGHT * f64::from(all), "{right} of {all} right");
+    assert!(f64::from(right) >= least_right * f64::from(all), "{right} of {all} right");
 }

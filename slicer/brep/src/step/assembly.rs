@@ -28,8 +28,8 @@ const SOLIDS: [&str; 4] =
 struct Shape {
     items: Vec<u64>,
     units: Option<Units>,
-    /// Shapes that are the same part in the same coordinates.
-    same: Vec<u64>,
+    /// Its group: shapes that are the same part in the same coordinates.
+    group: usize,
     /// Parts, and where they stand.
     parts: Vec<Part>,
 }
@@ -43,20 +43,22 @@ struct Part {
 
 /// All solids of a file in their places.
 pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
-    let mut tree =
-        Tree { entities, shapes: HashMap::new(), order: Vec::new(), is_part: HashSet::new() };
+    let mut tree = Tree {
+        entities,
+        shapes: HashMap::new(),
+        order: Vec::new(),
+        groups: Vec::new(),
+        is_part: HashSet::new(),
+    };
     tree.read_shapes()?;
-    tree.read_relations()?;
+    tree.read_same()?;
+    tree.read_parts()?;
     tree.read_mapped()?;
     let mut found = Found::default();
-    let mut seen = HashSet::new();
-    for &shape in &tree.order {
-        let group = tree.group(shape);
-        if seen.contains(&shape) || group.iter().any(|shape| tree.is_part.contains(shape)) {
-            continue;
+    for group in &tree.groups {
+        if !group.iter().any(|shape| tree.is_part.contains(shape)) {
+            tree.place(group[0], Frame::WORLD, 0, &mut found)?;
         }
-        seen.extend(group);
-        tree.place(shape, Frame::WORLD, 0, &mut found)?;
     }
     if found.list.is_empty() { Err(StepError::Empty) } else { Ok(found.list) }
 }
@@ -89,6 +91,8 @@ struct Tree<'a> {
     entities: &'a Entities,
     shapes: HashMap<u64, Shape>,
     order: Vec<u64>,
+    /// Shapes that are the same, in the order in which they are met.
+    groups: Vec<Vec<u64>>,
     /// Shapes that are parts of others.
     is_part: HashSet<u64>,
 }
@@ -105,7 +109,7 @@ impl Tree<'_> {
                 continue;
             };
             let units = Units::of_context(self.entities, context)?;
-            let shape = Shape { items, units, same: Vec::new(), parts: Vec::new() };
+            let shape = Shape { items, units, group: 0, parts: Vec::new() };
             if self.shapes.insert(item.id, shape).is_none() {
                 self.order.push(item.id);
             }
@@ -113,34 +117,73 @@ impl Tree<'_> {
         Ok(())
     }
 
-    fn read_relations(&mut self) -> Result<(), StepError> {
-        let children = self.children()?;
-        for item in self.entities.every() {
+    /// Relations between two shapes of the file.
+    fn relations(&self) -> impl Iterator<Item = (u64, [u64; 2])> {
+        self.entities.every().filter_map(|item| {
             let is_relation = matches!(
                 item.name(),
                 "SHAPE_REPRESENTATION_RELATIONSHIP" | "REPRESENTATION_RELATIONSHIP"
             );
             let (true, Some(a), Some(b)) = (is_relation, item.optional(2), item.optional(3)) else {
-                continue;
+                return None;
             };
-            if !(self.shapes.contains_key(&a) && self.shapes.contains_key(&b)) {
+            let are_shapes = self.shapes.contains_key(&a) && self.shapes.contains_key(&b);
+            are_shapes.then_some((item.id, [a, b]))
+        })
+    }
+
+    /// What comes to lie on what in a relation, if it moves a shape.
+    fn moving(&self, relation: u64) -> Option<Item<'_>> {
+        self.entities.find(relation, "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")
+    }
+
+    /// Shapes that are related without being moved are the same.
+    fn read_same(&mut self) -> Result<(), StepError> {
+        let mut same: HashMap<u64, Vec<u64>> = HashMap::new();
+        for (id, [a, b]) in self.relations() {
+            if self.moving(id).is_none() {
+                same.entry(a).or_default().push(b);
+                same.entry(b).or_default().push(a);
+            }
+        }
+        let mut seen = HashSet::new();
+        for &first in &self.order {
+            if !seen.insert(first) {
                 continue;
             }
-            let transformed =
-                self.entities.find(item.id, "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION");
-            let Some(transformed) = transformed else {
-                self.shape(a)?.same.push(b);
-                self.shape(b)?.same.push(a);
-                continue;
-            };
+            let mut group = vec![first];
+            let mut at = 0;
+            while let Some(shape) = group.get(at) {
+                let others = same.get(shape).into_iter().flatten();
+                group.extend(
+                    others.copied().filter(|&other| seen.insert(other)).collect::<Vec<_>>(),
+                );
+                at += 1;
+            }
+            self.groups.push(group);
+        }
+        for (number, group) in self.groups.clone().into_iter().enumerate() {
+            for shape in group {
+                self.shape(shape)?.group = number;
+            }
+        }
+        Ok(())
+    }
+
+    /// Shapes that are moved are parts.
+    fn read_parts(&mut self) -> Result<(), StepError> {
+        let children = self.children()?;
+        for (id, [a, b]) in self.relations().collect::<Vec<_>>() {
+            let Some(transformed) = self.moving(id) else { continue };
             let transformation = transformed.reference(0)?;
             let transformation =
                 self.entities.get(transformation, "ITEM_DEFINED_TRANSFORMATION")?;
             let (first, second) = (transformation.reference(2)?, transformation.reference(3)?);
             // The first is the part, unless the product structure says otherwise.
-            let is_swapped = children.get(&item.id).is_some_and(|child| {
-                !self.group(a).contains(child) && self.group(b).contains(child)
-            });
+            let group = |id: &u64| self.shapes.get(id).map(|shape| shape.group);
+            let is_swapped = children
+                .get(&id)
+                .is_some_and(|child| group(child) != group(&a) && group(child) == group(&b));
             let (part, whole, from, to) =
                 if is_swapped { (b, a, second, first) } else { (a, b, first, second) };
             self.is_part.insert(part);
@@ -190,17 +233,9 @@ impl Tree<'_> {
         self.shapes.get_mut(&id).ok_or(StepError::Missing { id })
     }
 
-    /// A shape and all that are the same, in the order in which they are met.
-    fn group(&self, shape: u64) -> Vec<u64> {
-        let mut group = vec![shape];
-        let mut at = 0;
-        while let Some(shape) = group.get(at).and_then(|id| self.shapes.get(id)) {
-            let new: Vec<u64> =
-                shape.same.iter().copied().filter(|id| !group.contains(id)).collect();
-            group.extend(new);
-            at += 1;
-        }
-        group
+    /// A shape and all that are the same.
+    fn group(&self, shape: u64) -> &[u64] {
+        self.shapes.get(&shape).map_or(&[], |shape| &self.groups[shape.group])
     }
 
     fn place(
@@ -210,11 +245,12 @@ impl Tree<'_> {
         level: usize,
         found: &mut Found,
     ) -> Result<(), StepError> {
-        found.visits += 1;
+        let group = self.group(shape);
+        found.visits += group.len().max(1);
         if level > MOST_LEVELS || found.visits > MOST_PARTS {
             return Err(StepError::Endless { most: MOST_PARTS });
         }
-        for id in self.group(shape) {
+        for &id in group {
             let Some(shape) = self.shapes.get(&id) else { continue };
             for &item in &shape.items {
                 if SOLIDS.iter().any(|name| self.entities.find(item, name).is_some()) {

@@ -7,6 +7,10 @@ use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::{Chain, Curve, Link, edge_range};
 use crate::vector::unit;
 
+/// How deep pieces of a chain count as nested, so that none is a chain of its own:
+/// one of itself would never end.
+const DEEPEST_PIECE: usize = MOST_NESTED - 2;
+
 impl Shapes<'_> {
     /// The curve of an edge.
     pub(crate) fn curve(&self, id: u64) -> Result<Curve, StepError> {
@@ -53,7 +57,7 @@ impl Shapes<'_> {
                 let curve = self.curve_within(item.reference(1)?, depth + 1)?;
                 Ok(if item.truth(4)? { curve } else { curve.reversed() })
             }
-            "COMPOSITE_CURVE" if depth < MOST_NESTED => self.composite(item, depth),
+            "COMPOSITE_CURVE" if depth < DEEPEST_PIECE => self.composite(item),
             _ => Err(unsupported()),
         }
     }
@@ -72,10 +76,10 @@ impl Shapes<'_> {
     }
 
     /// Bounded curves, one after the other.
-    fn composite(&self, item: Item, depth: usize) -> Result<Curve, StepError> {
+    fn composite(&self, item: Item) -> Result<Curve, StepError> {
         let link = |id: u64| {
             let segment = self.entities.get(id, "COMPOSITE_CURVE_SEGMENT")?;
-            let mut link = self.bounded(segment.reference(2)?, depth + 1)?;
+            let mut link = self.bounded(segment.reference(2)?, DEEPEST_PIECE)?;
             if !segment.truth(1)? {
                 link.range.reverse();
             }

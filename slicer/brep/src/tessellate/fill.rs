@@ -180,11 +180,11 @@ impl Work<'_> {
             let corners = face.vertices().map(|v| &self.corners[v.fix().index()]);
             let flat = face.vertices().map(|v| v.position());
             let places = corners.map(|corner| corner.place);
-            let is_point = corners[0].point.is_some()
-                && (0..3).any(|k| {
-                    corners[k].point.is_some() && corners[k].point == corners[(k + 1) % 3].point
-                });
-            if is_point {
+            // Two corners at one pole: no facet, and to stay so.
+            let is_tip = (0..3).any(|k| {
+                corners[k].point.is_some() && corners[k].point == corners[(k + 1) % 3].point
+            });
+            if is_tip {
                 continue;
             }
             let across = unit(cross(sub(places[1], places[0]), sub(places[2], places[0])));
