@@ -139,6 +139,12 @@ impl StepModel {
         Ok(Self { model, healed })
     }
 
+    /// The model, to be spoilt.
+    #[cfg(test)]
+    pub(crate) fn model_mut(&mut self) -> &mut Model {
+        &mut self.model
+    }
+
     /// Whether anything was joined.
     pub fn is_healed(&self) -> bool {
         !self.healed.is_empty()

@@ -16,7 +16,7 @@ use crate::error::BrepError;
 use crate::geometry::edge_range;
 use crate::kernel::{Facet, Fault, Finding, Tessellation};
 use crate::model::{Edge, Face, Loop, Model};
-use crate::vector::Vec3;
+use crate::vector::{Vec3, distance};
 
 /// A corner in a face's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +26,8 @@ struct Node {
     point: u32,
 }
 
+/// How much further from a vertex than the end of its curve points of an edge are.
+const CLEAR: f64 = 4.0;
 /// More facets than any part that is built takes: about 5 GB of memory.
 const MOST_FACETS: usize = 50_000_000;
 /// Points on edges.
@@ -106,10 +108,16 @@ fn chain(edge: &Edge, model: &Model, chord_mm: f64, points: &mut Vec<Vec3>) -> V
     let range = edge_range(&edge.curve, model.vertices[start], model.vertices[end], edge.forward);
     let line = edge.curve.polyline(range, chord_mm);
     let first = points.len() as u32;
-    // The vertices stand for the ends, so that all edges of a vertex meet.
+    // The vertices stand for the ends, so that all edges of a vertex meet. Where one
+    // lies off the curve, points about as near would turn the way back.
+    let off = |vertex: usize, end: usize| CLEAR * distance(model.vertices[vertex], line[end]);
+    let (off_start, off_end) = (off(start, 0), off(end, line.len() - 1));
+    let is_clear = |p: &&Vec3| {
+        distance(**p, line[0]) >= off_start && distance(**p, line[line.len() - 1]) >= off_end
+    };
     let inner = line.get(1..line.len() - 1).unwrap_or_default();
-    points.extend(inner);
-    let inner = first..first + inner.len() as u32;
+    points.extend(inner.iter().filter(is_clear));
+    let inner = first..points.len() as u32;
     [start as u32].into_iter().chain(inner).chain([end as u32]).collect()
 }
 

@@ -6,12 +6,16 @@
 //! two between the same vertices that run within the tolerance of each other one
 //! stays. What a body's facets are worth then is for the gate to say.
 
+mod span;
+mod vertices;
+
 use std::collections::{HashMap, HashSet};
 
-use crate::geometry::{Curve, edge_range};
+use self::span::Span;
+use crate::geometry::edge_range;
 use crate::kernel::{Fault, Finding};
 use crate::model::{Edge, Face, Loop, Model};
-use crate::vector::{Vec3, distance};
+use crate::vector::Vec3;
 
 /// Joins what lies within a tolerance, and says at which faces.
 pub(crate) fn heal(model: &mut Model, tolerance_mm: f64) -> Vec<Finding> {
@@ -21,11 +25,12 @@ pub(crate) fn heal(model: &mut Model, tolerance_mm: f64) -> Vec<Finding> {
         let mut healing = Healing {
             faces: &mut model.faces[faces],
             edges: &mut model.edges,
-            vertices: &model.vertices,
+            vertices: &mut model.vertices,
             tolerance_mm,
             widest_mm: HashMap::new(),
         };
         healing.join_vertices();
+        healing.settle();
         healing.cut_edges();
         healing.join_edges();
         for (face, (joints, off_mm)) in healing.joined() {
@@ -41,7 +46,7 @@ pub(crate) fn heal(model: &mut Model, tolerance_mm: f64) -> Vec<Finding> {
 struct Healing<'a> {
     faces: &'a mut [Face],
     edges: &'a mut Vec<Edge>,
-    vertices: &'a [Vec3],
+    vertices: &'a mut [Vec3],
     tolerance_mm: f64,
     /// For edges that were joined or whose ends were, how far apart that was.
     widest_mm: HashMap<usize, f64>,
@@ -86,73 +91,6 @@ impl Healing<'_> {
             .collect();
         loose.sort_unstable();
         loose
-    }
-
-    /// Makes one of vertices that lie within the tolerance.
-    fn join_vertices(&mut self) {
-        let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
-        // Which vertex each becomes: the first within the tolerance.
-        let mut becomes: HashMap<usize, usize> = HashMap::new();
-        for vertex in self.loose() {
-            let place = self.vertices[vertex];
-            let cell = place.map(|x| (x / self.tolerance_mm).floor() as i64);
-            let around = (0..27).map(|k| {
-                [0, 1, 2].map(|axis| cell[axis].saturating_add(k / 3i64.pow(axis as u32) % 3 - 1))
-            });
-            let near = around
-                .filter_map(|cell| cells.get(&cell))
-                .flatten()
-                .copied()
-                .find(|&other| distance(self.vertices[other], place) <= self.tolerance_mm);
-            match near {
-                Some(other) => drop(becomes.insert(vertex, other)),
-                None => cells.entry(cell).or_default().push(vertex),
-            }
-        }
-        self.collapse(&becomes);
-        self.rename(&becomes);
-    }
-
-    /// Takes edges out of loops whose ends become one vertex and which are as short
-    /// as that.
-    fn collapse(&mut self, becomes: &HashMap<usize, usize>) {
-        let at = |vertex: &usize| *becomes.get(vertex).unwrap_or(vertex);
-        let is_tiny = |&(edge, _): &(usize, bool)| {
-            let edge = &self.edges[edge];
-            let [a, b] = edge.ends;
-            a != b && at(&a) == at(&b) && {
-                let line = edge.curve.polyline(self.range(edge), self.tolerance_mm);
-                line.iter().all(|p| distance(*p, line[0]) <= 2.0 * self.tolerance_mm)
-            }
-        };
-        let tiny: HashSet<usize> =
-            self.loops().flatten().filter(|edge| is_tiny(edge)).map(|(edge, _)| *edge).collect();
-        for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
-            if let Loop::Edges(edges) = around
-                && edges.iter().any(|(edge, _)| !tiny.contains(edge))
-            {
-                edges.retain(|(edge, _)| !tiny.contains(edge));
-            }
-        }
-    }
-
-    fn rename(&mut self, becomes: &HashMap<usize, usize>) {
-        let used: HashSet<usize> = self.loops().flatten().map(|(edge, _)| *edge).collect();
-        for edge in used {
-            for end in &mut self.edges[edge].ends {
-                if let Some(&other) = becomes.get(end) {
-                    let apart = distance(self.vertices[*end], self.vertices[other]);
-                    let widest = self.widest_mm.entry(edge).or_default();
-                    *widest = widest.max(apart);
-                    *end = other;
-                }
-            }
-        }
-        for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
-            if let Loop::Vertex(vertex) = around {
-                *vertex = *becomes.get(vertex).unwrap_or(vertex);
-            }
-        }
     }
 
     fn range(&self, edge: &Edge) -> [f64; 2] {
@@ -206,7 +144,7 @@ impl Healing<'_> {
         let near = ends[first..].iter().take_while(|&&end| self.vertices[end][0] <= high);
         let mut cuts: Vec<(f64, usize)> = near
             .filter(|end| !edge.ends.contains(end))
-            .filter_map(|&end| Some((span.part(self.vertices[end])?, end)))
+            .filter_map(|&end| Some((span.inner_part(self.vertices[end])?, end)))
             .collect();
         cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
         cuts.into_iter().map(|(_, end)| end).collect()
@@ -280,50 +218,5 @@ impl Healing<'_> {
 /// Pieces of an edge between which it is compared.
 const SAMPLES: usize = 8;
 
-/// An edge's part of its curve.
-struct Span<'a> {
-    curve: &'a Curve,
-    range: [f64; 2],
-    low: Vec3,
-    high: Vec3,
-    tolerance_mm: f64,
-}
-
-impl<'a> Span<'a> {
-    fn new(edge: &'a Edge, range: [f64; 2], tolerance_mm: f64) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for p in edge.curve.polyline(range, tolerance_mm) {
-            for k in 0..3 {
-                low[k] = low[k].min(p[k]);
-                high[k] = high[k].max(p[k]);
-            }
-        }
-        Self { curve: &edge.curve, range, low, high, tolerance_mm }
-    }
-
-    fn apart(&self, p: Vec3) -> f64 {
-        distance(self.curve.place(self.curve.project(p)), p)
-    }
-
-    /// Where along the edge a point lies, from 0 to 1; nothing if it lies further
-    /// away than the tolerance, or no further from an end.
-    fn part(&self, p: Vec3) -> Option<f64> {
-        let near = 2.0 * self.tolerance_mm;
-        if (0..3).any(|k| p[k] < self.low[k] - near || p[k] > self.high[k] + near) {
-            return None;
-        }
-        let [from, to] = self.range;
-        let mut t = self.curve.project(p);
-        if let Some(period) = self.curve.period() {
-            let low = from.min(to);
-            t = low + (t - low).rem_euclid(period);
-        }
-        let at = self.curve.place(t);
-        let ends = [from, to].map(|end| distance(self.curve.place(end), at));
-        let part = (t - from) / (to - from);
-        let is_on = distance(at, p) <= self.tolerance_mm
-            && (0.0..=1.0).contains(&part)
-            && ends.iter().all(|&apart| apart > self.tolerance_mm);
-        is_on.then_some(part)
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,56 @@
+//! The parts of curves that edges are, as places to be near to.
+
+use crate::geometry::Curve;
+use crate::model::Edge;
+use crate::vector::{Vec3, distance};
+
+/// An edge's part of its curve.
+pub(super) struct Span<'a> {
+    curve: &'a Curve,
+    range: [f64; 2],
+    pub(super) low: Vec3,
+    pub(super) high: Vec3,
+    tolerance_mm: f64,
+}
+
+impl<'a> Span<'a> {
+    pub(super) fn new(edge: &'a Edge, range: [f64; 2], tolerance_mm: f64) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in edge.curve.polyline(range, tolerance_mm) {
+            for k in 0..3 {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
+            }
+        }
+        Self { curve: &edge.curve, range, low, high, tolerance_mm }
+    }
+
+    pub(super) fn apart(&self, p: Vec3) -> f64 {
+        distance(self.curve.place(self.curve.project(p)), p)
+    }
+
+    /// Where along the edge a point lies, from 0 to 1; nothing if it lies further
+    /// away than the tolerance.
+    pub(super) fn part(&self, p: Vec3) -> Option<f64> {
+        let near = 2.0 * self.tolerance_mm;
+        if (0..3).any(|k| p[k] < self.low[k] - near || p[k] > self.high[k] + near) {
+            return None;
+        }
+        let [from, to] = self.range;
+        let mut t = self.curve.project(p);
+        if let Some(period) = self.curve.period() {
+            // As near to the middle of the edge as turns allow.
+            let middle = (from + to) / 2.0;
+            t -= ((t - middle) / period).round() * period;
+        }
+        let part = ((t - from) / (to - from)).clamp(0.0, 1.0);
+        let at = self.curve.place(from + (to - from) * part);
+        (distance(at, p) <= self.tolerance_mm).then_some(part)
+    }
+
+    /// The same for a point that is further than the tolerance from both ends.
+    pub(super) fn inner_part(&self, p: Vec3) -> Option<f64> {
+        let is_end = |t: f64| distance(self.curve.place(t), p) <= self.tolerance_mm;
+        self.part(p).filter(|_| !self.range.into_iter().any(is_end))
+    }
+}

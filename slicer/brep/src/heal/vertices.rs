@@ -1,0 +1,122 @@
+//! Vertices that become one.
+
+use std::collections::{HashMap, HashSet};
+
+use super::Healing;
+use crate::model::Loop;
+use crate::vector::{Vec3, add, distance, scale};
+
+/// Steps of a vertex to where its edges meet, and how short the last one is, in
+/// millimetres.
+const MOST_STEPS: usize = 50;
+const SETTLED_MM: f64 = 1e-9;
+impl Healing<'_> {
+    /// Makes one of vertices that lie within the tolerance.
+    pub(super) fn join_vertices(&mut self) {
+        let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+        // Which vertex each becomes: the first within the tolerance.
+        let mut becomes: HashMap<usize, usize> = HashMap::new();
+        for vertex in self.loose() {
+            let place = self.vertices[vertex];
+            let cell = place.map(|x| (x / self.tolerance_mm).floor() as i64);
+            let around = (0..27).map(|k| {
+                [0, 1, 2].map(|axis| cell[axis].saturating_add(k / 3i64.pow(axis as u32) % 3 - 1))
+            });
+            let near = around
+                .filter_map(|cell| cells.get(&cell))
+                .flatten()
+                .copied()
+                .find(|&other| distance(self.vertices[other], place) <= self.tolerance_mm);
+            match near {
+                Some(other) => drop(becomes.insert(vertex, other)),
+                None => cells.entry(cell).or_default().push(vertex),
+            }
+        }
+        self.collapse(&becomes);
+        self.rename(&becomes);
+    }
+
+    /// Moves vertices that were joined to where the curves of their edges meet, and
+    /// onto a pole of their surface that is near.
+    pub(super) fn settle(&mut self) {
+        let mut around: HashMap<usize, Vec<usize>> = HashMap::new();
+        for &edge in self.widest_mm.keys() {
+            self.edges[edge].ends.iter().for_each(|end| around.entry(*end).or_default().push(edge));
+        }
+        let near = |a: Vec3, b: Vec3| distance(a, b) <= self.tolerance_mm;
+        for (&vertex, edges) in &around {
+            let start = self.vertices[vertex];
+            let mut place = start;
+            for _ in 0..MOST_STEPS {
+                let feet = edges.iter().map(|edge| {
+                    let curve = &self.edges[*edge].curve;
+                    curve.place(curve.project(place))
+                });
+                let middle = scale(feet.fold([0.0; 3], add), 1.0 / edges.len() as f64);
+                let way = distance(middle, std::mem::replace(&mut place, middle));
+                if way < SETTLED_MM {
+                    break;
+                }
+            }
+            if near(place, start) {
+                self.vertices[vertex] = place;
+            }
+        }
+        for face in self.faces.iter() {
+            let poles = face.surface.poles();
+            let ends = face.loops.iter().flat_map(|around| match around {
+                Loop::Edges(edges) => {
+                    edges.iter().flat_map(|(edge, _)| self.edges[*edge].ends).collect()
+                }
+                Loop::Vertex(vertex) => vec![*vertex],
+            });
+            for end in ends.filter(|end| around.contains_key(end)) {
+                if let Some(pole) = poles.iter().find(|pole| near(pole.point, self.vertices[end])) {
+                    self.vertices[end] = pole.point;
+                }
+            }
+        }
+    }
+
+    /// Takes edges out of loops whose ends become one vertex and which are as short
+    /// as that.
+    fn collapse(&mut self, becomes: &HashMap<usize, usize>) {
+        let at = |vertex: &usize| *becomes.get(vertex).unwrap_or(vertex);
+        let is_tiny = |&(edge, _): &(usize, bool)| {
+            let edge = &self.edges[edge];
+            let [a, b] = edge.ends;
+            a != b && at(&a) == at(&b) && {
+                let line = edge.curve.polyline(self.range(edge), self.tolerance_mm);
+                line.iter().all(|p| distance(*p, line[0]) <= 2.0 * self.tolerance_mm)
+            }
+        };
+        let tiny: HashSet<usize> =
+            self.loops().flatten().filter(|edge| is_tiny(edge)).map(|(edge, _)| *edge).collect();
+        for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
+            if let Loop::Edges(edges) = around
+                && edges.iter().any(|(edge, _)| !tiny.contains(edge))
+            {
+                edges.retain(|(edge, _)| !tiny.contains(edge));
+            }
+        }
+    }
+
+    fn rename(&mut self, becomes: &HashMap<usize, usize>) {
+        let used: HashSet<usize> = self.loops().flatten().map(|(edge, _)| *edge).collect();
+        for edge in used {
+            for end in &mut self.edges[edge].ends {
+                if let Some(&other) = becomes.get(end) {
+                    let apart = distance(self.vertices[*end], self.vertices[other]);
+                    let widest = self.widest_mm.entry(edge).or_default();
+                    *widest = widest.max(apart);
+                    *end = other;
+                }
+            }
+        }
+        for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
+            if let Loop::Vertex(vertex) = around {
+                *vertex = *becomes.get(vertex).unwrap_or(vertex);
+            }
+        }
+    }
+}
