@@ -134,10 +134,19 @@ impl Curve {
             Self::Parabola { frame, focal } => self.nearer(p, frame.local(p)[1] / (2.0 * focal)),
             Self::Chain(chain) => chain.project(p),
             Self::Spline(_) => {
-                let far = |t: f64| distance(self.at(t)[0], p);
+                let far = |t: &f64| distance(self.at(*t)[0], p);
+                let nearer = |a: &f64, b: &f64| far(a).total_cmp(&far(b));
                 let samples = self.samples();
-                let nearest = samples.iter().copied().min_by(|&a, &b| far(a).total_cmp(&far(b)));
-                self.nearer(p, nearest.unwrap_or(0.0))
+                let nearest = samples.iter().copied().min_by(nearer).unwrap_or(0.0);
+                let found = self.nearer(p, nearest);
+                // A closed curve may go on beyond its end where it begins.
+                match (self.period(), samples.as_slice()) {
+                    (Some(_), &[first, .., last]) if nearest == first => {
+                        let other = self.nearer(p, last);
+                        if nearer(&other, &found).is_lt() { other } else { found }
+                    }
+                    _ => found,
+                }
             }
         }
     }
@@ -256,6 +265,7 @@ pub(crate) fn edge_range(curve: &Curve, start: Vec3, end: Vec3, forward: bool) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::spline::{Knots, weighted};
     use crate::vector::length;
 
     fn circle() -> Curve {
@@ -288,6 +298,19 @@ mod tests {
             };
             let worst = points.windows(2).map(sag).fold(0.0, f64::max);
             assert!(worst <= chord_mm && worst > chord_mm / 5.0, "{worst}");
+        }
+    }
+
+    #[test]
+    fn a_point_before_the_seam_of_a_closed_spline_is_found() {
+        let place = |k: usize| [3.0, 0.0, 0.0, -3.0][k % 4];
+        let control = |k: usize| weighted([place(k), place(k + 3), 0.0], 1.0);
+        let knots = Knots::new(3, (0..11).map(|k| f64::from(k) - 3.0).collect(), 7).unwrap();
+        let spline = SplineCurve { knots, points: (0..7).map(control).collect() };
+        let curve = Curve::Spline(spline);
+        assert_eq!(curve.period(), Some(4.0));
+        for t in [0.01, 1.3, 3.96, 3.999] {
+            assert!((curve.project(curve.at(t)[0]) - t).abs() < 1e-9, "{t}");
         }
     }
 
