@@ -99,6 +99,15 @@ pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
     kernel.bodies().iter().map(report).collect()
 }
 
+/// Whether a body's two volumes are further apart than a chord lets them be.
+pub(crate) fn apart(report: &BodyReport, chord_mm: f64) -> Option<BodyFault> {
+    let (facets_mm3, surfaces_mm3) = (report.volume_mm3, report.exact_volume_mm3);
+    let most = f64::max(VOLUMES_APART * facets_mm3.abs(), chord_mm * report.area_mm2);
+    // Not a number is not within.
+    let is_within = (facets_mm3 - surfaces_mm3).abs() <= most;
+    (!is_within).then_some(BodyFault::Volumes { facets_mm3, surfaces_mm3 })
+}
+
 fn faults(
     kernel: &dyn Kernel,
     mesh: &Tessellation,
@@ -110,15 +119,10 @@ fn faults(
     }
     let mut faults: Vec<BodyFault> = open(kernel, mesh, facets).into_iter().collect();
     faults.extend(outside(kernel, mesh, facets));
-    let (facets_mm3, surfaces_mm3) = (report.volume_mm3, report.exact_volume_mm3);
-    let apart = (facets_mm3 - surfaces_mm3).abs();
-    // Not a number is not within.
-    let is_within =
-        apart <= f64::max(VOLUMES_APART * facets_mm3.abs(), mesh.chord_mm * report.area_mm2);
-    if !is_within {
-        faults.push(BodyFault::Volumes { facets_mm3, surfaces_mm3 });
-    } else if facets_mm3 <= 0.0 {
-        faults.push(BodyFault::InsideOut { volume_mm3: facets_mm3 });
+    if let Some(fault) = apart(report, mesh.chord_mm) {
+        faults.push(fault);
+    } else if report.volume_mm3 <= 0.0 {
+        faults.push(BodyFault::InsideOut { volume_mm3: report.volume_mm3 });
     }
     faults
 }
@@ -229,4 +233,28 @@ fn outside(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option
         is_off.then_some(BodyFault::Outside { entity: info.entity, off_mm })
     };
     of_face.into_iter().find_map(off)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn volumes_may_be_apart_as_far_as_the_chord_lets_them() {
+        let report = BodyReport {
+            name: String::new(),
+            facets: 12,
+            volume_mm3: 1000.0,
+            exact_volume_mm3: 1003.0,
+            area_mm2: 600.0,
+            box_mm: [[0.0; 3], [10.0; 3]],
+            faults: Vec::new(),
+        };
+        assert_eq!(apart(&report, 0.01), None);
+        let fault = BodyFault::Volumes { facets_mm3: 1000.0, surfaces_mm3: 1003.0 };
+        assert_eq!(apart(&report, 0.001), Some(fault));
+        let near = BodyReport { exact_volume_mm3: 1000.9, ..report.clone() };
+        assert_eq!(apart(&near, 0.0), None);
+        assert!(apart(&BodyReport { exact_volume_mm3: f64::NAN, ..report }, 1.0).is_some());
+    }
 }

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use crate::error::BrepError;
-use crate::gate::{BodyFault, BodyReport, check};
+use crate::gate::{BodyFault, BodyReport, apart, check};
 use crate::kernel::{Kernel, Tessellation};
 use crate::orient::turn_over;
 use crate::step::StepModel;
@@ -75,7 +75,7 @@ pub fn prepare(path: &Path, name: KernelName, chord_mm: f64) -> Result<Prepared,
     let first = facets(opened.kernel, 0.0, chord_mm);
     let first_try = Try::of(&first, 0.0, chord_mm);
     let mut search =
-        Search { path, name, tries: vec![first_try], best: first.map(|made| (0, made)) };
+        Search { path, name, chord_mm, tries: vec![first_try], best: first.map(|made| (0, made)) };
     let heals = HEALS.map(|by| by * own_mm).into_iter().chain(LOOSEST.map(|by| by * chord_mm));
     for heal_mm in heals.filter(|heal_mm| *heal_mm <= chord_mm) {
         search.healed(heal_mm, chord_mm)?;
@@ -92,6 +92,8 @@ pub fn prepare(path: &Path, name: KernelName, chord_mm: f64) -> Result<Prepared,
 struct Search<'a> {
     path: &'a Path,
     name: KernelName,
+    /// The chord that is wanted.
+    chord_mm: f64,
     /// All, the best one too.
     tries: Vec<Try>,
     /// Which one it is; an error if none gave facets, that of the first.
@@ -117,14 +119,21 @@ impl Search<'_> {
     fn longer(&mut self, chord_mm: f64) -> Result<(), BrepError> {
         if !self.is_done() {
             let heal_mm = self.best.as_ref().map_or(0.0, |(_, best)| best.heal_mm);
-            self.take(open(self.path, self.name, heal_mm)?.kernel, heal_mm, chord_mm);
+            let kernel = open(self.path, self.name, heal_mm)?.kernel;
+            self.take(kernel, heal_mm, chord_mm);
         }
         Ok(())
     }
 
     /// Makes facets, and keeps them if they are less wrong than those before.
     fn take(&mut self, kernel: Box<dyn Kernel>, heal_mm: f64, chord_mm: f64) {
-        let made = facets(kernel, heal_mm, chord_mm);
+        let mut made = facets(kernel, heal_mm, chord_mm);
+        if let Ok(made) = &mut made {
+            // A longer chord is no excuse for volumes.
+            for report in made.reports.iter_mut().filter(|report| report.faults.is_empty()) {
+                report.faults.extend(apart(report, self.chord_mm));
+            }
+        }
         self.tries.push(Try::of(&made, heal_mm, chord_mm));
         let Ok(made) = made else { return };
         let is_better = match &self.best {
