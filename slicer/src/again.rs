@@ -9,7 +9,7 @@ use crate::table::Table;
 
 impl Slices {
     /// Cuts a layer once more, with its plane moved up by so many micrometres but not
-    /// past its neighbours', and everything else as it is: 002 section 2.2.3 gets
+    /// past its neighbours' or out of the part, and everything else as it is: 002 section 2.2.3 gets
     /// by with sections that fail in this way.
     ///
     /// # Errors
@@ -21,7 +21,7 @@ impl Slices {
             let (start, end) = (layer, layer.saturating_add(1));
             return Err(SliceError::NoSuchLayers { start, end, count: count as u32 });
         }
-        let planes = self.planes.moved(index, by_um);
+        let planes = self.planes.moved(index, by_um, [self.survey.min[2], self.survey.max[2]]);
         let cutter = Cutter { grid: &self.grid, planes: &planes, fill: self.fill };
         let reach_um = self.gray.as_ref().map(LayerLevels::reach_um);
         let layers = index..index + 1;

@@ -140,13 +140,18 @@ impl Planes {
         }
     }
 
-    /// The same with one plane moved, by no more than half of the way to its neighbours.
-    pub(crate) fn moved(&self, layer: usize, by_um: f64) -> Self {
+    /// The same with one plane moved, by no more than half of the way to its neighbours,
+    /// and not out of the part between two heights.
+    pub(crate) fn moved(&self, layer: usize, by_um: f64, part_um: [f64; 2]) -> Self {
         let mut planes = self.clone();
         let here = self.z_um[layer];
         let below = layer.checked_sub(1).map_or(f64::MIN, |below| self.z_um[below]);
         let above = self.z_um.get(layer + 1).copied().unwrap_or(f64::MAX);
-        planes.z_um[layer] = here + by_um.clamp((below - here) / 2.0, (above - here) / 2.0);
+        let moved = here + by_um.clamp((below - here) / 2.0, (above - here) / 2.0);
+        let [bottom, top] = part_um;
+        if moved > bottom && moved <= top {
+            planes.z_um[layer] = moved;
+        }
         if let Spacing::Uneven(bins) = &mut planes.spacing {
             *bins = Bins::new(&planes.z_um);
         }

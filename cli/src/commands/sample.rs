@@ -1,8 +1,9 @@
+use std::ffi::OsStr;
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use lamp_fixtures::{Defect, Mesh, Part, build, inject};
+use lamp_fixtures::{Defect, Mesh, Part, StepPart, StepUnit, build, inject, step};
 use lamp_stack::Length;
 
 use crate::options::{Common, parse_count};
@@ -10,12 +11,13 @@ use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{is_stream, write_file};
 
-/// Write a sample part as STL, whole or with defects
+/// Write a sample part as STL, whole or with defects, or as STEP with exact surfaces
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp sample blade -o blade.stl --facets 750k
   lamp sample torus | slice - | lamp info
+  lamp sample tower -o tower.step
   lamp sample tower --defect drop --count 20 --seed 7 -o broken.stl")]
 pub(crate) struct SampleArgs {
     /// Which part
@@ -47,7 +49,8 @@ pub(crate) struct SampleArgs {
     #[arg(long, value_name = "LENGTH", default_value = "50um", requires = "defect")]
     by: Length,
 
-    /// Where to write the STL: a file, or - for standard output
+    /// Where to write the STL: a file, or - for standard output; a file that ends in .step gets
+    /// exact surfaces (sphere, torus, cone, tower)
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     output: PathBuf,
 }
@@ -85,6 +88,9 @@ enum DefectArg {
 
 pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
     let PartArg(part) = args.part;
+    if is_step_name(&args.output) {
+        return args.write_step(part);
+    }
     let mut mesh = build(part, args.facets).map_err(|error| Stop::usage(error.to_string()))?;
     if let Some(defect) = args.defect {
         inject(&mut mesh, args.defect(defect), args.count, args.seed);
@@ -112,6 +118,24 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
 }
 
 impl SampleArgs {
+    fn write_step(&self, part: Part) -> Result<(), Stop> {
+        let part = match part {
+            Part::Sphere => StepPart::Sphere,
+            Part::Torus => StepPart::Torus,
+            Part::Cone => StepPart::Cone,
+            Part::Tower => StepPart::Tower,
+            Part::Blade | Part::Cube => {
+                let why = format!("{} is made as STL only: write it to a .stl", part.name());
+                return Err(Stop::usage(why));
+            }
+        };
+        if self.ascii || self.defect.is_some() {
+            return Err(Stop::usage("--ascii and --defect are for STL: write it to a .stl"));
+        }
+        let text = step(part, StepUnit::Millimetre);
+        write_file(&self.output, |out| out.write_all(text.as_bytes()))
+    }
+
     fn defect(&self, defect: DefectArg) -> Defect {
         match defect {
             DefectArg::Drop => Defect::Drop,
@@ -121,6 +145,11 @@ impl SampleArgs {
             DefectArg::Gap => Defect::Gap { by_mm: self.by.mm() as f32 },
         }
     }
+}
+
+fn is_step_name(path: &Path) -> bool {
+    let is_step = |end: &OsStr| ["step", "stp"].iter().any(|name| end.eq_ignore_ascii_case(name));
+    path.extension().is_some_and(is_step)
 }
 
 fn say_size(args: &SampleArgs, common: &Common, mesh: &Mesh) {

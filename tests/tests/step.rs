@@ -1,0 +1,175 @@
+//! STEP parts, by the commands.
+
+use lamp_fixtures::{StepDefect, StepPart, StepUnit, broken_step, step};
+use lamp_stack::Image;
+use lamp_tests::{Scratch, masks};
+
+fn with(part: StepPart) -> Scratch {
+    let scratch = Scratch::new();
+    scratch.write("part.step", step(part, StepUnit::Inch).as_bytes());
+    scratch
+}
+
+fn broken(defect: StepDefect) -> Scratch {
+    let scratch = Scratch::new();
+    scratch.write("part.step", broken_step(defect).as_bytes());
+    scratch
+}
+
+/// Standard error of a command that succeeds.
+fn said(scratch: &Scratch, line: &str) -> String {
+    scratch.run(line).succeeds().stderr
+}
+
+/// The tower begins with a cylinder of radius 12.7 mm, 19.05 mm high.
+#[test]
+fn a_tower_in_inches_has_its_discs() {
+    let scratch = with(StepPart::Tower);
+    let text = said(&scratch, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
+    assert!(text.contains("crossings were moved from facets to surfaces"), "{text}");
+    let layers = scratch.layers("part.tif");
+    assert_eq!(layers.len(), 76);
+    let pitch = 25.4 / 600.0;
+    for (layer, mask) in layers.iter().zip(masks(&layers)).take(19) {
+        let [left, top] = layer.info.origin_mm.unwrap();
+        let is_inside = |column: u32, row: u32| {
+            let x = left + (f64::from(column) + 0.5) * pitch;
+            let y = top - (f64::from(row) + 0.5) * pitch;
+            x.hypot(y) < 12.7
+        };
+        for row in 0..mask.height() {
+            let inside: Vec<u32> = (0..mask.width()).filter(|&c| is_inside(c, row)).collect();
+            let ends = inside.first().map(|first| vec![*first, inside[inside.len() - 1] + 1]);
+            assert_eq!(mask.row(row), ends.unwrap_or_default(), "{} {row}", layer.info.index);
+        }
+    }
+}
+
+#[test]
+fn threads_memory_and_pipes_change_no_byte() {
+    let scratch = with(StepPart::Tower);
+    let line = "slice part.step --dpi 600 --thickness 1mm --rotate x:40 --quiet";
+    scratch.run(&format!("{line} --threads 1 -o one.tif")).succeeds_quietly();
+    scratch.run(&format!("{line} --threads 3 --memory 16MB -o three.tif")).succeeds_quietly();
+    assert!(scratch.bytes("one.tif") == scratch.bytes("three.tif"));
+    let piped = "slice - --dpi 600 --thickness 1mm --rotate x:40 --quiet -o piped.tif";
+    scratch.run_on(piped, &scratch.bytes("part.step")).succeeds_quietly();
+    assert_eq!(masks(&scratch.layers("piped.tif")), masks(&scratch.layers("one.tif")));
+}
+
+#[test]
+fn facets_of_a_file_are_those_of_the_stl_made_of_it() {
+    let scratch = with(StepPart::Torus);
+    scratch.run("lamp convert part.step part.stl --chord 20um").succeeds_quietly();
+    let line = "--dpi 600 --thickness 1mm --margin 4";
+    scratch
+        .run(&format!("slice part.step {line} --tolerance 20um --no-polish --quiet -o a.tif"))
+        .succeeds_quietly();
+    scratch.run(&format!("slice part.stl {line} -o b.tif")).succeeds_quietly();
+    scratch.run(&format!("slice part.step {line} --tolerance 20um --quiet -o c.tif")).succeeds();
+    let [a, b, c] = ["a.tif", "b.tif", "c.tif"].map(|name| scratch.layers(name));
+    // Most planes of the torus meet facets at the same heights in both.
+    let same = masks(&a).iter().zip(masks(&b)).filter(|(a, b)| **a == *b).count();
+    assert!(same + 2 > a.len(), "{same} of {}", a.len());
+    let same = masks(&a).iter().zip(masks(&c)).filter(|(a, c)| **a == *c).count();
+    assert!(same < 3, "{same} of {}", a.len());
+}
+
+#[test]
+fn heights_gray_and_sections_work_as_for_an_stl() {
+    let scratch = with(StepPart::Sphere);
+    let text = scratch.run("lamp heights part.step --dpi 300 --min 100um --max 1mm").succeeds();
+    assert!(String::from_utf8(text.stdout).unwrap().contains("uniform 1mm"));
+    let line = "--material lamp-suspension --dpi 300 --quiet -o gray.tif";
+    scratch.run(&format!("slice part.step --gray {line}")).succeeds_quietly();
+    let layers = scratch.layers("gray.tif");
+    assert!(layers.iter().any(|layer| matches!(layer.image, Image::Gray(_))));
+    let cure = "lamp cure gray.tif --part part.step --material lamp-suspension --section y=0mm";
+    scratch.run(&format!("{cure} -o cure.png")).succeeds();
+}
+
+#[test]
+fn a_report_names_what_a_file_holds() {
+    let scratch = with(StepPart::Pair);
+    let text = String::from_utf8(scratch.run("lamp brep part.step").succeeds().stdout).unwrap();
+    for words in ["unit:       inch", "bodies:     2", "1 (1 sphere)", "yes, it is closed"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let scratch = broken(StepDefect::Missing);
+    let text = String::from_utf8(scratch.run("lamp brep part.step").succeeds().stdout).unwrap();
+    assert!(text.contains("sliced:   no: ") && text.contains("tried:"), "{text}");
+    let ran = scratch.run("lamp brep part.step --strict");
+    assert_eq!(ran.statuses, [Some(3)], "{}", ran.stderr);
+}
+
+#[test]
+fn what_is_broken_is_refused_or_healed_and_said() {
+    for (defect, words) in [
+        (StepDefect::Missing, "edges of facets are open"),
+        (StepDefect::Crossing, "cross"),
+        (StepDefect::Apart { gap_nm: 100_000 }, "edges of facets are open"),
+    ] {
+        let scratch = broken(defect);
+        scratch.run("slice part.step -o part.tif").is_refused_with(&["part.step: ", words]);
+        assert_eq!(scratch.names(), ["part.step"], "{defect:?}");
+    }
+    for (defect, words) in [
+        (StepDefect::Apart { gap_nm: 1000 }, "joined"),
+        (StepDefect::Inverted, "turned over"),
+        (StepDefect::InsideOut, "turned over"),
+    ] {
+        let scratch = broken(defect);
+        let text = said(&scratch, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
+        assert!(text.contains(words), "{defect:?}: {text}");
+        let whole = with(StepPart::Block);
+        said(&whole, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
+        let [a, b] = [&scratch, &whole].map(|scratch| scratch.layers("part.tif"));
+        assert_eq!(masks(&a), masks(&b), "{defect:?}");
+    }
+}
+
+/// A block without its top: turned on its side, every layer has a gap.
+#[test]
+fn layers_with_gaps_come_from_the_fallback() {
+    let scratch = broken(StepDefect::Missing);
+    scratch.write("whole.step", step(StepPart::Block, StepUnit::Millimetre).as_bytes());
+    scratch.run("lamp convert whole.step whole.stl").succeeds_quietly();
+    let line = "--dpi 600 --thickness 1mm --rotate x:90";
+    said(&scratch, &format!("slice whole.step {line} -o whole.tif"));
+    let bridged = format!("slice part.step --fallback whole.stl {line} -o part.tif");
+    let text = said(&scratch, &bridged);
+    assert!(text.contains("layers with gaps taken from whole.stl: 0 to"), "{text}");
+    let [a, b] = ["part.tif", "whole.tif"].map(|name| scratch.layers(name));
+    let differ = masks(&a).iter().zip(masks(&b)).filter(|(a, b)| **a != *b).count();
+    assert_eq!(differ, 0, "{text}");
+    assert!(a.iter().all(|layer| layer.info.closed == Some(true)));
+    // Upright no layer has one.
+    let text = said(&scratch, "slice part.step --fallback whole.stl --dpi 600 -o up.tif");
+    assert!(!text.contains("gaps"), "{text}");
+    scratch.run("lamp sample sphere -o other.stl").succeeds();
+    scratch
+        .run("slice part.step --fallback other.stl -o wrong.tif")
+        .is_refused_with(&["other.stl: it is not the same part"]);
+}
+
+#[test]
+fn wrong_usage_is_told() {
+    let scratch = with(StepPart::Sphere);
+    scratch.run("slice part.step --units inch -o a.tif").is_wrong_usage(&["leave --units away"]);
+    scratch.run("slice part.step --tolerance 0um -o a.tif").is_wrong_usage(&["--tolerance"]);
+    scratch.run("slice part.step --timeout 0 -o a.tif").is_wrong_usage(&["write seconds"]);
+    scratch.run("lamp convert part.step part.obj").is_wrong_usage(&[".stl"]);
+    scratch.run("lamp sample blade -o blade.step").is_wrong_usage(&["as STL only"]);
+    scratch
+        .run("slice part.step --timeout 0.000001 --tolerance 1um -o a.tif")
+        .is_refused_with(&["takes longer than"]);
+    assert_eq!(scratch.names(), ["part.step"]);
+}
+
+#[test]
+fn a_sample_is_the_fixture() {
+    let scratch = Scratch::new();
+    scratch.run("lamp sample torus -o torus.step").succeeds_quietly();
+    let expected = step(StepPart::Torus, StepUnit::Millimetre);
+    assert_eq!(scratch.bytes("torus.step"), expected.as_bytes());
+}
