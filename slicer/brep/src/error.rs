@@ -12,11 +12,32 @@ pub enum BrepError {
     /// The file cannot be read.
     #[error("cannot read it")]
     Io(#[from] std::io::Error),
+    /// OpenCASCADE cannot work with it.
+    #[cfg(feature = "occt")]
+    #[error("OpenCASCADE says: {said}")]
+    Occt {
+        /// Why, in its words.
+        said: String,
+    },
     /// The chord is not a positive length.
     #[error("a chord of {chord_mm} mm is not a positive length")]
     Chord {
         /// In millimetres.
         chord_mm: f64,
+    },
+    /// A face has no size, or none that can be built.
+    #[cfg(feature = "occt")]
+    #[error("#{entity} is larger than anything that can be built, or has no size")]
+    Size {
+        /// The entity, or 0.
+        entity: u64,
+    },
+    /// The tolerance to mend with is not a positive length.
+    #[cfg(feature = "occt")]
+    #[error("a tolerance of {heal_mm} mm is not a positive length")]
+    Heal {
+        /// In millimetres.
+        heal_mm: f64,
     },
     /// There would be more facets than can be numbered.
     #[error("it takes more than {most} facets; give a longer chord")]

@@ -2,8 +2,10 @@
 
 use crate::error::BrepError;
 
-/// A point of a surface, in millimetres, and its first derivatives.
+/// A point of a surface, in millimetres, and its first derivatives: nine numbers in
+/// this order, so that a kernel in another language can write them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
 pub struct Jet {
     /// The point.
     pub point: [f64; 3],
@@ -48,7 +50,8 @@ pub trait Kernel: Send + Sync {
     /// Evaluates a face's surface at many parameters at once.
     ///
     /// Parameters may lie beyond the face, and outside the surface's domain as far
-    /// as it goes on there; those of closed surfaces come again.
+    /// as it goes on there; those of closed surfaces come again. Where there is no
+    /// surface, numbers are NaN.
     ///
     /// # Panics
     /// Where there is no such face, or the lists differ in length.
@@ -69,7 +72,7 @@ pub struct Body {
 pub struct FaceInfo {
     /// The kind of its surface: `plane`, `cylinder`, `B-spline`.
     pub kind: &'static str,
-    /// The entity of the file, such as 12 for `#12`.
+    /// The entity of the file, such as 12 for `#12`; 0 where it is not known.
     pub entity: u64,
     /// The least and the greatest corner of its surface's control points, in
     /// millimetres, if it has some: nothing of the surface lies outside.
@@ -148,6 +151,9 @@ pub enum Fault {
     /// Its loops cross each other or themselves.
     #[error("its loops cross each other or themselves")]
     Crossing,
+    /// No facets could be made of it, for another reason.
+    #[error("no facets could be made of it")]
+    Missing,
     /// A loop's edges do not follow each other.
     #[error("the edges of a loop do not follow each other")]
     Broken,

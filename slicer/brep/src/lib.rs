@@ -10,6 +10,9 @@
 //! loops say on which side of them a face lies. [`prepare`] opens, heals and checks a
 //! file in as many ways as it takes.
 //!
+//! With the feature `occt`, `OcctModel` is the kernel that has OpenCASCADE read the
+//! file and make the facets.
+//!
 //! ```
 //! use std::sync::Arc;
 //!
@@ -46,6 +49,8 @@ mod geometry;
 mod heal;
 mod kernel;
 mod model;
+#[cfg(feature = "occt")]
+mod occt;
 mod orient;
 mod placed;
 mod polish;
@@ -59,6 +64,8 @@ mod vector;
 pub use error::BrepError;
 pub use gate::{BodyFault, BodyReport, check};
 pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellation};
+#[cfg(feature = "occt")]
+pub use occt::OcctModel;
 pub use placed::{Chart, Placed};
 pub use polish::{Crossing, Fate, Probe, polish, polish_heights};
 pub use prepare::{KernelName, Prepared, Try, prepare};

@@ -7,6 +7,8 @@ use std::path::Path;
 use crate::error::BrepError;
 use crate::gate::{BodyFault, BodyReport, apart, check};
 use crate::kernel::{Kernel, Tessellation};
+#[cfg(feature = "occt")]
+use crate::occt::OcctModel;
 use crate::orient::turn_over;
 use crate::step::StepModel;
 
@@ -16,6 +18,9 @@ pub enum KernelName {
     /// This crate's own, in Rust.
     #[default]
     Lamp,
+    /// OpenCASCADE.
+    #[cfg(feature = "occt")]
+    Occt,
 }
 
 /// A model that is ready to be sliced, unless its reports have faults.
@@ -210,6 +215,16 @@ fn open(path: &Path, name: KernelName, heal_mm: f64) -> Result<Opened, BrepError
         KernelName::Lamp => {
             let model = StepModel::open_healed(path, heal_mm)?;
             let is_changed = model.is_healed();
+            Ok(Opened { kernel: Box::new(model), is_changed })
+        }
+        #[cfg(feature = "occt")]
+        KernelName::Occt => {
+            let is_changed = heal_mm > 0.0;
+            let model = if is_changed {
+                OcctModel::open_healed(path, heal_mm)?
+            } else {
+                OcctModel::open(path)?
+            };
             Ok(Opened { kernel: Box::new(model), is_changed })
         }
     })

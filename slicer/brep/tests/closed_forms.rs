@@ -15,15 +15,45 @@ fn read(part: StepPart, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessellati
     (model, mesh)
 }
 
-/// The bodies of a part that must be right.
+/// A text as each kernel reads it.
+fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
+    let own: Arc<dyn Kernel> = Arc::new(StepModel::read(text.as_bytes()).unwrap());
+    let meshed = |kernel: Arc<dyn Kernel>| {
+        let mesh = kernel.tessellate(chord_mm).unwrap();
+        (kernel, mesh)
+    };
+    [own].into_iter().chain(by_occt(text)).map(meshed).collect()
+}
+
+#[cfg(feature = "occt")]
+fn by_occt(text: &str) -> Option<Arc<dyn Kernel>> {
+    Some(Arc::new(lamp_brep::OcctModel::read(text.as_bytes()).unwrap()))
+}
+
+#[cfg(not(feature = "occt"))]
+fn by_occt(_: &str) -> Option<Arc<dyn Kernel>> {
+    None
+}
+
+/// The bodies of a part, which must be right by each kernel and the same to the chord.
 fn bodies(part: StepPart, unit: StepUnit, chord_mm: f64) -> Vec<BodyReport> {
-    let (model, mesh) = read(part, unit, chord_mm);
-    let reports = check(&model, &mesh);
-    assert!(mesh.findings.is_empty(), "{part:?}: {:?}", mesh.findings);
-    for report in &reports {
-        assert!(report.faults.is_empty(), "{part:?}: {:?}", report.faults);
+    let reports = |(kernel, mesh): &(Arc<dyn Kernel>, Tessellation)| {
+        let reports = check(&**kernel, mesh);
+        assert!(mesh.findings.is_empty(), "{part:?}: {:?}", mesh.findings);
+        for report in &reports {
+            assert!(report.faults.is_empty(), "{part:?}: {:?}", report.faults);
+        }
+        reports
+    };
+    let by_kernel: Vec<_> = kernels(&step(part, unit), chord_mm).iter().map(reports).collect();
+    for other in &by_kernel[1..] {
+        assert_eq!(other.len(), by_kernel[0].len(), "{part:?}");
+        for (a, b) in by_kernel[0].iter().zip(other) {
+            let most_mm3 = chord_mm * a.area_mm2;
+            assert!((a.volume_mm3 - b.volume_mm3).abs() < most_mm3, "{part:?}: {a:?} {b:?}");
+        }
     }
-    reports
+    by_kernel.into_iter().next().unwrap_or_default()
 }
 
 #[test]
@@ -208,18 +238,28 @@ fn crossings(placed: &Placed, z_mm: f64, step_mm: f64) -> Vec<Crossing> {
 
 /// Polishes the crossings of a part with many planes, and says how far those that
 /// moved are from where they should be, in millimetres, before and after, and
-/// which part of them was kept.
-fn errors(part: StepPart, heights_mm: &[f64], x_mm: impl Fn(&Crossing) -> f64) -> (f64, f64, f64) {
-    let chord_mm = 0.01;
-    let (model, mesh) = read(part, StepUnit::Millimetre, chord_mm);
-    let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-    let placed = Placed::new(Arc::new(model), Arc::new(mesh), rows);
+/// which part of them was kept; for each kernel.
+fn errors(
+    part: StepPart,
+    heights_mm: &[f64],
+    x_mm: impl Fn(&Crossing) -> f64,
+) -> Vec<(f64, f64, f64)> {
+    let kernels = kernels(&step(part, StepUnit::Millimetre), 0.01).into_iter();
+    let placed = kernels.map(|(kernel, mesh)| Placed::new(kernel, Arc::new(mesh), AS_IT_IS));
+    placed.map(|placed| errors_of(&placed, heights_mm, &x_mm)).collect()
+}
+
+fn errors_of(
+    placed: &Placed,
+    heights_mm: &[f64],
+    x_mm: impl Fn(&Crossing) -> f64,
+) -> (f64, f64, f64) {
     let (mut before, mut after): (f64, f64) = (0.0, 0.0);
     let (mut kept, mut all) = (0, 0);
     for &z_mm in heights_mm {
-        let facets = crossings(&placed, z_mm, 0.127);
+        let facets = crossings(placed, z_mm, 0.127);
         let mut exact = facets.clone();
-        polish(&placed, &mut exact);
+        polish(placed, &mut exact);
         for (old, new) in facets.iter().zip(&exact) {
             assert!((old.facet, old.y_mm, old.z_mm) == (new.facet, new.y_mm, new.z_mm));
             if new.fate == Fate::Moved {
@@ -243,9 +283,10 @@ fn crossings_of_a_sphere_are_exact_to_a_nanometre() {
         square.max(0.0).sqrt().copysign(at.x_mm)
     };
     let heights: Vec<f64> = (1..60).map(|k| 0.5 * f64::from(k) + 0.0123).collect();
-    let (before, after, kept) = errors(StepPart::Sphere, &heights, x_mm);
-    println!("sphere: {before} mm before, {after} after, {kept} kept");
-    assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
+    for (before, after, kept) in errors(StepPart::Sphere, &heights, x_mm) {
+        println!("sphere: {before} mm before, {after} after, {kept} kept");
+        assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
+    }
 }
 
 #[test]
@@ -261,9 +302,33 @@ fn crossings_of_a_torus_are_exact_to_a_nanometre() {
         if (outer - at.x_mm).abs() < (inner - at.x_mm).abs() { outer } else { inner }
     };
     let heights: Vec<f64> = (1..32).map(|k| 0.5 * f64::from(k) + 0.0123).collect();
-    let (before, after, kept) = errors(StepPart::Torus, &heights, x_mm);
-    println!("torus: {before} mm before, {after} after, {kept} kept");
-    assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
+    for (before, after, kept) in errors(StepPart::Torus, &heights, x_mm) {
+        println!("torus: {before} mm before, {after} after, {kept} kept");
+        assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
+    }
+}
+
+#[test]
+#[ignore = "it measures a rate, which only a release build has"]
+fn how_fast_polish_is() {
+    let blade = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/step/");
+    let blade = std::fs::read_to_string(format!("{blade}synthetic_cooled_blade.step"));
+    let torus = step(StepPart::Torus, StepUnit::Millimetre);
+    for (name, text) in [("torus", Some(torus)), ("cooled blade", blade.ok())] {
+        let Some(text) = text else { continue };
+        for (kernel, mesh) in kernels(&text, 0.01) {
+            let placed = Placed::new(kernel, Arc::new(mesh), AS_IT_IS);
+            let heights = (0..400).map(|k| 0.1 * f64::from(k) + 0.0123);
+            let mut list: Vec<Crossing> =
+                heights.flat_map(|z_mm| crossings(&placed, z_mm, 0.02)).collect();
+            let start = std::time::Instant::now();
+            polish(&placed, &mut list);
+            let rate = list.len() as f64 / start.elapsed().as_secs_f64();
+            let moved = list.iter().filter(|at| at.fate == Fate::Moved).count();
+            println!("{name}: {rate:.0} crossings a second, {moved} of {} moved", list.len());
+            assert!(moved > 9 * list.len() / 10);
+        }
+    }
 }
 
 fn placed(part: StepPart, chord_mm: f64, rows: [[f64; 4]; 3]) -> Placed {

@@ -110,6 +110,12 @@ fn every_file_is_right_or_refused() {
     every_file(KernelName::Lamp, LEAST_RIGHT);
 }
 
+#[cfg(feature = "occt")]
+#[test]
+fn every_file_is_right_or_refused_with_occt() {
+    every_file(KernelName::Occt, LEAST_RIGHT);
+}
+
 /// Reads every file of the folder, if it is there, and prints a table of them.
 fn every_file(kernel: KernelName, least_right: f64) {
     let Ok(figures) = std::fs::read(data().join("step_oracle.json")) else {

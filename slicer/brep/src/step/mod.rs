@@ -95,6 +95,12 @@ pub enum StepError {
     },
 }
 
+/// Reads the text alone.
+#[cfg(feature = "occt")]
+pub(crate) fn check_text(bytes: &[u8]) -> Result<(), StepError> {
+    file::Entities::read(bytes).map(drop)
+}
+
 /// A STEP file in memory, read by this crate alone.
 #[derive(Debug)]
 pub struct StepModel {

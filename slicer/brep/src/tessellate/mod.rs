@@ -29,7 +29,7 @@ struct Node {
 /// How much further from a vertex than the end of its curve points of an edge are.
 const CLEAR: f64 = 4.0;
 /// More facets than any part that is built takes: about 5 GB of memory.
-const MOST_FACETS: usize = 50_000_000;
+pub(crate) const MOST_FACETS: usize = 50_000_000;
 /// Points on edges.
 const MOST_POINTS: usize = 20_000_000;
 

@@ -1,0 +1,57 @@
+//! About how many facets a model takes, before they are made.
+
+use crate::error::BrepError;
+use crate::kernel::{Jet, Kernel};
+use crate::vector::{Vec3, length};
+
+/// Each face is measured in so many steps of u and of v.
+const STEPS: usize = 16;
+/// No part is a kilometre long.
+const MOST_MM: f64 = 1e6;
+
+/// The facets of all faces, from how much these bend within their ranges of u and v.
+pub(super) fn facets(
+    kernel: &dyn Kernel,
+    ranges: &[[[f64; 2]; 2]],
+    chord_mm: f64,
+) -> Result<f64, BrepError> {
+    let mut sum = 0.0;
+    for (face, range) in (0..).zip(ranges) {
+        let grid = grid(kernel, face, range);
+        let is_sound = |p: &Vec3| p.iter().all(|x| x.abs() < MOST_MM);
+        if !grid.iter().all(is_sound) {
+            return Err(BrepError::Size { entity: kernel.face(face).entity });
+        }
+        let along = |axis: usize| {
+            let line = |k| cells(&grid, axis, k, chord_mm);
+            (0..=STEPS).map(line).fold(1.0, f64::max)
+        };
+        sum += 2.0 * along(0) * along(1);
+    }
+    Ok(sum)
+}
+
+/// Points all over a face's range, row after row.
+fn grid(kernel: &dyn Kernel, face: u32, range: &[[f64; 2]; 2]) -> Vec<Vec3> {
+    let at = |axis: usize, k: usize| {
+        let [low, high] = range[axis];
+        low + (high - low) * k as f64 / STEPS as f64
+    };
+    let uv = |k: usize| [at(0, k / (STEPS + 1)), at(1, k % (STEPS + 1))];
+    let uv: Vec<[f64; 2]> = (0..(STEPS + 1).pow(2)).map(uv).collect();
+    let mut jets = vec![Jet::default(); uv.len()];
+    kernel.evaluate(face, &uv, &mut jets);
+    jets.iter().map(|jet| jet.point).collect()
+}
+
+/// The chords that follow a line of the grid.
+fn cells(grid: &[Vec3], axis: usize, line: usize, chord_mm: f64) -> f64 {
+    let at =
+        |k: usize| grid[if axis == 0 { k * (STEPS + 1) + line } else { line * (STEPS + 1) + k }];
+    let chords = |k: usize| {
+        let (a, b, c) = (at(k - 1), at(k), at(k + 1));
+        let sag_mm = length([0, 1, 2].map(|k| a[k] - 2.0 * b[k] + c[k])) / 8.0;
+        (sag_mm / chord_mm).sqrt()
+    };
+    (1..STEPS).map(chords).sum()
+}

@@ -1,0 +1,142 @@
+//! Reading STEP with OpenCASCADE.
+
+mod calls;
+mod count;
+mod join;
+mod refine;
+
+use std::path::Path;
+
+use crate::error::BrepError;
+use crate::kernel::{Body, FaceInfo, Jet, Kernel, Tessellation};
+use crate::step;
+use crate::tessellate::MOST_FACETS;
+
+/// A STEP file in memory, read by OpenCASCADE.
+///
+/// It mends small errors of the file by itself as it reads; edges are put on their
+/// surfaces within 10 nm, whatever the file claims of its own accuracy. Solids are bodies, and
+/// so are shells outside of solids; faces outside of shells are left out. A face
+/// that was mended into another may have lost its entity's number.
+pub struct OcctModel {
+    inner: calls::Model,
+    faces: Vec<FaceInfo>,
+    /// The parameters of each face, from and to.
+    ranges: Vec<[[f64; 2]; 2]>,
+    bodies: Vec<Body>,
+    unit: String,
+}
+
+impl OcctModel {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// Where it cannot be read, is not STEP, or holds no solid.
+    pub fn open(path: &Path) -> Result<Self, BrepError> {
+        Self::read(&std::fs::read(path)?)
+    }
+
+    /// Reads a file and mends its bodies: edges and vertices may be moved, and gaps
+    /// closed, by up to a tolerance in millimetres.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and where the tolerance is not a positive length.
+    pub fn open_healed(path: &Path, heal_mm: f64) -> Result<Self, BrepError> {
+        Self::read_healed(&std::fs::read(path)?, heal_mm)
+    }
+
+    /// Reads a file's bytes.
+    ///
+    /// # Errors
+    /// Where they are not STEP, or hold no solid.
+    pub fn read(bytes: &[u8]) -> Result<Self, BrepError> {
+        Self::of(bytes, 0.0)
+    }
+
+    /// Reads a file's bytes and mends its bodies, as [`Self::open_healed`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
+        if heal_mm > 0.0 && heal_mm.is_finite() {
+            Self::of(bytes, heal_mm)
+        } else {
+            Err(BrepError::Heal { heal_mm })
+        }
+    }
+
+    fn of(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
+        // OpenCASCADE goes on after text that makes no sense.
+        step::check_text(bytes)?;
+        let inner = calls::Model::read(bytes, heal_mm).map_err(|said| BrepError::Occt { said })?;
+        let all = inner.faces();
+        let body = |(number, name): (u32, String)| {
+            let start = all.partition_point(|face| face.body < number) as u32;
+            let end = all.partition_point(|face| face.body <= number) as u32;
+            Body { name, faces: start..end }
+        };
+        let bodies = (0..).zip(inner.names()).map(body).collect();
+        let unit = inner.unit();
+        let ranges = all.iter().map(|face| face.range).collect();
+        Ok(Self { inner, faces: all.iter().map(info).collect(), ranges, bodies, unit })
+    }
+}
+
+impl std::fmt::Debug for OcctModel {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.debug_struct("OcctModel").field("bodies", &self.bodies).finish_non_exhaustive()
+    }
+}
+
+fn info(face: &calls::Face) -> FaceInfo {
+    // The order of GeomAbs_SurfaceType.
+    const KINDS: [&str; 10] = [
+        "plane",
+        "cylinder",
+        "cone",
+        "sphere",
+        "torus",
+        "Bezier",
+        "B-spline",
+        "revolution",
+        "extrusion",
+        "offset",
+    ];
+    FaceInfo {
+        kind: KINDS.get(face.kind as usize).copied().unwrap_or("other"),
+        entity: face.entity,
+        control_box_mm: (face.has_box != 0).then_some(face.box_mm),
+    }
+}
+
+impl Kernel for OcctModel {
+    fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    fn face(&self, face: u32) -> FaceInfo {
+        self.faces[face as usize].clone()
+    }
+
+    fn unit(&self) -> &str {
+        &self.unit
+    }
+
+    fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError> {
+        if !(chord_mm > 0.0 && chord_mm.is_finite()) {
+            return Err(BrepError::Chord { chord_mm });
+        }
+        // It would not end.
+        if count::facets(self, &self.ranges, chord_mm)? > MOST_FACETS as f64 {
+            return Err(BrepError::TooMany { most: MOST_FACETS });
+        }
+        let parallel = rayon::current_num_threads() > 1;
+        let mesh = self.inner.mesh(chord_mm, parallel);
+        let mesh = mesh.map_err(|said| BrepError::Occt { said })?;
+        join::joined(self, &mesh, chord_mm)
+    }
+
+    fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]) {
+        self.inner.evaluate(face as usize, uv, jets);
+    }
+}
