@@ -34,7 +34,7 @@ pub(crate) struct BrepOptions {
 /// What reads B-rep parts, and for how long.
 #[derive(Args, Clone)]
 pub(crate) struct ReaderOptions {
-    /// What reads STEP parts: LAMP itself, or OpenCASCADE where it is built in
+    /// What reads STEP parts: LAMP itself, or OpenCASCADE (in builds with --features occt)
     #[arg(long, value_enum, default_value_t, help_heading = HEADING)]
     kernel: KernelArg,
 
@@ -48,6 +48,8 @@ pub(crate) struct ReaderOptions {
 enum KernelArg {
     #[default]
     Lamp,
+    #[cfg(feature = "occt")]
+    Occt,
 }
 
 impl BrepOptions {
@@ -67,6 +69,8 @@ impl ReaderOptions {
     fn command_line(&self) -> String {
         match self.kernel {
             KernelArg::Lamp => String::new(),
+            #[cfg(feature = "occt")]
+            KernelArg::Occt => " --kernel occt".to_owned(),
         }
     }
 
@@ -74,6 +78,8 @@ impl ReaderOptions {
     pub(crate) fn read(&self, path: &Path, tolerance: Length) -> Result<Prepared, Stop> {
         let kernel = match self.kernel {
             KernelArg::Lamp => KernelName::Lamp,
+            #[cfg(feature = "occt")]
+            KernelArg::Occt => KernelName::Occt,
         };
         // Nothing has been written yet: if it hangs, the process ends without it.
         let (sender, receiver) = channel();
@@ -150,10 +156,14 @@ pub(crate) fn refuse(prepared: &Prepared, may_be_open: bool) -> Result<(), Stop>
     let found = found.map_or_else(String::new, |it| format!(" (#{}: {})", it.entity, it.fault));
     Err(Stop::Failed(anyhow!(
         "it is not sliced, for its sections would be wrong: {first}{found}{more}; \
-         lamp brep tells more, OpenCASCADE (--kernel occt, where it is built in) may read it, \
-         and gaps can be bridged with --fallback part.stl"
+         lamp brep tells more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
     )))
 }
+
+#[cfg(feature = "occt")]
+const OTHER_KERNEL: &str = "the other --kernel may read it";
+#[cfg(not(feature = "occt"))]
+const OTHER_KERNEL: &str = "a build with --features occt may read it";
 
 /// What people call a body.
 pub(crate) fn body_name(number: usize, report: &BodyReport) -> String {

@@ -26,6 +26,8 @@ mod signals;
 mod solid;
 mod stop;
 mod streams;
+#[cfg(feature = "occt")]
+mod supervise;
 mod trace;
 mod walls;
 
@@ -80,11 +82,16 @@ pub fn run_stage(name: &str) -> ExitCode {
     finish(name, run(&command, &common))
 }
 
-fn run(command: &Command, common: &Common) -> Result<(), Stop> {
+fn run(command: &Command, common: &Common) -> Result<ExitCode, Stop> {
     keep_freed_memory();
     clean_up_on_signals()?;
+    #[cfg(feature = "occt")]
+    if let Some(status) = supervise::supervised()? {
+        return Ok(status);
+    }
     common.apply()?;
-    command.run(common)
+    command.run(common)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Lets the allocator keep what one layer frees for the next. GNU's gives freed
@@ -95,14 +102,15 @@ fn keep_freed_memory() {
 }
 
 /// Says in one sentence why a command stopped, and turns it into a status.
-fn finish(name: &str, result: Result<(), Stop>) -> ExitCode {
+fn finish(name: &str, result: Result<ExitCode, Stop>) -> ExitCode {
     wait_if_ending();
     match result {
         Err(stop) if !stop.is_reader_gone() => {
             say(&format!("{name}: {stop}"));
             ExitCode::from(stop.status())
         }
-        _ => ExitCode::SUCCESS,
+        Err(_) => ExitCode::SUCCESS,
+        Ok(status) => status,
     }
 }
 

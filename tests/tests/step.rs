@@ -148,7 +148,7 @@ fn layers_with_gaps_come_from_the_fallback() {
     assert!(!text.contains("gaps"), "{text}");
     scratch.run("lamp sample sphere -o other.stl").succeeds();
     scratch
-        .run("slice part.step --fallback other.stl -o wrong.tif")
+        .run("slice part.step --fallback other.stl --margin 999 -o wrong.tif")
         .is_refused_with(&["other.stl: it is not the same part"]);
 }
 

@@ -1,0 +1,38 @@
+//! OpenCASCADE in a process of its own: on broken files it may crash.
+
+use std::env;
+use std::ffi::OsString;
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, anyhow};
+
+use crate::stop::Stop;
+
+/// Set for the process that does the work.
+const MARK: &str = "LAMP_SUPERVISED";
+
+/// Runs this command once more, as a child that ends with this process, and returns
+/// its status; nothing where this is the child, or OpenCASCADE is not asked for. A
+/// child that crashes is a failure as any other: it has not written anything.
+pub(crate) fn supervised() -> Result<Option<ExitCode>, Stop> {
+    if env::var_os(MARK).is_some() {
+        let signal = Some(rustix::process::Signal::TERM);
+        rustix::process::set_parent_process_death_signal(signal)
+            .context("the process that watches over this one")?;
+        return Ok(None);
+    }
+    let words: Vec<OsString> = env::args_os().collect();
+    let asks = |pair: &[OsString]| pair[0] == "--kernel" && pair[1] == "occt";
+    if !words.windows(2).any(asks) && !words.iter().any(|word| word == "--kernel=occt") {
+        return Ok(None);
+    }
+    let program = env::current_exe().context("this program's own file")?;
+    let status = Command::new(program).args(&words[1..]).env(MARK, "1").status();
+    let status = status.context("a process for OpenCASCADE")?;
+    match status.code() {
+        Some(code) => Ok(Some(ExitCode::from(u8::try_from(code).unwrap_or(1)))),
+        None => Err(Stop::Failed(anyhow!(
+            "OpenCASCADE failed ({status}), as it does on some broken files: try --kernel lamp"
+        ))),
+    }
+}
