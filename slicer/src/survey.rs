@@ -105,15 +105,17 @@ impl Survey {
         }
         let whole = good.iter().copied().reduce(Block::joined).ok_or(SliceError::NoFacets)?;
         let (mut min, mut max) = (whole.min, whole.max);
-        for [low, high] in model.exact().filter_map(|exact| exact.placed.z_range_mm()) {
-            let (low, high) = (low * 1000.0, high * 1000.0);
-            // Not for rounding's sake: a flat end is where its facets are.
-            let rounding = f64::from(f32::EPSILON) * low.abs().max(high.abs());
-            if low < min[2] - rounding {
-                min[2] = low;
-            }
-            if high > max[2] + rounding {
-                max[2] = high;
+        for [low, high] in model.exact().filter_map(|exact| exact.placed.box_mm()) {
+            for (axis, unit) in [1.0, 1.0, 1000.0].into_iter().enumerate() {
+                let (low, high) = (low[axis] * unit, high[axis] * unit);
+                // Not for rounding's sake: a flat end is where its facets are.
+                let rounding = f64::from(f32::EPSILON) * low.abs().max(high.abs());
+                if low < min[axis] - rounding {
+                    min[axis] = low;
+                }
+                if high > max[axis] + rounding {
+                    max[axis] = high;
+                }
             }
         }
         Ok(Self { min, max, blocks: good })

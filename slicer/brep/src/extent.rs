@@ -1,29 +1,46 @@
-//! How high and how low surfaces reach.
+//! How far surfaces reach.
 
 use crate::kernel::Jet;
 use crate::placed::Placed;
 use crate::turn::is_below;
+use crate::vector::Vec3;
 
 /// Facets that are looked at for each end; around a level ring all are as high.
 const MOST_FACETS: usize = 64;
 const MOST_STEPS: usize = 30;
 
+/// Along an axis, or with `up` -1 against it.
+#[derive(Clone, Copy)]
+struct Way {
+    axis: usize,
+    up: f64,
+}
+
+impl Way {
+    fn along(self, vector: Vec3) -> f64 {
+        self.up * vector[self.axis]
+    }
+}
+
 impl Placed {
-    /// The lowest and the highest z of the surfaces, in millimetres: that of the
-    /// facets where they end at a corner or an edge, and further by as much as
+    /// The least and the greatest corner of the surfaces' box, in millimetres: that of
+    /// the facets where surfaces end at a corner or an edge, and further by as much as
     /// facets cut off where they are round. Nothing if there are no facets.
-    pub fn z_range_mm(&self) -> Option<[f64; 2]> {
-        let [low, high] = [-1.0, 1.0].map(|up| Some(up * self.end_mm(up)?));
-        Some([low?, high?])
+    pub fn box_mm(&self) -> Option<[[f64; 3]; 2]> {
+        if self.mesh().facets.is_empty() {
+            return None;
+        }
+        let end = |up: f64| [0, 1, 2].map(|axis| up * self.end_mm(Way { axis, up }));
+        Some([end(-1.0), end(1.0)])
     }
 
-    /// How far the surfaces reach upwards, or with `up` -1 downwards.
-    fn end_mm(&self, up: f64) -> Option<f64> {
+    /// How far the surfaces reach one way.
+    fn end_mm(&self, way: Way) -> f64 {
         let top = |facet: u32| {
-            self.corners(facet).map(|corner| up * corner[2]).into_iter().fold(f64::MIN, f64::max)
+            self.corners(facet).map(|corner| way.along(corner)).into_iter().fold(f64::MIN, f64::max)
         };
         let tops: Vec<f64> = (0..self.mesh().facets.len() as u32).map(top).collect();
-        let of_facets = tops.iter().copied().reduce(f64::max)?;
+        let of_facets = tops.iter().copied().fold(f64::MIN, f64::max);
         let mut near: Vec<u32> = (0u32..)
             .zip(&tops)
             .filter(|(_, top)| **top >= of_facets - self.tolerance_mm())
@@ -32,13 +49,13 @@ impl Placed {
             .collect();
         near.sort_by(|&a, &b| tops[b as usize].total_cmp(&tops[a as usize]));
         near.truncate(MOST_FACETS);
-        let ends = near.into_iter().filter_map(|facet| self.end_on(facet, up));
+        let ends = near.into_iter().filter_map(|facet| self.end_on(facet, way));
         let most = of_facets + 2.0 * self.tolerance_mm();
-        Some(ends.filter(|end| *end <= most).fold(of_facets, f64::max))
+        ends.filter(|end| *end <= most).fold(of_facets, f64::max)
     }
 
     /// Where a facet's surface is level, by Newton's method with differences.
-    fn end_on(&self, facet: u32, up: f64) -> Option<f64> {
+    fn end_on(&self, facet: u32, way: Way) -> Option<f64> {
         let uv = self.facet(facet).uv;
         let size = [0, 1].map(|k| {
             let of = uv.map(|uv| uv[k]);
@@ -50,12 +67,12 @@ impl Placed {
             let places = [at, [at[0] + by[0], at[1]], [at[0], at[1] + by[1]]];
             let mut jets = [Jet::default(); 3];
             self.evaluate(self.facet(facet).face, &places, &mut jets);
-            // How z rises over a facet's width, either way.
-            let rise = |jet: &Jet| [up * jet.du[2] * size[0], up * jet.dv[2] * size[1]];
+            // How far it goes over a facet's width along either parameter.
+            let rise = |jet: &Jet| [way.along(jet.du) * size[0], way.along(jet.dv) * size[1]];
             let [g, gu, gv] = [rise(&jets[0]), rise(&jets[1]), rise(&jets[2])];
             if g.iter().all(|g| g.abs() < 1e-11) {
                 let point = jets[0].point;
-                return is_below(self, facet, point).then_some(up * point[2]);
+                return is_below(self, facet, point).then_some(way.along(point));
             }
             let [a, b, d] = [gu[0] - g[0], (gu[1] - g[1] + gv[0] - g[0]) / 2.0, gv[1] - g[1]]
                 .map(|bend| bend / 1e-5);
