@@ -9,8 +9,10 @@ mod seeds;
 use std::error::Error;
 use std::io::{Cursor, Write};
 use std::path::Path;
+use std::sync::Arc;
 
 use fax::decoder::decode_g4;
+use lamp_brep::{Kernel, KernelName, prepare};
 use lamp_slicer::{Fill, Model, SliceError, SliceOptions, Slices};
 use lamp_stack::{
     Dpi, EncodedPage, Format, Image, Layer, Length, Mask, MaskBuilder, PageWriter, Pages,
@@ -60,6 +62,45 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
     let slices = Slices::new(Model::open(path)?, &options)?;
     if slices.grid().height > MOST_ROWS { Ok(Vec::new()) } else { slices.collect() }
 }
+
+/// Reads bytes as STEP and slices a few layers of what passes the gate, on facets and on
+/// surfaces: every contour closes and every row balances.
+///
+/// # Panics
+/// Where that is not so.
+pub fn step(bytes: &[u8]) {
+    let file = file_of(bytes);
+    let prepared = match prepare(file.path(), KernelName::Lamp, STEP_CHORD_MM) {
+        Ok(prepared) if prepared.is_good() => prepared,
+        Ok(_) => return,
+        Err(error) => return drop(one_line(&error)),
+    };
+    let kernel: Arc<dyn Kernel> = Arc::from(prepared.kernel);
+    let mesh = Arc::new(prepared.mesh);
+    for polish in [false, true] {
+        let model = Model::from_surfaces("part", String::new(), kernel.clone(), mesh.clone());
+        let options = SliceOptions {
+            dpi: Dpi::new(25.4).expect("a resolution"),
+            thickness: Length::from_mm(1.0),
+            layers: Some(0..6),
+            polish,
+            ..SliceOptions::default()
+        };
+        let slices = match Slices::new(model, &options) {
+            Ok(slices) if slices.grid().height <= MOST_ROWS => slices,
+            Ok(_) => return,
+            Err(error) => return drop(one_line(&error)),
+        };
+        for layer in slices {
+            let layer = layer.expect("facets in memory");
+            check_section(&layer);
+            assert!(layer.info.closed == Some(true) && layer.info.stray_rows.is_empty());
+        }
+    }
+}
+
+/// Parts of files that make sense are some centimetres large.
+const STEP_CHORD_MM: f64 = 0.5;
 
 fn check_section(layer: &Layer) {
     let Image::Mask(mask) = &layer.image else { panic!("slices are masks") };

@@ -1,7 +1,10 @@
 //! The seed corpus of the fuzz targets: small inputs of every kind, good ones
 //! and ones that lie, made by the fixtures.
 
-use lamp_fixtures::{Defect, Mesh, Part, build, inject, sphere, torus};
+use lamp_fixtures::{
+    Defect, Mesh, Part, StepDefect, StepPart, StepUnit, broken_step, build, inject, sphere, step,
+    torus,
+};
 use lamp_slicer::{Model, SliceOptions, Slices};
 use lamp_stack::{
     Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
@@ -28,6 +31,7 @@ pub fn seeds() -> Vec<Seed> {
     stl()
         .into_iter()
         .map(of("stl"))
+        .chain(steps().into_iter().map(of("step")))
         .chain(tiff().into_iter().map(of("tiff")))
         .chain(g4_codes().into_iter().map(of("g4")))
         .collect()
@@ -77,6 +81,17 @@ fn stl() -> Named {
         ("two_solids_ascii.stl", two),
         ("cut_ascii.stl", text(&ball)[..700].to_vec()),
         ("none_ascii.stl", text(&Mesh::default())),
+    ]
+}
+
+fn steps() -> Named {
+    let part = |part| step(part, StepUnit::Millimetre).into_bytes();
+    vec![
+        ("sphere.step", part(StepPart::Sphere)),
+        ("cone.step", part(StepPart::Cone)),
+        ("block.step", part(StepPart::Block)),
+        ("pair.step", step(StepPart::Pair, StepUnit::Inch).into_bytes()),
+        ("apart.step", broken_step(StepDefect::Apart { gap_nm: 1000 }).into_bytes()),
     ]
 }
 
