@@ -4,8 +4,11 @@
 pub(crate) mod chain;
 pub(crate) mod curve;
 mod offset;
+mod pieces;
 mod project;
 pub(crate) mod spline;
+pub(crate) mod spline_surface;
+mod strips;
 pub(crate) mod surface;
 
 pub(crate) use chain::{Chain, Link};

@@ -1,6 +1,6 @@
-//! Rational B-splines: basis functions, curves and surfaces.
+//! Rational B-splines: basis functions and curves.
 
-use crate::vector::{Vec3, distance};
+use crate::vector::Vec3;
 
 /// The highest degree that is read.
 pub(crate) const MOST_DEGREE: usize = 25;
@@ -14,11 +14,11 @@ pub(crate) struct Knots {
 }
 
 /// The basis functions at a parameter that are not zero, and their derivatives.
-struct Basis {
+pub(super) struct Basis<const MOST: usize> {
     /// The first control point that counts.
-    first: usize,
-    values: [f64; MOST_DEGREE + 1],
-    slopes: [f64; MOST_DEGREE + 1],
+    pub(super) first: usize,
+    pub(super) values: [f64; MOST],
+    pub(super) slopes: [f64; MOST],
 }
 
 impl Knots {
@@ -52,13 +52,22 @@ impl Knots {
         breaks
     }
 
+    pub(super) fn degree(&self) -> usize {
+        self.degree
+    }
+
+    /// All knots, each as often as it counts.
+    pub(super) fn list(&self) -> &[f64] {
+        &self.knots
+    }
+
     /// How many control points there are.
-    fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.knots.len() - self.degree - 1
     }
 
     /// Parameters between which the spline bends little.
-    fn samples(&self) -> Vec<f64> {
+    pub(super) fn samples(&self) -> Vec<f64> {
         let breaks = self.breaks();
         let parts = (2 * self.degree).min(6).max(24 / breaks.len());
         let within = |pair: &[f64]| {
@@ -68,16 +77,20 @@ impl Knots {
         breaks.windows(2).flat_map(within).chain(breaks.last().copied()).collect()
     }
 
+    /// The last knot at or before `t` that another follows.
+    pub(super) fn span(&self, t: f64) -> usize {
+        let [start, end] = self.domain();
+        if t >= end {
+            self.knots.partition_point(|&knot| knot < end) - 1
+        } else {
+            self.knots.partition_point(|&knot| knot <= t.max(start)) - 1
+        }
+    }
+
     /// The basis at `t`; beyond the domain, that of the last piece continued
     /// (algorithms A2.1 to A2.3 of *The NURBS Book*).
-    fn basis(&self, t: f64) -> Basis {
-        let (p, k) = (self.degree, &self.knots);
-        let [start, end] = self.domain();
-        let span = if t >= end {
-            k.partition_point(|&knot| knot < end) - 1
-        } else {
-            k.partition_point(|&knot| knot <= t.max(start)) - 1
-        };
+    pub(super) fn basis(&self, t: f64) -> Basis<{ MOST_DEGREE + 1 }> {
+        let (p, k, span) = (self.degree, &self.knots, self.span(t));
         let mut values = [0.0; MOST_DEGREE + 1];
         let mut slopes = [0.0; MOST_DEGREE + 1];
         values[0] = 1.0;
@@ -114,16 +127,16 @@ pub(crate) fn weighted(p: Vec3, w: f64) -> Weighted {
     [p[0] * w, p[1] * w, p[2] * w, w]
 }
 
-fn add_times(sum: &mut Weighted, p: &Weighted, by: f64) {
+pub(super) fn add_times(sum: &mut Weighted, p: &Weighted, by: f64) {
     sum.iter_mut().zip(p).for_each(|(sum, p)| *sum += p * by);
 }
 
 /// The point, and the derivative of a quotient.
-fn divided(p: &Weighted) -> Vec3 {
+pub(super) fn divided(p: &Weighted) -> Vec3 {
     [p[0] / p[3], p[1] / p[3], p[2] / p[3]]
 }
 
-fn divided_slope(p: Vec3, w: f64, slope: &Weighted) -> Vec3 {
+pub(super) fn divided_slope(p: Vec3, w: f64, slope: &Weighted) -> Vec3 {
     [0, 1, 2].map(|k| (slope[k] - slope[3] * p[k]) / w)
 }
 
@@ -156,93 +169,10 @@ impl SplineCurve {
     }
 }
 
-/// A B-spline surface.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct SplineSurface {
-    pub(crate) u: Knots,
-    pub(crate) v: Knots,
-    /// Row by row: those of one u beside each other.
-    pub(crate) points: Vec<Weighted>,
-    /// How many points there are along v.
-    columns: usize,
-    /// After which lengths u and v come again, where the surface is closed.
-    pub(crate) periods: [Option<f64>; 2],
-}
-
-/// How far apart the sides of a closed surface may lie, in millimetres.
-const CLOSED_MM: f64 = 1e-6;
-
-impl SplineSurface {
-    /// A surface; nothing if there are not as many points as the knots say.
-    pub(crate) fn new(u: Knots, v: Knots, points: Vec<Weighted>) -> Option<Self> {
-        let [rows, columns] = [u.count(), v.count()];
-        if points.len() != rows * columns {
-            return None;
-        }
-        let mut surface = Self { u, v, points, columns, periods: [None; 2] };
-        surface.periods = [0, 1].map(|axis| surface.period(axis));
-        Some(surface)
-    }
-
-    fn period(&self, axis: usize) -> Option<f64> {
-        let [first, last] = [false, true].map(|last| self.side(axis, last));
-        let is_closed = first.iter().zip(&last).all(|(a, b)| distance(*a, *b) < CLOSED_MM);
-        let [start, end] = if axis == 0 { self.u.domain() } else { self.v.domain() };
-        // A side that is one point meets itself without being closed.
-        (is_closed && !is_point(&first)).then_some(end - start)
-    }
-
-    /// Parameters all over the surface.
-    pub(crate) fn seeds(&self) -> Vec<[f64; 2]> {
-        let [us, vs] = [&self.u, &self.v].map(Knots::samples);
-        us.iter().flat_map(|&u| vs.iter().map(move |&v| [u, v])).collect()
-    }
-
-    /// The point and the derivatives along u and v.
-    pub(crate) fn at(&self, u: f64, v: f64) -> [Vec3; 3] {
-        let (along_u, along_v) = (self.u.basis(u), self.v.basis(v));
-        let mut sums = [[0.0; 4]; 3];
-        for i in 0..=self.u.degree {
-            let row = (along_u.first + i) * self.columns + along_v.first;
-            let (mut value, mut slope) = ([0.0; 4], [0.0; 4]);
-            for j in 0..=self.v.degree {
-                let control = &self.points[row + j];
-                add_times(&mut value, control, along_v.values[j]);
-                add_times(&mut slope, control, along_v.slopes[j]);
-            }
-            add_times(&mut sums[0], &value, along_u.values[i]);
-            add_times(&mut sums[1], &value, along_u.slopes[i]);
-            add_times(&mut sums[2], &slope, along_u.values[i]);
-        }
-        let p = divided(&sums[0]);
-        let w = sums[0][3];
-        [p, divided_slope(p, w, &sums[1]), divided_slope(p, w, &sums[2])]
-    }
-
-    /// Points all along a side of the domain: where u (axis 0) or v (axis 1) is
-    /// least or greatest. Knots need not be as often there as the side's control
-    /// points would take.
-    pub(crate) fn side(&self, axis: usize, last: bool) -> Vec<Vec3> {
-        let (fixed, free) = if axis == 0 { (&self.u, &self.v) } else { (&self.v, &self.u) };
-        let fixed = fixed.domain()[usize::from(last)];
-        let at = |t: f64| if axis == 0 { self.at(fixed, t)[0] } else { self.at(t, fixed)[0] };
-        free.samples().into_iter().map(at).collect()
-    }
-
-    /// Whether a side of the domain is one point.
-    pub(crate) fn is_pole(&self, axis: usize, last: bool) -> bool {
-        is_point(&self.side(axis, last))
-    }
-}
-
-fn is_point(side: &[Vec3]) -> bool {
-    side.iter().all(|p| distance(*p, side[0]) < CLOSED_MM)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::length;
+    use crate::vector::{distance, length};
 
     /// A quarter of a circle of radius 2, exactly.
     fn quarter() -> SplineCurve {
@@ -270,34 +200,6 @@ mod tests {
             assert!(distance(d, by_difference) < 1e-8, "{d:?} {by_difference:?}");
             assert!(distance(curve.clone().reversed().at(1.0 - t)[0], p) < 1e-14);
         }
-    }
-
-    #[test]
-    fn slopes_of_a_surface_are_those_of_its_points() {
-        let u = Knots::new(2, vec![0.0, 0.0, 0.0, 0.4, 1.0, 1.0, 1.0], 4).unwrap();
-        let v = Knots::new(3, vec![0.0, 0.0, 0.0, 0.0, 2.0, 2.0, 2.0, 2.0], 4).unwrap();
-        let control = |k: usize| {
-            let (i, j) = ((k / 4) as f64, (k % 4) as f64);
-            weighted([i, j, (i * 1.3 + j * j * 0.4).sin()], 1.0 + 0.1 * i)
-        };
-        let surface = SplineSurface::new(u, v, (0..16).map(control).collect()).unwrap();
-        assert_eq!(surface.periods, [None; 2]);
-        for (u, v) in [(0.0, 0.0), (0.4, 1.0), (0.7, 1.9), (1.0, 2.0)] {
-            let [_, du, dv] = surface.at(u, v);
-            // One-sided at a knot, where the second derivative jumps.
-            let h = 1e-6;
-            let difference =
-                |a: [Vec3; 3], b: [Vec3; 3]| [0, 1, 2].map(|k| (a[0][k] - b[0][k]) / h);
-            let (here, sign) = (surface.at(u, v), if u < 1.0 { 1.0 } else { -1.0 });
-            let along_u = difference(surface.at(u + sign * h, v), here).map(|d| d * sign);
-            let along_v = difference(surface.at(u, v + h), here);
-            assert!(distance(du, along_u) < 2e-4 && distance(dv, along_v) < 2e-4);
-        }
-        let side = surface.side(1, true);
-        assert_eq!(
-            (side[0], side.last()),
-            (surface.at(0.0, 2.0)[0], Some(&surface.at(1.0, 2.0)[0]))
-        );
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::curve::Curve;
 use super::offset;
-use super::spline::SplineSurface;
+use super::spline_surface::SplineSurface;
 use crate::kernel::Jet;
 use crate::vector::{Frame, Vec3, add, scale};
 
@@ -114,14 +114,20 @@ impl Surface {
                 let [x, y, _] = turn(p);
                 jet(frame, turn(p), [-y, x, 0.0], turn(d))
             }
-            Self::Spline(spline) => {
-                let [period_u, period_v] = self.periods();
-                let u = inside(u, Some(spline.u.domain()), period_u);
-                let v = inside(v, Some(spline.v.domain()), period_v);
-                let [point, du, dv] = spline.at(u, v);
-                Jet { point, du, dv }
-            }
+            Self::Spline(spline) => spline.at(spline.inside([u, v])),
             Self::Offset { basis, by_mm } => offset::at(basis, *by_mm, [u, v]),
+        }
+    }
+
+    /// The points and the first derivatives at many parameters.
+    pub(crate) fn evaluate(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
+        match self {
+            Self::Spline(spline) if spline.periods == [None; 2] => spline.evaluate(uv, jets),
+            Self::Spline(spline) => {
+                let uv: Vec<_> = uv.iter().map(|&uv| spline.inside(uv)).collect();
+                spline.evaluate(&uv, jets);
+            }
+            _ => jets.iter_mut().zip(uv).for_each(|(jet, &uv)| *jet = self.at(uv)),
         }
     }
 

@@ -187,9 +187,6 @@ impl Kernel for StepModel {
 
     fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]) {
         assert_eq!(uv.len(), jets.len(), "as many jets as parameters");
-        let surface = &self.model.faces[face as usize].surface;
-        for (jet, &uv) in jets.iter_mut().zip(uv) {
-            *jet = surface.at(uv);
-        }
+        self.model.faces[face as usize].surface.evaluate(uv, jets);
     }
 }

@@ -3,7 +3,8 @@
 use super::StepError;
 use super::file::{Entities, Item, Value};
 use super::shape::Shapes;
-use crate::geometry::spline::{Knots, SplineCurve, SplineSurface, Weighted, weighted};
+use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
+use crate::geometry::spline_surface::SplineSurface;
 
 impl Shapes<'_> {
     /// A `B_SPLINE_CURVE` of any kind, simple or complex.

@@ -1,0 +1,108 @@
+//! B-spline surfaces as polynomials, for fast evaluation.
+
+use super::pieces::{Pieces, horner};
+use super::spline::{Knots, Weighted};
+use crate::kernel::Jet;
+use crate::vector::Vec3;
+
+/// A surface as polynomials along v, and the basis along u.
+///
+/// These take as much memory as the control points up to one more than v's degree
+/// times. Polynomials along both would be faster yet, but take that for u as well.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Strips {
+    u: Pieces,
+    v: Pieces,
+    /// How many control points there are along u.
+    rows: usize,
+    /// Piece by piece along v, row by row of the control points, and power by power,
+    /// the highest first.
+    powers: Vec<Weighted>,
+    /// Whether weights differ from 1.
+    is_rational: bool,
+}
+
+impl Strips {
+    /// The strips; nothing for degrees that are too high.
+    pub(super) fn new(u: &Knots, v: &Knots, points: &[Weighted]) -> Option<Self> {
+        let is_rational = points.iter().any(|point| point[3] != 1.0);
+        let (rows, columns) = (u.count(), v.count());
+        let (u, v) = (Pieces::new(u)?, Pieces::new(v)?);
+        let mut powers = Vec::with_capacity(v.count() * rows * (v.degree() + 1));
+        for piece in 0..v.count() {
+            points.chunks(columns).for_each(|row| powers.extend(v.summed(piece, row)));
+        }
+        Some(Self { u, v, rows, powers, is_rational })
+    }
+
+    /// The points and the derivatives at many parameters.
+    pub(super) fn evaluate(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
+        match self.u.degree() {
+            1 => self.along_v::<2>(uv, jets),
+            2 => self.along_v::<3>(uv, jets),
+            3 => self.along_v::<4>(uv, jets),
+            4 => self.along_v::<5>(uv, jets),
+            5 => self.along_v::<6>(uv, jets),
+            6 => self.along_v::<7>(uv, jets),
+            _ => self.along_v::<8>(uv, jets),
+        }
+    }
+
+    /// `M` and `N` are one more than the degrees: loops of known length are fast.
+    fn along_v<const M: usize>(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
+        match self.v.degree() {
+            1 => self.each::<M, 2>(uv, jets),
+            2 => self.each::<M, 3>(uv, jets),
+            3 => self.each::<M, 4>(uv, jets),
+            4 => self.each::<M, 5>(uv, jets),
+            5 => self.each::<M, 6>(uv, jets),
+            6 => self.each::<M, 7>(uv, jets),
+            _ => self.each::<M, 8>(uv, jets),
+        }
+    }
+
+    fn each<const M: usize, const N: usize>(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
+        for (jet, uv) in jets.iter_mut().zip(uv) {
+            let sums = self.sums::<M, N>(*uv);
+            *jet = if self.is_rational { divided(&sums) } else { plain(&sums) };
+        }
+    }
+
+    /// The point, and the derivatives along u and v, each with its weight.
+    #[inline(always)]
+    fn sums<const M: usize, const N: usize>(&self, [u, v]: [f64; 2]) -> [Weighted; 3] {
+        let (along_u, along_v) = (self.u.basis::<M>(u), self.v.place(v));
+        let first = (along_v.number * self.rows + along_u.first) * N;
+        let (rows, _) = self.powers[first..][..M * N].as_chunks::<N>();
+        let mut sums = [[0.0; 4]; 3];
+        for (i, row) in rows.iter().enumerate() {
+            let (value, slope) = horner(row, along_v.t);
+            for c in 0..4 {
+                sums[0][c] += value[c] * along_u.values[i];
+                sums[1][c] += value[c] * along_u.slopes[i];
+                sums[2][c] += slope[c] * along_u.values[i];
+            }
+        }
+        let [point, du, dv] = sums;
+        [point, du, dv.map(|slope| slope * along_v.scale)]
+    }
+}
+
+fn place([x, y, z, _]: Weighted) -> Vec3 {
+    [x, y, z]
+}
+
+#[inline(always)]
+fn plain(sums: &[Weighted; 3]) -> Jet {
+    let [point, du, dv] = sums.map(place);
+    Jet { point, du, dv }
+}
+
+/// The point and the derivatives of a quotient.
+#[inline(always)]
+fn divided(sums: &[Weighted; 3]) -> Jet {
+    let per_weight = 1.0 / sums[0][3];
+    let point = place(sums[0]).map(|x| x * per_weight);
+    let slope = |d: Weighted| [0, 1, 2].map(|k| (d[k] - d[3] * point[k]) * per_weight);
+    Jet { point, du: slope(sums[1]), dv: slope(sums[2]) }
+}
