@@ -61,7 +61,7 @@ pub trait Kernel: Send + Sync {
 /// A body and its faces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Body {
-    /// The name that the file gives it; may be empty.
+    /// The name that the file gives it, or else its product; may be empty.
     pub name: String,
     /// The numbers of its faces.
     pub faces: std::ops::Range<u32>,

@@ -180,3 +180,35 @@ fn what_is_not_read_is_refused_by_name() {
     let error = StepModel::read(text.as_bytes()).unwrap_err().to_string();
     assert!(error.ends_with("is a SURFACE_REPLICA, which is not supported"), "{error}");
 }
+
+/// The names of a file's bodies.
+fn names(text: &str) -> Vec<String> {
+    let model = StepModel::read(text.as_bytes()).unwrap();
+    model.bodies().iter().map(|body| body.name.clone()).collect()
+}
+
+#[test]
+fn bodies_without_names_have_those_of_their_products() {
+    let pair = step(StepPart::Pair, StepUnit::Millimetre);
+    assert_eq!(names(&pair), ["part", "part"]);
+    let nameless = pair.replace("MANIFOLD_SOLID_BREP('part'", "MANIFOLD_SOLID_BREP(''");
+    assert_eq!(names(&nameless), ["", ""]);
+    let number = |name: &str| {
+        let line = pair.lines().find(|line| line.contains(&format!("={name}("))).unwrap();
+        line.split_once('=').unwrap().0.to_owned()
+    };
+    let product = |name: &str, shape: &str, k: usize| {
+        format!(
+            "#{k}1=PRODUCT('','{name}','',());\n#{k}2=PRODUCT_DEFINITION_FORMATION('','',#{k}1);\n\
+             #{k}3=PRODUCT_DEFINITION('','',#{k}2,$);\n\
+             #{k}4=PRODUCT_DEFINITION_SHAPE('','',#{k}3);\n\
+             #{k}5=SHAPE_DEFINITION_REPRESENTATION(#{k}4,{shape});\n"
+        )
+    };
+    let with = |text: &str, products: &str| text.replace("DATA;\n", &format!("DATA;\n{products}"));
+    let whole = product("pair", &number("SHAPE_REPRESENTATION"), 10_000);
+    let part = product("nut", &number("ADVANCED_BREP_SHAPE_REPRESENTATION"), 20_000);
+    assert_eq!(names(&with(&nameless, &(whole.clone() + &part))), ["nut", "nut"]);
+    assert_eq!(names(&with(&nameless, &whole)), ["pair", "pair"]);
+    assert_eq!(names(&with(&pair, &(whole + &part))), ["part", "part"]);
+}

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::StepError;
 use super::file::{Entities, Item};
+use super::product;
 use super::shape::Shapes;
 use super::units::Units;
 use crate::vector::Frame;
@@ -14,6 +15,8 @@ pub(crate) struct Placed {
     pub(crate) solid: u64,
     pub(crate) units: Units,
     pub(crate) place: Frame,
+    /// What its product is called; may be empty.
+    pub(crate) product: String,
 }
 
 /// More parts than any assembly that is built at once.
@@ -45,6 +48,7 @@ struct Part {
 pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
     let mut tree = Tree {
         entities,
+        names: product::names(entities),
         shapes: HashMap::new(),
         order: Vec::new(),
         groups: Vec::new(),
@@ -57,7 +61,11 @@ pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
     let mut found = Found::default();
     for group in &tree.groups {
         if !group.iter().any(|shape| tree.is_part.contains(shape)) {
-            tree.place(group[0], Frame::WORLD, 0, &mut found)?;
+            tree.place(
+                group[0],
+                Within { place: Frame::WORLD, product: "", level: 0 },
+                &mut found,
+            )?;
         }
     }
     if found.list.is_empty() { Err(StepError::Empty) } else { Ok(found.list) }
@@ -87,8 +95,20 @@ impl Found {
     }
 }
 
+/// What a shape stands in.
+#[derive(Clone, Copy)]
+struct Within<'a> {
+    place: Frame,
+    /// The product, whose name holds for shapes without one of their own.
+    product: &'a str,
+    /// How many assemblies are around it.
+    level: usize,
+}
+
 struct Tree<'a> {
     entities: &'a Entities,
+    /// What the products are called that shapes are of.
+    names: HashMap<u64, &'a str>,
     shapes: HashMap<u64, Shape>,
     order: Vec<u64>,
     /// Shapes that are the same, in the order in which they are met.
@@ -172,7 +192,7 @@ impl Tree<'_> {
 
     /// Shapes that are moved are parts.
     fn read_parts(&mut self) -> Result<(), StepError> {
-        let children = self.children()?;
+        let children = product::children(self.entities)?;
         for (id, [a, b]) in self.relations().collect::<Vec<_>>() {
             let Some(transformed) = self.moving(id) else { continue };
             let transformation = transformed.reference(0)?;
@@ -190,32 +210,6 @@ impl Tree<'_> {
             self.shape(whole)?.parts.push(Part { shape: part, from, to });
         }
         Ok(())
-    }
-
-    /// For each relation between shapes that belongs to a use of a product: the
-    /// shape of the product that is used.
-    fn children(&self) -> Result<HashMap<u64, u64>, StepError> {
-        let entities = self.entities;
-        let definitions: HashMap<u64, u64> = entities
-            .all("PRODUCT_DEFINITION_SHAPE")
-            .filter_map(|item| Some((item.id, item.optional(2)?)))
-            .collect();
-        let mut shapes = HashMap::new();
-        for item in entities.all("SHAPE_DEFINITION_REPRESENTATION") {
-            if let Some(definition) = definitions.get(&item.reference(0)?) {
-                shapes.entry(*definition).or_insert(item.reference(1)?);
-            }
-        }
-        let mut children = HashMap::new();
-        for item in entities.all("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION") {
-            let usage = definitions.get(&item.reference(1)?).copied();
-            let usage = usage.and_then(|id| entities.find(id, "NEXT_ASSEMBLY_USAGE_OCCURRENCE"));
-            let child = usage.and_then(|usage| shapes.get(&usage.optional(4)?).copied());
-            if let Some(child) = child {
-                children.insert(item.reference(0)?, child);
-            }
-        }
-        Ok(children)
     }
 
     fn read_mapped(&mut self) -> Result<(), StepError> {
@@ -238,31 +232,28 @@ impl Tree<'_> {
         self.shapes.get(&shape).map_or(&[], |shape| &self.groups[shape.group])
     }
 
-    fn place(
-        &self,
-        shape: u64,
-        place: Frame,
-        level: usize,
-        found: &mut Found,
-    ) -> Result<(), StepError> {
+    fn place(&self, shape: u64, within: Within, found: &mut Found) -> Result<(), StepError> {
         let group = self.group(shape);
         found.visits += group.len().max(1);
-        if level > MOST_LEVELS || found.visits > MOST_PARTS {
+        if within.level > MOST_LEVELS || found.visits > MOST_PARTS {
             return Err(StepError::Endless { most: MOST_PARTS });
         }
+        let named = group.iter().find_map(|shape| self.names.get(shape).copied());
+        let within = Within { product: named.unwrap_or(within.product), ..within };
         for &id in group {
             let Some(shape) = self.shapes.get(&id) else { continue };
             for &item in &shape.items {
                 if SOLIDS.iter().any(|name| self.entities.find(item, name).is_some()) {
                     let units = shape.units.clone().ok_or(StepError::NoUnit { id })?;
-                    found.add(Placed { solid: item, units, place });
+                    let (place, product) = (within.place, within.product.to_owned());
+                    found.add(Placed { solid: item, units, place, product });
                 } else if let Some(mapped) = self.entities.find(item, "MAPPED_ITEM") {
-                    self.place_mapped(mapped, id, place, level, found)?;
+                    self.place_mapped(mapped, id, within, found)?;
                 }
             }
             for part in &shape.parts {
-                let place = self.moved(place, (part.shape, part.from), (id, part.to))?;
-                self.place(part.shape, place, level + 1, found)?;
+                let within = self.moved(within, (part.shape, part.from), (id, part.to))?;
+                self.place(part.shape, within, found)?;
             }
         }
         Ok(())
@@ -272,18 +263,22 @@ impl Tree<'_> {
         &self,
         mapped: Item,
         whole: u64,
-        place: Frame,
-        level: usize,
+        within: Within,
         found: &mut Found,
     ) -> Result<(), StepError> {
         let map = self.entities.get(mapped.reference(1)?, "REPRESENTATION_MAP")?;
         let (from, part, to) = (map.reference(0)?, map.reference(1)?, mapped.reference(2)?);
-        let place = self.moved(place, (part, from), (whole, to))?;
-        self.place(part, place, level + 1, found)
+        let within = self.moved(within, (part, from), (whole, to))?;
+        self.place(part, within, found)
     }
 
-    /// Where a part stands whose placement comes to lie on another of the whole.
-    fn moved(&self, place: Frame, from: (u64, u64), to: (u64, u64)) -> Result<Frame, StepError> {
+    /// What a part stands in whose placement comes to lie on another of the whole.
+    fn moved<'a>(
+        &self,
+        within: Within<'a>,
+        from: (u64, u64),
+        to: (u64, u64),
+    ) -> Result<Within<'a>, StepError> {
         let frame = |(shape, placement): (u64, u64)| {
             let units = self.shapes.get(&shape).and_then(|shape| shape.units.as_ref());
             let units = units.ok_or(StepError::NoUnit { id: shape })?;
@@ -295,6 +290,7 @@ impl Tree<'_> {
             }
             shapes.frame(placement)
         };
-        Ok(place.then(&frame(to)?.then(&frame(from)?.inverse())))
+        let place = within.place.then(&frame(to)?.then(&frame(from)?.inverse()));
+        Ok(Within { place, level: within.level + 1, ..within })
     }
 }

@@ -3,6 +3,7 @@
 mod assembly;
 mod curve;
 mod file;
+mod product;
 mod shape;
 mod spline;
 mod surface;

@@ -23,7 +23,9 @@ pub(crate) fn model(entities: &Entities) -> Result<Model, StepError> {
         let mut reader = Reader::new(entities, &placed, &mut model);
         reader.solid(placed.solid)?;
         let faces = first..model.faces.len() as u32;
-        let name = entities.simple(placed.solid)?.text(0).to_owned();
+        let own = entities.simple(placed.solid)?.text(0);
+        // Many programs name products alone.
+        let name = if own.trim().is_empty() { placed.product } else { own.to_owned() };
         model.bodies.push(Body { name, faces });
     }
     Ok(model)
