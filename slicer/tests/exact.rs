@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use lamp_brep::{Kernel, StepModel};
 use lamp_fixtures::{StepPart, StepUnit, step};
-use lamp_slicer::{Axis, DepthLevels, LayerLevels, Model, Placement, SliceOptions, Slices};
+use lamp_slicer::{
+    Axis, DepthLevels, LayerHeights, LayerLevels, Model, Placement, SliceOptions, Slices,
+};
 use lamp_stack::{Dpi, Image, Length};
 
 fn model(part: StepPart, chord_mm: f64) -> Model {
@@ -96,6 +98,27 @@ fn a_torus_has_no_wrong_pixel() {
         let (wrong, white) =
             wrong_pixels(model(StepPart::Torus, chord_mm), &tilted, |point| outside(back(point)));
         assert!(wrong == 0 && white > 100_000, "askew, {dpi} dpi: {wrong} of {white}");
+    }
+}
+
+/// Where a torus lies askew its sections have saddles: contours meet in a cross, and
+/// facets part them the wrong way at heights nearer than the chord.
+#[test]
+fn contours_that_meet_have_no_wrong_pixel() {
+    let tilt = Placement::default().rotated(Axis::X, 20.0);
+    let back = |point: [f64; 3]| Placement::default().rotated(Axis::X, -20.0).at(point);
+    let outside = |[x, y, z]: [f64; 3]| (x.hypot(y) - 20.0).hypot(z - 8.0) - 8.0;
+    let (sin, cos) = 20f64.to_radians().sin_cos();
+    for saddle_mm in [20.0 * sin + 8.0 * cos - 8.0, -20.0 * sin + 8.0 * cos + 8.0] {
+        let near_um = [-80.0, -9.0, -4.0, -2.0, -1.0, -0.3, -0.02, 0.02, 0.3, 1.0, 2.0, 4.0, 9.0];
+        let tops = near_um.map(|um| ((1000.0 * saddle_mm + um) * 1000.0).round() / 1000.0);
+        let heights = Some(LayerHeights::new(tops.to_vec()).unwrap());
+        for (dpi, chord_mm) in [(1500.0, 0.0042), (2400.0, 0.0026), (600.0, 0.01)] {
+            let options = SliceOptions { heights: heights.clone(), ..options(dpi, 1.0, tilt) };
+            let model = model(StepPart::Torus, chord_mm);
+            let (wrong, white) = wrong_pixels(model, &options, |point| outside(back(point)));
+            assert!(wrong == 0 && white > 100_000, "{dpi} dpi: {wrong} of {white}");
+        }
     }
 }
 

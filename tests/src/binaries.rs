@@ -48,8 +48,10 @@ fn build() {
         Some("debug") | None => "dev",
         Some(name) => name,
     };
+    let features = if cfg!(feature = "occt") { "occt" } else { "" };
     let built = Command::new(env!("CARGO"))
-        .args(["build", "--package", "lamp-cli", "--bins", "--profile", profile, "--target-dir"])
+        .args(["build", "--package", "lamp-cli", "--bins", "--profile", profile])
+        .args(["--features", features, "--target-dir"])
         .arg(target_dir())
         .current_dir(workspace_root())
         .output()

@@ -173,3 +173,21 @@ fn a_sample_is_the_fixture() {
     let expected = step(StepPart::Torus, StepUnit::Millimetre);
     assert_eq!(scratch.bytes("torus.step"), expected.as_bytes());
 }
+
+#[cfg(feature = "occt")]
+#[test]
+fn kernels_agree_pixel_by_pixel() {
+    let scratch = with(StepPart::Torus);
+    let line = "--dpi 600 --thickness 1mm --rotate x:20 --quiet";
+    for kernel in ["lamp", "occt"] {
+        scratch
+            .run(&format!("slice part.step {line} --kernel {kernel} -o {kernel}.tif"))
+            .succeeds_quietly();
+    }
+    let [a, b] = ["lamp.tif", "occt.tif"].map(|name| scratch.layers(name));
+    assert_eq!(masks(&a), masks(&b));
+    assert!(a[0].info.stack != b[0].info.stack, "the stack remembers the kernel");
+    let broken = broken(StepDefect::Missing);
+    broken.run("slice part.step --kernel occt -o a.tif").is_refused_with(&["part.step: "]);
+    assert_eq!(broken.names(), ["part.step"]);
+}

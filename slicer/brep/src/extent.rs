@@ -11,9 +11,14 @@ const MOST_STEPS: usize = 30;
 
 /// Along an axis, or with `up` -1 against it.
 #[derive(Clone, Copy)]
-struct Way {
+pub(crate) struct Way {
     axis: usize,
     up: f64,
+}
+
+impl Way {
+    /// Upwards.
+    pub(crate) const UP: Self = Self { axis: 2, up: 1.0 };
 }
 
 impl Way {
@@ -54,8 +59,13 @@ impl Placed {
         ends.filter(|end| *end <= most).fold(of_facets, f64::max)
     }
 
-    /// Where a facet's surface is level, by Newton's method with differences.
+    /// How far a facet's surface reaches where it is level.
     fn end_on(&self, facet: u32, way: Way) -> Option<f64> {
+        self.level(facet, way).map(|level| way.along(level.jet.point))
+    }
+
+    /// Where a facet's surface is level, by Newton's method with differences.
+    pub(crate) fn level(&self, facet: u32, way: Way) -> Option<Level> {
         let uv = self.facet(facet).uv;
         let size = [0, 1].map(|k| {
             let of = uv.map(|uv| uv[k]);
@@ -70,12 +80,13 @@ impl Placed {
             // How far it goes over a facet's width along either parameter.
             let rise = |jet: &Jet| [way.along(jet.du) * size[0], way.along(jet.dv) * size[1]];
             let [g, gu, gv] = [rise(&jets[0]), rise(&jets[1]), rise(&jets[2])];
-            if g.iter().all(|g| g.abs() < 1e-11) {
-                let point = jets[0].point;
-                return is_below(self, facet, point).then_some(way.along(point));
-            }
             let [a, b, d] = [gu[0] - g[0], (gu[1] - g[1] + gv[0] - g[0]) / 2.0, gv[1] - g[1]]
                 .map(|bend| bend / 1e-5);
+            if g.iter().all(|g| g.abs() < 1e-11) {
+                let bend = [a / size[0] / size[0], b / size[0] / size[1], d / size[1] / size[1]];
+                let level = Level { uv: at, jet: jets[0], bend };
+                return is_below(self, facet, jets[0].point).then_some(level);
+            }
             // Along a level ring there is no bend: a little keeps it in place.
             let least = 1e-9 * (a.abs() + d.abs());
             let (a, d) = (a - least, d - least);
@@ -88,4 +99,12 @@ impl Placed {
         }
         None
     }
+}
+
+/// A point where a surface is level.
+pub(crate) struct Level {
+    pub(crate) uv: [f64; 2],
+    pub(crate) jet: Jet,
+    /// The second derivatives of the height: by u twice, by u and v, by v twice.
+    pub(crate) bend: [f64; 3],
 }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use crate::kernel::{Facet, Jet};
 use crate::placed::Placed;
 use crate::polish::{Crossing, Fate};
+use crate::saddle::Saddle;
 use crate::solve::{Wanted, solved};
 use crate::vector::{Vec3, add, distance, scale, sub};
 
@@ -32,6 +33,17 @@ pub struct Turn {
     along: [f64; 2],
 }
 
+/// What a row of a section meets near a turn or a saddle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Meets {
+    /// The contour twice, from the left.
+    Pair([Crossing; 2]),
+    /// Nothing.
+    Nothing,
+    /// What could not be found out.
+    Unknown,
+}
+
 /// A facet on whose surface contours may turn.
 #[derive(Debug)]
 struct Candidate {
@@ -40,6 +52,8 @@ struct Candidate {
     outwards_x: [f64; 3],
     low_mm: f64,
     high_mm: f64,
+    /// Whether the surface may be level somewhere over the facet.
+    may_be_level: bool,
 }
 
 /// The facets on whose surfaces contours turn.
@@ -48,6 +62,7 @@ pub struct Turns {
     candidates: Vec<Candidate>,
     /// The facets around the points of these, and of their neighbours.
     around: HashMap<u32, Vec<u32>>,
+    pub(crate) saddles: Vec<Saddle>,
 }
 
 /// As good as no angle.
@@ -71,6 +86,7 @@ impl Turns {
             candidates(placed, start as u32..count.min(start + BATCH) as u32)
         });
         let candidates: Vec<Candidate> = found.collect();
+        let saddles = saddles(placed, &candidates);
         let corners = |candidate: &Candidate| placed.facet(candidate.facet).corners;
         let mut points: HashSet<u32> = candidates.iter().flat_map(corners).collect();
         // And those of the facets around them.
@@ -85,7 +101,7 @@ impl Turns {
                 around.entry(*corner).or_default().push(number);
             }
         }
-        Self { candidates, around }
+        Self { candidates, around, saddles }
     }
 
     /// The turns of a section.
@@ -110,24 +126,31 @@ impl Turns {
         kept
     }
 
-    /// Where a row crosses the contour on both sides of a turn, from the left;
-    /// nothing where it does not, or not nearby.
-    pub fn pair(&self, placed: &Placed, turn: &Turn, y_mm: f64) -> Option<[Crossing; 2]> {
+    /// What a row meets near a turn.
+    pub fn at_turn(&self, placed: &Placed, turn: &Turn, y_mm: f64) -> Meets {
         let [x, y, z_mm] = turn.at_mm;
         let square = 2.0 * (y_mm - y) / turn.bend_per_mm;
         if square < 0.0 {
-            return None;
+            return Meets::Nothing;
         }
         let half = square.sqrt();
-        let mut pair = [-half, half].map(|by| {
+        let pair = [-half, half].map(|by| {
             let uv = [0, 1].map(|k| turn.uv[k] + by * turn.along[k]);
             let (facet, enters) = (turn.facet, false);
             Crossing { facet, uv, x_mm: x + by, y_mm, z_mm, enters, fate: Fate::OnFacet }
         });
+        self.settled(placed, pair)
+    }
+
+    /// Finds where two crossings with a contour really are, from the left.
+    pub(crate) fn settled(&self, placed: &Placed, mut pair: [Crossing; 2]) -> Meets {
         for crossing in &mut pair {
-            self.settle(placed, crossing)?;
+            if self.settle(placed, crossing).is_none() {
+                return Meets::Unknown;
+            }
         }
-        (pair[0].x_mm <= x && x <= pair[1].x_mm).then_some(pair)
+        let parts = pair[0].x_mm <= pair[1].x_mm && pair[0].enters != pair[1].enters;
+        if parts { Meets::Pair(pair) } else { Meets::Unknown }
     }
 
     /// Finds where a crossing really is, and on which facet's surface.
@@ -173,9 +196,30 @@ impl Turn {
 
     /// Whether it is the same as another that was found from another facet.
     fn is_same(&self, other: &Self, placed: &Placed) -> bool {
-        let faces = [self, other].map(|turn| placed.outwards(turn.facet).map(|n| n[1] > 0.0));
-        (self.at_mm[0] - other.at_mm[0]).abs() < SAME_MM && faces[0] == faces[1]
+        is_same_point(placed, (self.facet, self.at_mm), (other.facet, other.at_mm), 1)
     }
+}
+
+/// Whether two points were found twice, over different facets: at one place, where
+/// facets face the same way along an axis.
+pub(crate) fn is_same_point(placed: &Placed, a: (u32, Vec3), b: (u32, Vec3), axis: usize) -> bool {
+    let faces = [a.0, b.0].map(|facet| placed.outwards(facet).map(|n| n[axis] > 0.0));
+    distance(a.1, b.1) < SAME_MM && faces[0] == faces[1]
+}
+
+/// The saddles over facets whose surfaces may be level, each once.
+fn saddles(placed: &Placed, candidates: &[Candidate]) -> Vec<Saddle> {
+    let may_be_level = |candidate: &&Candidate| candidate.may_be_level;
+    let found = candidates.par_iter().filter(may_be_level);
+    let found: Vec<Saddle> =
+        found.filter_map(|candidate| Saddle::on(placed, candidate.facet)).collect();
+    let mut kept: Vec<Saddle> = Vec::new();
+    for saddle in found {
+        if !kept.iter().any(|other| saddle.is_same(other, placed)) {
+            kept.push(saddle);
+        }
+    }
+    kept
 }
 
 fn candidates(placed: &Placed, facets: std::ops::Range<u32>) -> Vec<Candidate> {
@@ -192,19 +236,25 @@ fn candidates(placed: &Placed, facets: std::ops::Range<u32>) -> Vec<Candidate> {
         found.extend(of_face.iter().zip(jets.chunks(3)).filter_map(|(&facet, jets)| {
             let flat = placed.outwards(facet)?;
             // At a pole the surface has none.
-            let outwards_x = [0, 1, 2]
-                .map(|k| placed.normal(facet, &jets[k]).map_or(flat[0], |normal| normal[0]));
-            let (low, high) = range(outwards_x);
-            // The surface may turn within the facet more than its corners show.
-            let more = 0.5 * (high - low) + LEVEL;
-            let turns = high - low > LEVEL && low - more < 0.0 && high + more > 0.0;
+            let normals = [0, 1, 2].map(|k| placed.normal(facet, &jets[k]).unwrap_or(flat));
+            let [outwards_x, outwards_y] = [0, 1].map(|axis| normals.map(|normal| normal[axis]));
+            let [turns, may_be_level] = [outwards_x, outwards_y].map(passes_zero);
             let (low, high) = range(placed.corners(facet).map(|corner| corner[2]));
             let off = placed.tolerance_mm();
-            let candidate = Candidate { facet, outwards_x, low_mm: low - off, high_mm: high + off };
+            let (low_mm, high_mm) = (low - off, high + off);
+            let candidate = Candidate { facet, outwards_x, low_mm, high_mm, may_be_level };
             turns.then_some(candidate)
         }));
     }
     found
+}
+
+/// Whether values at a facet's corners show that they may pass zero within it: the
+/// surface may turn more than its corners do.
+fn passes_zero(values: [f64; 3]) -> bool {
+    let (low, high) = range(values);
+    let more = 0.5 * (high - low) + LEVEL;
+    high - low > LEVEL && low - more < 0.0 && high + more > 0.0
 }
 
 fn range(values: [f64; 3]) -> (f64, f64) {

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use lamp_brep::{
-    BodyReport, Crossing, Facet, Fate, Kernel, Placed, StepModel, Tessellation, Turns, check,
-    polish,
+    BodyReport, Crossing, Facet, Fate, Kernel, Meets, Placed, StepModel, Tessellation, Turns,
+    check, polish,
 };
 use lamp_fixtures::{StepPart, StepUnit, blade_area_mm2, blade_volume_mm3, step};
 
@@ -379,16 +379,17 @@ fn contours_of_a_sphere_turn_at_its_highest_and_lowest_rows() {
                 if by > found[1].reach_mm {
                     continue;
                 }
-                let pair = turns
-                    .pair(&placed, &found[1], centre[1] + y)
-                    .unwrap_or_else(|| panic!("z {z} by {by}: not crossed"));
+                let Meets::Pair(pair) = turns.at_turn(&placed, &found[1], centre[1] + y) else {
+                    panic!("z {z} by {by}: not crossed")
+                };
                 let half = (radius * radius - y * y).max(0.0).sqrt();
                 for (crossing, x) in pair.iter().zip([-half, half]) {
                     assert!((crossing.x_mm - centre[0] - x).abs() < NM, "z {z} by {by}");
                     assert_eq!(crossing.enters, x < 0.0);
                 }
             }
-            assert!(turns.pair(&placed, &found[1], centre[1] + radius + 1e-4).is_none());
+            let beyond = turns.at_turn(&placed, &found[1], centre[1] + radius + 1e-4);
+            assert_eq!(beyond, Meets::Nothing);
         }
     }
 }

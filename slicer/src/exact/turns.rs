@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ops::{Range, RangeInclusive};
 
-use lamp_brep::Turn;
+use lamp_brep::{Meets, Saddle, Turn};
 
 use super::{Exact, Tally};
 use crate::cut::{Crossing, Cutter};
@@ -32,14 +32,16 @@ pub(crate) fn settle(
 ) -> Vec<Crossing> {
     let z_mm = cutter.planes.z_um(layer) / 1000.0;
     let mut rows: HashMap<u32, Row> = HashMap::new();
-    let mut turns = Vec::new();
+    let mut places = Vec::new();
     for exact in surfaces {
-        for turn in exact.turns().at(&exact.placed, z_mm) {
-            let near = Near::new(&turn, cutter);
-            for row in near.inside.clone().chain(near.beyond.clone()) {
-                rows.entry(row).or_default();
-            }
-            turns.push((*exact, turn, near));
+        let turns = exact.turns().at(&exact.placed, z_mm).into_iter();
+        let saddles = exact.turns().saddles(&exact.placed, z_mm);
+        let near = turns
+            .map(|turn| Near::turn(turn, cutter))
+            .chain(saddles.filter_map(|saddle| Near::saddle(saddle, exact, z_mm, cutter)));
+        for near in near {
+            rows.extend(near.rows.clone().map(|row| (row, Row::default())));
+            places.push((*exact, near));
         }
     }
     if rows.is_empty() {
@@ -57,58 +59,76 @@ pub(crate) fn settle(
             row.exact.push(crossing);
         }
     }
-    for (exact, turn, near) in turns {
-        near.settle(exact, tally, &turn, cutter, &mut rows);
+    for (exact, near) in places {
+        near.settle(exact, tally, z_mm, cutter, &mut rows);
     }
     // A map has no order; the table sorts.
     rest.extend(rows.into_values().flat_map(|row| row.kept.into_iter().chain(row.added)));
     rest
 }
 
-/// The rows about a turn.
+/// The rows about a place where facets may cross too many or too few of them.
 struct Near {
+    place: Place,
     /// The columns where facets may have crossings for those of the contour.
     columns: RangeInclusive<i64>,
-    /// Rows that cross the contour, those next to the turn first or last.
-    inside: Range<u32>,
-    /// Rows that do not, although facets may cross them.
-    beyond: Range<u32>,
-    /// Whether the contour goes down from the turn, to rows that come later.
-    down: bool,
+    rows: Range<u32>,
+}
+
+enum Place {
+    Turn(Turn),
+    Saddle(Saddle),
 }
 
 impl Near {
-    fn new(turn: &Turn, cutter: Cutter<'_>) -> Self {
+    fn new(place: Place, at: [f64; 2], reach_mm: [f64; 2], cutter: Cutter<'_>) -> Self {
         let grid = cutter.grid;
-        let [x, y, _] = turn.at_mm;
-        let [column, row] = grid.to_pixels(x, y);
-        let reach = turn.reach_mm / grid.dpi.pitch().mm();
+        let [column, row] = grid.to_pixels(at[0], at[1]);
+        let [reach, width] = reach_mm.map(|mm| mm / grid.dpi.pitch().mm() + 1.0);
         let clamped = |row: f64| row.ceil().clamp(0.0, f64::from(grid.height)) as u32;
-        let [above, at, below] = [row - reach, row, row + reach].map(clamped);
-        let down = turn.leaves < 0.0;
-        let (inside, beyond) = if down { (at..below, above..at) } else { (above..at, at..below) };
-        let width = turn.width_mm() / grid.dpi.pitch().mm() + 1.0;
         let columns = (column - width).floor() as i64..=(column + width).ceil() as i64;
-        Self { columns, inside, beyond, down }
+        Self { place, columns, rows: clamped(row - reach)..clamped(row + reach) }
+    }
+
+    fn turn(turn: Turn, cutter: Cutter<'_>) -> Self {
+        let [x, y, _] = turn.at_mm;
+        Self::new(Place::Turn(turn), [x, y], [turn.reach_mm, turn.width_mm()], cutter)
+    }
+
+    /// The rows about a saddle that is near the section.
+    fn saddle(saddle: &Saddle, exact: &Exact, z_mm: f64, cutter: Cutter<'_>) -> Option<Self> {
+        let [x, y, _] = saddle.at_mm;
+        let reach_mm = saddle.reach_mm(&exact.placed, z_mm)?;
+        Some(Self::new(Place::Saddle(*saddle), [x, y], reach_mm, cutter))
     }
 
     fn settle(
         &self,
         exact: &Exact,
         tally: &Tally,
-        turn: &Turn,
+        z_mm: f64,
         cutter: Cutter<'_>,
         rows: &mut HashMap<u32, Row>,
     ) {
-        for row in self.beyond.clone() {
-            let row = rows.get_mut(&row).expect("rows near turns are in the map");
-            self.take(tally, row);
-        }
-        let mut inside = self.inside.clone();
-        while let Some(number) = if self.down { inside.next() } else { inside.next_back() } {
+        let (turns, placed) = (exact.turns(), &exact.placed);
+        for number in self.rows.clone() {
             let row = rows.get_mut(&number).expect("rows near turns are in the map");
-            let Some(pair) = pair(exact, turn, cutter, number) else { return };
-            self.put(tally, pair, row);
+            let [_, y_mm] = cutter.grid.to_mm(0.0, f64::from(number));
+            let meets = match &self.place {
+                Place::Turn(turn) => turns.at_turn(placed, turn, y_mm),
+                Place::Saddle(saddle) => turns.at_saddle(placed, saddle, y_mm, z_mm),
+            };
+            match meets {
+                Meets::Pair(pair) => {
+                    let pair = pair.map(|crossing| {
+                        let [column, _] = cutter.grid.to_pixels(crossing.x_mm, y_mm);
+                        Crossing::at(cutter.grid, number, column, crossing.enters)
+                    });
+                    self.put(tally, pair, row);
+                }
+                Meets::Nothing => self.take(tally, row),
+                Meets::Unknown => {}
+            }
         }
     }
 
@@ -119,7 +139,7 @@ impl Near {
         row.kept.iter().filter(is_near).copied().collect()
     }
 
-    /// Takes the crossings of a row away that facets make beyond the turn.
+    /// Takes the crossings of a row away that facets make where the surface has none.
     fn take(&self, tally: &Tally, row: &mut Row) {
         let kept = self.kept(row);
         if winding(&kept) == 0 {
@@ -159,16 +179,4 @@ fn winding(crossings: &[Crossing]) -> i32 {
 fn is_same(a: Crossing, b: Crossing) -> bool {
     let [a, b] = [a.place(), b.place()];
     a.winding() == b.winding() && a.column().abs_diff(b.column()) <= 1
-}
-
-/// The crossings of a row with the contour on both sides of a turn, if they are
-/// in the image.
-fn pair(exact: &Exact, turn: &Turn, cutter: Cutter<'_>, row: u32) -> Option<[Crossing; 2]> {
-    let [_, y_mm] = cutter.grid.to_mm(0.0, f64::from(row));
-    let [a, b] = exact.turns().pair(&exact.placed, turn, y_mm)?;
-    let placed = |crossing: lamp_brep::Crossing| {
-        let [column, _] = cutter.grid.to_pixels(crossing.x_mm, y_mm);
-        Crossing::at(cutter.grid, row, column, crossing.enters)
-    };
-    Some([placed(a), placed(b)])
 }
