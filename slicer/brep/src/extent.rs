@@ -2,7 +2,6 @@
 
 use crate::kernel::Jet;
 use crate::placed::Placed;
-use crate::turn::is_below;
 use crate::vector::Vec3;
 
 /// Facets that are looked at for each end; around a level ring all are as high.
@@ -85,7 +84,7 @@ impl Placed {
             if g.iter().all(|g| g.abs() < 1e-11) {
                 let bend = [a / size[0] / size[0], b / size[0] / size[1], d / size[1] / size[1]];
                 let level = Level { uv: at, jet: jets[0], bend };
-                return is_below(self, facet, jets[0].point).then_some(level);
+                return self.is_below(facet, jets[0].point).then_some(level);
             }
             // Along a level ring there is no bend: a little keeps it in place.
             let least = 1e-9 * (a.abs() + d.abs());

@@ -61,6 +61,7 @@ mod step;
 mod tessellate;
 mod turn;
 mod vector;
+mod walk;
 
 pub use error::BrepError;
 pub use gate::{BodyFault, BodyReport, check};

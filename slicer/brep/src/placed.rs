@@ -1,18 +1,19 @@
 //! Surfaces where they stand on the machine.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::kernel::{Facet, Jet, Kernel, Tessellation};
 use crate::vector::{Vec3, cross, dot, length, scale, sub, unit};
+use crate::walk::Around;
 
 /// A model's surfaces and facets in a place: scaled, turned and moved.
-#[derive(Clone)]
 pub struct Placed {
     kernel: Arc<dyn Kernel>,
     mesh: Arc<Tessellation>,
     /// x, y and z of the place in millimetres, by x, y, z of the model and one.
     rows: [[f64; 4]; 3],
     tolerance_mm: f64,
+    around: OnceLock<Around>,
     /// Of each face, whether it is flat.
     is_flat: Vec<bool>,
 }
@@ -31,7 +32,7 @@ impl Placed {
         let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
         let faces = kernel.bodies().iter().map(|body| body.faces.end).max().unwrap_or(0);
         let is_flat = (0..faces).map(|face| kernel.face(face).kind == "plane").collect();
-        Self { kernel, mesh, rows, tolerance_mm, is_flat }
+        Self { kernel, mesh, rows, tolerance_mm, around: OnceLock::new(), is_flat }
     }
 
     /// How far facets may lie from their surfaces, in millimetres.
@@ -66,6 +67,11 @@ impl Placed {
 
     fn turned(&self, direction: Vec3) -> Vec3 {
         self.rows.map(|[x, y, z, _]| x * direction[0] + y * direction[1] + z * direction[2])
+    }
+
+    /// The facets around each point; a look at every facet the first time.
+    pub(crate) fn around(&self) -> &Around {
+        self.around.get_or_init(|| Around::new(&self.mesh))
     }
 
     /// Evaluates a face's surface at many parameters at once.

@@ -119,7 +119,12 @@ fn fate_of(
     // At a pole the surface has no normal.
     let outwards = placed.normal(facet, jet).map_or(0.0, |normal| normal[axis]);
     let is_other_side = outwards.abs() > LEVEL && (outwards > 0.0) != is_before;
-    if is_other_side || !is_near(&placed.facet(facet).uv, uv) {
+    // At a pole facets are so narrow that a crossing may pass several.
+    let is_there = || {
+        let below = placed.facet_below(facet, jet.point);
+        below.is_some_and(|below| placed.facet(below).face == placed.facet(facet).face)
+    };
+    if is_other_side || !(is_near(&placed.facet(facet).uv, uv) || is_there()) {
         Fate::Left
     } else if by_mm.abs() * outwards.abs() > FAR * placed.tolerance_mm() {
         Fate::Far

@@ -5,16 +5,14 @@
 //! twice too often or not at all. Two crossings more or less leave a row in
 //! balance.
 
-use std::collections::{HashMap, HashSet};
-
 use rayon::prelude::*;
 
-use crate::kernel::{Facet, Jet};
+use crate::kernel::Jet;
 use crate::placed::Placed;
 use crate::polish::{Crossing, Fate};
 use crate::saddle::Saddle;
 use crate::solve::{Wanted, solved};
-use crate::vector::{Vec3, add, distance, scale, sub};
+use crate::vector::{Vec3, distance, scale, sub};
 
 /// A point where a contour has a tangent along the rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,8 +58,6 @@ struct Candidate {
 #[derive(Debug, Default)]
 pub struct Turns {
     candidates: Vec<Candidate>,
-    /// The facets around the points of these, and of their neighbours.
-    around: HashMap<u32, Vec<u32>>,
     pub(crate) saddles: Vec<Saddle>,
 }
 
@@ -71,8 +67,6 @@ const LEVEL: f64 = 1e-9;
 const STEEP: f64 = 1e-4;
 /// Facets are evaluated so many at a time.
 const BATCH: usize = 4096;
-/// How far off its facet a point may be sideways, in facets.
-const BESIDE: f64 = 0.01;
 /// Nearer to each other, turns are the same, in millimetres.
 const SAME_MM: f64 = 1e-6;
 const MOST_STEPS: usize = 20;
@@ -87,21 +81,7 @@ impl Turns {
         });
         let candidates: Vec<Candidate> = found.collect();
         let saddles = saddles(placed, &candidates);
-        let corners = |candidate: &Candidate| placed.facet(candidate.facet).corners;
-        let mut points: HashSet<u32> = candidates.iter().flat_map(corners).collect();
-        // And those of the facets around them.
-        let facets = &placed.mesh().facets;
-        let touches = |facet: &&Facet| facet.corners.iter().any(|corner| points.contains(corner));
-        let more: Vec<u32> =
-            facets.iter().filter(touches).flat_map(|facet| facet.corners).collect();
-        points.extend(more);
-        let mut around: HashMap<u32, Vec<u32>> = HashMap::with_capacity(points.len());
-        for (number, facet) in (0..).zip(facets) {
-            for corner in facet.corners.iter().filter(|corner| points.contains(corner)) {
-                around.entry(*corner).or_default().push(number);
-            }
-        }
-        Self { candidates, around, saddles }
+        Self { candidates, saddles }
     }
 
     /// The turns of a section.
@@ -110,7 +90,11 @@ impl Turns {
         let mut turns: Vec<Turn> = Vec::new();
         for candidate in self.candidates.iter().filter(near) {
             for seed in seeds(placed, candidate, z_mm) {
-                turns.extend(turn(placed, candidate.facet, seed, z_mm));
+                let turn = turn(placed, candidate.facet, seed, z_mm);
+                // Facets as thin as those at a pole seldom lie below their own.
+                turns.extend(
+                    turn.filter(|turn| placed.facet_below(candidate.facet, turn.at_mm).is_some()),
+                );
             }
         }
         let key = |turn: &Turn| (turn.at_mm[1], turn.at_mm[0]);
@@ -161,7 +145,7 @@ impl Turns {
             let known_mm = [crossing.y_mm, crossing.z_mm];
             let wanted = Wanted { uv: crossing.uv, known_mm };
             let (uv, jet) = solved(placed, face, [1, 2], &[wanted])[0]?;
-            let facet = self.facet_below(placed, crossing.facet, jet.point)?;
+            let facet = placed.facet_below(crossing.facet, jet.point)?;
             if placed.facet(facet).face == face {
                 (crossing.x_mm, crossing.fate) = (jet.point[0], Fate::Moved);
                 (crossing.facet, crossing.uv) = (facet, uv);
@@ -171,20 +155,6 @@ impl Turns {
             (crossing.facet, crossing.uv) = (facet, placed.chart(facet).uv_at(jet.point));
         }
         None
-    }
-
-    /// The facet below a point of a surface, among another, those around it, and
-    /// those around these.
-    fn facet_below(&self, placed: &Placed, facet: u32, point: Vec3) -> Option<u32> {
-        let is_it = |facet: &u32| is_below(placed, *facet, point);
-        let further = || self.around(placed, facet).flat_map(|facet| self.around(placed, facet));
-        let near = [facet].into_iter().chain(self.around(placed, facet));
-        near.chain(further()).find(is_it)
-    }
-
-    fn around(&self, placed: &Placed, facet: u32) -> impl Iterator<Item = u32> {
-        let corners = placed.facet(facet).corners.into_iter();
-        corners.filter_map(|corner| self.around.get(&corner)).flatten().copied()
     }
 }
 
@@ -323,7 +293,7 @@ fn turn(placed: &Placed, facet: u32, seed: [f64; 2], z_mm: f64) -> Option<Turn> 
     None
 }
 
-/// The turn at a point where the contour goes along x, if it is one, and on its facet.
+/// The turn at a point where the contour goes along x, if it is one.
 fn found(
     placed: &Placed,
     facet: u32,
@@ -340,7 +310,7 @@ fn found(
     let bend_per_mm = -(turned[0][0] * along[0] + turned[1][0] * along[1]) / normal[1];
     let steep = normal[1].abs();
     let is_turn = steep > STEEP && bend_per_mm.is_finite() && bend_per_mm != 0.0;
-    (is_turn && is_below(placed, facet, jet.point)).then_some(Turn {
+    is_turn.then_some(Turn {
         at_mm: jet.point,
         leaves: bend_per_mm.signum(),
         reach_mm: 2.0 * placed.tolerance_mm() / steep,
@@ -349,15 +319,4 @@ fn found(
         bend_per_mm,
         along,
     })
-}
-
-/// Whether a point lies over a facet, as near as the facet is to its surface.
-pub(crate) fn is_below(placed: &Placed, facet: u32, point: Vec3) -> bool {
-    let [s, t] = placed.chart(facet).parts(point);
-    let [a, b, c] = placed.corners(facet);
-    let foot = add(a, add(scale(sub(b, a), s), scale(sub(c, a), t)));
-    s > -BESIDE
-        && t > -BESIDE
-        && s + t < 1.0 + BESIDE
-        && distance(foot, point) < 2.0 * placed.tolerance_mm()
 }

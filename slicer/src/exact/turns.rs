@@ -44,15 +44,11 @@ pub(crate) fn settle(
             places.push((*exact, near));
         }
     }
-    if rows.is_empty() {
-        return kept;
-    }
-    let mut rest = Vec::new();
     for crossing in kept {
-        match rows.get_mut(&(crossing.row() as u32)) {
-            Some(row) => row.kept.push(crossing),
-            None => rest.push(crossing),
-        }
+        rows.entry(crossing.row() as u32).or_default().kept.push(crossing);
+    }
+    if rows.is_empty() {
+        return Vec::new();
     }
     for crossing in crossings {
         if let Some(row) = rows.get_mut(&(crossing.row() as u32)) {
@@ -62,9 +58,40 @@ pub(crate) fn settle(
     for (exact, near) in places {
         near.settle(exact, tally, z_mm, cutter, &mut rows);
     }
+    let most = (FOLD_MM / cutter.grid.dpi.pitch().mm()) as u32;
+    rows.values_mut().for_each(|row| row.unfold(tally, most));
     // A map has no order; the table sorts.
-    rest.extend(rows.into_values().flat_map(|row| row.kept.into_iter().chain(row.added)));
-    rest
+    rows.into_values().flat_map(|row| row.kept.into_iter().chain(row.added)).collect()
+}
+
+/// No longer than this are the folds that facets make along rows.
+const FOLD_MM: f64 = 0.5;
+
+impl Row {
+    /// Takes folds away: where facets go along a row they may cross it to and fro,
+    /// while the surface does so once. Then two crossings have become the same, and the
+    /// one between them was kept.
+    fn unfold(&mut self, tally: &Tally, most: u32) {
+        let mut there: Vec<Crossing> = self.exact.iter().chain(&self.added).copied().collect();
+        let kept = std::mem::take(&mut self.kept);
+        for crossing in kept {
+            let away =
+                |other: &Crossing| other.place().column().abs_diff(crossing.place().column());
+            let is_double = |other: &Crossing| {
+                let same = there.iter().filter(|third| is_same(*other, **third)).count();
+                other.place().winding() != crossing.place().winding() && same > 1
+            };
+            let near = (0..there.len()).filter(|&k| away(&there[k]) <= most);
+            match near.filter(|&k| is_double(&there[k])).min_by_key(|&k| away(&there[k])) {
+                Some(double) => {
+                    // In one column there and back is nothing.
+                    self.added.push(there.swap_remove(double).reversed());
+                    tally.mend(2, 1);
+                }
+                None => self.kept.push(crossing),
+            }
+        }
+    }
 }
 
 /// The rows about a place where facets may cross too many or too few of them.
