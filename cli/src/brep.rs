@@ -2,7 +2,8 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::mem::discriminant;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -10,12 +11,12 @@ use std::time::Duration;
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use lamp_brep::{BodyFault, BodyReport, Finding, KernelName, Prepared, prepare};
-use lamp_slicer::{Model, digest_of_file};
+use lamp_slicer::{Model, digest_of_bytes};
 use lamp_stack::{Dpi, Length};
-use tempfile::NamedTempFile;
 
 use crate::options::parse_distance;
 use crate::stop::Stop;
+use crate::streams::is_stream;
 
 pub(crate) const HEADING: &str = "STEP parts";
 
@@ -75,7 +76,7 @@ impl ReaderOptions {
     }
 
     /// Reads a STEP file. Faults of its bodies are in the reports.
-    pub(crate) fn read(&self, path: &Path, tolerance: Length) -> Result<Prepared, Stop> {
+    pub(crate) fn read(&self, bytes: &Arc<[u8]>, tolerance: Length) -> Result<Prepared, Stop> {
         let kernel = match self.kernel {
             KernelArg::Lamp => KernelName::Lamp,
             #[cfg(feature = "occt")]
@@ -83,20 +84,21 @@ impl ReaderOptions {
         };
         // Nothing has been written yet: if it hangs, the process ends without it.
         let (sender, receiver) = channel();
-        let owned: PathBuf = path.to_owned();
+        let bytes = bytes.clone();
         std::thread::Builder::new()
             .stack_size(STACK_BYTES)
             .spawn(move || {
                 // Nobody listens any more once time is up.
-                let _ = sender.send(prepare(&owned, kernel, tolerance.mm()));
+                let _ = sender.send(prepare(&bytes, kernel, tolerance.mm()));
             })
             .context("no thread to read it")?;
         match receiver.recv_timeout(self.timeout) {
             Ok(prepared) => Ok(prepared.map_err(anyhow::Error::from)?),
             Err(RecvTimeoutError::Timeout) => Err(Stop::Failed(anyhow!(
-                "reading it takes longer than {} s: give it more with --timeout, or facets a \
-                 longer --tolerance than {tolerance}",
-                self.timeout.as_secs_f64()
+                "reading it takes longer than {} s: give it more with --timeout, or facets more \
+                 than {} to their surfaces",
+                self.timeout.as_secs_f64(),
+                length(tolerance.mm())
             ))),
             Err(RecvTimeoutError::Disconnected) => {
                 Err(Stop::Failed(anyhow!("reading it failed within the program")))
@@ -127,13 +129,13 @@ fn parse_seconds(text: &str) -> Result<Duration, String> {
 pub(crate) fn part_of(
     prepared: Prepared,
     name: &str,
-    file: &File,
+    bytes: &[u8],
     may_be_open: bool,
     say: &dyn Fn(&str),
 ) -> Result<Model, Stop> {
     refuse(&prepared, may_be_open)?;
     notes(&prepared).iter().for_each(|note| say(note));
-    let digest = digest_of_file(file).context("cannot read it")?;
+    let digest = digest_of_bytes(bytes);
     let Prepared { kernel, mesh, .. } = prepared;
     Ok(Model::from_surfaces(name, digest, Arc::from(kernel), Arc::new(mesh)))
 }
@@ -173,6 +175,18 @@ pub(crate) fn body_name(number: usize, report: &BodyReport) -> String {
     }
 }
 
+/// Whether boxes of bodies overlap, and by more than facets are exact.
+pub(crate) fn boxes_overlap(prepared: &Prepared) -> bool {
+    let overlap = |a: &BodyReport, b: &BodyReport| {
+        let [low, high] = [0, 1].map(|end| [a.box_mm[end], b.box_mm[end]]);
+        (0..3).all(|k| {
+            f64::min(high[0][k], high[1][k]) - f64::max(low[0][k], low[1][k]) > prepared.chord_mm
+        })
+    };
+    let reports = &prepared.reports;
+    (1..reports.len()).any(|k| reports[..k].iter().any(|other| overlap(other, &reports[k])))
+}
+
 /// What people should know of how a file was read.
 pub(crate) fn notes(prepared: &Prepared) -> Vec<String> {
     let mut notes = findings(&prepared.mesh.findings);
@@ -189,33 +203,50 @@ pub(crate) fn notes(prepared: &Prepared) -> Vec<String> {
     notes
 }
 
-/// Findings, those of one kind in one line.
+/// Findings, those of one kind in one line with the worst of them.
 fn findings(findings: &[Finding]) -> Vec<String> {
-    let mut kinds: Vec<(String, Vec<u64>)> = Vec::new();
+    let mut kinds: Vec<(&Finding, usize)> = Vec::new();
     for finding in findings {
-        let fault = finding.fault.to_string();
-        match kinds.iter_mut().find(|(kind, _)| *kind == fault) {
-            Some((_, entities)) => entities.push(finding.entity),
-            None => kinds.push((fault, vec![finding.entity])),
+        let same = |(other, _): &&mut (&Finding, usize)| {
+            discriminant(&other.fault) == discriminant(&finding.fault)
+        };
+        match kinds.iter_mut().find(same) {
+            Some((worst, count)) => {
+                *count += 1;
+                if finding.fault.off_mm() > worst.fault.off_mm() {
+                    *worst = finding;
+                }
+            }
+            None => kinds.push((finding, 1)),
         }
     }
-    let line = |(fault, entities): (String, Vec<u64>)| match &entities[..] {
-        [entity] => format!("#{entity}: {fault}"),
-        entities => format!("#{} and {} faces more: {fault}", entities[0], entities.len() - 1),
+    let line = |(worst, count): (&Finding, usize)| {
+        let more = match count {
+            1 => String::new(),
+            2 => ", the worse of two such faces".to_owned(),
+            count => format!(", the worst of {count} such faces"),
+        };
+        format!("#{}: {}{more}", worst.entity, worst.fault)
     };
     kinds.into_iter().map(line).collect()
 }
 
-/// A length as people read it.
+/// A length as people read it, to three decimals.
 pub(crate) fn length(mm: f64) -> String {
-    Length::from_mm(mm).to_whole_nm().to_string()
+    let (number, unit) = if mm < 1.0 { (1000.0 * mm, "um") } else { (mm, "mm") };
+    let text = format!("{number:.3}");
+    format!("{}{unit}", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// A STEP file that comes from a stream, kept as long as it is needed.
-pub(crate) fn kept(mut stream: impl Read) -> io::Result<NamedTempFile> {
-    let mut file = NamedTempFile::new()?;
-    io::copy(&mut stream, &mut file)?;
-    Ok(file)
+/// The bytes of a file, or of standard input.
+pub(crate) fn bytes_of(path: &Path) -> Result<Arc<[u8]>, Stop> {
+    let mut bytes = Vec::new();
+    let read = match is_stream(path) {
+        true => io::stdin().lock().read_to_end(&mut bytes),
+        false => File::open(path).and_then(|mut file| file.read_to_end(&mut bytes)),
+    };
+    read.context("cannot read it")?;
+    Ok(bytes.into())
 }
 
 /// Whether a file's first bytes are those of STEP.

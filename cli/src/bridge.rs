@@ -1,11 +1,12 @@
 //! Layers whose sections have gaps, bridged: cut again beside their planes, or taken
 //! from an STL of the same part.
 
-use std::path::{Path, PathBuf};
+use std::ops::Range;
+use std::path::Path;
 
 use anyhow::anyhow;
 use lamp_slicer::{Frame, Model, SliceError, SliceOptions, Slices};
-use lamp_stack::Layer;
+use lamp_stack::{Image, Layer, PageInfo};
 
 use crate::part::PartOptions;
 use crate::stop::Stop;
@@ -15,6 +16,9 @@ use crate::streams::input_name;
 const NUDGES_UM: [f64; 8] = [1.0, -1.0, 2.5, -2.5, 5.0, -5.0, 10.0, -10.0];
 /// How far boxes of the same part may be apart, in parts of its size.
 const SAME_BOX: f64 = 1e-3;
+/// In so many rows after each other an STL may have more or fewer transitions than
+/// the surfaces that it was made of, where contours turn.
+const TURNING_ROWS: usize = 4;
 
 /// A part's layers, those with gaps bridged where there is a fallback.
 pub(crate) struct Bridged {
@@ -34,11 +38,13 @@ impl Bridged {
     /// `fallback` is an STL of the same part, in millimetres.
     pub(crate) fn new(
         slices: Slices,
-        fallback: Option<&PathBuf>,
+        fallback: Option<&Path>,
         options: &PartOptions,
+        layers: Option<Range<u32>>,
     ) -> Result<Self, Stop> {
-        let open = |path: &PathBuf| {
-            Fallback::open(path, &slices, options).map_err(|stop| stop.at(input_name(path)))
+        let open = |path: &Path| {
+            let opened = Fallback::open(path, &slices, options, layers);
+            opened.map_err(|stop| stop.at(input_name(path)))
         };
         let fallback = fallback.map(open).transpose()?;
         Ok(Self { slices, fallback })
@@ -69,59 +75,96 @@ impl Iterator for Bridged {
     fn next(&mut self) -> Option<Self::Item> {
         let layer = self.slices.next()?;
         match (layer, &mut self.fallback) {
-            (Ok(layer), Some(fallback)) if !is_whole(&layer) => {
-                Some(fallback.instead(layer, &self.slices))
-            }
+            (Ok(layer), Some(fallback)) => Some(fallback.better(layer, &self.slices)),
             (layer, _) => Some(layer),
         }
     }
 }
 
 impl Fallback {
-    fn open(path: &Path, slices: &Slices, options: &PartOptions) -> Result<Self, Stop> {
+    fn open(
+        path: &Path,
+        slices: &Slices,
+        options: &PartOptions,
+        layers: Option<Range<u32>>,
+    ) -> Result<Self, Stop> {
         let grid = slices.grid();
         let options = SliceOptions {
             heights: Some(slices.layer_heights()),
             gray: slices.levels().cloned(),
             frame: Frame::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] },
+            layers,
             ..options.for_slicing()
         };
-        let fallback = Slices::new(Model::open(path)?, &options)?;
+        let other = |what: String| {
+            Stop::Failed(anyhow!("it is not the same part as the STEP file: its box {what}"))
+        };
+        let fallback = Slices::new(Model::open(path)?, &options).map_err(|error| match error {
+            SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
+            error => Stop::from(error),
+        })?;
         let ([low, high], others) = (slices.box_mm(), fallback.box_mm());
         let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
         let apart = |k: usize| (others[0][k] - low[k]).abs().max((others[1][k] - high[k]).abs());
         let apart_mm = (0..3).map(apart).fold(0.0, f64::max);
         if apart_mm > SAME_BOX * size {
-            return Err(Stop::Failed(anyhow!(
-                "it is not the same part: its box is {apart_mm:.3} mm off that of the STEP file"
-            )));
+            return Err(other(format!("is {apart_mm:.3} mm off")));
         }
         let (nudged, borrowed) = (Vec::new(), Vec::new());
         Ok(Self { name: input_name(path), slices: fallback, nudged, borrowed })
     }
 
-    /// Another image for a layer with gaps.
-    fn instead(&mut self, layer: Layer, slices: &Slices) -> Result<Layer, SliceError> {
+    /// The layer, or another image for it where it has gaps or lacks contours.
+    fn better(&mut self, layer: Layer, slices: &Slices) -> Result<Layer, SliceError> {
+        let Some(other) = self.slices.next().transpose()? else { return Ok(layer) };
         let number = layer.info.index;
-        for by_um in NUDGES_UM {
+        let is_good = |layer: &Layer| is_whole(layer) && has_same_contours(layer, &other);
+        if is_good(&layer) {
+            return Ok(layer);
+        }
+        let stack = layer.info.stack.clone();
+        for by_um in NUDGES_UM.into_iter().filter(|_| !is_whole(&layer)) {
             let again = slices.cut_again(number, by_um)?;
-            if is_whole(&again) {
+            if is_good(&again) {
                 self.nudged.push(number);
-                return Ok(Layer {
-                    info: lamp_stack::PageInfo { stack: layer.info.stack, ..again.info },
-                    ..again
-                });
+                return Ok(Layer { info: PageInfo { stack, ..again.info }, ..again });
             }
         }
         self.borrowed.push(number);
-        let other = self.slices.cut_again(number, 0.0)?;
-        Ok(Layer { info: lamp_stack::PageInfo { stack: layer.info.stack, ..other.info }, ..other })
+        Ok(Layer { info: PageInfo { stack, ..other.info }, ..other })
     }
 }
 
 /// Whether all contours close, and all rows balance.
 fn is_whole(layer: &Layer) -> bool {
     layer.info.closed == Some(true) && layer.info.stray_rows.is_empty()
+}
+
+/// Whether rows have as many transitions in both, but for those where contours turn. A
+/// face that is missing whole leaves no gap in a section: its contour is not there.
+fn has_same_contours(a: &Layer, b: &Layer) -> bool {
+    let [a, b] = [a, b].map(|layer| transitions(&layer.image));
+    let rows: Vec<bool> = a.iter().zip(&b).map(|(a, b)| a != b).collect();
+    a.len() == b.len()
+        && rows.chunk_by(|a, b| a == b).all(|run| !run[0] || run.len() < TURNING_ROWS)
+}
+
+/// How often each row turns from black to some level, or back.
+fn transitions(image: &Image) -> Vec<usize> {
+    match image {
+        Image::Mask(mask) => (0..mask.height()).map(|row| mask.row(row).len()).collect(),
+        Image::Gray(gray) => {
+            let of_row = |changes: &[lamp_stack::LevelChange]| {
+                let mut was_black = true;
+                let turns = changes.iter().filter(|change| {
+                    let is_black = change.level == 0;
+                    std::mem::replace(&mut was_black, is_black) != is_black
+                });
+                turns.count()
+            };
+            gray.rows().map(of_row).collect()
+        }
+    }
 }
 
 /// Numbers in order, those that follow each other as ranges.

@@ -3,12 +3,13 @@
 use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
 use lamp_slicer::{Body, Fill, Model, Placement, SliceError, Units};
 use lamp_stack::Dpi;
 
-use crate::brep::{BrepOptions, is_step, kept, part_of};
+use crate::brep::{BrepOptions, boxes_overlap, bytes_of, is_step, part_of};
 use crate::placement::PlacementOptions;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream};
@@ -89,8 +90,10 @@ impl SolidOptions {
             if !is_step {
                 return Ok(Model::from_stream("stdin", stream)?);
             }
-            let file = kept(stream).map_err(failed)?;
-            return self.step(file.path(), "stdin", reading);
+            let mut bytes = Vec::new();
+            let mut stream = stream;
+            stream.read_to_end(&mut bytes).map_err(failed)?;
+            return self.step(&bytes.into(), "stdin", reading);
         }
         let mut start = Vec::new();
         let file = File::open(path).map_err(failed)?;
@@ -100,17 +103,31 @@ impl SolidOptions {
             return Ok(Model::open(path)?);
         }
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        self.step(path, &name, reading)
+        self.step(&bytes_of(path)?, &name, reading)
     }
 
-    fn step(&self, path: &Path, name: &str, reading: &Reading<'_>) -> Result<Model, Stop> {
+    fn step(&self, bytes: &Arc<[u8]>, name: &str, reading: &Reading<'_>) -> Result<Model, Stop> {
         if let UnitsArg::Inch = self.units {
             let why = "a STEP file says itself what its numbers mean: leave --units away";
             return Err(Stop::usage(why));
         }
-        let prepared = self.brep.reader.read(path, self.brep.tolerance(reading.dpi))?;
-        let file = File::open(path).map_err(SliceError::from)?;
-        part_of(prepared, name, &file, reading.may_be_open, reading.say)
+        let tolerance = self.brep.tolerance(reading.dpi);
+        let pitch = reading.dpi.pitch();
+        if tolerance.um() > pitch.um() {
+            (reading.say)(&format!(
+                "--tolerance {tolerance} is more than a pixel: pixels may be wrong where faces \
+                 meet, and where they go along rows"
+            ));
+        }
+        let prepared = self.brep.reader.read(bytes, tolerance)?;
+        let may_overlap = matches!(self.fill, FillArg::EvenOdd) && boxes_overlap(&prepared);
+        if may_overlap {
+            (reading.say)(
+                "the boxes of bodies overlap: where the bodies do, too, they cut each other out, \
+                 or unite with --fill nonzero",
+            );
+        }
+        part_of(prepared, name, bytes, reading.may_be_open, reading.say)
     }
 }
 
@@ -145,7 +162,7 @@ pub(crate) struct Reading<'a> {
 }
 
 /// Enough to tell a STEP file by.
-const START_BYTES: u64 = 256;
+pub(crate) const START_BYTES: u64 = 256;
 
 /// Puts before a message the file whose facet it is about, or all files.
 pub(crate) fn at_part(stop: Stop, paths: &[PathBuf]) -> Stop {

@@ -58,7 +58,7 @@ pub use exact::Polished;
 pub use facet::{Facet, Units};
 pub use gray::{DepthLevels, LayerLevels};
 pub use grid::PixelGrid;
-pub use model::{Model, digest_of_file};
+pub use model::{Model, digest_of_bytes};
 pub use placement::{Axis, PlacedFacet, Placement};
 pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};

@@ -119,7 +119,7 @@ impl Model {
     }
 
     /// A part of exact surfaces, in millimetres, by the facets made of them. `digest`
-    /// is that of its file ([`digest_of_file`]).
+    /// is that of its file ([`digest_of_bytes`]).
     pub fn from_surfaces(
         name: &str,
         digest: String,
@@ -128,6 +128,11 @@ impl Model {
     ) -> Self {
         let files = vec![FileFacets::Surfaces(Surfaces { kernel, mesh })];
         Self { name: name.to_owned(), files, digest }
+    }
+
+    /// Whether there are exact surfaces below some of the facets.
+    pub fn has_surfaces(&self) -> bool {
+        self.surfaces().flatten().next().is_some()
     }
 
     /// The surfaces of each file that has some.
@@ -294,12 +299,11 @@ pub(crate) fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
     unsafe { MmapOptions::new().offset(offset).len(length).map(file) }
 }
 
-/// The digest of a file: `blake3:` and 64 hexadecimal digits.
-///
-/// # Errors
-/// Where it cannot be mapped.
-pub fn digest_of_file(file: &File) -> io::Result<String> {
-    digest_of(file, file.metadata()?.len())
+/// The digest of a file's bytes: `blake3:` and 64 hexadecimal digits.
+pub fn digest_of_bytes(bytes: &[u8]) -> String {
+    let mut hasher = Hasher::new();
+    hasher.update(bytes);
+    digest_text(&hasher)
 }
 
 fn digest_of(file: &File, size: u64) -> io::Result<String> {

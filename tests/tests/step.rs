@@ -2,7 +2,7 @@
 
 use lamp_fixtures::{StepDefect, StepPart, StepUnit, broken_step, step};
 use lamp_stack::Image;
-use lamp_tests::{Scratch, masks};
+use lamp_tests::{Scratch, mask, masks};
 
 fn with(part: StepPart) -> Scratch {
     let scratch = Scratch::new();
@@ -150,6 +150,37 @@ fn layers_with_gaps_come_from_the_fallback() {
     scratch
         .run("slice part.step --fallback other.stl --margin 999 -o wrong.tif")
         .is_refused_with(&["other.stl: it is not the same part"]);
+    scratch
+        .run("slice whole.stl --fallback whole.stl -o wrong.tif")
+        .is_wrong_usage(&["--fallback stands in for STEP parts"]);
+}
+
+/// A face that closes around the part leaves no gap in a section, but no contour.
+#[test]
+fn layers_without_a_contour_come_from_the_fallback() {
+    let whole = step(StepPart::Tower, StepUnit::Millimetre);
+    let scratch = Scratch::new();
+    scratch.write("whole.step", whole.as_bytes());
+    scratch.run("lamp convert whole.step -o whole.stl").succeeds_quietly();
+    let line = "--dpi 300 --thickness 2mm";
+    said(&scratch, &format!("slice whole.step {line} -o whole.tif"));
+    let expected = scratch.layers("whole.tif");
+    let start = whole.find("CLOSED_SHELL('',(").unwrap() + "CLOSED_SHELL('',(".len();
+    let end = start + whole[start..].find(')').unwrap();
+    let faces: Vec<&str> = whole[start..end].split(',').collect();
+    for missing in 0..faces.len() {
+        let mut left = faces.clone();
+        left.remove(missing);
+        let text = format!("{}{}{}", &whole[..start], left.join(","), &whole[end..]);
+        scratch.write("part.step", text.as_bytes());
+        scratch.run(&format!("slice part.step {line} -o no.tif")).is_refused_with(&["open"]);
+        said(&scratch, &format!("slice part.step --fallback whole.stl {line} -o part.tif"));
+        let layers = scratch.layers("part.tif");
+        for (layer, expected) in layers.iter().zip(&expected) {
+            let [a, b] = [layer, expected].map(|layer| mask(layer).white_pixels() as f64);
+            assert!((a / b - 1.0).abs() < 2e-3, "{}: {a} for {b}", layer.info.index);
+        }
+    }
 }
 
 #[test]

@@ -1,16 +1,13 @@
 use std::fmt::Write;
-use std::io;
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 use lamp_brep::{Body, BodyReport, Prepared};
 use lamp_stack::Dpi;
-use tempfile::NamedTempFile;
 
-use crate::brep::{BrepOptions, body_name, kept, length, notes};
+use crate::brep::{BrepOptions, body_name, bytes_of, length, notes};
 use crate::stop::Stop;
-use crate::streams::{input_name, is_stream, print};
+use crate::streams::{input_name, print};
 
 /// Say what a STEP part holds, and whether it can be sliced
 ///
@@ -42,11 +39,8 @@ pub(crate) struct BrepArgs {
 
 pub(crate) fn run(args: &BrepArgs) -> Result<(), Stop> {
     let name = input_name(&args.part);
-    let spooled = is_stream(&args.part).then(|| kept(io::stdin().lock())).transpose();
-    let spooled = spooled.with_context(|| name.clone())?;
-    let path = spooled.as_ref().map_or(args.part.as_path(), NamedTempFile::path);
-    let prepared = args.brep.reader.read(path, args.brep.tolerance(args.dpi));
-    let prepared = prepared.map_err(|stop| stop.at(name.clone()))?;
+    let read = || args.brep.reader.read(&bytes_of(&args.part)?, args.brep.tolerance(args.dpi));
+    let prepared = read().map_err(|stop| stop.at(name.clone()))?;
     print(&text(&name, &prepared))?;
     let refused = prepared.reports.iter().filter(|report| !report.faults.is_empty()).count();
     if args.strict && refused > 0 {
@@ -92,7 +86,7 @@ fn body_text(number: usize, body: &Body, report: &BodyReport, prepared: &Prepare
     };
     format!(
         "{}\n  faces:    {}\n  box:      x {}, y {}, z {} mm\n\
-         \x20 volume:   {:.6} mm3 (by facets {:.6})\n  area:     {:.6} mm2\n{sliced}",
+         \x20 volume:   {:.6} mm3 (by facets {:.6})\n  area:     {:.6} mm2, as the box by facets\n{sliced}",
         body_name(number, report),
         faces(body, prepared),
         side(0),

@@ -1,15 +1,15 @@
 use std::fs::File;
-use std::io;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use clap::Args;
 use lamp_stack::{Layer, Length, StackError, png_of_layer, write_png_folder};
-use tempfile::NamedTempFile;
 
-use crate::brep::{HEADING, ReaderOptions, kept, parse_tolerance, part_of};
+use crate::brep::{HEADING, ReaderOptions, bytes_of, is_step, parse_tolerance, part_of};
 use crate::options::{Common, Input, Output};
 use crate::report::say;
+use crate::solid::START_BYTES;
 use crate::stop::Stop;
 use crate::streams::{
     check_beside, folder_to_make, input_name, is_folder, is_stream, read_layers, report,
@@ -52,8 +52,17 @@ pub(crate) struct ConvertArgs {
 }
 
 pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Stop> {
-    if let Some(stl) = &args.stl {
+    if let Some(stl) = args.stl() {
         return args.write_stl(stl, common);
+    }
+    let mut start = Vec::new();
+    let path = &args.input.stack;
+    let file = if is_stream(path) { None } else { File::open(path).ok() };
+    if file.is_some_and(|file| file.take(START_BYTES).read_to_end(&mut start).is_ok())
+        && is_step(&start)
+    {
+        let name = input_name(path);
+        return Err(Stop::usage(format!("{name} is a STEP part: name a .stl after it")));
     }
     let output = args.output.output.as_path();
     let report = report("convert", common, &args.output);
@@ -82,22 +91,30 @@ enum Shape {
 }
 
 impl ConvertArgs {
+    /// The STL to write, if one is named.
+    fn stl(&self) -> Option<&Path> {
+        let output = Some(self.output.output.as_path());
+        let output = output.filter(|output| parse_stl(&output.to_string_lossy()).is_ok());
+        self.stl.as_deref().or(output)
+    }
+
     /// Writes a STEP part as facets.
     fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), Stop> {
         let path = &self.input.stack;
+        if self.input.layers.is_some() || self.png || self.output.classic {
+            let why = "--layers, --png and --classic are for stacks: a part becomes a whole STL";
+            return Err(Stop::usage(why));
+        }
         check_beside(stl, Path::new("-"), [path])?;
         let name = input_name(path);
-        let spooled = is_stream(path).then(|| kept(io::stdin().lock())).transpose();
-        let spooled = spooled.with_context(|| name.clone())?;
-        let path = spooled.as_ref().map_or(path.as_path(), NamedTempFile::path);
         let say = |line: &str| {
             if !common.quiet {
                 say(&format!("convert: {line}"));
             }
         };
         let model = || {
-            let prepared = self.reader.read(path, self.chord)?;
-            part_of(prepared, &name, &File::open(path).context("cannot read it")?, false, &say)
+            let bytes = bytes_of(path)?;
+            part_of(self.reader.read(&bytes, self.chord)?, &name, &bytes, false, &say)
         };
         let model = model().map_err(|stop| stop.at(name.clone()))?;
         write_file(stl, |out| model.write_stl(out))

@@ -52,8 +52,8 @@ pub(crate) struct SliceArgs {
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
-    /// An STL of the same STEP part, in millimetres: where the STEP part has gaps, layers are cut up
-    /// to 10 um beside their planes, or else taken from here
+    /// An STL of the same STEP part, in millimetres. Where the STEP part has gaps, layers are cut up
+    /// to 10 um beside their planes, or else taken from here; so are those that lack contours of it
     #[arg(long, value_name = "PART.stl", help_heading = HEADING)]
     fallback: Option<PathBuf>,
 
@@ -79,6 +79,9 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     let reading =
         Reading { dpi: args.options.dpi, may_be_open: args.fallback.is_some(), say: &say };
     let model = args.options.solid.open(&args.parts, &reading)?;
+    if args.fallback.is_some() && !model.has_surfaces() {
+        return Err(Stop::usage("--fallback stands in for STEP parts: give it with one"));
+    }
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args
         .parts
@@ -90,7 +93,8 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure, &say)
         .map_err(|stop| at_part(stop, &args.parts))?;
     report.expect(slices.layer_count() as u64);
-    let mut bridged = Bridged::new(slices, args.fallback.as_ref(), &args.options)?;
+    let mut bridged =
+        Bridged::new(slices, args.fallback.as_deref(), &args.options, args.layers.clone())?;
     let (mut counts, mut bands) = (Counts::default(), Vec::new());
     let layers = bridged.by_ref().map(|layer| {
         let mut layer = layer.map_err(|error| Stop::from(error).at(name.clone()))?;
@@ -114,7 +118,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         let rows = Rows { top_mm: origin_mm[1], dpi };
         write_file(path, |out| subject.write(&trace, rows, out))?;
     }
-    if let Some(polished) = slices.polished() {
+    if let Some(polished) = slices.polished().filter(|it| it.moved + it.kept > 0) {
         report.say(&polish_text(polished));
     }
     if let Some(text) = bridged.text() {

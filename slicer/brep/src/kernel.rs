@@ -194,3 +194,13 @@ pub enum Fault {
         off_mm: f64,
     },
 }
+
+impl Fault {
+    /// How far something is off, in millimetres; 0 where that is not the question.
+    pub fn off_mm(&self) -> f64 {
+        match self {
+            Self::Off { off_mm } | Self::Joined { off_mm, .. } | Self::Coarse { off_mm } => *off_mm,
+            _ => 0.0,
+        }
+    }
+}

@@ -1,8 +1,7 @@
-//! A file opened, made into facets and checked, in several ways if it must be.
+//! A file read, made into facets and checked, in several ways if it must be.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
 
 use crate::error::BrepError;
 use crate::gate::{BodyFault, BodyReport, apart, check};
@@ -60,27 +59,27 @@ const LOOSEST: [f64; 2] = [0.1, 1.0];
 /// Chords in parts of the one that is wanted.
 const CHORDS: [f64; 2] = [4.0, 16.0];
 
-/// Opens a file, makes its bodies into facets and checks them.
+/// Reads a file's bytes, makes its bodies into facets and checks them.
 ///
 /// What does not pass is healed first with the tolerance that the file gives for
 /// itself, then with a tighter and with looser ones, never more than the chord;
 /// and then made into facets with chords 4 and 16 times as long. Faces that are
 /// inside out are turned over, which the findings say. The first try without
-/// faults is returned, or else the one with the fewest, whose reports have them:
-/// it is not to be sliced. A panic is caught. There is no time limit.
+/// faults is returned, or else the one of the first chord with the fewest, whose
+/// reports have them: it is not to be sliced. A panic is caught. There is no time limit.
 ///
 /// # Errors
-/// Where the file cannot be read, or no try gives facets.
-pub fn prepare(path: &Path, name: KernelName, chord_mm: f64) -> Result<Prepared, BrepError> {
+/// Where they cannot be read, or no try gives facets.
+pub fn prepare(bytes: &[u8], name: KernelName, chord_mm: f64) -> Result<Prepared, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
     }
-    let opened = open(path, name, 0.0)?;
+    let opened = open(bytes, name, 0.0)?;
     let own_mm = opened.kernel.uncertainty_mm().unwrap_or(USUAL_MM);
     let first = facets(opened.kernel, 0.0, chord_mm);
     let first_try = Try::of(&first, 0.0, chord_mm);
     let mut search =
-        Search { path, name, chord_mm, tries: vec![first_try], best: first.map(|made| (0, made)) };
+        Search { bytes, name, chord_mm, tries: vec![first_try], best: first.map(|made| (0, made)) };
     let heals = HEALS.map(|by| by * own_mm).into_iter().chain(LOOSEST.map(|by| by * chord_mm));
     for heal_mm in heals.filter(|heal_mm| *heal_mm <= chord_mm) {
         search.healed(heal_mm, chord_mm)?;
@@ -95,7 +94,7 @@ pub fn prepare(path: &Path, name: KernelName, chord_mm: f64) -> Result<Prepared,
 
 /// What was tried so far.
 struct Search<'a> {
-    path: &'a Path,
+    bytes: &'a [u8],
     name: KernelName,
     /// The chord that is wanted.
     chord_mm: f64,
@@ -112,7 +111,7 @@ impl Search<'_> {
 
     fn healed(&mut self, heal_mm: f64, chord_mm: f64) -> Result<(), BrepError> {
         if !self.is_done() {
-            let opened = open(self.path, self.name, heal_mm)?;
+            let opened = open(self.bytes, self.name, heal_mm)?;
             if opened.is_changed {
                 self.take(opened.kernel, heal_mm, chord_mm);
             }
@@ -124,7 +123,7 @@ impl Search<'_> {
     fn longer(&mut self, chord_mm: f64) -> Result<(), BrepError> {
         if !self.is_done() {
             let heal_mm = self.best.as_ref().map_or(0.0, |(_, best)| best.heal_mm);
-            let kernel = open(self.path, self.name, heal_mm)?.kernel;
+            let kernel = open(self.bytes, self.name, heal_mm)?.kernel;
             self.take(kernel, heal_mm, chord_mm);
         }
         Ok(())
@@ -142,6 +141,8 @@ impl Search<'_> {
         self.tries.push(Try::of(&made, heal_mm, chord_mm));
         let Ok(made) = made else { return };
         let is_better = match &self.best {
+            // Fewer facets have fewer open edges, but are no better for that.
+            Ok(_) if chord_mm > self.chord_mm => made.is_good(),
             Ok((_, best)) => wrong(&made.reports) < wrong(&best.reports),
             Err(_) => true,
         };
@@ -208,12 +209,12 @@ struct Opened {
     is_changed: bool,
 }
 
-/// Opens a file, and joins what lies within a tolerance; with 0 it is taken as it
+/// Reads a file, and joins what lies within a tolerance; with 0 it is taken as it
 /// is.
-fn open(path: &Path, name: KernelName, heal_mm: f64) -> Result<Opened, BrepError> {
+fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<Opened, BrepError> {
     caught("reading the file", || match name {
         KernelName::Lamp => {
-            let model = StepModel::open_healed(path, heal_mm)?;
+            let model = StepModel::read_healed(bytes, heal_mm)?;
             let is_changed = model.is_healed();
             Ok(Opened { kernel: Box::new(model), is_changed })
         }
@@ -221,9 +222,9 @@ fn open(path: &Path, name: KernelName, heal_mm: f64) -> Result<Opened, BrepError
         KernelName::Occt => {
             let is_changed = heal_mm > 0.0;
             let model = if is_changed {
-                OcctModel::open_healed(path, heal_mm)?
+                OcctModel::read_healed(bytes, heal_mm)?
             } else {
-                OcctModel::open(path)?
+                OcctModel::read(bytes)?
             };
             Ok(Opened { kernel: Box::new(model), is_changed })
         }

@@ -7,7 +7,8 @@
 use crate::extent::Way;
 use crate::placed::Placed;
 use crate::polish::{Crossing, Fate};
-use crate::turn::{Meets, Turns, is_same_point};
+use crate::turn::{Meets, SAME_MM, Turns};
+use crate::vector::distance;
 
 /// A point where a surface is level and bends both ways.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +17,8 @@ pub struct Saddle {
     pub at_mm: [f64; 3],
     facet: u32,
     uv: [f64; 2],
+    /// Whether the part is below.
+    is_above: bool,
     /// The surface is z* + (a dx^2 + 2 b dx dy + c dy^2) / 2 here.
     form: [f64; 3],
     /// How u and v change with x and y.
@@ -39,12 +42,14 @@ impl Saddle {
         let [a, b, c] = form;
         // Not a ridge, along which one bend is rounding alone.
         let is_saddle = a * c - b * b < -1e-6 * (a * a + b * b + c * c);
-        let saddle = Self { at_mm: level.jet.point, facet, uv: level.uv, form, uv_by };
+        let is_above = placed.normal(facet, &level.jet)?[2] > 0.0;
+        let saddle = Self { at_mm: level.jet.point, facet, uv: level.uv, is_above, form, uv_by };
         (is_saddle && a.is_finite()).then_some(saddle)
     }
 
-    pub(crate) fn is_same(&self, other: &Self, placed: &Placed) -> bool {
-        is_same_point(placed, (self.facet, self.at_mm), (other.facet, other.at_mm), 2)
+    /// Whether it is the same as another that was found from another facet.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        distance(self.at_mm, other.at_mm) < SAME_MM && self.is_above == other.is_above
     }
 
     /// How far along y, and along x, facets may have contours part in another way

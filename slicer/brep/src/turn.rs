@@ -25,6 +25,8 @@ pub struct Turn {
     pub reach_mm: f64,
     facet: u32,
     uv: [f64; 2],
+    /// Whether the part is below, along y.
+    is_above: bool,
     /// The contour is y = y* + bend/2 (x - x*)^2 here.
     bend_per_mm: f64,
     /// How the parameters change with x along the contour.
@@ -68,7 +70,7 @@ const STEEP: f64 = 1e-4;
 /// Facets are evaluated so many at a time.
 const BATCH: usize = 4096;
 /// Nearer to each other, turns are the same, in millimetres.
-const SAME_MM: f64 = 1e-6;
+pub(crate) const SAME_MM: f64 = 1e-6;
 const MOST_STEPS: usize = 20;
 
 impl Turns {
@@ -103,7 +105,7 @@ impl Turns {
         for turn in turns {
             let is_near = |other: &&Turn| turn.at_mm[1] - other.at_mm[1] < SAME_MM;
             let mut near = kept.iter().rev().take_while(is_near);
-            if !near.any(|other| turn.is_same(other, placed)) {
+            if !near.any(|other| turn.is_same(other)) {
                 kept.push(turn);
             }
         }
@@ -165,16 +167,9 @@ impl Turn {
     }
 
     /// Whether it is the same as another that was found from another facet.
-    fn is_same(&self, other: &Self, placed: &Placed) -> bool {
-        is_same_point(placed, (self.facet, self.at_mm), (other.facet, other.at_mm), 1)
+    fn is_same(&self, other: &Self) -> bool {
+        distance(self.at_mm, other.at_mm) < SAME_MM && self.is_above == other.is_above
     }
-}
-
-/// Whether two points were found twice, over different facets: at one place, where
-/// facets face the same way along an axis.
-pub(crate) fn is_same_point(placed: &Placed, a: (u32, Vec3), b: (u32, Vec3), axis: usize) -> bool {
-    let faces = [a.0, b.0].map(|facet| placed.outwards(facet).map(|n| n[axis] > 0.0));
-    distance(a.1, b.1) < SAME_MM && faces[0] == faces[1]
 }
 
 /// The saddles over facets whose surfaces may be level, each once.
@@ -185,7 +180,7 @@ fn saddles(placed: &Placed, candidates: &[Candidate]) -> Vec<Saddle> {
         found.filter_map(|candidate| Saddle::on(placed, candidate.facet)).collect();
     let mut kept: Vec<Saddle> = Vec::new();
     for saddle in found {
-        if !kept.iter().any(|other| saddle.is_same(other, placed)) {
+        if !kept.iter().any(|other| saddle.is_same(other)) {
             kept.push(saddle);
         }
     }
@@ -316,6 +311,7 @@ fn found(
         reach_mm: 2.0 * placed.tolerance_mm() / steep,
         facet,
         uv,
+        is_above: normal[1] > 0.0,
         bend_per_mm,
         along,
     })

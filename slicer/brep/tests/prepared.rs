@@ -1,38 +1,17 @@
 //! Files that are healed, or refused for the right reason and at the right place.
 
-use std::path::PathBuf;
-
 use lamp_brep::{BodyFault, Fault, KernelName, Prepared, prepare};
 use lamp_fixtures::{StepDefect, StepPart, StepUnit, broken_step, step};
 
 /// The block's volume, in cubic millimetres.
 const BLOCK_MM3: f64 = 6000.0;
 
-/// A file that is gone when the test is over.
-struct File(PathBuf);
-
-impl File {
-    fn new(name: &str, text: &str) -> Self {
-        let name = format!("lamp-prepared-{}-{name}.step", std::process::id());
-        let path = std::env::temp_dir().join(name);
-        std::fs::write(&path, text).unwrap();
-        Self(path)
-    }
-}
-
-impl Drop for File {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0);
-    }
-}
-
-fn prepared(name: &str, text: &str, chord_mm: f64) -> Prepared {
-    let file = File::new(name, text);
-    prepare(&file.0, KernelName::Lamp, chord_mm).unwrap()
+fn prepared(text: &str, chord_mm: f64) -> Prepared {
+    prepare(text.as_bytes(), KernelName::Lamp, chord_mm).unwrap()
 }
 
 fn broken(defect: StepDefect, chord_mm: f64) -> Prepared {
-    prepared(&format!("{defect:?}-{chord_mm}"), &broken_step(defect), chord_mm)
+    prepared(&broken_step(defect), chord_mm)
 }
 
 /// The volume of the only body.
@@ -45,7 +24,7 @@ fn volume_mm3(prepared: &Prepared) -> f64 {
 #[test]
 fn what_is_right_is_taken_as_it_is() {
     for part in StepPart::ALL {
-        let prepared = prepared(&format!("{part:?}"), &step(part, StepUnit::Inch), 0.05);
+        let prepared = prepared(&step(part, StepUnit::Inch), 0.05);
         assert!(prepared.is_good(), "{part:?}: {:?}", prepared.reports);
         assert_eq!((prepared.heal_mm, prepared.chord_mm), (0.0, 0.05));
         assert!(prepared.tries.is_empty() && prepared.mesh.findings.is_empty(), "{part:?}");

@@ -40,7 +40,7 @@ enum Outcome {
 }
 
 fn read(path: &Path, kernel: KernelName, chord_mm: f64, heights_mm: &[f64]) -> Outcome {
-    let prepared = match prepare(path, kernel, chord_mm) {
+    let prepared = match prepare(&std::fs::read(path).unwrap(), kernel, chord_mm) {
         Ok(prepared) => prepared,
         Err(error) => return Outcome::Refused(error.to_string()),
     };

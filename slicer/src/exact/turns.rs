@@ -11,12 +11,12 @@ use crate::cut::{Crossing, Cutter};
 /// A row near a turn.
 #[derive(Default)]
 struct Row {
-    /// Its crossings on surfaces.
+    /// Its crossings on surfaces, as they were found.
+    found: Vec<Crossing>,
+    /// And as they are to be.
     exact: Vec<Crossing>,
     /// Those that were kept on facets.
     kept: Vec<Crossing>,
-    /// Those that are to be added.
-    added: Vec<Crossing>,
 }
 
 /// Returns what is to be added to a layer's crossings on surfaces: those that were
@@ -52,45 +52,57 @@ pub(crate) fn settle(
     }
     for crossing in crossings {
         if let Some(row) = rows.get_mut(&(crossing.row() as u32)) {
+            row.found.push(crossing);
             row.exact.push(crossing);
         }
     }
+    let most = (FOLD_MM / cutter.grid.dpi.pitch().mm()) as u32;
+    rows.values_mut().for_each(|row| row.unfold(tally, most));
     for (exact, near) in places {
         near.settle(exact, tally, z_mm, cutter, &mut rows);
     }
-    let most = (FOLD_MM / cutter.grid.dpi.pitch().mm()) as u32;
-    rows.values_mut().for_each(|row| row.unfold(tally, most));
     // A map has no order; the table sorts.
-    rows.into_values().flat_map(|row| row.kept.into_iter().chain(row.added)).collect()
+    rows.into_values().flat_map(Row::rest).collect()
 }
 
 /// No longer than this are the folds that facets make along rows.
-const FOLD_MM: f64 = 0.5;
+const FOLD_MM: f64 = 3.0;
 
 impl Row {
     /// Takes folds away: where facets go along a row they may cross it to and fro,
     /// while the surface does so once. Then two crossings have become the same, and the
     /// one between them was kept.
     fn unfold(&mut self, tally: &Tally, most: u32) {
-        let mut there: Vec<Crossing> = self.exact.iter().chain(&self.added).copied().collect();
         let kept = std::mem::take(&mut self.kept);
         for crossing in kept {
-            let away =
-                |other: &Crossing| other.place().column().abs_diff(crossing.place().column());
-            let is_double = |other: &Crossing| {
-                let same = there.iter().filter(|third| is_same(*other, **third)).count();
-                other.place().winding() != crossing.place().winding() && same > 1
+            let there = &self.exact;
+            let away = |k: &usize| there[*k].place().column().abs_diff(crossing.place().column());
+            let is_double = |k: &usize| {
+                let same = there.iter().filter(|other| is_same(there[*k], **other)).count();
+                there[*k].place().winding() != crossing.place().winding() && same > 1
             };
-            let near = (0..there.len()).filter(|&k| away(&there[k]) <= most);
-            match near.filter(|&k| is_double(&there[k])).min_by_key(|&k| away(&there[k])) {
+            let near = (0..there.len()).filter(|k| away(k) <= most);
+            match near.filter(is_double).min_by_key(away) {
                 Some(double) => {
-                    // In one column there and back is nothing.
-                    self.added.push(there.swap_remove(double).reversed());
+                    self.exact.swap_remove(double);
                     tally.mend(2, 1);
                 }
                 None => self.kept.push(crossing),
             }
         }
+    }
+
+    /// What is to be added to the crossings that were found: one to be taken away is
+    /// undone in its column, where there and back is nothing.
+    fn rest(mut self) -> impl Iterator<Item = Crossing> {
+        let mut undone = Vec::new();
+        for crossing in self.found {
+            match self.exact.iter().position(|other| *other == crossing) {
+                Some(at) => drop(self.exact.swap_remove(at)),
+                None => undone.push(crossing.reversed()),
+            }
+        }
+        self.kept.into_iter().chain(self.exact).chain(undone)
     }
 }
 
@@ -178,23 +190,20 @@ impl Near {
     /// Sees to it that a row has a pair of crossings near the turn, each once.
     fn put(&self, tally: &Tally, pair: [Crossing; 2], row: &mut Row) {
         let kept = self.kept(row);
-        let there = pair.map(|crossing| {
-            let others = row.exact.iter().chain(&row.added).copied();
-            others.filter(|other| is_same(crossing, *other)).collect::<Vec<_>>()
-        });
-        if winding(&kept) + there.iter().map(|there| winding(there)).sum::<i32>() != 0 {
+        let is_one = |other: &Crossing| pair.iter().any(|crossing| is_same(*crossing, *other));
+        let there: Vec<Crossing> =
+            row.exact.iter().filter(|other| is_one(other)).copied().collect();
+        let has_both = pair
+            .iter()
+            .all(|crossing| there.iter().filter(|other| is_same(*crossing, **other)).count() == 1);
+        let is_settled = kept.is_empty() && has_both;
+        if is_settled || winding(&kept) + winding(&there) != 0 {
             return;
         }
-        let before = row.added.len();
         row.kept.retain(|crossing| !kept.contains(crossing));
-        for (crossing, there) in pair.into_iter().zip(there) {
-            match &there[..] {
-                [] => row.added.push(crossing),
-                // In one column there and back is nothing.
-                [_, again @ ..] => row.added.extend(again.iter().map(|it| it.reversed())),
-            }
-        }
-        tally.mend(row.added.len() - before, kept.len());
+        row.exact.retain(|other| !is_one(other));
+        row.exact.extend(pair);
+        tally.mend(kept.len() + there.len().abs_diff(2), kept.len());
     }
 }
 

@@ -69,8 +69,7 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
 /// # Panics
 /// Where that is not so.
 pub fn step(bytes: &[u8]) {
-    let file = file_of(bytes);
-    let prepared = match prepare(file.path(), KernelName::Lamp, STEP_CHORD_MM) {
+    let prepared = match prepare(bytes, KernelName::Lamp, STEP_CHORD_MM) {
         Ok(prepared) if prepared.is_good() => prepared,
         Ok(_) => return,
         Err(error) => return drop(one_line(&error)),
