@@ -38,6 +38,8 @@ pub struct Turn {
 pub enum Meets {
     /// The contour twice, from the left.
     Pair([Crossing; 2]),
+    /// The contour at least on one side; on the other it may turn once more.
+    Side(Crossing),
     /// Nothing.
     Nothing,
     /// What could not be found out.
@@ -130,10 +132,12 @@ impl Turns {
 
     /// Finds where two crossings with a contour really are, from the left.
     pub(crate) fn settled(&self, placed: &Placed, mut pair: [Crossing; 2]) -> Meets {
-        for crossing in &mut pair {
-            if self.settle(placed, crossing).is_none() {
-                return Meets::Unknown;
-            }
+        let [left, right] = &mut pair;
+        match [left, right].map(|crossing| self.settle(placed, crossing).is_some()) {
+            [true, true] => {}
+            [true, false] => return Meets::Side(pair[0]),
+            [false, true] => return Meets::Side(pair[1]),
+            [false, false] => return Meets::Unknown,
         }
         let parts = pair[0].x_mm <= pair[1].x_mm && pair[0].enters != pair[1].enters;
         if parts { Meets::Pair(pair) } else { Meets::Unknown }

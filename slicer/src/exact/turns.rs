@@ -17,6 +17,8 @@ struct Row {
     exact: Vec<Crossing>,
     /// Those that were kept on facets.
     kept: Vec<Crossing>,
+    /// Those found on one side of a turn.
+    sides: Vec<Crossing>,
 }
 
 /// Returns what is to be added to a layer's crossings on surfaces: those that were
@@ -61,6 +63,7 @@ pub(crate) fn settle(
     for (exact, near) in places {
         near.settle(exact, tally, z_mm, cutter, &mut rows);
     }
+    rows.values_mut().for_each(|row| row.join_sides(tally));
     // A map has no order; the table sorts.
     rows.into_values().flat_map(Row::rest).collect()
 }
@@ -89,6 +92,21 @@ impl Row {
                 }
                 None => self.kept.push(crossing),
             }
+        }
+    }
+
+    /// Adds the outer sides of two turns between which the contour turns back, so that
+    /// neither has a pair of its own.
+    fn join_sides(&mut self, tally: &Tally) {
+        let mut sides: Vec<Crossing> = Vec::new();
+        for side in std::mem::take(&mut self.sides) {
+            if !self.exact.iter().chain(&sides).any(|other| is_same(side, *other)) {
+                sides.push(side);
+            }
+        }
+        if sides.len() == 2 && winding(&sides) == 0 && self.kept.is_empty() {
+            self.exact.extend(sides);
+            tally.mend(2, 0);
         }
     }
 
@@ -157,30 +175,34 @@ impl Near {
                 Place::Turn(turn) => turns.at_turn(placed, turn, y_mm),
                 Place::Saddle(saddle) => turns.at_saddle(placed, saddle, y_mm, z_mm),
             };
+            let at = |crossing: lamp_brep::Crossing| {
+                let [column, _] = cutter.grid.to_pixels(crossing.x_mm, y_mm);
+                Crossing::at(cutter.grid, number, column, crossing.enters)
+            };
             match meets {
-                Meets::Pair(pair) => {
-                    let pair = pair.map(|crossing| {
-                        let [column, _] = cutter.grid.to_pixels(crossing.x_mm, y_mm);
-                        Crossing::at(cutter.grid, number, column, crossing.enters)
-                    });
-                    self.put(tally, pair, row);
-                }
+                Meets::Pair(pair) => self.put(tally, pair.map(at), row),
+                Meets::Side(crossing) => row.sides.push(at(crossing)),
                 Meets::Nothing => self.take(tally, row),
                 Meets::Unknown => {}
             }
         }
     }
 
-    /// The crossings of a row that were kept on facets near the turn.
-    fn kept(&self, row: &Row) -> Vec<Crossing> {
-        let is_near =
-            |crossing: &&Crossing| self.columns.contains(&i64::from(crossing.place().column()));
+    /// The crossings of a row that were kept on facets near the turn, or near a pair that
+    /// the row has there.
+    fn kept(&self, row: &Row, pair: &[Crossing]) -> Vec<Crossing> {
+        let width = (self.columns.end() - self.columns.start()) / 2;
+        let column = |crossing: &Crossing| i64::from(crossing.place().column());
+        let is_near = |crossing: &&Crossing| {
+            let at = column(crossing);
+            self.columns.contains(&at) || pair.iter().any(|one| (column(one) - at).abs() <= width)
+        };
         row.kept.iter().filter(is_near).copied().collect()
     }
 
     /// Takes the crossings of a row away that facets make where the surface has none.
     fn take(&self, tally: &Tally, row: &mut Row) {
-        let kept = self.kept(row);
+        let kept = self.kept(row, &[]);
         if winding(&kept) == 0 {
             row.kept.retain(|crossing| !kept.contains(crossing));
             tally.mend(kept.len(), kept.len());
@@ -189,7 +211,7 @@ impl Near {
 
     /// Sees to it that a row has a pair of crossings near the turn, each once.
     fn put(&self, tally: &Tally, pair: [Crossing; 2], row: &mut Row) {
-        let kept = self.kept(row);
+        let kept = self.kept(row, &pair);
         let is_one = |other: &Crossing| pair.iter().any(|crossing| is_same(*crossing, *other));
         let there: Vec<Crossing> =
             row.exact.iter().filter(|other| is_one(other)).copied().collect();
