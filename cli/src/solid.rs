@@ -86,12 +86,11 @@ impl SolidOptions {
             let mut stdin = io::stdin().lock();
             stdin.by_ref().take(START_BYTES).read_to_end(&mut start).map_err(failed)?;
             let is_step = is_step(&start);
-            let stream = Cursor::new(start).chain(stdin);
+            let mut stream = Cursor::new(start).chain(stdin);
             if !is_step {
                 return Ok(Model::from_stream("stdin", stream)?);
             }
             let mut bytes = Vec::new();
-            let mut stream = stream;
             stream.read_to_end(&mut bytes).map_err(failed)?;
             return self.step(&bytes.into(), "stdin", reading);
         }

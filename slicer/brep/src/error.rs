@@ -9,9 +9,6 @@ pub enum BrepError {
     /// The file is not what it should be.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// The file cannot be read.
-    #[error("cannot read it")]
-    Io(#[from] std::io::Error),
     /// OpenCASCADE cannot work with it.
     #[cfg(feature = "occt")]
     #[error("OpenCASCADE says: {said}")]

@@ -7,6 +7,8 @@ use crate::vector::Vec3;
 /// Facets that are looked at for each end; around a level ring all are as high.
 const MOST_FACETS: usize = 64;
 const MOST_STEPS: usize = 30;
+/// Steps for differences, in parts of a facet.
+pub(crate) const DIFFERENCE: f64 = 1e-5;
 
 /// Along an axis, or with `up` -1 against it.
 #[derive(Clone, Copy)]
@@ -66,21 +68,16 @@ impl Placed {
     /// Where a facet's surface is level, by Newton's method with differences.
     pub(crate) fn level(&self, facet: u32, way: Way) -> Option<Level> {
         let uv = self.facet(facet).uv;
-        let size = [0, 1].map(|k| {
-            let of = uv.map(|uv| uv[k]);
-            of.into_iter().fold(f64::MIN, f64::max) - of.into_iter().fold(f64::MAX, f64::min)
-        });
+        let size = self.uv_size(facet);
+        let by = size.map(|size| DIFFERENCE * size);
         let mut at = [0, 1].map(|k| uv.iter().map(|uv| uv[k]).sum::<f64>() / 3.0);
         for _ in 0..MOST_STEPS {
-            let by = size.map(|size| 1e-5 * size);
-            let places = [at, [at[0] + by[0], at[1]], [at[0], at[1] + by[1]]];
-            let mut jets = [Jet::default(); 3];
-            self.evaluate(self.facet(facet).face, &places, &mut jets);
+            let jets = self.jets(facet, at, by);
             // How far it goes over a facet's width along either parameter.
             let rise = |jet: &Jet| [way.along(jet.du) * size[0], way.along(jet.dv) * size[1]];
             let [g, gu, gv] = [rise(&jets[0]), rise(&jets[1]), rise(&jets[2])];
             let [a, b, d] = [gu[0] - g[0], (gu[1] - g[1] + gv[0] - g[0]) / 2.0, gv[1] - g[1]]
-                .map(|bend| bend / 1e-5);
+                .map(|bend| bend / DIFFERENCE);
             if g.iter().all(|g| g.abs() < 1e-11) {
                 let bend = [a / size[0] / size[0], b / size[0] / size[1], d / size[1] / size[1]];
                 let level = Level { uv: at, jet: jets[0], bend };

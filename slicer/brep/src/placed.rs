@@ -83,6 +83,20 @@ impl Placed {
         }
     }
 
+    /// How far a facet's parameters reach along u and v.
+    pub(crate) fn uv_size(&self, facet: u32) -> [f64; 2] {
+        let [p, q, r] = self.facet(facet).uv;
+        [0, 1].map(|k| p[k].max(q[k]).max(r[k]) - p[k].min(q[k]).min(r[k]))
+    }
+
+    /// A facet's surface at parameters, and by so much further along u, and along v.
+    pub(crate) fn jets(&self, facet: u32, [u, v]: [f64; 2], by: [f64; 2]) -> [Jet; 3] {
+        let mut jets = [Jet::default(); 3];
+        let places = [[u, v], [u + by[0], v], [u, v + by[1]]];
+        self.evaluate(self.facet(facet).face, &places, &mut jets);
+        jets
+    }
+
     /// A facet, to find the parameters of its points.
     pub fn chart(&self, facet: u32) -> Chart {
         Chart::new(&self.corners(facet), self.facet(facet).uv)

@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use crate::extent::DIFFERENCE;
 use crate::kernel::Jet;
 use crate::placed::Placed;
 use crate::polish::{Crossing, Fate};
@@ -258,18 +259,11 @@ fn mixed(a: [f64; 2], b: [f64; 2], t: f64) -> [f64; 2] {
 /// Solves z(u, v) = plane, outwards x (u, v) = 0 from a facet's surroundings by
 /// Newton's method; the normal's derivatives are differences.
 fn turn(placed: &Placed, facet: u32, seed: [f64; 2], z_mm: f64) -> Option<Turn> {
-    let uv = placed.facet(facet).uv;
-    let size = [0, 1].map(|k| {
-        let (low, high) = range([uv[0][k], uv[1][k], uv[2][k]]);
-        high - low
-    });
-    let by = size.map(|size| 1e-5 * size);
-    let face = placed.facet(facet).face;
+    let size = placed.uv_size(facet);
+    let by = size.map(|size| DIFFERENCE * size);
     let mut at = seed;
     for _ in 0..MOST_STEPS {
-        let mut jets = [Jet::default(); 3];
-        let places = [at, [at[0] + by[0], at[1]], [at[0], at[1] + by[1]]];
-        placed.evaluate(face, &places, &mut jets);
+        let jets = placed.jets(facet, at, by);
         let normals = [0, 1, 2].map(|k| placed.normal(facet, &jets[k]));
         let [Some(n), Some(nu), Some(nv)] = normals else { return None };
         let turned = [scale(sub(nu, n), 1.0 / by[0]), scale(sub(nv, n), 1.0 / by[1])];

@@ -5,8 +5,6 @@ mod count;
 mod join;
 mod refine;
 
-use std::path::Path;
-
 use crate::error::BrepError;
 use crate::kernel::{Body, FaceInfo, Jet, Kernel, Tessellation};
 use crate::step;
@@ -28,23 +26,6 @@ pub struct OcctModel {
 }
 
 impl OcctModel {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// Where it cannot be read, is not STEP, or holds no solid.
-    pub fn open(path: &Path) -> Result<Self, BrepError> {
-        Self::read(&std::fs::read(path)?)
-    }
-
-    /// Reads a file and mends its bodies: edges and vertices may be moved, and gaps
-    /// closed, by up to a tolerance in millimetres.
-    ///
-    /// # Errors
-    /// As [`Self::open`], and where the tolerance is not a positive length.
-    pub fn open_healed(path: &Path, heal_mm: f64) -> Result<Self, BrepError> {
-        Self::read_healed(&std::fs::read(path)?, heal_mm)
-    }
-
     /// Reads a file's bytes.
     ///
     /// # Errors
@@ -53,10 +34,11 @@ impl OcctModel {
         Self::of(bytes, 0.0)
     }
 
-    /// Reads a file's bytes and mends its bodies, as [`Self::open_healed`].
+    /// Reads a file's bytes and mends its bodies: edges and vertices may be moved, and
+    /// gaps closed, by up to a tolerance in millimetres.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Self::read`], and where the tolerance is not a positive length.
     pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
         if heal_mm > 0.0 && heal_mm.is_finite() {
             Self::of(bytes, heal_mm)

@@ -11,8 +11,6 @@ mod token;
 mod topology;
 mod units;
 
-use std::path::Path;
-
 use crate::error::BrepError;
 use crate::heal::heal;
 use crate::kernel::{Body, FaceInfo, Finding, Jet, Kernel, Tessellation};
@@ -111,14 +109,6 @@ pub struct StepModel {
 }
 
 impl StepModel {
-    /// Reads a file as it is.
-    ///
-    /// # Errors
-    /// Where it cannot be read, is not STEP, or holds what is not supported.
-    pub fn open(path: &Path) -> Result<Self, BrepError> {
-        Self::open_healed(path, 0.0)
-    }
-
     /// Reads a file's bytes as they are.
     ///
     /// # Errors
@@ -127,16 +117,8 @@ impl StepModel {
         Self::read_healed(bytes, 0.0)
     }
 
-    /// Reads a file, and joins edges that faces give apart where they run within
-    /// `heal_mm` of each other. The tessellation's findings say where.
-    ///
-    /// # Errors
-    /// Where it cannot be read, is not STEP, or holds what is not supported.
-    pub fn open_healed(path: &Path, heal_mm: f64) -> Result<Self, BrepError> {
-        Self::read_healed(&std::fs::read(path)?, heal_mm)
-    }
-
-    /// Reads a file's bytes as [`StepModel::open_healed`] does.
+    /// Reads a file's bytes, and joins edges that faces give apart where they run
+    /// within `heal_mm` of each other. The tessellation's findings say where.
     ///
     /// # Errors
     /// Where they are not STEP, or hold what is not supported.
