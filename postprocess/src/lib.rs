@@ -44,6 +44,7 @@ pub use strips::{
     JoinSwathsError, StripWriter, StripsError, Swaths, SwathsError, is_strips, join_strips,
 };
 pub use tile::{
-    CellShape, CopyName, Heights, Layout, LayoutError, LayoutFile, MeshOptions, Moat, Pack, PackBy,
-    Part, Pattern, Pixels, Placement, StrayRows, TileError, TileOptions, Turns, tile,
+    CellShape, CopyName, CopyPlacement, HeightOptions, Layout, LayoutError, LayoutFile,
+    MeshOptions, MeshPattern, Moat, Pack, PackBy, PartStack, PixelSize, StrayRows, TileError,
+    TileOptions, Turns, tile,
 };

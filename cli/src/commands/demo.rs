@@ -9,7 +9,7 @@ use lamp_fixtures::{Part, build};
 use lamp_grayscale::Method;
 use lamp_postprocess::machine::Builtin;
 use lamp_postprocess::{
-    FixOptions, Heights, Layout, MeshOptions, Pack, Part as PlacedPart, TileOptions, fix, tile,
+    FixOptions, HeightOptions, Layout, MeshOptions, Pack, PartStack, TileOptions, fix, tile,
 };
 use lamp_slicer::Model;
 use lamp_stack::{Layer, Pages, StackError};
@@ -149,11 +149,11 @@ fn build_in_mesh(
     let area = Builtin::named("alpha").expect("it is built in").machine().area.value;
     let mut layers = part_layers(stl, range, report)?;
     let first = layers.next().ok_or(StackError::NoLayers)??;
-    let parts = vec![PlacedPart::of_image("the mould", &first)?];
+    let parts = vec![PartStack::of_image("the mould", &first)?];
     let mesh = MeshOptions::default();
     let layout = Layout::packed(parts, &[None], area, mesh.gap(), Pack::default())?;
     let layers = std::iter::once(Ok(first)).chain(layers);
-    let build = layout.with_mesh(&mesh)?.build(vec![layers], Heights::default(), |_| {});
+    let build = layout.with_mesh(&mesh)?.build(vec![layers], HeightOptions::default(), |_| {});
     let mut made = 0;
     write(build.inspect(|_| made += 1), stack, report)?;
     Ok(made)

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use anyhow::Context;
-use lamp_postprocess::{Layout, Part, Pixels, Placement};
+use lamp_postprocess::{CopyPlacement, Layout, PartStack, PixelSize};
 use lamp_stack::{Mask, Turn};
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
@@ -49,7 +49,7 @@ struct Picture<'a> {
 
 impl<'a> Picture<'a> {
     fn new(layout: &'a Layout) -> Self {
-        let Pixels { width, height } = layout.pixels();
+        let PixelSize { width, height } = layout.pixels();
         let scale = f64::from(SIDE) / f64::from(width.max(height).max(1));
         let mut outlines = layout.silhouettes();
         outlines.retain(|&(part, _), _| layout.parts()[part].outline().is_some());
@@ -57,7 +57,7 @@ impl<'a> Picture<'a> {
     }
 
     fn size(&self) -> (u32, u32) {
-        let Pixels { width, height } = self.layout.pixels();
+        let PixelSize { width, height } = self.layout.pixels();
         let [width, height] = [width, height].map(|side| self.scaled(side) as u32);
         (width + 2 * MARGIN as u32, height + (2 * MARGIN + LEGEND) as u32)
     }
@@ -81,7 +81,7 @@ impl<'a> Picture<'a> {
         for (at, number) in self.layout.placements().iter().zip(self.layout.numbers()) {
             self.draw_copy(area, at, number, colours[at.part])?;
         }
-        let Pixels { width, height } = self.layout.pixels();
+        let PixelSize { width, height } = self.layout.pixels();
         let border = GRAY_INK.stroke_width(3);
         area.draw(&Rectangle::new([self.at(0, 0), self.at(width, height)], border))?;
         self.draw_legend(area, &colours)?;
@@ -91,11 +91,11 @@ impl<'a> Picture<'a> {
     fn draw_copy<B: DrawingBackend>(
         &self,
         area: &DrawingArea<B, plotters::coord::Shift>,
-        at: &Placement,
+        at: &CopyPlacement,
         number: u32,
         ink: RGBColor,
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-        let Pixels { width, height } = self.layout.parts()[at.part].size(at.turn);
+        let PixelSize { width, height } = self.layout.parts()[at.part].size(at.turn);
         let corners = [self.at(at.left, at.top), self.at(at.left + width, at.top + height)];
         let fill = tint(ink).filled();
         match self.outlines.get(&(at.part, at.turn)) {
@@ -117,7 +117,7 @@ impl<'a> Picture<'a> {
     fn draw_outline<B: DrawingBackend>(
         &self,
         area: &DrawingArea<B, plotters::coord::Shift>,
-        at: &Placement,
+        at: &CopyPlacement,
         outline: &Mask,
         fill: ShapeStyle,
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
@@ -145,7 +145,7 @@ impl<'a> Picture<'a> {
         area: &DrawingArea<B, plotters::coord::Shift>,
         colours: &[RGBColor],
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-        let Pixels { height, .. } = self.layout.pixels();
+        let PixelSize { height, .. } = self.layout.pixels();
         let (mut x, y) = self.at(0, height);
         let y = y + 36;
         let parts = self.layout.parts().iter().enumerate();
@@ -161,7 +161,7 @@ impl<'a> Picture<'a> {
     }
 
     /// `blade.tif: 120 copies`.
-    fn entry(&self, part: usize, about: &Part) -> String {
+    fn entry(&self, part: usize, about: &PartStack) -> String {
         match self.layout.copies_of(part) {
             1 => format!("{}: 1 copy", about.name()),
             copies => format!("{}: {copies} copies", about.name()),

@@ -4,20 +4,20 @@ use lamp_stack::{Frame, Mask, MaskBuilder, Op, PageInfo, StackInfo, Turn, place_
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::error::EditError;
-use super::forms::Copies;
-use super::place::Place;
+use super::edit_error::EditError;
+use super::image_bounds::ImageBounds;
+use super::schema::CopySelection;
 
 /// Copies stand within so many pixels of an image's corner.
-const FARTHEST: i64 = 1 << 40;
+const MAX_OFFSET: i64 = 1 << 40;
 /// The images of all copies have at most so many rows together.
-const MOST_ROWS: u64 = 1 << 27;
+const MAX_ROWS: u64 = 1 << 27;
 
 /// A part's image as it stands in a build, or the whole image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Copy {
+pub(super) struct BuildCopy {
     /// Where the part's pixels lie in it, as it was before it was turned.
-    pub(super) part: Place,
+    pub(super) part: ImageBounds,
     pub(super) turn: Turn,
     pub(super) left: i64,
     pub(super) top: i64,
@@ -25,7 +25,7 @@ pub(super) struct Copy {
 
 /// What the first page says of the copies of a part.
 #[derive(Deserialize)]
-struct Tiled {
+struct TiledPart {
     part: Option<String>,
     part_pixels: [u32; 2],
     part_origin_mm: Option<[f64; 2]>,
@@ -34,16 +34,16 @@ struct Tiled {
     turns: Vec<String>,
 }
 
-impl Copy {
+impl BuildCopy {
     /// The copies that an edit is for, in a stack whose first page is `info` and
     /// whose pixels lie at `place`: the whole image, if it is for none.
     ///
     /// # Errors
     /// What the first page lacks.
     pub(super) fn all(
-        wanted: &Copies,
+        wanted: &CopySelection,
         info: &PageInfo,
-        place: &Place,
+        place: &ImageBounds,
     ) -> Result<Vec<Self>, EditError> {
         let whole = Self { part: *place, turn: Turn::default(), left: 0, top: 0 };
         if wanted.is_none() {
@@ -59,7 +59,7 @@ impl Copy {
         })?;
         let parts = tile["parts"].as_array().map_or(std::slice::from_ref(tile), Vec::as_slice);
         let read = |part: &Value| serde_json::from_value(part.clone());
-        let parts: Vec<Tiled> =
+        let parts: Vec<TiledPart> =
             parts.iter().map(read).collect::<Result<_, _>>().map_err(|error| {
                 wrong(format!("its page does not say where copies stand as tile does ({error})"))
             })?;
@@ -68,11 +68,11 @@ impl Copy {
             .part_origin_mm
             .ok_or_else(|| wrong("its page does not say where the part lay".to_owned()))?;
         let [width, height] = part.part_pixels;
-        let far = part.copies.iter().flatten().any(|place| place.abs() > FARTHEST);
-        if far || u64::from(height.max(width).max(1)) * part.copies.len() as u64 > MOST_ROWS {
+        let far = part.copies.iter().flatten().any(|place| place.abs() > MAX_OFFSET);
+        if far || u64::from(height.max(width).max(1)) * part.copies.len() as u64 > MAX_ROWS {
             return Err(wrong("its page says that copies stand where no image reaches".to_owned()));
         }
-        let lain = Place { origin_mm, width, height, ..*place };
+        let lain = ImageBounds { origin_mm, width, height, ..*place };
         let turns = part
             .turns
             .iter()
@@ -85,19 +85,23 @@ impl Copy {
     }
 
     /// Whether it is all of an image, as it is.
-    fn is_whole(&self, place: &Place) -> bool {
+    fn is_whole(&self, place: &ImageBounds) -> bool {
         *self == Self { part: *place, turn: Turn::default(), left: 0, top: 0 }
     }
 }
 
 /// The part whose copies are wanted.
-fn chosen(mut parts: Vec<Tiled>, wanted: &Copies, info: &PageInfo) -> Result<Tiled, String> {
+fn chosen(
+    mut parts: Vec<TiledPart>,
+    wanted: &CopySelection,
+    info: &PageInfo,
+) -> Result<TiledPart, String> {
     let one = info.stack.as_ref().map(|stack| stack.part.clone());
-    let name = |part: &Tiled| part.part.clone().or_else(|| one.clone()).unwrap_or_default();
+    let name = |part: &TiledPart| part.part.clone().or_else(|| one.clone()).unwrap_or_default();
     let names = || parts.iter().map(name).collect::<Vec<_>>().join(", ");
     let index = match wanted {
-        Copies::Of(wanted) => parts.iter().position(|part| name(part) == *wanted),
-        Copies::Any(_) => (parts.len() == 1).then_some(0),
+        CopySelection::Of(wanted) => parts.iter().position(|part| name(part) == *wanted),
+        CopySelection::Any(_) => (parts.len() == 1).then_some(0),
     };
     let index = index.ok_or_else(|| {
         format!("name one of the build's parts, as copies = \"NAME\": {}", names())
@@ -108,9 +112,9 @@ fn chosen(mut parts: Vec<Tiled>, wanted: &Copies, info: &PageInfo) -> Result<Til
 /// An image at `place` that is white where a copy is, of which `mask` gives each
 /// one's image. `None` where that has more runs than any may have.
 pub(super) fn composed(
-    copies: &[Copy],
-    place: &Place,
-    mask: impl Fn(usize, &Place) -> Mask,
+    copies: &[BuildCopy],
+    place: &ImageBounds,
+    mask: impl Fn(usize, &ImageBounds) -> Mask,
 ) -> Option<Mask> {
     if let [copy] = copies
         && copy.is_whole(place)
@@ -188,7 +192,8 @@ mod tests {
 
     use super::*;
 
-    const PLACE: Place = Place { origin_mm: [0.0, 9.0], dpi: None, width: 40, height: 30 };
+    const PLACE: ImageBounds =
+        ImageBounds { origin_mm: [0.0, 9.0], dpi: None, width: 40, height: 30 };
 
     fn info(tile: Value) -> PageInfo {
         let mut stack = StackInfo { part: "blade".to_owned(), ..StackInfo::default() };
@@ -204,13 +209,16 @@ mod tests {
     fn copies_are_those_of_the_page() {
         let mut page = info(part(&[[3, 4], [5, 6]]));
         page.stack.as_mut().unwrap().other["tile"]["turns"] = json!(["0", "90m"]);
-        let all = Copy::all(&Copies::Any(true), &page, &PLACE).unwrap();
-        let lain = Place { origin_mm: [1.0, 2.0], width: 7, height: 5, ..PLACE };
-        assert_eq!(all[0], Copy { part: lain, turn: Turn::default(), left: 3, top: 4 });
-        assert_eq!(all[1], Copy { part: lain, turn: Turn::new(1, true), left: 5, top: 6 });
-        assert_eq!(Copy::all(&Copies::Of("blade".to_owned()), &page, &PLACE).unwrap(), all);
+        let all = BuildCopy::all(&CopySelection::Any(true), &page, &PLACE).unwrap();
+        let lain = ImageBounds { origin_mm: [1.0, 2.0], width: 7, height: 5, ..PLACE };
+        assert_eq!(all[0], BuildCopy { part: lain, turn: Turn::default(), left: 3, top: 4 });
+        assert_eq!(all[1], BuildCopy { part: lain, turn: Turn::new(1, true), left: 5, top: 6 });
+        assert_eq!(
+            BuildCopy::all(&CopySelection::Of("blade".to_owned()), &page, &PLACE).unwrap(),
+            all
+        );
         move_copies(page.stack.as_mut().unwrap(), Frame { left: 2, top: -3, width: 9, height: 9 });
-        let moved = Copy::all(&Copies::Any(true), &page, &PLACE).unwrap();
+        let moved = BuildCopy::all(&CopySelection::Any(true), &page, &PLACE).unwrap();
         assert_eq!((moved[1].left, moved[1].top), (3, 9));
     }
 
@@ -222,17 +230,21 @@ mod tests {
             part
         });
         let page = info(json!({ "parts": parts }));
-        assert_eq!(Copy::all(&Copies::Of("core".to_owned()), &page, &PLACE).unwrap().len(), 1);
-        for wanted in [Copies::Any(true), Copies::Of("teapot".to_owned())] {
-            let error = Copy::all(&wanted, &page, &PLACE).unwrap_err().to_string();
+        assert_eq!(
+            BuildCopy::all(&CopySelection::Of("core".to_owned()), &page, &PLACE).unwrap().len(),
+            1
+        );
+        for wanted in [CopySelection::Any(true), CopySelection::Of("teapot".to_owned())] {
+            let error = BuildCopy::all(&wanted, &page, &PLACE).unwrap_err().to_string();
             assert!(error.contains("blade, core"), "{error}");
         }
     }
 
     #[test]
     fn what_a_page_lacks_is_said() {
-        let error =
-            |page: &PageInfo| Copy::all(&Copies::Any(true), page, &PLACE).unwrap_err().to_string();
+        let error = |page: &PageInfo| {
+            BuildCopy::all(&CopySelection::Any(true), page, &PLACE).unwrap_err().to_string()
+        };
         assert!(error(&PageInfo::default()).contains("builds that tile made"));
         assert!(error(&info(json!({ "copies": 3 }))).contains("as tile does"));
         let mut lost = part(&[[1, 1]]);
@@ -251,9 +263,9 @@ mod tests {
                 mask.push_row(&row.iter().copied().collect::<Vec<_>>()).unwrap();
             }
             let mask = mask.finish();
-            let lain = Place { width: 7, height: 5, ..PLACE };
-            let copies: Vec<Copy> = places.iter().map(|&(left, top, quarters, mirrored)| {
-                Copy { part: lain, turn: Turn::new(quarters, mirrored), left, top }
+            let lain = ImageBounds { width: 7, height: 5, ..PLACE };
+            let copies: Vec<BuildCopy> = places.iter().map(|&(left, top, quarters, mirrored)| {
+                BuildCopy { part: lain, turn: Turn::new(quarters, mirrored), left, top }
             }).collect();
             let made = composed(&copies, &PLACE, |_, _| mask.clone()).unwrap();
             let mut expected = Mask::black(40, 30);

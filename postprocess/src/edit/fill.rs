@@ -2,7 +2,7 @@
 
 use lamp_stack::{Mask, MaskBuilder};
 
-/// A point in pixels, as a [`Grid`](super::place::Grid) maps it: column, row.
+/// A point in pixels, as a [`PixelMap`](super::image_bounds::PixelMap) maps it: column, row.
 pub(super) type Point = [f64; 2];
 
 /// The pixels inside closed lines: those that they wind about, whichever way.
@@ -15,7 +15,8 @@ pub(super) fn polygons(lines: &[Vec<Point>], width: u32, height: u32) -> Mask {
         let next = line.iter().cycle().skip(1);
         line.iter().zip(next).for_each(|(&a, &b)| cross(a, b, height, &mut crossings));
     }
-    crossings.sort_unstable_by(|a: &Crossing, b| a.row.cmp(&b.row).then(a.x.total_cmp(&b.x)));
+    crossings
+        .sort_unstable_by(|a: &OutlineCrossing, b| a.row.cmp(&b.row).then(a.x.total_cmp(&b.x)));
     let mut crossings = crossings.as_slice();
     rows(width, height, |row, out| {
         let (here, rest) = crossings.split_at(crossings.partition_point(|c| c.row == row));
@@ -44,20 +45,20 @@ pub(super) fn disc([x, y]: Point, radius: f64, width: u32, height: u32) -> Mask 
 }
 
 /// Where a line crosses a row, and whether it goes down (1) or up (-1).
-struct Crossing {
+struct OutlineCrossing {
     row: u32,
     x: f64,
     winding: i32,
 }
 
-fn cross(a: Point, b: Point, height: u32, out: &mut Vec<Crossing>) {
+fn cross(a: Point, b: Point, height: u32, out: &mut Vec<OutlineCrossing>) {
     let ([top, bottom], winding) = if a[1] <= b[1] { ([a, b], 1) } else { ([b, a], -1) };
     let first = top[1].ceil().max(0.0);
     let end = bottom[1].ceil().min(height.into());
     let slope = (bottom[0] - top[0]) / (bottom[1] - top[1]);
     let mut row = first;
     while row < end {
-        out.push(Crossing { row: row as u32, x: top[0] + (row - top[1]) * slope, winding });
+        out.push(OutlineCrossing { row: row as u32, x: top[0] + (row - top[1]) * slope, winding });
         row += 1.0;
     }
 }

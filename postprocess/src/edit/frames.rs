@@ -2,12 +2,12 @@
 
 use lamp_stack::{Frame, Layer, PageInfo};
 
-use super::error::EditError;
-use super::forms::{Block, OtherStack, Pad};
-use super::place::Place;
+use super::edit_error::EditError;
+use super::image_bounds::ImageBounds;
+use super::schema::{OtherStack, Pad, Rectangle};
 
 /// A frame with so much black around the image, in whole pixels.
-pub(super) fn padded(pad: Pad, place: &Place) -> Result<Frame, EditError> {
+pub(super) fn padded(pad: Pad, place: &ImageBounds) -> Result<Frame, EditError> {
     let grid = place.grid()?;
     let [left, right, top, bottom] =
         [pad.left, pad.right, pad.top, pad.bottom].map(|length| grid.length(length).round() as i64);
@@ -28,12 +28,12 @@ pub(super) fn padded(pad: Pad, place: &Place) -> Result<Frame, EditError> {
 pub(super) fn frame_of(
     other: &Layer,
     OtherStack { by, .. }: &OtherStack,
-    place: &Place,
+    place: &ImageBounds,
     info: &PageInfo,
 ) -> Result<Frame, String> {
-    let from = Place::of(other);
+    let from = ImageBounds::of(other);
     if from.dpi != place.dpi {
-        let dpi = |place: &Place| {
+        let dpi = |place: &ImageBounds| {
             place.dpi.map_or("no resolution".to_owned(), |dpi| format!("{dpi} dpi"))
         };
         return Err(format!(
@@ -63,7 +63,11 @@ pub(super) fn frame_of(
 
 /// What of an image lies in a box: from the first centre inside to the first that
 /// is not.
-pub(super) fn cropped(crop: Block, number: usize, place: &Place) -> Result<Frame, EditError> {
+pub(super) fn cropped(
+    crop: Rectangle,
+    number: usize,
+    place: &ImageBounds,
+) -> Result<Frame, EditError> {
     let grid = place.grid()?;
     let [left, top] = grid.to_pixels([crop.x[0].mm(), crop.y[1].mm()]);
     let [right, bottom] = grid.to_pixels([crop.x[1].mm(), crop.y[0].mm()]);

@@ -7,8 +7,8 @@ use serde::Deserialize;
 use serde_json::Value;
 use serde_path_to_error::Segment;
 
-use super::error::EditError;
-use super::forms::{Along, Edit, OtherStack};
+use super::edit_error::EditError;
+use super::schema::{CylinderAxis, Edit, OtherStack};
 
 /// What is to be done to a stack, one after the other.
 #[derive(Clone, Debug)]
@@ -27,7 +27,7 @@ impl Edits {
     pub fn from_toml(text: &str) -> Result<Self, EditError> {
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
-        struct File {
+        struct EditFile {
             #[serde(default)]
             edit: Vec<Edit>,
         }
@@ -36,7 +36,7 @@ impl Edits {
             problem: one_line(error.message()),
         };
         let file = toml::Deserializer::parse(text).map_err(syntax)?;
-        let file: File = serde_path_to_error::deserialize(file).map_err(|error| {
+        let file: EditFile = serde_path_to_error::deserialize(file).map_err(|error| {
             let key = key_of(error.path());
             let inner = error.into_inner();
             let problem = one_line(inner.message()).replace(" field ", " key ");
@@ -109,7 +109,7 @@ impl Edit {
                  the part before tile",
             );
         }
-        if self.cylinder.is_some_and(|c| (c.along == Along::Z) == c.between.is_some()) {
+        if self.cylinder.is_some_and(|c| (c.along == CylinderAxis::Z) == c.between.is_some()) {
             return wrong(
                 "a cylinder along x or y needs between = [from, to], and only one along these",
             );

@@ -6,32 +6,32 @@
 //! Source: 002 section 2.4.3.
 
 mod copies;
-mod error;
+mod edit_error;
+#[cfg(test)]
+mod edit_tests;
 mod fill;
-mod forms;
 mod frames;
+mod image_bounds;
 mod letters;
 mod list;
-mod others;
-mod page;
-mod place;
+mod other_stacks;
+mod page_changes;
 mod plan;
+mod schema;
 mod shape;
-#[cfg(test)]
-mod tests;
 
 use std::sync::Arc;
 
 use lamp_stack::{Held, Layer, PageInfo, map_in_order};
 
-pub use error::EditError;
+pub use edit_error::EditError;
+pub(crate) use image_bounds::ImageBounds;
 pub use list::Edits;
-pub use others::OtherLayers;
-pub(crate) use page::frame_page;
-pub(crate) use place::Place;
+pub use other_stacks::OtherLayers;
+pub(crate) use page_changes::frame_page;
 
-use others::Other;
-use plan::Plan;
+use other_stacks::AlignedStack;
+use plan::EditPlan;
 
 /// Does edits to every layer of a stack. `others` are the stacks that the edits
 /// name, in order; `done` is told of each layer which edits were for it, by their
@@ -74,8 +74,8 @@ pub fn edit<E: From<EditError> + Send>(
     others: Vec<OtherLayers<E>>,
     mut done: impl FnMut(&Layer, &[usize]),
 ) -> impl Iterator<Item = Result<Layer, E>> {
-    let mut beside = Beside::new(&edits, others);
-    let mut plan: Option<Arc<Plan>> = None;
+    let mut beside = AlignedStacks::new(&edits, others);
+    let mut plan: Option<Arc<EditPlan>> = None;
     let mut layers = layers.fuse();
     let read = std::iter::from_fn(move || {
         let layer = match layers.next() {
@@ -85,7 +85,7 @@ pub fn edit<E: From<EditError> + Send>(
         };
         let planned = match &plan {
             Some(plan) => Ok(Arc::clone(plan)),
-            None => Plan::new(&edits, &layer, &mut beside.others)
+            None => EditPlan::new(&edits, &layer, &mut beside.others)
                 .map(|new| Arc::clone(plan.insert(Arc::new(new)))),
         };
         Some(planned.and_then(|plan| Ok(ToEdit { others: beside.at(&layer.info)?, layer, plan })))
@@ -103,7 +103,7 @@ pub fn edit<E: From<EditError> + Send>(
 struct ToEdit {
     layer: Layer,
     others: Vec<Option<Arc<Layer>>>,
-    plan: Arc<Plan>,
+    plan: Arc<EditPlan>,
 }
 
 impl Held for ToEdit {
@@ -114,14 +114,14 @@ impl Held for ToEdit {
 }
 
 /// The other stacks, at the height that has been reached.
-struct Beside<E> {
-    others: Vec<Other<E>>,
+struct AlignedStacks<E> {
+    others: Vec<AlignedStack<E>>,
     /// For each, the edit's number from 1, if it adds the whole stack.
     whole: Vec<Option<usize>>,
     last: Option<PageInfo>,
 }
 
-impl<E: From<EditError>> Beside<E> {
+impl<E: From<EditError>> AlignedStacks<E> {
     fn new(edits: &Edits, others: Vec<OtherLayers<E>>) -> Self {
         let named = (1..)
             .zip(&edits.list)
@@ -132,7 +132,7 @@ impl<E: From<EditError>> Beside<E> {
             let other = others.next().expect("there is a stack for each that is named");
             let whole = edit.adds_at_all_heights() && !other.may_reach_beyond;
             beside.whole.push(whole.then_some(number));
-            beside.others.push(Other::new(other, stack.by[2]));
+            beside.others.push(AlignedStack::new(other, stack.by[2]));
         }
         beside
     }
@@ -155,7 +155,7 @@ impl<E: From<EditError>> Beside<E> {
     /// Checks that stacks that are added have no layer that lies outside.
     fn check(
         &mut self,
-        outside: impl Fn(&mut Other<E>) -> Result<Option<String>, E>,
+        outside: impl Fn(&mut AlignedStack<E>) -> Result<Option<String>, E>,
         side: &str,
     ) -> Result<(), E> {
         for (other, number) in self.others.iter_mut().zip(&self.whole) {

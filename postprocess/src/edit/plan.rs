@@ -7,59 +7,59 @@ use std::sync::Arc;
 use lamp_stack::{Frame, Image, Layer, Mask, Op, PageInfo, Turn, gray_runs};
 use serde_json::json;
 
-use super::copies::Copy;
-use super::error::EditError;
-use super::forms::{Edit, Mirror, Span};
+use super::copies::BuildCopy;
+use super::edit_error::EditError;
 use super::frames::{cropped, frame_of, padded};
+use super::image_bounds::ImageBounds;
 use super::list::Edits;
-use super::others::{Other, middle};
-use super::page::{frame_page, turn_page};
-use super::place::Place;
-use super::shape::Shape;
+use super::other_stacks::{AlignedStack, middle};
+use super::page_changes::{frame_page, turn_page};
+use super::schema::{Edit, LengthRange, Mirror};
+use super::shape::EditShape;
 
 /// Images are at most so wide and high, in pixels, as the readers of stacks take.
 const LARGEST_SIDE: i64 = 1 << 26;
 
 /// What edits do to the layers of one stack.
-pub(super) struct Plan {
+pub(super) struct EditPlan {
     /// Where its layers lie.
-    place: Place,
-    steps: Vec<Step>,
+    place: ImageBounds,
+    steps: Vec<PlannedEdit>,
     /// What is told of the edits, for the first page.
     command: String,
 }
 
-enum Step {
+enum PlannedEdit {
     Shape {
-        reach: Reach,
+        reach: LayerSelection,
         op: Op,
-        shape: Shape,
+        shape: EditShape,
     },
     /// Another stack: what of its images lies in this one's.
     Other {
-        reach: Reach,
+        reach: LayerSelection,
         op: Op,
         frame: Frame,
     },
     Frame {
         frame: Frame,
-        place: Place,
+        place: ImageBounds,
     },
     Turn {
         turn: Turn,
         height: u32,
-        place: Place,
+        place: ImageBounds,
     },
 }
 
 /// The layers that an edit is for.
-enum Reach {
+enum LayerSelection {
     All,
-    Heights(Span),
+    Heights(LengthRange),
     Layers(Range<u32>),
 }
 
-impl Reach {
+impl LayerSelection {
     fn of(edit: &Edit) -> Self {
         match (edit.z, edit.layers) {
             (Some(span), _) => Self::Heights(span),
@@ -83,15 +83,16 @@ impl Reach {
     }
 }
 
-impl Plan {
+impl EditPlan {
     /// What `edits` do to a stack with that first layer. `others` are the stacks
     /// that they name.
     pub(super) fn new<E: From<EditError>>(
         edits: &Edits,
         first: &Layer,
-        others: &mut [Other<E>],
+        others: &mut [AlignedStack<E>],
     ) -> Result<Self, E> {
-        let mut plan = Self { place: Place::of(first), steps: Vec::new(), command: String::new() };
+        let mut plan =
+            Self { place: ImageBounds::of(first), steps: Vec::new(), command: String::new() };
         let (mut place, mut info) = (plan.place, first.info.clone());
         let (mut others, mut told) = (others.iter_mut(), edits.told.clone());
         for (number, (edit, told)) in (1..).zip(edits.list.iter().zip(&mut told)) {
@@ -103,12 +104,14 @@ impl Plan {
                     told["stack"]["file"] = origin_of(layer);
                     let frame = frame_of(layer, stack, &place, &info)
                         .map_err(|problem| EditError::edit(number, format!("{name} {problem}")))?;
-                    Step::Other { reach: Reach::of(edit), op: edit.op(), frame }
+                    PlannedEdit::Other { reach: LayerSelection::of(edit), op: edit.op(), frame }
                 }
-                None => Step::of(edit, number, &place, &info)?,
+                None => PlannedEdit::of(edit, number, &place, &info)?,
             };
             step.follow(&mut info)?;
-            if let Step::Frame { place: after, .. } | Step::Turn { place: after, .. } = step {
+            if let PlannedEdit::Frame { place: after, .. }
+            | PlannedEdit::Turn { place: after, .. } = step
+            {
                 place = after;
             }
             plan.steps.push(step);
@@ -124,13 +127,14 @@ impl Plan {
         layer: Layer,
         others: &[Option<Arc<Layer>>],
     ) -> Result<(Layer, Vec<usize>), EditError> {
-        if Place::of(&layer) != self.place {
+        if ImageBounds::of(&layer) != self.place {
             return Err(EditError::Unlike { layer: layer.info.name() });
         }
         let Layer { mut info, dpi, mut image } = layer;
         let (mut others, mut done) = (others.iter(), Vec::new());
         for (k, step) in self.steps.iter().enumerate() {
-            let other = if matches!(step, Step::Other { .. }) { others.next() } else { None };
+            let other =
+                if matches!(step, PlannedEdit::Other { .. }) { others.next() } else { None };
             let other = other.and_then(Option::as_deref);
             let too_many = || {
                 EditError::layer(
@@ -139,7 +143,9 @@ impl Plan {
                 )
             };
             let holds = match step {
-                Step::Shape { reach, .. } | Step::Other { reach, .. } => reach.holds(&info)?,
+                PlannedEdit::Shape { reach, .. } | PlannedEdit::Other { reach, .. } => {
+                    reach.holds(&info)?
+                }
                 _ => true,
             };
             if holds {
@@ -155,10 +161,15 @@ impl Plan {
     }
 }
 
-impl Step {
+impl PlannedEdit {
     /// What an edit that names no other stack does to a stack that lies at
     /// `place`, and whose first page is `info`.
-    fn of(edit: &Edit, number: usize, place: &Place, info: &PageInfo) -> Result<Self, EditError> {
+    fn of(
+        edit: &Edit,
+        number: usize,
+        place: &ImageBounds,
+        info: &PageInfo,
+    ) -> Result<Self, EditError> {
         let turned = |turn| Self::Turn { turn, height: place.height, place: place.turned(turn) };
         let framed = |frame: Frame| {
             if i64::from(frame.width.max(frame.height)) > LARGEST_SIDE {
@@ -181,11 +192,13 @@ impl Step {
         if let Some(crop) = edit.crop {
             return framed(cropped(crop, number, place)?);
         }
-        let copies = Copy::all(&edit.copies, info, place)?;
-        let shape = Shape::of(edit, number, place, copies)?;
-        let reach = match Reach::of(edit) {
+        let copies = BuildCopy::all(&edit.copies, info, place)?;
+        let shape = EditShape::of(edit, number, place, copies)?;
+        let reach = match LayerSelection::of(edit) {
             // Copies begin above the layers of mesh alone.
-            Reach::All if !edit.copies.is_none() => Reach::Layers(base_layers(info)..u32::MAX),
+            LayerSelection::All if !edit.copies.is_none() => {
+                LayerSelection::Layers(base_layers(info)..u32::MAX)
+            }
             reach => reach,
         };
         Ok(Self::Shape { reach, op: edit.op(), shape })
@@ -244,7 +257,8 @@ impl Edit {
 
     /// Whether all of another stack that is not black is to be in the result.
     pub(super) fn adds_at_all_heights(&self) -> bool {
-        matches!(Reach::of(self), Reach::All) && matches!(self.op(), Op::Union | Op::Xor)
+        matches!(LayerSelection::of(self), LayerSelection::All)
+            && matches!(self.op(), Op::Union | Op::Xor)
     }
 }
 

@@ -4,26 +4,26 @@ use std::borrow::Cow;
 
 use lamp_stack::{Length, Mask, PageInfo};
 
-use super::copies::{Copy, composed};
-use super::error::EditError;
+use super::copies::{BuildCopy, composed};
+use super::edit_error::EditError;
 use super::fill::{Point, disc, polygons};
-use super::forms::{Along, Block, Cylinder, Edit, Label, Line};
+use super::image_bounds::{ImageBounds, PixelMap};
 use super::letters::{numbered, outlines};
-use super::others::middle;
-use super::place::{Grid, Place};
+use super::other_stacks::middle;
+use super::schema::{Cylinder, CylinderAxis, Edit, Label, Rectangle, StraightLine};
 
 /// Letters' curves are off by at most so many pixels.
 const TOLERANCE: f64 = 1.0 / 64.0;
 
 /// A shape in the pixels of a stack.
-pub(super) enum Shape {
+pub(super) enum EditShape {
     /// One that is the same in each layer.
     Upright(Mask),
     /// A cylinder along x or y.
-    Lying { cylinder: Cylinder, copies: Vec<Copy>, place: Place },
+    Lying { cylinder: Cylinder, copies: Vec<BuildCopy>, place: ImageBounds },
 }
 
-impl Shape {
+impl EditShape {
     /// The shape that an edit names, in each of `copies`.
     ///
     /// # Errors
@@ -31,14 +31,14 @@ impl Shape {
     pub(super) fn of(
         edit: &Edit,
         number: usize,
-        place: &Place,
-        copies: Vec<Copy>,
+        place: &ImageBounds,
+        copies: Vec<BuildCopy>,
     ) -> Result<Self, EditError> {
         let wrong = |problem: String| EditError::edit(number, problem);
-        let grids: Vec<Grid> =
+        let grids: Vec<PixelMap> =
             copies.iter().map(|copy| copy.part.grid()).collect::<Result<_, _>>()?;
         let mask = if let Some(cylinder) = edit.cylinder {
-            if cylinder.along != Along::Z {
+            if cylinder.along != CylinderAxis::Z {
                 return Ok(Self::Lying { cylinder, copies, place: *place });
             }
             composed(&copies, place, |k, part| round(cylinder, grids[k], part))
@@ -91,7 +91,7 @@ impl Shape {
             )
         })?;
         let block = section(cylinder, middle);
-        let part = |_, part: &Place| {
+        let part = |_, part: &ImageBounds| {
             let corners = rectangle(block, part.grid().expect("it was found for each"));
             polygons(&[corners], part.width, part.height)
         };
@@ -100,29 +100,29 @@ impl Shape {
 }
 
 /// What a plane at a height cuts out of a cylinder that lies.
-fn section(cylinder: Cylinder, height: Length) -> Block {
+fn section(cylinder: Cylinder, height: Length) -> Rectangle {
     let [across, z] = cylinder.at.map(Length::um);
     let [radius, off] = [cylinder.diameter.um() / 2.0, height.um() - z];
     let half = (radius * radius - off * off).max(0.0).sqrt();
     let across = [across - half, across + half].map(Length::from_um);
     let between = cylinder.between.expect("one that lies has ends");
     match cylinder.along {
-        Along::X => Block { x: between, y: across },
-        _ => Block { x: across, y: between },
+        CylinderAxis::X => Rectangle { x: between, y: across },
+        _ => Rectangle { x: across, y: between },
     }
 }
 
-fn round(cylinder: Cylinder, grid: Grid, part: &Place) -> Mask {
+fn round(cylinder: Cylinder, grid: PixelMap, part: &ImageBounds) -> Mask {
     let centre = grid.to_pixels(cylinder.at.map(Length::mm));
     disc(centre, grid.length(cylinder.diameter) / 2.0, part.width, part.height)
 }
 
-fn rectangle(Block { x, y }: Block, grid: Grid) -> Vec<Point> {
+fn rectangle(Rectangle { x, y }: Rectangle, grid: PixelMap) -> Vec<Point> {
     let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
     corners.into_iter().map(|corner| grid.to_pixels(corner.map(Length::mm))).collect()
 }
 
-fn stroke(Line { from, to, width }: Line, grid: Grid) -> Vec<Point> {
+fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec<Point> {
     let [from, to] = [from, to].map(|end| end.map(Length::mm));
     let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
     let half = width.mm() / 2.0 / dx.hypot(dy);
@@ -132,7 +132,7 @@ fn stroke(Line { from, to, width }: Line, grid: Grid) -> Vec<Point> {
 }
 
 /// The outlines of a label at each of its places in the copy of that number.
-fn letters(label: &Label, part: &Place, copy: i64) -> Result<Vec<Vec<Point>>, String> {
+fn letters(label: &Label, part: &ImageBounds, copy: i64) -> Result<Vec<Vec<Point>>, String> {
     let grid = part.grid().map_err(|error| error.to_string())?;
     let mut lines: Vec<Vec<Point>> = Vec::new();
     let size = grid.length(label.height);

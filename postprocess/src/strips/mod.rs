@@ -25,7 +25,7 @@ use lamp_stack::{Frame, GrayMask, Image, Layer, gray_runs};
 use serde_json::json;
 use thiserror::Error;
 
-use crate::edit::{Place, frame_page};
+use crate::edit::{ImageBounds, frame_page};
 
 use index::INDEX;
 
@@ -122,7 +122,7 @@ impl Swaths {
         if start > 0 {
             let height = layer.image.height();
             let frame = Frame { left: start.into(), top: 0, width: self.mirrors, height };
-            frame_page(&mut info, frame, &Place::of(layer).framed(frame));
+            frame_page(&mut info, frame, &ImageBounds::of(layer).framed(frame));
         }
         let bits = if matches!(layer.image, Image::Mask(_)) { 1 } else { 8 };
         let strip =

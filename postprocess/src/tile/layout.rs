@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use lamp_stack::{Dpi, Image, Length, Mask, Size, Turn};
 
-use super::meet::common_pixel;
-use super::mesh::Mesh;
+use super::mesh::BuildMesh;
+use super::overlap::common_pixel;
 use super::pack::{self, Pack};
-use super::{CopyName, Part, Pixels, TileError};
+use super::{CopyName, PartStack, PixelSize, TileError};
 
 /// Build areas are at most so wide and high, in pixels, as the images that a
 /// stack's reader takes.
@@ -16,22 +16,22 @@ const LARGEST_SIDE: u32 = 1 << 26;
 /// Where copies of parts stand on a build area.
 #[derive(Clone, Debug)]
 pub struct Layout {
-    pub(super) parts: Vec<Part>,
-    pub(super) placements: Vec<Placement>,
+    pub(super) parts: Vec<PartStack>,
+    pub(super) placements: Vec<CopyPlacement>,
     pub(super) dpi: Dpi,
     pub(super) area: Size,
-    pub(super) pixels: Pixels,
+    pub(super) pixels: PixelSize,
     /// What made it, for the build's first page.
     pub(super) command: String,
     /// Whether the build's heights may be others than the parts'.
     pub(super) resampled: bool,
     /// What stands around the copies.
-    pub(super) mesh: Option<Mesh>,
+    pub(super) mesh: Option<BuildMesh>,
 }
 
 /// Where a copy stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Placement {
+pub struct CopyPlacement {
     /// Which part, from 0.
     pub part: usize,
     /// How it lies.
@@ -42,9 +42,9 @@ pub struct Placement {
     pub top: u32,
 }
 
-/// Where a copy is to stand: as a [`Placement`], perhaps off the area.
+/// Where a copy is to stand: as a [`CopyPlacement`], perhaps off the area.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wish {
+pub(super) struct RequestedPlacement {
     pub(super) part: usize,
     pub(super) turn: Turn,
     pub(super) left: i64,
@@ -63,7 +63,7 @@ impl Layout {
     /// # Panics
     /// If there are not as many counts as parts, or no part.
     pub fn packed(
-        parts: Vec<Part>,
+        parts: Vec<PartStack>,
         counts: &[Option<u32>],
         area: Size,
         gap: Length,
@@ -80,10 +80,14 @@ impl Layout {
     }
 
     /// Places copies where they are wished.
-    pub(super) fn placed(parts: Vec<Part>, wishes: &[Wish], area: Size) -> Result<Self, TileError> {
+    pub(super) fn placed(
+        parts: Vec<PartStack>,
+        wishes: &[RequestedPlacement],
+        area: Size,
+    ) -> Result<Self, TileError> {
         let mut layout = Self::empty(parts, area)?;
         for (index, wish) in wishes.iter().enumerate() {
-            let Wish { part, turn, left, top } = *wish;
+            let RequestedPlacement { part, turn, left, top } = *wish;
             let size = layout.parts[part].size(turn);
             let beyond = layout.beyond(wish, size);
             if beyond > 0 {
@@ -96,7 +100,12 @@ impl Layout {
                     area_mm: area,
                 });
             }
-            layout.placements.push(Placement { part, turn, left: left as u32, top: top as u32 });
+            layout.placements.push(CopyPlacement {
+                part,
+                turn,
+                left: left as u32,
+                top: top as u32,
+            });
         }
         layout.check_apart()?;
         layout.command = format!("tile --area {area} --layout");
@@ -104,7 +113,7 @@ impl Layout {
         Ok(layout)
     }
 
-    fn empty(parts: Vec<Part>, area: Size) -> Result<Self, TileError> {
+    fn empty(parts: Vec<PartStack>, area: Size) -> Result<Self, TileError> {
         let first = parts.first().expect("a build has a part");
         let dpi = first.dpi();
         if let Some(other) = parts.iter().find(|part| part.dpi() != dpi) {
@@ -115,8 +124,10 @@ impl Layout {
                 dpi: other.dpi(),
             });
         }
-        let pixels =
-            Pixels { width: whole_pixels(area.width, dpi), height: whole_pixels(area.height, dpi) };
+        let pixels = PixelSize {
+            width: whole_pixels(area.width, dpi),
+            height: whole_pixels(area.height, dpi),
+        };
         if pixels.width.max(pixels.height) > LARGEST_SIDE {
             return Err(TileError::AreaTooLarge { area_mm: area });
         }
@@ -133,12 +144,12 @@ impl Layout {
     }
 
     /// The parts, in the order of their stacks.
-    pub fn parts(&self) -> &[Part] {
+    pub fn parts(&self) -> &[PartStack] {
         &self.parts
     }
 
     /// The copies.
-    pub fn placements(&self) -> &[Placement] {
+    pub fn placements(&self) -> &[CopyPlacement] {
         &self.placements
     }
 
@@ -158,7 +169,7 @@ impl Layout {
     }
 
     /// The build's images.
-    pub fn pixels(&self) -> Pixels {
+    pub fn pixels(&self) -> PixelSize {
         self.pixels
     }
 
@@ -174,7 +185,7 @@ impl Layout {
     /// What each way of laying a part down looks like.
     pub fn silhouettes(&self) -> HashMap<(usize, Turn), Mask> {
         let mut all = HashMap::new();
-        for &Placement { part, turn, .. } in &self.placements {
+        for &CopyPlacement { part, turn, .. } in &self.placements {
             all.entry((part, turn)).or_insert_with(|| self.parts[part].silhouette(turn));
         }
         all
@@ -185,7 +196,7 @@ impl Layout {
     }
 
     /// By how many pixels a copy reaches beyond the area.
-    fn beyond(&self, wish: &Wish, size: Pixels) -> i64 {
+    fn beyond(&self, wish: &RequestedPlacement, size: PixelSize) -> i64 {
         let right = wish.left + i64::from(size.width) - i64::from(self.pixels.width);
         let bottom = wish.top + i64::from(size.height) - i64::from(self.pixels.height);
         right.max(bottom).max(-wish.left).max(-wish.top)
@@ -194,8 +205,8 @@ impl Layout {
     /// Checks that no two copies lie on each other, from the top to the bottom.
     fn check_apart(&self) -> Result<(), TileError> {
         let silhouettes = self.silhouettes();
-        let silhouette = |at: &Placement| &silhouettes[&(at.part, at.turn)];
-        let bottom = |at: &Placement| at.top + silhouette(at).height();
+        let silhouette = |at: &CopyPlacement| &silhouettes[&(at.part, at.turn)];
+        let bottom = |at: &CopyPlacement| at.top + silhouette(at).height();
         let mut order: Vec<usize> = (0..self.placements.len()).collect();
         order.sort_by_key(|&k| self.placements[k].top);
         let mut above: Vec<usize> = Vec::new();
@@ -242,7 +253,7 @@ impl Layout {
     }
 }
 
-impl Pixels {
+impl PixelSize {
     /// The size of an image.
     pub fn of(image: &Image) -> Self {
         Self { width: image.width(), height: image.height() }
@@ -262,25 +273,27 @@ mod tests {
     use super::*;
 
     /// At 25.4 dpi, one pixel is one millimetre.
-    fn part(outline: bool) -> Part {
+    fn part(outline: bool) -> PartStack {
         let image =
             Image::Mask(mask_of(&["........", ".##.....", ".##.....", ".####...", "........"]));
         let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image };
         if outline {
-            Part::of_outline("l.tif", std::iter::once(Ok::<_, TileError>(layer))).unwrap().unwrap()
+            PartStack::of_outline("l.tif", std::iter::once(Ok::<_, TileError>(layer)))
+                .unwrap()
+                .unwrap()
         } else {
-            Part::of_image("l.tif", &layer).unwrap()
+            PartStack::of_image("l.tif", &layer).unwrap()
         }
     }
 
     fn placed(outline: bool, wishes: &[(i64, i64, &str)]) -> Result<Layout, TileError> {
-        let wish = |&(left, top, turn): &(i64, i64, &str)| Wish {
+        let wish = |&(left, top, turn): &(i64, i64, &str)| RequestedPlacement {
             part: 0,
             turn: turn.parse().unwrap(),
             left,
             top,
         };
-        let wishes: Vec<Wish> = wishes.iter().map(wish).collect();
+        let wishes: Vec<RequestedPlacement> = wishes.iter().map(wish).collect();
         Layout::placed(vec![part(outline)], &wishes, "10x10mm".parse().unwrap())
     }
 

@@ -2,44 +2,44 @@
 //!
 //! Source: 002 section 2.4.2.
 //!
-//! A [`Part`] is what is known of a stack before it is placed, a [`Layout`]
+//! A [`PartStack`] is what is known of a stack before it is placed, a [`Layout`]
 //! where copies stand: found by [`Layout::packed`], or read from a
 //! [`LayoutFile`]. [`Layout::build`] reads the stacks in step, by height, and
 //! makes of their layers the build's. A layer is turned once for each way it
 //! lies, and a build's row is a merge of shifted rows.
 
-mod error;
-mod file;
-mod heights;
+mod build_page;
+mod compose;
 mod layout;
-mod meet;
+mod layout_file;
+mod lockstep;
 mod mesh;
+mod overlap;
 mod pack;
-mod page;
-mod part;
-mod rows;
+mod part_stack;
 #[cfg(test)]
 mod testing;
+mod tile_error;
 #[cfg(test)]
-mod tests;
+mod tile_tests;
 
 use std::borrow::Cow;
 use std::collections::HashMap;
 
 use lamp_stack::{Image, Layer, Length, Mask, Op, Size, Turn, map_in_order};
 
-use heights::{Step, Steps};
-use mesh::{Mesh, on_base};
-use rows::{Fault, Placed};
+use compose::{ComposeError, PlacedImage};
+use lockstep::{LayerSet, Lockstep};
+use mesh::{BuildMesh, on_base};
 
-pub use error::{CopyName, TileError};
-pub use file::{LayoutError, LayoutFile};
-pub use heights::Heights;
-pub use layout::{Layout, Placement};
-pub use mesh::{CellShape, MeshOptions, Moat, Pattern};
+pub use build_page::StrayRows;
+pub use layout::{CopyPlacement, Layout};
+pub use layout_file::{LayoutError, LayoutFile};
+pub use lockstep::HeightOptions;
+pub use mesh::{CellShape, MeshOptions, MeshPattern, Moat};
 pub use pack::{Pack, PackBy, Turns};
-pub use page::StrayRows;
-pub use part::Part;
+pub use part_stack::PartStack;
+pub use tile_error::{CopyName, TileError};
 
 /// How a part is laid out.
 #[derive(Clone, Copy, Debug)]
@@ -63,21 +63,21 @@ impl Default for TileOptions {
 
 /// A width and a height in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pixels {
+pub struct PixelSize {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
 }
 
-impl Pixels {
+impl PixelSize {
     /// Larger on every side.
     fn grown(self, by: u32) -> Self {
         Self { width: self.width + 2 * by, height: self.height + 2 * by }
     }
 }
 
-impl std::fmt::Display for Pixels {
+impl std::fmt::Display for PixelSize {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} x {}", self.width, self.height)
     }
@@ -111,13 +111,13 @@ fn layers_behind<'a, E: From<TileError> + Send + 'a>(
     layers: impl Iterator<Item = Result<Layer, E>> + 'a,
 ) -> impl Iterator<Item = Result<Layer, E>> + 'a {
     let all = std::iter::once(Ok(first)).chain(layers);
-    layout.build(vec![all], Heights::default(), |_| {})
+    layout.build(vec![all], HeightOptions::default(), |_| {})
 }
 
 impl TileOptions {
     /// Where copies of a part stand.
     fn layout(&self, first: &Layer) -> Result<Layout, TileError> {
-        let part = Part::of_image("the stack", first)?;
+        let part = PartStack::of_image("the stack", first)?;
         Layout::packed(vec![part], &[self.copies], self.area, self.gap, Pack::default())
     }
 }
@@ -131,7 +131,7 @@ impl Layout {
     pub fn build<E, S>(
         mut self,
         stacks: Vec<S>,
-        heights: Heights,
+        heights: HeightOptions,
         mut stray: impl FnMut(&StrayRows),
     ) -> impl Iterator<Item = Result<Layer, E>>
     where
@@ -143,9 +143,9 @@ impl Layout {
         let copies = (0..stacks.len()).map(|part| self.copies_of(part)).collect();
         let names: Vec<String> = self.parts.iter().map(|part| part.name().to_owned()).collect();
         let mesh = self.mesh.clone();
-        let mesh_bytes = mesh.as_ref().map_or(0, Mesh::bytes);
-        let steps = Steps::new(names.into_iter().zip(stacks), copies, heights, mesh_bytes);
-        let layers = map_in_order(steps, move |step: Step| {
+        let mesh_bytes = mesh.as_ref().map_or(0, BuildMesh::bytes);
+        let steps = Lockstep::new(names.into_iter().zip(stacks), copies, heights, mesh_bytes);
+        let layers = map_in_order(steps, move |step: LayerSet| {
             let layer =
                 Layer { info: self.page(&step)?, dpi: Some(self.dpi), image: self.image(&step)? };
             Ok((layer, self.stray_rows(&step)))
@@ -159,21 +159,22 @@ impl Layout {
     }
 
     /// The build's image: the parts, and the mesh around them.
-    fn image(&self, step: &Step) -> Result<Image, TileError> {
+    fn image(&self, step: &LayerSet) -> Result<Image, TileError> {
         let layers =
             self.layers_of(step).map(|(part, known, layer)| Ok((part, known.framed(layer)?)));
         let layers: Vec<(usize, Image)> = layers.collect::<Result<_, TileError>>()?;
         let layer = || step.some_layer().info.name();
         let too_many = || TileError::TooManyRuns { copies: self.placements.len(), layer: layer() };
         let turned = self.turned(&layers).ok_or_else(too_many)?;
-        let parts = rows::compose(&placed(&turned), self.pixels).map_err(|fault| match fault {
-            Fault::TooManyRuns => too_many(),
-            // Outlines were apart, so that a layer is not within its own.
-            Fault::Overlap => {
-                let name = self.parts[layers[0].0].name().to_owned();
-                TileError::Changed { name, layer: layer() }
-            }
-        })?;
+        let parts =
+            compose::compose(&placed(&turned), self.pixels).map_err(|fault| match fault {
+                ComposeError::TooManyRuns => too_many(),
+                // Outlines were apart, so that a layer is not within its own.
+                ComposeError::Overlap => {
+                    let name = self.parts[layers[0].0].name().to_owned();
+                    TileError::Changed { name, layer: layer() }
+                }
+            })?;
         let Some(mesh) = &self.mesh else { return Ok(parts) };
         let moats = match &mesh.fixed_moats {
             Some(moats) => Cow::Borrowed(moats),
@@ -190,19 +191,19 @@ impl Layout {
     }
 
     /// The moats around images of parts; `None` where these have too many runs.
-    fn moats(&self, mesh: &Mesh, images: &[(usize, Image)]) -> Option<Mask> {
+    fn moats(&self, mesh: &BuildMesh, images: &[(usize, Image)]) -> Option<Mask> {
         let moat = |(part, image): &(usize, Image)| (*part, Image::Mask(mesh.moat(image)));
         let moats = self.turned(&images.iter().map(moat).collect::<Vec<_>>())?;
-        rows::united(&placed(&moats), self.pixels.grown(mesh.reach())).ok()
+        compose::united(&placed(&moats), self.pixels.grown(mesh.reach())).ok()
     }
 
     /// Images of parts in each way in which copies lie, and where these stand; `None`
     /// where one has too many runs.
-    fn turned(&self, images: &[(usize, Image)]) -> Option<Vec<Turned>> {
+    fn turned(&self, images: &[(usize, Image)]) -> Option<Vec<OrientedImage>> {
         let mut turned = Vec::new();
         for (part, image) in images {
             for (turn, at) in self.places_by_turn(*part) {
-                turned.push(Turned { image: image.turned(turn)?, at });
+                turned.push(OrientedImage { image: image.turned(turn)?, at });
             }
         }
         Some(turned)
@@ -220,11 +221,11 @@ impl Layout {
 }
 
 /// An image, and the left columns and top rows of its copies.
-struct Turned {
+struct OrientedImage {
     image: Image,
     at: Vec<(u32, u32)>,
 }
 
-fn placed(images: &[Turned]) -> Vec<Placed<'_>> {
-    images.iter().map(|Turned { image, at }| Placed { image, at }).collect()
+fn placed(images: &[OrientedImage]) -> Vec<PlacedImage<'_>> {
+    images.iter().map(|OrientedImage { image, at }| PlacedImage { image, at }).collect()
 }

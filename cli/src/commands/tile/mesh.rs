@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use lamp_grayscale::{Method, dither_image};
-use lamp_postprocess::{CellShape, MeshOptions, Moat, Pattern};
+use lamp_postprocess::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_stack::{Image, Length, StackError};
 
 use crate::options::{parse_distance, parse_thickness};
@@ -108,9 +108,9 @@ impl MeshArgs {
         };
         let plain = MeshOptions::default();
         let pattern = match (shape, plain.pattern) {
-            (Some(shape), Pattern::Cells { cell, wall, .. }) => {
+            (Some(shape), MeshPattern::Cells { cell, wall, .. }) => {
                 let (cell, wall) = (self.cell.unwrap_or(cell), self.wall.unwrap_or(wall));
-                Pattern::Cells { shape, cell, wall }
+                MeshPattern::Cells { shape, cell, wall }
             }
             _ => template(&self.mesh)?,
         };
@@ -126,7 +126,7 @@ impl MeshArgs {
 }
 
 /// The first image of a file; of a gray one, what is at least half as bright as white.
-fn template(path: &Path) -> Result<Pattern, Stop> {
+fn template(path: &Path) -> Result<MeshPattern, Stop> {
     let place = input_name(path);
     let first = layers_of(open_pages(path)?, &place, None).next();
     let layer = first.unwrap_or_else(|| Err(failed_at(place.clone(), StackError::NoLayers)))?;
@@ -137,5 +137,5 @@ fn template(path: &Path) -> Result<Pattern, Stop> {
     };
     // Without blanks, as the stack's commands are words.
     let name = path.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_");
-    Ok(Pattern::Image { name, image })
+    Ok(MeshPattern::Image { name, image })
 }

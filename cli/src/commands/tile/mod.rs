@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use lamp_postprocess::{
-    Heights, Layout, LayoutFile, MeshOptions, Pack, PackBy, Part, StrayRows, TileOptions, Turns,
+    HeightOptions, Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, StrayRows,
+    TileOptions, Turns,
 };
 use lamp_stack::{Length, Size};
 
@@ -157,7 +158,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     let file = args.layout.as_deref().map(read_layout).transpose()?;
     let mut stacks = Stack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
     let needs_outlines = args.fit || args.pack == PackArg::Outline || args.mesh.needs_outlines();
-    let parts: Vec<Part> =
+    let parts: Vec<PartStack> =
         stacks.iter_mut().map(|stack| stack.part(needs_outlines)).collect::<Result<_, _>>()?;
     let plain = TileOptions::default();
     let machine_area = machine.map(|machine| machine.area.value);
@@ -185,7 +186,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
         .max()
         .inspect(|&layers| report.expect(u64::from(layers) + u64::from(base_layers)));
     let layers = stacks.into_iter().map(Stack::layers).collect::<Result<Vec<_>, _>>()?;
-    let heights = Heights { settle: args.settle, resample: args.resample };
+    let heights = HeightOptions { settle: args.settle, resample: args.resample };
     let build = layout.build(layers, heights, |stray| say_stray(&report, stray));
     strips::write(build, strips, output.as_ref(), &report)?;
     args.tell(&placed)
@@ -274,7 +275,7 @@ fn read_layout(path: &Path) -> Result<LayoutFile, Stop> {
 
 fn place(
     file: &LayoutFile,
-    parts: Vec<Part>,
+    parts: Vec<PartStack>,
     area: Size,
     path: Option<&Path>,
 ) -> Result<Layout, Stop> {

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use lamp_postprocess::Part;
+use lamp_postprocess::PartStack;
 use lamp_postprocess::machine::Machine;
 use lamp_stack::{Layer, Pages, StackError};
 
@@ -91,7 +91,7 @@ impl Stack {
 
     /// Reads what must be known to place the part: its first layer, or all of
     /// them to find its outline.
-    pub(super) fn part(&mut self, outline: bool) -> Result<Part, Stop> {
+    pub(super) fn part(&mut self, outline: bool) -> Result<PartStack, Stop> {
         let no_layers = failed_at(self.name.clone(), StackError::NoLayers);
         if outline {
             if is_stream(&self.path) {
@@ -103,13 +103,13 @@ impl Stack {
                     count = count.or(count_of(layer));
                 }
             });
-            let part = Part::of_outline::<Stop>(&self.name, layers)?.ok_or(no_layers);
+            let part = PartStack::of_outline::<Stop>(&self.name, layers)?.ok_or(no_layers);
             self.layer_count = count;
             return part;
         }
         let mut layers = self.read()?;
         let first = layers.next().unwrap_or(Err(no_layers))?;
-        let part = Part::of_image(&self.name, &first)?;
+        let part = PartStack::of_image(&self.name, &first)?;
         self.layer_count = count_of(&first);
         self.layers = Some(Box::new(std::iter::once(Ok(first)).chain(layers)));
         Ok(part)

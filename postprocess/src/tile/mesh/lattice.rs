@@ -2,6 +2,8 @@
 
 use lamp_stack::Mask;
 
+use super::CellShape;
+
 /// What stands in the empty places of a build. All lengths are in pixels, from the
 /// build's top left corner.
 #[derive(Clone, Debug)]
@@ -15,19 +17,12 @@ pub(in crate::tile) enum Lattice {
 /// Holes between walls, in rows that repeat.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::tile) struct Cells {
-    shape: Shape,
+    shape: CellShape,
     /// From the middle of a hole to that of the next in its row.
     pitch: f64,
     /// From the middle of a wall to the middle of a hole, less half a wall: how far
     /// a hole reaches to the left and to the right.
     reach: f64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Shape {
-    Square,
-    /// With a corner up, and a wall at the left and at the right.
-    Hexagon,
 }
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
@@ -36,12 +31,12 @@ impl Cells {
     /// Square cells, so far apart from middle to middle, with walls of a thickness
     /// between them.
     pub(in crate::tile) fn square(pitch: f64, wall: f64) -> Self {
-        Self { shape: Shape::Square, pitch, reach: 0.5 * (pitch - wall) }
+        Self { shape: CellShape::Square, pitch, reach: 0.5 * (pitch - wall) }
     }
 
     /// Hexagonal cells.
     pub(in crate::tile) fn hexagon(pitch: f64, wall: f64) -> Self {
-        Self { shape: Shape::Hexagon, pitch, reach: 0.5 * (pitch - wall) }
+        Self { shape: CellShape::Hexagon, pitch, reach: 0.5 * (pitch - wall) }
     }
 
     /// The holes that a line across meets: for the first and for the second of two
@@ -49,12 +44,12 @@ impl Cells {
     fn holes(&self, y: f64) -> [(f64, f64); 2] {
         let Self { shape, pitch, reach } = *self;
         match shape {
-            Shape::Square => {
+            CellShape::Square => {
                 let across = (y / pitch).rem_euclid(1.0) - 0.5;
                 let is_met = (across * pitch).abs() < reach;
                 [(0.5 * pitch, if is_met { reach } else { 0.0 }), (pitch, 0.0)]
             }
-            Shape::Hexagon => {
+            CellShape::Hexagon => {
                 // Rows of holes stand half a cell aside of each other.
                 let row_pitch = 0.5 * SQRT_3 * pitch;
                 let row = (y / row_pitch).floor();
@@ -147,15 +142,15 @@ mod tests {
 
     /// How far a point is from the nearest wall's middle: what is on a wall is less
     /// than half the wall from it.
-    fn from_wall(shape: Shape, pitch: f64, [x, y]: [f64; 2]) -> f64 {
+    fn from_wall(shape: CellShape, pitch: f64, [x, y]: [f64; 2]) -> f64 {
         // The cell of a point is that of the nearest middle.
         let around = |place: f64| (place / pitch) as i32 - 2..(place / pitch * 1.2) as i32 + 4;
         let middles = around(y).flat_map(|row| around(x).map(move |column| (column, row)));
         let middles = middles.map(|(column, row)| {
             let (column, row) = (f64::from(column), f64::from(row));
             match shape {
-                Shape::Square => [(column + 0.5) * pitch, (row + 0.5) * pitch],
-                Shape::Hexagon => {
+                CellShape::Square => [(column + 0.5) * pitch, (row + 0.5) * pitch],
+                CellShape::Hexagon => {
                     let aside = if row.rem_euclid(2.0) == 0.0 { 0.5 } else { 1.0 };
                     [(column + aside) * pitch, (row + 0.5) * pitch * SQRT_3 / 2.0]
                 }
@@ -179,8 +174,8 @@ mod tests {
     fn walls_are_half_way_between_the_middles_of_cells() {
         for (pitch, wall) in [(17.3, 4.1), (9.0, 1.0), (30.0, 0.4), (11.7, 8.0)] {
             for (shape, cells) in [
-                (Shape::Square, Cells::square(pitch, wall)),
-                (Shape::Hexagon, Cells::hexagon(pitch, wall)),
+                (CellShape::Square, Cells::square(pitch, wall)),
+                (CellShape::Hexagon, Cells::hexagon(pitch, wall)),
             ] {
                 let mask = drawn(&Lattice::Cells(cells), 150, 110);
                 for row in 0..110 {

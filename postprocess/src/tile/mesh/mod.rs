@@ -8,34 +8,34 @@
 //! first layers are mesh alone: what the parts stand on, and break from (section
 //! 1.1.3).
 
-mod base;
-mod breaks;
+mod base_layers;
+mod break_lines;
 mod lattice;
-mod options;
+mod mesh_options;
 #[cfg(test)]
-mod tests;
+mod mesh_tests;
 
 use lamp_stack::{Frame, Image, Length, Mask, MaskBuilder, Op, place_row};
 
-use self::breaks::{Breaks, Rect};
+use self::break_lines::{BreakLines, Rect};
 use self::lattice::{Lattice, toggle};
-use super::part::white_of;
-use super::{Layout, Part, Pixels, TileError};
+use super::part_stack::white_of;
+use super::{Layout, PartStack, PixelSize, TileError};
 use crate::offset::{offset_one_bit, without_holes};
 
-pub(super) use base::on_base;
-pub use options::{CellShape, MeshOptions, Moat, Pattern};
+pub(super) use base_layers::on_base;
+pub use mesh_options::{CellShape, MeshOptions, MeshPattern, Moat};
 
 /// The mesh of a layout, in pixels.
 #[derive(Clone, Debug)]
-pub(super) struct Mesh {
+pub(super) struct BuildMesh {
     lattice: Lattice,
-    breaks: Breaks,
+    breaks: BreakLines,
     clearance: f64,
     /// The moats around outlines, which are the same in all layers.
     pub(super) fixed_moats: Option<Mask>,
     pub(super) base_layers: u32,
-    build: Pixels,
+    build: PixelSize,
     /// How many changes of colour its rows have together, about.
     changes: usize,
 }
@@ -55,14 +55,14 @@ impl Layout {
         let lattice = options.lattice(self.dpi, self.pixels)?;
         let whole = |length| (pixels(length).round().min(f64::from(longest))) as u32;
         let breaks = match whole(options.break_width) {
-            0 => Breaks::default(),
+            0 => BreakLines::default(),
             width => {
                 let area = [self.pixels.width, self.pixels.height];
-                Breaks::new(&self.places(clearance), area, width, whole(options.break_pitch))
+                BreakLines::new(&self.places(clearance), area, width, whole(options.break_pitch))
                     .ok_or(TileError::ManyBreaks)?
             }
         };
-        let mut mesh = Mesh {
+        let mut mesh = BuildMesh {
             lattice,
             breaks,
             clearance,
@@ -73,7 +73,7 @@ impl Layout {
         };
         mesh.changes = mesh.count_changes();
         if options.moat == Moat::Outline {
-            let outline = |(index, part): (usize, &Part)| match part.outline() {
+            let outline = |(index, part): (usize, &PartStack)| match part.outline() {
                 Some(outline) => Ok((index, Image::Mask(outline.clone()))),
                 None => Err(TileError::NoOutline { name: part.name().to_owned() }),
             };
@@ -89,8 +89,8 @@ impl Layout {
     /// The places of the copies, with what stays free around them.
     fn places(&self, clearance: f64) -> Vec<Rect> {
         let free = clearance.ceil() as u32;
-        let place = |at: &super::Placement| {
-            let Pixels { width, height } = self.parts[at.part].size(at.turn);
+        let place = |at: &super::CopyPlacement| {
+            let PixelSize { width, height } = self.parts[at.part].size(at.turn);
             Rect {
                 left: at.left.saturating_sub(free),
                 top: at.top.saturating_sub(free),
@@ -102,7 +102,7 @@ impl Layout {
     }
 }
 
-impl Mesh {
+impl BuildMesh {
     /// How many bytes its image takes, about.
     pub(super) fn bytes(&self) -> usize {
         (self.changes + self.build.height as usize) * size_of::<u32>()
@@ -144,7 +144,7 @@ impl Mesh {
     /// moats hold the parts, and are on a build that is larger by the
     /// [`reach`](Self::reach) on every side.
     pub(super) fn around(&self, parts: &Mask, moats: &Mask) -> Mask {
-        let Pixels { width, height } = self.build;
+        let PixelSize { width, height } = self.build;
         let reach = self.reach();
         let mut mask = MaskBuilder::new(width);
         mask.reserve(height as usize, self.changes + parts.transition_count());
@@ -164,7 +164,7 @@ impl Mesh {
 
     /// The mesh alone.
     fn whole(&self) -> Mask {
-        let Pixels { width, height } = self.build;
+        let PixelSize { width, height } = self.build;
         let mut mask = MaskBuilder::new(width);
         mask.reserve(height as usize, self.changes);
         let mut row = Vec::new();

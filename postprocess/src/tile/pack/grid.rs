@@ -2,11 +2,11 @@
 
 use lamp_stack::Turn;
 
-use super::super::{Layout, Placement};
+use super::super::{CopyPlacement, Layout};
 
 /// Places up to so many copies of the one part in rows from the top left, the
 /// whole centred.
-pub(super) fn grid(layout: &Layout, turn: Turn, wanted: u32, gap: u32) -> Vec<Placement> {
+pub(super) fn grid(layout: &Layout, turn: Turn, wanted: u32, gap: u32) -> Vec<CopyPlacement> {
     let (part, area) = (layout.parts()[0].size(turn), layout.pixels());
     let (Some(columns), Some(rows)) =
         (most(area.width, part.width, gap), most(area.height, part.height, gap))
@@ -18,7 +18,9 @@ pub(super) fn grid(layout: &Layout, turn: Turn, wanted: u32, gap: u32) -> Vec<Pl
     let lefts = positions(area.width, part.width, gap, columns);
     let tops = positions(area.height, part.height, gap, copies.div_ceil(columns));
     let all = tops.flat_map(|top| lefts.clone().map(move |left| (left, top)));
-    all.map(|(left, top)| Placement { part: 0, turn, left, top }).take(copies as usize).collect()
+    all.map(|(left, top)| CopyPlacement { part: 0, turn, left, top })
+        .take(copies as usize)
+        .collect()
 }
 
 /// How many parts stand along a side; `None` where not one does.

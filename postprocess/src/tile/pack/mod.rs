@@ -4,15 +4,15 @@
 //! outlines, each without turning parts before turning them. A later way is
 //! taken only if it places more copies.
 
-mod free;
+mod greedy;
 mod grid;
-mod shapes;
+mod no_fit;
 
 use lamp_stack::Turn;
 
-use super::{Layout, Placement, TileError};
-use free::Order;
-use shapes::Shapes;
+use super::{CopyPlacement, Layout, TileError};
+use greedy::PlacingRule;
+use no_fit::NoFitRegions;
 
 /// How places are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,24 +72,33 @@ impl Pack {
     }
 
     /// The ways to try, each with the turns that it may use.
-    fn ways(self, alone: bool) -> Vec<Way> {
+    fn ways(self, alone: bool) -> Vec<Strategy> {
         let mut ways = Vec::new();
         let quarters = self.turns == Turns::Quarters;
         if alone {
             ways.extend(
-                [Some(Way::Grid(0)), quarters.then_some(Way::Grid(1))].into_iter().flatten(),
+                [Some(Strategy::Grid(0)), quarters.then_some(Strategy::Grid(1))]
+                    .into_iter()
+                    .flatten(),
             );
         } else {
-            ways.extend(Order::ALL.map(|order| Way::Free(PackBy::Boxes, Turns::None, order)));
+            ways.extend(
+                PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Boxes, Turns::None, order)),
+            );
         }
         if quarters {
-            ways.extend(Order::ALL.map(|order| Way::Free(PackBy::Boxes, Turns::Quarters, order)));
+            ways.extend(
+                PlacingRule::ALL
+                    .map(|order| Strategy::Greedy(PackBy::Boxes, Turns::Quarters, order)),
+            );
         }
         if self.by == PackBy::Outlines {
             let turns = [Turns::None, Turns::Half, Turns::Quarters].into_iter();
             let allowed = turns.filter(|turns| turns.all().len() <= self.turns.all().len());
             for turns in allowed {
-                ways.extend(Order::ALL.map(|order| Way::Free(PackBy::Outlines, turns, order)));
+                ways.extend(
+                    PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Outlines, turns, order)),
+                );
             }
         }
         ways
@@ -98,17 +107,17 @@ impl Pack {
 
 /// One way to find places.
 #[derive(Clone, Copy, Debug)]
-enum Way {
+enum Strategy {
     /// All copies of the one part in rows and columns, turned by so many right
     /// angles.
     Grid(u32),
     /// Copy by copy, where there is room.
-    Free(PackBy, Turns, Order),
+    Greedy(PackBy, Turns, PlacingRule),
 }
 
 /// More copies than anyone builds: of a part of a pixel, that is how many are
 /// as many as fit.
-const MOST: u32 = 1 << 20;
+const MAX_COPIES: u32 = 1 << 20;
 
 /// Finds places for all copies, or says how many found one.
 pub(super) fn pack(
@@ -116,7 +125,7 @@ pub(super) fn pack(
     counts: &[Option<u32>],
     gap: u32,
     how: Pack,
-) -> Result<Vec<Placement>, TileError> {
+) -> Result<Vec<CopyPlacement>, TileError> {
     let alone = counts.len() == 1;
     for part in 0..counts.len() {
         check_fits(layout, part, how.turns)?;
@@ -124,18 +133,21 @@ pub(super) fn pack(
     // As many as fit is more than all.
     let wanted: Vec<u32> = counts
         .iter()
-        .map(|count| count.unwrap_or(if alone { u32::MAX } else { 1 }).min(MOST))
+        .map(|count| count.unwrap_or(if alone { u32::MAX } else { 1 }).min(MAX_COPIES))
         .collect();
     let all = wanted.iter().map(|&count| count as usize).fold(0, usize::saturating_add);
-    let mut best: Vec<Placement> = Vec::new();
-    let mut shapes: Option<Shapes> = None;
+    let mut best: Vec<CopyPlacement> = Vec::new();
+    let mut shapes: Option<NoFitRegions> = None;
     for way in how.ways(alone) {
         let found = match way {
-            Way::Grid(quarters) => grid::grid(layout, Turn::new(quarters, false), wanted[0], gap),
-            Way::Free(by, turns, order) => {
+            Strategy::Grid(quarters) => {
+                grid::grid(layout, Turn::new(quarters, false), wanted[0], gap)
+            }
+            Strategy::Greedy(by, turns, order) => {
                 let current = shapes.take().filter(|shapes| shapes.are_by(by));
-                let shapes = shapes.insert(current.unwrap_or_else(|| Shapes::new(layout, gap, by)));
-                free::place(layout, shapes, &wanted, turns, order)
+                let shapes =
+                    shapes.insert(current.unwrap_or_else(|| NoFitRegions::new(layout, gap, by)));
+                greedy::place(layout, shapes, &wanted, turns, order)
             }
         };
         if found.len() > best.len() {
@@ -176,4 +188,4 @@ fn check_fits(layout: &Layout, part: usize, turns: Turns) -> Result<(), TileErro
 }
 
 #[cfg(test)]
-mod tests;
+mod pack_tests;

@@ -4,20 +4,20 @@ use std::collections::HashMap;
 
 use lamp_stack::Turn;
 
-use super::super::{Layout, Pixels, Placement};
+use super::super::{CopyPlacement, Layout, PixelSize};
 use super::Turns;
-use super::shapes::{NoFit, Run, Shapes};
+use super::no_fit::{CellRun, NoFitRegion, NoFitRegions};
 
 /// Which place is taken of those that are free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Order {
+pub(super) enum PlacingRule {
     /// The one nearest to the top.
     Top,
     /// The one whose copy ends nearest to the top.
     Bottom,
 }
 
-impl Order {
+impl PlacingRule {
     pub(super) const ALL: [Self; 2] = [Self::Top, Self::Bottom];
 }
 
@@ -25,14 +25,14 @@ impl Order {
 /// left; then moves the whole to the middle.
 pub(super) fn place(
     layout: &Layout,
-    shapes: &mut Shapes,
+    shapes: &mut NoFitRegions,
     wanted: &[u32],
     turns: Turns,
-    order: Order,
-) -> Vec<Placement> {
-    let mut free = Free { layout, shapes, taken: HashMap::new(), placements: Vec::new() };
+    order: PlacingRule,
+) -> Vec<CopyPlacement> {
+    let mut free = FreeRoom { layout, shapes, taken: HashMap::new(), placements: Vec::new() };
     let area = |part: &usize| {
-        let Pixels { width, height } = layout.parts()[*part].size(Turn::default());
+        let PixelSize { width, height } = layout.parts()[*part].size(Turn::default());
         std::cmp::Reverse(u64::from(width) * u64::from(height))
     };
     let mut parts: Vec<usize> = (0..wanted.len()).collect();
@@ -53,18 +53,18 @@ pub(super) fn place(
 }
 
 /// The room that is left on an area.
-struct Free<'a> {
+struct FreeRoom<'a> {
     layout: &'a Layout,
-    shapes: &'a mut Shapes,
+    shapes: &'a mut NoFitRegions,
     /// Of each way a part may lie, the places that are taken.
-    taken: HashMap<(usize, Turn), Taken>,
-    placements: Vec<Placement>,
+    taken: HashMap<(usize, Turn), TakenPlaces>,
+    placements: Vec<CopyPlacement>,
 }
 
 /// The places, in cells, where a shape may not begin.
-struct Taken {
+struct TakenPlaces {
     /// For each row, runs of columns apart from each other, from the left.
-    rows: Vec<Vec<Run>>,
+    rows: Vec<Vec<CellRun>>,
     /// How many columns there are.
     columns: i32,
     /// All rows above this one are taken.
@@ -73,17 +73,17 @@ struct Taken {
     known: usize,
 }
 
-impl Free<'_> {
+impl FreeRoom<'_> {
     /// Finds a place for one more copy, if there is one.
-    fn place(&mut self, part: usize, ways: &[Turn], order: Order) -> bool {
+    fn place(&mut self, part: usize, ways: &[Turn], order: PlacingRule) -> bool {
         let cell = self.shapes.cell;
         let found = ways.iter().filter_map(|&turn| {
             let (column, row) = self.first_place(part, turn)?;
             let placement =
-                Placement { part, turn, left: column as u32 * cell, top: row as u32 * cell };
+                CopyPlacement { part, turn, left: column as u32 * cell, top: row as u32 * cell };
             let rank = match order {
-                Order::Top => placement.top,
-                Order::Bottom => placement.top + self.layout.parts()[part].size(turn).height,
+                PlacingRule::Top => placement.top,
+                PlacingRule::Bottom => placement.top + self.layout.parts()[part].size(turn).height,
             };
             Some((rank, placement.left, placement))
         });
@@ -97,11 +97,11 @@ impl Free<'_> {
         let key = (part, turn);
         let (pixels, cell) = (self.layout.pixels(), self.shapes.cell);
         let size = self.layout.parts()[part].size(turn);
-        let room = Pixels {
+        let room = PixelSize {
             width: pixels.width.checked_sub(size.width)? / cell + 1,
             height: pixels.height.checked_sub(size.height)? / cell + 1,
         };
-        let taken = self.taken.entry(key).or_insert_with(|| Taken::new(room));
+        let taken = self.taken.entry(key).or_insert_with(|| TakenPlaces::new(room));
         for at in &self.placements[taken.known..] {
             let no_fit = self.shapes.no_fit(self.layout, key, (at.part, at.turn));
             taken.add(&no_fit, (at.left / cell) as i32, (at.top / cell) as i32);
@@ -111,15 +111,15 @@ impl Free<'_> {
     }
 }
 
-impl Taken {
-    fn new(room: Pixels) -> Self {
+impl TakenPlaces {
+    fn new(room: PixelSize) -> Self {
         let rows = vec![Vec::new(); room.height as usize];
         Self { rows, columns: room.width as i32, first: 0, known: 0 }
     }
 
     /// Takes the places at which a shape would meet another that begins at a
     /// column and a row.
-    fn add(&mut self, no_fit: &NoFit, column: i32, row: i32) {
+    fn add(&mut self, no_fit: &NoFitRegion, column: i32, row: i32) {
         let start = row - no_fit.top;
         let hidden = (-start).max(0) as usize;
         let rows = self.rows.iter_mut().skip(start.max(0) as usize);
@@ -150,7 +150,7 @@ impl Taken {
 
 /// Adds a run to runs that are apart from each other, and joins those that it
 /// touches.
-fn insert(runs: &mut Vec<Run>, (mut start, mut end): Run) {
+fn insert(runs: &mut Vec<CellRun>, (mut start, mut end): CellRun) {
     let first = runs.partition_point(|run| run.1 < start);
     let last = first + runs[first..].partition_point(|run| run.0 <= end);
     if let [met_first, ..] = runs[first..last] {
@@ -161,8 +161,8 @@ fn insert(runs: &mut Vec<Run>, (mut start, mut end): Run) {
 }
 
 /// Moves all copies together to the middle of the area.
-fn centre(layout: &Layout, placements: &mut [Placement]) {
-    let ends = |at: &Placement| {
+fn centre(layout: &Layout, placements: &mut [CopyPlacement]) {
+    let ends = |at: &CopyPlacement| {
         let size = layout.parts()[at.part].size(at.turn);
         (at.left + size.width, at.top + size.height)
     };

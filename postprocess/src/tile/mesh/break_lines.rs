@@ -17,16 +17,16 @@ impl Rect {
 }
 
 /// More lines than the mesh has cells.
-const MOST_LINES: u64 = 10_000;
+const MAX_LINES: u64 = 10_000;
 
 /// Lines from the parts to the edges of the build.
 #[derive(Clone, Debug, Default)]
-pub(in crate::tile) struct Breaks {
+pub(in crate::tile) struct BreakLines {
     /// Rows that are alike: before which row they end, and their transitions.
     bands: Vec<(u32, Vec<u32>)>,
 }
 
-impl Breaks {
+impl BreakLines {
     /// The lines of parts, `width` wide: through the middle of each part's place
     /// and every `pitch` aside of it, up, down, left and right, to the middle of
     /// another part's place, whose outline is met before, or to the build's edge. All
@@ -41,7 +41,7 @@ impl Breaks {
             let sides = [part.right - part.left, part.bottom - part.top];
             sides.map(|side| u64::from(side / pitch.max(width + 1)) + 1).iter().sum::<u64>()
         };
-        if parts.iter().map(of_part).sum::<u64>() > MOST_LINES {
+        if parts.iter().map(of_part).sum::<u64>() > MAX_LINES {
             return None;
         }
         let transposed: Vec<Rect> = parts.iter().map(|part| part.transposed()).collect();
@@ -118,7 +118,7 @@ mod tests {
         Rect { left, top, right, bottom }
     }
 
-    fn drawn(breaks: &Breaks, width: u32, height: u32) -> Vec<String> {
+    fn drawn(breaks: &BreakLines, width: u32, height: u32) -> Vec<String> {
         let rows = (0..height).map(|row| {
             let row = breaks.row(row);
             let is_cut = |column| row.partition_point(|&place| place <= column) % 2 == 1;
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn lines_run_from_a_part_to_the_edge() {
-        let breaks = Breaks::new(&[rect(3, 2, 8, 5)], [10, 7], 1, 100).unwrap();
+        let breaks = BreakLines::new(&[rect(3, 2, 8, 5)], [10, 7], 1, 100).unwrap();
         let expected = [
             ".....|....",
             ".....|....",
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn lines_end_at_other_parts_and_stand_a_pitch_apart() {
         let parts = [rect(2, 1, 7, 3), rect(1, 6, 6, 8)];
-        let breaks = Breaks::new(&parts, [9, 10], 1, 2).unwrap();
+        let breaks = BreakLines::new(&parts, [9, 10], 1, 2).unwrap();
         // The upper part's are in columns 2, 4 and 6, the lower one's in 1, 3 and 5;
         // 1 and 6 pass the other part by.
         let expected = [
@@ -165,13 +165,13 @@ mod tests {
 
     #[test]
     fn no_part_has_no_lines() {
-        assert!(Breaks::new(&[], [9, 10], 1, 2).unwrap().row(4).is_empty());
+        assert!(BreakLines::new(&[], [9, 10], 1, 2).unwrap().row(4).is_empty());
     }
 
     #[test]
     fn too_many_lines_are_none() {
         let parts = vec![rect(0, 0, 6_000, 6_000); 2];
-        assert!(Breaks::new(&parts, [6_000; 2], 1, 3).is_some());
-        assert!(Breaks::new(&parts, [6_000; 2], 1, 2).is_none());
+        assert!(BreakLines::new(&parts, [6_000; 2], 1, 3).is_some());
+        assert!(BreakLines::new(&parts, [6_000; 2], 1, 2).is_none());
     }
 }

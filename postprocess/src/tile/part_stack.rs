@@ -4,14 +4,14 @@ use lamp_stack::{
     Dpi, Frame, GrayMask, Image, Layer, LevelChange, Mask, MaskBuilder, Op, StackInfo, Turn,
 };
 
-use super::{Pixels, TileError};
+use super::{PixelSize, TileError};
 
 /// What is known of a part before it is placed.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct PartStack {
     name: String,
     dpi: Dpi,
-    image: Pixels,
+    image: PixelSize,
     /// What is placed of the image.
     frame: Frame,
     /// What is white in any layer, within the frame.
@@ -20,7 +20,7 @@ pub struct Part {
     pub(super) stack: Option<StackInfo>,
 }
 
-impl Part {
+impl PartStack {
     /// A part of which the whole image is placed, by its first layer. `name` is
     /// what people call it.
     ///
@@ -31,7 +31,7 @@ impl Part {
         let Some(dpi) = first.dpi else {
             return Err(TileError::NoResolution { name, layer: first.info.name() });
         };
-        let image = Pixels::of(&first.image);
+        let image = PixelSize::of(&first.image);
         let frame = Frame { left: 0, top: 0, width: image.width, height: image.height };
         let (origin_mm, stack) = (first.info.origin_mm, first.info.stack.clone());
         Ok(Self { name, dpi, image, frame, outline: None, origin_mm, stack })
@@ -92,13 +92,13 @@ impl Part {
     }
 
     /// What is placed, in pixels, when it is turned.
-    pub fn size(&self, turn: Turn) -> Pixels {
+    pub fn size(&self, turn: Turn) -> PixelSize {
         let (width, height) = turn.size(self.frame.width, self.frame.height);
-        Pixels { width, height }
+        PixelSize { width, height }
     }
 
     /// The size of its layers' images.
-    pub(super) fn image(&self) -> Pixels {
+    pub(super) fn image(&self) -> PixelSize {
         self.image
     }
 
@@ -116,7 +116,7 @@ impl Part {
     /// Checks that a layer is of the size and resolution of the first.
     pub(super) fn check(&self, layer: &Layer) -> Result<(), TileError> {
         let name = self.name.clone();
-        let found = Pixels::of(&layer.image);
+        let found = PixelSize::of(&layer.image);
         if found != self.image {
             let layer = layer.info.name();
             return Err(TileError::OtherSize { name, layer, found, expected: self.image });

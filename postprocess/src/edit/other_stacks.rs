@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use lamp_stack::{Layer, Length, PageInfo};
 
-use super::error::EditError;
-use super::place::Place;
+use super::edit_error::EditError;
+use super::image_bounds::ImageBounds;
 
 /// A stack that an edit names.
 pub struct OtherLayers<E> {
@@ -19,17 +19,17 @@ pub struct OtherLayers<E> {
 }
 
 /// A stack that is read along with the one that is edited.
-pub(super) struct Other<E> {
+pub(super) struct AlignedStack<E> {
     pub(super) name: String,
     layers: Box<dyn Iterator<Item = Result<Layer, E>>>,
     /// How far up it is moved.
     up: Length,
     current: Option<Arc<Layer>>,
     /// Where its layers lie, all of them.
-    place: Option<Place>,
+    place: Option<ImageBounds>,
 }
 
-impl<E: From<EditError>> Other<E> {
+impl<E: From<EditError>> AlignedStack<E> {
     pub(super) fn new(OtherLayers { name, layers, .. }: OtherLayers<E>, up: Length) -> Self {
         Self { name, layers, up, current: None, place: None }
     }
@@ -50,7 +50,7 @@ impl<E: From<EditError>> Other<E> {
     fn advance(&mut self) -> Result<(), E> {
         self.current = self.layers.next().transpose()?.map(Arc::new);
         let Some(layer) = &self.current else { return Ok(()) };
-        let place = Place::of(layer);
+        let place = ImageBounds::of(layer);
         if *self.place.get_or_insert(place) != place {
             let layer = format!("{}: {}", self.name, layer.info.name());
             return Err(EditError::Unlike { layer }.into());

@@ -1,13 +1,13 @@
 //! What pages say of images that were cropped, padded or turned.
 
 use super::copies::{forget_copies, move_copies};
-use super::error::EditError;
-use super::place::Place;
+use super::edit_error::EditError;
+use super::image_bounds::ImageBounds;
 use lamp_stack::{Frame, PageInfo, Turn};
 
 /// Makes a page say what holds for the rows that a frame shows, which lie at
 /// `place`.
-pub(crate) fn frame_page(info: &mut PageInfo, frame: Frame, place: &Place) {
+pub(crate) fn frame_page(info: &mut PageInfo, frame: Frame, place: &ImageBounds) {
     move_to(info, place);
     let moved = |row: u32, end: i64| {
         let row = i64::from(row).saturating_sub(frame.top);
@@ -31,7 +31,7 @@ pub(super) fn turn_page(
     info: &mut PageInfo,
     turn: Turn,
     height: u32,
-    place: &Place,
+    place: &ImageBounds,
 ) -> Result<(), EditError> {
     if turn.is_across() && !info.stray_rows.is_empty() {
         return Err(EditError::layer(
@@ -58,7 +58,7 @@ pub(super) fn turn_page(
     Ok(())
 }
 
-fn move_to(info: &mut PageInfo, place: &Place) {
+fn move_to(info: &mut PageInfo, place: &ImageBounds) {
     info.origin_mm = info.origin_mm.map(|_| place.origin_mm);
 }
 
@@ -69,7 +69,8 @@ mod tests {
 
     use super::*;
 
-    const PLACE: Place = Place { origin_mm: [7.0, 8.0], dpi: None, width: 5, height: 6 };
+    const PLACE: ImageBounds =
+        ImageBounds { origin_mm: [7.0, 8.0], dpi: None, width: 5, height: 6 };
 
     fn info() -> PageInfo {
         let mut stack = StackInfo::default();

@@ -4,14 +4,14 @@ use lamp_stack::{GrayMask, Image, Layer, Length, Mask, MaskBuilder, Size, StackI
 use proptest::prelude::*;
 
 use super::super::testing::{layer, mask_of};
-use super::super::{Heights, LayoutFile, Pack, Part, Turns};
+use super::super::{HeightOptions, LayoutFile, Pack, PartStack, Turns};
 use super::*;
 
 /// Millimetres, which are pixels here.
 fn mesh(shape: CellShape, [cell, wall, clearance]: [f64; 3]) -> MeshOptions {
     let [cell, wall, clearance] = [cell, wall, clearance].map(Length::from_mm);
     MeshOptions {
-        pattern: Pattern::Cells { shape, cell, wall },
+        pattern: MeshPattern::Cells { shape, cell, wall },
         clearance,
         moat: Moat::Layer,
         break_width: Length::from_mm(0.0),
@@ -22,7 +22,7 @@ fn mesh(shape: CellShape, [cell, wall, clearance]: [f64; 3]) -> MeshOptions {
 
 fn built(layout: &Layout, stacks: Vec<Vec<Layer>>) -> Vec<Layer> {
     let stacks = stacks.into_iter().map(|layers| layers.into_iter().map(Ok::<_, TileError>));
-    let build = layout.clone().build(stacks.collect(), Heights::default(), |_| {});
+    let build = layout.clone().build(stacks.collect(), HeightOptions::default(), |_| {});
     build.collect::<Result<_, _>>().unwrap()
 }
 
@@ -34,9 +34,9 @@ fn mask(layer: &Layer) -> &Mask {
 /// Places of parts: left, top and turn of each copy.
 fn layout(parts: &[Mask], copies: &[(usize, u32, u32, u32, bool)], area: &str) -> Option<Layout> {
     let named = |k: usize, part: &Mask| {
-        Part::of_image(&format!("p{k}"), &layer(0, Image::Mask(part.clone()))).unwrap()
+        PartStack::of_image(&format!("p{k}"), &layer(0, Image::Mask(part.clone()))).unwrap()
     };
-    let parts: Vec<Part> = parts.iter().enumerate().map(|(k, part)| named(k, part)).collect();
+    let parts: Vec<PartStack> = parts.iter().enumerate().map(|(k, part)| named(k, part)).collect();
     let lines: Vec<String> = copies
         .iter()
         .map(|(part, x, y, turn, mirror)| {
@@ -86,7 +86,7 @@ proptest! {
         let options =
             MeshOptions { break_width: Length::from_mm(break_width.into()), ..mesh(shape, lengths) };
         let meshed = layout.with_mesh(&options).unwrap();
-        let Mesh { breaks, .. } = meshed.mesh.as_ref().unwrap();
+        let BuildMesh { breaks, .. } = meshed.mesh.as_ref().unwrap();
         let walls = meshed.mesh.as_ref().unwrap().whole();
         let stacks = parts.iter().map(|part| vec![layer(0, Image::Mask(part.clone()))]).collect();
         let build = built(&meshed, stacks);
@@ -197,7 +197,7 @@ fn gray_parts_keep_their_levels() {
     let mut gray = GrayMask::new(6);
     (0..4).for_each(|_| gray.push_runs([(2, 0), (2, 90), (2, 0)]).unwrap());
     let part = layer(0, Image::Gray(gray));
-    let parts = vec![Part::of_image("p", &part).unwrap()];
+    let parts = vec![PartStack::of_image("p", &part).unwrap()];
     let pack = Pack { turns: Turns::None, ..Pack::default() };
     let area = "30x30mm".parse().unwrap();
     let layout = Layout::packed(parts, &[Some(1)], area, Length::from_mm(1.0), pack).unwrap();
@@ -222,7 +222,7 @@ fn meshes_that_are_none_are_refused() {
         assert!(matches!(refused(&cells(lengths)), TileError::NoCells { .. }));
     }
     assert!(matches!(refused(&cells([8.0, 1.0, 41.0])), TileError::WideMoat { .. }));
-    let pattern = Pattern::Image { name: "x".to_owned(), image: Mask::black(0, 0) };
+    let pattern = MeshPattern::Image { name: "x".to_owned(), image: Mask::black(0, 0) };
     let empty = MeshOptions { pattern, ..cells([8.0, 1.0, 1.0]) };
     assert!(matches!(refused(&empty), TileError::NoTemplate { .. }));
 }
@@ -239,11 +239,11 @@ fn no_mesh_is_within_an_outline() {
     let layers = || vec![layer(0, Image::Mask(slab.clone())), layer(1, Image::Mask(open.clone()))];
     let stack = || layers().into_iter().map(Ok::<_, TileError>);
     let area: Size = "30x30mm".parse().unwrap();
-    let placed = |part: Part| {
+    let placed = |part: PartStack| {
         let gap = Length::from_mm(1.0);
         Layout::packed(vec![part], &[Some(1)], area, gap, Pack::default()).unwrap()
     };
-    let layout = placed(Part::of_outline("p", stack()).unwrap().unwrap());
+    let layout = placed(PartStack::of_outline("p", stack()).unwrap().unwrap());
     let at = layout.placements()[0];
     let within = |moat: Moat| {
         let options = MeshOptions { moat, ..mesh(CellShape::Square, [4.0, 3.9, 0.0]) };
@@ -258,6 +258,6 @@ fn no_mesh_is_within_an_outline() {
     assert_eq!(within(Moat::Layer), [64, 64]);
     assert_eq!(within(Moat::Outline), [64, 32]);
     let options = MeshOptions { moat: Moat::Outline, ..MeshOptions::default() };
-    let refused = placed(Part::of_image("p", &layers()[0]).unwrap()).with_mesh(&options);
+    let refused = placed(PartStack::of_image("p", &layers()[0]).unwrap()).with_mesh(&options);
     assert!(matches!(refused, Err(TileError::NoOutline { .. })));
 }

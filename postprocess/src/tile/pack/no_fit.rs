@@ -11,55 +11,55 @@ use std::rc::Rc;
 
 use lamp_stack::{Frame, Mask, Turn};
 
-use super::super::{Layout, Pixels};
+use super::super::{Layout, PixelSize};
 use super::PackBy;
 use crate::offset::offset_one_bit;
 
 /// The columns from the first up to, but without, the second.
-pub(super) type Run = (i32, i32);
+pub(super) type CellRun = (i32, i32);
 
 /// A part is so many cells long, the shortest at least, the longest at most.
-const FINE: u32 = 256;
-const COARSE: u32 = 768;
+const MIN_CELLS: u32 = 256;
+const MAX_CELLS: u32 = 768;
 
 /// Parts as shapes in cells.
-pub(super) struct Shapes {
+pub(super) struct NoFitRegions {
     by: PackBy,
     gap: u32,
     /// Pixels on a side of a cell.
     pub(super) cell: u32,
-    turned: HashMap<(usize, Turn), Rc<Shape>>,
-    no_fits: HashMap<[(usize, Turn); 2], Rc<NoFit>>,
+    turned: HashMap<(usize, Turn), Rc<CellOutline>>,
+    no_fits: HashMap<[(usize, Turn); 2], Rc<NoFitRegion>>,
 }
 
 /// A part's outline in cells, turned.
-struct Shape {
-    rows: Vec<Vec<Run>>,
+struct CellOutline {
+    rows: Vec<Vec<CellRun>>,
     /// Grown by the gap; its first row and column stand so many cells before
     /// the shape's.
-    grown: Vec<Vec<Run>>,
+    grown: Vec<Vec<CellRun>>,
     margin: i32,
 }
 
 /// The displacements at which a shape meets another.
-pub(super) struct NoFit {
+pub(super) struct NoFitRegion {
     /// How far up the first row is.
     pub(super) top: i32,
-    pub(super) rows: Vec<Rc<[Run]>>,
+    pub(super) rows: Vec<Rc<[CellRun]>>,
 }
 
-impl Shapes {
+impl NoFitRegions {
     pub(super) fn new(layout: &Layout, gap: u32, by: PackBy) -> Self {
         let sides = layout.parts().iter().map(|part| {
-            let Pixels { width, height } = part.size(Turn::default());
+            let PixelSize { width, height } = part.size(Turn::default());
             width.max(height)
         });
         let cell = match by {
             PackBy::Boxes => 1,
             PackBy::Outlines => {
                 let (least, most) = (sides.clone().min(), sides.max());
-                let fine = least.unwrap_or(0) / FINE;
-                fine.max(most.unwrap_or(0).div_ceil(COARSE)).max(1)
+                let fine = least.unwrap_or(0) / MIN_CELLS;
+                fine.max(most.unwrap_or(0).div_ceil(MAX_CELLS)).max(1)
             }
         };
         Self { by, gap, cell, turned: HashMap::new(), no_fits: HashMap::new() }
@@ -76,7 +76,7 @@ impl Shapes {
         layout: &Layout,
         moving: (usize, Turn),
         placed: (usize, Turn),
-    ) -> Rc<NoFit> {
+    ) -> Rc<NoFitRegion> {
         if let Some(known) = self.no_fits.get(&[moving, placed]) {
             return Rc::clone(known);
         }
@@ -84,27 +84,28 @@ impl Shapes {
             PackBy::Boxes => {
                 let [moving, placed] =
                     [moving, placed].map(|(part, turn)| layout.parts()[part].size(turn));
-                NoFit::of_boxes(moving, placed, self.gap)
+                NoFitRegion::of_boxes(moving, placed, self.gap)
             }
             PackBy::Outlines => {
                 let [moving, placed] = [moving, placed].map(|key| self.shape(layout, key));
-                NoFit::of_shapes(&moving, &placed)
+                NoFitRegion::of_shapes(&moving, &placed)
             }
         });
         self.no_fits.insert([moving, placed], Rc::clone(&no_fit));
         no_fit
     }
 
-    fn shape(&mut self, layout: &Layout, key: (usize, Turn)) -> Rc<Shape> {
+    fn shape(&mut self, layout: &Layout, key: (usize, Turn)) -> Rc<CellOutline> {
         let (gap, cell) = (self.gap, self.cell);
-        let shape = || Rc::new(Shape::new(&layout.parts()[key.0].silhouette(key.1), gap, cell));
+        let shape =
+            || Rc::new(CellOutline::new(&layout.parts()[key.0].silhouette(key.1), gap, cell));
         Rc::clone(self.turned.entry(key).or_insert_with(shape))
     }
 }
 
-impl Shape {
+impl CellOutline {
     fn new(outline: &Mask, gap: u32, cell: u32) -> Self {
-        let size = Pixels { width: outline.width(), height: outline.height() };
+        let size = PixelSize { width: outline.width(), height: outline.height() };
         // Growing goes to the nearest pixel, which may be one further.
         let margin = if gap == 0 { 0 } else { (gap + 1).div_ceil(cell) };
         let around = margin * cell;
@@ -120,7 +121,7 @@ impl Shape {
 }
 
 /// The cells that hold a white pixel.
-fn cells(mask: &Mask, cell: u32) -> Vec<Vec<Run>> {
+fn cells(mask: &Mask, cell: u32) -> Vec<Vec<CellRun>> {
     let mut rows = vec![Vec::new(); mask.height().div_ceil(cell) as usize];
     for (index, row) in (0..).zip(mask.rows()) {
         let runs = row.chunks(2).map(|run| {
@@ -134,7 +135,7 @@ fn cells(mask: &Mask, cell: u32) -> Vec<Vec<Run>> {
 }
 
 /// Brings runs in order and joins those that touch.
-fn join_runs(runs: &mut Vec<Run>) {
+fn join_runs(runs: &mut Vec<CellRun>) {
     runs.sort_unstable();
     runs.dedup_by(|next, last| {
         let touch = next.0 <= last.1;
@@ -145,15 +146,15 @@ fn join_runs(runs: &mut Vec<Run>) {
     });
 }
 
-impl NoFit {
-    fn of_boxes(moving: Pixels, placed: Pixels, gap: u32) -> Self {
+impl NoFitRegion {
+    fn of_boxes(moving: PixelSize, placed: PixelSize, gap: u32) -> Self {
         let [width, height] = [moving.width, moving.height].map(|side| (side + gap) as i32);
-        let run: Rc<[Run]> = Rc::new([(1 - width, (placed.width + gap) as i32)]);
+        let run: Rc<[CellRun]> = Rc::new([(1 - width, (placed.width + gap) as i32)]);
         let rows = height - 1 + (placed.height + gap) as i32;
         Self { top: height - 1, rows: vec![run; rows as usize] }
     }
 
-    fn of_shapes(moving: &Shape, placed: &Shape) -> Self {
+    fn of_shapes(moving: &CellOutline, placed: &CellOutline) -> Self {
         let (high, margin) = (moving.rows.len() as i32, placed.margin);
         let top = high - 1 + margin;
         let rows = -top..placed.grown.len() as i32 - margin;
@@ -165,7 +166,8 @@ impl NoFit {
                     continue;
                 };
                 for &(start, end) in across {
-                    let met = |&(from, to): &Run| (from - margin - end + 1, to - margin - start);
+                    let met =
+                        |&(from, to): &CellRun| (from - margin - end + 1, to - margin - start);
                     runs.extend(others.iter().map(met));
                 }
             }

@@ -4,7 +4,7 @@ use std::iter::Peekable;
 
 use lamp_stack::{Image, Layer, Length, PageInfo, StackInfo};
 
-use super::Mesh;
+use super::BuildMesh;
 
 /// Layers that stand on mesh alone, which lies below them: heights are still the
 /// parts'. The base's layers are as thick, and exposed as long, as the first layer.
@@ -12,7 +12,7 @@ use super::Mesh;
 /// own, but counts with it.
 pub(in crate::tile) fn on_base<I, E>(
     layers: I,
-    mesh: Option<Mesh>,
+    mesh: Option<BuildMesh>,
 ) -> impl Iterator<Item = Result<Layer, E>>
 where
     I: Iterator<Item = Result<Layer, E>>,
@@ -23,7 +23,7 @@ where
 
 struct OnBase<I: Iterator> {
     layers: Peekable<I>,
-    mesh: Option<Mesh>,
+    mesh: Option<BuildMesh>,
     count: u32,
     made: u32,
 }

@@ -3,7 +3,7 @@
 use lamp_stack::{Dpi, Length, Size};
 use thiserror::Error;
 
-use super::Pixels;
+use super::PixelSize;
 
 /// Why parts cannot be laid out on a build area.
 ///
@@ -19,9 +19,9 @@ pub enum TileError {
         /// The part.
         name: String,
         /// Width and height of what is to be placed.
-        part: Pixels,
+        part: PixelSize,
         /// Width and height of the area.
-        area: Pixels,
+        area: PixelSize,
         /// The area as lengths.
         area_mm: Size,
     },
@@ -119,9 +119,9 @@ pub enum TileError {
         /// The layer's name.
         layer: String,
         /// Its size.
-        found: Pixels,
+        found: PixelSize,
         /// The first layer's size.
-        expected: Pixels,
+        expected: PixelSize,
     },
     /// Two parts of different resolutions.
     #[error(

@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 use super::letters::Align;
 
 /// Lengths are at most so long: machines are smaller.
-const LONGEST: Length = Length::from_um(1e7);
+const MAX_LENGTH: Length = Length::from_um(1e7);
 
 /// One edit: what stands in its table, where exactly one of the keys from `box`
 /// to `rotate` does.
@@ -18,18 +18,18 @@ pub(super) struct Edit {
     #[serde(default, deserialize_with = "op")]
     pub(super) op: Option<Op>,
     #[serde(default, deserialize_with = "some_span")]
-    pub(super) z: Option<Span>,
+    pub(super) z: Option<LengthRange>,
     #[serde(default)]
     pub(super) layers: Option<[u32; 2]>,
     #[serde(default)]
-    pub(super) copies: Copies,
+    pub(super) copies: CopySelection,
     #[serde(rename = "box")]
-    pub(super) block: Option<Block>,
+    pub(super) block: Option<Rectangle>,
     pub(super) cylinder: Option<Cylinder>,
-    pub(super) line: Option<Line>,
+    pub(super) line: Option<StraightLine>,
     pub(super) label: Option<Label>,
     pub(super) stack: Option<OtherStack>,
-    pub(super) crop: Option<Block>,
+    pub(super) crop: Option<Rectangle>,
     pub(super) pad: Option<Pad>,
     pub(super) mirror: Option<Mirror>,
     pub(super) rotate: Option<u32>,
@@ -38,20 +38,20 @@ pub(super) struct Edit {
 /// Whether an edit is done to each copy that `tile` made of a part.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged, expecting = "write true, or a part's name")]
-pub(super) enum Copies {
+pub(super) enum CopySelection {
     /// Of the one part, if so.
     Any(bool),
     /// Of the part of that name.
     Of(String),
 }
 
-impl Default for Copies {
+impl Default for CopySelection {
     fn default() -> Self {
         Self::Any(false)
     }
 }
 
-impl Copies {
+impl CopySelection {
     /// Whether the edit is done once, to the whole image.
     pub(super) fn is_none(&self) -> bool {
         matches!(self, Self::Any(false))
@@ -59,15 +59,15 @@ impl Copies {
 }
 
 /// From the first length up to, but without, the second.
-pub(super) type Span = [Length; 2];
+pub(super) type LengthRange = [Length; 2];
 
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Block {
+pub(super) struct Rectangle {
     #[serde(deserialize_with = "span")]
-    pub(super) x: Span,
+    pub(super) x: LengthRange,
     #[serde(deserialize_with = "span")]
-    pub(super) y: Span,
+    pub(super) y: LengthRange,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -80,15 +80,15 @@ pub(super) struct Cylinder {
     #[serde(deserialize_with = "size")]
     pub(super) diameter: Length,
     #[serde(default)]
-    pub(super) along: Along,
+    pub(super) along: CylinderAxis,
     /// From where to where one lies, along its axis.
     #[serde(default, deserialize_with = "some_span")]
-    pub(super) between: Option<Span>,
+    pub(super) between: Option<LengthRange>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Along {
+pub(super) enum CylinderAxis {
     X,
     Y,
     #[default]
@@ -98,7 +98,7 @@ pub(super) enum Along {
 /// A straight line with square ends.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Line {
+pub(super) struct StraightLine {
     #[serde(deserialize_with = "lengths")]
     pub(super) from: [Length; 2],
     #[serde(deserialize_with = "lengths")]
@@ -163,7 +163,7 @@ fn one() -> i32 {
 
 fn length<E: serde::de::Error>(text: &str) -> Result<Length, E> {
     let length: Length = text.parse().map_err(|error: LengthError| E::custom(error))?;
-    if length.um().abs() > LONGEST.um() {
+    if length.um().abs() > MAX_LENGTH.um() {
         return Err(E::custom(format!("{text} is more than 10 m")));
     }
     Ok(length)
@@ -178,7 +178,7 @@ fn lengths<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[Length
         .map_err(|_| D::Error::custom(format!("{count} lengths where {N} are needed")))
 }
 
-fn span<'de, D: Deserializer<'de>>(from: D) -> Result<Span, D::Error> {
+fn span<'de, D: Deserializer<'de>>(from: D) -> Result<LengthRange, D::Error> {
     let [start, end] = lengths(from)?;
     if start < end {
         Ok([start, end])
@@ -187,7 +187,7 @@ fn span<'de, D: Deserializer<'de>>(from: D) -> Result<Span, D::Error> {
     }
 }
 
-fn some_span<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Span>, D::Error> {
+fn some_span<'de, D: Deserializer<'de>>(from: D) -> Result<Option<LengthRange>, D::Error> {
     span(from).map(Some)
 }
 

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use lamp_stack::{Layer, PageInfo, StackInfo, Turn};
 use serde_json::{Map, Value, json};
 
-use super::heights::Step;
-use super::{Layout, Part, Placement, TileError};
+use super::lockstep::LayerSet;
+use super::{CopyPlacement, Layout, PartStack, TileError};
 
 /// Rows of a part's layer that are stray, told once however many copies there
 /// are.
@@ -23,12 +23,12 @@ pub struct StrayRows {
 }
 
 /// A part, and its layer at a height.
-type Here<'a> = (usize, &'a Part, &'a Layer);
+type PartLayer<'a> = (usize, &'a PartStack, &'a Layer);
 
 impl Layout {
     /// The page of the layer that a step makes.
-    pub(super) fn page(&self, step: &Step) -> Result<PageInfo, TileError> {
-        let here: Vec<Here<'_>> = self.layers_of(step).collect();
+    pub(super) fn page(&self, step: &LayerSet) -> Result<PageInfo, TileError> {
+        let here: Vec<PartLayer<'_>> = self.layers_of(step).collect();
         let infos = || here.iter().map(|(_, _, layer)| &layer.info);
         let closed = infos().map(|info| info.closed).reduce(|a, b| match (a, b) {
             (Some(false), _) | (_, Some(false)) => Some(false),
@@ -53,7 +53,7 @@ impl Layout {
     }
 
     /// The stray rows of each part.
-    pub(super) fn stray_rows(&self, step: &Step) -> Vec<StrayRows> {
+    pub(super) fn stray_rows(&self, step: &LayerSet) -> Vec<StrayRows> {
         let stray = self.layers_of(step).filter(|(_, _, layer)| !layer.info.stray_rows.is_empty());
         let named = stray.map(|(_, part, layer)| StrayRows {
             part: part.name().to_owned(),
@@ -64,14 +64,17 @@ impl Layout {
     }
 
     /// The parts that have a layer at a height.
-    pub(super) fn layers_of<'a>(&'a self, step: &'a Step) -> impl Iterator<Item = Here<'a>> {
+    pub(super) fn layers_of<'a>(
+        &'a self,
+        step: &'a LayerSet,
+    ) -> impl Iterator<Item = PartLayer<'a>> {
         let layers = self.parts.iter().zip(&step.layers).enumerate();
         layers.filter_map(|(index, (part, layer))| Some((index, part, layer.as_deref()?)))
     }
 
     /// Where rows that the parts' pages list are on the build. Of copies that
     /// are turned by a right angle they are columns, and none are listed.
-    fn rows_on_build(&self, here: &[Here<'_>], open: bool) -> Vec<u32> {
+    fn rows_on_build(&self, here: &[PartLayer<'_>], open: bool) -> Vec<u32> {
         let mut rows = BTreeSet::new();
         for &(part, _, layer) in here {
             let listed = if open { &layer.info.open_rows } else { &layer.info.stray_rows };
@@ -86,7 +89,7 @@ impl Layout {
 
     /// Where a row of a part's image is. A row at which contours break off is
     /// the first below an end, so it may be the one below the image.
-    fn row_on_build(&self, at: &Placement, row: u32, open: bool) -> Option<u32> {
+    fn row_on_build(&self, at: &CopyPlacement, row: u32, open: bool) -> Option<u32> {
         let frame = self.parts[at.part].frame();
         let row = u32::try_from(i64::from(row) - frame.top).ok()?;
         let last = frame.height.checked_sub(if open { 0 } else { 1 })?;
@@ -95,7 +98,7 @@ impl Layout {
     }
 
     /// What the first page says of the build.
-    fn stack_of(&self, here: &[Here<'_>]) -> StackInfo {
+    fn stack_of(&self, here: &[PartLayer<'_>]) -> StackInfo {
         if let &[(_, part, layer)] = here
             && self.parts.len() == 1
         {
@@ -106,7 +109,7 @@ impl Layout {
             stack.other.insert("tile".to_owned(), Value::Object(tile));
             return stack;
         }
-        let known = |part: &Part| part.stack.clone().unwrap_or_else(|| unknown(part));
+        let known = |part: &PartStack| part.stack.clone().unwrap_or_else(|| unknown(part));
         let stacks: Vec<StackInfo> = self.parts.iter().map(known).collect();
         let texts = |text: fn(&StackInfo) -> &str| stacks.iter().map(text);
         let names = told_apart(texts(|stack| &stack.part));
@@ -151,7 +154,7 @@ impl Layout {
     /// Where the copies of a part stand.
     fn described(&self, part: usize) -> Map<String, Value> {
         let copies = || self.placements.iter().filter(|at| at.part == part);
-        let Part { origin_mm, .. } = self.parts[part];
+        let PartStack { origin_mm, .. } = self.parts[part];
         let frame = self.parts[part].frame();
         let pitch = self.dpi.pitch().mm();
         let corner = origin_mm.map(|[x, y]| match (frame.left, frame.top) {
@@ -175,7 +178,7 @@ impl Layout {
 }
 
 /// The one exposure of all parts.
-fn exposure(step: &Step, here: &[Here<'_>]) -> Result<Option<f64>, TileError> {
+fn exposure(step: &LayerSet, here: &[PartLayer<'_>]) -> Result<Option<f64>, TileError> {
     let known = here.iter().filter_map(|(_, part, layer)| Some((part, layer.info.exposure_ms?)));
     let mut known = known.peekable();
     let Some(&(first, first_ms)) = known.peek() else { return Ok(None) };
@@ -191,7 +194,7 @@ fn exposure(step: &Step, here: &[Here<'_>]) -> Result<Option<f64>, TileError> {
 
 /// Whatever else the parts' pages say: what all say alike as it is, and the
 /// rest under `of_parts`, for each stack in their order.
-fn common(here: &[Here<'_>], parts: usize) -> Map<String, Value> {
+fn common(here: &[PartLayer<'_>], parts: usize) -> Map<String, Value> {
     let Some((_, _, first)) = here.first() else { return Map::new() };
     let is_common = |key: &str, value: &Value| {
         here.iter().all(|(_, _, layer)| layer.info.other.get(key) == Some(value))
@@ -232,7 +235,7 @@ fn digest_of<'a>(digests: impl Iterator<Item = &'a str>) -> String {
     format!("blake3:{}", hasher.finalize().to_hex())
 }
 
-impl Step {
+impl LayerSet {
     /// The first layer here, which there always is.
     pub(super) fn some_layer(&self) -> &Arc<Layer> {
         self.layers.iter().flatten().next().expect("a step has a layer")
@@ -240,7 +243,7 @@ impl Step {
 }
 
 /// What is known of a stack that does not say what it is.
-fn unknown(part: &Part) -> StackInfo {
+fn unknown(part: &PartStack) -> StackInfo {
     let stem = Path::new(part.name()).file_stem().unwrap_or_default();
     StackInfo { part: stem.to_string_lossy().into_owned(), ..StackInfo::default() }
 }

@@ -72,12 +72,13 @@ fn stray_rows_are_named_where_they_are_now() {
         let line =
             format!(r#"{{"copies": [{{"part": "p", "x_mm": 0, "y_mm": 0, "turn": {turn}}}]}}"#);
         let area: Size = "40x40mm".parse().unwrap();
-        let parts = vec![Part::of_image("p", &part).unwrap()];
+        let parts = vec![PartStack::of_image("p", &part).unwrap()];
         let layout = LayoutFile::from_json(&line).unwrap().place(parts, area).unwrap();
         let mut told = Vec::new();
         let stack = std::iter::once(Ok::<_, TileError>(part.clone()));
-        let page =
-            layout.build(vec![stack], Heights::default(), |rows| told.push(rows.clone())).next();
+        let page = layout
+            .build(vec![stack], HeightOptions::default(), |rows| told.push(rows.clone()))
+            .next();
         assert_eq!(
             told,
             [StrayRows { part: "p".to_owned(), layer: "layer 0".to_owned(), rows: vec![3] }]
@@ -94,7 +95,7 @@ fn a_copy_lies_as_the_layout_says() {
     let image = mask_of(&["......", ".#....", ".##...", "......"]);
     let outline = |_: ()| {
         let layers = std::iter::once(Ok::<_, TileError>(layer(0, Image::Mask(image.clone()))));
-        Part::of_outline("stacks/f.tif", layers).unwrap().unwrap()
+        PartStack::of_outline("stacks/f.tif", layers).unwrap().unwrap()
     };
     // The image's lower left corner is at 1, 2 when it is turned to 4 x 6.
     let text =
@@ -102,8 +103,12 @@ fn a_copy_lies_as_the_layout_says() {
     let file = LayoutFile::from_json(text).unwrap();
     let layout = file.place(vec![outline(())], "6x8mm".parse().unwrap()).unwrap();
     let stack = std::iter::once(Ok::<_, TileError>(layer(0, Image::Mask(image.clone()))));
-    let build =
-        layout.clone().build(vec![stack], Heights::default(), |_| {}).next().unwrap().unwrap();
+    let build = layout
+        .clone()
+        .build(vec![stack], HeightOptions::default(), |_| {})
+        .next()
+        .unwrap()
+        .unwrap();
     // Mirrored: ..##. on its side.
     let expected =
         mask_of(&["......", "..##..", "...#..", "......", "......", "......", "......", "......"]);
@@ -118,7 +123,7 @@ fn a_copy_lies_as_the_layout_says() {
 #[test]
 fn layouts_that_are_none_are_refused() {
     let place = |text: &str| {
-        let parts = vec![Part::of_image("a/p.tif", &black(4, 2)).unwrap()];
+        let parts = vec![PartStack::of_image("a/p.tif", &black(4, 2)).unwrap()];
         let file = LayoutFile::from_json(text)?;
         file.place(parts, "40x40mm".parse().unwrap()).map(|_| ())
     };
@@ -155,12 +160,13 @@ fn pages_of_several_parts_say_what_holds_for_all() {
         part
     };
     let build = |a: Layer, b: Layer| {
-        let parts = vec![Part::of_image("a", &a).unwrap(), Part::of_image("b", &b).unwrap()];
+        let parts =
+            vec![PartStack::of_image("a", &a).unwrap(), PartStack::of_image("b", &b).unwrap()];
         let [area, gap] = [Length::from_mm(9.0), Length::from_mm(1.0)];
         let area = Size { width: area, height: area };
         let layout = Layout::packed(parts, &[Some(2), None], area, gap, Pack::default()).unwrap();
         let stacks = [a, b].map(|layer| std::iter::once(Ok::<_, TileError>(layer)));
-        layout.build(stacks.into(), Heights::default(), |_| {}).next().unwrap()
+        layout.build(stacks.into(), HeightOptions::default(), |_| {}).next().unwrap()
     };
     let [a, b] = [("a", json!({"dither": 1, "fix": 2})), ("b", json!({"dither": 1, "fix": 3}))]
         .map(|(name, other)| page(name, Some(5.0), other));
@@ -183,7 +189,7 @@ fn pages_of_several_parts_say_what_holds_for_all() {
 #[test]
 fn a_stack_that_changed_is_refused() {
     let image = |row: &str| layer(0, Image::Mask(mask_of(&[row])));
-    let part = Part::of_outline("p", std::iter::once(Ok::<_, TileError>(image(".##."))));
+    let part = PartStack::of_outline("p", std::iter::once(Ok::<_, TileError>(image(".##."))));
     let options = options("9x9mm", None, 1.0);
     let layout = Layout::packed(
         vec![part.unwrap().unwrap()],
@@ -193,7 +199,8 @@ fn a_stack_that_changed_is_refused() {
         Pack::default(),
     );
     let stack = std::iter::once(Ok::<_, TileError>(image(".###")));
-    let built = layout.unwrap().build(vec![stack], Heights::default(), |_| {}).next().unwrap();
+    let built =
+        layout.unwrap().build(vec![stack], HeightOptions::default(), |_| {}).next().unwrap();
     assert!(matches!(built, Err(TileError::Changed { .. })));
 }
 
@@ -256,8 +263,8 @@ proptest! {
             (0..).zip(images).map(|(index, image)| Ok::<_, TileError>(layer(index, image)))
         };
         let part = |k: usize| match fit {
-            true => Part::of_outline(["a", "b"][k], layers(k)).ok().flatten(),
-            false => Part::of_image(["a", "b"][k], &layers(k).next().unwrap().unwrap()).ok(),
+            true => PartStack::of_outline(["a", "b"][k], layers(k)).ok().flatten(),
+            false => PartStack::of_image(["a", "b"][k], &layers(k).next().unwrap().unwrap()).ok(),
         };
         let Some(parts) = (0..2).map(part).collect::<Option<Vec<_>>>() else {
             // All is black.
@@ -273,7 +280,7 @@ proptest! {
         let again = layout.to_file().place(layout.parts.clone(), area).unwrap();
         prop_assert_eq!(again.placements(), layout.placements());
         let build: Vec<Layer> =
-            layout.clone().build(vec![layers(0), layers(1)], Heights::default(), |_| {}).collect::<Result<_, _>>().unwrap();
+            layout.clone().build(vec![layers(0), layers(1)], HeightOptions::default(), |_| {}).collect::<Result<_, _>>().unwrap();
         prop_assert_eq!(build.len(), stacks[0].len().max(stacks[1].len()));
         for (k, built) in build.iter().enumerate() {
             let mut rest = built.image.clone();
@@ -310,12 +317,12 @@ proptest! {
             r#"{{"copies": [{{"part": "p", "x_mm": 3, "y_mm": 2, "turn": {}, "mirror": {}}}]}}"#,
             turn.quarters() * 90, turn.is_mirrored()
         );
-        let parts = vec![Part::of_image("p", &first).unwrap()];
+        let parts = vec![PartStack::of_image("p", &first).unwrap()];
         let layout = LayoutFile::from_json(&text).unwrap().place(parts, "20x20mm".parse().unwrap()).unwrap();
         let at = layout.placements()[0];
         let size = layout.parts()[0].size(turn);
         prop_assert_eq!((at.left, at.top + size.height), (3, 18));
-        let built = layout.build(vec![std::iter::once(Ok::<_, TileError>(first))], Heights::default(), |_| {}).next();
+        let built = layout.build(vec![std::iter::once(Ok::<_, TileError>(first))], HeightOptions::default(), |_| {}).next();
         let place = Frame { left: 3, top: at.top.into(), width: size.width, height: size.height };
         let cut = built.unwrap().unwrap().image.framed(place).turned(turn.inverse()).unwrap();
         prop_assert_eq!(cut, stack[0].clone());
@@ -328,7 +335,7 @@ proptest! {
         );
         if let Ok(file) = LayoutFile::from_json(&text) {
             let area = file.area().unwrap();
-            let parts = vec![Part::of_image("p", &black(4, 2)).unwrap()];
+            let parts = vec![PartStack::of_image("p", &black(4, 2)).unwrap()];
             if let Ok(layout) = file.place(parts, area) {
                 let at = layout.placements()[0];
                 prop_assert!(at.left + 2 <= layout.pixels().width && at.top + 2 <= layout.pixels().height);

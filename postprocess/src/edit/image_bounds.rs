@@ -4,11 +4,11 @@ use std::fmt;
 
 use lamp_stack::{Dpi, Frame, Layer, Length, Turn};
 
-use super::error::EditError;
+use super::edit_error::EditError;
 
 /// The pixels of every layer in part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct ImageBounds {
     /// The top left corner, in millimetres.
     pub(super) origin_mm: [f64; 2],
     /// The resolution, where it is known.
@@ -17,7 +17,7 @@ pub(crate) struct Place {
     pub(super) height: u32,
 }
 
-impl Place {
+impl ImageBounds {
     /// Where a layer's pixels lie. Where its page does not say, its lower left
     /// corner is 0, 0.
     pub(crate) fn of(layer: &Layer) -> Self {
@@ -28,9 +28,9 @@ impl Place {
     }
 
     /// What maps points of the part to pixels.
-    pub(super) fn grid(&self) -> Result<Grid, EditError> {
+    pub(super) fn grid(&self) -> Result<PixelMap, EditError> {
         let dpi = self.dpi.ok_or(EditError::NoResolution)?;
-        Ok(Grid { origin_mm: self.origin_mm, dpi })
+        Ok(PixelMap { origin_mm: self.origin_mm, dpi })
     }
 
     /// Whether a point in pixels is on the image.
@@ -69,7 +69,7 @@ impl Place {
 }
 
 /// Where the image reaches, in millimetres.
-impl fmt::Display for Place {
+impl fmt::Display for ImageBounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let pitch = self.dpi.map_or(Length::default(), Dpi::pitch).mm();
         let [x, y] = self.origin_mm;
@@ -81,12 +81,12 @@ impl fmt::Display for Place {
 
 /// What maps points in millimetres to pixels.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Grid {
+pub(super) struct PixelMap {
     origin_mm: [f64; 2],
     dpi: Dpi,
 }
 
-impl Grid {
+impl PixelMap {
     /// A point in pixels: the columns from its first coordinate on have their
     /// centres right of it or on it, the rows from its second on below it or on
     /// it. What lies on a centre is a whole number, as in slicing.
@@ -106,8 +106,8 @@ impl Grid {
 mod tests {
     use super::*;
 
-    fn place(origin_mm: [f64; 2], width: u32, height: u32) -> Place {
-        Place { origin_mm, dpi: Dpi::new(25.4), width, height }
+    fn place(origin_mm: [f64; 2], width: u32, height: u32) -> ImageBounds {
+        ImageBounds { origin_mm, dpi: Dpi::new(25.4), width, height }
     }
 
     #[test]
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_point_on_a_centre_is_a_whole_number() {
-        let grid = Grid { origin_mm: [1.0, 5.0], dpi: Dpi::new(25.4).unwrap() };
+        let grid = PixelMap { origin_mm: [1.0, 5.0], dpi: Dpi::new(25.4).unwrap() };
         assert_eq!(grid.to_pixels([3.5, 4.5]), [2.0, 0.0]);
         assert_eq!(
             place([1.0, 5.0], 9, 9).framed(Frame { left: 2, top: -3, width: 1, height: 1 }),

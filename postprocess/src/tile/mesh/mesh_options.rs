@@ -2,19 +2,19 @@
 
 use lamp_stack::{Dpi, Length, MOST_RUNS, Mask};
 
-use super::super::{Pixels, TileError};
+use super::super::{PixelSize, TileError};
 use super::lattice::{Cells, Lattice};
 
 /// Mesh between two copies is so wide at least, unless it is asked for less.
-const LEAST_MESH: Length = Length::from_um(2000.0);
+const MIN_MESH_WIDTH: Length = Length::from_um(2000.0);
 /// Smaller cells have no holes worth the name.
-const LEAST_CELL_PIXELS: f64 = 4.0;
+const MIN_CELL_PIXELS: f64 = 4.0;
 
 /// The mesh of a build. The seed gives no numbers: the defaults are ours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshOptions {
     /// Its walls.
-    pub pattern: Pattern,
+    pub pattern: MeshPattern,
     /// How far from a part the mesh begins.
     pub clearance: Length,
     /// What it keeps away from.
@@ -40,7 +40,7 @@ pub enum Moat {
 
 /// The walls of a mesh.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Pattern {
+pub enum MeshPattern {
     /// Cells of one shape.
     Cells {
         /// Their shape.
@@ -62,7 +62,7 @@ pub enum Pattern {
 /// The shape of a mesh's cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellShape {
-    /// Hexagons.
+    /// Hexagons with a corner up, and a wall at the left and at the right.
     Hexagon,
     /// Squares.
     Square,
@@ -74,7 +74,7 @@ impl Default for MeshOptions {
     fn default() -> Self {
         let [cell, wall] = [5.0, 0.5].map(Length::from_mm);
         Self {
-            pattern: Pattern::Cells { shape: CellShape::Hexagon, cell, wall },
+            pattern: MeshPattern::Cells { shape: CellShape::Hexagon, cell, wall },
             clearance: Length::from_mm(1.0),
             moat: Moat::default(),
             break_width: Length::from_mm(0.5),
@@ -88,7 +88,7 @@ impl MeshOptions {
     /// How far apart copies are unless another gap is given: a moat around each, and
     /// 2 mm of mesh between.
     pub fn gap(&self) -> Length {
-        Length::from_um(2.0 * self.clearance.um() + LEAST_MESH.um())
+        Length::from_um(2.0 * self.clearance.um() + MIN_MESH_WIDTH.um())
     }
 
     /// The options of the command that makes this mesh.
@@ -96,14 +96,14 @@ impl MeshOptions {
         let moat = if self.moat == Moat::Outline { " --moat outline" } else { "" };
         let Self { clearance, break_width, break_pitch, base_layers, .. } = self;
         let pattern = match &self.pattern {
-            Pattern::Cells { shape, cell, wall } => {
+            MeshPattern::Cells { shape, cell, wall } => {
                 let shape = match shape {
                     CellShape::Hexagon => "hexagon",
                     CellShape::Square => "square",
                 };
                 format!("{shape} --cell {cell} --wall {wall}")
             }
-            Pattern::Image { name, .. } => name.clone(),
+            MeshPattern::Image { name, .. } => name.clone(),
         };
         format!(
             " --mesh {pattern} --clearance {clearance}{moat} --break-width {break_width} \
@@ -111,15 +111,15 @@ impl MeshOptions {
         )
     }
 
-    pub(super) fn lattice(&self, dpi: Dpi, build: Pixels) -> Result<Lattice, TileError> {
+    pub(super) fn lattice(&self, dpi: Dpi, build: PixelSize) -> Result<Lattice, TileError> {
         let runs_of_row = match &self.pattern {
-            Pattern::Cells { cell, wall, .. } => {
-                if cell.pixels(dpi) < LEAST_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
+            MeshPattern::Cells { cell, wall, .. } => {
+                if cell.pixels(dpi) < MIN_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
                     return Err(TileError::NoCells { cell: *cell, wall: *wall });
                 }
                 2.0 * f64::from(build.width) / cell.pixels(dpi)
             }
-            Pattern::Image { name, image } => {
+            MeshPattern::Image { name, image } => {
                 if image.width() == 0 || image.height() == 0 {
                     return Err(TileError::NoTemplate { name: name.clone() });
                 }
@@ -136,14 +136,14 @@ impl MeshOptions {
             return Err(TileError::FineMesh);
         }
         Ok(match &self.pattern {
-            Pattern::Cells { shape, cell, wall } => {
+            MeshPattern::Cells { shape, cell, wall } => {
                 let [cell, wall] = [cell, wall].map(|length| length.pixels(dpi));
                 Lattice::Cells(match shape {
                     CellShape::Hexagon => Cells::hexagon(cell, wall),
                     CellShape::Square => Cells::square(cell, wall),
                 })
             }
-            Pattern::Image { image, .. } => Lattice::Image(image.clone()),
+            MeshPattern::Image { image, .. } => Lattice::Image(image.clone()),
         })
     }
 }

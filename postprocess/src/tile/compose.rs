@@ -10,10 +10,10 @@ use lamp_stack::{
     place_row,
 };
 
-use super::Pixels;
+use super::PixelSize;
 
 /// An image and the places where it stands.
-pub(super) struct Placed<'a> {
+pub(super) struct PlacedImage<'a> {
     pub(super) image: &'a Image,
     /// Left column and top row. All of the image is on the build.
     pub(super) at: &'a [(u32, u32)],
@@ -21,7 +21,7 @@ pub(super) struct Placed<'a> {
 
 /// Why images make no build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fault {
+pub(super) enum ComposeError {
     /// A pixel is white in two copies.
     Overlap,
     /// There are more runs than an image may have.
@@ -29,7 +29,7 @@ pub(super) enum Fault {
 }
 
 /// Puts images on a black build: a gray one if any of them is gray.
-pub(super) fn compose(images: &[Placed<'_>], build: Pixels) -> Result<Image, Fault> {
+pub(super) fn compose(images: &[PlacedImage<'_>], build: PixelSize) -> Result<Image, ComposeError> {
     check_runs(images)?;
     let masks = images.iter().map(|placed| match placed.image {
         Image::Mask(mask) => Some(mask),
@@ -45,7 +45,7 @@ pub(super) fn compose(images: &[Placed<'_>], build: Pixels) -> Result<Image, Fau
 ///
 /// # Panics
 /// If one is gray.
-pub(super) fn united(images: &[Placed<'_>], build: Pixels) -> Result<Mask, Fault> {
+pub(super) fn united(images: &[PlacedImage<'_>], build: PixelSize) -> Result<Mask, ComposeError> {
     check_runs(images)?;
     let masks = images.iter().map(|placed| match placed.image {
         Image::Mask(mask) => mask,
@@ -54,19 +54,19 @@ pub(super) fn united(images: &[Placed<'_>], build: Pixels) -> Result<Mask, Fault
     compose_masks(&masks.collect::<Vec<_>>(), images, build, true)
 }
 
-fn check_runs(images: &[Placed<'_>]) -> Result<(), Fault> {
+fn check_runs(images: &[PlacedImage<'_>]) -> Result<(), ComposeError> {
     let runs =
         images.iter().map(|placed| placed.at.len().saturating_mul(placed.image.changes() + 1));
     let runs = runs.fold(0, usize::saturating_add);
-    if runs > MOST_RUNS { Err(Fault::TooManyRuns) } else { Ok(()) }
+    if runs > MOST_RUNS { Err(ComposeError::TooManyRuns) } else { Ok(()) }
 }
 
 fn compose_masks(
     masks: &[&Mask],
-    images: &[Placed<'_>],
-    build: Pixels,
+    images: &[PlacedImage<'_>],
+    build: PixelSize,
     may_overlap: bool,
-) -> Result<Mask, Fault> {
+) -> Result<Mask, ComposeError> {
     let mut mask = MaskBuilder::new(build.width);
     let runs = images.iter().map(|placed| placed.at.len() * placed.image.changes());
     mask.reserve(build.height as usize, runs.sum());
@@ -74,10 +74,10 @@ fn compose_masks(
         MaskRow { width: build.width, row: Vec::new(), one: Vec::new(), spare: Vec::new() };
     for_each_row(images, build.height, |met| {
         row.row.clear();
-        for &Met { image, left, row: index } in met {
+        for &CopyRow { image, left, row: index } in met {
             let overlaps = row.add(masks[image].row(index), masks[image].width(), left);
             if overlaps && !may_overlap {
-                return Err(Fault::Overlap);
+                return Err(ComposeError::Overlap);
             }
         }
         mask.push_row(&row.row).expect("copies stand on the build");
@@ -88,7 +88,7 @@ fn compose_masks(
 
 /// A copy's row on a row of the build.
 #[derive(Clone, Copy)]
-struct Met {
+struct CopyRow {
     image: usize,
     left: u32,
     row: u32,
@@ -97,15 +97,15 @@ struct Met {
 /// Tells for each row of the build, from the top, the rows of copies that it
 /// meets, by their left columns.
 fn for_each_row(
-    images: &[Placed<'_>],
+    images: &[PlacedImage<'_>],
     height: u32,
-    mut each: impl FnMut(&[Met]) -> Result<(), Fault>,
-) -> Result<(), Fault> {
+    mut each: impl FnMut(&[CopyRow]) -> Result<(), ComposeError>,
+) -> Result<(), ComposeError> {
     let mut waiting = BinaryHeap::new();
     for (image, placed) in images.iter().enumerate() {
         waiting.extend(placed.at.iter().map(|&(left, top)| Reverse((top, left, image))));
     }
-    let mut met: Vec<Met> = Vec::new();
+    let mut met: Vec<CopyRow> = Vec::new();
     for index in 0..height {
         met.retain_mut(|met| {
             met.row += 1;
@@ -115,7 +115,7 @@ fn for_each_row(
             waiting.pop();
             if images[image].image.height() > 0 {
                 let place = met.partition_point(|met| met.left <= left);
-                met.insert(place, Met { image, left, row: 0 });
+                met.insert(place, CopyRow { image, left, row: 0 });
             }
         }
         each(&met)?;
@@ -158,13 +158,13 @@ impl MaskRow {
     }
 }
 
-fn compose_grays(images: &[Placed<'_>], build: Pixels) -> Result<GrayMask, Fault> {
+fn compose_grays(images: &[PlacedImage<'_>], build: PixelSize) -> Result<GrayMask, ComposeError> {
     let grays: Vec<Cow<'_, GrayMask>> = images.iter().map(|placed| gray_of(placed.image)).collect();
     let mut gray = GrayMask::new(build.width);
     let (mut row, mut one, mut spare) = (Vec::new(), Vec::new(), Vec::new());
     for_each_row(images, build.height, |met| {
         row.clear();
-        for &Met { image, left, row: index } in met {
+        for &CopyRow { image, left, row: index } in met {
             shift_levels(
                 grays[image].row(index),
                 grays[image].width(),
@@ -211,7 +211,7 @@ fn add_levels(
     row: &mut Vec<LevelChange>,
     one: &[LevelChange],
     spare: &mut Vec<LevelChange>,
-) -> Result<(), Fault> {
+) -> Result<(), ComposeError> {
     let Some(first) = one.first() else { return Ok(()) };
     if row.last().is_none_or(|last| last.level == 0 && last.column < first.column) {
         row.extend_from_slice(one);
@@ -224,7 +224,7 @@ fn add_levels(
     };
     combine_levels([row, one], brighter, spare);
     std::mem::swap(row, spare);
-    if overlap.get() { Err(Fault::Overlap) } else { Ok(()) }
+    if overlap.get() { Err(ComposeError::Overlap) } else { Ok(()) }
 }
 
 #[cfg(test)]
@@ -252,9 +252,9 @@ mod tests {
         at: &[&[(u32, u32)]],
         width: u32,
         height: u32,
-    ) -> Result<Vec<String>, Fault> {
-        let placed = images.iter().zip(at).map(|(image, at)| Placed { image, at });
-        compose(&placed.collect::<Vec<_>>(), Pixels { width, height }).map(|build| drawn(&build))
+    ) -> Result<Vec<String>, ComposeError> {
+        let placed = images.iter().zip(at).map(|(image, at)| PlacedImage { image, at });
+        compose(&placed.collect::<Vec<_>>(), PixelSize { width, height }).map(|build| drawn(&build))
     }
 
     #[test]
@@ -263,7 +263,10 @@ mod tests {
         let dot = || Image::Mask(mask_of(&["##"]));
         let build = composed(&[u(), dot()], &[&[(0, 1), (4, 1)], &[(1, 1), (5, 0)]], 8, 4);
         assert_eq!(build.unwrap(), [".....##.", "#####..#", "########", "........"]);
-        assert_eq!(composed(&[u(), dot()], &[&[(0, 0)], &[(2, 0)]], 8, 4), Err(Fault::Overlap));
+        assert_eq!(
+            composed(&[u(), dot()], &[&[(0, 0)], &[(2, 0)]], 8, 4),
+            Err(ComposeError::Overlap)
+        );
     }
 
     #[test]
@@ -274,6 +277,6 @@ mod tests {
         let images = [u, Image::Gray(ramp)];
         let build = composed(&images, &[&[(0, 0)], &[(4, 0), (5, 1)]], 8, 2);
         assert_eq!(build.unwrap(), ["#..##++.", "####.#++"]);
-        assert_eq!(composed(&images, &[&[(0, 0)], &[(1, 1)]], 8, 2), Err(Fault::Overlap));
+        assert_eq!(composed(&images, &[&[(0, 0)], &[(1, 1)]], 8, 2), Err(ComposeError::Overlap));
     }
 }

@@ -2,16 +2,16 @@ use lamp_stack::{Image, Length, Mask};
 use proptest::prelude::*;
 
 use super::super::testing::{layer, mask_of};
-use super::super::{Layout, Pack, PackBy, Part, TileError, Turns};
+use super::super::{Layout, Pack, PackBy, PartStack, TileError, Turns};
 
 /// At 25.4 dpi, one pixel is one millimetre.
-fn outlined(mask: &Mask) -> Part {
+fn outlined(mask: &Mask) -> PartStack {
     let layer = layer(0, Image::Mask(mask.clone()));
-    Part::of_outline("p.tif", std::iter::once(Ok::<_, TileError>(layer))).unwrap().unwrap()
+    PartStack::of_outline("p.tif", std::iter::once(Ok::<_, TileError>(layer))).unwrap().unwrap()
 }
 
 fn packed(
-    parts: &[Part],
+    parts: &[PartStack],
     counts: &[Option<u32>],
     area: &str,
     gap: u32,
@@ -117,7 +117,7 @@ fn outlines_in_cells_are_no_nearer() {
     let grown = layout.silhouettes();
     for (k, one) in layout.placements().iter().enumerate() {
         for other in &layout.placements()[..k] {
-            let edge = |at: &super::Placement| {
+            let edge = |at: &super::CopyPlacement| {
                 let mask = &grown[&(at.part, at.turn)];
                 let rows = (0..mask.height()).filter(|&row| !mask.row(row).is_empty());
                 rows.flat_map(|row| {
@@ -151,7 +151,7 @@ proptest! {
         (gap, width, height) in (0u32..3, 6u32..24, 6u32..24),
         (outlines, turns) in (any::<bool>(), 0usize..3),
     ) {
-        let parts: Vec<Part> = shapes
+        let parts: Vec<PartStack> = shapes
             .iter()
             .map(|rows| {
                 let row = |bits: &u32| (0..6).map(|bit| if bits >> bit & 1 == 1 { '#' } else { '.' }).collect();

@@ -20,8 +20,8 @@ use lamp_stack::{Frame, Length, Size, Turn};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::layout::Wish;
-use super::{Layout, Part, Pixels, Placement, TileError};
+use super::layout::RequestedPlacement;
+use super::{CopyPlacement, Layout, PartStack, PixelSize, TileError};
 
 /// A layout as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,13 +30,13 @@ pub struct LayoutFile {
     /// The build area in millimetres, width and height.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     area_mm: Option<[f64; 2]>,
-    copies: Vec<CopyLine>,
+    copies: Vec<CopyEntry>,
 }
 
 /// A copy as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct CopyLine {
+struct CopyEntry {
     part: String,
     x_mm: f64,
     y_mm: f64,
@@ -101,7 +101,7 @@ pub enum LayoutError {
 }
 
 /// No build is larger, in millimetres: 2^26 pixels at 1 dpi.
-const LARGEST: f64 = 1e10;
+const MAX_MM: f64 = 1e10;
 
 impl LayoutFile {
     /// Reads a layout.
@@ -111,12 +111,12 @@ impl LayoutFile {
     pub fn from_json(text: &str) -> Result<Self, LayoutError> {
         let file: Self = serde_json::from_str(text)?;
         for (axis, value) in ["[0]", "[1]"].into_iter().zip(file.area_mm.into_iter().flatten()) {
-            let is_side = value > 0.0 && value < LARGEST;
+            let is_side = value > 0.0 && value < MAX_MM;
             check_number(is_side, value, || format!("area_mm{axis}"))?;
         }
         for (index, copy) in file.copies.iter().enumerate() {
             for (key, value) in [("x_mm", copy.x_mm), ("y_mm", copy.y_mm)] {
-                check_number(value.abs() < LARGEST, value, || format!("copies[{index}].{key}"))?;
+                check_number(value.abs() < MAX_MM, value, || format!("copies[{index}].{key}"))?;
             }
             if copy.turn % 90 != 0 || copy.turn >= 360 {
                 return Err(LayoutError::Turn { copy: index, turn: copy.turn });
@@ -150,13 +150,13 @@ impl LayoutFile {
     /// # Errors
     /// Where no part is called as a copy is, or a part has no copy; where copies
     /// overlap or are not on the area.
-    pub fn place(&self, parts: Vec<Part>, area: Size) -> Result<Layout, LayoutError> {
+    pub fn place(&self, parts: Vec<PartStack>, area: Size) -> Result<Layout, LayoutError> {
         let mut wishes = Vec::new();
         for (index, copy) in self.copies.iter().enumerate() {
             let unknown = || LayoutError::Unknown {
                 copy: index,
                 part: copy.part.clone(),
-                known: parts.iter().map(Part::name).collect::<Vec<_>>().join(", "),
+                known: parts.iter().map(PartStack::name).collect::<Vec<_>>().join(", "),
             };
             let part = part_called(&parts, &copy.part).ok_or_else(unknown)?;
             wishes.push(copy.wish(part, &parts[part], area));
@@ -176,10 +176,10 @@ impl Layout {
         let nm = |mm: f64| (mm * 1e6).round() / 1e6 + 0.0;
         let Size { width, height } = self.area;
         let pitch = self.dpi.pitch().mm();
-        let line = |at: &Placement| {
+        let line = |at: &CopyPlacement| {
             let part = &self.parts[at.part];
             let image = image_of(part, at);
-            CopyLine {
+            CopyEntry {
                 part: label(&self.parts, at.part).to_owned(),
                 x_mm: nm(image.left as f64 * pitch),
                 y_mm: nm(height.mm() - (image.top + i64::from(image.height)) as f64 * pitch),
@@ -194,8 +194,8 @@ impl Layout {
     }
 }
 
-impl CopyLine {
-    fn wish(&self, index: usize, part: &Part, area: Size) -> Wish {
+impl CopyEntry {
+    fn wish(&self, index: usize, part: &PartStack, area: Size) -> RequestedPlacement {
         let turn = Turn::new(self.turn / 90, self.mirror);
         let pitch = part.dpi().pitch().mm();
         let (margin_left, margin_top) = margins(part, turn);
@@ -204,12 +204,12 @@ impl CopyLine {
         let left = (self.x_mm / pitch).round() as i64;
         let bottom = ((area.height.mm() - self.y_mm) / pitch).round() as i64;
         let top = bottom - i64::from(height);
-        Wish { part: index, turn, left: left + margin_left, top: top + margin_top }
+        RequestedPlacement { part: index, turn, left: left + margin_left, top: top + margin_top }
     }
 }
 
 /// Where all of a copy's image is on the build.
-fn image_of(part: &Part, at: &Placement) -> Frame {
+fn image_of(part: &PartStack, at: &CopyPlacement) -> Frame {
     let (margin_left, margin_top) = margins(part, at.turn);
     let image = part.image();
     let (width, height) = at.turn.size(image.width, image.height);
@@ -222,8 +222,8 @@ fn image_of(part: &Part, at: &Placement) -> Frame {
 }
 
 /// How far from the turned image's left and top its frame begins.
-fn margins(part: &Part, turn: Turn) -> (i64, i64) {
-    let Pixels { width, height } = part.image();
+fn margins(part: &PartStack, turn: Turn) -> (i64, i64) {
+    let PixelSize { width, height } = part.image();
     let frame = part.frame();
     let mut left = frame.left;
     let mut top = frame.top;
@@ -244,14 +244,14 @@ fn check_number(is_right: bool, value: f64, place: impl Fn() -> String) -> Resul
 }
 
 /// The part of that name, or the one whose name ends so.
-fn part_called(parts: &[Part], name: &str) -> Option<usize> {
+fn part_called(parts: &[PartStack], name: &str) -> Option<usize> {
     let by_name = parts.iter().position(|part| part.name() == name);
     by_name.or_else(|| (0..parts.len()).find(|&part| label(parts, part) == name))
 }
 
 /// The last of a part's name, if no other part's ends so.
-fn label(parts: &[Part], part: usize) -> &str {
-    let last = |part: &Part| part.name().rsplit(['/', '\\']).next().map(str::to_owned);
+fn label(parts: &[PartStack], part: usize) -> &str {
+    let last = |part: &PartStack| part.name().rsplit(['/', '\\']).next().map(str::to_owned);
     let own = last(&parts[part]);
     let name = parts[part].name();
     match parts.iter().filter(|part| last(part) == own).count() {

@@ -2,10 +2,10 @@
 
 use lamp_stack::Mask;
 
-use super::Placement;
+use super::CopyPlacement;
 
 /// A pixel of the build that is white in two placed masks.
-pub(super) fn common_pixel(masks: [&Mask; 2], at: [&Placement; 2]) -> Option<(u32, u32)> {
+pub(super) fn common_pixel(masks: [&Mask; 2], at: [&CopyPlacement; 2]) -> Option<(u32, u32)> {
     let [a, b] = at;
     let top = a.top.max(b.top);
     let bottom = (a.top + masks[0].height()).min(b.top + masks[1].height());

@@ -12,7 +12,7 @@ use super::TileError;
 
 /// How stacks are joined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Heights {
+pub struct HeightOptions {
     /// Whether heights count from each stack's first layer, so that all stand
     /// on the platform.
     pub settle: bool,
@@ -23,10 +23,10 @@ pub struct Heights {
 }
 
 /// Heights nearer than this are the same, in micrometres.
-const SAME: f64 = 1.0;
+const TOLERANCE_UM: f64 = 1.0;
 
 /// The layers of the stacks at one height of the build.
-pub(super) struct Step {
+pub(super) struct LayerSet {
     pub(super) index: u32,
     /// The layer's bottom and thickness in micrometres, where they are known.
     pub(super) z_um: Option<f64>,
@@ -41,7 +41,7 @@ pub(super) struct Step {
     pub(super) is_first: bool,
 }
 
-impl Held for Step {
+impl Held for LayerSet {
     /// What the copies will take.
     fn bytes(&self) -> usize {
         let layers = self.layers.iter().zip(self.copies.iter());
@@ -54,9 +54,9 @@ impl Held for Step {
 }
 
 /// Stacks in step.
-pub(super) struct Steps<S> {
-    stacks: Vec<Stack<S>>,
-    heights: Heights,
+pub(super) struct Lockstep<S> {
+    stacks: Vec<SteppedStack<S>>,
+    heights: HeightOptions,
     copies: Arc<[usize]>,
     mesh_bytes: usize,
     /// The build layer before: its index, and its bottom and top.
@@ -64,7 +64,7 @@ pub(super) struct Steps<S> {
     done: bool,
 }
 
-struct Stack<S> {
+struct SteppedStack<S> {
     name: String,
     layers: S,
     /// The next layer.
@@ -73,7 +73,7 @@ struct Stack<S> {
     up: f64,
 }
 
-impl<S, E> Steps<S>
+impl<S, E> Lockstep<S>
 where
     S: Iterator<Item = Result<Layer, E>>,
     E: From<TileError>,
@@ -82,17 +82,17 @@ where
     pub(super) fn new(
         stacks: impl IntoIterator<Item = (String, S)>,
         copies: Arc<[usize]>,
-        heights: Heights,
+        heights: HeightOptions,
         mesh_bytes: usize,
     ) -> Self {
-        let stack = |(name, layers)| Stack { name, layers, next: None, up: 0.0 };
+        let stack = |(name, layers)| SteppedStack { name, layers, next: None, up: 0.0 };
         let stacks = stacks.into_iter().map(stack).collect();
         Self { stacks, heights, copies, mesh_bytes, last: None, done: false }
     }
 
-    fn step(&mut self) -> Result<Option<Step>, E> {
+    fn step(&mut self) -> Result<Option<LayerSet>, E> {
         if self.last.is_none() {
-            self.stacks.iter_mut().try_for_each(Stack::advance)?;
+            self.stacks.iter_mut().try_for_each(SteppedStack::advance)?;
             self.start_together()?;
         }
         if self.heights.resample && self.stacks.len() > 1 {
@@ -122,27 +122,27 @@ where
         z_um: Option<f64>,
         thickness_um: Option<f64>,
         layers: Vec<Option<Arc<Layer>>>,
-    ) -> Step {
+    ) -> LayerSet {
         let index = match self.last {
             Some((last, _)) => index.max(last.saturating_add(1)),
             None => index,
         };
         let is_first = self.last.replace((index, span)).is_none();
         let (copies, mesh_bytes) = (Arc::clone(&self.copies), self.mesh_bytes);
-        Step { index, z_um, thickness_um, layers, copies, mesh_bytes, is_first }
+        LayerSet { index, z_um, thickness_um, layers, copies, mesh_bytes, is_first }
     }
 
     /// Finds how far each stack must go up, and checks that all start at one
     /// height.
     fn start_together(&mut self) -> Result<(), TileError> {
-        let bottom = |stack: &Stack<S>| stack.span().map(|span| span[0]);
+        let bottom = |stack: &SteppedStack<S>| stack.span().map(|span| span[0]);
         let Some(first) = self.stacks.first().and_then(bottom) else { return Ok(()) };
         let first_name = self.stacks[0].name.clone();
         for stack in &mut self.stacks[1..] {
             let Some(z) = bottom(stack) else { continue };
             if self.heights.settle {
                 stack.up = first - z;
-            } else if (z - first).abs() > SAME {
+            } else if (z - first).abs() > TOLERANCE_UM {
                 let (first_z, z) = (first / 1e3, z / 1e3);
                 return Err(TileError::OtherStart {
                     first: first_name,
@@ -165,7 +165,7 @@ where
         for stack in all {
             let spans = stack.known_span()?;
             let build = build.unwrap_or(spans);
-            if build.iter().zip(spans).any(|(a, b)| (a - b).abs() > SAME) {
+            if build.iter().zip(spans).any(|(a, b)| (a - b).abs() > TOLERANCE_UM) {
                 let layer = stack.layer_name();
                 let first = self.stacks[leader].name.clone();
                 return Err(TileError::OtherHeights {
@@ -181,7 +181,7 @@ where
     }
 
     /// The next layer by the heights of the first stack.
-    fn resampled(&mut self) -> Result<Option<Step>, E> {
+    fn resampled(&mut self) -> Result<Option<LayerSet>, E> {
         let first = &self.stacks[0];
         let (index, span) = match (&first.next, self.last) {
             (Some(layer), _) => (layer.info.index, first.known_span()?),
@@ -205,7 +205,7 @@ where
     }
 }
 
-impl<S, E> Stack<S>
+impl<S, E> SteppedStack<S>
 where
     S: Iterator<Item = Result<Layer, E>>,
     E: From<TileError>,
@@ -219,8 +219,8 @@ where
     fn layer_at(&mut self, height: f64) -> Result<Option<Arc<Layer>>, E> {
         while self.next.is_some() {
             let [bottom, top] = self.known_span()?;
-            if top >= height - SAME {
-                return Ok(self.next.clone().filter(|_| bottom < height - SAME));
+            if top >= height - TOLERANCE_UM {
+                return Ok(self.next.clone().filter(|_| bottom < height - TOLERANCE_UM));
             }
             self.advance()?;
         }
@@ -228,7 +228,7 @@ where
     }
 }
 
-impl<S> Stack<S> {
+impl<S> SteppedStack<S> {
     /// The next layer's bottom and top on the build, in micrometres.
     fn span(&self) -> Option<[f64; 2]> {
         let info = &self.next.as_ref()?.info;
@@ -246,12 +246,12 @@ impl<S> Stack<S> {
     }
 }
 
-impl<S, E> Iterator for Steps<S>
+impl<S, E> Iterator for Lockstep<S>
 where
     S: Iterator<Item = Result<Layer, E>>,
     E: From<TileError>,
 {
-    type Item = Result<Step, E>;
+    type Item = Result<LayerSet, E>;
 
     /// The next layers; after an error, none.
     fn next(&mut self) -> Option<Self::Item> {
@@ -299,7 +299,7 @@ mod tests {
             .map(str::to_owned)
             .into_iter()
             .zip(stacks.into_iter().map(Vec::into_iter));
-        let steps = Steps::new(named, copies, Heights { settle, resample }, 0);
+        let steps = Lockstep::new(named, copies, HeightOptions { settle, resample }, 0);
         let index = |layer: &Option<Arc<Layer>>| layer.as_ref().map(|layer| layer.info.index);
         let mut next = 0;
         steps
