@@ -38,7 +38,7 @@ pub enum HeightsError {
         height_mm: f64,
     },
     /// Rows so near to each other that no image has as many.
-    #[error("rows {pitch_um} um apart are more than 2^24: give a wider --row-pitch")]
+    #[error("rows {pitch_um} um apart are more than 2^24")]
     TooManyRows {
         /// How far apart they would be, in micrometres.
         pitch_um: f64,

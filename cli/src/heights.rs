@@ -169,7 +169,7 @@ impl HeightOptions {
     /// What the machine builds.
     fn machine(&self) -> Result<Machine, Stop> {
         let step = self.step.unwrap_or(Length::from_um(1.0));
-        Machine::new(self.min(), self.max(), step).map_err(|error| Stop::usage(error.to_string()))
+        Machine::new(self.min(), self.max(), step).map_err(Stop::wrong_options)
     }
 
     /// Checks, before the work, what the parser cannot.

@@ -11,6 +11,7 @@ mod evidence;
 mod exposure;
 mod findings;
 mod heights;
+mod hints;
 mod lines;
 mod machines;
 mod materials;

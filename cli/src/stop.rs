@@ -9,11 +9,13 @@ use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, Til
 use lamp_slicer::SliceError;
 use lamp_stack::{JoinError, SplitError, StackError};
 
+use crate::hints::hint;
+
 /// Why a command stops: whose fault it is decides the exit status.
 #[derive(Debug)]
 pub(crate) enum Stop {
     /// Wrong usage: status 2.
-    Usage(String),
+    Usage(anyhow::Error),
     /// Bad input, or a failure on the way: status 1.
     Failed(anyhow::Error),
     /// Writing the output failed: status 1, or none if its reader went away.
@@ -24,7 +26,12 @@ pub(crate) enum Stop {
 
 impl Stop {
     pub(crate) fn usage(message: impl Into<String>) -> Self {
-        Self::Usage(message.into())
+        Self::Usage(anyhow::Error::msg(message.into()))
+    }
+
+    /// An error of a library that the options caused.
+    pub(crate) fn wrong_options(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::Usage(error.into())
     }
 
     pub(crate) fn output(error: io::Error, place: &'static str) -> Self {
@@ -34,7 +41,7 @@ impl Stop {
     /// Puts what was being worked on before the message.
     pub(crate) fn at(self, place: impl fmt::Display + Send + Sync + 'static) -> Self {
         match self {
-            Self::Usage(message) => Self::Usage(format!("{place}: {message}")),
+            Self::Usage(error) => Self::Usage(error.context(place)),
             Self::Failed(error) => Self::Failed(error.context(place)),
             Self::Output(error) => Self::Output(error.context(place)),
             Self::Findings(message) => Self::Findings(format!("{place}: {message}")),
@@ -72,8 +79,14 @@ impl Stop {
 impl fmt::Display for Stop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(message) | Self::Findings(message) => f.write_str(message),
-            Self::Failed(error) | Self::Output(error) => write!(f, "{error:#}"),
+            Self::Findings(message) => f.write_str(message),
+            Self::Usage(error) | Self::Failed(error) | Self::Output(error) => {
+                write!(f, "{error:#}")?;
+                match error.chain().find_map(hint) {
+                    Some(hint) => write!(f, ": {hint}"),
+                    None => Ok(()),
+                }
+            }
         }
     }
 }

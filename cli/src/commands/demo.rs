@@ -54,7 +54,7 @@ const AROUND: u32 = 10;
 
 pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
     let part = Part::Blade;
-    let mesh = build(part, args.facets).map_err(|error| Stop::usage(error.to_string()))?;
+    let mesh = build(part, args.facets).map_err(Stop::wrong_options)?;
     fs::create_dir_all(&args.folder).with_context(|| args.folder.display().to_string())?;
     let [stl, stack, sheet, meshed, in_mesh] =
         ["blade.stl", "build.tif", "layers.png", "alpha.tif", "alpha.png"]

@@ -91,7 +91,7 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
     if is_step_name(&args.output) {
         return args.write_step(part);
     }
-    let mut mesh = build(part, args.facets).map_err(|error| Stop::usage(error.to_string()))?;
+    let mut mesh = build(part, args.facets).map_err(Stop::wrong_options)?;
     if let Some(defect) = args.defect {
         inject(&mut mesh, args.defect(defect), args.count, args.seed);
     }

@@ -48,6 +48,6 @@ fn parse_gap(text: &str) -> Result<Length, String> {
 /// Impossible targets come from options.
 impl From<TargetError> for Stop {
     fn from(error: TargetError) -> Self {
-        Self::usage(error.to_string())
+        Self::wrong_options(error)
     }
 }

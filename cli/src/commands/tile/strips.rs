@@ -62,7 +62,7 @@ impl StripArgs {
         match StripWriter::new(folder, mirrors, overlap, format(classic)) {
             Ok(writer) => Ok(Some(Strips { folder: folder.to_owned(), writer })),
             Err(error @ (StripsError::Swaths(_) | StripsError::Mirrors { .. })) => {
-                Err(Stop::usage(error.to_string()))
+                Err(Stop::wrong_options(error))
             }
             Err(error) => Err(failed(folder, error)),
         }
