@@ -269,8 +269,5 @@ fn rows_are_not_too_near() {
         Units::Millimetres,
     );
     let error = Part::new(body.unwrap(), Length::from_um(1e-4), Fill::EvenOdd).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "rows 0.0001 um apart are more than 2^24"
-    );
+    assert_eq!(error.to_string(), "rows 0.0001 um apart are more than 2^24");
 }
