@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 use lamp_benches::score::{Bands, Score};
 use lamp_benches::sliced::{Layers, broken, mask, slice};
 use lamp_fixtures::{Defect, Part, build};
-use lamp_postprocess::{Band, FixOptions, Method as FixMethod, Outcome as BandOutcome, fix};
+use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, fix};
 use lamp_slicer::{Fill, SliceOptions};
 
 const PARTS: [(Part, usize); 5] = [

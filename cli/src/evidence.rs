@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use lamp_postprocess::{Band, Fixed, Outcome};
+use lamp_postprocess::{Band, BandOutcome, Fixed};
 use lamp_stack::{Image, write_rgb_png};
 
 use crate::picture::{Region, levels_of_region};
@@ -58,7 +58,7 @@ impl Evidence {
         let region = region(&fixed.before.image, band);
         let panel = |image: &Image| -> Vec<Vec<u8>> { levels_of_region(image, &region).collect() };
         let before = panel(&fixed.before.image);
-        let corrected = band.outcome == Outcome::Corrected;
+        let corrected = band.outcome == BandOutcome::Corrected;
         let panels = if corrected {
             let after = panel(&fixed.after.image);
             vec![plain(&before), plain(&after), difference(&before, &after)]

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::ops::Range;
 
-use lamp_postprocess::{Band, FixOptions, Fixed, Kind, Outcome};
+use lamp_postprocess::{Band, BandKind, BandOutcome, FixOptions, Fixed};
 use lamp_stack::Layer;
 use serde::Serialize;
 
@@ -62,7 +62,7 @@ impl Findings {
     /// Adds what was found in a layer.
     pub(crate) fn add(&mut self, fixed: &Fixed<'_>) {
         for band in fixed.bands {
-            if band.outcome == Outcome::Corrected {
+            if band.outcome == BandOutcome::Corrected {
                 self.corrected += 1;
                 self.pixels += band.pixels;
             }
@@ -107,14 +107,14 @@ impl Findings {
             columns: columns.as_ref().map(first_and_last),
             gap_x_mm: x_mm(&band.gap),
             gap_columns: band.gap.as_ref().map(first_and_last),
-            kinds: band.kinds.iter().map(Kind::name).collect(),
+            kinds: band.kinds.iter().map(BandKind::name).collect(),
             method: self.options.method.name(),
             confidence: (band.confidence * 1e4).round() / 1e4,
             pixels: band.pixels,
             outcome: match band.outcome {
-                Outcome::Corrected => "corrected",
-                Outcome::TooWide => "left: too wide",
-                Outcome::Doubtful => "left: doubtful",
+                BandOutcome::Corrected => "corrected",
+                BandOutcome::TooWide => "left: too wide",
+                BandOutcome::Doubtful => "left: doubtful",
             },
         }
     }

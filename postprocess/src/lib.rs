@@ -35,7 +35,7 @@ mod strips;
 mod tile;
 
 pub use edit::{EditError, Edits, OtherLayers, edit};
-pub use fix::{Band, FixOptions, Fixed, Kind, Kinds, Method, Outcome, fix};
+pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
 pub use offset::{
     CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,
     offset, offset_one_bit, shrink,

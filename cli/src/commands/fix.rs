@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use lamp_postprocess::{Band, FixOptions, Fixed, Method, Outcome};
+use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
 use crate::evidence::Evidence;
@@ -78,8 +78,8 @@ impl FixArgs {
     fn options(&self) -> FixOptions {
         FixOptions {
             method: match self.method {
-                MethodArg::Nearest => Method::Nearest,
-                MethodArg::Spline => Method::Spline,
+                MethodArg::Nearest => FixMethod::Nearest,
+                MethodArg::Spline => FixMethod::Spline,
             },
             max_width: self.max_width,
             min_confidence: self.min_confidence,
@@ -137,16 +137,16 @@ fn left_in_all(bands: usize) -> String {
 fn describe(fixed: &Fixed<'_>, options: &FixOptions) -> Vec<String> {
     let info = &fixed.before.info;
     let corrected: Vec<&Band> =
-        fixed.bands.iter().filter(|band| band.outcome == Outcome::Corrected).collect();
+        fixed.bands.iter().filter(|band| band.outcome == BandOutcome::Corrected).collect();
     let mut lines = Vec::new();
     if !corrected.is_empty() {
         lines.push(describe_corrected(info, &corrected));
     }
     for band in fixed.bands {
         let why = match band.outcome {
-            Outcome::Corrected => continue,
-            Outcome::TooWide => format!("{} rows wide, limit {}", band.rows, options.max_width),
-            Outcome::Doubtful => {
+            BandOutcome::Corrected => continue,
+            BandOutcome::TooWide => format!("{} rows wide, limit {}", band.rows, options.max_width),
+            BandOutcome::Doubtful => {
                 format!("confidence {:.2}, limit {:.2}", band.confidence, options.min_confidence)
             }
         };
@@ -191,16 +191,16 @@ fn parse_share(text: &str) -> Result<f64, String> {
 
 #[cfg(test)]
 mod tests {
-    use lamp_postprocess::Kinds;
+    use lamp_postprocess::BandKinds;
     use lamp_stack::{Dpi, Image, Layer, Mask};
 
     use super::*;
 
-    fn band(first_row: u32, rows: u32, outcome: Outcome) -> Band {
+    fn band(first_row: u32, rows: u32, outcome: BandOutcome) -> Band {
         Band {
             first_row,
             rows,
-            kinds: Kinds::NONE,
+            kinds: BandKinds::NONE,
             columns: 100..400,
             gap: Some(120..130),
             pixels: 107,
@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn what_was_corrected_is_said_in_one_line() {
         let info = PageInfo { index: 812, z_um: Some(81_200.0), ..PageInfo::default() };
-        let bands = [band(1034, 3, Outcome::Corrected), band(1070, 1, Outcome::Corrected)];
+        let bands = [band(1034, 3, BandOutcome::Corrected), band(1070, 1, BandOutcome::Corrected)];
         assert_eq!(
             described(&bands, info),
             ["layer 812 (z 81.20 mm): rows 1034-1036, 1070 corrected, 214 pixels changed"]
@@ -234,7 +234,7 @@ mod tests {
     fn what_was_left_is_said_with_its_place() {
         let origin_mm = Some([20.0, 120.0]);
         let info = PageInfo { index: 812, z_um: Some(81_200.0), origin_mm, ..PageInfo::default() };
-        let bands = [band(1034, 38, Outcome::TooWide), band(1080, 1, Outcome::Doubtful)];
+        let bands = [band(1034, 38, BandOutcome::TooWide), band(1080, 1, BandOutcome::Doubtful)];
         assert_eq!(
             described(&bands, info),
             [

@@ -4,7 +4,7 @@
 /// difference of the rows' numbers.
 const REACH: isize = 16;
 /// Rows that take more steps than that are not followed: no part looks so.
-const MOST_STEPS: usize = 1 << 22;
+const MAX_STEPS: usize = 1 << 22;
 /// What it costs, in pixels, that a contour closes, besides its width.
 const CLOSING: f64 = 2.0;
 
@@ -22,7 +22,7 @@ pub(crate) fn align(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
     let more = b.len() as isize - a.len() as isize;
     let (low, high) = (more.min(0) - REACH, more.max(0) + REACH);
     let stride = (high - low + 1) as usize;
-    if (a.len() + 1).saturating_mul(stride) > MOST_STEPS {
+    if (a.len() + 1).saturating_mul(stride) > MAX_STEPS {
         return vec![None; a.len()];
     }
     // cost[i][j - i - low]: the cheapest way to account for i and j crossings.

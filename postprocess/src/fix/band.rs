@@ -10,7 +10,7 @@ pub struct Band {
     /// How many rows it has.
     pub rows: u32,
     /// How it was found.
-    pub kinds: Kinds,
+    pub kinds: BandKinds,
     /// The columns that the correction changes; of a band that is left, those
     /// that it would change. Empty where no correction is known.
     pub columns: Range<u32>,
@@ -22,7 +22,7 @@ pub struct Band {
     /// How sure the correction is, from 0 to 1.
     pub confidence: f64,
     /// What was done.
-    pub outcome: Outcome,
+    pub outcome: BandOutcome,
 }
 
 impl Band {
@@ -34,7 +34,7 @@ impl Band {
 
 /// What was done about a band.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
+pub enum BandOutcome {
     /// It was corrected.
     Corrected,
     /// It was left: it has more rows than allowed.
@@ -43,13 +43,13 @@ pub enum Outcome {
     Doubtful,
 }
 
-/// How a band was found, and what is particular about it: a set of [`Kind`].
+/// How a band was found, and what is particular about it: a set of [`BandKind`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Kinds(u8);
+pub struct BandKinds(u8);
 
 /// A way in which rows are stray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum BandKind {
     /// The row ends white, though every part leaves the last column black
     /// (002 section 2.4.1, algorithm 10).
     EndsWhite,
@@ -69,7 +69,7 @@ pub enum Kind {
     Touching,
 }
 
-impl Kind {
+impl BandKind {
     /// All kinds.
     pub const ALL: [Self; 6] = [
         Self::EndsWhite,
@@ -93,10 +93,10 @@ impl Kind {
     }
 }
 
-impl Kinds {
+impl BandKinds {
     /// No kind: a good row.
     pub const NONE: Self = Self(0);
-    pub(super) const ENDS_WHITE: Self = Self(1 << Kind::EndsWhite as u8);
+    pub(super) const ENDS_WHITE: Self = Self(1 << BandKind::EndsWhite as u8);
 
     /// Whether there is none.
     pub fn is_empty(self) -> bool {
@@ -104,16 +104,16 @@ impl Kinds {
     }
 
     /// Whether a kind is among them.
-    pub fn contains(self, kind: Kind) -> bool {
+    pub fn contains(self, kind: BandKind) -> bool {
         self.0 & 1 << kind as u8 != 0
     }
 
-    /// The kinds, in the order of [`Kind::ALL`].
-    pub fn iter(self) -> impl Iterator<Item = Kind> {
-        Kind::ALL.into_iter().filter(move |&kind| self.contains(kind))
+    /// The kinds, in the order of [`BandKind::ALL`].
+    pub fn iter(self) -> impl Iterator<Item = BandKind> {
+        BandKind::ALL.into_iter().filter(move |&kind| self.contains(kind))
     }
 
-    pub(super) fn insert(&mut self, kind: Kind) {
+    pub(super) fn insert(&mut self, kind: BandKind) {
         self.0 |= 1 << kind as u8;
     }
 
@@ -122,8 +122,8 @@ impl Kinds {
     }
 }
 
-impl FromIterator<Kind> for Kinds {
-    fn from_iter<I: IntoIterator<Item = Kind>>(kinds: I) -> Self {
+impl FromIterator<BandKind> for BandKinds {
+    fn from_iter<I: IntoIterator<Item = BandKind>>(kinds: I) -> Self {
         let mut all = Self::NONE;
         kinds.into_iter().for_each(|kind| all.insert(kind));
         all

@@ -9,7 +9,7 @@ use std::ops::Range;
 use lamp_stack::Mask;
 
 use super::align::align;
-use super::curve::{hermite, parabola, slope};
+use super::polynomial::{hermite, parabola, slope};
 
 /// So many good rows on each side show where a contour is going.
 pub(super) const DEPTH: u32 = 12;
@@ -26,7 +26,7 @@ pub(super) struct Expected {
     /// How far off that may be, in pixels.
     pub(super) slack: f64,
     /// The contour, and which of its sides.
-    pub(super) side: Side,
+    pub(super) side: LineId,
     /// Whether it must be there: the contour crosses the whole band.
     pub(super) through: bool,
     /// Whether it is more likely there than not.
@@ -37,7 +37,7 @@ pub(super) struct Expected {
 
 /// One of the lines that make up the contours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Side {
+pub(super) struct LineId {
     contour: usize,
     right: bool,
 }
@@ -64,26 +64,26 @@ pub(super) struct Contours {
 }
 
 /// Where a line is known to cross the rows looked at.
-type Knots = Vec<Option<f64>>;
+type KnownColumns = Vec<Option<f64>>;
 
 /// Where a line should cross a row, and how far off that may be.
 type Guess = (f64, f64);
 
 #[derive(Debug)]
 struct Contour {
-    course: Course,
+    course: ContourPath,
     /// Where its lines, one or two, should cross each row of the band.
     guesses: Vec<Vec<Guess>>,
 }
 
 #[derive(Debug)]
-enum Course {
+enum ContourPath {
     /// It crosses the band from the good row above to the one below, or from
     /// one of them to the image's edge.
-    Through(Knots),
+    Through(KnownColumns),
     /// Both sides of a contour that comes from above, or from below, and ends
     /// in the band.
-    Closing { sides: [Knots; 2], from_above: bool },
+    Closing { sides: [KnownColumns; 2], from_above: bool },
 }
 
 impl Contours {
@@ -110,7 +110,7 @@ impl Contours {
         let mut contours = Self { rows, band, good_rows, contours: Vec::new() };
         if above.is_empty() || below.is_empty() {
             for line in follow(mask, &[above, below].concat()) {
-                contours.push(Course::Through(contours.knots(&[&line])));
+                contours.push(ContourPath::Through(contours.knots(&[&line])));
             }
         } else {
             contours.join(&follow(mask, &above), &follow(mask, &below));
@@ -120,9 +120,9 @@ impl Contours {
     }
 
     /// Joins the lines that cross the band; what is left comes in pairs.
-    fn join(&mut self, above: &[Line], below: &[Line]) {
+    fn join(&mut self, above: &[LinePoints], below: &[LinePoints]) {
         let ahead = f64::from(self.band.end - self.band.start + 1);
-        let reach = |lines: &[Line], rows: f64| -> Vec<f64> {
+        let reach = |lines: &[LinePoints], rows: f64| -> Vec<f64> {
             let mut columns: Vec<f64> = lines
                 .iter()
                 .map(|line| line[0].1 + rows * slope(line).clamp(-20.0, 20.0))
@@ -141,7 +141,7 @@ impl Contours {
             if let Some(partner) = *partner {
                 joined[partner] = true;
                 let knots = self.knots(&[line, &below[partner]]);
-                self.push(Course::Through(knots));
+                self.push(ContourPath::Through(knots));
             } else {
                 pairs.push(line);
             }
@@ -150,12 +150,12 @@ impl Contours {
         for (lines, from_above) in [(pairs, true), (begun.collect(), false)] {
             for pair in lines.chunks_exact(2) {
                 let sides = [self.knots(&pair[..1]), self.knots(&pair[1..])];
-                self.push(Course::Closing { sides, from_above });
+                self.push(ContourPath::Closing { sides, from_above });
             }
         }
     }
 
-    fn knots(&self, lines: &[&Line]) -> Knots {
+    fn knots(&self, lines: &[&LinePoints]) -> KnownColumns {
         let mut knots = vec![None; (self.rows.end - self.rows.start) as usize];
         for &(row, column) in lines.iter().copied().flatten() {
             knots[(row - f64::from(self.rows.start)) as usize] = Some(column);
@@ -163,17 +163,17 @@ impl Contours {
         knots
     }
 
-    fn push(&mut self, course: Course) {
+    fn push(&mut self, course: ContourPath) {
         self.contours.push(Contour { course, guesses: Vec::new() });
     }
 
     /// Notes that a line was found in a row of the band. [`Self::guess`] then
     /// makes use of it.
-    pub(super) fn found(&mut self, side: Side, row: u32, column: u32) {
+    pub(super) fn found(&mut self, side: LineId, row: u32, column: u32) {
         let at = (row - self.rows.start) as usize;
         let knots = match &mut self.contours[side.contour].course {
-            Course::Through(knots) => knots,
-            Course::Closing { sides, .. } => &mut sides[usize::from(side.right)],
+            ContourPath::Through(knots) => knots,
+            ContourPath::Closing { sides, .. } => &mut sides[usize::from(side.right)],
         };
         knots[at] = Some(f64::from(column));
     }
@@ -185,8 +185,8 @@ impl Contours {
             [self.band.start, self.band.end].map(|row| (row - self.rows.start) as usize);
         for Contour { course, guesses } in &mut self.contours {
             *guesses = match course {
-                Course::Through(knots) => vec![through(knots, start..end)],
-                Course::Closing { sides, from_above } => {
+                ContourPath::Through(knots) => vec![through(knots, start..end)],
+                ContourPath::Closing { sides, from_above } => {
                     let [left, right]: [Vec<_>; 2] = closing(sides, start..end, *from_above);
                     vec![left, right]
                 }
@@ -199,14 +199,14 @@ impl Contours {
         let at = (row - self.band.start) as usize;
         let mut outlook = Outlook::default();
         for (contour, Contour { course, guesses }) in self.contours.iter().enumerate() {
-            let through = matches!(course, Course::Through(_));
+            let through = matches!(course, ContourPath::Through(_));
             let apart = match &guesses[..] {
                 [left, right] => right[at].0 - left[at].0 - left[at].1 - right[at].1,
                 _ => f64::INFINITY,
             };
             for (line, guesses) in guesses.iter().enumerate() {
                 let (column, slack) = guesses[at];
-                let side = Side { contour, right: line == 1 };
+                let side = LineId { contour, right: line == 1 };
                 let likely = apart > CLEARLY_OPEN;
                 outlook.crossings.push(Expected {
                     column,
@@ -217,7 +217,7 @@ impl Contours {
                     may_be_missed: true,
                 });
             }
-            if let Course::Closing { sides, .. } = course {
+            if let ContourPath::Closing { sides, .. } = course {
                 outlook.unknown.push(span(sides, [guesses[0][at], guesses[1][at]]));
             }
         }
@@ -241,7 +241,7 @@ fn apart(mut ranges: Vec<Range<f64>>) -> Vec<Range<f64>> {
 }
 
 /// Columns between which a contour that closes may be anywhere.
-fn span(sides: &[Knots; 2], now: [Guess; 2]) -> Range<f64> {
+fn span(sides: &[KnownColumns; 2], now: [Guess; 2]) -> Range<f64> {
     let columns = || sides.iter().flatten().copied().flatten();
     let slack = now[0].1.max(now[1].1) + 2.0;
     let low = columns().fold(now[0].0, f64::min) - slack;
@@ -250,13 +250,13 @@ fn span(sides: &[Knots; 2], now: [Guess; 2]) -> Range<f64> {
 }
 
 /// A line's crossings, from the row beside the band outwards: (row, column).
-type Line = Vec<(f64, f64)>;
+type LinePoints = Vec<(f64, f64)>;
 
 /// Follows every crossing of the first row through the others.
-fn follow(mask: &Mask, rows: &[u32]) -> Vec<Line> {
+fn follow(mask: &Mask, rows: &[u32]) -> Vec<LinePoints> {
     let columns = |row: u32| -> Vec<f64> { mask.row(row).iter().map(|&c| c.into()).collect() };
     let mut last = columns(rows[0]);
-    let mut lines: Vec<Line> = last.iter().map(|&c| vec![(rows[0].into(), c)]).collect();
+    let mut lines: Vec<LinePoints> = last.iter().map(|&c| vec![(rows[0].into(), c)]).collect();
     // Which line each crossing of the last row is on.
     let mut on: Vec<Option<usize>> = (0..lines.len()).map(Some).collect();
     for &row in &rows[1..] {
@@ -277,24 +277,24 @@ fn follow(mask: &Mask, rows: &[u32]) -> Vec<Line> {
 }
 
 /// The known points from a row on, in steps of one row, without a gap.
-fn line_from(knots: &Knots, rows: impl Iterator<Item = usize>) -> Line {
+fn line_from(knots: &KnownColumns, rows: impl Iterator<Item = usize>) -> LinePoints {
     let point = |row: usize| Some((row as f64, knots[row]?));
     rows.map_while(point).take(DEPTH as usize).collect()
 }
 
 /// The line upwards of a row that is known.
-fn above(knots: &Knots, row: usize) -> Line {
+fn above(knots: &KnownColumns, row: usize) -> LinePoints {
     line_from(knots, (0..=row).rev())
 }
 
 /// The line downwards of a row that is known.
-fn below(knots: &Knots, row: usize) -> Line {
+fn below(knots: &KnownColumns, row: usize) -> LinePoints {
     line_from(knots, row..knots.len())
 }
 
 /// Where a line that crosses the band should cross its rows, and how far off
 /// that may be: where it is known, there; between, along a cubic.
-fn through(knots: &Knots, rows: Range<usize>) -> Vec<Guess> {
+fn through(knots: &KnownColumns, rows: Range<usize>) -> Vec<Guess> {
     let mut guesses = Vec::with_capacity(rows.len());
     let mut row = rows.start;
     while row < rows.end {
@@ -309,7 +309,7 @@ fn through(knots: &Knots, rows: Range<usize>) -> Vec<Guess> {
         // would be unknown itself, and one with this.
         let from = row.checked_sub(1).map(|row| above(knots, row)).filter(|line| !line.is_empty());
         let to = next.map(|row| below(knots, row));
-        let curve = Curve::between(from, to);
+        let curve = LineCurve::between(from, to);
         guesses.extend((row..end).map(|row| curve.at(row as f64)));
         row = end;
     }
@@ -317,7 +317,7 @@ fn through(knots: &Knots, rows: Range<usize>) -> Vec<Guess> {
 }
 
 /// The course of a line between rows where it is known.
-enum Curve {
+enum LineCurve {
     Between {
         from: (f64, f64),
         from_slope: f64,
@@ -331,9 +331,9 @@ enum Curve {
     },
 }
 
-impl Curve {
+impl LineCurve {
     /// From one line to another; there is at least one.
-    fn between(from: Option<Line>, to: Option<Line>) -> Self {
+    fn between(from: Option<LinePoints>, to: Option<LinePoints>) -> Self {
         match (from, to) {
             (Some(from), Some(to)) => Self::Between {
                 from: from[0],
@@ -346,7 +346,7 @@ impl Curve {
         }
     }
 
-    fn on(line: &Line) -> Self {
+    fn on(line: &LinePoints) -> Self {
         Self::On { from: line[0], slope: slope(line) }
     }
 
@@ -372,7 +372,7 @@ impl Curve {
 ///
 /// The square of the width of a circle, an ellipse and a wedge alike is a
 /// polynomial of second degree along the rows; its middle goes on straight.
-fn closing(sides: &[Knots; 2], rows: Range<usize>, from_above: bool) -> [Vec<Guess>; 2] {
+fn closing(sides: &[KnownColumns; 2], rows: Range<usize>, from_above: bool) -> [Vec<Guess>; 2] {
     // The last row where both sides are known, on the way into the band.
     let both = |row: &usize| sides[0][*row].is_some() && sides[1][*row].is_some();
     let last = if from_above {
@@ -383,7 +383,7 @@ fn closing(sides: &[Knots; 2], rows: Range<usize>, from_above: bool) -> [Vec<Gue
     let last = last.expect("both sides were found in the good row beside the band");
     let [left, right] = [0, 1]
         .map(|side| if from_above { above(&sides[side], last) } else { below(&sides[side], last) });
-    let points = |value: &dyn Fn(f64, f64) -> f64| -> Line {
+    let points = |value: &dyn Fn(f64, f64) -> f64| -> LinePoints {
         left.iter().zip(&right).map(|(l, r)| (l.0, value(l.1, r.1))).collect()
     };
     let squares = points(&|l, r| (0.5 * (r - l)).powi(2));

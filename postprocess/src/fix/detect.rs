@@ -5,7 +5,7 @@ use std::ops::Range;
 use lamp_stack::{Image, Mask, white_in_row};
 
 use super::FixOptions;
-use super::band::{Kind, Kinds};
+use super::band::{BandKind, BandKinds};
 use super::combine::{difference, majority, white_in_both};
 use super::contours::{Contours, DEPTH};
 use super::mend::{DROP, mend};
@@ -13,10 +13,10 @@ use super::outline::outline_row;
 
 /// Two crossings missed, or a sliver, show in a run of at least so many
 /// pixels: shorter ones may be the part's own.
-const LONG: u32 = 16;
+const MIN_RUN: u32 = 16;
 /// Contours that were missed together, and in no row alone, are looked for in
 /// bands of at most so many rows.
-const WIDEST_PAIRED: u32 = 30;
+const MAX_PAIRED_ROWS: u32 = 30;
 /// The search for paired rows ends where it has taken so many times what the
 /// layer has in rows and crossings: it is no part's section.
 const EFFORT: usize = 2;
@@ -37,7 +37,7 @@ pub(super) struct Scene<'a> {
 
 /// How stray each row of an image is.
 pub(super) struct Strays {
-    kinds: Vec<Kinds>,
+    kinds: Vec<BandKinds>,
     /// Rows that may be as they are: to be told of, but not corrected.
     pub(super) doubtful: Vec<u32>,
 }
@@ -47,14 +47,14 @@ impl Strays {
         self.kinds[row as usize].is_empty()
     }
 
-    pub(super) fn kinds(&self, row: u32) -> Kinds {
+    pub(super) fn kinds(&self, row: u32) -> BandKinds {
         self.kinds[row as usize]
     }
 
     /// Whether a row of the mask was ended by a later stage: it did not balance,
     /// and yet it ends black.
     pub(super) fn is_ended(&self, mask: &Mask, row: u32) -> bool {
-        self.kinds(row).contains(Kind::Unbalanced) && mask.row(row).len().is_multiple_of(2)
+        self.kinds(row).contains(BandKind::Unbalanced) && mask.row(row).len().is_multiple_of(2)
     }
 
     /// The bands of neighbouring stray rows, from the top.
@@ -62,7 +62,7 @@ impl Strays {
         runs((0..self.kinds.len() as u32).filter(|&row| !self.is_good(row)))
     }
 
-    fn mark(&mut self, rows: Range<u32>, kind: Kind, believed: bool) {
+    fn mark(&mut self, rows: Range<u32>, kind: BandKind, believed: bool) {
         for row in rows {
             self.kinds[row as usize].insert(kind);
             if !believed {
@@ -91,11 +91,11 @@ impl Scene<'_> {
         let mut strays = Strays { kinds, doubtful: Vec::new() };
         for &row in self.unbalanced {
             if let Some(kinds) = strays.kinds.get_mut(row as usize) {
-                kinds.insert(Kind::Unbalanced);
+                kinds.insert(BandKind::Unbalanced);
             }
         }
         if !closed {
-            self.find_pairs(&mut strays, &crossings, options.max_width.min(WIDEST_PAIRED));
+            self.find_pairs(&mut strays, &crossings, options.max_width.min(MAX_PAIRED_ROWS));
             self.find_slivers(&mut strays, &crossings);
             strays.doubtful.sort_unstable();
         }
@@ -142,7 +142,7 @@ impl Scene<'_> {
         let lacks_some = |row: &u32| {
             strays.is_good(*row) && {
                 let mended = mended(*row);
-                mended.gain >= LONG && !mended.added.is_empty()
+                mended.gain >= MIN_RUN && !mended.added.is_empty()
             }
         };
         for rows in runs(band.clone().filter(lacks_some)) {
@@ -164,7 +164,7 @@ impl Scene<'_> {
                     false
                 }
             };
-            strays.mark(rows, Kind::Paired, believed);
+            strays.mark(rows, BandKind::Paired, believed);
         }
     }
 
@@ -186,7 +186,7 @@ impl Scene<'_> {
             // A hole or a bar whose side just touches this plane looks the
             // same, but the next layer shows more of it.
             if without != had && !self.is_in_another_layer(row, had, &without) {
-                strays.mark(row..row + 1, Kind::Sliver, self.open_rows.is_some());
+                strays.mark(row..row + 1, BandKind::Sliver, self.open_rows.is_some());
             }
         }
     }
@@ -228,8 +228,8 @@ fn runs(rows: impl Iterator<Item = u32>) -> Vec<Range<u32>> {
     runs
 }
 
-fn kinds_alone(crossings: u32) -> Kinds {
-    if crossings.is_multiple_of(2) { Kinds::NONE } else { Kinds::ENDS_WHITE }
+fn kinds_alone(crossings: u32) -> BandKinds {
+    if crossings.is_multiple_of(2) { BandKinds::NONE } else { BandKinds::ENDS_WHITE }
 }
 
 /// The row without its long runs that lie between pixels of the other colour
@@ -247,7 +247,7 @@ pub(super) fn without_slivers(row: &[u32], above: &[u32], below: &[u32]) -> Vec<
     };
     let slivers: Vec<u32> = alone
         .chunks_exact(2)
-        .filter(|run| run[1] - run[0] >= LONG && lies_between(run))
+        .filter(|run| run[1] - run[0] >= MIN_RUN && lies_between(run))
         .flatten()
         .copied()
         .collect();

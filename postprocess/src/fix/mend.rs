@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::contours::{Expected, Outlook, Side};
+use super::contours::{Expected, LineId, Outlook};
 
 /// What it costs, in wrong pixels, to add a crossing that must be there: as
 /// little as keeps a row that is right as it is.
@@ -27,7 +27,7 @@ pub(super) struct Mended {
     /// Its transitions, even in number.
     pub(super) row: Vec<u32>,
     /// Which lines it did cross, and where.
-    pub(super) found: Vec<(Side, u32)>,
+    pub(super) found: Vec<(LineId, u32)>,
     /// The crossings that were added.
     pub(super) added: Vec<Expected>,
     /// How many crossings were dropped.
@@ -43,13 +43,13 @@ pub(super) struct Mended {
 
 /// Something at a column: a crossing that the row has, or might have.
 #[derive(Clone, Copy, Debug)]
-struct Event {
+struct RowEvent {
     column: u32,
-    what: What,
+    what: EventKind,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum What {
+enum EventKind {
     /// A crossing where one was expected.
     Found { through: bool },
     /// A crossing where none was, and what it costs to drop it.
@@ -58,24 +58,27 @@ enum What {
     Missing { which: usize, through: bool, price: u32 },
 }
 
-impl Event {
+impl RowEvent {
     /// The prices of not crossing here, and of crossing.
     fn prices(&self) -> [Option<u32>; 2] {
         match self.what {
-            What::Found { .. } => [None, Some(0)],
-            What::Extra { drop } => [Some(drop), Some(0)],
-            What::Missing { price, .. } => [Some(0), Some(price)],
+            EventKind::Found { .. } => [None, Some(0)],
+            EventKind::Extra { drop } => [Some(drop), Some(0)],
+            EventKind::Missing { price, .. } => [Some(0), Some(price)],
         }
     }
 
     /// Whether the row as it was crosses here.
     fn was(&self) -> bool {
-        !matches!(self.what, What::Missing { .. })
+        !matches!(self.what, EventKind::Missing { .. })
     }
 
     /// Whether the expected colour changes here.
     fn is_expected(&self) -> bool {
-        matches!(self.what, What::Found { through: true } | What::Missing { through: true, .. })
+        matches!(
+            self.what,
+            EventKind::Found { through: true } | EventKind::Missing { through: true, .. }
+        )
     }
 }
 
@@ -97,27 +100,36 @@ pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> Men
             }
         }
         match event.what {
-            What::Extra { .. } if !crosses => mended.dropped += 1,
-            What::Missing { which, .. } if crosses => mended.added.push(outlook.crossings[which]),
-            What::Missing { which, .. } if outlook.crossings[which].likely => mended.absent += 1,
+            EventKind::Extra { .. } if !crosses => mended.dropped += 1,
+            EventKind::Missing { which, .. } if crosses => {
+                mended.added.push(outlook.crossings[which]);
+            }
+            EventKind::Missing { which, .. } if outlook.crossings[which].likely => {
+                mended.absent += 1;
+            }
             _ => {}
         }
     }
     mended.off = off(&crossings, &pixels);
-    let was: Vec<bool> = events.iter().map(Event::was).collect();
+    let was: Vec<bool> = events.iter().map(RowEvent::was).collect();
     mended.gain = off(&was, &pixels).saturating_sub(mended.off);
     mended
 }
 
 /// All crossings, had or expected, from the left, and those that are both.
-fn events(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> (Vec<Event>, Vec<(Side, u32)>) {
+fn events(
+    row: &[u32],
+    outlook: &Outlook,
+    width: u32,
+    drop: u32,
+) -> (Vec<RowEvent>, Vec<(LineId, u32)>) {
     let expected = &outlook.crossings;
     let nearest_expected: Vec<Option<usize>> = row
         .iter()
         .map(|&column| nearest(expected.len(), |i| expected[i].column, f64::from(column)))
         .collect();
-    let mut events: Vec<Event> =
-        row.iter().map(|&column| Event { column, what: What::Extra { drop } }).collect();
+    let mut events: Vec<RowEvent> =
+        row.iter().map(|&column| RowEvent { column, what: EventKind::Extra { drop } }).collect();
     let (mut found, mut missing) = (Vec::new(), Vec::new());
     for (which, crossing) in expected.iter().enumerate() {
         let partner = nearest(row.len(), |i| row[i].into(), crossing.column).filter(|&i| {
@@ -126,7 +138,7 @@ fn events(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> (Vec<Event>,
         });
         match partner {
             Some(i) => {
-                events[i].what = What::Found { through: crossing.through };
+                events[i].what = EventKind::Found { through: crossing.through };
                 found.push((crossing.side, row[i]));
             }
             None => missing.push(which),
@@ -147,14 +159,14 @@ fn events(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> (Vec<Event>,
     (events, found)
 }
 
-fn missing_at(which: usize, crossing: &Expected, width: u32) -> Event {
+fn missing_at(which: usize, crossing: &Expected, width: u32) -> RowEvent {
     let price = match crossing {
         Expected { may_be_missed: false, .. } => ADD_CROSSED,
         Expected { through: true, .. } => ADD,
         _ => ADD_CLOSING,
     };
     let column = crossing.column.round().clamp(0.0, f64::from(width - 1)) as u32;
-    Event { column, what: What::Missing { which, through: crossing.through, price } }
+    RowEvent { column, what: EventKind::Missing { which, through: crossing.through, price } }
 }
 
 /// Which of `len` sorted places is the nearest to `place`.
@@ -170,7 +182,7 @@ fn nearest(len: usize, at: impl Fn(usize) -> f64, place: f64) -> Option<usize> {
 
 /// For the pixels before each event, and behind the last, how many would be
 /// wrong if they were black, and if they were white.
-fn wrong_pixels(events: &[Event], unknown: &[Range<f64>], width: u32) -> Vec<[u32; 2]> {
+fn wrong_pixels(events: &[RowEvent], unknown: &[Range<f64>], width: u32) -> Vec<[u32; 2]> {
     let mut start = 0;
     let mut white = false;
     let mut unknown = unknown;
@@ -184,7 +196,7 @@ fn wrong_pixels(events: &[Event], unknown: &[Range<f64>], width: u32) -> Vec<[u3
         let hidden: f64 = met.map(|zone| zone.end.min(high) - zone.start.max(low)).sum();
         let known = (high - low - hidden).max(0.0) as u32;
         pixels.push(if white { [known, 0] } else { [0, known] });
-        white ^= events.get(i).is_some_and(Event::is_expected);
+        white ^= events.get(i).is_some_and(RowEvent::is_expected);
         start = end;
     }
     pixels
@@ -203,7 +215,7 @@ fn off(crossings: &[bool], pixels: &[[u32; 2]]) -> u32 {
 
 /// At which events the cheapest row crosses: by dynamic programming over the
 /// row's colour (Viterbi's algorithm).
-fn cheapest(events: &[Event], pixels: &[[u32; 2]]) -> Vec<bool> {
+fn cheapest(events: &[RowEvent], pixels: &[[u32; 2]]) -> Vec<bool> {
     const NEVER: u32 = u32::MAX / 4;
     let mut cost = [pixels[0][0], NEVER];
     // For each event and colour behind it, whether the best way crosses there.

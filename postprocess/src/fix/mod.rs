@@ -13,13 +13,13 @@ mod align;
 mod band;
 mod combine;
 mod contours;
-mod curve;
 mod detect;
-mod gray;
+mod gray_rows;
 mod mend;
 mod nearest;
 mod outline;
-mod spline;
+mod polynomial;
+mod rebuild;
 mod window;
 
 use std::ops::Range;
@@ -28,18 +28,18 @@ use std::sync::Arc;
 use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, map_in_order, white_in_row};
 use serde_json::json;
 
-pub use band::{Band, Kind, Kinds, Outcome};
+pub use band::{Band, BandKind, BandKinds, BandOutcome};
 
 use combine::difference;
 use detect::{Scene, Strays};
-use gray::GrayRow;
+use gray_rows::GrayRow;
 use window::{Window, windows};
 
 /// How stray rows are corrected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixOptions {
     /// Where the corrected rows come from.
-    pub method: Method,
+    pub method: FixMethod,
     /// Bands of more rows are left as they are.
     pub max_width: u32,
     /// Bands whose correction is less sure are left as they are (0 to 1).
@@ -54,13 +54,18 @@ impl Default for FixOptions {
     /// at 1500 dpi. Bands of broken sample parts less sure than 0.35 keep a tenth of
     /// their wrong pixels, the others 0.2 % at most (`benches/README.md`).
     fn default() -> Self {
-        Self { method: Method::Spline, max_width: 15, min_confidence: 0.35, use_neighbours: false }
+        Self {
+            method: FixMethod::Spline,
+            max_width: 15,
+            min_confidence: 0.35,
+            use_neighbours: false,
+        }
     }
 }
 
 /// Where the rows of a band come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
+pub enum FixMethod {
     /// What the good rows above and below share (002, algorithm 11).
     Nearest,
     /// C1 cubic Hermite curves along the contours (002, figure 29c) give the
@@ -69,7 +74,7 @@ pub enum Method {
     Spline,
 }
 
-impl Method {
+impl FixMethod {
     /// Its name on pages and in reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -143,11 +148,11 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
         let (band, rows) = fix_band(&scene, &strays, &band, options);
         // Rows that only looked stray, and on a closer look are right.
         let is_known =
-            band.kinds.contains(Kind::EndsWhite) || band.kinds.contains(Kind::Unbalanced);
+            band.kinds.contains(BandKind::EndsWhite) || band.kinds.contains(BandKind::Unbalanced);
         if band.pixels == 0 && !rows.is_empty() && !is_known {
             continue;
         }
-        if band.outcome == Outcome::Corrected {
+        if band.outcome == BandOutcome::Corrected {
             corrected.push((band.first_row, rows));
         }
         bands.push(band);
@@ -162,17 +167,17 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
     let mut info = layer.info.clone();
     let is_corrected = |row: &u32| {
         let band = bands.get(bands.partition_point(|band| band.end() <= *row));
-        band.is_some_and(|b| b.outcome == Outcome::Corrected && b.first_row <= *row)
+        band.is_some_and(|b| b.outcome == BandOutcome::Corrected && b.first_row <= *row)
     };
     info.stray_rows.retain(|row| !is_corrected(row));
     info.other.insert("fix".to_owned(), on_page(&bands, options.method));
     (Some(Layer { info, dpi: layer.dpi, image }), bands)
 }
 
-fn on_page(bands: &[Band], method: Method) -> serde_json::Value {
+fn on_page(bands: &[Band], method: FixMethod) -> serde_json::Value {
     let bands: Vec<_> = bands
         .iter()
-        .filter(|band| band.outcome == Outcome::Corrected)
+        .filter(|band| band.outcome == BandOutcome::Corrected)
         .map(|b| json!({"row": b.first_row, "rows": b.rows, "pixels": b.pixels}))
         .collect();
     json!({"method": method.name(), "bands": bands})
@@ -186,10 +191,10 @@ fn fix_band(
     options: &FixOptions,
 ) -> (Band, Vec<Vec<u32>>) {
     let mask = scene.mask;
-    let mut kinds = Kinds::NONE;
+    let mut kinds = BandKinds::NONE;
     band.clone().for_each(|row| kinds.join(strays.kinds(row)));
     if band.start == 0 || band.end == mask.height() {
-        kinds.insert(Kind::AtEdge);
+        kinds.insert(BandKind::AtEdge);
     }
     let is_good = |row| !band.contains(&row) && strays.is_good(row);
     let is_ended = |row| strays.is_ended(mask, row);
@@ -199,31 +204,31 @@ fn fix_band(
         }
         _ => None,
     };
-    let sliver = [Kind::Sliver].into_iter().collect::<Kinds>();
+    let sliver = [BandKind::Sliver].into_iter().collect::<BandKinds>();
     let (mut gap, mut confidence, mut rows) = (None, 0.0, Vec::new());
     if kinds == sliver {
-        rows = band.clone().map(|row| spline::unsliver(mask, row)).collect();
+        rows = band.clone().map(|row| rebuild::unsliver(mask, row)).collect();
         confidence = 0.9;
     } else if let Some(rebuilt) =
-        spline::rebuild(mask, band, is_good, is_ended, scene.open_rows, voters)
+        rebuild::rebuild(mask, band, is_good, is_ended, scene.open_rows, voters)
     {
         if rebuilt.touching {
-            kinds.insert(Kind::Touching);
+            kinds.insert(BandKind::Touching);
         }
         (gap, confidence, rows) = (rebuilt.gap, rebuilt.confidence, rebuilt.rows);
     }
-    if options.method == Method::Nearest && !rows.is_empty() {
+    if options.method == FixMethod::Nearest && !rows.is_empty() {
         (rows, confidence) = nearest::nearest(mask, band);
     }
     if band.clone().any(|row| strays.doubtful.binary_search(&row).is_ok()) {
         confidence = f64::min(confidence, DOUBTFUL);
     }
     let outcome = if band.len() as u32 > options.max_width {
-        Outcome::TooWide
+        BandOutcome::TooWide
     } else if confidence < options.min_confidence || rows.is_empty() {
-        Outcome::Doubtful
+        BandOutcome::Doubtful
     } else {
-        Outcome::Corrected
+        BandOutcome::Corrected
     };
     let (columns, pixels) = changes(mask, band, &rows);
     let band = Band {
@@ -293,7 +298,7 @@ fn gray_with_rows(gray: &GrayMask, outlines: &Mask, new: &[NewRows]) -> GrayMask
             let upper = row - first <= end - 1 - row && *first > 0 || end == gray.height();
             let beside = if upper { first.checked_sub(1) } else { Some(end) };
             let beside = beside.map_or(GrayRow { levels: &[], outline: &[] }, row_of);
-            let runs = gray::levels(&row_of(row), &beside, outline);
+            let runs = gray_rows::levels(&row_of(row), &beside, outline);
             fixed.push_runs(runs).expect("runs as wide as the outline");
         }
         done = end;
@@ -305,4 +310,4 @@ fn gray_with_rows(gray: &GrayMask, outlines: &Mask, new: &[NewRows]) -> GrayMask
 }
 
 #[cfg(test)]
-mod tests;
+mod fix_tests;

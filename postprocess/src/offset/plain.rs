@@ -5,11 +5,11 @@
 //! and below that is like it, their deep runs touching, too. There the shape goes
 //! where its deep inside goes, and nothing needs to be looked after.
 
-use super::edge::{Edge, Piece};
+use super::edge_map::{EdgeMap, EdgeRun};
 
 /// A run of the shape in a row.
 #[derive(Clone, Debug)]
-struct Stretch {
+struct ShapeRun {
     start: i32,
     end: i32,
     /// The pixels deep inside, if they are one run.
@@ -18,14 +18,14 @@ struct Stretch {
     touches: [u32; 2],
     /// How many rows away something is not plain.
     away: u32,
-    /// The end of its pieces.
-    pieces_end: usize,
+    /// The end of its edge_runs.
+    edge_runs_end: usize,
 }
 
-/// For each piece of an edge, whether it lies in a run that is plain, as are
+/// For each run of an edge, whether it lies in a run that is plain, as are
 /// those within `margin` rows. On each side there may be `beside` pixels that
 /// are not deep inside.
-pub(super) fn plain_pieces(edge: &Edge, beside: i32, margin: u32) -> Vec<bool> {
+pub(super) fn plain_runs(edge: &EdgeMap, beside: i32, margin: u32) -> Vec<bool> {
     let (mut runs, pairs) = stretches(edge, beside);
     for &(upper, lower) in &pairs {
         runs[upper].touches[1] += 1;
@@ -48,21 +48,21 @@ pub(super) fn plain_pieces(edge: &Edge, beside: i32, margin: u32) -> Vec<bool> {
     }
     let mut plain = Vec::new();
     for run in &runs {
-        plain.resize(run.pieces_end, run.away > margin);
+        plain.resize(run.edge_runs_end, run.away > margin);
     }
     plain
 }
 
 /// The runs of all rows, and which of them touch, upper and lower, row by row.
-fn stretches(edge: &Edge, beside: i32) -> (Vec<Stretch>, Vec<(usize, usize)>) {
-    let mut runs: Vec<Stretch> = Vec::new();
+fn stretches(edge: &EdgeMap, beside: i32) -> (Vec<ShapeRun>, Vec<(usize, usize)>) {
+    let mut runs: Vec<ShapeRun> = Vec::new();
     let mut pairs = Vec::new();
-    let (mut above, mut pieces_end) = (0, 0);
+    let (mut above, mut edge_runs_end) = (0, 0);
     for row in 0..edge.height() {
         let first = runs.len();
-        for pieces in edge.row(row.into()).chunk_by(|a, b| a.run.1 == b.run.0) {
-            pieces_end += pieces.len();
-            runs.push(stretch(pieces, beside, pieces_end));
+        for edge_runs in edge.row(row.into()).chunk_by(|a, b| a.columns.1 == b.columns.0) {
+            edge_runs_end += edge_runs.len();
+            runs.push(stretch(edge_runs, beside, edge_runs_end));
         }
         let (mut upper, mut lower) = (above, first);
         while upper < first && lower < runs.len() {
@@ -81,15 +81,15 @@ fn stretches(edge: &Edge, beside: i32) -> (Vec<Stretch>, Vec<(usize, usize)>) {
     (runs, pairs)
 }
 
-fn stretch(pieces: &[Piece], beside: i32, pieces_end: usize) -> Stretch {
-    let [start, end] = [pieces[0].run.0, pieces[pieces.len() - 1].run.1];
-    let is_deep = |piece: &Piece| piece.first.is_none();
-    let first = pieces.iter().position(is_deep);
-    let last = pieces.iter().rposition(is_deep);
+fn stretch(edge_runs: &[EdgeRun], beside: i32, edge_runs_end: usize) -> ShapeRun {
+    let [start, end] = [edge_runs[0].columns.0, edge_runs[edge_runs.len() - 1].columns.1];
+    let is_deep = |run: &EdgeRun| run.first.is_none();
+    let first = edge_runs.iter().position(is_deep);
+    let last = edge_runs.iter().rposition(is_deep);
     let deep = first.zip(last).and_then(|(first, last)| {
-        let (from, to) = (pieces[first].run.0, pieces[last].run.1);
-        let is_one = pieces[first..=last].iter().all(is_deep);
+        let (from, to) = (edge_runs[first].columns.0, edge_runs[last].columns.1);
+        let is_one = edge_runs[first..=last].iter().all(is_deep);
         (is_one && from - start <= beside && end - to <= beside).then_some((from, to))
     });
-    Stretch { start, end, deep, touches: [0; 2], away: 0, pieces_end }
+    ShapeRun { start, end, deep, touches: [0; 2], away: 0, edge_runs_end }
 }

@@ -4,14 +4,14 @@ use lamp_stack::{GrayMask, Image, LevelChange, MaskBuilder};
 
 /// Along one side: which pixels of the larger image show which of the image.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Side {
+pub(super) struct AxisScale {
     /// What is left of a length after firing.
     left: f64,
     /// The pixels of the image.
     before: u32,
 }
 
-impl Side {
+impl AxisScale {
     /// Of a side of so many pixels that firing shrinks by a share, from 0 to
     /// less than 1.
     pub(super) fn new(before: u32, shrinkage: f64) -> Self {
@@ -32,7 +32,7 @@ impl Side {
 
 /// An image as large as it must be for the fired part to have its size. Each
 /// pixel has the colour of the pixel that its centre then lies in.
-pub(super) fn scaled(image: &Image, columns: &Side, rows: &Side, width: u32) -> Image {
+pub(super) fn scaled(image: &Image, columns: &AxisScale, rows: &AxisScale, width: u32) -> Image {
     let column = |column: u32| columns.first_past(column) as u32;
     let times = |row: u32| rows.first_past(row + 1) - rows.first_past(row);
     match image {
@@ -90,8 +90,8 @@ mod tests {
     use super::*;
 
     fn made_larger(mask: &Mask, shrinkage: [f64; 2]) -> Image {
-        let columns = Side::new(mask.width(), shrinkage[0]);
-        let rows = Side::new(mask.height(), shrinkage[1]);
+        let columns = AxisScale::new(mask.width(), shrinkage[0]);
+        let rows = AxisScale::new(mask.height(), shrinkage[1]);
         let width = columns.after() as u32 + 5;
         scaled(&Image::Mask(mask.clone()), &columns, &rows, width)
     }
@@ -120,7 +120,7 @@ mod tests {
         gray.push_runs([(3, 0), (7, 40), (20, 255), (10, 3)]).unwrap();
         gray.push_runs([(30, 9)]).unwrap();
         let mask = Mask::new(40, vec![0, 1, 3], vec![3, 0, 30]).unwrap();
-        let [columns, rows] = [40, 2].map(|side| Side::new(side, 0.1));
+        let [columns, rows] = [40, 2].map(|side| AxisScale::new(side, 0.1));
         let Image::Gray(larger) = scaled(&Image::Gray(gray), &columns, &rows, 64) else {
             unreachable!("gray images stay gray")
         };

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::edge::{Edge, EdgePixel};
+use super::edge_map::{EdgeMap, EdgePixel};
 
 /// A place where a wall was narrowed less than asked, as it would have become
 /// too thin or been lost. All widths are in pixels, where half of
@@ -23,13 +23,13 @@ pub struct ThinWall {
 }
 
 /// Differences of width below so much are the raster's.
-const OF_NOTE: f64 = 0.25;
+const MIN_DIFFERENCE: f64 = 0.25;
 
 impl ThinWall {
     /// The wall of a core whose sides should move by `by` each, if it was
     /// narrowed less.
     pub(super) fn of(
-        edge: &Edge,
+        edge: &EdgeMap,
         core: &[EdgePixel],
         by: impl Fn(&EdgePixel) -> f64,
     ) -> Option<Self> {
@@ -38,7 +38,7 @@ impl ThinWall {
         let middle = places[places.len() / 2];
         let (width, made) = across(edge, middle);
         let asked = (width - 2.0 * by(middle)).max(0.0);
-        if made - asked < OF_NOTE {
+        if made - asked < MIN_DIFFERENCE {
             return None;
         }
         let range = |of: fn(&EdgePixel) -> u32| {
@@ -52,7 +52,7 @@ impl ThinWall {
 
 /// How wide a wall is at a pixel, the shortest of four ways across, and how
 /// much of that is exposed.
-fn across(edge: &Edge, pixel: &EdgePixel) -> (f64, f64) {
+fn across(edge: &EdgeMap, pixel: &EdgePixel) -> (f64, f64) {
     let radius = f64::from(edge.squares[pixel.index as usize]).sqrt();
     let most = (3.0 * radius) as i64 + 2;
     let ways = [(1, 0), (0, 1), (1, 1), (1, -1)].map(|(right, down)| {

@@ -15,7 +15,7 @@ pub struct Widths {
 /// From one class of sizes to the next the distance changes by no more.
 const STEP: f64 = 0.25;
 /// Sizes are parted no finer.
-const MOST_STEPS: f64 = 32.0;
+const MAX_STEPS: f64 = 32.0;
 
 impl Widths {
     /// The same for all places; outwards where below zero.
@@ -34,7 +34,7 @@ impl Widths {
         for pair in sizes.windows(2) {
             let [from, to] = [pair[0], pair[1]];
             let change = (width(to) - width(from)).abs();
-            let steps = (change / STEP).ceil().clamp(1.0, MOST_STEPS);
+            let steps = (change / STEP).ceil().clamp(1.0, MAX_STEPS);
             let size = |step: f64| from + (to - from) * step / steps;
             for step in 0..steps as u32 {
                 let step = f64::from(step);

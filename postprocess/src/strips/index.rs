@@ -14,16 +14,16 @@ use super::{StripsError, Swaths};
 pub(super) const INDEX: &str = "strips.json";
 
 /// So many strips are written at most: each is an open file.
-pub(super) const MOST_STRIPS: u32 = 512;
+pub(super) const MAX_STRIPS: u32 = 512;
 /// Images are at most so wide, as the readers of stacks take.
-pub(super) const WIDEST: u32 = 1 << 26;
+pub(super) const MAX_SIDE: u32 = 1 << 26;
 /// No index is longer, in bytes.
-const LONGEST: u64 = 1 << 20;
+const MAX_INDEX_BYTES: u64 = 1 << 20;
 
 /// What the index says of a build and its strips.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Index {
+pub(super) struct StripIndex {
     /// The build's name.
     pub(super) name: String,
     /// Its width and height.
@@ -55,7 +55,7 @@ pub(super) fn file_name(swath: u32) -> String {
     format!("strip_{swath:03}.tif")
 }
 
-impl Index {
+impl StripIndex {
     pub(super) fn new(name: &str, [width, height]: [u32; 2], layers: u32, swaths: &Swaths) -> Self {
         Self {
             name: name.to_owned(),
@@ -84,7 +84,7 @@ impl Index {
     pub(super) fn read(folder: &Path) -> Result<Self, StripsError> {
         let mut text = String::new();
         let read = File::open(folder.join(INDEX))
-            .and_then(|file| file.take(LONGEST).read_to_string(&mut text));
+            .and_then(|file| file.take(MAX_INDEX_BYTES).read_to_string(&mut text));
         read.map_err(|error| StripsError::In {
             file: INDEX.to_owned(),
             source: StackError::Io(error),
@@ -105,7 +105,7 @@ impl Index {
     /// How its strips lie, if they are not too many or too wide.
     fn swaths(&self) -> Result<Option<Swaths>, StripsError> {
         let swaths = Swaths::new(self.mirrors, self.overlap, self.pixels[0])?;
-        let is_some = self.mirrors <= WIDEST && swaths.count() <= MOST_STRIPS;
+        let is_some = self.mirrors <= MAX_SIDE && swaths.count() <= MAX_STRIPS;
         Ok(is_some.then_some(swaths))
     }
 
@@ -122,9 +122,9 @@ mod tests {
     #[test]
     fn an_index_reads_back_and_what_is_none_is_refused() {
         let swaths = Swaths::new(10, 4, 22).unwrap();
-        let index = Index::new("a \"b\"", [22, 7], 3, &swaths);
+        let index = StripIndex::new("a \"b\"", [22, 7], 3, &swaths);
         let text = index.to_json();
-        assert_eq!(Index::parse(&text).unwrap(), index);
+        assert_eq!(StripIndex::parse(&text).unwrap(), index);
         assert_eq!(text.lines().count(), 12);
         for (from, to) in [
             ("\"overlap\": 4", "\"overlap\": 5"),
@@ -138,7 +138,7 @@ mod tests {
             ("]\n}", "]"),
         ] {
             assert!(text.contains(from), "{from} in {text}");
-            assert!(Index::parse(&text.replacen(from, to, 1)).is_err(), "{to}");
+            assert!(StripIndex::parse(&text.replacen(from, to, 1)).is_err(), "{to}");
         }
     }
 }

@@ -11,12 +11,12 @@
 //! and shares some with the next, so that a seam shows no edge. There the one's
 //! dose falls as the other's rises, and both are the layer's.
 
-mod error;
 mod index;
-mod join;
+mod join_swaths;
 mod read;
+mod strips_error;
 #[cfg(test)]
-mod tests;
+mod strips_tests;
 mod write;
 
 use std::ops::Range;
@@ -29,9 +29,9 @@ use crate::edit::{ImageBounds, frame_page};
 
 use index::INDEX;
 
-pub use error::StripsError;
-pub use join::JoinSwathsError;
+pub use join_swaths::JoinSwathsError;
 pub use read::{is_strips, join_strips};
+pub use strips_error::StripsError;
 pub use write::StripWriter;
 
 /// How build layers are cut into swaths, from the left.

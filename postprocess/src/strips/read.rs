@@ -6,7 +6,7 @@ use lamp_stack::{
     GrayMask, Held, Image, Layer, Mask, MaskBuilder, Page, PageInfo, Pages, map_in_order,
 };
 
-use super::index::{INDEX, Index, file_name};
+use super::index::{INDEX, StripIndex, file_name};
 use super::{JoinSwathsError, StripsError, Swaths};
 
 /// Whether a folder holds strips: then it has an index of them.
@@ -23,7 +23,7 @@ pub fn is_strips(folder: &Path) -> bool {
 pub fn join_strips(
     folder: &Path,
 ) -> Result<impl Iterator<Item = Result<Layer, StripsError>> + use<>, StripsError> {
-    let index = Index::read(folder)?;
+    let index = StripIndex::read(folder)?;
     let swaths = Swaths::new(index.mirrors, index.overlap, index.pixels[0])?;
     let strip = |file: &String| match Pages::open(&folder.join(file)) {
         Ok(pages) => Ok((file.clone(), pages)),
@@ -31,12 +31,12 @@ pub fn join_strips(
     };
     let files = index.strips.iter().map(|line| strip(&line.file)).collect::<Result<_, _>>()?;
     let strips =
-        Strips { files, swaths, height: index.pixels[1], left: index.layers, digest: None };
-    Ok(map_in_order(strips, Slice::join))
+        StripReader { files, swaths, height: index.pixels[1], left: index.layers, digest: None };
+    Ok(map_in_order(strips, LayerPages::join))
 }
 
 /// The strips, read in step.
-struct Strips {
+struct StripReader {
     files: Vec<(String, Pages)>,
     swaths: Swaths,
     height: u32,
@@ -46,8 +46,8 @@ struct Strips {
     digest: Option<String>,
 }
 
-impl Iterator for Strips {
-    type Item = Result<Slice, StripsError>;
+impl Iterator for StripReader {
+    type Item = Result<LayerPages, StripsError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let pages: Result<Vec<Option<Page>>, StripsError> = self
@@ -63,9 +63,9 @@ impl Iterator for Strips {
     }
 }
 
-impl Strips {
+impl StripReader {
     /// The pages of a layer, once they are seen to be one's.
-    fn slice(&mut self, pages: Vec<Option<Page>>) -> Result<Option<Slice>, StripsError> {
+    fn slice(&mut self, pages: Vec<Option<Page>>) -> Result<Option<LayerPages>, StripsError> {
         let of_first = pages[0].as_ref().map(|page| page.info().clone());
         for (page, swath) in pages.iter().zip(0..) {
             let info = page.as_ref().map(Page::info);
@@ -76,7 +76,7 @@ impl Strips {
         }
         self.left = self.left.saturating_sub(1);
         let pages: Option<Vec<Page>> = pages.into_iter().collect();
-        Ok(pages.map(|pages| Slice { pages, swaths: self.swaths, height: self.height }))
+        Ok(pages.map(|pages| LayerPages { pages, swaths: self.swaths, height: self.height }))
     }
 
     /// In what a page is not that of a swath beside the first swath's, if at all.
@@ -113,19 +113,19 @@ impl Strips {
 }
 
 /// The pages of one layer, a strip after the other.
-struct Slice {
+struct LayerPages {
     pages: Vec<Page>,
     swaths: Swaths,
     height: u32,
 }
 
-impl Held for Slice {
+impl Held for LayerPages {
     fn bytes(&self) -> usize {
         self.pages.iter().map(Held::bytes).sum()
     }
 }
 
-impl Slice {
+impl LayerPages {
     fn join(self) -> Result<Layer, StripsError> {
         let decoded = self.pages.into_iter().zip(0..).map(|(page, swath)| {
             let in_file = |source| StripsError::In { file: file_name(swath), source };

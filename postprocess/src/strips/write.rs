@@ -8,7 +8,7 @@ use lamp_stack::{
     EncodedPage, FolderBeside, Format, Held, Layer, PageWriter, StackError, map_in_order,
 };
 
-use super::index::{INDEX, Index, MOST_STRIPS, WIDEST, file_name};
+use super::index::{INDEX, MAX_SIDE, MAX_STRIPS, StripIndex, file_name};
 use super::{StripsError, Swaths};
 
 /// Enough for the pages of a narrow strip; hundreds of files are open at once.
@@ -21,11 +21,11 @@ pub struct StripWriter {
     format: Format,
     mirrors: u32,
     overlap: u32,
-    open: Option<Open>,
+    open: Option<OpenStrips>,
 }
 
 /// What is known from the first layer on.
-struct Open {
+struct OpenStrips {
     swaths: Swaths,
     name: String,
     height: u32,
@@ -47,8 +47,8 @@ impl StripWriter {
         format: Format,
     ) -> Result<Self, StripsError> {
         Swaths::new(mirrors, overlap, 0)?;
-        if mirrors > WIDEST {
-            return Err(StripsError::Mirrors { mirrors, most: WIDEST });
+        if mirrors > MAX_SIDE {
+            return Err(StripsError::Mirrors { mirrors, most: MAX_SIDE });
         }
         let folder = FolderBeside::over_nothing(folder)?;
         Ok(Self { folder, format, mirrors, overlap, open: None })
@@ -73,8 +73,8 @@ impl StripWriter {
             let [size, first] = [size, first].map(|[width, height]| format!("{width} x {height}"));
             return Err(StripsError::Size { layer: layer.info.name(), size, first });
         }
-        let cuts = (0..swaths.count()).map(|swath| Ok(Cut { layer, swaths, swath }));
-        let pages = map_in_order(cuts, |Cut { layer, swaths, swath }| {
+        let cuts = (0..swaths.count()).map(|swath| Ok(SwathCut { layer, swaths, swath }));
+        let pages = map_in_order(cuts, |SwathCut { layer, swaths, swath }| {
             Ok::<_, StripsError>(EncodedPage::new(&swaths.cut_layer(layer, swath)))
         });
         for (page, file) in pages.zip(&mut open.files) {
@@ -84,19 +84,19 @@ impl StripWriter {
         Ok(())
     }
 
-    fn open(&self, first: &Layer) -> Result<Open, StripsError> {
+    fn open(&self, first: &Layer) -> Result<OpenStrips, StripsError> {
         let (mirrors, width) = (self.mirrors, first.image.width());
         let swaths = Swaths::new(mirrors, self.overlap, width)?;
         let strips = swaths.count();
-        if strips > MOST_STRIPS {
-            return Err(StripsError::TooMany { width, strips, mirrors, most: MOST_STRIPS });
+        if strips > MAX_STRIPS {
+            return Err(StripsError::TooMany { width, strips, mirrors, most: MAX_STRIPS });
         }
         let file = |swath| -> Result<_, StripsError> {
             let file = File::create_new(self.folder.path().join(file_name(swath)));
             let out = BufWriter::with_capacity(BUFFER_BYTES, file.map_err(StackError::from)?);
             Ok(PageWriter::new(out, self.format))
         };
-        Ok(Open {
+        Ok(OpenStrips {
             swaths,
             name: first.info.stack.as_ref().map(|stack| stack.part.clone()).unwrap_or_default(),
             height: first.image.height(),
@@ -111,7 +111,7 @@ impl StripWriter {
     /// Where writing fails, or there was no layer.
     pub fn finish(self) -> Result<(), StripsError> {
         let open = self.open.ok_or(StackError::NoLayers)?;
-        let index = Index::new(&open.name, open.size(), open.layers, &open.swaths);
+        let index = StripIndex::new(&open.name, open.size(), open.layers, &open.swaths);
         for file in open.files {
             file.finish()?;
         }
@@ -120,20 +120,20 @@ impl StripWriter {
     }
 }
 
-impl Open {
+impl OpenStrips {
     fn size(&self) -> [u32; 2] {
         [self.swaths.width, self.height]
     }
 }
 
 /// A swath that is to be cut.
-struct Cut<'a> {
+struct SwathCut<'a> {
     layer: &'a Layer,
     swaths: Swaths,
     swath: u32,
 }
 
-impl Held for Cut<'_> {
+impl Held for SwathCut<'_> {
     fn bytes(&self) -> usize {
         // About its share of the runs, and the levels of its ramps.
         let ramps = 16 * self.swaths.overlap as usize * self.layer.image.height() as usize;

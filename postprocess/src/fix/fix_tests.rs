@@ -16,7 +16,7 @@ fn picture(rows: &[&str]) -> Mask {
 }
 
 /// Where a shape is crossed by a row, as real columns.
-type Shape = fn(f64) -> Vec<f64>;
+type ShapeCrossings = fn(f64) -> Vec<f64>;
 
 const WIDTH: u32 = 800;
 const HEIGHT: u32 = 500;
@@ -41,7 +41,7 @@ fn bars(row: f64) -> Vec<f64> {
 }
 
 /// The shape as a mask; `miss` says of each row which crossings are lost.
-fn drawn(shape: Shape, miss: impl Fn(u32) -> &'static [usize]) -> Mask {
+fn drawn(shape: ShapeCrossings, miss: impl Fn(u32) -> &'static [usize]) -> Mask {
     let mut mask = MaskBuilder::new(WIDTH);
     for row in 0..HEIGHT {
         let crossings = shape(f64::from(row)).into_iter().enumerate();
@@ -51,7 +51,7 @@ fn drawn(shape: Shape, miss: impl Fn(u32) -> &'static [usize]) -> Mask {
     mask.finish()
 }
 
-fn whole(shape: Shape) -> Mask {
+fn whole(shape: ShapeCrossings) -> Mask {
     drawn(shape, |_| &[])
 }
 
@@ -79,7 +79,7 @@ fn spline(mask: &Mask) -> (Mask, Vec<Band>) {
 
 fn nearest(mask: &Mask) -> (Mask, Vec<Band>) {
     let options = FixOptions {
-        method: Method::Nearest,
+        method: FixMethod::Nearest,
         max_width: u32::MAX,
         min_confidence: 0.0,
         use_neighbours: false,
@@ -87,7 +87,7 @@ fn nearest(mask: &Mask) -> (Mask, Vec<Band>) {
     fixed_mask(mask, options)
 }
 
-fn kinds(kinds: &[Kind]) -> Kinds {
+fn kinds(kinds: &[BandKind]) -> BandKinds {
     kinds.iter().copied().collect()
 }
 
@@ -113,7 +113,7 @@ fn nearest_takes_what_the_good_rows_share() {
 fn nearest_takes_what_lies_outside_for_black() {
     let (mended, bands) = nearest(&picture(&["..######", "..##....", "....####"]));
     assert_eq!(mended, picture(&["..##....", "..##....", "........"]));
-    assert!(bands.iter().all(|band| band.kinds == kinds(&[Kind::EndsWhite, Kind::AtEdge])));
+    assert!(bands.iter().all(|band| band.kinds == kinds(&[BandKind::EndsWhite, BandKind::AtEdge])));
 }
 
 #[test]
@@ -129,8 +129,8 @@ fn a_missed_crossing_is_put_back_and_all_others_stay() {
                 "{missed:?} {rows:?}: {pixels}"
             );
             let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
-            assert_eq!((band.first_row..band.end(), band.outcome), (rows, Outcome::Corrected));
-            assert_eq!(band.kinds, kinds(&[Kind::EndsWhite]));
+            assert_eq!((band.first_row..band.end(), band.outcome), (rows, BandOutcome::Corrected));
+            assert_eq!(band.kinds, kinds(&[BandKind::EndsWhite]));
             assert_eq!(band.pixels, off(&mended, &stray).0);
             let gap = band.gap.clone().unwrap();
             let edges: Vec<u32> =
@@ -185,7 +185,10 @@ fn two_crossings_missed_in_a_row_are_found_where_contours_break_off() {
         let Image::Mask(mended) = &layers[0].image else { unreachable!() };
         assert!(off(mended, &whole(bars)).1 <= 1);
         let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
-        assert_eq!((band.kinds, band.outcome), (kinds(&[Kind::Paired]), Outcome::Corrected));
+        assert_eq!(
+            (band.kinds, band.outcome),
+            (kinds(&[BandKind::Paired]), BandOutcome::Corrected)
+        );
         assert_eq!(band.first_row..band.end(), rows);
     }
 }
@@ -205,7 +208,10 @@ fn where_nothing_is_known_a_row_that_lacks_two_crossings_is_told_of_and_stays() 
     let alone = vec![barred(0, 150..151)];
     let (layers, bands) = fixed(alone.clone(), FixOptions::default());
     assert_eq!(layers, alone);
-    assert_eq!((bands[0].kinds, bands[0].outcome), (kinds(&[Kind::Paired]), Outcome::Doubtful));
+    assert_eq!(
+        (bands[0].kinds, bands[0].outcome),
+        (kinds(&[BandKind::Paired]), BandOutcome::Doubtful)
+    );
     // Of several rows, or in another layer too, it is the part's own.
     for own in [vec![barred(0, 150..152)], (0..3).map(|k| barred(k, 150..151)).collect()] {
         assert_eq!(fixed(own.clone(), FixOptions::default()), (own, vec![]));
@@ -222,7 +228,7 @@ fn rows_of_two_gaps_beside_each_other_are_one_band() {
         _ => &[],
     });
     let (mended, bands) = spline(&stray);
-    let all = kinds(&[Kind::EndsWhite, Kind::Paired]);
+    let all = kinds(&[BandKind::EndsWhite, BandKind::Paired]);
     assert_eq!(bands.len(), 1, "{bands:?}");
     assert_eq!((bands[0].first_row, bands[0].rows, bands[0].kinds), (200, 12, all));
     assert!(off(&mended, &whole(ring)).1 <= 1);
@@ -233,7 +239,7 @@ fn rows_of_two_gaps_beside_each_other_are_one_band() {
         _ => &[],
     });
     let (mended, bands) = spline(&touching);
-    assert_eq!(bands[0].kinds, kinds(&[Kind::EndsWhite, Kind::Touching]));
+    assert_eq!(bands[0].kinds, kinds(&[BandKind::EndsWhite, BandKind::Touching]));
     assert!(off(&mended, &whole(ring)).1 <= 1);
 }
 
@@ -251,12 +257,12 @@ fn a_sliver_goes_only_if_contours_break_off_there_and_no_other_layer_has_it() {
     let of = |masks: Vec<Mask>| -> Vec<Layer> {
         masks.into_iter().zip(0..).map(|(mask, index)| layer(index, mask)).collect()
     };
-    let sliver = kinds(&[Kind::Sliver]);
+    let sliver = kinds(&[BandKind::Sliver]);
     let mut broken = of(vec![clean(), with_sliver(), clean()]);
     broken[1] = with_open_rows(broken[1].clone(), &[250, 251]);
     let (layers, bands) = fixed(broken.clone(), FixOptions::default());
     assert_eq!(layers[1].image, Image::Mask(clean()));
-    assert_eq!((bands[0].kinds, bands[0].outcome), (sliver, Outcome::Corrected));
+    assert_eq!((bands[0].kinds, bands[0].outcome), (sliver, BandOutcome::Corrected));
 
     // No contour breaks off there.
     broken[1] = with_open_rows(broken[1].clone(), &[250, 300]);
@@ -266,7 +272,7 @@ fn a_sliver_goes_only_if_contours_break_off_there_and_no_other_layer_has_it() {
     let unknown = of(vec![clean(), with_sliver(), clean()]);
     let (layers, bands) = fixed(unknown.clone(), FixOptions::default());
     assert_eq!(layers, unknown);
-    assert_eq!((bands[0].kinds, bands[0].outcome), (sliver, Outcome::Doubtful));
+    assert_eq!((bands[0].kinds, bands[0].outcome), (sliver, BandOutcome::Doubtful));
 
     // Its neighbour above has more of it: the top of a bar that lies there.
     let top = of(vec![clean(), with_sliver(), with_sliver()]);
@@ -281,8 +287,8 @@ fn a_band_at_the_edge_goes_on_from_its_good_side() {
         mask.push_row(&[100, right][..if row < 3 { 1 } else { 2 }]).unwrap();
     }
     let (mended, bands) = spline(&mask.finish());
-    assert_eq!(bands[0].kinds, kinds(&[Kind::EndsWhite, Kind::AtEdge]));
-    assert_eq!(bands[0].outcome, Outcome::Corrected);
+    assert_eq!(bands[0].kinds, kinds(&[BandKind::EndsWhite, BandKind::AtEdge]));
+    assert_eq!(bands[0].outcome, BandOutcome::Corrected);
     for row in 0..3 {
         assert_eq!(mended.row(row), [100, 300 + row]);
     }
@@ -293,7 +299,7 @@ fn what_is_too_wide_is_left_and_its_gap_is_named() {
     let stray = drawn(bars, |row| if (100..116).contains(&row) { &[3] } else { &[] });
     let (mended, bands) = spline(&stray);
     assert_eq!(mended, stray);
-    assert_eq!((bands[0].outcome, bands[0].rows), (Outcome::TooWide, 16));
+    assert_eq!((bands[0].outcome, bands[0].rows), (BandOutcome::TooWide, 16));
     let gap = bands[0].gap.clone().unwrap();
     assert!(gap.start.abs_diff(397) <= 1 && gap.end.abs_diff(404) <= 1, "{gap:?}");
     let wider = FixOptions { max_width: 16, ..FixOptions::default() };
@@ -308,7 +314,7 @@ fn an_image_without_a_good_row_is_left() {
         nearest(&stray),
     ] {
         let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
-        assert_eq!((band.outcome, band.confidence), (Outcome::Doubtful, 0.0));
+        assert_eq!((band.outcome, band.confidence), (BandOutcome::Doubtful, 0.0));
         assert_eq!(mended, stray);
     }
 }
@@ -316,7 +322,7 @@ fn an_image_without_a_good_row_is_left() {
 #[test]
 fn neighbours_hold_a_wide_band_between_them() {
     // In the band the bar has a notch that no good row shows, but the layers do.
-    let notched: Shape = |row| {
+    let notched: ShapeCrossings = |row| {
         let dent = (12.0 - (row - 250.0).abs()).max(0.0);
         vec![100.0, 300.0 - dent]
     };
@@ -339,8 +345,8 @@ fn rows_that_the_page_lists_are_looked_at_and_crossed_off() {
     // The second of the rows is good, the third does not exist.
     listed.info.stray_rows = vec![150, 300, 9000];
     let (layers, bands) = fixed(vec![listed], FixOptions::default());
-    assert_eq!(bands[0].kinds, kinds(&[Kind::EndsWhite, Kind::Unbalanced]));
-    assert_eq!((bands[1].kinds, bands[1].pixels), (kinds(&[Kind::Unbalanced]), 0));
+    assert_eq!(bands[0].kinds, kinds(&[BandKind::EndsWhite, BandKind::Unbalanced]));
+    assert_eq!((bands[1].kinds, bands[1].pixels), (kinds(&[BandKind::Unbalanced]), 0));
     let info = &layers[0].info;
     assert_eq!(info.stray_rows, [9000]);
     assert_eq!(info.other["fix"]["method"], "spline");
@@ -384,7 +390,7 @@ fn gray_rows_take_the_levels_of_the_good_rows_along_new_edges() {
         let image = Image::Gray(stray);
         let stray = Layer { info: PageInfo::default(), dpi: None, image };
         let (layers, bands) = fixed(vec![stray], FixOptions::default());
-        assert_eq!((bands.len(), bands[0].outcome), (1, Outcome::Corrected));
+        assert_eq!((bands.len(), bands[0].outcome), (1, BandOutcome::Corrected));
         let Image::Gray(mended) = &layers[0].image else { panic!("gray stays gray") };
         let clean = gray_bars(|_| &[]);
         for row in rows.clone() {
@@ -419,14 +425,14 @@ proptest! {
             mask.push_row(&row.iter().copied().collect::<Vec<_>>()).unwrap();
         }
         let mask = mask.finish();
-        let method = if by_nearest { Method::Nearest } else { Method::Spline };
+        let method = if by_nearest { FixMethod::Nearest } else { FixMethod::Spline };
         let (mended, bands) = fixed_mask(&mask, FixOptions { method, min_confidence, ..FixOptions::default() });
         let band_of = |row| bands.iter().find(|band| (band.first_row..band.end()).contains(&row));
         let mut changed = 0;
         for row in 0..mask.height() {
             let pixels = white_in_row(&difference(mask.row(row), mended.row(row)), 60);
             match band_of(row) {
-                Some(band) if band.outcome == Outcome::Corrected => {
+                Some(band) if band.outcome == BandOutcome::Corrected => {
                     changed += pixels;
                     prop_assert!(mended.row(row).len().is_multiple_of(2) || by_nearest);
                 }
@@ -434,7 +440,7 @@ proptest! {
                 None => prop_assert!(pixels == 0 && mask.row(row).len().is_multiple_of(2)),
             }
         }
-        let corrected = bands.iter().filter(|band| band.outcome == Outcome::Corrected);
+        let corrected = bands.iter().filter(|band| band.outcome == BandOutcome::Corrected);
         prop_assert_eq!(changed, corrected.map(|band| band.pixels).sum::<u64>());
         prop_assert!(bands.iter().all(|band| (0.0..=1.0).contains(&band.confidence)));
     }

@@ -7,12 +7,12 @@ pub(super) type Run = (i32, i32);
 
 /// For each row of an image its runs, from the left, apart from each other.
 #[derive(Clone, Debug)]
-pub(super) struct Rows {
+pub(super) struct RowRuns {
     ends: Vec<usize>,
     runs: Vec<Run>,
 }
 
-impl Rows {
+impl RowRuns {
     /// No rows yet.
     pub(super) fn new() -> Self {
         Self { ends: vec![0], runs: Vec::new() }

@@ -2,15 +2,15 @@
 
 use lamp_stack::Mask;
 
-use super::rows::{Rows, Run, subtract};
+use super::row_runs::{RowRuns, Run, subtract};
 
 /// Columns that no image reaches.
 const BEYOND: i32 = 1 << 29;
 const EVERYTHING: [Run; 1] = [(-BEYOND, BEYOND)];
 
-/// Sources which pixels distances are measured.
+/// From which pixels distances are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sources {
+pub(super) enum SourceColour {
     /// Black ones. Outside the image all is black.
     Black,
     /// White ones.
@@ -19,40 +19,40 @@ pub(super) enum Sources {
 
 /// An image as the pixels that distances are measured from, centre to centre.
 #[derive(Debug)]
-pub(super) struct Field {
-    sources: Sources,
+pub(super) struct Sources {
+    colour: SourceColour,
     /// The runs of the other colour. Those that black ones end beside the
     /// image's edges go on for ever.
-    between: Rows,
+    between: RowRuns,
 }
 
-impl Field {
-    pub(super) fn new(mask: &Mask, sources: Sources) -> Self {
-        let white = Rows::white(mask);
-        if sources == Sources::Black {
-            return Self { sources, between: white };
+impl Sources {
+    pub(super) fn new(mask: &Mask, colour: SourceColour) -> Self {
+        let white = RowRuns::white(mask);
+        if colour == SourceColour::Black {
+            return Self { colour, between: white };
         }
-        let mut between = Rows::new();
+        let mut between = RowRuns::new();
         let mut black = Vec::new();
         for row in 0..white.height() {
             subtract(&EVERYTHING, white.row(row), &mut black);
             between.push(&black);
         }
-        Self { sources, between }
+        Self { colour, between }
     }
 
     /// The runs without a source in a row, which may lie outside the image.
     pub(super) fn row(&self, row: i64) -> &[Run] {
         match u32::try_from(row) {
             Ok(row) if row < self.between.height() => self.between.row(row),
-            _ if self.sources == Sources::Black => &[],
+            _ if self.colour == SourceColour::Black => &[],
             _ => &EVERYTHING,
         }
     }
 
     /// Makes `out` what is left of a region's runs in row `row` without the
     /// pixels that lie in the disc of a source.
-    pub(super) fn outside(&self, disc: &Disc, row: u32, region: &[Run], out: &mut Outside) {
+    pub(super) fn erode(&self, disc: &Disc, row: u32, region: &[Run], out: &mut Erosion) {
         out.runs.clear();
         out.runs.extend_from_slice(region);
         for &away in &disc.order {
@@ -69,11 +69,11 @@ impl Field {
     }
 
     /// What is left of all rows of a region.
-    pub(super) fn all_outside(&self, disc: &Disc, region: &Rows) -> Rows {
-        let mut rows = Rows::new();
-        let mut out = Outside::default();
+    pub(super) fn erode_all(&self, disc: &Disc, region: &RowRuns) -> RowRuns {
+        let mut rows = RowRuns::new();
+        let mut out = Erosion::default();
         for row in 0..region.height() {
-            self.outside(disc, row, region.row(row), &mut out);
+            self.erode(disc, row, region.row(row), &mut out);
             rows.push(&out.runs);
         }
         rows
@@ -82,12 +82,12 @@ impl Field {
 
 /// Runs as they are narrowed.
 #[derive(Debug, Default)]
-pub(super) struct Outside {
+pub(super) struct Erosion {
     pub(super) runs: Vec<Run>,
     spare: Vec<Run>,
 }
 
-impl Outside {
+impl Erosion {
     /// Leaves what is further than `half` columns inside the runs `between`
     /// sources.
     fn narrow(&mut self, between: &[Run], half: i32) {
@@ -121,20 +121,20 @@ pub(super) struct Disc {
 }
 
 /// The radius of the largest disc, in pixels: more than any image is wide.
-const LARGEST_RADIUS: f64 = (1 << 27) as f64;
+const MAX_RADIUS: f64 = (1 << 27) as f64;
 
 /// Squares of lengths in pixels that are whole but for rounding are whole.
 const ROUNDING: f64 = 1e-7;
 
 /// The squared distance from which on pixels are at least `radius` away.
 pub(super) fn at_least(radius: f64) -> u64 {
-    let radius = radius.clamp(0.0, LARGEST_RADIUS);
+    let radius = radius.clamp(0.0, MAX_RADIUS);
     (radius * radius - ROUNDING).ceil() as u64
 }
 
 /// The squared distance from which on pixels are more than `radius` away.
 pub(super) fn more_than(radius: f64) -> u64 {
-    let radius = radius.clamp(0.0, LARGEST_RADIUS);
+    let radius = radius.clamp(0.0, MAX_RADIUS);
     (radius * radius + ROUNDING).floor() as u64 + 1
 }
 

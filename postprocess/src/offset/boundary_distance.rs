@@ -1,13 +1,13 @@
 //! The squared distances of the pixels along an edge.
 
-use super::far::Field;
-use super::rows::Run;
+use super::erode::Sources;
+use super::row_runs::Run;
 
 /// Distances along a row are measured up to here: edges move less far, and the
 /// sum of two squares of them is a number of 32 bits.
-const FURTHEST: u32 = 1 << 15;
+const MAX_DISTANCE: u32 = 1 << 15;
 
-impl Field {
+impl Sources {
     /// Makes `squares` the squared distance of each pixel of a run in row
     /// `row` from the nearest source, where that is below `limit`.
     pub(super) fn squares(&self, row: u32, run: Run, limit: u64, squares: &mut Vec<u32>) {
@@ -47,7 +47,7 @@ fn nearer(between: &[Run], (start, end): Run, away: u32, squares: &mut [u32]) {
             let right = (to - column) as u32;
             let places = &mut squares[(column - start) as usize..(inside - start) as usize];
             for (square, step) in places.iter_mut().zip(0..) {
-                let aside = (left + step).min(right - step).min(FURTHEST);
+                let aside = (left + step).min(right - step).min(MAX_DISTANCE);
                 *square = (away + aside * aside).min(*square);
             }
             column = inside;

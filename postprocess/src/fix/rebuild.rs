@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use lamp_stack::{Image, Mask};
 
-use super::contours::{Contours, Expected, Outlook, Side};
+use super::contours::{Contours, Expected, LineId, Outlook};
 use super::detect::without_slivers;
 use super::mend::{DROP, DROP_ENDED, Mended, mend};
 use super::outline::outline_row;
@@ -44,7 +44,7 @@ pub(super) fn rebuild(
 ) -> Option<Rebuilt> {
     let mut contours = Contours::around(mask, band.clone(), is_good)?;
     let stretch = |row: u32| open_rows.map(|open| open.partition_point(|&open| open <= row));
-    let mut crossed: BTreeSet<(usize, Side)> = BTreeSet::new();
+    let mut crossed: BTreeSet<(usize, LineId)> = BTreeSet::new();
     let mend_row = |contours: &Contours, crossed: &BTreeSet<_>, row: u32| {
         let mut outlook = contours.outlook(row);
         for crossing in &mut outlook.crossings {
@@ -95,8 +95,9 @@ fn columns_of<'a>(added: impl Iterator<Item = &'a Expected>, width: u32) -> Opti
 }
 
 fn lack_others(a: &Mended, b: &Mended) -> bool {
-    let [a, b] = [a, b]
-        .map(|mended| -> BTreeSet<Side> { mended.added.iter().map(|added| added.side).collect() });
+    let [a, b] = [a, b].map(|mended| -> BTreeSet<LineId> {
+        mended.added.iter().map(|added| added.side).collect()
+    });
     !a.is_empty() && !b.is_empty() && a.is_disjoint(&b)
 }
 

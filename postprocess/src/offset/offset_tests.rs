@@ -94,7 +94,7 @@ proptest! {
         mask in masks(), by in 0.1..7.0f64, min_feature in 0.5..5.0f64,
     ) {
         let (kept, _) = shrink(&mask, &Widths::uniform(by), min_feature);
-        let plain = pieces::without_specks(offset(&mask, by));
+        let plain = components::without_specks(offset(&mask, by));
         for row in 0..mask.height() {
             for column in 0..mask.width() {
                 let level = level_at(&kept, column, row);
@@ -233,7 +233,7 @@ fn places_are_as_wide_as_the_squares_they_lie_in() {
         |column: i32, row: i32| (column - row + 100).abs() <= 7 && (90..190).contains(&row);
     let mask = drawn(200, 200, |c, r| square(c, r) || upright(c, r) || turned(c, r));
     let sizes = [5.0, 10.0, 15.0, 59.0, 62.0];
-    let parts = size::by_size(&mask, &sizes);
+    let parts = local_thickness::by_size(&mask, &sizes);
     let class = |column, row| parts.iter().position(|part| part.holds(column, row));
     for row in [0, 1, 9, 10, 70, 199] {
         assert_eq!(class(0, row), None);

@@ -1,23 +1,23 @@
 //! An image near its edges: what lies deep inside, and how far each other
 //! pixel is from the edge.
 
-use super::along::{Along, Sides};
-use super::far::{Disc, Field, Outside, at_least, more_than};
-use super::rows::{Rows, Run, subtract};
+use super::aligned_rows::{AlignedRows, AlignedRun};
+use super::erode::{Disc, Erosion, Sources, at_least, more_than};
+use super::row_runs::{RowRuns, Run, subtract};
 
 /// A region of an image, and how far its edges move.
 #[derive(Debug)]
-pub(super) struct Class {
+pub(super) struct SizeClass {
     /// Pixels that are no sources of distance.
-    pub(super) region: Rows,
+    pub(super) region: RowRuns,
     /// How far, in pixels; not below zero.
     pub(super) by: f64,
 }
 
-/// A run of a row of an [`Edge`].
+/// A run of a row of an [`EdgeMap`].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
-    pub(super) run: Run,
+pub(super) struct EdgeRun {
+    pub(super) columns: Run,
     /// Where its pixels stand in the edge's arrays; a run deep inside has none.
     pub(super) first: Option<u32>,
 }
@@ -33,9 +33,9 @@ pub(super) struct EdgePixel {
 
 /// The pixels of some regions, from a distance on that leaves nothing of them.
 #[derive(Debug, Default)]
-pub(super) struct Edge {
+pub(super) struct EdgeMap {
     ends: Vec<usize>,
-    pieces: Vec<Piece>,
+    runs: Vec<EdgeRun>,
     /// The squared distance of each pixel along the edge from the nearest
     /// source.
     pub(super) squares: Vec<u32>,
@@ -43,11 +43,17 @@ pub(super) struct Edge {
     pub(super) levels: Vec<u8>,
 }
 
-impl Edge {
+impl EdgeMap {
     /// Where the edges of `classes` lie when they have moved. Pixels from
     /// `depth` further in on are deep inside. Where `all`, pixels of which
     /// nothing is left are there, too.
-    pub(super) fn new(field: &Field, width: u32, classes: &[Class], depth: f64, all: bool) -> Self {
+    pub(super) fn new(
+        sources: &Sources,
+        width: u32,
+        classes: &[SizeClass],
+        depth: f64,
+        all: bool,
+    ) -> Self {
         let height = classes.first().map_or(0, |class| class.region.height());
         let discs: Vec<_> = classes
             .iter()
@@ -55,15 +61,17 @@ impl Edge {
                 let outer = if all { 0 } else { more_than(class.by) };
                 let inner = at_least(class.by + depth);
                 let discs = [Disc::below(outer, height), Disc::below(inner, height)];
-                (discs, Levels::new(class.by, inner))
+                (discs, LevelTable::new(class.by, inner))
             })
             .collect();
         let mut edge = Self { ends: vec![0], ..Self::default() };
-        let [mut outer, mut inner] = [Outside::default(), Outside::default()];
+        let [mut outer, mut inner] = [Erosion::default(), Erosion::default()];
         let mut runs = Vec::new();
         let mut squares = Vec::new();
         let mut along = match &discs[..] {
-            [([outer, inner], levels)] => Some((Along::new(field, [outer, inner], width), levels)),
+            [([outer, inner], levels)] => {
+                Some((AlignedRows::new(sources, [outer, inner], width), levels))
+            }
             _ => None,
         };
         let mut sides = Vec::new();
@@ -72,23 +80,23 @@ impl Edge {
                 && along.row(row, &mut sides)
             {
                 edge.push_along(&sides, discs[0].0[1].halves().len(), levels, &mut squares);
-                edge.ends.push(edge.pieces.len());
+                edge.ends.push(edge.runs.len());
                 continue;
             }
-            let first = edge.pieces.len();
+            let first = edge.runs.len();
             for (class, ([outer_disc, inner_disc], levels)) in classes.iter().zip(&discs) {
-                field.outside(outer_disc, row, class.region.row(row), &mut outer);
-                field.outside(inner_disc, row, &outer.runs, &mut inner);
-                let deep = inner.runs.iter().map(|&run| Piece { run, first: None });
-                edge.pieces.extend(deep);
+                sources.erode(outer_disc, row, class.region.row(row), &mut outer);
+                sources.erode(inner_disc, row, &outer.runs, &mut inner);
+                let deep = inner.runs.iter().map(|&run| EdgeRun { columns: run, first: None });
+                edge.runs.extend(deep);
                 subtract(&outer.runs, &inner.runs, &mut runs);
                 for &run in &runs {
-                    field.squares(row, run, levels.limit, &mut squares);
+                    sources.squares(row, run, levels.limit, &mut squares);
                     edge.push(run, levels, &squares);
                 }
             }
-            edge.pieces[first..].sort_unstable_by_key(|piece| piece.run);
-            edge.ends.push(edge.pieces.len());
+            edge.runs[first..].sort_unstable_by_key(|run| run.columns);
+            edge.ends.push(edge.runs.len());
         }
         edge
     }
@@ -96,9 +104,9 @@ impl Edge {
     /// Adds a row of runs whose sides are measured by themselves.
     fn push_along(
         &mut self,
-        runs: &[Sides],
+        runs: &[AlignedRun],
         reach: usize,
-        levels: &Levels,
+        levels: &LevelTable,
         squares: &mut Vec<u32>,
     ) {
         for sides in runs {
@@ -107,7 +115,7 @@ impl Edge {
                 sides.squares(reach, true, squares);
                 self.push((outer.0, inner.0), levels, squares);
             }
-            self.pieces.push(Piece { run: inner, first: None });
+            self.runs.push(EdgeRun { columns: inner, first: None });
             if inner.1 < outer.1 {
                 sides.squares(reach, false, squares);
                 self.push((inner.1, outer.1), levels, squares);
@@ -115,9 +123,9 @@ impl Edge {
         }
     }
 
-    fn push(&mut self, run: Run, levels: &Levels, squares: &[u32]) {
+    fn push(&mut self, run: Run, levels: &LevelTable, squares: &[u32]) {
         let first = u32::try_from(self.squares.len()).expect("an image has fewer pixels at edges");
-        self.pieces.push(Piece { run, first: Some(first) });
+        self.runs.push(EdgeRun { columns: run, first: Some(first) });
         self.squares.extend_from_slice(squares);
         self.levels.extend(squares.iter().map(|&square| levels.of(square)));
     }
@@ -126,33 +134,31 @@ impl Edge {
         (self.ends.len() - 1) as u32
     }
 
-    /// The pieces of a row, from the left; of rows outside the image none.
-    pub(super) fn row(&self, row: i64) -> &[Piece] {
+    /// The runs of a row, from the left; of rows outside the image none.
+    pub(super) fn row(&self, row: i64) -> &[EdgeRun] {
         match usize::try_from(row) {
-            Ok(row) if row + 1 < self.ends.len() => {
-                &self.pieces[self.ends[row]..self.ends[row + 1]]
-            }
+            Ok(row) if row + 1 < self.ends.len() => &self.runs[self.ends[row]..self.ends[row + 1]],
             _ => &[],
         }
     }
 
     /// Where a pixel of the regions stands in the arrays; deep inside, nowhere.
     pub(super) fn at(&self, column: i32, row: i64) -> Option<Option<u32>> {
-        let pieces = self.row(row);
-        let next = pieces.partition_point(|piece| piece.run.1 <= column);
-        let piece = pieces.get(next).filter(|piece| piece.run.0 <= column)?;
-        Some(piece.first.map(|first| first + (column - piece.run.0) as u32))
+        let runs = self.row(row);
+        let next = runs.partition_point(|run| run.columns.1 <= column);
+        let run = runs.get(next).filter(|run| run.columns.0 <= column)?;
+        Some(run.first.map(|first| first + (column - run.columns.0) as u32))
     }
 
-    /// Shows all pixels along the edge, row by row, but those of pieces that are
+    /// Shows all pixels along the edge, row by row, but those of runs that are
     /// `plain`.
     pub(super) fn for_each(&self, plain: &[bool], mut show: impl FnMut(EdgePixel)) {
         let mut plain = plain.iter();
         for row in 0..self.height() {
-            for piece in self.row(row.into()) {
-                let is_plain = *plain.next().expect("one for each piece");
-                let Some(first) = piece.first.filter(|_| !is_plain) else { continue };
-                for (index, column) in (first..).zip(piece.run.0..piece.run.1) {
+            for run in self.row(row.into()) {
+                let is_plain = *plain.next().expect("one for each run");
+                let Some(first) = run.first.filter(|_| !is_plain) else { continue };
+                for (index, column) in (first..).zip(run.columns.0..run.columns.1) {
                     show(EdgePixel { column, row, index });
                 }
             }
@@ -170,11 +176,11 @@ impl Edge {
     ) {
         runs.clear();
         let mut column = 0;
-        for piece in self.row(row.into()) {
-            let [start, end] = [piece.run.0, piece.run.1].map(|column| column as u32);
+        for run in self.row(row.into()) {
+            let [start, end] = [run.columns.0, run.columns.1].map(|column| column as u32);
             runs.push((start - column, level_outside));
             let turned = |level: u8| if level_outside == 0 { level } else { 255 - level };
-            match piece.first {
+            match run.first {
                 None => runs.push((end - start, turned(255))),
                 Some(first) => {
                     let levels = &self.levels[first as usize..][..(end - start) as usize];
@@ -189,7 +195,7 @@ impl Edge {
 }
 
 /// The levels of pixels by their squared distance.
-struct Levels {
+struct LevelTable {
     by: f64,
     /// Squares are below.
     limit: u64,
@@ -197,7 +203,7 @@ struct Levels {
     table: Vec<u8>,
 }
 
-impl Levels {
+impl LevelTable {
     fn new(by: f64, limit: u64) -> Self {
         let table = (0..limit.min(4096) as u32).map(|square| Self::level(square, by)).collect();
         Self { by, limit, table }

@@ -4,8 +4,8 @@ use lamp_stack::{Dpi, GrayMask, Image, Layer, Length, Mask, map_in_order};
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use super::pieces::{self, Loss};
-use super::scale::{Side, scaled};
+use super::components::{self, Loss};
+use super::scale::{AxisScale, scaled};
 use super::walls::ThinWall;
 use super::widths::Widths;
 use super::{levels, offset, shrink};
@@ -110,12 +110,12 @@ pub enum CompensateError {
 }
 
 /// The most that edges move, in pixels.
-const MOST: f64 = 4096.0;
+const MAX_MOVE: f64 = 4096.0;
 /// How deep, in pixels, edges are looked at for thin walls.
-const DEEPEST: f64 = 64.0;
+const MAX_DEPTH: f64 = 64.0;
 /// Images are at most so wide and high, in pixels, as those that a stack's
 /// reader takes.
-const LARGEST_SIDE: u64 = 1 << 26;
+const MAX_SIDE: u64 = 1 << 26;
 /// Images are as wide as a multiple of this (002 section 2.2.2).
 const WIDTH_UNIT: u64 = 32;
 
@@ -149,7 +149,7 @@ pub fn compensate<E: From<CompensateError> + Send>(
     });
     done.map(move |done| {
         let (layer, done) = done?;
-        if let Some(Done { walls, losses, cut_off }) = done {
+        if let Some(MovedEdges { walls, losses, cut_off }) = done {
             report(&Compensated { layer: &layer, walls: &walls, losses: &losses, cut_off });
         }
         Ok(layer)
@@ -162,7 +162,7 @@ fn on_page(
     widths: &Widths,
     options: &CompensateOptions,
     dpi: Dpi,
-    done: &Done,
+    done: &MovedEdges,
 ) -> Value {
     let nm = |um: f64| (um * 1e3).round() / 1e3 + 0.0;
     let mut page = before.filter(Value::is_object).unwrap_or_else(|| json!({}));
@@ -189,10 +189,10 @@ fn scale(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensateErro
     if layer.info.stack.as_ref().is_some_and(|stack| stack.other.contains_key("tile")) {
         return Err(CompensateError::Tiled { layer: layer.info.name() });
     }
-    let columns = Side::new(layer.image.width(), shrinkage.x);
-    let rows = Side::new(layer.image.height(), shrinkage.y);
+    let columns = AxisScale::new(layer.image.width(), shrinkage.x);
+    let rows = AxisScale::new(layer.image.height(), shrinkage.y);
     let width = columns.after().next_multiple_of(WIDTH_UNIT);
-    if width.max(rows.after()) > LARGEST_SIDE {
+    if width.max(rows.after()) > MAX_SIDE {
         return Err(CompensateError::TooLarge { layer: layer.info.name() });
     }
     layer.image = scaled(&layer.image, &columns, &rows, width as u32);
@@ -209,7 +209,7 @@ fn scale(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensateErro
 
 /// What is to tell of a layer whose edges moved.
 #[derive(Default)]
-struct Done {
+struct MovedEdges {
     walls: Vec<ThinWall>,
     losses: Vec<Loss>,
     /// Whether the image was too small to grow in.
@@ -222,33 +222,33 @@ fn move_edges(
     widths: &Widths,
     options: &CompensateOptions,
     dpi: Dpi,
-) -> Result<Option<Done>, CompensateError> {
+) -> Result<Option<MovedEdges>, CompensateError> {
     if widths.are_zero() || layer.image.changes() == 0 {
         return Ok(None);
     }
     let [least, most] = widths.range();
     let furthest = most.max(-least);
-    if furthest > MOST {
+    if furthest > MAX_MOVE {
         let layer = layer.info.name();
-        return Err(CompensateError::TooFar { layer, pixels: furthest, most: MOST });
+        return Err(CompensateError::TooFar { layer, pixels: furthest, most: MAX_MOVE });
     }
     let min_feature = options.min_feature.map_or(2.0, |length| length.pixels(dpi));
     let depth = most + min_feature / 2.0;
-    if most > 0.0 && min_feature > 0.0 && depth > DEEPEST {
+    if most > 0.0 && min_feature > 0.0 && depth > MAX_DEPTH {
         let layer = layer.info.name();
-        let most_moved = DEEPEST - min_feature.min(2.0) / 2.0;
+        let most_moved = MAX_DEPTH - min_feature.min(2.0) / 2.0;
         if most > most_moved {
             let most_um = (most_moved * dpi.pitch().um()).floor();
             return Err(CompensateError::TooFarForWalls { layer, pixels: most, most_um });
         }
-        return Err(CompensateError::TooDeep { layer, pixels: depth, most: DEEPEST });
+        return Err(CompensateError::TooDeep { layer, pixels: depth, most: MAX_DEPTH });
     }
-    let mut done = Done::default();
+    let mut done = MovedEdges::default();
     let mut shrunk = |mask: &Mask| {
         let (gray, walls) = shrink(mask, widths, min_feature);
         done.walls = walls;
         if min_feature == 0.0 {
-            done.losses = pieces::losses(mask, &levels::at_least(&gray, 128));
+            done.losses = components::losses(mask, &levels::at_least(&gray, 128));
         }
         gray
     };

@@ -4,16 +4,16 @@
 //! at its centre, and none lies beside another one's neighbour, each side of a run
 //! is measured by itself, against its like in the other rows.
 
-use super::far::{Disc, Field};
-use super::rows::Run;
+use super::erode::{Disc, Sources};
+use super::row_runs::Run;
 
 /// As many rows on each side are looked at.
-const MOST: usize = 16;
+const MAX_REACH: usize = 16;
 
 /// The rows around one.
 #[derive(Debug)]
-pub(super) struct Along<'a> {
-    field: &'a Field,
+pub(super) struct AlignedRows<'a> {
+    sources: &'a Sources,
     discs: [&'a Disc; 2],
     width: i32,
     /// The rows above and below, from the row itself on.
@@ -22,33 +22,33 @@ pub(super) struct Along<'a> {
 
 /// A run of such a row.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sides {
+pub(super) struct AlignedRun {
     /// What lies outside the sources' outer discs.
     pub(super) outer: Run,
     /// What lies outside their inner ones; at least a pixel.
     pub(super) inner: Run,
     /// The innermost ends, of rows that are so many rows away.
-    ends: [Run; MOST],
+    ends: [Run; MAX_REACH],
 }
 
-impl<'a> Along<'a> {
+impl<'a> AlignedRows<'a> {
     /// For discs of which the outer is the smaller one.
-    pub(super) fn new(field: &'a Field, discs: [&'a Disc; 2], width: u32) -> Self {
-        Self { field, discs, width: width as i32, rows: Vec::new() }
+    pub(super) fn new(sources: &'a Sources, discs: [&'a Disc; 2], width: u32) -> Self {
+        Self { sources, discs, width: width as i32, rows: Vec::new() }
     }
 
     /// Makes `out` the runs of a row, if they run along those of its like.
-    pub(super) fn row(&mut self, row: u32, out: &mut Vec<Sides>) -> bool {
+    pub(super) fn row(&mut self, row: u32, out: &mut Vec<AlignedRun>) -> bool {
         out.clear();
         let reach = self.discs[1].halves().len();
-        let runs = self.field.row(row.into());
-        if reach > MOST {
+        let runs = self.sources.row(row.into());
+        if reach > MAX_REACH {
             return false;
         }
         self.rows.clear();
         for away in 0..reach as i64 {
             let rows =
-                [i64::from(row) - away, i64::from(row) + away].map(|row| self.field.row(row));
+                [i64::from(row) - away, i64::from(row) + away].map(|row| self.sources.row(row));
             if rows.iter().any(|row| row.len() != runs.len()) {
                 return false;
             }
@@ -63,8 +63,8 @@ impl<'a> Along<'a> {
     }
 
     /// The sides of a run, if it lies right of where the one before ends.
-    fn sides(&self, run: usize, before: &mut i32) -> Option<Sides> {
-        let mut ends = [(0, 0); MOST];
+    fn sides(&self, run: usize, before: &mut i32) -> Option<AlignedRun> {
+        let mut ends = [(0, 0); MAX_REACH];
         let mut hull = (i32::MAX, i32::MIN);
         for (end, rows) in ends.iter_mut().zip(&self.rows) {
             let [a, b] = rows.map(|row| row[run]);
@@ -80,11 +80,11 @@ impl<'a> Along<'a> {
             narrowed
                 .fold(own, |left, (half, end)| (left.0.max(end.0 + half), left.1.min(end.1 - half)))
         });
-        (inner.0 < inner.1).then_some(Sides { outer, inner, ends })
+        (inner.0 < inner.1).then_some(AlignedRun { outer, inner, ends })
     }
 }
 
-impl Sides {
+impl AlignedRun {
     /// The squared distances of the pixels left of the inner ones, then of those
     /// right of them, by how many rows count.
     pub(super) fn squares(&self, reach: usize, left: bool, squares: &mut Vec<u32>) {

@@ -8,7 +8,7 @@ use std::ops::Range;
 use lamp_stack::{GrayMask, Mask};
 
 use super::levels;
-use super::rows::Rows;
+use super::row_runs::RowRuns;
 
 /// A piece of an image that edges took away or broke apart as they moved.
 ///
@@ -26,7 +26,7 @@ pub struct Loss {
 /// The pieces of which nothing is left, and those that broke apart, from the
 /// top. All that is white `after` was so `before`.
 pub(super) fn losses(before: &Mask, after: &Mask) -> Vec<Loss> {
-    let [before, after] = [before, after].map(|mask| Pieces::of(Rows::white(mask)));
+    let [before, after] = [before, after].map(|mask| Components::of(RowRuns::white(mask)));
     let mut left = vec![0; before.runs.len()];
     for (run, &(row, column)) in after.runs.iter().enumerate() {
         if after.first[run] as usize == run {
@@ -65,7 +65,7 @@ pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
     if !(0..gray.height()).any(faint) {
         return gray;
     }
-    let pieces = Pieces::of(Rows::white(&levels::at_least(&gray, 1)));
+    let pieces = Components::of(RowRuns::white(&levels::at_least(&gray, 1)));
     let mut stays = vec![false; pieces.runs.len()];
     for (row, bright) in (0..).zip(levels::at_least(&gray, 128).rows()) {
         for start in bright.iter().step_by(2) {
@@ -82,15 +82,15 @@ pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
 
 /// Makes white what is black and does not touch the black of the top left pixel.
 pub(crate) fn without_holes(mask: &Mask) -> Mask {
-    let black = Pieces::of(Rows::white(&mask.inverted()));
+    let black = Components::of(RowRuns::white(&mask.inverted()));
     let outside = black.first.first().copied();
     let outside = black.filtered(mask.height(), |run| Some(black.first[run]) == outside);
     outside.mask(mask.width()).inverted()
 }
 
 /// The runs of a shape, by the pieces that they belong to.
-struct Pieces {
-    rows: Rows,
+struct Components {
+    rows: RowRuns,
     /// The row and first column of each run.
     runs: Vec<(u32, i32)>,
     /// Where each run ends.
@@ -99,8 +99,8 @@ struct Pieces {
     first: Vec<u32>,
 }
 
-impl Pieces {
-    fn of(rows: Rows) -> Self {
+impl Components {
+    fn of(rows: RowRuns) -> Self {
         let mut pieces = Self { runs: Vec::new(), ends: Vec::new(), first: Vec::new(), rows };
         let mut above = 0;
         for row in 0..pieces.rows.height() {
@@ -147,8 +147,8 @@ impl Pieces {
     }
 
     /// The runs that stay.
-    fn filtered(&self, height: u32, stays: impl Fn(usize) -> bool) -> Rows {
-        let mut rows = Rows::new();
+    fn filtered(&self, height: u32, stays: impl Fn(usize) -> bool) -> RowRuns {
+        let mut rows = RowRuns::new();
         let mut all = 0..self.runs.len();
         for row in 0..height {
             let runs = self.rows.row(row).iter().zip(all.by_ref());
@@ -162,7 +162,7 @@ impl Pieces {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{drawn, level_at};
+    use super::super::offset_tests::{drawn, level_at};
     use super::*;
 
     #[test]

@@ -8,9 +8,9 @@
 //! Of a convex corner nothing is left, as pixels further inside lie beside
 //! each pixel there.
 
-use super::edge::{Edge, EdgePixel, level};
-use super::far;
-use super::plain::plain_pieces;
+use super::edge_map::{EdgeMap, EdgePixel, level};
+use super::erode;
+use super::plain::plain_runs;
 
 /// The neighbours, counter-clockwise from the right, as (column, row) steps.
 const AROUND: [(i32, i32); 8] =
@@ -35,11 +35,11 @@ impl Cores {
     /// Finds the cores.
     ///
     /// Pixels from `depth` on are deep inside.
-    pub(super) fn of(edge: &Edge, depth: f64) -> Self {
+    pub(super) fn of(edge: &EdgeMap, depth: f64) -> Self {
         // Past a corner of 60 degrees, and further than what is taken away of
         // one place can reach from another.
         let [beside, margin] = [2.0 * depth, depth + 2.0].map(f64::ceil);
-        let plain = plain_pieces(edge, beside as i32, margin as u32);
+        let plain = plain_runs(edge, beside as i32, margin as u32);
         if plain.iter().all(|plain| *plain) {
             return Self { around: Vec::new(), cores: Vec::new() };
         }
@@ -50,12 +50,12 @@ impl Cores {
     }
 
     /// Exposes each core, so wide as `width` pixels or as the wall is.
-    pub(super) fn widen(&self, edge: &mut Edge, width: f64) {
+    pub(super) fn widen(&self, edge: &mut EdgeMap, width: f64) {
         // A slanted core has fewer pixels for its length, so it gets more beside.
         let mut ball = Ball::new(width / 2.0 + 0.75);
         // All of a wall that is no wider itself.
         let mut whole = Ball::new(width / 2.0 + 1.0);
-        let no_wider = far::more_than(width / 2.0 + 0.5);
+        let no_wider = erode::more_than(width / 2.0 + 0.5);
         for core in self.cores.iter().flatten() {
             let square = u64::from(edge.squares[core.index as usize]);
             let ball = if square < no_wider { &mut whole } else { &mut ball };
@@ -106,33 +106,33 @@ impl Ball {
     }
 }
 
-/// The neighbours of each pixel that is not in a plain piece.
-fn neighbours(edge: &Edge, plain: &[bool]) -> Vec<[u32; 8]> {
+/// The neighbours of each pixel that is not in a plain run.
+fn neighbours(edge: &EdgeMap, plain: &[bool]) -> Vec<[u32; 8]> {
     let mut all = vec![[BLACK; 8]; edge.squares.len()];
     let mut plain = plain.iter();
     for row in 0..i64::from(edge.height()) {
         let rows = [-1, 0, 1].map(|step| edge.row(row + step));
         let mut next = [0; 3];
-        for piece in rows[1] {
-            let is_plain = *plain.next().expect("one for each piece");
-            let Some(first) = piece.first.filter(|_| !is_plain) else { continue };
-            let (start, end) = piece.run;
+        for run in rows[1] {
+            let is_plain = *plain.next().expect("one for each run");
+            let Some(first) = run.first.filter(|_| !is_plain) else { continue };
+            let (start, end) = run.columns;
             // What stands in the columns left of, at and right of the pixel.
             let mut columns = [[BLACK; 3]; 3];
             for column in start - 1..=end {
                 columns.rotate_left(1);
-                for ((pieces, next), at) in rows.iter().zip(&mut next).zip(&mut columns[2]) {
-                    // The piece before may have looked one column ahead.
-                    while *next > 0 && pieces[*next - 1].run.1 > column {
+                for ((runs, next), at) in rows.iter().zip(&mut next).zip(&mut columns[2]) {
+                    // The run before may have looked one column ahead.
+                    while *next > 0 && runs[*next - 1].columns.1 > column {
                         *next -= 1;
                     }
-                    while pieces.get(*next).is_some_and(|piece| piece.run.1 <= column) {
+                    while runs.get(*next).is_some_and(|run| run.columns.1 <= column) {
                         *next += 1;
                     }
-                    *at = match pieces.get(*next) {
-                        Some(piece) if piece.run.0 <= column => piece
+                    *at = match runs.get(*next) {
+                        Some(run) if run.columns.0 <= column => run
                             .first
-                            .map_or(DEEP, |first| FIRST + first + (column - piece.run.0) as u32),
+                            .map_or(DEEP, |first| FIRST + first + (column - run.columns.0) as u32),
                         _ => BLACK,
                     };
                 }
@@ -148,8 +148,8 @@ fn neighbours(edge: &Edge, plain: &[bool]) -> Vec<[u32; 8]> {
 }
 
 /// Takes away all pixels that may go, and says which are left. Those in plain
-/// pieces go.
-fn thinned(edge: &Edge, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
+/// runs go.
+fn thinned(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     let mut left = vec![false; edge.squares.len()];
     edge.for_each(plain, |pixel| left[pixel.index as usize] = true);
     let mut order = outside_first(&edge.squares, &left);
@@ -188,7 +188,7 @@ fn outside_first(squares: &[u32], there: &[bool]) -> Vec<u32> {
 
 /// Says which pixels walls must not be shortened beyond: those that lie
 /// furthest inside among their neighbours, but for those in a corner.
-fn ends(edge: &Edge, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
+fn ends(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     let square = |index: u32| match index {
         BLACK => 0,
         DEEP => u32::MAX,
@@ -208,9 +208,9 @@ fn ends(edge: &Edge, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
 /// Whether a pixel lies within twice the radius of a disc inside the shape, which
 /// is larger than its own by a pixel or deep inside: a corner, a blunt tip or a
 /// knob that is no longer than it is wide.
-fn is_in_corner(edge: &Edge, pixel: &EdgePixel) -> bool {
+fn is_in_corner(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
     let radius = f64::from(edge.squares[pixel.index as usize]).sqrt() + 1.0;
-    let larger = far::at_least(radius);
+    let larger = erode::at_least(radius);
     let reach = (2.0 * radius) as i32;
     let is_larger = |column: i32, row: i32| {
         let place = edge.at(pixel.column + column, i64::from(pixel.row) + i64::from(row));
@@ -237,7 +237,12 @@ fn is_simple(around: &[u32; 8], left: &[bool]) -> bool {
 }
 
 /// Pixels that are left, those together that touch.
-fn group(edge: &Edge, plain: &[bool], around: &[[u32; 8]], left: &[bool]) -> Vec<Vec<EdgePixel>> {
+fn group(
+    edge: &EdgeMap,
+    plain: &[bool],
+    around: &[[u32; 8]],
+    left: &[bool],
+) -> Vec<Vec<EdgePixel>> {
     if !left.contains(&true) {
         return Vec::new();
     }

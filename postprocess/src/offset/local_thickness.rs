@@ -9,31 +9,31 @@
 
 use lamp_stack::Mask;
 
-use super::far::{Disc, Field, Sources, at_least, more_than};
-use super::rows::{Rows, subtract};
+use super::erode::{Disc, SourceColour, Sources, at_least, more_than};
+use super::row_runs::{RowRuns, subtract};
 
 /// Parts a mask by the sizes of its places: first those smaller than the first
 /// of `sizes` (in pixels, increasing), then those from each up to the next.
-pub(super) fn by_size(mask: &Mask, sizes: &[f64]) -> Vec<Rows> {
+pub(super) fn by_size(mask: &Mask, sizes: &[f64]) -> Vec<RowRuns> {
     let height = mask.height();
-    let from_black = Field::new(mask, Sources::Black);
-    let mut left = Rows::white(mask);
+    let from_black = Sources::new(mask, SourceColour::Black);
+    let mut left = RowRuns::white(mask);
     // The centres of discs: of larger ones there are fewer.
-    let mut centres: Vec<Rows> = Vec::new();
+    let mut centres: Vec<RowRuns> = Vec::new();
     for size in sizes {
         let disc = Disc::below(at_least(size / 2.0), height);
         let smaller = centres.last().unwrap_or(&left);
-        centres.push(from_black.all_outside(&disc, smaller));
+        centres.push(from_black.erode_all(&disc, smaller));
     }
     let mut parts = Vec::new();
     for (size, centres) in sizes.iter().zip(&centres).rev() {
-        let mut part = Rows::new();
+        let mut part = RowRuns::new();
         if centres.are_empty() {
             (0..height).for_each(|_| part.push(&[]));
         } else {
-            let from_centres = Field::new(&centres.mask(mask.width()), Sources::White);
+            let from_centres = Sources::new(&centres.mask(mask.width()), SourceColour::White);
             let reach = Disc::below(more_than(size / 2f64.sqrt()), height);
-            let smaller = from_centres.all_outside(&reach, &left);
+            let smaller = from_centres.erode_all(&reach, &left);
             let mut runs = Vec::new();
             for row in 0..height {
                 subtract(left.row(row), smaller.row(row), &mut runs);

@@ -60,14 +60,14 @@ pub(super) fn hermite(
 }
 
 /// A polynomial about the row of the first point.
-struct Fit {
+struct Polynomial {
     from: f64,
     value: f64,
     slope: f64,
     bend: f64,
 }
 
-impl Fit {
+impl Polynomial {
     fn at(&self, row: f64) -> f64 {
         let d = row - self.from;
         self.value + d * (self.slope + d * self.bend)
@@ -80,7 +80,7 @@ impl Fit {
 
 /// Fits a polynomial of degree 1 or 2 by least squares: the normal equations,
 /// by Cramer's rule. Rows must differ, and be more than the degree.
-fn fit(points: &[(f64, f64)], degree: usize) -> Fit {
+fn fit(points: &[(f64, f64)], degree: usize) -> Polynomial {
     let from = points[0].0;
     // Sums of powers of the rows, and of values times them.
     let (mut s, mut v) = ([0.0; 5], [0.0; 3]);
@@ -94,7 +94,7 @@ fn fit(points: &[(f64, f64)], degree: usize) -> Fit {
         let determinant = s[0] * s[2] - s[1] * s[1];
         let value = (v[0] * s[2] - v[1] * s[1]) / determinant;
         let slope = (s[0] * v[1] - s[1] * v[0]) / determinant;
-        return Fit { from, value, slope, bend: 0.0 };
+        return Polynomial { from, value, slope, bend: 0.0 };
     }
     let columns = [[s[0], s[1], s[2]], [s[1], s[2], s[3]], [s[2], s[3], s[4]]];
     let [value, slope, bend] = std::array::from_fn(|which| {
@@ -102,7 +102,7 @@ fn fit(points: &[(f64, f64)], degree: usize) -> Fit {
         replaced[which] = v;
         determinant(&replaced) / determinant(&columns)
     });
-    Fit { from, value, slope, bend }
+    Polynomial { from, value, slope, bend }
 }
 
 fn determinant([a, b, c]: &[[f64; 3]; 3]) -> f64 {

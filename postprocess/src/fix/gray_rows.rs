@@ -29,8 +29,8 @@ pub(super) fn levels(had: &GrayRow<'_>, beside: &GrayRow<'_>, outline: &[u32]) -
 
 /// Adds the levels of a run of the outline.
 fn white_run(had: &GrayRow<'_>, beside: &GrayRow<'_>, run: Range<u32>, runs: &mut Vec<(u32, u8)>) {
-    let left = Profile::left(beside, run.start);
-    let right = Profile::right(beside, run.end);
+    let left = EdgeLevels::left(beside, run.start);
+    let right = EdgeLevels::right(beside, run.end);
     // An edge of the other direction had its levels on its other side.
     let is_new = |column: u32, direction: usize| {
         had.outline.binary_search(&column).map_or(true, |which| which % 2 != direction)
@@ -57,12 +57,12 @@ fn white_run(had: &GrayRow<'_>, beside: &GrayRow<'_>, run: Range<u32>, runs: &mu
 }
 
 /// The gray levels along an edge: `depth` pixels from column `at` on.
-struct Profile {
+struct EdgeLevels {
     at: u32,
     depth: u32,
 }
 
-impl Profile {
+impl EdgeLevels {
     const NONE: Self = Self { at: 0, depth: 0 };
 
     /// Of the left edge nearest to a column.
