@@ -4,6 +4,7 @@ use lamp_stack::{Dpi, Length, MOST_RUNS, Mask};
 
 use super::super::{PixelSize, TileError};
 use super::lattice::{Cells, Lattice};
+use crate::names::named;
 
 /// Mesh between two copies is so wide at least, unless it is asked for less.
 const MIN_MESH_WIDTH: Length = Length::from_um(2000.0);
@@ -68,6 +69,9 @@ pub enum CellShape {
     Square,
 }
 
+named!(Moat { Layer: "layer", Outline: "outline" });
+named!(CellShape { Hexagon: "hexagon", Square: "square" });
+
 impl Default for MeshOptions {
     /// Hexagons of 5 mm with walls of 0.5 mm, 1 mm from the parts; break lines of
     /// 0.5 mm, 20 mm apart; five layers of mesh alone.
@@ -93,14 +97,13 @@ impl MeshOptions {
 
     /// The options of the command that makes this mesh.
     pub(super) fn command(&self) -> String {
-        let moat = if self.moat == Moat::Outline { " --moat outline" } else { "" };
+        let moat = match self.moat {
+            Moat::Layer => String::new(),
+            moat => format!(" --moat {moat}"),
+        };
         let Self { clearance, break_width, break_pitch, base_layers, .. } = self;
         let pattern = match &self.pattern {
             MeshPattern::Cells { shape, cell, wall } => {
-                let shape = match shape {
-                    CellShape::Hexagon => "hexagon",
-                    CellShape::Square => "square",
-                };
                 format!("{shape} --cell {cell} --wall {wall}")
             }
             MeshPattern::Image { name, .. } => name.clone(),

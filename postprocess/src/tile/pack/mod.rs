@@ -11,6 +11,7 @@ mod no_fit;
 use lamp_stack::Turn;
 
 use super::{CopyPlacement, Layout, TileError};
+use crate::names::named;
 use greedy::PlacingRule;
 use no_fit::NoFitRegions;
 
@@ -35,7 +36,7 @@ pub enum PackBy {
 
 /// Which ways parts may be turned, where that places more. None is mirrored,
 /// which would be another part.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Turns {
     /// Not at all.
     #[default]
@@ -45,6 +46,9 @@ pub enum Turns {
     /// By 90, 180 and 270 degrees.
     Quarters,
 }
+
+named!(PackBy { Boxes: "box", Outlines: "outline" });
+named!(Turns { None: "none", Half: "half", Quarters: "quarters" });
 
 impl Turns {
     fn all(self) -> &'static [u32] {
@@ -59,16 +63,14 @@ impl Turns {
 impl Pack {
     /// The options that ask for it, as a command has them.
     pub(super) fn options(self) -> String {
-        let by = match self.by {
-            PackBy::Boxes => "",
-            PackBy::Outlines => " --pack outline",
-        };
-        let turns = match self.turns {
-            Turns::None => "",
-            Turns::Half => " --turns half",
-            Turns::Quarters => " --turns quarters",
-        };
-        [by, turns].concat()
+        let mut options = String::new();
+        if self.by != PackBy::default() {
+            options += &format!(" --pack {}", self.by);
+        }
+        if self.turns != Turns::default() {
+            options += &format!(" --turns {}", self.turns);
+        }
+        options
     }
 
     /// The ways to try, each with the turns that it may use.
@@ -93,9 +95,8 @@ impl Pack {
             );
         }
         if self.by == PackBy::Outlines {
-            let turns = [Turns::None, Turns::Half, Turns::Quarters].into_iter();
-            let allowed = turns.filter(|turns| turns.all().len() <= self.turns.all().len());
-            for turns in allowed {
+            let allowed = Turns::ALL.iter().filter(|turns| **turns <= self.turns);
+            for &turns in allowed {
                 ways.extend(
                     PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Outlines, turns, order)),
                 );
