@@ -11,11 +11,10 @@ use lamp_adaptive::Part as AdaptivePart;
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::{Method, dither_image};
 use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
-use lamp_slicer::{
-    Body, DepthLevels, Fill, LayerLevels, Model, Placement, SliceOptions, Slices, Units,
-};
+use lamp_slicer::{Body, Fill, LayerLevels, Model, Placement, SliceOptions, Slices, Units};
 use lamp_stack::{
-    Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
+    DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo,
+    PageWriter, g4,
 };
 
 /// Layers with pins and holes, 1500 dpi.

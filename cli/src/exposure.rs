@@ -6,8 +6,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::calibrate::{ExposureTimes, Table};
 use lamp_grayscale::resin::{ExposureTime, Resin};
-use lamp_slicer::DepthLevels;
-use lamp_stack::Length;
+use lamp_stack::{DepthLevels, Length};
 
 use crate::materials::{material, read_text};
 use crate::stop::Stop;

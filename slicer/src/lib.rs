@@ -56,7 +56,7 @@ pub use body::Body;
 pub use error::SliceError;
 pub use exact::Polished;
 pub use facet::{Facet, Units};
-pub use gray::{DepthLevels, LayerLevels};
+pub use gray::LayerLevels;
 pub use grid::PixelGrid;
 pub use model::{Model, digest_of_bytes};
 pub use placement::{Axis, PlacedFacet, Placement};

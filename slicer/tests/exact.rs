@@ -4,10 +4,8 @@ use std::sync::Arc;
 
 use lamp_brep::{Kernel, StepModel};
 use lamp_fixtures::{StepPart, StepUnit, step};
-use lamp_slicer::{
-    Axis, DepthLevels, LayerHeights, LayerLevels, Model, Placement, SliceOptions, Slices,
-};
-use lamp_stack::{Dpi, Image, Length};
+use lamp_slicer::{Axis, LayerHeights, LayerLevels, Model, Placement, SliceOptions, Slices};
+use lamp_stack::{DepthLevels, Dpi, Image, Length};
 
 fn model(part: StepPart, chord_mm: f64) -> Model {
     let kernel = StepModel::read(step(part, StepUnit::Inch).as_bytes()).unwrap();

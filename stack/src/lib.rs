@@ -24,6 +24,7 @@
 //! ```
 
 mod combine;
+mod depth_levels;
 mod error;
 mod frame;
 pub mod g4;
@@ -48,6 +49,7 @@ mod tiff;
 mod turn;
 
 pub use combine::{Op, combine_levels, combine_rows};
+pub use depth_levels::DepthLevels;
 pub use error::StackError;
 pub use frame::{Frame, place_row};
 pub use gray::{GrayMask, GrayMaskError, LevelChange, gray_runs};

@@ -14,8 +14,7 @@ mod units;
 mod width;
 mod working_curve;
 
-use lamp_slicer::DepthLevels;
-use lamp_stack::Length;
+use lamp_stack::{DepthLevels, Length};
 
 pub use beam::GaussianBeam;
 pub use broadening::{broadening_depth, cure_width_of_square};

@@ -4,7 +4,7 @@
 //! slopes away within the layer, full exposure cures too deep. The vertical line
 //! through a pixel's centre leaves the part where it meets the first facet
 //! below the section ([`sheet`](self::sheet)); the depth there, counted from the
-//! layer's top, has a gray level ([`DepthLevels`]), and the others in its row
+//! layer's top, has a gray level ([`DepthLevels`](lamp_stack::DepthLevels)), and the others in its row
 //! make runs of it ([`shade`](self::shade)).
 //!
 //! Source: 002 section 3.3.10, algorithm 15, with the depth from the facets
@@ -18,6 +18,6 @@ mod levels;
 mod shade;
 mod sheet;
 
-pub use levels::{DepthLevels, LayerLevels};
+pub use levels::LayerLevels;
 pub(crate) use shade::Shader;
 pub(crate) use sheet::{Sheet, Span};

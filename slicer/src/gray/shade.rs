@@ -1,9 +1,9 @@
 //! A layer's rows of gray levels, from its section and what lies below.
 
-use lamp_stack::{GrayMask, Image, LevelChange, MaskBuilder};
+use lamp_stack::{DepthLevels, GrayMask, Image, Length, LevelChange, MaskBuilder};
 
 use crate::cut::Place;
-use crate::gray::{DepthLevels, Span};
+use crate::gray::Span;
 use crate::planes::Planes;
 use crate::table::Fill;
 
@@ -88,7 +88,8 @@ impl<'a> Shader<'a> {
         }
         let end = if self.open.iter().all(|span| span.is_level()) { start + 1 } else { end };
         for column in start..end {
-            let level = self.exit_um(column, winding).map_or(255, |um| self.levels.of_um(um));
+            let exit = self.exit_um(column, winding).map(Length::from_um);
+            let level = exit.map_or(255, |depth| self.levels.level(depth));
             self.push(column, level);
         }
     }

@@ -4,10 +4,10 @@
 
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, torus, tower};
 use lamp_slicer::{
-    Axis, DepthLevels, Fill, LayerHeights, LayerLevels, PixelGrid, Placement, PlaneRule,
-    SliceError, SliceOptions, Slices,
+    Axis, Fill, LayerHeights, LayerLevels, PixelGrid, Placement, PlaneRule, SliceError,
+    SliceOptions, Slices,
 };
-use lamp_stack::{Image, Layer, Length, gray_runs};
+use lamp_stack::{DepthLevels, Image, Layer, Length, gray_runs};
 use proptest::prelude::*;
 use rayon::prelude::*;
 

@@ -4,8 +4,8 @@
 use std::fs;
 
 use lamp_fixtures::{Mesh, sphere, tower};
-use lamp_slicer::{DepthLevels, Fill, LayerHeights, LayerLevels, Model, SliceOptions, Slices};
-use lamp_stack::{Layer, Length};
+use lamp_slicer::{Fill, LayerHeights, LayerLevels, Model, SliceOptions, Slices};
+use lamp_stack::{DepthLevels, Layer, Length};
 
 use crate::common::{
     block, joined, mask, model, options, slice, try_layers, white_pixels, without_stack,
