@@ -38,7 +38,7 @@ mod buckets;
 mod cut;
 mod ends;
 mod error;
-mod exact;
+pub mod exact;
 mod facet;
 mod gray;
 mod grid;

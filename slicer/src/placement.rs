@@ -6,7 +6,7 @@
 
 use std::io;
 
-use crate::exact::Exact;
+use crate::exact::PlacedSurfaces;
 use crate::facet::{Facet, Units};
 use crate::model::{Model, Surfaces};
 
@@ -113,8 +113,8 @@ pub(crate) fn heights(facet: &PlacedFacet) -> (f64, f64) {
 pub(crate) struct PlacedModel {
     pub(crate) model: Model,
     way: Way,
-    /// Of each file that has surfaces: these in their place.
-    exact: Vec<Option<Exact>>,
+    /// Each file's surfaces in place, if it has some.
+    surfaces: Vec<Option<PlacedSurfaces>>,
 }
 
 /// The way from file units to the place.
@@ -127,14 +127,16 @@ enum Way {
 
 impl PlacedModel {
     pub(crate) fn new(model: Model, placement: &Placement, units: Units) -> Self {
-        let exact = |surfaces: Option<&Surfaces>| {
+        let place = |surfaces: Option<&Surfaces>| {
             let rows = placement.rows.map(|[x, y, z, shift]| {
                 let unit = units.mm();
                 [x * unit, y * unit, z * unit, shift]
             });
-            surfaces.map(|surfaces| Exact::new(surfaces, rows))
+            surfaces.map(|Surfaces { kernel, mesh }| {
+                PlacedSurfaces::new(kernel.clone(), mesh.clone(), rows)
+            })
         };
-        let exact = model.surfaces().map(exact).collect();
+        let surfaces = model.surfaces().map(place).collect();
         let mut rows = placement.rows;
         // Straight to micrometres: z in file units times them is exact.
         for (row, (unit, per_mm)) in
@@ -145,25 +147,25 @@ impl PlacedModel {
         }
         let scale = std::array::from_fn(|axis| rows[axis][axis]);
         let is_scale = (0..12).all(|k| k % 4 == k / 4 || rows[k / 4][k % 4] == 0.0);
-        Self { model, way: if is_scale { Way::Scale(scale) } else { Way::Affine(rows) }, exact }
+        Self { model, way: if is_scale { Way::Scale(scale) } else { Way::Affine(rows) }, surfaces }
     }
 
     /// Without its surfaces: by facets alone.
     pub(crate) fn on_facets(mut self) -> Self {
-        self.exact.fill_with(|| None);
+        self.surfaces.fill_with(|| None);
         self
     }
 
     /// The surfaces that there are.
-    pub(crate) fn exact(&self) -> impl Iterator<Item = &Exact> {
-        self.exact.iter().flatten()
+    pub(crate) fn surfaces(&self) -> impl Iterator<Item = &PlacedSurfaces> {
+        self.surfaces.iter().flatten()
     }
 
     /// The surfaces below a block's facets, if it has some, and its first facet's
     /// number among theirs.
-    pub(crate) fn exact_of_block(&self, block: usize) -> Option<(&Exact, u32)> {
+    pub(crate) fn surfaces_of_block(&self, block: usize) -> Option<(&PlacedSurfaces, u32)> {
         let (file, facets) = self.model.place_of(block);
-        Some((self.exact[file].as_ref()?, facets.start as u32))
+        Some((self.surfaces[file].as_ref()?, facets.start as u32))
     }
 
     /// Gives every facet of a block.

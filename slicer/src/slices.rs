@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::buckets::Buckets;
 use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
-use crate::exact::{Exact, Polished};
+use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::Units;
 use crate::gray::{LayerLevels, Span};
 use crate::grid::PixelGrid;
@@ -174,7 +174,7 @@ impl Slices {
             slabs.iter().map(|slab| heights_of(slab, &planes, reach_um)).collect();
         // Where no temporary file can be written, slabs read all they meet.
         // Buckets do not say which facet is whose, and B-rep facets are in memory.
-        let wants_sorting = model.exact().next().is_none() && survey.wants_sorting(&heights);
+        let wants_sorting = model.surfaces().next().is_none() && survey.wants_sorting(&heights);
         let buckets = wants_sorting
             .then(|| Buckets::sort(&model, &planes, reach_um, &slabs, options.memory as usize).ok())
             .flatten();
@@ -209,7 +209,7 @@ impl Slices {
 
     /// What was done to the crossings of B-rep parts so far, if there are such.
     pub fn polished(&self) -> Option<Polished> {
-        self.model.exact().next().map(|_| self.polished.joined(self.table.polished()))
+        self.model.surfaces().next().map(|_| self.polished.joined(self.table.polished()))
     }
 
     /// Fills the table with the next slab, as the iterator does when it needs
@@ -287,7 +287,7 @@ impl Slices {
         cutter: Cutter<'_>,
         open_rows: &OpenRows,
     ) -> Layer {
-        let surfaces: Vec<_> = self.model.exact().collect();
+        let surfaces: Vec<_> = self.model.surfaces().collect();
         let Section { image, stray_rows, closed } =
             table.layer(layer, cutter, &surfaces, self.gray.as_ref());
         let open_rows = open_rows.get(&layer).cloned().unwrap_or_default();
@@ -407,8 +407,8 @@ impl Facets for Blocks<'_> {
         self.model.for_each_in_block(self.blocks[piece], each)
     }
 
-    fn exact(&self, piece: usize) -> Option<(&Exact, u32)> {
-        self.model.exact_of_block(self.blocks[piece])
+    fn surfaces(&self, piece: usize) -> Option<(&PlacedSurfaces, u32)> {
+        self.model.surfaces_of_block(self.blocks[piece])
     }
 }
 

@@ -7,6 +7,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::error::SliceError;
+use crate::exact::PlacedSurfaces;
 use crate::placement::{PlacedFacet, PlacedModel};
 use crate::planes::Planes;
 
@@ -105,7 +106,7 @@ impl Survey {
         }
         let whole = good.iter().copied().reduce(Block::joined).ok_or(SliceError::NoFacets)?;
         let (mut min, mut max) = (whole.min, whole.max);
-        for [low, high] in model.exact().filter_map(|exact| exact.placed.box_mm()) {
+        for [low, high] in model.surfaces().filter_map(PlacedSurfaces::box_mm) {
             for (axis, unit) in [1.0, 1.0, 1000.0].into_iter().enumerate() {
                 let (low, high) = (low[axis] * unit, high[axis] * unit);
                 // Not for rounding's sake: a flat end is where its facets are.

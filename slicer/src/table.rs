@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place, Share};
 use crate::ends::{EndSum, RowSums};
-use crate::exact::{Exact, ExactCut, Polished, Tally, settle};
+use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
 use crate::gray::{LayerLevels, Shader, Span};
 use crate::placement::PlacedFacet;
 
@@ -49,7 +49,7 @@ pub(crate) trait Facets: Sync {
 
     /// The exact surfaces below a piece's facets, if it has some, and its first
     /// facet's number among theirs.
-    fn exact(&self, _piece: usize) -> Option<(&Exact, u32)> {
+    fn surfaces(&self, _piece: usize) -> Option<(&PlacedSurfaces, u32)> {
         None
     }
 }
@@ -123,9 +123,9 @@ impl Table {
                 if piece >= facets.pieces() {
                     return Ok(());
                 }
-                if let Some((exact, first)) = facets.exact(piece) {
+                if let Some((surfaces, first)) = facets.surfaces(piece) {
                     let mut cut =
-                        ExactCut::new(exact, first, tally, cutter, layers.clone(), reach_um);
+                        ExactCut::new(surfaces, first, tally, cutter, layers.clone(), reach_um);
                     facets.for_each_in(piece, |facet| {
                         if !budget.is_spent() {
                             unclaimed += cut.cut(facet, shares);
@@ -189,7 +189,7 @@ impl Table {
         &self,
         layer: usize,
         cutter: Cutter<'_>,
-        surfaces: &[&Exact],
+        surfaces: &[&PlacedSurfaces],
         crossings: impl Iterator<Item = Crossing>,
     ) -> Vec<Crossing> {
         if surfaces.is_empty() {
@@ -204,7 +204,7 @@ impl Table {
         &self,
         layer: usize,
         cutter: Cutter<'_>,
-        surfaces: &[&Exact],
+        surfaces: &[&PlacedSurfaces],
         gray: Option<&LayerLevels>,
     ) -> Section {
         let Cutter { grid, planes, fill } = cutter;

@@ -1,47 +1,55 @@
 //! Points and directions as three numbers.
 
 /// A point in millimetres, or a direction.
-pub(crate) type Vec3 = [f64; 3];
+pub type Vec3 = [f64; 3];
 
-pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
+/// Returns `a + b`.
+pub fn add(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+/// Returns `a - b`.
+pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-pub(crate) fn scale(a: Vec3, s: f64) -> Vec3 {
+/// Returns `s a`.
+pub fn scale(a: Vec3, s: f64) -> Vec3 {
     [a[0] * s, a[1] * s, a[2] * s]
 }
 
-/// `a + s b`.
-pub(crate) fn along(a: Vec3, b: Vec3, s: f64) -> Vec3 {
+/// Returns `a + s b`.
+pub fn along(a: Vec3, b: Vec3, s: f64) -> Vec3 {
     [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
 }
 
-pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+/// Returns the scalar product.
+pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+/// Returns the vector product.
+pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-pub(crate) fn length(a: Vec3) -> f64 {
+/// Returns the length.
+pub fn length(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
-pub(crate) fn distance(a: Vec3, b: Vec3) -> f64 {
+/// Returns the distance between two points.
+pub fn distance(a: Vec3, b: Vec3) -> f64 {
     length(sub(a, b))
 }
 
-pub(crate) fn middle(a: Vec3, b: Vec3) -> Vec3 {
+/// Returns the point halfway between two.
+pub fn middle(a: Vec3, b: Vec3) -> Vec3 {
     scale(add(a, b), 0.5)
 }
 
-/// The direction with length 1; nothing if it has no length or is not finite.
-pub(crate) fn unit(a: Vec3) -> Option<Vec3> {
+/// Returns the direction with length 1; nothing if it has no length or is not finite.
+pub fn unit(a: Vec3) -> Option<Vec3> {
     let length = length(a);
     (length > 1e-12 && length.is_finite()).then(|| scale(a, 1.0 / length))
 }

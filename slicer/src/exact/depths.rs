@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use lamp_brep::{Probe, polish_heights};
-
-use super::Exact;
+use super::placed::PlacedSurfaces;
+use super::polish::{FacetPoint, polish};
 use crate::cut::{Crossing, Cutter, Share};
 use crate::gray::{Sheet, Span};
 use crate::placement::PlacedFacet;
@@ -12,72 +11,69 @@ use crate::placement::PlacedFacet;
 /// Enough that evaluating surfaces pays for each call; 0.3 MB.
 const BATCH: usize = 4096;
 
-/// Pixels over facets, whose exact heights go into the table as spans of one column.
-pub(crate) struct Depths<'a> {
-    exact: &'a Exact,
+/// Pixels over curved facets, whose exact heights go into the table as spans of one
+/// column.
+pub(super) struct Depths<'a> {
+    surfaces: &'a PlacedSurfaces,
     cutter: Cutter<'a>,
     layers: Range<usize>,
     reach_um: f64,
-    probes: Vec<Probe>,
-    /// Column and row, and the span to be, without its depth.
+    points: Vec<FacetPoint>,
+    /// The span that each point becomes, without its depth.
     pixels: Vec<Span>,
 }
 
 impl<'a> Depths<'a> {
-    pub(crate) fn new(
-        exact: &'a Exact,
+    pub(super) fn new(
+        surfaces: &'a PlacedSurfaces,
         cutter: Cutter<'a>,
         layers: Range<usize>,
         reach_um: f64,
     ) -> Self {
-        Self { exact, cutter, layers, reach_um, probes: Vec::new(), pixels: Vec::new() }
+        Self { surfaces, cutter, layers, reach_um, points: Vec::new(), pixels: Vec::new() }
     }
 
-    /// Adds what rows meet of a facet below the sections, as deep as they are exposed,
-    /// and says how many crossings would take as much memory.
-    pub(crate) fn look_down(
+    /// Adds what rows meet of a facet below the sections, as deep as they are exposed.
+    /// Returns how many crossings would take as much memory.
+    pub(super) fn look_down(
         &mut self,
         number: u32,
         facet: &PlacedFacet,
         shares: &mut [Share],
     ) -> usize {
-        let (cutter, placed) = (self.cutter, &self.exact.placed);
-        if placed.is_flat(number) {
+        let (cutter, surfaces) = (self.cutter, self.surfaces);
+        if surfaces.is_flat(number) {
             return cutter.look_down(facet, self.reach_um, &self.layers, shares);
         }
         let Some(sheet) = Sheet::new(&cutter, facet) else { return 0 };
-        let (low_um, high_um) = self.heights();
+        let planes = cutter.planes;
+        let low_um = planes.z_um(self.layers.start) - self.reach_um;
+        let high_um = planes.z_um(self.layers.end - 1);
         // Where a facet is steep its surface may be much higher or lower.
-        let slack_um = sheet.slack_um(1000.0 * placed.tolerance_mm());
-        let chart = placed.chart(number);
-        let before = self.probes.len();
+        let slack_um = sheet.slack_um(1000.0 * surfaces.tolerance_mm());
+        let chart = surfaces.chart(number);
+        let before = self.points.len();
         let heights = low_um - slack_um..high_um + slack_um;
         sheet.for_each_pixel(&cutter, heights, |pixel, z_um| {
             let [x, y] = cutter.grid.to_mm(f64::from(pixel.start), f64::from(pixel.row));
             let at_mm = [x, y, z_um / 1000.0];
-            let is_above = pixel.winding() < 0;
-            self.probes.push(Probe { facet: number, uv: chart.uv_at(at_mm), at_mm, is_above });
+            let enters = pixel.winding() > 0;
+            self.points.push(FacetPoint::new(number, chart.uv_at(at_mm), at_mm, enters));
             self.pixels.push(pixel);
         });
-        let count = self.probes.len() - before;
-        if self.probes.len() >= BATCH {
+        let count = self.points.len() - before;
+        if self.points.len() >= BATCH {
             self.finish(shares);
         }
         count * size_of::<Span>() / size_of::<Crossing>()
     }
 
-    /// Between which heights the layers look at facets.
-    fn heights(&self) -> (f64, f64) {
-        let planes = self.cutter.planes;
-        (planes.z_um(self.layers.start) - self.reach_um, planes.z_um(self.layers.end - 1))
-    }
-
     /// Finds the exact heights of what was gathered, and puts them into the table.
-    pub(crate) fn finish(&mut self, shares: &mut [Share]) {
-        polish_heights(&self.exact.placed, &mut self.probes);
+    pub(super) fn finish(&mut self, shares: &mut [Share]) {
+        polish(self.surfaces, 2, &mut self.points);
         let planes = self.cutter.planes;
-        for (probe, pixel) in self.probes.iter().zip(&self.pixels) {
-            let z_um = 1000.0 * probe.at_mm[2];
+        for (point, pixel) in self.points.drain(..).zip(self.pixels.drain(..)) {
+            let z_um = 1000.0 * point.at_mm[2];
             let met = planes.between(z_um - pixel.tie_um(), z_um + self.reach_um);
             for layer in met.start.max(self.layers.start)..met.end.min(self.layers.end) {
                 let depth_um = planes.top_um(layer) - z_um;
@@ -87,7 +83,5 @@ impl<'a> Depths<'a> {
                 }
             }
         }
-        self.probes.clear();
-        self.pixels.clear();
     }
 }

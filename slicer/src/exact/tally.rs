@@ -2,8 +2,6 @@
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use lamp_brep::{Crossing, Fate};
-
 /// What polishing did to the crossings of facets.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Polished {
@@ -47,17 +45,20 @@ pub(crate) struct Tally {
 const PM_PER_MM: f64 = 1e9;
 
 impl Tally {
-    /// Counts crossings that were at `facets_mm` along x before.
-    pub(crate) fn add(&self, crossings: &[Crossing], facets_mm: &[f64]) {
-        let (mut moved, mut sum, mut most) = (0, 0, 0);
-        for (crossing, from) in crossings.iter().zip(facets_mm) {
-            if crossing.fate == Fate::Moved {
-                let pm = ((crossing.x_mm - from).abs() * PM_PER_MM) as u64;
-                (moved, sum, most) = (moved + 1, sum + pm, most.max(pm));
-            }
+    /// Counts crossings by how far they moved along x, in millimetres, or that they were
+    /// kept.
+    pub(super) fn add(&self, moves_mm: impl Iterator<Item = Option<f64>>) {
+        let (mut moved, mut kept, mut sum, mut most) = (0, 0, 0, 0);
+        for by_mm in moves_mm {
+            let Some(by_mm) = by_mm else {
+                kept += 1;
+                continue;
+            };
+            let pm = (by_mm * PM_PER_MM) as u64;
+            (moved, sum, most) = (moved + 1, sum + pm, most.max(pm));
         }
         self.moved.fetch_add(moved, Relaxed);
-        self.kept.fetch_add(crossings.len() as u64 - moved, Relaxed);
+        self.kept.fetch_add(kept, Relaxed);
         self.sum_pm.fetch_add(sum, Relaxed);
         self.most_pm.fetch_max(most, Relaxed);
     }

@@ -3,9 +3,12 @@
 use std::collections::HashMap;
 use std::ops::{Range, RangeInclusive};
 
-use lamp_brep::{Meets, Saddle, Turn};
-
-use super::{Exact, Tally};
+use super::extrema::Extremum;
+use super::locate::RowContact;
+use super::placed::PlacedSurfaces;
+use super::polish::FacetPoint;
+use super::saddle::Saddle;
+use super::tally::Tally;
 use crate::cut::{Crossing, Cutter};
 
 /// A row near a turn.
@@ -25,7 +28,7 @@ struct Row {
 /// kept on facets, but for pairs that the surfaces do not make where contours turn,
 /// and the pairs there that facets do not make.
 pub(crate) fn settle(
-    surfaces: &[&Exact],
+    surfaces: &[&PlacedSurfaces],
     tally: &Tally,
     layer: usize,
     cutter: Cutter<'_>,
@@ -35,15 +38,15 @@ pub(crate) fn settle(
     let z_mm = cutter.planes.z_um(layer) / 1000.0;
     let mut rows: HashMap<u32, Row> = HashMap::new();
     let mut places = Vec::new();
-    for exact in surfaces {
-        let turns = exact.turns().at(&exact.placed, z_mm).into_iter();
-        let saddles = exact.turns().saddles(&exact.placed, z_mm);
-        let near = turns
-            .map(|turn| Near::turn(turn, cutter))
-            .chain(saddles.filter_map(|saddle| Near::saddle(saddle, exact, z_mm, cutter)));
+    for surfaces in surfaces {
+        let extrema = surfaces.extrema(z_mm).into_iter();
+        let saddles = &surfaces.critical_points().saddles;
+        let near = extrema.map(|extremum| Near::extremum(extremum, cutter)).chain(
+            saddles.iter().filter_map(|saddle| Near::saddle(saddle, surfaces, z_mm, cutter)),
+        );
         for near in near {
             rows.extend(near.rows.clone().map(|row| (row, Row::default())));
-            places.push((*exact, near));
+            places.push((*surfaces, near));
         }
     }
     for crossing in kept {
@@ -60,8 +63,8 @@ pub(crate) fn settle(
     }
     let most = (FOLD_MM / cutter.grid.dpi.pitch().mm()) as u32;
     rows.values_mut().for_each(|row| row.unfold(tally, most));
-    for (exact, near) in places {
-        near.settle(exact, tally, z_mm, cutter, &mut rows);
+    for (surfaces, near) in places {
+        near.settle(surfaces, tally, z_mm, cutter, &mut rows);
     }
     rows.values_mut().for_each(|row| row.join_sides(tally));
     // A map has no order; the table sorts.
@@ -133,7 +136,7 @@ struct Near {
 }
 
 enum Place {
-    Turn(Turn),
+    Extremum(Extremum),
     Saddle(Saddle),
 }
 
@@ -147,43 +150,48 @@ impl Near {
         Self { place, columns, rows: clamped(row - reach)..clamped(row + reach) }
     }
 
-    fn turn(turn: Turn, cutter: Cutter<'_>) -> Self {
-        let [x, y, _] = turn.at_mm;
-        Self::new(Place::Turn(turn), [x, y], [turn.reach_mm, turn.width_mm()], cutter)
+    fn extremum(extremum: Extremum, cutter: Cutter<'_>) -> Self {
+        let [x, y, _] = extremum.at_mm;
+        let reach_mm = [extremum.reach_mm, extremum.width_mm()];
+        Self::new(Place::Extremum(extremum), [x, y], reach_mm, cutter)
     }
 
     /// The rows about a saddle that is near the section.
-    fn saddle(saddle: &Saddle, exact: &Exact, z_mm: f64, cutter: Cutter<'_>) -> Option<Self> {
+    fn saddle(
+        saddle: &Saddle,
+        surfaces: &PlacedSurfaces,
+        z_mm: f64,
+        cutter: Cutter<'_>,
+    ) -> Option<Self> {
         let [x, y, _] = saddle.at_mm;
-        let reach_mm = saddle.reach_mm(&exact.placed, z_mm)?;
+        let reach_mm = saddle.reach_mm(surfaces, z_mm)?;
         Some(Self::new(Place::Saddle(*saddle), [x, y], reach_mm, cutter))
     }
 
     fn settle(
         &self,
-        exact: &Exact,
+        surfaces: &PlacedSurfaces,
         tally: &Tally,
         z_mm: f64,
         cutter: Cutter<'_>,
         rows: &mut HashMap<u32, Row>,
     ) {
-        let (turns, placed) = (exact.turns(), &exact.placed);
         for number in self.rows.clone() {
             let row = rows.get_mut(&number).expect("rows near turns are in the map");
             let [_, y_mm] = cutter.grid.to_mm(0.0, f64::from(number));
-            let meets = match &self.place {
-                Place::Turn(turn) => turns.at_turn(placed, turn, y_mm),
-                Place::Saddle(saddle) => turns.at_saddle(placed, saddle, y_mm, z_mm),
+            let contact = match &self.place {
+                Place::Extremum(extremum) => extremum.contact(surfaces, y_mm),
+                Place::Saddle(saddle) => saddle.contact(surfaces, y_mm, z_mm),
             };
-            let at = |crossing: lamp_brep::Crossing| {
-                let [column, _] = cutter.grid.to_pixels(crossing.x_mm, y_mm);
-                Crossing::at(cutter.grid, number, column, crossing.enters)
+            let at = |point: FacetPoint| {
+                let [column, _] = cutter.grid.to_pixels(point.at_mm[0], y_mm);
+                Crossing::at(cutter.grid, number, column, point.enters)
             };
-            match meets {
-                Meets::Pair(pair) => self.put(tally, pair.map(at), row),
-                Meets::Side(crossing) => row.sides.push(at(crossing)),
-                Meets::Nothing => self.take(tally, row),
-                Meets::Unknown => {}
+            match contact {
+                RowContact::Pair(pair) => self.put(tally, pair.map(at), row),
+                RowContact::OneSide(point) => row.sides.push(at(point)),
+                RowContact::Nothing => self.take(tally, row),
+                RowContact::Unknown => {}
             }
         }
     }

@@ -1,0 +1,108 @@
+//! Points where surfaces are level, and how far surfaces reach along the axes.
+
+use lamp_brep::Jet;
+use lamp_brep::vector::Vec3;
+
+use super::placed::PlacedSurfaces;
+
+/// How many facets are searched for each end: around a level ring all are as high.
+const MAX_FACETS: usize = 64;
+const MAX_STEPS: usize = 30;
+/// Steps for differences, in parts of a facet.
+pub(super) const DIFFERENCE: f64 = 1e-5;
+
+/// A direction along an axis, or with `sign` -1 against it.
+#[derive(Clone, Copy)]
+pub(super) struct AxisDirection {
+    axis: usize,
+    sign: f64,
+}
+
+impl AxisDirection {
+    pub(super) const UP: Self = Self { axis: 2, sign: 1.0 };
+
+    fn along(self, vector: Vec3) -> f64 {
+        self.sign * vector[self.axis]
+    }
+}
+
+/// A point where a surface is level: where it goes neither up nor down along a
+/// direction.
+pub(super) struct LevelPoint {
+    pub(super) uv: [f64; 2],
+    pub(super) jet: Jet,
+    /// The second derivatives of the height: by u twice, by u and v, by v twice.
+    pub(super) bend: [f64; 3],
+}
+
+impl PlacedSurfaces {
+    /// Returns the least and the greatest corner of the surfaces' box, in millimetres;
+    /// nothing if there are no facets.
+    ///
+    /// It is the facets' box where surfaces end at a corner or an edge, and is larger by
+    /// what facets cut off where surfaces are round.
+    pub fn box_mm(&self) -> Option<[[f64; 3]; 2]> {
+        if self.mesh().facets.is_empty() {
+            return None;
+        }
+        let end =
+            |sign: f64| [0, 1, 2].map(|axis| sign * self.end_mm(AxisDirection { axis, sign }));
+        Some([end(-1.0), end(1.0)])
+    }
+
+    /// Returns how far the surfaces reach in a direction.
+    fn end_mm(&self, direction: AxisDirection) -> f64 {
+        let top = |facet: u32| {
+            let corners = self.corners(facet).map(|corner| direction.along(corner));
+            corners.into_iter().fold(f64::MIN, f64::max)
+        };
+        let tops: Vec<f64> = (0..self.mesh().facets.len() as u32).map(top).collect();
+        let of_facets = tops.iter().copied().fold(f64::MIN, f64::max);
+        let mut near: Vec<u32> = (0u32..)
+            .zip(&tops)
+            .filter(|(_, top)| **top >= of_facets - self.tolerance_mm())
+            .map(|(facet, _)| facet)
+            .filter(|&facet| !self.is_flat(facet))
+            .collect();
+        near.sort_by(|&a, &b| tops[b as usize].total_cmp(&tops[a as usize]));
+        near.truncate(MAX_FACETS);
+        let levels = near.into_iter().filter_map(|facet| self.level_point(facet, direction));
+        let most = of_facets + 2.0 * self.tolerance_mm();
+        levels
+            .map(|level| direction.along(level.jet.point))
+            .filter(|end| *end <= most)
+            .fold(of_facets, f64::max)
+    }
+
+    /// Finds where a facet's surface is level, by Newton's method with differences.
+    pub(super) fn level_point(&self, facet: u32, direction: AxisDirection) -> Option<LevelPoint> {
+        let uv = self.facet(facet).uv;
+        let size = self.uv_size(facet);
+        let by = size.map(|size| DIFFERENCE * size);
+        let mut at = [0, 1].map(|k| uv.iter().map(|uv| uv[k]).sum::<f64>() / 3.0);
+        for _ in 0..MAX_STEPS {
+            let jets = self.jets(facet, at, by);
+            // The rise over a facet's width along either parameter.
+            let rise =
+                |jet: &Jet| [direction.along(jet.du) * size[0], direction.along(jet.dv) * size[1]];
+            let [g, gu, gv] = [rise(&jets[0]), rise(&jets[1]), rise(&jets[2])];
+            let [a, b, d] = [gu[0] - g[0], (gu[1] - g[1] + gv[0] - g[0]) / 2.0, gv[1] - g[1]]
+                .map(|bend| bend / DIFFERENCE);
+            if g.iter().all(|g| g.abs() < 1e-11) {
+                let bend = [a / size[0] / size[0], b / size[0] / size[1], d / size[1] / size[1]];
+                let level = LevelPoint { uv: at, jet: jets[0], bend };
+                return self.is_below(facet, jets[0].point).then_some(level);
+            }
+            // Along a level ring there is no bend. A little keeps the point in place.
+            let least = 1e-9 * (a.abs() + d.abs());
+            let (a, d) = (a - least, d - least);
+            let det = a * d - b * b;
+            let step = [(b * g[1] - d * g[0]) / det, (b * g[0] - a * g[1]) / det];
+            if !step.iter().all(|step| step.abs() < 4.0) {
+                return None;
+            }
+            at = [0, 1].map(|k| at[k] + step[k] * size[k]);
+        }
+        None
+    }
+}

@@ -1,0 +1,132 @@
+//! Where points of surfaces lie: below which facet, found by walking from facet to
+//! facet, and at which parameters.
+
+use lamp_brep::Tessellation;
+use lamp_brep::vector::{Vec3, add, distance, dot, scale, sub};
+
+use super::placed::PlacedSurfaces;
+use super::polish::FacetPoint;
+use super::solve::{Wanted, solve};
+
+/// How far from its facet a point may be, in tolerances of the tessellation.
+const NEAR: f64 = 2.0;
+/// How many facets a walk passes at most.
+const MAX_FACETS: usize = 256;
+/// How many faces a contour is followed through: one and its neighbours.
+const MAX_FACES: usize = 3;
+
+/// What a row of a section has near an extremum or a saddle of the contour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RowContact {
+    /// Two crossings with the contour, from the left.
+    Pair([FacetPoint; 2]),
+    /// A crossing on one side at least. On the other the contour may turn once more.
+    OneSide(FacetPoint),
+    /// No crossing.
+    Nothing,
+    /// Not known: no point of the surface was found.
+    Unknown,
+}
+
+/// The facets around each point of a tessellation.
+#[derive(Debug)]
+pub(super) struct PointFacets {
+    facets: Vec<u32>,
+    /// Where those of each point begin.
+    starts: Vec<u32>,
+}
+
+impl PointFacets {
+    pub(super) fn new(mesh: &Tessellation) -> Self {
+        let mut starts = vec![0; mesh.points.len() + 2];
+        let corners = || mesh.facets.iter().flat_map(|facet| facet.corners);
+        corners().for_each(|corner| starts[corner as usize + 2] += 1);
+        for point in 2..starts.len() {
+            starts[point] += starts[point - 1];
+        }
+        let mut facets = vec![0; 3 * mesh.facets.len()];
+        for (k, corner) in corners().enumerate() {
+            let next: &mut u32 = &mut starts[corner as usize + 1];
+            facets[*next as usize] = (k / 3) as u32;
+            *next += 1;
+        }
+        Self { facets, starts }
+    }
+
+    fn of(&self, point: u32) -> &[u32] {
+        let point = point as usize;
+        &self.facets[self.starts[point] as usize..self.starts[point + 1] as usize]
+    }
+}
+
+impl PlacedSurfaces {
+    /// Returns the facet below a point of a surface, walking there from another facet.
+    /// Nothing if the walk ends further away than surfaces are from their facets.
+    pub(super) fn facet_below(&self, facet: u32, point: Vec3) -> Option<u32> {
+        let away = |facet: u32| (self.distance_to(facet, point), facet);
+        let mut nearest = away(facet);
+        for _ in 0..MAX_FACETS {
+            let corners = self.facet(nearest.1).corners.into_iter();
+            let around = corners.flat_map(|corner| self.point_facets().of(corner));
+            let next = around
+                .map(|&facet| away(facet))
+                .fold(nearest, |a, b| if b.0 < a.0 { b } else { a });
+            if next.0 >= nearest.0 {
+                break;
+            }
+            nearest = next;
+        }
+        (nearest.0 < NEAR * self.tolerance_mm()).then_some(nearest.1)
+    }
+
+    /// Returns whether a point is as near to a facet as its surface is.
+    pub(super) fn is_below(&self, facet: u32, point: Vec3) -> bool {
+        self.distance_to(facet, point) < NEAR * self.tolerance_mm()
+    }
+
+    fn distance_to(&self, facet: u32, point: Vec3) -> f64 {
+        let [s, t] = self.chart(facet).shares_of(point);
+        let [a, b, c] = self.corners(facet);
+        if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+            let foot = add(a, add(scale(sub(b, a), s), scale(sub(c, a), t)));
+            return distance(foot, point);
+        }
+        let to_side = |(p, q): (Vec3, Vec3)| {
+            let (way, to) = (sub(q, p), sub(point, p));
+            let part = (dot(to, way) / dot(way, way).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            distance(add(p, scale(way, part)), point)
+        };
+        [(a, b), (b, c), (c, a)].map(to_side).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Finds where a row crosses a contour twice, from estimates of both places, the
+    /// left one first.
+    pub(super) fn locate_pair(&self, estimates: [FacetPoint; 2]) -> RowContact {
+        match estimates.map(|estimate| self.locate_crossing(estimate)) {
+            [Some(left), Some(right)] => {
+                let is_pair = left.at_mm[0] <= right.at_mm[0] && left.enters != right.enters;
+                if is_pair { RowContact::Pair([left, right]) } else { RowContact::Unknown }
+            }
+            [Some(one), None] | [None, Some(one)] => RowContact::OneSide(one),
+            [None, None] => RowContact::Unknown,
+        }
+    }
+
+    /// Finds where a row crosses a contour, and below which facet.
+    fn locate_crossing(&self, mut point: FacetPoint) -> Option<FacetPoint> {
+        // A contour that goes on into another face is looked for on its surface.
+        for _ in 0..MAX_FACES {
+            let face = self.facet(point.facet).face;
+            let wanted = Wanted { uv: point.uv, known_mm: [point.at_mm[1], point.at_mm[2]] };
+            let (uv, jet) = solve(self, face, [1, 2], &[wanted])[0]?;
+            let facet = self.facet_below(point.facet, jet.point)?;
+            if self.facet(facet).face == face {
+                let at_mm = [jet.point[0], point.at_mm[1], point.at_mm[2]];
+                let enters = self.normal(facet, &jet)?[0] < 0.0;
+                return Some(FacetPoint { facet, uv, at_mm, enters, is_exact: true });
+            }
+            (point.facet, point.uv) = (facet, self.chart(facet).uv_at(jet.point));
+        }
+        None
+    }
+}

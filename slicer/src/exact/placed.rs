@@ -1,0 +1,163 @@
+//! The exact surfaces of a B-rep part where it stands on the machine.
+
+use std::fmt;
+use std::sync::{Arc, OnceLock};
+
+use lamp_brep::vector::{Vec3, cross, dot, length, scale, sub, unit};
+use lamp_brep::{Facet, Jet, Kernel, Tessellation};
+
+use super::extrema::CriticalPoints;
+use super::locate::PointFacets;
+
+/// A model's surfaces and facets: scaled, turned and moved to their place.
+pub struct PlacedSurfaces {
+    kernel: Arc<dyn Kernel>,
+    mesh: Arc<Tessellation>,
+    /// x, y and z in place in millimetres, by x, y, z of the model and one.
+    rows: [[f64; 4]; 3],
+    tolerance_mm: f64,
+    /// Whether each face is flat.
+    is_flat: Vec<bool>,
+    point_facets: OnceLock<PointFacets>,
+    critical_points: OnceLock<CriticalPoints>,
+}
+
+impl fmt::Debug for PlacedSurfaces {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PlacedSurfaces").field("rows", &self.rows).finish_non_exhaustive()
+    }
+}
+
+impl PlacedSurfaces {
+    /// Places a model: `rows` give x, y and z on the machine, in millimetres, by x, y
+    /// and z of the model in millimetres and one.
+    pub fn new(kernel: Arc<dyn Kernel>, mesh: Arc<Tessellation>, rows: [[f64; 4]; 3]) -> Self {
+        let stretch = |axis: usize| length([rows[0][axis], rows[1][axis], rows[2][axis]]);
+        let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
+        let faces = kernel.bodies().iter().map(|body| body.faces.end).max().unwrap_or(0);
+        let is_flat = (0..faces).map(|face| kernel.face(face).kind == "plane").collect();
+        let (point_facets, critical_points) = (OnceLock::new(), OnceLock::new());
+        Self { kernel, mesh, rows, tolerance_mm, is_flat, point_facets, critical_points }
+    }
+
+    /// Returns how far facets may lie from their surfaces, in millimetres.
+    pub fn tolerance_mm(&self) -> f64 {
+        self.tolerance_mm
+    }
+
+    /// Returns the facets, as the model has them before it is placed.
+    pub fn mesh(&self) -> &Tessellation {
+        &self.mesh
+    }
+
+    /// Returns whether a facet's surface is flat, so that the facet itself is exact.
+    pub(crate) fn is_flat(&self, facet: u32) -> bool {
+        self.is_flat[self.facet(facet).face as usize]
+    }
+
+    pub(crate) fn facet(&self, number: u32) -> &Facet {
+        &self.mesh.facets[number as usize]
+    }
+
+    /// Returns a facet's corners in place.
+    pub(crate) fn corners(&self, number: u32) -> [Vec3; 3] {
+        self.mesh.corners(self.facet(number)).map(|corner| self.at(corner))
+    }
+
+    fn at(&self, point: Vec3) -> Vec3 {
+        let moved = self.turned(point);
+        [0, 1, 2].map(|k| moved[k] + self.rows[k][3])
+    }
+
+    fn turned(&self, direction: Vec3) -> Vec3 {
+        self.rows.map(|[x, y, z, _]| x * direction[0] + y * direction[1] + z * direction[2])
+    }
+
+    /// Returns the facets around each point. The first call looks at every facet.
+    pub(super) fn point_facets(&self) -> &PointFacets {
+        self.point_facets.get_or_init(|| PointFacets::new(&self.mesh))
+    }
+
+    /// Returns where contours may turn or meet. The first call looks at every facet.
+    pub(super) fn critical_points(&self) -> &CriticalPoints {
+        self.critical_points.get_or_init(|| CriticalPoints::find(self))
+    }
+
+    /// Evaluates a face's surface in place at many parameters at once.
+    pub(super) fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]) {
+        self.kernel.evaluate(face, uv, jets);
+        for jet in jets {
+            *jet =
+                Jet { point: self.at(jet.point), du: self.turned(jet.du), dv: self.turned(jet.dv) };
+        }
+    }
+
+    /// Returns the widths of a facet's parameters along u and v.
+    pub(super) fn uv_size(&self, facet: u32) -> [f64; 2] {
+        let [p, q, r] = self.facet(facet).uv;
+        [0, 1].map(|k| p[k].max(q[k]).max(r[k]) - p[k].min(q[k]).min(r[k]))
+    }
+
+    /// Evaluates a facet's surface at parameters, and a little further along u and
+    /// along v, for second derivatives by differences.
+    pub(super) fn jets(&self, facet: u32, [u, v]: [f64; 2], by: [f64; 2]) -> [Jet; 3] {
+        let mut jets = [Jet::default(); 3];
+        let at = [[u, v], [u + by[0], v], [u, v + by[1]]];
+        self.evaluate(self.facet(facet).face, &at, &mut jets);
+        jets
+    }
+
+    /// Returns the map from a facet's points to parameters of its surface.
+    pub fn chart(&self, facet: u32) -> Chart {
+        Chart::new(&self.corners(facet), self.facet(facet).uv)
+    }
+
+    /// Returns the surface's normal on the side to which the facet faces, with length
+    /// 1; nothing at a pole or over a facet without area.
+    pub(super) fn normal(&self, facet: u32, jet: &Jet) -> Option<Vec3> {
+        let (across, flat) = (unit(cross(jet.du, jet.dv))?, self.facet_normal(facet)?);
+        Some(scale(across, dot(across, flat).signum()))
+    }
+
+    /// Returns a facet's normal out of the body, with length 1, if it has an area.
+    pub(super) fn facet_normal(&self, facet: u32) -> Option<Vec3> {
+        let [a, b, c] = self.corners(facet);
+        unit(cross(sub(b, a), sub(c, a)))
+    }
+}
+
+/// A linear map from points of a facet to parameters of its surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Chart {
+    corner: Vec3,
+    /// Dotted with a way from the corner, these give its shares of the facet's first
+    /// and last side.
+    shares: [Vec3; 2],
+    uv: [[f64; 2]; 3],
+}
+
+impl Chart {
+    fn new([a, b, c]: &[Vec3; 3], uv: [[f64; 2]; 3]) -> Self {
+        let (e, f) = (sub(*b, *a), sub(*c, *a));
+        let (ee, ef, ff) = (dot(e, e), dot(e, f), dot(f, f));
+        let det = ee * ff - ef * ef;
+        // All points of a facet without area get the parameters of its first corner.
+        let per = if det > 0.0 { 1.0 / det } else { 0.0 };
+        let share = |a: Vec3, aa: f64, b: Vec3| scale(sub(scale(a, aa), scale(b, ef)), per);
+        Self { corner: *a, shares: [share(e, ff, f), share(f, ee, e)], uv }
+    }
+
+    /// Returns the barycentric coordinates for the second and the third corner of a
+    /// point projected onto the facet's plane.
+    pub(super) fn shares_of(&self, point: Vec3) -> [f64; 2] {
+        let way = sub(point, self.corner);
+        self.shares.map(|share| dot(way, share))
+    }
+
+    /// Returns the parameters of a point.
+    pub fn uv_at(&self, point: [f64; 3]) -> [f64; 2] {
+        let [s, t] = self.shares_of(point);
+        let [p, q, r] = self.uv;
+        [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]))
+    }
+}

@@ -1,0 +1,105 @@
+//! Points of facets moved onto the exact surfaces.
+
+use lamp_brep::Jet;
+
+use super::placed::PlacedSurfaces;
+use super::solve::{Wanted, solve};
+
+/// A point of a facet that moves along an axis, x or z, to the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FacetPoint {
+    /// The facet's number in the tessellation.
+    pub facet: u32,
+    /// The point's parameters on the facet's surface.
+    pub uv: [f64; 2],
+    /// The point, in millimetres.
+    pub at_mm: [f64; 3],
+    /// Whether the part is entered here along the axis, as the facet faces.
+    pub enters: bool,
+    /// Whether the point was found on the surface.
+    pub is_exact: bool,
+}
+
+impl FacetPoint {
+    /// A point that is still on its facet.
+    pub fn new(facet: u32, uv: [f64; 2], at_mm: [f64; 3], enters: bool) -> Self {
+        Self { facet, uv, at_mm, enters, is_exact: false }
+    }
+}
+
+/// How far a point may move across the surface, in tolerances of the tessellation:
+/// once for the facet's distance, and once more because the normal differs where the
+/// point comes from.
+const MAX_MOVE: f64 = 2.0;
+/// A surface whose normal has less than this along the axis may face either way.
+const LEVEL: f64 = 1e-6;
+/// How far beyond its facet a point may lie, in facets.
+const MAX_BEYOND: f64 = 1.0;
+
+/// Moves points along an axis, 0 for x or 2 for z, to where the surfaces have the
+/// other two coordinates, by Newton's method from the facets' parameters.
+///
+/// A point stays on its facet, and is not exact, where that diverges, where the
+/// solution belongs to another facet or to the other side of the part, or where it
+/// lies further across the surface than twice the tessellation's tolerance. (Along a
+/// row that grazes the surface the same error is a longer way.) Points are neither
+/// added nor taken away, so rows balance as before.
+///
+/// # Panics
+/// Panics if a point's facet does not exist.
+pub fn polish(surfaces: &PlacedSurfaces, axis: usize, points: &mut [FacetPoint]) {
+    let known = if axis == 0 { [1, 2] } else { [0, 1] };
+    let face = |point: &&mut FacetPoint| surfaces.facet(point.facet).face;
+    let mut points: Vec<&mut FacetPoint> = points.iter_mut().collect();
+    if !points.is_sorted_by_key(face) {
+        points.sort_by_key(face);
+    }
+    for points in points.chunk_by_mut(|a, b| face(a) == face(b)) {
+        let wanted = |point: &&mut FacetPoint| Wanted {
+            uv: point.uv,
+            known_mm: known.map(|axis| point.at_mm[axis]),
+        };
+        let wanted: Vec<Wanted> = points.iter().map(wanted).collect();
+        let found = solve(surfaces, face(&points[0]), known, &wanted);
+        for (point, found) in points.iter_mut().zip(found) {
+            let Some((uv, jet)) = found else { continue };
+            point.is_exact = is_same_point(surfaces, axis, point, uv, &jet);
+            if point.is_exact {
+                (point.uv, point.at_mm[axis]) = (uv, jet.point[axis]);
+            }
+        }
+    }
+}
+
+/// Returns whether a solution is where the surface has the facet's point, and not
+/// where it passes the same row once more.
+fn is_same_point(
+    surfaces: &PlacedSurfaces,
+    axis: usize,
+    point: &FacetPoint,
+    uv: [f64; 2],
+    jet: &Jet,
+) -> bool {
+    // At a pole the surface has no normal.
+    let outwards = surfaces.normal(point.facet, jet).map_or(0.0, |normal| normal[axis]);
+    let is_other_side = outwards.abs() > LEVEL && (outwards < 0.0) != point.enters;
+    // At a pole facets are so narrow that a point may pass several.
+    let is_on_face = || {
+        let below = surfaces.facet_below(point.facet, jet.point);
+        below.is_some_and(|below| surfaces.facet(below).face == surfaces.facet(point.facet).face)
+    };
+    let by_mm = jet.point[axis] - point.at_mm[axis];
+    let is_too_far = by_mm.abs() * outwards.abs() > MAX_MOVE * surfaces.tolerance_mm();
+    let is_near_facet = || is_near(&surfaces.facet(point.facet).uv, uv);
+    !is_other_side && !is_too_far && (is_near_facet() || is_on_face())
+}
+
+/// Returns whether parameters lie on a facet or near it.
+fn is_near([p, q, r]: &[[f64; 2]; 3], uv: [f64; 2]) -> bool {
+    let double = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
+    let whole = double(*p, *q, *r);
+    let parts = [double(uv, *q, *r), double(*p, uv, *r), double(*p, *q, uv)];
+    parts.iter().all(|part| part / whole >= -MAX_BEYOND)
+}
