@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::ops::Range;
 use std::str::FromStr;
 
-use lamp_stack::{Image, gray_runs, write_gray_png};
+use lamp_stack::{Image, gray_runs, white_runs, write_gray_png};
 
 /// A part of an image, in pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -162,8 +162,7 @@ fn runs_of_rows(image: &Image) -> Box<dyn Iterator<Item = Runs> + '_> {
     match image {
         Image::Gray(gray) => Box::new(gray.rows().map(move |row| gray_runs(row, width).collect())),
         Image::Mask(mask) => Box::new(mask.rows().map(move |row| {
-            let run = |run: &[u32]| (run[0], run.get(1).copied().unwrap_or(width), 255);
-            row.chunks(2).map(run).collect()
+            white_runs(row, width).map(|(start, end)| (start, end, 255)).collect()
         })),
     }
 }

@@ -6,7 +6,7 @@
 //! is cured stays so: the single-layer experiment of 002 figure 67, layer after
 //! layer.
 
-use lamp_stack::{Image, Length, gray_runs};
+use lamp_stack::{Image, Length, gray_runs, white_runs};
 
 /// Heights between which a vertical line is inside something: from and to, in
 /// micrometres, rising, without gaps of nothing between them.
@@ -61,8 +61,8 @@ impl Line {
 fn for_each_run_of_row(image: &Image, row: u32, mut each: impl FnMut(u32, u32, u8)) {
     match image {
         Image::Mask(mask) => {
-            for run in mask.row(row).chunks(2) {
-                each(run[0], run.get(1).copied().unwrap_or(mask.width()), 255);
+            for (start, end) in white_runs(mask.row(row), mask.width()) {
+                each(start, end, 255);
             }
         }
         Image::Gray(gray) => {

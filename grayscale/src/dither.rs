@@ -1,6 +1,6 @@
 //! Dithering as a stage.
 
-use lamp_stack::{GrayMask, Image, Layer, MOST_RUNS, Mask, map_in_order};
+use lamp_stack::{GrayMask, Image, Layer, MAX_RUNS, Mask, map_in_order};
 use thiserror::Error;
 
 use crate::row::TooManyRuns;
@@ -44,7 +44,7 @@ impl Method {
 pub enum DitherError {
     /// The dots are more runs than any reader of stacks takes.
     #[error(
-        "layer {layer}: its dots make more than {MOST_RUNS} runs, too many for any reader of the \
+        "layer {layer}: its dots make more than {MAX_RUNS} runs, too many for any reader of the \
          stack: expose part of the area at a time, or make fewer pixels gray"
     )]
     TooManyRuns {
@@ -78,7 +78,7 @@ pub fn dither<E: From<DitherError> + Send>(
 /// gives, so that the holes of one layer do not lie on those of the next.
 ///
 /// # Errors
-/// Where the dots make more runs than [`MOST_RUNS`].
+/// Where the dots make more runs than [`MAX_RUNS`].
 pub fn dither_image(gray: &GrayMask, method: Method, layer: u32) -> Result<Mask, DitherError> {
     let dots = match method {
         Method::BlueNoise => blue_noise::SCREEN.dither(gray, blue_noise::shift(layer)),

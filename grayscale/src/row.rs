@@ -1,6 +1,6 @@
 //! Images of dots, gathered run by run from the top left.
 
-use lamp_stack::{MOST_RUNS, Mask, MaskBuilder};
+use lamp_stack::{MAX_RUNS, Mask, MaskBuilder};
 
 /// The dots are more runs than a reader of stacks takes.
 #[derive(Debug)]
@@ -94,7 +94,7 @@ impl Dots {
     pub(crate) fn finish_row(&mut self) -> Result<(), TooManyRuns> {
         self.row.pop_if(|end| *end == self.width);
         self.above += self.row.len();
-        if self.above > MOST_RUNS {
+        if self.above > MAX_RUNS {
             return Err(TooManyRuns);
         }
         self.mask.push_row(&self.row).expect("runs come from the left");

@@ -69,7 +69,7 @@ pub enum SliceError {
     /// An image would have too many pixels on a side.
     #[error(
         "an image would be {width} x {height} pixels, more than {} on a side: check --units and --dpi",
-        crate::grid::LARGEST_SIDE
+        crate::grid::MAX_SIDE
     )]
     TooLarge {
         /// Width in pixels.

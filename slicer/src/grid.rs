@@ -4,8 +4,10 @@ use lamp_stack::Dpi;
 
 use crate::error::SliceError;
 
-/// Images are at most so wide and high, in pixels.
-pub(crate) const LARGEST_SIDE: u32 = 1 << 24;
+/// The greatest width and height of a layer in pixels. It is less than that of
+/// any image, because all rows of a slab take memory, also those without
+/// crossings.
+pub(crate) const MAX_SIDE: u32 = lamp_stack::MAX_SIDE / 4;
 
 /// The pixels of a layer in part coordinates.
 ///
@@ -61,7 +63,7 @@ impl PixelGrid {
     /// # Errors
     /// Where a side is not between 1 and 2^24 pixels.
     pub fn at(origin_mm: [f64; 2], width: f64, height: f64, dpi: Dpi) -> Result<Self, SliceError> {
-        let allowed = 1.0..=f64::from(LARGEST_SIDE);
+        let allowed = 1.0..=f64::from(MAX_SIDE);
         if !allowed.contains(&width) || !allowed.contains(&height) {
             return Err(SliceError::TooLarge { width, height });
         }

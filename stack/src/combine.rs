@@ -3,9 +3,12 @@
 use std::fmt;
 use std::str::FromStr;
 
+use thiserror::Error;
+
 use crate::gray::{GrayMask, LevelChange};
 use crate::layer::Image;
-use crate::mask::{MOST_RUNS, Mask, MaskBuilder};
+use crate::limits::MAX_RUNS;
+use crate::mask::{Mask, MaskBuilder};
 
 /// What becomes of two images, pixel by pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +22,11 @@ pub enum Op {
     /// White where one is and the other is not.
     Xor,
 }
+
+/// A text that names no [`Op`].
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("`{0}` is none of union, intersect, difference and xor")]
+pub struct OpError(String);
 
 impl Op {
     /// Every operation.
@@ -76,11 +84,11 @@ impl fmt::Display for Op {
 }
 
 impl FromStr for Op {
-    type Err = String;
+    type Err = OpError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, OpError> {
         let known = Self::ALL.into_iter().find(|op| op.name() == text);
-        known.ok_or_else(|| format!("`{text}` is none of union, intersect, difference and xor"))
+        known.ok_or_else(|| OpError(text.to_owned()))
     }
 }
 
@@ -144,7 +152,7 @@ impl Mask {
         let mut row = Vec::new();
         for (a, b) in self.rows().zip(other.rows()) {
             op.rows(a, b, &mut row);
-            if mask.transition_count() + row.len() > MOST_RUNS {
+            if mask.transition_count() + row.len() > MAX_RUNS {
                 return None;
             }
             mask.push_checked(&row);
@@ -165,7 +173,7 @@ impl GrayMask {
         let mut row = Vec::new();
         for (a, b) in self.rows().zip(other.rows()) {
             combine_levels([a, b], |[a, b]| op.level(a, b), &mut row);
-            if gray.change_count() + row.len() > MOST_RUNS {
+            if gray.change_count() + row.len() > MAX_RUNS {
                 return None;
             }
             gray.push_row(&row).expect("both rows are of images as wide");
@@ -260,6 +268,6 @@ mod tests {
                 assert_eq!(op.level(x, y), made);
             }
         }
-        assert!("plus".parse::<Op>().unwrap_err().contains("`plus`"));
+        assert!("plus".parse::<Op>().unwrap_err().to_string().contains("`plus`"));
     }
 }

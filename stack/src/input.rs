@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::StackError;
 use crate::layer::Layer;
+use crate::limits::Limits;
 use crate::ordered::map_in_order;
 use crate::tiff::{Page, PageReader};
 
@@ -13,6 +14,7 @@ use crate::tiff::{Page, PageReader};
 #[derive(Debug)]
 pub struct Pages {
     source: Source,
+    limits: Limits,
     count: u32,
     last_whole: Option<u32>,
 }
@@ -44,7 +46,7 @@ impl Pages {
         } else {
             Source::One(PageReader::from_file(File::open(path)?)?)
         };
-        Ok(Self { source, count: 0, last_whole: None })
+        Ok(Self::new(source))
     }
 
     /// Reads a TIFF or PNG file that is open, from its start.
@@ -52,8 +54,7 @@ impl Pages {
     /// # Errors
     /// Where nothing can be read there, or it is neither.
     pub fn from_file(file: File) -> Result<Self, StackError> {
-        let source = Source::One(PageReader::from_file(file)?);
-        Ok(Self { source, count: 0, last_whole: None })
+        Ok(Self::new(Source::One(PageReader::from_file(file)?)))
     }
 
     /// Reads a stack as it arrives, such as from standard input.
@@ -61,8 +62,20 @@ impl Pages {
     /// # Errors
     /// Where nothing arrives, or it is neither a TIFF nor a PNG.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
-        let source = Source::One(PageReader::from_stream(stream)?);
-        Ok(Self { source, count: 0, last_whole: None })
+        Ok(Self::new(Source::One(PageReader::from_stream(stream)?)))
+    }
+
+    fn new(source: Source) -> Self {
+        Self { source, limits: Limits::default(), count: 0, last_whole: None }
+    }
+
+    /// Returns the pages, read within these limits instead of the default ones.
+    pub fn with_limits(self, limits: Limits) -> Self {
+        let source = match self.source {
+            Source::One(reader) => Source::One(reader.with_limits(limits)),
+            folder @ Source::Folder { .. } => folder,
+        };
+        Self { source, limits, ..self }
     }
 
     /// The pages' layers, decoded on all threads, in order.
@@ -79,13 +92,13 @@ impl Pages {
                     Some(Err(StackError::CutOff { last_whole: self.last_whole }))
                 }
                 None => None,
-                Some(file) => {
-                    Some(one_page(&file, self.count, self.last_whole).map_err(|source| {
+                Some(file) => Some(
+                    one_page(&file, self.limits, self.count, self.last_whole).map_err(|source| {
                         let file =
                             file.file_name().unwrap_or_default().to_string_lossy().into_owned();
                         StackError::InFile { file, source: Box::new(source) }
-                    }))
-                }
+                    }),
+                ),
             },
         }
     }
@@ -132,8 +145,14 @@ impl Iterator for Pages {
 }
 
 /// The page of a folder's file.
-fn one_page(file: &Path, number: u32, last_whole: Option<u32>) -> Result<Page, StackError> {
-    let mut reader = PageReader::from_file(File::open(file)?)?.numbered(number, last_whole);
+fn one_page(
+    file: &Path,
+    limits: Limits,
+    number: u32,
+    last_whole: Option<u32>,
+) -> Result<Page, StackError> {
+    let reader = PageReader::from_file(File::open(file)?)?;
+    let mut reader = reader.with_limits(limits).numbered(number, last_whole);
     let page = reader.next().unwrap_or(Err(StackError::Empty))?;
     if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
 }

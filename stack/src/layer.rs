@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use crate::gray::GrayMask;
 use crate::length::{Dpi, Length};
 use crate::mask::Mask;
-use crate::ordered::Held;
+use crate::ordered::MemorySize;
 
 /// What is exposed at one height: an image, and where and how it is exposed.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +22,7 @@ pub struct Layer {
     pub image: Image,
 }
 
-impl Held for Layer {
+impl MemorySize for Layer {
     fn bytes(&self) -> usize {
         let (rows, changes) = (self.image.height() as usize, self.image.changes());
         match self.image {

@@ -38,10 +38,6 @@ impl PartialEq for Mask {
 
 impl Eq for Mask {}
 
-/// An image has at most so many transitions, far more than any layer: what a
-/// reader takes before it gives up.
-pub const MOST_RUNS: usize = 1 << 27;
-
 /// Why arrays are not a mask.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
@@ -177,10 +173,26 @@ impl Mask {
     }
 }
 
-/// The number of white pixels in a row of `width` pixels with these
+/// Returns the white runs of a row of `width` pixels with these transitions, as
+/// the first column and the column after the last.
+///
+/// ```
+/// // `.###..##`
+/// let runs: Vec<_> = lamp_stack::white_runs(&[1, 4, 6], 8).collect();
+/// assert_eq!(runs, [(1, 4), (6, 8)]);
+/// ```
+#[inline]
+pub fn white_runs(
+    transitions: &[u32],
+    width: u32,
+) -> impl DoubleEndedIterator<Item = (u32, u32)> + ExactSizeIterator + Clone + use<'_> {
+    transitions.chunks(2).map(move |run| (run[0], run.get(1).copied().unwrap_or(width)))
+}
+
+/// Returns the number of white pixels in a row of `width` pixels with these
 /// transitions.
 pub fn white_in_row(transitions: &[u32], width: u32) -> u64 {
-    transitions.chunks(2).map(|run| u64::from(run.get(1).unwrap_or(&width) - run[0])).sum()
+    white_runs(transitions, width).map(|(start, end)| u64::from(end - start)).sum()
 }
 
 fn check_row(row: usize, transitions: &[u32], width: u32) -> Result<(), MaskError> {

@@ -5,12 +5,12 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 /// What waits in a queue, and how much memory it takes there.
-pub trait Held {
+pub trait MemorySize {
     /// About how many bytes it takes, or will take once it is decoded.
     fn bytes(&self) -> usize;
 }
 
-impl<T: Held, U> Held for (T, U) {
+impl<T: MemorySize, U> MemorySize for (T, U) {
     fn bytes(&self) -> usize {
         self.0.bytes()
     }
@@ -33,7 +33,7 @@ pub fn map_in_order<I, T, U, E>(
 ) -> impl Iterator<Item = Result<U, E>>
 where
     I: Iterator<Item = Result<T, E>>,
-    T: Held + Send,
+    T: MemorySize + Send,
     U: Send,
     E: Send,
 {
@@ -55,7 +55,7 @@ where
     })
 }
 
-fn take_batch<T: Held, E>(
+fn take_batch<T: MemorySize, E>(
     input: &mut impl Iterator<Item = Result<T, E>>,
     threads: usize,
 ) -> Vec<Result<T, E>> {
@@ -63,7 +63,7 @@ fn take_batch<T: Held, E>(
     let mut bytes = 0;
     while batch.len() < threads || (batch.len() < MOST_A_THREAD * threads && bytes < ENOUGH_BYTES) {
         let Some(item) = input.next() else { break };
-        bytes += item.as_ref().map_or(ENOUGH_BYTES, Held::bytes);
+        bytes += item.as_ref().map_or(ENOUGH_BYTES, MemorySize::bytes);
         batch.push(item);
     }
     batch
@@ -73,7 +73,7 @@ fn take_batch<T: Held, E>(
 mod tests {
     use super::*;
 
-    impl Held for usize {
+    impl MemorySize for usize {
         fn bytes(&self) -> usize {
             *self
         }

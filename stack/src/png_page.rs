@@ -8,8 +8,9 @@ use crate::error::StackError;
 use crate::gray::GrayMask;
 use crate::layer::{Image, PageInfo};
 use crate::length::Dpi;
-use crate::mask::{MOST_RUNS, MaskBuilder};
-use crate::tiff::{LARGEST_SIDE, bit_transitions, byte_runs};
+use crate::limits::Limits;
+use crate::mask::MaskBuilder;
+use crate::tiff::{bit_transitions, byte_runs};
 
 /// What every PNG starts with.
 pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
@@ -56,8 +57,8 @@ impl From<png::DecodingError> for PngFault {
 type Rows<'a> = Reader<Cursor<&'a [u8]>>;
 
 /// Reads what stands before the image data.
-pub(crate) fn header(file: &[u8]) -> Result<Header, PngFault> {
-    let (reader, samples) = open(file)?;
+pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PngFault> {
+    let (reader, samples) = open(file, limits)?;
     let info = reader.info();
     let mut line = description(info).and_then(|text| PageInfo::parse(text.as_bytes()));
     Ok(Header {
@@ -70,25 +71,37 @@ pub(crate) fn header(file: &[u8]) -> Result<Header, PngFault> {
 }
 
 /// Decodes the image.
-pub(crate) fn decode(file: &[u8]) -> Result<Image, PngFault> {
-    let (reader, samples) = open(file)?;
-    if samples.are_bits() { decode_mask(reader, &samples) } else { decode_gray(reader, &samples) }
+pub(crate) fn decode(file: &[u8], limits: &Limits) -> Result<Image, PngFault> {
+    let (reader, samples) = open(file, limits)?;
+    if samples.are_bits() {
+        decode_mask(reader, &samples, limits.runs)
+    } else {
+        decode_gray(reader, &samples, limits.runs)
+    }
 }
 
-fn decode_mask(mut reader: Rows<'_>, samples: &Samples) -> Result<Image, PngFault> {
+fn decode_mask(
+    mut reader: Rows<'_>,
+    samples: &Samples,
+    max_runs: usize,
+) -> Result<Image, PngFault> {
     let width = reader.info().width;
     let mut mask = MaskBuilder::new(width);
     let mut runs = Vec::new();
     while let Some(row) = reader.next_row()? {
         byte_runs(row.data(), &mut runs);
         mask.push_checked(&bit_transitions(&runs, width));
-        check_runs(mask.transition_count())?;
+        check_runs(mask.transition_count(), max_runs)?;
     }
     let mask = mask.finish();
     Ok(Image::Mask(if samples.levels[0] == 0 { mask } else { mask.inverted() }))
 }
 
-fn decode_gray(mut reader: Rows<'_>, samples: &Samples) -> Result<Image, PngFault> {
+fn decode_gray(
+    mut reader: Rows<'_>,
+    samples: &Samples,
+    max_runs: usize,
+) -> Result<Image, PngFault> {
     let width = reader.info().width;
     let mut gray = GrayMask::new(width);
     let (mut row_samples, mut runs) = (Vec::new(), Vec::new());
@@ -102,25 +115,25 @@ fn decode_gray(mut reader: Rows<'_>, samples: &Samples) -> Result<Image, PngFaul
                 .ok_or_else(|| PngFault::Malformed(format!("its palette has no entry {sample}")))?;
         }
         gray.push_runs(runs.iter().copied()).expect("a row is as long as the width");
-        check_runs(gray.change_count())?;
+        check_runs(gray.change_count(), max_runs)?;
     }
     Ok(Image::Gray(gray))
 }
 
-fn check_runs(runs: usize) -> Result<(), PngFault> {
-    if runs > MOST_RUNS {
+fn check_runs(runs: usize, max: usize) -> Result<(), PngFault> {
+    if runs > max {
         return Err(PngFault::Malformed("it has more runs than an image may have".to_owned()));
     }
     Ok(())
 }
 
-fn open(file: &[u8]) -> Result<(Rows<'_>, Samples), PngFault> {
+fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(Rows<'a>, Samples), PngFault> {
     let mut decoder = Decoder::new(Cursor::new(file));
     decoder.set_ignore_iccp_chunk(true);
     let reader = decoder.read_info()?;
     let info = reader.info();
-    let side = u64::from(info.width.max(info.height));
-    if side > LARGEST_SIDE {
+    let side = info.width.max(info.height);
+    if side > limits.side {
         return Err(PngFault::Malformed(format!("it claims a side of {side} pixels")));
     }
     if info.interlaced {

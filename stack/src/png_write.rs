@@ -13,6 +13,7 @@ use crate::error::StackError;
 use crate::gray::gray_runs;
 use crate::layer::{Image, Layer};
 use crate::length::Dpi;
+use crate::mask::white_runs;
 use crate::ordered::map_in_order;
 use crate::png_page::{DESCRIPTION, EXACT_DPI};
 use crate::temporary::FolderBeside;
@@ -145,8 +146,7 @@ fn write_rows(
 /// A row's pixels, eight a byte, the first in the highest bit.
 fn bits(transitions: &[u32], width: u32) -> Vec<u8> {
     let mut bytes = vec![0; width.div_ceil(8) as usize];
-    for run in transitions.chunks(2) {
-        let (start, end) = (run[0], run.get(1).copied().unwrap_or(width));
+    for (start, end) in white_runs(transitions, width) {
         let (first, last) = ((start / 8) as usize, (end / 8) as usize);
         let (from, to) = (0xFF >> (start % 8), !(0xFF >> (end % 8)));
         if first == last {
@@ -208,7 +208,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{Mask, PageInfo, StackInfo, png_page};
+    use crate::{Limits, Mask, PageInfo, StackInfo, png_page};
 
     proptest! {
         #[test]
@@ -255,7 +255,8 @@ mod tests {
             for own in [None, Some(0.5), Some(1500.0)] {
                 let mut layer = layer(dpi, "cube");
                 layer.info.other.extend(own.map(|dpi| ("dpi".to_owned(), dpi.into())));
-                let header = png_page::header(&png_of_layer(&layer).unwrap()).unwrap();
+                let header =
+                    png_page::header(&png_of_layer(&layer).unwrap(), &Limits::default()).unwrap();
                 assert_eq!(header.dpi, layer.dpi);
                 // A page that needs the key for itself takes it.
                 if own.is_none() || dpi.fract() == 0.0 || dpi == 203.2 {

@@ -13,10 +13,10 @@ const BASE: usize = 5;
 
 /// The white runs of an image, as rows and columns.
 fn white_runs(mask: &Mask) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
-    let runs = |row: &[u32]| -> Vec<_> {
-        row.chunks(2).map(|run| run[0] as usize..run[1] as usize).collect()
-    };
-    mask.rows().enumerate().flat_map(move |(k, row)| runs(row).into_iter().map(move |run| (k, run)))
+    mask.rows().enumerate().flat_map(|(k, row)| {
+        let runs = lamp_stack::white_runs(row, mask.width());
+        runs.map(move |(start, end)| (k, start as usize..end as usize))
+    })
 }
 
 /// Pixel by pixel, what lies nearer to white pixels than leaves `gap` pixels

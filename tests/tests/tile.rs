@@ -2,12 +2,12 @@
 
 use std::fs;
 
-use lamp_stack::{Dpi, Frame, GrayMask, Image, Layer, Mask, Op, PageInfo, StackInfo, Turn};
+use lamp_stack::{Dpi, Frame, GrayMask, Image, Layer, Mask, Op, Orientation, PageInfo, StackInfo};
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
 
 /// Where the copies of a part stand: left, top and turn.
-fn copies(about: &Value) -> Vec<(u32, u32, Turn)> {
+fn copies(about: &Value) -> Vec<(u32, u32, Orientation)> {
     let places = about["copies"].as_array().expect("a list").iter();
     let turn = |k: usize| about["turns"][k].as_str().unwrap_or("0").parse().expect("a turn");
     let number = |value: &Value| value.as_u64().expect("a number of pixels") as u32;
@@ -43,7 +43,7 @@ fn check(scratch: &Scratch, build: &str, stacks: &[&str]) -> usize {
                     width: rest.width(),
                     height: rest.height(),
                 };
-                let copy = placed.turned(turn).unwrap().framed(around);
+                let copy = placed.oriented(turn).unwrap().framed(around);
                 assert_eq!(copy.combined(Op::Difference, &rest).unwrap().white_pixels(), 0);
                 rest = rest.combined(Op::Xor, &copy).unwrap();
             }
@@ -240,7 +240,7 @@ fn gray_layers_make_a_gray_build() {
     for (left, top, turn) in places {
         let (width, height) = turn.size(64, 16);
         let cut = image.framed(Frame { left: left.into(), top: top.into(), width, height });
-        assert!(cut.turned(turn.inverse()).unwrap() == ramp);
+        assert!(cut.oriented(turn.inverse()).unwrap() == ramp);
     }
     // Thresholds know no place, so that dots are the same before and after.
     let dots = "dither --method threshold";

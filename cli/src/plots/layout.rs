@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use lamp_postprocess::{CopyPlacement, Layout, PartStack, PixelSize};
-use lamp_stack::{Mask, Turn};
+use lamp_stack::{Mask, Orientation, white_runs};
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -44,7 +44,7 @@ struct Picture<'a> {
     /// Pixels of the picture for one of the build.
     scale: f64,
     /// Of parts whose outlines are known, what they look like.
-    outlines: HashMap<(usize, Turn), Mask>,
+    outlines: HashMap<(usize, Orientation), Mask>,
 }
 
 impl<'a> Picture<'a> {
@@ -127,11 +127,9 @@ impl<'a> Picture<'a> {
         for y in top..bottom {
             let row = (f64::from(y - MARGIN) + 0.5) / self.scale - f64::from(at.top);
             let row = outline.row((row.max(0.0) as u32).min(outline.height() - 1));
-            let runs = row.chunks(2).map(|run| {
-                let ends = [run[0], *run.get(1).unwrap_or(&outline.width())];
-                let [from, to] = ends.map(|column| self.at(at.left + column, 0).0);
-                (from, to)
-            });
+            let runs = white_runs(row, outline.width());
+            let x_of = |column| self.at(at.left + column, 0).0;
+            let runs = runs.map(|(start, end)| (x_of(start), x_of(end)));
             strips.add(y, runs.collect());
         }
         for strip in strips.finish() {

@@ -7,7 +7,7 @@ mod spectrum;
 mod tiles;
 
 use lamp_grayscale::{Method, dither_image};
-use lamp_stack::{GrayMask, Mask};
+use lamp_stack::{GrayMask, Mask, white_runs};
 
 /// The methods that make dots.
 const DOTS: [Method; 3] = [Method::BlueNoise, Method::Ordered, Method::FloydSteinberg];
@@ -36,9 +36,8 @@ fn pixels(mask: &Mask) -> Vec<bool> {
     for row in mask.rows() {
         let start = pixels.len();
         pixels.resize(start + mask.width() as usize, false);
-        for run in row.chunks(2) {
-            let end = run.get(1).copied().unwrap_or(mask.width());
-            pixels[start + run[0] as usize..start + end as usize].fill(true);
+        for (from, to) in white_runs(row, mask.width()) {
+            pixels[start + from as usize..start + to as usize].fill(true);
         }
     }
     pixels

@@ -1,6 +1,8 @@
 //! The copies of parts that `tile` made, by what the first page says of them.
 
-use lamp_stack::{Frame, Mask, MaskBuilder, Op, PageInfo, StackInfo, Turn, place_row};
+use lamp_stack::{
+    Frame, Mask, MaskBuilder, Op, Orientation, OrientationError, PageInfo, StackInfo, place_row,
+};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -18,7 +20,7 @@ const MAX_ROWS: u64 = 1 << 27;
 pub(super) struct BuildCopy {
     /// Where the part's pixels lie in it, as it was before it was turned.
     pub(super) part: ImageBounds,
-    pub(super) turn: Turn,
+    pub(super) turn: Orientation,
     pub(super) left: i64,
     pub(super) top: i64,
 }
@@ -45,7 +47,7 @@ impl BuildCopy {
         info: &PageInfo,
         place: &ImageBounds,
     ) -> Result<Vec<Self>, EditError> {
-        let whole = Self { part: *place, turn: Turn::default(), left: 0, top: 0 };
+        let whole = Self { part: *place, turn: Orientation::default(), left: 0, top: 0 };
         if wanted.is_none() {
             return Ok(vec![whole]);
         }
@@ -77,16 +79,17 @@ impl BuildCopy {
             .turns
             .iter()
             .map(|turn| turn.parse())
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(wrong)?;
-        let turns = turns.into_iter().chain(std::iter::repeat(Turn::default()));
-        let copy = |([left, top], turn): ([i64; 2], Turn)| Self { part: lain, turn, left, top };
+            .collect::<Result<Vec<_>, OrientationError>>()
+            .map_err(|error| wrong(error.to_string()))?;
+        let turns = turns.into_iter().chain(std::iter::repeat(Orientation::default()));
+        let copy =
+            |([left, top], turn): ([i64; 2], Orientation)| Self { part: lain, turn, left, top };
         Ok(part.copies.into_iter().zip(turns).map(copy).collect())
     }
 
     /// Whether it is all of an image, as it is.
     fn is_whole(&self, place: &ImageBounds) -> bool {
-        *self == Self { part: *place, turn: Turn::default(), left: 0, top: 0 }
+        *self == Self { part: *place, turn: Orientation::default(), left: 0, top: 0 }
     }
 }
 
@@ -124,7 +127,7 @@ pub(super) fn composed(
     let masks: Vec<Mask> = copies
         .iter()
         .enumerate()
-        .map(|(k, copy)| mask(k, &copy.part).turned(copy.turn))
+        .map(|(k, copy)| mask(k, &copy.part).oriented(copy.turn))
         .collect::<Option<_>>()?;
     // Which rows of which copies have anything, by the build's rows.
     let mut rows: Vec<(u32, u32, usize)> = Vec::new();
@@ -211,8 +214,11 @@ mod tests {
         page.stack.as_mut().unwrap().other["tile"]["turns"] = json!(["0", "90m"]);
         let all = BuildCopy::all(&CopySelection::Any(true), &page, &PLACE).unwrap();
         let lain = ImageBounds { origin_mm: [1.0, 2.0], width: 7, height: 5, ..PLACE };
-        assert_eq!(all[0], BuildCopy { part: lain, turn: Turn::default(), left: 3, top: 4 });
-        assert_eq!(all[1], BuildCopy { part: lain, turn: Turn::new(1, true), left: 5, top: 6 });
+        assert_eq!(all[0], BuildCopy { part: lain, turn: Orientation::default(), left: 3, top: 4 });
+        assert_eq!(
+            all[1],
+            BuildCopy { part: lain, turn: Orientation::new(1, true), left: 5, top: 6 }
+        );
         assert_eq!(
             BuildCopy::all(&CopySelection::Of("blade".to_owned()), &page, &PLACE).unwrap(),
             all
@@ -265,13 +271,13 @@ mod tests {
             let mask = mask.finish();
             let lain = ImageBounds { width: 7, height: 5, ..PLACE };
             let copies: Vec<BuildCopy> = places.iter().map(|&(left, top, quarters, mirrored)| {
-                BuildCopy { part: lain, turn: Turn::new(quarters, mirrored), left, top }
+                BuildCopy { part: lain, turn: Orientation::new(quarters, mirrored), left, top }
             }).collect();
             let made = composed(&copies, &PLACE, |_, _| mask.clone()).unwrap();
             let mut expected = Mask::black(40, 30);
             for copy in &copies {
                 let frame = Frame { left: -copy.left, top: -copy.top, width: 40, height: 30 };
-                let placed = mask.turned(copy.turn).unwrap().framed(frame);
+                let placed = mask.oriented(copy.turn).unwrap().framed(frame);
                 expected = expected.combined(Op::Union, &placed).unwrap();
             }
             prop_assert_eq!(made, expected);

@@ -251,10 +251,10 @@ fn each_copy_of_a_build_has_the_next_number() {
     for (k, (left, top, turn)) in
         [(0, 0, "0"), (20, 30, "180"), (40, 5, "90")].into_iter().enumerate()
     {
-        let turn: lamp_stack::Turn = turn.parse().unwrap();
+        let turn: lamp_stack::Orientation = turn.parse().unwrap();
         let alone = list.replace("copies = true\n", "").replace("= 7", &format!("= {}", 7 - k));
         let part = edited(vec![black(12, 9)], &alone, vec![]).unwrap();
-        let expected = mask(&part[0]).turned(turn).unwrap();
+        let expected = mask(&part[0]).oriented(turn).unwrap();
         let (width, height) = turn.size(12, 9);
         assert_eq!(
             mask(&after[0]).framed(lamp_stack::Frame { left, top, width, height }),

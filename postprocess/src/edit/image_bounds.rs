@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_stack::{Dpi, Frame, Layer, Length, Turn};
+use lamp_stack::{Dpi, Frame, Layer, Length, Orientation};
 
 use super::edit_error::EditError;
 
@@ -52,7 +52,7 @@ impl ImageBounds {
     }
 
     /// Where the pixels lie when the part is turned about x = y = 0.
-    pub(super) fn turned(&self, turn: Turn) -> Self {
+    pub(super) fn turned(&self, turn: Orientation) -> Self {
         let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
         let [mut x0, mut y1] = self.origin_mm;
         let [mut width, mut height] = [self.width, self.height].map(|side| f64::from(side) * pitch);
@@ -122,7 +122,7 @@ mod tests {
             ("0m", [-4.0, 5.0]),
             ("90m", [-5.0, -1.0]),
         ] {
-            let turn: Turn = turn.parse().unwrap();
+            let turn: Orientation = turn.parse().unwrap();
             let (width, height) = turn.size(3, 2);
             assert_eq!(image.turned(turn), place(origin, width, height), "{turn}");
         }

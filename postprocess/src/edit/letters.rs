@@ -1,6 +1,6 @@
 //! Letters as closed lines.
 
-use lamp_stack::Turn;
+use lamp_stack::Orientation;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 use super::fill::Point;
@@ -26,7 +26,7 @@ pub(super) enum Align {
 pub(super) fn outlines(
     text: &str,
     align: Align,
-    turn: Turn,
+    turn: Orientation,
     tolerance: f64,
 ) -> Result<Vec<Vec<Point>>, char> {
     let face = Face::parse(FONT, 0).expect("the font that comes with the program is one");
@@ -55,7 +55,7 @@ fn glyph(face: &Face<'_>, letter: char) -> Option<GlyphId> {
 }
 
 /// A point turned about the zero, with y up.
-fn turned([x, y]: Point, turn: Turn) -> Point {
+fn turned([x, y]: Point, turn: Orientation) -> Point {
     let start = if turn.is_mirrored() { [-x, y] } else { [x, y] };
     (0..turn.quarters()).fold(start, |[x, y], _| [-y, x])
 }
@@ -188,8 +188,8 @@ mod tests {
     #[test]
     fn the_font_has_what_labels_need() {
         let letters: String = (' '..='~').collect();
-        assert!(outlines(&letters, Align::Left, Turn::default(), 0.01).is_ok());
-        assert_eq!(outlines("a\u{3a9}", Align::Left, Turn::default(), 0.01), Err('\u{3a9}'));
+        assert!(outlines(&letters, Align::Left, Orientation::default(), 0.01).is_ok());
+        assert_eq!(outlines("a\u{3a9}", Align::Left, Orientation::default(), 0.01), Err('\u{3a9}'));
     }
 
     fn drawn(text: &str, align: Align, turn: &str) -> Vec<String> {

@@ -22,7 +22,7 @@ mod shape;
 
 use std::sync::Arc;
 
-use lamp_stack::{Held, Layer, PageInfo, map_in_order};
+use lamp_stack::{Layer, MemorySize, PageInfo, map_in_order};
 
 pub use edit_error::EditError;
 pub(crate) use image_bounds::ImageBounds;
@@ -106,7 +106,7 @@ struct ToEdit {
     plan: Arc<EditPlan>,
 }
 
-impl Held for ToEdit {
+impl MemorySize for ToEdit {
     fn bytes(&self) -> usize {
         let others = self.others.iter().flatten().map(|layer| layer.bytes());
         self.layer.bytes() + others.sum::<usize>()

@@ -3,7 +3,7 @@
 use super::copies::{forget_copies, move_copies};
 use super::edit_error::EditError;
 use super::image_bounds::ImageBounds;
-use lamp_stack::{Frame, PageInfo, Turn};
+use lamp_stack::{Frame, Orientation, PageInfo};
 
 /// Makes a page say what holds for the rows that a frame shows, which lie at
 /// `place`.
@@ -29,7 +29,7 @@ pub(crate) fn frame_page(info: &mut PageInfo, frame: Frame, place: &ImageBounds)
 /// Where stray rows would become columns.
 pub(super) fn turn_page(
     info: &mut PageInfo,
-    turn: Turn,
+    turn: Orientation,
     height: u32,
     place: &ImageBounds,
 ) -> Result<(), EditError> {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Frame, Image, Layer, Mask, Op, PageInfo, Turn, gray_runs};
+use lamp_stack::{Frame, Image, Layer, MAX_SIDE, Mask, Op, Orientation, PageInfo, gray_runs};
 use serde_json::json;
 
 use super::copies::BuildCopy;
@@ -16,9 +16,6 @@ use super::other_stacks::{AlignedStack, middle};
 use super::page_changes::{frame_page, turn_page};
 use super::schema::{Edit, LengthRange, Mirror};
 use super::shape::EditShape;
-
-/// Images are at most so wide and high, in pixels, as the readers of stacks take.
-const LARGEST_SIDE: i64 = 1 << 26;
 
 /// What edits do to the layers of one stack.
 pub(super) struct EditPlan {
@@ -46,7 +43,7 @@ enum PlannedEdit {
         place: ImageBounds,
     },
     Turn {
-        turn: Turn,
+        turn: Orientation,
         height: u32,
         place: ImageBounds,
     },
@@ -172,7 +169,7 @@ impl PlannedEdit {
     ) -> Result<Self, EditError> {
         let turned = |turn| Self::Turn { turn, height: place.height, place: place.turned(turn) };
         let framed = |frame: Frame| {
-            if i64::from(frame.width.max(frame.height)) > LARGEST_SIDE {
+            if frame.width.max(frame.height) > MAX_SIDE {
                 return Err(EditError::edit(
                     number,
                     "the image would be more than 2^26 pixels wide or high",
@@ -181,10 +178,10 @@ impl PlannedEdit {
             Ok(Self::Frame { frame, place: place.framed(frame) })
         };
         if let Some(degrees) = edit.rotate {
-            return Ok(turned(Turn::new(degrees / 90, false)));
+            return Ok(turned(Orientation::new(degrees / 90, false)));
         }
         if let Some(mirror) = edit.mirror {
-            return Ok(turned(Turn::new(if mirror == Mirror::X { 0 } else { 2 }, true)));
+            return Ok(turned(Orientation::new(if mirror == Mirror::X { 0 } else { 2 }, true)));
         }
         if let Some(pad) = edit.pad {
             return framed(padded(pad, place)?);
@@ -217,7 +214,7 @@ impl PlannedEdit {
     ) -> Result<Option<Image>, EditError> {
         let combined = |op, with: &Image| image.combined(op, with);
         Ok(match self {
-            Self::Turn { turn, .. } => image.turned(*turn),
+            Self::Turn { turn, .. } => image.oriented(*turn),
             Self::Frame { frame, .. } => Some(image.framed(*frame)),
             Self::Shape { op, shape, .. } => {
                 let mask = shape.at(info)?.map(Cow::into_owned);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lamp_stack::{Length, LengthError, Op, Turn};
+use lamp_stack::{Length, LengthError, Op, Orientation};
 use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::letters::Align;
@@ -120,7 +120,7 @@ pub(super) struct Label {
     #[serde(default)]
     pub(super) align: Align,
     #[serde(default, deserialize_with = "turn")]
-    pub(super) turn: Turn,
+    pub(super) turn: Orientation,
     #[serde(default = "one")]
     pub(super) start: i32,
     #[serde(default = "one")]
@@ -210,7 +210,7 @@ fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
     if length.um() == 0.0 { Err(D::Error::custom("it must be above zero")) } else { Ok(length) }
 }
 
-fn turn<'de, D: Deserializer<'de>>(from: D) -> Result<Turn, D::Error> {
+fn turn<'de, D: Deserializer<'de>>(from: D) -> Result<Orientation, D::Error> {
     String::deserialize(from)?.parse().map_err(D::Error::custom)
 }
 
@@ -219,7 +219,7 @@ fn op<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Op>, D::Error> {
     match text.as_str() {
         "add" => Ok(Some(Op::Union)),
         "subtract" => Ok(Some(Op::Difference)),
-        _ => text.parse().map(Some).map_err(|_: String| {
+        _ => text.parse().map(Some).map_err(|_| {
             D::Error::custom(format!(
                 "`{text}` is none of add, subtract, union, difference, intersect and xor"
             ))

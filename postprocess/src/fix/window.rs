@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lamp_stack::{Held, Image, Layer};
+use lamp_stack::{Image, Layer, MemorySize};
 
 /// A layer, and those below and above it where they are there and show the
 /// same place.
@@ -19,7 +19,7 @@ impl Window {
     }
 }
 
-impl Held for Window {
+impl MemorySize for Window {
     fn bytes(&self) -> usize {
         self.layer.bytes()
     }

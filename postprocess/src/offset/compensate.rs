@@ -1,6 +1,6 @@
 //! Compensation as a stage.
 
-use lamp_stack::{Dpi, GrayMask, Image, Layer, Length, Mask, map_in_order};
+use lamp_stack::{Dpi, GrayMask, Image, Layer, Length, MAX_SIDE, Mask, map_in_order};
 use serde_json::{Value, json};
 use thiserror::Error;
 
@@ -113,9 +113,6 @@ pub enum CompensateError {
 const MAX_MOVE: f64 = 4096.0;
 /// How deep, in pixels, edges are looked at for thin walls.
 const MAX_DEPTH: f64 = 64.0;
-/// Images are at most so wide and high, in pixels, as those that a stack's
-/// reader takes.
-const MAX_SIDE: u64 = 1 << 26;
 /// Images are as wide as a multiple of this (002 section 2.2.2).
 const WIDTH_UNIT: u64 = 32;
 
@@ -192,7 +189,7 @@ fn scale(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensateErro
     let columns = AxisScale::new(layer.image.width(), shrinkage.x);
     let rows = AxisScale::new(layer.image.height(), shrinkage.y);
     let width = columns.after().next_multiple_of(WIDTH_UNIT);
-    if width.max(rows.after()) > MAX_SIDE {
+    if width.max(rows.after()) > MAX_SIDE.into() {
         return Err(CompensateError::TooLarge { layer: layer.info.name() });
     }
     layer.image = scaled(&layer.image, &columns, &rows, width as u32);

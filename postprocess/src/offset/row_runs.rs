@@ -1,6 +1,6 @@
 //! Rows as runs with both ends.
 
-use lamp_stack::{Mask, MaskBuilder};
+use lamp_stack::{Mask, MaskBuilder, white_runs};
 
 /// The columns from the first up to, but without, the second.
 pub(super) type Run = (i32, i32);
@@ -23,8 +23,8 @@ impl RowRuns {
         let mut rows = Self::new();
         rows.runs.reserve(mask.transition_count() / 2 + 1);
         for row in mask.rows() {
-            let end = |run: &[u32]| *run.get(1).unwrap_or(&mask.width()) as i32;
-            rows.runs.extend(row.chunks(2).map(|run| (run[0] as i32, end(run))));
+            let runs = white_runs(row, mask.width());
+            rows.runs.extend(runs.map(|(start, end)| (start as i32, end as i32)));
             rows.ends.push(rows.runs.len());
         }
         rows

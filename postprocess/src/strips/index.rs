@@ -5,7 +5,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-use lamp_stack::StackError;
+use lamp_stack::{MAX_SIDE, StackError};
 use serde::{Deserialize, Serialize};
 
 use super::{StripsError, Swaths};
@@ -15,8 +15,6 @@ pub(super) const INDEX: &str = "strips.json";
 
 /// So many strips are written at most: each is an open file.
 pub(super) const MAX_STRIPS: u32 = 512;
-/// Images are at most so wide, as the readers of stacks take.
-pub(super) const MAX_SIDE: u32 = 1 << 26;
 /// No index is longer, in bytes.
 const MAX_INDEX_BYTES: u64 = 1 << 20;
 

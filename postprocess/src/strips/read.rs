@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lamp_stack::{
-    GrayMask, Held, Image, Layer, Mask, MaskBuilder, Page, PageInfo, Pages, map_in_order,
+    GrayMask, Image, Layer, Mask, MaskBuilder, MemorySize, Page, PageInfo, Pages, map_in_order,
 };
 
 use super::index::{INDEX, StripIndex, file_name};
@@ -119,9 +119,9 @@ struct LayerPages {
     height: u32,
 }
 
-impl Held for LayerPages {
+impl MemorySize for LayerPages {
     fn bytes(&self) -> usize {
-        self.pages.iter().map(Held::bytes).sum()
+        self.pages.iter().map(MemorySize::bytes).sum()
     }
 }
 

@@ -5,10 +5,11 @@ use std::io::BufWriter;
 use std::path::Path;
 
 use lamp_stack::{
-    EncodedPage, FolderBeside, Format, Held, Layer, PageWriter, StackError, map_in_order,
+    EncodedPage, FolderBeside, Format, Layer, MAX_SIDE, MemorySize, PageWriter, StackError,
+    map_in_order,
 };
 
-use super::index::{INDEX, MAX_SIDE, MAX_STRIPS, StripIndex, file_name};
+use super::index::{INDEX, MAX_STRIPS, StripIndex, file_name};
 use super::{StripsError, Swaths};
 
 /// Enough for the pages of a narrow strip; hundreds of files are open at once.
@@ -133,7 +134,7 @@ struct SwathCut<'a> {
     swath: u32,
 }
 
-impl Held for SwathCut<'_> {
+impl MemorySize for SwathCut<'_> {
     fn bytes(&self) -> usize {
         // About its share of the runs, and the levels of its ramps.
         let ramps = 16 * self.swaths.overlap as usize * self.layer.image.height() as usize;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use lamp_stack::{Layer, PageInfo, StackInfo, Turn};
+use lamp_stack::{Layer, Orientation, PageInfo, StackInfo};
 use serde_json::{Map, Value, json};
 
 use super::lockstep::LayerSet;
@@ -93,7 +93,7 @@ impl Layout {
         let frame = self.parts[at.part].frame();
         let row = u32::try_from(i64::from(row) - frame.top).ok()?;
         let last = frame.height.checked_sub(if open { 0 } else { 1 })?;
-        let upside_down = at.turn == Turn::new(2, at.turn.is_mirrored());
+        let upside_down = at.turn == Orientation::new(2, at.turn.is_mirrored());
         (row <= last).then(|| at.top + if upside_down { last - row } else { row })
     }
 
@@ -169,7 +169,7 @@ impl Layout {
         }
         let places: Vec<_> = copies().map(|at| [at.left, at.top]).collect();
         all.insert("copies".to_owned(), json!(places));
-        if copies().any(|at| at.turn != Turn::default()) {
+        if copies().any(|at| at.turn != Orientation::default()) {
             let turns: Vec<_> = copies().map(|at| at.turn.to_string()).collect();
             all.insert("turns".to_owned(), json!(turns));
         }

@@ -6,7 +6,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use lamp_stack::{
-    GrayMask, Image, LevelChange, MOST_RUNS, Mask, MaskBuilder, combine_levels, combine_rows,
+    GrayMask, Image, LevelChange, MAX_RUNS, Mask, MaskBuilder, combine_levels, combine_rows,
     place_row,
 };
 
@@ -58,7 +58,7 @@ fn check_runs(images: &[PlacedImage<'_>]) -> Result<(), ComposeError> {
     let runs =
         images.iter().map(|placed| placed.at.len().saturating_mul(placed.image.changes() + 1));
     let runs = runs.fold(0, usize::saturating_add);
-    if runs > MOST_RUNS { Err(ComposeError::TooManyRuns) } else { Ok(()) }
+    if runs > MAX_RUNS { Err(ComposeError::TooManyRuns) } else { Ok(()) }
 }
 
 fn compose_masks(

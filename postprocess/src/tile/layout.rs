@@ -2,16 +2,12 @@
 
 use std::collections::HashMap;
 
-use lamp_stack::{Dpi, Image, Length, Mask, Size, Turn};
+use lamp_stack::{Dpi, Image, Length, MAX_SIDE, Mask, Orientation, Size};
 
 use super::mesh::BuildMesh;
 use super::overlap::common_pixel;
 use super::pack::{self, Pack};
 use super::{CopyName, PartStack, PixelSize, TileError};
-
-/// Build areas are at most so wide and high, in pixels, as the images that a
-/// stack's reader takes.
-const LARGEST_SIDE: u32 = 1 << 26;
 
 /// Where copies of parts stand on a build area.
 #[derive(Clone, Debug)]
@@ -35,7 +31,7 @@ pub struct CopyPlacement {
     /// Which part, from 0.
     pub part: usize,
     /// How it lies.
-    pub turn: Turn,
+    pub turn: Orientation,
     /// The column of the build where the turned part's frame begins.
     pub left: u32,
     /// The row of the build where it begins.
@@ -46,7 +42,7 @@ pub struct CopyPlacement {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RequestedPlacement {
     pub(super) part: usize,
-    pub(super) turn: Turn,
+    pub(super) turn: Orientation,
     pub(super) left: i64,
     pub(super) top: i64,
 }
@@ -73,7 +69,7 @@ impl Layout {
         let mut layout = Self::empty(parts, area)?;
         let gap_pixels = (gap.pixels(layout.dpi).max(0.0) - 1e-6).ceil().max(0.0) as u32;
         // Larger gaps than the area mean one copy a row as well.
-        let gap_pixels = gap_pixels.min(LARGEST_SIDE);
+        let gap_pixels = gap_pixels.min(MAX_SIDE);
         layout.placements = pack::pack(&layout, counts, gap_pixels, pack)?;
         layout.command = layout.packing_command(gap, pack);
         Ok(layout)
@@ -128,7 +124,7 @@ impl Layout {
             width: whole_pixels(area.width, dpi),
             height: whole_pixels(area.height, dpi),
         };
-        if pixels.width.max(pixels.height) > LARGEST_SIDE {
+        if pixels.width.max(pixels.height) > MAX_SIDE {
             return Err(TileError::AreaTooLarge { area_mm: area });
         }
         Ok(Self {
@@ -183,7 +179,7 @@ impl Layout {
     }
 
     /// What each way of laying a part down looks like.
-    pub fn silhouettes(&self) -> HashMap<(usize, Turn), Mask> {
+    pub fn silhouettes(&self) -> HashMap<(usize, Orientation), Mask> {
         let mut all = HashMap::new();
         for &CopyPlacement { part, turn, .. } in &self.placements {
             all.entry((part, turn)).or_insert_with(|| self.parts[part].silhouette(turn));

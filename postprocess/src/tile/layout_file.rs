@@ -16,7 +16,7 @@
 //! anticlockwise; with `"mirror": true` the image is mirrored left to right
 //! before it is turned.
 
-use lamp_stack::{Frame, Length, Size, Turn};
+use lamp_stack::{Frame, Length, Orientation, Size};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -196,7 +196,7 @@ impl Layout {
 
 impl CopyEntry {
     fn wish(&self, index: usize, part: &PartStack, area: Size) -> RequestedPlacement {
-        let turn = Turn::new(self.turn / 90, self.mirror);
+        let turn = Orientation::new(self.turn / 90, self.mirror);
         let pitch = part.dpi().pitch().mm();
         let (margin_left, margin_top) = margins(part, turn);
         let image = part.image();
@@ -222,7 +222,7 @@ fn image_of(part: &PartStack, at: &CopyPlacement) -> Frame {
 }
 
 /// How far from the turned image's left and top its frame begins.
-fn margins(part: &PartStack, turn: Turn) -> (i64, i64) {
+fn margins(part: &PartStack, turn: Orientation) -> (i64, i64) {
     let PixelSize { width, height } = part.image();
     let frame = part.frame();
     let mut left = frame.left;

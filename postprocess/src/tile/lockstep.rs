@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use lamp_stack::{Held, Layer};
+use lamp_stack::{Layer, MemorySize};
 
 use super::TileError;
 
@@ -41,7 +41,7 @@ pub(super) struct LayerSet {
     pub(super) is_first: bool,
 }
 
-impl Held for LayerSet {
+impl MemorySize for LayerSet {
     /// What the copies will take.
     fn bytes(&self) -> usize {
         let layers = self.layers.iter().zip(self.copies.iter());

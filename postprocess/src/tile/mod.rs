@@ -26,7 +26,7 @@ mod tile_tests;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use lamp_stack::{Image, Layer, Length, Mask, Op, Size, Turn, map_in_order};
+use lamp_stack::{Image, Layer, Length, Mask, Op, Orientation, Size, map_in_order};
 
 use compose::{ComposeError, PlacedImage};
 use lockstep::{LayerSet, Lockstep};
@@ -203,19 +203,19 @@ impl Layout {
         let mut turned = Vec::new();
         for (part, image) in images {
             for (turn, at) in self.places_by_turn(*part) {
-                turned.push(OrientedImage { image: image.turned(turn)?, at });
+                turned.push(OrientedImage { image: image.oriented(turn)?, at });
             }
         }
         Some(turned)
     }
 
     /// For each way in which copies of a part lie, where they stand.
-    fn places_by_turn(&self, part: usize) -> Vec<(Turn, Vec<(u32, u32)>)> {
-        let mut places: HashMap<Turn, Vec<(u32, u32)>> = HashMap::new();
+    fn places_by_turn(&self, part: usize) -> Vec<(Orientation, Vec<(u32, u32)>)> {
+        let mut places: HashMap<Orientation, Vec<(u32, u32)>> = HashMap::new();
         for at in self.placements.iter().filter(|at| at.part == part) {
             places.entry(at.turn).or_default().push((at.left, at.top));
         }
-        let turns = Turn::ALL.into_iter();
+        let turns = Orientation::ALL.into_iter();
         turns.filter_map(|turn| Some((turn, places.remove(&turn)?))).collect()
     }
 }

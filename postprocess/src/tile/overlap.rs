@@ -1,6 +1,6 @@
 //! Whether two copies lie on each other.
 
-use lamp_stack::Mask;
+use lamp_stack::{Mask, white_runs};
 
 use super::CopyPlacement;
 
@@ -34,5 +34,5 @@ pub(super) fn common_pixel(masks: [&Mask; 2], at: [&CopyPlacement; 2]) -> Option
 
 /// The white runs of a row that is shifted to the right.
 fn runs(row: &[u32], width: u32, left: u32) -> impl Iterator<Item = (u32, u32)> {
-    row.chunks(2).map(move |run| (left + run[0], left + run.get(1).unwrap_or(&width)))
+    white_runs(row, width).map(move |(start, end)| (left + start, left + end))
 }

@@ -1,7 +1,7 @@
 //! A part as it is placed: its size, and its outline where that is known.
 
 use lamp_stack::{
-    Dpi, Frame, GrayMask, Image, Layer, LevelChange, Mask, MaskBuilder, Op, StackInfo, Turn,
+    Dpi, Frame, GrayMask, Image, Layer, LevelChange, Mask, MaskBuilder, Op, Orientation, StackInfo,
 };
 
 use super::{PixelSize, TileError};
@@ -92,7 +92,7 @@ impl PartStack {
     }
 
     /// What is placed, in pixels, when it is turned.
-    pub fn size(&self, turn: Turn) -> PixelSize {
+    pub fn size(&self, turn: Orientation) -> PixelSize {
         let (width, height) = turn.size(self.frame.width, self.frame.height);
         PixelSize { width, height }
     }
@@ -103,8 +103,8 @@ impl PartStack {
     }
 
     /// The outline, or all of the frame where it is not known.
-    pub(super) fn silhouette(&self, turn: Turn) -> Mask {
-        let outline = self.outline.as_ref().and_then(|outline| outline.turned(turn));
+    pub(super) fn silhouette(&self, turn: Orientation) -> Mask {
+        let outline = self.outline.as_ref().and_then(|outline| outline.oriented(turn));
         let size = self.size(turn);
         outline.unwrap_or_else(|| {
             let mut mask = MaskBuilder::new(size.width);

@@ -291,7 +291,7 @@ proptest! {
                 };
                 let Some(image) = stacks[at.part].get(k) else { continue };
                 let expected = image.framed(layout.parts()[at.part].frame());
-                let found = built.image.framed(place).turned(at.turn.inverse()).unwrap();
+                let found = built.image.framed(place).oriented(at.turn.inverse()).unwrap();
                 for row in 0..expected.height() {
                     for column in 0..expected.width() {
                         let wanted = level(&expected, column, row);
@@ -300,7 +300,7 @@ proptest! {
                     }
                 }
                 // Take the copy away: at last nothing is left.
-                let around = expected.turned(at.turn).unwrap().framed(Frame {
+                let around = expected.oriented(at.turn).unwrap().framed(Frame {
                     left: -place.left, top: -place.top, width: 60, height: 40,
                 });
                 rest = rest.combined(lamp_stack::Op::Xor, &around).unwrap();
@@ -311,7 +311,7 @@ proptest! {
 
     #[test]
     fn every_turn_of_a_copy_turns_back(stack in any::<bool>().prop_flat_map(arbitrary_stack), turn in 0usize..8) {
-        let turn = Turn::ALL[turn];
+        let turn = Orientation::ALL[turn];
         let first = layer(0, stack[0].clone());
         let text = format!(
             r#"{{"copies": [{{"part": "p", "x_mm": 3, "y_mm": 2, "turn": {}, "mirror": {}}}]}}"#,
@@ -324,7 +324,7 @@ proptest! {
         prop_assert_eq!((at.left, at.top + size.height), (3, 18));
         let built = layout.build(vec![std::iter::once(Ok::<_, TileError>(first))], HeightOptions::default(), |_| {}).next();
         let place = Frame { left: 3, top: at.top.into(), width: size.width, height: size.height };
-        let cut = built.unwrap().unwrap().image.framed(place).turned(turn.inverse()).unwrap();
+        let cut = built.unwrap().unwrap().image.framed(place).oriented(turn.inverse()).unwrap();
         prop_assert_eq!(cut, stack[0].clone());
     }
 

@@ -8,7 +8,8 @@ use super::codes::{
 };
 use super::row::{LOOK, Row, TOGETHER, WIDE};
 use super::{G4Error, G4Fault};
-use crate::mask::{MOST_RUNS, Mask, MaskBuilder};
+use crate::limits::MAX_RUNS;
+use crate::mask::{Mask, MaskBuilder};
 
 /// Decodes a T.6 (CCITT Group 4) strip of `height` rows, most significant
 /// bit first, into a mask. T.6's white is black (0).
@@ -23,7 +24,7 @@ use crate::mask::{MOST_RUNS, Mask, MaskBuilder};
 /// Source: ITU-T Recommendation T.6, section 2.2.
 pub fn decode(strip: &[u8], width: u32, height: u32) -> Result<Mask, G4Error> {
     let mut mask = MaskBuilder::new(width);
-    decode_rows(strip, width, height, &mut mask)?;
+    decode_rows(strip, width, height, MAX_RUNS, &mut mask)?;
     Ok(mask.finish())
 }
 
@@ -32,6 +33,7 @@ pub(crate) fn decode_rows(
     strip: &[u8],
     width: u32,
     height: u32,
+    max_runs: usize,
     mask: &mut MaskBuilder,
 ) -> Result<(), G4Error> {
     let mut bits = BitReader::new(strip);
@@ -49,7 +51,7 @@ pub(crate) fn decode_rows(
         decode_row(&mut bits, &above, &mut row, width)
             .map_err(|fault| G4Error { row: index, fault })?;
         mask.push_padded(&row.places, row.len);
-        if mask.transition_count() > MOST_RUNS {
+        if mask.transition_count() > max_runs {
             return Err(G4Error { row: index, fault: G4Fault::TooManyRuns });
         }
         std::mem::swap(&mut above, &mut row);

@@ -4,7 +4,7 @@ use super::codes::EOL;
 use super::decode::{BitReader, decode_row};
 use super::row::Row;
 use super::{G4Error, G4Fault};
-use crate::mask::{MOST_RUNS, MaskBuilder};
+use crate::mask::MaskBuilder;
 
 /// The kinds of Group 3 that TIFF knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +34,7 @@ pub(crate) fn decode_group3_rows(
     strip: &[u8],
     width: u32,
     height: u32,
+    max_runs: usize,
     mask: &mut MaskBuilder,
 ) -> Result<(), G4Error> {
     let mut rows = Rows { bits: BitReader::new(strip), kind, ends_of_line: false };
@@ -46,7 +47,7 @@ pub(crate) fn decode_group3_rows(
             rows.runs(&mut row, width).map_err(failed)?;
         }
         mask.push_padded(&row.places, row.len);
-        if mask.transition_count() > MOST_RUNS {
+        if mask.transition_count() > max_runs {
             return Err(failed(G4Fault::TooManyRuns));
         }
         std::mem::swap(&mut above, &mut row);
@@ -197,7 +198,7 @@ mod tests {
 
     fn decode(strip: &[u8], kind: Group3, width: u32, height: u32) -> Result<Mask, G4Error> {
         let mut mask = MaskBuilder::new(width);
-        decode_group3_rows(kind, strip, width, height, &mut mask)?;
+        decode_group3_rows(kind, strip, width, height, crate::MAX_RUNS, &mut mask)?;
         Ok(mask.finish())
     }
 

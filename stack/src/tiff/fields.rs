@@ -15,14 +15,8 @@ use super::tags::{
 use crate::error::StackError;
 use crate::layer::PageInfo;
 use crate::length::Dpi;
-
-/// Images are at most this wide and high: columns and their sums fit in 32
-/// bits with room to spare.
-pub(crate) const LARGEST_SIDE: u64 = 1 << 26;
-
-/// Images that are turned become at most this high: a row costs memory, and
-/// unlike a row that is stored, no data.
-const HIGHEST_TURNED: u32 = 1 << 22;
+use crate::limits::Limits;
+use crate::orientation::Orientation;
 
 /// The tags that are looked at.
 pub(super) const KNOWN: [u16; 21] = [
@@ -53,6 +47,7 @@ pub(super) const KNOWN: [u16; 21] = [
 pub(super) struct Fields {
     pub(super) page: u32,
     pub(super) little_endian: bool,
+    pub(super) limits: Limits,
     /// By tag: the field's type and bytes.
     pub(super) values: HashMap<u16, (u16, Vec<u8>)>,
 }
@@ -83,7 +78,7 @@ impl Fields {
 
     fn side(&self, tag: u16) -> Result<u32, StackError> {
         match self.number(tag)? {
-            side @ 1..=LARGEST_SIDE => Ok(side as u32),
+            side if (1..=self.limits.side.into()).contains(&side) => Ok(side as u32),
             side => Err(malformed(self.page, format!("it claims a side of {side} pixels"))),
         }
     }
@@ -120,17 +115,17 @@ impl Fields {
                 return Err(self.unsupported(format!("photometric interpretation {other}")));
             }
         };
-        let orientation = match self.number_or(ORIENTATION, 1)? {
-            orientation @ 1..=8 => orientation as u8,
-            other => return Err(malformed(self.page, format!("there is no orientation {other}"))),
-        };
+        let tag = self.number_or(ORIENTATION, 1)?;
+        let orientation = Orientation::of_tiff_tag(tag)
+            .ok_or_else(|| malformed(self.page, format!("there is no orientation {tag}")))?;
         let (width, height) = (self.side(IMAGE_WIDTH)?, self.side(IMAGE_LENGTH)?);
-        if orientation >= 5 && width > HIGHEST_TURNED {
+        if orientation.is_across() && width > self.limits.rows_from_columns {
             let what = format!("it claims {width} columns, too many to turn it upright");
             return Err(malformed(self.page, what));
         }
         Ok(Page {
             number: self.page,
+            limits: self.limits,
             info: self.info(),
             dpi: self.dpi(),
             width,

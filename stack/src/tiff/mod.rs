@@ -23,7 +23,6 @@ mod tiles;
 mod unpack;
 mod write;
 
-pub(crate) use fields::LARGEST_SIDE;
 pub(crate) use page::bit_transitions;
 pub use page::{Compression, Page};
 pub use read::PageReader;

@@ -7,9 +7,10 @@ use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
 use crate::layer::{Image, Layer, PageInfo};
 use crate::length::Dpi;
-use crate::mask::{MOST_RUNS, Mask, MaskBuilder};
-use crate::ordered::Held;
-use crate::orient::upright;
+use crate::limits::Limits;
+use crate::mask::{Mask, MaskBuilder};
+use crate::ordered::MemorySize;
+use crate::orientation::Orientation;
 use crate::png_page::{self, Header};
 use crate::tiff::fields::malformed;
 use crate::tiff::layout::Layout;
@@ -43,13 +44,14 @@ pub enum Compression {
 #[derive(Clone, Debug)]
 pub struct Page {
     pub(super) number: u32,
+    pub(super) limits: Limits,
     pub(super) info: PageInfo,
     pub(super) dpi: Option<Dpi>,
     pub(super) width: u32,
     pub(super) gray: bool,
     pub(super) white_is_zero: bool,
-    /// As in the TIFF tag: 1 to 8, 1 being upright.
-    pub(super) orientation: u8,
+    /// What sets the image upright.
+    pub(super) orientation: Orientation,
     pub(super) compression: Compression,
     /// Whether gray levels are stored as differences to the left.
     pub(super) differences: bool,
@@ -62,7 +64,7 @@ pub struct Page {
 /// hold fewer than its length promises.
 const MOST_RESERVED: usize = 1 << 20;
 
-impl Held for Page {
+impl MemorySize for Page {
     fn bytes(&self) -> usize {
         // A code of one to four bits makes a transition of four bytes; what is
         // packed may be anything.
@@ -76,16 +78,17 @@ impl Held for Page {
 
 impl Page {
     /// A page that is a PNG file.
-    pub(super) fn of_png(number: u32, header: Header, file: Vec<u8>) -> Self {
+    pub(super) fn of_png(number: u32, limits: Limits, header: Header, file: Vec<u8>) -> Self {
         let Header { width, height, gray, dpi, info } = header;
         Self {
             number,
+            limits,
             info: info.unwrap_or(PageInfo { index: number, ..PageInfo::default() }),
             dpi,
             width,
             gray,
             white_is_zero: false,
-            orientation: 1,
+            orientation: Orientation::default(),
             compression: Compression::Png,
             differences: false,
             layout: Layout::strips(width, height, height),
@@ -116,12 +119,17 @@ impl Page {
     pub fn decode(mut self) -> Result<Layer, StackError> {
         let image = match self.gray {
             _ if self.compression == Compression::Png => {
-                png_page::decode(&self.pieces[0]).map_err(|fault| fault.on(self.number))?
+                png_page::decode(&self.pieces[0], &self.limits)
+                    .map_err(|fault| fault.on(self.number))?
             }
             true => Image::Gray(self.decode_gray()?),
             false => Image::Mask(self.decode_mask()?),
         };
-        let image = upright(image, self.orientation).ok_or_else(|| self.too_many_runs())?;
+        let image = if self.orientation == Orientation::default() {
+            image
+        } else {
+            image.oriented(self.orientation).ok_or_else(|| self.too_many_runs())?
+        };
         Ok(Layer { info: self.info, dpi: self.dpi, image })
     }
 
@@ -183,7 +191,9 @@ impl Page {
     /// Whether a 1-bit page stands as we would write it.
     fn is_in_our_layout(&self) -> bool {
         let one_strip = self.pieces.len() == 1 && !self.layout.tiled;
-        one_strip && self.compression == Compression::G4 && self.orientation == 1
+        one_strip
+            && self.compression == Compression::G4
+            && self.orientation == Orientation::default()
     }
 
     /// The strips, or the tiles side by side, and the rows of the page that
@@ -200,16 +210,18 @@ impl Page {
         mask: &mut MaskBuilder,
     ) -> Result<(), StackError> {
         let (width, height) = (self.layout.width, rows.end - rows.start);
-        let group3 = |kind, mask: &mut _| g4::decode_group3_rows(kind, piece, width, height, mask);
+        let max_runs = self.limits.runs;
+        let group3 =
+            |kind, mask: &mut _| g4::decode_group3_rows(kind, piece, width, height, max_runs, mask);
         let decoded = match self.compression {
             Compression::ModifiedHuffman => group3(Group3::ModifiedHuffman, mask),
             Compression::Group3 => group3(Group3::OneDimensional, mask),
             Compression::Group3TwoDimensional => group3(Group3::TwoDimensional, mask),
-            Compression::G4 => g4::decode_rows(piece, width, height, mask),
+            Compression::G4 => g4::decode_rows(piece, width, height, max_runs, mask),
             _ => {
                 return self.unpack(piece, width.div_ceil(8), height, |row| {
                     mask.push_checked(&bit_transitions(row, width));
-                    mask.transition_count() <= MOST_RUNS
+                    mask.transition_count() <= max_runs
                 });
             }
         };
@@ -225,7 +237,7 @@ impl Page {
         self.unpack(piece, self.layout.width, height, |row| {
             let levels = row.iter().map(|&(length, byte)| (length, byte ^ flip));
             gray.push_runs(levels).expect("rows are cut to the width");
-            gray.change_count() <= MOST_RUNS
+            gray.change_count() <= self.limits.runs
         })
     }
 
@@ -250,7 +262,7 @@ impl Page {
     }
 
     fn check_runs(&self, runs: usize) -> Result<(), StackError> {
-        if runs > MOST_RUNS { Err(self.too_many_runs()) } else { Ok(()) }
+        if runs > self.limits.runs { Err(self.too_many_runs()) } else { Ok(()) }
     }
 
     fn too_many_runs(&self) -> StackError {

@@ -9,21 +9,15 @@ use super::page::Page;
 use super::source::Source;
 use super::tags::{FILL_ORDER, type_size};
 use crate::error::StackError;
+use crate::limits::Limits;
 use crate::png_page;
-
-/// More directory entries than any TIFF writer makes.
-const MOST_ENTRIES: u64 = 4096;
-/// More bytes than any text or table of strips of a page takes. Numbers and
-/// JSON take up to a hundred times their bytes once they are read.
-const LONGEST_VALUE: u64 = 2 << 20;
-/// More bytes than any PNG of a page has: an endless stream must end.
-const MOST_PNG_BYTES: u64 = 1 << 30;
 
 /// Reads pages one after the other, from a stream (forward only) or from a
 /// file (any order). A PNG is a page of its own.
 #[derive(Debug)]
 pub struct PageReader {
     source: Source,
+    limits: Limits,
     png: bool,
     big: bool,
     little_endian: bool,
@@ -51,6 +45,11 @@ impl PageReader {
     /// Where the file is empty or does not start as a TIFF or a PNG.
     pub fn from_file(file: File) -> Result<Self, StackError> {
         Self::new(Source::File { file: BufReader::with_capacity(1 << 18, file), position: 0 })
+    }
+
+    /// Returns the reader with these limits instead of the default ones.
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits: limits.within_images(), ..self }
     }
 
     fn new(mut source: Source) -> Result<Self, StackError> {
@@ -90,6 +89,7 @@ impl PageReader {
         let next = if png { 8 } else { number(&start, little_endian) };
         Ok(Self {
             source,
+            limits: Limits::default(),
             png,
             big,
             little_endian,
@@ -150,7 +150,7 @@ impl PageReader {
     fn read_directory(&mut self) -> Result<(Vec<Entry>, u64), StackError> {
         let (count_size, entry_size, word) = if self.big { (8, 20, 8) } else { (2, 12, 4) };
         let count = number(&self.read(self.next, count_size)?, self.little_endian);
-        if count > MOST_ENTRIES {
+        if count > self.limits.directory_entries {
             return Err(malformed(self.number, format!("its directory claims {count} entries")));
         }
         let bytes = self.read(self.next + count_size, count * entry_size + word)?;
@@ -170,15 +170,19 @@ impl PageReader {
     /// The values of the fields that matter, read in the order in which they
     /// stand.
     fn read_values(&mut self, entries: &[Entry]) -> Result<Fields, StackError> {
-        let mut fields =
-            Fields { page: self.number, little_endian: self.little_endian, values: HashMap::new() };
+        let mut fields = Fields {
+            page: self.number,
+            little_endian: self.little_endian,
+            limits: self.limits,
+            values: HashMap::new(),
+        };
         let mut distant = Vec::new();
         let mut seen = HashSet::new();
         // The first entry of a tag counts, as for libtiff.
         let first = |entry: &&Entry| KNOWN.contains(&entry.tag) && seen.insert(entry.tag);
         for entry in entries.iter().filter(first) {
             let length = entry.count.saturating_mul(type_size(entry.kind));
-            if length > LONGEST_VALUE {
+            if length > self.limits.field_bytes {
                 let what = format!("its tag {} claims {length} bytes", entry.tag);
                 return Err(malformed(self.number, what));
             }
@@ -233,8 +237,9 @@ impl PageReader {
                 return Err(malformed(self.number, "its PNG has bytes between its chunks"));
             }
             file.extend_from_slice(&head);
-            if file.len() as u64 + length > MOST_PNG_BYTES {
-                let what = format!("its PNG has more than {MOST_PNG_BYTES} bytes");
+            let most = self.limits.png_bytes;
+            if file.len() as u64 + length > most {
+                let what = format!("its PNG has more than {most} bytes");
                 return Err(malformed(self.number, what));
             }
             // The data, and its checksum.
@@ -244,8 +249,9 @@ impl PageReader {
                 break;
             }
         }
-        let header = png_page::header(&file).map_err(|fault| fault.on(self.number))?;
-        Ok(Page::of_png(self.number, header, file))
+        let header =
+            png_page::header(&file, &self.limits).map_err(|fault| fault.on(self.number))?;
+        Ok(Page::of_png(self.number, self.limits, header, file))
     }
 }
 

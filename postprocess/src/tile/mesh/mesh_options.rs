@@ -1,6 +1,6 @@
 //! What a mesh is to be.
 
-use lamp_stack::{Dpi, Length, MOST_RUNS, Mask};
+use lamp_stack::{Dpi, Length, MAX_RUNS, Mask};
 
 use super::super::{PixelSize, TileError};
 use super::lattice::{Cells, Lattice};
@@ -135,7 +135,7 @@ impl MeshOptions {
                 rows as f64 * f64::from(build.width) / f64::from(image.width())
             }
         };
-        if runs_of_row * f64::from(build.height) > MOST_RUNS as f64 / 2.0 {
+        if runs_of_row * f64::from(build.height) > MAX_RUNS as f64 / 2.0 {
             return Err(TileError::FineMesh);
         }
         Ok(match &self.pattern {

@@ -15,7 +15,7 @@ mod mesh_options;
 #[cfg(test)]
 mod mesh_tests;
 
-use lamp_stack::{Frame, Image, Length, Mask, MaskBuilder, Op, place_row};
+use lamp_stack::{Frame, Image, Length, Mask, MaskBuilder, Op, place_row, white_runs};
 
 use self::break_lines::{BreakLines, Rect};
 use self::lattice::{Lattice, toggle};
@@ -192,18 +192,18 @@ fn inlaid(mut wall: &[u32], free: &[u32], mut part: &[u32], width: u32, out: &mu
     out.clear();
     // Whether the walls that are left begin white.
     let mut is_wall = false;
-    for hole in free.chunks(2) {
-        let before = wall.partition_point(|&column| column < hole[0]);
+    for (start, end) in white_runs(free, width) {
+        let before = wall.partition_point(|&column| column < start);
         out.extend_from_slice(&wall[..before]);
         wall = &wall[before..];
         is_wall ^= before % 2 == 1;
         if is_wall {
-            toggle(hole[0], width, out);
+            toggle(start, width, out);
         }
-        let Some(&end) = hole.get(1) else {
+        if end == width {
             part.iter().for_each(|&column| toggle(column, width, out));
             return;
-        };
+        }
         let within = part.partition_point(|&column| column <= end);
         part[..within].iter().for_each(|&column| toggle(column, width, out));
         part = &part[within..];

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lamp_stack::Turn;
+use lamp_stack::Orientation;
 
 use super::super::{CopyPlacement, Layout, PixelSize};
 use super::Turns;
@@ -32,14 +32,14 @@ pub(super) fn place(
 ) -> Vec<CopyPlacement> {
     let mut free = FreeRoom { layout, shapes, taken: HashMap::new(), placements: Vec::new() };
     let area = |part: &usize| {
-        let PixelSize { width, height } = layout.parts()[*part].size(Turn::default());
+        let PixelSize { width, height } = layout.parts()[*part].size(Orientation::default());
         std::cmp::Reverse(u64::from(width) * u64::from(height))
     };
     let mut parts: Vec<usize> = (0..wanted.len()).collect();
     parts.sort_by_key(area);
     for part in parts {
-        let ways: Vec<Turn> =
-            turns.all().iter().map(|&quarters| Turn::new(quarters, false)).collect();
+        let ways: Vec<Orientation> =
+            turns.all().iter().map(|&quarters| Orientation::new(quarters, false)).collect();
         for _ in 0..wanted[part] {
             if !free.place(part, &ways, order) {
                 break;
@@ -57,7 +57,7 @@ struct FreeRoom<'a> {
     layout: &'a Layout,
     shapes: &'a mut NoFitRegions,
     /// Of each way a part may lie, the places that are taken.
-    taken: HashMap<(usize, Turn), TakenPlaces>,
+    taken: HashMap<(usize, Orientation), TakenPlaces>,
     placements: Vec<CopyPlacement>,
 }
 
@@ -75,7 +75,7 @@ struct TakenPlaces {
 
 impl FreeRoom<'_> {
     /// Finds a place for one more copy, if there is one.
-    fn place(&mut self, part: usize, ways: &[Turn], order: PlacingRule) -> bool {
+    fn place(&mut self, part: usize, ways: &[Orientation], order: PlacingRule) -> bool {
         let cell = self.shapes.cell;
         let found = ways.iter().filter_map(|&turn| {
             let (column, row) = self.first_place(part, turn)?;
@@ -93,7 +93,7 @@ impl FreeRoom<'_> {
     }
 
     /// The first row, and in it the first column, where a shape may begin.
-    fn first_place(&mut self, part: usize, turn: Turn) -> Option<(i32, i32)> {
+    fn first_place(&mut self, part: usize, turn: Orientation) -> Option<(i32, i32)> {
         let key = (part, turn);
         let (pixels, cell) = (self.layout.pixels(), self.shapes.cell);
         let size = self.layout.parts()[part].size(turn);

@@ -1,12 +1,17 @@
 //! Copies of one part in rows and columns.
 
-use lamp_stack::Turn;
+use lamp_stack::Orientation;
 
 use super::super::{CopyPlacement, Layout};
 
 /// Places up to so many copies of the one part in rows from the top left, the
 /// whole centred.
-pub(super) fn grid(layout: &Layout, turn: Turn, wanted: u32, gap: u32) -> Vec<CopyPlacement> {
+pub(super) fn grid(
+    layout: &Layout,
+    turn: Orientation,
+    wanted: u32,
+    gap: u32,
+) -> Vec<CopyPlacement> {
     let (part, area) = (layout.parts()[0].size(turn), layout.pixels());
     let (Some(columns), Some(rows)) =
         (most(area.width, part.width, gap), most(area.height, part.height, gap))

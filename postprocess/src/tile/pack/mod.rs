@@ -8,7 +8,7 @@ mod greedy;
 mod grid;
 mod no_fit;
 
-use lamp_stack::Turn;
+use lamp_stack::Orientation;
 
 use super::{CopyPlacement, Layout, TileError};
 use crate::names::named;
@@ -142,7 +142,7 @@ pub(super) fn pack(
     for way in how.ways(alone) {
         let found = match way {
             Strategy::Grid(quarters) => {
-                grid::grid(layout, Turn::new(quarters, false), wanted[0], gap)
+                grid::grid(layout, Orientation::new(quarters, false), wanted[0], gap)
             }
             Strategy::Greedy(by, turns, order) => {
                 let current = shapes.take().filter(|shapes| shapes.are_by(by));
@@ -177,14 +177,14 @@ pub(super) fn pack(
 fn check_fits(layout: &Layout, part: usize, turns: Turns) -> Result<(), TileError> {
     let area = layout.pixels();
     let fits = turns.all().iter().any(|&quarters| {
-        let size = layout.parts()[part].size(Turn::new(quarters, false));
+        let size = layout.parts()[part].size(Orientation::new(quarters, false));
         size.width <= area.width && size.height <= area.height
     });
     if fits {
         return Ok(());
     }
     let name = layout.parts()[part].name().to_owned();
-    let size = layout.parts()[part].size(Turn::default());
+    let size = layout.parts()[part].size(Orientation::default());
     Err(TileError::TooLarge { name, part: size, area, area_mm: layout.area() })
 }
 

@@ -9,7 +9,7 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use lamp_stack::{Frame, Mask, Turn};
+use lamp_stack::{Frame, Mask, Orientation, white_runs};
 
 use super::super::{Layout, PixelSize};
 use super::PackBy;
@@ -28,8 +28,8 @@ pub(super) struct NoFitRegions {
     gap: u32,
     /// Pixels on a side of a cell.
     pub(super) cell: u32,
-    turned: HashMap<(usize, Turn), Rc<CellOutline>>,
-    no_fits: HashMap<[(usize, Turn); 2], Rc<NoFitRegion>>,
+    turned: HashMap<(usize, Orientation), Rc<CellOutline>>,
+    no_fits: HashMap<[(usize, Orientation); 2], Rc<NoFitRegion>>,
 }
 
 /// A part's outline in cells, turned.
@@ -51,7 +51,7 @@ pub(super) struct NoFitRegion {
 impl NoFitRegions {
     pub(super) fn new(layout: &Layout, gap: u32, by: PackBy) -> Self {
         let sides = layout.parts().iter().map(|part| {
-            let PixelSize { width, height } = part.size(Turn::default());
+            let PixelSize { width, height } = part.size(Orientation::default());
             width.max(height)
         });
         let cell = match by {
@@ -74,8 +74,8 @@ impl NoFitRegions {
     pub(super) fn no_fit(
         &mut self,
         layout: &Layout,
-        moving: (usize, Turn),
-        placed: (usize, Turn),
+        moving: (usize, Orientation),
+        placed: (usize, Orientation),
     ) -> Rc<NoFitRegion> {
         if let Some(known) = self.no_fits.get(&[moving, placed]) {
             return Rc::clone(known);
@@ -95,7 +95,7 @@ impl NoFitRegions {
         no_fit
     }
 
-    fn shape(&mut self, layout: &Layout, key: (usize, Turn)) -> Rc<CellOutline> {
+    fn shape(&mut self, layout: &Layout, key: (usize, Orientation)) -> Rc<CellOutline> {
         let (gap, cell) = (self.gap, self.cell);
         let shape =
             || Rc::new(CellOutline::new(&layout.parts()[key.0].silhouette(key.1), gap, cell));
@@ -124,10 +124,8 @@ impl CellOutline {
 fn cells(mask: &Mask, cell: u32) -> Vec<Vec<CellRun>> {
     let mut rows = vec![Vec::new(); mask.height().div_ceil(cell) as usize];
     for (index, row) in (0..).zip(mask.rows()) {
-        let runs = row.chunks(2).map(|run| {
-            let end = *run.get(1).unwrap_or(&mask.width());
-            ((run[0] / cell) as i32, end.div_ceil(cell) as i32)
-        });
+        let runs = white_runs(row, mask.width());
+        let runs = runs.map(|(start, end)| ((start / cell) as i32, end.div_ceil(cell) as i32));
         rows[index / cell as usize].extend(runs);
     }
     rows.iter_mut().for_each(join_runs);

@@ -1,0 +1,463 @@
+//! Images rotated and mirrored, on runs.
+
+use std::fmt;
+use std::ops::Range;
+use std::str::FromStr;
+
+use thiserror::Error;
+
+use crate::gray::{GrayMask, LevelChange};
+use crate::layer::Image;
+use crate::limits::MAX_RUNS;
+use crate::mask::{Mask, MaskBuilder};
+
+/// One of the eight isometries of an image: mirrored left to right or not, then
+/// rotated anticlockwise by right angles, as seen with row 0 on top.
+///
+/// ```text
+///   0      90    180    270   0m     90m   180m   270m
+///   #..    .#    ###    ##    ..#    ##    ###    #.
+///   ###    .#    ..#    #.    ###    .#    #..    #.
+///          ##           #.           .#           ##
+/// ```
+///
+/// ```
+/// use lamp_stack::{Mask, Orientation};
+///
+/// let mask = Mask::new(3, vec![0, 2, 3], vec![0, 1, 0]).unwrap();
+/// let orientation: Orientation = "90m".parse().unwrap();
+/// let turned = mask.oriented(orientation).unwrap();
+/// assert_eq!((turned.width(), turned.height()), (2, 3));
+/// assert_eq!(turned.oriented(orientation.inverse()), Some(mask));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Orientation {
+    /// How many right angles, below four.
+    quarters: u8,
+    mirrored: bool,
+}
+
+/// A text that names no [`Orientation`].
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("`{0}` is no turn: write 0, 90, 180 or 270, and m behind it to mirror first")]
+pub struct OrientationError(String);
+
+impl Orientation {
+    /// All eight: the four rotations, then the same mirrored.
+    pub const ALL: [Self; 8] = {
+        let mut all = [Self { quarters: 0, mirrored: false }; 8];
+        let mut k = 0;
+        while k < 8 {
+            all[k] = Self { quarters: k as u8 % 4, mirrored: k >= 4 };
+            k += 1;
+        }
+        all
+    };
+
+    /// Mirrors left to right if `mirrored`, then rotates by `quarters` right
+    /// angles anticlockwise.
+    pub fn new(quarters: u32, mirrored: bool) -> Self {
+        Self { quarters: (quarters % 4) as u8, mirrored }
+    }
+
+    /// Returns what sets an image upright whose rows are stored as TIFF's
+    /// orientation tag says (1 to 8); `None` for other values.
+    ///
+    /// Source: TIFF 6.0, section 8, Orientation.
+    pub(crate) fn of_tiff_tag(tag: u64) -> Option<Self> {
+        let ways = ["0", "0m", "180", "180m", "90m", "270", "270m", "90"];
+        ways.get(usize::try_from(tag).ok()?.checked_sub(1)?)?.parse().ok()
+    }
+
+    /// The number of right angles of the rotation, anticlockwise: below four.
+    pub fn quarters(self) -> u32 {
+        self.quarters.into()
+    }
+
+    /// Returns true if an image is mirrored left to right before the rotation.
+    pub fn is_mirrored(self) -> bool {
+        self.mirrored
+    }
+
+    /// Returns true if rows become columns.
+    pub fn is_across(self) -> bool {
+        self.quarters % 2 == 1
+    }
+
+    /// Returns the orientation that undoes this one.
+    pub fn inverse(self) -> Self {
+        // A reflection is its own inverse.
+        let quarters = if self.mirrored { self.quarters } else { (4 - self.quarters) % 4 };
+        Self { quarters, ..self }
+    }
+
+    /// The width and height of an image of this width and height once it is
+    /// oriented.
+    pub fn size(self, width: u32, height: u32) -> (u32, u32) {
+        if self.is_across() { (height, width) } else { (width, height) }
+    }
+
+    /// Returns whether, after rows and columns are exchanged where the
+    /// orientation [`is_across`](Self::is_across), the columns and the rows are
+    /// to be reversed.
+    fn reversed(self) -> (bool, bool) {
+        let (columns, rows) = (self.quarters >= 2, matches!(self.quarters, 1 | 2));
+        if self.mirrored { (!rows, columns) } else { (columns, rows) }
+    }
+}
+
+impl fmt::Display for Orientation {
+    /// Writes `0`, `90`, `180` or `270`, and `m` behind it if mirrored.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}", u32::from(self.quarters) * 90, if self.mirrored { "m" } else { "" })
+    }
+}
+
+impl FromStr for Orientation {
+    type Err = OrientationError;
+
+    /// Parses what [`Display`](fmt::Display) writes.
+    fn from_str(text: &str) -> Result<Self, OrientationError> {
+        let known = Self::ALL.into_iter().find(|known| known.to_string() == text.trim());
+        known.ok_or_else(|| OrientationError(text.to_owned()))
+    }
+}
+
+impl Mask {
+    /// Returns the image in another orientation, or `None` if that has more
+    /// than [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
+    pub fn oriented(&self, orientation: Orientation) -> Option<Self> {
+        let mut image = if orientation.is_across() { self.transposed()? } else { self.clone() };
+        let (columns, rows) = orientation.reversed();
+        if columns {
+            image = image.with_columns_reversed();
+        }
+        Some(if rows { image.with_rows_reversed() } else { image })
+    }
+
+    /// The image with its last row first.
+    pub(crate) fn with_rows_reversed(&self) -> Self {
+        let mut mask = MaskBuilder::new(self.width());
+        mask.reserve(self.height() as usize, self.transition_count());
+        for row in (0..self.height()).rev() {
+            mask.push_checked(self.row(row));
+        }
+        mask.finish()
+    }
+
+    /// The image with its last column first.
+    pub(crate) fn with_columns_reversed(&self) -> Self {
+        let width = self.width();
+        let mut mask = MaskBuilder::new(width);
+        mask.reserve(self.height() as usize, self.transition_count());
+        let mut reversed = Vec::new();
+        for row in self.rows() {
+            reversed.clear();
+            // A row that ends white starts white when reversed, and the other
+            // way round.
+            if row.len() % 2 == 1 {
+                reversed.push(0);
+            }
+            let starts_white = row.first() == Some(&0);
+            let inner = &row[usize::from(starts_white)..];
+            reversed.extend(inner.iter().rev().map(|&column| width - column));
+            mask.push_checked(&reversed);
+        }
+        mask.finish()
+    }
+
+    /// The image with rows and columns exchanged; `None` where that has more
+    /// runs than any image may have. It costs the edges along rows.
+    pub(crate) fn transposed(&self) -> Option<Self> {
+        let (offsets, transitions) = by_column(self.width(), 0, |each| {
+            let mut above: &[u32] = &[];
+            for (row, index) in self.rows().zip(0..) {
+                stretches_that_differ(above, row, self.width(), |stretch| each(stretch, index));
+                above = row;
+            }
+        })?;
+        Some(Self::new(self.height(), offsets, transitions).expect("rows come in order"))
+    }
+}
+
+impl GrayMask {
+    /// Returns the image in another orientation, or `None` if that has more
+    /// than [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
+    pub fn oriented(&self, orientation: Orientation) -> Option<Self> {
+        let mut image = if orientation.is_across() { self.transposed()? } else { self.clone() };
+        let (columns, rows) = orientation.reversed();
+        if columns {
+            image = image.with_columns_reversed();
+        }
+        Some(if rows { image.with_rows_reversed() } else { image })
+    }
+
+    /// The image with its last row first.
+    pub(crate) fn with_rows_reversed(&self) -> Self {
+        let rows: Vec<_> = self.rows().collect();
+        let mut gray = Self::new(self.width());
+        for row in rows.into_iter().rev() {
+            gray.push_row(row).expect("it was a row of an image as wide");
+        }
+        gray
+    }
+
+    /// The image with its last column first.
+    pub(crate) fn with_columns_reversed(&self) -> Self {
+        let width = self.width();
+        let mut gray = Self::new(width);
+        for row in self.rows() {
+            let mut runs = Vec::new();
+            let mut end = width;
+            for &LevelChange { column, level } in row.iter().rev() {
+                runs.push((end - column, level));
+                end = column;
+            }
+            gray.push_runs(runs).expect("a row reversed is as long");
+        }
+        gray
+    }
+
+    /// The image with rows and columns exchanged; `None` where that has more
+    /// runs than any image may have. It costs the edges along rows.
+    pub(crate) fn transposed(&self) -> Option<Self> {
+        let blank = LevelChange { column: 0, level: 0 };
+        let (offsets, changes) = by_column(self.width(), blank, |each| {
+            let mut above: &[LevelChange] = &[];
+            for (row, index) in self.rows().zip(0..) {
+                levels_that_differ(above, row, self.width(), |stretch, level| {
+                    each(stretch, LevelChange { column: index, level });
+                });
+                above = row;
+            }
+        })?;
+        let rows = offsets.windows(2).map(|ends| &changes[ends[0] as usize..ends[1] as usize]);
+        let mut gray = Self::new(self.height());
+        for row in rows {
+            gray.push_row(row).expect("rows come in order");
+        }
+        Some(gray)
+    }
+}
+
+impl Image {
+    /// Returns the image in another orientation, or `None` if that has more
+    /// than [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
+    pub fn oriented(&self, orientation: Orientation) -> Option<Self> {
+        Some(match self {
+            Self::Mask(mask) => Self::Mask(mask.oriented(orientation)?),
+            Self::Gray(gray) => Self::Gray(gray.oriented(orientation)?),
+        })
+    }
+}
+
+/// Gives each stretch of columns where two rows of a mask differ.
+fn stretches_that_differ(above: &[u32], row: &[u32], width: u32, mut each: impl FnMut(Range<u32>)) {
+    let (mut i, mut j) = (0, 0);
+    let mut start = None;
+    loop {
+        let (a, b) = (above.get(i), row.get(j));
+        let Some(&column) = a.into_iter().chain(b).min() else { break };
+        i += usize::from(a == Some(&column));
+        j += usize::from(b == Some(&column));
+        if a != b {
+            match start.take() {
+                None => start = Some(column),
+                Some(start) => each(start..column),
+            }
+        }
+    }
+    if let Some(start) = start {
+        each(start..width);
+    }
+}
+
+/// Gives each stretch of columns where two rows of a gray mask differ, and the
+/// second row's level there.
+fn levels_that_differ(
+    above: &[LevelChange],
+    row: &[LevelChange],
+    width: u32,
+    mut each: impl FnMut(Range<u32>, u8),
+) {
+    let (mut i, mut j) = (0, 0);
+    let (mut start, mut level_above, mut level) = (0, 0, 0);
+    while start < width {
+        let (a, b) = (above.get(i), row.get(j));
+        let column = a.into_iter().chain(b).map(|change| change.column).min().unwrap_or(width);
+        if level_above != level && start < column {
+            each(start..column, level);
+        }
+        if let Some(change) = a.filter(|change| change.column == column) {
+            level_above = change.level;
+            i += 1;
+        }
+        if let Some(change) = b.filter(|change| change.column == column) {
+            level = change.level;
+            j += 1;
+        }
+        start = column;
+    }
+}
+
+/// Gathers values that `visit` gives for stretches of columns, by column: where
+/// each column's values start (and one entry more), and the values. `visit` is
+/// called several times and must give the same each time. `None` where the
+/// values are more than the runs that an image may have.
+fn by_column<T: Copy>(
+    width: u32,
+    blank: T,
+    visit: impl Fn(&mut dyn FnMut(Range<u32>, T)),
+) -> Option<(Vec<u32>, Vec<T>)> {
+    let mut total = 0u64;
+    visit(&mut |stretch, _| total += u64::from(stretch.end - stretch.start));
+    if total > MAX_RUNS as u64 {
+        return None;
+    }
+    // At each column, how many values more than the column before it has.
+    let mut starts = vec![0u32; width as usize + 1];
+    visit(&mut |stretch, _| {
+        for (column, step) in [(stretch.start, 1), (stretch.end, u32::MAX)] {
+            let more = &mut starts[column as usize];
+            *more = more.wrapping_add(step);
+        }
+    });
+    let (mut start, mut count) = (0u32, 0u32);
+    for column in &mut starts {
+        count = count.wrapping_add(*column);
+        *column = start;
+        start += count;
+    }
+    let mut values = vec![blank; total as usize];
+    visit(&mut |stretch, value| {
+        for next in &mut starts[stretch.start as usize..stretch.end as usize] {
+            values[*next as usize] = value;
+            *next += 1;
+        }
+    });
+    // Each column's start has become its end, which is the next one's start.
+    starts.copy_within(..width as usize, 1);
+    starts[0] = 0;
+    Some((starts, values))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{arbitrary_gray, arbitrary_mask, level, mask_of};
+
+    fn drawn(mask: &Mask) -> Vec<String> {
+        let pixel = |column, row| if mask.is_white(column, row) { '#' } else { '.' };
+        let row = |row| (0..mask.width()).map(|column| pixel(column, row)).collect();
+        (0..mask.height()).map(row).collect()
+    }
+
+    #[test]
+    fn images_lie_as_drawn() {
+        let mask = mask_of(3, [&[0, 1][..], &[0]]);
+        let ways = [
+            ("0", vec!["#..", "###"]),
+            ("90", vec![".#", ".#", "##"]),
+            ("180", vec!["###", "..#"]),
+            ("270", vec!["##", "#.", "#."]),
+            ("0m", vec!["..#", "###"]),
+            ("90m", vec!["##", ".#", ".#"]),
+            ("180m", vec!["###", "#.."]),
+            ("270m", vec!["#.", "#.", "##"]),
+        ];
+        for (way, picture) in ways {
+            assert_eq!(drawn(&mask.oriented(way.parse().unwrap()).unwrap()), picture, "{way}");
+        }
+    }
+
+    #[test]
+    fn orientations_are_written_as_they_are_read() {
+        for orientation in Orientation::ALL {
+            assert_eq!(orientation.to_string().parse(), Ok(orientation));
+            let Orientation { quarters, mirrored } = orientation;
+            assert_eq!(Orientation::new(u32::from(quarters) + 4, mirrored), orientation);
+        }
+        for wrong in ["", "m", "45", "-90", "90 m", "m90", "360"] {
+            assert!(wrong.parse::<Orientation>().is_err(), "{wrong}");
+        }
+    }
+
+    /// Where a point of a turned image comes from, by the definition: x to the
+    /// right and y up from the middle, in half pixels.
+    fn source(orientation: Orientation, (mut x, mut y): (i64, i64)) -> (i64, i64) {
+        for _ in 0..orientation.quarters() {
+            (x, y) = (y, -x);
+        }
+        (if orientation.is_mirrored() { -x } else { x }, y)
+    }
+
+    fn check(image: &Image) {
+        let [width, height] = [image.width(), image.height()].map(i64::from);
+        for orientation in Orientation::ALL {
+            let turned = image.oriented(orientation).unwrap();
+            let size = orientation.size(image.width(), image.height());
+            assert_eq!((turned.width(), turned.height()), size);
+            assert_eq!(turned.oriented(orientation.inverse()).unwrap(), *image);
+            for (row, column) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (y, x))) {
+                let x = 2 * i64::from(column) + 1 - i64::from(size.0);
+                let y = i64::from(size.1) - 2 * i64::from(row) - 1;
+                let (x, y) = source(orientation, (x, y));
+                let expected = level(image, ((x + width) / 2) as u32, ((height - y) / 2) as u32);
+                assert_eq!(level(&turned, column, row), expected, "{orientation} {column} {row}");
+            }
+        }
+    }
+
+    /// Where the pixel of an upright image stands in an image of `width` and
+    /// `height` that is stored with an orientation tag, as TIFF 6.0 words it.
+    fn stored_at(tag: u64, x: u32, y: u32, width: u32, height: u32) -> (u32, u32) {
+        match tag {
+            1 => (x, y),
+            2 => (width - 1 - x, y),
+            3 => (width - 1 - x, height - 1 - y),
+            4 => (x, height - 1 - y),
+            5 => (y, x),
+            6 => (y, height - 1 - x),
+            7 => (width - 1 - y, height - 1 - x),
+            8 => (width - 1 - y, x),
+            _ => unreachable!(),
+        }
+    }
+
+    #[test]
+    fn tiff_s_tags_are_undone() {
+        let image = Image::Mask(mask_of(3, [&[0, 1][..], &[0]]));
+        for tag in 1..=8 {
+            let upright = image.oriented(Orientation::of_tiff_tag(tag).unwrap()).unwrap();
+            for (x, y) in
+                (0..upright.width()).flat_map(|x| (0..upright.height()).map(move |y| (x, y)))
+            {
+                let (column, row) = stored_at(tag, x, y, 3, 2);
+                assert_eq!(level(&upright, x, y), level(&image, column, row), "tag {tag}");
+            }
+        }
+        assert_eq!([0, 9, u64::MAX].map(Orientation::of_tiff_tag), [None; 3]);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        #[test]
+        fn every_pixel_comes_from_its_place(mask in arbitrary_mask(), gray in arbitrary_gray()) {
+            prop_assume!(mask.width() < 3000);
+            check(&Image::Mask(mask));
+            check(&Image::Gray(gray));
+        }
+    }
+
+    #[test]
+    fn an_image_that_transposed_has_too_many_runs_is_refused() {
+        let mut mask = MaskBuilder::new(1 << 26);
+        for row in 0..4 {
+            mask.push_checked(if row % 2 == 0 { &[0] } else { &[] });
+        }
+        assert_eq!(mask.finish().transposed(), None);
+    }
+}
