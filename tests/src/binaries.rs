@@ -40,22 +40,25 @@ fn folder_above(path: &Path) -> PathBuf {
     path.parent().expect("tests run in target/<profile>/deps").to_owned()
 }
 
-/// Cargo builds a package's binaries for that package's own tests only, so
-/// they are built here, with the profile of this test.
+/// Builds the binaries with the profile of this test: cargo does so by itself
+/// only for tests of the package that has them.
+///
+/// The whole workspace is named, so that the features of shared crates are those
+/// of `cargo test --workspace`, which has built all but the binaries by then.
 fn build() {
     let folder = profile_dir();
     let profile = match folder.file_name().and_then(|name| name.to_str()) {
         Some("debug") | None => "dev",
         Some(name) => name,
     };
-    let features = if cfg!(feature = "occt") { "occt" } else { "" };
+    let features = if cfg!(feature = "occt") { "lamp-cli/occt" } else { "" };
     let built = Command::new(env!("CARGO"))
-        .args(["build", "--package", "lamp-cli", "--bins", "--profile", profile])
+        .args(["build", "--workspace", "--bins", "--profile", profile])
         .args(["--features", features, "--target-dir"])
         .arg(target_dir())
         .current_dir(workspace_root())
         .output()
         .expect("cargo starts");
-    let said = String::from_utf8_lossy(&built.stderr);
-    assert!(built.status.success(), "the binaries do not build:\n{said}");
+    let stderr = String::from_utf8_lossy(&built.stderr);
+    assert!(built.status.success(), "the binaries do not build:\n{stderr}");
 }
