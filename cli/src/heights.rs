@@ -1,6 +1,6 @@
 //! How thick each layer is, as options say.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, Heights, HeightsError, Machine, Part, Search, Slab,
     VolumeDeviation,
@@ -10,8 +10,7 @@ use lamp_slicer::{Body, Fill};
 use lamp_stack::{Dpi, Length};
 
 use crate::exposure::Exposure;
-use crate::options::parse_thickness;
-use crate::solid::value_name;
+use crate::options::{one_of, parse_thickness};
 use crate::stop::Stop;
 
 pub(crate) const HEADING: &str = "Adaptive layer heights";
@@ -37,8 +36,8 @@ pub(crate) struct HeightOptions {
     /// How far a layer is off the part: by the volume it lacks and has too much, by the cusps at
     /// its edge, or by how the section's area changes [default: volume, or cusp where --cusp is
     /// given]
-    #[arg(long, value_enum, help_heading = HEADING)]
-    criterion: Option<CriterionArg>,
+    #[arg(long, value_parser = one_of::<Measure>(), help_heading = HEADING)]
+    criterion: Option<Measure>,
 
     /// The most that a layer may be off, as a share of its volume (or, by --criterion area, of its
     /// section): 2% or 0.02 [default: 2%]
@@ -75,13 +74,6 @@ pub(crate) struct HeightOptions {
     row_pitch: Option<Length>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum CriterionArg {
-    Volume,
-    Cusp,
-    Area,
-}
-
 /// The layers found, and the bound that they keep.
 pub(crate) struct Found {
     pub(crate) measure: Measure,
@@ -90,24 +82,30 @@ pub(crate) struct Found {
 }
 
 /// What is measured of a layer, and in which unit.
-#[derive(Clone, Copy)]
-pub(crate) struct Measure(CriterionArg);
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Measure {
+    Volume,
+    Cusp,
+    Area,
+}
+
+lamp_stack::named!(Measure { Volume = "volume", Cusp = "cusp", Area = "area" });
 
 impl Measure {
     pub(crate) fn criterion(self) -> &'static dyn Criterion {
-        match self.0 {
-            CriterionArg::Volume => &VolumeDeviation,
-            CriterionArg::Cusp => &CuspHeight,
-            CriterionArg::Area => &AreaDeviation,
+        match self {
+            Self::Volume => &VolumeDeviation,
+            Self::Cusp => &CuspHeight,
+            Self::Area => &AreaDeviation,
         }
     }
 
     /// `2.00%`, `10.0um`.
     pub(crate) fn text(self, measure: f64) -> String {
-        match self.0 {
+        match self {
             _ if measure.is_infinite() => "none".to_owned(),
-            CriterionArg::Cusp => format!("{}um", significant(measure)),
-            CriterionArg::Volume | CriterionArg::Area => {
+            Self::Cusp => format!("{}um", significant(measure)),
+            Self::Volume | Self::Area => {
                 format!("{}%", significant(measure * 100.0))
             }
         }
@@ -117,7 +115,7 @@ impl Measure {
 impl Found {
     /// `volume 2.00%`.
     pub(crate) fn bound(&self) -> String {
-        format!("{} {}", value_name(&self.measure.0), self.measure.text(self.bound))
+        format!("{} {}", self.measure, self.measure.text(self.bound))
     }
 
     /// How many layers are farther off.
@@ -175,17 +173,17 @@ impl HeightOptions {
     /// Checks, before the work, what the parser cannot.
     pub(crate) fn check(&self, exposure: Option<&Exposure>) -> Result<(), Stop> {
         self.machine()?;
-        self.criterion()?;
+        self.measure()?;
         if self.time_budget.is_some() {
             let _ = self.seconds_of_layers(exposure)?;
         }
         Ok(())
     }
 
-    fn criterion(&self) -> Result<CriterionArg, Stop> {
-        let default = if self.cusp.is_some() { CriterionArg::Cusp } else { CriterionArg::Volume };
+    fn measure(&self) -> Result<Measure, Stop> {
+        let default = if self.cusp.is_some() { Measure::Cusp } else { Measure::Volume };
         let criterion = self.criterion.unwrap_or(default);
-        match (criterion == CriterionArg::Cusp, self.cusp.is_some()) {
+        match (criterion == Measure::Cusp, self.cusp.is_some()) {
             (false, true) => Err(Stop::usage("--cusp goes with --criterion cusp")),
             (true, false) if self.deviation.is_some() || !self.has_budget() => {
                 Err(Stop::usage("--criterion cusp takes its bound from --cusp, as --cusp 10um"))
@@ -197,7 +195,7 @@ impl HeightOptions {
     /// Searches for the heights.
     pub(crate) fn find(&self, part: &Part, exposure: Option<&Exposure>) -> Result<Found, Stop> {
         let machine = self.machine()?;
-        let measure = Measure(self.criterion()?);
+        let measure = self.measure()?;
         let criterion = measure.criterion();
         let search = Search { part, machine: &machine, criterion, snap: self.snap };
         let failed = |error: HeightsError| Stop::Failed(error.into());
@@ -248,7 +246,7 @@ impl HeightOptions {
         add("min", length(self.min));
         add("max", length(self.max));
         add("step", length(self.step));
-        add("criterion", self.criterion.map(|criterion| value_name(&criterion)));
+        add("criterion", self.criterion.map(|criterion| criterion.to_string()));
         add("deviation", self.deviation.map(|share| share.to_string()));
         add("cusp", length(self.cusp));
         add("layers-budget", self.layers_budget.map(|layers| layers.to_string()));

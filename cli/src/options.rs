@@ -4,8 +4,9 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_grayscale::resin::Intensity;
-use lamp_stack::{Length, LengthError};
+use lamp_stack::{Length, LengthError, Named};
 
 use crate::stop::Stop;
 
@@ -55,6 +56,24 @@ pub(crate) struct Output {
     /// Write a classic TIFF (at most 4 GiB) instead of a BigTIFF
     #[arg(long)]
     pub(crate) classic: bool,
+}
+
+/// Returns a parser of a library's named values, which `--help` lists.
+pub(crate) fn one_of<T: Named>() -> impl TypedValueParser<Value = T> {
+    one_of_described(&[])
+}
+
+/// Returns a parser of a library's named values; `--help` lists them, each with its line
+/// of `help`.
+pub(crate) fn one_of_described<T: Named>(
+    help: &'static [&'static str],
+) -> impl TypedValueParser<Value = T> {
+    let value = |(k, names): (usize, &&'static [&'static str])| {
+        let value = PossibleValue::new(names[0]).aliases(names[1..].iter());
+        if help.is_empty() { value } else { value.help(help[k]) }
+    };
+    PossibleValuesParser::new(T::NAMES.iter().enumerate().map(value))
+        .map(|name| name.parse().expect("only names of the type pass"))
 }
 
 /// Parses `A..B`, `A..`, `..B` or a single layer.

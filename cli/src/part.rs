@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use clap::{Args, Parser, ValueEnum};
+use clap::{Args, Parser};
 use lamp_grayscale::resin::ExposureTime;
 use lamp_slicer::{Frame, LayerHeights, LayerLevels, Model, PlaneRule, SliceOptions, Slices};
 use lamp_stack::{Dpi, Layer, Length, Size};
@@ -11,9 +11,9 @@ use lamp_stack::{Dpi, Layer, Length, Size};
 use crate::brep::HEADING;
 use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
 use crate::heights::{self, HeightOptions};
-use crate::options::parse_thickness;
+use crate::options::{one_of, parse_thickness};
 use crate::placement::parse_numbers;
-use crate::solid::{SolidOptions, value_name};
+use crate::solid::SolidOptions;
 use crate::stop::Stop;
 
 /// What decides the images.
@@ -29,8 +29,8 @@ pub(crate) struct PartOptions {
     thickness: Length,
 
     /// Where in its layer a section is taken
-    #[arg(long, value_enum, default_value_t)]
-    plane: PlaneArg,
+    #[arg(long, value_parser = one_of::<PlaneRule>(), default_value_t)]
+    plane: PlaneRule,
 
     #[command(flatten)]
     pub(crate) solid: SolidOptions,
@@ -71,27 +71,15 @@ pub(crate) struct PartOptions {
     gray: bool,
 }
 
-#[derive(Clone, Copy, Default, ValueEnum)]
-enum PlaneArg {
-    #[default]
-    Top,
-    Middle,
-    Bottom,
-}
-
 impl PartOptions {
     pub(crate) fn for_slicing(&self) -> SliceOptions {
         SliceOptions {
             dpi: self.dpi,
             thickness: self.thickness,
-            plane: match self.plane {
-                PlaneArg::Top => PlaneRule::Top,
-                PlaneArg::Middle => PlaneRule::Middle,
-                PlaneArg::Bottom => PlaneRule::Bottom,
-            },
-            units: self.solid.units(),
+            plane: self.plane,
+            units: self.solid.units,
             placement: self.solid.placement(),
-            fill: self.solid.fill(),
+            fill: self.solid.fill,
             frame: self.frame(),
             polish: !self.no_polish,
             ..SliceOptions::default()
@@ -133,7 +121,7 @@ impl PartOptions {
         let mut line = format!(
             "slice {part} --dpi {} {layers} --plane {}{}",
             self.dpi,
-            value_name(&self.plane),
+            self.plane,
             self.solid.command_line(),
         );
         line += if self.no_polish { " --no-polish" } else { "" };
@@ -195,7 +183,7 @@ impl PartOptions {
         say: &dyn Fn(&str),
     ) -> Result<LayerHeights, Stop> {
         let body = self.solid.body(model.clone())?;
-        let part = self.heights.part(body, self.dpi, self.solid.fill())?;
+        let part = self.heights.part(body, self.dpi, self.solid.fill)?;
         let found = self.heights.find(&part, exposure)?;
         found.warn(say);
         if self.heights.has_budget() {
@@ -217,7 +205,7 @@ impl PartOptions {
     pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Stop> {
         let needs_top = [(self.gray, "--gray"), (self.adaptive, "--adaptive")];
         if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)
-            && !matches!(self.plane, PlaneArg::Top)
+            && self.plane != PlaneRule::Top
         {
             let why = format!("{option} takes sections at the layers' tops: leave --plane away");
             return Err(Stop::usage(why));

@@ -1,7 +1,9 @@
 //! What is done to a part before it is sliced.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lamp_slicer::{Axis, Placement};
+
+use crate::options::one_of;
 
 const HEADING: &str = "Placement of the part, in this order";
 
@@ -15,43 +17,21 @@ pub(crate) struct PlacementOptions {
     scale: Option<[f64; 3]>,
 
     /// Mirror the part: x swaps its left and its right
-    #[arg(long, value_name = "AXIS", value_delimiter = ',', help_heading = HEADING)]
-    mirror: Vec<AxisArg>,
+    #[arg(long, value_name = "AXIS", value_parser = one_of::<Axis>(), value_delimiter = ',')]
+    #[arg(help_heading = HEADING)]
+    mirror: Vec<Axis>,
 
     /// Turn the part about an axis through 0, by degrees counter-clockwise seen from the axis's
     /// tip; several one after another, as x:90,z:-12.5. Quarter turns are exact
     #[arg(long, value_name = "AXIS:DEGREES", value_parser = parse_rotation)]
     #[arg(value_delimiter = ',', help_heading = HEADING)]
-    rotate: Vec<(AxisArg, f64)>,
+    rotate: Vec<(Axis, f64)>,
 
     /// Move the part, in millimetres. The image goes with it: its origin and the heights of the
     /// layers are in the coordinates that the part then has
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, help_heading = HEADING)]
     #[arg(allow_hyphen_values = true)]
     translate: Option<[f64; 3]>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-enum AxisArg {
-    X,
-    Y,
-    Z,
-}
-
-impl AxisArg {
-    fn name(self) -> String {
-        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
-    }
-}
-
-impl From<AxisArg> for Axis {
-    fn from(axis: AxisArg) -> Self {
-        match axis {
-            AxisArg::X => Self::X,
-            AxisArg::Y => Self::Y,
-            AxisArg::Z => Self::Z,
-        }
-    }
 }
 
 impl PlacementOptions {
@@ -63,7 +43,7 @@ impl PlacementOptions {
             placement = placement.scaled(factors);
         }
         for &(axis, degrees) in &self.rotate {
-            placement = placement.rotated(axis.into(), degrees);
+            placement = placement.rotated(axis, degrees);
         }
         placement.translated(self.translate.unwrap_or([0.0; 3]))
     }
@@ -75,11 +55,11 @@ impl PlacementOptions {
             line += &format!(" --scale {x},{y},{z}");
         }
         if !self.mirror.is_empty() {
-            let axes: Vec<String> = self.mirror.iter().map(|axis| axis.name()).collect();
+            let axes: Vec<String> = self.mirror.iter().map(Axis::to_string).collect();
             line += &format!(" --mirror {}", axes.join(","));
         }
         if !self.rotate.is_empty() {
-            let turn = |(axis, degrees): &(AxisArg, f64)| format!("{}:{degrees}", axis.name());
+            let turn = |(axis, degrees): &(Axis, f64)| format!("{axis}:{degrees}");
             let turns: Vec<String> = self.rotate.iter().map(turn).collect();
             line += &format!(" --rotate {}", turns.join(","));
         }
@@ -111,10 +91,10 @@ fn parse_scale(text: &str) -> Result<[f64; 3], String> {
     }
 }
 
-fn parse_rotation(text: &str) -> Result<(AxisArg, f64), String> {
+fn parse_rotation(text: &str) -> Result<(Axis, f64), String> {
     let wrong = || format!("`{text}` is not a rotation: write AXIS:DEGREES, as x:90 or z:-12.5");
     let (axis, degrees) = text.split_once(':').ok_or_else(wrong)?;
-    let axis = AxisArg::from_str(axis.trim(), true).map_err(|_| wrong())?;
+    let axis = axis.trim().to_ascii_lowercase().parse().map_err(|_| wrong())?;
     let [degrees] = parse_numbers(degrees).ok_or_else(wrong)?;
     Ok((axis, degrees))
 }
@@ -132,8 +112,8 @@ mod tests {
     fn values_people_write() {
         assert_eq!(parse_scale("1.02"), Ok([1.02; 3]));
         assert_eq!(parse_scale("1, 2,.5"), Ok([1.0, 2.0, 0.5]));
-        assert_eq!(parse_rotation("x:90"), Ok((AxisArg::X, 90.0)));
-        assert_eq!(parse_rotation("Z: -12.5"), Ok((AxisArg::Z, -12.5)));
+        assert_eq!(parse_rotation("x:90"), Ok((Axis::X, 90.0)));
+        assert_eq!(parse_rotation("Z: -12.5"), Ok((Axis::Z, -12.5)));
         assert_eq!(parse_translation("-5,0,1e4mm"), Ok([-5.0, 0.0, 1e4]));
         for wrong in ["", "0", "-1", "1,2", "1,2,0", "1,2,3,4", "nan", "inf", "1e999", "two"] {
             assert!(parse_scale(wrong).is_err(), "{wrong}");

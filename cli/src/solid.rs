@@ -5,11 +5,12 @@ use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lamp_slicer::{Body, Fill, Model, Placement, SliceError, Units};
 use lamp_stack::Dpi;
 
 use crate::brep::{BrepOptions, boxes_overlap, bytes_of, is_step, part_of};
+use crate::options::one_of;
 use crate::placement::PlacementOptions;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream};
@@ -18,13 +19,13 @@ use crate::streams::{input_name, is_stream};
 #[derive(Args, Clone)]
 pub(crate) struct SolidOptions {
     /// What the numbers of an STL mean; a STEP file says so itself
-    #[arg(long, value_enum, default_value_t)]
-    units: UnitsArg,
+    #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
+    pub(crate) units: Units,
 
     /// What is inside: between odd and even crossings, or wherever contours wind around (for
     /// bodies that overlap)
-    #[arg(long, value_enum, default_value_t)]
-    fill: FillArg,
+    #[arg(long, value_parser = one_of::<Fill>(), default_value_t)]
+    pub(crate) fill: Fill,
 
     #[command(flatten)]
     placement: PlacementOptions,
@@ -34,39 +35,20 @@ pub(crate) struct SolidOptions {
 }
 
 impl SolidOptions {
-    pub(crate) fn fill(&self) -> Fill {
-        match self.fill {
-            FillArg::EvenOdd => Fill::EvenOdd,
-            FillArg::NonZero => Fill::NonZero,
-        }
-    }
-
-    pub(crate) fn units(&self) -> Units {
-        match self.units {
-            UnitsArg::Mm => Units::Millimetres,
-            UnitsArg::Inch => Units::Inches,
-        }
-    }
-
     pub(crate) fn placement(&self) -> Placement {
         self.placement.placement()
     }
 
     /// The part in memory.
     pub(crate) fn body(&self, model: Model) -> Result<Body, SliceError> {
-        Body::new(model, &self.placement(), self.units())
-    }
-
-    /// What people write for the rule of what is inside.
-    pub(crate) fn fill_name(&self) -> String {
-        value_name(&self.fill)
+        Body::new(model, &self.placement(), self.units)
     }
 
     /// The options as the stack remembers them.
     pub(crate) fn command_line(&self) -> String {
         let placement = self.placement.command_line();
         let brep = self.brep.command_line();
-        format!(" --units {} --fill {}{placement}{brep}", value_name(&self.units), self.fill_name())
+        format!(" --units {} --fill {}{placement}{brep}", self.units, self.fill)
     }
 
     /// Opens all files of a part.
@@ -106,7 +88,7 @@ impl SolidOptions {
     }
 
     fn step(&self, bytes: &Arc<[u8]>, name: &str, reading: &Reading<'_>) -> Result<Model, Stop> {
-        if let UnitsArg::Inch = self.units {
+        if self.units == Units::Inches {
             let why = "a STEP file says itself what its numbers mean: leave --units away";
             return Err(Stop::usage(why));
         }
@@ -119,7 +101,7 @@ impl SolidOptions {
             ));
         }
         let prepared = self.brep.reader.read(bytes, tolerance)?;
-        let may_overlap = matches!(self.fill, FillArg::EvenOdd) && boxes_overlap(&prepared);
+        let may_overlap = self.fill == Fill::EvenOdd && boxes_overlap(&prepared);
         if may_overlap {
             (reading.say)(
                 "the boxes of bodies overlap: where the bodies do, too, they cut each other out, \
@@ -128,26 +110,6 @@ impl SolidOptions {
         }
         part_of(prepared, name, bytes, reading.may_be_open, reading.say)
     }
-}
-
-#[derive(Clone, Copy, Default, ValueEnum)]
-enum UnitsArg {
-    #[default]
-    Mm,
-    Inch,
-}
-
-#[derive(Clone, Copy, Default, ValueEnum)]
-enum FillArg {
-    #[default]
-    EvenOdd,
-    #[value(name = "nonzero", alias = "non-zero")]
-    NonZero,
-}
-
-/// What people write for a value.
-pub(crate) fn value_name(value: &impl ValueEnum) -> String {
-    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 /// What files are read for.

@@ -22,21 +22,12 @@ pub enum Method {
     Threshold,
 }
 
-impl Method {
-    /// Every method.
-    pub const ALL: [Self; 4] =
-        [Self::BlueNoise, Self::Ordered, Self::FloydSteinberg, Self::Threshold];
-
-    /// The method's name in options and metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::BlueNoise => "blue-noise",
-            Self::Ordered => "ordered",
-            Self::FloydSteinberg => "floyd-steinberg",
-            Self::Threshold => "threshold",
-        }
-    }
-}
+lamp_stack::named!(Method {
+    BlueNoise = "blue-noise",
+    Ordered = "ordered",
+    FloydSteinberg = "floyd-steinberg",
+    Threshold = "threshold",
+});
 
 /// Why a layer was not dithered.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

@@ -30,14 +30,12 @@
 mod edit;
 mod fix;
 pub mod machine;
-mod names;
 mod offset;
 mod strips;
 mod tile;
 
 pub use edit::{EditError, Edits, OtherLayers, edit};
 pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
-pub use names::UnknownName;
 pub use offset::{
     CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,
     offset, offset_one_bit, shrink,

@@ -14,6 +14,8 @@ pub enum Units {
     Inches,
 }
 
+lamp_stack::named!(Units { Millimetres = "mm", Inches = "inch" });
+
 impl Units {
     /// Millimetres in one unit.
     pub fn mm(self) -> f64 {

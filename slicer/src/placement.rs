@@ -21,6 +21,8 @@ pub enum Axis {
     Z,
 }
 
+lamp_stack::named!(Axis { X = "x", Y = "y", Z = "z" });
+
 /// What is done to a part before it is sliced: nothing by default. Each step
 /// follows the ones before, and acts about the origin.
 ///

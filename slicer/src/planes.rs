@@ -22,6 +22,8 @@ pub enum PlaneRule {
     Bottom,
 }
 
+lamp_stack::named!(PlaneRule { Top = "top", Middle = "middle", Bottom = "bottom" });
+
 /// Layers of any thickness: the heights between which each one lies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerHeights {

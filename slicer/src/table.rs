@@ -29,6 +29,8 @@ pub enum Fill {
     NonZero,
 }
 
+lamp_stack::named!(Fill { EvenOdd = "even-odd", NonZero = "nonzero" | "non-zero" });
+
 impl Fill {
     /// Whether a place that contours wind around so often is inside.
     #[inline]

@@ -1,10 +1,5 @@
 //! Images out of others of their size, pixel by pixel, on runs.
 
-use std::fmt;
-use std::str::FromStr;
-
-use thiserror::Error;
-
 use crate::gray::{GrayMask, LevelChange};
 use crate::layer::Image;
 use crate::limits::MAX_RUNS;
@@ -23,15 +18,7 @@ pub enum Op {
     Xor,
 }
 
-/// A text that names no [`Op`].
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("`{0}` is none of union, intersect, difference and xor")]
-pub struct OpError(String);
-
 impl Op {
-    /// Every operation.
-    pub const ALL: [Self; 4] = [Self::Union, Self::Intersect, Self::Difference, Self::Xor];
-
     /// Whether the pixel is white that two make.
     pub fn is_white(self, a: bool, b: bool) -> bool {
         match self {
@@ -66,31 +53,14 @@ impl Op {
             _ => combine_rows([a, b], |[a, b]| self.is_white(a, b), out),
         }
     }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Union => "union",
-            Self::Intersect => "intersect",
-            Self::Difference => "difference",
-            Self::Xor => "xor",
-        }
-    }
 }
 
-impl fmt::Display for Op {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Op {
-    type Err = OpError;
-
-    fn from_str(text: &str) -> Result<Self, OpError> {
-        let known = Self::ALL.into_iter().find(|op| op.name() == text);
-        known.ok_or_else(|| OpError(text.to_owned()))
-    }
-}
+crate::named!(Op {
+    Union = "union",
+    Intersect = "intersect",
+    Difference = "difference",
+    Xor = "xor",
+});
 
 /// Makes `out` the row whose every pixel is what `colour` makes of the pixels
 /// of `rows` there. `colour` must leave black what is black in all.
@@ -268,6 +238,6 @@ mod tests {
                 assert_eq!(op.level(x, y), made);
             }
         }
-        assert!("plus".parse::<Op>().unwrap_err().to_string().contains("`plus`"));
+        assert_eq!("plus".parse::<Op>().unwrap_err().name, "plus");
     }
 }

@@ -1,8 +1,8 @@
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lamp_grayscale::{EVEN_DOTS, Homogeneity, Method, UNEVEN_DOTS, homogeneity};
 use lamp_stack::{Image, Layer, Length};
 
-use crate::options::{Common, Input, Output};
+use crate::options::{Common, Input, Output, one_of_described};
 use crate::stop::Stop;
 use crate::streams::{read_layers, report, write_layers};
 
@@ -24,48 +24,28 @@ pub(crate) struct DitherArgs {
     input: Input,
 
     /// How gray becomes dots
-    #[arg(long, value_enum, default_value_t)]
-    method: MethodArg,
+    #[arg(long, default_value_t, value_parser = one_of_described::<Method>(&[
+        "Dots far from each other, in no pattern: a mask of 128 x 128 thresholds",
+        "Bayer's pattern of 16 x 16 thresholds",
+        "Error diffusion, with the thresholds of blue noise",
+        "No dots: levels of 128 and more, of 255, are white",
+    ]))]
+    method: Method,
 
     #[command(flatten)]
     output: Output,
 }
 
-#[derive(Clone, Copy, Default, ValueEnum)]
-enum MethodArg {
-    /// Dots far from each other, in no pattern: a mask of 128 x 128 thresholds
-    #[default]
-    BlueNoise,
-    /// Bayer's pattern of 16 x 16 thresholds
-    Ordered,
-    /// Error diffusion, with the thresholds of blue noise
-    FloydSteinberg,
-    /// No dots: levels of 128 and more, of 255, are white
-    Threshold,
-}
-
-impl From<MethodArg> for Method {
-    fn from(method: MethodArg) -> Self {
-        match method {
-            MethodArg::BlueNoise => Self::BlueNoise,
-            MethodArg::Ordered => Self::Ordered,
-            MethodArg::FloydSteinberg => Self::FloydSteinberg,
-            MethodArg::Threshold => Self::Threshold,
-        }
-    }
-}
-
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Stop> {
-    let method = args.method.into();
     let report = report("dither", common, &args.output);
-    let mut told = method == Method::Threshold;
+    let mut told = args.method == Method::Threshold;
     let layers = read_layers(&args.input, &report)?.inspect(|layer| {
         if let Some(line) = layer.as_ref().ok().filter(|_| !told).and_then(unevenness) {
             told = true;
             report.say(&line);
         }
     });
-    write_layers(lamp_grayscale::dither(layers, method), &args.output, &report)
+    write_layers(lamp_grayscale::dither(layers, args.method), &args.output, &report)
 }
 
 /// What is to be feared of the dots of a gray layer, if its pixels are wider

@@ -1,13 +1,13 @@
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
 use crate::evidence::Evidence;
 use crate::findings::{Findings, whereabouts};
 use crate::lines::parse_report;
-use crate::options::{Common, Input, Output};
+use crate::options::{Common, Input, Output, one_of_described};
 use crate::stop::Stop;
 use crate::streams::{check_beside, read_layers, report, write_file, write_layers};
 
@@ -32,8 +32,11 @@ pub(crate) struct FixArgs {
     input: Input,
 
     /// Where the missed crossings come from
-    #[arg(long, value_enum, default_value_t)]
-    method: MethodArg,
+    #[arg(long, default_value_t, value_parser = one_of_described::<FixMethod>(&[
+        "What the good rows above and below share (edges of wide bands become steps)",
+        "Smooth curves along the part's contours",
+    ]))]
+    method: FixMethod,
 
     /// Leave bands of more rows: half the part's smallest feature is a good limit
     #[arg(long, value_name = "ROWS", default_value_t = FixOptions::default().max_width)]
@@ -65,22 +68,10 @@ pub(crate) struct FixArgs {
     output: Output,
 }
 
-#[derive(Clone, Copy, Default, ValueEnum)]
-enum MethodArg {
-    /// What the good rows above and below share (edges of wide bands become steps)
-    Nearest,
-    /// Smooth curves along the part's contours
-    #[default]
-    Spline,
-}
-
 impl FixArgs {
     fn options(&self) -> FixOptions {
         FixOptions {
-            method: match self.method {
-                MethodArg::Nearest => FixMethod::Nearest,
-                MethodArg::Spline => FixMethod::Spline,
-            },
+            method: self.method,
             max_width: self.max_width,
             min_confidence: self.min_confidence,
             use_neighbours: self.use_neighbours,

@@ -71,7 +71,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Stop> {
     let model =
         args.solid.open(&args.parts, &Reading { dpi: args.dpi, may_be_open: false, say: &say })?;
     let body = args.solid.body(model).map_err(|error| at_part(error.into(), &args.parts))?;
-    let part = args.heights.part(body, args.dpi, args.solid.fill())?;
+    let part = args.heights.part(body, args.dpi, args.solid.fill)?;
     let found = args.heights.find(&part, exposure.as_ref());
     let found = found.map_err(|stop| at_part(stop, &args.parts))?;
     let uniform = args.uniform(&part).map_err(|stop| at_part(stop, &args.parts))?;

@@ -2,7 +2,8 @@ use std::ffi::OsStr;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum, builder::PossibleValue};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_fixtures::{Defect, Mesh, Part, StepPart, StepUnit, build, inject, step};
 use lamp_stack::Length;
 
@@ -21,8 +22,8 @@ Examples:
   lamp sample tower --defect drop --count 20 --seed 7 -o broken.stl")]
 pub(crate) struct SampleArgs {
     /// Which part
-    #[arg(value_enum)]
-    part: PartArg,
+    #[arg(value_parser = parts())]
+    part: Part,
 
     /// About how many facets
     #[arg(long, value_name = "N", default_value = "100k", value_parser = parse_count)]
@@ -34,8 +35,8 @@ pub(crate) struct SampleArgs {
 
     /// Break the mesh: drop, flip or duplicate facets, nudge a corner of each, or
     /// open a gap along an edge of each
-    #[arg(long, value_enum)]
-    defect: Option<DefectArg>,
+    #[arg(long, value_parser = PossibleValuesParser::new(Defect::NAMES))]
+    defect: Option<String>,
 
     /// How many facets to break
     #[arg(long, value_name = "N", default_value = "10", value_parser = parse_count, requires = "defect")]
@@ -55,45 +56,21 @@ pub(crate) struct SampleArgs {
     output: PathBuf,
 }
 
-#[derive(Clone, Copy)]
-struct PartArg(Part);
-
-impl ValueEnum for PartArg {
-    fn value_variants<'a>() -> &'a [Self] {
-        const ALL: [PartArg; Part::ALL.len()] = {
-            let mut all = [PartArg(Part::Blade); Part::ALL.len()];
-            let mut i = 0;
-            while i < all.len() {
-                all[i] = PartArg(Part::ALL[i]);
-                i += 1;
-            }
-            all
-        };
-        &ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.0.name()).help(self.0.description()))
-    }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum DefectArg {
-    Drop,
-    Flip,
-    Duplicate,
-    Nudge,
-    Gap,
+fn parts() -> impl TypedValueParser<Value = Part> {
+    let value = |part: Part| PossibleValue::new(part.name()).help(part.description());
+    PossibleValuesParser::new(Part::ALL.map(value))
+        .map(|name| Part::from_name(&name).expect("only names of parts pass"))
 }
 
 pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
-    let PartArg(part) = args.part;
+    let part = args.part;
     if is_step_name(&args.output) {
         return args.write_step(part);
     }
     let mut mesh = build(part, args.facets).map_err(Stop::wrong_options)?;
-    if let Some(defect) = args.defect {
-        inject(&mut mesh, args.defect(defect), args.count, args.seed);
+    if let Some(name) = &args.defect {
+        let defect = Defect::from_name(name, args.by.mm() as f32).expect("only names pass");
+        inject(&mut mesh, defect, args.count, args.seed);
     }
     let write = |out: &mut dyn Write| {
         if args.ascii {
@@ -134,16 +111,6 @@ impl SampleArgs {
         }
         let text = step(part, StepUnit::Millimetre);
         write_file(&self.output, |out| out.write_all(text.as_bytes()))
-    }
-
-    fn defect(&self, defect: DefectArg) -> Defect {
-        match defect {
-            DefectArg::Drop => Defect::Drop,
-            DefectArg::Flip => Defect::Flip,
-            DefectArg::Duplicate => Defect::Duplicate,
-            DefectArg::Nudge => Defect::Nudge { by_mm: self.by.mm() as f32 },
-            DefectArg::Gap => Defect::Gap { by_mm: self.by.mm() as f32 },
-        }
     }
 }
 

@@ -111,7 +111,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         let trace = slices.trace(&bands).map_err(|error| Stop::from(error).at(name))?;
         let subject = Subject {
             files: files.into_iter().map(Cow::into_owned).collect(),
-            fill: &args.options.solid.fill_name(),
+            fill: args.options.solid.fill.name(),
             counts,
         };
         let PixelGrid { origin_mm, dpi, .. } = *slices.grid();

@@ -74,15 +74,7 @@ pub enum FixMethod {
     Spline,
 }
 
-impl FixMethod {
-    /// Its name on pages and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Nearest => "nearest",
-            Self::Spline => "spline",
-        }
-    }
-}
+lamp_stack::named!(FixMethod { Nearest = "nearest", Spline = "spline" });
 
 /// What was found in a layer, and what was done.
 #[derive(Debug)]

@@ -10,6 +10,16 @@ fn options(area: &str, copies: Option<u32>, gap_mm: f64) -> TileOptions {
     TileOptions { area: area.parse().unwrap(), copies, gap: Length::from_mm(gap_mm) }
 }
 
+#[test]
+fn names_are_read_as_they_are_written() {
+    assert!(Turns::ALL.iter().all(|turns| turns.to_string().parse() == Ok(*turns)));
+    assert!(PackBy::ALL.iter().all(|by| by.to_string().parse() == Ok(*by)));
+    assert!(Moat::ALL.iter().all(|moat| moat.to_string().parse() == Ok(*moat)));
+    assert!(CellShape::ALL.iter().all(|shape| shape.to_string().parse() == Ok(*shape)));
+    let error = "tight".parse::<PackBy>().unwrap_err();
+    assert_eq!(error.to_string(), "`tight` is none of box, outline");
+}
+
 fn black(width: u32, height: u32) -> Layer {
     Layer { info: PageInfo::default(), ..layer(0, Image::Mask(Mask::black(width, height))) }
 }

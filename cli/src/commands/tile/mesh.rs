@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lamp_grayscale::{Method, dither_image};
 use lamp_postprocess::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_stack::{Image, Length, StackError};
 
-use crate::options::{parse_distance, parse_thickness};
+use crate::options::{one_of, parse_distance, parse_thickness};
 use crate::stop::Stop;
 use crate::streams::{failed_at, input_name, layers_of, open_pages};
 
@@ -37,8 +37,9 @@ pub(super) struct MeshArgs {
 
     /// Whether the moat follows the part in each layer, or what is white in any layer: then no mesh
     /// stands on the part's faces or in bores that lie across. It implies --fit [default: layer]
-    #[arg(long, value_enum, value_name = "layer|outline", help_heading = HEADING)]
-    moat: Option<MoatArg>,
+    #[arg(long, value_name = "layer|outline", value_parser = one_of::<Moat>())]
+    #[arg(help_heading = HEADING)]
+    moat: Option<Moat>,
 
     /// How wide break lines are, which cut the mesh from each part up, down, left and right to the
     /// next part or the area's edge; 0um makes none [default: 500um]
@@ -55,22 +56,16 @@ pub(super) struct MeshArgs {
     base_layers: Option<u32>,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum MoatArg {
-    Layer,
-    Outline,
-}
-
 impl MeshArgs {
     /// Whether it must know the parts' outlines.
     pub(super) fn needs_outlines(&self) -> bool {
-        self.moat == Some(MoatArg::Outline)
+        self.moat == Some(Moat::Outline)
     }
 
     /// The file that it reads, if any.
     pub(super) fn file(&self) -> Option<&PathBuf> {
-        let is_name = ["hexagon", "square", "none"].iter().any(|name| self.mesh == Path::new(name));
-        (!is_name).then_some(&self.mesh)
+        let is_shape = self.mesh.to_str().is_some_and(|name| name.parse::<CellShape>().is_ok());
+        (!is_shape && self.mesh != Path::new("none")).then_some(&self.mesh)
     }
 
     /// Checks that no option is without effect.
@@ -100,12 +95,10 @@ impl MeshArgs {
 
     /// The mesh, unless there is to be none.
     pub(super) fn options(&self) -> Result<Option<MeshOptions>, Stop> {
-        let shape = match self.mesh.to_str() {
-            Some("none") => return Ok(None),
-            Some("hexagon") => Some(CellShape::Hexagon),
-            Some("square") => Some(CellShape::Square),
-            _ => None,
-        };
+        if self.mesh == Path::new("none") {
+            return Ok(None);
+        }
+        let shape = self.mesh.to_str().and_then(|name| name.parse().ok());
         let plain = MeshOptions::default();
         let pattern = match (shape, plain.pattern) {
             (Some(shape), MeshPattern::Cells { cell, wall, .. }) => {
@@ -117,7 +110,7 @@ impl MeshArgs {
         Ok(Some(MeshOptions {
             pattern,
             clearance: self.clearance.unwrap_or(plain.clearance),
-            moat: if self.needs_outlines() { Moat::Outline } else { Moat::Layer },
+            moat: self.moat.unwrap_or_default(),
             break_width: self.break_width.unwrap_or(plain.break_width),
             break_pitch: self.break_pitch.unwrap_or(plain.break_pitch),
             base_layers: self.base_layers.unwrap_or(plain.base_layers),

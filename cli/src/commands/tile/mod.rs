@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lamp_postprocess::{
     HeightOptions, Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, StrayRows,
     TileOptions, Turns,
@@ -16,7 +16,7 @@ use lamp_stack::{Length, Size};
 use crate::lines::parse_report;
 use crate::machines::machine;
 use crate::materials::read_text;
-use crate::options::{Common, Output, parse_distance, parse_layers};
+use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::plots;
 use crate::report::Report;
 use crate::stop::Stop;
@@ -80,13 +80,20 @@ pub(crate) struct TileArgs {
     fit: bool,
 
     /// By what copies keep apart; outline implies --fit
-    #[arg(long, value_enum, default_value_t)]
-    pack: PackArg,
+    #[arg(long, default_value_t, value_parser = one_of_described::<PackBy>(&[
+        "The boxes around the parts",
+        "The parts' outlines, where boxes place fewer",
+    ]))]
+    pack: PackBy,
 
     /// Which turns packing may use where that gains parts [default: none, or quarters with --pack
     /// outline]
-    #[arg(long, value_enum)]
-    turns: Option<TurnsArg>,
+    #[arg(long, value_parser = one_of_described::<Turns>(&[
+        "Parts lie as they were sliced",
+        "By 180 degrees",
+        "By 90, 180 and 270 degrees",
+    ]))]
+    turns: Option<Turns>,
 
     /// Place the copies as this file says, instead of packing them
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
@@ -126,25 +133,6 @@ pub(crate) struct TileArgs {
     classic: bool,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
-enum PackArg {
-    /// The boxes around the parts
-    #[default]
-    Box,
-    /// The parts' outlines, where boxes place fewer
-    Outline,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum TurnsArg {
-    /// Parts lie as they were sliced
-    None,
-    /// By 180 degrees
-    Half,
-    /// By 90, 180 and 270 degrees
-    Quarters,
-}
-
 pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     args.check()?;
     let mesh = args.mesh.options()?;
@@ -157,7 +145,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     let strips = args.strips.writer(machine.as_ref(), args.classic)?;
     let file = args.layout.as_deref().map(read_layout).transpose()?;
     let mut stacks = Stack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
-    let needs_outlines = args.fit || args.pack == PackArg::Outline || args.mesh.needs_outlines();
+    let needs_outlines = args.fit || args.pack == PackBy::Outlines || args.mesh.needs_outlines();
     let parts: Vec<PartStack> =
         stacks.iter_mut().map(|stack| stack.part(needs_outlines)).collect::<Result<_, _>>()?;
     let plain = TileOptions::default();
@@ -240,16 +228,11 @@ impl TileArgs {
     }
 
     fn packing(&self) -> Pack {
-        let (by, turns) = match self.pack {
-            PackArg::Box => (PackBy::Boxes, TurnsArg::None),
-            PackArg::Outline => (PackBy::Outlines, TurnsArg::Quarters),
+        let usual = match self.pack {
+            PackBy::Boxes => Turns::None,
+            PackBy::Outlines => Turns::Quarters,
         };
-        let turns = match self.turns.unwrap_or(turns) {
-            TurnsArg::None => Turns::None,
-            TurnsArg::Half => Turns::Half,
-            TurnsArg::Quarters => Turns::Quarters,
-        };
-        Pack { by, turns }
+        Pack { by: self.pack, turns: self.turns.unwrap_or(usual) }
     }
 
     /// Writes where the copies stand, as was asked.

@@ -4,7 +4,6 @@ use lamp_stack::{Dpi, Length, MAX_RUNS, Mask};
 
 use super::super::{PixelSize, TileError};
 use super::lattice::{Cells, Lattice};
-use crate::names::named;
 
 /// Mesh between two copies is so wide at least, unless it is asked for less.
 const MIN_MESH_WIDTH: Length = Length::from_um(2000.0);
@@ -39,6 +38,8 @@ pub enum Moat {
     Outline,
 }
 
+lamp_stack::named!(Moat { Layer = "layer", Outline = "outline" });
+
 /// The walls of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshPattern {
@@ -69,8 +70,7 @@ pub enum CellShape {
     Square,
 }
 
-named!(Moat { Layer: "layer", Outline: "outline" });
-named!(CellShape { Hexagon: "hexagon", Square: "square" });
+lamp_stack::named!(CellShape { Hexagon = "hexagon", Square = "square" });
 
 impl Default for MeshOptions {
     /// Hexagons of 5 mm with walls of 0.5 mm, 1 mm from the parts; break lines of

@@ -11,7 +11,6 @@ mod no_fit;
 use lamp_stack::Orientation;
 
 use super::{CopyPlacement, Layout, TileError};
-use crate::names::named;
 use greedy::PlacingRule;
 use no_fit::NoFitRegions;
 
@@ -34,6 +33,8 @@ pub enum PackBy {
     Outlines,
 }
 
+lamp_stack::named!(PackBy { Boxes = "box", Outlines = "outline" });
+
 /// Which ways parts may be turned, where that places more. None is mirrored,
 /// which would be another part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,8 +48,7 @@ pub enum Turns {
     Quarters,
 }
 
-named!(PackBy { Boxes: "box", Outlines: "outline" });
-named!(Turns { None: "none", Half: "half", Quarters: "quarters" });
+lamp_stack::named!(Turns { None = "none", Half = "half", Quarters = "quarters" });
 
 impl Turns {
     fn all(self) -> &'static [u32] {
@@ -95,8 +95,8 @@ impl Pack {
             );
         }
         if self.by == PackBy::Outlines {
-            let allowed = Turns::ALL.iter().filter(|turns| **turns <= self.turns);
-            for &turns in allowed {
+            let allowed = Turns::ALL.into_iter().filter(|turns| *turns <= self.turns);
+            for turns in allowed {
                 ways.extend(
                     PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Outlines, turns, order)),
                 );
