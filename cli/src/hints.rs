@@ -5,11 +5,22 @@
 use std::error::Error;
 
 use lamp_adaptive::HeightsError;
+use lamp_postprocess::{EditError, EditProblem, LayerProblem, LayoutError, TileError};
+use lamp_stack::Length;
 
 /// Returns what to try about an error, to stand after its message.
 pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
     if let Some(error) = error.downcast_ref() {
         return heights(error);
+    }
+    if let Some(error) = error.downcast_ref() {
+        return tile(error);
+    }
+    if let Some(error) = error.downcast_ref() {
+        return layout(error);
+    }
+    if let Some(error) = error.downcast_ref() {
+        return edit(error);
     }
     None
 }
@@ -19,4 +30,67 @@ fn heights(error: &HeightsError) -> Option<String> {
         HeightsError::TooManyRows { .. } => Some("give a wider --row-pitch".to_owned()),
         _ => None,
     }
+}
+
+fn tile(error: &TileError) -> Option<String> {
+    let hint = match error {
+        TileError::TooLarge { .. } => {
+            "give a larger --area, or --fit if the image is wider than the part"
+        }
+        TileError::TooMany { .. } => {
+            "give a larger --area, a smaller --gap or fewer copies, or try --pack outline"
+        }
+        TileError::NoCells { .. } => "give a larger --cell or a smaller --wall",
+        TileError::FineMesh => "give a larger --cell, or --mesh none",
+        TileError::ManyBreaks => "give a wider --break-pitch, or --break-width 0um",
+        TileError::NoOutline { .. } => "give --fit",
+        TileError::WideMoat { .. } => "give a smaller --clearance, or --mesh none",
+        TileError::TooManyRuns { .. } => "place fewer copies",
+        TileError::Resolutions { .. } => "slice the parts at one resolution",
+        TileError::Changed { .. } => "run tile again",
+        TileError::Overlap { .. } => {
+            "move one of them, or give --fit if only their black margins do"
+        }
+        TileError::OutOfArea { .. } => "move it, or give --fit if only its black margin does",
+        TileError::OtherStart { .. } => {
+            "slice them with the same first layer, or give --settle to set all on the platform"
+        }
+        TileError::OtherHeights { build: [bottom, top], first, .. } => {
+            let thickness = Length::from_um(top.um() - bottom.um()).to_whole_nm();
+            return Some(format!(
+                "slice it again with --thickness {thickness}, or give --resample to take the \
+                 layer at each height of {first}"
+            ));
+        }
+        TileError::Exposures { .. } => "slice the parts for the same exposure",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn layout(error: &LayoutError) -> Option<String> {
+    match error {
+        LayoutError::Unused { .. } => Some("leave that stack out, or add copies".to_owned()),
+        // It is transparent, so that it is no cause of its own.
+        LayoutError::Tile(error) => tile(error),
+        _ => None,
+    }
+}
+
+fn edit(error: &EditError) -> Option<String> {
+    let hint = match error {
+        EditError::Edit { problem, .. } => match problem {
+            EditProblem::IntersectInCopies => "intersect the part before tile",
+            EditProblem::Angle => "turn the part with slice --rotate",
+            EditProblem::OtherResolution { .. } => "slice both stacks at one resolution",
+            _ => return None,
+        },
+        EditError::Layer { problem, .. } => match problem {
+            LayerProblem::StrayColumns => "fix the stack first",
+            LayerProblem::NoCopies => "copies are for builds that tile made",
+            _ => return None,
+        },
+        _ => return None,
+    };
+    Some(hint.to_owned())
 }

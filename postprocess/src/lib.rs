@@ -34,7 +34,7 @@ mod offset;
 mod strips;
 mod tile;
 
-pub use edit::{EditError, Edits, OtherLayers, edit};
+pub use edit::{EditError, EditProblem, Edits, ImageBounds, LayerProblem, OtherLayers, edit};
 pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
 pub use offset::{
     CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,

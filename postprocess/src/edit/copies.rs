@@ -1,12 +1,10 @@
 //! The copies of parts that `tile` made, by what the first page says of them.
 
-use lamp_stack::{
-    Frame, Mask, MaskBuilder, Op, Orientation, OrientationError, PageInfo, StackInfo, place_row,
-};
+use lamp_stack::{Frame, Mask, MaskBuilder, Op, Orientation, PageInfo, StackInfo, place_row};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::edit_error::EditError;
+use super::edit_error::{EditError, LayerProblem};
 use super::image_bounds::ImageBounds;
 use super::schema::CopySelection;
 
@@ -51,36 +49,29 @@ impl BuildCopy {
         if wanted.is_none() {
             return Ok(vec![whole]);
         }
-        let wrong = |problem: String| EditError::layer(info, problem);
+        let wrong = |problem: LayerProblem| problem.of_layer(info);
         let tile = info.stack.as_ref().and_then(|stack| stack.other.get("tile"));
-        let tile = tile.ok_or_else(|| {
-            wrong(
-                "its page does not say where copies stand: copies are for builds that tile made"
-                    .to_owned(),
-            )
-        })?;
+        let tile = tile.ok_or_else(|| wrong(LayerProblem::NoCopies))?;
         let parts = tile["parts"].as_array().map_or(std::slice::from_ref(tile), Vec::as_slice);
         let read = |part: &Value| serde_json::from_value(part.clone());
-        let parts: Vec<TiledPart> =
-            parts.iter().map(read).collect::<Result<_, _>>().map_err(|error| {
-                wrong(format!("its page does not say where copies stand as tile does ({error})"))
-            })?;
+        let parts: Vec<TiledPart> = parts
+            .iter()
+            .map(read)
+            .collect::<Result<_, _>>()
+            .map_err(|error| wrong(LayerProblem::CopiesFormat(error)))?;
         let part = chosen(parts, wanted, info).map_err(wrong)?;
-        let origin_mm = part
-            .part_origin_mm
-            .ok_or_else(|| wrong("its page does not say where the part lay".to_owned()))?;
+        let origin_mm = part.part_origin_mm.ok_or_else(|| wrong(LayerProblem::NoPartOrigin))?;
         let [width, height] = part.part_pixels;
         let far = part.copies.iter().flatten().any(|place| place.abs() > MAX_OFFSET);
         if far || u64::from(height.max(width).max(1)) * part.copies.len() as u64 > MAX_ROWS {
-            return Err(wrong("its page says that copies stand where no image reaches".to_owned()));
+            return Err(wrong(LayerProblem::FarCopies));
         }
         let lain = ImageBounds { origin_mm, width, height, ..*place };
         let turns = part
             .turns
             .iter()
-            .map(|turn| turn.parse())
-            .collect::<Result<Vec<_>, OrientationError>>()
-            .map_err(|error| wrong(error.to_string()))?;
+            .map(|turn| turn.parse().map_err(|error| wrong(LayerProblem::CopyTurn(error))))
+            .collect::<Result<Vec<_>, _>>()?;
         let turns = turns.into_iter().chain(std::iter::repeat(Orientation::default()));
         let copy =
             |([left, top], turn): ([i64; 2], Orientation)| Self { part: lain, turn, left, top };
@@ -98,17 +89,15 @@ fn chosen(
     mut parts: Vec<TiledPart>,
     wanted: &CopySelection,
     info: &PageInfo,
-) -> Result<TiledPart, String> {
+) -> Result<TiledPart, LayerProblem> {
     let one = info.stack.as_ref().map(|stack| stack.part.clone());
     let name = |part: &TiledPart| part.part.clone().or_else(|| one.clone()).unwrap_or_default();
-    let names = || parts.iter().map(name).collect::<Vec<_>>().join(", ");
+    let names = || parts.iter().map(name).collect();
     let index = match wanted {
         CopySelection::Of(wanted) => parts.iter().position(|part| name(part) == *wanted),
         CopySelection::Any(_) => (parts.len() == 1).then_some(0),
     };
-    let index = index.ok_or_else(|| {
-        format!("name one of the build's parts, as copies = \"NAME\": {}", names())
-    })?;
+    let index = index.ok_or_else(|| LayerProblem::WhichPart { parts: names() })?;
     Ok(parts.swap_remove(index))
 }
 
@@ -251,8 +240,8 @@ mod tests {
         let error = |page: &PageInfo| {
             BuildCopy::all(&CopySelection::Any(true), page, &PLACE).unwrap_err().to_string()
         };
-        assert!(error(&PageInfo::default()).contains("builds that tile made"));
-        assert!(error(&info(json!({ "copies": 3 }))).contains("as tile does"));
+        assert!(error(&PageInfo::default()).contains("where copies stand"));
+        assert!(error(&info(json!({ "copies": 3 }))).contains("as builds do"));
         let mut lost = part(&[[1, 1]]);
         lost["part_origin_mm"] = Value::Null;
         assert!(error(&info(lost)).contains("where the part lay"));

@@ -1,17 +1,20 @@
-//! Why a stack cannot be edited.
+//! Errors of reading a list of edits and of making them.
 
+use lamp_stack::{Dpi, OrientationError};
 use thiserror::Error;
 
+use super::ImageBounds;
+
 /// Why a stack cannot be edited.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EditError {
-    /// The list of edits is no TOML.
+    /// The list of edits is not TOML.
     #[error("line {line}: {problem}: edits are a TOML file with [[edit]] tables")]
     Syntax {
         /// From 1.
         line: usize,
-        /// What stands there.
+        /// The TOML reader's message.
         problem: String,
     },
     /// A key of the list is wrong, unknown or missing.
@@ -21,24 +24,24 @@ pub enum EditError {
         line: usize,
         /// The edit's number and the key's path, as `edit 2, box.x`.
         key: String,
-        /// What is wrong.
+        /// The TOML reader's message.
         problem: String,
     },
-    /// There is nothing to do.
+    /// The list has no edit.
     #[error("there is no edit: add an [[edit]] table")]
     NoEdits,
-    /// An edit contradicts itself, or the stack.
+    /// An edit contradicts itself, or does not suit the stack.
     #[error("edit {number}: {problem}")]
     Edit {
-        /// From 1.
+        /// The edit's number, from 1.
         number: usize,
-        /// What is wrong, and what would be right.
-        problem: String,
+        /// What is wrong with it.
+        problem: EditProblem,
     },
     /// The pages do not say how large pixels are, so lengths mean nothing.
     #[error("the stack has no resolution, so lengths have no meaning in it")]
     NoResolution,
-    /// A layer is not like the first.
+    /// A layer's size, place or resolution differs from the first layer's.
     #[error("{layer} has another size, place or resolution than the first layer: a stack has one")]
     Unlike {
         /// The layer's name.
@@ -49,17 +52,182 @@ pub enum EditError {
     Layer {
         /// The layer's name.
         layer: String,
-        /// What is wrong, and what would be right.
-        problem: String,
+        /// What is wrong with it.
+        problem: LayerProblem,
     },
 }
 
-impl EditError {
-    pub(super) fn edit(number: usize, problem: impl Into<String>) -> Self {
-        Self::Edit { number, problem: problem.into() }
-    }
+/// Why an edit of a list cannot be made.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum EditProblem {
+    /// It has none or several of the keys that say what to do.
+    #[error("write one of box, cylinder, line, label, stack, crop, pad, mirror and rotate")]
+    NotOneAction,
+    /// An edit of whole images chooses layers or an operation.
+    #[error("it holds for all layers: take op, z and layers out")]
+    WholeStack,
+    /// Layers are chosen both by height and by number.
+    #[error("z and layers say the same: write one of them")]
+    TwoRanges,
+    /// Copies are chosen for something that is not drawn.
+    #[error("copies are for boxes, cylinders, lines and labels: take it out")]
+    CopiesWithoutShape,
+    /// All but the shapes in the copies would go.
+    #[error("intersect would take away all of the build but the shapes in these copies")]
+    IntersectInCopies,
+    /// A lying cylinder has no ends, or an upright one has.
+    #[error("a cylinder along x or y needs between = [from, to], and only one along these")]
+    CylinderEnds,
+    /// The angle is no multiple of 90 degrees.
+    #[error("images rotate by 90, 180 or 270 degrees")]
+    Angle,
+    /// The line has no length.
+    #[error("the line ends where it begins")]
+    PointLine,
+    /// The shape has more runs than an image can hold.
+    #[error("it has more runs than an image can hold")]
+    TooManyRuns,
+    /// The shape covers no pixel's centre.
+    #[error("no pixel is in it: the image is {0}")]
+    NoPixel(ImageBounds),
+    /// The box to keep lies beside the image.
+    #[error("nothing is left: the image is {0}")]
+    NothingLeft(ImageBounds),
+    /// The padded image would be larger than the largest image.
+    #[error("the image would be more than 2^26 pixels wide or high")]
+    LargeImage,
+    /// A letter that the font lacks.
+    #[error("labels have no `{0}`, only the letters of ASCII")]
+    Letter(char),
+    /// A label's text has a single brace.
+    #[error("`{0}` has a brace without its other")]
+    Brace(String),
+    /// Braces in a label's text hold something else than a number's place.
+    #[error("`{{{0}}}` is no number's place: write {{n}}, or {{n:04}} for four digits")]
+    NumberField(String),
+    /// A label is not all on the image.
+    #[error("`{text}` reaches outside the image, which is {image}: move it, or pad first")]
+    LabelOutside {
+        /// The label's text.
+        text: String,
+        /// The image, or that of the part whose copy has the label.
+        image: ImageBounds,
+    },
+    /// The other stack is empty.
+    #[error("{stack} has no layers")]
+    NoLayers {
+        /// The other stack.
+        stack: String,
+    },
+    /// The two stacks have different resolutions.
+    #[error(
+        "{stack} has {}, and the stack that is edited {}",
+        resolution(*found), resolution(*edited)
+    )]
+    OtherResolution {
+        /// The other stack.
+        stack: String,
+        /// Its resolution.
+        found: Option<Dpi>,
+        /// The edited stack's resolution.
+        edited: Option<Dpi>,
+    },
+    /// Only one of the two stacks says where its images lie.
+    #[error("{stack} and the stack that is edited do not both say where they lie")]
+    OtherOrigin {
+        /// The other stack.
+        stack: String,
+    },
+    /// The other stack is to be moved, but has no resolution.
+    #[error("{stack} has no resolution, so lengths have no meaning in it")]
+    OtherLengths {
+        /// The other stack.
+        stack: String,
+    },
+    /// The other stack is added, but has layers at heights that the edited one lacks.
+    #[error(
+        "{layer} of {stack} lies {} the stack and would be lost: write z or layers, or edit the larger stack",
+        if *is_above { "above" } else { "below" }
+    )]
+    LayersLost {
+        /// The other stack.
+        stack: String,
+        /// The name of a layer that would be lost.
+        layer: String,
+        /// Whether it lies above the edited stack's last layer, not below the first.
+        is_above: bool,
+    },
+}
 
-    pub(super) fn layer(layer: &lamp_stack::PageInfo, problem: impl Into<String>) -> Self {
-        Self::Layer { layer: layer.name(), problem: problem.into() }
+/// Why a layer cannot be edited.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LayerProblem {
+    /// A lying cylinder meets a layer of unknown height.
+    #[error("it does not say at what height it is, so no cylinder can lie in it")]
+    NoHeightForCylinder,
+    /// Layers are chosen by height, but this one does not say its own.
+    #[error("it does not say at what height it is: write layers = [first, end] instead of z")]
+    NoHeightForRange,
+    /// The result has more runs than an image can hold.
+    #[error("edit {edit} makes more runs than an image can hold")]
+    TooManyRuns {
+        /// The edit's number, from 1.
+        edit: usize,
+    },
+    /// The other stack is white beside the image.
+    #[error("what is added to it reaches beside its image: pad it first")]
+    BesideImage,
+    /// Rotating would make columns of stray rows.
+    #[error("its stray rows would become columns, which no stage mends")]
+    StrayColumns,
+    /// The first page is not a build's.
+    #[error("its page does not say where copies stand")]
+    NoCopies,
+    /// The first page describes copies in an unknown way.
+    #[error("its page does not say where copies stand as builds do ({0})")]
+    CopiesFormat(serde_json::Error),
+    /// The first page turns a copy in an unknown way.
+    #[error("its page does not say how a copy is turned: {0}")]
+    CopyTurn(OrientationError),
+    /// The first page does not say where the part lay before it was copied.
+    #[error("its page does not say where the part lay")]
+    NoPartOrigin,
+    /// The first page has copies beyond any image.
+    #[error("its page says that copies stand where no image reaches")]
+    FarCopies,
+    /// The build has several parts and none of them is named.
+    #[error("name one of the build's parts, as copies = \"NAME\": {}", parts.join(", "))]
+    WhichPart {
+        /// The parts there are.
+        parts: Vec<String>,
+    },
+    /// A layer of another stack says its height, which the edited stack's do not.
+    #[error("says at what height it is, and the stack that is edited does not")]
+    HeightUnlikeEdited,
+    /// A layer of another stack does not say its height, which the edited stack's do.
+    #[error("does not say at what height it is, and the stack that is edited does")]
+    NoHeightUnlikeEdited,
+    /// A layer of another stack has no height that could be changed.
+    #[error("does not say at what height it is, so it cannot be moved up")]
+    NoHeightToMove,
+}
+
+impl EditProblem {
+    /// Adds the number of the edit, from 1.
+    pub(super) fn of_edit(self, number: usize) -> EditError {
+        EditError::Edit { number, problem: self }
     }
+}
+
+impl LayerProblem {
+    /// Adds the layer's name.
+    pub(super) fn of_layer(self, layer: &lamp_stack::PageInfo) -> EditError {
+        EditError::Layer { layer: layer.name(), problem: self }
+    }
+}
+
+fn resolution(dpi: Option<Dpi>) -> String {
+    dpi.map_or("no resolution".to_owned(), |dpi| format!("{dpi} dpi"))
 }

@@ -2,7 +2,7 @@
 
 use lamp_stack::{Frame, Layer, PageInfo};
 
-use super::edit_error::EditError;
+use super::edit_error::{EditError, EditProblem};
 use super::image_bounds::ImageBounds;
 use super::schema::{OtherStack, Pad, Rectangle};
 
@@ -30,26 +30,22 @@ pub(super) fn frame_of(
     OtherStack { by, .. }: &OtherStack,
     place: &ImageBounds,
     info: &PageInfo,
-) -> Result<Frame, String> {
+    name: &str,
+) -> Result<Frame, EditProblem> {
+    let stack = name.to_owned();
     let from = ImageBounds::of(other);
     if from.dpi != place.dpi {
-        let dpi = |place: &ImageBounds| {
-            place.dpi.map_or("no resolution".to_owned(), |dpi| format!("{dpi} dpi"))
-        };
-        return Err(format!(
-            "has {}, and the stack that is edited {}: slice both alike",
-            dpi(&from),
-            dpi(place)
-        ));
+        let (found, edited) = (from.dpi, place.dpi);
+        return Err(EditProblem::OtherResolution { stack, found, edited });
     }
     if other.info.origin_mm.is_some() != info.origin_mm.is_some() {
-        return Err("and the stack that is edited do not both say where they lie".to_owned());
+        return Err(EditProblem::OtherOrigin { stack });
     }
     let Ok(grid) = place.grid() else {
         // Without a size of pixels all images begin at the top left.
         let moved = by[..2].iter().any(|by| by.um() != 0.0);
         return if moved {
-            Err(EditError::NoResolution.to_string())
+            Err(EditProblem::OtherLengths { stack })
         } else {
             Ok(Frame { left: 0, top: 0, width: place.width, height: place.height })
         };
@@ -75,7 +71,7 @@ pub(super) fn cropped(
     let [left, right] = [left, right].map(|x| within(x, place.width));
     let [top, bottom] = [top, bottom].map(|y| within(y, place.height));
     if left == right || top == bottom {
-        return Err(EditError::edit(number, format!("nothing is left: the image is {place}")));
+        return Err(EditProblem::NothingLeft(*place).of_edit(number));
     }
     Ok(Frame { left, top, width: (right - left) as u32, height: (bottom - top) as u32 })
 }

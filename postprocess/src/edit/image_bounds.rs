@@ -8,7 +8,7 @@ use super::edit_error::EditError;
 
 /// The pixels of every layer in part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ImageBounds {
+pub struct ImageBounds {
     /// The top left corner, in millimetres.
     pub(super) origin_mm: [f64; 2],
     /// The resolution, where it is known.

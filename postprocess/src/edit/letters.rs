@@ -3,6 +3,7 @@
 use lamp_stack::Orientation;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
+use super::edit_error::EditProblem;
 use super::fill::Point;
 
 const FONT: &[u8] = include_bytes!("../../../fonts/roboto-subset.ttf");
@@ -141,7 +142,7 @@ impl OutlineBuilder for Pen {
 ///
 /// # Errors
 /// What is wrong with the text.
-pub(super) fn numbered(text: &str, n: i64) -> Result<String, String> {
+pub(super) fn numbered(text: &str, n: i64) -> Result<String, EditProblem> {
     let mut out = String::new();
     let mut rest = text;
     while let Some(start) = rest.find(['{', '}']) {
@@ -149,10 +150,8 @@ pub(super) fn numbered(text: &str, n: i64) -> Result<String, String> {
         let (field, after) = rest[start..]
             .strip_prefix('{')
             .and_then(|inside| inside.split_once('}'))
-            .ok_or_else(|| format!("`{text}` has a brace without its other"))?;
-        out += &number(field, n).ok_or_else(|| {
-            format!("`{{{field}}}` is no number's place: write {{n}}, or {{n:04}} for four digits")
-        })?;
+            .ok_or_else(|| EditProblem::Brace(text.to_owned()))?;
+        out += &number(field, n).ok_or_else(|| EditProblem::NumberField(field.to_owned()))?;
         rest = after;
     }
     Ok(out + rest)

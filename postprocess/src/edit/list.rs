@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use serde_path_to_error::Segment;
 
-use super::edit_error::EditError;
+use super::edit_error::{EditError, EditProblem};
 use super::schema::{CylinderAxis, Edit, OtherStack};
 
 /// What is to be done to a stack, one after the other.
@@ -78,7 +78,10 @@ impl Edits {
 impl Edit {
     /// Checks what single keys cannot show.
     fn check(&self, number: usize) -> Result<(), EditError> {
-        let wrong = |problem: &str| Err(EditError::edit(number, problem));
+        self.problem().map_or(Ok(()), |problem| Err(problem.of_edit(number)))
+    }
+
+    fn problem(&self) -> Option<EditProblem> {
         let shapes = [
             self.block.is_some(),
             self.cylinder.is_some(),
@@ -90,36 +93,27 @@ impl Edit {
         let count = |of: [bool; 4]| of.into_iter().filter(|is| *is).count();
         let (shapes, of_all) = (count(shapes), count(of_all));
         if shapes + of_all + usize::from(self.stack.is_some()) != 1 {
-            return wrong(
-                "write one of box, cylinder, line, label, stack, crop, pad, mirror and rotate",
-            );
+            return Some(EditProblem::NotOneAction);
         }
         if of_all == 1 && (self.op.is_some() || self.z.is_some() || self.layers.is_some()) {
-            return wrong("it holds for all layers: take op, z and layers out");
+            return Some(EditProblem::WholeStack);
         }
         if self.z.is_some() && self.layers.is_some() {
-            return wrong("z and layers say the same: write one of them");
+            return Some(EditProblem::TwoRanges);
         }
         if !self.copies.is_none() && shapes == 0 {
-            return wrong("copies are for boxes, cylinders, lines and labels: take it out");
+            return Some(EditProblem::CopiesWithoutShape);
         }
         if !self.copies.is_none() && self.op == Some(Op::Intersect) {
-            return wrong(
-                "intersect would take away all of the build but the shapes in these copies: intersect \
-                 the part before tile",
-            );
+            return Some(EditProblem::IntersectInCopies);
         }
         if self.cylinder.is_some_and(|c| (c.along == CylinderAxis::Z) == c.between.is_some()) {
-            return wrong(
-                "a cylinder along x or y needs between = [from, to], and only one along these",
-            );
+            return Some(EditProblem::CylinderEnds);
         }
         if self.rotate.is_some_and(|degrees| degrees % 90 != 0) {
-            return wrong(
-                "images rotate by 90, 180 or 270 degrees: turn the part with slice --rotate",
-            );
+            return Some(EditProblem::Angle);
         }
-        Ok(())
+        None
     }
 }
 

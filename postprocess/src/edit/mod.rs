@@ -24,8 +24,8 @@ use std::sync::Arc;
 
 use lamp_stack::{Layer, MemorySize, PageInfo, map_in_order};
 
-pub use edit_error::EditError;
-pub(crate) use image_bounds::ImageBounds;
+pub use edit_error::{EditError, EditProblem, LayerProblem};
+pub use image_bounds::ImageBounds;
 pub use list::Edits;
 pub use other_stacks::OtherLayers;
 pub(crate) use page_changes::frame_page;
@@ -140,7 +140,7 @@ impl<E: From<EditError>> AlignedStacks<E> {
     /// The layers at the height of one.
     fn at(&mut self, info: &PageInfo) -> Result<Vec<Option<Arc<Layer>>>, E> {
         if self.last.is_none() {
-            self.check(|other| other.below(info), "below")?;
+            self.check(|other| other.below(info), false)?;
         }
         self.last = Some(PageInfo { stack: None, ..info.clone() });
         self.others.iter_mut().map(|other| other.at(info)).collect()
@@ -149,23 +149,21 @@ impl<E: From<EditError>> AlignedStacks<E> {
     /// Checks, once, that no layer of a stack that is added is left.
     fn left_over(&mut self) -> Result<(), E> {
         let Some(last) = self.last.take() else { return Ok(()) };
-        self.check(|other| other.above(&last), "above")
+        self.check(|other| other.above(&last), true)
     }
 
     /// Checks that stacks that are added have no layer that lies outside.
     fn check(
         &mut self,
         outside: impl Fn(&mut AlignedStack<E>) -> Result<Option<String>, E>,
-        side: &str,
+        is_above: bool,
     ) -> Result<(), E> {
         for (other, number) in self.others.iter_mut().zip(&self.whole) {
             let Some(number) = number else { continue };
             if let Some(layer) = outside(other)? {
-                let problem = format!(
-                    "{layer} of {} lies {side} the stack and would be lost: write z or layers, or edit the larger stack",
-                    other.name
-                );
-                return Err(EditError::edit(*number, problem).into());
+                let stack = other.name.clone();
+                let lost = EditProblem::LayersLost { stack, layer, is_above };
+                return Err(lost.of_edit(*number).into());
             }
         }
         Ok(())

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lamp_stack::{Layer, Length, PageInfo};
 
-use super::edit_error::EditError;
+use super::edit_error::{EditError, EditProblem, LayerProblem};
 use super::image_bounds::ImageBounds;
 
 /// A stack that an edit names.
@@ -42,7 +42,7 @@ impl<E: From<EditError>> AlignedStack<E> {
         if self.place.is_none() {
             self.advance()?;
         }
-        let none = || EditError::edit(number, format!("{} has no layers", self.name)).into();
+        let none = || EditProblem::NoLayers { stack: self.name.clone() }.of_edit(number).into();
         self.current.as_deref().ok_or_else(none)
     }
 
@@ -115,25 +115,17 @@ impl<E: From<EditError>> AlignedStack<E> {
                 let start = z + self.up.um();
                 Ok([start, start + thickness])
             }
-            (Some(_), Some(_)) => Err(self
-                .unlike(info, "says at what height it is, and the stack that is edited does not")),
-            _ if by_height => Err(self.unlike(
-                info,
-                "does not say at what height it is, and the stack that is edited does",
-            )),
+            (Some(_), Some(_)) => Err(self.unlike(info, LayerProblem::HeightUnlikeEdited)),
+            _ if by_height => Err(self.unlike(info, LayerProblem::NoHeightUnlikeEdited)),
             _ if self.up != Length::default() => {
-                Err(self
-                    .unlike(info, "does not say at what height it is, so it cannot be moved up"))
+                Err(self.unlike(info, LayerProblem::NoHeightToMove))
             }
             _ => Ok([info.index.into(), f64::from(info.index) + 1.0]),
         }
     }
 
-    fn unlike(&self, info: &PageInfo, problem: &str) -> EditError {
-        EditError::Layer {
-            layer: format!("{}: {}", self.name, info.name()),
-            problem: problem.to_owned(),
-        }
+    fn unlike(&self, info: &PageInfo, problem: LayerProblem) -> EditError {
+        EditError::Layer { layer: format!("{}: {}", self.name, info.name()), problem }
     }
 }
 

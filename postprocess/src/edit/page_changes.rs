@@ -1,7 +1,7 @@
 //! What pages say of images that were cropped, padded or turned.
 
 use super::copies::{forget_copies, move_copies};
-use super::edit_error::EditError;
+use super::edit_error::{EditError, LayerProblem};
 use super::image_bounds::ImageBounds;
 use lamp_stack::{Frame, Orientation, PageInfo};
 
@@ -34,10 +34,7 @@ pub(super) fn turn_page(
     place: &ImageBounds,
 ) -> Result<(), EditError> {
     if turn.is_across() && !info.stray_rows.is_empty() {
-        return Err(EditError::layer(
-            info,
-            "its stray rows would become columns, which no stage mends: fix the stack first",
-        ));
+        return Err(LayerProblem::StrayColumns.of_layer(info));
     }
     move_to(info, place);
     if turn.is_across() {
@@ -112,6 +109,6 @@ mod tests {
         turn_page(&mut page, "180".parse().unwrap(), 10, &PLACE).unwrap();
         assert_eq!(page.stray_rows, [0, 4, 7]);
         let across = turn_page(&mut page, "90".parse().unwrap(), 10, &PLACE);
-        assert!(across.unwrap_err().to_string().contains("fix the stack first"));
+        assert!(across.unwrap_err().to_string().contains("would become columns"));
     }
 }

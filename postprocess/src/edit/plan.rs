@@ -8,7 +8,7 @@ use lamp_stack::{Frame, Image, Layer, MAX_SIDE, Mask, Op, Orientation, PageInfo,
 use serde_json::json;
 
 use super::copies::BuildCopy;
-use super::edit_error::EditError;
+use super::edit_error::{EditError, EditProblem, LayerProblem};
 use super::frames::{cropped, frame_of, padded};
 use super::image_bounds::ImageBounds;
 use super::list::Edits;
@@ -71,9 +71,8 @@ impl LayerSelection {
             Self::All => true,
             Self::Layers(layers) => layers.contains(&info.index),
             Self::Heights([start, end]) => {
-                let middle = middle(info).ok_or_else(|| {
-                    EditError::layer(info, "it does not say at what height it is: write layers = [first, end] instead of z")
-                })?;
+                let middle =
+                    middle(info).ok_or_else(|| LayerProblem::NoHeightForRange.of_layer(info))?;
                 (start..end).contains(&&middle)
             }
         })
@@ -99,8 +98,8 @@ impl EditPlan {
                     let name = other.name.clone();
                     let layer = other.first(number)?;
                     told["stack"]["file"] = origin_of(layer);
-                    let frame = frame_of(layer, stack, &place, &info)
-                        .map_err(|problem| EditError::edit(number, format!("{name} {problem}")))?;
+                    let frame = frame_of(layer, stack, &place, &info, &name)
+                        .map_err(|problem| problem.of_edit(number))?;
                     PlannedEdit::Other { reach: LayerSelection::of(edit), op: edit.op(), frame }
                 }
                 None => PlannedEdit::of(edit, number, &place, &info)?,
@@ -133,12 +132,7 @@ impl EditPlan {
             let other =
                 if matches!(step, PlannedEdit::Other { .. }) { others.next() } else { None };
             let other = other.and_then(Option::as_deref);
-            let too_many = || {
-                EditError::layer(
-                    &info,
-                    format!("edit {} makes more runs than an image can hold", k + 1),
-                )
-            };
+            let too_many = || LayerProblem::TooManyRuns { edit: k + 1 }.of_layer(&info);
             let holds = match step {
                 PlannedEdit::Shape { reach, .. } | PlannedEdit::Other { reach, .. } => {
                     reach.holds(&info)?
@@ -170,10 +164,7 @@ impl PlannedEdit {
         let turned = |turn| Self::Turn { turn, height: place.height, place: place.turned(turn) };
         let framed = |frame: Frame| {
             if frame.width.max(frame.height) > MAX_SIDE {
-                return Err(EditError::edit(
-                    number,
-                    "the image would be more than 2^26 pixels wide or high",
-                ));
+                return Err(EditProblem::LargeImage.of_edit(number));
             }
             Ok(Self::Frame { frame, place: place.framed(frame) })
         };
@@ -224,8 +215,7 @@ impl PlannedEdit {
                 Some(other) => {
                     let shown = other.image.framed(*frame);
                     if matches!(op, Op::Union | Op::Xor) && lit(&shown) < lit(&other.image) {
-                        let problem = "what is added to it reaches beside its image: pad it first";
-                        return Err(EditError::layer(info, problem.to_owned()));
+                        return Err(LayerProblem::BesideImage.of_layer(info));
                     }
                     combined(*op, &shown)
                 }

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use lamp_stack::{Length, Mask, PageInfo};
 
 use super::copies::{BuildCopy, composed};
-use super::edit_error::EditError;
+use super::edit_error::{EditError, EditProblem, LayerProblem};
 use super::fill::{Point, disc, polygons};
 use super::image_bounds::{ImageBounds, PixelMap};
 use super::letters::{numbered, outlines};
@@ -34,7 +34,7 @@ impl EditShape {
         place: &ImageBounds,
         copies: Vec<BuildCopy>,
     ) -> Result<Self, EditError> {
-        let wrong = |problem: String| EditError::edit(number, problem);
+        let wrong = |problem: EditProblem| problem.of_edit(number);
         let grids: Vec<PixelMap> =
             copies.iter().map(|copy| copy.part.grid()).collect::<Result<_, _>>()?;
         let mask = if let Some(cylinder) = edit.cylinder {
@@ -46,13 +46,14 @@ impl EditShape {
             let lines: Vec<_> = copies
                 .iter()
                 .zip(0..)
-                .map(|(copy, k)| letters(label, &copy.part, k))
+                .zip(&grids)
+                .map(|((copy, k), grid)| letters(label, &copy.part, *grid, k))
                 .collect::<Result<_, _>>()
                 .map_err(wrong)?;
             composed(&copies, place, |k, part| polygons(&lines[k], part.width, part.height))
         } else {
             if edit.line.is_some_and(|line| line.from == line.to) {
-                return Err(wrong("the line ends where it begins".to_owned()));
+                return Err(wrong(EditProblem::PointLine));
             }
             let block = edit.block.map(|block| move |grid| rectangle(block, grid));
             let line = edit.line.map(|line| move |grid| stroke(line, grid));
@@ -66,11 +67,10 @@ impl EditShape {
                 polygons(&[corners(grids[k])], part.width, part.height)
             })
         };
-        let mask =
-            mask.ok_or_else(|| wrong("it has more runs than an image can hold".to_owned()))?;
+        let mask = mask.ok_or_else(|| wrong(EditProblem::TooManyRuns))?;
         if mask.transition_count() == 0 {
             let lain = copies.first().map_or(place, |copy| &copy.part);
-            return Err(wrong(format!("no pixel is in it: the image is {lain}")));
+            return Err(wrong(EditProblem::NoPixel(*lain)));
         }
         Ok(Self::Upright(mask))
     }
@@ -84,12 +84,8 @@ impl EditShape {
             Self::Upright(mask) => return Ok(Some(Cow::Borrowed(mask))),
             Self::Lying { cylinder, copies, place } => (*cylinder, copies, place),
         };
-        let middle = middle(info).ok_or_else(|| {
-            EditError::layer(
-                info,
-                "it does not say at what height it is, so no cylinder can lie in it",
-            )
-        })?;
+        let middle =
+            middle(info).ok_or_else(|| LayerProblem::NoHeightForCylinder.of_layer(info))?;
         let block = section(cylinder, middle);
         let part = |_, part: &ImageBounds| {
             let corners = rectangle(block, part.grid().expect("it was found for each"));
@@ -132,15 +128,19 @@ fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec
 }
 
 /// The outlines of a label at each of its places in the copy of that number.
-fn letters(label: &Label, part: &ImageBounds, copy: i64) -> Result<Vec<Vec<Point>>, String> {
-    let grid = part.grid().map_err(|error| error.to_string())?;
+fn letters(
+    label: &Label,
+    part: &ImageBounds,
+    grid: PixelMap,
+    copy: i64,
+) -> Result<Vec<Vec<Point>>, EditProblem> {
     let mut lines: Vec<Vec<Point>> = Vec::new();
     let size = grid.length(label.height);
     let before = copy * label.at.len() as i64;
     for (at, k) in label.at.iter().zip(before..) {
         let text = numbered(&label.text, i64::from(label.start) + k * i64::from(label.step))?;
         let glyphs = outlines(&text, label.align, label.turn, TOLERANCE / size)
-            .map_err(|letter| format!("labels have no `{letter}`, only the letters of ASCII"))?;
+            .map_err(EditProblem::Letter)?;
         let [x, y] = grid.to_pixels(at.map(Length::mm));
         let placed = |[right, up]: Point| [x + size * right, y - size * up];
         lines.extend(
@@ -148,9 +148,7 @@ fn letters(label: &Label, part: &ImageBounds, copy: i64) -> Result<Vec<Vec<Point
         );
         // Half a number is a wrong one.
         if !lines.iter().flatten().all(|&point| part.holds(point)) {
-            return Err(format!(
-                "`{text}` reaches outside the image, which is {part}: move it, or pad first"
-            ));
+            return Err(EditProblem::LabelOutside { text, image: *part });
         }
     }
     Ok(lines)

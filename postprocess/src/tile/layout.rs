@@ -226,7 +226,7 @@ impl Layout {
         let [one, other] = copies.map(|k| self.copy_name(self.placements[k].part, numbers[k]));
         let pitch = self.dpi.pitch().mm();
         let y_mm = self.area.height.mm() - f64::from(row) * pitch;
-        TileError::Overlap { one, other, x_mm: f64::from(column) * pitch, y_mm }
+        TileError::Overlap { one, other, at_mm: [f64::from(column) * pitch, y_mm] }
     }
 
     fn packing_command(&mut self, gap: Length, pack: Pack) -> String {

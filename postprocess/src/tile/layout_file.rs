@@ -80,17 +80,17 @@ pub enum LayoutError {
     #[error("there is no copy in it")]
     Empty,
     /// No stack is called so.
-    #[error("copies[{copy}].part: no stack is called {part:?}: there is {known}")]
+    #[error("copies[{copy}].part: no stack is called {part:?}: there is {}", known.join(", "))]
     Unknown {
         /// Which copy, from 0.
         copy: usize,
         /// What stands there.
         part: String,
         /// The stacks there are.
-        known: String,
+        known: Vec<String>,
     },
     /// A stack is not used.
-    #[error("{part} has no copy in it: leave that stack out, or add copies")]
+    #[error("{part} has no copy in it")]
     Unused {
         /// The stack.
         part: String,
@@ -156,7 +156,7 @@ impl LayoutFile {
             let unknown = || LayoutError::Unknown {
                 copy: index,
                 part: copy.part.clone(),
-                known: parts.iter().map(PartStack::name).collect::<Vec<_>>().join(", "),
+                known: parts.iter().map(|part| part.name().to_owned()).collect(),
             };
             let part = part_called(&parts, &copy.part).ok_or_else(unknown)?;
             wishes.push(copy.wish(part, &parts[part], area));

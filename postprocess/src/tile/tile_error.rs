@@ -1,132 +1,127 @@
-//! Why parts cannot be laid out.
+//! Errors of laying parts out and building their layers.
+
+use std::fmt;
 
 use lamp_stack::{Dpi, Length, Size};
 use thiserror::Error;
 
 use super::PixelSize;
 
-/// Why parts cannot be laid out on a build area.
+/// Why parts cannot be laid out on a build area, or their layers not be built.
 ///
-/// Parts and layers are called by what people call them.
+/// `name` is always a part as the caller named it, `layer` a layer as its page
+/// names it.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TileError {
-    /// Not one copy fits.
+    /// Not a single copy fits.
     #[error(
-        "{name}: the part's image is {part} pixels, larger than the build area of {area} ({area_mm}): give a larger --area, or --fit if the image is wider than the part"
+        "{name}: the part's image is {part} pixels, larger than the build area of {area} ({area_mm})"
     )]
     TooLarge {
         /// The part.
         name: String,
-        /// Width and height of what is to be placed.
+        /// The size of what would be placed.
         part: PixelSize,
-        /// Width and height of the area.
+        /// The size of the area.
         area: PixelSize,
         /// The area as lengths.
         area_mm: Size,
     },
     /// Not all copies fit.
     #[error(
-        "{name}: {asked} copies were asked for, but only {most} fit on the build area of {area_mm}: give a larger --area, a smaller --gap or fewer copies, or try --pack outline"
+        "{name}: {asked} copies were asked for, but only {most} fit on the build area of {area_mm}"
     )]
     TooMany {
         /// The part.
         name: String,
-        /// The copies asked for.
+        /// The number of copies asked for.
         asked: u32,
-        /// The copies for which a place was found.
+        /// The number of copies that found a place.
         most: u32,
         /// The area as lengths.
         area_mm: Size,
     },
-    /// The build area is larger than any reader of stacks takes.
+    /// The build area is larger than the largest image.
     #[error("the build area of {area_mm} is more than 2^26 pixels wide or high")]
     AreaTooLarge {
         /// The area as lengths.
         area_mm: Size,
     },
-    /// Cells without holes, or too small for pixels.
-    #[error(
-        "a mesh of cells {cell} apart with walls of {wall} has no holes: give a larger --cell or a smaller --wall"
-    )]
+    /// The walls leave no holes, or cells are smaller than a few pixels.
+    #[error("a mesh of cells {cell} apart with walls of {wall} has no holes")]
     NoCells {
-        /// From the middle of a cell to that of the next.
+        /// The distance between the centres of neighbouring cells.
         cell: Length,
         /// The thickness of the walls.
         wall: Length,
     },
-    /// A mesh that is an image without pixels.
+    /// The image to repeat as a mesh has no pixels.
     #[error("{name}: the mesh's image has no pixels")]
     NoTemplate {
         /// The image.
         name: String,
     },
-    /// A mesh of more runs than an image can hold.
-    #[error("the mesh has more runs than an image can hold: give it larger cells")]
+    /// The mesh has more runs than an image can hold.
+    #[error("the mesh has more runs than an image can hold")]
     FineMesh,
-    /// Break lines that leave no mesh.
-    #[error(
-        "there would be more than 10000 break lines: give a wider --break-pitch, or --break-width 0um"
-    )]
+    /// Break lines would leave nothing of the mesh.
+    #[error("there would be more than 10000 break lines")]
     ManyBreaks,
-    /// Moats by outlines that are not known.
-    #[error("{name}: its outline is not known: moats by outline need --fit")]
+    /// The moat is to follow outlines, but a part was read without its outline.
+    #[error("{name}: its outline is not known, and moats by outline need it")]
     NoOutline {
         /// The part.
         name: String,
     },
-    /// A moat that leaves no place for the mesh.
-    #[error(
-        "a clearance of {clearance} is wider than the build area of {area_mm}: give a smaller --clearance, or --mesh none"
-    )]
+    /// The moat leaves no room for the mesh.
+    #[error("a clearance of {clearance} is wider than the build area of {area_mm}")]
     WideMoat {
-        /// How far from a part the mesh would begin.
+        /// The distance between a part and the mesh.
         clearance: Length,
         /// The area as lengths.
         area_mm: Size,
     },
     /// The copies have more runs than an image can hold.
-    #[error("{copies} copies in {layer} have more runs than an image can hold: place fewer")]
+    #[error("{copies} copies in {layer} have more runs than an image can hold")]
     TooManyRuns {
-        /// How many copies.
+        /// The number of copies.
         copies: usize,
-        /// The layer's name.
+        /// The layer.
         layer: String,
     },
-    /// The resolution is not known, so lengths have no meaning in pixels.
+    /// The resolution is unknown, so lengths mean nothing in pixels.
     #[error("{name}: {layer} has no resolution, so the build area has no size in pixels")]
     NoResolution {
         /// The part.
         name: String,
-        /// The layer's name.
+        /// The layer.
         layer: String,
     },
-    /// A layer of another resolution than the first.
+    /// A layer's resolution differs from the first layer's.
     #[error("{name}: {layer} has another resolution than the first layer: a stack has one")]
     OtherResolution {
         /// The part.
         name: String,
-        /// The layer's name.
+        /// The layer.
         layer: String,
     },
-    /// A layer is not like the first.
+    /// A layer's size differs from the first layer's.
     #[error(
         "{name}: {layer} is {found} pixels where the first layer is {expected}: a stack has one size"
     )]
     OtherSize {
         /// The part.
         name: String,
-        /// The layer's name.
+        /// The layer.
         layer: String,
         /// Its size.
         found: PixelSize,
         /// The first layer's size.
         expected: PixelSize,
     },
-    /// Two parts of different resolutions.
-    #[error(
-        "{name} has {dpi} dpi and {first} has {first_dpi} dpi: slice them at one resolution to build them together"
-    )]
+    /// Two parts have different resolutions.
+    #[error("{name} has {dpi} dpi and {first} has {first_dpi} dpi: a build has one resolution")]
     Resolutions {
         /// The first part.
         first: String,
@@ -137,128 +132,115 @@ pub enum TileError {
         /// Its resolution.
         dpi: Dpi,
     },
-    /// There is nothing to find the extents of.
+    /// A part is black in all layers.
     #[error("{name}: all its layers are black, so there is no part to place")]
     Black {
         /// The part.
         name: String,
     },
-    /// A layer is not within the extents that were found.
+    /// A layer is white outside the outline that was found before.
     #[error(
-        "{name}: {layer} is not as it was when the part's extents were found: the stack was changed meanwhile; run tile again"
+        "{name}: {layer} is not as it was when the part's extents were found: the stack was changed meanwhile"
     )]
     Changed {
         /// The part.
         name: String,
-        /// The layer's name.
+        /// The layer.
         layer: String,
     },
-    /// Two copies of a layout lie on each other.
-    #[error(
-        "{one} and {other} overlap near x {x_mm:.2} y {y_mm:.2} mm: move one of them, or give --fit if only their black margins do"
-    )]
+    /// Two copies of a layout overlap.
+    #[error("{one} and {other} overlap near x {:.2} y {:.2} mm", at_mm[0], at_mm[1])]
     Overlap {
         /// A copy.
         one: CopyName,
-        /// Another.
+        /// Another copy.
         other: CopyName,
-        /// Where on the build, from its lower left corner.
-        x_mm: f64,
-        /// Where on the build, from its lower left corner.
-        y_mm: f64,
+        /// A point of both, from the build area's lower left corner.
+        at_mm: [f64; 2],
     },
-    /// A copy of a layout is not on the build area.
-    #[error(
-        "{copy} reaches {beyond} beyond the build area of {area_mm}: move it, or give --fit if only its black margin does"
-    )]
+    /// A copy of a layout reaches beyond the build area.
+    #[error("{copy} reaches {beyond} beyond the build area of {area_mm}")]
     OutOfArea {
         /// The copy.
         copy: CopyName,
-        /// How far.
+        /// The distance.
         beyond: Length,
         /// The area as lengths.
         area_mm: Size,
     },
-    /// Stacks that start at different heights.
-    #[error(
-        "{name} starts at z {z:.3} mm and {first} at {first_z:.3} mm: slice them with the same first layer, or give --settle to set all on the platform"
-    )]
+    /// Two stacks start at different heights.
+    #[error("{name} starts at z {:.3} mm and {first} at {:.3} mm", z.mm(), first_z.mm())]
     OtherStart {
         /// The first part.
         first: String,
-        /// Its height in millimetres.
-        first_z: f64,
+        /// The bottom of its first layer.
+        first_z: Length,
         /// The part that differs.
         name: String,
-        /// Its height in millimetres.
-        z: f64,
+        /// The bottom of its first layer.
+        z: Length,
     },
-    /// A layer that does not match the build's.
+    /// A layer does not span the heights of the build's layer.
     #[error(
-        "{name}: {layer} spans z {} to {} mm where the build's layer spans {} to {}: slice it again with --thickness {}, or give --resample to take the layer at each height of {first}",
-        mm(.spans[0]), mm(.spans[1]), mm(.build[0]), mm(.build[1]), thickness(.build)
+        "{name}: {layer} spans z {} to {} mm where the build's layer spans {} to {}",
+        mm(.spans[0]), mm(.spans[1]), mm(.build[0]), mm(.build[1])
     )]
     OtherHeights {
         /// The part.
         name: String,
-        /// The layer's name.
+        /// The layer.
         layer: String,
-        /// The layer's bottom and top, in micrometres.
-        spans: [f64; 2],
-        /// Those of the build's layer.
-        build: [f64; 2],
+        /// The layer's bottom and top.
+        spans: [Length; 2],
+        /// The bottom and top of the build's layer.
+        build: [Length; 2],
         /// The part whose heights are the build's.
         first: String,
     },
-    /// A layer says nothing of its height.
+    /// A layer does not say its height or thickness.
     #[error(
         "{name}: {layer} does not say at which height it lies and how thick it is, as other stacks do: stacks are joined by their heights"
     )]
     NoHeight {
         /// The part.
         name: String,
-        /// The layer's name.
+        /// The layer.
         layer: String,
     },
-    /// Parts that want different exposures in one layer.
+    /// Two parts have different exposures in one layer.
     #[error(
-        "in {layer}, {name} is to be exposed for {ms} ms and {first} for {first_ms} ms: a build's layer has one exposure; slice the parts for the same"
+        "in {layer}, {name} is to be exposed for {ms} ms and {first} for {first_ms} ms: a build's layer has one exposure"
     )]
     Exposures {
-        /// The layer's name.
+        /// The layer.
         layer: String,
         /// A part.
         first: String,
-        /// Its exposure.
+        /// Its exposure in milliseconds.
         first_ms: f64,
         /// The part that differs.
         name: String,
-        /// Its exposure.
+        /// Its exposure in milliseconds.
         ms: f64,
     },
 }
 
-/// A copy of a part, as people call it: `blade.tif copy 3`.
+/// A copy of a part as messages name it: `blade.tif copy 3`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CopyName {
     /// The part.
     pub name: String,
-    /// Which of the part's copies, from 1.
+    /// The copy's number among those of the part, from 1.
     pub number: u32,
 }
 
-impl std::fmt::Display for CopyName {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Display for CopyName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} copy {}", self.name, self.number)
     }
 }
 
-/// Micrometres as millimetres, to the micrometre's tenth.
-fn mm(um: f64) -> f64 {
-    (um * 10.0).round() / 1e4
-}
-
-/// How thick a layer is, to the nanometre.
-fn thickness([bottom, top]: &[f64; 2]) -> Length {
-    Length::from_um(((top - bottom) * 1e3).round() / 1e3)
+/// Returns a length in millimetres, rounded to a tenth of a micrometre.
+fn mm(length: Length) -> f64 {
+    (length.um() * 10.0).round() / 1e4
 }
