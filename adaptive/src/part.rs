@@ -1,13 +1,16 @@
 //! A part, and the layers that it may be built of.
 
+use std::ops::Range;
+
+use lamp_slicer::scan::RowFacet;
 use lamp_slicer::{Body, Fill, PlacedFacet};
-use lamp_stack::Length;
+use lamp_stack::{Grouped, Length};
 use rayon::prelude::*;
 
-use crate::cut::{Cuts, RowFacet, Rows};
+use crate::cut::Cuts;
 use crate::error::HeightsError;
 use crate::profile::{Change, Profile};
-use crate::row::Sweep;
+use crate::row::{Slope, Sweep, Toggle};
 use crate::slab::{Slab, Slabs};
 
 /// Rows are worked on in so many stripes, whatever the threads, so that sums do
@@ -19,6 +22,22 @@ const LEVEL_UM: f64 = 0.05;
 
 /// More rows than any image has.
 const MOST_ROWS: f64 = 16_777_216.0;
+
+/// Rows of the image: x in millimetres, and y in rows, downwards.
+#[derive(Clone, Copy, Debug)]
+struct Rows {
+    top_mm: f64,
+    pitch_mm: f64,
+    count: u32,
+}
+
+impl Rows {
+    /// Returns a facet as rows meet it, if any does.
+    fn of_facet(&self, facet: &PlacedFacet) -> Option<RowFacet> {
+        let row = |y: f64| (self.top_mm - y) / self.pitch_mm - 0.5;
+        RowFacet::new(facet.map(|[x, y, z_um]| [x, row(y), z_um]), self.count)
+    }
+}
 
 /// A part as layers see it.
 ///
@@ -118,8 +137,8 @@ impl Part {
     fn rise(&self, facets: &[PlacedFacet], z_um: [f64; 2], planes: &[f64]) -> Rise {
         let stripe_rows = self.rows.count.div_ceil(STRIPES);
         let mut stripes: Vec<Vec<RowFacet>> = (0..STRIPES).map(|_| Vec::new()).collect();
-        for facet in facets.iter().filter_map(|facet| RowFacet::new(facet, &self.rows)) {
-            let [first, end] = facet.rows();
+        for facet in facets.iter().filter_map(|facet| self.rows.of_facet(facet)) {
+            let Range { start: first, end } = facet.rows();
             for stripe in first / stripe_rows..=(end - 1) / stripe_rows {
                 stripes[stripe as usize].push(facet);
             }
@@ -128,7 +147,7 @@ impl Part {
             let first = stripe as u32 * stripe_rows;
             let mut cuts = Cuts::default();
             for facet in &facets {
-                facet.cut([first, first + stripe_rows], z_um, &mut cuts);
+                cuts.add_facet(facet, [first, first + stripe_rows], z_um);
             }
             self.sweep(&cuts, first, stripe_rows, planes)
         };
@@ -146,11 +165,14 @@ impl Part {
     fn sweep(&self, cuts: &Cuts, first: u32, rows: u32, planes: &[f64]) -> Rise {
         let mut profile = Profile::new(planes);
         let mut sweep = Sweep::new(self.fill);
-        let mut toggles = ByRow::new(&cuts.toggles, first, rows, |toggle| toggle.row);
-        let mut slopes = ByRow::new(&cuts.slopes, first, rows, |slope| slope.row);
+        let rows = rows as usize;
+        let toggle = |toggle: &Toggle| ((toggle.row - first) as usize, *toggle);
+        let slope = |slope: &Slope| ((slope.row - first) as usize, *slope);
+        let mut toggles = Grouped::new(rows, || cuts.toggles.iter().map(toggle));
+        let mut slopes = Grouped::new(rows, || cuts.slopes.iter().map(slope));
         let mut rows_left_out = 0;
-        for row in 0..rows as usize {
-            let (toggles, slopes) = (toggles.row(row), slopes.row(row));
+        for row in 0..rows {
+            let (toggles, slopes) = (toggles.group_mut(row), slopes.group_mut(row));
             toggles.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
             slopes.sort_unstable_by(|a, b| a.x[0].total_cmp(&b.x[0]));
             rows_left_out += u32::from(!sweep.add(toggles, slopes, &mut profile));
@@ -173,35 +195,6 @@ struct Rise {
     bottom_width: f64,
     unavoidable: f64,
     rows_left_out: u32,
-}
-
-/// Things sorted by row (a counting sort).
-struct ByRow<T> {
-    starts: Vec<u32>,
-    things: Vec<T>,
-}
-
-impl<T: Copy + Default> ByRow<T> {
-    fn new(things: &[T], first: u32, rows: u32, row_of: impl Fn(&T) -> u32) -> Self {
-        let mut starts = vec![0; rows as usize + 2];
-        for thing in things {
-            starts[(row_of(thing) - first) as usize + 2] += 1;
-        }
-        for row in 2..starts.len() {
-            starts[row] += starts[row - 1];
-        }
-        let mut sorted = vec![T::default(); things.len()];
-        for thing in things {
-            let next = &mut starts[(row_of(thing) - first) as usize + 1];
-            sorted[*next as usize] = *thing;
-            *next += 1;
-        }
-        Self { starts, things: sorted }
-    }
-
-    fn row(&mut self, row: usize) -> &mut [T] {
-        &mut self.things[self.starts[row] as usize..self.starts[row + 1] as usize]
-    }
 }
 
 /// A facet's normal, in millimetres squared.

@@ -7,6 +7,8 @@
 //! past its lower end, and takes it away again at the first past its upper end: its
 //! cost does not depend on how many tops there are.
 
+use lamp_slicer::scan::count_at_or_below;
+
 /// From this many tops between a line's ends on, polynomials are cheaper than the
 /// tops one by one; and so far apart the ends do not spoil their rounding.
 const MANY_TOPS: usize = 6;
@@ -153,15 +155,7 @@ impl<'a> Profile<'a> {
     /// The first top above a height.
     #[inline]
     pub(crate) fn first_above(&self, height: f64) -> usize {
-        // Tops are nearly even: guess, then walk.
-        let mut top = (((height - self.tops[0]) * self.per_um) as usize).min(self.tops.len());
-        while top < self.tops.len() && self.tops[top] <= height {
-            top += 1;
-        }
-        while top > 0 && self.tops[top - 1] > height {
-            top -= 1;
-        }
-        top
+        count_at_or_below(self.tops, height, (height - self.tops[0]) * self.per_um)
     }
 
     pub(crate) fn add(&mut self, line: Line) {

@@ -56,13 +56,6 @@ impl Sweep {
         Self { fill, ends: Vec::new(), open: Vec::new() }
     }
 
-    fn is_inside(&self, winding: i32) -> bool {
-        match self.fill {
-            Fill::EvenOdd => winding % 2 != 0,
-            Fill::NonZero => winding != 0,
-        }
-    }
-
     /// Adds a row, whose toggles and slopes are sorted from the left. Returns
     /// whether it balances: a row that does not, because the mesh has a gap, is left
     /// out.
@@ -76,7 +69,7 @@ impl Sweep {
             return true;
         }
         let balance = toggles.iter().map(|toggle| i32::from(toggle.winding)).sum();
-        if self.is_inside(balance) {
+        if self.fill.is_inside(balance) {
             return false;
         }
         self.ends.clear();
@@ -99,7 +92,7 @@ impl Sweep {
                     self.open.push(*slope);
                 }
             }
-            if self.is_inside(winding) {
+            if self.fill.is_inside(winding) {
                 profile.bottom_width += columns[1] - columns[0];
             }
             match self.open.len() {
@@ -135,14 +128,14 @@ impl Sweep {
     /// Adds columns over lines that are sorted from below.
     fn pass(&self, columns: [f64; 2], mut winding: i32, profile: &mut Profile<'_>) {
         let width = columns[1] - columns[0];
-        let mut inside = self.is_inside(winding);
+        let mut inside = self.fill.is_inside(winding);
         // How much of each column is inside, if it ends as it begins.
         let mut within = [0.0; 2];
         // How much of each column, up to the line before, is not as it is after it.
         let mut unlike = [0.0; 2];
         for slope in &self.open {
             winding += i32::from(slope.winding);
-            if self.is_inside(winding) == inside {
+            if self.fill.is_inside(winding) == inside {
                 continue;
             }
             let heights = columns.map(|x| slope.height(x));

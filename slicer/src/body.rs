@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use lamp_stack::{Grouped, KeyCounts};
+
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
 use crate::model::Model;
@@ -13,22 +15,19 @@ use crate::survey::Survey;
 #[derive(Debug)]
 pub struct Body {
     model: PlacedModel,
-    /// In the order of the bins where they begin.
-    facets: Vec<Facet>,
-    bins: Bins,
-    /// Where in `facets` each bin's begin.
-    starts: Vec<u32>,
-    /// Facets of lower bins that reach into a bin.
-    from_below: Vec<u32>,
-    /// Where in `from_below` each bin's begin.
-    from_below_starts: Vec<u32>,
+    bins: HeightBins,
+    /// By the bin in which they begin.
+    facets: Grouped<Facet>,
+    /// Of each bin: the facets of lower bins that reach into it, by their place in
+    /// `facets`.
+    from_below: Grouped<u32>,
     min: [f64; 3],
     max: [f64; 3],
 }
 
 /// Even ranges of height.
 #[derive(Clone, Copy, Debug)]
-struct Bins {
+struct HeightBins {
     start_um: f64,
     height_um: f64,
     count: usize,
@@ -37,7 +36,7 @@ struct Bins {
 /// More would not be met one by one.
 const MOST_BINS: f64 = 65_536.0;
 
-impl Bins {
+impl HeightBins {
     /// Twice as high as facets are on average: most facets meet one or two.
     fn new(survey: &Survey) -> Self {
         let (start_um, end_um) = (survey.min[2], survey.max[2]);
@@ -71,36 +70,28 @@ impl Body {
         let model = PlacedModel::new(model, placement, units);
         let survey = Survey::of(&model)?;
         survey.check_distance()?;
-        let bins = Bins::new(&survey);
-        let (mut starts, mut below) = (vec![0; bins.count + 2], vec![0; bins.count + 2]);
+        let bins = HeightBins::new(&survey);
+        let (mut facets, mut from_below) = (KeyCounts::new(bins.count), KeyCounts::new(bins.count));
         let blocks = 0..model.model.block_count();
         for block in blocks.clone() {
             model.for_each_in_block(block, |facet| {
                 let met = bins.of_facet(facet);
-                starts[met.start + 2] += 1u32;
-                (met.start + 1..met.end).for_each(|bin| below[bin + 2] += 1u32);
+                facets.add(met.start);
+                (met.start + 1..met.end).for_each(|bin| from_below.add(bin));
             })?;
         }
-        for bin in 2..bins.count + 2 {
-            starts[bin] += starts[bin - 1];
-            below[bin] += below[bin - 1];
-        }
-        let mut facets = vec![Facet::default(); model.model.facet_count()];
-        let mut from_below = vec![0; below[bins.count + 1] as usize];
+        let (mut facets, mut from_below) = (facets.into_groups(), from_below.into_groups());
         for block in blocks {
             model.model.for_each_in_block(block, |facet| {
                 let met = bins.of_facet(&model.placed(facet));
-                let place = take_place(&mut starts[met.start + 1]);
-                facets[place as usize] = *facet;
+                let place = facets.put(met.start, *facet);
                 for bin in met.start + 1..met.end {
-                    from_below[take_place(&mut below[bin + 1]) as usize] = place;
+                    from_below.put(bin, place);
                 }
             })?;
         }
-        starts.pop();
-        below.pop();
-        let (min, max) = (survey.min, survey.max);
-        Ok(Self { model, facets, bins, starts, from_below, from_below_starts: below, min, max })
+        let (facets, from_below) = (facets.finish(), from_below.finish());
+        Ok(Self { model, bins, facets, from_below, min: survey.min, max: survey.max })
     }
 
     /// The least x and y in millimetres, and z in micrometres.
@@ -117,12 +108,9 @@ impl Body {
     /// in no order, but always the same. Heights are in micrometres.
     pub fn between(&self, low_um: f64, high_um: f64) -> Vec<PlacedFacet> {
         let (first, last) = (self.bins.of(low_um), self.bins.of(high_um));
-        let range = |starts: &[u32], bins: Range<usize>| {
-            starts[bins.start] as usize..starts[bins.end] as usize
-        };
-        let from_below = &self.from_below[range(&self.from_below_starts, first..first + 1)];
-        let own = &self.facets[range(&self.starts, first..last + 1)];
-        let from_below = from_below.iter().map(|&facet| &self.facets[facet as usize]);
+        let facets = self.facets.items();
+        let from_below = self.from_below.group(first).iter().map(|&facet| &facets[facet as usize]);
+        let own = &facets[self.facets.range(first..last + 1)];
         let placed = from_below.chain(own).map(|facet| self.model.placed(facet));
         let is_met = |facet: &PlacedFacet| {
             let (low, high) = heights(facet);
@@ -133,13 +121,8 @@ impl Body {
 
     /// Gives every facet.
     pub fn for_each(&self, mut each: impl FnMut(&PlacedFacet)) {
-        self.facets.iter().for_each(|facet| each(&self.model.placed(facet)));
+        self.facets.items().iter().for_each(|facet| each(&self.model.placed(facet)));
     }
-}
-
-fn take_place(next: &mut u32) -> u32 {
-    *next += 1;
-    *next - 1
 }
 
 #[cfg(test)]

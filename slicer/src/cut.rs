@@ -20,6 +20,7 @@ use crate::gray::{Sheet, Span};
 use crate::grid::PixelGrid;
 use crate::placement::{PlacedFacet, heights};
 use crate::planes::Planes;
+use crate::scan::{SortedFacet, Z, ceil_clamped};
 use crate::table::Fill;
 
 /// A crossing of a row: the row in the high half; in the low half the first
@@ -122,15 +123,6 @@ pub(crate) struct End {
     pub(crate) edge: [u8; 2],
 }
 
-/// A corner: x and y in pixels, z in micrometres, and which of its facet's it
-/// is.
-#[derive(Clone, Copy)]
-struct Corner {
-    pixels: [f64; 2],
-    z_um: f64,
-    number: u8,
-}
-
 impl Cutter<'_> {
     /// Adds the facet's crossings in `layers` to the shares of those layers,
     /// and says how many there are.
@@ -194,44 +186,24 @@ impl Cutter<'_> {
         if met.is_empty() {
             return;
         }
-        let ([low, middle, high], odd) = self.sorted_corners(facet);
-        // The longest edge in z is crossed by every plane met, the other two
-        // below and above the middle corner.
-        let long = Edge::new(low, high);
-        let turn = self.planes.at_or_below(middle.z_um).clamp(met.start, met.end);
-        for (from, to, met) in [(low, middle, met.start..turn), (middle, high, turn..met.end)] {
-            if met.is_empty() {
-                continue;
-            }
-            let short = Edge::new(from, to);
-            for layer in met {
-                let z_um = self.planes.z_um(layer);
-                let ends = [long.end(z_um), short.end(z_um)];
-                each(layer, Segment { ends, turned: odd });
-            }
-        }
-    }
-
-    /// The corners from the lowest to the highest, and whether putting them
-    /// in this order turned the facet over.
-    #[inline]
-    fn sorted_corners(&self, facet: &PlacedFacet) -> ([Corner; 3], bool) {
-        let corner = |number: u8| {
-            let [x, y, z_um] = facet[usize::from(number)];
-            Corner { pixels: self.grid.to_pixels(x, y), z_um, number }
-        };
-        let [mut low, mut middle, mut high] = [0, 1, 2].map(corner);
-        let mut odd = false;
-        let mut order = |lower: &mut Corner, upper: &mut Corner| {
-            if upper.z_um < lower.z_um {
-                std::mem::swap(lower, upper);
-                odd = !odd;
-            }
-        };
-        order(&mut low, &mut middle);
-        order(&mut middle, &mut high);
-        order(&mut low, &mut middle);
-        ([low, middle, high], odd)
+        let corners = facet.map(|[x, y, z_um]| {
+            let [column, row] = self.grid.to_pixels(x, y);
+            [column, row, z_um]
+        });
+        let sorted = SortedFacet::<Z>::new(corners);
+        let [low, middle, high] = sorted.order;
+        let long = [low, high];
+        let short = [[low, middle], [middle, high]];
+        let second = self.planes.at_or_below(sorted.corners[1][Z]);
+        sorted.for_each_line(
+            met,
+            second,
+            |layer| self.planes.z_um(layer),
+            |layer, [a, b], half| {
+                let ends = [End { at: a, edge: long }, End { at: b, edge: short[half] }];
+                each(layer, Segment { ends, turned: sorted.is_flipped });
+            },
+        );
     }
 
     /// Adds the crossings of rows with a segment between two points of a
@@ -279,72 +251,5 @@ impl Cutter<'_> {
     #[inline]
     pub(crate) fn first_row(&self, point: [f64; 2]) -> u32 {
         ceil_clamped(point[1], self.grid.height)
-    }
-}
-
-/// The least whole number that is not below `value`, between 0 and `most`.
-#[inline]
-pub(crate) fn ceil_clamped(value: f64, most: u32) -> u32 {
-    // Casts saturate. `f64::ceil` is a call on processors before SSE4.1.
-    let whole = value as i32;
-    let ceiling = whole.saturating_add(i32::from(f64::from(whole) < value));
-    ceiling.clamp(0, most as i32) as u32
-}
-
-/// An edge from its lower to its higher corner.
-#[derive(Clone, Copy)]
-struct Edge {
-    low: Corner,
-    high: Corner,
-    pixels_per_um: [f64; 2],
-}
-
-impl Edge {
-    #[inline]
-    fn new(low: Corner, high: Corner) -> Self {
-        let rise_um = high.z_um - low.z_um;
-        let slope = |axis: usize| (high.pixels[axis] - low.pixels[axis]) / rise_um;
-        Self { low, high, pixels_per_um: [slope(0), slope(1)] }
-    }
-
-    /// The end that a segment has on the edge at a height.
-    #[inline]
-    fn end(&self, z_um: f64) -> End {
-        End { at: self.at(z_um), edge: [self.low.number, self.high.number] }
-    }
-
-    /// The edge's point at a height, in pixels.
-    #[inline]
-    fn at(&self, z_um: f64) -> [f64; 2] {
-        // No rounding where a plane meets the corner itself.
-        if z_um >= self.high.z_um {
-            return self.high.pixels;
-        }
-        let above_um = z_um - self.low.z_um;
-        [
-            self.low.pixels[0] + self.pixels_per_um[0] * above_um,
-            self.low.pixels[1] + self.pixels_per_um[1] * above_um,
-        ]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ceilings_are_exact_and_clamped() {
-        for (value, ceiling) in [
-            (0.0, 0),
-            (-0.5, 0),
-            (-7.0, 0),
-            (1e-300, 1),
-            (5.0, 5),
-            (5.000_000_000_1, 6),
-            (1e9, 1000),
-            (f64::INFINITY, 1000),
-        ] {
-            assert_eq!(ceil_clamped(value, 1000), ceiling, "{value}");
-        }
     }
 }

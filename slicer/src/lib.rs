@@ -45,6 +45,7 @@ mod grid;
 mod model;
 mod placement;
 mod planes;
+pub mod scan;
 mod section;
 mod slices;
 mod stl;

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use lamp_stack::Length;
+use lamp_stack::{Grouped, Length};
 
 use crate::error::SliceError;
+use crate::scan::count_at_or_below;
 
 /// More layers than any machine builds.
 const MOST_LAYERS: f64 = 4e6;
@@ -79,7 +80,7 @@ pub(crate) struct Planes {
 #[derive(Clone, Debug)]
 enum Spacing {
     Even { thickness_um: f64 },
-    Uneven(Bins),
+    Uneven(PlaneBins),
 }
 
 impl Planes {
@@ -130,7 +131,7 @@ impl Planes {
         };
         let boundaries_um = heights.boundaries_um.clone();
         let z_um: Vec<f64> = boundaries_um.windows(2).map(plane).collect();
-        Self { spacing: Spacing::Uneven(Bins::new(&z_um)), z_um, boundaries_um }
+        Self { spacing: Spacing::Uneven(PlaneBins::new(&z_um)), z_um, boundaries_um }
     }
 
     /// A single plane.
@@ -155,7 +156,7 @@ impl Planes {
             planes.z_um[layer] = moved;
         }
         if let Spacing::Uneven(bins) = &mut planes.spacing {
-            *bins = Bins::new(&planes.z_um);
+            *bins = PlaneBins::new(&planes.z_um);
         }
         planes
     }
@@ -217,23 +218,12 @@ impl Planes {
     #[inline]
     pub(crate) fn at_or_below(&self, z_um: f64) -> usize {
         match &self.spacing {
-            Spacing::Even { thickness_um } => self.walk_from_guess(z_um, *thickness_um),
-            Spacing::Uneven(bins) => bins.at_or_below(&self.z_um, z_um),
+            Spacing::Even { thickness_um } => {
+                let guess = (z_um - self.z_um[0]) / thickness_um + 1.0;
+                count_at_or_below(&self.z_um, z_um, guess)
+            }
+            Spacing::Uneven(bins) => bins.at_or_below(z_um),
         }
-    }
-
-    #[inline]
-    fn walk_from_guess(&self, z_um: f64, thickness_um: f64) -> usize {
-        // The planes are nearly even: guess, then walk to the exact answer.
-        let guess = (z_um - self.z_um[0]) / thickness_um + 1.0;
-        let mut count = (guess as usize).min(self.z_um.len());
-        while count < self.z_um.len() && self.z_um[count] <= z_um {
-            count += 1;
-        }
-        while count > 0 && self.z_um[count - 1] > z_um {
-            count -= 1;
-        }
-        count
     }
 }
 
@@ -243,46 +233,42 @@ fn to_nanometres(um: f64) -> f64 {
 
 /// Finds planes that are not evenly apart, by as many even bins.
 #[derive(Clone, Debug)]
-struct Bins {
+struct PlaneBins {
     start_um: f64,
     per_um: f64,
-    /// How many planes lie in the bins before each, and in all of them.
-    before: Vec<u32>,
+    last: usize,
+    planes_um: Grouped<f64>,
 }
 
-impl Bins {
-    /// For planes from the lowest to the highest.
+impl PlaneBins {
+    /// Sorts planes, the lowest first, into bins.
     fn new(planes_um: &[f64]) -> Self {
         let [start_um, end_um] = [planes_um[0], planes_um[planes_um.len() - 1]];
         let count = planes_um.len();
         // All in one bin where they lie at one height.
         let per_um = if end_um > start_um { count as f64 / (end_um - start_um) } else { 0.0 };
-        let mut bins = Self { start_um, per_um, before: vec![0; count + 1] };
-        for &plane in planes_um {
-            let bin = bins.of(plane);
-            bins.before[bin + 1] += 1;
-        }
-        for bin in 0..count {
-            bins.before[bin + 1] += bins.before[bin];
-        }
-        bins
+        let empty = Self { start_um, per_um, last: count - 1, planes_um: Grouped::default() };
+        let planes_um = Grouped::new(count, || planes_um.iter().map(|&z| (empty.bin(z), z)));
+        Self { planes_um, ..empty }
     }
 
-    /// The bin of a height; those outside are in the first or the last.
+    /// Returns the bin of a height: the first or the last for those outside.
     #[inline]
-    fn of(&self, z_um: f64) -> usize {
-        let bin = (z_um - self.start_um) * self.per_um;
-        (bin as usize).min(self.before.len() - 2)
+    fn bin(&self, z_um: f64) -> usize {
+        (((z_um - self.start_um) * self.per_um) as usize).min(self.last)
     }
 
+    /// Returns how many planes lie at or below a height.
+    ///
     /// Bins rise with heights, however these are rounded: planes in lower bins
     /// are lower, those in higher ones higher.
-    // Apart, so that the even planes' search stays small enough to be inlined.
+    // Not inlined, so that the even planes' search stays small enough to be.
     #[inline(never)]
-    fn at_or_below(&self, planes_um: &[f64], z_um: f64) -> usize {
-        let bin = self.of(z_um);
-        let [start, end] = [self.before[bin], self.before[bin + 1]].map(|count| count as usize);
-        start + planes_um[start..end].partition_point(|&plane| plane <= z_um)
+    fn at_or_below(&self, z_um: f64) -> usize {
+        let bin = self.bin(z_um);
+        let planes_um = self.planes_um.group(bin);
+        let below = self.planes_um.range(bin..bin + 1).start;
+        below + planes_um.partition_point(|&plane| plane <= z_um)
     }
 }
 

@@ -76,7 +76,7 @@ fn inside(crossings: &[(u32, f64, i32)], fill: Fill) -> Inside {
     let (mut inside, mut entered, mut winding) = (Inside::new(), None, 0);
     for &(_, x, turn) in crossings {
         winding += turn;
-        let is_inside = fill.holds(winding);
+        let is_inside = fill.is_inside(winding);
         match entered {
             None if is_inside => entered = Some(x),
             Some(from) if !is_inside => {

@@ -9,7 +9,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use lamp_stack::{Image, Mask};
+use lamp_stack::{Grouped, Image, Mask};
 use rayon::prelude::*;
 
 use crate::cut::{Crossing, Cutter, Place, Share};
@@ -32,9 +32,9 @@ pub enum Fill {
 lamp_stack::named!(Fill { EvenOdd = "even-odd", NonZero = "nonzero" | "non-zero" });
 
 impl Fill {
-    /// Whether a place that contours wind around so often is inside.
+    /// Returns true if a point is inside that contours wind around this often.
     #[inline]
-    pub(crate) fn holds(self, winding: i32) -> bool {
+    pub fn is_inside(self, winding: i32) -> bool {
         match self {
             Self::EvenOdd => winding % 2 != 0,
             Self::NonZero => winding != 0,
@@ -216,14 +216,17 @@ impl Table {
             .map(|levels| Shader::new(levels.of_layer(layer), fill, planes, layer, &spans, width));
         let of_facets = || self.shares(layer).flat_map(|share| &share.crossings).copied();
         let more = self.more(layer, cutter, surfaces, of_facets());
-        let crossings = || of_facets().chain(more.iter().copied());
-        let (starts, mut places) = sort_by_row(crossings, height);
-        let mut row_offsets = Vec::with_capacity(starts.len());
+        let crossings = || {
+            let all = of_facets().chain(more.iter().copied());
+            all.map(|crossing| (crossing.row(), crossing.place()))
+        };
+        let mut by_row = Grouped::new(height as usize, crossings);
+        let mut row_offsets = Vec::with_capacity(height as usize + 1);
         row_offsets.push(0);
-        let mut transitions = Vec::with_capacity(places.len());
+        let mut transitions = Vec::with_capacity(by_row.items().len());
         let mut stray_rows = Vec::new();
-        for (row, ends) in starts.windows(2).enumerate() {
-            let places = &mut places[ends[0] as usize..ends[1] as usize];
+        for row in 0..height {
+            let places = by_row.group_mut(row as usize);
             if !places.is_empty() {
                 sort(places);
                 let balanced = match fill {
@@ -231,12 +234,12 @@ impl Table {
                     Fill::NonZero => non_zero(places, &mut transitions),
                 };
                 if !balanced {
-                    stray_rows.push(row as u32);
+                    stray_rows.push(row);
                 }
             }
             row_offsets.push(transitions.len() as u32);
             if let Some(shader) = &mut shader {
-                shader.push_row(row as u32, places);
+                shader.push_row(row, places);
             }
         }
         let mask = Mask::new(width, row_offsets, transitions);
@@ -294,29 +297,6 @@ fn sort(places: &mut [Place]) {
         }
         places[at] = place;
     }
-}
-
-/// Sorts crossings by their rows (a counting sort): where each row starts,
-/// and the places in the rows.
-fn sort_by_row<I: Iterator<Item = Crossing>>(
-    crossings: impl Fn() -> I,
-    height: u32,
-) -> (Vec<u32>, Vec<Place>) {
-    let mut starts = vec![0u32; height as usize + 2];
-    for crossing in crossings() {
-        starts[crossing.row() + 2] += 1;
-    }
-    for row in 2..starts.len() {
-        starts[row] += starts[row - 1];
-    }
-    let mut places = vec![Place::default(); starts[height as usize + 1] as usize];
-    for crossing in crossings() {
-        let at = &mut starts[crossing.row() + 1];
-        places[*at as usize] = crossing.place();
-        *at += 1;
-    }
-    starts.pop();
-    (starts, places)
 }
 
 /// Adds a row's transitions: it toggles at every place; two at one column

@@ -24,6 +24,7 @@
 //! ```
 
 mod combine;
+mod counting_sort;
 mod depth_levels;
 mod error;
 mod frame;
@@ -50,6 +51,7 @@ mod text;
 mod tiff;
 
 pub use combine::{Op, combine_levels, combine_rows};
+pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use depth_levels::DepthLevels;
 pub use error::StackError;
 pub use frame::{Frame, place_row};

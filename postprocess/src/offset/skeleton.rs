@@ -8,6 +8,8 @@
 //! Of a convex corner nothing is left, as pixels further inside lie beside
 //! each pixel there.
 
+use lamp_stack::Grouped;
+
 use super::edge_map::{EdgeMap, EdgePixel, level};
 use super::erode;
 use super::plain::plain_runs;
@@ -172,18 +174,7 @@ fn thinned(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
 fn outside_first(squares: &[u32], there: &[bool]) -> Vec<u32> {
     let those = || (0..).zip(squares).zip(there).filter(|(_, there)| **there).map(|(of, _)| of);
     let most = squares.iter().copied().max().map_or(0, |most| most as usize);
-    let mut places = vec![0u32; most + 2];
-    those().for_each(|(_, &square)| places[square as usize + 1] += 1);
-    for square in 1..places.len() {
-        places[square] += places[square - 1];
-    }
-    let mut order = vec![0; places[most + 1] as usize];
-    for (index, &square) in those() {
-        let place = &mut places[square as usize];
-        order[*place as usize] = index;
-        *place += 1;
-    }
-    order
+    Grouped::new(most + 1, || those().map(|(of, &square)| (square as usize, of))).into_items()
 }
 
 /// Says which pixels walls must not be shortened beyond: those that lie

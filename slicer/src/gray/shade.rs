@@ -65,7 +65,7 @@ impl<'a> Shader<'a> {
 
     /// Adds columns between which no contour crosses the row.
     fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &'a [Span]) {
-        if !self.fill.holds(winding) {
+        if !self.fill.is_inside(winding) {
             return self.push(start, 0);
         }
         let mut column = start;

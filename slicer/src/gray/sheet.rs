@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use crate::cut::{Cutter, ceil_clamped};
+use crate::cut::Cutter;
 use crate::placement::{PlacedFacet, heights};
 use crate::planes::Planes;
+use crate::scan::{RowFacet, ceil_clamped};
 
 /// Closer than this to a layer's plane, and to each other, facets are taken to
 /// touch: far more than rounding, far less than anything cures.
@@ -87,13 +88,7 @@ fn depths(planes: &Planes, layer: usize, reach_um: f64, tie_um: f64) -> Range<f6
 
 /// A facet seen from above: x and y in pixels, z in micrometres.
 pub(crate) struct Sheet {
-    /// From the top row down.
-    corners: [[f64; 3]; 3],
-    /// From the first corner to the last, to the middle one, and from there.
-    edges: [Edge; 3],
-    /// The rows that it crosses, and among them the first past the middle.
-    rows: Range<u32>,
-    turn: u32,
+    facet: RowFacet,
     low_um: f64,
     high_um: f64,
     tie_um: f64,
@@ -102,37 +97,10 @@ pub(crate) struct Sheet {
     winding: i32,
 }
 
-/// An edge seen from above, from its upper row to its lower.
-#[derive(Clone, Copy)]
-struct Edge {
-    upper: [f64; 3],
-    /// Columns and micrometres for each row.
-    slopes: [f64; 2],
-}
-
-impl Edge {
-    fn new(upper: [f64; 3], lower: [f64; 3]) -> Self {
-        let fall = lower[1] - upper[1];
-        Self { upper, slopes: [(lower[0] - upper[0]) / fall, (lower[2] - upper[2]) / fall] }
-    }
-
-    /// The column where it crosses a row.
-    #[inline]
-    fn column(&self, row: u32) -> f64 {
-        self.upper[0] + self.slopes[0] * (f64::from(row) - self.upper[1])
-    }
-
-    /// The height where it crosses a row, in micrometres.
-    #[inline]
-    fn height(&self, row: u32) -> f64 {
-        self.upper[2] + self.slopes[1] * (f64::from(row) - self.upper[1])
-    }
-}
-
 impl Sheet {
     /// A facet as vertical lines see it, where they can meet it.
     pub(crate) fn new(cutter: &Cutter<'_>, facet: &PlacedFacet) -> Option<Self> {
-        let mut corners = facet.map(|[x, y, z_um]| {
+        let corners = facet.map(|[x, y, z_um]| {
             let [column, row] = cutter.grid.to_pixels(x, y);
             [column, row, z_um]
         });
@@ -144,18 +112,9 @@ impl Sheet {
             return None;
         }
         let um_per_pixel = (cross(1, 2).abs() + cross(2, 0).abs()) / area.abs();
-        corners.sort_unstable_by(|a, b| a[1].total_cmp(&b[1]));
-        let [upper, middle, lower] = corners;
-        let [first, turn, end] = corners.map(|[column, row, _]| cutter.first_row([column, row]));
-        if first == end {
-            return None;
-        }
         let (low_um, high_um) = heights(facet);
         Some(Self {
-            corners,
-            edges: [(upper, lower), (upper, middle), (middle, lower)].map(|(a, b)| Edge::new(a, b)),
-            rows: first..end,
-            turn,
+            facet: RowFacet::new(corners, cutter.grid.height)?,
             low_um,
             high_um,
             steepness: 1.0 + um_per_pixel / cutter.grid.dpi.pitch().um(),
@@ -177,9 +136,9 @@ impl Sheet {
         let planes = cutter.planes;
         let low_um = planes.z_um(layers.start) - reach_um;
         let high_um = planes.z_um(layers.end - 1) + self.tie_um;
-        for row in self.rows_between(low_um, high_um) {
+        self.facet.for_each_row(self.facet.rows_between([low_um, high_um]), |row, ends| {
             // Most rows of steep facets pass between two columns.
-            let Some(stretch) = self.stretch(row, cutter.grid.width) else { continue };
+            let Some(stretch) = self.stretch(ends, cutter.grid.width) else { return };
             let [low_um, high_um] = stretch.heights();
             let met = planes.between(low_um - self.tie_um, high_um + reach_um);
             for layer in met.start.max(layers.start)..met.end.min(layers.end) {
@@ -190,7 +149,7 @@ impl Sheet {
                     each(layer, Span { um_per_column, ..self.span(row, columns, depth_um) });
                 }
             }
-        }
+        });
     }
 
     /// What a row meets of it at one depth.
@@ -212,15 +171,16 @@ impl Sheet {
         heights_um: Range<f64>,
         mut each: impl FnMut(Span, f64),
     ) {
-        for row in self.rows_between(heights_um.start, heights_um.end) {
-            let Some(stretch) = self.stretch(row, cutter.grid.width) else { continue };
+        let rows = self.facet.rows_between([heights_um.start, heights_um.end]);
+        self.facet.for_each_row(rows, |row, ends| {
+            let Some(stretch) = self.stretch(ends, cutter.grid.width) else { return };
             for column in stretch.columns.clone() {
                 let z_um = stretch.height(column);
                 if heights_um.contains(&z_um) {
                     each(self.span(row, column..column + 1, 0.0), z_um);
                 }
             }
-        }
+        });
     }
 
     /// How much higher or lower a surface may be that is so near to it.
@@ -230,38 +190,16 @@ impl Sheet {
         (near_um * self.steepness).min(most)
     }
 
-    /// The rows of what lies between two heights, and perhaps one more on each
-    /// side, where rounding could decide.
-    fn rows_between(&self, low_um: f64, high_um: f64) -> Range<u32> {
-        let (mut first, mut last) = (f64::MAX, f64::MIN);
-        let mut reach = |row: f64| (first, last) = (first.min(row), last.max(row));
-        for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-            let (a, b) = (self.corners[from], self.corners[to]);
-            if (low_um..=high_um).contains(&a[2]) {
-                reach(a[1]);
-            }
-            for z_um in [low_um, high_um] {
-                if (a[2] < z_um) != (b[2] < z_um) {
-                    reach(a[1] + (b[1] - a[1]) * ((z_um - a[2]) / (b[2] - a[2])));
-                }
-            }
-        }
-        let Range { start, end } = self.rows;
-        ceil_clamped(first - 1e-3, end).max(start)..ceil_clamped(last + 1e-3, end)
-    }
-
     /// What a row meets of it.
     #[inline]
-    fn stretch(&self, row: u32, width: u32) -> Option<Stretch> {
-        let [long, first, second] = &self.edges;
-        let short = if row < self.turn { first } else { second };
-        let ends = [long.column(row), short.column(row)];
+    fn stretch(&self, ends: [[f64; 2]; 2], width: u32) -> Option<Stretch> {
+        let [long, short] = ends;
+        let ends = [long[0], short[0]];
         let [a, b] = ends.map(|column| ceil_clamped(column, width));
         if a == b {
             return None;
         }
-        let heights =
-            [long.height(row), short.height(row)].map(|z| z.clamp(self.low_um, self.high_um));
+        let heights = [long[1], short[1]].map(|z| z.clamp(self.low_um, self.high_um));
         let um_per_column = (heights[1] - heights[0]) / (ends[1] - ends[0]);
         Some(Stretch { columns: a.min(b)..a.max(b), ends, heights, um_per_column })
     }

@@ -1,0 +1,218 @@
+//! Facets along lines: where planes and rows meet a facet's edges.
+//!
+//! The slicer meets facets with planes, then the segments there with rows; gray
+//! layers and adaptive heights meet facets with rows straight away. All do so
+//! alike. A facet's corners are sorted along an axis. Of the lines across it
+//! (planes across z, rows across y) each meets the long edge, from the first
+//! corner to the last, and one of the two short edges, before or behind the
+//! middle corner.
+//!
+//! Both facets on an edge find its point on a line by the same arithmetic on the
+//! same two ends, sorted alike. The points of a closed mesh on a line are
+//! therefore equal in pairs, bit for bit, whatever the rounding.
+
+use std::ops::Range;
+
+/// The axis of rows.
+pub const Y: usize = 1;
+/// The axis of planes.
+pub const Z: usize = 2;
+
+/// Returns the least whole number that is not below `value`, between 0 and `max`.
+#[inline]
+pub fn ceil_clamped(value: f64, max: u32) -> u32 {
+    // Casts saturate. `f64::ceil` is a call on processors before SSE4.1.
+    let whole = value as i32;
+    let ceiling = whole.saturating_add(i32::from(f64::from(whole) < value));
+    ceiling.clamp(0, max as i32) as u32
+}
+
+/// Returns how many of some rising numbers are at or below `value`. Numbers that
+/// are nearly even are found fast: by a guess, and a walk from there.
+#[inline]
+pub fn count_at_or_below(rising: &[f64], value: f64, guess: f64) -> usize {
+    let mut count = (guess as usize).min(rising.len());
+    while count < rising.len() && rising[count] <= value {
+        count += 1;
+    }
+    while count > 0 && rising[count - 1] > value {
+        count -= 1;
+    }
+    count
+}
+
+/// A facet whose corners are sorted along an axis, [`Y`] or [`Z`].
+#[derive(Clone, Copy, Debug)]
+pub struct SortedFacet<const ALONG: usize> {
+    /// The corners, from the least to the greatest.
+    pub corners: [[f64; 3]; 3],
+    /// Which corner of the facet each one is.
+    pub order: [u8; 3],
+    /// Whether sorting turned the facet over.
+    pub is_flipped: bool,
+}
+
+impl<const ALONG: usize> SortedFacet<ALONG> {
+    /// Sorts a facet's corners.
+    #[inline]
+    pub fn new(corners: [[f64; 3]; 3]) -> Self {
+        let mut sorted = Self { corners, order: [0, 1, 2], is_flipped: false };
+        sorted.order_pair(0);
+        sorted.order_pair(1);
+        sorted.order_pair(0);
+        sorted
+    }
+
+    #[inline]
+    fn order_pair(&mut self, first: usize) {
+        if self.corners[first + 1][ALONG] < self.corners[first][ALONG] {
+            self.corners.swap(first, first + 1);
+            self.order.swap(first, first + 1);
+            self.is_flipped = !self.is_flipped;
+        }
+    }
+
+    /// Gives each of some lines across the facet, with the points of the long and of
+    /// the short edge there, and which of the short edges that is, 0 or 1. `second`
+    /// is the first line past the middle corner, `at` says where a line is.
+    #[inline]
+    pub fn for_each_line(
+        &self,
+        lines: Range<usize>,
+        second: usize,
+        at: impl Fn(usize) -> f64,
+        mut each: impl FnMut(usize, [[f64; 2]; 2], usize),
+    ) {
+        if lines.is_empty() {
+            return;
+        }
+        let [low, middle, high] = self.corners;
+        let long = FacetEdge::<ALONG>::new(low, high);
+        let second = second.clamp(lines.start, lines.end);
+        let halves = [(low, middle, lines.start..second), (middle, high, second..lines.end)];
+        for (half, (from, to, lines)) in halves.into_iter().enumerate() {
+            if lines.is_empty() {
+                continue;
+            }
+            let short = FacetEdge::<ALONG>::new(from, to);
+            for line in lines {
+                let value = at(line);
+                each(line, [long.at(value), short.at(value)], half);
+            }
+        }
+    }
+}
+
+/// A side of a facet, from its lesser end along the axis to its greater.
+#[derive(Clone, Copy)]
+struct FacetEdge<const ALONG: usize> {
+    from: [f64; 3],
+    to: [f64; 3],
+    slopes: [f64; 2],
+}
+
+impl<const ALONG: usize> FacetEdge<ALONG> {
+    /// The other two axes.
+    const ACROSS: [usize; 2] = if ALONG == Z { [0, Y] } else { [0, Z] };
+
+    #[inline]
+    fn new(from: [f64; 3], to: [f64; 3]) -> Self {
+        let length = to[ALONG] - from[ALONG];
+        Self { from, to, slopes: Self::ACROSS.map(|axis| (to[axis] - from[axis]) / length) }
+    }
+
+    /// Returns the edge's point on a line, without the coordinate along the axis.
+    #[inline]
+    fn at(&self, value: f64) -> [f64; 2] {
+        let [a, b] = Self::ACROSS;
+        // No rounding where a plane meets the corner itself. Rows never do: those
+        // of an edge end before the first that its lower end is past.
+        if ALONG == Z && value >= self.to[Z] {
+            return [self.to[a], self.to[b]];
+        }
+        let passed = value - self.from[ALONG];
+        [self.from[a] + self.slopes[0] * passed, self.from[b] + self.slopes[1] * passed]
+    }
+}
+
+/// A facet that rows cross: x in any unit, y in rows downwards, z in micrometres.
+#[derive(Clone, Copy, Debug)]
+pub struct RowFacet {
+    sorted: SortedFacet<Y>,
+    /// The first row past each corner.
+    rows: [u32; 3],
+}
+
+impl RowFacet {
+    /// Returns the facet between these corners, if any of `count` rows crosses it.
+    #[inline]
+    pub fn new(corners: [[f64; 3]; 3], count: u32) -> Option<Self> {
+        let sorted = SortedFacet::new(corners);
+        let rows = sorted.corners.map(|corner| ceil_clamped(corner[Y], count));
+        (rows[0] < rows[2]).then_some(Self { sorted, rows })
+    }
+
+    /// Returns the rows that cross it.
+    pub fn rows(&self) -> Range<u32> {
+        self.rows[0]..self.rows[2]
+    }
+
+    /// Returns true if its short edges and its long one, in this order, go around it
+    /// the way its corners do not.
+    #[inline]
+    pub fn is_flipped(&self) -> bool {
+        self.sorted.is_flipped
+    }
+
+    /// Returns the rows that cross what lies between two heights (micrometres), and
+    /// perhaps one more on each side, where rounding could decide.
+    pub fn rows_between(&self, [low_um, high_um]: [f64; 2]) -> Range<u32> {
+        let (mut first, mut last) = (f64::MAX, f64::MIN);
+        let mut reach = |row: f64| (first, last) = (first.min(row), last.max(row));
+        for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+            let (a, b) = (self.sorted.corners[from], self.sorted.corners[to]);
+            if (low_um..=high_um).contains(&a[Z]) {
+                reach(a[Y]);
+            }
+            for z_um in [low_um, high_um] {
+                if (a[Z] < z_um) != (b[Z] < z_um) {
+                    reach(a[Y] + (b[Y] - a[Y]) * ((z_um - a[Z]) / (b[Z] - a[Z])));
+                }
+            }
+        }
+        let Range { start, end } = self.rows();
+        ceil_clamped(first - 1e-3, end).max(start)..ceil_clamped(last + 1e-3, end)
+    }
+
+    /// Gives each of some rows that cross it, with the points (x, z) where its long
+    /// and its short edge are there.
+    #[inline]
+    pub fn for_each_row(&self, rows: Range<u32>, mut each: impl FnMut(u32, [[f64; 2]; 2])) {
+        let rows = rows.start as usize..rows.end as usize;
+        let at = |row: usize| f64::from(row as u32);
+        self.sorted.for_each_line(rows, self.rows[1] as usize, at, |row, ends, _| {
+            each(row as u32, ends);
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ceilings_are_exact_and_clamped() {
+        for (value, ceiling) in [
+            (0.0, 0),
+            (-0.5, 0),
+            (-7.0, 0),
+            (1e-300, 1),
+            (5.0, 5),
+            (5.000_000_000_1, 6),
+            (1e9, 1000),
+            (f64::INFINITY, 1000),
+        ] {
+            assert_eq!(ceil_clamped(value, 1000), ceiling, "{value}");
+        }
+    }
+}

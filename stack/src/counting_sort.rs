@@ -1,0 +1,126 @@
+//! Items grouped by small whole keys, by a counting sort.
+
+use std::ops::Range;
+
+/// Items grouped by key. Within a group they keep the order in which they came.
+///
+/// ```
+/// use lamp_stack::Grouped;
+///
+/// let words = ["runs", "of", "a", "row", "are", "few"];
+/// let by_length = Grouped::new(5, || words.iter().map(|&word| (word.len(), word)));
+/// assert_eq!(by_length.group(3), ["row", "are", "few"]);
+/// assert_eq!(by_length.range(1..3), 0..2);
+/// assert!(by_length.group(0).is_empty());
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Grouped<T> {
+    /// Where each group begins, and where the last one ends.
+    starts: Vec<u32>,
+    items: Vec<T>,
+}
+
+impl<T: Copy + Default> Grouped<T> {
+    /// Groups items by keys below `keys`. Asks for the items twice, to count
+    /// and to place them; both times they must be the same.
+    ///
+    /// # Panics
+    /// Panics if a key is not below `keys`, or there are 2^32 items.
+    #[inline]
+    pub fn new<I: Iterator<Item = (usize, T)>>(keys: usize, items: impl Fn() -> I) -> Self {
+        let mut counts = KeyCounts::new(keys);
+        items().for_each(|(key, _)| counts.add(key));
+        let mut groups = counts.into_groups();
+        items().for_each(|(key, item)| {
+            groups.put(key, item);
+        });
+        groups.finish()
+    }
+}
+
+impl<T> Grouped<T> {
+    /// Returns the items with a key.
+    #[inline]
+    pub fn group(&self, key: usize) -> &[T] {
+        &self.items[self.range(key..key + 1)]
+    }
+
+    /// Returns the items with a key, to be changed.
+    #[inline]
+    pub fn group_mut(&mut self, key: usize) -> &mut [T] {
+        let range = self.range(key..key + 1);
+        &mut self.items[range]
+    }
+
+    /// Returns where the groups of some keys lie among all [`items`](Self::items).
+    #[inline]
+    pub fn range(&self, keys: Range<usize>) -> Range<usize> {
+        self.starts[keys.start] as usize..self.starts[keys.end] as usize
+    }
+
+    /// Returns all items, by rising keys.
+    pub fn items(&self) -> &[T] {
+        &self.items
+    }
+
+    /// Returns all items, by rising keys.
+    pub fn into_items(self) -> Vec<T> {
+        self.items
+    }
+}
+
+/// The first pass of a counting sort: how often each key occurs. For items that
+/// come from somewhere that may fail; otherwise [`Grouped::new`] does it all.
+#[derive(Clone, Debug)]
+pub struct KeyCounts {
+    /// Those of key k at k + 2, so that summing and placing need no other list.
+    counts: Vec<u32>,
+}
+
+impl KeyCounts {
+    /// Starts with none of the keys below `keys`.
+    pub fn new(keys: usize) -> Self {
+        Self { counts: vec![0; keys + 2] }
+    }
+
+    /// Counts an item.
+    #[inline]
+    pub fn add(&mut self, key: usize) {
+        self.counts[key + 2] += 1;
+    }
+
+    /// Makes room for what was counted.
+    pub fn into_groups<T: Copy + Default>(self) -> UnfinishedGroups<T> {
+        let mut starts = self.counts;
+        for key in 2..starts.len() {
+            starts[key] += starts[key - 1];
+        }
+        let items = vec![T::default(); starts[starts.len() - 1] as usize];
+        UnfinishedGroups(Grouped { starts, items })
+    }
+}
+
+/// The second pass of a counting sort: groups with room for the items that were
+/// counted.
+#[derive(Clone, Debug)]
+pub struct UnfinishedGroups<T>(Grouped<T>);
+
+impl<T> UnfinishedGroups<T> {
+    /// Puts an item into its group, and returns its place among all items.
+    #[inline]
+    pub fn put(&mut self, key: usize, item: T) -> u32 {
+        let Grouped { starts, items } = &mut self.0;
+        let place = starts[key + 1];
+        items[place as usize] = item;
+        starts[key + 1] += 1;
+        place
+    }
+
+    /// Returns the groups, once as many items were put in as were counted.
+    pub fn finish(self) -> Grouped<T> {
+        let mut groups = self.0;
+        // Each start has moved to its group's end, where the next one starts.
+        groups.starts.pop();
+        groups
+    }
+}
