@@ -3,6 +3,7 @@
 
 use lamp_brep::Tessellation;
 use lamp_brep::vector::{Vec3, add, distance, dot, scale, sub};
+use lamp_stack::Grouped;
 
 use super::placed::PlacedSurfaces;
 use super::polish::FacetPoint;
@@ -28,35 +29,12 @@ pub enum RowContact {
     Unknown,
 }
 
-/// The facets around each point of a tessellation.
-#[derive(Debug)]
-pub(super) struct PointFacets {
-    facets: Vec<u32>,
-    /// Where those of each point begin.
-    starts: Vec<u32>,
-}
-
-impl PointFacets {
-    pub(super) fn new(mesh: &Tessellation) -> Self {
-        let mut starts = vec![0; mesh.points.len() + 2];
-        let corners = || mesh.facets.iter().flat_map(|facet| facet.corners);
-        corners().for_each(|corner| starts[corner as usize + 2] += 1);
-        for point in 2..starts.len() {
-            starts[point] += starts[point - 1];
-        }
-        let mut facets = vec![0; 3 * mesh.facets.len()];
-        for (k, corner) in corners().enumerate() {
-            let next: &mut u32 = &mut starts[corner as usize + 1];
-            facets[*next as usize] = (k / 3) as u32;
-            *next += 1;
-        }
-        Self { facets, starts }
-    }
-
-    fn of(&self, point: u32) -> &[u32] {
-        let point = point as usize;
-        &self.facets[self.starts[point] as usize..self.starts[point + 1] as usize]
-    }
+/// Groups the facets of a tessellation by the points that are their corners.
+pub(super) fn facets_by_point(mesh: &Tessellation) -> Grouped<u32> {
+    let facets = || (0..).zip(&mesh.facets);
+    Grouped::new(mesh.points.len(), || {
+        facets().flat_map(|(k, facet)| facet.corners.map(|point| (point as usize, k)))
+    })
 }
 
 impl PlacedSurfaces {
@@ -67,7 +45,7 @@ impl PlacedSurfaces {
         let mut nearest = away(facet);
         for _ in 0..MAX_FACETS {
             let corners = self.facet(nearest.1).corners.into_iter();
-            let around = corners.flat_map(|corner| self.point_facets().of(corner));
+            let around = corners.flat_map(|corner| self.facets_by_point().group(corner as usize));
             let next = around
                 .map(|&facet| away(facet))
                 .fold(nearest, |a, b| if b.0 < a.0 { b } else { a });

@@ -5,9 +5,10 @@ use std::sync::{Arc, OnceLock};
 
 use lamp_brep::vector::{Vec3, cross, dot, length, scale, sub, unit};
 use lamp_brep::{Facet, Jet, Kernel, Tessellation};
+use lamp_stack::Grouped;
 
 use super::extrema::CriticalPoints;
-use super::locate::PointFacets;
+use super::locate::facets_by_point;
 
 /// A model's surfaces and facets: scaled, turned and moved to their place.
 pub struct PlacedSurfaces {
@@ -18,7 +19,7 @@ pub struct PlacedSurfaces {
     tolerance_mm: f64,
     /// Whether each face is flat.
     is_flat: Vec<bool>,
-    point_facets: OnceLock<PointFacets>,
+    facets_by_point: OnceLock<Grouped<u32>>,
     critical_points: OnceLock<CriticalPoints>,
 }
 
@@ -36,8 +37,8 @@ impl PlacedSurfaces {
         let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
         let faces = kernel.bodies().iter().map(|body| body.faces.end).max().unwrap_or(0);
         let is_flat = (0..faces).map(|face| kernel.face(face).kind == "plane").collect();
-        let (point_facets, critical_points) = (OnceLock::new(), OnceLock::new());
-        Self { kernel, mesh, rows, tolerance_mm, is_flat, point_facets, critical_points }
+        let (facets_by_point, critical_points) = (OnceLock::new(), OnceLock::new());
+        Self { kernel, mesh, rows, tolerance_mm, is_flat, facets_by_point, critical_points }
     }
 
     /// Returns how far facets may lie from their surfaces, in millimetres.
@@ -74,8 +75,8 @@ impl PlacedSurfaces {
     }
 
     /// Returns the facets around each point. The first call looks at every facet.
-    pub(super) fn point_facets(&self) -> &PointFacets {
-        self.point_facets.get_or_init(|| PointFacets::new(&self.mesh))
+    pub(super) fn facets_by_point(&self) -> &Grouped<u32> {
+        self.facets_by_point.get_or_init(|| facets_by_point(&self.mesh))
     }
 
     /// Returns where contours may turn or meet. The first call looks at every facet.
