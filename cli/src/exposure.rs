@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::calibrate::{ExposureTimes, Table};
+use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{ExposureTime, Resin};
 use lamp_stack::{DepthLevels, Length};
 
-use crate::materials::{material, read_text};
+use crate::catalogue::{entry, read_text};
 use crate::stop::Stop;
 use crate::streams::input_name;
 
@@ -63,7 +64,7 @@ impl ExposureOptions {
             return Ok(Some(Exposure { name, source: Source::Table(times) }));
         }
         let Some(path) = &self.material else { return Ok(None) };
-        let material = material(path)?;
+        let material: Material = entry(path)?;
         let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
         let source = Source::Resin { resin, overcure: self.overcure };
         Ok(Some(Exposure { name: material.name, source }))

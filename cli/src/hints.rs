@@ -6,7 +6,9 @@ use std::error::Error;
 
 use lamp_adaptive::HeightsError;
 use lamp_postprocess::{EditError, EditProblem, LayerProblem, LayoutError, TileError};
-use lamp_stack::Length;
+use lamp_grayscale::material::MaterialError;
+use lamp_postprocess::machine::{MachineError, MachineLimit};
+use lamp_stack::{CatalogueError, Length};
 
 /// Returns what to try about an error, to stand after its message.
 pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
@@ -21,6 +23,15 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
     }
     if let Some(error) = error.downcast_ref() {
         return edit(error);
+    }
+    if let Some(error) = error.downcast_ref() {
+        return machine_limit(error);
+    }
+    if let Some(error) = error.downcast_ref::<CatalogueError<MaterialError>>() {
+        return catalogue(error);
+    }
+    if let Some(error) = error.downcast_ref::<CatalogueError<MachineError>>() {
+        return catalogue(error);
     }
     None
 }
@@ -93,4 +104,19 @@ fn edit(error: &EditError) -> Option<String> {
         _ => return None,
     };
     Some(hint.to_owned())
+}
+fn machine_limit(error: &MachineLimit) -> Option<String> {
+    let option = match error {
+        MachineLimit::Dpi { .. } => "--dpi",
+        MachineLimit::Thickness { .. } => "--thickness",
+        _ => return None,
+    };
+    Some(format!("slice it with such a {option}, or give --area instead of --machine"))
+}
+
+fn catalogue<F>(error: &CatalogueError<F>) -> Option<String> {
+    match error {
+        CatalogueError::Syntax { kind, .. } => Some(format!("lamp {kind} show prints some")),
+        _ => None,
+    }
 }

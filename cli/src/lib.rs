@@ -6,6 +6,7 @@
 
 mod brep;
 mod bridge;
+mod catalogue;
 mod commands;
 mod evidence;
 mod exposure;
@@ -13,8 +14,6 @@ mod findings;
 mod heights;
 mod hints;
 mod lines;
-mod machines;
-mod materials;
 mod options;
 mod part;
 mod picture;

@@ -1,11 +1,11 @@
 //! The built-in materials hold the numbers of their sources, and no others.
 
-use lamp_grayscale::material::{Builtin, Material, ResinError};
+use lamp_grayscale::material::{Material, ResinError};
 use lamp_grayscale::resin::{CureError, CureModel, Dose, ExposureTime, GrayLevel, WorkingCurve};
-use lamp_stack::Length;
+use lamp_stack::{Catalogued, Length};
 
 fn material(name: &str) -> Material {
-    Builtin::named(name).unwrap().material()
+    Material::builtin(name).unwrap()
 }
 
 #[test]
@@ -77,14 +77,14 @@ fn pegda_cures_films_of_180_um_and_more() {
 
 #[test]
 fn every_number_names_the_place_in_its_source() {
-    for builtin in Builtin::ALL {
+    for builtin in Material::BUILTINS {
         let sources: Vec<_> =
-            builtin.toml().lines().filter_map(|line| line.strip_prefix("source = \"")).collect();
+            builtin.toml.lines().filter_map(|line| line.strip_prefix("source = \"")).collect();
         let places = ["equation", "table", "figure", "section", "appendix"];
         for source in &sources {
             assert!(["000 ", "002 ", "003 "].iter().any(|seed| source.starts_with(seed)));
             assert!(places.iter().any(|place| source.contains(place)), "{source}");
         }
-        assert!(!sources.is_empty(), "{}", builtin.name());
+        assert!(!sources.is_empty(), "{}", builtin.name);
     }
 }

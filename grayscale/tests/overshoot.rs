@@ -2,19 +2,19 @@
 //! against white layers (002 figure 67, as simulation).
 
 use lamp_fixtures::{Mesh, sphere, tower};
-use lamp_grayscale::material::Builtin;
+use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{GrayLevel, Resin};
 use lamp_grayscale::{CuredLine, Line, excess};
 use lamp_slicer::{
     Axis, Fill, Model, PixelGrid, Placement, SectionOptions, SliceOptions, Slices, Units, section,
 };
-use lamp_stack::{Dpi, Layer, Length};
+use lamp_stack::{Catalogued, Dpi, Layer, Length};
 
 const DPI: f64 = 1500.0;
 const THICKNESS_UM: f64 = 200.0;
 
 fn resin() -> Resin {
-    Builtin::named("lamp-suspension").unwrap().material().resin().unwrap()
+    Material::builtin("lamp-suspension").unwrap().resin().unwrap()
 }
 
 fn model(mesh: &Mesh) -> Model {

@@ -2,11 +2,11 @@
 //! line.
 
 use lamp_grayscale::material::{
-    Builtin, Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine,
-    Material, TwoDepthNumbers, WidthNumbers, Written,
+    Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine, Material,
+    TwoDepthNumbers, WidthNumbers, Written,
 };
 use lamp_grayscale::resin::{Dose, Intensity, WidthSensitivity};
-use lamp_stack::Length;
+use lamp_stack::{Catalogued, Length};
 use proptest::option;
 use proptest::prelude::*;
 
@@ -127,9 +127,9 @@ proptest! {
 
     #[test]
     fn a_spoilt_file_is_refused_in_one_line(
-        which in 0..Builtin::ALL.len(), at in 0..4000usize, length in 0..20usize, junk in "\\PC{0,6}",
+        which in 0..Material::BUILTINS.len(), at in 0..4000usize, length in 0..20usize, junk in "\\PC{0,6}",
     ) {
-        let mut text: Vec<char> = Builtin::ALL[which].toml().chars().collect();
+        let mut text: Vec<char> = Material::BUILTINS[which].toml.chars().collect();
         let at = at % text.len();
         text.splice(at..text.len().min(at + length), junk.chars());
         // What is spoilt may be a comment.

@@ -23,6 +23,7 @@
 //! # }
 //! ```
 
+mod catalogue;
 mod combine;
 mod counting_sort;
 mod depth_levels;
@@ -50,6 +51,7 @@ mod testing;
 mod text;
 mod tiff;
 
+pub use catalogue::{Builtin, CatalogueError, Catalogued, nonempty_text};
 pub use combine::{Op, combine_levels, combine_rows};
 pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use depth_levels::DepthLevels;

@@ -7,8 +7,8 @@ use lamp_grayscale::resin::{CureWidth, Dose, ExposureTime, QuantityError};
 use lamp_postprocess::{CompensateError, CompensateOptions, Shrinkage, Widths};
 use lamp_stack::{Dpi, Layer, Length, LengthError};
 
+use crate::catalogue::entry;
 use crate::lines::parse_report;
-use crate::materials::material;
 use crate::options::{Common, Input, Output, parse_distance};
 use crate::stop::Stop;
 use crate::streams::{
@@ -166,7 +166,7 @@ impl By {
                 (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
             };
         };
-        let material = material(path)?;
+        let material: Material = entry(path)?;
         let name = &material.name;
         let width =
             material.cure_width().map_err(|error| Stop::Failed(error.into()).at(name.clone()))?;

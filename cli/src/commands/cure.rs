@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::Solid;
+use lamp_grayscale::material::Material;
 use lamp_stack::StackInfo;
 
-use crate::materials::material;
+use crate::catalogue::entry;
 use crate::options::{Common, Input};
 use crate::part::PartOptions;
 use crate::picture::Scale;
@@ -63,7 +64,7 @@ pub(crate) struct CureArgs {
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Stop> {
     let inputs = args.part.iter().chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
-    let material = material(&args.material)?;
+    let material: Material = entry(&args.material)?;
     let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
     let name = input_name(&args.input.stack);
     let failed = |error: anyhow::Error| Stop::Failed(error).at(name.clone());

@@ -7,12 +7,12 @@ use anyhow::Context;
 use clap::Args;
 use lamp_fixtures::{Part, build};
 use lamp_grayscale::Method;
-use lamp_postprocess::machine::Builtin;
+use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
     FixOptions, HeightOptions, Layout, MeshOptions, Pack, PartStack, TileOptions, fix, tile,
 };
 use lamp_slicer::Model;
-use lamp_stack::{Layer, Pages, StackError};
+use lamp_stack::{Catalogued, Layer, Pages, StackError};
 
 use crate::options::{Common, Output, parse_count};
 use crate::part::PartOptions;
@@ -146,7 +146,7 @@ fn build_in_mesh(
     range: Option<Range<u32>>,
     report: &Report,
 ) -> Result<u32, Stop> {
-    let area = Builtin::named("alpha").expect("it is built in").machine().area.value;
+    let area = Machine::builtin("alpha").expect("it is built in").area.value;
     let mut layers = part_layers(stl, range, report)?;
     let first = layers.next().ok_or(StackError::NoLayers)??;
     let parts = vec![PartStack::of_image("the mould", &first)?];

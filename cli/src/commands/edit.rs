@@ -5,7 +5,7 @@ use clap::{ArgGroup, Args};
 use lamp_postprocess::{EditError, Edits, OtherLayers};
 use lamp_stack::Op;
 
-use crate::materials::read_text;
+use crate::catalogue::read_text;
 use crate::options::{Common, Input, Output};
 use crate::stop::Stop;
 use crate::streams::{

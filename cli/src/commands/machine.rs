@@ -1,11 +1,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use lamp_postprocess::machine::{Builtin, Machine};
+use lamp_postprocess::machine::Machine;
+use lamp_stack::Catalogued;
 
-use crate::machines::machine_and_text;
+use crate::catalogue;
 use crate::stop::Stop;
-use crate::streams::{is_stream, print};
+use crate::streams::print;
 
 /// List or show machines: how large a build may be, and in what pixels and layers
 #[derive(Args)]
@@ -25,7 +26,7 @@ enum Action {
     List,
     /// Print a machine's file as it was written, once it is checked: to read, or to start one from
     Show {
-        /// Which machine: a built-in machine's name, or a file
+        /// Which machine: a built-in machine's name, a file, or - for standard input
         #[arg(value_name = "MACHINE")]
         machine: PathBuf,
     },
@@ -34,17 +35,14 @@ enum Action {
 pub(crate) fn run(args: &MachineArgs) -> Result<(), Stop> {
     match &args.action {
         Action::List => print(&table()),
-        Action::Show { machine } if is_stream(machine) => {
-            Err(Stop::usage("name a built-in machine or a file"))
-        }
-        Action::Show { machine } => print(&machine_and_text(machine)?.1),
+        Action::Show { machine } => catalogue::show::<Machine>(machine),
     }
 }
 
 /// A line for each built-in machine.
 fn table() -> String {
     let mut text = format!("{:<8}{:<18}{:<14}{:<16}description\n", "name", "area", "dpi", "layers");
-    for machine in Builtin::ALL.map(|builtin| builtin.machine()) {
+    for machine in Machine::builtins() {
         let Machine { name, description, area, dpi, thickness, .. } = machine;
         let area = area.value.to_string();
         let dpi = dpi.map_or("any".to_owned(), |dpi| format!("{}-{}", dpi.least, dpi.most));

@@ -1,15 +1,13 @@
-use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::{Args, Subcommand};
-use lamp_grayscale::material::{Builtin, Material};
+use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::Depths;
-use lamp_stack::Length;
+use lamp_stack::{Catalogued, Length};
 
-use crate::materials::{material_and_text, read};
+use crate::catalogue;
 use crate::stop::Stop;
-use crate::streams::{input_name, is_stream, print};
+use crate::streams::{input_name, print};
 
 /// List, show or check materials: how deep light cures a resin
 #[derive(Args)]
@@ -43,10 +41,7 @@ enum Action {
 pub(crate) fn run(args: &MaterialArgs) -> Result<(), Stop> {
     match &args.action {
         Action::List => print(&table()),
-        Action::Show { material } => {
-            refuse_terminal(material)?;
-            print(&material_and_text(material)?.1)
-        }
+        Action::Show { material } => catalogue::show::<Material>(material),
         Action::Check { file } => check(file),
     }
 }
@@ -54,7 +49,7 @@ pub(crate) fn run(args: &MaterialArgs) -> Result<(), Stop> {
 /// A line for each built-in material.
 fn table() -> String {
     let mut text = format!("{:<18}{:<18}{:<38}description\n", "name", "full white", "models");
-    for material in Builtin::ALL.map(|builtin| builtin.material()) {
+    for material in Material::builtins() {
         let light = material.intensity.as_ref().map(|light| light.value.to_string());
         let light = light.unwrap_or_else(|| "-".to_owned());
         let mut models = models(&material).join(", ");
@@ -90,18 +85,9 @@ fn widths(material: &Material) -> Option<String> {
     })
 }
 
-fn refuse_terminal(path: &Path) -> Result<(), Stop> {
-    if is_stream(path) && io::stdin().is_terminal() {
-        return Err(Stop::usage("no material to read: name a file, or pipe one in"));
-    }
-    Ok(())
-}
-
 fn check(path: &Path) -> Result<(), Stop> {
-    refuse_terminal(path)?;
-    let name = input_name(path);
-    let (material, _) = read(path).with_context(|| name.clone())?;
-    print(&format!("{name}: {}\n", allows(&material)))
+    let (material, _) = catalogue::read_file(path)?;
+    print(&format!("{}: {}\n", input_name(path), allows(&material)))
 }
 
 /// Says in a sentence what a material allows.

@@ -1,95 +1,72 @@
 //! Material files: reading, and writing what reads back the same.
 
-use lamp_stack::{line_of, one_line};
+use lamp_stack::{Builtin, CatalogueError, Catalogued, one_line};
 use thiserror::Error;
 
 use super::Material;
 use crate::resin::ModelError;
 
-/// Why a text is no material.
+/// Why a material's numbers make no models.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MaterialError {
-    /// No TOML.
-    #[error("line {line}: {problem}: a material is a TOML file (lamp material show prints some)")]
-    Syntax {
-        /// From 1.
-        line: usize,
-        /// What stands there.
-        problem: String,
-    },
-    /// A key is wrong, unknown or missing.
-    #[error("line {line}: {key}: {problem}")]
-    Key {
-        /// From 1.
-        line: usize,
-        /// Its path, as `working-curve.critical-dose`.
-        key: String,
-        /// What is wrong, and what would be right.
-        problem: String,
-    },
-    /// The name is no name.
-    #[error("name: `{0}` is not a name: write small letters, digits and -, as lamp-suspension")]
-    Name(String),
-    /// Numbers that make no model.
+    /// The numbers of a table make no model.
     // Not a source: its text is in this one's.
     #[error("{table}.{problem}")]
     Model {
         /// The model's table.
         table: &'static str,
-        /// What is wrong with them.
+        /// What is wrong with its numbers.
         problem: ModelError,
     },
     /// The light of full white is not above zero.
     #[error("intensity.value must be above zero")]
     Dark,
-    /// A constant is no number.
+    /// A constant is infinite or not a number.
     #[error("constants.{0}.value must be a finite number")]
     NoNumber(String),
-    /// A dimmed lamp's curve keeps the working curve's penetration depth.
+    /// A dimmed lamp's curve keeps the penetration depth of a working curve, and
+    /// there is none.
     #[error("dimmed-lamp needs a working curve: add [working-curve.penetration-depth]")]
     NoWorkingCurve,
 }
 
 impl Material {
-    /// Reads a material file.
-    ///
-    /// # Errors
-    /// Where the text is no TOML, a key is unknown, missing or wrong, or the
-    /// numbers make no model; the error names the key.
-    pub fn from_toml(text: &str) -> Result<Self, MaterialError> {
-        let syntax = |error: toml::de::Error| MaterialError::Syntax {
-            line: line_of(text, error.span()),
-            problem: one_line(error.message()),
-        };
-        let file = toml::Deserializer::parse(text).map_err(syntax)?;
-        let material: Self = serde_path_to_error::deserialize(file).map_err(|error| {
-            let key = error.path().to_string();
-            let inner = error.into_inner();
-            wrong_key(line_of(text, inner.span()), key, inner.message())
-        })?;
-        material.check()?;
-        Ok(material)
-    }
-
     /// Writes a material file, which reads back as the same material.
     ///
     /// # Errors
-    /// Where [`Self::from_toml`] would refuse what was written.
+    /// Returns an error if [`Self::from_toml`] would refuse what was written.
     ///
     /// # Panics
     /// Never: texts and numbers in tables are TOML.
-    pub fn to_toml(&self) -> Result<String, MaterialError> {
+    pub fn to_toml(&self) -> Result<String, CatalogueError<MaterialError>> {
         let text = toml::to_string(self).expect("texts and numbers in tables are TOML");
         Self::from_toml(&text).map(|_| text)
     }
+}
 
-    /// Checks what single keys cannot show.
+macro_rules! builtin {
+    ($name:literal) => {
+        Builtin { name: $name, toml: include_str!(concat!("../../materials/", $name, ".toml")) }
+    };
+}
+
+impl Catalogued for Material {
+    const KIND: &'static str = "material";
+    const BUILTINS: &'static [Builtin] = &[
+        builtin!("lamp-no-absorber"),
+        builtin!("lamp-suspension"),
+        builtin!("pegda-mw700"),
+        builtin!("sl-5510"),
+        builtin!("tmpta"),
+    ];
+    type Fault = MaterialError;
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
     fn check(&self) -> Result<(), MaterialError> {
-        let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-        if self.name.is_empty() || !self.name.chars().all(letters) {
-            return Err(MaterialError::Name(one_line(&self.name)));
-        }
         if self.intensity.as_ref().is_some_and(|light| light.value.mw_per_cm2() == 0.0) {
             return Err(MaterialError::Dark);
         }
@@ -106,17 +83,8 @@ impl Material {
     }
 }
 
-fn wrong_key(line: usize, key: String, problem: &str) -> MaterialError {
-    // The parser calls the file itself `.`.
-    let key = if key == "." { "the file".to_owned() } else { key };
-    let todo = if problem.starts_with("missing field") { ": add it" } else { "" };
-    let problem = one_line(problem).replace(" field ", " key ") + todo;
-    MaterialError::Key { line, key: one_line(&key), problem }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::Builtin;
     use super::*;
 
     const WHOLE: &str = r#"name = "mine"
@@ -138,12 +106,12 @@ source = "notebook, page 3"
 
     #[test]
     fn built_in_materials_are_whole_and_bear_their_names() {
-        for builtin in Builtin::ALL {
-            let material = Material::from_toml(builtin.toml()).unwrap();
-            assert_eq!(material.name, builtin.name());
+        for builtin in Material::BUILTINS {
+            let material = Material::from_toml(builtin.toml).unwrap();
+            assert_eq!(material.name, builtin.name);
             assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material));
         }
-        assert!(Builtin::ALL.is_sorted_by_key(Builtin::name));
+        assert!(Material::BUILTINS.is_sorted_by_key(|builtin| builtin.name));
     }
 
     #[test]
@@ -177,14 +145,14 @@ source = "notebook, page 3"
             ),
             ("radiometer", " ", &["intensity.source", "is empty"]),
             ("name = \"mine\"", "", &["the file", "missing key `name`: add it"]),
-            ("\"mine\"", "\"My resin\"", &["name: `My resin` is not a name", "lamp-suspension"]),
+            ("\"mine\"", "\"My resin\"", &["name: `My resin` is not a name", "lamp-no-absorber"]),
             ("[intensity]", "[light]", &["line 4", "unknown key `light`", "`intensity`"]),
             (
                 "plus-minus",
                 "plusminus",
                 &["line 14", "penetration-depth", "unknown key `plusminus`", "`plus-minus`"],
             ),
-            ("[intensity]", "[intensity", &["line 4", "TOML", "lamp material show"]),
+            ("[intensity]", "[intensity", &["line 4", "a material is a TOML file"]),
         ] {
             assert!(WHOLE.contains(from), "{from}");
             let error = Material::from_toml(&WHOLE.replacen(from, to, 1)).unwrap_err().to_string();
@@ -211,7 +179,10 @@ source = "notebook, page 3"
         assert_eq!(infinite, "constants.a.value must be a finite number");
         let dimmed = line("dimmed-lamp.critical-dose", "18 um").replace(" um", " mJ/cm2");
         let text = format!("name = \"a\"\ndescription = \"\"\n{dimmed}");
-        assert_eq!(Material::from_toml(&text), Err(MaterialError::NoWorkingCurve));
+        assert_eq!(
+            Material::from_toml(&text),
+            Err(CatalogueError::Fault(MaterialError::NoWorkingCurve))
+        );
     }
 
     #[test]

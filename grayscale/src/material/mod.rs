@@ -2,10 +2,10 @@
 //! TOML files.
 //!
 //! ```
-//! use lamp_grayscale::material::Builtin;
-//! use lamp_stack::Length;
+//! use lamp_grayscale::material::Material;
+//! use lamp_stack::{Catalogued, Length};
 //!
-//! let material = Builtin::named("lamp-suspension").unwrap().material();
+//! let material = Material::builtin("lamp-suspension").unwrap();
 //! let resin = material.resin()?;
 //! // White cures half as deep again as the layer.
 //! let time = resin.exposure_time(Length::from_um(100.0), 1.5)?;
@@ -14,7 +14,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod builtin;
 mod file;
 mod number;
 
@@ -24,7 +23,6 @@ use lamp_stack::Length;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-pub use builtin::Builtin;
 pub use file::MaterialError;
 pub use number::{Constant, Given, GivenDepths, GivenLine, Written};
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::str::FromStr;
 
-use lamp_stack::Length;
+use lamp_stack::{Length, nonempty_text};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -22,7 +22,7 @@ pub struct Given<T> {
     #[serde(with = "written_or_none", default, skip_serializing_if = "Option::is_none")]
     pub plus_minus: Option<T>,
     /// The equation, table, figure or measurement.
-    #[serde(deserialize_with = "some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
@@ -38,7 +38,7 @@ pub struct GivenLine<T> {
     #[serde(with = "written")]
     pub rise: T,
     /// The equation, table, figure or measurement.
-    #[serde(deserialize_with = "some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
@@ -59,7 +59,7 @@ pub struct GivenDepths {
     #[serde(with = "written_or_none", default, skip_serializing_if = "Option::is_none")]
     pub to: Option<Length>,
     /// The section, figure or measurement.
-    #[serde(deserialize_with = "some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
@@ -76,10 +76,10 @@ pub struct Constant {
     /// The number.
     pub value: f64,
     /// Its unit.
-    #[serde(deserialize_with = "some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub unit: String,
     /// The equation, table, figure or measurement.
-    #[serde(deserialize_with = "some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
@@ -180,14 +180,6 @@ mod written_or_none {
     ) -> Result<Option<T>, D::Error> {
         written::deserialize(from).map(Some)
     }
-}
-
-fn some_text<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
-    let text = String::deserialize(from)?;
-    if text.trim().is_empty() {
-        return Err(de::Error::custom("this is empty: write what it is for the next reader"));
-    }
-    Ok(text)
 }
 
 #[cfg(test)]

@@ -103,8 +103,10 @@ impl Resin {
 
 #[cfg(test)]
 mod tests {
+    use lamp_stack::Catalogued;
+
     use super::*;
-    use crate::material::Builtin;
+    use crate::material::Material;
 
     #[test]
     fn white_cures_the_layer_times_overcure() {
@@ -132,7 +134,7 @@ mod tests {
 
     #[test]
     fn levels_are_those_of_the_root_finder() {
-        let material = Builtin::named("lamp-suspension").unwrap().material();
+        let material = Material::builtin("lamp-suspension").unwrap();
         let resin = material.resin().unwrap();
         for (um, overcure) in [(25.0, 1.0), (100.0, 1.0), (100.0, 1.7)] {
             let time = resin.exposure_time(Length::from_um(um), overcure).unwrap();
@@ -151,7 +153,7 @@ mod tests {
 
     #[test]
     fn levels_need_a_model_of_all_depths() {
-        let material = Builtin::named("pegda-mw700").unwrap().material();
+        let material = Material::builtin("pegda-mw700").unwrap();
         let resin = material.resin().unwrap();
         let time = resin.exposure_time(Length::from_um(300.0), 1.0).unwrap();
         assert!(matches!(resin.depth_levels(time), Err(CureError::NotAllTo { .. })));

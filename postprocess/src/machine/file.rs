@@ -3,37 +3,16 @@
 use std::fmt::Display;
 use std::str::FromStr;
 
-use lamp_stack::{Dpi, Length, Size, line_of, one_line};
+use lamp_stack::{Builtin, Catalogued, Dpi, Length, Size};
 use serde::de::{self, Deserialize, Deserializer};
 use thiserror::Error;
 
 use super::Machine;
 
-/// Why a text is no machine.
+/// Why a machine's numbers contradict each other.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MachineError {
-    /// No TOML.
-    #[error("line {line}: {problem}: a machine is a TOML file (lamp machine show prints some)")]
-    Syntax {
-        /// From 1.
-        line: usize,
-        /// What stands there.
-        problem: String,
-    },
-    /// A key is wrong, unknown or missing.
-    #[error("line {line}: {key}: {problem}")]
-    Key {
-        /// From 1.
-        line: usize,
-        /// Its path, as `area.value`.
-        key: String,
-        /// What is wrong, and what would be right.
-        problem: String,
-    },
-    /// The name is no name.
-    #[error("name: `{0}` is not a name: write small letters, digits and -, as beta")]
-    Name(String),
     /// Limits that hold nothing, or no possible resolution.
     #[error("{0}: least and most must be above zero, and least not above most")]
     Range(&'static str),
@@ -42,38 +21,22 @@ pub enum MachineError {
     Strips,
 }
 
-impl Machine {
-    /// Reads a machine file.
-    ///
-    /// # Errors
-    /// Where the text is no TOML, a key is unknown, missing or wrong, or its
-    /// numbers make no machine; the error names the key.
-    pub fn from_toml(text: &str) -> Result<Self, MachineError> {
-        let file = toml::Deserializer::parse(text).map_err(|error| MachineError::Syntax {
-            line: line_of(text, error.span()),
-            problem: one_line(error.message()),
-        })?;
-        let machine: Self = serde_path_to_error::deserialize(file).map_err(|error| {
-            let path = error.path().to_string();
-            // The parser calls the file itself `.`.
-            let key = if path == "." { "the file".to_owned() } else { one_line(&path) };
-            let inner = error.into_inner();
-            MachineError::Key {
-                line: line_of(text, inner.span()),
-                key,
-                problem: one_line(inner.message()),
-            }
-        })?;
-        machine.check_numbers()?;
-        Ok(machine)
+macro_rules! builtin {
+    ($name:literal) => {
+        Builtin { name: $name, toml: include_str!(concat!("../../machines/", $name, ".toml")) }
+    };
+}
+
+impl Catalogued for Machine {
+    const KIND: &'static str = "machine";
+    const BUILTINS: &'static [Builtin] = &[builtin!("alpha"), builtin!("beta")];
+    type Fault = MachineError;
+
+    fn name(&self) -> &str {
+        &self.name
     }
 
-    /// Checks what single keys cannot show.
-    fn check_numbers(&self) -> Result<(), MachineError> {
-        let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-        if self.name.is_empty() || !self.name.chars().all(letters) {
-            return Err(MachineError::Name(one_line(&self.name)));
-        }
+    fn check(&self) -> Result<(), MachineError> {
         if let Some(dpi) = &self.dpi
             && !(Dpi::new(dpi.least).is_some()
                 && Dpi::new(dpi.most).is_some()
@@ -107,17 +70,8 @@ fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Resul
     String::deserialize(from)?.parse().map_err(de::Error::custom)
 }
 
-pub(super) fn some_text<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
-    let text = String::deserialize(from)?;
-    if text.trim().is_empty() {
-        return Err(de::Error::custom("this is empty: write what it is for the next reader"));
-    }
-    Ok(text)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::Builtin;
     use super::*;
 
     const WHOLE: &str = r#"name = "mine"
@@ -145,12 +99,13 @@ source = "data sheet"
 
     #[test]
     fn built_in_machines_are_whole_and_bear_their_names() {
-        for builtin in Builtin::ALL {
-            let machine = Machine::from_toml(builtin.toml()).unwrap();
-            assert_eq!(machine.name, builtin.name());
+        for builtin in Machine::BUILTINS {
+            let machine = Machine::from_toml(builtin.toml).unwrap();
+            assert_eq!(machine.name, builtin.name);
             assert_eq!(machine.strips, None);
         }
-        let [alpha, beta] = Builtin::ALL.map(|builtin| builtin.machine().area.value);
+        let [alpha, beta] =
+            ["alpha", "beta"].map(|name| Machine::builtin(name).unwrap().area.value);
         assert_eq!((alpha.width.mm(), alpha.height.mm()), (101.6, 114.3));
         assert!((beta.width.mm() - 584.2).abs() < 1e-9 && beta.width == beta.height);
     }
@@ -169,7 +124,7 @@ source = "data sheet"
             ("mirrors = 1024", "mirrors = 128", &["strips", "half its mirrors"]),
             ("mirrors = 1024", "mirrors = -1", &["line 19", "strips.mirrors"]),
             ("\"mine\"", "\"My own\"", &["name", "`My own` is not a name"]),
-            ("[area]", "[area", &["line 4", "TOML", "lamp machine show"]),
+            ("[area]", "[area", &["line 4", "a machine is a TOML file"]),
         ] {
             assert!(WHOLE.contains(from), "{from}");
             let error = Machine::from_toml(&WHOLE.replacen(from, to, 1)).unwrap_err().to_string();

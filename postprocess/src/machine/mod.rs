@@ -2,21 +2,20 @@
 //! files.
 //!
 //! ```
-//! use lamp_postprocess::machine::Builtin;
+//! use lamp_postprocess::machine::Machine;
+//! use lamp_stack::Catalogued;
 //!
-//! let beta = Builtin::named("beta").unwrap().machine();
+//! let beta = Machine::builtin("beta").unwrap();
 //! assert_eq!(beta.area.value, "23x23in".parse()?);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod builtin;
 mod file;
 
-use lamp_stack::{Layer, Length, Size};
+use lamp_stack::{Layer, Length, Size, nonempty_text};
 use serde::Deserialize;
 use thiserror::Error;
 
-pub use builtin::Builtin;
 pub use file::MachineError;
 
 /// What is known of a machine. What a source does not give is absent, and then
@@ -46,7 +45,7 @@ pub struct Area {
     #[serde(deserialize_with = "file::size")]
     pub value: Size,
     /// The section, table or data sheet.
-    #[serde(deserialize_with = "file::some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
@@ -59,7 +58,7 @@ pub struct DpiRange {
     /// The finest.
     pub most: f64,
     /// The section, table or data sheet.
-    #[serde(deserialize_with = "file::some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
@@ -74,7 +73,7 @@ pub struct ThicknessRange {
     #[serde(deserialize_with = "file::length")]
     pub most: Length,
     /// The section, table or data sheet.
-    #[serde(deserialize_with = "file::some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
@@ -87,7 +86,7 @@ pub struct Strips {
     /// How many pixels a swath shares with the next.
     pub overlap: u32,
     /// The section, table or data sheet.
-    #[serde(deserialize_with = "file::some_text")]
+    #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
@@ -96,9 +95,7 @@ pub struct Strips {
 #[non_exhaustive]
 pub enum MachineLimit {
     /// Another resolution.
-    #[error(
-        "{layer} has {dpi} dpi, and the machine {machine} builds in {least} to {most} dpi: slice it with such a --dpi, or give --area instead of --machine"
-    )]
+    #[error("{layer} has {dpi} dpi, and the machine {machine} builds in {least} to {most} dpi")]
     Dpi {
         /// The layer's name.
         layer: String,
@@ -113,7 +110,7 @@ pub enum MachineLimit {
     },
     /// Another thickness.
     #[error(
-        "{layer} is {thickness} thick, and the machine {machine} builds in layers of {least} to {most}: slice it with such a --thickness, or give --area instead of --machine"
+        "{layer} is {thickness} thick, and the machine {machine} builds in layers of {least} to {most}"
     )]
     Thickness {
         /// The layer's name.
@@ -169,7 +166,7 @@ impl Machine {
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{Dpi, Image, Mask, PageInfo};
+    use lamp_stack::{Catalogued, Dpi, Image, Mask, PageInfo};
 
     use super::*;
 
@@ -180,7 +177,7 @@ mod tests {
 
     #[test]
     fn layers_beyond_the_limits_are_named() {
-        let beta = Builtin::named("beta").unwrap().machine();
+        let beta = Machine::builtin("beta").unwrap();
         for (dpi, thickness) in [(1500.0, 100.0), (2400.0, 25.0), (2000.0, 100.0 + 1e-9)] {
             assert_eq!(beta.check(&layer(dpi, thickness)), Ok(()));
         }

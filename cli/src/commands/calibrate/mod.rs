@@ -13,8 +13,9 @@ use clap::{Args, Subcommand};
 use lamp_grayscale::calibrate::{DataError, FitError, Table};
 use lamp_grayscale::material::{Given, Material, MaterialError};
 use lamp_grayscale::resin::Intensity;
+use lamp_stack::CatalogueError;
 
-use crate::materials::{material, read_text};
+use crate::catalogue::{entry, read_text};
 use crate::options::{Common, parse_light};
 use crate::plots::{self, Plot, drawn};
 use crate::stop::Stop;
@@ -101,7 +102,7 @@ impl Files {
 
     /// The material to add to, with the light given.
     fn base(&self) -> Result<Option<Material>, Stop> {
-        self.material.as_deref().map(material).transpose()
+        self.material.as_deref().map(entry).transpose()
     }
 
     /// The light that makes doses of times.
@@ -175,9 +176,11 @@ impl Files {
         }
     }
 
-    fn no_material(&self, output: &Path, error: MaterialError) -> Stop {
+    fn no_material(&self, output: &Path, error: CatalogueError<MaterialError>) -> Stop {
         match error {
-            MaterialError::Name(_) => Stop::usage(format!("{error}; give the material a --name")),
+            CatalogueError::Name { .. } => {
+                Stop::usage(format!("{error}; give the material a --name"))
+            }
             error => Stop::Failed(anyhow!(error).context(output.display().to_string())),
         }
     }

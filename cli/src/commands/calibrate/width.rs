@@ -10,7 +10,7 @@ use lamp_stack::Dpi;
 
 use super::Files;
 use super::text::{Text, in_legend, short};
-use crate::materials::material;
+use crate::catalogue::entry;
 use crate::options::Common;
 use crate::plots::{Axis, Plot, Series, highest};
 use crate::report::Report;
@@ -44,7 +44,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Stop> {
     let files = &args.files;
     files.check()?;
     let base = files.base()?;
-    let of_depths = args.depth_material.as_deref().map(material).transpose()?;
+    let of_depths = args.depth_material.as_deref().map(entry).transpose()?;
     let depths = match of_depths.as_ref().or(base.as_ref()) {
         Some(material) => cure_depths(material).map_err(anyhow::Error::new)?,
         None => None,

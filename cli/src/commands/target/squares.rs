@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{ArgGroup, Args};
+use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_grayscale::target::{Exposure, squares};
 use lamp_stack::{
@@ -12,7 +13,7 @@ use lamp_stack::{
 };
 
 use super::{parse_gap, whole_pixels};
-use crate::materials::material;
+use crate::catalogue::entry;
 use crate::options::{Common, parse_light};
 use crate::report::Report;
 use crate::stop::Stop;
@@ -116,7 +117,7 @@ impl SquaresArgs {
         let Some(path) = &self.material else {
             return Ok(self.intensity.expect("one of the two is required"));
         };
-        let material = material(path)?;
+        let material: Material = entry(path)?;
         let name = path.display();
         material.intensity.map(|light| light.value).ok_or_else(|| {
             Stop::usage(format!("{name} does not say how bright full white is: give --intensity"))

@@ -13,9 +13,8 @@ use lamp_postprocess::{
 };
 use lamp_stack::{Length, Size};
 
+use crate::catalogue::{entry, read_text};
 use crate::lines::parse_report;
-use crate::machines::machine;
-use crate::materials::read_text;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::plots;
 use crate::report::Report;
@@ -141,7 +140,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
         Some(output) => report("tile", common, output),
         None => Report::new("tile", common.quiet, true),
     };
-    let machine = args.machine.as_deref().map(machine).transpose()?;
+    let machine = args.machine.as_deref().map(entry).transpose()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic)?;
     let file = args.layout.as_deref().map(read_layout).transpose()?;
     let mut stacks = Stack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
