@@ -5,9 +5,9 @@
 use std::error::Error;
 
 use lamp_adaptive::HeightsError;
-use lamp_postprocess::{EditError, EditProblem, LayerProblem, LayoutError, TileError};
 use lamp_grayscale::material::MaterialError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
+use lamp_postprocess::{EditError, EditProblem, LayerProblem, LayoutError, TileError};
 use lamp_stack::{CatalogueError, Length};
 
 /// Returns what to try about an error, to stand after its message.
