@@ -1,7 +1,7 @@
 //! Parts as layers in memory, whole and broken in one frame.
 
 use lamp_fixtures::{Defect, Mesh, inject};
-use lamp_slicer::{Frame, Model, SliceError, SliceOptions, Slices};
+use lamp_slicer::{GridRule, Model, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, Mask};
 
 /// A part's layers, bottom first.
@@ -11,11 +11,11 @@ pub type Layers = Vec<Layer>;
 ///
 /// # Errors
 /// As [`Slices`].
-pub fn slice(mesh: &Mesh, options: &SliceOptions) -> Result<(Layers, Frame), SliceError> {
+pub fn slice(mesh: &Mesh, options: &SliceOptions) -> Result<(Layers, GridRule), SliceError> {
     let slices = Slices::new(Model::from_facets("part", mesh.facets.clone()), options)?;
     let grid = slices.grid();
-    let frame = Frame::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] };
-    Ok((slices.collect::<Result<_, _>>()?, frame))
+    let grid = GridRule::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] };
+    Ok((slices.collect::<Result<_, _>>()?, grid))
 }
 
 /// Breaks `count` facets of a mesh, and keeps its height: of the seeds `seed`,
@@ -68,8 +68,8 @@ mod tests {
     #[test]
     fn broken_layers_lie_on_those_of_the_whole_part() {
         let whole = tower(5_000);
-        let (clean, frame) = slice(&whole, &coarse()).unwrap();
-        let options = SliceOptions { frame, ..coarse() };
+        let (clean, grid) = slice(&whole, &coarse()).unwrap();
+        let options = SliceOptions { grid, ..coarse() };
         let (again, _) = slice(&whole, &options).unwrap();
         assert!(clean == again);
         for defect in [Defect::Drop, Defect::Gap { by_mm: 0.5 }] {

@@ -1,12 +1,12 @@
 //! The most accurate layers that a budget allows.
 
 use crate::error::HeightsError;
-use crate::heights::{Budget, Heights, Search};
+use crate::search::{Budget, HeightSearch, Heights};
 
 /// Bounds are found to one part in so many.
 const PRECISION: f64 = 100.0;
 
-impl Search<'_> {
+impl HeightSearch<'_> {
     /// Finds the smallest bound, to one percent, whose layers cost at most `most`
     /// together, and these layers: each costs least for its thickness among those
     /// within the bound. `cost` says what a layer of so many micrometres costs: one

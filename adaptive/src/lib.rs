@@ -1,24 +1,24 @@
 //! How thick each layer may be.
 //!
 //! A layer is built as a slab: the part's section at its top, swept down. A
-//! [`Part`] knows how such [`Slab`]s differ from it, for all tops that a layer may
-//! have at once; a [`Criterion`] measures how far a slab is off; a [`Search`] takes,
+//! [`LayeredPart`] knows how such [`Slab`]s differ from it, for all tops that a layer may
+//! have at once; a [`Criterion`] measures how far a slab is off; a [`HeightSearch`] takes,
 //! from the bottom up, the thickest layers that are not too far off (002 section
 //! 3.2).
 //!
 //! ```
-//! use lamp_adaptive::{Machine, Part, Search, VolumeDeviation};
-//! use lamp_slicer::{Body, Fill, Model, Placement, Units};
+//! use lamp_adaptive::{Thicknesses, LayeredPart, HeightSearch, VolumeDeviation};
+//! use lamp_slicer::{FacetIndex, Fill, Model, Placement, Units};
 //! use lamp_stack::Length;
 //!
 //! // A tetrahedron, 1 mm high.
 //! let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
 //! let model = Model::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
-//! let body = Body::new(model, &Placement::default(), Units::Millimetres)?;
-//! let part = Part::new(body, Length::from_um(10.0), Fill::EvenOdd)?;
+//! let facets = FacetIndex::new(model, &Placement::default(), Units::Millimetres)?;
+//! let part = LayeredPart::new(facets, Length::from_um(10.0), Fill::EvenOdd)?;
 //! let [min, max, step] = [10.0, 100.0, 1.0].map(Length::from_um);
-//! let machine = Machine::new(min, max, step)?;
-//! let search = Search { part: &part, machine: &machine, criterion: &VolumeDeviation, snap: false };
+//! let thicknesses = Thicknesses::new(min, max, step)?;
+//! let search = HeightSearch { part: &part, thicknesses: &thicknesses, criterion: &VolumeDeviation, snap: false };
 //! let heights = search.heights(0.05)?;
 //! // Sections shrink faster towards the tip, and layers with them.
 //! assert_eq!(heights.slabs[0].thickness_um, 49.0);
@@ -29,18 +29,18 @@
 
 mod budget;
 mod criterion;
-mod cut;
 mod error;
-mod heights;
-mod machine;
-mod part;
+mod layered_part;
 mod profile;
-mod row;
+mod row_cuts;
+mod search;
 mod slab;
+mod sweep;
+mod thicknesses;
 
 pub use criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
 pub use error::HeightsError;
-pub use heights::{Heights, Search, uniform_heights};
-pub use machine::Machine;
-pub use part::Part;
+pub use layered_part::LayeredPart;
+pub use search::{HeightSearch, Heights, uniform_heights};
 pub use slab::{Slab, Slabs};
+pub use thicknesses::Thicknesses;

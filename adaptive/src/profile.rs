@@ -34,14 +34,14 @@ impl Change {
 /// ends at it, going up. What each place along it adds to what is lost and gained
 /// goes evenly from one end to the other.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Line {
+pub(crate) struct SurfaceLine {
     pub(crate) heights: [f64; 2],
     pub(crate) width: f64,
     pub(crate) lost: [f64; 2],
     pub(crate) gained: [f64; 2],
 }
 
-impl Line {
+impl SurfaceLine {
     fn rising(self) -> Self {
         if self.heights[0] <= self.heights[1] {
             return self;
@@ -75,7 +75,7 @@ struct Polynomials {
 }
 
 impl Polynomials {
-    fn of(line: &Line) -> Self {
+    fn of(line: &SurfaceLine) -> Self {
         let [low, high] = line.heights;
         let slope = 1.0 / (high - low);
         let start = -low * slope;
@@ -158,7 +158,7 @@ impl<'a> Profile<'a> {
         count_at_or_below(self.tops, height, (height - self.tops[0]) * self.per_um)
     }
 
-    pub(crate) fn add(&mut self, line: Line) {
+    pub(crate) fn add(&mut self, line: SurfaceLine) {
         let line = line.rising();
         let [low, high] = line.heights;
         let (first, end) = (self.first_above(low), self.first_above(high));
@@ -208,7 +208,8 @@ mod tests {
     fn polynomials_are_the_tops_one_by_one() {
         let tops: Vec<f64> = (25..=100).map(f64::from).collect();
         let mut profile = Profile::new(&tops);
-        let line = |heights, width| Line { heights, width, lost: [3.0, 40.0], gained: [1.5, -0.5] };
+        let line =
+            |heights, width| SurfaceLine { heights, width, lost: [3.0, 40.0], gained: [1.5, -0.5] };
         let lines = [
             line([-5.0, 90.0], 0.3),
             line([99.5, 10.0], -0.7),
@@ -220,7 +221,7 @@ mod tests {
         lines.iter().for_each(|&line| profile.add(line));
         for (k, change) in profile.changes().iter().enumerate() {
             let mut expected = Change::default();
-            for line in lines.map(Line::rising) {
+            for line in lines.map(SurfaceLine::rising) {
                 let [low, high] = line.heights;
                 let passed = if tops[k] <= low {
                     0.0
@@ -243,7 +244,12 @@ mod tests {
     fn a_flat_line_counts_above_its_height() {
         let tops = [10.0, 20.0, 30.0];
         let mut profile = Profile::new(&tops);
-        profile.add(Line { heights: [20.0; 2], width: 2.0, lost: [0.0; 2], gained: [20.0; 2] });
+        profile.add(SurfaceLine {
+            heights: [20.0; 2],
+            width: 2.0,
+            lost: [0.0; 2],
+            gained: [20.0; 2],
+        });
         let gained: Vec<f64> = profile.changes().iter().map(|change| change.gained).collect();
         assert_eq!(gained, [0.0, 0.0, 40.0]);
     }

@@ -4,16 +4,17 @@
 use std::f64::consts::PI;
 
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, Machine, Part, Search, Slab, VolumeDeviation,
+    AreaDeviation, Criterion, CuspHeight, HeightSearch, LayeredPart, Slab, Thicknesses,
+    VolumeDeviation,
 };
 use lamp_fixtures::{Mesh, cone, sphere};
-use lamp_slicer::{Body, Fill, Model, Placement, Units};
+use lamp_slicer::{FacetIndex, Fill, Model, Placement, Units};
 use lamp_stack::Length;
 
-fn part(mesh: &Mesh) -> Part {
+fn part(mesh: &Mesh) -> LayeredPart {
     let model = Model::from_facets("part", mesh.facets.clone());
-    let body = Body::new(model, &Placement::default(), Units::Millimetres).unwrap();
-    Part::new(body, Length::from_um(5.0), Fill::EvenOdd).unwrap()
+    let facets = FacetIndex::new(model, &Placement::default(), Units::Millimetres).unwrap();
+    LayeredPart::new(facets, Length::from_um(5.0), Fill::EvenOdd).unwrap()
 }
 
 /// The volumes of a layer in cubic millimetres, of areas by height in millimetres:
@@ -45,7 +46,7 @@ fn check(slab: &Slab, [lost, gained, volume]: [f64; 3]) {
 
 /// Checks layers at many heights and of many thicknesses, with the tops of each
 /// height found at once.
-fn check_all(part: &Part, height: f64, of: impl Fn(f64, f64) -> [f64; 3]) {
+fn check_all(part: &LayeredPart, height: f64, of: impl Fn(f64, f64) -> [f64; 3]) {
     // The first layers begin at the pole or on the platform; thinner than a few
     // facets there, they are those of the mesh and not of the sphere.
     for place in 0..24 {
@@ -125,9 +126,10 @@ fn the_area_is_blind_to_an_inclined_cylinder() {
     let cusp = CuspHeight.measure(&slab);
     assert!((cusp - 1000.0 * 0.5_f64.sqrt()).abs() < 1.0, "{cusp}");
     let [min, max, step] = [50.0, 1000.0, 10.0].map(Length::from_um);
-    let machine = Machine::new(min, max, step).unwrap();
+    let thicknesses = Thicknesses::new(min, max, step).unwrap();
     let layers = |criterion: &dyn Criterion| {
-        let search = Search { part: &part, machine: &machine, criterion, snap: false };
+        let search =
+            HeightSearch { part: &part, thicknesses: &thicknesses, criterion, snap: false };
         search.heights(0.02).unwrap().slabs
     };
     assert_eq!(layers(&AreaDeviation).len(), 10);

@@ -1,35 +1,35 @@
 //! The search for heights: bounds kept, degenerate parts, budgets, flat faces.
 
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, Heights, HeightsError, Machine, Part, Search, Slab,
-    VolumeDeviation, uniform_heights,
+    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart, Slab,
+    Thicknesses, VolumeDeviation, uniform_heights,
 };
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, tower};
-use lamp_slicer::{Axis, Body, Fill, Model, Placement, Units};
+use lamp_slicer::{Axis, FacetIndex, Fill, Model, Placement, Units};
 use lamp_stack::Length;
 
 const INCH_UM: f64 = 25_400.0;
 
-fn part(mesh: &Mesh) -> Part {
+fn part(mesh: &Mesh) -> LayeredPart {
     placed(mesh, &Placement::default())
 }
 
-fn placed(mesh: &Mesh, placement: &Placement) -> Part {
+fn placed(mesh: &Mesh, placement: &Placement) -> LayeredPart {
     let model = Model::from_facets("part", mesh.facets.clone());
-    let body = Body::new(model, placement, Units::Millimetres).unwrap();
-    Part::new(body, Length::from_um(50.0), Fill::EvenOdd).unwrap()
+    let facets = FacetIndex::new(model, placement, Units::Millimetres).unwrap();
+    LayeredPart::new(facets, Length::from_um(50.0), Fill::EvenOdd).unwrap()
 }
 
-fn machine(min: f64, max: f64, step: f64) -> Machine {
+fn buildable(min: f64, max: f64, step: f64) -> Thicknesses {
     let [min, max, step] = [min, max, step].map(Length::from_um);
-    Machine::new(min, max, step).unwrap()
+    Thicknesses::new(min, max, step).unwrap()
 }
 
-fn by_volume<'a>(part: &'a Part, machine: &'a Machine) -> Search<'a> {
-    Search { part, machine, criterion: &VolumeDeviation, snap: false }
+fn by_volume<'a>(part: &'a LayeredPart, thicknesses: &'a Thicknesses) -> HeightSearch<'a> {
+    HeightSearch { part, thicknesses, criterion: &VolumeDeviation, snap: false }
 }
 
-fn thicknesses(heights: &Heights) -> Vec<f64> {
+fn built_um(heights: &Heights) -> Vec<f64> {
     heights.slabs.iter().map(|slab| (slab.thickness_um * 1e3).round() / 1e3).collect()
 }
 
@@ -46,8 +46,8 @@ fn joined(meshes: &[Mesh]) -> Mesh {
 #[test]
 fn the_part_of_figure_48() {
     let part = part(&tower(60_000));
-    let machine = machine(0.001 * INCH_UM, 0.1 * INCH_UM, 0.001 * INCH_UM);
-    let slabs = by_volume(&part, &machine).heights(0.02).unwrap().slabs;
+    let thicknesses = buildable(0.001 * INCH_UM, 0.1 * INCH_UM, 0.001 * INCH_UM);
+    let slabs = by_volume(&part, &thicknesses).heights(0.02).unwrap().slabs;
     let between = |low: f64, high: f64| {
         slabs.iter().filter(move |slab| slab.bottom_um >= low && slab.top_um() <= high)
     };
@@ -72,23 +72,23 @@ fn the_part_of_figure_48() {
 fn layers_fill_the_part() {
     let part = part(&tower(5_000));
     for (min, max, step) in [(25.0, 100.0, 1.0), (30.0, 50.0, 7.0), (60.0, 100.0, 10.0)] {
-        let machine = machine(min, max, step);
+        let thicknesses = buildable(min, max, step);
         for snap in [false, true] {
-            let search = Search { snap, ..by_volume(&part, &machine) };
+            let search = HeightSearch { snap, ..by_volume(&part, &thicknesses) };
             let heights = search.heights(0.01).unwrap();
             for pair in heights.slabs.windows(2) {
                 assert!((pair[0].top_um() - pair[1].bottom_um).abs() < 1e-9);
             }
             let top = heights.slabs.last().unwrap().top_um();
             assert!((top - 76_200.0).abs() <= step / 2.0 + 1e-3, "{top}");
-            assert!(thicknesses(&heights).iter().all(|t| (min..=max).contains(t)));
+            assert!(built_um(&heights).iter().all(|t| (min..=max).contains(t)));
         }
     }
 }
 
 #[test]
 fn a_plate_is_a_layer_or_a_few() {
-    let machine = machine(25.0, 100.0, 1.0);
+    let thicknesses = buildable(25.0, 100.0, 1.0);
     for (height_um, expected) in [
         (10.0, &[25.0][..]),
         (25.0, &[25.0]),
@@ -98,12 +98,12 @@ fn a_plate_is_a_layer_or_a_few() {
         (200.0, &[100.0, 100.0]),
     ] {
         let part = part(&plate(0.0, height_um / 1000.0));
-        let heights = by_volume(&part, &machine).heights(0.02).unwrap();
-        assert_eq!(thicknesses(&heights), expected, "{height_um}");
+        let heights = by_volume(&part, &thicknesses).heights(0.02).unwrap();
+        assert_eq!(built_um(&heights), expected, "{height_um}");
     }
     let flat = Mesh { facets: vec![[[0.0, 0.0, 3.0], [1.0, 0.0, 3.0], [0.0, 1.0, 3.0]]] };
-    let heights = by_volume(&part(&flat), &machine).heights(0.02).unwrap();
-    assert_eq!(thicknesses(&heights), [25.0]);
+    let heights = by_volume(&part(&flat), &thicknesses).heights(0.02).unwrap();
+    assert_eq!(built_um(&heights), [25.0]);
 }
 
 /// Nothing is lost where there is nothing, and the next body begins with a layer
@@ -111,9 +111,9 @@ fn a_plate_is_a_layer_or_a_few() {
 #[test]
 fn bodies_above_each_other_with_nothing_between() {
     let part = part(&joined(&[plate(0.0, 1.0), plate(1.4321, 2.0), plate(2.0005, 3.0)]));
-    let machine = machine(10.0, 100.0, 1.0);
+    let thicknesses = buildable(10.0, 100.0, 1.0);
     for criterion in [&VolumeDeviation as &dyn Criterion, &CuspHeight] {
-        let search = Search { criterion, snap: true, ..by_volume(&part, &machine) };
+        let search = HeightSearch { criterion, snap: true, ..by_volume(&part, &thicknesses) };
         let heights = search.heights(0.02).unwrap();
         let [lost, gained, volume] = heights.volumes_mm3();
         assert!(heights.slabs.len() < 50);
@@ -128,9 +128,9 @@ fn layers_snap_to_flat_faces() {
     let part =
         part(&joined(&[plate(0.0, 1.03), plate(1.03, 2.0).map(|[x, y, z]| [x / 2.0, y, z])]));
     assert_eq!(part.flat_faces_um().len(), 3);
-    let machine = machine(25.0, 100.0, 1.0);
+    let thicknesses = buildable(25.0, 100.0, 1.0);
     let tops = |snap: bool| {
-        let search = Search { snap, ..by_volume(&part, &machine) };
+        let search = HeightSearch { snap, ..by_volume(&part, &thicknesses) };
         let heights = search.heights(0.5).unwrap();
         heights.slabs.iter().map(|slab| slab.top_um().round()).collect::<Vec<_>>()
     };
@@ -141,8 +141,8 @@ fn layers_snap_to_flat_faces() {
 #[test]
 fn budgets_are_kept_and_used() {
     let part = part(&tower(5_000));
-    let machine = machine(100.0, 1000.0, 10.0);
-    let search = by_volume(&part, &machine);
+    let thicknesses = buildable(100.0, 1000.0, 10.0);
+    let search = by_volume(&part, &thicknesses);
     for layers in [90.0, 150.0, 300.0] {
         let (bound, heights) = search.within_budget(|_| 1.0, layers).unwrap();
         let count = heights.slabs.len() as f64;
@@ -163,10 +163,10 @@ fn budgets_are_kept_and_used() {
 #[test]
 fn threads_do_not_change_the_heights() {
     let part = part(&tower(5_000));
-    let machine = machine(100.0, 1000.0, 10.0);
+    let thicknesses = buildable(100.0, 1000.0, 10.0);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| by_volume(&part, &machine).heights(0.02).unwrap())
+        pool.install(|| by_volume(&part, &thicknesses).heights(0.02).unwrap())
     };
     assert_eq!(with(1), with(3));
 }
@@ -190,12 +190,12 @@ fn what_is_ruled_out_would_not_have_been_found() {
         (joined(&[plate(0.0, 1.0), plate(1.4, 1.5), plate(4.0, 5.0)]), Placement::default()),
     ] {
         let part = placed(&mesh, &placement);
-        let machine = machine(20.0, 4_000.0, 10.0);
+        let thicknesses = buildable(20.0, 4_000.0, 10.0);
         for bound in [0.001, 0.01, 0.05, 0.4] {
-            let search = by_volume(&part, &machine);
-            let all = Search { criterion: &LookingAtAll, ..by_volume(&part, &machine) };
+            let search = by_volume(&part, &thicknesses);
+            let all = HeightSearch { criterion: &LookingAtAll, ..by_volume(&part, &thicknesses) };
             // Volumes may differ in their last digits.
-            let [found, expected] = [search, all].map(|s| thicknesses(&s.heights(bound).unwrap()));
+            let [found, expected] = [search, all].map(|s| built_um(&s.heights(bound).unwrap()));
             assert!(found == expected, "{bound}: {} layers, {}", found.len(), expected.len());
         }
     }
@@ -205,10 +205,10 @@ fn what_is_ruled_out_would_not_have_been_found() {
 #[test]
 fn a_budget_of_time_is_kept_by_the_quickest_layers() {
     let part = part(&plate(0.0, 6.0));
-    let machine = machine(100.0, 1000.0, 10.0);
+    let thicknesses = buildable(100.0, 1000.0, 10.0);
     let cost = |um: f64| (um / 150.0).exp();
     let quickest = 6_000.0 / 150.0 * cost(150.0);
-    let search = by_volume(&part, &machine);
+    let search = by_volume(&part, &thicknesses);
     let (bound, heights) = search.within_budget(cost, 1.01 * quickest).unwrap();
     assert!(bound == 0.0 && heights.slabs.iter().all(|slab| slab.thickness_um < 200.0));
     assert!(search.within_budget(cost, 0.99 * quickest).is_err());
@@ -217,9 +217,9 @@ fn a_budget_of_time_is_kept_by_the_quickest_layers() {
 #[test]
 fn a_bound_that_no_budget_keeps_is_infinite() {
     let part = part(&sphere(5.0, 5_000));
-    let machine = machine(25.0, 100.0, 1.0);
+    let thicknesses = buildable(25.0, 100.0, 1.0);
     // The first layer stands on a point: no share of nothing is finite.
-    let search = Search { criterion: &AreaDeviation, ..by_volume(&part, &machine) };
+    let search = HeightSearch { criterion: &AreaDeviation, ..by_volume(&part, &thicknesses) };
     let (bound, heights) = search.within_budget(|_| 1.0, 100.0).unwrap();
     assert!(bound.is_infinite());
     assert_eq!(search.heights(bound).unwrap(), heights);
@@ -240,13 +240,13 @@ fn faces_that_were_turned_into_place_are_flat() {
 fn layers_of_which_nothing_is_known_are_the_thinnest() {
     let mut mesh = cone(4.0, 2.0, 3.0, 200);
     let whole = part(&mesh);
-    let machine = machine(25.0, 100.0, 1.0);
-    let closed = by_volume(&whole, &machine).heights(0.5).unwrap();
+    let thicknesses = buildable(25.0, 100.0, 1.0);
+    let closed = by_volume(&whole, &thicknesses).heights(0.5).unwrap();
     assert!(closed.slabs.iter().all(|slab| slab.rows_left_out == 0));
     // Without the side to the right, no row balances.
     mesh.facets.retain(|facet| facet.iter().map(|corner| corner[0]).sum::<f32>() < 0.0);
     let open = part(&mesh);
-    let heights = by_volume(&open, &machine).heights(0.5).unwrap();
+    let heights = by_volume(&open, &thicknesses).heights(0.5).unwrap();
     assert_eq!(heights.slabs.len(), 120);
     assert!(heights.slabs.iter().all(|slab| slab.rows_left_out > 0));
 }
@@ -263,11 +263,11 @@ fn what_is_above_the_last_layer_is_lost() {
 
 #[test]
 fn rows_are_not_too_near() {
-    let body = Body::new(
+    let facets = FacetIndex::new(
         Model::from_facets("plate", plate(0.0, 1.0).facets),
         &Placement::default(),
         Units::Millimetres,
     );
-    let error = Part::new(body.unwrap(), Length::from_um(1e-4), Fill::EvenOdd).unwrap_err();
+    let error = LayeredPart::new(facets.unwrap(), Length::from_um(1e-4), Fill::EvenOdd).unwrap_err();
     assert_eq!(error.to_string(), "rows 0.0001 um apart are more than 2^24");
 }

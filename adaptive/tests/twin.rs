@@ -1,9 +1,11 @@
 //! Slabs against a slow obvious twin: sections at very many heights, compared
 //! with the one at the top, row by row.
 
-use lamp_adaptive::{Part, Slab};
+use lamp_adaptive::{LayeredPart, Slab};
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
-use lamp_slicer::{Axis, Body, Fill, Inside, Model, Placement, SectionOptions, Units, section};
+use lamp_slicer::{
+    Axis, FacetIndex, Fill, Inside, Model, Placement, SectionOptions, Units, section,
+};
 use lamp_stack::{Dpi, Length};
 
 /// 254 dpi: rows 0.1 mm apart.
@@ -35,10 +37,10 @@ impl Twin {
     }
 
     fn check(&self, layers: &[[f64; 2]]) {
-        let body = Body::new(self.model(), &self.placement, Units::Millimetres).unwrap();
-        let [min, max] = [body.min(), body.max()];
+        let facets = FacetIndex::new(self.model(), &self.placement, Units::Millimetres).unwrap();
+        let [min, max] = [facets.min(), facets.max()];
         let rows = ((max[1] - min[1]) / PITCH_MM).ceil() as u32;
-        let part = Part::new(body, Length::from_mm(PITCH_MM), self.fill).unwrap();
+        let part = LayeredPart::new(facets, Length::from_mm(PITCH_MM), self.fill).unwrap();
         let height = max[2] - min[2];
         for layer in layers {
             let [bottom, top] = layer.map(|share| min[2] + share * height);

@@ -7,11 +7,11 @@ use std::io::Cursor;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use fax::{Color, VecWriter, decoder, encoder};
-use lamp_adaptive::Part as AdaptivePart;
-use lamp_fixtures::{Part, build};
+use lamp_adaptive::LayeredPart;
+use lamp_fixtures::{Sample, build};
 use lamp_grayscale::{Method, dither_image};
 use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
-use lamp_slicer::{Body, Fill, LayerLevels, Model, Placement, SliceOptions, Slices, Units};
+use lamp_slicer::{FacetIndex, Fill, LayerLevels, Model, Placement, SliceOptions, Slices, Units};
 use lamp_stack::{
     DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo,
     PageWriter, g4,
@@ -21,7 +21,7 @@ use lamp_stack::{
 const LAYERS: std::ops::Range<u32> = 440..460;
 
 fn slices(facets: usize, gray: Option<DepthLevels>) -> impl Fn() -> Slices {
-    let facets = build(Part::Blade, facets).expect("enough facets").facets;
+    let facets = build(Sample::Blade, facets).expect("enough facets").facets;
     move || {
         let model = Model::from_facets("blade", facets.clone());
         let gray = gray.clone().map(LayerLevels::from);
@@ -121,10 +121,11 @@ fn page(runs: u32, length: u32) -> GrayMask {
 }
 
 fn heights(criterion: &mut Criterion) {
-    let facets = build(Part::Blade, 750_000).expect("enough facets").facets;
+    let facets = build(Sample::Blade, 750_000).expect("enough facets").facets;
     let model = Model::from_facets("blade", facets);
-    let body = Body::new(model, &Placement::default(), Units::Millimetres).expect("it is finite");
-    let part = AdaptivePart::new(body, Length::from_um(68.0), Fill::EvenOdd);
+    let body =
+        FacetIndex::new(model, &Placement::default(), Units::Millimetres).expect("it is finite");
+    let part = LayeredPart::new(body, Length::from_um(68.0), Fill::EvenOdd);
     let part = part.expect("its rows are few");
     let mut group = criterion.benchmark_group("heights");
     group.throughput(Throughput::Elements(LAYERS.len() as u64));

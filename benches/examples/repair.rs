@@ -15,16 +15,16 @@ use std::time::{Duration, Instant};
 
 use lamp_benches::score::{Bands, Score};
 use lamp_benches::sliced::{Layers, broken, mask, slice};
-use lamp_fixtures::{Defect, Part, build};
+use lamp_fixtures::{Defect, Sample, build};
 use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, fix};
 use lamp_slicer::{Fill, SliceOptions};
 
-const PARTS: [(Part, usize); 5] = [
-    (Part::Blade, 24_000),
-    (Part::Blade, 750_000),
-    (Part::Tower, 20_000),
-    (Part::Torus, 20_000),
-    (Part::Sphere, 20_000),
+const PARTS: [(Sample, usize); 5] = [
+    (Sample::Blade, 24_000),
+    (Sample::Blade, 750_000),
+    (Sample::Tower, 20_000),
+    (Sample::Torus, 20_000),
+    (Sample::Sphere, 20_000),
 ];
 
 /// One facet of so many is broken.
@@ -73,8 +73,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let count = facets / FACETS_PER_DEFECT;
         for (defect_name, defect, fill) in defects() {
             let options = SliceOptions { fill, ..SliceOptions::default() };
-            let (clean, frame) = slice(&whole, &options)?;
-            let options = SliceOptions { frame, ..options };
+            let (clean, grid) = slice(&whole, &options)?;
+            let options = SliceOptions { grid, ..options };
             let mut results = METHODS.map(|_| Outcome::default());
             for seed in SEEDS {
                 let (stray, _) = slice(&broken(&whole, defect, count, seed), &options)?;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use anyhow::anyhow;
-use lamp_slicer::{Frame, Model, SliceError, SliceOptions, Slices};
+use lamp_slicer::{GridRule, Model, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, PageInfo};
 
 use crate::part::PartOptions;
@@ -92,7 +92,7 @@ impl Fallback {
         let options = SliceOptions {
             heights: Some(slices.layer_heights()),
             gray: slices.levels().cloned(),
-            frame: Frame::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] },
+            grid: GridRule::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] },
             layers,
             ..options.for_slicing()
         };

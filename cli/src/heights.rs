@@ -2,11 +2,11 @@
 
 use clap::Args;
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, Heights, HeightsError, Machine, Part, Search, Slab,
-    VolumeDeviation,
+    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart, Slab,
+    Thicknesses, VolumeDeviation,
 };
 use lamp_grayscale::calibrate::with_digits;
-use lamp_slicer::{Body, Fill};
+use lamp_slicer::{FacetIndex, Fill};
 use lamp_stack::{Dpi, Length};
 
 use crate::exposure::Exposure;
@@ -153,9 +153,9 @@ impl HeightOptions {
     }
 
     /// The part as rows see it.
-    pub(crate) fn part(&self, body: Body, dpi: Dpi, fill: Fill) -> Result<Part, Stop> {
+    pub(crate) fn part(&self, body: FacetIndex, dpi: Dpi, fill: Fill) -> Result<LayeredPart, Stop> {
         let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
-        let part = Part::new(body, self.row_pitch.unwrap_or(pitch), fill);
+        let part = LayeredPart::new(body, self.row_pitch.unwrap_or(pitch), fill);
         part.map_err(|error| Stop::Failed(error.into()))
     }
 
@@ -165,14 +165,14 @@ impl HeightOptions {
     }
 
     /// What the machine builds.
-    fn machine(&self) -> Result<Machine, Stop> {
+    fn thicknesses(&self) -> Result<Thicknesses, Stop> {
         let step = self.step.unwrap_or(Length::from_um(1.0));
-        Machine::new(self.min(), self.max(), step).map_err(Stop::wrong_options)
+        Thicknesses::new(self.min(), self.max(), step).map_err(Stop::wrong_options)
     }
 
     /// Checks, before the work, what the parser cannot.
     pub(crate) fn check(&self, exposure: Option<&Exposure>) -> Result<(), Stop> {
-        self.machine()?;
+        self.thicknesses()?;
         self.measure()?;
         if self.time_budget.is_some() {
             let _ = self.seconds_of_layers(exposure)?;
@@ -193,11 +193,15 @@ impl HeightOptions {
     }
 
     /// Searches for the heights.
-    pub(crate) fn find(&self, part: &Part, exposure: Option<&Exposure>) -> Result<Found, Stop> {
-        let machine = self.machine()?;
+    pub(crate) fn find(
+        &self,
+        part: &LayeredPart,
+        exposure: Option<&Exposure>,
+    ) -> Result<Found, Stop> {
+        let thicknesses = self.thicknesses()?;
         let measure = self.measure()?;
         let criterion = measure.criterion();
-        let search = Search { part, machine: &machine, criterion, snap: self.snap };
+        let search = HeightSearch { part, thicknesses: &thicknesses, criterion, snap: self.snap };
         let failed = |error: HeightsError| Stop::Failed(error.into());
         let (bound, heights) = if let Some(layers) = self.layers_budget {
             search

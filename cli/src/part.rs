@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser};
 use lamp_grayscale::resin::ExposureTime;
-use lamp_slicer::{Frame, LayerHeights, LayerLevels, Model, PlaneRule, SliceOptions, Slices};
+use lamp_slicer::{GridRule, LayerHeights, LayerLevels, Model, PlaneRule, SliceOptions, Slices};
 use lamp_stack::{Dpi, Layer, Length, Size};
 
 use crate::brep::HEADING;
@@ -80,19 +80,19 @@ impl PartOptions {
             units: self.solid.units,
             placement: self.solid.placement(),
             fill: self.solid.fill,
-            frame: self.frame(),
+            grid: self.grid(),
             polish: !self.no_polish,
             ..SliceOptions::default()
         }
     }
 
-    fn frame(&self) -> Frame {
+    fn grid(&self) -> GridRule {
         match (self.origin, self.size) {
             (Some(origin_mm), Some(size)) => {
                 let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
-                Frame::At { origin_mm, pixels: [side(size.width), side(size.height)] }
+                GridRule::At { origin_mm, pixels: [side(size.width), side(size.height)] }
             }
-            _ => Frame::Around { margin: self.margin },
+            _ => GridRule::Around { margin: self.margin },
         }
     }
 

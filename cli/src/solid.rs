@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use lamp_slicer::{Body, Fill, Model, Placement, SliceError, Units};
+use lamp_slicer::{FacetIndex, Fill, Model, Placement, SliceError, Units};
 use lamp_stack::Dpi;
 
 use crate::brep::{BrepOptions, boxes_overlap, bytes_of, is_step, part_of};
@@ -40,8 +40,8 @@ impl SolidOptions {
     }
 
     /// The part in memory.
-    pub(crate) fn body(&self, model: Model) -> Result<Body, SliceError> {
-        Body::new(model, &self.placement(), self.units)
+    pub(crate) fn body(&self, model: Model) -> Result<FacetIndex, SliceError> {
+        FacetIndex::new(model, &self.placement(), self.units)
     }
 
     /// The options as the stack remembers them.

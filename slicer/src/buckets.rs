@@ -18,7 +18,7 @@ use crate::facet::Facet;
 use crate::model::map;
 use crate::placement::{PlacedFacet, PlacedModel, heights};
 use crate::planes::Planes;
-use crate::table::Facets;
+use crate::table::FacetSource;
 
 /// A facet in a bucket: three corners.
 const RECORD_BYTES: usize = 36;
@@ -50,14 +50,14 @@ impl Buckets {
         slabs: &[Range<usize>],
         memory: usize,
     ) -> io::Result<Self> {
-        let order = Order::new(planes, reach_um, slabs);
+        let order = BucketOrder::new(planes, reach_um, slabs);
         let count = order.per_slab * slabs.len();
         // As many workers as have room for their chunks.
         let workers = (memory / (count << 12)).clamp(1, rayon::current_num_threads());
         let chunk_bytes = (memory / (workers * count)).clamp(1 << 12, 1 << 18);
         let file = tempfile::tempfile()?;
         let buckets = Self { file, chunks: vec![Vec::new(); count], per_slab: order.per_slab };
-        let writer = Mutex::new(Writer { buckets, end: 0 });
+        let writer = Mutex::new(BucketWriter { buckets, end: 0 });
         let blocks: Vec<usize> = (0..model.model.block_count()).collect();
         let piece = blocks.len().div_ceil(workers).max(1);
         blocks.par_chunks(piece).try_for_each(|blocks| {
@@ -83,14 +83,14 @@ impl Buckets {
     }
 
     /// The facets of a slab.
-    pub(crate) fn of_slab<'a>(&'a self, slab: usize, model: &'a PlacedModel) -> Bucket<'a> {
+    pub(crate) fn of_slab<'a>(&'a self, slab: usize, model: &'a PlacedModel) -> SlabFacets<'a> {
         let buckets = &self.chunks[slab * self.per_slab..][..self.per_slab];
-        Bucket { file: &self.file, chunks: buckets.concat(), model }
+        SlabFacets { file: &self.file, chunks: buckets.concat(), model }
     }
 }
 
 /// Which buckets a facet belongs in.
-struct Order<'a> {
+struct BucketOrder<'a> {
     planes: &'a Planes,
     reach_um: f64,
     slabs: &'a [Range<usize>],
@@ -100,7 +100,7 @@ struct Order<'a> {
     of_layer: Vec<usize>,
 }
 
-impl<'a> Order<'a> {
+impl<'a> BucketOrder<'a> {
     fn new(planes: &'a Planes, reach_um: f64, slabs: &'a [Range<usize>]) -> Self {
         let per_slab = BUCKETS.div_ceil(slabs.len());
         let buckets = |(slab, layers): (usize, &Range<usize>)| {
@@ -141,14 +141,14 @@ fn record(facet: &Facet) -> [u8; RECORD_BYTES] {
     record
 }
 
-struct Writer {
+struct BucketWriter {
     buckets: Buckets,
     end: u64,
 }
 
-fn write(writer: &Mutex<Writer>, bucket: usize, records: &mut Vec<u8>) -> io::Result<()> {
+fn write(writer: &Mutex<BucketWriter>, bucket: usize, records: &mut Vec<u8>) -> io::Result<()> {
     if !records.is_empty() {
-        let Writer { buckets, end } = &mut *writer.lock().expect("no writer panics");
+        let BucketWriter { buckets, end } = &mut *writer.lock().expect("no writer panics");
         buckets.file.write_all(records)?;
         let start = *end;
         *end += records.len() as u64;
@@ -159,13 +159,13 @@ fn write(writer: &Mutex<Writer>, bucket: usize, records: &mut Vec<u8>) -> io::Re
 }
 
 /// The facets of one slab.
-pub(crate) struct Bucket<'a> {
+pub(crate) struct SlabFacets<'a> {
     file: &'a File,
     chunks: Vec<Range<u64>>,
     model: &'a PlacedModel,
 }
 
-impl Facets for Bucket<'_> {
+impl FacetSource for SlabFacets<'_> {
     fn pieces(&self) -> usize {
         self.chunks.len()
     }

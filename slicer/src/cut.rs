@@ -15,8 +15,8 @@
 
 use std::ops::Range;
 
-use crate::ends::EndSum;
-use crate::gray::{Sheet, Span};
+use crate::closure::EndSum;
+use crate::gray::{DepthSpan, Sheet};
 use crate::grid::PixelGrid;
 use crate::placement::{PlacedFacet, heights};
 use crate::planes::Planes;
@@ -54,16 +54,16 @@ impl Crossing {
 
     /// Column and direction in one, to sort by.
     #[inline]
-    pub(crate) fn place(self) -> Place {
-        Place(self.0 as u32)
+    pub(crate) fn in_row(self) -> RowCrossing {
+        RowCrossing(self.0 as u32)
     }
 }
 
 /// Where in its row a crossing is, and in which direction the contour goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Place(u32);
+pub(crate) struct RowCrossing(u32);
 
-impl Place {
+impl RowCrossing {
     #[inline]
     pub(crate) fn column(self) -> u32 {
         self.0 >> 1
@@ -86,16 +86,16 @@ pub(crate) struct Cutter<'a> {
 
 /// What a worker finds of a layer.
 #[derive(Debug, Default)]
-pub(crate) struct Share {
+pub(crate) struct LayerShare {
     pub(crate) crossings: Vec<Crossing>,
     /// Those of B-rep facets for which no point of the surface was found.
     pub(crate) kept: Vec<Crossing>,
     pub(crate) ends: EndSum,
     /// What lies below the section, for gray layers.
-    pub(crate) spans: Vec<Span>,
+    pub(crate) spans: Vec<DepthSpan>,
 }
 
-impl Share {
+impl LayerShare {
     /// Empties it; the lists keep their memory.
     pub(crate) fn clear(&mut self) {
         self.crossings.clear();
@@ -109,14 +109,14 @@ impl Share {
 /// segment goes from its start to its end, the part is on its left, as seen
 /// from above.
 pub(crate) struct Segment {
-    pub(crate) ends: [End; 2],
+    pub(crate) ends: [SegmentEnd; 2],
     /// Whether the second end is the start.
     pub(crate) turned: bool,
 }
 
 /// An end of a segment.
 #[derive(Clone, Copy)]
-pub(crate) struct End {
+pub(crate) struct SegmentEnd {
     /// In pixels.
     pub(crate) at: [f64; 2],
     /// Which corners of the facet its edge joins.
@@ -131,7 +131,7 @@ impl Cutter<'_> {
         &self,
         facet: &PlacedFacet,
         layers: &Range<usize>,
-        shares: &mut [Share],
+        shares: &mut [LayerShare],
     ) -> usize {
         let mut count = 0;
         self.for_each_segment(facet, layers, |layer, segment| {
@@ -151,7 +151,7 @@ impl Cutter<'_> {
         facet: &PlacedFacet,
         reach_um: f64,
         layers: &Range<usize>,
-        shares: &mut [Share],
+        shares: &mut [LayerShare],
     ) -> usize {
         let (low, high) = heights(facet);
         let met = self.planes.between(low, high + reach_um);
@@ -165,7 +165,7 @@ impl Cutter<'_> {
             shares[layer - layers.start].spans.push(span);
             count += 1;
         });
-        count * size_of::<Span>() / size_of::<Crossing>()
+        count * size_of::<DepthSpan>() / size_of::<Crossing>()
     }
 
     /// Gives the facet's segments in `layers`, from below.
@@ -200,7 +200,8 @@ impl Cutter<'_> {
             second,
             |layer| self.planes.z_um(layer),
             |layer, [a, b], half| {
-                let ends = [End { at: a, edge: long }, End { at: b, edge: short[half] }];
+                let ends =
+                    [SegmentEnd { at: a, edge: long }, SegmentEnd { at: b, edge: short[half] }];
                 each(layer, Segment { ends, turned: sorted.is_flipped });
             },
         );

@@ -31,15 +31,14 @@
 //! # Ok::<(), lamp_slicer::SliceError>(())
 //! ```
 
-mod again;
 mod ascii;
-mod body;
 mod buckets;
+mod closure;
 mod cut;
-mod ends;
 mod error;
 pub mod exact;
 mod facet;
+mod facet_index;
 mod gray;
 mod grid;
 mod model;
@@ -53,16 +52,16 @@ mod survey;
 mod table;
 mod trace;
 
-pub use body::Body;
 pub use error::SliceError;
 pub use exact::Polished;
 pub use facet::{Facet, Units};
+pub use facet_index::FacetIndex;
 pub use gray::LayerLevels;
 pub use grid::PixelGrid;
 pub use model::{Model, digest_of_bytes};
 pub use placement::{Axis, PlacedFacet, Placement};
 pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};
-pub use slices::{Frame, SliceOptions, Slices};
+pub use slices::{GridRule, SliceOptions, Slices};
 pub use table::Fill;
 pub use trace::{EdgeFacet, FaultyEdge, OpenEnd, StrayBand, Trace, TracedBand};

@@ -114,14 +114,14 @@ pub(crate) fn heights(facet: &PlacedFacet) -> (f64, f64) {
 #[derive(Debug)]
 pub(crate) struct PlacedModel {
     pub(crate) model: Model,
-    way: Way,
+    transform: Transform,
     /// Each file's surfaces in place, if it has some.
     surfaces: Vec<Option<PlacedSurfaces>>,
 }
 
 /// The way from file units to the place.
 #[derive(Debug)]
-enum Way {
+enum Transform {
     /// The axes scaled: most parts stay where they are, and pay for no more.
     Scale([f64; 3]),
     Affine([[f64; 4]; 3]),
@@ -149,7 +149,11 @@ impl PlacedModel {
         }
         let scale = std::array::from_fn(|axis| rows[axis][axis]);
         let is_scale = (0..12).all(|k| k % 4 == k / 4 || rows[k / 4][k % 4] == 0.0);
-        Self { model, way: if is_scale { Way::Scale(scale) } else { Way::Affine(rows) }, surfaces }
+        Self {
+            model,
+            transform: if is_scale { Transform::Scale(scale) } else { Transform::Affine(rows) },
+            surfaces,
+        }
     }
 
     /// Without its surfaces: by facets alone.
@@ -177,11 +181,11 @@ impl PlacedModel {
         mut each: impl FnMut(&PlacedFacet),
     ) -> io::Result<()> {
         // Two loops, so that neither asks at every facet which one it is.
-        match self.way {
-            Way::Scale(scale) => self.model.for_each_in_block(block, |facet| {
+        match self.transform {
+            Transform::Scale(scale) => self.model.for_each_in_block(block, |facet| {
                 each(&placed(facet, |corner| scaled(&scale, corner)));
             }),
-            Way::Affine(rows) => self.model.for_each_in_block(block, |facet| {
+            Transform::Affine(rows) => self.model.for_each_in_block(block, |facet| {
                 each(&placed(facet, |corner| rows.map(|row| affine(&row, corner))));
             }),
         }
@@ -190,9 +194,9 @@ impl PlacedModel {
     /// A facet of the file in its place.
     #[inline]
     pub(crate) fn placed(&self, facet: &Facet) -> PlacedFacet {
-        match &self.way {
-            Way::Scale(scale) => placed(facet, |corner| scaled(scale, corner)),
-            Way::Affine(rows) => placed(facet, |corner| rows.map(|row| affine(&row, corner))),
+        match &self.transform {
+            Transform::Scale(scale) => placed(facet, |corner| scaled(scale, corner)),
+            Transform::Affine(rows) => placed(facet, |corner| rows.map(|row| affine(&row, corner))),
         }
     }
 }

@@ -12,13 +12,13 @@ use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
 use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::Units;
-use crate::gray::{LayerLevels, Span};
+use crate::gray::{DepthSpan, LayerLevels};
 use crate::grid::PixelGrid;
 use crate::model::Model;
 use crate::placement::{PlacedFacet, PlacedModel, Placement};
 use crate::planes::{LayerHeights, PlaneRule, Planes};
 use crate::survey::Survey;
-use crate::table::{Facets, Fill, OpenRows, Section, Table, open_rows};
+use crate::table::{CutLayer, FacetSource, Fill, OpenRows, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
 
 /// How a part is sliced.
@@ -48,7 +48,7 @@ pub struct SliceOptions {
     /// The layers wanted, all where `None`.
     pub layers: Option<Range<u32>>,
     /// The frame of the images.
-    pub frame: Frame,
+    pub grid: GridRule,
     /// About how many bytes the table of crossings may take; at least one
     /// layer's is held.
     pub memory: u64,
@@ -56,7 +56,7 @@ pub struct SliceOptions {
 
 /// Which part of the plane the images show.
 #[derive(Clone, Copy, Debug)]
-pub enum Frame {
+pub enum GridRule {
     /// The part's box and a margin of so many pixels.
     Around {
         /// Black pixels on every side.
@@ -72,7 +72,7 @@ pub enum Frame {
     },
 }
 
-impl Frame {
+impl GridRule {
     fn grid(self, min_mm: [f64; 2], max_mm: [f64; 2], dpi: Dpi) -> Result<PixelGrid, SliceError> {
         match self {
             Self::Around { margin } => PixelGrid::around(min_mm, max_mm, margin, dpi),
@@ -102,7 +102,7 @@ impl Default for SliceOptions {
             gray: None,
             polish: true,
             layers: None,
-            frame: Frame::Around { margin: 1 },
+            grid: GridRule::Around { margin: 1 },
             memory: 64 << 20,
         }
     }
@@ -117,12 +117,12 @@ impl Default for SliceOptions {
 /// and bytes do not depend on them.
 #[derive(Debug)]
 pub struct Slices {
-    pub(crate) model: PlacedModel,
-    pub(crate) survey: Survey,
-    pub(crate) grid: PixelGrid,
-    pub(crate) planes: Planes,
-    pub(crate) fill: Fill,
-    pub(crate) gray: Option<LayerLevels>,
+    model: PlacedModel,
+    survey: Survey,
+    grid: PixelGrid,
+    planes: Planes,
+    fill: Fill,
+    gray: Option<LayerLevels>,
     wanted: Range<usize>,
     most_crossings: usize,
     /// Slabs of layers that fit by the estimate.
@@ -153,7 +153,7 @@ impl Slices {
         survey.check_distance()?;
         let model = if options.polish { model } else { model.on_facets() };
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
-        let grid = options.frame.grid(min_mm, max_mm, options.dpi)?;
+        let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;
         let (bottom_um, top_um) = (survey.min[2], survey.max[2]);
         let planes = match &options.heights {
             Some(heights) => Planes::of(heights, top_um, options.plane),
@@ -212,6 +212,45 @@ impl Slices {
         self.model.surfaces().next().map(|_| self.polished.joined(self.table.polished()))
     }
 
+    /// Cuts a layer once more, with its plane moved up by so many micrometres but not
+    /// past its neighbours' or out of the part, and everything else as it is: 002 section 2.2.3 gets
+    /// by with sections that fail in this way.
+    ///
+    /// # Errors
+    /// Where there is no such layer, or the file cannot be read.
+    pub fn cut_again(&self, layer: u32, by_um: f64) -> Result<Layer, SliceError> {
+        let count = self.planes.len();
+        let index = layer as usize;
+        if index >= count {
+            let (start, end) = (layer, layer.saturating_add(1));
+            return Err(SliceError::NoSuchLayers { start, end, count: count as u32 });
+        }
+        let planes = self.planes.moved(index, by_um, [self.survey.min[2], self.survey.max[2]]);
+        let cutter = Cutter { grid: &self.grid, planes: &planes, fill: self.fill };
+        let reach_um = self.gray.as_ref().map(LayerLevels::reach_um);
+        let layers = index..index + 1;
+        let below = reach_um.unwrap_or(0.0);
+        let facets = MetBlocks::of(&self.model, &self.survey, &layers, &planes, below);
+        let mut table = Table::default();
+        let open = fill(&mut table, &facets, cutter, reach_um, layers, usize::MAX)?;
+        Ok(self.image_of(index, &table, cutter, &open.unwrap_or_default()))
+    }
+
+    /// The heights of the layers.
+    pub fn layer_heights(&self) -> LayerHeights {
+        self.planes.heights()
+    }
+
+    /// The gray levels of depths, if layers are gray.
+    pub fn levels(&self) -> Option<&LayerLevels> {
+        self.gray.as_ref()
+    }
+
+    /// The least and the greatest corner of the part in its place, in millimetres.
+    pub fn box_mm(&self) -> [[f64; 3]; 2] {
+        [self.survey.min, self.survey.max].map(|[x, y, z_um]| [x, y, z_um / 1000.0])
+    }
+
     /// Fills the table with the next slab, as the iterator does when it needs
     /// to. Benchmarks call it, to time the table and the images apart.
     #[doc(hidden)]
@@ -230,7 +269,8 @@ impl Slices {
                 let facets = buckets.of_slab(slab, &self.model);
                 fill(&mut self.table, &facets, cutter, gray, layers, most)?
             } else {
-                let facets = Blocks::of(&self.model, &self.survey, &layers, &self.planes, reach_um);
+                let facets =
+                    MetBlocks::of(&self.model, &self.survey, &layers, &self.planes, reach_um);
                 fill(&mut self.table, &facets, cutter, gray, layers, most)?
             };
             if let Some(open_rows) = open_rows {
@@ -280,7 +320,7 @@ impl Slices {
     }
 
     /// Makes a layer of a table into an image.
-    pub(crate) fn image_of(
+    fn image_of(
         &self,
         layer: usize,
         table: &Table,
@@ -288,7 +328,7 @@ impl Slices {
         open_rows: &OpenRows,
     ) -> Layer {
         let surfaces: Vec<_> = self.model.surfaces().collect();
-        let Section { image, stray_rows, closed } =
+        let CutLayer { image, stray_rows, closed } =
             table.layer(layer, cutter, &surfaces, self.gray.as_ref());
         let open_rows = open_rows.get(&layer).cloned().unwrap_or_default();
         let closed = Some(closed);
@@ -357,9 +397,9 @@ impl Iterator for Slices {
 
 /// Fills the table with the crossings of some layers, and finds the rows where
 /// their contours break off. `None` where the crossings are too many.
-pub(crate) fn fill(
+fn fill(
     table: &mut Table,
-    facets: &impl Facets,
+    facets: &impl FacetSource,
     cutter: Cutter<'_>,
     reach_um: Option<f64>,
     layers: Range<usize>,
@@ -379,14 +419,14 @@ pub(crate) fn fill(
 }
 
 /// The facets of some blocks of a part.
-pub(crate) struct Blocks<'a> {
+struct MetBlocks<'a> {
     model: &'a PlacedModel,
     blocks: Vec<usize>,
 }
 
-impl<'a> Blocks<'a> {
+impl<'a> MetBlocks<'a> {
     /// Those that some layers meet, which look so far below their planes.
-    pub(crate) fn of(
+    fn of(
         model: &'a PlacedModel,
         survey: &Survey,
         layers: &Range<usize>,
@@ -398,7 +438,7 @@ impl<'a> Blocks<'a> {
     }
 }
 
-impl Facets for Blocks<'_> {
+impl FacetSource for MetBlocks<'_> {
     fn pieces(&self) -> usize {
         self.blocks.len()
     }
@@ -422,7 +462,7 @@ fn heights_of(layers: &Range<usize>, planes: &Planes, reach_um: f64) -> (f64, f6
 /// in them, where layers are exposed so many times as deep as they are thick. A
 /// facet crosses as many rows between planes as on them.
 fn spans_per_crossing(reach: f64) -> f64 {
-    (1.0 + reach) * (size_of::<Span>() / size_of::<Crossing>()) as f64
+    (1.0 + reach) * (size_of::<DepthSpan>() / size_of::<Crossing>()) as f64
 }
 
 /// Cuts layers into slabs of at most `most` crossings, and at least a layer.

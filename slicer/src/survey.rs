@@ -19,12 +19,12 @@ const FARTHEST_MM: f64 = 1e9;
 pub(crate) struct Survey {
     pub(crate) min: [f64; 3],
     pub(crate) max: [f64; 3],
-    blocks: Vec<Block>,
+    blocks: Vec<BlockSurvey>,
 }
 
 /// A block of consecutive facets of the file.
 #[derive(Clone, Copy, Debug)]
-struct Block {
+struct BlockSurvey {
     min: [f64; 3],
     max: [f64; 3],
     /// Half the sum of the facets' boxes in y and z: what the block's
@@ -35,7 +35,7 @@ struct Block {
     heights_um: f64,
 }
 
-impl Block {
+impl BlockSurvey {
     const EMPTY: Self =
         Self { min: [f64::MAX; 3], max: [f64::MIN; 3], yz_area: 0.0, facets: 0, heights_um: 0.0 };
 
@@ -97,14 +97,14 @@ impl Survey {
     pub(crate) fn of(model: &PlacedModel) -> Result<Self, SliceError> {
         let blocks: Vec<_> = (0..model.model.block_count())
             .into_par_iter()
-            .map(|block| Block::of(model, block))
+            .map(|block| BlockSurvey::of(model, block))
             .collect();
         // In the order of the file, so that the first bad facet is named.
         let mut good = Vec::with_capacity(blocks.len());
         for block in blocks {
             good.push(block??);
         }
-        let whole = good.iter().copied().reduce(Block::joined).ok_or(SliceError::NoFacets)?;
+        let whole = good.iter().copied().reduce(BlockSurvey::joined).ok_or(SliceError::NoFacets)?;
         let (mut min, mut max) = (whole.min, whole.max);
         for [low, high] in model.surfaces().filter_map(PlacedSurfaces::box_mm) {
             for (axis, unit) in [1.0, 1.0, 1000.0].into_iter().enumerate() {
@@ -135,7 +135,7 @@ impl Survey {
     pub(crate) fn blocks_between(&self, low_um: f64, high_um: f64) -> Vec<usize> {
         (0..self.blocks.len())
             .filter(|&block| {
-                let Block { min, max, .. } = self.blocks[block];
+                let BlockSurvey { min, max, .. } = self.blocks[block];
                 min[2] < high_um && max[2] >= low_um
             })
             .collect()
@@ -143,7 +143,7 @@ impl Survey {
 
     /// The layers whose planes a block meets.
     pub(crate) fn planes_of_block(&self, block: usize, planes: &Planes) -> Range<usize> {
-        let Block { min, max, .. } = self.blocks[block];
+        let BlockSurvey { min, max, .. } = self.blocks[block];
         planes.between(min[2], max[2])
     }
 
@@ -153,7 +153,7 @@ impl Survey {
     pub(crate) fn wants_sorting(&self, slabs: &[(f64, f64)]) -> bool {
         let height_um = (self.max[2] - self.min[2]) / slabs.len() as f64;
         let (mut facets, mut visits, mut met) = (0.0, 0.0, 0.0);
-        for &Block { min, max, facets: count, heights_um, .. } in &self.blocks {
+        for &BlockSurvey { min, max, facets: count, heights_um, .. } in &self.blocks {
             let slabs = slabs.iter().filter(|(low, high)| min[2] < *high && max[2] >= *low);
             facets += count as f64;
             visits += count as f64 * slabs.count() as f64;

@@ -12,10 +12,10 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use lamp_stack::{Grouped, Image, Mask};
 use rayon::prelude::*;
 
-use crate::cut::{Crossing, Cutter, Place, Share};
-use crate::ends::{EndSum, RowSums};
+use crate::closure::{EndSum, RowSums};
+use crate::cut::{Crossing, Cutter, LayerShare, RowCrossing};
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
-use crate::gray::{LayerLevels, Shader, Span};
+use crate::gray::{DepthSpan, LayerLevels, Shader};
 use crate::placement::PlacedFacet;
 
 /// What is inside.
@@ -43,7 +43,7 @@ impl Fill {
 }
 
 /// Facets in pieces, which threads take one after another.
-pub(crate) trait Facets: Sync {
+pub(crate) trait FacetSource: Sync {
     fn pieces(&self) -> usize;
 
     /// Gives every facet of a piece.
@@ -62,13 +62,13 @@ pub(crate) struct Table {
     layers: Range<usize>,
     /// What each worker found of each layer. Lists keep their memory from slab
     /// to slab.
-    parts: Vec<Vec<Share>>,
+    parts: Vec<Vec<LayerShare>>,
     /// What polishing did to the crossings of these layers.
     tally: Tally,
 }
 
 /// What a layer's crossings make.
-pub(crate) struct Section {
+pub(crate) struct CutLayer {
     pub(crate) image: Image,
     /// The rows whose crossings do not balance.
     pub(crate) stray_rows: Vec<u32>,
@@ -77,14 +77,14 @@ pub(crate) struct Section {
 }
 
 /// How many crossings all workers may make together.
-struct Budget {
+struct CrossingLimit {
     used: AtomicUsize,
     most: usize,
     /// Whether the slab could be smaller.
     must_fit: bool,
 }
 
-impl Budget {
+impl CrossingLimit {
     /// Claims crossings that were made, a few thousand at a time, so that the
     /// workers seldom meet.
     #[inline]
@@ -105,20 +105,20 @@ impl Table {
     /// `false`, once the crossings pass `most` in a slab that could be smaller.
     pub(crate) fn fill(
         &mut self,
-        facets: &impl Facets,
+        facets: &impl FacetSource,
         cutter: Cutter<'_>,
         reach_um: Option<f64>,
         layers: Range<usize>,
         most: usize,
     ) -> io::Result<bool> {
         self.parts.resize_with(rayon::current_num_threads(), Vec::new);
-        let budget = Budget { used: AtomicUsize::new(0), most, must_fit: layers.len() > 1 };
+        let budget = CrossingLimit { used: AtomicUsize::new(0), most, must_fit: layers.len() > 1 };
         let next = AtomicUsize::new(0);
         self.tally = Tally::default();
         let tally = &self.tally;
         self.parts.par_iter_mut().try_for_each(|shares| -> io::Result<()> {
-            shares.iter_mut().for_each(Share::clear);
-            shares.resize_with(shares.len().max(layers.len()), Share::default);
+            shares.iter_mut().for_each(LayerShare::clear);
+            shares.resize_with(shares.len().max(layers.len()), LayerShare::default);
             let mut unclaimed = 0;
             loop {
                 let piece = next.fetch_add(1, Relaxed);
@@ -167,7 +167,7 @@ impl Table {
         ends.fold(EndSum::default(), |sum, ends| sum.joined(ends, fill)).is_closed()
     }
 
-    fn shares(&self, layer: usize) -> impl Iterator<Item = &Share> {
+    fn shares(&self, layer: usize) -> impl Iterator<Item = &LayerShare> {
         self.parts.iter().map(move |shares| &shares[layer - self.layers.start])
     }
 
@@ -178,10 +178,10 @@ impl Table {
     }
 
     /// What lies below a layer's section, row by row.
-    fn spans(&self, layer: usize) -> Vec<Span> {
+    fn spans(&self, layer: usize) -> Vec<DepthSpan> {
         let mut spans: Vec<_> =
             self.shares(layer).flat_map(|share| &share.spans).copied().collect();
-        spans.sort_unstable_by_key(Span::place);
+        spans.sort_unstable_by_key(DepthSpan::place);
         spans
     }
 
@@ -208,7 +208,7 @@ impl Table {
         cutter: Cutter<'_>,
         surfaces: &[&PlacedSurfaces],
         gray: Option<&LayerLevels>,
-    ) -> Section {
+    ) -> CutLayer {
         let Cutter { grid, planes, fill } = cutter;
         let (width, height) = (grid.width, grid.height);
         let spans = self.spans(layer);
@@ -218,7 +218,7 @@ impl Table {
         let more = self.more(layer, cutter, surfaces, of_facets());
         let crossings = || {
             let all = of_facets().chain(more.iter().copied());
-            all.map(|crossing| (crossing.row(), crossing.place()))
+            all.map(|crossing| (crossing.row(), crossing.in_row()))
         };
         let mut by_row = Grouped::new(height as usize, crossings);
         let mut row_offsets = Vec::with_capacity(height as usize + 1);
@@ -244,7 +244,7 @@ impl Table {
         }
         let mask = Mask::new(width, row_offsets, transitions);
         let mask = mask.expect("sorted places without pairs increase strictly");
-        Section {
+        CutLayer {
             image: shader.map_or(Image::Mask(mask), Shader::finish),
             stray_rows,
             closed: self.is_closed(layer, fill),
@@ -259,7 +259,7 @@ pub(crate) type OpenRows = BTreeMap<usize, Vec<u32>>;
 /// Finds the rows where the contours of some layers, in order, break off, by a
 /// second look at the facets.
 pub(crate) fn open_rows(
-    facets: &impl Facets,
+    facets: &impl FacetSource,
     cutter: Cutter<'_>,
     layers: &[usize],
 ) -> io::Result<OpenRows> {
@@ -284,7 +284,7 @@ pub(crate) fn open_rows(
 
 /// Sorts the places of a row. Most rows have a few, and need no call.
 #[inline]
-fn sort(places: &mut [Place]) {
+fn sort(places: &mut [RowCrossing]) {
     if places.len() > 16 {
         return places.sort_unstable();
     }
@@ -302,7 +302,7 @@ fn sort(places: &mut [Place]) {
 /// Adds a row's transitions: it toggles at every place; two at one column
 /// cancel. Says whether the number of places is even.
 #[inline]
-fn even_odd(places: &[Place], transitions: &mut Vec<u32>) -> bool {
+fn even_odd(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bool {
     let start = transitions.len();
     for place in places {
         if transitions.len() > start && transitions.last() == Some(&place.column()) {
@@ -316,7 +316,7 @@ fn even_odd(places: &[Place], transitions: &mut Vec<u32>) -> bool {
 
 /// Adds a row's transitions: it toggles where the winding number leaves or
 /// reaches zero. Says whether it is zero at the end.
-fn non_zero(places: &[Place], transitions: &mut Vec<u32>) -> bool {
+fn non_zero(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bool {
     let mut winding = 0;
     for group in places.chunk_by(|a, b| a.column() == b.column()) {
         let before = winding;

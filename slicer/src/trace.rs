@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use lamp_stack::PageInfo;
 use rayon::prelude::*;
 
-use crate::cut::{Cutter, End};
+use crate::cut::{Cutter, SegmentEnd};
 use crate::facet::Facet;
 use crate::placement::PlacedModel;
 use crate::survey::Survey;
@@ -164,7 +164,7 @@ impl Tracer<'_> {
                 let before = sightings.len();
                 self.cutter.for_each_segment(placed, &span, |layer, segment| {
                     let bands = bands_of[layer - span.start];
-                    let mut look = |end: End, starts| {
+                    let mut look = |end: SegmentEnd, starts| {
                         let row = self.cutter.first_row(end.at);
                         let band = bands.partition_point(|band| band.rows.end < row);
                         if bands.get(band).is_some_and(|band| band.rows.start <= row) {

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use lamp_brep::{Kernel, StepModel};
-use lamp_fixtures::{StepPart, StepUnit, step};
+use lamp_fixtures::{StepSample, StepUnit, step};
 use lamp_slicer::{Axis, LayerHeights, LayerLevels, Model, Placement, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Dpi, Image, Length};
 
-fn model(part: StepPart, chord_mm: f64) -> Model {
+fn model(part: StepSample, chord_mm: f64) -> Model {
     let kernel = StepModel::read(step(part, StepUnit::Inch).as_bytes()).unwrap();
     let mesh = kernel.tessellate(chord_mm).unwrap();
     Model::from_surfaces("part", String::new(), Arc::new(kernel), Arc::new(mesh))
@@ -67,7 +67,7 @@ fn a_sphere_has_no_wrong_pixel() {
         let options = options(dpi, 3.0, Placement::default());
         for chord_mm in [0.25 * 25.4 / dpi, 0.05] {
             let (wrong, white) =
-                wrong_pixels(model(StepPart::Sphere, chord_mm), &options, off_sphere);
+                wrong_pixels(model(StepSample::Sphere, chord_mm), &options, off_sphere);
             assert!(wrong == 0 && white > 100_000, "{dpi} dpi, {chord_mm} mm: {wrong} of {white}");
         }
     }
@@ -90,11 +90,11 @@ fn a_torus_has_no_wrong_pixel() {
     for dpi in [1500.0, 2400.0] {
         let chord_mm = 0.25 * 25.4 / dpi;
         let flat = options(dpi, 2.3, Placement::default());
-        let (wrong, white) = wrong_pixels(model(StepPart::Torus, chord_mm), &flat, outside);
+        let (wrong, white) = wrong_pixels(model(StepSample::Torus, chord_mm), &flat, outside);
         assert!(wrong == 0 && white > 100_000, "{dpi} dpi: {wrong} of {white}");
         let tilted = options(dpi, 9.1, askew());
         let (wrong, white) =
-            wrong_pixels(model(StepPart::Torus, chord_mm), &tilted, |point| outside(back(point)));
+            wrong_pixels(model(StepSample::Torus, chord_mm), &tilted, |point| outside(back(point)));
         assert!(wrong == 0 && white > 100_000, "askew, {dpi} dpi: {wrong} of {white}");
     }
 }
@@ -107,7 +107,7 @@ fn poles_have_no_wrong_pixel() {
         let back = about_x(-degrees);
         let layers = Some(layers);
         let options = SliceOptions { layers, ..options(1500.0, 0.1, about_x(degrees)) };
-        let model = model(StepPart::Sphere, 0.25 * 25.4 / 1500.0);
+        let model = model(StepSample::Sphere, 0.25 * 25.4 / 1500.0);
         let (wrong, white) = wrong_pixels(model, &options, |point| off_sphere(back.at(point)));
         assert!(wrong == 0 && white > 10_000, "{degrees} degrees: {wrong} of {white}");
     }
@@ -119,7 +119,7 @@ fn crescents_have_no_wrong_pixel() {
     let [there, back] = [3.0, -3.0].map(|by| Placement::default().rotated(Axis::X, by));
     let outside = |[x, y, z]: [f64; 3]| (x.hypot(y) - 20.0).hypot(z - 8.0) - 8.0;
     let options = SliceOptions { layers: Some(37..39), ..options(800.0, 0.41, there) };
-    let model = model(StepPart::Torus, 0.25 * 25.4 / 800.0);
+    let model = model(StepSample::Torus, 0.25 * 25.4 / 800.0);
     let (wrong, white) = wrong_pixels(model, &options, |point| outside(back.at(point)));
     assert!(wrong == 0 && white > 10_000, "{wrong} of {white}");
 }
@@ -138,7 +138,7 @@ fn contours_that_meet_have_no_wrong_pixel() {
         let heights = Some(LayerHeights::new(tops.to_vec()).unwrap());
         for (dpi, chord_mm) in [(1500.0, 0.0042), (600.0, 0.01)] {
             let options = SliceOptions { heights: heights.clone(), ..options(dpi, 1.0, tilt) };
-            let model = model(StepPart::Torus, chord_mm);
+            let model = model(StepSample::Torus, chord_mm);
             let (wrong, white) = wrong_pixels(model, &options, |point| outside(back(point)));
             assert!(wrong == 0 && white > 100_000, "{dpi} dpi: {wrong} of {white}");
         }
@@ -150,7 +150,7 @@ fn contours_that_meet_have_no_wrong_pixel() {
 fn facets_alone_have_wrong_pixels() {
     let options = SliceOptions { polish: false, ..options(1500.0, 3.0, Placement::default()) };
     let wrong = [0.1, 0.01, 0.001]
-        .map(|chord_mm| wrong_pixels(model(StepPart::Sphere, chord_mm), &options, off_sphere).0);
+        .map(|chord_mm| wrong_pixels(model(StepSample::Sphere, chord_mm), &options, off_sphere).0);
     println!("{wrong:?}");
     assert!(wrong[0] > 5 * wrong[1] && wrong[1] > 5 * wrong[2] && wrong[2] > 0, "{wrong:?}");
 }
@@ -165,7 +165,7 @@ fn gray_levels_are_those_of_the_exact_depth() {
     // Facets are off by up to 60 levels.
     for (chord_mm, polish) in [(0.01, true), (0.05, true), (0.05, false)] {
         let options = SliceOptions { polish, layers: Some(10..40), ..options.clone() };
-        let slices = Slices::new(model(StepPart::Sphere, chord_mm), &options).unwrap();
+        let slices = Slices::new(model(StepSample::Sphere, chord_mm), &options).unwrap();
         let grid = *slices.grid();
         let (mut off, mut gray) = (0, 0);
         for layer in slices {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lamp_brep::{Kernel, StepModel, Tessellation};
-use lamp_fixtures::{StepPart, StepUnit, blade_area_mm2, step};
+use lamp_fixtures::{StepSample, StepUnit, blade_area_mm2, step};
 use lamp_slicer::exact::{FacetPoint, PlacedSurfaces, RowContact, polish};
 
 /// A nanometre, in millimetres.
@@ -39,7 +39,7 @@ fn by_occt(_: &str) -> Option<Arc<dyn Kernel>> {
     None
 }
 
-fn placed(part: StepPart, chord_mm: f64, rows: [[f64; 4]; 3]) -> PlacedSurfaces {
+fn placed(part: StepSample, chord_mm: f64, rows: [[f64; 4]; 3]) -> PlacedSurfaces {
     let model = StepModel::read(step(part, StepUnit::Millimetre).as_bytes()).unwrap();
     let mesh = model.tessellate(chord_mm).unwrap();
     PlacedSurfaces::new(Arc::new(model), Arc::new(mesh), rows)
@@ -49,7 +49,7 @@ fn placed(part: StepPart, chord_mm: f64, rows: [[f64; 4]; 3]) -> PlacedSurfaces 
 fn crossings_of_a_blade_give_its_sections_exactly() {
     // The length of rows within the section, times their distance. Rows that touch
     // the section but no facet are missing.
-    let surfaces = placed(StepPart::Blade, 0.02, AS_IT_IS);
+    let surfaces = placed(StepSample::Blade, 0.02, AS_IT_IS);
     let (step_mm, z_mm) = (0.002, 17.0123);
     let length = |points: &[FacetPoint]| {
         let mut rows: Vec<(f64, f64)> =
@@ -99,7 +99,7 @@ fn crossings(surfaces: &PlacedSurfaces, z_mm: f64, step_mm: f64) -> Vec<FacetPoi
 /// are from where they should be, in millimetres, before and after, and which part of
 /// them was kept; for each kernel.
 fn errors(
-    part: StepPart,
+    part: StepSample,
     heights_mm: &[f64],
     x_mm: impl Fn([f64; 3]) -> f64,
 ) -> Vec<(f64, f64, f64)> {
@@ -140,7 +140,7 @@ fn crossings_of_a_sphere_are_exact_to_a_nanometre() {
         square.max(0.0).sqrt().copysign(x)
     };
     let heights: Vec<f64> = (1..60).map(|k| 0.5 * f64::from(k) + 0.0123).collect();
-    for (before, after, kept) in errors(StepPart::Sphere, &heights, x_mm) {
+    for (before, after, kept) in errors(StepSample::Sphere, &heights, x_mm) {
         println!("sphere: {before} mm before, {after} after, {kept} kept");
         assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
     }
@@ -156,7 +156,7 @@ fn crossings_of_a_torus_are_exact_to_a_nanometre() {
         if (outer - x).abs() < (inner - x).abs() { outer } else { inner }
     };
     let heights: Vec<f64> = (1..32).map(|k| 0.5 * f64::from(k) + 0.0123).collect();
-    for (before, after, kept) in errors(StepPart::Torus, &heights, x_mm) {
+    for (before, after, kept) in errors(StepSample::Torus, &heights, x_mm) {
         println!("torus: {before} mm before, {after} after, {kept} kept");
         assert!(before > 0.005 && after < NM && kept < 0.02, "{before} {after} {kept}");
     }
@@ -167,7 +167,7 @@ fn crossings_of_a_torus_are_exact_to_a_nanometre() {
 fn how_fast_polish_is() {
     let blade = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/step/");
     let blade = std::fs::read_to_string(format!("{blade}synthetic_cooled_blade.step"));
-    let torus = step(StepPart::Torus, StepUnit::Millimetre);
+    let torus = step(StepSample::Torus, StepUnit::Millimetre);
     for (name, text) in [("torus", Some(torus)), ("cooled blade", blade.ok())] {
         let Some(text) = text else { continue };
         for (kernel, mesh) in kernels(&text, 0.01) {
@@ -190,18 +190,18 @@ fn round_parts_reach_exactly_as_far_as_they_do() {
     let is_near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < NM);
     for rows in [AS_IT_IS, ASKEW] {
         let centre = at(&rows, [0.0, 0.0, 15.0]);
-        let [low, high] = placed(StepPart::Sphere, 0.02, rows).box_mm().unwrap();
+        let [low, high] = placed(StepSample::Sphere, 0.02, rows).box_mm().unwrap();
         assert!(is_near(low, centre.map(|c| c - 15.0)), "{low:?}");
         assert!(is_near(high, centre.map(|c| c + 15.0)), "{high:?}");
     }
-    let [low, high] = placed(StepPart::Torus, 0.02, AS_IT_IS).box_mm().unwrap();
+    let [low, high] = placed(StepSample::Torus, 0.02, AS_IT_IS).box_mm().unwrap();
     assert!(is_near(low, [-28.0, -28.0, 0.0]) && is_near(high, [28.0, 28.0, 16.0]), "{high:?}");
 }
 
 #[test]
 fn contours_of_a_sphere_turn_at_its_highest_and_lowest_rows() {
     for rows in [AS_IT_IS, ASKEW] {
-        let surfaces = placed(StepPart::Sphere, 0.02, rows);
+        let surfaces = placed(StepSample::Sphere, 0.02, rows);
         let centre = at(&rows, [0.0, 0.0, 15.0]);
         // The last one is higher than any facet.
         for z in [-14.999f64, -14.9, -3.3, 0.0, 7.7, 14.99, 14.9995] {

@@ -6,11 +6,11 @@
 //! type:
 //!
 //! ```
-//! use lamp_fixtures::Part;
+//! use lamp_fixtures::Sample;
 //! use lamp_tests::Scratch;
 //!
 //! let scratch = Scratch::new();
-//! scratch.part("cube.stl", Part::Cube, 64);
+//! scratch.part("cube.stl", Sample::Cube, 64);
 //! scratch.run("slice cube.stl --dpi 100 | fix | dither | tile --mesh none > build.tif").succeeds();
 //! assert_eq!(scratch.layers("build.tif").len(), 200);
 //! ```

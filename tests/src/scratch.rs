@@ -5,7 +5,7 @@ use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use lamp_fixtures::{Mesh, Part, build};
+use lamp_fixtures::{Mesh, Sample, build};
 use lamp_stack::{
     Destination, Dpi, Format, GrayMask, Image, Layer, Mask, PageInfo, Pages, StackError,
     write_stack,
@@ -55,8 +55,8 @@ impl Scratch {
     /// Where they cannot be made.
     pub fn with_tower_and_torus() -> Self {
         let scratch = Self::new();
-        scratch.part("tower.stl", Part::Tower, 5_000);
-        scratch.part("torus.stl", Part::Torus, 2_000);
+        scratch.part("tower.stl", Sample::Tower, 5_000);
+        scratch.part("torus.stl", Sample::Torus, 2_000);
         for name in ["tower", "torus"] {
             let line = format!("slice {name}.stl --dpi 100 --thickness 1mm -q -o {name}.tif");
             scratch.run(&line).succeeds_quietly();
@@ -80,7 +80,7 @@ impl Scratch {
     }
 
     /// Writes a sample part.
-    pub fn part(&self, name: &str, part: Part, facets: usize) {
+    pub fn part(&self, name: &str, part: Sample, facets: usize) {
         self.mesh(name, &build(part, facets).expect("enough facets"));
     }
 

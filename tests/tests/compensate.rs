@@ -1,6 +1,6 @@
 //! `lamp compensate`: edges moved, walls kept and told of, shrinkage made up for.
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Dpi, GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo, StackInfo};
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
@@ -169,7 +169,7 @@ fn what_goes_where_walls_are_not_kept_is_told_of() {
 #[test]
 fn a_part_that_goes_whole_is_told_of() {
     let scratch = Scratch::new();
-    scratch.part("sphere.stl", Part::Sphere, 2_000);
+    scratch.part("sphere.stl", Sample::Sphere, 2_000);
     scratch.run("slice sphere.stl --dpi 100 --thickness 2mm -o in.tif").succeeds_quietly();
     let line =
         "lamp compensate in.tif --uniform 20mm --min-feature 0um --report lost.json -o out.tif";
@@ -255,7 +255,7 @@ fn shrinkage_is_made_up_for_and_the_origin_goes_with_it() {
 #[test]
 fn it_is_a_stage_whatever_the_threads() {
     let scratch = Scratch::new();
-    scratch.part("tower.stl", Part::Tower, 2_000);
+    scratch.part("tower.stl", Sample::Tower, 2_000);
     let slice = "slice tower.stl --dpi 200 --thickness 5mm";
     let rest = "dither --quiet | tile --area 200x200mm --mesh none";
     for threads in [1, 2, 7] {

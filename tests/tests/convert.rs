@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::Cursor;
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::Layer;
 use lamp_tests::{Scratch, mask};
 
@@ -98,7 +98,7 @@ fn a_folder_of_pngs_holds_the_pixels_and_the_lines() {
 #[test]
 fn a_resolution_that_metres_would_lose_stands_in_the_line() {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     scratch.run("slice cube.stl --dpi 72.25 --layers 7 -o cube.tif").succeeds_quietly();
     scratch.run("lamp convert cube.tif -o cube.png").succeeds_quietly();
     let (png, layer) = (read(scratch.bytes("cube.png")), scratch.layers("cube.tif").remove(0));

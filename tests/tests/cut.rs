@@ -4,7 +4,7 @@
 use std::io::{Read, Write};
 use std::process::{ChildStdout, Command, Stdio};
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_tests::Scratch;
 
 /// Where the pages of a `BigTIFF` stack of one-strip pages end: a reader of
@@ -42,7 +42,7 @@ fn cuts(ends: &[usize]) -> Vec<usize> {
 #[test]
 fn a_stack_cut_anywhere_is_refused_and_leaves_nothing() {
     let scratch = Scratch::new();
-    scratch.part("torus.stl", Part::Torus, 400);
+    scratch.part("torus.stl", Sample::Torus, 400);
     let line = "slice torus.stl --dpi 100 --thickness 2mm --layers 1..";
     let stack = scratch.run(line).succeeds().stdout;
     let ends = page_ends(&stack);
@@ -70,7 +70,7 @@ fn a_stack_cut_anywhere_is_refused_and_leaves_nothing() {
 #[test]
 fn the_refusal_travels_down_the_pipe() {
     let scratch = Scratch::new();
-    scratch.part("torus.stl", Part::Torus, 400);
+    scratch.part("torus.stl", Sample::Torus, 400);
     let stack = scratch.run("slice torus.stl --dpi 100 --thickness 1mm").succeeds().stdout;
     let ran = scratch.run_on("fix | dither | tile -o out.tif", &stack[..stack.len() / 2]);
     assert_eq!(ran.statuses, [Some(1); 3], "{ran:?}");
@@ -81,7 +81,7 @@ fn the_refusal_travels_down_the_pipe() {
 #[test]
 fn a_slicer_killed_midway_fails_the_stages_after_it() {
     let scratch = Scratch::new();
-    scratch.part("blade.stl", Part::Blade, 24_000);
+    scratch.part("blade.stl", Sample::Blade, 24_000);
     for stage in ["fix", "dither", "tile"] {
         let mut slice = scratch.command("slice blade.stl").stdout(Stdio::piped()).spawn().unwrap();
         let mut next = scratch.command(&format!("{stage} -o out.tif"));
@@ -106,7 +106,7 @@ fn a_slicer_killed_midway_fails_the_stages_after_it() {
 #[test]
 fn an_interrupted_stage_leaves_nothing() {
     let scratch = Scratch::new();
-    scratch.part("blade.stl", Part::Blade, 24_000);
+    scratch.part("blade.stl", Sample::Blade, 24_000);
     // Shells start background jobs with Ctrl-C ignored, which stays so.
     let (signal, status) = ("-TERM", 143);
     for output in ["out.tif", "out/"] {
@@ -151,7 +151,7 @@ fn a_stage_that_waits_for_its_input_can_be_interrupted() {
 #[test]
 fn pipes_and_links_are_written_to_and_not_replaced() {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     scratch.run("slice cube.stl --dpi 100 --thickness 1mm -o cube.tif").succeeds();
     let pipe = scratch.path("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
@@ -211,7 +211,7 @@ fn reads_a_little(scratch: &Scratch, line: &str) {
 #[test]
 fn a_reader_that_goes_away_ends_the_stages_quietly() {
     let scratch = Scratch::new();
-    scratch.part("blade.stl", Part::Blade, 24_000);
+    scratch.part("blade.stl", Sample::Blade, 24_000);
     scratch.run("slice blade.stl --layers 400..440 -o blade.tif").succeeds();
     for line in [
         "slice blade.stl",
@@ -234,7 +234,7 @@ fn a_full_disk_is_no_success() {
         return;
     }
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     scratch.run("slice cube.stl --dpi 100 --thickness 1mm -o cube.tif").succeeds();
     for line in [
         "slice cube.stl",
@@ -264,7 +264,7 @@ fn an_input_without_a_byte_is_said_to_be_empty() {
 #[test]
 fn a_folder_that_lost_pages_is_refused() {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     // Which of the ten pages are still there.
     for left in [0..9, 0..1] {
         scratch.run("slice cube.stl --dpi 100 --thickness 2mm -o pages/").succeeds();
@@ -281,7 +281,7 @@ fn a_folder_that_lost_pages_is_refused() {
 #[test]
 fn a_broken_pipe_does_not_hide_a_broken_stack() {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     let stack = scratch.run("slice cube.stl --dpi 100 --thickness 1mm").succeeds().stdout;
     let mut fix = scratch.command("fix -o out.tif");
     let mut fix = fix.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();

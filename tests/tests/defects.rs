@@ -1,7 +1,7 @@
 //! Broken meshes: `slice` says which rows do not balance, `fix` mends them,
 //! and what is whole passes untouched.
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::Layer;
 use lamp_tests::{Ran, Scratch, ends_white, mask, masks};
 
@@ -57,7 +57,7 @@ fn a_seed_always_breaks_the_same_facets() {
 #[test]
 fn a_clean_stack_passes_byte_for_byte() {
     let scratch = Scratch::new();
-    for part in Part::ALL {
+    for part in Sample::ALL {
         scratch.part("part.stl", part, part.min_facets().max(2_000));
         let stack = scratch.run(&format!("slice part.stl {COARSE}")).succeeds_quietly().stdout;
         for stage in ["fix", "dither", "dither --method floyd-steinberg"] {

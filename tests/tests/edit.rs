@@ -1,6 +1,6 @@
 //! `lamp edit`: shapes, labels and other stacks, and what the pages say then.
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Image, Layer, Mask};
 use lamp_tests::{Scratch, mask, masks, workspace_root, write_gray_ramp};
 
@@ -8,7 +8,7 @@ use lamp_tests::{Scratch, mask, masks, workspace_root, write_gray_ramp};
 /// 100 um.
 fn with_cube() -> Scratch {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 2000);
+    scratch.part("cube.stl", Sample::Cube, 2000);
     scratch.run("slice cube.stl --dpi 254 --thickness 500um -o cube.tif").succeeds_quietly();
     scratch
 }
@@ -258,8 +258,8 @@ fn wrong_usage_is_status_2() {
 #[test]
 fn a_build_keeps_what_is_not_in_its_copies() {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
-    scratch.part("torus.stl", Part::Torus, 800);
+    scratch.part("cube.stl", Sample::Cube, 64);
+    scratch.part("torus.stl", Sample::Torus, 800);
     for part in ["cube", "torus"] {
         let line = format!("slice {part}.stl --dpi 100 --thickness 1mm -o {part}.tif");
         scratch.run(&line).succeeds_quietly();

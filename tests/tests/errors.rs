@@ -3,13 +3,13 @@
 
 use std::fs;
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_tests::{Ran, Scratch};
 
 /// A folder with a good part, a good stack and all sorts of bad files.
 fn with_all_sorts() -> Scratch {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     scratch.run("slice cube.stl --dpi 100 --thickness 1mm -o cube.tif").succeeds();
     let stl = scratch.bytes("cube.stl");
     scratch.write("empty.stl", b"");

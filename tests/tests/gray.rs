@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Image, gray_runs};
 use lamp_tests::{Ran, Scratch};
 
@@ -10,7 +10,7 @@ const COARSE: &str = "--dpi 300 --thickness 400um";
 
 fn with_tower() -> Scratch {
     let scratch = Scratch::new();
-    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch.part("tower.stl", Sample::Tower, 5_000);
     scratch
 }
 
@@ -187,7 +187,7 @@ fn a_section_shows_what_gray_saves() {
 #[test]
 fn a_section_needs_its_own_part() {
     let scratch = with_tower();
-    scratch.part("cube.stl", Part::Cube, 200);
+    scratch.part("cube.stl", Sample::Cube, 200);
     scratch.run(&format!("slice tower.stl {COARSE} -o white.tif")).succeeds_quietly();
     let cure = "lamp cure white.tif --material lamp-suspension --section y=0mm";
     scratch.run(&format!("{cure} --part cube.stl -o s.png")).is_refused_with(&["not sliced from"]);

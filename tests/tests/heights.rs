@@ -1,6 +1,6 @@
 //! Layers of adaptive heights, by the commands.
 
-use lamp_fixtures::{Mesh, Part, cone};
+use lamp_fixtures::{Mesh, Sample, cone};
 use lamp_stack::{Image, Layer};
 use lamp_tests::{Scratch, masks};
 
@@ -9,7 +9,7 @@ const LIMITS: &str = "--min 100um --max 2.5mm --step 10um";
 
 fn with_tower() -> Scratch {
     let scratch = Scratch::new();
-    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch.part("tower.stl", Sample::Tower, 5_000);
     scratch.write("times.csv", b"thickness_um,exposure_ms\n100,200\n500,1000\n2500,9000\n");
     scratch
 }

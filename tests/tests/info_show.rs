@@ -2,13 +2,13 @@
 
 use std::io::Cursor;
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::Mask;
 use lamp_tests::{Scratch, mask, masks};
 
 fn with_cube() -> Scratch {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 200);
+    scratch.part("cube.stl", Sample::Cube, 200);
     scratch.run("slice cube.stl --dpi 100 --thickness 1mm -o cube.tif").succeeds();
     scratch
 }
@@ -96,7 +96,7 @@ fn show(scratch: &Scratch, options: &str) -> Picture {
 
 fn with_blade() -> (Scratch, Mask) {
     let scratch = Scratch::new();
-    scratch.part("blade.stl", Part::Blade, 24_000);
+    scratch.part("blade.stl", Sample::Blade, 24_000);
     scratch.run("slice blade.stl --dpi 100 --thickness 1mm -o blade.tif").succeeds();
     let image = mask(&scratch.layers("blade.tif")[45]).clone();
     (scratch, image)

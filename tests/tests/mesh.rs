@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Frame, Image, Layer, Mask, Op};
 use lamp_tests::{Scratch, ends_white, mask, write_gray_ramp};
 
@@ -203,7 +203,7 @@ fn threads_change_no_byte_and_fix_nothing() {
 #[test]
 fn edits_of_copies_hit_the_parts() {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 2000);
+    scratch.part("cube.stl", Sample::Cube, 2000);
     scratch.run("slice cube.stl --dpi 254 --thickness 500um -o cube.tif").succeeds_quietly();
     let label = |start: u32, copies: &str| {
         format!(
@@ -237,7 +237,7 @@ fn edits_of_copies_hit_the_parts() {
 #[test]
 fn mesh_keeps_out_of_a_part_that_lies() {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     scratch
         .run("slice cube.stl --rotate x:90 --dpi 100 --thickness 1mm -o cube.tif")
         .succeeds_quietly();

@@ -1,7 +1,7 @@
 //! Other programs open what the pipeline makes, and see the same pixels.
 //! A program that is not installed is skipped, which is said.
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Layer, Mask};
 use lamp_tests::{Scratch, ask, ask_python, masks, packed_mask, plain_pages};
 
@@ -9,7 +9,7 @@ use lamp_tests::{Scratch, ask, ask_python, masks, packed_mask, plain_pages};
 /// `classic.tif`.
 fn with_build() -> (Scratch, Vec<Layer>) {
     let scratch = Scratch::new();
-    scratch.part("blade.stl", Part::Blade, 24_000);
+    scratch.part("blade.stl", Sample::Blade, 24_000);
     let line = "slice blade.stl --dpi 100 --thickness 5mm | fix | dither \
                 | tile --mesh none --area 170x80mm > build.tif";
     scratch.run(line).succeeds_quietly();

@@ -1,7 +1,7 @@
 //! Whole pipelines of real processes: whichever way the layers travel, the
 //! same ones arrive.
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Layer, PageInfo, StackInfo};
 use lamp_tests::{Scratch, masks, read_stack};
 
@@ -12,7 +12,7 @@ const AREA: &str = "--area 4x4in";
 
 fn with_tower() -> Scratch {
     let scratch = Scratch::new();
-    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch.part("tower.stl", Sample::Tower, 5_000);
     scratch
 }
 

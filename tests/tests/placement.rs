@@ -1,7 +1,7 @@
 //! Parts scaled, mirrored, turned and moved on their way in; several parts in
 //! one job.
 
-use lamp_fixtures::{Mesh, Part, sphere, torus};
+use lamp_fixtures::{Mesh, Sample, sphere, torus};
 use lamp_stack::{Layer, StackInfo};
 use lamp_tests::{Scratch, masks};
 
@@ -14,7 +14,7 @@ fn stack_info(layers: &[Layer]) -> &StackInfo {
 #[test]
 fn a_part_is_scaled_mirrored_turned_and_moved_in_this_order() {
     let scratch = Scratch::new();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     // The cube, 20 mm wide around the z axis on z = 0, comes to x -1 to 1, y
     // -10 to 10, z 0 to 5; to z -5 to 0; to x -10 to 10, y -1 to 1; to y -5
     // to 0, z -1 to 1; and away.
@@ -37,7 +37,7 @@ fn a_part_is_scaled_mirrored_turned_and_moved_in_this_order() {
 #[test]
 fn the_stack_remembers_where_the_part_was_put() {
     let scratch = Scratch::new();
-    scratch.part("tower.stl", Part::Tower, 2_000);
+    scratch.part("tower.stl", Sample::Tower, 2_000);
     scratch.run(&format!("slice tower.stl {COARSE} -o plain.tif")).succeeds_quietly();
     let placed = "--scale 2 --mirror x,z --rotate x:90,z:-12.5 --translate -5,0,12.7";
     scratch.run(&format!("slice tower.stl {COARSE} {placed} -o placed.tif")).succeeds_quietly();

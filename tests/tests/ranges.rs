@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Destination, Dpi, Format, GrayMask, Image, Layer, PageInfo, StackError};
 use lamp_tests::Scratch;
 
@@ -132,7 +132,7 @@ fn stacks_that_say_nothing_of_themselves_split_and_join_too() {
 #[test]
 fn stacks_that_do_not_belong_together_are_both_named() {
     let scratch = with_broken_tower();
-    scratch.part("cube.stl", Part::Cube, 64);
+    scratch.part("cube.stl", Sample::Cube, 64);
     for (name, line) in [
         ("low", "slice t.stl --layers 0..10 --thickness 1mm --dpi 100"),
         ("next", "slice t.stl --layers 10..20 --thickness 1mm --dpi 100"),

@@ -1,10 +1,10 @@
 //! STEP parts, by the commands.
 
-use lamp_fixtures::{StepDefect, StepPart, StepUnit, broken_step, step};
+use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
 use lamp_stack::Image;
 use lamp_tests::{Scratch, mask, masks};
 
-fn with(part: StepPart) -> Scratch {
+fn with(part: StepSample) -> Scratch {
     let scratch = Scratch::new();
     scratch.write("part.step", step(part, StepUnit::Inch).as_bytes());
     scratch
@@ -24,7 +24,7 @@ fn said(scratch: &Scratch, line: &str) -> String {
 /// The tower begins with a cylinder of radius 12.7 mm, 19.05 mm high.
 #[test]
 fn a_tower_in_inches_has_its_discs() {
-    let scratch = with(StepPart::Tower);
+    let scratch = with(StepSample::Tower);
     let text = said(&scratch, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
     assert!(text.contains("crossings were moved from facets to surfaces"), "{text}");
     let layers = scratch.layers("part.tif");
@@ -47,7 +47,7 @@ fn a_tower_in_inches_has_its_discs() {
 
 #[test]
 fn threads_memory_and_pipes_change_no_byte() {
-    let scratch = with(StepPart::Tower);
+    let scratch = with(StepSample::Tower);
     let line = "slice part.step --dpi 600 --thickness 1mm --rotate x:40 --quiet";
     scratch.run(&format!("{line} --threads 1 -o one.tif")).succeeds_quietly();
     scratch.run(&format!("{line} --threads 3 --memory 16MB -o three.tif")).succeeds_quietly();
@@ -59,7 +59,7 @@ fn threads_memory_and_pipes_change_no_byte() {
 
 #[test]
 fn facets_of_a_file_are_those_of_the_stl_made_of_it() {
-    let scratch = with(StepPart::Torus);
+    let scratch = with(StepSample::Torus);
     scratch.run("lamp convert part.step part.stl --chord 20um").succeeds_quietly();
     let line = "--dpi 600 --thickness 1mm --margin 4";
     scratch
@@ -77,7 +77,7 @@ fn facets_of_a_file_are_those_of_the_stl_made_of_it() {
 
 #[test]
 fn heights_gray_and_sections_work_as_for_an_stl() {
-    let scratch = with(StepPart::Sphere);
+    let scratch = with(StepSample::Sphere);
     let text = scratch.run("lamp heights part.step --dpi 300 --min 100um --max 1mm").succeeds();
     assert!(String::from_utf8(text.stdout).unwrap().contains("uniform 1mm"));
     let line = "--material lamp-suspension --dpi 300 --quiet -o gray.tif";
@@ -90,7 +90,7 @@ fn heights_gray_and_sections_work_as_for_an_stl() {
 
 #[test]
 fn a_report_names_what_a_file_holds() {
-    let scratch = with(StepPart::Pair);
+    let scratch = with(StepSample::Pair);
     let text = String::from_utf8(scratch.run("lamp brep part.step").succeeds().stdout).unwrap();
     for words in ["unit:       inch", "bodies:     2", "1 (1 sphere)", "yes, it is closed"] {
         assert!(text.contains(words), "{words}: {text}");
@@ -121,7 +121,7 @@ fn what_is_broken_is_refused_or_healed_and_said() {
         let scratch = broken(defect);
         let text = said(&scratch, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
         assert!(text.contains(words), "{defect:?}: {text}");
-        let whole = with(StepPart::Block);
+        let whole = with(StepSample::Block);
         said(&whole, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
         let [a, b] = [&scratch, &whole].map(|scratch| scratch.layers("part.tif"));
         assert_eq!(masks(&a), masks(&b), "{defect:?}");
@@ -132,7 +132,7 @@ fn what_is_broken_is_refused_or_healed_and_said() {
 #[test]
 fn layers_with_gaps_come_from_the_fallback() {
     let scratch = broken(StepDefect::Missing);
-    scratch.write("whole.step", step(StepPart::Block, StepUnit::Millimetre).as_bytes());
+    scratch.write("whole.step", step(StepSample::Block, StepUnit::Millimetre).as_bytes());
     scratch.run("lamp convert whole.step whole.stl").succeeds_quietly();
     let line = "--dpi 600 --thickness 1mm --rotate x:90";
     said(&scratch, &format!("slice whole.step {line} -o whole.tif"));
@@ -158,7 +158,7 @@ fn layers_with_gaps_come_from_the_fallback() {
 /// A face that closes around the part leaves no gap in a section, but no contour.
 #[test]
 fn layers_without_a_contour_come_from_the_fallback() {
-    let whole = step(StepPart::Tower, StepUnit::Millimetre);
+    let whole = step(StepSample::Tower, StepUnit::Millimetre);
     let scratch = Scratch::new();
     scratch.write("whole.step", whole.as_bytes());
     scratch.run("lamp convert whole.step -o whole.stl").succeeds_quietly();
@@ -185,7 +185,7 @@ fn layers_without_a_contour_come_from_the_fallback() {
 
 #[test]
 fn wrong_usage_is_told() {
-    let scratch = with(StepPart::Sphere);
+    let scratch = with(StepSample::Sphere);
     scratch.run("slice part.step --units inch -o a.tif").is_wrong_usage(&["leave --units away"]);
     scratch.run("slice part.step --tolerance 0um -o a.tif").is_wrong_usage(&["--tolerance"]);
     scratch.run("slice part.step --timeout 0 -o a.tif").is_wrong_usage(&["write seconds"]);
@@ -201,14 +201,14 @@ fn wrong_usage_is_told() {
 fn a_sample_is_the_fixture() {
     let scratch = Scratch::new();
     scratch.run("lamp sample torus -o torus.step").succeeds_quietly();
-    let expected = step(StepPart::Torus, StepUnit::Millimetre);
+    let expected = step(StepSample::Torus, StepUnit::Millimetre);
     assert_eq!(scratch.bytes("torus.step"), expected.as_bytes());
 }
 
 #[cfg(feature = "occt")]
 #[test]
 fn kernels_agree_pixel_by_pixel() {
-    let scratch = with(StepPart::Torus);
+    let scratch = with(StepSample::Torus);
     let line = "--dpi 600 --thickness 1mm --rotate x:20 --quiet";
     for kernel in ["lamp", "occt"] {
         scratch

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Dpi, GrayMask, Image, Layer, PageInfo, StackInfo, gray_runs};
 use lamp_tests::Scratch;
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 /// A tower of 76 layers, which makes a build of 236 x 236 pixels.
 fn with_tower() -> Scratch {
     let scratch = Scratch::new();
-    scratch.part("tower.stl", Part::Tower, 5_000);
+    scratch.part("tower.stl", Sample::Tower, 5_000);
     scratch.run("slice tower.stl --dpi 100 --thickness 1mm -q -o tower.tif").succeeds_quietly();
     scratch
 }

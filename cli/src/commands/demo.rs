@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use clap::Args;
-use lamp_fixtures::{Part, build};
+use lamp_fixtures::{Sample, build};
 use lamp_grayscale::Method;
 use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
@@ -53,7 +53,7 @@ const IN_MESH: usize = 1;
 const AROUND: u32 = 10;
 
 pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
-    let part = Part::Blade;
+    let part = Sample::Blade;
     let mesh = build(part, args.facets).map_err(Stop::wrong_options)?;
     fs::create_dir_all(&args.folder).with_context(|| args.folder.display().to_string())?;
     let [stl, stack, sheet, meshed, in_mesh] =

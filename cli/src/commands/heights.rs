@@ -2,7 +2,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_adaptive::{AreaDeviation, Criterion, CuspHeight, Heights, Part, Slab, uniform_heights};
+use lamp_adaptive::{
+    AreaDeviation, Criterion, CuspHeight, Heights, LayeredPart, Slab, uniform_heights,
+};
 use lamp_stack::{Dpi, Length};
 
 use crate::exposure::{Exposure, ExposureOptions};
@@ -106,7 +108,7 @@ impl HeightsArgs {
     }
 
     /// The uniform layers to compare with, by what they are called.
-    fn uniform(&self, part: &Part) -> Result<Vec<(String, Heights)>, Stop> {
+    fn uniform(&self, part: &LayeredPart) -> Result<Vec<(String, Heights)>, Stop> {
         let thickest = [self.heights.max()];
         let uniform = if self.uniform.is_empty() { &thickest[..] } else { &self.uniform };
         let layers = |thickness: &Length| {

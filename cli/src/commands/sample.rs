@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use lamp_fixtures::{Defect, Mesh, Part, StepPart, StepUnit, build, inject, step};
+use lamp_fixtures::{Defect, Mesh, Sample, StepSample, StepUnit, build, inject, step};
 use lamp_stack::Length;
 
 use crate::options::{Common, parse_count};
@@ -23,7 +23,7 @@ Examples:
 pub(crate) struct SampleArgs {
     /// Which part
     #[arg(value_parser = parts())]
-    part: Part,
+    part: Sample,
 
     /// About how many facets
     #[arg(long, value_name = "N", default_value = "100k", value_parser = parse_count)]
@@ -56,10 +56,10 @@ pub(crate) struct SampleArgs {
     output: PathBuf,
 }
 
-fn parts() -> impl TypedValueParser<Value = Part> {
-    let value = |part: Part| PossibleValue::new(part.name()).help(part.description());
-    PossibleValuesParser::new(Part::ALL.map(value))
-        .map(|name| Part::from_name(&name).expect("only names of parts pass"))
+fn parts() -> impl TypedValueParser<Value = Sample> {
+    let value = |part: Sample| PossibleValue::new(part.name()).help(part.description());
+    PossibleValuesParser::new(Sample::ALL.map(value))
+        .map(|name| Sample::from_name(&name).expect("only names of parts pass"))
 }
 
 pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
@@ -95,13 +95,13 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
 }
 
 impl SampleArgs {
-    fn write_step(&self, part: Part) -> Result<(), Stop> {
+    fn write_step(&self, part: Sample) -> Result<(), Stop> {
         let part = match part {
-            Part::Sphere => StepPart::Sphere,
-            Part::Torus => StepPart::Torus,
-            Part::Cone => StepPart::Cone,
-            Part::Tower => StepPart::Tower,
-            Part::Blade | Part::Cube => {
+            Sample::Sphere => StepSample::Sphere,
+            Sample::Torus => StepSample::Torus,
+            Sample::Cone => StepSample::Cone,
+            Sample::Tower => StepSample::Tower,
+            Sample::Blade | Sample::Cube => {
                 let why = format!("{} is made as STL only: write it to a .stl", part.name());
                 return Err(Stop::usage(why));
             }

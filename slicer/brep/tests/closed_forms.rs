@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use lamp_brep::{BodyReport, Facet, Kernel, StepModel, Tessellation, check};
-use lamp_fixtures::{StepPart, StepUnit, blade_area_mm2, blade_volume_mm3, step};
+use lamp_fixtures::{StepSample, StepUnit, blade_area_mm2, blade_volume_mm3, step};
 
-fn read(part: StepPart, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessellation) {
+fn read(part: StepSample, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessellation) {
     let model = StepModel::read(step(part, unit).as_bytes()).unwrap();
     let mesh = model.tessellate(chord_mm).unwrap();
     (model, mesh)
@@ -33,7 +33,7 @@ fn by_occt(_: &str) -> Option<Arc<dyn Kernel>> {
 }
 
 /// The bodies of a part, which must be right by each kernel and the same to the chord.
-fn bodies(part: StepPart, unit: StepUnit, chord_mm: f64) -> Vec<BodyReport> {
+fn bodies(part: StepSample, unit: StepUnit, chord_mm: f64) -> Vec<BodyReport> {
     let reports = |(kernel, mesh): &(Arc<dyn Kernel>, Tessellation)| {
         let reports = check(&**kernel, mesh);
         assert!(mesh.findings.is_empty(), "{part:?}: {:?}", mesh.findings);
@@ -56,9 +56,9 @@ fn bodies(part: StepPart, unit: StepUnit, chord_mm: f64) -> Vec<BodyReport> {
 #[test]
 fn volumes_come_near_to_closed_forms_in_every_unit() {
     let parts = [
-        (StepPart::Sphere, 4.0 / 3.0 * PI * 15f64.powi(3)),
-        (StepPart::Torus, 2.0 * PI * PI * 20.0 * 64.0),
-        (StepPart::Cone, PI * 225.0 * 30.0 / 3.0),
+        (StepSample::Sphere, 4.0 / 3.0 * PI * 15f64.powi(3)),
+        (StepSample::Torus, 2.0 * PI * PI * 20.0 * 64.0),
+        (StepSample::Cone, PI * 225.0 * 30.0 / 3.0),
     ];
     for unit in [StepUnit::Millimetre, StepUnit::Metre, StepUnit::Inch] {
         for (part, volume_mm3) in parts {
@@ -68,7 +68,7 @@ fn volumes_come_near_to_closed_forms_in_every_unit() {
                 assert!(off < 0.0 && off > -0.5 * chord_mm, "{part:?} {chord_mm}: {off}");
                 let off = report.exact_volume_mm3 / volume_mm3 - 1.0;
                 // The edge of the cone's foot is a polygon for both of its faces.
-                let most = if part == StepPart::Cone { 0.05 * chord_mm } else { 1e-6 };
+                let most = if part == StepSample::Cone { 0.05 * chord_mm } else { 1e-6 };
                 assert!(off.abs() < most, "{part:?} {chord_mm}: exact {off}");
             }
         }
@@ -88,7 +88,7 @@ fn parts_of_a_torus_that_meets_itself_are_told_apart() {
             + 2.0 * major * minor * (end + sin * cos)
             + minor * minor * (2.0 * sin - 2.0 / 3.0 * sin.powi(3)));
     let lemon = apple - 2.0 * PI * PI * major * minor * minor;
-    for (part, volume_mm3) in [(StepPart::Apple, apple), (StepPart::Lemon, lemon)] {
+    for (part, volume_mm3) in [(StepSample::Apple, apple), (StepSample::Lemon, lemon)] {
         for chord_mm in [0.1, 0.005] {
             // OpenCASCADE makes both parts of it one body: see docs/occt.md.
             let (model, mesh) = read(part, StepUnit::Inch, chord_mm);
@@ -106,7 +106,7 @@ fn parts_of_a_torus_that_meets_itself_are_told_apart() {
 fn flat_and_slanted_walls_hold_what_they_should() {
     let frustum = PI * 30.0 / 3.0 * (225.0 + 112.5 + 56.25);
     for (part, volume_mm3, most) in
-        [(StepPart::Block, 6000.0, 1e-12), (StepPart::Frustum, frustum, 1e-3)]
+        [(StepSample::Block, 6000.0, 1e-12), (StepSample::Frustum, frustum, 1e-3)]
     {
         let [report] = &bodies(part, StepUnit::Metre, 0.01)[..] else { panic!("one body") };
         for volume in [report.volume_mm3, report.exact_volume_mm3] {
@@ -119,7 +119,7 @@ fn flat_and_slanted_walls_hold_what_they_should() {
 fn a_lofted_blade_has_its_sections() {
     let mut before = f64::INFINITY;
     for chord_mm in [0.05, 0.005] {
-        let (model, mesh) = read(StepPart::Blade, StepUnit::Inch, chord_mm);
+        let (model, mesh) = read(StepSample::Blade, StepUnit::Inch, chord_mm);
         let report = &check(&model, &mesh)[0];
         assert!(report.faults.is_empty() && mesh.findings.is_empty(), "{report:?}");
         let off = (report.volume_mm3 / blade_volume_mm3() - 1.0).abs();
@@ -155,7 +155,7 @@ fn area_mm2(mesh: &Tessellation, z_mm: f64) -> f64 {
 #[test]
 fn a_tower_of_all_kinds_of_surfaces_is_closed() {
     for chord_mm in [0.2, 0.02] {
-        let [report] = &bodies(StepPart::Tower, StepUnit::Inch, chord_mm)[..] else {
+        let [report] = &bodies(StepSample::Tower, StepUnit::Inch, chord_mm)[..] else {
             panic!("one body")
         };
         let [low, high] = report.box_mm;
@@ -166,7 +166,7 @@ fn a_tower_of_all_kinds_of_surfaces_is_closed() {
 
 #[test]
 fn an_assembly_has_its_parts_in_their_places() {
-    let reports = bodies(StepPart::Pair, StepUnit::Inch, 0.01);
+    let reports = bodies(StepSample::Pair, StepUnit::Inch, 0.01);
     assert_eq!(reports.len(), 2);
     // The second stands on x = 50 mm, at the height of the first one's centre.
     let expected = [[-15.0, -15.0, 0.0], [50.0, -15.0, 0.0]];

@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use lamp_brep::{BrepError, Kernel, StepError, StepModel, check};
-use lamp_fixtures::{SplitMix, StepDefect, StepPart, StepUnit, broken_step, step};
+use lamp_fixtures::{SplitMix, StepDefect, StepSample, StepUnit, broken_step, step};
 
 /// Numbers that geometry does not like.
 const NUMBERS: [&str; 10] =
@@ -57,7 +57,7 @@ fn broken_files_are_refused_or_read_in_time() {
     let (mut refused, mut passed) = (0, 0);
     let mut slowest = Duration::ZERO;
     let gaps = StepDefect::Apart { gap_nm: 1000 };
-    let mut texts: Vec<(String, String)> = StepPart::ALL
+    let mut texts: Vec<(String, String)> = StepSample::ALL
         .iter()
         .map(|part| (format!("{part:?}"), step(*part, StepUnit::Inch)))
         .collect();
@@ -94,7 +94,7 @@ const DEEP: usize = 100_000;
 
 /// What is said of the sphere's file with more entities.
 fn said_of(more: &str) -> Result<usize, BrepError> {
-    let text = step(StepPart::Sphere, StepUnit::Millimetre);
+    let text = step(StepSample::Sphere, StepUnit::Millimetre);
     let text = text.replace("ENDSEC;\nEND-ISO", &format!("{more}ENDSEC;\nEND-ISO"));
     let start = Instant::now();
     let said = StepModel::read(text.as_bytes()).map(|model| model.bodies().len());
@@ -104,7 +104,7 @@ fn said_of(more: &str) -> Result<usize, BrepError> {
 
 /// The entity of a type in the sphere's file, such as `#7`.
 fn number_of(name: &str) -> String {
-    let text = step(StepPart::Sphere, StepUnit::Millimetre);
+    let text = step(StepSample::Sphere, StepUnit::Millimetre);
     let line = text.lines().find(|line| line.contains(&format!("={name}("))).unwrap();
     line.split('=').next().unwrap().to_owned()
 }
@@ -178,7 +178,7 @@ fn entities_that_hold_themselves_are_refused() {
         (face, format!("{own}=ORIENTED_FACE('',*,{own},.T.);")),
     ];
     for (old, entity) in circles {
-        let text = step(StepPart::Sphere, StepUnit::Millimetre);
+        let text = step(StepSample::Sphere, StepUnit::Millimetre);
         let text: Vec<String> = text
             .lines()
             .map(|line| {

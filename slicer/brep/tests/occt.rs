@@ -5,11 +5,11 @@
 use std::fmt::Write;
 
 use lamp_brep::{BodyFault, BrepError, Jet, Kernel, OcctModel, StepModel, check};
-use lamp_fixtures::{StepPart, StepUnit, step};
+use lamp_fixtures::{StepSample, StepUnit, step};
 
 #[test]
 fn both_kernels_say_the_same_of_bodies_and_faces() {
-    for part in [StepPart::Sphere, StepPart::Torus, StepPart::Cone, StepPart::Pair] {
+    for part in [StepSample::Sphere, StepSample::Torus, StepSample::Cone, StepSample::Pair] {
         let text = step(part, StepUnit::Inch);
         let own = StepModel::read(text.as_bytes()).unwrap();
         let other = OcctModel::read(text.as_bytes()).unwrap();
@@ -22,7 +22,7 @@ fn both_kernels_say_the_same_of_bodies_and_faces() {
 
 #[test]
 fn facets_are_the_same_on_any_number_of_threads_and_at_any_time() {
-    let text = step(StepPart::Cone, StepUnit::Millimetre);
+    let text = step(StepSample::Cone, StepUnit::Millimetre);
     let model = OcctModel::read(text.as_bytes()).unwrap();
     let first = model.tessellate(0.01).unwrap();
     let other = model.tessellate(0.1).unwrap();
@@ -33,7 +33,7 @@ fn facets_are_the_same_on_any_number_of_threads_and_at_any_time() {
 
 #[test]
 fn surfaces_are_evaluated_on_many_threads_at_once() {
-    let text = step(StepPart::Torus, StepUnit::Metre);
+    let text = step(StepSample::Torus, StepUnit::Metre);
     let model = OcctModel::read(text.as_bytes()).unwrap();
     let uv: Vec<[f64; 2]> =
         (0..5000).map(|k| [f64::from(k) * 0.01, f64::from(k) * 0.003]).collect();
@@ -56,7 +56,7 @@ fn surfaces_are_evaluated_on_many_threads_at_once() {
 /// A corner of a box of 60, 20 and 10 mm. Each face has points of its own, a gap
 /// further along z than those of the face before.
 fn loose_corner(gap_mm: f64) -> String {
-    let text = step(StepPart::Sphere, StepUnit::Millimetre);
+    let text = step(StepSample::Sphere, StepUnit::Millimetre);
     let (text, end) = text.split_at(text.find("ENDSEC;\nEND-").unwrap());
     let shape = "ADVANCED_BREP_SHAPE_REPRESENTATION('',(";
     let old = text.split(shape).nth(1).unwrap().split(')').next().unwrap();
@@ -108,7 +108,7 @@ fn gaps_are_closed_up_to_a_tolerance() {
 fn what_cannot_be_read_is_refused() {
     let said = |bytes: &[u8]| OcctModel::read(bytes).unwrap_err().to_string();
     assert!(said(b"solid part").contains("does not begin with ISO-10303-21"));
-    let text = step(StepPart::Cone, StepUnit::Metre);
+    let text = step(StepSample::Cone, StepUnit::Metre);
     let half = said(&text.as_bytes()[..text.len() / 2]);
     assert!(half.contains("makes no sense") || half.contains("cut off"), "{half}");
     let broken = said(text.replace("VERTEX_LOOP('',#", "VERTEX_LOOP('',#1").as_bytes());
@@ -117,9 +117,9 @@ fn what_cannot_be_read_is_refused() {
     assert!(matches!(healed, Err(BrepError::Heal { .. })));
     let model = OcctModel::read(text.as_bytes()).unwrap();
     assert!(matches!(model.tessellate(0.0), Err(BrepError::Chord { .. })));
-    let torus = OcctModel::read(step(StepPart::Torus, StepUnit::Metre).as_bytes()).unwrap();
+    let torus = OcctModel::read(step(StepSample::Torus, StepUnit::Metre).as_bytes()).unwrap();
     assert!(matches!(torus.tessellate(1e-9), Err(BrepError::TooMany { .. })));
-    let endless = step(StepPart::Sphere, StepUnit::Metre).replace(",0.015);", ",1.E200);");
+    let endless = step(StepSample::Sphere, StepUnit::Metre).replace(",0.015);", ",1.E200);");
     let model = OcctModel::read(endless.as_bytes()).unwrap();
     assert!(matches!(model.tessellate(0.1), Err(BrepError::Size { .. })));
 }

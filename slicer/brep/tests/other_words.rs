@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use lamp_brep::{BrepError, Kernel, StepError, StepModel, check};
-use lamp_fixtures::{StepPart, StepUnit, step};
+use lamp_fixtures::{StepSample, StepUnit, step};
 
 /// The volume of a frustum of radii 15 and 7.5 mm, 30 mm high.
 const FRUSTUM_MM3: f64 = PI * 30.0 / 3.0 * (225.0 + 112.5 + 56.25);
@@ -11,7 +11,7 @@ const FRUSTUM_MM3: f64 = PI * 30.0 / 3.0 * (225.0 + 112.5 + 56.25);
 /// A part's file, in which every entity of a type is replaced: by what is made of
 /// its number and its attributes, with numbers of one's own from `next` on.
 fn reworded(
-    part: StepPart,
+    part: StepSample,
     unit: StepUnit,
     name: &str,
     words: impl Fn(&str, &str, usize) -> String,
@@ -50,12 +50,13 @@ fn is_frustum(text: &str) {
 #[test]
 fn trimmed_circles_may_go_backwards() {
     for (sense, edge) in [(".T.", ".T."), (".F.", ".F.")] {
-        let text = reworded(StepPart::Frustum, StepUnit::Inch, "CIRCLE", |id, attributes, next| {
-            format!(
-                "{id}=TRIMMED_CURVE('',#{next},(PARAMETER_VALUE(0.)),(PARAMETER_VALUE(6.28)),\
+        let text =
+            reworded(StepSample::Frustum, StepUnit::Inch, "CIRCLE", |id, attributes, next| {
+                format!(
+                    "{id}=TRIMMED_CURVE('',#{next},(PARAMETER_VALUE(0.)),(PARAMETER_VALUE(6.28)),\
                  {sense},.PARAMETER.);\n#{next}=CIRCLE({attributes});"
-            )
-        });
+                )
+            });
         // The edges follow the trimmed curve in the other direction then.
         let text: Vec<String> = text
             .lines()
@@ -71,7 +72,7 @@ fn trimmed_circles_may_go_backwards() {
 #[test]
 fn circles_may_be_chains_of_arcs() {
     // Half a turn forwards, the other half given backwards.
-    let text = reworded(StepPart::Frustum, StepUnit::Metre, "CIRCLE", |id, attributes, k| {
+    let text = reworded(StepSample::Frustum, StepUnit::Metre, "CIRCLE", |id, attributes, k| {
         let arc = |k: usize, from: &str, to: &str, sense: &str| {
             format!(
                 "#{k}=TRIMMED_CURVE('',#{},(PARAMETER_VALUE({from})),(PARAMETER_VALUE({to})),\
@@ -98,7 +99,7 @@ fn circles_may_be_chains_of_arcs() {
 
 #[test]
 fn a_chain_with_a_gap_is_refused() {
-    let text = reworded(StepPart::Frustum, StepUnit::Metre, "CIRCLE", |id, attributes, k| {
+    let text = reworded(StepSample::Frustum, StepUnit::Metre, "CIRCLE", |id, attributes, k| {
         let [a, b] = [k + 1, k + 2];
         format!(
             "{id}=COMPOSITE_CURVE('',(#{a},#{a}),.F.);\n#{k}=CIRCLE({attributes});\n\
@@ -114,7 +115,7 @@ fn a_chain_with_a_gap_is_refused() {
 
 #[test]
 fn surfaces_may_be_trimmed_or_bounded_or_offset() {
-    let plain = volumes_mm3(&step(StepPart::Tower, StepUnit::Millimetre), 0.02);
+    let plain = volumes_mm3(&step(StepSample::Tower, StepUnit::Millimetre), 0.02);
     let words: [fn(&str, &str, usize) -> String; 5] = [
         |id, attributes, k| {
             format!(
@@ -139,7 +140,7 @@ fn surfaces_may_be_trimmed_or_bounded_or_offset() {
         |id, attributes, k| extruded(id, &attributes.replace("12.7", "15.0"), k, -2.3),
     ];
     for words in words {
-        let text = reworded(StepPart::Tower, StepUnit::Millimetre, "CYLINDRICAL_SURFACE", words);
+        let text = reworded(StepSample::Tower, StepUnit::Millimetre, "CYLINDRICAL_SURFACE", words);
         let volumes = volumes_mm3(&text, 0.02);
         for (volume, plain) in volumes.into_iter().zip(plain) {
             assert!((volume / plain - 1.0).abs() < 1e-4, "{volume} {plain}");
@@ -158,23 +159,27 @@ fn extruded(id: &str, attributes: &str, k: usize, by: f64) -> String {
 
 #[test]
 fn a_closed_shell_is_a_body_without_a_solid() {
-    let text =
-        reworded(StepPart::Frustum, StepUnit::Inch, "MANIFOLD_SOLID_BREP", |id, attributes, _| {
+    let text = reworded(
+        StepSample::Frustum,
+        StepUnit::Inch,
+        "MANIFOLD_SOLID_BREP",
+        |id, attributes, _| {
             let (name, shell) = attributes.split_once(',').unwrap();
             format!("{id}=SHELL_BASED_SURFACE_MODEL({name},({shell}));")
-        });
+        },
+    );
     let text = text.replace("ADVANCED_BREP_SHAPE", "MANIFOLD_SURFACE_SHAPE");
     is_frustum(&text);
 }
 
 #[test]
 fn what_is_not_read_is_refused_by_name() {
-    let text = reworded(StepPart::Frustum, StepUnit::Inch, "CIRCLE", |id, _, _| {
+    let text = reworded(StepSample::Frustum, StepUnit::Inch, "CIRCLE", |id, _, _| {
         format!("{id}=PCURVE('',#1,#1);")
     });
     let error = StepModel::read(text.as_bytes()).unwrap_err().to_string();
     assert!(error.starts_with('#') && error.ends_with("is a PCURVE, which is not supported"));
-    let text = reworded(StepPart::Frustum, StepUnit::Inch, "CONICAL_SURFACE", |id, _, _| {
+    let text = reworded(StepSample::Frustum, StepUnit::Inch, "CONICAL_SURFACE", |id, _, _| {
         format!("{id}=SURFACE_REPLICA('',#1,#1);")
     });
     let error = StepModel::read(text.as_bytes()).unwrap_err().to_string();
@@ -189,7 +194,7 @@ fn names(text: &str) -> Vec<String> {
 
 #[test]
 fn bodies_without_names_have_those_of_their_products() {
-    let pair = step(StepPart::Pair, StepUnit::Millimetre);
+    let pair = step(StepSample::Pair, StepUnit::Millimetre);
     let pair = pair.replace("PRODUCT('part','part'", "PRODUCT('7','nut'");
     assert_eq!(names(&pair), ["part", "part"]);
     let nameless = pair.replace("MANIFOLD_SOLID_BREP('part'", "MANIFOLD_SOLID_BREP(''");

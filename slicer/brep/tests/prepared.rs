@@ -1,7 +1,7 @@
 //! Files that are healed, or refused for the right reason and at the right place.
 
 use lamp_brep::{BodyFault, Fault, KernelName, Prepared, prepare};
-use lamp_fixtures::{StepDefect, StepPart, StepUnit, broken_step, step};
+use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
 
 /// The block's volume, in cubic millimetres.
 const BLOCK_MM3: f64 = 6000.0;
@@ -23,7 +23,7 @@ fn volume_mm3(prepared: &Prepared) -> f64 {
 
 #[test]
 fn what_is_right_is_taken_as_it_is() {
-    for part in StepPart::ALL {
+    for part in StepSample::ALL {
         let prepared = prepared(&step(part, StepUnit::Inch), 0.05);
         assert!(prepared.is_good(), "{part:?}: {:?}", prepared.reports);
         assert_eq!((prepared.heal_mm, prepared.chord_mm), (0.0, 0.05));

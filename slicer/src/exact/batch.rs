@@ -7,7 +7,7 @@ use lamp_brep::vector::{Vec3, cross, sub};
 use super::placed::PlacedSurfaces;
 use super::polish::{FacetPoint, polish};
 use super::tally::Tally;
-use crate::cut::{Crossing, Cutter, Share};
+use crate::cut::{Crossing, Cutter, LayerShare};
 use crate::placement::PlacedFacet;
 
 /// Enough that evaluating surfaces pays for each call; 0.5 MB.
@@ -35,7 +35,12 @@ impl<'a> Batch<'a> {
     }
 
     /// Adds a facet's crossings and returns how many there are.
-    pub(super) fn cut(&mut self, number: u32, facet: &PlacedFacet, shares: &mut [Share]) -> usize {
+    pub(super) fn cut(
+        &mut self,
+        number: u32,
+        facet: &PlacedFacet,
+        shares: &mut [LayerShare],
+    ) -> usize {
         let cutter = self.cutter;
         let surfaces = self.surfaces;
         let flat = surfaces.is_flat(number).then(|| FlatFace::new(surfaces, number));
@@ -68,7 +73,7 @@ impl<'a> Batch<'a> {
     }
 
     /// Polishes what was gathered, and puts it into the table.
-    pub(super) fn finish(&mut self, shares: &mut [Share]) {
+    pub(super) fn finish(&mut self, shares: &mut [LayerShare]) {
         polish(self.surfaces, 0, &mut self.points);
         self.tally.add(self.points.iter().zip(&self.cells).map(|(point, &(_, _, facet_mm))| {
             point.is_exact.then(|| (point.at_mm[0] - facet_mm).abs())

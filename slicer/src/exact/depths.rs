@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::placed::PlacedSurfaces;
 use super::polish::{FacetPoint, polish};
-use crate::cut::{Crossing, Cutter, Share};
-use crate::gray::{Sheet, Span};
+use crate::cut::{Crossing, Cutter, LayerShare};
+use crate::gray::{DepthSpan, Sheet};
 use crate::placement::PlacedFacet;
 
 /// Enough that evaluating surfaces pays for each call; 0.3 MB.
@@ -20,7 +20,7 @@ pub(super) struct Depths<'a> {
     reach_um: f64,
     points: Vec<FacetPoint>,
     /// The span that each point becomes, without its depth.
-    pixels: Vec<Span>,
+    pixels: Vec<DepthSpan>,
 }
 
 impl<'a> Depths<'a> {
@@ -39,7 +39,7 @@ impl<'a> Depths<'a> {
         &mut self,
         number: u32,
         facet: &PlacedFacet,
-        shares: &mut [Share],
+        shares: &mut [LayerShare],
     ) -> usize {
         let (cutter, surfaces) = (self.cutter, self.surfaces);
         if surfaces.is_flat(number) {
@@ -65,11 +65,11 @@ impl<'a> Depths<'a> {
         if self.points.len() >= BATCH {
             self.finish(shares);
         }
-        count * size_of::<Span>() / size_of::<Crossing>()
+        count * size_of::<DepthSpan>() / size_of::<Crossing>()
     }
 
     /// Finds the exact heights of what was gathered, and puts them into the table.
-    pub(super) fn finish(&mut self, shares: &mut [Share]) {
+    pub(super) fn finish(&mut self, shares: &mut [LayerShare]) {
         polish(self.surfaces, 2, &mut self.points);
         let planes = self.cutter.planes;
         for (point, pixel) in self.points.drain(..).zip(self.pixels.drain(..)) {

@@ -33,7 +33,7 @@ pub(crate) use settle::settle;
 pub use tally::Polished;
 pub(crate) use tally::Tally;
 
-use crate::cut::{Cutter, Share};
+use crate::cut::{Cutter, LayerShare};
 use crate::placement::PlacedFacet;
 
 /// A worker's way from consecutive facets of a B-rep model to its share of the table.
@@ -60,7 +60,7 @@ impl<'a> ExactCut<'a> {
     }
 
     /// Adds the next facet. Returns how many crossings would take as much memory.
-    pub(crate) fn cut(&mut self, facet: &PlacedFacet, shares: &mut [Share]) -> usize {
+    pub(crate) fn cut(&mut self, facet: &PlacedFacet, shares: &mut [LayerShare]) -> usize {
         let number = self.next;
         self.next += 1;
         let below = self.depths.as_mut();
@@ -69,7 +69,7 @@ impl<'a> ExactCut<'a> {
     }
 
     /// Puts the rest into the table.
-    pub(crate) fn finish(&mut self, shares: &mut [Share]) {
+    pub(crate) fn finish(&mut self, shares: &mut [LayerShare]) {
         self.crossings.finish(shares);
         if let Some(depths) = &mut self.depths {
             depths.finish(shares);

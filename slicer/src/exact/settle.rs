@@ -82,10 +82,10 @@ impl Row {
         let kept = std::mem::take(&mut self.kept);
         for crossing in kept {
             let there = &self.exact;
-            let away = |k: &usize| there[*k].place().column().abs_diff(crossing.place().column());
+            let away = |k: &usize| there[*k].in_row().column().abs_diff(crossing.in_row().column());
             let is_double = |k: &usize| {
                 let same = there.iter().filter(|other| is_same(there[*k], **other)).count();
-                there[*k].place().winding() != crossing.place().winding() && same > 1
+                there[*k].in_row().winding() != crossing.in_row().winding() && same > 1
             };
             let near = (0..there.len()).filter(|k| away(k) <= most);
             match near.filter(is_double).min_by_key(away) {
@@ -200,7 +200,7 @@ impl Near {
     /// the row has there.
     fn kept(&self, row: &Row, pair: &[Crossing]) -> Vec<Crossing> {
         let width = (self.columns.end() - self.columns.start()) / 2;
-        let column = |crossing: &Crossing| i64::from(crossing.place().column());
+        let column = |crossing: &Crossing| i64::from(crossing.in_row().column());
         let is_near = |crossing: &&Crossing| {
             let at = column(crossing);
             self.columns.contains(&at) || pair.iter().any(|one| (column(one) - at).abs() <= width)
@@ -238,11 +238,11 @@ impl Near {
 }
 
 fn winding(crossings: &[Crossing]) -> i32 {
-    crossings.iter().map(|crossing| crossing.place().winding()).sum()
+    crossings.iter().map(|crossing| crossing.in_row().winding()).sum()
 }
 
 /// Whether two crossings are the same, found twice; which may round to two columns.
 fn is_same(a: Crossing, b: Crossing) -> bool {
-    let [a, b] = [a.place(), b.place()];
+    let [a, b] = [a.in_row(), b.in_row()];
     a.winding() == b.winding() && a.column().abs_diff(b.column()) <= 1
 }

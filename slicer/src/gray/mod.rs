@@ -20,4 +20,4 @@ mod sheet;
 
 pub use levels::LayerLevels;
 pub(crate) use shade::Shader;
-pub(crate) use sheet::{Sheet, Span};
+pub(crate) use sheet::{DepthSpan, Sheet};

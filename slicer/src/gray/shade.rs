@@ -2,8 +2,8 @@
 
 use lamp_stack::{DepthLevels, GrayMask, Image, Length, LevelChange, MaskBuilder};
 
-use crate::cut::Place;
-use crate::gray::Span;
+use crate::cut::RowCrossing;
+use crate::gray::DepthSpan;
 use crate::planes::Planes;
 use crate::table::Fill;
 
@@ -14,10 +14,10 @@ pub(crate) struct Shader<'a> {
     /// The layer's plane below the layer's top.
     plane_depth_um: f64,
     /// Those of the rows to come, by row.
-    spans: &'a [Span],
+    spans: &'a [DepthSpan],
     /// Those over a column, in the order of their starts.
-    open: Vec<&'a Span>,
-    met: Vec<(f64, &'a Span)>,
+    open: Vec<&'a DepthSpan>,
+    met: Vec<(f64, &'a DepthSpan)>,
     changes: Vec<LevelChange>,
     image: GrayMask,
 }
@@ -29,7 +29,7 @@ impl<'a> Shader<'a> {
         fill: Fill,
         planes: &Planes,
         layer: usize,
-        spans: &'a [Span],
+        spans: &'a [DepthSpan],
         width: u32,
     ) -> Self {
         Self {
@@ -46,7 +46,7 @@ impl<'a> Shader<'a> {
 
     /// Adds the next row, given the sorted places where the section's contours
     /// cross it.
-    pub(crate) fn push_row(&mut self, row: u32, places: &[Place]) {
+    pub(crate) fn push_row(&mut self, row: u32, places: &[RowCrossing]) {
         let count = self.spans.iter().take_while(|span| span.row <= row).count();
         let (mut spans, rest) = self.spans.split_at(count);
         self.spans = rest;
@@ -64,7 +64,7 @@ impl<'a> Shader<'a> {
     }
 
     /// Adds columns between which no contour crosses the row.
-    fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &'a [Span]) {
+    fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &'a [DepthSpan]) {
         if !self.fill.is_inside(winding) {
             return self.push(start, 0);
         }
@@ -101,7 +101,7 @@ impl<'a> Shader<'a> {
         self.met.extend(self.open.iter().map(|&span| (span.depth_um(column), span)));
         self.met.sort_by(|a, b| a.partial_cmp(b).expect("depths are numbers"));
         let touching =
-            |a: &(f64, &Span), b: &(f64, &Span)| b.0 - a.0 <= a.1.tie_um() + b.1.tie_um();
+            |a: &(f64, &DepthSpan), b: &(f64, &DepthSpan)| b.0 - a.0 <= a.1.tie_um() + b.1.tie_um();
         let mut left = winding;
         for group in self.met.chunk_by(touching) {
             let (depth, first) = group[0];

@@ -22,7 +22,7 @@ const STANDING_UM: f64 = 1.0;
 /// What a row's vertical lines meet of a facet below a section: columns from
 /// `start` to `end`, at depths along a straight line.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-pub(crate) struct Span {
+pub(crate) struct DepthSpan {
     pub(crate) row: u32,
     pub(crate) start: u32,
     pub(crate) end: u32,
@@ -34,7 +34,7 @@ pub(crate) struct Span {
     signed_tie_um: f32,
 }
 
-impl Span {
+impl DepthSpan {
     /// Row and first column in one, to sort by.
     #[inline]
     pub(crate) fn place(&self) -> u64 {
@@ -131,7 +131,7 @@ impl Sheet {
         cutter: &Cutter<'_>,
         layers: Range<usize>,
         reach_um: f64,
-        mut each: impl FnMut(usize, Span),
+        mut each: impl FnMut(usize, DepthSpan),
     ) {
         let planes = cutter.planes;
         let low_um = planes.z_um(layers.start) - reach_um;
@@ -146,15 +146,15 @@ impl Sheet {
                 let depths = depths(planes, layer, reach_um, self.tie_um);
                 if let Some((columns, depth_um)) = stretch.within(top_um, &depths) {
                     let um_per_column = -stretch.um_per_column as f32;
-                    each(layer, Span { um_per_column, ..self.span(row, columns, depth_um) });
+                    each(layer, DepthSpan { um_per_column, ..self.span(row, columns, depth_um) });
                 }
             }
         });
     }
 
     /// What a row meets of it at one depth.
-    fn span(&self, row: u32, columns: Range<u32>, depth_um: f64) -> Span {
-        Span {
+    fn span(&self, row: u32, columns: Range<u32>, depth_um: f64) -> DepthSpan {
+        DepthSpan {
             row,
             start: columns.start,
             end: columns.end,
@@ -169,7 +169,7 @@ impl Sheet {
         &self,
         cutter: &Cutter<'_>,
         heights_um: Range<f64>,
-        mut each: impl FnMut(Span, f64),
+        mut each: impl FnMut(DepthSpan, f64),
     ) {
         let rows = self.facet.rows_between([heights_um.start, heights_um.end]);
         self.facet.for_each_row(rows, |row, ends| {
@@ -192,7 +192,7 @@ impl Sheet {
 
     /// What a row meets of it.
     #[inline]
-    fn stretch(&self, ends: [[f64; 2]; 2], width: u32) -> Option<Stretch> {
+    fn stretch(&self, ends: [[f64; 2]; 2], width: u32) -> Option<RowStretch> {
         let [long, short] = ends;
         let ends = [long[0], short[0]];
         let [a, b] = ends.map(|column| ceil_clamped(column, width));
@@ -201,20 +201,20 @@ impl Sheet {
         }
         let heights = [long[1], short[1]].map(|z| z.clamp(self.low_um, self.high_um));
         let um_per_column = (heights[1] - heights[0]) / (ends[1] - ends[0]);
-        Some(Stretch { columns: a.min(b)..a.max(b), ends, heights, um_per_column })
+        Some(RowStretch { columns: a.min(b)..a.max(b), ends, heights, um_per_column })
     }
 }
 
 /// What a row meets of a facet: columns, of which each is at a height along the
 /// line from edge to edge.
-struct Stretch {
+struct RowStretch {
     columns: Range<u32>,
     ends: [f64; 2],
     heights: [f64; 2],
     um_per_column: f64,
 }
 
-impl Stretch {
+impl RowStretch {
     /// The lower and the higher end's height.
     #[inline]
     fn heights(&self) -> [f64; 2] {

@@ -1,8 +1,8 @@
 //! A page says whether its contours close: always where the mesh does, never
 //! where the plane meets a facet that is missing or comes twice.
 
-use lamp_fixtures::{Defect, Facet, Mesh, Part, build, inject};
-use lamp_slicer::{Axis, Fill, Frame, Placement, PlaneRule, SliceOptions};
+use lamp_fixtures::{Defect, Facet, Mesh, Sample, build, inject};
+use lamp_slicer::{Axis, Fill, GridRule, Placement, PlaneRule, SliceOptions};
 use lamp_stack::Layer;
 use proptest::prelude::*;
 
@@ -20,7 +20,7 @@ fn coarse(fill: Fill) -> SliceOptions {
 }
 
 fn parts() -> impl Iterator<Item = Mesh> {
-    Part::ALL.into_iter().map(|part| build(part, part.min_facets().max(500)).unwrap())
+    Sample::ALL.into_iter().map(|part| build(part, part.min_facets().max(500)).unwrap())
 }
 
 /// Which planes a facet meets in a segment: with a corner below, and either one
@@ -67,8 +67,8 @@ fn corners_on_planes_and_rows_leave_a_part_closed() {
         let origin_mm = [low[0] - 3.0 / 16.0, high[1] + 3.0 / 16.0];
         let pixels = [0, 1].map(|axis| ((high[axis] - low[axis]) * 8.0) as u32 + 4);
         for fill in FILLS {
-            let frame = Frame::At { origin_mm, pixels };
-            let options = SliceOptions { fill, frame, ..options(203.2, 125.0) };
+            let grid = GridRule::At { origin_mm, pixels };
+            let options = SliceOptions { fill, grid, ..options(203.2, 125.0) };
             assert!(closed(&slice(&mesh, &options)).iter().all(|&closed| closed));
         }
     }
@@ -120,7 +120,7 @@ fn the_layers_that_meet_a_spoiled_facet_are_open_and_no_others() {
 /// there shows all the same.
 #[test]
 fn a_gap_between_two_rows_shows() {
-    let mesh = build(Part::Sphere, 20_000).unwrap();
+    let mesh = build(Sample::Sphere, 20_000).unwrap();
     let mut broken = mesh.clone();
     inject(&mut broken, Defect::Drop, 30, 5);
     let layers = slice(&broken, &options(10.0, 100.0));
@@ -137,7 +137,7 @@ proptest! {
     /// Whatever is flipped: images, stray rows and the rest stay as they are.
     #[test]
     fn flipped_facets_change_nothing_under_even_odd(
-        part in 0..Part::ALL.len(),
+        part in 0..Sample::ALL.len(),
         share in 0.0..=1.0,
         seed in any::<u64>(),
         degrees in 0.0..360.0,

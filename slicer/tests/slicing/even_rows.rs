@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use lamp_fixtures::{Defect, Mesh, blade, cone, cube_with_hole, inject, sphere, torus, tower};
 use lamp_slicer::{
-    Axis, Facet, Fill, Frame, PixelGrid, Placement, PlaneRule, SliceOptions, Slices,
+    Axis, Facet, Fill, GridRule, PixelGrid, Placement, PlaneRule, SliceOptions, Slices,
 };
 use lamp_stack::Layer;
 use proptest::prelude::*;
@@ -70,7 +70,7 @@ fn on_centres(mesh: &Mesh) -> SliceOptions {
     let (low, high) = mesh.bounds_mm();
     let origin_mm = [low[0] - 3.0 / 16.0, high[1] + 3.0 / 16.0];
     let pixels = [0, 1].map(|axis| ((high[axis] - low[axis]) * 8.0) as u32 + 4);
-    SliceOptions { frame: Frame::At { origin_mm, pixels }, ..options(203.2, 125.0) }
+    SliceOptions { grid: GridRule::At { origin_mm, pixels }, ..options(203.2, 125.0) }
 }
 
 /// Facets that change nothing: without area, or twice with opposite sides.

@@ -1,6 +1,6 @@
 //! What the layers say of themselves: index, place, thickness, part.
 
-use lamp_slicer::{Frame, PlaneRule, SliceError, SliceOptions, Slices};
+use lamp_slicer::{GridRule, PlaneRule, SliceError, SliceOptions, Slices};
 use lamp_stack::Length;
 use proptest::prelude::*;
 
@@ -96,8 +96,8 @@ proptest! {
         dpi in 80.0..500.0,
     ) {
         let mesh = block(low, [0, 1, 2].map(|axis| low[axis] + size[axis]));
-        let frame = Frame::Around { margin };
-        let layers = slice(&mesh, &SliceOptions { frame, ..options(dpi, 1000.0) });
+        let grid = GridRule::Around { margin };
+        let layers = slice(&mesh, &SliceOptions { grid, ..options(dpi, 1000.0) });
         let (low, high) = mesh.bounds_mm();
         let image = mask(&layers[0]);
         prop_assert_eq!(image.width() % 32, 0);
@@ -122,8 +122,8 @@ proptest! {
 
 #[test]
 fn a_given_frame_is_kept() {
-    let frame = Frame::At { origin_mm: [-3.25, 7.125], pixels: [60, 80] };
-    let options = SliceOptions { frame, ..options(254.0, 500.0) };
+    let grid = GridRule::At { origin_mm: [-3.25, 7.125], pixels: [60, 80] };
+    let options = SliceOptions { grid, ..options(254.0, 500.0) };
     for layer in slice(&cube(0.0, 2.0), &options) {
         assert_eq!(layer.info.origin_mm, Some([-3.25, 7.125]));
         assert_eq!((layer.image.width(), layer.image.height()), (60, 80));
@@ -136,8 +136,8 @@ fn a_part_that_sticks_out_of_its_frame_is_refused() {
     // black column.
     let part = block([1.0, -2.0, 0.0], [3.0, 1.0, 1.0]);
     let framed = |origin_mm, pixels| {
-        let frame = Frame::At { origin_mm, pixels };
-        try_layers(model(&part), &SliceOptions { frame, ..options(203.2, 500.0) })
+        let grid = GridRule::At { origin_mm, pixels };
+        try_layers(model(&part), &SliceOptions { grid, ..options(203.2, 500.0) })
     };
     let layers = framed([1.0, 1.0], [17, 24]).unwrap();
     assert_eq!(white_pixels(&layers), 2 * 16 * 24);
@@ -159,8 +159,8 @@ fn a_part_that_sticks_out_of_its_frame_is_refused() {
 fn moving_the_frame_moves_the_image() {
     let mesh = lamp_fixtures::torus(2.0, 0.7, 500);
     let framed = |origin_mm, pixels| {
-        let frame = Frame::At { origin_mm, pixels };
-        slice(&mesh, &SliceOptions { frame, ..options(254.0, 100.0) })
+        let grid = GridRule::At { origin_mm, pixels };
+        slice(&mesh, &SliceOptions { grid, ..options(254.0, 100.0) })
     };
     let (small, large) = (framed([-3.0, 3.0], [60, 60]), framed([-3.7, 3.4], [90, 77]));
     assert_eq!(white_pixels(&small), white_pixels(&large));
@@ -193,8 +193,8 @@ fn images_too_large_are_refused() {
     assert!(matches!(error, SliceError::TooLarge { .. }), "{error}");
     assert!(error.to_string().contains("--dpi"), "{error}");
     for pixels in [[0, 5], [5, 0], [(1 << 24) + 1, 5], [5, u32::MAX]] {
-        let frame = Frame::At { origin_mm: [0.0; 2], pixels };
-        let error = refusal(&SliceOptions { frame, ..options(254.0, 100.0) });
+        let grid = GridRule::At { origin_mm: [0.0; 2], pixels };
+        let error = refusal(&SliceOptions { grid, ..options(254.0, 100.0) });
         assert!(matches!(error, SliceError::TooLarge { .. }), "{error}");
     }
 }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::f64::consts::PI;
 
 use lamp_fixtures::{Mesh, sphere, torus};
-use lamp_slicer::{Axis, Fill, Frame, Placement, PlaneRule, SliceError, SliceOptions, Units};
+use lamp_slicer::{Axis, Fill, GridRule, Placement, PlaneRule, SliceError, SliceOptions, Units};
 use lamp_stack::Layer;
 use proptest::prelude::*;
 
@@ -28,9 +28,9 @@ fn odd_part() -> Mesh {
 
 /// Cubes of an eighth of a millimetre, as many each way, around the origin.
 fn in_cubes(placement: Placement, fill: Fill) -> Vec<Layer> {
-    let frame = Frame::At { origin_mm: [-2.5, 2.5], pixels: [40, 40] };
+    let grid = GridRule::At { origin_mm: [-2.5, 2.5], pixels: [40, 40] };
     let plane = PlaneRule::Middle;
-    slice(&odd_part(), &SliceOptions { plane, fill, frame, placement, ..options(203.2, 125.0) })
+    slice(&odd_part(), &SliceOptions { plane, fill, grid, placement, ..options(203.2, 125.0) })
 }
 
 /// The centres of the white cubes, in sixteenths of a millimetre.
@@ -99,8 +99,8 @@ proptest! {
     ) {
         let shift = steps.map(|step| f64::from(step) / 8.0);
         let sliced = |placement, origin_mm| {
-            let frame = Frame::At { origin_mm, pixels: [40, 40] };
-            slice(&odd_part(), &SliceOptions { frame, placement, ..options(203.2, 125.0) })
+            let grid = GridRule::At { origin_mm, pixels: [40, 40] };
+            slice(&odd_part(), &SliceOptions { grid, placement, ..options(203.2, 125.0) })
         };
         let there = Placement::default().translated(shift);
         let moved = sliced(there, [shift[0] - 2.5, shift[1] + 2.5]);
@@ -135,10 +135,10 @@ fn a_factor_of_two_is_half_the_resolution() {
         SliceOptions { placement: Placement::default().scaled([2.0; 3]), ..options(150.0, 500.0) };
     let layers = slice(&odd_part(), &options(300.0, 250.0));
     assert!(white_pixels(&layers) > 2000);
-    let frame = Frame::At { origin_mm: [-4.5, 4.5], pixels: [64, 54] };
-    let halves = Frame::At { origin_mm: [-2.25, 2.25], pixels: [64, 54] };
-    let large = slice(&odd_part(), &SliceOptions { frame, ..doubled });
-    let small = slice(&odd_part(), &SliceOptions { frame: halves, ..options(300.0, 250.0) });
+    let grid = GridRule::At { origin_mm: [-4.5, 4.5], pixels: [64, 54] };
+    let halves = GridRule::At { origin_mm: [-2.25, 2.25], pixels: [64, 54] };
+    let large = slice(&odd_part(), &SliceOptions { grid, ..doubled });
+    let small = slice(&odd_part(), &SliceOptions { grid: halves, ..options(300.0, 250.0) });
     assert_eq!(masks(&large), masks(&small));
 }
 

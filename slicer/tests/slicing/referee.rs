@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, torus, tower};
-use lamp_slicer::{Fill, Frame, PixelGrid, PlaneRule, SliceOptions, Slices, Units};
+use lamp_slicer::{Fill, GridRule, PixelGrid, PlaneRule, SliceOptions, Slices, Units};
 use lamp_stack::Layer;
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -161,8 +161,8 @@ fn a_frame_may_be_anywhere_around_the_part() {
     for (origin_mm, pixels) in
         [([-2.7, 3.8], [66, 80]), ([-9.037, 4.4], [133, 90]), ([-3.0, 6.013], [70, 103])]
     {
-        let frame = Frame::At { origin_mm, pixels };
-        let options = SliceOptions { frame, ..options(254.0, 410.0) };
+        let grid = GridRule::At { origin_mm, pixels };
+        let options = SliceOptions { grid, ..options(254.0, 410.0) };
         assert_eq!(referee(&mesh, &options), Ok(()));
     }
 }
@@ -196,7 +196,7 @@ fn any_options() -> impl Strategy<Value = SliceOptions> {
         |(dpi, thickness_um, plane, fill, margin)| SliceOptions {
             plane,
             fill,
-            frame: Frame::Around { margin },
+            grid: GridRule::Around { margin },
             ..options(dpi, thickness_um)
         },
     )

@@ -5,7 +5,7 @@
 //! millimetre: half pixels, half layers.
 
 use lamp_fixtures::Mesh;
-use lamp_slicer::{Frame, PlaneRule, SliceOptions};
+use lamp_slicer::{GridRule, PlaneRule, SliceOptions};
 use lamp_stack::Mask;
 use proptest::prelude::*;
 
@@ -15,8 +15,8 @@ use crate::common::{block, cases, joined, mask, options, slice};
 const FRAME: [u32; 2] = [21, 16];
 
 fn exact_options(plane: PlaneRule, pixels: [u32; 2]) -> SliceOptions {
-    let frame = Frame::At { origin_mm: [0.0, 2.0], pixels };
-    SliceOptions { plane, frame, ..options(203.2, 125.0) }
+    let grid = GridRule::At { origin_mm: [0.0, 2.0], pixels };
+    SliceOptions { plane, grid, ..options(203.2, 125.0) }
 }
 
 /// A box from one place to another.

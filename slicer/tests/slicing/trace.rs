@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use lamp_fixtures::{Defect, Facet, Mesh, Part, build, inject, sphere};
+use lamp_fixtures::{Defect, Facet, Mesh, Sample, build, inject, sphere};
 use lamp_slicer::{
     Axis, EdgeFacet, Fill, Model, Placement, SliceError, SliceOptions, Slices, StrayBand, Trace,
 };
@@ -23,7 +23,7 @@ fn coarse(fill: Fill) -> SliceOptions {
     SliceOptions { fill, ..options(100.0, 500.0) }
 }
 
-fn broken(part: Part, defect: Defect, count: usize, seed: u64) -> Mesh {
+fn broken(part: Sample, defect: Defect, count: usize, seed: u64) -> Mesh {
     let mut mesh = build(part, part.min_facets().max(1_500)).unwrap();
     inject(&mut mesh, defect, count, seed);
     mesh
@@ -82,7 +82,7 @@ proptest! {
 
     #[test]
     fn every_band_lies_between_open_ends_on_faulty_edges(
-        part in prop::sample::select(vec![Part::Tower, Part::Sphere, Part::Torus, Part::Cube]),
+        part in prop::sample::select(vec![Sample::Tower, Sample::Sphere, Sample::Torus, Sample::Cube]),
         defect in prop::sample::select(vec![
             Defect::Drop, Defect::Flip, Defect::Duplicate, Defect::Nudge { by_mm: 0.3 },
         ]),
@@ -102,14 +102,14 @@ proptest! {
 
 #[test]
 fn a_whole_part_has_nothing_to_trace() {
-    let mesh = build(Part::Tower, 2_000).unwrap();
+    let mesh = build(Sample::Tower, 2_000).unwrap();
     let (bands, trace) = traced(model(&mesh), &coarse(Fill::NonZero));
     assert_eq!((bands, trace), (Vec::new(), Trace::default()));
 }
 
 #[test]
 fn threads_memory_and_order_do_not_change_a_trace() {
-    let mut broken = build(Part::Tower, 30_000).unwrap();
+    let mut broken = build(Sample::Tower, 30_000).unwrap();
     inject(&mut broken, Defect::Nudge { by_mm: 0.2 }, 3_000, 4);
     let (bands, expected) = traced(model(&broken), &coarse(Fill::EvenOdd));
     assert!(expected.bands.len() > 500 && expected.edges.len() > 2_000);

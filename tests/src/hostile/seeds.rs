@@ -2,8 +2,8 @@
 //! and ones that lie, made by the fixtures.
 
 use lamp_fixtures::{
-    Defect, Mesh, Part, StepDefect, StepPart, StepUnit, broken_step, build, inject, sphere, step,
-    torus,
+    Defect, Mesh, Sample, StepDefect, StepSample, StepUnit, broken_step, build, inject, sphere,
+    step, torus,
 };
 use lamp_slicer::{Model, SliceOptions, Slices};
 use lamp_stack::{
@@ -58,7 +58,7 @@ fn with(mut bytes: Vec<u8>, at: usize, new: &[u8]) -> Vec<u8> {
 }
 
 fn stl() -> Named {
-    let cube = build(Part::Cube, 64).expect("enough facets");
+    let cube = build(Sample::Cube, 64).expect("enough facets");
     let ball = sphere(3.0, 24);
     let mut open = torus(4.0, 1.5, 60);
     inject(&mut open, Defect::Drop, 4, 7);
@@ -87,10 +87,10 @@ fn stl() -> Named {
 fn steps() -> Named {
     let part = |part| step(part, StepUnit::Millimetre).into_bytes();
     vec![
-        ("sphere.step", part(StepPart::Sphere)),
-        ("cone.step", part(StepPart::Cone)),
-        ("block.step", part(StepPart::Block)),
-        ("pair.step", step(StepPart::Pair, StepUnit::Inch).into_bytes()),
+        ("sphere.step", part(StepSample::Sphere)),
+        ("cone.step", part(StepSample::Cone)),
+        ("block.step", part(StepSample::Block)),
+        ("pair.step", step(StepSample::Pair, StepUnit::Inch).into_bytes()),
         ("apart.step", broken_step(StepDefect::Apart { gap_nm: 1000 }).into_bytes()),
     ]
 }

@@ -1,6 +1,6 @@
 //! What is whole passes byte for byte, and what is corrected stays so.
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_tests::{Scratch, stripped};
 use proptest::prelude::*;
 
@@ -9,7 +9,7 @@ proptest! {
 
     #[test]
     fn a_clean_stack_passes_whatever_is_known_of_it(
-        part in prop::sample::select(Part::ALL.to_vec()),
+        part in prop::sample::select(Sample::ALL.to_vec()),
         turn in prop::array::uniform3(-180.0..180.0f64),
         dpi in 150..400u32,
         thickness_um in 1000..4000u32,
@@ -28,7 +28,7 @@ proptest! {
         scratch.stack("unsure.tif", unsure);
         // A blade has slots that show in few rows of one layer alone, as a row that
         // missed two crossings does: only its page tells them apart.
-        let names = if part == Part::Blade { &["clean"][..] } else { &["clean", "unsure", "bare"] };
+        let names = if part == Sample::Blade { &["clean"][..] } else { &["clean", "unsure", "bare"] };
         for name in names {
             let ran = scratch.run(&format!("fix {name}.tif -o fixed.tif"));
             prop_assert!(ran.statuses == [Some(0)], "{}: {:?}", name, ran);
@@ -44,7 +44,7 @@ proptest! {
 #[test]
 fn rows_that_only_looked_stray_stay() {
     let scratch = Scratch::new();
-    scratch.part("blade.stl", Part::Blade, Part::Blade.min_facets());
+    scratch.part("blade.stl", Sample::Blade, Sample::Blade.min_facets());
     let turn = "--rotate y:26.48399766014992,z:-138.09997614731395";
     let line = format!("slice blade.stl {turn} --dpi 46 --thickness 2268um -o clean.tif");
     scratch.run(&line).succeeds_quietly();

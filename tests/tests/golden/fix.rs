@@ -1,6 +1,6 @@
 //! Each kind of stray rows and what `fix` makes of them, one below the other.
 
-use lamp_fixtures::Part;
+use lamp_fixtures::Sample;
 use lamp_stack::{Image, Layer, Mask, MaskBuilder};
 use lamp_tests::{Scratch, at_least, edited, mask, stripped, with_soft_edges};
 use serde_json::Value;
@@ -31,7 +31,7 @@ fn broken(part: &str, slicing: &str) -> Scratch {
 /// The torus near its waist, whole, as a stack of three layers.
 fn waist() -> Vec<Layer> {
     let scratch = Scratch::new();
-    scratch.part("torus.stl", Part::Torus, 5_000);
+    scratch.part("torus.stl", Sample::Torus, 5_000);
     let line = "slice torus.stl --dpi 60 --thickness 1mm --layers 6..9 -o waist.tif";
     scratch.run(line).succeeds_quietly();
     stripped(&scratch.layers("waist.tif"))

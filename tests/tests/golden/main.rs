@@ -7,7 +7,7 @@
 
 mod fix;
 
-use lamp_fixtures::{Mesh, Part, sphere};
+use lamp_fixtures::{Mesh, Sample, sphere};
 use lamp_stack::{Layer, Mask};
 use lamp_tests::{
     Change, Golden, Scratch, Shade, difference, ends_white, mask, note, read_stack, write_gray_ramp,
@@ -40,7 +40,7 @@ fn named(part: &str, layers: &[Layer], wanted: &[u32]) -> Images {
     wanted.iter().map(image).collect()
 }
 
-fn sliced(part: Part, facets: usize, options: &str) -> Vec<Layer> {
+fn sliced(part: Sample, facets: usize, options: &str) -> Vec<Layer> {
     let scratch = Scratch::new();
     scratch.part("part.stl", part, facets);
     read_stack(scratch.run(&format!("slice part.stl {options}")).succeeds_quietly().stdout)
@@ -49,22 +49,22 @@ fn sliced(part: Part, facets: usize, options: &str) -> Vec<Layer> {
 /// Drains in the flange, a row of pins and holes, the serpentine between
 /// them, the tip plate.
 fn blade() -> Images {
-    named("blade", &sliced(Part::Blade, 24_000, "--dpi 100 --thickness 1mm"), &[5, 45, 96, 117])
+    named("blade", &sliced(Sample::Blade, 24_000, "--dpi 100 --thickness 1mm"), &[5, 45, 96, 117])
 }
 
 /// Cylinder, cone, sphere, and the five lobes at their widest and narrowest.
 fn tower() -> Images {
-    let layers = sliced(Part::Tower, 20_000, "--dpi 150 --thickness 1mm");
+    let layers = sliced(Sample::Tower, 20_000, "--dpi 150 --thickness 1mm");
     named("tower", &layers, &[9, 30, 45, 60, 70])
 }
 
 /// The torus where it starts, at its waist and where it ends.
 fn torus() -> Images {
-    named("torus", &sliced(Part::Torus, 5_000, "--dpi 100 --thickness 1mm"), &[0, 7, 14])
+    named("torus", &sliced(Sample::Torus, 5_000, "--dpi 100 --thickness 1mm"), &[0, 7, 14])
 }
 
 fn cube() -> Images {
-    named("cube", &sliced(Part::Cube, 200, "--dpi 100 --thickness 1mm"), &[10])
+    named("cube", &sliced(Sample::Cube, 200, "--dpi 100 --thickness 1mm"), &[10])
 }
 
 /// Two balls that overlap: what the two rules of filling make of them.
@@ -99,7 +99,7 @@ fn broken() -> Images {
 /// Copies on a build area, the last row not full.
 fn tiled() -> Images {
     let scratch = Scratch::new();
-    scratch.part("torus.stl", Part::Torus, 2_000);
+    scratch.part("torus.stl", Sample::Torus, 2_000);
     let line = "slice torus.stl --dpi 60 --thickness 1mm --layers 7 | fix | dither \
                 | tile --mesh none --area 220x150mm --copies 5 --gap 2mm";
     named("tiled", &read_stack(scratch.run(line).succeeds_quietly().stdout), &[7])

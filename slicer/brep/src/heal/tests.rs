@@ -6,7 +6,7 @@ use super::*;
 use crate::gate::{BodyReport, check};
 use crate::kernel::Kernel;
 use crate::step::StepModel;
-use lamp_fixtures::{SplitMix, StepPart, StepUnit, step};
+use lamp_fixtures::{SplitMix, StepSample, StepUnit, step};
 
 /// How a model is torn apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,7 +96,7 @@ fn is_healed(read: impl Fn() -> StepModel, name: &str, chord_mm: f64) {
 
 #[test]
 fn parts_that_are_torn_apart_are_whole_again() {
-    for part in StepPart::ALL {
+    for part in StepSample::ALL {
         let text = step(part, StepUnit::Inch);
         is_healed(|| StepModel::read(text.as_bytes()).unwrap(), &format!("{part:?}"), 0.02);
     }

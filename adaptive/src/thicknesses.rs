@@ -11,12 +11,12 @@ const MOST_THICKNESSES: f64 = 10_000.0;
 
 /// Thicknesses that a machine builds: whole steps between limits.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Machine {
+pub struct Thicknesses {
     step_um: f64,
     steps: RangeInclusive<usize>,
 }
 
-impl Machine {
+impl Thicknesses {
     /// A machine that builds layers from `min` to `max`, in whole steps.
     ///
     /// # Errors
@@ -79,53 +79,53 @@ impl Machine {
 mod tests {
     use super::*;
 
-    fn machine(min: f64, max: f64, step: f64) -> Result<Machine, HeightsError> {
+    fn thicknesses(min: f64, max: f64, step: f64) -> Result<Thicknesses, HeightsError> {
         let [min, max, step] = [min, max, step].map(Length::from_um);
-        Machine::new(min, max, step)
+        Thicknesses::new(min, max, step)
     }
 
     #[test]
     fn thicknesses_are_whole_steps() {
-        assert_eq!(machine(25.0, 100.0, 1.0).unwrap().steps(), 25..=100);
-        assert_eq!(machine(25.4, 2540.0, 25.4).unwrap().steps(), 1..=100);
-        assert_eq!(machine(30.0, 100.0, 20.0).unwrap().steps(), 2..=5);
+        assert_eq!(thicknesses(25.0, 100.0, 1.0).unwrap().steps(), 25..=100);
+        assert_eq!(thicknesses(25.4, 2540.0, 25.4).unwrap().steps(), 1..=100);
+        assert_eq!(thicknesses(30.0, 100.0, 20.0).unwrap().steps(), 2..=5);
         for (min, max, step) in
             [(50.0, 25.0, 1.0), (41.0, 59.0, 20.0), (1.0, 2.0, 0.0), (f64::NAN, 9.0, 1.0)]
         {
-            assert!(machine(min, max, step).is_err(), "{min} {max} {step}");
+            assert!(thicknesses(min, max, step).is_err(), "{min} {max} {step}");
         }
-        assert!(matches!(machine(1.0, 1e6, 1.0), Err(HeightsError::TooManySteps { .. })));
+        assert!(matches!(thicknesses(1.0, 1e6, 1.0), Err(HeightsError::TooManySteps { .. })));
     }
 
     #[test]
     fn layers_leave_room_for_the_rest() {
-        let machine = machine(3.0, 10.0, 1.0).unwrap();
-        assert_eq!(machine.choices(0, &[100]), (3..=10).collect::<Vec<_>>());
+        let thicknesses = thicknesses(3.0, 10.0, 1.0).unwrap();
+        assert_eq!(thicknesses.choices(0, &[100]), (3..=10).collect::<Vec<_>>());
         // Two steps could not be filled.
-        assert_eq!(machine.choices(0, &[12]), [3, 4, 5, 6, 7, 8, 9]);
-        assert_eq!(machine.choices(0, &[7]), [3, 4, 7]);
-        assert_eq!(machine.choices(0, &[5]), [5]);
+        assert_eq!(thicknesses.choices(0, &[12]), [3, 4, 5, 6, 7, 8, 9]);
+        assert_eq!(thicknesses.choices(0, &[7]), [3, 4, 7]);
+        assert_eq!(thicknesses.choices(0, &[5]), [5]);
         // The first end cannot be reached, the second can.
-        assert_eq!(machine.choices(10, &[5, 10, 12, 15]), [5]);
-        assert_eq!(machine.choices(10, &[12, 100]), (3..=10).collect::<Vec<_>>());
-        assert_eq!(machine.choices(10, &[12]), [3]);
-        assert_eq!(machine.choices(10, &[]), (3..=10).collect::<Vec<_>>());
+        assert_eq!(thicknesses.choices(10, &[5, 10, 12, 15]), [5]);
+        assert_eq!(thicknesses.choices(10, &[12, 100]), (3..=10).collect::<Vec<_>>());
+        assert_eq!(thicknesses.choices(10, &[12]), [3]);
+        assert_eq!(thicknesses.choices(10, &[]), (3..=10).collect::<Vec<_>>());
     }
 
     #[test]
     fn layers_pass_the_last_end_by_as_little_as_can_be() {
-        let machine = machine(60.0, 100.0, 1.0).unwrap();
+        let thicknesses = thicknesses(60.0, 100.0, 1.0).unwrap();
         // Two of 60 are nearer to 110 than one of 100 and one of 60.
-        assert_eq!(machine.choices(0, &[110]), [60]);
-        assert_eq!(machine.choices(60, &[110]), [60]);
-        assert_eq!(machine.choices(0, &[119]), [60]);
-        assert_eq!(machine.choices(0, &[50, 110]), [60]);
+        assert_eq!(thicknesses.choices(0, &[110]), [60]);
+        assert_eq!(thicknesses.choices(60, &[110]), [60]);
+        assert_eq!(thicknesses.choices(0, &[119]), [60]);
+        assert_eq!(thicknesses.choices(0, &[50, 110]), [60]);
     }
 
     #[test]
     fn narrow_limits_leave_gaps() {
-        let machine = machine(6.0, 10.0, 1.0).unwrap();
-        assert!(!machine.can_fill(11) && machine.can_fill(12) && machine.can_fill(0));
-        assert_eq!(machine.choices(0, &[17]), [7, 8, 9, 10]);
+        let thicknesses = thicknesses(6.0, 10.0, 1.0).unwrap();
+        assert!(!thicknesses.can_fill(11) && thicknesses.can_fill(12) && thicknesses.can_fill(0));
+        assert_eq!(thicknesses.choices(0, &[17]), [7, 8, 9, 10]);
     }
 }

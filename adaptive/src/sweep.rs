@@ -7,7 +7,7 @@
 
 use lamp_slicer::Fill;
 
-use crate::profile::{Line, Profile};
+use crate::profile::{Profile, SurfaceLine};
 
 /// Where the row's bottom line, at the layer's bottom, passes the part's surface.
 #[derive(Clone, Copy, Debug, Default)]
@@ -144,9 +144,9 @@ impl Sweep {
             let sign = if inside { 1.0 } else { -1.0 };
             within = [within[0] + sign * heights[0], within[1] + sign * heights[1]];
             profile.add(if inside {
-                Line { heights, width: -width, lost: unlike, gained: before }
+                SurfaceLine { heights, width: -width, lost: unlike, gained: before }
             } else {
-                Line { heights, width, lost: before, gained: unlike }
+                SurfaceLine { heights, width, lost: before, gained: unlike }
             });
             inside = !inside;
         }

@@ -4,20 +4,20 @@ use lamp_slicer::{LayerHeights, SliceError};
 
 use crate::criterion::Criterion;
 use crate::error::HeightsError;
-use crate::machine::Machine;
-use crate::part::Part;
+use crate::layered_part::LayeredPart;
 use crate::slab::Slab;
+use crate::thicknesses::Thicknesses;
 
 /// More than any machine builds.
 const MOST_LAYERS: f64 = 1e6;
 
 /// How heights are searched for.
 #[derive(Debug)]
-pub struct Search<'a> {
+pub struct HeightSearch<'a> {
     /// The part.
-    pub part: &'a Part,
-    /// The machine.
-    pub machine: &'a Machine,
+    pub part: &'a LayeredPart,
+    /// The thicknesses that the machine builds.
+    pub thicknesses: &'a Thicknesses,
     /// The measure of how far a layer is off.
     pub criterion: &'a dyn Criterion,
     /// Whether layers end at flat faces.
@@ -35,7 +35,7 @@ pub struct Heights {
 }
 
 impl Heights {
-    fn of(part: &Part, slabs: Vec<Slab>) -> Self {
+    fn of(part: &LayeredPart, slabs: Vec<Slab>) -> Self {
         let (end_um, top_um) = (slabs.last().map_or(0.0, Slab::top_um), part.heights_um()[1]);
         let is_left = !slabs.is_empty() && end_um < top_um;
         let unbuilt_mm3 =
@@ -81,7 +81,7 @@ impl Budget<'_> {
 /// Up to this share of the thickest layer, a look at lower tops alone costs less.
 const NEAR: f64 = 0.6;
 
-impl Search<'_> {
+impl HeightSearch<'_> {
     /// Finds the layers from the bottom: each the thickest whose measure is at most
     /// `bound`, or the thinnest where none is. They end at the part's top, rounded to
     /// whole steps.
@@ -106,10 +106,10 @@ impl Search<'_> {
         budget: Option<Budget<'_>>,
     ) -> Result<Option<Heights>, HeightsError> {
         let [bottom_um, top_um] = self.part.heights_um();
-        let step_um = self.machine.step_um();
+        let step_um = self.thicknesses.step_um();
         let at = |step: usize| bottom_um + step as f64 * step_um;
         let end = ((top_um - bottom_um) / step_um).round().max(1.0);
-        if end / *self.machine.steps().start() as f64 > MOST_LAYERS {
+        if end / *self.thicknesses.steps().start() as f64 > MOST_LAYERS {
             return Err(HeightsError::TooHigh { height_mm: (top_um - bottom_um) / 1000.0 });
         }
         let end = end as usize;
@@ -117,7 +117,7 @@ impl Search<'_> {
         let (mut step, mut spent, mut slabs) = (0, 0.0, Vec::new());
         let mut last_um = f64::INFINITY;
         while step < end {
-            let choices = self.machine.choices(step, &ends);
+            let choices = self.thicknesses.choices(step, &ends);
             let tops: Vec<f64> = choices.iter().map(|choice| at(step + choice)).collect();
             let found = self.slabs(at(step), &tops, last_um, bound);
             let chosen = self.choose(&found, bound, budget);
@@ -167,7 +167,7 @@ impl Search<'_> {
     /// top that no layer fits between are left out.
     fn ends(&self, end: usize) -> Vec<usize> {
         let bottom_um = self.part.heights_um()[0];
-        let step_um = self.machine.step_um();
+        let step_um = self.thicknesses.step_um();
         let mut ends = vec![end];
         if self.snap {
             for face in self.part.flat_faces_um() {
@@ -176,7 +176,7 @@ impl Search<'_> {
                 ends.push(steps.saturating_sub(usize::from(is_above)));
             }
         }
-        ends.retain(|step| (1..=end).contains(step) && self.machine.can_fill(end - step));
+        ends.retain(|step| (1..=end).contains(step) && self.thicknesses.can_fill(end - step));
         ends.sort_unstable();
         ends.dedup();
         ends
@@ -187,7 +187,7 @@ impl Search<'_> {
 ///
 /// # Errors
 /// Where the layers would be too many, or have no thickness.
-pub fn uniform_heights(part: &Part, thickness_um: f64) -> Result<Heights, HeightsError> {
+pub fn uniform_heights(part: &LayeredPart, thickness_um: f64) -> Result<Heights, HeightsError> {
     let [bottom_um, top_um] = part.heights_um();
     let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
     // Written so that a thickness of NaN or below zero fails, too.

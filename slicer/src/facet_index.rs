@@ -13,7 +13,7 @@ use crate::survey::Survey;
 /// A part in its place, of which the facets between two heights are found
 /// without a look at the others. It takes about 45 bytes a facet.
 #[derive(Debug)]
-pub struct Body {
+pub struct FacetIndex {
     model: PlacedModel,
     bins: HeightBins,
     /// By the bin in which they begin.
@@ -60,7 +60,7 @@ impl HeightBins {
     }
 }
 
-impl Body {
+impl FacetIndex {
     /// Reads a part into memory.
     ///
     /// # Errors
@@ -139,7 +139,7 @@ mod tests {
         facets.push([[0.0, 0.0, -5.0], [1.0, 0.0, 80.0], [0.0, 1.0, 80.0]]);
         for placement in [Placement::default(), Placement::default().rotated(Axis::X, 90.0)] {
             let model = Model::from_facets("tower", facets.clone());
-            let body = Body::new(model, &placement, Units::Millimetres).unwrap();
+            let body = FacetIndex::new(model, &placement, Units::Millimetres).unwrap();
             let (min, max) = (body.min()[2], body.max()[2]);
             let mut all = Vec::new();
             body.for_each(|facet| all.push(*facet));
@@ -166,7 +166,7 @@ mod tests {
     fn a_flat_part_is_one_bin() {
         let flat = vec![[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]];
         let model = Model::from_facets("flat", flat);
-        let body = Body::new(model, &Placement::default(), Units::Inches).unwrap();
+        let body = FacetIndex::new(model, &Placement::default(), Units::Inches).unwrap();
         assert_eq!(body.between(25_399.0, 25_500.0).len(), 1);
         assert!(body.between(25_400.0, 25_500.0).is_empty());
     }

@@ -3,15 +3,15 @@
 use std::ops::Range;
 
 use lamp_slicer::scan::RowFacet;
-use lamp_slicer::{Body, Fill, PlacedFacet};
+use lamp_slicer::{FacetIndex, Fill, PlacedFacet};
 use lamp_stack::{Grouped, Length};
 use rayon::prelude::*;
 
-use crate::cut::Cuts;
 use crate::error::HeightsError;
 use crate::profile::{Change, Profile};
-use crate::row::{Slope, Sweep, Toggle};
+use crate::row_cuts::Cuts;
 use crate::slab::{Slab, Slabs};
+use crate::sweep::{Slope, Sweep, Toggle};
 
 /// Rows are worked on in so many stripes, whatever the threads, so that sums do
 /// not depend on them.
@@ -44,19 +44,19 @@ impl Rows {
 /// Volumes are exact along x and z, as far as the facets tell; along y they are
 /// sums over rows, as images are.
 #[derive(Debug)]
-pub struct Part {
-    body: Body,
+pub struct LayeredPart {
+    body: FacetIndex,
     rows: Rows,
     fill: Fill,
 }
 
-impl Part {
+impl LayeredPart {
     /// A part seen along rows that are `pitch` apart, the first of which is half a
     /// pitch below the part's greatest y. What lies between two rows is not seen.
     ///
     /// # Errors
     /// Where there would be more rows than any image has.
-    pub fn new(body: Body, pitch: Length, fill: Fill) -> Result<Self, HeightsError> {
+    pub fn new(body: FacetIndex, pitch: Length, fill: Fill) -> Result<Self, HeightsError> {
         let height_mm = body.max()[1] - body.min()[1];
         let count = (height_mm / pitch.mm()).ceil().max(1.0);
         // Written so that a pitch of NaN or zero fails, too.

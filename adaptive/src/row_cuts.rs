@@ -5,7 +5,7 @@
 
 use lamp_slicer::scan::RowFacet;
 
-use crate::row::{Slope, Toggle};
+use crate::sweep::{Slope, Toggle};
 
 /// What rows see of facets.
 #[derive(Debug, Default)]
