@@ -268,6 +268,7 @@ fn rows_are_not_too_near() {
         &Placement::default(),
         Units::Millimetres,
     );
-    let error = LayeredPart::new(facets.unwrap(), Length::from_um(1e-4), Fill::EvenOdd).unwrap_err();
+    let error =
+        LayeredPart::new(facets.unwrap(), Length::from_um(1e-4), Fill::EvenOdd).unwrap_err();
     assert_eq!(error.to_string(), "rows 0.0001 um apart are more than 2^24");
 }
