@@ -49,6 +49,7 @@ mod temporary;
 #[cfg(test)]
 mod testing;
 mod text;
+mod threshold;
 mod tiff;
 
 pub use catalogue::{Builtin, CatalogueError, Catalogued, nonempty_text};

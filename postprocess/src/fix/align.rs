@@ -1,20 +1,20 @@
-//! Which crossings of one row belong to which of another.
+//! Matching of the crossings of two rows that lie on the same contours.
 
-/// How far from the diagonal a path may stray, in crossings, beyond the
-/// difference of the rows' numbers.
+/// The crossings by which a path may stray from the diagonal, beyond the difference of the
+/// rows' numbers. Between rows of a part few contours end or begin at once.
 const REACH: isize = 16;
-/// Rows that take more steps than that are not followed: no part looks so.
+/// Steps of the longest search. Rows that take more are not matched: no part has such rows.
 const MAX_STEPS: usize = 1 << 22;
-/// What it costs, in pixels, that a contour closes, besides its width.
+/// The cost of a contour that closes, in pixels, in addition to its width.
 const CLOSING: f64 = 2.0;
 
-/// Gives for each crossing of `a` the one of `b` on the same contour. Both are
-/// sorted and of even number.
+/// Returns the crossing of `b` on the same contour for each crossing of `a`, if there is one.
+/// Both are sorted and even in number.
 ///
-/// Crossings keep their order and their direction: what has no partner does
-/// so in pairs of neighbours, the two sides of a contour that ends or begins
-/// between the rows. Of all such ways the cheapest is taken: partners cost
-/// their distance, pairs without a partner their width.
+/// Crossings keep their order and direction, so those without a partner come in neighbouring
+/// pairs: the two sides of a contour that ends or begins between the rows. Of all such matchings
+/// this is the cheapest, by dynamic programming: partners cost their distance, pairs without a
+/// partner their width.
 pub(crate) fn align(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
     if a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 2.0) {
         return (0..a.len()).map(Some).collect();
@@ -25,7 +25,8 @@ pub(crate) fn align(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
     if (a.len() + 1).saturating_mul(stride) > MAX_STEPS {
         return vec![None; a.len()];
     }
-    // cost[i][j - i - low]: the cheapest way to account for i and j crossings.
+    // cost[i][j - i - low]: the cheapest matching of the first i and j crossings. Only a strip
+    // along the diagonal is kept, as rows may have thousands of crossings.
     let mut cost = vec![f64::INFINITY; (a.len() + 1) * stride];
     let at = |i: usize, j: usize| {
         let column = j as isize - i as isize - low;

@@ -1,53 +1,52 @@
-//! What is found and done: bands of stray rows.
+//! Bands of stray rows: how each was found, and what was done about it.
 
 use std::ops::Range;
 
 /// A band of neighbouring stray rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Band {
-    /// The band's first row, from the top.
+    /// The first row, counted from the top of the image.
     pub first_row: u32,
-    /// How many rows it has.
+    /// The number of rows.
     pub rows: u32,
-    /// How it was found.
+    /// The ways in which it was found.
     pub kinds: BandKinds,
-    /// The columns that the correction changes; of a band that is left, those
-    /// that it would change. Empty where no correction is known.
+    /// The columns that the correction changes, or would change if the band is left. Empty if
+    /// no correction is known.
     pub columns: Range<u32>,
-    /// Where the crossings were missed: the columns of those that the
-    /// correction adds. This is where the mesh has its gap.
+    /// The columns in which crossings are added. This is where the mesh has its gap.
     pub gap: Option<Range<u32>>,
-    /// How many pixels change, or would.
+    /// The number of pixels that change, or would change.
     pub pixels: u64,
-    /// How sure the correction is, from 0 to 1.
+    /// The confidence in the correction, from 0 to 1.
     pub confidence: f64,
-    /// What was done.
+    /// The action taken.
     pub outcome: BandOutcome,
 }
 
 impl Band {
-    /// The row behind the last.
+    /// Returns the row after the last.
     pub fn end(&self) -> u32 {
         self.first_row + self.rows
     }
 }
 
-/// What was done about a band.
+/// The action taken on a band.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BandOutcome {
     /// It was corrected.
     Corrected,
-    /// It was left: it has more rows than allowed.
+    /// It was left because it has more rows than allowed.
     TooWide,
-    /// It was left: its correction is not sure enough.
+    /// It was left because the confidence in its correction is too low.
     Doubtful,
 }
 
-/// How a band was found, and what is particular about it: a set of [`BandKind`].
+/// A set of [`BandKind`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BandKinds(u8);
 
-/// A way in which rows are stray.
+/// A way in which a band was found, or something particular about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BandKind {
     /// The row ends white, though every part leaves the last column black
@@ -55,60 +54,42 @@ pub enum BandKind {
     EndsWhite,
     /// The slicer found that the row's crossings do not balance.
     Unbalanced,
-    /// The row ends black, but lacks two contours, or four, that cross the
-    /// rows above and below: two crossings were missed.
+    /// The row ends black, but lacks two or four contours that cross the rows above and below.
     Paired,
-    /// A run one row high, between pixels of the other colour above and below
-    /// (002 section 2.4.1, the first algorithm), which the layers below and
-    /// above do not have either.
+    /// A run one row high between pixels of the other colour above and below (002 section
+    /// 2.4.1, the first algorithm), which the layers below and above do not have either.
     Sliver,
-    /// The band reaches the image's first or last row, so that only one side
-    /// shows what belongs there.
+    /// The band reaches the image's first or last row: good rows are on one side only.
     AtEdge,
-    /// Bands of different gaps touch: neighbouring rows lack different contours.
+    /// Neighbouring rows lack different contours: the bands of two gaps touch.
     Touching,
 }
 
-impl BandKind {
-    /// All kinds.
-    pub const ALL: [Self; 6] = [
-        Self::EndsWhite,
-        Self::Unbalanced,
-        Self::Paired,
-        Self::Sliver,
-        Self::AtEdge,
-        Self::Touching,
-    ];
-
-    /// Its name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::EndsWhite => "ends white",
-            Self::Unbalanced => "unbalanced",
-            Self::Paired => "paired",
-            Self::Sliver => "sliver",
-            Self::AtEdge => "at edge",
-            Self::Touching => "touching",
-        }
-    }
-}
+lamp_stack::named!(BandKind {
+    EndsWhite = "ends white",
+    Unbalanced = "unbalanced",
+    Paired = "paired",
+    Sliver = "sliver",
+    AtEdge = "at edge",
+    Touching = "touching",
+});
 
 impl BandKinds {
-    /// No kind: a good row.
+    /// The empty set, of a good row.
     pub const NONE: Self = Self(0);
     pub(super) const ENDS_WHITE: Self = Self(1 << BandKind::EndsWhite as u8);
 
-    /// Whether there is none.
+    /// Returns whether the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether a kind is among them.
+    /// Returns whether the set has a kind.
     pub fn contains(self, kind: BandKind) -> bool {
         self.0 & 1 << kind as u8 != 0
     }
 
-    /// The kinds, in the order of [`BandKind::ALL`].
+    /// Returns the kinds in the order of [`BandKind::ALL`].
     pub fn iter(self) -> impl Iterator<Item = BandKind> {
         BandKind::ALL.into_iter().filter(move |&kind| self.contains(kind))
     }

@@ -1,23 +1,22 @@
-//! Rows out of rows, pixel by pixel, on their transitions.
+//! Rows combined pixel by pixel, on their transitions.
 
 use lamp_stack::{Op, combine_rows, white_in_row};
 
-/// The row whose every pixel has the colour that at least two of three rows
-/// have there.
+/// Returns the row whose pixels have the colour of at least two of three rows.
 pub(super) fn majority(rows: [&[u32]; 3]) -> Vec<u32> {
     let mut out = Vec::new();
     combine_rows(rows, |[a, b, c]| a & b | b & c | a & c, &mut out);
     out
 }
 
-/// The row that is white where two rows differ.
+/// Returns the row that is white where two rows differ.
 pub(super) fn difference(a: &[u32], b: &[u32]) -> Vec<u32> {
     let mut out = Vec::new();
     Op::Xor.rows(a, b, &mut out);
     out
 }
 
-/// How many pixels are white in both of two rows.
+/// Counts the pixels that are white in both of two rows.
 pub(super) fn white_in_both(a: &[u32], b: &[u32], width: u32) -> u64 {
     let mut out = Vec::new();
     Op::Intersect.rows(a, b, &mut out);

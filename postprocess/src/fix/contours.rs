@@ -1,5 +1,4 @@
-//! The contours that cross a band of stray rows, and where in its rows they
-//! should cross.
+//! The contours around a band of stray rows, and where they should cross its rows.
 //!
 //! Source: 002 section 2.4.1 and figure 29c: C1 cubic Hermite curves through
 //! the crossings of the good rows on both sides.
@@ -11,23 +10,23 @@ use lamp_stack::Mask;
 use super::align::align;
 use super::polynomial::{hermite, parabola, slope};
 
-/// So many good rows on each side show where a contour is going.
+/// The number of good rows on each side that show where a contour is going.
 pub(super) const DEPTH: u32 = 12;
 
-/// A contour that ends in the band is likely to be there still where it should
-/// be so many pixels wide at least.
-const CLEARLY_OPEN: f64 = 8.0;
+/// The expected width in pixels from which on a contour that ends in the band is likely to be
+/// there still.
+const MIN_LIKELY_WIDTH: f64 = 8.0;
 
 /// A crossing that a row of the band should have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Expected {
-    /// The column, as transitions are counted, not rounded.
+    /// The column, counted as transitions are, not rounded.
     pub(super) column: f64,
-    /// How far off that may be, in pixels.
+    /// The error that the column may have, in pixels.
     pub(super) slack: f64,
-    /// The contour, and which of its sides.
+    /// The line that it lies on.
     pub(super) side: LineId,
-    /// Whether it must be there: the contour crosses the whole band.
+    /// Whether it must be there, as the contour crosses the whole band.
     pub(super) through: bool,
     /// Whether it is more likely there than not.
     pub(super) likely: bool,
@@ -35,60 +34,59 @@ pub(super) struct Expected {
     pub(super) may_be_missed: bool,
 }
 
-/// One of the lines that make up the contours.
+/// A line: a contour that crosses the band, or one side of a contour that ends in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct LineId {
     contour: usize,
     right: bool,
 }
 
-/// What a row of the band should look like.
+/// The crossings that a row of the band should have.
 #[derive(Debug, Default)]
 pub(super) struct Outlook {
     /// The crossings, from the left.
     pub(super) crossings: Vec<Expected>,
-    /// Where contours end or begin somewhere in the band, so that nobody knows
-    /// the colour in this row: from the left, apart from each other.
+    /// Columns whose colour in this row is unknown, as a contour ends or begins there in the
+    /// band: from the left, without overlap.
     pub(super) unknown: Vec<Range<f64>>,
 }
 
 /// The contours that cross a band or end in it.
 #[derive(Debug)]
 pub(super) struct Contours {
-    /// The rows that are looked at: the band and good rows around it.
+    /// The band and the good rows around it.
     rows: Range<u32>,
     band: Range<u32>,
-    /// How many good rows there are beside it, on the side that has fewer.
+    /// The number of good rows beside it, on the side that has fewer.
     pub(super) good_rows: usize,
     contours: Vec<Contour>,
 }
 
-/// Where a line is known to cross the rows looked at.
+/// The columns at which a line is known to cross the rows.
 type KnownColumns = Vec<Option<f64>>;
 
-/// Where a line should cross a row, and how far off that may be.
+/// The column at which a line should cross a row, and the error that it may have.
 type Guess = (f64, f64);
 
 #[derive(Debug)]
 struct Contour {
     course: ContourPath,
-    /// Where its lines, one or two, should cross each row of the band.
+    /// The crossings of its one or two lines with each row of the band.
     guesses: Vec<Vec<Guess>>,
 }
 
 #[derive(Debug)]
 enum ContourPath {
-    /// It crosses the band from the good row above to the one below, or from
-    /// one of them to the image's edge.
+    /// Crosses the band from the good row above to the one below, or from one of them to the
+    /// image's edge.
     Through(KnownColumns),
-    /// Both sides of a contour that comes from above, or from below, and ends
-    /// in the band.
+    /// Comes from above or below and ends in the band: both sides of the contour.
     Closing { sides: [KnownColumns; 2], from_above: bool },
 }
 
 impl Contours {
-    /// Follows the contours around a band of rows; `is_good` tells rows that
-    /// can be relied on. `None` where the band has no good row beside it.
+    /// Follows the contours around a band, through rows that are good. Returns `None` if no good
+    /// row lies beside the band.
     pub(super) fn around(
         mask: &Mask,
         band: Range<u32>,
@@ -99,7 +97,7 @@ impl Contours {
         let above: Vec<_> =
             (rows.start..band.start).rev().take_while(|&row| is_good(row)).collect();
         let below: Vec<_> = (band.end..rows.end).take_while(|&row| is_good(row)).collect();
-        // Beyond the image's edge all is black and good.
+        // Beyond the image's edge all rows are black and good.
         let to_edge = [above.last() == Some(&0), below.last() == Some(&(mask.height() - 1))];
         let good_rows = [&above, &below]
             .into_iter()
@@ -119,22 +117,23 @@ impl Contours {
         Some(contours)
     }
 
-    /// Joins the lines that cross the band; what is left comes in pairs.
+    /// Joins the lines above and below the band. Lines without a partner come in pairs, the two
+    /// sides of a contour that ends in the band.
     fn join(&mut self, above: &[LinePoints], below: &[LinePoints]) {
         let ahead = f64::from(self.band.end - self.band.start + 1);
-        let reach = |lines: &[LinePoints], rows: f64| -> Vec<f64> {
+        let extended = |lines: &[LinePoints], rows: f64| -> Vec<f64> {
             let mut columns: Vec<f64> = lines
                 .iter()
                 .map(|line| line[0].1 + rows * slope(line).clamp(-20.0, 20.0))
                 .collect();
-            // Lines do not pass each other.
+            // Contours do not cross, so their order must stay.
             for i in 1..columns.len() {
                 columns[i] = columns[i].max(columns[i - 1]);
             }
             columns
         };
-        // Halfway, so that both sides have their say.
-        let partners = align(&reach(above, ahead / 2.0), &reach(below, -ahead / 2.0));
+        // Both sides are extended to the band's middle, where their errors are alike.
+        let partners = align(&extended(above, ahead / 2.0), &extended(below, -ahead / 2.0));
         let mut joined = vec![false; below.len()];
         let mut pairs = Vec::new();
         for (line, partner) in above.iter().zip(&partners) {
@@ -155,6 +154,7 @@ impl Contours {
         }
     }
 
+    /// Returns the crossings of some lines by row.
     fn knots(&self, lines: &[&LinePoints]) -> KnownColumns {
         let mut knots = vec![None; (self.rows.end - self.rows.start) as usize];
         for &(row, column) in lines.iter().copied().flatten() {
@@ -167,8 +167,7 @@ impl Contours {
         self.contours.push(Contour { course, guesses: Vec::new() });
     }
 
-    /// Notes that a line was found in a row of the band. [`Self::guess`] then
-    /// makes use of it.
+    /// Records that a row of the band crosses a line, for the next [`guess`](Self::guess).
     pub(super) fn found(&mut self, side: LineId, row: u32, column: u32) {
         let at = (row - self.rows.start) as usize;
         let knots = match &mut self.contours[side.contour].course {
@@ -178,8 +177,7 @@ impl Contours {
         knots[at] = Some(f64::from(column));
     }
 
-    /// Works out where the lines should cross the band's rows, from all that
-    /// is known by now.
+    /// Computes where the lines should cross the band's rows from all crossings known by now.
     pub(super) fn guess(&mut self) {
         let [start, end] =
             [self.band.start, self.band.end].map(|row| (row - self.rows.start) as usize);
@@ -194,20 +192,20 @@ impl Contours {
         }
     }
 
-    /// What a row of the band should look like.
+    /// Returns the crossings that a row of the band should have.
     pub(super) fn outlook(&self, row: u32) -> Outlook {
         let at = (row - self.band.start) as usize;
         let mut outlook = Outlook::default();
         for (contour, Contour { course, guesses }) in self.contours.iter().enumerate() {
             let through = matches!(course, ContourPath::Through(_));
-            let apart = match &guesses[..] {
+            let min_width = match &guesses[..] {
                 [left, right] => right[at].0 - left[at].0 - left[at].1 - right[at].1,
                 _ => f64::INFINITY,
             };
             for (line, guesses) in guesses.iter().enumerate() {
                 let (column, slack) = guesses[at];
                 let side = LineId { contour, right: line == 1 };
-                let likely = apart > CLEARLY_OPEN;
+                let likely = min_width > MIN_LIKELY_WIDTH;
                 outlook.crossings.push(Expected {
                     column,
                     slack,
@@ -222,13 +220,13 @@ impl Contours {
             }
         }
         outlook.crossings.sort_by(|a, b| a.column.total_cmp(&b.column));
-        outlook.unknown = apart(outlook.unknown);
+        outlook.unknown = merged(outlook.unknown);
         outlook
     }
 }
 
-/// Ranges in order, those that overlap as one.
-fn apart(mut ranges: Vec<Range<f64>>) -> Vec<Range<f64>> {
+/// Sorts ranges and merges those that overlap.
+fn merged(mut ranges: Vec<Range<f64>>) -> Vec<Range<f64>> {
     ranges.sort_by(|a, b| a.start.total_cmp(&b.start));
     ranges.dedup_by(|next, last| {
         let overlap = next.start <= last.end;
@@ -240,7 +238,7 @@ fn apart(mut ranges: Vec<Range<f64>>) -> Vec<Range<f64>> {
     ranges
 }
 
-/// Columns between which a contour that closes may be anywhere.
+/// Returns the columns between which a contour that ends in the band may lie.
 fn span(sides: &[KnownColumns; 2], now: [Guess; 2]) -> Range<f64> {
     let columns = || sides.iter().flatten().copied().flatten();
     let slack = now[0].1.max(now[1].1) + 2.0;
@@ -252,12 +250,12 @@ fn span(sides: &[KnownColumns; 2], now: [Guess; 2]) -> Range<f64> {
 /// A line's crossings, from the row beside the band outwards: (row, column).
 type LinePoints = Vec<(f64, f64)>;
 
-/// Follows every crossing of the first row through the others.
+/// Follows every crossing of the first row through the others, and returns the lines.
 fn follow(mask: &Mask, rows: &[u32]) -> Vec<LinePoints> {
     let columns = |row: u32| -> Vec<f64> { mask.row(row).iter().map(|&c| c.into()).collect() };
     let mut last = columns(rows[0]);
     let mut lines: Vec<LinePoints> = last.iter().map(|&c| vec![(rows[0].into(), c)]).collect();
-    // Which line each crossing of the last row is on.
+    // The line that each crossing of the last row lies on.
     let mut on: Vec<Option<usize>> = (0..lines.len()).map(Some).collect();
     for &row in &rows[1..] {
         if on.iter().all(Option::is_none) {
@@ -276,24 +274,24 @@ fn follow(mask: &Mask, rows: &[u32]) -> Vec<LinePoints> {
     lines
 }
 
-/// The known points from a row on, in steps of one row, without a gap.
+/// Returns the known points of rows up to the first unknown one.
 fn line_from(knots: &KnownColumns, rows: impl Iterator<Item = usize>) -> LinePoints {
     let point = |row: usize| Some((row as f64, knots[row]?));
     rows.map_while(point).take(DEPTH as usize).collect()
 }
 
-/// The line upwards of a row that is known.
+/// Returns a line from a known row upwards.
 fn above(knots: &KnownColumns, row: usize) -> LinePoints {
     line_from(knots, (0..=row).rev())
 }
 
-/// The line downwards of a row that is known.
+/// Returns a line from a known row downwards.
 fn below(knots: &KnownColumns, row: usize) -> LinePoints {
     line_from(knots, row..knots.len())
 }
 
-/// Where a line that crosses the band should cross its rows, and how far off
-/// that may be: where it is known, there; between, along a cubic.
+/// Returns where a line through the band should cross its rows: where it is known to, and along
+/// cubics in between.
 fn through(knots: &KnownColumns, rows: Range<usize>) -> Vec<Guess> {
     let mut guesses = Vec::with_capacity(rows.len());
     let mut row = rows.start;
@@ -305,8 +303,8 @@ fn through(knots: &KnownColumns, rows: Range<usize>) -> Vec<Guess> {
         }
         let next = (row..knots.len()).find(|&row| knots[row].is_some());
         let end = next.unwrap_or(rows.end).min(rows.end);
-        // The row before is known, if it is one of those looked at: else it
-        // would be unknown itself, and one with this.
+        // The row before is known, if there is one: each stretch of unknown rows is taken at
+        // once.
         let from = row.checked_sub(1).map(|row| above(knots, row)).filter(|line| !line.is_empty());
         let to = next.map(|row| below(knots, row));
         let curve = LineCurve::between(from, to);
@@ -316,7 +314,7 @@ fn through(knots: &KnownColumns, rows: Range<usize>) -> Vec<Guess> {
     guesses
 }
 
-/// The course of a line between rows where it is known.
+/// A line between rows where it is known.
 enum LineCurve {
     Between {
         from: (f64, f64),
@@ -324,7 +322,7 @@ enum LineCurve {
         to: (f64, f64),
         to_slope: f64,
     },
-    /// Known on one side only, it goes straight on.
+    /// Known on one side only: the line goes straight on.
     On {
         from: (f64, f64),
         slope: f64,
@@ -332,7 +330,7 @@ enum LineCurve {
 }
 
 impl LineCurve {
-    /// From one line to another; there is at least one.
+    /// Returns the curve between two lines, of which at least one is known.
     fn between(from: Option<LinePoints>, to: Option<LinePoints>) -> Self {
         match (from, to) {
             (Some(from), Some(to)) => Self::Between {
@@ -366,12 +364,11 @@ impl LineCurve {
     }
 }
 
-/// Where the two sides of a contour that ends in the band should cross its
-/// rows, and how far off that may be. Where it has ended by then, both lie
-/// where it did.
+/// Returns where the two sides of a contour that ends in the band should cross its rows. After
+/// its end both sides lie on its middle.
 ///
-/// The square of the width of a circle, an ellipse and a wedge alike is a
-/// polynomial of second degree along the rows; its middle goes on straight.
+/// The middle goes straight on. The square of the width is a polynomial of second degree along
+/// the rows, which is exact for circles, ellipses and wedges.
 fn closing(sides: &[KnownColumns; 2], rows: Range<usize>, from_above: bool) -> [Vec<Guess>; 2] {
     // The last row where both sides are known, on the way into the band.
     let both = |row: &usize| sides[0][*row].is_some() && sides[1][*row].is_some();

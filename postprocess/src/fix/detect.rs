@@ -1,4 +1,4 @@
-//! Which rows are stray.
+//! Detection of stray rows.
 
 use std::ops::Range;
 
@@ -9,36 +9,34 @@ use super::band::{BandKind, BandKinds};
 use super::combine::{difference, majority, white_in_both};
 use super::contours::{Contours, DEPTH};
 use super::mend::{DROP, mend};
-use super::outline::outline_row;
 
-/// Two crossings missed, or a sliver, show in a run of at least so many
-/// pixels: shorter ones may be the part's own.
+/// Pixels from which on a run counts as a sliver, or as wrong for lack of two crossings:
+/// shorter ones may be the part's own.
 const MIN_RUN: u32 = 16;
-/// Contours that were missed together, and in no row alone, are looked for in
-/// bands of at most so many rows.
+/// Rows of the widest band that is searched for contours missed in all its rows.
 const MAX_PAIRED_ROWS: u32 = 30;
-/// The search for paired rows ends where it has taken so many times what the
-/// layer has in rows and crossings: it is no part's section.
-const EFFORT: usize = 2;
-/// Where so large a share of the pixels of another layer agrees, it agrees.
-const AGREES: f64 = 0.9;
+/// Effort after which the search for paired rows ends, as a multiple of the layer's rows and
+/// crossings: no part's section takes more, but noise would take the square.
+const MAX_EFFORT: usize = 2;
+/// The share of pixels that must agree for a neighbouring layer to agree.
+const MIN_AGREEMENT: f64 = 0.9;
 
-/// A layer as it is looked at.
+/// What is known of a layer before its rows are corrected.
 pub(super) struct Scene<'a> {
-    /// The image's outlines.
+    /// The exposed pixels.
     pub(super) mask: &'a Mask,
-    /// The rows whose crossings did not balance, increasing.
+    /// The rows whose crossings did not balance when the layer was sliced, increasing.
     pub(super) unbalanced: &'a [u32],
-    /// The rows at which contours break off, increasing, where that is known.
+    /// The rows at which contours break off, increasing, if that is known.
     pub(super) open_rows: Option<&'a [u32]>,
-    /// The images of the layers below and above.
+    /// The images of the layers below and above, if they are there.
     pub(super) neighbours: [Option<&'a Image>; 2],
 }
 
-/// How stray each row of an image is.
+/// The stray rows of an image.
 pub(super) struct Strays {
     kinds: Vec<BandKinds>,
-    /// Rows that may be as they are: to be told of, but not corrected.
+    /// Rows that may be right as they are: to be reported, but not corrected.
     pub(super) doubtful: Vec<u32>,
 }
 
@@ -51,21 +49,21 @@ impl Strays {
         self.kinds[row as usize]
     }
 
-    /// Whether a row of the mask was ended by a later stage: it did not balance,
-    /// and yet it ends black.
+    /// Returns whether a later stage ended a row of the mask: it did not balance when it was
+    /// sliced, and yet it ends black.
     pub(super) fn is_ended(&self, mask: &Mask, row: u32) -> bool {
         self.kinds(row).contains(BandKind::Unbalanced) && mask.row(row).len().is_multiple_of(2)
     }
 
-    /// The bands of neighbouring stray rows, from the top.
+    /// Returns the bands of neighbouring stray rows, from the top.
     pub(super) fn bands(&self) -> Vec<Range<u32>> {
         runs((0..self.kinds.len() as u32).filter(|&row| !self.is_good(row)))
     }
 
-    fn mark(&mut self, rows: Range<u32>, kind: BandKind, believed: bool) {
+    fn mark(&mut self, rows: Range<u32>, kind: BandKind, is_certain: bool) {
         for row in rows {
             self.kinds[row as usize].insert(kind);
-            if !believed {
+            if !is_certain {
                 self.doubtful.push(row);
             }
         }
@@ -73,28 +71,31 @@ impl Strays {
 }
 
 impl Scene<'_> {
-    /// The stray rows; `None` where all are good, which takes one look at the
-    /// number of each row's transitions.
+    /// Finds the stray rows. Returns `None` if all rows are good, which for most layers takes
+    /// one look at the number of each row's transitions.
     ///
-    /// A row begins to miss crossings, and ceases to, only where a contour
-    /// breaks off. In a layer whose contours all close there is nothing to look
-    /// for but rows that end white.
+    /// A row begins and ceases to miss crossings only where a contour breaks off. If all
+    /// contours of a layer close, only rows that end white can be stray.
     pub(super) fn strays(&self, options: &FixOptions) -> Option<Strays> {
         let crossings: Vec<u32> = self.mask.rows().map(|row| row.len() as u32).collect();
         let parity = crossings.iter().fold(0, |any, crossings| any | crossings);
-        let whole = self.unbalanced.is_empty() && parity % 2 == 0;
-        let closed = self.open_rows.is_some_and(<[u32]>::is_empty);
-        if whole && closed {
+        let is_balanced = self.unbalanced.is_empty() && parity % 2 == 0;
+        let is_closed = self.open_rows.is_some_and(<[u32]>::is_empty);
+        if is_balanced && is_closed {
             return None;
         }
-        let kinds = crossings.iter().map(|&crossings| kinds_alone(crossings)).collect();
+        // Every part leaves the last column black (002 section 2.4.1, algorithm 10).
+        let alone = |crossings: &u32| {
+            if crossings.is_multiple_of(2) { BandKinds::NONE } else { BandKinds::ENDS_WHITE }
+        };
+        let kinds = crossings.iter().map(alone).collect();
         let mut strays = Strays { kinds, doubtful: Vec::new() };
         for &row in self.unbalanced {
             if let Some(kinds) = strays.kinds.get_mut(row as usize) {
                 kinds.insert(BandKind::Unbalanced);
             }
         }
-        if !closed {
+        if !is_closed {
             self.find_pairs(&mut strays, &crossings, options.max_width.min(MAX_PAIRED_ROWS));
             self.find_slivers(&mut strays, &crossings);
             strays.doubtful.sort_unstable();
@@ -102,11 +103,11 @@ impl Scene<'_> {
         strays.kinds.iter().any(|kinds| !kinds.is_empty()).then_some(strays)
     }
 
-    /// Finds rows that lack contours which cross good rows above and below.
+    /// Finds rows that lack contours which cross good rows above and below them.
     fn find_pairs(&self, strays: &mut Strays, crossings: &[u32], max_width: u32) {
-        let mut effort = EFFORT * (crossings.len() + self.mask.transition_count());
+        let mut effort = MAX_EFFORT * (crossings.len() + self.mask.transition_count());
         for row in 1..crossings.len() {
-            // Most rows have as many crossings as the one above.
+            // Most rows have as many crossings as the one above: nothing is missing there.
             if crossings[row] >= crossings[row - 1] && strays.kinds[row - 1].is_empty() {
                 continue;
             }
@@ -133,7 +134,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Marks the rows of a band that are stray though they end black.
+    /// Marks the rows of a band that are stray although they end black.
     fn check_pairs(&self, strays: &mut Strays, band: &Range<u32>) {
         let is_good = |row: u32| !band.contains(&row) && strays.is_good(row);
         let Some(contours) = Contours::around(self.mask, band.clone(), is_good) else { return };
@@ -148,8 +149,8 @@ impl Scene<'_> {
         for rows in runs(band.clone().filter(lacks_some)) {
             let touches = [rows.start.checked_sub(1), Some(rows.end)].into_iter().flatten();
             let beside_strays = touches.into_iter().any(|row| !strays.is_good(row));
-            let believed = match self.open_rows {
-                // All else is the part's own.
+            let is_certain = match self.open_rows {
+                // What is not between open rows is the part's own.
                 Some(open) if !is_between(open, &rows) => continue,
                 Some(_) => true,
                 None if beside_strays => true,
@@ -164,11 +165,11 @@ impl Scene<'_> {
                     false
                 }
             };
-            strays.mark(rows, BandKind::Paired, believed);
+            strays.mark(rows, BandKind::Paired, is_certain);
         }
     }
 
-    /// Finds rows with a run that no row or layer beside them has.
+    /// Finds rows with a run that neither the rows nor the layers beside them have.
     fn find_slivers(&self, strays: &mut Strays, crossings: &[u32]) {
         for (row, crossings) in (1..).zip(crossings.windows(3)) {
             if crossings[1] <= crossings[0] || crossings[1] <= crossings[2] {
@@ -178,45 +179,45 @@ impl Scene<'_> {
             if self.open_rows.is_some_and(|open| !is_between(open)) {
                 continue;
             }
-            let [above, had, below] = [row - 1, row, row + 1].map(|row| self.mask.row(row));
             if [row - 1, row, row + 1].iter().any(|&row| !strays.is_good(row)) {
                 continue;
             }
-            let without = without_slivers(had, above, below);
-            // A hole or a bar whose side just touches this plane looks the
-            // same, but the next layer shows more of it.
+            let had = self.mask.row(row);
+            let without = without_slivers(self.mask, row);
+            // A hole or a bar whose side just touches this plane looks the same, but the next
+            // layer shows more of it.
             if without != had && !self.is_in_another_layer(row, had, &without) {
                 strays.mark(row..row + 1, BandKind::Sliver, self.open_rows.is_some());
             }
         }
     }
 
-    /// Whether one of the layers beside this one has, where two versions of a
-    /// row differ, the colours of the first.
+    /// Returns whether a neighbouring layer has the colours of the first of two versions of a
+    /// row where they differ.
     fn is_in_another_layer(&self, row: u32, had: &[u32], mended: &[u32]) -> bool {
         let width = self.mask.width();
         let differ = difference(had, mended);
         let pixels = white_in_row(&differ, width) as f64;
         self.neighbours.into_iter().flatten().any(|image| {
-            let as_mended = difference(&outline_row(image, row), had);
+            let as_mended = difference(&image.exposed_row(row), had);
             let share = white_in_both(&differ, &as_mended, width) as f64 / pixels;
-            share <= 1.0 - AGREES
+            share <= 1.0 - MIN_AGREEMENT
         })
     }
 }
 
-/// Whether one of the increasing rows is in a band, or ends it.
+/// Returns whether one of the increasing rows is in a band or right behind it.
 fn any_in(open: &[u32], band: &Range<u32>) -> bool {
     let first = open.partition_point(|&row| row < band.start);
     open.get(first).is_some_and(|&row| row <= band.end)
 }
 
-/// Whether contours break off where rows begin and where they end.
+/// Returns whether contours break off both where rows begin and where they end.
 fn is_between(open: &[u32], rows: &Range<u32>) -> bool {
     open.binary_search(&rows.start).is_ok() && open.binary_search(&rows.end).is_ok()
 }
 
-/// The runs of neighbouring rows.
+/// Groups increasing rows into ranges without gaps.
 fn runs(rows: impl Iterator<Item = u32>) -> Vec<Range<u32>> {
     let mut runs: Vec<Range<u32>> = Vec::new();
     for row in rows {
@@ -228,26 +229,24 @@ fn runs(rows: impl Iterator<Item = u32>) -> Vec<Range<u32>> {
     runs
 }
 
-fn kinds_alone(crossings: u32) -> BandKinds {
-    if crossings.is_multiple_of(2) { BandKinds::NONE } else { BandKinds::ENDS_WHITE }
-}
-
-/// The row without its long runs that lie between pixels of the other colour
-/// above and below.
-pub(super) fn without_slivers(row: &[u32], above: &[u32], below: &[u32]) -> Vec<u32> {
-    let most = majority([above, row, below]);
-    let alone = difference(&most, row);
+/// Returns a row without its long runs that lie between pixels of the other colour above and
+/// below. The row must have neighbours on both sides.
+///
+/// Source: 002 section 2.4.1, the first algorithm.
+pub(super) fn without_slivers(mask: &Mask, row: u32) -> Vec<u32> {
+    let [above, row, below] = [row - 1, row, row + 1].map(|row| mask.row(row));
+    let alone = difference(&majority([above, row, below]), row);
     let is_own = |column: &u32| row.binary_search(column).is_ok();
-    let lies_between = |run: &[u32]| {
-        let crossed = |other: &[u32]| {
-            let at = other.partition_point(|&column| column <= run[0]);
-            other.get(at).is_some_and(|&column| column < run[1])
+    let is_between = |run: &[u32]| {
+        let crosses = |other: &[u32]| {
+            let next = other.partition_point(|&column| column <= run[0]);
+            other.get(next).is_some_and(|&column| column < run[1])
         };
-        is_own(&run[0]) && is_own(&run[1]) && !crossed(above) && !crossed(below)
+        run.iter().all(is_own) && !crosses(above) && !crosses(below)
     };
     let slivers: Vec<u32> = alone
         .chunks_exact(2)
-        .filter(|run| run[1] - run[0] >= MIN_RUN && lies_between(run))
+        .filter(|run| run[1] - run[0] >= MIN_RUN && is_between(run))
         .flatten()
         .copied()
         .collect();

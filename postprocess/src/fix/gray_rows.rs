@@ -1,25 +1,33 @@
-//! Gray rows along outlines that were put right.
+//! Levels of gray rows whose exposed pixels were corrected.
 
 use std::ops::Range;
 
 use lamp_stack::LevelChange;
 
-/// A gray row, and its outline.
+/// A gray row.
 pub(super) struct GrayRow<'a> {
     pub(super) levels: &'a [LevelChange],
-    pub(super) outline: &'a [u32],
+    /// The transitions of the pixels that are exposed at all.
+    pub(super) exposed: &'a [u32],
 }
 
-/// The runs of a gray row that has a new outline: (length, level).
+impl GrayRow<'_> {
+    /// Returns the exposed run whose left edge (0) or right edge (1) is the nearest to a column.
+    fn run_nearest(&self, edge: usize, column: u32) -> Option<Range<u32>> {
+        let runs = self.exposed.chunks_exact(2);
+        runs.min_by_key(|run| run[edge].abs_diff(column)).map(|run| run[0]..run[1])
+    }
+}
+
+/// Returns the runs of a gray row with new exposed pixels: (length, level).
 ///
-/// Along an edge that the row had, its levels stay. Along one that is new they
-/// are those of the good row `beside` along its nearest edge of that
-/// direction, up to full exposure or half its run. Where the row had nothing
-/// further in, it takes what the good row has there, or full exposure.
-pub(super) fn levels(had: &GrayRow<'_>, beside: &GrayRow<'_>, outline: &[u32]) -> Vec<(u32, u8)> {
+/// Along an edge that the row had, its levels stay. Along a new edge they are those of the good
+/// row `beside` along its nearest edge of that direction, up to full exposure or half its run.
+/// Further inside, pixels that were black take the good row's levels, or full exposure.
+pub(super) fn levels(had: &GrayRow<'_>, beside: &GrayRow<'_>, exposed: &[u32]) -> Vec<(u32, u8)> {
     let mut runs = Vec::new();
     let mut end = 0;
-    for run in outline.chunks_exact(2) {
+    for run in exposed.chunks_exact(2) {
         runs.push((run[0] - end, 0));
         white_run(had, beside, run[0]..run[1], &mut runs);
         end = run[1];
@@ -27,13 +35,13 @@ pub(super) fn levels(had: &GrayRow<'_>, beside: &GrayRow<'_>, outline: &[u32]) -
     runs
 }
 
-/// Adds the levels of a run of the outline.
+/// Adds the levels of an exposed run.
 fn white_run(had: &GrayRow<'_>, beside: &GrayRow<'_>, run: Range<u32>, runs: &mut Vec<(u32, u8)>) {
     let left = EdgeLevels::left(beside, run.start);
     let right = EdgeLevels::right(beside, run.end);
-    // An edge of the other direction had its levels on its other side.
+    // An edge of the other direction has its levels on its other side.
     let is_new = |column: u32, direction: usize| {
-        had.outline.binary_search(&column).map_or(true, |which| which % 2 != direction)
+        had.exposed.binary_search(&column).map_or(true, |which| which % 2 != direction)
     };
     let half = (run.end - run.start) / 2;
     let left_depth = if is_new(run.start, 0) { left.depth.min(half) } else { 0 };
@@ -65,33 +73,31 @@ struct EdgeLevels {
 impl EdgeLevels {
     const NONE: Self = Self { at: 0, depth: 0 };
 
-    /// Of the left edge nearest to a column.
+    /// Returns the levels along the left edge nearest to a column.
     fn left(row: &GrayRow<'_>, column: u32) -> Self {
-        let runs = row.outline.chunks_exact(2);
-        let Some(run) = runs.min_by_key(|run| run[0].abs_diff(column)) else { return Self::NONE };
-        let half = (run[1] - run[0]).div_ceil(2);
-        let gray = levels_in(row.levels, run[0]..run[0] + half).take_while(|run| run.1 < 255);
-        Self { at: run[0], depth: gray.map(|run| run.0).sum() }
+        let Some(run) = row.run_nearest(0, column) else { return Self::NONE };
+        let half = run.len().div_ceil(2) as u32;
+        let gray = levels_in(row.levels, run.start..run.start + half).take_while(|run| run.1 < 255);
+        Self { at: run.start, depth: gray.map(|run| run.0).sum() }
     }
 
-    /// Of the right edge nearest to a column.
+    /// Returns the levels along the right edge nearest to a column.
     fn right(row: &GrayRow<'_>, column: u32) -> Self {
-        let runs = row.outline.chunks_exact(2);
-        let Some(run) = runs.min_by_key(|run| run[1].abs_diff(column)) else { return Self::NONE };
-        let half = (run[1] - run[0]).div_ceil(2);
-        let runs: Vec<_> = levels_in(row.levels, run[1] - half..run[1]).collect();
+        let Some(run) = row.run_nearest(1, column) else { return Self::NONE };
+        let half = run.len().div_ceil(2) as u32;
+        let runs: Vec<_> = levels_in(row.levels, run.end - half..run.end).collect();
         let gray = runs.iter().rev().take_while(|run| run.1 < 255);
         let depth = gray.map(|run| run.0).sum();
-        Self { at: run[1] - depth, depth }
+        Self { at: run.end - depth, depth }
     }
 }
 
-/// The runs of a row between two columns: (length, level).
+/// Returns the runs of a row between two columns: (length, level).
 fn levels_in(row: &[LevelChange], columns: Range<u32>) -> impl Iterator<Item = (u32, u8)> {
     with_columns(row, columns).map(|(_, length, level)| (length, level))
 }
 
-/// The runs of a row between two columns: (column, length, level).
+/// Returns the runs of a row between two columns, black ones too: (column, length, level).
 fn with_columns(row: &[LevelChange], columns: Range<u32>) -> impl Iterator<Item = (u32, u32, u8)> {
     let mut next = row.partition_point(|change| change.column <= columns.start);
     let mut level = next.checked_sub(1).map_or(0, |last| row[last].level);

@@ -1,47 +1,48 @@
-//! Which crossings a stray row missed.
+//! Correction of one stray row, given the crossings that it should have.
 
 use std::ops::Range;
 
 use super::contours::{Expected, LineId, Outlook};
 
-/// What it costs, in wrong pixels, to add a crossing that must be there: as
-/// little as keeps a row that is right as it is.
+/// The cost, in wrong pixels, of adding a crossing that must be there. Above zero, so that a row
+/// that is right stays as it is.
 const ADD: u32 = 2;
-/// To add one of a contour that ends somewhere here.
+/// The cost of adding a crossing of a contour that ends somewhere in the band.
 const ADD_CLOSING: u32 = 4;
-/// To add one of a line that the row cannot have missed: no row is as wide.
+/// The cost of adding a crossing of a line that the row cannot have missed: more than a row has
+/// pixels.
 const ADD_CROSSED: u32 = 1 << 24;
-/// To drop a crossing that the row has. A gap in a mesh loses crossings; it
-/// makes none.
+/// The cost of dropping a crossing that the row has. It is high because a gap in a mesh loses
+/// crossings and makes none.
 pub(super) const DROP: u32 = 24;
-/// To drop one of a row that did not balance and yet ends black: `tile` ends
-/// what runs across where the copy's image ends.
+/// The cost of dropping a crossing of a row that did not balance and yet ends black: tiling ends
+/// a stray run where the copy's image ends, which makes a crossing.
 pub(super) const DROP_ENDED: u32 = 8;
-/// A crossing is taken for the one expected from so many pixels off, besides
-/// the expectation's own slack.
+/// The distance in pixels, in addition to the slack, at which a crossing still is the expected
+/// one.
 const NEAR: f64 = 1.5;
 
-/// A row of a band, put right.
+/// A corrected row of a band.
 #[derive(Debug, Default)]
 pub(super) struct Mended {
     /// Its transitions, even in number.
     pub(super) row: Vec<u32>,
-    /// Which lines it did cross, and where.
+    /// The expected lines that the row had crossed, and the columns.
     pub(super) found: Vec<(LineId, u32)>,
     /// The crossings that were added.
     pub(super) added: Vec<Expected>,
-    /// How many crossings were dropped.
+    /// The number of crossings that were dropped.
     pub(super) dropped: usize,
-    /// How many crossings of contours that end somewhere here, but hardly
-    /// before this row, were neither found nor added.
+    /// The number of likely crossings, of contours that end somewhere in the band but hardly
+    /// before this row, that were neither found nor added.
     pub(super) absent: usize,
-    /// How many pixels are known to be off what was expected, and how much
-    /// less than with the row as it was that is.
+    /// The number of pixels that differ from what is known to be expected.
     pub(super) off: u32,
+    /// How much smaller that number is than it was before the correction.
     pub(super) gain: u32,
 }
 
-/// Something at a column: a crossing that the row has, or might have.
+/// A crossing that the row has or should have.
 #[derive(Clone, Copy, Debug)]
 struct RowEvent {
     column: u32,
@@ -50,16 +51,16 @@ struct RowEvent {
 
 #[derive(Clone, Copy, Debug)]
 enum EventKind {
-    /// A crossing where one was expected.
+    /// A crossing that the row has and should have.
     Found { through: bool },
-    /// A crossing where none was, and what it costs to drop it.
+    /// A crossing that the row has and should not have, and the cost of dropping it.
     Extra { drop: u32 },
-    /// None where one was expected: that many of the outlook.
+    /// A crossing that the row should have, `which` in the outlook, and the cost of adding it.
     Missing { which: usize, through: bool, price: u32 },
 }
 
 impl RowEvent {
-    /// The prices of not crossing here, and of crossing.
+    /// Returns the costs of not crossing here and of crossing, if they are possible.
     fn prices(&self) -> [Option<u32>; 2] {
         match self.what {
             EventKind::Found { .. } => [None, Some(0)],
@@ -68,12 +69,12 @@ impl RowEvent {
         }
     }
 
-    /// Whether the row as it was crosses here.
+    /// Returns whether the row crossed here before its correction.
     fn was(&self) -> bool {
         !matches!(self.what, EventKind::Missing { .. })
     }
 
-    /// Whether the expected colour changes here.
+    /// Returns whether the expected colour changes here.
     fn is_expected(&self) -> bool {
         matches!(
             self.what,
@@ -82,9 +83,8 @@ impl RowEvent {
     }
 }
 
-/// Puts a row right: of all rows that keep the crossings where expected ones
-/// were found, and end black, the cheapest, where each wrong pixel costs one,
-/// and each crossing that is dropped costs `drop`.
+/// Corrects a row: returns the cheapest of all rows that end black and keep the crossings found
+/// where they were expected. Each wrong pixel costs one, each dropped crossing `drop`.
 pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> Mended {
     let (events, found) = events(row, outlook, width, drop);
     let pixels = wrong_pixels(&events, &outlook.unknown, width);
@@ -92,7 +92,7 @@ pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> Men
     let mut mended = Mended { found, ..Mended::default() };
     for (event, &crosses) in events.iter().zip(&crossings) {
         if crosses {
-            // Two at one column leave the colour as it is.
+            // Two crossings at one column leave the colour as it is.
             if mended.row.last() == Some(&event.column) {
                 mended.row.pop();
             } else {
@@ -116,7 +116,7 @@ pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> Men
     mended
 }
 
-/// All crossings, had or expected, from the left, and those that are both.
+/// Returns all crossings that the row has or should have, from the left, and those found.
 fn events(
     row: &[u32],
     outlook: &Outlook,
@@ -148,7 +148,7 @@ fn events(
     while let [which, rest @ ..] = missing {
         let both = rest.first().filter(|&&next| next == which + 1);
         if both.is_some_and(|&next| [*which, next].iter().all(|&k| !expected[k].may_be_missed)) {
-            // A slit or a wall of the part's own.
+            // Both sides of a slit or a wall that the part itself has here.
             missing = &rest[1..];
         } else {
             events.push(missing_at(*which, &expected[*which], width));
@@ -159,6 +159,7 @@ fn events(
     (events, found)
 }
 
+/// Returns an expected crossing as one that the row lacks.
 fn missing_at(which: usize, crossing: &Expected, width: u32) -> RowEvent {
     let price = match crossing {
         Expected { may_be_missed: false, .. } => ADD_CROSSED,
@@ -169,7 +170,7 @@ fn missing_at(which: usize, crossing: &Expected, width: u32) -> RowEvent {
     RowEvent { column, what: EventKind::Missing { which, through: crossing.through, price } }
 }
 
-/// Which of `len` sorted places is the nearest to `place`.
+/// Returns the index of the nearest to `place` among `len` sorted places.
 fn nearest(len: usize, at: impl Fn(usize) -> f64, place: f64) -> Option<usize> {
     let (mut low, mut high) = (0, len);
     while low < high {
@@ -180,8 +181,8 @@ fn nearest(len: usize, at: impl Fn(usize) -> f64, place: f64) -> Option<usize> {
     candidates.min_by(|&a, &b| (at(a) - place).abs().total_cmp(&(at(b) - place).abs()))
 }
 
-/// For the pixels before each event, and behind the last, how many would be
-/// wrong if they were black, and if they were white.
+/// Returns how many pixels before each event, and after the last, would be wrong if they were
+/// black, and how many if they were white.
 fn wrong_pixels(events: &[RowEvent], unknown: &[Range<f64>], width: u32) -> Vec<[u32; 2]> {
     let mut start = 0;
     let mut white = false;
@@ -202,7 +203,7 @@ fn wrong_pixels(events: &[RowEvent], unknown: &[Range<f64>], width: u32) -> Vec<
     pixels
 }
 
-/// How many pixels are wrong in a row that crosses at these events.
+/// Counts the wrong pixels of a row that crosses at these events.
 fn off(crossings: &[bool], pixels: &[[u32; 2]]) -> u32 {
     let mut white = false;
     let mut off = pixels[0][0];
@@ -213,12 +214,12 @@ fn off(crossings: &[bool], pixels: &[[u32; 2]]) -> u32 {
     off
 }
 
-/// At which events the cheapest row crosses: by dynamic programming over the
-/// row's colour (Viterbi's algorithm).
+/// Returns at which events the cheapest row crosses, by dynamic programming over the row's
+/// colour (Viterbi's algorithm).
 fn cheapest(events: &[RowEvent], pixels: &[[u32; 2]]) -> Vec<bool> {
     const NEVER: u32 = u32::MAX / 4;
     let mut cost = [pixels[0][0], NEVER];
-    // For each event and colour behind it, whether the best way crosses there.
+    // For each event and the colour after it: whether the cheapest way there crosses.
     let mut crosses: Vec<[bool; 2]> = Vec::with_capacity(events.len());
     for (event, pixels) in events.iter().zip(&pixels[1..]) {
         let [stay, cross] = event.prices().map(|price| price.unwrap_or(NEVER));

@@ -1,13 +1,12 @@
 //! Detection and correction of stray rows.
 //!
-//! Source: 002 section 2.4.1, algorithms 10 and 11, figures 28 and 29.
+//! A gap in a mesh loses crossings, and each lost crossing inverts all pixels to its right.
+//! [`detect`] finds the rows where that happened. [`contours`] follows the part's contours
+//! from the good rows above and below through a band of stray rows, and [`mend`] decides which
+//! crossings a row missed. A row begins and ceases to miss crossings only where a contour
+//! breaks off: that tells stray rows from the part's own slits.
 //!
-//! A gap in a mesh loses crossings, and each crossing that is lost turns over
-//! the colour of all pixels to its right. [`detect`] finds the rows where that
-//! happened; [`contours`] follows the part's contours from the good rows above
-//! and below through the band, [`mend`] finds which of them a row should cross
-//! but does not. A row begins to miss crossings, and ceases to, only where a
-//! contour breaks off: that tells stray rows from the part's own slits.
+//! Source: 002 section 2.4.1, algorithms 10 and 11, figures 28 and 29.
 
 mod align;
 mod band;
@@ -17,7 +16,6 @@ mod detect;
 mod gray_rows;
 mod mend;
 mod nearest;
-mod outline;
 mod polynomial;
 mod rebuild;
 mod window;
@@ -33,26 +31,39 @@ pub use band::{Band, BandKind, BandKinds, BandOutcome};
 use combine::difference;
 use detect::{Scene, Strays};
 use gray_rows::GrayRow;
+use rebuild::Correction;
 use window::{Window, windows};
 
-/// How stray rows are corrected.
+/// Bands of at least this many rows are adjusted to the neighbouring layers, if asked for.
+///
+/// Crossings of narrower bands lie within a pixel or two of their curves anyway.
+const MIN_ADJUSTED_ROWS: u32 = 3;
+/// The confidence in the correction of rows that may be right as they are: below the default
+/// limit, so that they are reported and stay.
+const DOUBTFUL_CONFIDENCE: f64 = 0.25;
+/// The confidence in a row without its slivers.
+const SLIVER_CONFIDENCE: f64 = 0.9;
+
+/// Options of [`fix`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixOptions {
-    /// Where the corrected rows come from.
+    /// How corrected rows are made.
     pub method: FixMethod,
-    /// Bands of more rows are left as they are.
+    /// Bands of more rows stay as they are.
     pub max_width: u32,
-    /// Bands whose correction is less sure are left as they are (0 to 1).
+    /// Bands whose correction has a lower confidence, from 0 to 1, stay as they are.
     pub min_confidence: f64,
-    /// Whether the layers below and above say where contours cross bands of
-    /// three rows and more.
+    /// Whether added crossings of bands of three rows and more are kept between those of the
+    /// layers below and above.
     pub use_neighbours: bool,
 }
 
 impl Default for FixOptions {
-    /// Curves; at most 15 rows, half the smallest feature of the seed's blades
-    /// at 1500 dpi. Bands of broken sample parts less sure than 0.35 keep a tenth of
-    /// their wrong pixels, the others 0.2 % at most (`benches/README.md`).
+    /// Returns the spline method with a limit of 15 rows, half the smallest feature of 002's
+    /// blades at 1500 dpi, and a confidence of 0.35.
+    ///
+    /// Corrections below that confidence left a tenth of the wrong pixels of broken sample
+    /// parts, the others at most 0.2 % (`benches/README.md`).
     fn default() -> Self {
         Self {
             method: FixMethod::Spline,
@@ -63,45 +74,66 @@ impl Default for FixOptions {
     }
 }
 
-/// Where the rows of a band come from.
+/// How the rows of a band are corrected.
+///
+/// ```
+/// use lamp_postprocess::FixMethod;
+///
+/// assert_eq!("nearest".parse(), Ok(FixMethod::Nearest));
+/// assert_eq!(FixMethod::default().to_string(), "spline");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FixMethod {
-    /// What the good rows above and below share (002, algorithm 11).
+    /// Pixels take the colour that the good rows above and below share (002, algorithm 11).
     Nearest,
-    /// C1 cubic Hermite curves along the contours (002, figure 29c) give the
-    /// crossings that were missed; the others stay.
+    /// C1 cubic Hermite curves along the contours (002, figure 29c) give the missed crossings;
+    /// the others stay.
     #[default]
     Spline,
 }
 
 lamp_stack::named!(FixMethod { Nearest = "nearest", Spline = "spline" });
 
-/// What was found in a layer, and what was done.
+/// A layer with stray rows, and what was done about them.
 #[derive(Debug)]
 pub struct Fixed<'a> {
-    /// The layer as it came.
+    /// The layer as it was.
     pub before: &'a Layer,
-    /// The layer as it goes.
+    /// The layer as it is passed on.
     pub after: &'a Layer,
     /// The bands of stray rows, from the top.
     pub bands: &'a [Band],
 }
 
-/// Bands of this many rows and more have their neighbours' votes, if wanted.
-const VOTED: u32 = 3;
-
-/// Corrects the stray rows of each layer, and tells `report` of each layer
-/// that has some. The page of a layer that was changed says so under `fix`,
-/// and no longer lists the corrected rows as stray. All other layers pass
-/// unchanged.
+/// Corrects the stray rows of each layer and calls `report` for each layer that has some.
 ///
-/// Gray layers are corrected by their outlines, the places where anything is
-/// exposed; levels along an edge that was rebuilt are those of a good row
-/// beside it.
+/// The page of a changed layer lists the corrections under `fix` and no longer lists the
+/// corrected rows as stray. All other layers pass unchanged.
 ///
-/// The layers below and above tell a sliver from the part's own features and,
-/// where it is wanted, where contours cross a band. They are looked at as they
-/// come, so the result depends on no order.
+/// In gray layers the exposed pixels, whatever their level, are corrected as in a mask; levels
+/// along a rebuilt edge are those of a good row beside it.
+///
+/// The layers below and above tell a sliver from the part's own features and, if asked for,
+/// where contours cross a band. They are used as they were before correction, so the result
+/// depends on no order.
+///
+/// ```
+/// use lamp_postprocess::{BandOutcome, FixOptions, fix};
+/// use lamp_stack::{Image, Layer, Mask, PageInfo};
+///
+/// // Row 1 missed its second crossing and is white up to the image's edge.
+/// let stray = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5])?;
+/// let layer = Layer { info: PageInfo::default(), dpi: None, image: Image::Mask(stray) };
+/// let layers = std::iter::once(Ok::<_, std::io::Error>(layer));
+///
+/// let mut fixed = fix(layers, FixOptions::default(), |fixed| {
+///     assert_eq!(fixed.bands[0].first_row, 1);
+///     assert_eq!(fixed.bands[0].outcome, BandOutcome::Corrected);
+/// });
+/// let Image::Mask(mask) = fixed.next().unwrap()?.image else { unreachable!() };
+/// assert_eq!(mask.row(1), [2, 5]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn fix<E: Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     options: FixOptions,
@@ -121,14 +153,14 @@ pub fn fix<E: Send>(
     })
 }
 
-/// The corrected layer, if anything was corrected, and what was found.
+/// Returns the corrected layer, if anything was corrected, and the bands found.
 fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>) {
     let layer = &*window.layer;
     let mut unbalanced = layer.info.stray_rows.clone();
     unbalanced.sort_unstable();
-    let outlines = outline::outlines(&layer.image);
+    let exposed = layer.image.exposed();
     let scene = Scene {
-        mask: &outlines,
+        mask: &exposed,
         unbalanced: &unbalanced,
         open_rows: layer.info.closed.map(|_| &layer.info.open_rows[..]),
         neighbours: window.neighbours(),
@@ -136,16 +168,16 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
     let Some(strays) = scene.strays(options) else { return (None, Vec::new()) };
     let mut bands = Vec::new();
     let mut corrected = Vec::new();
-    for band in strays.bands() {
-        let (band, rows) = fix_band(&scene, &strays, &band, options);
-        // Rows that only looked stray, and on a closer look are right.
+    for rows in strays.bands() {
+        let (band, new_rows) = fix_band(&scene, &strays, &rows, options);
+        // Rows that only looked stray turn out right on a closer look.
         let is_known =
             band.kinds.contains(BandKind::EndsWhite) || band.kinds.contains(BandKind::Unbalanced);
-        if band.pixels == 0 && !rows.is_empty() && !is_known {
+        if band.pixels == 0 && !new_rows.is_empty() && !is_known {
             continue;
         }
         if band.outcome == BandOutcome::Corrected {
-            corrected.push((band.first_row, rows));
+            corrected.push((rows, new_rows));
         }
         bands.push(band);
     }
@@ -154,19 +186,16 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
     }
     let image = match &layer.image {
         Image::Mask(mask) => Image::Mask(with_rows(mask, &corrected)),
-        Image::Gray(gray) => Image::Gray(gray_with_rows(gray, &outlines, &corrected)),
+        Image::Gray(gray) => Image::Gray(gray_with_rows(gray, &exposed, &corrected)),
     };
     let mut info = layer.info.clone();
-    let is_corrected = |row: &u32| {
-        let band = bands.get(bands.partition_point(|band| band.end() <= *row));
-        band.is_some_and(|b| b.outcome == BandOutcome::Corrected && b.first_row <= *row)
-    };
-    info.stray_rows.retain(|row| !is_corrected(row));
-    info.other.insert("fix".to_owned(), on_page(&bands, options.method));
+    info.stray_rows.retain(|&row| corrected_row(&corrected, row).is_none());
+    info.other.insert("fix".to_owned(), page_entry(&bands, options.method));
     (Some(Layer { info, dpi: layer.dpi, image }), bands)
 }
 
-fn on_page(bands: &[Band], method: FixMethod) -> serde_json::Value {
+/// Returns what a corrected layer's page says under `fix`.
+fn page_entry(bands: &[Band], method: FixMethod) -> serde_json::Value {
     let bands: Vec<_> = bands
         .iter()
         .filter(|band| band.outcome == BandOutcome::Corrected)
@@ -175,7 +204,7 @@ fn on_page(bands: &[Band], method: FixMethod) -> serde_json::Value {
     json!({"method": method.name(), "bands": bands})
 }
 
-/// Corrects a band, or says why not; the rows are those it should have.
+/// Returns what was found in a band, and the rows that it should have, if they are known.
 fn fix_band(
     scene: &Scene<'_>,
     strays: &Strays,
@@ -188,32 +217,13 @@ fn fix_band(
     if band.start == 0 || band.end == mask.height() {
         kinds.insert(BandKind::AtEdge);
     }
-    let is_good = |row| !band.contains(&row) && strays.is_good(row);
-    let is_ended = |row| strays.is_ended(mask, row);
-    let voters = match scene.neighbours {
-        [Some(below), Some(above)] if options.use_neighbours && band.len() as u32 >= VOTED => {
-            Some([below, above])
-        }
-        _ => None,
-    };
-    let sliver = [BandKind::Sliver].into_iter().collect::<BandKinds>();
-    let (mut gap, mut confidence, mut rows) = (None, 0.0, Vec::new());
-    if kinds == sliver {
-        rows = band.clone().map(|row| rebuild::unsliver(mask, row)).collect();
-        confidence = 0.9;
-    } else if let Some(rebuilt) =
-        rebuild::rebuild(mask, band, is_good, is_ended, scene.open_rows, voters)
-    {
-        if rebuilt.touching {
-            kinds.insert(BandKind::Touching);
-        }
-        (gap, confidence, rows) = (rebuilt.gap, rebuilt.confidence, rebuilt.rows);
+    let correction = correct(scene, strays, band, kinds, options).unwrap_or_default();
+    if correction.touching {
+        kinds.insert(BandKind::Touching);
     }
-    if options.method == FixMethod::Nearest && !rows.is_empty() {
-        (rows, confidence) = nearest::nearest(mask, band);
-    }
+    let Correction { rows, gap, mut confidence, .. } = correction;
     if band.clone().any(|row| strays.doubtful.binary_search(&row).is_ok()) {
-        confidence = f64::min(confidence, DOUBTFUL);
+        confidence = confidence.min(DOUBTFUL_CONFIDENCE);
     }
     let outcome = if band.len() as u32 > options.max_width {
         BandOutcome::TooWide
@@ -223,23 +233,45 @@ fn fix_band(
         BandOutcome::Corrected
     };
     let (columns, pixels) = changes(mask, band, &rows);
-    let band = Band {
-        first_row: band.start,
-        rows: band.len() as u32,
-        kinds,
-        columns,
-        gap,
-        pixels,
-        confidence,
-        outcome,
-    };
+    let (first_row, row_count) = (band.start, band.len() as u32);
+    let band =
+        Band { first_row, rows: row_count, kinds, columns, gap, pixels, confidence, outcome };
     (band, rows)
 }
 
-/// The confidence in the correction of rows that may be right as they are.
-const DOUBTFUL: f64 = 0.25;
+/// Corrects a band by the method asked for. `None` if no good row lies beside it.
+fn correct(
+    scene: &Scene<'_>,
+    strays: &Strays,
+    band: &Range<u32>,
+    kinds: BandKinds,
+    options: &FixOptions,
+) -> Option<Correction> {
+    let mask = scene.mask;
+    let mut correction = if kinds == [BandKind::Sliver].into_iter().collect() {
+        let rows = band.clone().map(|row| detect::without_slivers(mask, row)).collect();
+        Correction { rows, confidence: SLIVER_CONFIDENCE, ..Correction::default() }
+    } else {
+        let is_good = |row| !band.contains(&row) && strays.is_good(row);
+        let is_ended = |row| strays.is_ended(mask, row);
+        let neighbours = match scene.neighbours {
+            [Some(below), Some(above)]
+                if options.use_neighbours && band.len() as u32 >= MIN_ADJUSTED_ROWS =>
+            {
+                Some([below, above])
+            }
+            _ => None,
+        };
+        rebuild::rebuild(mask, band, is_good, is_ended, scene.open_rows, neighbours)?
+    };
+    if options.method == FixMethod::Nearest {
+        // The gap and what touches are known from the contours, whatever the method.
+        (correction.rows, correction.confidence) = nearest::nearest(mask, band);
+    }
+    Some(correction)
+}
 
-/// Which columns new rows change, and how many pixels.
+/// Returns the columns that new rows change, and how many pixels.
 fn changes(mask: &Mask, band: &Range<u32>, rows: &[Vec<u32>]) -> (Range<u32>, u64) {
     let mut columns: Option<Range<u32>> = None;
     let mut pixels = 0;
@@ -257,46 +289,46 @@ fn changes(mask: &Mask, band: &Range<u32>, rows: &[Vec<u32>]) -> (Range<u32>, u6
     (columns.unwrap_or(0..0), pixels)
 }
 
-/// New rows, and the first of them.
-type NewRows = (u32, Vec<Vec<u32>>);
+/// The rows of a corrected band, and the transitions that they now have.
+type CorrectedBand = (Range<u32>, Vec<Vec<u32>>);
 
-/// The mask with some rows replaced.
-fn with_rows(mask: &Mask, new: &[NewRows]) -> Mask {
+/// Returns the band that a row is in and the row's new transitions, if it was corrected.
+fn corrected_row(bands: &[CorrectedBand], row: u32) -> Option<(&Range<u32>, &[u32])> {
+    let (band, rows) = bands.get(bands.partition_point(|(band, _)| band.end <= row))?;
+    let index = row.checked_sub(band.start)?;
+    Some((band, &rows[index as usize]))
+}
+
+/// Returns the mask with the rows of some bands replaced.
+fn with_rows(mask: &Mask, corrected: &[CorrectedBand]) -> Mask {
     let mut fixed = MaskBuilder::new(mask.width());
     fixed.reserve(mask.height() as usize, mask.transition_count());
-    let mut push = |row: &[u32]| fixed.push_row(row).expect("mended rows are canonical");
-    let mut done = 0;
-    for (first, rows) in new {
-        (done..*first).for_each(|row| push(mask.row(row)));
-        rows.iter().for_each(|row| push(row));
-        done = first + rows.len() as u32;
+    for (row, had) in (0..).zip(mask.rows()) {
+        let new = corrected_row(corrected, row).map_or(had, |(_, new)| new);
+        fixed.push_row(new).expect("corrected rows are canonical");
     }
-    (done..mask.height()).for_each(|row| push(mask.row(row)));
     fixed.finish()
 }
 
-/// The gray mask with the outlines of some rows replaced.
-fn gray_with_rows(gray: &GrayMask, outlines: &Mask, new: &[NewRows]) -> GrayMask {
+/// Returns the gray mask with other exposed pixels in the rows of some bands.
+fn gray_with_rows(gray: &GrayMask, exposed: &Mask, corrected: &[CorrectedBand]) -> GrayMask {
     let mut fixed = GrayMask::new(gray.width());
-    let mut done = 0;
-    let row_of = |row: u32| GrayRow { levels: gray.row(row), outline: outlines.row(row) };
-    for (first, rows) in new {
-        for row in done..*first {
+    let row_of = |row: u32| GrayRow { levels: gray.row(row), exposed: exposed.row(row) };
+    for row in 0..gray.height() {
+        let Some((band, new)) = corrected_row(corrected, row) else {
             fixed.push_row(gray.row(row)).expect("it was a row");
-        }
-        let end = first + rows.len() as u32;
-        for (row, outline) in (*first..).zip(rows) {
-            // The nearer of the good rows; the image's edge has only one.
-            let upper = row - first <= end - 1 - row && *first > 0 || end == gray.height();
-            let beside = if upper { first.checked_sub(1) } else { Some(end) };
-            let beside = beside.map_or(GrayRow { levels: &[], outline: &[] }, row_of);
-            let runs = gray_rows::levels(&row_of(row), &beside, outline);
-            fixed.push_runs(runs).expect("runs as wide as the outline");
-        }
-        done = end;
-    }
-    for row in done..gray.height() {
-        fixed.push_row(gray.row(row)).expect("it was a row");
+            continue;
+        };
+        // Levels come from the nearer good row; a band at the image's edge has only one.
+        let is_upper_nearer = row - band.start <= band.end - 1 - row && band.start > 0;
+        let beside = if is_upper_nearer || band.end == gray.height() {
+            band.start.checked_sub(1)
+        } else {
+            Some(band.end)
+        };
+        let beside = beside.map_or(GrayRow { levels: &[], exposed: &[] }, row_of);
+        let runs = gray_rows::levels(&row_of(row), &beside, new);
+        fixed.push_runs(runs).expect("runs within the image");
     }
     fixed
 }

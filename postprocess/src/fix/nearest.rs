@@ -1,4 +1,6 @@
-//! A band's rows from the good rows beside it.
+//! Correction of a band from the good rows beside it.
+//!
+//! Source: 002 section 2.4.1, algorithm 11.
 
 use std::ops::Range;
 
@@ -6,23 +8,20 @@ use lamp_stack::{Mask, white_in_row};
 
 use super::combine::{difference, majority};
 
-/// Each pixel takes the colour that the good rows above and below the band
-/// share, and keeps its own where they differ. Rows outside the image are
-/// black. Says, too, how sure that is: less the more the good rows differ.
-///
-/// Source: 002 section 2.4.1, algorithm 11.
+/// Gives each pixel the colour that the good rows above and below the band share, and leaves it
+/// where they differ. Rows outside the image are black. Returns the rows and the confidence in
+/// them, which is lower the more the good rows differ.
 pub(super) fn nearest(mask: &Mask, band: &Range<u32>) -> (Vec<Vec<u32>>, f64) {
-    let row_or_black = |row: Option<u32>| match row {
-        Some(row) if row < mask.height() => mask.row(row),
-        _ => &[],
+    let row_or_black = |row: Option<u32>| {
+        row.filter(|&row| row < mask.height()).map_or(&[][..], |row| mask.row(row))
     };
     let (above, below) = (row_or_black(band.start.checked_sub(1)), row_or_black(Some(band.end)));
     let rows: Vec<_> = band.clone().map(|row| majority([above, mask.row(row), below])).collect();
     let pixels = |a: &[u32], b: &[u32]| white_in_row(&difference(a, b), mask.width()) as f64;
-    let unsure = pixels(above, below);
+    let undecided = pixels(above, below);
     let changed = band.clone().zip(&rows).map(|(row, new)| pixels(mask.row(row), new));
-    let sure =
-        changed.map(|changed| if unsure == 0.0 { 1.0 } else { changed / (changed + unsure) });
-    let confidence = sure.fold(1.0, f64::min);
-    (rows, confidence)
+    let confidence =
+        changed.map(|changed| if undecided == 0.0 { 1.0 } else { changed / (changed + undecided) });
+    let least = confidence.fold(1.0, f64::min);
+    (rows, least)
 }

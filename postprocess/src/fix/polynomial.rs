@@ -1,15 +1,15 @@
-//! Curves through the crossings of a contour: points are (row, column), the
-//! nearest to where the curve is wanted first.
+//! Polynomials through the crossings of a contour.
+//!
+//! Points are (row, column), the nearest to where the curve is wanted first.
 
-/// How far a good fit may be off a point: a transition is a crossing rounded
-/// to whole pixels, and a little more.
+/// The distance in pixels of a good fit from a point: a transition is a crossing rounded to
+/// whole pixels, and the curve has some error of its own.
 const ROUNDING: f64 = 0.6;
-/// A parabola through fewer points tells more of rounding than of the slope.
-const ENOUGH: usize = 6;
+/// A parabola through fewer points shows the rounding rather than the slope.
+const MIN_PARABOLA: usize = 6;
 
-/// The slope of a contour at the first of its points, in columns a row: of a
-/// parabola through as many points as it fits, or of a straight line where
-/// these are few.
+/// Returns the slope of a contour at the first of its points, in columns per row: of a parabola
+/// through as many points as it fits, or of a straight line if these are few.
 pub(super) fn slope(points: &[(f64, f64)]) -> f64 {
     let longest = |degree: usize| {
         (degree + 2..=points.len())
@@ -18,7 +18,7 @@ pub(super) fn slope(points: &[(f64, f64)]) -> f64 {
             .find(|(n, fit)| points[..*n].iter().all(|&point| fit.misses(point) < ROUNDING))
     };
     match longest(2) {
-        Some((n, fit)) if n >= ENOUGH => fit.slope,
+        Some((n, fit)) if n >= MIN_PARABOLA => fit.slope,
         _ => match (longest(1), points) {
             (Some((_, fit)), _) => fit.slope,
             (None, [first, second, ..]) => (second.1 - first.1) / (second.0 - first.0),
@@ -27,8 +27,8 @@ pub(super) fn slope(points: &[(f64, f64)]) -> f64 {
     }
 }
 
-/// A polynomial of second degree through the points by least squares, at a
-/// row. Fewer than four points make a straight line.
+/// Returns the value at a row of a parabola fitted to the points by least squares, or of a
+/// straight line if there are fewer than four.
 pub(super) fn parabola(points: &[(f64, f64)], row: f64) -> f64 {
     match points.len() {
         0 => 0.0,
@@ -37,8 +37,7 @@ pub(super) fn parabola(points: &[(f64, f64)], row: f64) -> f64 {
     }
 }
 
-/// The cubic from one point to another with these slopes there, at a row
-/// between.
+/// Returns the value at a row of the cubic from one point to another with these slopes there.
 pub(super) fn hermite(
     from: (f64, f64),
     from_slope: f64,
@@ -48,7 +47,8 @@ pub(super) fn hermite(
 ) -> f64 {
     let length = to.0 - from.0;
     let chord = (to.1 - from.1) / length;
-    // Slopes at a corner or a tip say little about the far end.
+    // The slope at a corner or a tip says little about the far end, and would make the curve
+    // overshoot.
     let most = 3.0 * chord.abs() + 4.0;
     let [from_slope, to_slope] = [from_slope, to_slope].map(|slope| slope.clamp(-most, most));
     let t = (row - from.0) / length;
@@ -59,7 +59,7 @@ pub(super) fn hermite(
         + (t3 - t2) * length * to_slope
 }
 
-/// A polynomial about the row of the first point.
+/// A polynomial of second degree in the distance from the row of its first point.
 struct Polynomial {
     from: f64,
     value: f64,
@@ -78,11 +78,11 @@ impl Polynomial {
     }
 }
 
-/// Fits a polynomial of degree 1 or 2 by least squares: the normal equations,
-/// by Cramer's rule. Rows must differ, and be more than the degree.
+/// Fits a polynomial of degree 1 or 2 by least squares: the normal equations by Cramer's rule.
+/// There must be more points than the degree, in different rows.
 fn fit(points: &[(f64, f64)], degree: usize) -> Polynomial {
     let from = points[0].0;
-    // Sums of powers of the rows, and of values times them.
+    // Sums of powers of the rows, and of columns times these powers.
     let (mut s, mut v) = ([0.0; 5], [0.0; 3]);
     for &(row, value) in points {
         let d = row - from;

@@ -1,4 +1,4 @@
-//! A band's rows from the contours that cross it.
+//! Correction of a band from the contours that cross it.
 //!
 //! Source: 002 section 2.4.1 and figure 29c.
 
@@ -9,39 +9,37 @@ use std::ops::Range;
 use lamp_stack::{Image, Mask};
 
 use super::contours::{Contours, Expected, LineId, Outlook};
-use super::detect::without_slivers;
 use super::mend::{DROP, DROP_ENDED, Mended, mend};
-use super::outline::outline_row;
 
-/// The rows of a band, put right.
-pub(super) struct Rebuilt {
-    /// Their transitions.
+/// The corrected rows of a band; the default corrects nothing.
+#[derive(Debug, Default)]
+pub(super) struct Correction {
+    /// The transitions of each row.
     pub(super) rows: Vec<Vec<u32>>,
-    /// Between which columns crossings were added.
+    /// The columns in which crossings were added.
     pub(super) gap: Option<Range<u32>>,
-    /// How sure it is, from 0 to 1: as sure as the least sure row.
+    /// The confidence in the least certain row, from 0 to 1.
     pub(super) confidence: f64,
     /// Whether neighbouring rows lack different contours.
     pub(super) touching: bool,
 }
 
-/// Rebuilds the rows of a band. `None` where there is no good row beside it.
+/// Rebuilds the rows of a band. Returns `None` if no good row lies beside it.
 ///
-/// Crossings that the rows have where a contour is expected stay as they are,
-/// and the contour is then expected to go through them; only crossings that
-/// were missed come from its curve.
+/// Crossings near a contour's curve stay as they are, and the curve is then led through them;
+/// only missed crossings come from the curve.
 ///
-/// Between two rows of `open_rows`, where contours break off, all rows miss the
-/// same ones. So a line that one of them crosses is missed by none: where it is
-/// not crossed, the part itself has a slit or a wall.
+/// Between two rows of `open_rows`, where contours break off, all rows miss the same contours.
+/// So a line that one of these rows crosses is missed by none: where another row does not cross
+/// it, the part itself has a slit or a wall.
 pub(super) fn rebuild(
     mask: &Mask,
     band: &Range<u32>,
     is_good: impl Fn(u32) -> bool,
     is_ended: impl Fn(u32) -> bool,
     open_rows: Option<&[u32]>,
-    voters: Option<[&Image; 2]>,
-) -> Option<Rebuilt> {
+    neighbours: Option<[&Image; 2]>,
+) -> Option<Correction> {
     let mut contours = Contours::around(mask, band.clone(), is_good)?;
     let stretch = |row: u32| open_rows.map(|open| open.partition_point(|&open| open <= row));
     let mut crossed: BTreeSet<(usize, LineId)> = BTreeSet::new();
@@ -51,12 +49,14 @@ pub(super) fn rebuild(
             let is_crossed = |stretch| crossed.contains(&(stretch, crossing.side));
             crossing.may_be_missed = !stretch(row).is_some_and(is_crossed);
         }
-        if let Some(voters) = voters {
-            vote(&mut outlook, &voters.map(|image| outline_row(image, row)));
+        if let Some(neighbours) = neighbours {
+            adjust(&mut outlook, &neighbours.map(|image| image.exposed_row(row)));
         }
         let drop = if is_ended(row) { DROP_ENDED } else { DROP };
         mend(mask.row(row), &outlook, mask.width(), drop)
     };
+    // A first pass finds the crossings that rows have; with these known, the curves of the
+    // second are better.
     let first: Vec<Mended> = band.clone().map(|row| mend_row(&contours, &crossed, row)).collect();
     for (row, mended) in band.clone().zip(first) {
         for (side, column) in mended.found {
@@ -71,9 +71,9 @@ pub(super) fn rebuild(
         .map(|(mended, row)| confidence(mended, mask.row(row), mask.width(), is_ended(row)))
         .fold(1.0, f64::min);
     let at_edge = band.start == 0 || band.end == mask.height();
-    // A row or two between bands hardly show where a contour is going.
+    // One or two good rows between bands hardly show where a contour is going.
     let beside = (contours.good_rows + 1).min(4) as f64 / 4.0;
-    Some(Rebuilt {
+    Some(Correction {
         gap: columns_of(mended.iter().flat_map(|mended| &mended.added), mask.width()),
         confidence: least * beside * if at_edge { 0.8 } else { 1.0 },
         touching: mended.windows(2).any(|rows| lack_others(&rows[0], &rows[1])),
@@ -81,12 +81,7 @@ pub(super) fn rebuild(
     })
 }
 
-/// Takes the slivers out of a row.
-pub(super) fn unsliver(mask: &Mask, row: u32) -> Vec<u32> {
-    let [above, had, below] = [row - 1, row, row + 1].map(|row| mask.row(row));
-    without_slivers(had, above, below)
-}
-
+/// Returns the columns from the first to the last added crossing.
 fn columns_of<'a>(added: impl Iterator<Item = &'a Expected>, width: u32) -> Option<Range<u32>> {
     let column = |at: f64| at.round().clamp(0.0, f64::from(width - 1)) as u32;
     added
@@ -94,6 +89,7 @@ fn columns_of<'a>(added: impl Iterator<Item = &'a Expected>, width: u32) -> Opti
         .reduce(|a, b| a.start.min(b.start)..a.end.max(b.end))
 }
 
+/// Returns whether two rows each lack contours, but none in common.
 fn lack_others(a: &Mended, b: &Mended) -> bool {
     let [a, b] = [a, b].map(|mended| -> BTreeSet<LineId> {
         mended.added.iter().map(|added| added.side).collect()
@@ -101,25 +97,25 @@ fn lack_others(a: &Mended, b: &Mended) -> bool {
     !a.is_empty() && !b.is_empty() && a.is_disjoint(&b)
 }
 
-/// How sure a row is, from 0 to 1. It is less so where a contour that was
-/// added may lie further off than the next crossing, the least sure of them
-/// counting, where more was changed than a gap explains, and where the row
-/// still is not what was expected.
+/// Returns the confidence in a row, from 0 to 1.
+///
+/// It falls if an added crossing may lie further off than the next one (the worst counts), if
+/// more was changed than one gap explains, and if the row still differs from what was expected.
 fn confidence(mended: &Mended, had: &[u32], width: u32, is_ended: bool) -> f64 {
-    /// Crossings nearer than that are no less sure for it.
-    const ROOM: f64 = 8.0;
+    /// Pixels of room beside an added crossing that are always granted.
+    const MIN_ROOM: f64 = 8.0;
     let placed = mended.added.iter().map(|added| {
         let left = mended.row.partition_point(|&c| f64::from(c) < added.column - 1.0);
         let right = mended.row.partition_point(|&c| f64::from(c) <= added.column + 1.0);
         let others = [left.checked_sub(1), Some(right)].into_iter().flatten();
         let distance = |&column: &u32| (f64::from(column) - added.column).abs();
         let room = others.filter_map(|which| mended.row.get(which).map(distance));
-        let room = room.fold(f64::from(width), f64::min).max(ROOM);
+        let room = room.fold(f64::from(width), f64::min).max(MIN_ROOM);
         room / (room + added.slack)
     });
     let (added, dropped) = (mended.added.len(), mended.dropped);
     let (more, dropped) = match is_ended {
-        // A crossing more and one less for each copy of the part.
+        // On a build, each copy of the part has one crossing added and one dropped.
         true => (added.abs_diff(dropped), 0),
         false => ((added + dropped).saturating_sub(2 - had.len() % 2), dropped),
     };
@@ -129,10 +125,10 @@ fn confidence(mended: &Mended, had: &[u32], width: u32, is_ended: bool) -> f64 {
     placed.fold(1.0, f64::min) * edits * 0.8f64.powi(mended.absent as i32) * explained
 }
 
-/// Lets the layers below and above say where contours cross: each crossing
-/// goes between theirs.
-fn vote(outlook: &mut Outlook, rows: &[Cow<'_, [u32]>; 2]) {
-    // A row that ends white is stray itself.
+/// Moves each expected crossing between those of the layers below and above, if both have one
+/// near it.
+fn adjust(outlook: &mut Outlook, rows: &[Cow<'_, [u32]>; 2]) {
+    // A row that ends white is stray itself and tells nothing.
     if rows.iter().any(|row| !row.len().is_multiple_of(2)) {
         return;
     }

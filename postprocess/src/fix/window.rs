@@ -1,11 +1,10 @@
-//! Layers with the layers beside them.
+//! Layers together with the layers below and above them.
 
 use std::sync::Arc;
 
 use lamp_stack::{Image, Layer, MemorySize};
 
-/// A layer, and those below and above it where they are there and show the
-/// same place.
+/// A layer with the layers below and above it, if these are present and show the same place.
 pub(super) struct Window {
     pub(super) layer: Arc<Layer>,
     below: Option<Arc<Layer>>,
@@ -13,7 +12,7 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// The images of the layers below and above.
+    /// Returns the images of the layers below and above.
     pub(super) fn neighbours(&self) -> [Option<&Image>; 2] {
         [&self.below, &self.above].map(|layer| layer.as_ref().map(|layer| &layer.image))
     }
@@ -25,7 +24,7 @@ impl MemorySize for Window {
     }
 }
 
-/// Puts each layer between its neighbours. After an error comes nothing more.
+/// Puts each layer between its neighbours. Ends after the first error.
 pub(super) fn windows<E>(
     layers: impl Iterator<Item = Result<Layer, E>>,
 ) -> impl Iterator<Item = Result<Window, E>> {
@@ -46,7 +45,7 @@ pub(super) fn windows<E>(
     })
 }
 
-/// Whether two layers follow each other and their pixels lie at one place.
+/// Returns whether two layers follow each other and their pixels lie at the same place.
 fn are_beside(a: &Layer, b: &Layer) -> bool {
     a.info.index.abs_diff(b.info.index) == 1
         && a.image.width() == b.image.width()

@@ -8,7 +8,7 @@ use super::components::{self, Loss};
 use super::scale::{AxisScale, scaled};
 use super::walls::ThinWall;
 use super::widths::Widths;
-use super::{levels, offset, shrink};
+use super::{offset, shrink};
 
 /// How layers are compensated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -245,7 +245,7 @@ fn move_edges(
         let (gray, walls) = shrink(mask, widths, min_feature);
         done.walls = walls;
         if min_feature == 0.0 {
-            done.losses = components::losses(mask, &levels::at_least(&gray, 128));
+            done.losses = components::losses(mask, &gray.at_least(128));
         }
         gray
     };
@@ -259,18 +259,15 @@ fn move_edges(
             return Err(CompensateError::GrayGrows { layer: layer.info.name() });
         }
         Image::Gray(gray) => {
-            let outline = shrunk(&levels::at_least(gray, 1));
-            let outline = if options.one_bit {
-                GrayMask::from(&levels::at_least(&outline, 128))
-            } else {
-                outline
-            };
-            levels::lower(gray, &outline)
+            let outline = shrunk(&gray.at_least(1));
+            let outline =
+                if options.one_bit { GrayMask::from(&outline.at_least(128)) } else { outline };
+            components::lower(gray, &outline)
         }
     };
     let image = match &layer.image {
-        Image::Mask(_) if options.one_bit => Image::Mask(levels::at_least(&gray, 128)),
-        Image::Mask(_) => levels::mask(&gray).map_or_else(|| Image::Gray(gray), Image::Mask),
+        Image::Mask(_) if options.one_bit => Image::Mask(gray.at_least(128)),
+        Image::Mask(_) => gray.to_mask().map_or_else(|| Image::Gray(gray), Image::Mask),
         Image::Gray(_) => Image::Gray(gray),
     };
     if image == layer.image && done.walls.is_empty() && !done.cut_off {

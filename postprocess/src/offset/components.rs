@@ -5,9 +5,8 @@
 
 use std::ops::Range;
 
-use lamp_stack::{GrayMask, Mask};
+use lamp_stack::{GrayMask, Mask, combine_levels};
 
-use super::levels;
 use super::row_runs::RowRuns;
 
 /// A piece of an image that edges took away or broke apart as they moved.
@@ -65,9 +64,9 @@ pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
     if !(0..gray.height()).any(faint) {
         return gray;
     }
-    let pieces = Components::of(RowRuns::white(&levels::at_least(&gray, 1)));
+    let pieces = Components::of(RowRuns::white(&gray.at_least(1)));
     let mut stays = vec![false; pieces.runs.len()];
-    for (row, bright) in (0..).zip(levels::at_least(&gray, 128).rows()) {
+    for (row, bright) in (0..).zip(gray.at_least(128).rows()) {
         for start in bright.iter().step_by(2) {
             stays[pieces.at(*start as i32, row)] = true;
         }
@@ -77,7 +76,18 @@ pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
         return gray;
     }
     let kept = pieces.filtered(gray.height(), stays).mask(gray.width());
-    levels::lower(&gray, &GrayMask::from(&kept))
+    lower(&gray, &GrayMask::from(&kept))
+}
+
+/// The lower level of two images of one size at each pixel.
+pub(super) fn lower(a: &GrayMask, b: &GrayMask) -> GrayMask {
+    let mut out = GrayMask::new(a.width());
+    let mut row = Vec::new();
+    for (a, b) in a.rows().zip(b.rows()) {
+        combine_levels([a, b], |[a, b]| a.min(b), &mut row);
+        out.push_row(&row).expect("both rows are of images as wide");
+    }
+    out
 }
 
 /// Makes white what is black and does not touch the black of the top left pixel.
@@ -162,7 +172,7 @@ impl Components {
 
 #[cfg(test)]
 mod tests {
-    use super::super::offset_tests::{drawn, level_at};
+    use super::super::offset_tests::drawn;
     use super::*;
 
     #[test]
@@ -201,8 +211,8 @@ mod tests {
         }
         let clean = without_specks(gray.clone());
         for (column, row) in (0..4).flat_map(|row| (0..16).map(move |column| (column, row))) {
-            let level = if column < 7 { level_at(&gray, column, row) } else { 0 };
-            assert_eq!(level_at(&clean, column, row), level, "{column} {row}");
+            let level = if column < 7 { gray.level(column, row) } else { 0 };
+            assert_eq!(clean.level(column, row), level, "{column} {row}");
         }
     }
 }

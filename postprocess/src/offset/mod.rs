@@ -24,7 +24,6 @@ mod compensate;
 mod components;
 mod edge_map;
 mod erode;
-mod levels;
 mod local_thickness;
 mod plain;
 mod row_runs;

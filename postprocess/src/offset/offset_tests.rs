@@ -1,6 +1,6 @@
 //! Offsets beside a slow twin that measures every pixel against every other.
 
-use lamp_stack::{GrayMask, Mask, MaskBuilder};
+use lamp_stack::{Mask, MaskBuilder};
 use proptest::prelude::*;
 
 use super::*;
@@ -14,12 +14,6 @@ pub(super) fn drawn(width: u32, height: u32, is_white: impl Fn(i32, i32) -> bool
         mask.push_row(&toggles.map(|c| c as u32).collect::<Vec<_>>()).unwrap();
     }
     mask.finish()
-}
-
-pub(super) fn level_at(gray: &GrayMask, column: u32, row: u32) -> u8 {
-    let changes = gray.row(row);
-    let next = changes.partition_point(|change| change.column <= column);
-    next.checked_sub(1).map_or(0, |last| changes[last].level)
 }
 
 /// The squared distance of a pixel from the nearest of the other colour. Of
@@ -79,7 +73,7 @@ proptest! {
         for row in 0..mask.height() {
             for column in 0..mask.width() {
                 let left = referee(&mask, by, column, row);
-                let level = level_at(&gray, column, row);
+                let level = gray.level(column, row);
                 prop_assert!((f64::from(level) - 255.0 * left).abs() <= 0.5 + 1e-6,
                     "column {} row {}: {} for {}", column, row, level, 255.0 * left);
                 if (left - 0.5).abs() > 1e-6 {
@@ -97,13 +91,13 @@ proptest! {
         let plain = components::without_specks(offset(&mask, by));
         for row in 0..mask.height() {
             for column in 0..mask.width() {
-                let level = level_at(&kept, column, row);
-                prop_assert!(level >= level_at(&plain, column, row));
+                let level = kept.level(column, row);
+                prop_assert!(level >= plain.level(column, row));
                 prop_assert!(level == 0 || mask.is_white(column, row));
             }
         }
         for level in [1, 128] {
-            prop_assert_eq!(parts(&levels::at_least(&kept, level)), parts(&mask), "{}", level);
+            prop_assert_eq!(parts(&kept.at_least(level)), parts(&mask), "{}", level);
         }
     }
 }
@@ -136,10 +130,10 @@ fn a_straight_edge_moves_by_exactly_the_distance() {
     let bar = drawn(40, 30, |column, row| (10..30).contains(&column) && (5..25).contains(&row));
     for (by, left) in [(0.25, 19.5), (1.0, 18.0), (1.476, 17.048), (7.9, 4.2), (-1.476, 22.952)] {
         let gray = offset(&bar, by);
-        let sum: u32 = (0..40).map(|column| u32::from(level_at(&gray, column, 15))).sum();
+        let sum: u32 = (0..40).map(|column| u32::from(gray.level(column, 15))).sum();
         assert!((f64::from(sum) / 255.0 - left).abs() < 0.005, "{by}: {sum}");
     }
-    assert_eq!(levels::mask(&offset(&bar, 1.0)), Some(offset_one_bit(&bar, 1.0)));
+    assert_eq!(offset(&bar, 1.0).to_mask(), Some(offset_one_bit(&bar, 1.0)));
     assert_eq!(offset_one_bit(&bar, 1.4).white_pixels(), 18 * 18);
     assert_eq!(offset_one_bit(&bar, 1.6).white_pixels(), 16 * 16);
 }
@@ -192,13 +186,13 @@ fn a_thin_wall_stays_as_wide_as_the_least_feature_at_any_angle() {
             let (kept, walls) = shrink(&mask, &Widths::uniform(3.5), 2.0);
             let white: u32 = (0..160u32)
                 .flat_map(|row| (0..160u32).map(move |column| (column, row)))
-                .map(|(column, row)| u32::from(level_at(&kept, column, row)))
+                .map(|(column, row)| u32::from(kept.level(column, row)))
                 .sum();
             let made = f64::from(white) / 255.0 / 120.0;
             let own = mask.white_pixels() as f64 / 120.0;
             let [low, high] = [0.95 * own.min(2.0), own.min(3.6) + 0.1];
             assert!((low..=high).contains(&made), "{width} at {degrees}: {made}");
-            assert_eq!(parts(&levels::at_least(&kept, 255)), 1, "{width} at {degrees}");
+            assert_eq!(parts(&kept.at_least(255)), 1, "{width} at {degrees}");
             assert_eq!(walls.len(), 1, "{width} at {degrees}: {walls:?}");
             assert_eq!(walls[0].asked, 0.0);
             assert!((walls[0].width - width).abs() <= 1.0, "{width} at {degrees}: {walls:?}");
@@ -289,7 +283,7 @@ fn a_waist_between_wide_places_does_not_break() {
             assert_eq!(parts(&mask), 1);
             assert_eq!(parts(&offset_one_bit(&mask, 5.5)), 2, "{degrees} {wide}");
             let (kept, walls) = shrink(&mask, &Widths::uniform(5.5), 2.0);
-            assert_eq!(parts(&levels::at_least(&kept, 255)), 1, "{degrees}");
+            assert_eq!(parts(&kept.at_least(255)), 1, "{degrees}");
             assert_eq!(walls.len(), 1, "{degrees}: {walls:?}");
             assert!(walls[0].width > wide && walls[0].asked < 5.0, "{walls:?}");
             // Elsewhere nothing is kept.

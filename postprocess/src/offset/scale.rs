@@ -125,7 +125,7 @@ mod tests {
             unreachable!("gray images stay gray")
         };
         let white = scaled(&Image::Mask(mask), &columns, &rows, 64);
-        assert_eq!(Image::Mask(super::super::levels::at_least(&larger, 1)), white);
+        assert_eq!(Image::Mask(larger.at_least(1)), white);
         assert_eq!(larger.row(0).iter().map(|c| c.level).collect::<Vec<_>>(), [40, 255, 3, 0]);
     }
 }

@@ -36,7 +36,7 @@ impl Swaths {
         if swaths.len() != self.count() as usize || !swaths.iter().all(fits) {
             return Err(JoinSwathsError::Unlike);
         }
-        let swaths: Vec<Cow<'_, GrayMask>> = swaths.iter().map(gray).collect();
+        let swaths: Vec<Cow<'_, GrayMask>> = swaths.iter().map(Image::to_gray).collect();
         let mut layer = GrayMask::new(self.width);
         let mut steps = Vec::new();
         for row in 0..height {
@@ -85,13 +85,6 @@ impl Swaths {
             }
         }
         Ok(changes)
-    }
-}
-
-pub(super) fn gray(image: &Image) -> Cow<'_, GrayMask> {
-    match image {
-        Image::Mask(mask) => Cow::Owned(mask.into()),
-        Image::Gray(gray) => Cow::Borrowed(gray),
     }
 }
 

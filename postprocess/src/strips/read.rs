@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use lamp_stack::{
-    GrayMask, Image, Layer, Mask, MaskBuilder, MemorySize, Page, PageInfo, Pages, map_in_order,
-};
+use lamp_stack::{Image, Layer, MemorySize, Page, PageInfo, Pages, map_in_order};
 
 use super::index::{INDEX, StripIndex, file_name};
 use super::{JoinSwathsError, StripsError, Swaths};
@@ -142,7 +140,7 @@ impl LayerPages {
         }
         let was_one_bit = info.other.shift_remove("strip").is_some_and(|strip| strip["bits"] == 1);
         let image = if was_one_bit {
-            let mask = black_and_white(&gray);
+            let mask = gray.to_mask();
             Image::Mask(mask.ok_or_else(|| StripsError::Gray { layer: info.name() })?)
         } else {
             Image::Gray(gray)
@@ -153,21 +151,4 @@ impl LayerPages {
         }
         Ok(Layer { info, dpi, image })
     }
-}
-
-/// An image of no other levels than 0 and 255 as a mask.
-fn black_and_white(gray: &GrayMask) -> Option<Mask> {
-    let mut mask = MaskBuilder::new(gray.width());
-    let mut row = Vec::new();
-    for changes in gray.rows() {
-        row.clear();
-        for change in changes {
-            if ![0, 255].contains(&change.level) {
-                return None;
-            }
-            row.push(change.column);
-        }
-        mask.push_row(&row).expect("the changes of a row go up");
-    }
-    Some(mask.finish())
 }

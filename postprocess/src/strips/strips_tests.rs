@@ -27,9 +27,7 @@ fn image(width: u32, rows: &[Vec<(u32, u8)>], levels: bool) -> Image {
 }
 
 fn level(image: &Image, column: u32, row: u32) -> u8 {
-    let gray = join_swaths::gray(image);
-    let runs = gray_runs(gray.row(row), gray.width());
-    runs.into_iter().find(|run| (run.0..run.1).contains(&column)).map_or(0, |run| run.2)
+    image.to_gray().level(column, row)
 }
 
 proptest! {
@@ -58,7 +56,7 @@ proptest! {
                 prop_assert_eq!(sum, u32::from(level(&layer, column, row)), "{} {}", column, row);
             }
         }
-        prop_assert_eq!(swaths.join(&cut), Ok(join_swaths::gray(&layer).into_owned()));
+        prop_assert_eq!(swaths.join(&cut), Ok(layer.to_gray().into_owned()));
     }
 }
 
