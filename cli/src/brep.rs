@@ -13,27 +13,33 @@ use clap::{Args, ValueEnum};
 use lamp_brep::{BodyFault, BodyReport, Finding, KernelName, Prepared, prepare};
 use lamp_slicer::{Model, digest_of_bytes};
 use lamp_stack::{Dpi, Length};
+use serde::{Deserialize, Serialize};
 
 use crate::options::parse_distance;
+use crate::recorded::optional;
 use crate::stop::Stop;
 use crate::streams::is_stream;
 
 pub(crate) const HEADING: &str = "STEP parts";
 
 /// How B-rep parts are read.
-#[derive(Args, Clone)]
+#[derive(Args, Clone, Default, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
 pub(crate) struct BrepOptions {
     /// How far the facets of a STEP part may lie from its surfaces [default: a quarter of a
     /// pixel]
     #[arg(long, value_name = "LENGTH", value_parser = parse_tolerance, help_heading = HEADING)]
+    #[serde(with = "optional")]
     tolerance: Option<Length>,
 
     #[command(flatten)]
+    #[serde(flatten)]
     pub(crate) reader: ReaderOptions,
 }
 
 /// What reads B-rep parts, and for how long.
-#[derive(Args, Clone)]
+#[derive(Args, Clone, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct ReaderOptions {
     /// What reads STEP parts: LAMP itself, or OpenCASCADE (in builds with --features occt)
     #[arg(long, value_enum, default_value_t, help_heading = HEADING)]
@@ -42,10 +48,12 @@ pub(crate) struct ReaderOptions {
     /// Give up on a STEP part that takes longer to read, in seconds
     #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = parse_seconds)]
     #[arg(help_heading = HEADING)]
+    #[serde(skip)]
     timeout: Duration,
 }
 
-#[derive(Clone, Copy, Default, ValueEnum)]
+#[derive(Clone, Copy, Default, PartialEq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 enum KernelArg {
     #[default]
     Lamp,
@@ -53,13 +61,13 @@ enum KernelArg {
     Occt,
 }
 
-impl BrepOptions {
-    /// The options as the stack remembers them.
-    pub(crate) fn command_line(&self) -> String {
-        let tolerance = self.tolerance.map(|tolerance| format!(" --tolerance {tolerance}"));
-        tolerance.unwrap_or_default() + &self.reader.command_line()
+impl Default for ReaderOptions {
+    fn default() -> Self {
+        Self { kernel: KernelArg::default(), timeout: Duration::from_secs(300) }
     }
+}
 
+impl BrepOptions {
     /// How far facets may lie from surfaces, for images of some resolution.
     pub(crate) fn tolerance(&self, dpi: Dpi) -> Length {
         self.tolerance.unwrap_or_else(|| Length::from_um(dpi.pitch().um() / 4.0))
@@ -67,12 +75,9 @@ impl BrepOptions {
 }
 
 impl ReaderOptions {
-    fn command_line(&self) -> String {
-        match self.kernel {
-            KernelArg::Lamp => String::new(),
-            #[cfg(feature = "occt")]
-            KernelArg::Occt => " --kernel occt".to_owned(),
-        }
+    /// Whether it reads files as it does by default.
+    pub(crate) fn is_usual(&self) -> bool {
+        self.kernel == KernelArg::default()
     }
 
     /// Reads a STEP file. Faults of its bodies are in the reports.

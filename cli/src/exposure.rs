@@ -8,8 +8,10 @@ use lamp_grayscale::calibrate::{ExposureTimes, Table};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{ExposureTime, Resin};
 use lamp_stack::{DepthLevels, Length};
+use serde::{Deserialize, Serialize};
 
 use crate::catalogue::{entry, read_text};
+use crate::recorded::text;
 use crate::stop::Stop;
 use crate::streams::input_name;
 
@@ -19,7 +21,8 @@ pub(crate) const EXPOSURE: &str = "Exposure";
 const LARGEST_TABLE: u64 = 1 << 20;
 
 /// Options that say how long layers are exposed.
-#[derive(Args, Clone)]
+#[derive(Args, Clone, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
 pub(crate) struct ExposureOptions {
     /// The resin: a name of `lamp material list`, or a file. Pages then say how long they are
     /// exposed
@@ -30,6 +33,7 @@ pub(crate) struct ExposureOptions {
     /// below
     #[arg(long, value_name = "LAYERS", default_value = "1", value_parser = parse_overcure)]
     #[arg(requires = "material", help_heading = EXPOSURE)]
+    #[serde(with = "text")]
     overcure: f64,
 
     /// How long layers of each thickness are exposed, instead of by a material: a table with the
@@ -49,7 +53,26 @@ enum Source {
     Table(ExposureTimes),
 }
 
+impl Default for ExposureOptions {
+    fn default() -> Self {
+        Self { material: None, overcure: 1.0, exposure_table: None }
+    }
+}
+
 impl ExposureOptions {
+    /// Puts the name of the material or table in the place of its path, as stacks record it.
+    pub(crate) fn name(&mut self, exposure: Option<&Exposure>) {
+        let Some(Exposure { name, .. }) = exposure else { return };
+        for path in [&mut self.material, &mut self.exposure_table].into_iter().flatten() {
+            *path = PathBuf::from(name);
+        }
+    }
+
+    /// Whether a material decides the exposure.
+    pub(crate) fn has_material(&self) -> bool {
+        self.material.is_some()
+    }
+
     /// The files that it reads.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.material.iter().chain(&self.exposure_table)
@@ -106,16 +129,6 @@ impl Exposure {
 
     fn failed(&self, error: anyhow::Error) -> Stop {
         Stop::Failed(error).at(self.name.clone())
-    }
-
-    /// The options as the stack remembers them.
-    pub(crate) fn command_line(&self) -> String {
-        match &self.source {
-            Source::Resin { overcure, .. } => {
-                format!(" --material {} --overcure {overcure}", self.name)
-            }
-            Source::Table(_) => format!(" --exposure-table {}", self.name),
-        }
     }
 }
 

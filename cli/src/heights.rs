@@ -1,5 +1,8 @@
 //! How thick each layer is, as options say.
 
+use std::fmt;
+use std::str::FromStr;
+
 use clap::Args;
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart, Slab,
@@ -8,9 +11,11 @@ use lamp_adaptive::{
 use lamp_grayscale::calibrate::with_digits;
 use lamp_slicer::{FacetIndex, Fill};
 use lamp_stack::{Dpi, Length};
+use serde::{Deserialize, Serialize};
 
 use crate::exposure::Exposure;
 use crate::options::{one_of, parse_thickness};
+use crate::recorded::optional;
 use crate::stop::Stop;
 
 pub(crate) const HEADING: &str = "Adaptive layer heights";
@@ -19,50 +24,60 @@ pub(crate) const HEADING: &str = "Adaptive layer heights";
 const PIXELS_PER_ROW: f64 = 4.0;
 
 /// Options that say how thick each layer may be.
-#[derive(Args, Clone, Default)]
+#[derive(Args, Clone, Default, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
 pub(crate) struct HeightOptions {
     /// The thinnest layer that the machine builds [default: 25um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    #[serde(with = "optional")]
     min: Option<Length>,
 
     /// The thickest [default: 100um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    #[serde(with = "optional")]
     max: Option<Length>,
 
     /// Layers are whole steps thick [default: 1um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    #[serde(with = "optional")]
     step: Option<Length>,
 
     /// How far a layer is off the part: by the volume it lacks and has too much, by the cusps at
     /// its edge, or by how the section's area changes [default: volume, or cusp where --cusp is
     /// given]
     #[arg(long, value_parser = one_of::<Measure>(), help_heading = HEADING)]
+    #[serde(with = "optional")]
     criterion: Option<Measure>,
 
     /// The most that a layer may be off, as a share of its volume (or, by --criterion area, of its
     /// section): 2% or 0.02 [default: 2%]
     #[arg(long, value_name = "SHARE", value_parser = parse_share, help_heading = HEADING)]
+    #[serde(with = "optional")]
     deviation: Option<f64>,
 
     /// The highest cusp: how far a layer's edge may be off the surface, along its normal
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     #[arg(conflicts_with = "deviation")]
+    #[serde(with = "optional")]
     cusp: Option<Length>,
 
     /// At most so many layers: the smallest bound that needs no more is found, to one percent
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     #[arg(conflicts_with_all = ["deviation", "cusp", "time_budget"], help_heading = HEADING)]
+    #[serde(with = "optional")]
     layers_budget: Option<u32>,
 
     /// At most so long for all layers, as 8h, 90min or 1200s: their exposures, by --material or
     /// --exposure-table, and --layer-overhead
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, help_heading = HEADING)]
+    #[arg(long, value_name = "TIME", help_heading = HEADING)]
     #[arg(conflicts_with_all = ["deviation", "cusp"])]
-    time_budget: Option<f64>,
+    #[serde(with = "optional")]
+    time_budget: Option<Seconds>,
 
     /// What each layer takes besides its exposure, as 30s: recoating, most of all
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, help_heading = HEADING)]
-    pub(crate) layer_overhead: Option<f64>,
+    #[arg(long, value_name = "TIME", help_heading = HEADING)]
+    #[serde(with = "optional")]
+    layer_overhead: Option<Seconds>,
 
     /// End layers at flat faces, wherever the limits allow
     #[arg(long, help_heading = HEADING)]
@@ -71,6 +86,7 @@ pub(crate) struct HeightOptions {
     /// How far apart the rows are along which the part is measured: what is thinner across them
     /// may be missed [default: four pixels]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    #[serde(with = "optional")]
     row_pitch: Option<Length>,
 }
 
@@ -207,7 +223,7 @@ impl HeightOptions {
             search
                 .within_budget(|_| 1.0, layers.into())
                 .map_err(|error| over(error, |layers| format!("{layers} layers")))?
-        } else if let Some(seconds) = self.time_budget {
+        } else if let Some(Seconds(seconds)) = self.time_budget {
             let cost = self.seconds_of_layers(exposure)?;
             search.within_budget(cost, seconds).map_err(|error| over(error, time_text))?
         } else {
@@ -233,34 +249,16 @@ impl HeightOptions {
         // What holds for the limits holds between them.
         exposure.time(self.min())?;
         exposure.time(self.max())?;
-        let overhead = self.layer_overhead.unwrap_or(0.0);
+        let overhead = self.overhead();
         Ok(move |um: f64| {
             let time = exposure.time(Length::from_um(um));
             overhead + time.map_or(f64::INFINITY, |time| time.ms() / 1000.0)
         })
     }
 
-    /// The options that were given, as the stack remembers them.
-    pub(crate) fn command_line(&self) -> String {
-        let mut line = String::new();
-        let mut add = |name: &str, value: Option<String>| {
-            line += &value.map_or(String::new(), |value| format!(" --{name} {value}"));
-        };
-        let length = |length: Option<Length>| length.map(|length| length.to_string());
-        add("min", length(self.min));
-        add("max", length(self.max));
-        add("step", length(self.step));
-        add("criterion", self.criterion.map(|criterion| criterion.to_string()));
-        add("deviation", self.deviation.map(|share| share.to_string()));
-        add("cusp", length(self.cusp));
-        add("layers-budget", self.layers_budget.map(|layers| layers.to_string()));
-        add("time-budget", self.time_budget.map(|seconds| format!("{seconds}s")));
-        add("layer-overhead", self.layer_overhead.map(|seconds| format!("{seconds}s")));
-        add("row-pitch", length(self.row_pitch));
-        if self.snap {
-            line += " --snap";
-        }
-        line
+    /// How many seconds each layer takes besides its exposure.
+    pub(crate) fn overhead(&self) -> f64 {
+        self.layer_overhead.map_or(0.0, |Seconds(seconds)| seconds)
     }
 }
 
@@ -309,20 +307,34 @@ fn parse_share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses a time in seconds: `8h`, `90min`, `30s`.
-fn parse_seconds(text: &str) -> Result<f64, String> {
-    let wrong = || format!("`{text}` is not a time: write 8h, 90min or 30s");
-    let split = text.find(|c: char| c.is_ascii_alphabetic()).ok_or_else(wrong)?;
-    let factor = match &text[split..] {
-        "h" => 3600.0,
-        "min" => 60.0,
-        "s" => 1.0,
-        "ms" => 0.001,
-        _ => return Err(wrong()),
-    };
-    match text[..split].trim().parse::<f64>() {
-        Ok(number) if (0.0..1e12).contains(&number) => Ok(number * factor),
-        _ => Err(wrong()),
+/// A time in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Seconds(f64);
+
+impl fmt::Display for Seconds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}s", self.0)
+    }
+}
+
+impl FromStr for Seconds {
+    type Err = String;
+
+    /// Parses `8h`, `90min` or `30s`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is not a time: write 8h, 90min or 30s");
+        let split = text.find(|c: char| c.is_ascii_alphabetic()).ok_or_else(wrong)?;
+        let factor = match &text[split..] {
+            "h" => 3600.0,
+            "min" => 60.0,
+            "s" => 1.0,
+            "ms" => 0.001,
+            _ => return Err(wrong()),
+        };
+        match text[..split].trim().parse::<f64>() {
+            Ok(number) if (0.0..1e12).contains(&number) => Ok(Self(number * factor)),
+            _ => Err(wrong()),
+        }
     }
 }
 
@@ -334,14 +346,14 @@ mod tests {
     fn shares_and_times() {
         assert_eq!(parse_share("2%"), Ok(0.02));
         assert_eq!(parse_share("0.05"), Ok(0.05));
-        assert_eq!(parse_seconds("8h"), Ok(28_800.0));
-        assert_eq!(parse_seconds("1.5 min"), Ok(90.0));
+        assert_eq!("8h".parse(), Ok(Seconds(28_800.0)));
+        assert_eq!("1.5 min".parse(), Ok(Seconds(90.0)));
         assert_eq!(parse_share("150%"), Ok(1.5));
         for wrong in ["", "-1%", "nan", "2 percent", "2", "inf%"] {
             assert!(parse_share(wrong).is_err(), "{wrong}");
         }
         for wrong in ["", "8", "h", "-3s", "nans", "infh"] {
-            assert!(parse_seconds(wrong).is_err(), "{wrong}");
+            assert!(wrong.parse::<Seconds>().is_err(), "{wrong}");
         }
     }
 

@@ -8,18 +8,21 @@ mod brep;
 mod bridge;
 mod catalogue;
 mod commands;
+mod compensate_report;
 mod evidence;
 mod exposure;
-mod findings;
+mod fix_report;
 mod heights;
 mod hints;
-mod lines;
+mod json_report;
+mod mesh_report;
 mod options;
 mod part;
 mod picture;
 mod place;
 mod placement;
 mod plots;
+mod recorded;
 mod report;
 mod section;
 mod signals;
@@ -28,8 +31,6 @@ mod stop;
 mod streams;
 #[cfg(feature = "occt")]
 mod supervise;
-mod trace;
-mod walls;
 
 use std::process::ExitCode;
 

@@ -3,36 +3,44 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use clap::{Args, Parser};
+use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_slicer::{GridRule, LayerHeights, LayerLevels, Model, PlaneRule, SliceOptions, Slices};
 use lamp_stack::{Dpi, Layer, Length, Size};
+use serde::{Deserialize, Serialize};
 
 use crate::brep::HEADING;
 use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
 use crate::heights::{self, HeightOptions};
 use crate::options::{one_of, parse_thickness};
-use crate::placement::parse_numbers;
+use crate::placement::Numbers;
+use crate::recorded::{from_words, optional, text, to_words};
 use crate::solid::SolidOptions;
 use crate::stop::Stop;
 
 /// What decides the images.
-#[derive(Args, Clone)]
+#[derive(Args, Clone, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
 pub(crate) struct PartOptions {
     /// Resolution in dots per inch
-    #[arg(long, value_name = "DPI", default_value = "1500")]
+    #[arg(long, value_name = "DPI", default_value_t = Self::default().dpi)]
+    #[serde(with = "text")]
     pub(crate) dpi: Dpi,
 
     /// Thickness of the layers, as 100um, 0.1mm, 4mil or 0.004in
-    #[arg(long, value_name = "LENGTH", default_value = "100um", value_parser = parse_thickness)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    #[arg(default_value_t = Self::default().thickness)]
     #[arg(allow_hyphen_values = true, conflicts_with = "adaptive")]
+    #[serde(with = "text")]
     thickness: Length,
 
     /// Where in its layer a section is taken
     #[arg(long, value_parser = one_of::<PlaneRule>(), default_value_t)]
+    #[serde(with = "text")]
     plane: PlaneRule,
 
     #[command(flatten)]
+    #[serde(flatten)]
     pub(crate) solid: SolidOptions,
 
     /// Leave crossings on the facets of STEP parts, instead of moving them onto the exact
@@ -41,17 +49,20 @@ pub(crate) struct PartOptions {
     no_polish: bool,
 
     /// Black pixels around the part's box
-    #[arg(long, value_name = "PIXELS", default_value_t = 1)]
+    #[arg(long, value_name = "PIXELS", default_value_t = Self::default().margin)]
+    #[serde(with = "text")]
     margin: u32,
 
     /// Top left corner of the image in part coordinates, in millimetres, instead of the part's
     /// box; the image must hold the part, and leave its last column black
     #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
     #[arg(allow_hyphen_values = true)]
-    origin: Option<[f64; 2]>,
+    #[serde(with = "optional")]
+    origin: Option<Numbers<2>>,
 
     /// Size of the image, as 80x80mm or 4x4.5in; goes with --origin
     #[arg(long, value_name = "WxH", requires = "origin")]
+    #[serde(with = "optional")]
     size: Option<Size>,
 
     /// Make each layer as thick as the part's slopes allow, by the options below
@@ -59,9 +70,11 @@ pub(crate) struct PartOptions {
     adaptive: bool,
 
     #[command(flatten)]
+    #[serde(flatten)]
     heights: HeightOptions,
 
     #[command(flatten)]
+    #[serde(flatten)]
     exposure: ExposureOptions,
 
     /// Write gray layers: each pixel as bright as it takes to cure the part below it, down to
@@ -69,6 +82,25 @@ pub(crate) struct PartOptions {
     #[arg(long, requires = "material", conflicts_with = "exposure_table")]
     #[arg(help_heading = EXPOSURE)]
     gray: bool,
+}
+
+impl Default for PartOptions {
+    fn default() -> Self {
+        Self {
+            dpi: Dpi::new(1500.0).expect("it is a resolution"),
+            thickness: Length::from_um(100.0),
+            plane: PlaneRule::default(),
+            solid: SolidOptions::default(),
+            no_polish: false,
+            margin: 1,
+            origin: None,
+            size: None,
+            adaptive: false,
+            heights: HeightOptions::default(),
+            exposure: ExposureOptions::default(),
+            gray: false,
+        }
+    }
 }
 
 impl PartOptions {
@@ -88,7 +120,7 @@ impl PartOptions {
 
     fn grid(&self) -> GridRule {
         match (self.origin, self.size) {
-            (Some(origin_mm), Some(size)) => {
+            (Some(Numbers(origin_mm)), Some(size)) => {
                 let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
                 GridRule::At { origin_mm, pixels: [side(size.width), side(size.height)] }
             }
@@ -96,44 +128,26 @@ impl PartOptions {
         }
     }
 
-    /// The options of a command as a stack remembers it, where that is a slice
-    /// command.
+    /// Reads the options from a command that a stack records; none if it is no slice command.
     pub(crate) fn of_command(command: &str) -> Option<Self> {
-        #[derive(Parser)]
-        struct Recorded {
-            #[command(flatten)]
-            options: PartOptions,
-        }
         // The name of the part may hold blanks.
         let rest = command.strip_prefix("slice")?;
-        let options = rest.find(" --").map_or("", |start| &rest[start..]);
-        let words = ["slice"].into_iter().chain(options.split_whitespace());
-        Recorded::try_parse_from(words).ok().map(|recorded| recorded.options)
+        from_words(rest.find(" --").map_or("", |start| &rest[start..]))
     }
 
-    /// The command as the stack remembers it: no paths, no option that leaves
-    /// the bytes alone.
-    fn command_line(&self, part: &str, exposure: Option<&Exposure>) -> String {
-        let layers = match self.adaptive {
-            true => format!("--adaptive{}", self.heights.command_line()),
-            false => format!("--thickness {}", self.thickness),
-        };
-        let mut line = format!(
-            "slice {part} --dpi {} {layers} --plane {}{}",
-            self.dpi,
-            self.plane,
-            self.solid.command_line(),
-        );
-        line += if self.no_polish { " --no-polish" } else { "" };
-        if let Some(exposure) = exposure {
-            line += if self.gray { " --gray" } else { "" };
-            line += &exposure.command_line();
-        }
-        line += &match (self.origin, self.size) {
-            (Some([x, y]), Some(size)) => format!(" --origin {x},{y} --size {size}"),
-            _ => format!(" --margin {}", self.margin),
-        };
-        line
+    /// The command as the stack records it.
+    fn command(&self, part: &str, exposure: Option<&Exposure>) -> String {
+        let mut options = self.clone();
+        options.exposure.name(exposure);
+        let kernel = self.solid.brep.reader.is_usual();
+        let words = to_words(&options, |key| match key {
+            "thickness" => !self.adaptive,
+            "kernel" => !kernel,
+            "overcure" => options.exposure.has_material(),
+            "margin" => self.origin.is_none(),
+            _ => true,
+        });
+        format!("slice {part}{words}")
     }
 
     /// The layers of a part, the first naming this command; `part` is the
@@ -161,7 +175,7 @@ impl PartOptions {
             exposure.time(self.thickness)?;
         }
         let slices = Slices::new(model, &options)?;
-        let command = self.command_line(part, exposure.as_ref());
+        let command = self.command(part, exposure.as_ref());
         let name_command = move |layer: &mut Layer| {
             // All thicknesses were tried above.
             let time = |exposure: &Exposure| {
@@ -211,7 +225,7 @@ impl PartOptions {
             return Err(Stop::usage(why));
         }
         if !self.adaptive
-            && let Some(option) = self.heights.command_line().split_whitespace().next()
+            && let Some(option) = to_words(&self.heights, |_| true).split_whitespace().next()
         {
             return Err(Stop::usage(format!("{option} goes with --adaptive")));
         }
@@ -240,7 +254,36 @@ fn machine_memory() -> u64 {
 }
 
 /// Parses `X,Y` in millimetres.
-fn parse_origin(text: &str) -> Result<[f64; 2], String> {
-    parse_numbers(text.trim_end_matches("mm"))
-        .ok_or_else(|| format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2"))
+fn parse_origin(text: &str) -> Result<Numbers<2>, String> {
+    let wrong = || format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2");
+    text.trim_end_matches("mm").parse().map_err(|_| wrong())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recorded_commands_are_read_as_they_were_written() {
+        for words in [
+            "--dpi 1500 --thickness 100um --plane top --units mm --fill even-odd --margin 1",
+            "--dpi 72.25 --adaptive --min 0.5um --step 1um --criterion cusp --cusp 10um \
+             --time-budget 28800s --row-pitch 1.5mm --snap --plane top --units inch \
+             --fill nonzero --scale 1,2,0.5 --mirror x,y --rotate x:90,z:-12.5 \
+             --translate -5,0,12.7 --tolerance 1um --no-polish --gray --material lamp-suspension \
+             --overcure 1.5 --origin -1,77.2 --size 80x80.5mm",
+            "--dpi 300 --thickness 1.5mm --plane middle --units mm --fill even-odd \
+             --exposure-table my_times.csv --margin 0",
+        ] {
+            let command = format!("slice my part.stl {words}");
+            let options = PartOptions::of_command(&command).unwrap();
+            assert_eq!(options.command("my part.stl", None), command);
+        }
+        let of_older = PartOptions::of_command("slice a.stl --dpi 1500").unwrap();
+        assert_eq!(of_older.command("", None), PartOptions::default().command("", None));
+        for wrong in ["fix", "slice a.stl --colour red", "slice a.stl --dpi", "slice a --fill all"]
+        {
+            assert!(PartOptions::of_command(wrong).is_none(), "{wrong}");
+        }
+    }
 }

@@ -8,29 +8,36 @@ use std::sync::Arc;
 use clap::Args;
 use lamp_slicer::{FacetIndex, Fill, Model, Placement, SliceError, Units};
 use lamp_stack::Dpi;
+use serde::{Deserialize, Serialize};
 
 use crate::brep::{BrepOptions, boxes_overlap, bytes_of, is_step, part_of};
 use crate::options::one_of;
 use crate::placement::PlacementOptions;
+use crate::recorded::text;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream};
 
 /// What decides the solid that is sliced.
-#[derive(Args, Clone)]
+#[derive(Args, Clone, Default, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
 pub(crate) struct SolidOptions {
     /// What the numbers of an STL mean; a STEP file says so itself
     #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
+    #[serde(with = "text")]
     pub(crate) units: Units,
 
     /// What is inside: between odd and even crossings, or wherever contours wind around (for
     /// bodies that overlap)
     #[arg(long, value_parser = one_of::<Fill>(), default_value_t)]
+    #[serde(with = "text")]
     pub(crate) fill: Fill,
 
     #[command(flatten)]
+    #[serde(flatten)]
     placement: PlacementOptions,
 
     #[command(flatten)]
+    #[serde(flatten)]
     pub(crate) brep: BrepOptions,
 }
 
@@ -42,13 +49,6 @@ impl SolidOptions {
     /// The part in memory.
     pub(crate) fn body(&self, model: Model) -> Result<FacetIndex, SliceError> {
         FacetIndex::new(model, &self.placement(), self.units)
-    }
-
-    /// The options as the stack remembers them.
-    pub(crate) fn command_line(&self) -> String {
-        let placement = self.placement.command_line();
-        let brep = self.brep.command_line();
-        format!(" --units {} --fill {}{placement}{brep}", self.units, self.fill)
     }
 
     /// Opens all files of a part.

@@ -8,13 +8,13 @@ use lamp_postprocess::{CompensateError, CompensateOptions, Shrinkage, Widths};
 use lamp_stack::{Dpi, Layer, Length, LengthError};
 
 use crate::catalogue::entry;
-use crate::lines::parse_report;
+use crate::compensate_report::Walls;
+use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output, parse_distance};
 use crate::stop::Stop;
 use crate::streams::{
-    check_beside, check_not_input, input_name, read_layers, report, write_file, write_layers,
+    check_beside, check_not_input, input_name, read_layers, report, write_layers,
 };
-use crate::walls::Walls;
 
 /// Narrow images by what the resin cures beyond them, and make up for firing shrinkage
 ///
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Stop> {
         report.say(&line);
     }
     if let Some(path) = &args.report {
-        write_file(path, |out| walls.write(layer_count, out))?;
+        walls.write(layer_count, path)?;
     }
     Ok(())
 }

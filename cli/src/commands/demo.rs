@@ -108,7 +108,7 @@ fn part_layers(
     range: Option<Range<u32>>,
     report: &Report,
 ) -> Result<impl Iterator<Item = Result<Layer, Stop>>, Stop> {
-    let options = PartOptions::of_command("slice").expect("every option has a default");
+    let options = PartOptions::default();
     let model = Model::open(stl)?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
     let (slices, name_command) = options.slices(model, &file, range, None, None, &|_| {})?;

@@ -5,11 +5,11 @@ use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
 use crate::evidence::Evidence;
-use crate::findings::{Findings, whereabouts};
-use crate::lines::parse_report;
+use crate::fix_report::{Findings, whereabouts};
+use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output, one_of_described};
 use crate::stop::Stop;
-use crate::streams::{check_beside, read_layers, report, write_file, write_layers};
+use crate::streams::{check_beside, read_layers, report, write_layers};
 
 /// Find and correct stray rows: rows that a gap in the mesh made run across the image
 ///
@@ -103,7 +103,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Stop> {
         evidence.finish()?;
     }
     if let Some(path) = &args.report {
-        write_file(path, |out| findings.write(layer_count, out))?;
+        findings.write(layer_count, path)?;
     }
     match findings.left() {
         0 => Ok(()),

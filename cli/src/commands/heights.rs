@@ -87,7 +87,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Stop> {
         let bytes = drawn(&plots(&name_of_all(&args.parts), &all[..2]), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
     }
-    let overhead = args.heights.layer_overhead.unwrap_or(0.0);
+    let overhead = args.heights.overhead();
     print(&summary(&found, &all, exposure.as_ref(), overhead))
 }
 

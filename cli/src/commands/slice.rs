@@ -7,14 +7,14 @@ use lamp_slicer::{PixelGrid, Polished, StrayBand};
 
 use crate::brep::{HEADING, length};
 use crate::bridge::Bridged;
-use crate::lines::parse_report;
+use crate::json_report::parse_report;
+use crate::mesh_report::{Counts, Rows, Subject};
 use crate::options::{Common, Output, parse_layers, parse_memory};
 use crate::part::PartOptions;
 use crate::report::Report;
 use crate::solid::{Reading, at_part, name_of_all};
 use crate::stop::Stop;
-use crate::streams::{check_beside, check_not_input, report, write_file, write_layers};
-use crate::trace::{Counts, Rows, Subject};
+use crate::streams::{check_beside, check_not_input, report, write_layers};
 
 /// Slice an STL or STEP part into a stack of layer images
 ///
@@ -116,7 +116,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         };
         let PixelGrid { origin_mm, dpi, .. } = *slices.grid();
         let rows = Rows { top_mm: origin_mm[1], dpi };
-        write_file(path, |out| subject.write(&trace, rows, out))?;
+        subject.write(&trace, rows, path)?;
     }
     if let Some(polished) = slices.polished().filter(|it| it.moved + it.kept > 0) {
         report.say(&polish_text(polished));

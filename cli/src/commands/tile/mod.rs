@@ -14,7 +14,7 @@ use lamp_postprocess::{
 use lamp_stack::{Length, Size};
 
 use crate::catalogue::{entry, read_text};
-use crate::lines::parse_report;
+use crate::json_report::parse_report;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::plots;
 use crate::report::Report;

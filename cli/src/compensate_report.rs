@@ -1,15 +1,16 @@
 //! Walls that `compensate` narrowed less than asked, and pieces that it lost, in
 //! words and as JSON.
 
-use std::io::{self, Write};
 use std::ops::Range;
+use std::path::Path;
 
 use lamp_postprocess::{Compensated, Loss, ThinWall};
 use lamp_stack::Layer;
 use serde::Serialize;
 
-use crate::lines::{to_nm, write_lines};
+use crate::json_report::{JsonReport, to_nm};
 use crate::place::{Place, millimetres};
+use crate::stop::Stop;
 
 /// So many walls are listed; others are only counted.
 const MOST_LISTED: usize = 10_000;
@@ -133,9 +134,9 @@ impl Walls {
         lines
     }
 
-    /// Writes all as one JSON object, a line for each wall.
-    pub(crate) fn write(&self, layers: usize, out: &mut dyn Write) -> io::Result<()> {
-        let head = serde_json::to_string(&Head {
+    /// Writes the report.
+    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), Stop> {
+        let head = Head {
             layers,
             layers_changed: self.changed,
             layers_cut_off: self.cut_off.as_ref().map_or(0, |(_, count)| *count),
@@ -144,10 +145,8 @@ impl Walls {
             lost: self.lost,
             broken: self.broken,
             not_listed: self.walls + self.lost + self.broken - self.listed.len(),
-        })?;
-        write!(out, "{},\n\"walls\":[", head.trim_end_matches('}'))?;
-        write_lines(self.listed.iter(), out)?;
-        writeln!(out, "]}}")
+        };
+        JsonReport::new(&head).list("walls", &self.listed).write(path)
     }
 }
 

@@ -1,13 +1,14 @@
 //! The report of what is wrong with a mesh, as `slice --report` writes it: one
 //! JSON object, with an edge or a band on each line.
 
-use std::io::{self, Write};
+use std::path::Path;
 
 use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
 use lamp_stack::{Dpi, PageInfo};
 use serde::Serialize;
 
-use crate::lines::{to_nm, write_lines};
+use crate::json_report::{JsonReport, to_nm};
+use crate::stop::Stop;
 
 /// What is counted while the layers pass.
 #[derive(Clone, Copy, Default, Serialize)]
@@ -78,13 +79,12 @@ pub(crate) struct Rows {
 
 impl Subject<'_> {
     /// Writes the report.
-    pub(crate) fn write(&self, trace: &Trace, rows: Rows, out: &mut dyn Write) -> io::Result<()> {
-        let head = serde_json::to_string(self)?;
-        write!(out, "{},\n\"edges\":[", head.trim_end_matches('}'))?;
-        write_lines(trace.edges.iter().enumerate().map(edge_line), out)?;
-        write!(out, "],\n\"bands\":[")?;
-        write_lines(trace.bands.iter().map(|band| band_line(band, rows)), out)?;
-        writeln!(out, "]}}")
+    pub(crate) fn write(&self, trace: &Trace, rows: Rows, path: &Path) -> Result<(), Stop> {
+        let bands = trace.bands.iter().map(|band| band_line(band, rows));
+        JsonReport::new(self)
+            .list("edges", trace.edges.iter().enumerate().map(edge_line))
+            .list("bands", bands)
+            .write(path)
     }
 }
 

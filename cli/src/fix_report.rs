@@ -1,14 +1,15 @@
 //! What `fix` found and did, as JSON, and where it was.
 
-use std::io::{self, Write};
 use std::ops::Range;
+use std::path::Path;
 
 use lamp_postprocess::{Band, BandKind, BandOutcome, FixOptions, Fixed};
 use lamp_stack::Layer;
 use serde::Serialize;
 
-use crate::lines::{to_nm, write_lines};
+use crate::json_report::{JsonReport, to_nm};
 use crate::place::{Place, millimetres};
+use crate::stop::Stop;
 
 /// Collects what is found.
 pub(crate) struct Findings {
@@ -75,9 +76,9 @@ impl Findings {
         self.bands.len() - self.corrected
     }
 
-    /// Writes all as one JSON object, a line for each band.
-    pub(crate) fn write(&self, layers: usize, out: &mut dyn Write) -> io::Result<()> {
-        let head = serde_json::to_string(&Head {
+    /// Writes the report.
+    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), Stop> {
+        let head = Head {
             method: self.options.method.name(),
             max_width: self.options.max_width,
             min_confidence: self.options.min_confidence,
@@ -86,10 +87,8 @@ impl Findings {
             bands_corrected: self.corrected,
             bands_left: self.left(),
             pixels_changed: self.pixels,
-        })?;
-        write!(out, "{},\n\"bands\":[", head.trim_end_matches('}'))?;
-        write_lines(self.bands.iter(), out)?;
-        writeln!(out, "]}}")
+        };
+        JsonReport::new(&head).list("bands", &self.bands).write(path)
     }
 
     fn line(&self, layer: &Layer, band: &Band) -> BandLine {

@@ -1,0 +1,54 @@
+//! Writes reports: JSON objects that people can read, too, with a list item on each line.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::stop::Stop;
+use crate::streams::write_file;
+
+/// A JSON object that is being written: first some fields, then lists.
+pub(crate) struct JsonReport(String);
+
+impl JsonReport {
+    /// Starts a report with the fields of `head`.
+    pub(crate) fn new(head: &impl Serialize) -> Self {
+        let mut text = json(head);
+        text.pop();
+        Self(text)
+    }
+
+    /// Adds a list.
+    pub(crate) fn list(
+        mut self,
+        name: &str,
+        items: impl IntoIterator<Item = impl Serialize>,
+    ) -> Self {
+        let lines: Vec<_> = items.into_iter().map(|item| format!("\n{}", json(&item))).collect();
+        self.0 += &format!(",\n\"{name}\":[{}]", lines.join(","));
+        self
+    }
+
+    /// Ends the report and writes it to a file.
+    pub(crate) fn write(self, path: &Path) -> Result<(), Stop> {
+        write_file(path, |out| writeln!(out, "{}}}", self.0))
+    }
+}
+
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("reports have text keys")
+}
+
+/// Rounds to the nanometre, for more digits say nothing. Adding zero turns -0 into 0.
+pub(crate) fn to_nm(mm: f64) -> f64 {
+    (mm * 1e6).round() / 1e6 + 0.0
+}
+
+/// Parses the name of a report. Standard output is for the stack.
+pub(crate) fn parse_report(text: &str) -> Result<PathBuf, String> {
+    match text {
+        "-" => Err("standard output is for the stack: name a file, as report.json".to_owned()),
+        "" => Err("name a file, as report.json".to_owned()),
+        name => Ok(PathBuf::from(name)),
+    }
+}

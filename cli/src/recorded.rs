@@ -1,0 +1,133 @@
+//! Slicing options as a stack records them: words of a command, and back.
+//!
+//! Each value stands as people write it, so that the words are a command that can be run.
+
+use std::fmt::Display;
+use std::str::FromStr;
+
+use serde::de::{DeserializeOwned, Error};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value};
+
+/// The options that decide the images, in the order in which they are recorded. Stacks made
+/// with other paths, or with less memory, are to have the same bytes: such options are left out.
+const RECORDED: [&str; 31] = [
+    "dpi",
+    "adaptive",
+    "min",
+    "max",
+    "step",
+    "criterion",
+    "deviation",
+    "cusp",
+    "layers-budget",
+    "time-budget",
+    "layer-overhead",
+    "row-pitch",
+    "snap",
+    "thickness",
+    "plane",
+    "units",
+    "fill",
+    "scale",
+    "mirror",
+    "rotate",
+    "translate",
+    "tolerance",
+    "kernel",
+    "no-polish",
+    "gray",
+    "material",
+    "overcure",
+    "exposure-table",
+    "origin",
+    "size",
+    "margin",
+];
+
+/// Returns the options as words: ` --dpi 1500 --snap` and so on, those for which `applies`
+/// holds.
+pub(crate) fn to_words(options: &impl Serialize, applies: impl Fn(&str) -> bool) -> String {
+    let options = serde_json::to_value(options).expect("options are texts and flags");
+    let word = |key: &str| match &options[key] {
+        Value::Bool(true) => format!(" --{key}"),
+        Value::String(value) => format!(" --{key} {value}"),
+        _ => String::new(),
+    };
+    RECORDED.into_iter().filter(|key| applies(key)).map(word).collect()
+}
+
+/// Reads options from their words. Returns none if there are words of other options.
+pub(crate) fn from_words<T: DeserializeOwned>(words: &str) -> Option<T> {
+    let mut options = Map::new();
+    let mut words = words.split_whitespace().peekable();
+    while let Some(word) = words.next() {
+        let key = word.strip_prefix("--").filter(|key| RECORDED.contains(key))?;
+        let value = words.next_if(|word| !word.starts_with("--"));
+        options.insert(key.to_owned(), value.map_or(Value::Bool(true), Value::from));
+    }
+    serde_json::from_value(Value::Object(options)).ok()
+}
+
+fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(text: &str) -> Result<T, D::Error> {
+    text.parse().map_err(D::Error::custom)
+}
+
+/// A value as text, for serde.
+pub(crate) mod text {
+    use super::{Deserialize, Deserializer, Display, FromStr, Serializer, parsed};
+
+    pub(crate) fn serialize<S: Serializer>(value: &impl Display, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(value)
+    }
+
+    pub(crate) fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<T, D::Error> {
+        parsed::<T, D>(&String::deserialize(from)?)
+    }
+}
+
+/// A value that may be missing as text, for serde.
+pub(crate) mod optional {
+    use super::{Deserializer, Display, FromStr, Serializer, text};
+
+    #[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
+    pub(crate) fn serialize<S: Serializer>(
+        value: &Option<impl Display>,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        match value {
+            Some(value) => text::serialize(value, to),
+            None => to.serialize_none(),
+        }
+    }
+
+    pub(crate) fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Option<T>, D::Error> {
+        text::deserialize(from).map(Some)
+    }
+}
+
+/// Values as one text with commas between, for serde.
+pub(crate) mod list {
+    use super::{Deserialize, Deserializer, Display, FromStr, Serializer, parsed};
+
+    pub(crate) fn serialize<S: Serializer>(
+        values: &[impl Display],
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        match values {
+            [] => to.serialize_none(),
+            _ => to
+                .collect_str(&values.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")),
+        }
+    }
+
+    pub(crate) fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Vec<T>, D::Error> {
+        String::deserialize(from)?.split(',').map(parsed::<T, D>).collect()
+    }
+}
