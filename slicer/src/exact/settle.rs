@@ -1,4 +1,11 @@
-//! Rows that facets miss, or cross too often, where contours turn.
+//! Rows near extrema and saddles of contours, where facets miss crossings or have too
+//! many.
+//!
+//! Three repairs follow each other. Each adds or removes crossings whose windings sum
+//! to zero, so a row that balances goes on to do so. Crossings that are added lie on
+//! the surface. Those removed are either found twice or were kept on their facet, and
+//! are at most as far from the contour as the facets are, so where a repair guesses
+//! wrong the row is as good as that of the facets alone.
 
 use std::collections::HashMap;
 use std::ops::{Range, RangeInclusive};
@@ -11,22 +18,24 @@ use super::saddle::Saddle;
 use super::tally::Tally;
 use crate::cut::{Crossing, Cutter};
 
-/// A row near a turn.
+/// A row near an extremum or a saddle, or with crossings that were kept on facets.
 #[derive(Default)]
-struct Row {
-    /// Its crossings on surfaces, as they were found.
+struct UnsettledRow {
+    /// The crossings on surfaces as polishing found them.
     found: Vec<Crossing>,
-    /// And as they are to be.
+    /// The crossings on surfaces as the row shall have them.
     exact: Vec<Crossing>,
-    /// Those that were kept on facets.
+    /// The crossings kept on facets.
     kept: Vec<Crossing>,
-    /// Those found on one side of a turn.
+    /// Crossings located on one side of an extremum or a saddle only.
     sides: Vec<Crossing>,
 }
 
-/// Returns what is to be added to a layer's crossings on surfaces: those that were
-/// kept on facets, but for pairs that the surfaces do not make where contours turn,
-/// and the pairs there that facets do not make.
+/// Returns the crossings to add to those of a layer that lie on surfaces.
+///
+/// They are those `kept` on facets, except pairs that the surfaces do not have near
+/// extrema and saddles; the pairs there that facets do not have; and the reverse of
+/// those on surfaces that are too many.
 pub(crate) fn settle(
     surfaces: &[&PlacedSurfaces],
     tally: &Tally,
@@ -36,17 +45,16 @@ pub(crate) fn settle(
     kept: Vec<Crossing>,
 ) -> Vec<Crossing> {
     let z_mm = cutter.planes.z_um(layer) / 1000.0;
-    let mut rows: HashMap<u32, Row> = HashMap::new();
-    let mut places = Vec::new();
+    let mut rows: HashMap<u32, UnsettledRow> = HashMap::new();
+    let mut all_near = Vec::new();
     for surfaces in surfaces {
         let extrema = surfaces.extrema(z_mm).into_iter();
-        let saddles = &surfaces.critical_points().saddles;
-        let near = extrema.map(|extremum| Near::extremum(extremum, cutter)).chain(
-            saddles.iter().filter_map(|saddle| Near::saddle(saddle, surfaces, z_mm, cutter)),
-        );
-        for near in near {
-            rows.extend(near.rows.clone().map(|row| (row, Row::default())));
-            places.push((*surfaces, near));
+        let extrema = extrema.map(|extremum| Near::extremum(extremum, cutter));
+        let saddles = surfaces.critical_points().saddles.iter();
+        let saddles = saddles.filter_map(|saddle| Near::saddle(saddle, surfaces, z_mm, cutter));
+        for near in extrema.chain(saddles) {
+            rows.extend(near.rows.clone().map(|row| (row, UnsettledRow::default())));
+            all_near.push((*surfaces, near));
         }
     }
     for crossing in kept {
@@ -61,24 +69,36 @@ pub(crate) fn settle(
             row.exact.push(crossing);
         }
     }
-    let most = (FOLD_MM / cutter.grid.dpi.pitch().mm()) as u32;
-    rows.values_mut().for_each(|row| row.unfold(tally, most));
-    for (surfaces, near) in places {
+    let max_columns = (MAX_FOLD_MM / cutter.grid.dpi.pitch().mm()) as u32;
+    rows.values_mut().for_each(|row| row.unfold(tally, max_columns));
+    for (surfaces, near) in all_near {
         near.settle(surfaces, tally, z_mm, cutter, &mut rows);
     }
-    rows.values_mut().for_each(|row| row.join_sides(tally));
+    rows.values_mut().for_each(|row| row.add_sides(tally));
     // A map has no order; the table sorts.
-    rows.into_values().flat_map(Row::rest).collect()
+    rows.into_values().flat_map(UnsettledRow::changes).collect()
 }
 
-/// No longer than this are the folds that facets make along rows.
-const FOLD_MM: f64 = 3.0;
+/// The longest fold that is looked for, along its row.
+///
+/// A fold is as long as the two or three facets that make it. They are long only where
+/// the surface is straight, and has no folds. The limit bounds the damage where two
+/// contours touch that are not a fold.
+const MAX_FOLD_MM: f64 = 3.0;
 
-impl Row {
-    /// Takes folds away: where facets go along a row they may cross it to and fro,
-    /// while the surface does so once. Then two crossings have become the same, and the
-    /// one between them was kept.
-    fn unfold(&mut self, tally: &Tally, most: u32) {
+impl UnsettledRow {
+    /// Removes folds: where facets go along a row, they may cross it there, back and
+    /// there again, while the surface does so once.
+    ///
+    /// Polishing takes both crossings there to the same point of the surface, and finds
+    /// none for the one back, since the surface faces the other way. So a fold is a kept
+    /// crossing with two equal ones of the other winding beside it. Removing it and one
+    /// of the two leaves the crossing that the surface has. Without that, even-odd
+    /// filling would cancel the two and leave the kept one, which is off by the fold.
+    ///
+    /// Contours of two bodies that touch within a column, beside a kept crossing of a
+    /// third contour, look the same. Then the third is off, by at most the fold.
+    fn unfold(&mut self, tally: &Tally, max_columns: u32) {
         let kept = std::mem::take(&mut self.kept);
         for crossing in kept {
             let there = &self.exact;
@@ -87,7 +107,7 @@ impl Row {
                 let same = there.iter().filter(|other| is_same(there[*k], **other)).count();
                 there[*k].in_row().winding() != crossing.in_row().winding() && same > 1
             };
-            let near = (0..there.len()).filter(|k| away(k) <= most);
+            let near = (0..there.len()).filter(|k| away(k) <= max_columns);
             match near.filter(is_double).min_by_key(away) {
                 Some(double) => {
                     self.exact.swap_remove(double);
@@ -98,9 +118,14 @@ impl Row {
         }
     }
 
-    /// Adds the outer sides of two turns between which the contour turns back, so that
+    /// Adds the outer sides of two extrema between which the contour turns back, so that
     /// neither has a pair of its own.
-    fn join_sides(&mut self, tally: &Tally) {
+    ///
+    /// Both are crossings of the row with the surface that no facet has, and they balance,
+    /// so the part is between them. With other numbers of sides, or with a kept crossing
+    /// that may stand for one of them, it is open which belong together: the row stays
+    /// without them.
+    fn add_sides(&mut self, tally: &Tally) {
         let mut sides: Vec<Crossing> = Vec::new();
         for side in std::mem::take(&mut self.sides) {
             if !self.exact.iter().chain(&sides).any(|other| is_same(side, *other)) {
@@ -113,59 +138,58 @@ impl Row {
         }
     }
 
-    /// What is to be added to the crossings that were found: one to be taken away is
-    /// undone in its column, where there and back is nothing.
-    fn rest(mut self) -> impl Iterator<Item = Crossing> {
-        let mut undone = Vec::new();
+    /// Returns the crossings to add to those found. One that is to go is cancelled by its
+    /// reverse in the same column.
+    fn changes(mut self) -> impl Iterator<Item = Crossing> {
+        let mut cancelled = Vec::new();
         for crossing in self.found {
             match self.exact.iter().position(|other| *other == crossing) {
                 Some(at) => drop(self.exact.swap_remove(at)),
-                None => undone.push(crossing.reversed()),
+                None => cancelled.push(crossing.reversed()),
             }
         }
-        self.kept.into_iter().chain(self.exact).chain(undone)
+        self.kept.into_iter().chain(self.exact).chain(cancelled)
     }
 }
 
-/// The rows about a place where facets may cross too many or too few of them.
+/// An extremum or a saddle, and the pixels around it where facets may cross too many or
+/// too few rows.
 struct Near {
-    place: Place,
-    /// The columns where facets may have crossings for those of the contour.
+    point: CriticalPoint,
+    /// The columns where facets may have crossings instead of the contour's.
     columns: RangeInclusive<i64>,
     rows: Range<u32>,
 }
 
-enum Place {
+enum CriticalPoint {
     Extremum(Extremum),
     Saddle(Saddle),
 }
 
 impl Near {
-    fn new(place: Place, at: [f64; 2], reach_mm: [f64; 2], cutter: Cutter<'_>) -> Self {
+    fn new(point: CriticalPoint, at: [f64; 3], reach_mm: [f64; 2], cutter: Cutter<'_>) -> Self {
         let grid = cutter.grid;
         let [column, row] = grid.to_pixels(at[0], at[1]);
         let [reach, width] = reach_mm.map(|mm| mm / grid.dpi.pitch().mm() + 1.0);
         let clamped = |row: f64| row.ceil().clamp(0.0, f64::from(grid.height)) as u32;
         let columns = (column - width).floor() as i64..=(column + width).ceil() as i64;
-        Self { place, columns, rows: clamped(row - reach)..clamped(row + reach) }
+        Self { point, columns, rows: clamped(row - reach)..clamped(row + reach) }
     }
 
     fn extremum(extremum: Extremum, cutter: Cutter<'_>) -> Self {
-        let [x, y, _] = extremum.at_mm;
         let reach_mm = [extremum.reach_mm, extremum.width_mm()];
-        Self::new(Place::Extremum(extremum), [x, y], reach_mm, cutter)
+        Self::new(CriticalPoint::Extremum(extremum), extremum.at_mm, reach_mm, cutter)
     }
 
-    /// The rows about a saddle that is near the section.
+    /// Nothing if the saddle is too far from the section.
     fn saddle(
         saddle: &Saddle,
         surfaces: &PlacedSurfaces,
         z_mm: f64,
         cutter: Cutter<'_>,
     ) -> Option<Self> {
-        let [x, y, _] = saddle.at_mm;
         let reach_mm = saddle.reach_mm(surfaces, z_mm)?;
-        Some(Self::new(Place::Saddle(*saddle), [x, y], reach_mm, cutter))
+        Some(Self::new(CriticalPoint::Saddle(*saddle), saddle.at_mm, reach_mm, cutter))
     }
 
     fn settle(
@@ -174,31 +198,31 @@ impl Near {
         tally: &Tally,
         z_mm: f64,
         cutter: Cutter<'_>,
-        rows: &mut HashMap<u32, Row>,
+        rows: &mut HashMap<u32, UnsettledRow>,
     ) {
         for number in self.rows.clone() {
-            let row = rows.get_mut(&number).expect("rows near turns are in the map");
+            let row = rows.get_mut(&number).expect("the map has all rows near the point");
             let [_, y_mm] = cutter.grid.to_mm(0.0, f64::from(number));
-            let contact = match &self.place {
-                Place::Extremum(extremum) => extremum.contact(surfaces, y_mm),
-                Place::Saddle(saddle) => saddle.contact(surfaces, y_mm, z_mm),
+            let contact = match &self.point {
+                CriticalPoint::Extremum(extremum) => extremum.contact(surfaces, y_mm),
+                CriticalPoint::Saddle(saddle) => saddle.contact(surfaces, y_mm, z_mm),
             };
-            let at = |point: FacetPoint| {
+            let crossing = |point: FacetPoint| {
                 let [column, _] = cutter.grid.to_pixels(point.at_mm[0], y_mm);
                 Crossing::at(cutter.grid, number, column, point.enters)
             };
             match contact {
-                RowContact::Pair(pair) => self.put(tally, pair.map(at), row),
-                RowContact::OneSide(point) => row.sides.push(at(point)),
-                RowContact::Nothing => self.take(tally, row),
+                RowContact::Pair(pair) => self.set_pair(tally, pair.map(crossing), row),
+                RowContact::OneSide(point) => row.sides.push(crossing(point)),
+                RowContact::Nothing => self.remove_kept(tally, row),
                 RowContact::Unknown => {}
             }
         }
     }
 
-    /// The crossings of a row that were kept on facets near the turn, or near a pair that
-    /// the row has there.
-    fn kept(&self, row: &Row, pair: &[Crossing]) -> Vec<Crossing> {
+    /// Returns a row's crossings that were kept on facets near the point, or near a pair
+    /// that the row has there.
+    fn kept(&self, row: &UnsettledRow, pair: &[Crossing]) -> Vec<Crossing> {
         let width = (self.columns.end() - self.columns.start()) / 2;
         let column = |crossing: &Crossing| i64::from(crossing.in_row().column());
         let is_near = |crossing: &&Crossing| {
@@ -208,8 +232,8 @@ impl Near {
         row.kept.iter().filter(is_near).copied().collect()
     }
 
-    /// Takes the crossings of a row away that facets make where the surface has none.
-    fn take(&self, tally: &Tally, row: &mut Row) {
+    /// Removes a row's crossings that facets have where the surface has none.
+    fn remove_kept(&self, tally: &Tally, row: &mut UnsettledRow) {
         let kept = self.kept(row, &[]);
         if winding(&kept) == 0 {
             row.kept.retain(|crossing| !kept.contains(crossing));
@@ -217,8 +241,8 @@ impl Near {
         }
     }
 
-    /// Sees to it that a row has a pair of crossings near the turn, each once.
-    fn put(&self, tally: &Tally, pair: [Crossing; 2], row: &mut Row) {
+    /// Gives a row the surface's pair of crossings near the point, each once.
+    fn set_pair(&self, tally: &Tally, pair: [Crossing; 2], row: &mut UnsettledRow) {
         let kept = self.kept(row, &pair);
         let is_one = |other: &Crossing| pair.iter().any(|crossing| is_same(*crossing, *other));
         let there: Vec<Crossing> =
@@ -241,7 +265,8 @@ fn winding(crossings: &[Crossing]) -> i32 {
     crossings.iter().map(|crossing| crossing.in_row().winding()).sum()
 }
 
-/// Whether two crossings are the same, found twice; which may round to two columns.
+/// Returns whether two crossings are one that was found twice: by rounding it may be in
+/// either of two columns.
 fn is_same(a: Crossing, b: Crossing) -> bool {
     let [a, b] = [a.in_row(), b.in_row()];
     a.winding() == b.winding() && a.column().abs_diff(b.column()) <= 1
