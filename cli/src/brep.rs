@@ -5,19 +5,16 @@ use std::io::{self, Read};
 use std::mem::discriminant;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
-use lamp_brep::{BodyFault, BodyReport, Finding, KernelName, Prepared, prepare};
-use lamp_slicer::{Model, digest_of_bytes};
+use lamp_slicer::brep::{BodyReport, Finding, KernelName, Prepared};
+use lamp_slicer::{OpenOptions, SliceError};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::options::parse_distance;
 use crate::recorded::optional;
-use crate::stop::Stop;
 use crate::streams::is_stream;
 
 pub(crate) const HEADING: &str = "STEP parts";
@@ -80,40 +77,16 @@ impl ReaderOptions {
         self.kernel == KernelArg::default()
     }
 
-    /// Reads a STEP file. Faults of its bodies are in the reports.
-    pub(crate) fn read(&self, bytes: &Arc<[u8]>, tolerance: Length) -> Result<Prepared, Stop> {
+    /// The options of the library, for facets within a tolerance of surfaces.
+    pub(crate) fn for_opening(&self, tolerance: Length) -> OpenOptions {
         let kernel = match self.kernel {
             KernelArg::Lamp => KernelName::Lamp,
             #[cfg(feature = "occt")]
             KernelArg::Occt => KernelName::Occt,
         };
-        // Nothing has been written yet: if it hangs, the process ends without it.
-        let (sender, receiver) = channel();
-        let bytes = bytes.clone();
-        std::thread::Builder::new()
-            .stack_size(STACK_BYTES)
-            .spawn(move || {
-                // Nobody listens any more once time is up.
-                let _ = sender.send(prepare(&bytes, kernel, tolerance.mm()));
-            })
-            .context("no thread to read it")?;
-        match receiver.recv_timeout(self.timeout) {
-            Ok(prepared) => Ok(prepared.map_err(anyhow::Error::from)?),
-            Err(RecvTimeoutError::Timeout) => Err(Stop::Failed(anyhow!(
-                "reading it takes longer than {} s: give it more with --timeout, or facets more \
-                 than {} to their surfaces",
-                self.timeout.as_secs_f64(),
-                length(tolerance.mm())
-            ))),
-            Err(RecvTimeoutError::Disconnected) => {
-                Err(Stop::Failed(anyhow!("reading it failed within the program")))
-            }
-        }
+        OpenOptions { kernel, tolerance, timeout: self.timeout, ..OpenOptions::default() }
     }
 }
-
-/// Files nest entities as deep as they like.
-const STACK_BYTES: usize = 64 << 20;
 
 pub(crate) fn parse_tolerance(text: &str) -> Result<Length, String> {
     let length = parse_distance(text)?;
@@ -127,57 +100,6 @@ fn parse_seconds(text: &str) -> Result<Duration, String> {
     seconds
         .filter(|seconds| !seconds.is_zero())
         .ok_or_else(|| format!("`{text}` is not a time: write seconds, as 60"))
-}
-
-/// The part of a STEP file; refused where bodies have faults, but for gaps if these
-/// `may_be_open`. `say` is told what was found and done.
-pub(crate) fn part_of(
-    prepared: Prepared,
-    name: &str,
-    bytes: &[u8],
-    may_be_open: bool,
-    say: &dyn Fn(&str),
-) -> Result<Model, Stop> {
-    refuse(&prepared, may_be_open)?;
-    notes(&prepared).iter().for_each(|note| say(note));
-    let digest = digest_of_bytes(bytes);
-    let Prepared { kernel, mesh, .. } = prepared;
-    Ok(Model::from_surfaces(name, digest, Arc::from(kernel), Arc::new(mesh)))
-}
-
-/// Refuses bodies with faults, but for gaps if these `may_be_open`.
-pub(crate) fn refuse(prepared: &Prepared, may_be_open: bool) -> Result<(), Stop> {
-    let is_borne = |fault: &BodyFault| may_be_open && matches!(fault, BodyFault::Open { .. });
-    let bodies = (1..).zip(&prepared.reports);
-    let faults = bodies.flat_map(|(number, report)| {
-        let faults = report.faults.iter().filter(|fault| !is_borne(fault));
-        faults.map(move |fault| format!("{}: {fault}", body_name(number, report)))
-    });
-    let faults: Vec<_> = faults.collect();
-    let Some(first) = faults.first() else { return Ok(()) };
-    let more = match faults.len() {
-        1 => String::new(),
-        count => format!(", and {} faults more", count - 1),
-    };
-    let found = prepared.mesh.findings.first();
-    let found = found.map_or_else(String::new, |it| format!(" (#{}: {})", it.entity, it.fault));
-    Err(Stop::Failed(anyhow!(
-        "it is not sliced, for its sections would be wrong: {first}{found}{more}; \
-         lamp brep tells more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
-    )))
-}
-
-#[cfg(feature = "occt")]
-const OTHER_KERNEL: &str = "the other --kernel may read it";
-#[cfg(not(feature = "occt"))]
-const OTHER_KERNEL: &str = "a build with --features occt may read it";
-
-/// What people call a body.
-pub(crate) fn body_name(number: usize, report: &BodyReport) -> String {
-    match report.name.trim() {
-        "" => format!("body {number}"),
-        name => format!("body {number} ({})", lamp_stack::one_line(name)),
-    }
 }
 
 /// Whether boxes of bodies overlap, and by more than facets are exact.
@@ -244,17 +166,12 @@ pub(crate) fn length(mm: f64) -> String {
 }
 
 /// The bytes of a file, or of standard input.
-pub(crate) fn bytes_of(path: &Path) -> Result<Arc<[u8]>, Stop> {
+pub(crate) fn bytes_of(path: &Path) -> Result<Arc<[u8]>, SliceError> {
     let mut bytes = Vec::new();
     let read = match is_stream(path) {
         true => io::stdin().lock().read_to_end(&mut bytes),
         false => File::open(path).and_then(|mut file| file.read_to_end(&mut bytes)),
     };
-    read.context("cannot read it")?;
+    read?;
     Ok(bytes.into())
-}
-
-/// Whether a file's first bytes are those of STEP.
-pub(crate) fn is_step(start: &[u8]) -> bool {
-    start.trim_ascii_start().starts_with(b"ISO-10303-21")
 }

@@ -89,6 +89,8 @@ impl Fallback {
         layers: Option<Range<u32>>,
     ) -> Result<Self, Stop> {
         let grid = slices.grid();
+        let brep = &options.solid.brep;
+        let opening = brep.reader.for_opening(brep.tolerance(options.dpi));
         let options = SliceOptions {
             heights: Some(slices.layer_heights()),
             gray: slices.levels().cloned(),
@@ -99,10 +101,11 @@ impl Fallback {
         let other = |what: String| {
             Stop::Failed(anyhow!("it is not the same part as the STEP file: its box {what}"))
         };
-        let fallback = Slices::new(Model::open(path)?, &options).map_err(|error| match error {
-            SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
-            error => Stop::from(error),
-        })?;
+        let fallback =
+            Slices::new(Model::open(path, &opening)?, &options).map_err(|error| match error {
+                SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
+                error => Stop::from(error),
+            })?;
         let ([low, high], others) = (slices.box_mm(), fallback.box_mm());
         let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
         let apart = |k: usize| (others[0][k] - low[k]).abs().max((others[1][k] - high[k]).abs());

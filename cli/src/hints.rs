@@ -8,6 +8,7 @@ use lamp_adaptive::HeightsError;
 use lamp_grayscale::material::MaterialError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
 use lamp_postprocess::{EditError, EditProblem, LayerProblem, LayoutError, TileError};
+use lamp_slicer::SliceError;
 use lamp_stack::{CatalogueError, Length};
 
 /// Returns what to try about an error, to stand after its message.
@@ -33,8 +34,28 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
     if let Some(error) = error.downcast_ref::<CatalogueError<MachineError>>() {
         return catalogue(error);
     }
+    if let Some(error) = error.downcast_ref() {
+        return slicing(error);
+    }
     None
 }
+
+fn slicing(error: &SliceError) -> Option<String> {
+    match error {
+        SliceError::Faulty { .. } => Some(format!(
+            "lamp brep tells more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
+        )),
+        SliceError::Timeout { tolerance, .. } => Some(format!(
+            "give it more with --timeout, or let facets lie more than {tolerance} from the surfaces"
+        )),
+        _ => None,
+    }
+}
+
+#[cfg(feature = "occt")]
+const OTHER_KERNEL: &str = "the other --kernel may read it";
+#[cfg(not(feature = "occt"))]
+const OTHER_KERNEL: &str = "a build with --features occt may read it";
 
 fn heights(error: &HeightsError) -> Option<String> {
     match error {

@@ -1,16 +1,15 @@
 //! The solid that is sliced: its files, and what is inside.
 
-use std::fs::File;
-use std::io::{self, Cursor, Read};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::Args;
-use lamp_slicer::{FacetIndex, Fill, Model, Placement, SliceError, Units};
-use lamp_stack::Dpi;
+use lamp_slicer::brep::Prepared;
+use lamp_slicer::{FacetIndex, Fill, Model, OpenOptions, Placement, SliceError, Units};
+use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
-use crate::brep::{BrepOptions, boxes_overlap, bytes_of, is_step, part_of};
+use crate::brep::{BrepOptions, boxes_overlap, notes};
 use crate::options::one_of;
 use crate::placement::PlacementOptions;
 use crate::recorded::text;
@@ -62,53 +61,46 @@ impl SolidOptions {
     }
 
     fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Model, Stop> {
-        let failed = |error: io::Error| Stop::from(SliceError::from(error));
-        if is_stream(path) {
-            let mut start = Vec::new();
-            let mut stdin = io::stdin().lock();
-            stdin.by_ref().take(START_BYTES).read_to_end(&mut start).map_err(failed)?;
-            let is_step = is_step(&start);
-            let mut stream = Cursor::new(start).chain(stdin);
-            if !is_step {
-                return Ok(Model::from_stream("stdin", stream)?);
-            }
-            let mut bytes = Vec::new();
-            stream.read_to_end(&mut bytes).map_err(failed)?;
-            return self.step(&bytes.into(), "stdin", reading);
+        let tolerance = self.brep.tolerance(reading.dpi);
+        let options = OpenOptions {
+            allow_gaps: reading.may_be_open,
+            ..self.brep.reader.for_opening(tolerance)
+        };
+        let model = match is_stream(path) {
+            true => Model::from_stream("stdin", io::stdin().lock(), &options)?,
+            false => Model::open(path, &options)?,
+        };
+        for prepared in model.prepared() {
+            self.check_step(prepared, tolerance, reading)?;
         }
-        let mut start = Vec::new();
-        let file = File::open(path).map_err(failed)?;
-        // What is no file is for the slicer to refuse.
-        let read = file.take(START_BYTES).read_to_end(&mut start);
-        if read.is_err() || !is_step(&start) {
-            return Ok(Model::open(path)?);
-        }
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        self.step(&bytes_of(path)?, &name, reading)
+        Ok(model)
     }
 
-    fn step(&self, bytes: &Arc<[u8]>, name: &str, reading: &Reading<'_>) -> Result<Model, Stop> {
+    /// Refuses units for a STEP file, and says what people should know of it.
+    fn check_step(
+        &self,
+        prepared: &Prepared,
+        tolerance: Length,
+        reading: &Reading<'_>,
+    ) -> Result<(), Stop> {
         if self.units == Units::Inches {
             let why = "a STEP file says itself what its numbers mean: leave --units away";
             return Err(Stop::usage(why));
         }
-        let tolerance = self.brep.tolerance(reading.dpi);
-        let pitch = reading.dpi.pitch();
-        if tolerance.um() > pitch.um() {
+        if tolerance.um() > reading.dpi.pitch().um() {
             (reading.say)(&format!(
                 "--tolerance {tolerance} is more than a pixel: pixels may be wrong where faces \
                  meet, and where they go along rows"
             ));
         }
-        let prepared = self.brep.reader.read(bytes, tolerance)?;
-        let may_overlap = self.fill == Fill::EvenOdd && boxes_overlap(&prepared);
-        if may_overlap {
+        if self.fill == Fill::EvenOdd && boxes_overlap(prepared) {
             (reading.say)(
                 "the boxes of bodies overlap: where the bodies do, too, they cut each other out, \
                  or unite with --fill nonzero",
             );
         }
-        part_of(prepared, name, bytes, reading.may_be_open, reading.say)
+        notes(prepared).iter().for_each(|note| (reading.say)(note));
+        Ok(())
     }
 }
 
@@ -121,9 +113,6 @@ pub(crate) struct Reading<'a> {
     /// Who is told what was found in STEP files.
     pub(crate) say: &'a dyn Fn(&str),
 }
-
-/// Enough to tell a STEP file by.
-pub(crate) const START_BYTES: u64 = 256;
 
 /// Puts before a message the file whose facet it is about, or all files.
 pub(crate) fn at_part(stop: Stop, paths: &[PathBuf]) -> Stop {

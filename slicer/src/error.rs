@@ -1,7 +1,10 @@
 //! What can be wrong with a part.
 
 use std::io;
+use std::time::Duration;
 
+use lamp_brep::{BodyFault, BrepError, Finding};
+use lamp_stack::Length;
 use thiserror::Error;
 
 /// Why a part cannot be sliced.
@@ -23,7 +26,7 @@ pub enum SliceError {
         size: u64,
     },
     /// A file of a format that is known, but not read.
-    #[error("this is a {0} file, not an STL: export the part as STL")]
+    #[error("this is a {0} file, not an STL or STEP file: export the part as one")]
     OtherFormat(&'static str),
     /// A binary STL whose header does not agree with its size.
     #[error(
@@ -130,6 +133,33 @@ pub enum SliceError {
     /// Gray layers with their sections elsewhere than at their tops.
     #[error("gray layers are as deep as the part below their tops: slice them with --plane top")]
     GrayPlane,
+    /// A STEP file could not be read, or no facets could be made of it.
+    #[error(transparent)]
+    Brep(#[from] BrepError),
+    /// Bodies of a STEP file have faults.
+    #[error(
+        "it is not sliced, because its sections would be wrong: {body}: {fault}{}{}",
+        finding.as_ref().map_or_else(String::new, |it| format!(" (#{}: {})", it.entity, it.fault)),
+        if *more > 0 { format!(", and {more} faults more") } else { String::new() },
+    )]
+    Faulty {
+        /// The first body with a fault.
+        body: String,
+        /// Its first fault.
+        fault: BodyFault,
+        /// The first finding about a face, which may be the reason.
+        finding: Option<Finding>,
+        /// How many more faults there are.
+        more: usize,
+    },
+    /// Reading a STEP file took too long.
+    #[error("reading it takes longer than {} s", timeout.as_secs_f64())]
+    Timeout {
+        /// The time allowed.
+        timeout: Duration,
+        /// How far facets were allowed to lie from surfaces.
+        tolerance: Length,
+    },
     /// Reading the file failed.
     #[error(transparent)]
     Io(#[from] io::Error),

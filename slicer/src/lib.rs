@@ -42,6 +42,7 @@ mod facet_index;
 mod gray;
 mod grid;
 mod model;
+mod open;
 mod placement;
 mod planes;
 pub mod scan;
@@ -52,13 +53,17 @@ mod survey;
 mod table;
 mod trace;
 
+/// B-rep models: kernels, and reports of what they read.
+pub use lamp_brep as brep;
+
 pub use error::SliceError;
 pub use exact::Polished;
 pub use facet::{Facet, Units};
 pub use facet_index::FacetIndex;
 pub use gray::LayerLevels;
 pub use grid::PixelGrid;
-pub use model::{Model, digest_of_bytes};
+pub use model::Model;
+pub use open::{OpenOptions, body_name, read_step};
 pub use placement::{Axis, PlacedFacet, Placement};
 pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};

@@ -1,14 +1,12 @@
 //! A part as a source of facets.
 
-use std::fmt;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::ops::Range;
-use std::path::Path;
 use std::sync::Arc;
 
 use blake3::Hasher;
-use lamp_brep::{Kernel, Tessellation};
+use lamp_brep::Prepared;
 use memmap2::{Mmap, MmapOptions};
 
 use crate::ascii;
@@ -39,27 +37,7 @@ pub struct Model {
 enum FileFacets {
     Binary { file: Arc<File>, count: usize },
     Memory(Arc<Vec<Facet>>),
-    Surfaces(Surfaces),
-}
-
-/// A B-rep model: its exact surfaces, and the facets made of them.
-#[derive(Clone)]
-pub(crate) struct Surfaces {
-    pub(crate) kernel: Arc<dyn Kernel>,
-    pub(crate) mesh: Arc<Tessellation>,
-}
-
-impl fmt::Debug for Surfaces {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Surfaces").finish_non_exhaustive()
-    }
-}
-
-impl Surfaces {
-    /// A facet, as STL has it.
-    fn facet(&self, facet: &lamp_brep::Facet) -> Facet {
-        self.mesh.corners(facet).map(|corner| corner.map(|c| c as f32))
-    }
+    Surfaces(Arc<Prepared>),
 }
 
 impl FileFacets {
@@ -67,7 +45,7 @@ impl FileFacets {
         match self {
             Self::Binary { count, .. } => *count,
             Self::Memory(facets) => facets.len(),
-            Self::Surfaces(surfaces) => surfaces.mesh.facets.len(),
+            Self::Surfaces(prepared) => prepared.mesh.facets.len(),
         }
     }
 
@@ -84,30 +62,6 @@ impl FileFacets {
 }
 
 impl Model {
-    /// Opens an STL file, binary or ASCII. Which one it is follows from its
-    /// size and content: many binary files begin with `solid`, too.
-    ///
-    /// The file must not change while the model is in use.
-    ///
-    /// # Errors
-    /// Where the file cannot be read, is no STL, contradicts itself, or holds
-    /// no facets.
-    pub fn open(path: &Path) -> Result<Self, SliceError> {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Self::from_file(name, &File::open(path)?)
-    }
-
-    /// Reads an STL from a stream, such as standard input, by way of a
-    /// temporary file.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
-    pub fn from_stream(name: &str, mut stream: impl Read) -> Result<Self, SliceError> {
-        let mut file = tempfile::tempfile()?;
-        io::copy(&mut stream, &mut file)?;
-        Self::from_file(name.to_owned(), &file)
-    }
-
     /// A part of these facets.
     pub fn from_facets(name: &str, facets: Vec<Facet>) -> Self {
         let mut hasher = Hasher::new();
@@ -118,27 +72,23 @@ impl Model {
         Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
     }
 
-    /// A part of exact surfaces, in millimetres, by the facets made of them. `digest`
-    /// is that of its file ([`digest_of_bytes`]).
-    pub fn from_surfaces(
-        name: &str,
-        digest: String,
-        kernel: Arc<dyn Kernel>,
-        mesh: Arc<Tessellation>,
-    ) -> Self {
-        let files = vec![FileFacets::Surfaces(Surfaces { kernel, mesh })];
-        Self { name: name.to_owned(), files, digest }
+    /// A part of exact surfaces, in millimetres, from the bytes of its file.
+    pub(crate) fn from_surfaces(name: &str, bytes: &[u8], prepared: Prepared) -> Self {
+        let mut hasher = Hasher::new();
+        hasher.update(bytes);
+        let files = vec![FileFacets::Surfaces(Arc::new(prepared))];
+        Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
     }
 
-    /// Whether there are exact surfaces below some of the facets.
-    pub fn has_surfaces(&self) -> bool {
-        self.surfaces().flatten().next().is_some()
+    /// Returns what was read of each STEP file.
+    pub fn prepared(&self) -> impl Iterator<Item = &Prepared> {
+        self.surfaces().flatten()
     }
 
-    /// The surfaces of each file that has some.
-    pub(crate) fn surfaces(&self) -> impl Iterator<Item = Option<&Surfaces>> {
+    /// Returns the surfaces of each file that has some.
+    pub(crate) fn surfaces(&self) -> impl Iterator<Item = Option<&Prepared>> {
         self.files.iter().map(|file| match file {
-            FileFacets::Surfaces(surfaces) => Some(surfaces),
+            FileFacets::Surfaces(prepared) => Some(&**prepared),
             _ => None,
         })
     }
@@ -162,7 +112,9 @@ impl Model {
         Self { name, files: models.into_iter().flat_map(|model| model.files).collect(), digest }
     }
 
-    fn from_file(name: String, file: &File) -> Result<Self, SliceError> {
+    /// Opens an STL file, binary or ASCII. Which one it is follows from its size and
+    /// content: many binary files begin with `solid`, too.
+    pub(crate) fn from_stl(name: String, file: &File) -> Result<Self, SliceError> {
         let metadata = file.metadata()?;
         if !metadata.is_file() {
             return Err(SliceError::NotAFile);
@@ -225,7 +177,10 @@ impl Model {
     pub(crate) fn facet(&self, file: usize, facet: usize) -> io::Result<Facet> {
         match &self.files[file] {
             FileFacets::Memory(facets) => Ok(facets[facet]),
-            FileFacets::Surfaces(surfaces) => Ok(surfaces.facet(&surfaces.mesh.facets[facet])),
+            FileFacets::Surfaces(prepared) => {
+                let mesh = &prepared.mesh;
+                Ok(rounded(mesh.corners(&mesh.facets[facet])))
+            }
             FileFacets::Binary { file, .. } => {
                 let offset = HEADER_BYTES + (facet * FACET_BYTES) as u64;
                 let bytes = map(file, offset, FACET_BYTES)?;
@@ -243,9 +198,10 @@ impl Model {
         let (file, Range { start, end }) = self.place_of(block);
         match &self.files[file] {
             FileFacets::Memory(facets) => facets[start..end].iter().for_each(each),
-            FileFacets::Surfaces(surfaces) => {
-                let facets = &surfaces.mesh.facets[start..end];
-                facets.iter().for_each(|facet| each(&surfaces.facet(facet)));
+            FileFacets::Surfaces(prepared) => {
+                let mesh = &prepared.mesh;
+                let facets = &mesh.facets[start..end];
+                facets.iter().for_each(|facet| each(&rounded(mesh.corners(facet))));
             }
             FileFacets::Binary { file, .. } => {
                 let offset = HEADER_BYTES + (start * FACET_BYTES) as u64;
@@ -268,8 +224,7 @@ fn why_not_stl(start: &[u8], declared: Option<u32>, size: u64) -> SliceError {
 
 /// The format of a file that is given for an STL by mistake, if it is known.
 fn other_format(start: &[u8]) -> Option<&'static str> {
-    const FORMATS: [(&[u8], &str); 7] = [
-        (b"ISO-10303-21", "STEP"),
+    const FORMATS: [(&[u8], &str); 6] = [
         (b"II*\0", "TIFF"),
         (b"II+\0", "TIFF"),
         (b"MM\0*", "TIFF"),
@@ -278,6 +233,11 @@ fn other_format(start: &[u8]) -> Option<&'static str> {
         (b"\x89PNG", "PNG"),
     ];
     FORMATS.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, name)| *name)
+}
+
+/// Rounds corners to 32 bits, as STL has them.
+fn rounded(corners: [[f64; 3]; 3]) -> Facet {
+    corners.map(|corner| corner.map(|c| c as f32))
 }
 
 /// The corners of a binary facet.
@@ -297,13 +257,6 @@ pub(crate) fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
     // if another process changes the file meanwhile, which `Model::open`
     // forbids (temporary files have no name); any bytes are valid numbers here.
     unsafe { MmapOptions::new().offset(offset).len(length).map(file) }
-}
-
-/// The digest of a file's bytes: `blake3:` and 64 hexadecimal digits.
-pub fn digest_of_bytes(bytes: &[u8]) -> String {
-    let mut hasher = Hasher::new();
-    hasher.update(bytes);
-    digest_text(&hasher)
 }
 
 fn digest_of(file: &File, size: u64) -> io::Result<String> {

@@ -6,9 +6,11 @@
 
 use std::io;
 
+use lamp_brep::Prepared;
+
 use crate::exact::PlacedSurfaces;
 use crate::facet::{Facet, Units};
-use crate::model::{Model, Surfaces};
+use crate::model::Model;
 
 /// An axis of part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,12 +131,12 @@ enum Transform {
 
 impl PlacedModel {
     pub(crate) fn new(model: Model, placement: &Placement, units: Units) -> Self {
-        let place = |surfaces: Option<&Surfaces>| {
+        let place = |prepared: Option<&Prepared>| {
             let rows = placement.rows.map(|[x, y, z, shift]| {
                 let unit = units.mm();
                 [x * unit, y * unit, z * unit, shift]
             });
-            surfaces.map(|Surfaces { kernel, mesh }| {
+            prepared.map(|Prepared { kernel, mesh, .. }| {
                 PlacedSurfaces::new(kernel.clone(), mesh.clone(), rows)
             })
         };

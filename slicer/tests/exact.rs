@@ -1,16 +1,15 @@
 //! B-rep parts against closed forms, pixel by pixel.
 
-use std::sync::Arc;
-
-use lamp_brep::{Kernel, StepModel};
 use lamp_fixtures::{StepSample, StepUnit, step};
-use lamp_slicer::{Axis, LayerHeights, LayerLevels, Model, Placement, SliceOptions, Slices};
+use lamp_slicer::{
+    Axis, LayerHeights, LayerLevels, Model, OpenOptions, Placement, SliceOptions, Slices,
+};
 use lamp_stack::{DepthLevels, Dpi, Image, Length};
 
 fn model(part: StepSample, chord_mm: f64) -> Model {
-    let kernel = StepModel::read(step(part, StepUnit::Inch).as_bytes()).unwrap();
-    let mesh = kernel.tessellate(chord_mm).unwrap();
-    Model::from_surfaces("part", String::new(), Arc::new(kernel), Arc::new(mesh))
+    let tolerance = Length::from_mm(chord_mm);
+    let options = OpenOptions { tolerance, ..OpenOptions::default() };
+    Model::from_step("part", step(part, StepUnit::Inch).as_bytes().into(), &options).unwrap()
 }
 
 /// Counts the pixels of a part's layers that are not what the closed form says:

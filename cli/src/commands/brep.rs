@@ -2,10 +2,11 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_brep::{Body, BodyReport, Prepared};
+use lamp_slicer::brep::{Body, BodyReport, Prepared};
+use lamp_slicer::{SliceError, body_name, read_step};
 use lamp_stack::Dpi;
 
-use crate::brep::{BrepOptions, body_name, bytes_of, length, notes};
+use crate::brep::{BrepOptions, bytes_of, length, notes};
 use crate::stop::Stop;
 use crate::streams::{input_name, print};
 
@@ -39,8 +40,9 @@ pub(crate) struct BrepArgs {
 
 pub(crate) fn run(args: &BrepArgs) -> Result<(), Stop> {
     let name = input_name(&args.part);
-    let read = || args.brep.reader.read(&bytes_of(&args.part)?, args.brep.tolerance(args.dpi));
-    let prepared = read().map_err(|stop| stop.at(name.clone()))?;
+    let options = args.brep.reader.for_opening(args.brep.tolerance(args.dpi));
+    let read = || read_step(bytes_of(&args.part)?, &options);
+    let prepared = read().map_err(|error: SliceError| Stop::from(error).at(name.clone()))?;
     print(&text(&name, &prepared))?;
     let refused = prepared.reports.iter().filter(|report| !report.faults.is_empty()).count();
     if args.strict && refused > 0 {

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
+use lamp_slicer::Model;
+use lamp_slicer::brep::{START_BYTES, is_step};
 use lamp_stack::{Layer, Length, StackError, png_of_layer, write_png_folder};
 
-use crate::brep::{HEADING, ReaderOptions, bytes_of, is_step, parse_tolerance, part_of};
+use crate::brep::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
 use crate::options::{Common, Input, Output};
 use crate::report::say;
-use crate::solid::START_BYTES;
 use crate::stop::Stop;
 use crate::streams::{
     check_beside, folder_to_make, input_name, is_folder, is_stream, read_layers, report,
@@ -107,16 +108,13 @@ impl ConvertArgs {
         }
         check_beside(stl, Path::new("-"), [path])?;
         let name = input_name(path);
-        let say = |line: &str| {
-            if !common.quiet {
-                say(&format!("convert: {line}"));
-            }
-        };
-        let model = || {
-            let bytes = bytes_of(path)?;
-            part_of(self.reader.read(&bytes, self.chord)?, &name, &bytes, false, &say)
-        };
-        let model = model().map_err(|stop| stop.at(name.clone()))?;
+        let options = self.reader.for_opening(self.chord);
+        let model = bytes_of(path).and_then(|bytes| Model::from_step(&name, bytes, &options));
+        let model = model.map_err(|error| Stop::from(error).at(name))?;
+        if !common.quiet {
+            let notes = model.prepared().flat_map(notes);
+            notes.for_each(|note| say(&format!("convert: {note}")));
+        }
         write_file(stl, |out| model.write_stl(out))
     }
 

@@ -79,7 +79,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     let reading =
         Reading { dpi: args.options.dpi, may_be_open: args.fallback.is_some(), say: &say };
     let model = args.options.solid.open(&args.parts, &reading)?;
-    if args.fallback.is_some() && !model.has_surfaces() {
+    if args.fallback.is_some() && model.prepared().next().is_none() {
         return Err(Stop::usage("--fallback stands in for STEP parts: give it with one"));
     }
     let name = name_of_all(&args.parts);

@@ -56,4 +56,4 @@ pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellatio
 #[cfg(feature = "occt")]
 pub use occt::OcctModel;
 pub use prepare::{KernelName, Prepared, Try, prepare};
-pub use step::{StepError, StepModel};
+pub use step::{START_BYTES, StepError, StepModel, is_step};

@@ -1,7 +1,9 @@
 //! A file read, made into facets and checked, in several ways if it must be.
 
 use std::any::Any;
+use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 use crate::error::BrepError;
 use crate::gate::{BodyFault, BodyReport, apart, check};
@@ -25,9 +27,9 @@ pub enum KernelName {
 /// A model that is ready to be sliced, unless its reports have faults.
 pub struct Prepared {
     /// The model.
-    pub kernel: Box<dyn Kernel>,
+    pub kernel: Arc<dyn Kernel>,
     /// Its facets. What was found and done is among their findings.
-    pub mesh: Tessellation,
+    pub mesh: Arc<Tessellation>,
     /// What the gate says of each body.
     pub reports: Vec<BodyReport>,
     /// What was tried before and was worse, in order.
@@ -130,7 +132,7 @@ impl Search<'_> {
     }
 
     /// Makes facets, and keeps them if they are less wrong than those before.
-    fn take(&mut self, kernel: Box<dyn Kernel>, heal_mm: f64, chord_mm: f64) {
+    fn take(&mut self, kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) {
         let mut made = facets(kernel, heal_mm, chord_mm);
         if let Ok(made) = &mut made {
             // A longer chord is no excuse for volumes.
@@ -153,16 +155,22 @@ impl Search<'_> {
 }
 
 /// Makes facets of a model and checks them.
-fn facets(kernel: Box<dyn Kernel>, heal_mm: f64, chord_mm: f64) -> Result<Prepared, BrepError> {
+fn facets(kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) -> Result<Prepared, BrepError> {
     let (mesh, reports) = caught("making facets", || {
         let mut mesh = kernel.tessellate(chord_mm)?;
         let mut reports = check(kernel.as_ref(), &mesh);
         if turn_over(kernel.as_ref(), &mut mesh, &reports) {
             reports = check(kernel.as_ref(), &mesh);
         }
-        Ok((mesh, reports))
+        Ok((Arc::new(mesh), reports))
     })?;
     Ok(Prepared { kernel, mesh, reports, tries: Vec::new(), heal_mm, chord_mm })
+}
+
+impl fmt::Debug for Prepared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Prepared").field("reports", &self.reports).finish_non_exhaustive()
+    }
 }
 
 impl Prepared {
@@ -204,7 +212,7 @@ fn wrong(reports: &[BodyReport]) -> [usize; 3] {
 
 /// A file as a kernel has read it.
 struct Opened {
-    kernel: Box<dyn Kernel>,
+    kernel: Arc<dyn Kernel>,
     /// Whether healing changed anything.
     is_changed: bool,
 }
@@ -216,7 +224,7 @@ fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<Opened, BrepErro
         KernelName::Lamp => {
             let model = StepModel::read_healed(bytes, heal_mm)?;
             let is_changed = model.is_healed();
-            Ok(Opened { kernel: Box::new(model), is_changed })
+            Ok(Opened { kernel: Arc::new(model), is_changed })
         }
         #[cfg(feature = "occt")]
         KernelName::Occt => {
@@ -226,7 +234,7 @@ fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<Opened, BrepErro
             } else {
                 OcctModel::read(bytes)?
             };
-            Ok(Opened { kernel: Box::new(model), is_changed })
+            Ok(Opened { kernel: Arc::new(model), is_changed })
         }
     })
 }

@@ -4,7 +4,7 @@
 use std::fs;
 
 use lamp_fixtures::{Mesh, sphere, tower};
-use lamp_slicer::{Fill, LayerHeights, LayerLevels, Model, SliceOptions, Slices};
+use lamp_slicer::{Fill, LayerHeights, LayerLevels, Model, OpenOptions, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Layer, Length};
 
 use crate::common::{
@@ -20,8 +20,9 @@ fn several_files_are_one_part() {
     meshes[0].write_stl("a", &mut binary).unwrap();
     meshes[1].write_ascii_stl("b", &mut text).unwrap();
     let read = || {
-        let [a, b] = [("a", &binary), ("b", &text)]
-            .map(|(name, bytes)| Model::from_stream(name, &bytes[..]).unwrap());
+        let [a, b] = [("a", &binary), ("b", &text)].map(|(name, bytes)| {
+            Model::from_stream(name, &bytes[..], &OpenOptions::default()).unwrap()
+        });
         [a, b, Model::from_facets("c", meshes[2].facets.clone())]
     };
     let whole = joined(&meshes);
@@ -147,8 +148,9 @@ fn files_streams_and_memory_give_the_same_layers() {
     let expected = slice(&mesh, &coarse());
     for bytes in [binary, text] {
         fs::write(&path, &bytes).unwrap();
-        let from_file = try_layers(Model::open(&path).unwrap(), &coarse()).unwrap();
-        let stream = Model::from_stream("part", &bytes[..]).unwrap();
+        let from_file =
+            try_layers(Model::open(&path, &OpenOptions::default()).unwrap(), &coarse()).unwrap();
+        let stream = Model::from_stream("part", &bytes[..], &OpenOptions::default()).unwrap();
         assert_eq!(stream.facet_count(), mesh.facets.len());
         assert!(try_layers(stream, &coarse()).unwrap() == from_file);
 

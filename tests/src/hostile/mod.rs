@@ -9,11 +9,9 @@ mod seeds;
 use std::error::Error;
 use std::io::{Cursor, Write};
 use std::path::Path;
-use std::sync::Arc;
 
 use fax::decoder::decode_g4;
-use lamp_brep::{Kernel, KernelName, prepare};
-use lamp_slicer::{Fill, Model, SliceError, SliceOptions, Slices};
+use lamp_slicer::{Fill, Model, OpenOptions, SliceError, SliceOptions, Slices};
 use lamp_stack::{
     Dpi, EncodedPage, Format, Image, Layer, Length, Mask, MaskBuilder, PageWriter, Pages,
     StackError, g4 as codec,
@@ -59,7 +57,7 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
         memory,
         ..SliceOptions::default()
     };
-    let slices = Slices::new(Model::open(path)?, &options)?;
+    let slices = Slices::new(Model::open(path, &OpenOptions::default())?, &options)?;
     if slices.grid().height > MOST_ROWS { Ok(Vec::new()) } else { slices.collect() }
 }
 
@@ -69,15 +67,13 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
 /// # Panics
 /// Where that is not so.
 pub fn step(bytes: &[u8]) {
-    let prepared = match prepare(bytes, KernelName::Lamp, STEP_CHORD_MM) {
-        Ok(prepared) if prepared.is_good() => prepared,
-        Ok(_) => return,
+    // Parts of files that make sense are some centimetres large.
+    let options = OpenOptions { tolerance: Length::from_mm(0.5), ..OpenOptions::default() };
+    let model = match Model::from_step("part", bytes.into(), &options) {
+        Ok(model) => model,
         Err(error) => return drop(one_line(&error)),
     };
-    let kernel: Arc<dyn Kernel> = Arc::from(prepared.kernel);
-    let mesh = Arc::new(prepared.mesh);
     for polish in [false, true] {
-        let model = Model::from_surfaces("part", String::new(), kernel.clone(), mesh.clone());
         let options = SliceOptions {
             dpi: Dpi::new(25.4).expect("a resolution"),
             thickness: Length::from_mm(1.0),
@@ -85,7 +81,7 @@ pub fn step(bytes: &[u8]) {
             polish,
             ..SliceOptions::default()
         };
-        let slices = match Slices::new(model, &options) {
+        let slices = match Slices::new(model.clone(), &options) {
             Ok(slices) if slices.grid().height <= MOST_ROWS => slices,
             Ok(_) => return,
             Err(error) => return drop(one_line(&error)),
@@ -97,9 +93,6 @@ pub fn step(bytes: &[u8]) {
         }
     }
 }
-
-/// Parts of files that make sense are some centimetres large.
-const STEP_CHORD_MM: f64 = 0.5;
 
 fn check_section(layer: &Layer) {
     let Image::Mask(mask) = &layer.image else { panic!("slices are masks") };

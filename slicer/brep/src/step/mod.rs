@@ -94,6 +94,14 @@ pub enum StepError {
     },
 }
 
+/// As many of a file's first bytes as [`is_step`] needs.
+pub const START_BYTES: u64 = 256;
+
+/// Returns whether a file's first bytes are those of STEP.
+pub fn is_step(start: &[u8]) -> bool {
+    start.trim_ascii_start().starts_with(b"ISO-10303-21")
+}
+
 /// Reads the text alone.
 #[cfg(feature = "occt")]
 pub(crate) fn check_text(bytes: &[u8]) -> Result<(), StepError> {
