@@ -60,7 +60,7 @@ impl Model {
             return Self::from_stl(name, &file);
         }
         file.read_to_end(&mut start)?;
-        Self::from_step(&name, start.into(), options)
+        Self::from_step(&name, start, options)
     }
 
     /// Reads an STL or STEP file from a stream, such as standard input; an STL by way
@@ -77,7 +77,7 @@ impl Model {
         stream.by_ref().take(START_BYTES).read_to_end(&mut start)?;
         if is_step(&start) {
             stream.read_to_end(&mut start)?;
-            return Self::from_step(name, start.into(), options);
+            return Self::from_step(name, start, options);
         }
         let mut file = tempfile::tempfile()?;
         std::io::copy(&mut Cursor::new(start).chain(stream), &mut file)?;
@@ -90,9 +90,10 @@ impl Model {
     /// Returns an error if they cannot be read in time, or if bodies have faults.
     pub fn from_step(
         name: &str,
-        bytes: Arc<[u8]>,
+        bytes: impl Into<Arc<[u8]>>,
         options: &OpenOptions,
     ) -> Result<Self, SliceError> {
+        let bytes = bytes.into();
         let prepared = read_step(bytes.clone(), options)?;
         refuse_faults(&prepared, options.allow_gaps)?;
         Ok(Self::from_surfaces(name, &bytes, prepared))

@@ -9,7 +9,7 @@ use lamp_stack::{DepthLevels, Dpi, Image, Length};
 fn model(part: StepSample, chord_mm: f64) -> Model {
     let tolerance = Length::from_mm(chord_mm);
     let options = OpenOptions { tolerance, ..OpenOptions::default() };
-    Model::from_step("part", step(part, StepUnit::Inch).as_bytes().into(), &options).unwrap()
+    Model::from_step("part", step(part, StepUnit::Inch).as_bytes(), &options).unwrap()
 }
 
 /// Counts the pixels of a part's layers that are not what the closed form says:

@@ -69,7 +69,7 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
 pub fn step(bytes: &[u8]) {
     // Parts of files that make sense are some centimetres large.
     let options = OpenOptions { tolerance: Length::from_mm(0.5), ..OpenOptions::default() };
-    let model = match Model::from_step("part", bytes.into(), &options) {
+    let model = match Model::from_step("part", bytes, &options) {
         Ok(model) => model,
         Err(error) => return drop(one_line(&error)),
     };
