@@ -9,7 +9,7 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use fax::{Color, VecWriter, decoder, encoder};
 use lamp_adaptive::LayeredPart;
 use lamp_fixtures::{Sample, build};
-use lamp_grayscale::{Method, dither_image};
+use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
 use lamp_slicer::{FacetIndex, Fill, LayerLevels, Model, Placement, SliceOptions, Slices, Units};
 use lamp_stack::{
@@ -153,11 +153,11 @@ fn dither(criterion: &mut Criterion) {
     };
     for runs in [22, 43, 86] {
         let name = format!("blue-noise, {runs} runs of 40 gray pixels in a row");
-        bench(name, &page(runs, 40), runs, 40, Method::BlueNoise);
+        bench(name, &page(runs, 40), runs, 40, DitherMethod::BlueNoise);
     }
     for (runs, length) in [(43, 40), (2, 860), (430, 4)] {
         let page = page(runs, length);
-        for method in Method::ALL {
+        for method in DitherMethod::ALL {
             let name = format!("{}, {runs} runs of {length}", method.name());
             bench(name, &page, runs, length, method);
         }

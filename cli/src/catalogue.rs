@@ -14,13 +14,13 @@ use crate::streams::{input_name, is_stream, print};
 const MAX_FILE: u64 = 1 << 20;
 
 /// A document whose errors can be reported.
-pub(crate) trait Entry: Catalogued<Fault: Fault> {}
+pub(crate) trait Entry: Catalogued<CheckError: Reportable> {}
 
-impl<T: Catalogued<Fault: Fault>> Entry for T {}
+impl<T: Catalogued<CheckError: Reportable>> Entry for T {}
 
-pub(crate) trait Fault: std::error::Error + Send + Sync + 'static {}
+pub(crate) trait Reportable: std::error::Error + Send + Sync + 'static {}
 
-impl<T: std::error::Error + Send + Sync + 'static> Fault for T {}
+impl<T: std::error::Error + Send + Sync + 'static> Reportable for T {}
 
 /// Returns the built-in document of a name, or that of a file.
 pub(crate) fn entry<T: Entry>(path: &Path) -> Result<T, Stop> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lamp_grayscale::calibrate::{ExposureTimes, Table};
+use lamp_grayscale::calibrate::{CsvTable, ExposureTimes};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{ExposureTime, Resin};
 use lamp_stack::{DepthLevels, Length};
@@ -95,7 +95,7 @@ impl ExposureOptions {
 }
 
 fn read_times(path: &Path) -> anyhow::Result<ExposureTimes> {
-    let table = Table::parse(&read_text(path, LARGEST_TABLE, "a table of exposure times")?)?;
+    let table = CsvTable::parse(&read_text(path, LARGEST_TABLE, "a table of exposure times")?)?;
     Ok(ExposureTimes::new(&table)?)
 }
 

@@ -8,7 +8,7 @@ use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart, Slab,
     Thicknesses, VolumeDeviation,
 };
-use lamp_grayscale::calibrate::with_digits;
+use lamp_grayscale::calibrate::format_significant;
 use lamp_slicer::{FacetIndex, Fill};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
@@ -278,7 +278,7 @@ fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Stop {
 
 /// To three digits, as tables of heights say numbers.
 pub(crate) fn significant(number: f64) -> String {
-    with_digits(number, 3)
+    format_significant(number, 3)
 }
 
 /// A time in the unit that people would say it in.

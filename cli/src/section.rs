@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, anyhow};
 use lamp_grayscale::resin::{ExposureTime, GrayLevel, Resin};
-use lamp_grayscale::{CuredLine, Line, Solid, excess};
+use lamp_grayscale::{CuredLine, PixelLine, SolidHeights, excess};
 use lamp_slicer::{Axis, Model, SectionOptions, SliceError, section};
 use lamp_stack::{Dpi, Image, Layer, Length, write_rgb_png};
 
@@ -58,7 +58,7 @@ pub(crate) fn parse_along(text: &str) -> Result<Range<f64>, String> {
 /// The pixels along a section, and where they lie on the part.
 #[derive(Clone, Copy)]
 pub(crate) struct Course {
-    pub(crate) line: Line,
+    pub(crate) line: PixelLine,
     corner_mm: [f64; 2],
     dpi: Dpi,
     pixels: u32,
@@ -84,8 +84,8 @@ impl Course {
             return Err(anyhow!("{plane} is outside its images: {low:.3} to {high:.3} mm"));
         }
         let (line, pixels) = match plane {
-            Plane::X(_) => (Line::Column(number as u32), height),
-            Plane::Y(_) => (Line::Row(number as u32), width),
+            Plane::X(_) => (PixelLine::Column(number as u32), height),
+            Plane::Y(_) => (PixelLine::Row(number as u32), width),
         };
         Ok(Self { line, corner_mm, dpi, pixels })
     }
@@ -95,8 +95,10 @@ impl Course {
         let pitch = self.dpi.pitch().mm();
         let inwards = |pixel: u32| (f64::from(pixel) + 0.5) * pitch;
         match self.line {
-            Line::Row(row) => Plane::Y(Length::from_mm(self.corner_mm[1] - inwards(row))),
-            Line::Column(column) => Plane::X(Length::from_mm(self.corner_mm[0] + inwards(column))),
+            PixelLine::Row(row) => Plane::Y(Length::from_mm(self.corner_mm[1] - inwards(row))),
+            PixelLine::Column(column) => {
+                Plane::X(Length::from_mm(self.corner_mm[0] + inwards(column)))
+            }
         }
     }
 
@@ -104,8 +106,8 @@ impl Course {
     fn within(&self, along_mm: &Range<f64>) -> Range<u32> {
         let pitch = self.dpi.pitch().mm();
         let [from, to] = match self.line {
-            Line::Row(_) => [along_mm.start, along_mm.end].map(|x| x - self.corner_mm[0]),
-            Line::Column(_) => [along_mm.end, along_mm.start].map(|y| self.corner_mm[1] - y),
+            PixelLine::Row(_) => [along_mm.start, along_mm.end].map(|x| x - self.corner_mm[0]),
+            PixelLine::Column(_) => [along_mm.end, along_mm.start].map(|y| self.corner_mm[1] - y),
         };
         let [from, to] = [from, to].map(|mm| (mm / pitch - 0.5).ceil());
         let pixel = |number: f64| number.clamp(0.0, f64::from(self.pixels)) as u32;
@@ -118,7 +120,7 @@ impl Course {
         &self,
         model: Model,
         options: &PartOptions,
-    ) -> Result<Vec<Solid>, SliceError> {
+    ) -> Result<Vec<SolidHeights>, SliceError> {
         let options = options.for_slicing();
         let turned = options.placement.rotated(Axis::Y, 90.0);
         let pitch = self.dpi.pitch().mm();
@@ -141,7 +143,7 @@ impl Course {
                 rows: self.pixels,
             },
         )?;
-        if let Line::Row(_) = self.line {
+        if let PixelLine::Row(_) = self.line {
             // Rows count from the largest x.
             rows.reverse();
         }
@@ -217,8 +219,8 @@ pub(crate) struct Panels {
     course: Course,
     pixels: Range<u32>,
     heights_um: Range<f64>,
-    cured: Vec<(&'static str, Vec<Solid>)>,
-    part: Option<Vec<Solid>>,
+    cured: Vec<(&'static str, Vec<SolidHeights>)>,
+    part: Option<Vec<SolidHeights>>,
 }
 
 /// Black pixels between two pictures.
@@ -237,7 +239,7 @@ impl Panels {
     /// last one's top. `along_mm` is the stretch shown, all where `None`.
     pub(crate) fn new(
         exposures: &Exposures<'_>,
-        part: Option<Vec<Solid>>,
+        part: Option<Vec<SolidHeights>>,
         along_mm: Option<&Range<f64>>,
     ) -> anyhow::Result<Self> {
         let Exposures { course, in_full, by_levels, has_gray, heights_um, .. } = exposures;
@@ -245,7 +247,8 @@ impl Panels {
         if pixels.is_empty() {
             return Err(anyhow!("no pixel of the section lies between these places"));
         }
-        let clipped = |solids: &[Solid]| solids.iter().map(|s| clip(s, heights_um)).collect();
+        let clipped =
+            |solids: &[SolidHeights]| solids.iter().map(|s| clip(s, heights_um)).collect();
         let mut cured = vec![("white", clipped(in_full.pixels()))];
         if *has_gray {
             cured.push(("gray", clipped(by_levels.pixels())));
@@ -268,8 +271,8 @@ impl Panels {
     /// The areas, as a table.
     pub(crate) fn text(&self, material: &str) -> String {
         let line = match self.course.line {
-            Line::Row(row) => format!("row {row}"),
-            Line::Column(column) => format!("column {column}"),
+            PixelLine::Row(row) => format!("row {row}"),
+            PixelLine::Column(column) => format!("column {column}"),
         };
         let [low, high] = [self.heights_um.start, self.heights_um.end].map(|um| um / 1000.0);
         let plane = self.course.plane();
@@ -297,7 +300,7 @@ impl Panels {
         let [width, height] = self.size(scale);
         let all = width * self.cured.len() + GAP * (self.cured.len() - 1);
         let rows = (0..height).map(|row| {
-            let panel = |(_, cured): &(_, Vec<Solid>)| self.row(row, cured, scale, width);
+            let panel = |(_, cured): &(_, Vec<SolidHeights>)| self.row(row, cured, scale, width);
             let panels: Vec<_> = self.cured.iter().map(panel).collect();
             panels.join(&[0; 3 * GAP][..])
         });
@@ -324,7 +327,7 @@ impl Panels {
     }
 
     /// A row of a picture, from the top: what is at its pixels' centres.
-    fn row(&self, row: usize, cured: &[Solid], scale: Scale, width: usize) -> Vec<u8> {
+    fn row(&self, row: usize, cured: &[SolidHeights], scale: Scale, width: usize) -> Vec<u8> {
         let step_um = self.course.dpi.pitch().um() / factor(scale);
         let z_at = |row: usize| self.heights_um.end - (row as f64 + 0.5) * step_um;
         let pixel_at = |column: usize| {
@@ -378,7 +381,7 @@ fn holds(solid: &[[f64; 2]], z_um: f64) -> bool {
 }
 
 /// What lies between two heights.
-fn clip(solid: &[[f64; 2]], heights_um: &Range<f64>) -> Solid {
+fn clip(solid: &[[f64; 2]], heights_um: &Range<f64>) -> SolidHeights {
     let cut = |&[from, to]: &[f64; 2]| [from.max(heights_um.start), to.min(heights_um.end)];
     solid.iter().map(cut).filter(|[from, to]| from < to).collect()
 }

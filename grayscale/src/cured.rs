@@ -10,18 +10,18 @@ use lamp_stack::{Image, Length, gray_runs, white_runs};
 
 /// Heights between which a vertical line is inside something: from and to, in
 /// micrometres, rising, without gaps of nothing between them.
-pub type Solid = Vec<[f64; 2]>;
+pub type SolidHeights = Vec<[f64; 2]>;
 
 /// A line of an image's pixels, from the left or from the top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Line {
+pub enum PixelLine {
     /// A row.
     Row(u32),
     /// A column.
     Column(u32),
 }
 
-impl Line {
+impl PixelLine {
     /// How many pixels of an image are on it.
     pub fn len(self, image: &Image) -> u32 {
         match self {
@@ -76,7 +76,7 @@ fn for_each_run_of_row(image: &Image, row: u32, mut each: impl FnMut(u32, u32, u
 /// What exposures have cured along a line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CuredLine {
-    pixels: Vec<Solid>,
+    pixels: Vec<SolidHeights>,
 }
 
 impl CuredLine {
@@ -87,13 +87,13 @@ impl CuredLine {
     /// Where the line does not cross the image.
     pub fn expose(
         &mut self,
-        line: Line,
+        line: PixelLine,
         image: &Image,
         top: Length,
         depth_of: impl Fn(u8) -> Length,
     ) {
         let length = line.len(image) as usize;
-        self.pixels.resize(length.max(self.pixels.len()), Solid::new());
+        self.pixels.resize(length.max(self.pixels.len()), SolidHeights::new());
         line.for_each_run(image, |start, end, level| {
             let depth = depth_of(level).um();
             if depth > 0.0 {
@@ -105,13 +105,13 @@ impl CuredLine {
     }
 
     /// Where each pixel of the line is solid.
-    pub fn pixels(&self) -> &[Solid] {
+    pub fn pixels(&self) -> &[SolidHeights] {
         &self.pixels
     }
 }
 
 /// Adds what an exposure cures to what was cured from below.
-fn cure(solid: &mut Solid, [mut from, to]: [f64; 2]) {
+fn cure(solid: &mut SolidHeights, [mut from, to]: [f64; 2]) {
     while let Some(&[before, reached]) = solid.last() {
         // A layer and the next touch, but for the last digits of their heights.
         if reached < from - 1e-6 {
@@ -156,27 +156,27 @@ mod tests {
     fn each_level_reaches_its_depth() {
         let depth_of = |level| um(f64::from(level));
         for (line, solids) in [
-            (Line::Row(1), vec![vec![], vec![[900.0, 1000.0]], vec![[745.0, 1000.0]]]),
-            (Line::Column(6), vec![vec![[745.0, 1000.0]]; 3]),
+            (PixelLine::Row(1), vec![vec![], vec![[900.0, 1000.0]], vec![[745.0, 1000.0]]]),
+            (PixelLine::Column(6), vec![vec![[745.0, 1000.0]]; 3]),
         ] {
             let mut cured = CuredLine::default();
             cured.expose(line, &image(), um(1000.0), depth_of);
             assert_eq!(cured.pixels().len(), line.len(&image()) as usize);
             for (pixel, solid) in [0, 3, 7].into_iter().zip(solids) {
-                let of_column = matches!(line, Line::Column(_));
+                let of_column = matches!(line, PixelLine::Column(_));
                 let pixel = if of_column { pixel / 3 } else { pixel };
                 assert_eq!(cured.pixels()[pixel], solid, "{line:?} {pixel}");
             }
         }
-        assert!(Line::Row(3).crosses(&image()) && !Line::Row(4).crosses(&image()));
-        assert!(Line::Column(8).crosses(&image()) && !Line::Column(9).crosses(&image()));
+        assert!(PixelLine::Row(3).crosses(&image()) && !PixelLine::Row(4).crosses(&image()));
+        assert!(PixelLine::Column(8).crosses(&image()) && !PixelLine::Column(9).crosses(&image()));
     }
 
     #[test]
     fn layers_grow_together_or_leave_gaps() {
         let mut cured = CuredLine::default();
         for (top, depth) in [(100.0, 100.0), (200.0, 60.0), (300.0, 100.0), (400.0, 350.0)] {
-            cured.expose(Line::Row(0), &image(), um(top), |level| {
+            cured.expose(PixelLine::Row(0), &image(), um(top), |level| {
                 um(if level == 255 { depth } else { 0.0 })
             });
             let expected: &[[f64; 2]] = match top as u32 {

@@ -7,7 +7,7 @@
 use lamp_stack::{GrayMask, Mask, gray_runs};
 
 use crate::blue_noise::{SCREEN, SIDE};
-use crate::row::{Dots, TooManyRuns};
+use crate::dots::{Dots, TooManyRuns};
 
 /// Levels are counted in sixteenths, so that errors divide without loss.
 const WHITE: i32 = 255 * 16;

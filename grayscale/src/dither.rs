@@ -3,12 +3,12 @@
 use lamp_stack::{GrayMask, Image, Layer, MAX_RUNS, Mask, map_in_order};
 use thiserror::Error;
 
-use crate::row::TooManyRuns;
+use crate::dots::TooManyRuns;
 use crate::{blue_noise, diffusion, ordered, threshold};
 
 /// How gray becomes dots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
+pub enum DitherMethod {
     /// A mask of 128 x 128 thresholds that keeps dots apart and follows no
     /// pattern; it moves from layer to layer.
     #[default]
@@ -22,7 +22,7 @@ pub enum Method {
     Threshold,
 }
 
-lamp_stack::named!(Method {
+lamp_stack::named!(DitherMethod {
     BlueNoise = "blue-noise",
     Ordered = "ordered",
     FloydSteinberg = "floyd-steinberg",
@@ -51,7 +51,7 @@ pub enum DitherError {
 /// Those of `layers` and of [`dither_image`].
 pub fn dither<E: From<DitherError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
-    method: Method,
+    method: DitherMethod,
 ) -> impl Iterator<Item = Result<Layer, E>> {
     map_in_order(layers, move |mut layer| {
         if let Image::Gray(gray) = &layer.image {
@@ -70,12 +70,16 @@ pub fn dither<E: From<DitherError> + Send>(
 ///
 /// # Errors
 /// Where the dots make more runs than [`MAX_RUNS`].
-pub fn dither_image(gray: &GrayMask, method: Method, layer: u32) -> Result<Mask, DitherError> {
+pub fn dither_image(
+    gray: &GrayMask,
+    method: DitherMethod,
+    layer: u32,
+) -> Result<Mask, DitherError> {
     let dots = match method {
-        Method::BlueNoise => blue_noise::SCREEN.dither(gray, blue_noise::shift(layer)),
-        Method::Ordered => ordered::SCREEN.dither(gray, ordered::shift(layer)),
-        Method::FloydSteinberg => diffusion::diffuse(gray, blue_noise::shift(layer)),
-        Method::Threshold => threshold::threshold(gray),
+        DitherMethod::BlueNoise => blue_noise::SCREEN.dither(gray, blue_noise::shift(layer)),
+        DitherMethod::Ordered => ordered::SCREEN.dither(gray, ordered::shift(layer)),
+        DitherMethod::FloydSteinberg => diffusion::diffuse(gray, blue_noise::shift(layer)),
+        DitherMethod::Threshold => threshold::threshold(gray),
     };
     dots.map_err(|TooManyRuns| DitherError::TooManyRuns { layer })
 }

@@ -8,7 +8,7 @@
 //! resin averages dots of a size.
 //!
 //! ```
-//! use lamp_grayscale::{Method, dither_image};
+//! use lamp_grayscale::{DitherMethod, dither_image};
 //! use lamp_stack::GrayMask;
 //!
 //! let mut gray = GrayMask::new(48);
@@ -16,7 +16,7 @@
 //!     gray.push_runs([(16, 0), (16, 64), (16, 255)]).unwrap();
 //! }
 //! let layer = 7;
-//! let dots = dither_image(&gray, Method::Ordered, layer)?;
+//! let dots = dither_image(&gray, DitherMethod::Ordered, layer)?;
 //! // A quarter of the 256 gray pixels, and all the white ones.
 //! assert_eq!(dots.white_pixels(), 64 + 256);
 //! # Ok::<_, lamp_grayscale::DitherError>(())
@@ -27,17 +27,17 @@ pub mod calibrate;
 mod cured;
 mod diffusion;
 mod dither;
-mod homogeneous;
+mod dots;
+mod homogeneity;
 pub mod material;
 mod ordered;
 pub mod resin;
-mod row;
 mod screen;
 pub mod target;
 mod threshold;
 #[cfg(test)]
 mod void_and_cluster;
 
-pub use cured::{CuredLine, Line, Solid, excess};
-pub use dither::{DitherError, Method, dither, dither_image};
-pub use homogeneous::{EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
+pub use cured::{CuredLine, PixelLine, SolidHeights, excess};
+pub use dither::{DitherError, DitherMethod, dither, dither_image};
+pub use homogeneity::{EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};

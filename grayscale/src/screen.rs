@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use lamp_stack::{GrayMask, Mask, gray_runs};
 
-use crate::row::{Dots, Pattern, TooManyRuns};
+use crate::dots::{Dots, Pattern, TooManyRuns};
 
 /// Thresholds of `side` x `side` places, each as the least level that is white
 /// there. A level makes the share of places white that is nearest to it.

@@ -9,7 +9,7 @@ use crate::resin::{Dose, GrayLevel};
 
 /// One exposure of a target. Every square that is white in it gets its dose.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Exposure {
+pub struct TargetExposure {
     /// What is white.
     pub image: Mask,
     /// The dose that the exposure adds.
@@ -36,10 +36,10 @@ pub enum TargetError {
 }
 
 /// Squares and gaps are no wider than this; it is 33 in at 1500 dpi.
-const MOST_PIXELS: u32 = 50_000;
+const MAX_PIXELS: u32 = 50_000;
 /// Tiles of screens are no wider than this: a screen has many runs.
-const MOST_TILE: u32 = 5_000;
-const MOST_DOSES: usize = 100;
+const MAX_TILE: u32 = 5_000;
+const MAX_DOSES: usize = 100;
 
 /// Image widths are multiples of this (002 section 2.2.2).
 const WIDTH_STEP: u32 = 32;
@@ -55,20 +55,20 @@ const WIDTH_STEP: u32 = 32;
 /// # Errors
 /// Where the doses are none, too many or do not go up from above zero, or a length
 /// makes no image.
-pub fn squares(side: u32, gap: u32, doses: &[Dose]) -> Result<Vec<Exposure>, TargetError> {
-    check_pixels("squares", side, MOST_PIXELS)?;
-    check_pixels("gaps", gap, MOST_PIXELS)?;
+pub fn squares(side: u32, gap: u32, doses: &[Dose]) -> Result<Vec<TargetExposure>, TargetError> {
+    check_pixels("squares", side, MAX_PIXELS)?;
+    check_pixels("gaps", gap, MAX_PIXELS)?;
     let rises =
         doses.is_sorted_by(|a, b| a < b) && doses.iter().all(|d| d.mj_per_cm2().is_finite());
     let begins = doses.first().is_some_and(|first| first.mj_per_cm2() > 0.0);
-    if !(rises && begins && doses.len() <= MOST_DOSES) {
+    if !(rises && begins && doses.len() <= MAX_DOSES) {
         return Err(TargetError::Doses);
     }
     let mut before = 0.0;
     let expose = |(first, dose): (usize, &Dose)| {
         let added = Dose::from_mj_per_cm2(dose.mj_per_cm2() - before);
         before = dose.mj_per_cm2();
-        Exposure { image: squares_from(first, doses.len(), side, gap), dose: added }
+        TargetExposure { image: squares_from(first, doses.len(), side, gap), dose: added }
     };
     Ok(doses.iter().enumerate().map(expose).collect())
 }
@@ -114,13 +114,13 @@ pub fn screens(
     gap: u32,
     cells: &[u32],
 ) -> Result<GrayMask, TargetError> {
-    check_pixels("tiles", tile, MOST_TILE)?;
-    check_pixels("gaps", gap, MOST_PIXELS)?;
+    check_pixels("tiles", tile, MAX_TILE)?;
+    check_pixels("gaps", gap, MAX_PIXELS)?;
     for &cell in cells {
-        check_pixels("screen squares", cell, MOST_TILE)?;
+        check_pixels("screen squares", cell, MAX_TILE)?;
     }
     let sixty_fourths = (level.get() * 64.0).round() as u32;
-    let tiles = 1 + cells.len().min(MOST_DOSES) as u32;
+    let tiles = 1 + cells.len().min(MAX_DOSES) as u32;
     let width = gap + tiles * (tile + gap);
     let mut image = GrayMask::new(width.next_multiple_of(WIDTH_STEP));
     let mut push =

@@ -2,7 +2,7 @@
 
 use lamp_stack::{GrayMask, Mask, gray_runs};
 
-use crate::row::{Dots, TooManyRuns};
+use crate::dots::{Dots, TooManyRuns};
 
 /// Makes pixels of at least half the full level white.
 pub(crate) fn threshold(gray: &GrayMask) -> Result<Mask, TooManyRuns> {

@@ -4,7 +4,7 @@
 use lamp_fixtures::{Mesh, sphere, tower};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{GrayLevel, Resin};
-use lamp_grayscale::{CuredLine, Line, excess};
+use lamp_grayscale::{CuredLine, PixelLine, excess};
 use lamp_slicer::{
     Axis, Fill, Model, PixelGrid, Placement, SectionOptions, SliceOptions, Slices, Units, section,
 };
@@ -56,7 +56,7 @@ fn errors(
         let mut cured = CuredLine::default();
         for Layer { info, image, .. } in layers {
             let top = Length::from_um(info.z_um.unwrap() + THICKNESS_UM);
-            cured.expose(Line::Row(row), image, top, |level| depths[usize::from(level)]);
+            cured.expose(PixelLine::Row(row), image, top, |level| depths[usize::from(level)]);
         }
         for fine_row in 0..fine {
             let y = grid.origin_mm[1] - (f64::from(row * fine + fine_row) + 0.5) * step_mm;

@@ -1,6 +1,6 @@
 //! What dithering must leave alone.
 
-use lamp_grayscale::{DitherError, Method, dither, dither_image};
+use lamp_grayscale::{DitherError, DitherMethod, dither, dither_image};
 use lamp_stack::{GrayMask, Image, Layer, Mask, PageInfo};
 use proptest::prelude::*;
 
@@ -22,7 +22,7 @@ fn level_at(gray: &GrayMask, column: u32, row: usize) -> u8 {
 proptest! {
     #[test]
     fn solid_pixels_keep_their_colour(gray in gray_image(), layer in any::<u32>()) {
-        for method in Method::ALL {
+        for method in DitherMethod::ALL {
             let dots = dither_image(&gray, method, layer).unwrap();
             prop_assert_eq!((dots.width(), dots.height()), (gray.width(), gray.height()));
             for pixel in 0..gray.width() * gray.height() {
@@ -45,7 +45,7 @@ fn masks_pass_unchanged_and_gray_pages_name_the_method() {
     let gray = Layer { info, dpi: None, image: Image::Gray(GrayMask::new(8)) };
     let layers = [Ok::<_, DitherError>(masked.clone()), Ok(gray)];
     let out: Vec<_> =
-        dither(layers.into_iter(), Method::FloydSteinberg).map(Result::unwrap).collect();
+        dither(layers.into_iter(), DitherMethod::FloydSteinberg).map(Result::unwrap).collect();
     assert_eq!(out[0], masked);
     assert!(matches!(out[1].image, Image::Mask(_)));
     assert_eq!(out[1].info.other["dither"], "floyd-steinberg");
@@ -58,6 +58,6 @@ fn dots_that_no_reader_takes_are_refused() {
     for _ in 0..8 {
         gray.push_runs([(1 << 26, 128)]).unwrap();
     }
-    let error = dither_image(&gray, Method::BlueNoise, 3).unwrap_err();
+    let error = dither_image(&gray, DitherMethod::BlueNoise, 3).unwrap_err();
     assert!(error.to_string().starts_with("layer 3: its dots make more than 134217728 runs"));
 }

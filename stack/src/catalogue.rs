@@ -21,13 +21,13 @@ use crate::{line_of, one_line};
 ///     const KIND: &'static str = "lamp";
 ///     const BUILTINS: &'static [Builtin] =
 ///         &[Builtin { name: "desk", toml: "name = 'desk'\nwatts = 8.0" }];
-///     type Fault = std::convert::Infallible;
+///     type CheckError = std::convert::Infallible;
 ///
 ///     fn name(&self) -> &str {
 ///         &self.name
 ///     }
 ///
-///     fn check(&self) -> Result<(), Self::Fault> {
+///     fn check(&self) -> Result<(), Self::CheckError> {
 ///         Ok(())
 ///     }
 /// }
@@ -42,7 +42,7 @@ pub trait Catalogued: DeserializeOwned {
     /// The built-in documents, in the order of their names.
     const BUILTINS: &'static [Builtin];
     /// Why values make no document though each can be read.
-    type Fault;
+    type CheckError;
 
     /// Returns the document's name: small letters, digits and `-`.
     fn name(&self) -> &str;
@@ -51,14 +51,14 @@ pub trait Catalogued: DeserializeOwned {
     ///
     /// # Errors
     /// Returns an error if the values contradict each other.
-    fn check(&self) -> Result<(), Self::Fault>;
+    fn check(&self) -> Result<(), Self::CheckError>;
 
     /// Reads a document.
     ///
     /// # Errors
     /// Returns an error if the text is not TOML, if a key is unknown, missing or wrong,
     /// or if [`check`](Self::check) fails. Every error names its line or key.
-    fn from_toml(text: &str) -> Result<Self, CatalogueError<Self::Fault>> {
+    fn from_toml(text: &str) -> Result<Self, CatalogueError<Self::CheckError>> {
         let syntax = |error: toml::de::Error| CatalogueError::Syntax {
             kind: Self::KIND,
             line: line_of(text, error.span()),
@@ -80,7 +80,7 @@ pub trait Catalogued: DeserializeOwned {
             let example = Self::BUILTINS.first().map_or("mine", |builtin| builtin.name);
             return Err(CatalogueError::Name { name: one_line(entry.name()), example });
         }
-        entry.check().map_err(CatalogueError::Fault)?;
+        entry.check().map_err(CatalogueError::Check)?;
         Ok(entry)
     }
 
@@ -117,7 +117,7 @@ pub struct Builtin {
 /// Why a text is no document of a catalogue.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
-pub enum CatalogueError<F> {
+pub enum CatalogueError<E> {
     /// The text is not TOML.
     #[error("line {line}: {problem}: a {kind} is a TOML file")]
     Syntax {
@@ -148,7 +148,7 @@ pub enum CatalogueError<F> {
     },
     /// The values make no document.
     #[error(transparent)]
-    Fault(F),
+    Check(E),
 }
 
 /// Writes a parser's message in TOML's words: serde says `field` for a key.

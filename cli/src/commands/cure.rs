@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lamp_grayscale::Solid;
+use lamp_grayscale::SolidHeights;
 use lamp_grayscale::material::Material;
 use lamp_stack::StackInfo;
 
@@ -105,7 +105,7 @@ fn outline(
     course: &Course,
     stack: Option<&StackInfo>,
     name: &str,
-) -> Result<Vec<Solid>, Stop> {
+) -> Result<Vec<SolidHeights>, Stop> {
     let sliced = stack.and_then(|stack| {
         let options = PartOptions::of_command(stack.commands.first()?)?;
         Some((options, &stack.digest))

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Context;
 use clap::Args;
 use lamp_fixtures::{Sample, build};
-use lamp_grayscale::Method;
+use lamp_grayscale::DitherMethod;
 use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
     FixOptions, HeightOptions, Layout, MeshOptions, Pack, PartStack, TileOptions, fix, tile,
@@ -122,7 +122,7 @@ fn part_layers(
     let fixed = fix(layers, FixOptions::default(), move |fixed| {
         report.say(&format!("{} had stray rows", fixed.before.info.name()));
     });
-    Ok(lamp_grayscale::dither(fixed, Method::default()))
+    Ok(lamp_grayscale::dither(fixed, DitherMethod::default()))
 }
 
 /// All four stages, on a black build area.

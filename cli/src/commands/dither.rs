@@ -1,5 +1,5 @@
 use clap::Args;
-use lamp_grayscale::{EVEN_DOTS, Homogeneity, Method, UNEVEN_DOTS, homogeneity};
+use lamp_grayscale::{DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
 use lamp_stack::{Image, Layer, Length};
 
 use crate::options::{Common, Input, Output, one_of_described};
@@ -24,13 +24,13 @@ pub(crate) struct DitherArgs {
     input: Input,
 
     /// How gray becomes dots
-    #[arg(long, default_value_t, value_parser = one_of_described::<Method>(&[
+    #[arg(long, default_value_t, value_parser = one_of_described::<DitherMethod>(&[
         "Dots far from each other, in no pattern: a mask of 128 x 128 thresholds",
         "Bayer's pattern of 16 x 16 thresholds",
         "Error diffusion, with the thresholds of blue noise",
         "No dots: levels of 128 and more, of 255, are white",
     ]))]
-    method: Method,
+    method: DitherMethod,
 
     #[command(flatten)]
     output: Output,
@@ -38,7 +38,7 @@ pub(crate) struct DitherArgs {
 
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Stop> {
     let report = report("dither", common, &args.output);
-    let mut told = args.method == Method::Threshold;
+    let mut told = args.method == DitherMethod::Threshold;
     let layers = read_layers(&args.input, &report)?.inspect(|layer| {
         if let Some(line) = layer.as_ref().ok().filter(|_| !told).and_then(unevenness) {
             told = true;

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::Depths;
+use lamp_grayscale::resin::DepthRange;
 use lamp_stack::{Catalogued, Length};
 
 use crate::catalogue;
@@ -104,7 +104,7 @@ fn allows(material: &Material) -> String {
     let layer = if depths.from.um() > 100.0 { depths.from } else { Length::from_um(100.0) };
     let models = models(material).join(", ");
     let holds =
-        if depths == Depths::ALL { String::new() } else { format!(" (depths of {depths})") };
+        if depths == DepthRange::ALL { String::new() } else { format!(" (depths of {depths})") };
     match resin.exposure_time(layer, 1.0) {
         Ok(time) => format!(
             "{} gives {models}{holds}; at {}, full white cures {layer} in {time:.1}",

@@ -4,19 +4,19 @@ use std::ops::RangeInclusive;
 
 use lamp_stack::Length;
 
-use super::data::DataError;
-use super::table::{Row, Table};
+use super::csv_table::{CsvTable, TableRow};
+use super::measurements::DataError;
 use crate::resin::{Dose, ExposureTime, Intensity};
 
 pub(super) const DOSE: &str = "dose_mj_per_cm2";
 pub(super) const EXPOSURE: &str = "exposure_ms";
 
-/// Depths, widths and sides in um, from a nanometre to a metre: what no measurement
+/// DepthRange, widths and sides in um, from a nanometre to a metre: what no measurement
 /// passes, but a slip of the pen may.
 pub(super) const LENGTHS: RangeInclusive<f64> = 1e-3..=1e6;
 
 /// A misspelt column must not be silently left out.
-pub(super) fn check_columns(table: &Table, known: &[&str]) -> Result<(), DataError> {
+pub(super) fn check_columns(table: &CsvTable, known: &[&str]) -> Result<(), DataError> {
     let is_known = |column: &&String| known.contains(&column.as_str()) || column.as_str() == "note";
     match table.columns().iter().find(|column| !is_known(column)) {
         Some(column) => Err(DataError::Unknown { column: column.clone(), known: known.join(", ") }),
@@ -32,13 +32,13 @@ pub(super) struct Column {
 }
 
 impl Column {
-    pub(super) fn find(table: &Table, name: &'static str) -> Option<Self> {
+    pub(super) fn find(table: &CsvTable, name: &'static str) -> Option<Self> {
         table.find(name).map(|index| Self { name, index })
     }
 
     /// The one of two columns that is there, and whether it is the first.
     pub(super) fn either(
-        table: &Table,
+        table: &CsvTable,
         first: &'static str,
         second: &'static str,
     ) -> Result<(Self, bool), DataError> {
@@ -50,14 +50,14 @@ impl Column {
         }
     }
 
-    pub(super) fn number_or_blank(self, row: &Row) -> Result<Option<f64>, DataError> {
+    pub(super) fn number_or_blank(self, row: &TableRow) -> Result<Option<f64>, DataError> {
         match row.cell(self.index) {
             "" => Ok(None),
             _ => self.number(row).map(Some),
         }
     }
 
-    pub(super) fn number(self, row: &Row) -> Result<f64, DataError> {
+    pub(super) fn number(self, row: &TableRow) -> Result<f64, DataError> {
         let text = row.cell(self.index);
         let (line, column) = (row.line, self.name);
         let number: Option<f64> = text.parse().ok().filter(|number: &f64| number.is_finite());
@@ -66,7 +66,7 @@ impl Column {
 
     /// A length in um, or a blank. None and less than none are lengths too: a film
     /// may be uncured, and a balance may show less than nothing.
-    pub(super) fn length_or_blank(self, row: &Row) -> Result<Option<Length>, DataError> {
+    pub(super) fn length_or_blank(self, row: &TableRow) -> Result<Option<Length>, DataError> {
         let Some(um) = self.number_or_blank(row)? else { return Ok(None) };
         if LENGTHS.contains(&um) || (um <= 0.0 && -um <= *LENGTHS.end()) {
             return Ok(Some(Length::from_um(um)));
@@ -74,7 +74,7 @@ impl Column {
         Err(self.impossible(row, "a length from 0.001 um to 1 m"))
     }
 
-    pub(super) fn impossible(self, row: &Row, wanted: &'static str) -> DataError {
+    pub(super) fn impossible(self, row: &TableRow, wanted: &'static str) -> DataError {
         let text = row.cell(self.index).to_owned();
         DataError::Impossible { line: row.line, column: self.name, text, wanted }
     }
@@ -87,7 +87,7 @@ pub(super) struct DoseColumn {
 }
 
 impl DoseColumn {
-    pub(super) fn find(table: &Table, light: Option<Intensity>) -> Result<Self, DataError> {
+    pub(super) fn find(table: &CsvTable, light: Option<Intensity>) -> Result<Self, DataError> {
         let (column, is_dose) = Column::either(table, DOSE, EXPOSURE)?;
         if is_dose {
             return Ok(Self { column, light: None });
@@ -95,7 +95,7 @@ impl DoseColumn {
         Ok(Self { column, light: Some(light.ok_or(DataError::NoLight)?) })
     }
 
-    pub(super) fn of(&self, row: &Row) -> Result<Dose, DataError> {
+    pub(super) fn of(&self, row: &TableRow) -> Result<Dose, DataError> {
         let number = self.column.number(row)?;
         let (dose, wanted) = match self.light {
             None => (Dose::from_mj_per_cm2(number), "a dose from 1e-6 to 1e9 mJ/cm2"),

@@ -3,9 +3,9 @@
 //! confidence interval.
 //!
 //! ```
-//! use lamp_grayscale::calibrate::{Table, depth_points, fit_curve};
+//! use lamp_grayscale::calibrate::{CsvTable, depth_points, fit_curve};
 //!
-//! let table = Table::parse("dose_mj_per_cm2,depth_um\n320,188\n640,333\n1280,481\n1920,566")?;
+//! let table = CsvTable::parse("dose_mj_per_cm2,depth_um\n320,188\n640,333\n1280,481\n1920,566")?;
 //! let measured = depth_points(&table, None)?;
 //! let fit = fit_curve(&measured.points)?;
 //! assert_eq!(fit.penetration_depth.value.um().round(), 211.0);
@@ -16,37 +16,37 @@
 //! The errors of the measurements are taken to be independent, of one spread and
 //! normal, and the doses to be exact.
 
-mod bent;
 mod columns;
-mod curve;
-mod data;
-mod digits;
-mod gray;
-mod line;
-mod solve;
-mod student;
-mod table;
+mod csv_table;
+mod exposure_times;
+mod fit_curve;
+mod fit_gray;
+mod fit_two_depth;
+mod fit_widths;
 #[cfg(test)]
-mod testing;
-mod times;
-mod two_depth;
-mod width;
+mod made_up;
+mod matrix;
+mod measurements;
+mod regression;
+mod significant;
+mod student_t;
+mod two_depth_curve;
 
 use lamp_stack::Length;
 use thiserror::Error;
 
 use crate::material::Given;
 use crate::resin::{Dose, WidthSensitivity};
-use digits::to_digits;
+use significant::round_significant;
 
-pub use curve::{CurveFit, fit_curve};
-pub use data::{DataError, DepthPoint, Measured, WidthPoint, depth_points, width_points};
-pub use digits::with_digits;
-pub use gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
-pub use table::{Table, TableError};
-pub use times::ExposureTimes;
-pub use two_depth::{TwoDepthFit, fit_two_depth};
-pub use width::{WidthFit, fit_widths};
+pub use csv_table::{CsvTable, TableError};
+pub use exposure_times::ExposureTimes;
+pub use fit_curve::{CurveFit, fit_curve};
+pub use fit_gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
+pub use fit_two_depth::{TwoDepthFit, fit_two_depth};
+pub use fit_widths::{WidthFit, fit_widths};
+pub use measurements::{DataError, DepthPoint, Measured, WidthPoint, depth_points, width_points};
+pub use significant::format_significant;
 
 /// A number found from measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,8 +115,8 @@ impl<T: Quantity> Estimate<T> {
     pub fn given(&self, source: &str) -> Given<T> {
         let plus_minus = self.plus_minus().number();
         Given {
-            value: T::of(to_digits(self.value.number(), 6)),
-            plus_minus: plus_minus.is_finite().then(|| T::of(to_digits(plus_minus, 3))),
+            value: T::of(round_significant(self.value.number(), 6)),
+            plus_minus: plus_minus.is_finite().then(|| T::of(round_significant(plus_minus, 3))),
             source: source.to_owned(),
         }
     }
@@ -241,7 +241,7 @@ pub enum FitError {
 
 /// A number for an error.
 fn short(number: f64) -> String {
-    with_digits(number, 4)
+    format_significant(number, 4)
 }
 
 /// So many of something are.

@@ -60,7 +60,7 @@ impl Catalogued for Material {
         builtin!("sl-5510"),
         builtin!("tmpta"),
     ];
-    type Fault = MaterialError;
+    type CheckError = MaterialError;
 
     fn name(&self) -> &str {
         &self.name
@@ -181,7 +181,7 @@ source = "notebook, page 3"
         let text = format!("name = \"a\"\ndescription = \"\"\n{dimmed}");
         assert_eq!(
             Material::from_toml(&text),
-            Err(CatalogueError::Fault(MaterialError::NoWorkingCurve))
+            Err(CatalogueError::Check(MaterialError::NoWorkingCurve))
         );
     }
 

@@ -27,8 +27,8 @@ pub use file::MaterialError;
 pub use number::{Constant, Given, GivenDepths, GivenLine, Written};
 
 use crate::resin::{
-    CureModel, CureWidth, Depths, Dose, GrayCurve, Intensity, IntensityLines, Line, ModelError,
-    Resin, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
+    CureModel, CureWidth, DepthRange, Dose, GrayCurve, Intensity, IntensityLines, ModelError,
+    Resin, StraightLine, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
 };
 
 /// What is known of a resin. What a source does not give is absent. The default
@@ -160,7 +160,7 @@ impl Material {
     pub fn dimmed_lamp(&self) -> Result<Option<IntensityLines>, MaterialError> {
         let Some(lines) = &self.dimmed_lamp else { return Ok(None) };
         let curve = self.working_curve()?.ok_or(MaterialError::NoWorkingCurve)?;
-        let stays = Line { at_zero: curve.penetration_depth(), rise: Length::default() };
+        let stays = StraightLine { at_zero: curve.penetration_depth(), rise: Length::default() };
         let lines = IntensityLines::new(lines.critical_dose.line(), stays);
         lines.map(Some).map_err(of("dimmed-lamp"))
     }
@@ -194,7 +194,7 @@ impl Material {
     /// Where a number is not above zero, or the depths are none.
     pub fn two_depth(&self) -> Result<Option<TwoDepth>, MaterialError> {
         let model = |numbers: &TwoDepthNumbers| {
-            let depths = numbers.depths.as_ref().map_or(Depths::ALL, GivenDepths::depths);
+            let depths = numbers.depths.as_ref().map_or(DepthRange::ALL, GivenDepths::depths);
             let [liquid, solid] = [&numbers.liquid_depth, &numbers.solid_depth];
             TwoDepth::new(numbers.critical_dose.value, liquid.value, solid.value, depths)
         };

@@ -8,7 +8,7 @@ use lamp_stack::{Length, nonempty_text};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::resin::{Depths, Dose, Intensity, Line, WidthSensitivity};
+use crate::resin::{DepthRange, Dose, Intensity, StraightLine, WidthSensitivity};
 
 /// A number with its unit, and where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,8 +43,8 @@ pub struct GivenLine<T> {
 }
 
 impl<T: Copy> GivenLine<T> {
-    pub(super) fn line(&self) -> Line<T> {
-        Line { at_zero: self.at_zero, rise: self.rise }
+    pub(super) fn line(&self) -> StraightLine<T> {
+        StraightLine { at_zero: self.at_zero, rise: self.rise }
     }
 }
 
@@ -64,8 +64,8 @@ pub struct GivenDepths {
 }
 
 impl GivenDepths {
-    pub(super) fn depths(&self) -> Depths {
-        Depths { from: self.from, to: self.to }
+    pub(super) fn depths(&self) -> DepthRange {
+        DepthRange { from: self.from, to: self.to }
     }
 }
 

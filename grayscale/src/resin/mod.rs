@@ -3,15 +3,15 @@
 mod beam;
 mod broadening;
 mod composition;
+mod cure_width;
 mod filter;
-mod gray;
-#[cfg(test)]
-pub(crate) mod laws;
+mod gray_curve;
 mod model;
+#[cfg(test)]
+pub(crate) mod model_laws;
 pub mod shrinkage;
 mod two_depth;
 mod units;
-mod width;
 mod working_curve;
 
 use lamp_stack::{DepthLevels, Length};
@@ -19,12 +19,12 @@ use lamp_stack::{DepthLevels, Length};
 pub use beam::GaussianBeam;
 pub use broadening::{broadening_depth, cure_width_of_square};
 pub use composition::{Absorber, Inhibition, Suspension};
+pub use cure_width::{CureWidth, WidthLine};
 pub use filter::OpticalDensity;
-pub use gray::{GrayCurve, IntensityLines, Line};
-pub use model::{CureError, CureModel, Depths, ModelError};
+pub use gray_curve::{GrayCurve, IntensityLines, StraightLine};
+pub use model::{CureError, CureModel, DepthRange, ModelError};
 pub use two_depth::TwoDepth;
 pub use units::{Dose, ExposureTime, GrayLevel, Intensity, QuantityError, WidthSensitivity};
-pub use width::{CureWidth, WidthLine};
 pub use working_curve::WorkingCurve;
 
 /// A cure model under a lamp: gray levels and times instead of doses.
@@ -85,7 +85,7 @@ impl Resin {
     }
 
     /// Returns the gray levels that cure each depth in an exposure, for slicing:
-    /// what [`Self::gray_for`] gives, to the nearest of 255. Depths from what
+    /// what [`Self::gray_for`] gives, to the nearest of 255. DepthRange from what
     /// full white cures are white.
     ///
     /// # Errors

@@ -28,8 +28,8 @@ pub trait CureModel: fmt::Debug + Send + Sync {
 
     /// Returns the depths that the model holds for. `depth` answers outside
     /// them too, as its equation has it.
-    fn depths(&self) -> Depths {
-        Depths::ALL
+    fn depths(&self) -> DepthRange {
+        DepthRange::ALL
     }
 
     /// Returns the depth that a gray level cures in an exposure whose white
@@ -64,14 +64,14 @@ pub(super) fn check_reach(depth: Length, deepest: Length) -> Result<(), CureErro
 
 /// The depths that a model holds for, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Depths {
+pub struct DepthRange {
     /// The shallowest.
     pub from: Length,
     /// The deepest, where there is one.
     pub to: Option<Length>,
 }
 
-impl Depths {
+impl DepthRange {
     /// Every depth.
     pub const ALL: Self = Self { from: Length::from_um(0.0), to: None };
 
@@ -89,7 +89,7 @@ impl Depths {
     }
 }
 
-impl fmt::Display for Depths {
+impl fmt::Display for DepthRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.to {
             Some(to) => write!(f, "{} to {to}", self.from),
@@ -111,7 +111,7 @@ pub enum CureError {
         /// The depth asked for.
         depth: Length,
         /// Those it holds for.
-        depths: Depths,
+        depths: DepthRange,
     },
     /// The model does not hold for all that a gray layer needs.
     #[error(
@@ -122,7 +122,7 @@ pub enum CureError {
         /// The depth that white cures.
         reach: Length,
         /// Those it holds for.
-        depths: Depths,
+        depths: DepthRange,
     },
     /// White does not cure as deep.
     #[error(

@@ -2,7 +2,7 @@
 
 use lamp_stack::Length;
 
-use super::model::{CureError, CureModel, Depths, ModelError, positive};
+use super::model::{CureError, CureModel, DepthRange, ModelError, positive};
 use super::units::Dose;
 
 /// The cure model with its own penetration depth for the liquid (`D_pL`) and
@@ -19,7 +19,7 @@ pub struct TwoDepth {
     critical_dose: Dose,
     liquid_depth: Length,
     solid_depth: Length,
-    depths: Depths,
+    depths: DepthRange,
 }
 
 impl TwoDepth {
@@ -32,7 +32,7 @@ impl TwoDepth {
         critical_dose: Dose,
         liquid_depth: Length,
         solid_depth: Length,
-        depths: Depths,
+        depths: DepthRange,
     ) -> Result<Self, ModelError> {
         positive(critical_dose.mj_per_cm2(), "critical-dose")?;
         positive(liquid_depth.um(), "liquid-depth")?;
@@ -74,7 +74,7 @@ impl CureModel for TwoDepth {
         }
     }
 
-    fn depths(&self) -> Depths {
+    fn depths(&self) -> DepthRange {
         self.depths
     }
 }
@@ -84,11 +84,11 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::resin::{ExposureTime, Intensity, WorkingCurve, laws};
+    use crate::resin::{ExposureTime, Intensity, WorkingCurve, model_laws};
 
     fn model(mj: f64, liquid: f64, solid: f64) -> TwoDepth {
         let um = Length::from_um;
-        TwoDepth::new(Dose::from_mj_per_cm2(mj), um(liquid), um(solid), Depths::ALL).unwrap()
+        TwoDepth::new(Dose::from_mj_per_cm2(mj), um(liquid), um(solid), DepthRange::ALL).unwrap()
     }
 
     #[test]
@@ -116,19 +116,19 @@ mod tests {
             let dose = Intensity::from_mw_per_cm2(0.2064) * ExposureTime::from_ms(1000.0 * seconds);
             (resin.depth(dose).um() - um).powi(2)
         };
-        let squares: f64 = laws::APPENDIX_A.into_iter().map(square).sum();
+        let squares: f64 = model_laws::APPENDIX_A.into_iter().map(square).sum();
         assert!((1346.2..1346.4).contains(&squares), "{squares}");
     }
 
     #[test]
     fn it_keeps_the_laws() {
-        laws::hold(&model(4.0, 11.0, 15.0), 0.001..=300.0);
-        laws::hold(&model(11.593, 302.8253, 99995602.7076), 0.001..=3000.0);
+        model_laws::hold(&model(4.0, 11.0, 15.0), 0.001..=300.0);
+        model_laws::hold(&model(11.593, 302.8253, 99995602.7076), 0.001..=3000.0);
     }
 
     #[test]
     fn outside_its_depths_there_is_no_dose() {
-        let depths = Depths { from: Length::from_um(180.0), to: Some(Length::from_um(620.0)) };
+        let depths = DepthRange { from: Length::from_um(180.0), to: Some(Length::from_um(620.0)) };
         let um = Length::from_um;
         let dose = Dose::from_mj_per_cm2(11.593);
         let model = TwoDepth::new(dose, um(302.8253), um(99995602.7076), depths).unwrap();
@@ -142,7 +142,7 @@ mod tests {
         }
         // Nothing to cure is no shallow depth.
         assert_eq!(model.dose(um(0.0)), Ok(Dose::default()));
-        let none = Depths { from: um(620.0), to: Some(um(180.0)) };
+        let none = DepthRange { from: um(620.0), to: Some(um(180.0)) };
         assert_eq!(TwoDepth::new(dose, um(1.0), um(1.0), none), Err(ModelError::NoDepths));
     }
 

@@ -69,7 +69,7 @@ impl CureModel for WorkingCurve {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::resin::laws;
+    use crate::resin::model_laws;
 
     fn curve(mj: f64, um: f64) -> WorkingCurve {
         WorkingCurve::new(Dose::from_mj_per_cm2(mj), Length::from_um(um)).unwrap()
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn it_keeps_the_laws() {
         for curve in [curve(131.5, 211.0), curve(39.4, 638.51), curve(8.9, 122.0)] {
-            laws::hold(&curve, 0.001..=3000.0);
+            model_laws::hold(&curve, 0.001..=3000.0);
         }
     }
 

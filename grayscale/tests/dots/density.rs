@@ -1,6 +1,6 @@
 //! How many dots windows hold.
 
-use lamp_grayscale::Method;
+use lamp_grayscale::DitherMethod;
 use lamp_stack::Mask;
 
 use crate::{DOTS, PERIOD, dots, pixels};
@@ -35,7 +35,7 @@ fn levels(shares: std::ops::RangeInclusive<f64>) -> std::ops::RangeInclusive<u8>
 }
 
 /// The largest root mean square and the largest error of any level.
-fn errors_of(method: Method, side: u32, layer: u32) -> [f64; 2] {
+fn errors_of(method: DitherMethod, side: u32, layer: u32) -> [f64; 2] {
     let mut errors = [0.0f64; 2];
     for level in levels(0.05..=0.95) {
         let share = f64::from(level) / 255.0;
@@ -56,14 +56,14 @@ const SIDE: u32 = PERIOD + WINDOW as u32;
 
 #[test]
 fn windows_of_blue_noise_have_the_density_of_the_level() {
-    let [rms, worst] = errors_of(Method::BlueNoise, SIDE, 0);
+    let [rms, worst] = errors_of(DitherMethod::BlueNoise, SIDE, 0);
     println!("blue-noise: {rms} rms, {worst} at worst");
     assert!(rms <= 0.01 && worst <= 0.03, "{rms} rms, {worst} at worst");
 }
 
 #[test]
 fn windows_of_the_ordered_pattern_are_its_period() {
-    let [_, worst] = errors_of(Method::Ordered, SIDE, 5);
+    let [_, worst] = errors_of(DitherMethod::Ordered, SIDE, 5);
     assert!(worst <= 0.5 / 256.0 + 1e-12, "{worst} at worst");
 }
 
@@ -72,7 +72,7 @@ fn windows_of_the_ordered_pattern_are_its_period() {
 #[test]
 fn windows_of_diffused_errors_have_the_density_of_the_level() {
     for layer in [0, 1, 50, 127] {
-        let [rms, worst] = errors_of(Method::FloydSteinberg, 300, layer);
+        let [rms, worst] = errors_of(DitherMethod::FloydSteinberg, 300, layer);
         println!("floyd-steinberg, layer {layer}: {rms} rms, {worst} at worst");
         assert!(rms <= 0.01 && worst <= 0.03, "{layer}: {rms} rms, {worst} at worst");
     }

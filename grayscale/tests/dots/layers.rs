@@ -1,6 +1,6 @@
 //! Dots over the layers: holes must not stack.
 
-use lamp_grayscale::Method;
+use lamp_grayscale::DitherMethod;
 
 use crate::{PERIOD, dots, pixels};
 
@@ -13,7 +13,7 @@ struct Stacked {
     most_in_a_row: [u32; 2],
 }
 
-fn stacked(method: Method, level: u8) -> Stacked {
+fn stacked(method: DitherMethod, level: u8) -> Stacked {
     // All that blue noise and the ordered pattern ever do.
     let layers: Vec<_> =
         (0..256 + 16).map(|layer| pixels(&dots(method, level, PERIOD, layer))).collect();
@@ -34,7 +34,7 @@ fn stacked(method: Method, level: u8) -> Stacked {
 }
 
 #[track_caller]
-fn check(method: Method, level: u8, white_of_16: [u32; 2], most_in_a_row: [u32; 2]) {
+fn check(method: DitherMethod, level: u8, white_of_16: [u32; 2], most_in_a_row: [u32; 2]) {
     let found = stacked(method, level);
     let both = (found.white_of_16, found.most_in_a_row);
     println!("{} {level}: {both:?}", method.name());
@@ -50,22 +50,22 @@ fn check(method: Method, level: u8, white_of_16: [u32; 2], most_in_a_row: [u32; 
 
 #[test]
 fn blue_noise_fills_its_holes_within_a_few_layers() {
-    check(Method::BlueNoise, 128, [6, 10], [3, 3]);
-    check(Method::BlueNoise, 64, [2, 6], [7, 2]);
-    check(Method::BlueNoise, 191, [10, 15], [2, 9]);
+    check(DitherMethod::BlueNoise, 128, [6, 10], [3, 3]);
+    check(DitherMethod::BlueNoise, 64, [2, 6], [7, 2]);
+    check(DitherMethod::BlueNoise, 191, [10, 15], [2, 9]);
 }
 
 #[test]
 fn the_ordered_pattern_fills_its_holes_in_turn() {
-    check(Method::Ordered, 128, [8, 9], [1, 3]);
-    check(Method::Ordered, 64, [4, 4], [3, 1]);
-    check(Method::Ordered, 191, [12, 12], [1, 3]);
+    check(DitherMethod::Ordered, 128, [8, 9], [1, 3]);
+    check(DitherMethod::Ordered, 64, [4, 4], [3, 1]);
+    check(DitherMethod::Ordered, 191, [12, 12], [1, 3]);
 }
 
 /// Errors undo part of what the thresholds ask for.
 #[test]
 fn diffused_errors_fill_holes_less_regularly() {
-    check(Method::FloydSteinberg, 128, [1, 15], [13, 13]);
+    check(DitherMethod::FloydSteinberg, 128, [1, 15], [13, 13]);
 }
 
 #[test]
@@ -76,5 +76,8 @@ fn the_next_layer_is_another_and_the_same_layer_is_the_same() {
         // The last index there is.
         assert_ne!(layer(u32::MAX), layer(u32::MAX - 1));
     }
-    assert_eq!(dots(Method::Threshold, 128, 64, 1), dots(Method::Threshold, 128, 64, 2));
+    assert_eq!(
+        dots(DitherMethod::Threshold, 128, 64, 1),
+        dots(DitherMethod::Threshold, 128, 64, 2)
+    );
 }

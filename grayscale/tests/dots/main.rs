@@ -6,11 +6,12 @@ mod layers;
 mod spectrum;
 mod tiles;
 
-use lamp_grayscale::{Method, dither_image};
+use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_stack::{GrayMask, Mask, white_runs};
 
 /// The methods that make dots.
-const DOTS: [Method; 3] = [Method::BlueNoise, Method::Ordered, Method::FloydSteinberg];
+const DOTS: [DitherMethod; 3] =
+    [DitherMethod::BlueNoise, DitherMethod::Ordered, DitherMethod::FloydSteinberg];
 
 /// The period of every method's pattern, in pixels and in layers but for the
 /// ordered one's 256 layers.
@@ -26,7 +27,7 @@ fn flat(level: u8, side: u32) -> GrayMask {
 }
 
 /// Returns the dots of a level in a layer.
-fn dots(method: Method, level: u8, side: u32, layer: u32) -> Mask {
+fn dots(method: DitherMethod, level: u8, side: u32, layer: u32) -> Mask {
     dither_image(&flat(level, side), method, layer).unwrap()
 }
 

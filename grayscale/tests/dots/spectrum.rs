@@ -4,7 +4,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use lamp_grayscale::Method;
+use lamp_grayscale::DitherMethod;
 
 use crate::{PERIOD, dots, pixels};
 
@@ -12,7 +12,7 @@ const SIDE: usize = PERIOD as usize;
 
 /// The power of each frequency but zero, where that of white noise of the same
 /// level is 1: columns, rows (cycles a pixel, from -1/2), power.
-fn spectrum(method: Method, level: u8) -> Vec<(f64, f64, f64)> {
+fn spectrum(method: DitherMethod, level: u8) -> Vec<(f64, f64, f64)> {
     let pixels = pixels(&dots(method, level, PERIOD, 0));
     let mean = pixels.iter().filter(|white| **white).count() as f64 / pixels.len() as f64;
     let values: Vec<_> = pixels.iter().map(|&white| [f64::from(white) - mean, 0.0]).collect();
@@ -63,7 +63,7 @@ const LEVELS: [u8; 7] = [26, 51, 77, 128, 179, 204, 230];
 #[test]
 fn blue_noise_has_little_at_low_frequencies_and_a_plateau_above() {
     for level in LEVELS {
-        let spectrum = spectrum(Method::BlueNoise, level);
+        let spectrum = spectrum(DitherMethod::BlueNoise, level);
         let share = f64::from(level.min(255 - level)) / 255.0;
         // One dot in each square of this many cycles a pixel.
         let principal = share.sqrt();
@@ -85,7 +85,7 @@ fn blue_noise_has_little_at_low_frequencies_and_a_plateau_above() {
 #[test]
 fn blue_noise_has_no_peak_and_no_direction() {
     for level in LEVELS {
-        let spectrum = spectrum(Method::BlueNoise, level);
+        let spectrum = spectrum(DitherMethod::BlueNoise, level);
         // Of 8192 frequencies of noise the highest is about 9 times the mean.
         let highest = highest(&spectrum);
         let plateau = spectrum.iter().filter(|(x, y, _)| (0.35..0.5).contains(&x.hypot(*y)));
@@ -103,5 +103,5 @@ fn blue_noise_has_no_peak_and_no_direction() {
 
 #[test]
 fn an_ordered_pattern_is_all_peaks() {
-    assert!(highest(&spectrum(Method::Ordered, 77)) > 500.0);
+    assert!(highest(&spectrum(DitherMethod::Ordered, 77)) > 500.0);
 }

@@ -1,6 +1,6 @@
 //! Dots of a gray image that is moved, as copies on a build area are.
 
-use lamp_grayscale::{Method, dither_image};
+use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_stack::GrayMask;
 use proptest::prelude::*;
 
@@ -35,7 +35,7 @@ proptest! {
         rows in rows(), right in 0u32..3, down in 0u32..3, layer in any::<u32>(),
     ) {
         let (right, down) = (right * PERIOD, down * PERIOD);
-        for method in Method::ALL {
+        for method in DitherMethod::ALL {
             let here = dither_image(&moved(&rows, 0, 0), method, layer).unwrap();
             let there = dither_image(&moved(&rows, right, down), method, layer).unwrap();
             prop_assert_eq!(here.white_pixels(), there.white_pixels());

@@ -30,7 +30,7 @@ macro_rules! builtin {
 impl Catalogued for Machine {
     const KIND: &'static str = "machine";
     const BUILTINS: &'static [Builtin] = &[builtin!("alpha"), builtin!("beta")];
-    type Fault = MachineError;
+    type CheckError = MachineError;
 
     fn name(&self) -> &str {
         &self.name

@@ -6,7 +6,7 @@ use lamp_grayscale::calibrate::{
     depth_points, fit_curve, fit_gray, fit_two_depth,
 };
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::{CureModel, Dose, GrayCurve, GrayLevel, Line};
+use lamp_grayscale::resin::{CureModel, Dose, GrayCurve, GrayLevel, StraightLine};
 use lamp_stack::Length;
 
 use super::Files;
@@ -206,8 +206,8 @@ fn plot(title: String, fit: &Fit, points: &[DepthPoint]) -> Plot {
 fn of_levels(fit: &GrayFit, points: &[DepthPoint], doses: &[Dose]) -> Vec<Series> {
     let (ec, dp) = (&fit.critical_dose, &fit.penetration_depth);
     let model = GrayCurve::new(
-        Line { at_zero: ec.at_zero.value, rise: ec.rise.value },
-        Line { at_zero: dp.at_zero.value, rise: dp.rise.value },
+        StraightLine { at_zero: ec.at_zero.value, rise: ec.rise.value },
+        StraightLine { at_zero: dp.at_zero.value, rise: dp.rise.value },
     )
     .expect("lines that fall are levelled, and begin above zero");
     let level = |level: &LevelFit| {

@@ -10,7 +10,7 @@ use std::slice;
 
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
-use lamp_grayscale::calibrate::{DataError, FitError, Table};
+use lamp_grayscale::calibrate::{CsvTable, DataError, FitError};
 use lamp_grayscale::material::{Given, Material, MaterialError};
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::CatalogueError;
@@ -111,9 +111,9 @@ impl Files {
         self.intensity.or_else(of_base)
     }
 
-    fn table(&self) -> Result<Table, Stop> {
-        let read = || -> anyhow::Result<Table> {
-            Ok(Table::parse(&read_text(&self.data, LARGEST_TABLE, "a table of measurements")?)?)
+    fn table(&self) -> Result<CsvTable, Stop> {
+        let read = || -> anyhow::Result<CsvTable> {
+            Ok(CsvTable::parse(&read_text(&self.data, LARGEST_TABLE, "a table of measurements")?)?)
         };
         Ok(read().with_context(|| self.place())?)
     }

@@ -1,6 +1,6 @@
 //! The table that calibrations print.
 
-use lamp_grayscale::calibrate::{Estimate, Measured, Quantity, with_digits};
+use lamp_grayscale::calibrate::{Estimate, Measured, Quantity, format_significant};
 
 /// The numbers of a calibration, a line each.
 pub(super) struct Text {
@@ -72,7 +72,7 @@ pub(super) fn in_legend<T: Quantity>(name: &str, unit: &str, estimate: &Estimate
 
 /// A number to five digits, `-` where it has no end.
 pub(super) fn short(number: f64) -> String {
-    with_digits(number, 5)
+    format_significant(number, 5)
 }
 
 #[cfg(test)]

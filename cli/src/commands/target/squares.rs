@@ -7,7 +7,7 @@ use anyhow::Context;
 use clap::{ArgGroup, Args};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, Intensity};
-use lamp_grayscale::target::{Exposure, squares};
+use lamp_grayscale::target::{TargetExposure, squares};
 use lamp_stack::{
     Destination, Dpi, FolderBeside, Format, Image, Layer, Length, PageInfo, StackInfo, write_stack,
 };
@@ -74,7 +74,7 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Stop> {
     }
     // All of them, before there is a folder: a size may be impossible.
     let doses = &args.doses.0;
-    let targets: Vec<(u32, Vec<Exposure>)> = sizes
+    let targets: Vec<(u32, Vec<TargetExposure>)> = sizes
         .into_iter()
         .map(|size| Ok((size, squares(size, gap, doses)?)))
         .collect::<Result<_, Stop>>()?;
@@ -128,7 +128,7 @@ impl SquaresArgs {
     fn layers(
         &self,
         size: u32,
-        exposures: Vec<Exposure>,
+        exposures: Vec<TargetExposure>,
         light: Intensity,
     ) -> impl Iterator<Item = Result<Layer, Stop>> + use<> {
         let doses: Vec<f64> = self.doses.0.iter().map(|dose| dose.mj_per_cm2()).collect();

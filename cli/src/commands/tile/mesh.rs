@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_grayscale::{Method, dither_image};
+use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_postprocess::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_stack::{Image, Length, StackError};
 
@@ -125,7 +125,7 @@ fn template(path: &Path) -> Result<MeshPattern, Stop> {
     let layer = first.unwrap_or_else(|| Err(failed_at(place.clone(), StackError::NoLayers)))?;
     let image = match layer.image {
         Image::Mask(image) => image,
-        Image::Gray(gray) => dither_image(&gray, Method::Threshold, 0)
+        Image::Gray(gray) => dither_image(&gray, DitherMethod::Threshold, 0)
             .map_err(|error| Stop::Failed(error.into()).at(place))?,
     };
     // Without blanks, as the stack's commands are words.

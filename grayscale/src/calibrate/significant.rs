@@ -2,7 +2,7 @@
 
 /// Writes a number to so many digits, with an exponent where it would be long
 /// otherwise; `-` where it has no end.
-pub fn with_digits(number: f64, digits: usize) -> String {
+pub fn format_significant(number: f64, digits: usize) -> String {
     if !number.is_finite() {
         return "-".to_owned();
     }
@@ -18,7 +18,7 @@ pub fn with_digits(number: f64, digits: usize) -> String {
 }
 
 /// Rounds to so many digits.
-pub(super) fn to_digits(number: f64, digits: usize) -> f64 {
+pub(super) fn round_significant(number: f64, digits: usize) -> f64 {
     let text = format!("{number:.*e}", digits - 1);
     text.parse().expect("what is written as a number reads as one")
 }
@@ -40,8 +40,8 @@ mod tests {
             (-1.234_56e92, "-1.2346e92"),
             (f64::INFINITY, "-"),
         ] {
-            assert_eq!(with_digits(number, 5), text);
+            assert_eq!(format_significant(number, 5), text);
         }
-        assert_eq!(to_digits(131.512_345, 6), 131.512);
+        assert_eq!(round_significant(131.512_345, 6), 131.512);
     }
 }

@@ -1,10 +1,10 @@
 //! The two-depth model's curve, in the parameters that it is fitted in.
 
-use super::solve::{inverse, product};
+use super::matrix::{inverse, product};
 
 /// `z = ln(1 + k a (E - E_c))/k`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Curve {
+pub(super) struct TwoDepthCurve {
     /// `E_c`.
     pub(super) onset: f64,
     /// `ln a`, where `a` is `D_pL/E_c`.
@@ -13,7 +13,7 @@ pub(super) struct Curve {
     pub(super) bend: f64,
 }
 
-impl Curve {
+impl TwoDepthCurve {
     /// The curve of a bend, by the line that `(exp(k z) - 1)/k = a (E - E_c)` is.
     pub(super) fn from_line(data: &[(f64, f64)], bend: f64) -> Option<Self> {
         let straight = |z: f64| if bend > 0.0 { (bend * z).exp_m1() / bend } else { z };
@@ -107,10 +107,10 @@ mod tests {
     #[test]
     fn a_bend_of_nothing_is_a_line() {
         for bend in [0.0, 1e-9, 1e-6, 9e-7, 2e-6] {
-            let curve = Curve { onset: 4.0, log_rate: 3.0, bend };
+            let curve = TwoDepthCurve { onset: 4.0, log_rate: 3.0, bend };
             let slopes = curve.at(9.0).1;
             let moved = |onset, log_rate, bend: f64| {
-                let other = Curve {
+                let other = TwoDepthCurve {
                     onset: curve.onset + onset,
                     log_rate: curve.log_rate + log_rate,
                     bend: curve.bend + bend,

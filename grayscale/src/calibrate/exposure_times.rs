@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use lamp_stack::Length;
 
 use super::columns::{Column, EXPOSURE, LENGTHS, check_columns};
-use super::data::DataError;
-use super::table::Table;
+use super::csv_table::CsvTable;
+use super::measurements::DataError;
 use crate::resin::ExposureTime;
 
 const THICKNESS: &str = "thickness_um";
@@ -27,7 +27,7 @@ impl ExposureTimes {
     /// # Errors
     /// Where a column is missing or unknown, a cell is no possible number, or a
     /// thickness stands twice.
-    pub fn new(table: &Table) -> Result<Self, DataError> {
+    pub fn new(table: &CsvTable) -> Result<Self, DataError> {
         check_columns(table, &[THICKNESS, EXPOSURE])?;
         let column = |name| Column::find(table, name).ok_or(DataError::NoColumn(name));
         let (thickness, exposure) = (column(THICKNESS)?, column(EXPOSURE)?);
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     fn times(text: &str) -> Result<ExposureTimes, DataError> {
-        ExposureTimes::new(&Table::parse(text).unwrap())
+        ExposureTimes::new(&CsvTable::parse(text).unwrap())
     }
 
     #[test]

@@ -4,7 +4,7 @@ use lamp_stack::{Dpi, Length};
 use thiserror::Error;
 
 use super::columns::{Column, DOSE, DoseColumn, EXPOSURE, LENGTHS, check_columns};
-use super::table::{Row, Table};
+use super::csv_table::{CsvTable, TableRow};
 use crate::resin::{Dose, GrayLevel, Intensity, cure_width_of_square};
 
 /// A measured cure depth.
@@ -104,12 +104,12 @@ const WIDTH: &str = "width_um";
 
 /// Takes cure depths from a table of `dose_mj_per_cm2` or, under a light,
 /// `exposure_ms`; `depth_um`; and `gray`, white where that is absent. The doses are
-/// those of full white. Depths of zero and below cured nothing.
+/// those of full white. DepthRange of zero and below cured nothing.
 ///
 /// # Errors
 /// Where a column is missing or unknown, or a cell is no possible number.
 pub fn depth_points(
-    table: &Table,
+    table: &CsvTable,
     light: Option<Intensity>,
 ) -> Result<Measured<DepthPoint>, DataError> {
     check_columns(table, &[DOSE, EXPOSURE, GRAY, DEPTH])?;
@@ -143,7 +143,7 @@ pub fn depth_points(
 /// # Errors
 /// Where a column is missing or unknown, or a cell is no possible number.
 pub fn width_points(
-    table: &Table,
+    table: &CsvTable,
     light: Option<Intensity>,
     dpi: Dpi,
 ) -> Result<Measured<WidthPoint>, DataError> {
@@ -175,8 +175,8 @@ enum Read<T> {
 }
 
 fn measured<T>(
-    table: &Table,
-    read: impl Fn(&Row) -> Result<Read<T>, DataError>,
+    table: &CsvTable,
+    read: impl Fn(&TableRow) -> Result<Read<T>, DataError>,
 ) -> Result<Measured<T>, DataError> {
     let mut measured = Measured { points: Vec::new(), none: 0, blank: 0 };
     for row in table.rows() {
@@ -197,11 +197,11 @@ mod tests {
     use super::*;
 
     fn depths(text: &str) -> Result<Measured<DepthPoint>, DataError> {
-        depth_points(&Table::parse(text).unwrap(), Some(Intensity::from_mw_per_cm2(1600.0)))
+        depth_points(&CsvTable::parse(text).unwrap(), Some(Intensity::from_mw_per_cm2(1600.0)))
     }
 
     fn widths(text: &str) -> Result<Measured<WidthPoint>, DataError> {
-        width_points(&Table::parse(text).unwrap(), None, Dpi::new(1500.0).unwrap())
+        width_points(&CsvTable::parse(text).unwrap(), None, Dpi::new(1500.0).unwrap())
     }
 
     #[test]

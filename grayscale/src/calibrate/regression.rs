@@ -1,7 +1,7 @@
 //! A straight line through points, by least squares.
 
 use super::FitError;
-use super::student::t_95;
+use super::student_t::t_95;
 
 /// The least-squares line through points, and how sure it is.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,10 +2,10 @@
 
 use lamp_stack::Length;
 
-use super::bent::Curve;
-use super::data::DepthPoint;
-use super::solve::{dot, inverse, product};
-use super::student::t_95;
+use super::matrix::{dot, inverse, product};
+use super::measurements::DepthPoint;
+use super::student_t::t_95;
+use super::two_depth_curve::TwoDepthCurve;
 use super::{Estimate, FitError};
 use crate::material::TwoDepthNumbers;
 use crate::resin::Dose;
@@ -27,7 +27,7 @@ pub struct TwoDepthFit {
     pub r2: f64,
     /// How many points it is of.
     pub points: usize,
-    curve: Curve,
+    curve: TwoDepthCurve,
     /// The parameters' covariance, times the square of Student's t.
     spread: [[f64; 3]; 3],
 }
@@ -54,7 +54,8 @@ pub fn fit_two_depth(points: &[DepthPoint]) -> Result<TwoDepthFit, FitError> {
     check(&data)?;
     let deepest = data.iter().map(|point| point.1).fold(0.0, f64::max);
     let bends = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].map(|times| times / deepest);
-    let fits = bends.iter().filter_map(|&bend| Curve::from_line(&data, bend)?.fitted(&data));
+    let fits =
+        bends.iter().filter_map(|&bend| TwoDepthCurve::from_line(&data, bend)?.fitted(&data));
     let best = fits.min_by(|a, b| a.squares(&data).total_cmp(&b.squares(&data)));
     let curve = best.filter(|curve| curve.onset > 0.0).ok_or(FitError::NoFit)?;
     TwoDepthFit::of(curve, &data, deepest).ok_or(FitError::NoFit)?.told()
@@ -70,12 +71,12 @@ fn check(data: &[(f64, f64)]) -> Result<(), FitError> {
     if doses.len() < 3 {
         return Err(FitError::TooFewDoses { doses: doses.len(), needed: 3 });
     }
-    super::line::LineFit::new(data)?.rising("um for each mJ/cm2")?;
+    super::regression::LineFit::new(data)?.rising("um for each mJ/cm2")?;
     Ok(())
 }
 
 impl TwoDepthFit {
-    fn of(curve: Curve, data: &[(f64, f64)], deepest: f64) -> Option<Self> {
+    fn of(curve: TwoDepthCurve, data: &[(f64, f64)], deepest: f64) -> Option<Self> {
         let straight = curve.bend * deepest < 1.0 / CLEAR;
         let mean = data.iter().map(|point| point.1).sum::<f64>() / data.len() as f64;
         let scatter: f64 = data.iter().map(|point| (point.1 - mean).powi(2)).sum();
@@ -149,15 +150,15 @@ impl TwoDepthFit {
 mod tests {
     use lamp_fixtures::SplitMix;
 
-    use super::super::testing::{depth_points, share_held};
+    use super::super::made_up::{depth_points, share_held};
     use super::*;
-    use crate::resin::{Depths, ExposureTime, GrayLevel, Intensity, TwoDepth, laws};
+    use crate::resin::{DepthRange, ExposureTime, GrayLevel, Intensity, TwoDepth, model_laws};
 
     const DOSES: [f64; 10] = [5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 30.0, 45.0, 70.0, 100.0];
 
     fn truth() -> TwoDepth {
         let um = Length::from_um;
-        TwoDepth::new(Dose::from_mj_per_cm2(4.0), um(80.0), um(150.0), Depths::ALL).unwrap()
+        TwoDepth::new(Dose::from_mj_per_cm2(4.0), um(80.0), um(150.0), DepthRange::ALL).unwrap()
     }
 
     #[test]
@@ -210,7 +211,7 @@ mod tests {
     fn the_points_of_appendix_a_are_straight() {
         // Appendix E has E_c 11.593,
         // D_pL 302.8253 and a D_pS of 100 m for them.
-        let points = laws::APPENDIX_A.map(|(seconds, um)| {
+        let points = model_laws::APPENDIX_A.map(|(seconds, um)| {
             let dose = Intensity::from_mw_per_cm2(0.2064) * ExposureTime::from_ms(1000.0 * seconds);
             DepthPoint { gray: GrayLevel::WHITE, dose, depth: Length::from_um(um) }
         });

@@ -2,10 +2,10 @@
 
 use lamp_stack::Length;
 
-use super::curve::{CurveFit, fit_curve};
-use super::data::DepthPoint;
-use super::digits::to_digits;
-use super::line::LineFit;
+use super::fit_curve::{CurveFit, fit_curve};
+use super::measurements::DepthPoint;
+use super::regression::LineFit;
+use super::significant::round_significant;
 use super::{Estimate, FitError, Quantity};
 use crate::material::{CurveLines, GivenLine};
 use crate::resin::{Dose, GrayLevel};
@@ -118,11 +118,11 @@ impl GrayFit {
 }
 
 fn given<T: Quantity>(line: &LineEstimate<T>, source: &str, unit: &str) -> GivenLine<T> {
-    let half = |estimate: &Estimate<T>| to_digits(estimate.plus_minus().number(), 3);
+    let half = |estimate: &Estimate<T>| round_significant(estimate.plus_minus().number(), 3);
     let (zero, rise) = (half(&line.at_zero), half(&line.rise));
     GivenLine {
-        at_zero: T::of(to_digits(line.at_zero.value.number(), 6)),
-        rise: T::of(to_digits(line.rise.value.number(), 6)),
+        at_zero: T::of(round_significant(line.at_zero.value.number(), 6)),
+        rise: T::of(round_significant(line.rise.value.number(), 6)),
         source: format!("{source}; at-zero +- {zero} {unit}, rise +- {rise} {unit}"),
     }
 }
@@ -131,9 +131,9 @@ fn given<T: Quantity>(line: &LineEstimate<T>, source: &str, unit: &str) -> Given
 mod tests {
     use lamp_fixtures::SplitMix;
 
-    use super::super::testing::share_held;
+    use super::super::made_up::share_held;
     use super::*;
-    use crate::resin::{CureModel, GrayCurve, Line};
+    use crate::resin::{CureModel, GrayCurve, StraightLine};
 
     const LEVELS: [f64; 5] = [0.2, 0.4, 0.5, 0.8, 1.0];
 
@@ -141,8 +141,8 @@ mod tests {
     fn lamp() -> GrayCurve {
         let [ec, ec_rise] = [101.8, 35.6].map(Dose::from_mj_per_cm2);
         let [dp, dp_rise] = [193.1, 22.1].map(Length::from_um);
-        let critical_dose = Line { at_zero: ec, rise: ec_rise };
-        GrayCurve::new(critical_dose, Line { at_zero: dp, rise: dp_rise }).unwrap()
+        let critical_dose = StraightLine { at_zero: ec, rise: ec_rise };
+        GrayCurve::new(critical_dose, StraightLine { at_zero: dp, rise: dp_rise }).unwrap()
     }
 
     /// What a model says of white's doses of three to twenty times 131.5 mJ/cm²

@@ -8,14 +8,14 @@ use super::working_curve::WorkingCurve;
 
 /// A straight line `at_zero + rise x`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line<T> {
+pub struct StraightLine<T> {
     /// The value at zero.
     pub at_zero: T,
     /// What one unit adds.
     pub rise: T,
 }
 
-impl Line<Dose> {
+impl StraightLine<Dose> {
     fn at(self, x: f64) -> Dose {
         Dose::from_mj_per_cm2(line(self.at_zero.mj_per_cm2(), self.rise.mj_per_cm2(), x))
     }
@@ -26,7 +26,7 @@ impl Line<Dose> {
     }
 }
 
-impl Line<Length> {
+impl StraightLine<Length> {
     fn at(self, x: f64) -> Length {
         Length::from_um(line(self.at_zero.um(), self.rise.um(), x))
     }
@@ -61,8 +61,8 @@ fn watts_per_cm2(light: Intensity) -> f64 {
 /// Every intensity has a working curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntensityLines {
-    critical_dose: Line<Dose>,
-    penetration_depth: Line<Length>,
+    critical_dose: StraightLine<Dose>,
+    penetration_depth: StraightLine<Length>,
 }
 
 impl IntensityLines {
@@ -71,8 +71,8 @@ impl IntensityLines {
     /// # Errors
     /// Where a line starts at no more than zero, or falls.
     pub fn new(
-        critical_dose: Line<Dose>,
-        penetration_depth: Line<Length>,
+        critical_dose: StraightLine<Dose>,
+        penetration_depth: StraightLine<Length>,
     ) -> Result<Self, ModelError> {
         critical_dose.check()?;
         penetration_depth.check()?;
@@ -93,8 +93,8 @@ impl IntensityLines {
         let dose_rise = Dose::from_mj_per_cm2(dose.rise.mj_per_cm2() * watts);
         let depth_rise = Length::from_um(depth.rise.um() * watts);
         GrayCurve {
-            critical_dose: Line { rise: dose_rise, ..dose },
-            penetration_depth: Line { rise: depth_rise, ..depth },
+            critical_dose: StraightLine { rise: dose_rise, ..dose },
+            penetration_depth: StraightLine { rise: depth_rise, ..depth },
         }
     }
 }
@@ -109,8 +109,8 @@ impl IntensityLines {
 /// wherever anything cures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GrayCurve {
-    critical_dose: Line<Dose>,
-    penetration_depth: Line<Length>,
+    critical_dose: StraightLine<Dose>,
+    penetration_depth: StraightLine<Length>,
 }
 
 impl GrayCurve {
@@ -119,8 +119,8 @@ impl GrayCurve {
     /// # Errors
     /// Where a line starts at no more than zero, or falls.
     pub fn new(
-        critical_dose: Line<Dose>,
-        penetration_depth: Line<Length>,
+        critical_dose: StraightLine<Dose>,
+        penetration_depth: StraightLine<Length>,
     ) -> Result<Self, ModelError> {
         critical_dose.check()?;
         penetration_depth.check()?;
@@ -176,16 +176,16 @@ impl CureModel for GrayCurve {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::resin::{ExposureTime, laws};
+    use crate::resin::{ExposureTime, model_laws};
 
-    fn dose_line(at_zero: f64, rise: f64) -> Line<Dose> {
+    fn dose_line(at_zero: f64, rise: f64) -> StraightLine<Dose> {
         let [at_zero, rise] = [at_zero, rise].map(Dose::from_mj_per_cm2);
-        Line { at_zero, rise }
+        StraightLine { at_zero, rise }
     }
 
-    fn depth_line(at_zero: f64, rise: f64) -> Line<Length> {
+    fn depth_line(at_zero: f64, rise: f64) -> StraightLine<Length> {
         let [at_zero, rise] = [at_zero, rise].map(Length::from_um);
-        Line { at_zero, rise }
+        StraightLine { at_zero, rise }
     }
 
     /// 002 eq. 40.
@@ -245,10 +245,10 @@ mod tests {
 
     #[test]
     fn it_keeps_the_laws() {
-        laws::hold(&lamp(), 0.001..=3000.0);
+        model_laws::hold(&lamp(), 0.001..=3000.0);
         // Flat lines are the working curve.
         let flat = GrayCurve::new(dose_line(131.5, 0.0), depth_line(211.0, 0.0)).unwrap();
-        laws::hold(&flat, 0.001..=3000.0);
+        model_laws::hold(&flat, 0.001..=3000.0);
         let white = Dose::from_mj_per_cm2(320.0);
         let curve = flat.at(GrayLevel::WHITE);
         for um in [1.0, 50.0, 187.0] {

@@ -2,8 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::data::WidthPoint;
-use super::line::LineFit;
+use super::measurements::WidthPoint;
+use super::regression::LineFit;
 use super::{Estimate, FitError};
 use crate::material::WidthNumbers;
 use crate::resin::{Dose, WidthSensitivity};
@@ -106,7 +106,7 @@ impl WidthFit {
 mod tests {
     use lamp_fixtures::SplitMix;
 
-    use super::super::testing::share_held;
+    use super::super::made_up::share_held;
     use super::*;
     use crate::resin::WidthLine;
 

@@ -2,8 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::data::DepthPoint;
-use super::line::LineFit;
+use super::measurements::DepthPoint;
+use super::regression::LineFit;
 use super::{Estimate, FitError};
 use crate::material::CurveNumbers;
 use crate::resin::Dose;
@@ -69,7 +69,7 @@ impl CurveFit {
 mod tests {
     use lamp_fixtures::SplitMix;
 
-    use super::super::testing::{depth_points, share_held};
+    use super::super::made_up::{depth_points, share_held};
     use super::*;
     use crate::resin::{CureModel, WorkingCurve};
 
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn of_100_intervals_95_hold_the_truth() {
-        // Depths to 5 um as in 002 section 3.3.5; and far coarser ones, where the
+        // DepthRange to 5 um as in 002 section 3.3.5; and far coarser ones, where the
         // interval of E_c is lopsided.
         for spread in [5.0, 40.0] {
             let mut noise = SplitMix(7);

@@ -128,15 +128,20 @@ mod tests {
 
     /// What one run of pixels is given as.
     #[derive(Clone, Debug)]
-    enum Given {
+    enum RunKind {
         Black,
         White,
         Each,
         Pattern,
     }
 
-    fn given() -> impl Strategy<Value = Given> {
-        prop_oneof![Just(Given::Black), Just(Given::White), Just(Given::Each), Just(Given::Pattern)]
+    fn given() -> impl Strategy<Value = RunKind> {
+        prop_oneof![
+            Just(RunKind::Black),
+            Just(RunKind::White),
+            Just(RunKind::Each),
+            Just(RunKind::Pattern)
+        ]
     }
 
     fn changes(period: &[bool]) -> Vec<u8> {
@@ -165,16 +170,16 @@ mod tests {
                     break;
                 }
                 wanted.extend((start..end).map(|column| match given {
-                    Given::Black => false,
-                    Given::White => true,
-                    Given::Each | Given::Pattern => pattern_at(column),
+                    RunKind::Black => false,
+                    RunKind::White => true,
+                    RunKind::Each | RunKind::Pattern => pattern_at(column),
                 }));
                 let phase = (start + shift) % period as u32;
                 match given {
-                    Given::Black => {}
-                    Given::White => image.push_white(start, end),
-                    Given::Each => image.push_each(start, end, pattern_at),
-                    Given::Pattern => {
+                    RunKind::Black => {}
+                    RunKind::White => image.push_white(start, end),
+                    RunKind::Each => image.push_each(start, end, pattern_at),
+                    RunKind::Pattern => {
                         image.push_pattern((start, end), pattern, phase, period as u32);
                     }
                 }

@@ -5,21 +5,21 @@ use thiserror::Error;
 /// A table of measurements.
 ///
 /// ```
-/// use lamp_grayscale::calibrate::Table;
+/// use lamp_grayscale::calibrate::CsvTable;
 ///
-/// let table = Table::parse("dose_mj_per_cm2, depth_um\n# a comment\n320, 187.6\n")?;
+/// let table = CsvTable::parse("dose_mj_per_cm2, depth_um\n# a comment\n320, 187.6\n")?;
 /// assert_eq!(table.columns(), ["dose_mj_per_cm2", "depth_um"]);
 /// # Ok::<(), lamp_grayscale::calibrate::TableError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Table {
+pub struct CsvTable {
     columns: Vec<String>,
-    rows: Vec<Row>,
+    rows: Vec<TableRow>,
 }
 
 /// A row's texts, as many as there are columns.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Row {
+pub(super) struct TableRow {
     /// Its line in the file, from 1.
     pub(super) line: usize,
     cells: Vec<String>,
@@ -58,7 +58,7 @@ pub enum TableError {
     },
 }
 
-impl Table {
+impl CsvTable {
     /// Reads a table: a header, then rows. Blank lines and those that start with `#`
     /// are skipped; quotes around a cell are taken off.
     ///
@@ -84,7 +84,7 @@ impl Table {
         let row = |(line, text)| {
             let cells = cells(text);
             if cells.len() == columns.len() {
-                Ok(Row { line, cells })
+                Ok(TableRow { line, cells })
             } else {
                 Err(TableError::Ragged { line, cells: cells.len(), columns: columns.len() })
             }
@@ -98,7 +98,7 @@ impl Table {
         &self.columns
     }
 
-    pub(super) fn rows(&self) -> &[Row] {
+    pub(super) fn rows(&self) -> &[TableRow] {
         &self.rows
     }
 
@@ -108,7 +108,7 @@ impl Table {
     }
 }
 
-impl Row {
+impl TableRow {
     /// The text of a column that the table has.
     pub(super) fn cell(&self, column: usize) -> &str {
         &self.cells[column]
@@ -127,18 +127,18 @@ mod tests {
 
     #[test]
     fn spreadsheets_and_hands_write_tables() {
-        let table = Table::parse("\u{feff}\"a\",\"b\"\r\n\r\n# c\r\n1,\r\n 2 , 3 \r\n").unwrap();
+        let table = CsvTable::parse("\u{feff}\"a\",\"b\"\r\n\r\n# c\r\n1,\r\n 2 , 3 \r\n").unwrap();
         assert_eq!(table.columns(), ["a", "b"]);
         let rows: Vec<_> = table.rows().iter().map(|row| (row.line, &row.cells[..])).collect();
         let text = |texts: [&str; 2]| texts.map(str::to_owned).to_vec();
         assert_eq!(rows, [(4, &text(["1", ""])[..]), (5, &text(["2", "3"])[..])]);
         assert_eq!((table.find("b"), table.find("c")), (Some(1), None));
-        assert_eq!(Table::parse("a\n").unwrap().rows(), []);
+        assert_eq!(CsvTable::parse("a\n").unwrap().rows(), []);
     }
 
     #[test]
     fn what_is_no_table_is_an_error() {
-        let refused = |text| Table::parse(text).unwrap_err().to_string();
+        let refused = |text| CsvTable::parse(text).unwrap_err().to_string();
         for text in ["", "\n \n", "# nothing"] {
             assert!(refused(text).starts_with("the file is empty"), "{text:?}");
         }
