@@ -1,19 +1,26 @@
-//! How far a layer is off the part, by several measures.
+//! Measures of a layer's error.
 
 use std::fmt::Debug;
 
 use crate::slab::{Slab, Slabs, share};
 
-/// A measure of how far a layer is off the part. It sees the slab alone, wherever
-/// that was found.
+/// A measure of a layer's error. It depends on the slab alone.
+///
+/// ```
+/// use lamp_adaptive::{Criterion, CuspHeight, Slab};
+///
+/// // Walls at 30 degrees to the vertical: half of each normal points up.
+/// let slab = Slab { thickness_um: 100.0, steepest: 0.5, ..Slab::default() };
+/// assert_eq!(CuspHeight.measure(&slab), 50.0);
+/// ```
 pub trait Criterion: Debug + Send + Sync {
-    /// How far the layer is off, to be compared with the greatest allowed.
+    /// Returns the error, to be compared with a bound.
     fn measure(&self, slab: &Slab) -> f64;
 
-    /// Whether no layer that is thicker than the last of `slabs`, up to `most_um`, can
-    /// be within a bound. Where that is not known, all of them are looked at.
-    fn rules_out_thicker(&self, slabs: &Slabs, most_um: f64, bound: f64) -> bool {
-        let _ = (slabs, most_um, bound);
+    /// Returns true if no layer thicker than the last of `slabs`, up to `max_um`, can
+    /// be within the bound. If false, all of them are looked at.
+    fn rules_out_thicker(&self, slabs: &Slabs, max_um: f64, bound: f64) -> bool {
+        let _ = (slabs, max_um, bound);
         false
     }
 }
@@ -28,24 +35,24 @@ impl Criterion for VolumeDeviation {
         slab.deviation()
     }
 
-    /// Let the last of the slabs be `w` thick and hold the volume `V1`, of which at
-    /// least `L` is wrong in any thicker layer. A layer of thickness `(1 + r) w` whose
-    /// section has the area `a` holds `V1 + V2`, of which `S1` and `S2` are wrong.
-    /// What its section lacks of the part above `w` is wrong, so `V2 <= S2 + r w a`;
-    /// what it has beyond the part below is wrong, so `w a <= S1 + V1`. If it is
-    /// within the bound `d`, then `S1 + S2 <= d (V1 + V2)`, and with `m = max(1, r)`
-    /// follows `V1 + V2 <= V1 (1 + r) / (1 - m d)`. But `L <= S1`: where `L` is more
-    /// than `d` times that, no such layer is within the bound.
-    fn rules_out_thicker(&self, slabs: &Slabs, most_um: f64, bound: f64) -> bool {
+    // Let the last of the slabs be `w` thick and hold the volume `V1`, of which at
+    // least `L` is wrong in any thicker layer. A layer of thickness `(1 + r) w` whose
+    // section has the area `a` holds `V1 + V2`, of which `S1` and `S2` are wrong.
+    // What its section lacks of the part above `w` is wrong, so `V2 <= S2 + r w a`;
+    // what it has beyond the part below is wrong, so `w a <= S1 + V1`. If it is
+    // within the bound `d`, then `S1 + S2 <= d (V1 + V2)`, and with `m = max(1, r)`
+    // follows `V1 + V2 <= V1 (1 + r) / (1 - m d)`. But `L <= S1`: where `L` is more
+    // than `d` times that, no such layer is within the bound.
+    fn rules_out_thicker(&self, slabs: &Slabs, max_um: f64, bound: f64) -> bool {
         let Some(last) = slabs.each.last() else { return false };
-        let r = most_um / last.thickness_um - 1.0;
+        let r = max_um / last.thickness_um - 1.0;
         let left = 1.0 - r.max(1.0) * bound;
-        // More than rounding apart.
+        // By more than rounding.
         left > 0.0 && slabs.unavoidable_mm3 * left > 1.000_001 * bound * (1.0 + r) * last.volume_mm3
     }
 }
 
-/// The cusp height in micrometres: how far the slab's edge is off the part's
+/// The cusp height in micrometres: the distance of the slab's edge from the part's
 /// surface, along its normal, `c = t |N_z|`.
 ///
 /// Source: Dolenc and Makela, by 002 equations 7 to 10.
@@ -57,15 +64,15 @@ impl Criterion for CuspHeight {
         slab.thickness_um * slab.steepest
     }
 
-    /// Thicker layers hold all facets of thinner ones.
-    fn rules_out_thicker(&self, slabs: &Slabs, _most_um: f64, bound: f64) -> bool {
+    // Thicker layers hold all facets of thinner ones.
+    fn rules_out_thicker(&self, slabs: &Slabs, _max_um: f64, bound: f64) -> bool {
         slabs.each.last().is_some_and(|last| self.measure(last) > bound)
     }
 }
 
 /// The change of the section's area from the layer's bottom to its top, as a share
-/// of that at the bottom. Blind to walls that lean without a change of area (002
-/// figure 45).
+/// of that at the bottom. It does not see walls that lean without a change of area
+/// (002 figure 45).
 ///
 /// Source: Jamieson and Hacker, by 002 equation 23.
 #[derive(Clone, Copy, Debug, Default)]

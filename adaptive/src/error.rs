@@ -1,54 +1,50 @@
-//! What can be wrong with what is asked of layers.
+//! Why no layer heights can be found.
 
+use lamp_stack::Length;
 use thiserror::Error;
 
 /// Why no layer heights can be found.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum HeightsError {
-    /// Limits of a machine that leave it no thickness.
-    #[error(
-        "no layer is a whole number of steps of {step_um} um and between {min_um} and {max_um} um thick: \
-         give a smaller step or wider limits"
-    )]
+    /// No whole number of steps lies between the limits.
+    #[error("no layer is a whole number of steps of {step} and between {min} and {max} thick")]
     NoThickness {
-        /// The least thickness in micrometres.
-        min_um: f64,
+        /// The least thickness.
+        min: Length,
         /// The greatest.
-        max_um: f64,
+        max: Length,
         /// The step between thicknesses.
-        step_um: f64,
+        step: Length,
     },
-    /// Far more thicknesses than a search looks at.
-    #[error(
-        "the machine would have {count} thicknesses to choose from: give a step above {min_step_um} um"
-    )]
+    /// The limits hold more thicknesses than a search tries.
+    #[error("steps of {step} make {count} thicknesses, more than a search tries")]
     TooManySteps {
         /// How many thicknesses there are.
-        count: f64,
-        /// The least step that is possible, in micrometres.
-        min_step_um: f64,
+        count: usize,
+        /// The step between thicknesses.
+        step: Length,
+        /// The least step that is possible.
+        min_step: Length,
     },
-    /// A part that would have more layers than any machine builds.
-    #[error(
-        "the part is {height_mm} mm high, more than a million of the thinnest layers: check the units and limits"
-    )]
+    /// The part would have more layers than any machine builds.
+    #[error("the part is {height} high, more than a million of the thinnest layers")]
     TooHigh {
-        /// The part's height in millimetres.
-        height_mm: f64,
+        /// The part's height.
+        height: Length,
     },
-    /// Rows so near to each other that no image has as many.
-    #[error("rows {pitch_um} um apart are more than 2^24")]
+    /// More rows than any image has.
+    #[error("rows {pitch} apart are more than 2^24")]
     TooManyRows {
-        /// How far apart they would be, in micrometres.
-        pitch_um: f64,
+        /// The distance from row to row.
+        pitch: Length,
     },
-    /// A budget below what any layers take.
-    #[error("the layers that take least take {least}, more than the budget of {budget}")]
+    /// The budget is below the cost of any layers within the limits.
+    #[error("the cheapest layers cost {least}, more than the budget of {budget}")]
     Budget {
-        /// What they take at least.
+        /// The cost of the cheapest layers.
         least: f64,
-        /// What was allowed.
+        /// The cost that was allowed.
         budget: f64,
     },
 }

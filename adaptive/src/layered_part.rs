@@ -1,29 +1,30 @@
-//! A part, and the layers that it may be built of.
+//! A part seen along rows, and its differences from layers.
 
 use std::ops::Range;
 
 use lamp_slicer::scan::RowFacet;
-use lamp_slicer::{FacetIndex, Fill, PlacedFacet};
+use lamp_slicer::{FacetIndex, Fill, PlacedFacet, facet_heights};
 use lamp_stack::{Grouped, Length};
 use rayon::prelude::*;
 
 use crate::error::HeightsError;
-use crate::profile::{Change, Profile};
-use crate::row_cuts::Cuts;
+use crate::profile::{Profile, ProfileChange};
+use crate::row_cuts::RowCuts;
 use crate::slab::{Slab, Slabs};
 use crate::sweep::{Slope, Sweep, Toggle};
 
-/// Rows are worked on in so many stripes, whatever the threads, so that sums do
-/// not depend on them.
+/// The number of stripes of rows that are worked on at once. It does not follow
+/// the threads, so that sums do not depend on them.
 const STRIPES: u32 = 16;
 
-/// Facets of less height are level: far more than rounding, far less than a step.
+/// Facets of less height count as level: far more than rounding, far less than a
+/// step.
 const LEVEL_UM: f64 = 0.05;
 
 /// More rows than any image has.
-const MOST_ROWS: f64 = 16_777_216.0;
+const MAX_ROWS: f64 = 16_777_216.0;
 
-/// Rows of the image: x in millimetres, and y in rows, downwards.
+/// Rows of pixels.
 #[derive(Clone, Copy, Debug)]
 struct Rows {
     top_mm: f64,
@@ -39,46 +40,46 @@ impl Rows {
     }
 }
 
-/// A part as layers see it.
+/// A part seen along rows, for comparing it with layers.
 ///
-/// Volumes are exact along x and z, as far as the facets tell; along y they are
-/// sums over rows, as images are.
+/// Volumes are those of the facets, exact along x and z; along y they are sums over
+/// rows, as in images.
 #[derive(Debug)]
 pub struct LayeredPart {
-    body: FacetIndex,
+    facets: FacetIndex,
     rows: Rows,
     fill: Fill,
 }
 
 impl LayeredPart {
-    /// A part seen along rows that are `pitch` apart, the first of which is half a
-    /// pitch below the part's greatest y. What lies between two rows is not seen.
+    /// Looks at a part along rows that are `pitch` apart, the first half a pitch below
+    /// the part's greatest y. Details between two rows are not seen.
     ///
     /// # Errors
-    /// Where there would be more rows than any image has.
-    pub fn new(body: FacetIndex, pitch: Length, fill: Fill) -> Result<Self, HeightsError> {
-        let height_mm = body.max()[1] - body.min()[1];
+    /// Returns an error if there would be more rows than any image has.
+    pub fn new(facets: FacetIndex, pitch: Length, fill: Fill) -> Result<Self, HeightsError> {
+        let height_mm = facets.max()[1] - facets.min()[1];
         let count = (height_mm / pitch.mm()).ceil().max(1.0);
-        // Written so that a pitch of NaN or zero fails, too.
-        if !(pitch.um() > 0.0 && count <= MOST_ROWS) {
-            return Err(HeightsError::TooManyRows { pitch_um: pitch.um() });
+        // Negated, so that a pitch of NaN fails, too.
+        if !(pitch.um() > 0.0 && count <= MAX_ROWS) {
+            return Err(HeightsError::TooManyRows { pitch });
         }
-        let rows = Rows { top_mm: body.max()[1], pitch_mm: pitch.mm(), count: count as u32 };
-        Ok(Self { body, rows, fill })
+        let rows = Rows { top_mm: facets.max()[1], pitch_mm: pitch.mm(), count: count as u32 };
+        Ok(Self { facets, rows, fill })
     }
 
-    /// The height of its lowest and its highest point, in micrometres.
+    /// Returns the heights of the lowest and the highest point, in micrometres.
     pub fn heights_um(&self) -> [f64; 2] {
-        [self.body.min()[2], self.body.max()[2]]
+        [self.facets.min()[2], self.facets.max()[2]]
     }
 
-    /// The heights of its flat faces, in micrometres, rising: those of level facets
-    /// of together at least a row's pitch squared. Faces that were turned into their
-    /// place are level but for rounding; the lowest corner counts.
+    /// Returns the heights of flat faces in micrometres, rising: of level facets whose
+    /// areas add up to at least a row's pitch squared. The lowest corner counts, since
+    /// faces that were turned into their place are level only up to rounding.
     pub fn flat_faces_um(&self) -> Vec<f64> {
         let mut faces = Vec::new();
-        self.body.for_each(|facet| {
-            let [low, high] = height_of(facet);
+        self.facets.for_each(|facet| {
+            let (low, high) = facet_heights(facet);
             if high - low <= LEVEL_UM {
                 faces.push((low, normal(facet)[2].abs() / 2.0));
             }
@@ -91,29 +92,29 @@ impl LayeredPart {
         large.map(|faces| faces[0].0).collect()
     }
 
-    /// The layers from one height to each of several tops, which rise: all in
-    /// micrometres. A layer that holds the part's top has its section there, as in
-    /// the slicer.
+    /// Returns the slabs from one height to each of several rising tops, all in
+    /// micrometres. A layer that holds the part's top has its section there, as in the
+    /// slicer.
     ///
     /// # Panics
-    /// Where there is no top, or one is not above the bottom.
+    /// Panics if there is no top, or one is not above the bottom.
     pub fn slabs(&self, bottom_um: f64, tops_um: &[f64]) -> Slabs {
         assert!(tops_um.first().is_some_and(|&top| top > bottom_um), "a layer has some thickness");
-        let part_top_um = self.body.max()[2];
+        let part_top_um = self.facets.max()[2];
         let plane = |top: f64| if bottom_um <= part_top_um { top.min(part_top_um) } else { top };
         let planes: Vec<f64> = tops_um.iter().map(|&top| plane(top) - bottom_um).collect();
         let last_um = plane(tops_um[tops_um.len() - 1]);
-        let facets = self.body.between(bottom_um, last_um);
+        let facets = self.facets.between(bottom_um, last_um);
         let Rise { changes, bottom_width, unavoidable, rows_left_out } =
             self.rise(&facets, [bottom_um, last_um], &planes);
         let steepest = steepest(&facets, bottom_um, tops_um);
         let pitch_mm = self.rows.pitch_mm;
         let slab = |k: usize| {
-            let Change { width, lost, gained } = changes[k];
+            let ProfileChange { width, lost, gained } = changes[k];
             let top_width = (bottom_width + width).max(0.0);
             let (lost, gained) = (lost.max(0.0), gained.max(0.0));
             let thickness_um = tops_um[k] - bottom_um;
-            // Above the part's top there is only what the slab has too much.
+            // Above the part's top all of the slab is too much.
             let above = top_width * (thickness_um - planes[k]);
             Slab {
                 bottom_um,
@@ -133,7 +134,7 @@ impl LayeredPart {
         }
     }
 
-    /// What changes from the bottom to each plane above it, over all rows.
+    /// Returns the changes from the bottom to each plane above it, summed over all rows.
     fn rise(&self, facets: &[PlacedFacet], z_um: [f64; 2], planes: &[f64]) -> Rise {
         let stripe_rows = self.rows.count.div_ceil(STRIPES);
         let mut stripes: Vec<Vec<RowFacet>> = (0..STRIPES).map(|_| Vec::new()).collect();
@@ -145,14 +146,15 @@ impl LayeredPart {
         }
         let of_stripe = |(stripe, facets): (usize, Vec<RowFacet>)| {
             let first = stripe as u32 * stripe_rows;
-            let mut cuts = Cuts::default();
+            let mut cuts = RowCuts::default();
             for facet in &facets {
                 cuts.add_facet(facet, [first, first + stripe_rows], z_um);
             }
             self.sweep(&cuts, first, stripe_rows, planes)
         };
         let stripes: Vec<Rise> = stripes.into_par_iter().enumerate().map(of_stripe).collect();
-        let mut sum = Rise { changes: vec![Change::default(); planes.len()], ..Rise::default() };
+        let mut sum =
+            Rise { changes: vec![ProfileChange::default(); planes.len()], ..Rise::default() };
         for stripe in stripes {
             sum.bottom_width += stripe.bottom_width;
             sum.unavoidable += stripe.unavoidable;
@@ -162,7 +164,7 @@ impl LayeredPart {
         sum
     }
 
-    fn sweep(&self, cuts: &Cuts, first: u32, rows: u32, planes: &[f64]) -> Rise {
+    fn sweep(&self, cuts: &RowCuts, first: u32, rows: u32, planes: &[f64]) -> Rise {
         let mut profile = Profile::new(planes);
         let mut sweep = Sweep::new(self.fill);
         let rows = rows as usize;
@@ -186,18 +188,18 @@ impl LayeredPart {
     }
 }
 
-/// What rows see of a part from a bottom up, in millimetres and micrometres along
-/// them.
+/// Changes of a part's section from a bottom up, in millimetres along rows and
+/// micrometres of height.
 #[derive(Default)]
 struct Rise {
     /// For each plane.
-    changes: Vec<Change>,
+    changes: Vec<ProfileChange>,
     bottom_width: f64,
     unavoidable: f64,
     rows_left_out: u32,
 }
 
-/// A facet's normal, in millimetres squared.
+/// Returns a facet's normal, as long as twice its area in square millimetres.
 fn normal(facet: &PlacedFacet) -> [f64; 3] {
     let [a, b, c] = facet.map(|[x, y, z_um]| [x, y, z_um / 1000.0]);
     let [u, v] = [b, c].map(|to| [0, 1, 2].map(|axis| to[axis] - a[axis]));
@@ -205,17 +207,12 @@ fn normal(facet: &PlacedFacet) -> [f64; 3] {
     [cross(1, 2), cross(2, 0), cross(0, 1)]
 }
 
-/// The heights of a facet's lowest and highest corner.
-fn height_of(facet: &PlacedFacet) -> [f64; 2] {
-    let [a, b, c] = facet.map(|corner| corner[2]);
-    [a.min(b).min(c), a.max(b).max(c)]
-}
-
-/// The greatest |N_z| of the facets above a bottom and below each of several tops.
+/// Returns the greatest |N_z| of the facets above a bottom and below each of several
+/// tops.
 fn steepest(facets: &[PlacedFacet], bottom_um: f64, tops_um: &[f64]) -> Vec<f64> {
     let mut steepest = vec![0.0; tops_um.len()];
     for facet in facets {
-        let [low, high] = height_of(facet);
+        let (low, high) = facet_heights(facet);
         let normal = normal(facet);
         let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
         let first = tops_um.partition_point(|&top| top <= low);

@@ -1,13 +1,13 @@
-//! How thick each layer may be.
+//! Layers as thick as the part allows.
 //!
 //! A layer is built as a slab: the part's section at its top, swept down. A
-//! [`LayeredPart`] knows how such [`Slab`]s differ from it, for all tops that a layer may
-//! have at once; a [`Criterion`] measures how far a slab is off; a [`HeightSearch`] takes,
-//! from the bottom up, the thickest layers that are not too far off (002 section
-//! 3.2).
+//! [`LayeredPart`] compares such [`Slab`]s with the part, for all tops that a
+//! layer may have at once. A [`Criterion`] measures a slab's error. A
+//! [`HeightSearch`] takes, from the bottom up, the thickest layers whose error is
+//! within a bound, or the most accurate ones within a budget (002 section 3.2).
 //!
 //! ```
-//! use lamp_adaptive::{Thicknesses, LayeredPart, HeightSearch, VolumeDeviation};
+//! use lamp_adaptive::{HeightSearch, LayeredPart, Thicknesses, VolumeDeviation};
 //! use lamp_slicer::{FacetIndex, Fill, Model, Placement, Units};
 //! use lamp_stack::Length;
 //!
@@ -18,7 +18,8 @@
 //! let part = LayeredPart::new(facets, Length::from_um(10.0), Fill::EvenOdd)?;
 //! let [min, max, step] = [10.0, 100.0, 1.0].map(Length::from_um);
 //! let thicknesses = Thicknesses::new(min, max, step)?;
-//! let search = HeightSearch { part: &part, thicknesses: &thicknesses, criterion: &VolumeDeviation, snap: false };
+//! let criterion = &VolumeDeviation;
+//! let search = HeightSearch { part: &part, thicknesses: &thicknesses, criterion, snap: false };
 //! let heights = search.heights(0.05)?;
 //! // Sections shrink faster towards the tip, and layers with them.
 //! assert_eq!(heights.slabs[0].thickness_um, 49.0);

@@ -1,28 +1,29 @@
-//! What a layer lacks and has too much, for all tops that it may have at once.
+//! Sums what a layer lacks and has too much, for all tops it may have at once.
 //!
-//! Seen along a row of the image, a facet is a line from one x and height to
-//! another. A layer whose top lies above some of that line differs from one whose
-//! top lies below by an amount that grows with the top as a polynomial, and stays
-//! once the top is above all of it. So a line adds its polynomial at the first top
-//! past its lower end, and takes it away again at the first past its upper end: its
-//! cost does not depend on how many tops there are.
+//! Along a row, a facet is a line from one x and height to another. As a layer's
+//! top rises past this line, it changes what the layer lacks and has too much by a
+//! polynomial of the top's height; once the top is above all of the line, the change
+//! stays. So a line adds its polynomial at the first top above its lower end, and
+//! takes it away again at the first above its upper end. The cost of a line does not
+//! depend on the number of tops.
 
 use lamp_slicer::scan::count_at_or_below;
 
-/// From this many tops between a line's ends on, polynomials are cheaper than the
-/// tops one by one; and so far apart the ends do not spoil their rounding.
+/// From this many tops between a line's ends on, a polynomial is cheaper than one
+/// sum for each top. Between closer ends it would also suffer from rounding, as it
+/// divides by their distance.
 const MANY_TOPS: usize = 6;
 
-/// What changes as a layer's top passes a line: the section's width in millimetres,
-/// and the areas along the row, in millimetres times micrometres.
+/// A change as a layer's top rises past lines: of the section's width in millimetres,
+/// and of areas along the row, in millimetres times micrometres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Change {
+pub(crate) struct ProfileChange {
     pub(crate) width: f64,
     pub(crate) lost: f64,
     pub(crate) gained: f64,
 }
 
-impl Change {
+impl ProfileChange {
     pub(crate) fn add(&mut self, other: Self) {
         self.width += other.width;
         self.lost += other.lost;
@@ -30,12 +31,12 @@ impl Change {
     }
 }
 
-/// A line that tops pass: `width` is its extent along x, below zero where the part
-/// ends at it, going up. What each place along it adds to what is lost and gained
-/// goes evenly from one end to the other.
+/// A facet's line along a row. Along it, the heights lost and gained once tops are
+/// past it go evenly from one end to the other.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfaceLine {
     pub(crate) heights: [f64; 2],
+    /// The extent along x; below zero if the part lies below the line.
     pub(crate) width: f64,
     pub(crate) lost: [f64; 2],
     pub(crate) gained: [f64; 2],
@@ -55,12 +56,16 @@ impl SurfaceLine {
         }
     }
 
-    /// What has changed once a share of it is passed.
+    /// Returns the change once a share of the line is passed.
     #[inline]
-    fn passed(&self, share: f64) -> Change {
+    fn passed(&self, share: f64) -> ProfileChange {
         let dx = self.width.abs();
         let area = |[a, b]: [f64; 2]| dx * share * (a + 0.5 * (b - a) * share);
-        Change { width: self.width * share, lost: area(self.lost), gained: area(self.gained) }
+        ProfileChange {
+            width: self.width * share,
+            lost: area(self.lost),
+            gained: area(self.gained),
+        }
     }
 }
 
@@ -95,7 +100,7 @@ impl Polynomials {
         }
     }
 
-    fn constant(change: Change) -> Self {
+    fn constant(change: ProfileChange) -> Self {
         Self {
             width: [change.width, 0.0],
             lost: [change.lost, 0.0, 0.0],
@@ -112,9 +117,9 @@ impl Polynomials {
         add(&mut self.gained, &other.gained);
     }
 
-    fn at(&self, top: f64) -> Change {
+    fn at(&self, top: f64) -> ProfileChange {
         let area = |p: &Polynomial| p[0] + top * (p[1] + top * p[2]);
-        Change {
+        ProfileChange {
             width: self.width[0] + top * self.width[1],
             lost: area(&self.lost),
             gained: area(&self.gained),
@@ -127,15 +132,15 @@ impl Polynomials {
 pub(crate) struct Profile<'a> {
     /// Tops above the layer's bottom, in micrometres, rising.
     tops: &'a [f64],
-    /// Tops in a micrometre, about.
+    /// About how many tops lie in a micrometre.
     per_um: f64,
-    /// What begins at each top, and holds from there on.
+    /// The polynomials that begin at each top, and hold from there on.
     starts: Vec<Polynomials>,
-    /// What holds at each top alone.
-    alone: Vec<Change>,
+    /// The changes at single tops.
+    alone: Vec<ProfileChange>,
     /// The section's width at the bottom.
     pub(crate) bottom_width: f64,
-    /// What any layer up to the last top or beyond has wrong below it, at least.
+    /// The least error, below the last top, of any layer up to this top or higher.
     pub(crate) unavoidable: f64,
 }
 
@@ -146,13 +151,13 @@ impl<'a> Profile<'a> {
             tops,
             per_um: if span > 0.0 { (tops.len() - 1) as f64 / span } else { 0.0 },
             starts: vec![Polynomials::default(); tops.len() + 1],
-            alone: vec![Change::default(); tops.len()],
+            alone: vec![ProfileChange::default(); tops.len()],
             bottom_width: 0.0,
             unavoidable: 0.0,
         }
     }
 
-    /// The first top above a height.
+    /// Returns the first top above a height.
     #[inline]
     pub(crate) fn first_above(&self, height: f64) -> usize {
         count_at_or_below(self.tops, height, (height - self.tops[0]) * self.per_um)
@@ -175,20 +180,20 @@ impl<'a> Profile<'a> {
         self.starts[end].add(&Polynomials::constant(line.passed(1.0)), 1.0);
     }
 
-    /// Adds columns of which so much is inside at their two ends, below the last line
-    /// that they pass, and all above it if they end inside.
+    /// Adds the unavoidable error of columns. `within` is the height inside at the
+    /// first and the last of them, less the top if they end inside.
     pub(crate) fn add_unavoidable(&mut self, width: f64, within: [f64; 2], ends_inside: bool) {
         let last = self.tops[self.tops.len() - 1];
         let lesser = within.map(|within| {
             let within = if ends_inside { last + within } else { within };
             within.min(last - within).max(0.0)
         });
-        // The lesser of two lines bends down between the ends.
+        // Between the ends the true one is no less: a minimum of lines is concave.
         self.unavoidable += width * 0.5 * (lesser[0] + lesser[1]);
     }
 
-    /// The changes from the layer's bottom to each top.
-    pub(crate) fn changes(&self) -> Vec<Change> {
+    /// Returns the changes from the layer's bottom to each top.
+    pub(crate) fn changes(&self) -> Vec<ProfileChange> {
         let mut sum = Polynomials::default();
         let changes = self.tops.iter().enumerate().map(|(k, &top)| {
             sum.add(&self.starts[k], 1.0);
@@ -220,7 +225,7 @@ mod tests {
         ];
         lines.iter().for_each(|&line| profile.add(line));
         for (k, change) in profile.changes().iter().enumerate() {
-            let mut expected = Change::default();
+            let mut expected = ProfileChange::default();
             for line in lines.map(SurfaceLine::rising) {
                 let [low, high] = line.heights;
                 let passed = if tops[k] <= low {

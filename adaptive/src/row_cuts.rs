@@ -1,20 +1,17 @@
-//! A facet's lines along the rows of the image.
-//!
-//! As in the slicer, both facets on an edge find its point on a row by the same
-//! arithmetic on the same two ends, so that a closed mesh makes closed chains.
+//! Lines of facets along rows, clipped to a layer's heights.
 
 use lamp_slicer::scan::RowFacet;
 
 use crate::sweep::{Slope, Toggle};
 
-/// What rows see of facets.
+/// What rows see of facets between two heights.
 #[derive(Debug, Default)]
-pub(crate) struct Cuts {
+pub(crate) struct RowCuts {
     pub(crate) toggles: Vec<Toggle>,
     pub(crate) slopes: Vec<Slope>,
 }
 
-impl Cuts {
+impl RowCuts {
     /// Adds what some rows see of a facet between two heights (micrometres).
     pub(crate) fn add_facet(&mut self, facet: &RowFacet, rows: [u32; 2], z: [f64; 2]) {
         let seen = facet.rows_between(z);
@@ -26,16 +23,16 @@ impl Cuts {
 
     /// Adds a facet's line in a row, between its long and one of its short edges.
     #[inline]
-    fn add(&mut self, row: u32, long: [f64; 2], short: [f64; 2], turned: bool, z: [f64; 2]) {
+    fn add(&mut self, row: u32, long: [f64; 2], short: [f64; 2], is_flipped: bool, z: [f64; 2]) {
         let [bottom, top] = z;
         let (mut low, mut high) = if long[1] <= short[1] { (long, short) } else { (short, long) };
         // A corner on the layer's bottom counts as below it.
         if high[1] <= bottom || low[1] > top {
             return;
         }
-        // Along the line from start to end, as the facet faces outwards, the part
-        // is on the left, where z is up and x to the right.
-        let (start, end) = if turned { (short, long) } else { (long, short) };
+        // With z up and x to the right, the part is on the left of the line from
+        // start to end if the facet faces outwards.
+        let (start, end) = if is_flipped { (short, long) } else { (long, short) };
         let [from, to] = [low, high];
         let per_um = (to[0] - from[0]) / (to[1] - from[1]);
         let at = |z: f64| [from[0] + per_um * (z - from[1]), z];
@@ -47,6 +44,7 @@ impl Cuts {
         if to[1] > top {
             high = at(top);
         }
+        // An upright line has no columns above it: what it parts, its toggle says.
         if low[0] != high[0] {
             let (left, right) = if low[0] < high[0] { (low, high) } else { (high, low) };
             let winding = if start[0] < end[0] { 1 } else { -1 };

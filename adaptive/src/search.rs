@@ -1,6 +1,7 @@
-//! The search for layer heights.
+//! Searches for layer heights from the bottom of a part up.
 
 use lamp_slicer::{LayerHeights, SliceError};
+use lamp_stack::Length;
 
 use crate::criterion::Criterion;
 use crate::error::HeightsError;
@@ -9,18 +10,18 @@ use crate::slab::Slab;
 use crate::thicknesses::Thicknesses;
 
 /// More than any machine builds.
-const MOST_LAYERS: f64 = 1e6;
+const MAX_LAYERS: f64 = 1e6;
 
-/// How heights are searched for.
+/// A search for a part's layer heights.
 #[derive(Debug)]
 pub struct HeightSearch<'a> {
     /// The part.
     pub part: &'a LayeredPart,
     /// The thicknesses that the machine builds.
     pub thicknesses: &'a Thicknesses,
-    /// The measure of how far a layer is off.
+    /// The measure of a layer's error.
     pub criterion: &'a dyn Criterion,
-    /// Whether layers end at flat faces.
+    /// Makes layers end at flat faces.
     pub snap: bool,
 }
 
@@ -29,7 +30,7 @@ pub struct HeightSearch<'a> {
 pub struct Heights {
     /// The layers.
     pub slabs: Vec<Slab>,
-    /// What of the part lies above the last layer, in cubic millimetres: heights are
+    /// The part's volume above the last layer, in cubic millimetres: heights are
     /// rounded to whole layers or steps.
     pub unbuilt_mm3: f64,
 }
@@ -43,10 +44,10 @@ impl Heights {
         Self { slabs, unbuilt_mm3 }
     }
 
-    /// The layers' heights, as the slicer takes them.
+    /// Returns the layers' heights, as the slicer takes them.
     ///
     /// # Errors
-    /// Where the layers are too many.
+    /// Returns an error if there are too many layers.
     pub fn layer_heights(&self) -> Result<LayerHeights, SliceError> {
         let ends = self.slabs.iter().map(Slab::top_um);
         LayerHeights::new(
@@ -54,8 +55,8 @@ impl Heights {
         )
     }
 
-    /// The volume lost (and not built), the volume gained and the part's volume, in
-    /// cubic millimetres.
+    /// Returns the volume lost (and not built), the volume gained and the part's
+    /// volume, in cubic millimetres.
     pub fn volumes_mm3(&self) -> [f64; 3] {
         let sum = |of: fn(&Slab) -> f64| self.slabs.iter().map(of).sum::<f64>();
         let [lost, gained, volume] =
@@ -64,53 +65,57 @@ impl Heights {
     }
 }
 
-/// What layers may cost together.
+/// A limit to what layers cost together.
 #[derive(Clone, Copy)]
 pub(crate) struct Budget<'a> {
-    /// What a layer of so many micrometres costs.
-    pub(crate) cost: &'a dyn Fn(f64) -> f64,
-    pub(crate) most: f64,
+    /// Returns the cost of a layer by its thickness.
+    pub(crate) cost: &'a dyn Fn(Length) -> f64,
+    pub(crate) max: f64,
 }
 
 impl Budget<'_> {
+    fn of(&self, slab: &Slab) -> f64 {
+        (self.cost)(Length::from_um(slab.thickness_um))
+    }
+
     pub(crate) fn of_all(&self, slabs: &[Slab]) -> f64 {
-        slabs.iter().map(|slab| (self.cost)(slab.thickness_um)).sum()
+        slabs.iter().map(|slab| self.of(slab)).sum()
     }
 }
 
-/// Up to this share of the thickest layer, a look at lower tops alone costs less.
+/// Up to this share of the thickest layer, looking at lower tops alone costs less.
 const NEAR: f64 = 0.6;
 
 impl HeightSearch<'_> {
-    /// Finds the layers from the bottom: each the thickest whose measure is at most
-    /// `bound`, or the thinnest where none is. They end at the part's top, rounded to
+    /// Finds the layers from the bottom up: each is the thickest whose measure is at most
+    /// `bound`, or the thinnest if there is none. They end at the part's top, rounded to
     /// whole steps.
     ///
-    /// Thicker layers are not always worse, so all thicknesses are looked at, except
-    /// those that a criterion rules out.
-    /// Source: 002 section 3.2.3, algorithms 12 and 13, which bisect.
+    /// Source: 002 section 3.2.3, algorithms 12 and 13. These bisect; but thicker layers
+    /// are not always worse, so here all thicknesses are tried that the criterion does
+    /// not rule out.
     ///
     /// # Errors
-    /// Where the layers would be too many.
+    /// Returns an error if there would be too many layers.
     pub fn heights(&self, bound: f64) -> Result<Heights, HeightsError> {
         let found = self.heights_within(bound, None)?;
         Ok(found.expect("layers that cost nothing are within any budget"))
     }
 
-    /// As [`heights`](Self::heights); with a budget each the layer that costs least
-    /// for its thickness among those within the bound, and `None` once they cost more
-    /// than they may.
+    /// Finds the layers as [`heights`](Self::heights) does. With a budget, each is the
+    /// one that costs least for its thickness among those within the bound. Returns
+    /// `None` once they exceed the budget.
     pub(crate) fn heights_within(
         &self,
         bound: f64,
         budget: Option<Budget<'_>>,
     ) -> Result<Option<Heights>, HeightsError> {
         let [bottom_um, top_um] = self.part.heights_um();
-        let step_um = self.thicknesses.step_um();
+        let step_um = self.thicknesses.step().um();
         let at = |step: usize| bottom_um + step as f64 * step_um;
         let end = ((top_um - bottom_um) / step_um).round().max(1.0);
-        if end / *self.thicknesses.steps().start() as f64 > MOST_LAYERS {
-            return Err(HeightsError::TooHigh { height_mm: (top_um - bottom_um) / 1000.0 });
+        if end / *self.thicknesses.steps().start() as f64 > MAX_LAYERS {
+            return Err(too_high([bottom_um, top_um]));
         }
         let end = end as usize;
         let ends = self.ends(end);
@@ -123,8 +128,8 @@ impl HeightSearch<'_> {
             let chosen = self.choose(&found, bound, budget);
             step += choices[chosen];
             last_um = found[chosen].thickness_um;
-            spent += budget.map_or(0.0, |budget| (budget.cost)(last_um));
-            if budget.is_some_and(|budget| spent > budget.most) {
+            spent += budget.map_or(0.0, |budget| budget.of(&found[chosen]));
+            if budget.is_some_and(|budget| spent > budget.max) {
                 return Ok(None);
             }
             slabs.push(found[chosen]);
@@ -132,16 +137,16 @@ impl HeightSearch<'_> {
         Ok(Some(Heights::of(self.part, slabs)))
     }
 
-    /// The slabs of all tops, or of the lower ones where no other can be within the
-    /// bound. The layer before is a hint how many these are.
+    /// Returns the slabs of all tops, or of the lower ones if no other can be within the
+    /// bound. The thickness of the layer before hints at how many these are.
     fn slabs(&self, bottom_um: f64, tops_um: &[f64], last_um: f64, bound: f64) -> Vec<Slab> {
-        let most_um = tops_um[tops_um.len() - 1] - bottom_um;
-        // So many suffice where errors grow as the thickness squared.
-        let near_um = 1.2 * (2.0 * last_um * most_um).sqrt();
-        if near_um < NEAR * most_um {
+        let max_um = tops_um[tops_um.len() - 1] - bottom_um;
+        // These suffice where errors grow as the thickness squared.
+        let near_um = 1.2 * (2.0 * last_um * max_um).sqrt();
+        if near_um < NEAR * max_um {
             let near = tops_um.partition_point(|top| top - bottom_um <= near_um).max(1);
             let slabs = self.part.slabs(bottom_um, &tops_um[..near]);
-            if self.criterion.rules_out_thicker(&slabs, most_um, bound) {
+            if self.criterion.rules_out_thicker(&slabs, max_um, bound) {
                 return slabs.each;
             }
         }
@@ -153,8 +158,8 @@ impl HeightSearch<'_> {
         let mut good = (0..slabs.len()).rev().filter(|&k| measures[k] <= bound);
         let cheapest = match budget {
             None => good.next(),
-            Some(Budget { cost, .. }) => {
-                let per_um = |k: &usize| cost(slabs[*k].thickness_um) / slabs[*k].thickness_um;
+            Some(budget) => {
+                let per_um = |k: &usize| budget.of(&slabs[*k]) / slabs[*k].thickness_um;
                 // The thickest of those that cost the same.
                 good.min_by(|a, b| per_um(a).total_cmp(&per_um(b)))
             }
@@ -162,12 +167,12 @@ impl HeightSearch<'_> {
         cheapest.unwrap_or(0)
     }
 
-    /// The heights where layers are to end, in steps: flat faces, rounded down so
-    /// that sections lie below them, and the part's top. Faces so close below the
-    /// top that no layer fits between are left out.
+    /// Returns the heights where layers are to end, in steps: flat faces, rounded down
+    /// so that sections lie below them, and the part's top. Faces too close below the
+    /// top for a layer between them are left out.
     fn ends(&self, end: usize) -> Vec<usize> {
         let bottom_um = self.part.heights_um()[0];
-        let step_um = self.thicknesses.step_um();
+        let step_um = self.thicknesses.step().um();
         let mut ends = vec![end];
         if self.snap {
             for face in self.part.flat_faces_um() {
@@ -183,18 +188,23 @@ impl HeightSearch<'_> {
     }
 }
 
-/// The layers of a part that are all of one thickness, as the slicer has them.
+/// Returns a part's layers of one thickness, as the slicer makes them.
 ///
 /// # Errors
-/// Where the layers would be too many, or have no thickness.
-pub fn uniform_heights(part: &LayeredPart, thickness_um: f64) -> Result<Heights, HeightsError> {
+/// Returns an error if there would be too many layers, or they have no thickness.
+pub fn uniform_heights(part: &LayeredPart, thickness: Length) -> Result<Heights, HeightsError> {
     let [bottom_um, top_um] = part.heights_um();
+    let thickness_um = thickness.um();
     let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
-    // Written so that a thickness of NaN or below zero fails, too.
-    if !(thickness_um > 0.0 && count <= MOST_LAYERS) {
-        return Err(HeightsError::TooHigh { height_mm: (top_um - bottom_um) / 1000.0 });
+    // Negated, so that a thickness of NaN fails, too.
+    if !(thickness_um > 0.0 && count <= MAX_LAYERS) {
+        return Err(too_high([bottom_um, top_um]));
     }
     let at = |k: u32| bottom_um + f64::from(k) * thickness_um;
     let slab = |k: u32| part.slabs(at(k), &[at(k + 1)]).each[0];
     Ok(Heights::of(part, (0..count as u32).map(slab).collect()))
+}
+
+fn too_high([bottom_um, top_um]: [f64; 2]) -> HeightsError {
+    HeightsError::TooHigh { height: Length::from_um(top_um - bottom_um).to_whole_nm() }
 }

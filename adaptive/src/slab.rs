@@ -1,18 +1,18 @@
-//! A layer as it is built, beside the part.
+//! Layers as they are built, compared with the part.
 
-/// A layer as it is built, the part's section at its top swept down, and how it
-/// differs from the part between the same heights.
+/// A layer as it is built, the part's section at its top swept down, compared with
+/// the part between the same heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slab {
-    /// Its bottom, in micrometres.
+    /// The height of its bottom, in micrometres.
     pub bottom_um: f64,
     /// Its thickness, in micrometres.
     pub thickness_um: f64,
     /// The part's volume between its bottom and its top, in cubic millimetres.
     pub volume_mm3: f64,
-    /// What of that the slab lacks (algorithm 14, line 10).
+    /// The volume of the part that the slab lacks (algorithm 14, line 10).
     pub lost_mm3: f64,
-    /// What the slab has beyond it (algorithm 14, line 12).
+    /// The volume of the slab outside the part (algorithm 14, line 12).
     pub gained_mm3: f64,
     /// The area of the part's section just above the slab's bottom, in square
     /// millimetres.
@@ -22,31 +22,31 @@ pub struct Slab {
     /// The greatest |N_z| of the unit normals of the facets inside the layer: 0 for
     /// upright walls, 1 for flat faces between bottom and top.
     pub steepest: f64,
-    /// Rows that tell nothing, since their crossings do not balance: the mesh has a
-    /// gap.
+    /// The number of rows left out because their crossings do not balance: the mesh
+    /// has a gap.
     pub rows_left_out: u32,
 }
 
-/// The layers that may begin at one height.
+/// Slabs that begin at one height.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slabs {
     /// One for each top, the lowest first.
     pub each: Vec<Slab>,
-    /// What any layer that is at least as thick as the last of these has wrong below
-    /// that one's top, at least, in cubic millimetres: along each vertical line, the
-    /// lesser of what is inside and what is not.
+    /// The least error, in cubic millimetres, below the last slab's top of any layer
+    /// that reaches this top or higher: along each vertical line, the lesser of the
+    /// lengths inside and outside the part.
     pub unavoidable_mm3: f64,
 }
 
 impl Slab {
-    /// Its top, in micrometres.
+    /// Returns the height of its top, in micrometres.
     pub fn top_um(&self) -> f64 {
         self.bottom_um + self.thickness_um
     }
 
-    /// The volume lost and gained as a share of the part's volume in the layer; zero
-    /// where there is none of either (002 equation 24 and algorithm 14), and infinite
-    /// where no row tells.
+    /// Returns the volume lost and gained as a share of the part's volume in the layer
+    /// (002 equation 24 and algorithm 14): zero if all are zero, and infinite if that
+    /// is because rows were left out.
     pub fn deviation(&self) -> f64 {
         let wrong = self.lost_mm3 + self.gained_mm3;
         if wrong + self.volume_mm3 == 0.0 && self.rows_left_out > 0 {
@@ -56,7 +56,7 @@ impl Slab {
     }
 }
 
-/// A share, of which nothing of nothing is zero.
+/// Returns `part / whole`, with 0 / 0 = 0.
 pub(crate) fn share(part: f64, whole: f64) -> f64 {
     if part == 0.0 { 0.0 } else { part / whole }
 }

@@ -1,31 +1,31 @@
-//! A part between two heights, seen along a row of the image.
+//! Sweeps a row of a part between two heights from left to right.
 //!
-//! Facets are then lines over x, and the columns between two neighbouring ends of
-//! lines all pass the same lines in the same order. Going up such a column, the
-//! part begins and ends in turn; where a layer's top is, decides which of these
-//! stretches the layer has wrongly. Nothing is sampled along x or z.
+//! Facets are lines over x here. All columns between two neighbouring ends of
+//! lines pass the same lines in the same order. Going up such a column, the part
+//! begins and ends in turn, and the layer's top decides which of these stretches
+//! the layer lacks or has too much. Nothing is sampled along x or z.
 
 use lamp_slicer::Fill;
 
 use crate::profile::{Profile, SurfaceLine};
 
-/// Where the row's bottom line, at the layer's bottom, passes the part's surface.
+/// A point where the part's surface crosses the layer's bottom in a row.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Toggle {
     pub(crate) row: u32,
     pub(crate) x: f64,
-    /// +1 where going right enters the part, -1 where it leaves.
+    /// +1 if the part is on the right, -1 if it is on the left.
     pub(crate) winding: i8,
 }
 
-/// A facet's line: heights in micrometres above the layer's bottom at two places,
-/// the left one first.
+/// A facet's line along a row: its two ends, the left one first, with their heights
+/// in micrometres above the layer's bottom.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Slope {
     pub(crate) row: u32,
     pub(crate) x: [f64; 2],
     pub(crate) heights: [f64; 2],
-    /// +1 where going up enters the part, -1 where it leaves.
+    /// +1 if the part is above, -1 if it is below.
     pub(crate) winding: i8,
 }
 
@@ -40,7 +40,7 @@ impl Slope {
     }
 }
 
-/// Adds rows to a profile. It keeps its lists from row to row.
+/// Adds rows to a profile. Lists keep their memory from row to row.
 #[derive(Debug)]
 pub(crate) struct Sweep {
     fill: Fill,
@@ -48,17 +48,16 @@ pub(crate) struct Sweep {
     open: Vec<Slope>,
 }
 
-/// Surfaces that pass through each other part the columns so often at most.
-const MOST_PARTINGS: u32 = 12;
+/// How often columns are split where surfaces pass through each other, at most.
+const MAX_SPLITS: u32 = 12;
 
 impl Sweep {
     pub(crate) fn new(fill: Fill) -> Self {
         Self { fill, ends: Vec::new(), open: Vec::new() }
     }
 
-    /// Adds a row, whose toggles and slopes are sorted from the left. Returns
-    /// whether it balances: a row that does not, because the mesh has a gap, is left
-    /// out.
+    /// Adds a row, whose toggles and slopes are sorted from the left. Returns false
+    /// and adds nothing if the row does not balance, because the mesh has a gap.
     pub(crate) fn add(
         &mut self,
         toggles: &[Toggle],
@@ -98,15 +97,15 @@ impl Sweep {
             match self.open.len() {
                 0 => {}
                 1 => self.pass(columns, winding, profile),
-                _ => self.part(columns, winding, MOST_PARTINGS, profile),
+                _ => self.split(columns, winding, MAX_SPLITS, profile),
             }
         }
         true
     }
 
-    /// Adds columns over several lines, apart on both sides of where two of these
-    /// cross.
-    fn part(&mut self, columns: [f64; 2], winding: i32, partings: u32, profile: &mut Profile<'_>) {
+    /// Adds columns over several lines; those on either side of a place where two
+    /// lines cross separately.
+    fn split(&mut self, columns: [f64; 2], winding: i32, splits: u32, profile: &mut Profile<'_>) {
         let [a, b] = columns;
         let middle = 0.5 * (a + b);
         self.open.sort_unstable_by(|p, q| p.height(middle).total_cmp(&q.height(middle)));
@@ -117,9 +116,9 @@ impl Sweep {
             (a < x && x < b).then_some(x)
         });
         match crossing {
-            Some(x) if partings > 0 => {
-                self.part([a, x], winding, partings - 1, profile);
-                self.part([x, b], winding, partings - 1, profile);
+            Some(x) if splits > 0 => {
+                self.split([a, x], winding, splits - 1, profile);
+                self.split([x, b], winding, splits - 1, profile);
             }
             _ => self.pass(columns, winding, profile),
         }
@@ -129,9 +128,9 @@ impl Sweep {
     fn pass(&self, columns: [f64; 2], mut winding: i32, profile: &mut Profile<'_>) {
         let width = columns[1] - columns[0];
         let mut inside = self.fill.is_inside(winding);
-        // How much of each column is inside, if it ends as it begins.
+        // The height inside each of the two columns, as if they ended outside.
         let mut within = [0.0; 2];
-        // How much of each column, up to the line before, is not as it is after it.
+        // The height, up to the line before, that is not as it is just above it.
         let mut unlike = [0.0; 2];
         for slope in &self.open {
             winding += i32::from(slope.winding);
@@ -165,7 +164,7 @@ fn next_until<'a, T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::profile::Change;
+    use crate::profile::ProfileChange;
 
     fn toggle(x: f64, winding: i8) -> Toggle {
         Toggle { row: 0, x, winding }
@@ -175,14 +174,14 @@ mod tests {
         Slope { row: 0, x, heights, winding }
     }
 
-    fn changes(fill: Fill, toggles: &[Toggle], slopes: &[Slope]) -> Vec<Change> {
+    fn changes(fill: Fill, toggles: &[Toggle], slopes: &[Slope]) -> Vec<ProfileChange> {
         let mut profile = Profile::new(&[10.0, 20.0, 40.0]);
         Sweep::new(fill).add(toggles, slopes, &mut profile);
         profile.changes()
     }
 
-    fn change(width: f64, lost: f64, gained: f64) -> Change {
-        Change { width, lost, gained }
+    fn change(width: f64, lost: f64, gained: f64) -> ProfileChange {
+        ProfileChange { width, lost, gained }
     }
 
     /// A wall that leans in by 1 over 40, and one that leans out.
@@ -215,7 +214,7 @@ mod tests {
 
     /// Two bodies that cross like an X: by even-odd, nothing is inside both.
     #[test]
-    fn lines_that_cross_part_the_columns() {
+    fn columns_are_split_where_lines_cross() {
         let slopes = [slope([0.0, 4.0], [5.0, 9.0], 1), slope([0.0, 4.0], [9.0, 5.0], -1)];
         let found = changes(Fill::EvenOdd, &[], &slopes);
         // Two triangles, 4 high and 2 wide.
@@ -225,6 +224,6 @@ mod tests {
     #[test]
     fn a_row_with_a_gap_is_left_out() {
         let found = changes(Fill::EvenOdd, &[toggle(0.0, 1)], &[slope([0.0, 1.0], [5.0; 2], 1)]);
-        assert!(found.iter().all(|found| *found == Change::default()));
+        assert!(found.iter().all(|found| *found == ProfileChange::default()));
     }
 }

@@ -1,4 +1,4 @@
-//! What thicknesses a machine builds, and where its layers may end.
+//! Thicknesses that a machine builds, and where layers of them may end.
 
 use std::ops::RangeInclusive;
 
@@ -6,8 +6,8 @@ use lamp_stack::Length;
 
 use crate::error::HeightsError;
 
-/// More choices than these are a step by mistake.
-const MOST_THICKNESSES: f64 = 10_000.0;
+/// With more, the step is a mistake.
+const MAX_THICKNESSES: f64 = 10_000.0;
 
 /// Thicknesses that a machine builds: whole steps between limits.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,45 +17,56 @@ pub struct Thicknesses {
 }
 
 impl Thicknesses {
-    /// A machine that builds layers from `min` to `max`, in whole steps.
+    /// Creates the thicknesses from `min` to `max` that are whole steps.
+    ///
+    /// ```
+    /// use lamp_adaptive::Thicknesses;
+    /// use lamp_stack::Length;
+    ///
+    /// let [min, max, step] = [30.0, 100.0, 20.0].map(Length::from_um);
+    /// assert_eq!(Thicknesses::new(min, max, step)?.step(), step); // 40, 60, 80 and 100 um
+    /// assert!(Thicknesses::new(max, min, step).is_err());
+    /// # Ok::<(), lamp_adaptive::HeightsError>(())
+    /// ```
     ///
     /// # Errors
-    /// Where that is no thickness, or far too many.
+    /// Returns an error if there are none, or more than a search tries.
     pub fn new(min: Length, max: Length, step: Length) -> Result<Self, HeightsError> {
         let [min_um, max_um, step_um] = [min, max, step].map(Length::um);
         // Limits that are whole steps may miss them by rounding.
         let first = (min_um / step_um - 1e-6).ceil().max(1.0);
         let last = (max_um / step_um + 1e-6).floor();
-        // Written so that a step of NaN or zero fails, too.
+        // Negated, so that a step of NaN fails, too.
         if !(step_um > 0.0 && min_um > 0.0 && first <= last && last.is_finite()) {
-            return Err(HeightsError::NoThickness { min_um, max_um, step_um });
+            return Err(HeightsError::NoThickness { min, max, step });
         }
-        if last > MOST_THICKNESSES {
-            let min_step_um = max_um / MOST_THICKNESSES;
-            return Err(HeightsError::TooManySteps { count: last - first + 1.0, min_step_um });
+        if last > MAX_THICKNESSES {
+            let min_step = Length::from_um(max_um / MAX_THICKNESSES);
+            let count = (last - first) as usize + 1;
+            return Err(HeightsError::TooManySteps { count, step, min_step });
         }
         Ok(Self { step_um, steps: first as usize..=last as usize })
     }
 
-    /// The step between thicknesses, in micrometres.
-    pub fn step_um(&self) -> f64 {
-        self.step_um
+    /// Returns the step between thicknesses.
+    pub fn step(&self) -> Length {
+        Length::from_um(self.step_um)
     }
 
-    /// The thicknesses, in steps.
+    /// Returns the thicknesses, in steps.
     pub(crate) fn steps(&self) -> RangeInclusive<usize> {
         self.steps.clone()
     }
 
-    /// Whether layers can fill so many steps.
+    /// Returns true if layers can fill a height, in steps, exactly.
     pub(crate) fn can_fill(&self, steps: usize) -> bool {
         steps.div_ceil(*self.steps.end()) * self.steps.start() <= steps
     }
 
-    /// The thicknesses that a layer may have below the next of several heights where
-    /// one is to end: those after which layers can fill the rest. Heights that
-    /// cannot be reached are passed over; the last, where the part ends, is then
-    /// passed by as little as can be. All are in steps.
+    /// Returns the thicknesses that a layer may have at `bottom`, below the next of
+    /// `ends`, where layers are to end: those after which layers can fill the rest. Ends
+    /// that cannot be reached are skipped. The last one, where the part ends, is then
+    /// exceeded by as little as possible. All are in steps.
     pub(crate) fn choices(&self, bottom: usize, ends: &[usize]) -> Vec<usize> {
         let ahead = &ends[ends.partition_point(|&end| end <= bottom)..];
         let reached = ahead.iter().find(|&&end| self.can_fill(end - bottom));
@@ -69,7 +80,7 @@ impl Thicknesses {
         self.steps().filter(leads_on).collect()
     }
 
-    /// How far layers must reach beyond so many steps, at least.
+    /// Returns the least excess, in steps, of layers that cover a height.
     fn least_beyond(&self, steps: usize) -> usize {
         (steps.div_ceil(*self.steps.end()) * self.steps.start()).saturating_sub(steps)
     }
@@ -113,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn layers_pass_the_last_end_by_as_little_as_can_be() {
+    fn layers_exceed_the_last_end_by_as_little_as_possible() {
         let thicknesses = thicknesses(60.0, 100.0, 1.0).unwrap();
         // Two of 60 are nearer to 110 than one of 100 and one of 60.
         assert_eq!(thicknesses.choices(0, &[110]), [60]);

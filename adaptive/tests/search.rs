@@ -63,7 +63,7 @@ fn the_part_of_figure_48() {
         assert!(slab.deviation() <= 0.02 || slab.thickness_um < 26.0, "{slab:?}");
     }
     let worst = |slabs: &[Slab]| slabs.iter().map(Slab::deviation).fold(0.0, f64::max);
-    let uniform = uniform_heights(&part, 0.1 * INCH_UM).unwrap();
+    let uniform = uniform_heights(&part, Length::from_um(0.1 * INCH_UM)).unwrap();
     assert_eq!(uniform.slabs.len(), 30);
     assert!(worst(&uniform.slabs) > 0.2 && worst(&slabs) <= 0.02);
 }
@@ -150,9 +150,10 @@ fn budgets_are_kept_and_used() {
         assert_eq!(search.heights(bound).unwrap(), heights);
     }
     // 2 s a layer, and 10 ms a micrometre.
-    let cost = |um: f64| 2000.0 + 10.0 * um;
+    let cost = |thickness: Length| 2000.0 + 10.0 * thickness.um();
     let (_, heights) = search.within_budget(cost, 1.2e6).unwrap();
-    let spent: f64 = heights.slabs.iter().map(|slab| cost(slab.thickness_um)).sum();
+    let spent: f64 =
+        heights.slabs.iter().map(|slab| cost(Length::from_um(slab.thickness_um))).sum();
     assert!((1.1e6..=1.2e6).contains(&spent), "{spent}");
     let (bound, heights) = search.within_budget(|_| 1.0, 1e4).unwrap();
     assert!(bound == 0.0 && heights.slabs.len() < 763);
@@ -206,8 +207,8 @@ fn what_is_ruled_out_would_not_have_been_found() {
 fn a_budget_of_time_is_kept_by_the_quickest_layers() {
     let part = part(&plate(0.0, 6.0));
     let thicknesses = buildable(100.0, 1000.0, 10.0);
-    let cost = |um: f64| (um / 150.0).exp();
-    let quickest = 6_000.0 / 150.0 * cost(150.0);
+    let cost = |thickness: Length| (thickness.um() / 150.0).exp();
+    let quickest = 6_000.0 / 150.0 * cost(Length::from_um(150.0));
     let search = by_volume(&part, &thicknesses);
     let (bound, heights) = search.within_budget(cost, 1.01 * quickest).unwrap();
     assert!(bound == 0.0 && heights.slabs.iter().all(|slab| slab.thickness_um < 200.0));
@@ -254,11 +255,14 @@ fn layers_of_which_nothing_is_known_are_the_thinnest() {
 #[test]
 fn what_is_above_the_last_layer_is_lost() {
     let part = part(&plate(0.0, 1.013));
-    let heights = uniform_heights(&part, 100.0).unwrap();
+    let heights = uniform_heights(&part, Length::from_um(100.0)).unwrap();
     let [lost, _, volume] = heights.volumes_mm3();
     assert_eq!(heights.slabs.len(), 10);
     assert!((lost / volume - 13.0 / 1013.0).abs() < 1e-6, "{lost} of {volume}");
-    assert!(matches!(uniform_heights(&part, 1e-4), Err(HeightsError::TooHigh { .. })));
+    assert!(matches!(
+        uniform_heights(&part, Length::from_um(1e-4)),
+        Err(HeightsError::TooHigh { .. })
+    ));
 }
 
 #[test]
@@ -270,5 +274,5 @@ fn rows_are_not_too_near() {
     );
     let error =
         LayeredPart::new(facets.unwrap(), Length::from_um(1e-4), Fill::EvenOdd).unwrap_err();
-    assert_eq!(error.to_string(), "rows 0.0001 um apart are more than 2^24");
+    assert_eq!(error.to_string(), "rows 0.0001um apart are more than 2^24");
 }

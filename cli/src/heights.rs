@@ -238,11 +238,11 @@ impl HeightOptions {
         Ok(Found { measure, bound, heights })
     }
 
-    /// How many seconds a layer of so many micrometres takes.
+    /// Returns the time in seconds that a layer takes by its thickness.
     fn seconds_of_layers<'a>(
         &self,
         exposure: Option<&'a Exposure>,
-    ) -> Result<impl Fn(f64) -> f64 + use<'a>, Stop> {
+    ) -> Result<impl Fn(Length) -> f64 + use<'a>, Stop> {
         let exposure = exposure.ok_or_else(|| {
             Stop::usage("--time-budget needs exposures: give --material or --exposure-table")
         })?;
@@ -250,8 +250,8 @@ impl HeightOptions {
         exposure.time(self.min())?;
         exposure.time(self.max())?;
         let overhead = self.overhead();
-        Ok(move |um: f64| {
-            let time = exposure.time(Length::from_um(um));
+        Ok(move |thickness: Length| {
+            let time = exposure.time(thickness);
             overhead + time.map_or(f64::INFINITY, |time| time.ms() / 1000.0)
         })
     }
@@ -262,7 +262,7 @@ impl HeightOptions {
     }
 }
 
-/// Says a budget that cannot be kept in words.
+/// Describes a budget that is too small, in its unit.
 fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Stop {
     Stop::Failed(match error {
         HeightsError::Budget { least, budget } => {

@@ -58,10 +58,16 @@ const OTHER_KERNEL: &str = "the other --kernel may read it";
 const OTHER_KERNEL: &str = "a build with --features occt may read it";
 
 fn heights(error: &HeightsError) -> Option<String> {
-    match error {
-        HeightsError::TooManyRows { .. } => Some("give a wider --row-pitch".to_owned()),
-        _ => None,
-    }
+    let hint = match error {
+        HeightsError::NoThickness { .. } => "give a smaller --step, or a wider --min and --max",
+        HeightsError::TooManySteps { min_step, .. } => {
+            return Some(format!("give a --step above {min_step}"));
+        }
+        HeightsError::TooHigh { .. } => "check --units, --min and --max",
+        HeightsError::TooManyRows { .. } => "give a wider --row-pitch",
+        _ => return None,
+    };
+    Some(hint.to_owned())
 }
 
 fn tile(error: &TileError) -> Option<String> {

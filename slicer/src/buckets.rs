@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use crate::facet::Facet;
 use crate::model::map;
-use crate::placement::{PlacedFacet, PlacedModel, heights};
+use crate::placement::{PlacedFacet, PlacedModel, facet_heights};
 use crate::planes::Planes;
 use crate::table::FacetSource;
 
@@ -119,7 +119,7 @@ impl<'a> BucketOrder<'a> {
     /// Gives the bucket of the lowest layer met in each slab met.
     #[inline]
     fn for_each_bucket(&self, facet: &PlacedFacet, mut each: impl FnMut(usize)) {
-        let (low, high) = heights(facet);
+        let (low, high) = facet_heights(facet);
         let met = self.planes.between(low, high + self.reach_um);
         let first = self.slabs[0].start;
         let Some(&bucket) = self.of_layer.get(met.start.saturating_sub(first)) else { return };

@@ -18,7 +18,7 @@ use std::ops::Range;
 use crate::closure::EndSum;
 use crate::gray::{DepthSpan, Sheet};
 use crate::grid::PixelGrid;
-use crate::placement::{PlacedFacet, heights};
+use crate::placement::{PlacedFacet, facet_heights};
 use crate::planes::Planes;
 use crate::scan::{SortedFacet, Z, ceil_clamped};
 use crate::table::Fill;
@@ -153,7 +153,7 @@ impl Cutter<'_> {
         layers: &Range<usize>,
         shares: &mut [LayerShare],
     ) -> usize {
-        let (low, high) = heights(facet);
+        let (low, high) = facet_heights(facet);
         let met = self.planes.between(low, high + reach_um);
         let met = met.start.max(layers.start)..met.end.min(layers.end);
         if met.is_empty() {
@@ -176,7 +176,7 @@ impl Cutter<'_> {
         layers: &Range<usize>,
         mut each: impl FnMut(usize, Segment),
     ) {
-        let (low, high) = heights(facet);
+        let (low, high) = facet_heights(facet);
         // Most facets of a part in no order lie in another slab.
         if low >= self.planes.z_um(layers.end - 1) || high < self.planes.z_um(layers.start) {
             return;

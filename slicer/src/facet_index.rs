@@ -7,7 +7,7 @@ use lamp_stack::{Grouped, KeyCounts};
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
 use crate::model::Model;
-use crate::placement::{PlacedFacet, PlacedModel, Placement, heights};
+use crate::placement::{PlacedFacet, PlacedModel, Placement, facet_heights};
 use crate::survey::Survey;
 
 /// A part in its place, of which the facets between two heights are found
@@ -55,7 +55,7 @@ impl HeightBins {
 
     /// The bins that a facet meets.
     fn of_facet(&self, facet: &PlacedFacet) -> Range<usize> {
-        let (low, high) = heights(facet);
+        let (low, high) = facet_heights(facet);
         self.of(low)..self.of(high) + 1
     }
 }
@@ -113,7 +113,7 @@ impl FacetIndex {
         let own = &facets[self.facets.range(first..last + 1)];
         let placed = from_below.chain(own).map(|facet| self.model.placed(facet));
         let is_met = |facet: &PlacedFacet| {
-            let (low, high) = heights(facet);
+            let (low, high) = facet_heights(facet);
             low <= high_um && high > low_um
         };
         placed.filter(is_met).collect()
@@ -149,7 +149,7 @@ mod tests {
                 for high in [low, low + 1.0, low + 300.0, low + 30_000.0] {
                     let mut expected = all.clone();
                     expected.retain(|facet| {
-                        let (a, b) = heights(facet);
+                        let (a, b) = facet_heights(facet);
                         a <= high && b > low
                     });
                     let mut found = body.between(low, high);

@@ -64,7 +64,7 @@ pub use gray::LayerLevels;
 pub use grid::PixelGrid;
 pub use model::Model;
 pub use open::{OpenOptions, body_name, read_step};
-pub use placement::{Axis, PlacedFacet, Placement};
+pub use placement::{Axis, PlacedFacet, Placement, facet_heights};
 pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};
 pub use slices::{GridRule, SliceOptions, Slices};

@@ -105,9 +105,9 @@ fn scaled(scale: &[f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
 /// A facet in its place: x and y in millimetres, z in micrometres.
 pub type PlacedFacet = [[f64; 3]; 3];
 
-/// The lowest and the highest z of a facet.
+/// Returns the lowest and the highest z of a facet.
 #[inline]
-pub(crate) fn heights(facet: &PlacedFacet) -> (f64, f64) {
+pub fn facet_heights(facet: &PlacedFacet) -> (f64, f64) {
     let [a, b, c] = facet.map(|corner| corner[2]);
     (a.min(b).min(c), a.max(b).max(c))
 }

@@ -112,7 +112,7 @@ impl HeightsArgs {
         let thickest = [self.heights.max()];
         let uniform = if self.uniform.is_empty() { &thickest[..] } else { &self.uniform };
         let layers = |thickness: &Length| {
-            let heights = uniform_heights(part, thickness.um());
+            let heights = uniform_heights(part, *thickness);
             let heights = heights.map_err(|error| Stop::Failed(error.into()))?;
             Ok((format!("uniform {thickness}"), heights))
         };

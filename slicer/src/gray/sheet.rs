@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::cut::Cutter;
-use crate::placement::{PlacedFacet, heights};
+use crate::placement::{PlacedFacet, facet_heights};
 use crate::planes::Planes;
 use crate::scan::{RowFacet, ceil_clamped};
 
@@ -112,7 +112,7 @@ impl Sheet {
             return None;
         }
         let um_per_pixel = (cross(1, 2).abs() + cross(2, 0).abs()) / area.abs();
-        let (low_um, high_um) = heights(facet);
+        let (low_um, high_um) = facet_heights(facet);
         Some(Self {
             facet: RowFacet::new(corners, cutter.grid.height)?,
             low_um,
