@@ -268,7 +268,7 @@ fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Stop {
         HeightsError::Budget { least, budget } => {
             let [least, budget] = [least, budget].map(say);
             anyhow::anyhow!(
-                "the layers that take least take {least}, more than the budget of {budget}: allow more, or \
+                "the cheapest layers take {least}, more than the budget of {budget}: allow more, or \
                  wider limits"
             )
         }
