@@ -1,6 +1,7 @@
-//! Break lines: where the mesh is cut through, so that parts come free.
+//! Break lines: cuts through the mesh along which parts come free.
 
-/// A part's place, or a line's: columns and rows from the first to before the last.
+/// The box of a part or of a line, from its first column and row up to but excluding
+/// its last ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::tile) struct Rect {
     pub(in crate::tile) left: u32,
@@ -10,27 +11,27 @@ pub(in crate::tile) struct Rect {
 }
 
 impl Rect {
-    /// With columns and rows for each other.
+    /// Returns the box with columns and rows exchanged.
     fn transposed(self) -> Self {
         Self { left: self.top, top: self.left, right: self.bottom, bottom: self.right }
     }
 }
 
-/// More lines than the mesh has cells.
+/// More lines would leave nothing of the mesh.
 const MAX_LINES: u64 = 10_000;
 
-/// Lines from the parts to the edges of the build.
+/// The break lines of a build.
 #[derive(Clone, Debug, Default)]
 pub(in crate::tile) struct BreakLines {
-    /// Rows that are alike: before which row they end, and their transitions.
+    /// Bands of equal rows: the row behind the last, and their transitions.
     bands: Vec<(u32, Vec<u32>)>,
 }
 
 impl BreakLines {
-    /// The lines of parts, `width` wide: through the middle of each part's place
-    /// and every `pitch` aside of it, up, down, left and right, to the middle of
-    /// another part's place, whose outline is met before, or to the build's edge. All
-    /// are in pixels. `None` where they are too many.
+    /// Creates the lines of parts, `width` wide: up, down, left and right through the
+    /// middle of each part's box and at every `pitch` from there, to the middle of the
+    /// next part's box, whose outline they meet before, or to the build's edge. Lengths
+    /// are in pixels. Returns `None` if there are too many.
     pub(in crate::tile) fn new(
         parts: &[Rect],
         area: [u32; 2],
@@ -51,14 +52,14 @@ impl BreakLines {
         Some(Self { bands: bands(&lines, area[1]) })
     }
 
-    /// Gives the transitions of a row.
+    /// Returns the transitions of a row.
     pub(in crate::tile) fn row(&self, row: u32) -> &[u32] {
         let band = self.bands.partition_point(|band| band.0 <= row);
         self.bands.get(band).map_or(&[], |band| &band.1)
     }
 }
 
-/// The lines that go up and down.
+/// Returns the vertical lines.
 fn upright(parts: &[Rect], [columns, rows]: [u32; 2], width: u32, pitch: u32) -> Vec<Rect> {
     let mut lines = Vec::new();
     let pitch = pitch.max(width + 1);
@@ -69,7 +70,7 @@ fn upright(parts: &[Rect], [columns, rows]: [u32; 2], width: u32, pitch: u32) ->
         for place in (0..=2 * aside).step_by(pitch as usize) {
             let left = (middle + place).saturating_sub(aside + width / 2);
             let right = (left + width).min(columns);
-            // Others that the line meets, above and below.
+            // Other parts that the line meets.
             let met = || parts.iter().filter(|p| *p != part && p.left < right && left < p.right);
             let middle = |p: &Rect| p.top + (p.bottom - p.top) / 2;
             let above = met().filter(|p| middle(p) < part.top).map(middle);
@@ -85,7 +86,7 @@ fn upright(parts: &[Rect], [columns, rows]: [u32; 2], width: u32, pitch: u32) ->
     lines
 }
 
-/// The rows of some rectangles together, those that are alike as one.
+/// Returns the rows of the union of boxes, with equal rows as one band.
 fn bands(lines: &[Rect], height: u32) -> Vec<(u32, Vec<u32>)> {
     let mut ends: Vec<u32> = lines.iter().flat_map(|line| [line.top, line.bottom]).collect();
     ends.push(height);

@@ -1,14 +1,14 @@
-//! The mesh's walls, row by row.
+//! The walls of a mesh, row by row.
 
 use lamp_stack::Mask;
 
 use super::CellShape;
 
-/// What stands in the empty places of a build. All lengths are in pixels, from the
+/// The walls of a mesh before moats and break lines. Lengths are in pixels, from the
 /// build's top left corner.
 #[derive(Clone, Debug)]
 pub(in crate::tile) enum Lattice {
-    /// Walls around cells: holes in an even pattern.
+    /// Walls around cells.
     Cells(Cells),
     /// An image that is repeated.
     Image(Mask),
@@ -18,39 +18,34 @@ pub(in crate::tile) enum Lattice {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::tile) struct Cells {
     shape: CellShape,
-    /// From the middle of a hole to that of the next in its row.
+    /// The distance between the centres of neighbouring holes.
     pitch: f64,
-    /// From the middle of a wall to the middle of a hole, less half a wall: how far
-    /// a hole reaches to the left and to the right.
+    /// The distance from a hole's centre to its left and right wall.
     reach: f64,
 }
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 impl Cells {
-    /// Square cells, so far apart from middle to middle, with walls of a thickness
-    /// between them.
-    pub(in crate::tile) fn square(pitch: f64, wall: f64) -> Self {
-        Self { shape: CellShape::Square, pitch, reach: 0.5 * (pitch - wall) }
+    /// Creates cells whose centres are `pitch` apart, with walls between them.
+    pub(in crate::tile) fn new(shape: CellShape, pitch: f64, wall: f64) -> Self {
+        Self { shape, pitch, reach: 0.5 * (pitch - wall) }
     }
 
-    /// Hexagonal cells.
-    pub(in crate::tile) fn hexagon(pitch: f64, wall: f64) -> Self {
-        Self { shape: CellShape::Hexagon, pitch, reach: 0.5 * (pitch - wall) }
-    }
-
-    /// The holes that a line across meets: for the first and for the second of two
-    /// that take turns, where the first's middle is and how far it reaches.
+    /// Returns the centre and half the width of two holes that a horizontal line
+    /// crosses, from the left. They repeat at every pitch.
     fn holes(&self, y: f64) -> [(f64, f64); 2] {
         let Self { shape, pitch, reach } = *self;
         match shape {
             CellShape::Square => {
-                let across = (y / pitch).rem_euclid(1.0) - 0.5;
-                let is_met = (across * pitch).abs() < reach;
-                [(0.5 * pitch, if is_met { reach } else { 0.0 }), (pitch, 0.0)]
+                let from_centre = (y / pitch).rem_euclid(1.0) - 0.5;
+                let is_crossed = (from_centre * pitch).abs() < reach;
+                [(0.5 * pitch, if is_crossed { reach } else { 0.0 }), (pitch, 0.0)]
             }
             CellShape::Hexagon => {
-                // Rows of holes stand half a cell aside of each other.
+                // Each row of holes is shifted by half a cell against the next. As
+                // corners of one row reach between those of the other, a line may
+                // cross holes of two rows.
                 let row_pitch = 0.5 * SQRT_3 * pitch;
                 let row = (y / row_pitch).floor();
                 let hole = |row: f64| {
@@ -60,9 +55,8 @@ impl Cells {
                     let is_even = row.rem_euclid(2.0) < 0.5;
                     (if is_even { 0.5 * pitch } else { pitch }, half)
                 };
-                // The next row whose holes come so near.
-                let next = if y < (row + 0.5) * row_pitch { row - 1.0 } else { row + 1.0 };
-                let [a, b] = [hole(row), hole(next)];
+                let nearest = if y < (row + 0.5) * row_pitch { row - 1.0 } else { row + 1.0 };
+                let [a, b] = [hole(row), hole(nearest)];
                 if a.0 < b.0 { [a, b] } else { [b, a] }
             }
         }
@@ -70,15 +64,15 @@ impl Cells {
 
     fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
         let holes = self.holes(f64::from(row) + 0.5);
-        // A pixel is a wall's where its middle is not in a hole.
+        // A pixel is a wall's if its centre is in no hole.
         let column = |x: f64| ceil(x - 0.5).min(width);
         out.push(0);
-        // The second kind may begin in the cell before the first.
+        // Holes of the second kind may begin in the cell to the left of the image.
         let cells = (f64::from(width) / self.pitch).ceil() as i64 + 1;
         for cell in -1..cells {
             let cell = cell as f64 * self.pitch;
-            for (middle, half) in holes {
-                let [start, end] = [cell + middle - half, cell + middle + half].map(column);
+            for (centre, half) in holes {
+                let [start, end] = [cell + centre - half, cell + centre + half].map(column);
                 if start < end {
                     toggle(start, width, out);
                     toggle(end, width, out);
@@ -89,7 +83,7 @@ impl Cells {
 }
 
 impl Lattice {
-    /// Makes `out` a row of the mesh, `width` columns wide.
+    /// Replaces `out` by a row of walls, `width` columns wide.
     pub(in crate::tile) fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
         out.clear();
         match self {
@@ -109,15 +103,15 @@ impl Lattice {
     }
 }
 
-/// The least whole number from 0 on that is not below a number.
+/// Returns the least integer that is not below a number, or 0.
 #[inline]
 fn ceil(x: f64) -> u32 {
-    // Casts saturate, and cost less than rounding.
+    // Casts saturate, and cost less than `f64::ceil`, which is a call on x86-64.
     let whole = x as u32;
     whole + u32::from(f64::from(whole) < x)
 }
 
-/// Changes the colour of a row from a column on that is not before the last change.
+/// Changes a row's colour from a column on that is at or behind its last transition.
 pub(super) fn toggle(column: u32, width: u32, row: &mut Vec<u32>) {
     if column < width && row.pop_if(|last| *last == column).is_none() {
         row.push(column);
@@ -140,8 +134,7 @@ mod tests {
         mask.finish()
     }
 
-    /// How far a point is from the nearest wall's middle: what is on a wall is less
-    /// than half the wall from it.
+    /// Returns a point's distance from the middle of the nearest wall.
     fn from_wall(shape: CellShape, pitch: f64, [x, y]: [f64; 2]) -> f64 {
         // The cell of a point is that of the nearest middle.
         let around = |place: f64| (place / pitch) as i32 - 2..(place / pitch * 1.2) as i32 + 4;
@@ -173,11 +166,8 @@ mod tests {
     #[test]
     fn walls_are_half_way_between_the_middles_of_cells() {
         for (pitch, wall) in [(17.3, 4.1), (9.0, 1.0), (30.0, 0.4), (11.7, 8.0)] {
-            for (shape, cells) in [
-                (CellShape::Square, Cells::square(pitch, wall)),
-                (CellShape::Hexagon, Cells::hexagon(pitch, wall)),
-            ] {
-                let mask = drawn(&Lattice::Cells(cells), 150, 110);
+            for shape in CellShape::ALL {
+                let mask = drawn(&Lattice::Cells(Cells::new(shape, pitch, wall)), 150, 110);
                 for row in 0..110 {
                     for column in 0..150 {
                         let place = [f64::from(column) + 0.5, f64::from(row) + 0.5];
@@ -194,7 +184,7 @@ mod tests {
 
     #[test]
     fn an_image_repeats() {
-        let image = drawn(&Lattice::Cells(Cells::square(5.0, 2.0)), 7, 5);
+        let image = drawn(&Lattice::Cells(Cells::new(CellShape::Square, 5.0, 2.0)), 7, 5);
         let mask = drawn(&Lattice::Image(image.clone()), 33, 23);
         for row in 0..23 {
             for column in 0..33 {

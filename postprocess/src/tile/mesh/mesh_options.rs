@@ -1,40 +1,58 @@
-//! What a mesh is to be.
+//! Options of a mesh, and the walls that they ask for.
 
 use lamp_stack::{Dpi, Length, MAX_RUNS, Mask};
 
 use super::super::{PixelSize, TileError};
 use super::lattice::{Cells, Lattice};
 
-/// Mesh between two copies is so wide at least, unless it is asked for less.
+/// The least width of mesh between two copies, unless a smaller gap is given.
 const MIN_MESH_WIDTH: Length = Length::from_um(2000.0);
 /// Smaller cells have no holes worth the name.
 const MIN_CELL_PIXELS: f64 = 4.0;
 
-/// The mesh of a build. The seed gives no numbers: the defaults are ours.
+/// The mesh of a build.
+///
+/// 002 gives no measures for meshes: the defaults are ours.
+///
+/// ```
+/// use lamp_postprocess::{CellShape, MeshOptions, MeshPattern};
+/// use lamp_stack::Length;
+///
+/// let options = MeshOptions {
+///     pattern: MeshPattern::Cells {
+///         shape: CellShape::Square,
+///         cell: Length::from_mm(4.0),
+///         wall: Length::from_mm(0.4),
+///     },
+///     ..MeshOptions::default()
+/// };
+/// // Two moats of 1 mm, and 2 mm of mesh between them.
+/// assert_eq!(options.gap(), Length::from_mm(4.0));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshOptions {
-    /// Its walls.
+    /// The walls.
     pub pattern: MeshPattern,
-    /// How far from a part the mesh begins.
+    /// The distance between a part and the mesh.
     pub clearance: Length,
-    /// What it keeps away from.
+    /// What moats follow.
     pub moat: Moat,
-    /// How wide break lines are; there are none where this is zero.
+    /// The width of break lines; zero makes none.
     pub break_width: Length,
-    /// How far apart those of one part are.
+    /// The distance between the break lines of a part.
     pub break_pitch: Length,
-    /// How many layers of mesh alone there are below the parts.
+    /// The number of layers of mesh alone below the parts.
     pub base_layers: u32,
 }
 
-/// What a mesh keeps away from.
+/// What moats follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Moat {
-    /// Each layer of the part: the mesh follows it, stands on its faces that look up,
-    /// carries those that look down, and enters bores that lie across.
+    /// Each layer of the part. Mesh stands on faces that look up, carries those that
+    /// look down, and enters bores that are open to the side.
     #[default]
     Layer,
-    /// What is white in any layer, so that no mesh is above, below or in the part.
+    /// The part's outline in all layers. No mesh is above, below or in the part.
     Outline,
 }
 
@@ -47,14 +65,14 @@ pub enum MeshPattern {
     Cells {
         /// Their shape.
         shape: CellShape,
-        /// From the middle of a cell to that of the next.
+        /// The distance between the centres of neighbouring cells.
         cell: Length,
         /// The thickness of the walls between them.
         wall: Length,
     },
     /// An image that is repeated over the area.
     Image {
-        /// What the build's first page calls it.
+        /// Its name on the build's first page.
         name: String,
         /// White is cured.
         image: Mask,
@@ -73,8 +91,8 @@ pub enum CellShape {
 lamp_stack::named!(CellShape { Hexagon = "hexagon", Square = "square" });
 
 impl Default for MeshOptions {
-    /// Hexagons of 5 mm with walls of 0.5 mm, 1 mm from the parts; break lines of
-    /// 0.5 mm, 20 mm apart; five layers of mesh alone.
+    /// Returns hexagons of 5 mm with walls of 0.5 mm, 1 mm from the parts; break lines
+    /// of 0.5 mm, 20 mm apart; five base layers.
     fn default() -> Self {
         let [cell, wall] = [5.0, 0.5].map(Length::from_mm);
         Self {
@@ -89,13 +107,14 @@ impl Default for MeshOptions {
 }
 
 impl MeshOptions {
-    /// How far apart copies are unless another gap is given: a moat around each, and
-    /// 2 mm of mesh between.
+    /// Returns the gap between copies that leaves a moat around each and 2 mm of mesh
+    /// between.
     pub fn gap(&self) -> Length {
         Length::from_um(2.0 * self.clearance.um() + MIN_MESH_WIDTH.um())
     }
 
-    /// The options of the command that makes this mesh.
+    /// Returns the options of the command that makes this mesh, for the build's first
+    /// page.
     pub(super) fn command(&self) -> String {
         let moat = match self.moat {
             Moat::Layer => String::new(),
@@ -114,39 +133,38 @@ impl MeshOptions {
         )
     }
 
+    /// Returns the walls in pixels.
+    ///
+    /// # Errors
+    /// Returns an error if they leave no holes, or have more runs than an image can hold.
     pub(super) fn lattice(&self, dpi: Dpi, build: PixelSize) -> Result<Lattice, TileError> {
-        let runs_of_row = match &self.pattern {
-            MeshPattern::Cells { cell, wall, .. } => {
-                if cell.pixels(dpi) < MIN_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
-                    return Err(TileError::NoCells { cell: *cell, wall: *wall });
+        let (lattice, runs_of_row) = match &self.pattern {
+            &MeshPattern::Cells { shape, cell, wall } => {
+                let [pitch, thickness] = [cell, wall].map(|length| length.pixels(dpi));
+                if pitch < MIN_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
+                    return Err(TileError::NoCells { cell, wall });
                 }
-                2.0 * f64::from(build.width) / cell.pixels(dpi)
+                let runs = 2.0 * f64::from(build.width) / pitch;
+                (Lattice::Cells(Cells::new(shape, pitch, thickness)), runs)
             }
             MeshPattern::Image { name, image } => {
                 if image.width() == 0 || image.height() == 0 {
                     return Err(TileError::NoTemplate { name: name.clone() });
                 }
-                // Where a row ends white and the next copy begins so, nothing changes.
+                // Where a row ends white and its next copy begins white, nothing changes.
                 let changes = |row: &[u32]| match row {
                     [0, ..] if row.len() % 2 == 1 => row.len() - 1,
                     row => row.len() + row.len() % 2,
                 };
-                let rows = image.rows().map(changes).max().unwrap_or(0);
-                rows as f64 * f64::from(build.width) / f64::from(image.width())
+                let changes = image.rows().map(changes).max().unwrap_or(0);
+                let runs = changes as f64 * f64::from(build.width) / f64::from(image.width());
+                (Lattice::Image(image.clone()), runs)
             }
         };
+        // Half the limit leaves room for the parts.
         if runs_of_row * f64::from(build.height) > MAX_RUNS as f64 / 2.0 {
             return Err(TileError::FineMesh);
         }
-        Ok(match &self.pattern {
-            MeshPattern::Cells { shape, cell, wall } => {
-                let [cell, wall] = [cell, wall].map(|length| length.pixels(dpi));
-                Lattice::Cells(match shape {
-                    CellShape::Hexagon => Cells::hexagon(cell, wall),
-                    CellShape::Square => Cells::square(cell, wall),
-                })
-            }
-            MeshPattern::Image { image, .. } => Lattice::Image(image.clone()),
-        })
+        Ok(lattice)
     }
 }

@@ -1,12 +1,9 @@
-//! The mesh around the parts of a build.
+//! Fills the empty places of a build area with a mesh.
 //!
-//! Walls fill the empty places of the build area, so that the uncured suspension
-//! there does not slosh when the next layer is spread (002 section 2.4.2, figure
-//! 30). Around each part a moat that follows its outline, layer by layer, stays
-//! free, with all that it encloses, and break lines cut the mesh through, so that
-//! parts come free of it. The
-//! first layers are mesh alone: what the parts stand on, and break from (section
-//! 1.1.3).
+//! Its walls keep the uncured suspension from sloshing when the next layer is spread
+//! (002 section 2.4.2, figure 30). A moat around each part, and all that it encloses,
+//! stays free; break lines cut through the mesh so that parts come free of it. The
+//! first layers are mesh alone: the parts stand on them and break off (section 1.1.3).
 
 mod base_layers;
 mod break_lines;
@@ -26,17 +23,17 @@ use crate::offset::{offset_one_bit, without_holes};
 pub(super) use base_layers::on_base;
 pub use mesh_options::{CellShape, MeshOptions, MeshPattern, Moat};
 
-/// The mesh of a layout, in pixels.
+/// The mesh of a layout. Lengths are in pixels.
 #[derive(Clone, Debug)]
 pub(super) struct BuildMesh {
     lattice: Lattice,
     breaks: BreakLines,
     clearance: f64,
-    /// The moats around outlines, which are the same in all layers.
+    /// The moats of all layers, if they follow outlines.
     pub(super) fixed_moats: Option<Mask>,
     pub(super) base_layers: u32,
     build: PixelSize,
-    /// How many changes of colour its rows have together, about.
+    /// The number of transitions in all rows, estimated.
     changes: usize,
 }
 
@@ -44,7 +41,9 @@ impl Layout {
     /// Surrounds the copies with a mesh.
     ///
     /// # Errors
-    /// Where the mesh would have no holes, or more runs than an image can hold.
+    /// Returns an error if the mesh would have no holes, no room beside the moats or
+    /// more runs than an image can hold, or if moats are to follow outlines and a part
+    /// was read without its outline.
     pub fn with_mesh(mut self, options: &MeshOptions) -> Result<Self, TileError> {
         let pixels = |length: Length| length.pixels(self.dpi).max(0.0);
         let clearance = pixels(options.clearance);
@@ -86,7 +85,7 @@ impl Layout {
         Ok(self)
     }
 
-    /// The places of the copies, with what stays free around them.
+    /// Returns the boxes around the copies and their clearance.
     fn places(&self, clearance: f64) -> Vec<Rect> {
         let free = clearance.ceil() as u32;
         let place = |at: &super::CopyPlacement| {
@@ -103,13 +102,13 @@ impl Layout {
 }
 
 impl BuildMesh {
-    /// How many bytes its image takes, about.
+    /// Returns the memory that its image takes, estimated in bytes.
     pub(super) fn bytes(&self) -> usize {
         (self.changes + self.build.height as usize) * size_of::<u32>()
     }
 
     fn count_changes(&self) -> usize {
-        // Rows are alike for long: one in eight tells.
+        // Neighbouring rows are alike: one in eight is counted.
         let mut row = Vec::new();
         let mut count = |index: u32| {
             self.wall_row(index, &mut row);
@@ -118,14 +117,14 @@ impl BuildMesh {
         (0..self.build.height).step_by(8).map(&mut count).sum()
     }
 
-    /// How many pixels a moat may reach beyond its part.
+    /// Returns the number of pixels that a moat may reach beyond its part.
     pub(super) fn reach(&self) -> u32 {
         self.clearance.ceil() as u32 + 1
     }
 
-    /// What stays free around a part's image, and in its cavities, from which no
-    /// mesh would come free: an image that is larger by the [`reach`](Self::reach) on
-    /// every side.
+    /// Returns the moat around a part's image, on an image that is larger by the
+    /// [`reach`](Self::reach) on every side. Cavities belong to it, as mesh in them
+    /// would not come out.
     pub(super) fn moat(&self, image: &Image) -> Mask {
         let reach = self.reach();
         let frame = Frame {
@@ -134,14 +133,14 @@ impl BuildMesh {
             width: image.width() + 2 * reach,
             height: image.height() + 2 * reach,
         };
-        // Edges round to whole pixels: half of one more leaves no less than the
-        // clearance between the part's last pixel and the mesh's first.
+        // Offsets round to whole pixels: half a pixel more leaves no less than the
+        // clearance between the last pixel of the part and the first of the mesh.
         let moat = offset_one_bit(&white_of(image).framed(frame), -(self.clearance + 0.5));
         without_holes(&moat)
     }
 
-    /// The parts, and around them the mesh without the moats and the break lines. The
-    /// moats hold the parts, and are on a build that is larger by the
+    /// Returns the parts, and outside the moats and break lines the mesh. The moats
+    /// hold the parts, on an image that is larger than the build by the
     /// [`reach`](Self::reach) on every side.
     pub(super) fn around(&self, parts: &Mask, moats: &Mask) -> Mask {
         let PixelSize { width, height } = self.build;
@@ -162,7 +161,7 @@ impl BuildMesh {
         mask.finish()
     }
 
-    /// The mesh alone.
+    /// Returns the mesh without moats and break lines.
     fn whole(&self) -> Mask {
         let PixelSize { width, height } = self.build;
         let mut mask = MaskBuilder::new(width);
@@ -175,8 +174,8 @@ impl BuildMesh {
         mask.finish()
     }
 
-    /// A row of walls. The last column is black: a row that ends white would be
-    /// taken for a stray one.
+    /// Replaces `row` by a row of walls. Its last column is black, because a row that
+    /// ends white counts as stray.
     fn wall_row(&self, index: u32, row: &mut Vec<u32>) {
         let last = self.build.width - 1;
         self.lattice.row(index, last, row);
@@ -186,11 +185,11 @@ impl BuildMesh {
     }
 }
 
-/// Makes `out` a row of walls with what is free of them cut out, and the parts, which
-/// lie in what is free, put in.
+/// Replaces `out` by a row of walls, with its `free` columns cut out and the parts, all
+/// of which lie in these, put in.
 fn inlaid(mut wall: &[u32], free: &[u32], mut part: &[u32], width: u32, out: &mut Vec<u32>) {
     out.clear();
-    // Whether the walls that are left begin white.
+    // Whether the rest of the walls begins white.
     let mut is_wall = false;
     for (start, end) in white_runs(free, width) {
         let before = wall.partition_point(|&column| column < start);
