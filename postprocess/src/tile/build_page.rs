@@ -1,4 +1,4 @@
-//! What a build's pages say.
+//! The pages of a build: where rows and copies are, and what each part's page said.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -10,8 +10,7 @@ use serde_json::{Map, Value, json};
 use super::lockstep::LayerSet;
 use super::{CopyPlacement, Layout, PartStack, TileError};
 
-/// Rows of a part's layer that are stray, told once however many copies there
-/// are.
+/// The stray rows of a part's layer, reported once for all copies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StrayRows {
     /// The part.
@@ -22,11 +21,11 @@ pub struct StrayRows {
     pub rows: Vec<u32>,
 }
 
-/// A part, and its layer at a height.
+/// A part's index, the part, and its layer at a height.
 type PartLayer<'a> = (usize, &'a PartStack, &'a Layer);
 
 impl Layout {
-    /// The page of the layer that a step makes.
+    /// Returns the page of the build's layer at one height.
     pub(super) fn page(&self, step: &LayerSet) -> Result<PageInfo, TileError> {
         let here: Vec<PartLayer<'_>> = self.layers_of(step).collect();
         let infos = || here.iter().map(|(_, _, layer)| &layer.info);
@@ -52,7 +51,7 @@ impl Layout {
         })
     }
 
-    /// The stray rows of each part.
+    /// Returns the stray rows of each part.
     pub(super) fn stray_rows(&self, step: &LayerSet) -> Vec<StrayRows> {
         let stray = self.layers_of(step).filter(|(_, _, layer)| !layer.info.stray_rows.is_empty());
         let named = stray.map(|(_, part, layer)| StrayRows {
@@ -63,7 +62,7 @@ impl Layout {
         named.collect()
     }
 
-    /// The parts that have a layer at a height.
+    /// Returns the parts that have a layer at a height.
     pub(super) fn layers_of<'a>(
         &'a self,
         step: &'a LayerSet,
@@ -72,8 +71,8 @@ impl Layout {
         layers.filter_map(|(index, (part, layer))| Some((index, part, layer.as_deref()?)))
     }
 
-    /// Where rows that the parts' pages list are on the build. Of copies that
-    /// are turned by a right angle they are columns, and none are listed.
+    /// Returns where rows that the parts' pages list are on the build. In copies that are
+    /// turned by a right angle they are columns, so these list none.
     fn rows_on_build(&self, here: &[PartLayer<'_>], open: bool) -> Vec<u32> {
         let mut rows = BTreeSet::new();
         for &(part, _, layer) in here {
@@ -87,8 +86,8 @@ impl Layout {
         rows.into_iter().collect()
     }
 
-    /// Where a row of a part's image is. A row at which contours break off is
-    /// the first below an end, so it may be the one below the image.
+    /// Returns where a row of a part's image is on the build. A row at which contours
+    /// break off is the first below an open end, so it may be the one below the image.
     fn row_on_build(&self, at: &CopyPlacement, row: u32, open: bool) -> Option<u32> {
         let frame = self.parts[at.part].frame();
         let row = u32::try_from(i64::from(row) - frame.top).ok()?;
@@ -97,7 +96,7 @@ impl Layout {
         (row <= last).then(|| at.top + if upside_down { last - row } else { row })
     }
 
-    /// What the first page says of the build.
+    /// Returns what the first page says of the build.
     fn stack_of(&self, here: &[PartLayer<'_>]) -> StackInfo {
         if let &[(_, part, layer)] = here
             && self.parts.len() == 1
@@ -112,7 +111,7 @@ impl Layout {
         let known = |part: &PartStack| part.stack.clone().unwrap_or_else(|| unknown(part));
         let stacks: Vec<StackInfo> = self.parts.iter().map(known).collect();
         let texts = |text: fn(&StackInfo) -> &str| stacks.iter().map(text);
-        let names = told_apart(texts(|stack| &stack.part));
+        let names = unique_names(texts(|stack| &stack.part));
         let described = stacks.iter().zip(names).enumerate().map(|(part, (stack, name))| {
             let mut all = Map::new();
             all.insert("part".to_owned(), json!(name));
@@ -134,15 +133,15 @@ impl Layout {
         }
     }
 
-    /// How many of the first layers are mesh alone, where any are.
+    /// Returns the entry for the number of base layers, if there are any.
     fn base(&self) -> Map<String, Value> {
         let layers = self.mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
         let base = (layers > 0).then(|| ("base_layers".to_owned(), json!(layers)));
         base.into_iter().collect()
     }
 
-    /// How many layers there are where all stacks say so: all start together,
-    /// and the longest ends last.
+    /// Returns the number of layers if all stacks say theirs: they start together, so it
+    /// is that of the longest.
     fn layer_count(&self) -> Option<u32> {
         if self.resampled {
             return None;
@@ -151,7 +150,7 @@ impl Layout {
         counts.collect::<Option<Vec<u32>>>()?.into_iter().max()
     }
 
-    /// Where the copies of a part stand.
+    /// Returns the entries for a part: its frame, and where its copies stand.
     fn described(&self, part: usize) -> Map<String, Value> {
         let copies = || self.placements.iter().filter(|at| at.part == part);
         let PartStack { origin_mm, .. } = self.parts[part];
@@ -177,7 +176,7 @@ impl Layout {
     }
 }
 
-/// The one exposure of all parts.
+/// Returns the exposure of all parts, which must agree.
 fn exposure(step: &LayerSet, here: &[PartLayer<'_>]) -> Result<Option<f64>, TileError> {
     let known = here.iter().filter_map(|(_, part, layer)| Some((part, layer.info.exposure_ms?)));
     let mut known = known.peekable();
@@ -192,8 +191,8 @@ fn exposure(step: &LayerSet, here: &[PartLayer<'_>]) -> Result<Option<f64>, Tile
     }
 }
 
-/// Whatever else the parts' pages say: what all say alike as it is, and the
-/// rest under `of_parts`, for each stack in their order.
+/// Returns the other entries of the parts' pages: those that are equal in all as they
+/// are, the rest under `of_parts`, a map for each part.
 fn common(here: &[PartLayer<'_>], parts: usize) -> Map<String, Value> {
     let Some((_, _, first)) = here.first() else { return Map::new() };
     let is_common = |key: &str, value: &Value| {
@@ -212,18 +211,18 @@ fn common(here: &[PartLayer<'_>], parts: usize) -> Map<String, Value> {
     other
 }
 
-/// Names with `-2`, `-3`, ... behind those that were there before.
-fn told_apart<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let mut told: Vec<String> = Vec::new();
+/// Makes names unique by `-2`, `-3`, ... behind repeated ones.
+fn unique_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut unique: Vec<String> = Vec::new();
     for name in names {
         let numbered = (2..).map(|number| format!("{name}-{number}"));
-        let mut free = std::iter::once(name.to_owned()).chain(numbered);
-        told.extend(free.find(|name| !told.contains(name)));
+        let mut candidates = std::iter::once(name.to_owned()).chain(numbered);
+        unique.extend(candidates.find(|name| !unique.contains(name)));
     }
-    told
+    unique
 }
 
-/// The digest of several inputs: that of their digests, one after another.
+/// Returns the digest of several inputs, which is that of their digests in order.
 fn digest_of<'a>(digests: impl Iterator<Item = &'a str>) -> String {
     let mut hasher = blake3::Hasher::new();
     for digest in digests {
@@ -236,13 +235,13 @@ fn digest_of<'a>(digests: impl Iterator<Item = &'a str>) -> String {
 }
 
 impl LayerSet {
-    /// The first layer here, which there always is.
+    /// Returns the first of the layers, of which there is always one.
     pub(super) fn some_layer(&self) -> &Arc<Layer> {
         self.layers.iter().flatten().next().expect("a step has a layer")
     }
 }
 
-/// What is known of a stack that does not say what it is.
+/// Describes a stack that does not describe itself.
 fn unknown(part: &PartStack) -> StackInfo {
     let stem = Path::new(part.name()).file_stem().unwrap_or_default();
     StackInfo { part: stem.to_string_lossy().into_owned(), ..StackInfo::default() }
@@ -253,8 +252,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_told_apart() {
-        let names = told_apart(["a", "b", "a", "a-2", "a"].into_iter());
+    fn repeated_names_get_numbers() {
+        let names = unique_names(["a", "b", "a", "a-2", "a"].into_iter());
         assert_eq!(names, ["a", "b", "a-2", "a-2-2", "a-3"]);
     }
 }

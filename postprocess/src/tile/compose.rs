@@ -13,10 +13,10 @@ use lamp_stack::{
 use super::PixelSize;
 
 /// An image and the places where it stands.
-pub(super) struct PlacedImage<'a> {
-    pub(super) image: &'a Image,
+pub(super) struct PlacedImage {
+    pub(super) image: Image,
     /// Left column and top row. All of the image is on the build.
-    pub(super) at: &'a [(u32, u32)],
+    pub(super) at: Vec<(u32, u32)>,
 }
 
 /// Why images make no build.
@@ -29,9 +29,9 @@ pub(super) enum ComposeError {
 }
 
 /// Puts images on a black build: a gray one if any of them is gray.
-pub(super) fn compose(images: &[PlacedImage<'_>], build: PixelSize) -> Result<Image, ComposeError> {
+pub(super) fn compose(images: &[PlacedImage], build: PixelSize) -> Result<Image, ComposeError> {
     check_runs(images)?;
-    let masks = images.iter().map(|placed| match placed.image {
+    let masks = images.iter().map(|placed| match &placed.image {
         Image::Mask(mask) => Some(mask),
         Image::Gray(_) => None,
     });
@@ -45,16 +45,16 @@ pub(super) fn compose(images: &[PlacedImage<'_>], build: PixelSize) -> Result<Im
 ///
 /// # Panics
 /// If one is gray.
-pub(super) fn united(images: &[PlacedImage<'_>], build: PixelSize) -> Result<Mask, ComposeError> {
+pub(super) fn united(images: &[PlacedImage], build: PixelSize) -> Result<Mask, ComposeError> {
     check_runs(images)?;
-    let masks = images.iter().map(|placed| match placed.image {
+    let masks = images.iter().map(|placed| match &placed.image {
         Image::Mask(mask) => mask,
         Image::Gray(_) => panic!("gray images are not united"),
     });
     compose_masks(&masks.collect::<Vec<_>>(), images, build, true)
 }
 
-fn check_runs(images: &[PlacedImage<'_>]) -> Result<(), ComposeError> {
+fn check_runs(images: &[PlacedImage]) -> Result<(), ComposeError> {
     let runs =
         images.iter().map(|placed| placed.at.len().saturating_mul(placed.image.changes() + 1));
     let runs = runs.fold(0, usize::saturating_add);
@@ -63,7 +63,7 @@ fn check_runs(images: &[PlacedImage<'_>]) -> Result<(), ComposeError> {
 
 fn compose_masks(
     masks: &[&Mask],
-    images: &[PlacedImage<'_>],
+    images: &[PlacedImage],
     build: PixelSize,
     may_overlap: bool,
 ) -> Result<Mask, ComposeError> {
@@ -97,7 +97,7 @@ struct CopyRow {
 /// Tells for each row of the build, from the top, the rows of copies that it
 /// meets, by their left columns.
 fn for_each_row(
-    images: &[PlacedImage<'_>],
+    images: &[PlacedImage],
     height: u32,
     mut each: impl FnMut(&[CopyRow]) -> Result<(), ComposeError>,
 ) -> Result<(), ComposeError> {
@@ -158,8 +158,9 @@ impl MaskRow {
     }
 }
 
-fn compose_grays(images: &[PlacedImage<'_>], build: PixelSize) -> Result<GrayMask, ComposeError> {
-    let grays: Vec<Cow<'_, GrayMask>> = images.iter().map(|placed| gray_of(placed.image)).collect();
+fn compose_grays(images: &[PlacedImage], build: PixelSize) -> Result<GrayMask, ComposeError> {
+    let grays: Vec<Cow<'_, GrayMask>> =
+        images.iter().map(|placed| gray_of(&placed.image)).collect();
     let mut gray = GrayMask::new(build.width);
     let (mut row, mut one, mut spare) = (Vec::new(), Vec::new(), Vec::new());
     for_each_row(images, build.height, |met| {
@@ -253,7 +254,10 @@ mod tests {
         width: u32,
         height: u32,
     ) -> Result<Vec<String>, ComposeError> {
-        let placed = images.iter().zip(at).map(|(image, at)| PlacedImage { image, at });
+        let placed = images
+            .iter()
+            .zip(at)
+            .map(|(image, at)| PlacedImage { image: image.clone(), at: at.to_vec() });
         compose(&placed.collect::<Vec<_>>(), PixelSize { width, height }).map(|build| drawn(&build))
     }
 

@@ -1,15 +1,32 @@
-//! Where copies stand.
+//! Layouts: where the copies of parts stand on a build area.
 
 use std::collections::HashMap;
 
-use lamp_stack::{Dpi, Image, Length, MAX_SIDE, Mask, Orientation, Size};
+use lamp_stack::{Dpi, Length, MAX_SIDE, Mask, Orientation, Size};
 
 use super::mesh::BuildMesh;
 use super::overlap::common_pixel;
 use super::pack::{self, Pack};
 use super::{CopyName, PartStack, PixelSize, TileError};
 
-/// Where copies of parts stand on a build area.
+/// Where the copies of parts stand on a build area.
+///
+/// ```
+/// use lamp_postprocess::{Layout, Pack, PartStack};
+/// use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
+///
+/// // At 254 dpi, 10 pixels are a millimetre.
+/// let image = Image::Mask(Mask::black(30, 20).inverted());
+/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image };
+/// let part = PartStack::of_image("blade.tif", &layer)?;
+///
+/// // As many copies as fit, 1 mm apart: two, in the middle of the area.
+/// let (area, gap) = ("8x4mm".parse()?, Length::from_mm(1.0));
+/// let layout = Layout::packed(vec![part], &[None], area, gap, Pack::default())?;
+/// let corners: Vec<_> = layout.placements().iter().map(|at| (at.left, at.top)).collect();
+/// assert_eq!(corners, [(5, 10), (45, 10)]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Layout {
     pub(super) parts: Vec<PartStack>,
@@ -17,28 +34,28 @@ pub struct Layout {
     pub(super) dpi: Dpi,
     pub(super) area: Size,
     pub(super) pixels: PixelSize,
-    /// What made it, for the build's first page.
+    /// The command that made it, for the build's first page.
     pub(super) command: String,
-    /// Whether the build's heights may be others than the parts'.
+    /// Whether the build's heights may differ from the parts'.
     pub(super) resampled: bool,
-    /// What stands around the copies.
+    /// The mesh around the copies.
     pub(super) mesh: Option<BuildMesh>,
 }
 
-/// Where a copy stands.
+/// Where a copy stands on a build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CopyPlacement {
-    /// Which part, from 0.
+    /// The part's index, from 0.
     pub part: usize,
-    /// How it lies.
+    /// The orientation of the part's images.
     pub turn: Orientation,
-    /// The column of the build where the turned part's frame begins.
+    /// The first column of the oriented part's frame on the build.
     pub left: u32,
-    /// The row of the build where it begins.
+    /// The first row of that frame on the build.
     pub top: u32,
 }
 
-/// Where a copy is to stand: as a [`CopyPlacement`], perhaps off the area.
+/// A [`CopyPlacement`] as it is asked for, perhaps off the area.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RequestedPlacement {
     pub(super) part: usize,
@@ -48,16 +65,15 @@ pub(super) struct RequestedPlacement {
 }
 
 impl Layout {
-    /// Finds places for so many copies of each part, on an area, apart from each
-    /// other by a gap. Without a count there are as many as fit of a part that is
-    /// alone, and one of each otherwise.
+    /// Finds places for copies of each part, at least a gap apart. `None` as a count
+    /// means as many copies as fit of a single part, and one of each of several.
     ///
     /// # Errors
-    /// Where the parts have different resolutions, or not all copies find a
-    /// place.
+    /// Returns an error if the parts have different resolutions, or if not all copies
+    /// find a place.
     ///
     /// # Panics
-    /// If there are not as many counts as parts, or no part.
+    /// Panics if there are not as many counts as parts, or no part.
     pub fn packed(
         parts: Vec<PartStack>,
         counts: &[Option<u32>],
@@ -68,26 +84,29 @@ impl Layout {
         assert_eq!(parts.len(), counts.len(), "a count for each part");
         let mut layout = Self::empty(parts, area)?;
         let gap_pixels = (gap.pixels(layout.dpi).max(0.0) - 1e-6).ceil().max(0.0) as u32;
-        // Larger gaps than the area mean one copy a row as well.
+        // A gap as wide as the area leaves room for one copy, and so does a wider one.
         let gap_pixels = gap_pixels.min(MAX_SIDE);
         layout.placements = pack::pack(&layout, counts, gap_pixels, pack)?;
         layout.command = layout.packing_command(gap, pack);
         Ok(layout)
     }
 
-    /// Places copies where they are wished.
+    /// Places copies where they are asked for.
+    ///
+    /// # Errors
+    /// Returns an error if copies overlap or reach beyond the area.
     pub(super) fn placed(
         parts: Vec<PartStack>,
-        wishes: &[RequestedPlacement],
+        requested: &[RequestedPlacement],
         area: Size,
     ) -> Result<Self, TileError> {
         let mut layout = Self::empty(parts, area)?;
-        for (index, wish) in wishes.iter().enumerate() {
-            let RequestedPlacement { part, turn, left, top } = *wish;
+        for (index, request) in requested.iter().enumerate() {
+            let RequestedPlacement { part, turn, left, top } = *request;
             let size = layout.parts[part].size(turn);
-            let beyond = layout.beyond(wish, size);
+            let beyond = layout.beyond(request, size);
             if beyond > 0 {
-                let number = wishes[..=index].iter().filter(|other| other.part == part).count();
+                let number = requested[..=index].iter().filter(|other| other.part == part).count();
                 return Err(TileError::OutOfArea {
                     copy: layout.copy_name(part, number as u32),
                     beyond: Length::from_um(
@@ -104,8 +123,7 @@ impl Layout {
             });
         }
         layout.check_apart()?;
-        layout.command = format!("tile --area {area} --layout");
-        layout.note_fit();
+        layout.command = format!("tile --area {area} --layout{}", layout.fit_option());
         Ok(layout)
     }
 
@@ -139,37 +157,37 @@ impl Layout {
         })
     }
 
-    /// The parts, in the order of their stacks.
+    /// Returns the parts, in the order of their stacks.
     pub fn parts(&self) -> &[PartStack] {
         &self.parts
     }
 
-    /// The copies.
+    /// Returns the placements of all copies.
     pub fn placements(&self) -> &[CopyPlacement] {
         &self.placements
     }
 
-    /// How many copies a part has.
+    /// Returns the number of copies of a part.
     pub fn copies_of(&self, part: usize) -> usize {
         self.placements.iter().filter(|placement| placement.part == part).count()
     }
 
-    /// The resolution of all parts.
+    /// Returns the resolution of all parts.
     pub fn dpi(&self) -> Dpi {
         self.dpi
     }
 
-    /// The build area.
+    /// Returns the build area.
     pub fn area(&self) -> Size {
         self.area
     }
 
-    /// The build's images.
+    /// Returns the size of the build's images.
     pub fn pixels(&self) -> PixelSize {
         self.pixels
     }
 
-    /// The number of each copy among those of its part, from 1.
+    /// Returns each copy's number among those of its part, from 1.
     pub fn numbers(&self) -> impl Iterator<Item = u32> {
         let mut counts = vec![0; self.parts.len()];
         self.placements.iter().map(move |placement| {
@@ -178,7 +196,7 @@ impl Layout {
         })
     }
 
-    /// What each way of laying a part down looks like.
+    /// Returns the silhouette of each part in each orientation of its copies.
     pub fn silhouettes(&self) -> HashMap<(usize, Orientation), Mask> {
         let mut all = HashMap::new();
         for &CopyPlacement { part, turn, .. } in &self.placements {
@@ -191,14 +209,15 @@ impl Layout {
         CopyName { name: self.parts[part].name().to_owned(), number }
     }
 
-    /// By how many pixels a copy reaches beyond the area.
-    fn beyond(&self, wish: &RequestedPlacement, size: PixelSize) -> i64 {
-        let right = wish.left + i64::from(size.width) - i64::from(self.pixels.width);
-        let bottom = wish.top + i64::from(size.height) - i64::from(self.pixels.height);
-        right.max(bottom).max(-wish.left).max(-wish.top)
+    /// Returns the number of pixels by which a copy reaches beyond the area; negative
+    /// within it.
+    fn beyond(&self, request: &RequestedPlacement, size: PixelSize) -> i64 {
+        let right = request.left + i64::from(size.width) - i64::from(self.pixels.width);
+        let bottom = request.top + i64::from(size.height) - i64::from(self.pixels.height);
+        right.max(bottom).max(-request.left).max(-request.top)
     }
 
-    /// Checks that no two copies lie on each other, from the top to the bottom.
+    /// Checks that no two copies overlap, sweeping from the top to the bottom.
     fn check_apart(&self) -> Result<(), TileError> {
         let silhouettes = self.silhouettes();
         let silhouette = |at: &CopyPlacement| &silhouettes[&(at.part, at.turn)];
@@ -229,41 +248,29 @@ impl Layout {
         TileError::Overlap { one, other, at_mm: [f64::from(column) * pitch, y_mm] }
     }
 
-    fn packing_command(&mut self, gap: Length, pack: Pack) -> String {
+    fn packing_command(&self, gap: Length, pack: Pack) -> String {
         let copies: Vec<String> = match self.parts.len() {
             1 => vec![self.placements.len().to_string()],
             parts => (0..parts).map(|part| self.copies_of(part).to_string()).collect(),
         };
-        let area = self.area;
-        let mut command = format!("tile --area {area} --copies {} --gap {gap}", copies.join(","));
-        command += &pack.options();
-        self.command = command;
-        self.note_fit();
-        std::mem::take(&mut self.command)
+        let (area, copies, pack) = (self.area, copies.join(","), pack.options());
+        format!("tile --area {area} --copies {copies} --gap {gap}{pack}{}", self.fit_option())
     }
 
-    fn note_fit(&mut self) {
-        if self.parts.iter().any(|part| part.outline().is_some()) {
-            self.command += " --fit";
-        }
+    fn fit_option(&self) -> &'static str {
+        let fits = self.parts.iter().any(|part| part.outline().is_some());
+        if fits { " --fit" } else { "" }
     }
 }
 
-impl PixelSize {
-    /// The size of an image.
-    pub fn of(image: &Image) -> Self {
-        Self { width: image.width(), height: image.height() }
-    }
-}
-
-/// The whole pixels of a length, where one that misses by rounding counts.
+/// Returns the whole pixels of a length. A pixel that only rounding cuts off counts.
 fn whole_pixels(length: Length, dpi: Dpi) -> u32 {
     (length.pixels(dpi) + 1e-6) as u32
 }
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{Layer, PageInfo};
+    use lamp_stack::{Image, Layer, PageInfo};
 
     use super::super::testing::mask_of;
     use super::*;
@@ -282,15 +289,15 @@ mod tests {
         }
     }
 
-    fn placed(outline: bool, wishes: &[(i64, i64, &str)]) -> Result<Layout, TileError> {
-        let wish = |&(left, top, turn): &(i64, i64, &str)| RequestedPlacement {
+    fn placed(outline: bool, requested: &[(i64, i64, &str)]) -> Result<Layout, TileError> {
+        let request = |&(left, top, turn): &(i64, i64, &str)| RequestedPlacement {
             part: 0,
             turn: turn.parse().unwrap(),
             left,
             top,
         };
-        let wishes: Vec<RequestedPlacement> = wishes.iter().map(wish).collect();
-        Layout::placed(vec![part(outline)], &wishes, "10x10mm".parse().unwrap())
+        let requested: Vec<RequestedPlacement> = requested.iter().map(request).collect();
+        Layout::placed(vec![part(outline)], &requested, "10x10mm".parse().unwrap())
     }
 
     #[test]

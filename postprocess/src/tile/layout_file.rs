@@ -1,4 +1,4 @@
-//! Layouts as JSON files.
+//! Reads and writes layouts as JSON files.
 //!
 //! ```json
 //! {
@@ -9,12 +9,11 @@
 //! }
 //! ```
 //!
-//! x and y are where the lower left corner of the copy's image stands, turned as
-//! it is, from the lower left corner of the build area, to the nearest pixel. The
-//! image is all of the page, with its black margin: it may reach beyond the
-//! area where the part's extents do not. `turn` is 0, 90, 180 or 270 degrees
-//! anticlockwise; with `"mirror": true` the image is mirrored left to right
-//! before it is turned.
+//! `x_mm` and `y_mm` are the distances from the build area's lower left corner to that
+//! of the copy's image, as it lies there, rounded to pixels. The image is the whole
+//! page with its black margin, which may reach beyond the area where the part does
+//! not. `turn` is 0, 90, 180 or 270 degrees anticlockwise; `"mirror": true` mirrors the
+//! image left to right before it is turned.
 
 use lamp_stack::{Frame, Length, Orientation, Size};
 use serde::{Deserialize, Serialize};
@@ -23,17 +22,26 @@ use thiserror::Error;
 use super::layout::RequestedPlacement;
 use super::{CopyPlacement, Layout, PartStack, PixelSize, TileError};
 
-/// A layout as it stands in a file.
+/// A layout as a file has it.
+///
+/// ```
+/// use lamp_postprocess::LayoutFile;
+///
+/// let text = r#"{"copies": [{"part": "blade.tif", "x_mm": 2, "y_mm": 3, "turn": 90}]}"#;
+/// let file = LayoutFile::from_json(text)?;
+/// assert_eq!(LayoutFile::from_json(&file.to_json())?, file);
+/// # Ok::<(), lamp_postprocess::LayoutError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LayoutFile {
-    /// The build area in millimetres, width and height.
+    /// The width and height of the build area in millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     area_mm: Option<[f64; 2]>,
     copies: Vec<CopyEntry>,
 }
 
-/// A copy as it stands in a file.
+/// A copy as a file has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CopyEntry {
@@ -51,63 +59,63 @@ fn is_zero(turn: &u32) -> bool {
     *turn == 0
 }
 
-/// Why a text is no layout.
+/// Why a text is no layout, or one that the parts do not allow.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LayoutError {
-    /// It is not such a JSON file.
+    /// The text is no JSON, or has other keys.
     #[error(
         "this is not a layout: {0}; write {{\"copies\": [{{\"part\": \"blade.tif\", \"x_mm\": 1, \"y_mm\": 1, \"turn\": 90}}]}}"
     )]
     Json(#[from] serde_json::Error),
-    /// A number that is no place or no area.
+    /// A number is no distance on a build area.
     #[error("{place}: {value} is no length on a build area")]
     Number {
-        /// Where it stands, as `copies[3].x_mm`.
+        /// The key, as `copies[3].x_mm`.
         place: String,
-        /// What stands there.
+        /// Its value.
         value: f64,
     },
-    /// No right angle.
+    /// A turn is no multiple of 90 degrees below 360.
     #[error("copies[{copy}].turn: {turn} is no turn: write 0, 90, 180 or 270")]
     Turn {
-        /// Which copy, from 0.
+        /// The copy's index, from 0.
         copy: usize,
-        /// What stands there.
+        /// The turn in degrees.
         turn: u32,
     },
-    /// There is no copy.
+    /// The layout has no copy.
     #[error("there is no copy in it")]
     Empty,
-    /// No stack is called so.
+    /// No stack has the name of a copy's part.
     #[error("copies[{copy}].part: no stack is called {part:?}: there is {}", known.join(", "))]
     Unknown {
-        /// Which copy, from 0.
+        /// The copy's index, from 0.
         copy: usize,
-        /// What stands there.
+        /// The name.
         part: String,
         /// The stacks there are.
         known: Vec<String>,
     },
-    /// A stack is not used.
+    /// A stack has no copy.
     #[error("{part} has no copy in it")]
     Unused {
         /// The stack.
         part: String,
     },
-    /// The copies cannot stand there.
+    /// The copies overlap or reach beyond the area, or the parts do not go together.
     #[error(transparent)]
     Tile(#[from] TileError),
 }
 
-/// No build is larger, in millimetres: 2^26 pixels at 1 dpi.
+/// A side of 2^26 pixels at 1 dpi is shorter than this.
 const MAX_MM: f64 = 1e10;
 
 impl LayoutFile {
     /// Reads a layout.
     ///
     /// # Errors
-    /// Where the text is none.
+    /// Returns an error if the text is none, or a value cannot stand on a build area.
     pub fn from_json(text: &str) -> Result<Self, LayoutError> {
         let file: Self = serde_json::from_str(text)?;
         for (axis, value) in ["[0]", "[1]"].into_iter().zip(file.area_mm.into_iter().flatten()) {
@@ -125,7 +133,7 @@ impl LayoutFile {
         if file.copies.is_empty() { Err(LayoutError::Empty) } else { Ok(file) }
     }
 
-    /// Writes the layout, a line for each copy.
+    /// Returns the layout as JSON, with a line for each copy.
     pub fn to_json(&self) -> String {
         let line = |copy| serde_json::to_string(copy).expect("texts and numbers are JSON");
         let copies: Vec<_> = self.copies.iter().map(|copy| format!("    {}", line(copy))).collect();
@@ -138,20 +146,20 @@ impl LayoutFile {
         )
     }
 
-    /// The build area, where the file has one.
+    /// Returns the build area, if the file has one.
     pub fn area(&self) -> Option<Size> {
         let [width, height] = self.area_mm?.map(Length::from_mm);
         Some(Size { width, height })
     }
 
-    /// Places copies of parts as the file says. A part is called by its name or
-    /// by the last of it, as `blade.tif` of `stacks/blade.tif`.
+    /// Places copies of parts as the file says. It names a part by the part's name or
+    /// by the end of it, as `blade.tif` for `stacks/blade.tif`.
     ///
     /// # Errors
-    /// Where no part is called as a copy is, or a part has no copy; where copies
-    /// overlap or are not on the area.
+    /// Returns an error if a copy's part is unknown or a part has no copy, and if copies
+    /// overlap or reach beyond the area.
     pub fn place(&self, parts: Vec<PartStack>, area: Size) -> Result<Layout, LayoutError> {
-        let mut wishes = Vec::new();
+        let mut requested = Vec::new();
         for (index, copy) in self.copies.iter().enumerate() {
             let unknown = || LayoutError::Unknown {
                 copy: index,
@@ -159,19 +167,19 @@ impl LayoutFile {
                 known: parts.iter().map(|part| part.name().to_owned()).collect(),
             };
             let part = part_called(&parts, &copy.part).ok_or_else(unknown)?;
-            wishes.push(copy.wish(part, &parts[part], area));
+            requested.push(copy.request(part, &parts[part], area));
         }
         if let Some(unused) =
-            (0..parts.len()).find(|part| wishes.iter().all(|wish| wish.part != *part))
+            (0..parts.len()).find(|part| requested.iter().all(|request| request.part != *part))
         {
             return Err(LayoutError::Unused { part: parts[unused].name().to_owned() });
         }
-        Ok(Layout::placed(parts, &wishes, area)?)
+        Ok(Layout::placed(parts, &requested, area)?)
     }
 }
 
 impl Layout {
-    /// The layout as a file, which gives the same layout again.
+    /// Returns the layout as a file, which gives the same layout again.
     pub fn to_file(&self) -> LayoutFile {
         let nm = |mm: f64| (mm * 1e6).round() / 1e6 + 0.0;
         let Size { width, height } = self.area;
@@ -195,7 +203,7 @@ impl Layout {
 }
 
 impl CopyEntry {
-    fn wish(&self, index: usize, part: &PartStack, area: Size) -> RequestedPlacement {
+    fn request(&self, index: usize, part: &PartStack, area: Size) -> RequestedPlacement {
         let turn = Orientation::new(self.turn / 90, self.mirror);
         let pitch = part.dpi().pitch().mm();
         let (margin_left, margin_top) = margins(part, turn);
@@ -208,7 +216,7 @@ impl CopyEntry {
     }
 }
 
-/// Where all of a copy's image is on the build.
+/// Returns the frame of a copy's whole image on the build.
 fn image_of(part: &PartStack, at: &CopyPlacement) -> Frame {
     let (margin_left, margin_top) = margins(part, at.turn);
     let image = part.image();
@@ -221,7 +229,7 @@ fn image_of(part: &PartStack, at: &CopyPlacement) -> Frame {
     }
 }
 
-/// How far from the turned image's left and top its frame begins.
+/// Returns the distances from the oriented image's left and top edge to its frame.
 fn margins(part: &PartStack, turn: Orientation) -> (i64, i64) {
     let PixelSize { width, height } = part.image();
     let frame = part.frame();
@@ -233,7 +241,7 @@ fn margins(part: &PartStack, turn: Orientation) -> (i64, i64) {
         (left, right) = (right, left);
     }
     for _ in 0..turn.quarters() {
-        // Anticlockwise: what was on the right comes to the top.
+        // A quarter anticlockwise brings the right edge to the top.
         (left, top, right, bottom) = (top, right, bottom, left);
     }
     (left, top)
@@ -243,19 +251,18 @@ fn check_number(is_right: bool, value: f64, place: impl Fn() -> String) -> Resul
     if is_right { Ok(()) } else { Err(LayoutError::Number { place: place(), value }) }
 }
 
-/// The part of that name, or the one whose name ends so.
+/// Returns the part of a name, or the one whose label it is.
 fn part_called(parts: &[PartStack], name: &str) -> Option<usize> {
     let by_name = parts.iter().position(|part| part.name() == name);
     by_name.or_else(|| (0..parts.len()).find(|&part| label(parts, part) == name))
 }
 
-/// The last of a part's name, if no other part's ends so.
+/// Returns the file name in a part's name, or all of it if another part has the same.
 fn label(parts: &[PartStack], part: usize) -> &str {
-    let last = |part: &PartStack| part.name().rsplit(['/', '\\']).next().map(str::to_owned);
-    let own = last(&parts[part]);
-    let name = parts[part].name();
-    match parts.iter().filter(|part| last(part) == own).count() {
-        1 => &name[name.len() - own.map_or(0, |own| own.len())..],
-        _ => name,
+    fn file_name(part: &PartStack) -> &str {
+        part.name().rsplit(['/', '\\']).next().unwrap_or_default()
     }
+    let own = file_name(&parts[part]);
+    let is_unique = parts.iter().filter(|part| file_name(part) == own).count() == 1;
+    if is_unique { own } else { parts[part].name() }
 }

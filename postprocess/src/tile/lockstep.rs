@@ -1,8 +1,8 @@
-//! Stacks read in step, by height.
+//! Reads several stacks layer by layer, by height.
 //!
-//! A build layer takes from each stack the layer that spans the same heights.
+//! A layer of the build takes from each stack the layer that spans the same heights.
 //! The first stack leads, and where it has ended the next one that goes on; so
-//! shorter parts just end. Of each stack one layer is held.
+//! shorter parts just end. One layer of each stack is in memory.
 
 use std::sync::Arc;
 
@@ -10,56 +10,47 @@ use lamp_stack::{Layer, Length, MemorySize};
 
 use super::TileError;
 
-/// How stacks are joined.
+/// How stacks of different heights are joined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HeightOptions {
-    /// Whether heights count from each stack's first layer, so that all stand
-    /// on the platform.
+    /// Counts heights from each stack's first layer, so that all parts stand on the
+    /// platform.
     pub settle: bool,
-    /// Whether layers need not match: the build has the heights of the first
-    /// stack, above it layers as thick as its last, and takes of each other
-    /// stack the layer that holds the top of the build's.
+    /// Joins layers that do not match. The build has the heights of the first stack,
+    /// above it layers as thick as its last, and takes of each other stack the layer
+    /// that holds the top of the build's.
     pub resample: bool,
 }
 
 /// Heights nearer than this are the same, in micrometres.
 const TOLERANCE_UM: f64 = 1.0;
 
-/// The layers of the stacks at one height of the build.
+/// The layers of all stacks at one height of the build.
 pub(super) struct LayerSet {
     pub(super) index: u32,
-    /// The layer's bottom and thickness in micrometres, where they are known.
+    /// The layer's bottom and thickness in micrometres, if they are known.
     pub(super) z_um: Option<f64>,
     pub(super) thickness_um: Option<f64>,
-    /// For each stack, its layer here.
+    /// The layer of each stack that has one here.
     pub(super) layers: Vec<Option<Arc<Layer>>>,
-    /// How many copies there are of each.
-    pub(super) copies: Arc<[usize]>,
-    /// What the mesh around them takes.
-    pub(super) mesh_bytes: usize,
     /// Whether it is the build's first.
     pub(super) is_first: bool,
+    /// The memory that the build's layer will take.
+    bytes: usize,
 }
 
 impl MemorySize for LayerSet {
-    /// What the copies will take.
     fn bytes(&self) -> usize {
-        let layers = self.layers.iter().zip(self.copies.iter());
-        layers
-            .map(|(layer, &copies)| {
-                layer.as_ref().map_or(0, |layer| layer.bytes().saturating_mul(copies + 1))
-            })
-            .fold(self.mesh_bytes, usize::saturating_add)
+        self.bytes
     }
 }
 
-/// Stacks in step.
+/// Stacks that are read together.
 pub(super) struct Lockstep<S> {
     stacks: Vec<SteppedStack<S>>,
-    heights: HeightOptions,
-    copies: Arc<[usize]>,
+    options: HeightOptions,
     mesh_bytes: usize,
-    /// The build layer before: its index, and its bottom and top.
+    /// The index of the last layer of the build, and its bottom and top.
     last: Option<(u32, Option<[f64; 2]>)>,
     done: bool,
 }
@@ -67,9 +58,10 @@ pub(super) struct Lockstep<S> {
 struct SteppedStack<S> {
     name: String,
     layers: S,
-    /// The next layer.
+    /// The number of copies on the build.
+    copies: usize,
     next: Option<Arc<Layer>>,
-    /// What is to be added to its heights.
+    /// What its heights are raised by, in micrometres.
     up: f64,
 }
 
@@ -78,16 +70,17 @@ where
     S: Iterator<Item = Result<Layer, E>>,
     E: From<TileError>,
 {
-    /// Stacks by name, with the number of copies of each.
+    /// Creates it from each stack's name, number of copies and layers, and the memory
+    /// that the mesh takes in each layer.
     pub(super) fn new(
-        stacks: impl IntoIterator<Item = (String, S)>,
-        copies: Arc<[usize]>,
-        heights: HeightOptions,
+        stacks: impl IntoIterator<Item = (String, usize, S)>,
+        options: HeightOptions,
         mesh_bytes: usize,
     ) -> Self {
-        let stack = |(name, layers)| SteppedStack { name, layers, next: None, up: 0.0 };
+        let stack =
+            |(name, copies, layers)| SteppedStack { name, layers, copies, next: None, up: 0.0 };
         let stacks = stacks.into_iter().map(stack).collect();
-        Self { stacks, heights, copies, mesh_bytes, last: None, done: false }
+        Self { stacks, options, mesh_bytes, last: None, done: false }
     }
 
     fn step(&mut self) -> Result<Option<LayerSet>, E> {
@@ -95,7 +88,7 @@ where
             self.stacks.iter_mut().try_for_each(SteppedStack::advance)?;
             self.start_together()?;
         }
-        if self.heights.resample && self.stacks.len() > 1 {
+        if self.options.resample && self.stacks.len() > 1 {
             return self.resampled();
         }
         let Some(leader) = self.stacks.iter().position(|stack| stack.next.is_some()) else {
@@ -110,46 +103,41 @@ where
                 stack.advance()?;
             }
         }
-        // Other programs' layers may say one of the two.
+        // Layers of other programs may state a height without a thickness.
         let z_um = lead.info.z_um.map(|z| z + self.stacks[leader].up);
-        Ok(Some(self.made(lead.info.index, span, z_um, lead.info.thickness_um, layers)))
+        Ok(Some(self.layer_set(lead.info.index, span, [z_um, lead.info.thickness_um], layers)))
     }
 
-    fn made(
+    fn layer_set(
         &mut self,
         index: u32,
         span: Option<[f64; 2]>,
-        z_um: Option<f64>,
-        thickness_um: Option<f64>,
+        [z_um, thickness_um]: [Option<f64>; 2],
         layers: Vec<Option<Arc<Layer>>>,
     ) -> LayerSet {
-        let index = match self.last {
-            Some((last, _)) => index.max(last.saturating_add(1)),
-            None => index,
-        };
+        // A later leader may have counted its layers from another number.
+        let index = self.last.map_or(index, |(last, _)| index.max(last.saturating_add(1)));
         let is_first = self.last.replace((index, span)).is_none();
-        let (copies, mesh_bytes) = (Arc::clone(&self.copies), self.mesh_bytes);
-        LayerSet { index, z_um, thickness_um, layers, copies, mesh_bytes, is_first }
+        let bytes = self.stacks.iter().zip(&layers).map(|(stack, layer)| {
+            layer.as_ref().map_or(0, |layer| layer.bytes().saturating_mul(stack.copies + 1))
+        });
+        let bytes = bytes.fold(self.mesh_bytes, usize::saturating_add);
+        LayerSet { index, z_um, thickness_um, layers, is_first, bytes }
     }
 
-    /// Finds how far each stack must go up, and checks that all start at one
-    /// height.
+    /// Finds how far each stack is raised, and checks that all start at one height.
     fn start_together(&mut self) -> Result<(), TileError> {
         let bottom = |stack: &SteppedStack<S>| stack.span().map(|span| span[0]);
         let Some(first) = self.stacks.first().and_then(bottom) else { return Ok(()) };
         let first_name = self.stacks[0].name.clone();
         for stack in &mut self.stacks[1..] {
             let Some(z) = bottom(stack) else { continue };
-            if self.heights.settle {
+            if self.options.settle {
                 stack.up = first - z;
             } else if (z - first).abs() > TOLERANCE_UM {
                 let [first_z, z] = [first, z].map(Length::from_um);
-                return Err(TileError::OtherStart {
-                    first: first_name,
-                    first_z,
-                    name: stack.name.clone(),
-                    z,
-                });
+                let name = stack.name.clone();
+                return Err(TileError::OtherStart { first: first_name, first_z, name, z });
             }
         }
         Ok(())
@@ -166,21 +154,19 @@ where
             let spans = stack.known_span()?;
             let build = build.unwrap_or(spans);
             if build.iter().zip(spans).any(|(a, b)| (a - b).abs() > TOLERANCE_UM) {
-                let layer = stack.layer_name();
-                let first = self.stacks[leader].name.clone();
                 return Err(TileError::OtherHeights {
                     name: stack.name.clone(),
-                    layer,
+                    layer: stack.layer_name(),
                     spans: spans.map(Length::from_um),
                     build: build.map(Length::from_um),
-                    first,
+                    first: self.stacks[leader].name.clone(),
                 });
             }
         }
         Ok(())
     }
 
-    /// The next layer by the heights of the first stack.
+    /// Returns the next layers by the heights of the first stack.
     fn resampled(&mut self) -> Result<Option<LayerSet>, E> {
         let first = &self.stacks[0];
         let (index, span) = match (&first.next, self.last) {
@@ -190,18 +176,19 @@ where
             }
             (None, _) => return Ok(None),
         };
-        let mut layers = Vec::new();
-        for stack in &mut self.stacks {
-            layers.push(stack.layer_at(span[1])?);
-        }
+        let layers: Vec<_> = self
+            .stacks
+            .iter_mut()
+            .map(|stack| stack.layer_at(span[1]))
+            .collect::<Result<_, E>>()?;
         if layers.iter().all(Option::is_none) {
             return Ok(None);
         }
         if self.stacks[0].next.is_some() {
             self.stacks[0].advance()?;
         }
-        let (z_um, thickness_um) = (Some(span[0]), Some(span[1] - span[0]));
-        Ok(Some(self.made(index, Some(span), z_um, thickness_um, layers)))
+        let heights = [span[0], span[1] - span[0]].map(Some);
+        Ok(Some(self.layer_set(index, Some(span), heights, layers)))
     }
 }
 
@@ -215,7 +202,7 @@ where
         Ok(())
     }
 
-    /// Goes on to the layer that holds a height, its top included.
+    /// Goes on to the layer that holds a height, its top included, and returns it.
     fn layer_at(&mut self, height: f64) -> Result<Option<Arc<Layer>>, E> {
         while self.next.is_some() {
             let [bottom, top] = self.known_span()?;
@@ -229,7 +216,7 @@ where
 }
 
 impl<S> SteppedStack<S> {
-    /// The next layer's bottom and top on the build, in micrometres.
+    /// Returns the next layer's bottom and top on the build, in micrometres.
     fn span(&self) -> Option<[f64; 2]> {
         let info = &self.next.as_ref()?.info;
         let bottom = info.z_um? + self.up;
@@ -253,7 +240,7 @@ where
 {
     type Item = Result<LayerSet, E>;
 
-    /// The next layers; after an error, none.
+    /// Returns the next layers; none after an error.
     fn next(&mut self) -> Option<Self::Item> {
         if self.done {
             return None;
@@ -272,7 +259,7 @@ mod tests {
 
     type Result<T> = std::result::Result<T, TileError>;
 
-    /// A stack of layers of these thicknesses from a height on.
+    /// Returns a stack of layers of these thicknesses from a height on.
     fn stack(from: f64, thicknesses: &[f64]) -> Vec<Result<Layer>> {
         let mut z = from;
         let layer = |(index, &thickness): (u32, &f64)| {
@@ -288,18 +275,15 @@ mod tests {
         (0..).zip(thicknesses).map(layer).collect()
     }
 
-    /// Which layers of the stacks each layer of the build has.
+    /// Returns the stacks' layers in each layer of the build.
     fn joined(
         stacks: Vec<Vec<Result<Layer>>>,
         settle: bool,
         resample: bool,
     ) -> Result<Vec<Vec<Option<u32>>>> {
-        let copies = vec![1; stacks.len()].into();
-        let named = ["a", "b", "c"]
-            .map(str::to_owned)
-            .into_iter()
-            .zip(stacks.into_iter().map(Vec::into_iter));
-        let steps = Lockstep::new(named, copies, HeightOptions { settle, resample }, 0);
+        let names = ["a", "b", "c"].map(str::to_owned).into_iter();
+        let stacks = names.zip(stacks).map(|(name, layers)| (name, 1, layers.into_iter()));
+        let steps = Lockstep::new(stacks, HeightOptions { settle, resample }, 0);
         let index = |layer: &Option<Arc<Layer>>| layer.as_ref().map(|layer| layer.info.index);
         let mut next = 0;
         steps

@@ -1,12 +1,12 @@
-//! Copies of parts on a build area.
+//! Lays copies of parts out on a build area.
+//!
+//! A [`PartStack`] is what is known of a stack before it is placed, a [`Layout`] says
+//! where copies stand: [`Layout::packed`] finds places, a [`LayoutFile`] has them.
+//! [`Layout::build`] reads the stacks together, by height, and makes the build's
+//! layers. It orients a layer once for each way in which copies lie, and merges shifted
+//! rows into the build's.
 //!
 //! Source: 002 section 2.4.2.
-//!
-//! A [`PartStack`] is what is known of a stack before it is placed, a [`Layout`]
-//! where copies stand: found by [`Layout::packed`], or read from a
-//! [`LayoutFile`]. [`Layout::build`] reads the stacks in step, by height, and
-//! makes of their layers the build's. A layer is turned once for each way it
-//! lies, and a build's row is a merge of shifted rows.
 
 mod build_page;
 mod compose;
@@ -41,20 +41,20 @@ pub use pack::{Pack, PackBy, Turns};
 pub use part_stack::PartStack;
 pub use tile_error::{CopyName, TileError};
 
-/// How a part is laid out.
+/// Options to lay out one part.
 #[derive(Clone, Copy, Debug)]
 pub struct TileOptions {
     /// The build area.
     pub area: Size,
-    /// How many copies; as many as fit where `None`.
+    /// The number of copies; as many as fit if `None`.
     pub copies: Option<u32>,
     /// The least distance between two copies.
     pub gap: Length,
 }
 
 impl Default for TileOptions {
-    /// As many copies as fit on the alpha machine (4 x 4.5 in, 002 table 1),
-    /// 1 mm apart. The gap is ours: the seed gives none.
+    /// Returns as many copies as fit on the alpha machine (4 x 4.5 in, 002 table 1),
+    /// 1 mm apart. The gap is ours: 002 gives none.
     fn default() -> Self {
         let [width, height] = [4.0, 4.5].map(|inch| Length::from_um(inch * 25_400.0));
         Self { area: Size { width, height }, copies: None, gap: Length::from_mm(1.0) }
@@ -64,14 +64,19 @@ impl Default for TileOptions {
 /// A width and a height in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelSize {
-    /// Columns.
+    /// The number of columns.
     pub width: u32,
-    /// Rows.
+    /// The number of rows.
     pub height: u32,
 }
 
 impl PixelSize {
-    /// Larger on every side.
+    /// Returns the size of an image.
+    pub fn of(image: &Image) -> Self {
+        Self { width: image.width(), height: image.height() }
+    }
+
+    /// Returns the size with `by` pixels more on every side.
     fn grown(self, by: u32) -> Self {
         Self { width: self.width + 2 * by, height: self.height + 2 * by }
     }
@@ -83,39 +88,46 @@ impl std::fmt::Display for PixelSize {
     }
 }
 
-/// Lays copies of each layer of one stack out on a black build area, in rows from
-/// the top left, the whole centred. Where the copies stand follows from the
-/// first layer and is stated on its page, in pixels.
-pub fn tile<'a, E: From<TileError> + Send + 'a>(
-    layers: impl Iterator<Item = Result<Layer, E>> + 'a,
+/// Lays copies of one stack's layers out on a black build area, in rows from the top
+/// left, centred. The first layer decides where the copies stand; its page says so, in
+/// pixels.
+///
+/// ```
+/// use lamp_postprocess::{TileError, TileOptions, tile};
+/// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
+///
+/// let image = Image::Mask(Mask::black(30, 20).inverted());
+/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image };
+/// let layers = std::iter::once(Ok::<_, TileError>(layer));
+///
+/// // At 254 dpi, 10 pixels are a millimetre: three columns and four rows of copies.
+/// let options = TileOptions { area: "12x12mm".parse()?, ..TileOptions::default() };
+/// let Image::Mask(build) = tile(layers, options).next().unwrap()?.image else { unreachable!() };
+/// assert_eq!(build.white_pixels(), 3 * 4 * 30 * 20);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn tile<E: From<TileError> + Send>(
+    layers: impl Iterator<Item = Result<Layer, E>>,
     options: TileOptions,
-) -> impl Iterator<Item = Result<Layer, E>> + 'a {
-    let mut layers = Some(layers);
-    let mut build: Box<dyn Iterator<Item = Result<Layer, E>> + 'a> = Box::new(std::iter::empty());
-    std::iter::from_fn(move || {
-        if let Some(mut layers) = layers.take() {
-            let layout = match layers.next()?.and_then(|first| Ok((options.layout(&first)?, first)))
-            {
-                Ok((layout, first)) => layers_behind(layout, first, layers),
-                Err(error) => return Some(Err(error)),
-            };
-            build = Box::new(layout);
-        }
-        build.next()
-    })
-}
-
-fn layers_behind<'a, E: From<TileError> + Send + 'a>(
-    layout: Layout,
-    first: Layer,
-    layers: impl Iterator<Item = Result<Layer, E>> + 'a,
-) -> impl Iterator<Item = Result<Layer, E>> + 'a {
-    let all = std::iter::once(Ok(first)).chain(layers);
-    layout.build(vec![all], HeightOptions::default(), |_| {})
+) -> impl Iterator<Item = Result<Layer, E>> {
+    // Nothing is read before the first layer is asked for.
+    let build = std::iter::once_with(move || {
+        let mut layers = layers.peekable();
+        let (error, layout) = match layers.peek() {
+            Some(Ok(first)) => match options.layout(first) {
+                Ok(layout) => (None, Some(layout)),
+                Err(error) => (Some(Err(error.into())), None),
+            },
+            _ => (layers.next(), None),
+        };
+        let build =
+            layout.map(|layout| layout.build(vec![layers], HeightOptions::default(), |_| {}));
+        error.into_iter().chain(build.into_iter().flatten())
+    });
+    build.flatten()
 }
 
 impl TileOptions {
-    /// Where copies of a part stand.
     fn layout(&self, first: &Layer) -> Result<Layout, TileError> {
         let part = PartStack::of_image("the stack", first)?;
         Layout::packed(vec![part], &[self.copies], self.area, self.gap, Pack::default())
@@ -123,11 +135,14 @@ impl TileOptions {
 }
 
 impl Layout {
-    /// Makes the build's layers of the parts', whose stacks come in the order of
-    /// the parts. `stray` is told of rows that the parts' pages call stray.
+    /// Makes the build's layers out of the parts' stacks, which come in the order of
+    /// the parts. `stray` is called with the rows that a part's page calls stray.
+    ///
+    /// Layers come with an error if a stack cannot be read, or differs from what was
+    /// placed, or does not match the other stacks' heights.
     ///
     /// # Panics
-    /// If there are not as many stacks as parts.
+    /// Panics if there are not as many stacks as parts.
     pub fn build<E, S>(
         mut self,
         stacks: Vec<S>,
@@ -140,11 +155,12 @@ impl Layout {
     {
         assert_eq!(stacks.len(), self.parts.len(), "a stack for each part");
         self.resampled = heights.resample && stacks.len() > 1;
-        let copies = (0..stacks.len()).map(|part| self.copies_of(part)).collect();
-        let names: Vec<String> = self.parts.iter().map(|part| part.name().to_owned()).collect();
         let mesh = self.mesh.clone();
         let mesh_bytes = mesh.as_ref().map_or(0, BuildMesh::bytes);
-        let steps = Lockstep::new(names.into_iter().zip(stacks), copies, heights, mesh_bytes);
+        let named = stacks.into_iter().zip(&self.parts).enumerate();
+        let stacks =
+            named.map(|(k, (stack, part))| (part.name().to_owned(), self.copies_of(k), stack));
+        let steps = Lockstep::new(stacks, heights, mesh_bytes);
         let layers = map_in_order(steps, move |step: LayerSet| {
             let layer =
                 Layer { info: self.page(&step)?, dpi: Some(self.dpi), image: self.image(&step)? };
@@ -158,23 +174,22 @@ impl Layout {
         on_base(layers, mesh)
     }
 
-    /// The build's image: the parts, and the mesh around them.
+    /// Returns the build's image: the parts, and the mesh around them.
     fn image(&self, step: &LayerSet) -> Result<Image, TileError> {
         let layers =
             self.layers_of(step).map(|(part, known, layer)| Ok((part, known.framed(layer)?)));
         let layers: Vec<(usize, Image)> = layers.collect::<Result<_, TileError>>()?;
         let layer = || step.some_layer().info.name();
         let too_many = || TileError::TooManyRuns { copies: self.placements.len(), layer: layer() };
-        let turned = self.turned(&layers).ok_or_else(too_many)?;
-        let parts =
-            compose::compose(&placed(&turned), self.pixels).map_err(|fault| match fault {
-                ComposeError::TooManyRuns => too_many(),
-                // Outlines were apart, so that a layer is not within its own.
-                ComposeError::Overlap => {
-                    let name = self.parts[layers[0].0].name().to_owned();
-                    TileError::Changed { name, layer: layer() }
-                }
-            })?;
+        let placed = self.placed_images(&layers).ok_or_else(too_many)?;
+        let parts = compose::compose(&placed, self.pixels).map_err(|fault| match fault {
+            ComposeError::TooManyRuns => too_many(),
+            // The layout was checked by outlines, so a layer is white outside its own.
+            ComposeError::Overlap => {
+                let name = self.parts[layers[0].0].name().to_owned();
+                TileError::Changed { name, layer: layer() }
+            }
+        })?;
         let Some(mesh) = &self.mesh else { return Ok(parts) };
         let moats = match &mesh.fixed_moats {
             Some(moats) => Cow::Borrowed(moats),
@@ -190,42 +205,28 @@ impl Layout {
         }
     }
 
-    /// The moats around images of parts; `None` where these have too many runs.
+    /// Returns the moats around parts' images, or `None` if these have too many runs.
     fn moats(&self, mesh: &BuildMesh, images: &[(usize, Image)]) -> Option<Mask> {
         let moat = |(part, image): &(usize, Image)| (*part, Image::Mask(mesh.moat(image)));
-        let moats = self.turned(&images.iter().map(moat).collect::<Vec<_>>())?;
-        compose::united(&placed(&moats), self.pixels.grown(mesh.reach())).ok()
+        let moats = self.placed_images(&images.iter().map(moat).collect::<Vec<_>>())?;
+        compose::united(&moats, self.pixels.grown(mesh.reach())).ok()
     }
 
-    /// Images of parts in each way in which copies lie, and where these stand; `None`
-    /// where one has too many runs.
-    fn turned(&self, images: &[(usize, Image)]) -> Option<Vec<OrientedImage>> {
-        let mut turned = Vec::new();
+    /// Orients parts' images in each way in which copies lie. Returns `None` if one
+    /// has too many runs.
+    fn placed_images(&self, images: &[(usize, Image)]) -> Option<Vec<PlacedImage>> {
+        let mut placed = Vec::new();
         for (part, image) in images {
-            for (turn, at) in self.places_by_turn(*part) {
-                turned.push(OrientedImage { image: image.oriented(turn)?, at });
+            let mut corners: HashMap<Orientation, Vec<(u32, u32)>> = HashMap::new();
+            for at in self.placements.iter().filter(|at| at.part == *part) {
+                corners.entry(at.turn).or_default().push((at.left, at.top));
+            }
+            for orientation in Orientation::ALL {
+                if let Some(at) = corners.remove(&orientation) {
+                    placed.push(PlacedImage { image: image.oriented(orientation)?, at });
+                }
             }
         }
-        Some(turned)
+        Some(placed)
     }
-
-    /// For each way in which copies of a part lie, where they stand.
-    fn places_by_turn(&self, part: usize) -> Vec<(Orientation, Vec<(u32, u32)>)> {
-        let mut places: HashMap<Orientation, Vec<(u32, u32)>> = HashMap::new();
-        for at in self.placements.iter().filter(|at| at.part == part) {
-            places.entry(at.turn).or_default().push((at.left, at.top));
-        }
-        let turns = Orientation::ALL.into_iter();
-        turns.filter_map(|turn| Some((turn, places.remove(&turn)?))).collect()
-    }
-}
-
-/// An image, and the left columns and top rows of its copies.
-struct OrientedImage {
-    image: Image,
-    at: Vec<(u32, u32)>,
-}
-
-fn placed(images: &[OrientedImage]) -> Vec<PlacedImage<'_>> {
-    images.iter().map(|OrientedImage { image, at }| PlacedImage { image, at }).collect()
 }

@@ -1,10 +1,10 @@
-//! Whether two copies lie on each other.
+//! Finds where two copies overlap.
 
 use lamp_stack::{Mask, white_runs};
 
 use super::CopyPlacement;
 
-/// A pixel of the build that is white in two placed masks.
+/// Returns the column and row of a pixel of the build that is white in two placed masks.
 pub(super) fn common_pixel(masks: [&Mask; 2], at: [&CopyPlacement; 2]) -> Option<(u32, u32)> {
     let [a, b] = at;
     let top = a.top.max(b.top);
@@ -15,9 +15,11 @@ pub(super) fn common_pixel(masks: [&Mask; 2], at: [&CopyPlacement; 2]) -> Option
         return None;
     }
     (top..bottom).find_map(|row| {
-        let rows =
-            [0, 1].map(|k| runs(masks[k].row(row - at[k].top), masks[k].width(), at[k].left));
-        let [mut one, mut other] = rows.map(Iterator::peekable);
+        let [mut one, mut other] = [0, 1].map(|k| {
+            let (row, left) = (masks[k].row(row - at[k].top), at[k].left);
+            let runs = white_runs(row, masks[k].width());
+            runs.map(move |(start, end)| (left + start, left + end)).peekable()
+        });
         loop {
             let (&(a, a_end), &(b, b_end)) = (one.peek()?, other.peek()?);
             if a.max(b) < a_end.min(b_end) {
@@ -30,9 +32,4 @@ pub(super) fn common_pixel(masks: [&Mask; 2], at: [&CopyPlacement; 2]) -> Option
             };
         }
     })
-}
-
-/// The white runs of a row that is shifted to the right.
-fn runs(row: &[u32], width: u32, left: u32) -> impl Iterator<Item = (u32, u32)> {
-    white_runs(row, width).map(move |(start, end)| (left + start, left + end))
 }

@@ -1,4 +1,4 @@
-//! A part as it is placed: its size, and its outline where that is known.
+//! The stack of a part before it is placed: its size, and its outline if that is known.
 
 use lamp_stack::{
     Dpi, Frame, GrayMask, Image, Layer, LevelChange, Mask, MaskBuilder, Op, Orientation, StackInfo,
@@ -6,26 +6,26 @@ use lamp_stack::{
 
 use super::{PixelSize, TileError};
 
-/// What is known of a part before it is placed.
+/// The stack of a part, as it is known before it is placed.
 #[derive(Clone, Debug)]
 pub struct PartStack {
     name: String,
     dpi: Dpi,
     image: PixelSize,
-    /// What is placed of the image.
+    /// The part of the image that is placed.
     frame: Frame,
-    /// What is white in any layer, within the frame.
+    /// The union of all layers, within the frame.
     outline: Option<Mask>,
     pub(super) origin_mm: Option<[f64; 2]>,
     pub(super) stack: Option<StackInfo>,
 }
 
 impl PartStack {
-    /// A part of which the whole image is placed, by its first layer. `name` is
-    /// what people call it.
+    /// Creates a part whose whole image is placed, from its first layer. Messages and
+    /// layout files use its `name`.
     ///
     /// # Errors
-    /// Where the layer has no resolution.
+    /// Returns an error if the layer has no resolution.
     pub fn of_image(name: &str, first: &Layer) -> Result<Self, TileError> {
         let name = name.to_owned();
         let Some(dpi) = first.dpi else {
@@ -37,12 +37,12 @@ impl PartStack {
         Ok(Self { name, dpi, image, frame, outline: None, origin_mm, stack })
     }
 
-    /// A part of which the extents are placed: the least frame that holds what
-    /// is white in any of its layers. `None` where there are no layers.
+    /// Creates a part whose extents are placed, the least frame that holds what is white
+    /// in any of its layers. Returns `None` if there are no layers.
     ///
     /// # Errors
-    /// Those of the layers; where they have no resolution, or not one and the
-    /// same, or another size, or are all black.
+    /// Returns the layers' errors, and one if they have no resolution, differ in
+    /// resolution or size, or are all black.
     pub fn of_outline<E: From<TileError>>(
         name: &str,
         layers: impl Iterator<Item = Result<Layer, E>>,
@@ -71,49 +71,45 @@ impl PartStack {
         Ok(Some(part))
     }
 
-    /// What people call it.
+    /// Returns the part's name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Its resolution.
+    /// Returns the resolution.
     pub fn dpi(&self) -> Dpi {
         self.dpi
     }
 
-    /// The part of its image that is placed: all of it, or its extents.
+    /// Returns the part of the image that is placed: all of it, or the extents.
     pub fn frame(&self) -> Frame {
         self.frame
     }
 
-    /// What is white in any layer, within the frame, where that is known.
+    /// Returns the union of all layers, within the frame, if it is known.
     pub fn outline(&self) -> Option<&Mask> {
         self.outline.as_ref()
     }
 
-    /// What is placed, in pixels, when it is turned.
+    /// Returns the size of the oriented frame.
     pub fn size(&self, turn: Orientation) -> PixelSize {
         let (width, height) = turn.size(self.frame.width, self.frame.height);
         PixelSize { width, height }
     }
 
-    /// The size of its layers' images.
+    /// Returns the size of the layers' images.
     pub(super) fn image(&self) -> PixelSize {
         self.image
     }
 
-    /// The outline, or all of the frame where it is not known.
+    /// Returns the oriented outline, or all of the frame if no outline is known.
     pub(super) fn silhouette(&self, turn: Orientation) -> Mask {
         let outline = self.outline.as_ref().and_then(|outline| outline.oriented(turn));
-        let size = self.size(turn);
-        outline.unwrap_or_else(|| {
-            let mut mask = MaskBuilder::new(size.width);
-            (0..size.height).for_each(|_| mask.push_row(&[0]).expect("a white row"));
-            mask.finish()
-        })
+        let PixelSize { width, height } = self.size(turn);
+        outline.unwrap_or_else(|| Mask::black(width, height).inverted())
     }
 
-    /// Checks that a layer is of the size and resolution of the first.
+    /// Checks that a layer has the size and resolution of the first.
     pub(super) fn check(&self, layer: &Layer) -> Result<(), TileError> {
         let name = self.name.clone();
         let found = PixelSize::of(&layer.image);
@@ -140,7 +136,7 @@ impl PartStack {
     }
 }
 
-/// What is not black.
+/// Returns a mask of the pixels that are not black.
 pub(super) fn white_of(image: &Image) -> Mask {
     match image {
         Image::Mask(mask) => mask.clone(),
@@ -165,7 +161,7 @@ fn white_of_gray(gray: &GrayMask) -> Mask {
     mask.finish()
 }
 
-/// The least frame that holds all that is white; `None` where nothing is.
+/// Returns the least frame that holds all that is white, or `None` if nothing is.
 fn extents(mask: &Mask) -> Option<Frame> {
     let rows = || (0..).zip(mask.rows()).filter(|(_, row)| !row.is_empty());
     let (top, bottom) = (rows().next()?.0, rows().last()?.0);
@@ -175,7 +171,7 @@ fn extents(mask: &Mask) -> Option<Frame> {
     Some(Frame { left: left.into(), top: i64::from(top), width, height })
 }
 
-/// Where the last run of a row that is not black ends.
+/// Returns the end of the last white run in a row that is not black.
 fn end_of(row: &[u32], width: u32) -> u32 {
     match row {
         [.., last] if row.len().is_multiple_of(2) => *last,

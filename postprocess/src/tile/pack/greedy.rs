@@ -1,4 +1,4 @@
-//! Copy by copy, each where there is room for it.
+//! Packs greedily: puts each copy at the first place that is free for it.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use super::super::{CopyPlacement, Layout, PixelSize};
 use super::Turns;
 use super::no_fit::{CellRun, NoFitRegion, NoFitRegions};
 
-/// Which place is taken of those that are free.
+/// The free place that a copy takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PlacingRule {
     /// The one nearest to the top.
@@ -21,16 +21,16 @@ impl PlacingRule {
     pub(super) const ALL: [Self; 2] = [Self::Top, Self::Bottom];
 }
 
-/// Places up to so many copies of each part, large parts first, from the top
-/// left; then moves the whole to the middle.
+/// Places up to `wanted` copies of each part from the top left, large parts first, and
+/// centres all of them.
 pub(super) fn place(
     layout: &Layout,
-    shapes: &mut NoFitRegions,
+    regions: &mut NoFitRegions,
     wanted: &[u32],
     turns: Turns,
     order: PlacingRule,
 ) -> Vec<CopyPlacement> {
-    let mut free = FreeRoom { layout, shapes, taken: HashMap::new(), placements: Vec::new() };
+    let mut free = FreeRoom { layout, regions, taken: HashMap::new(), placements: Vec::new() };
     let area = |part: &usize| {
         let PixelSize { width, height } = layout.parts()[*part].size(Orientation::default());
         std::cmp::Reverse(u64::from(width) * u64::from(height))
@@ -39,7 +39,7 @@ pub(super) fn place(
     parts.sort_by_key(area);
     for part in parts {
         let ways: Vec<Orientation> =
-            turns.all().iter().map(|&quarters| Orientation::new(quarters, false)).collect();
+            turns.quarters().iter().map(|&quarters| Orientation::new(quarters, false)).collect();
         for _ in 0..wanted[part] {
             if !free.place(part, &ways, order) {
                 break;
@@ -52,31 +52,31 @@ pub(super) fn place(
     placements
 }
 
-/// The room that is left on an area.
+/// The room left on an area.
 struct FreeRoom<'a> {
     layout: &'a Layout,
-    shapes: &'a mut NoFitRegions,
-    /// Of each way a part may lie, the places that are taken.
+    regions: &'a mut NoFitRegions,
+    /// The places taken for each part and orientation.
     taken: HashMap<(usize, Orientation), TakenPlaces>,
     placements: Vec<CopyPlacement>,
 }
 
-/// The places, in cells, where a shape may not begin.
+/// The cells where an outline may not begin.
 struct TakenPlaces {
-    /// For each row, runs of columns apart from each other, from the left.
+    /// The taken columns of each row as runs that do not touch, from the left.
     rows: Vec<Vec<CellRun>>,
-    /// How many columns there are.
+    /// The number of columns.
     columns: i32,
-    /// All rows above this one are taken.
+    /// The first row that is not known to be full.
     first: usize,
-    /// How many of the copies it knows of.
+    /// The number of copies that were taken into account.
     known: usize,
 }
 
 impl FreeRoom<'_> {
-    /// Finds a place for one more copy, if there is one.
+    /// Finds a place for one more copy. Returns whether there was one.
     fn place(&mut self, part: usize, ways: &[Orientation], order: PlacingRule) -> bool {
-        let cell = self.shapes.cell;
+        let cell = self.regions.cell;
         let found = ways.iter().filter_map(|&turn| {
             let (column, row) = self.first_place(part, turn)?;
             let placement =
@@ -92,10 +92,10 @@ impl FreeRoom<'_> {
         best.is_some()
     }
 
-    /// The first row, and in it the first column, where a shape may begin.
+    /// Returns the first column of the first row where an outline may begin.
     fn first_place(&mut self, part: usize, turn: Orientation) -> Option<(i32, i32)> {
         let key = (part, turn);
-        let (pixels, cell) = (self.layout.pixels(), self.shapes.cell);
+        let (pixels, cell) = (self.layout.pixels(), self.regions.cell);
         let size = self.layout.parts()[part].size(turn);
         let room = PixelSize {
             width: pixels.width.checked_sub(size.width)? / cell + 1,
@@ -103,7 +103,7 @@ impl FreeRoom<'_> {
         };
         let taken = self.taken.entry(key).or_insert_with(|| TakenPlaces::new(room));
         for at in &self.placements[taken.known..] {
-            let no_fit = self.shapes.no_fit(self.layout, key, (at.part, at.turn));
+            let no_fit = self.regions.no_fit(self.layout, key, (at.part, at.turn));
             taken.add(&no_fit, (at.left / cell) as i32, (at.top / cell) as i32);
         }
         taken.known = self.placements.len();
@@ -117,7 +117,7 @@ impl TakenPlaces {
         Self { rows, columns: room.width as i32, first: 0, known: 0 }
     }
 
-    /// Takes the places at which a shape would meet another that begins at a
+    /// Takes the places at which an outline would overlap another that begins at a
     /// column and a row.
     fn add(&mut self, no_fit: &NoFitRegion, column: i32, row: i32) {
         let start = row - no_fit.top;
@@ -148,8 +148,7 @@ impl TakenPlaces {
     }
 }
 
-/// Adds a run to runs that are apart from each other, and joins those that it
-/// touches.
+/// Adds a run to runs that do not touch, and joins those that it touches.
 fn insert(runs: &mut Vec<CellRun>, (mut start, mut end): CellRun) {
     let first = runs.partition_point(|run| run.1 < start);
     let last = first + runs[first..].partition_point(|run| run.0 <= end);

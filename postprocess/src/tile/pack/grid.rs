@@ -1,11 +1,10 @@
-//! Copies of one part in rows and columns.
+//! Packs copies of one part in rows and columns.
 
 use lamp_stack::Orientation;
 
 use super::super::{CopyPlacement, Layout};
 
-/// Places up to so many copies of the one part in rows from the top left, the
-/// whole centred.
+/// Places up to `wanted` copies of the only part in rows from the top left, centred.
 pub(super) fn grid(
     layout: &Layout,
     turn: Orientation,
@@ -28,12 +27,12 @@ pub(super) fn grid(
         .collect()
 }
 
-/// How many parts stand along a side; `None` where not one does.
+/// Returns the number of parts that fit along a side, or `None` if not one does.
 fn most(area: u32, part: u32, gap: u32) -> Option<u32> {
     Some(area.checked_sub(part)? / (part + gap).max(1) + 1)
 }
 
-/// Where `count` parts stand along a side, centred.
+/// Returns where `count` parts stand along a side, centred.
 fn positions(area: u32, part: u32, gap: u32, count: u32) -> impl Iterator<Item = u32> + Clone {
     let used = count * part + (count - 1) * gap;
     (0..count).map(move |i| (area - used) / 2 + i * (part + gap))

@@ -1,8 +1,8 @@
-//! Places for as many copies as fit, or as are wanted.
+//! Packs copies: finds places for as many as fit, or as are asked for.
 //!
-//! What is simple comes first: a grid, then boxes wherever they fit, then
-//! outlines, each without turning parts before turning them. A later way is
-//! taken only if it places more copies.
+//! Simple strategies come first: a grid, then boxes wherever they fit, then outlines,
+//! each before and after parts may be turned. A later strategy is taken only if it
+//! places more copies.
 
 mod greedy;
 mod grid;
@@ -14,29 +14,29 @@ use super::{CopyPlacement, Layout, TileError};
 use greedy::PlacingRule;
 use no_fit::NoFitRegions;
 
-/// How places are found.
+/// Options to find places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pack {
-    /// By what parts keep apart.
+    /// What keeps the gap from other parts.
     pub by: PackBy,
-    /// Which ways parts may be turned.
+    /// How parts may be turned.
     pub turns: Turns,
 }
 
-/// By what parts keep apart.
+/// What of a part keeps the gap from other parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PackBy {
-    /// The boxes around them.
+    /// The box around it.
     #[default]
     Boxes,
-    /// Their outlines, where boxes do not place all.
+    /// Its outline, if boxes do not place all copies.
     Outlines,
 }
 
 lamp_stack::named!(PackBy { Boxes = "box", Outlines = "outline" });
 
-/// Which ways parts may be turned, where that places more. None is mirrored,
-/// which would be another part.
+/// How parts may be turned if that places more copies. None is mirrored, as that would
+/// be another part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Turns {
     /// Not at all.
@@ -51,7 +51,8 @@ pub enum Turns {
 lamp_stack::named!(Turns { None = "none", Half = "half", Quarters = "quarters" });
 
 impl Turns {
-    fn all(self) -> &'static [u32] {
+    /// Returns the quarter turns that are allowed, in the order in which they are tried.
+    fn quarters(self) -> &'static [u32] {
         match self {
             Self::None => &[0],
             Self::Half => &[0, 2],
@@ -61,7 +62,7 @@ impl Turns {
 }
 
 impl Pack {
-    /// The options that ask for it, as a command has them.
+    /// Returns the options that ask for it, for the command on the build's first page.
     pub(super) fn options(self) -> String {
         let mut options = String::new();
         if self.by != PackBy::default() {
@@ -73,23 +74,23 @@ impl Pack {
         options
     }
 
-    /// The ways to try, each with the turns that it may use.
-    fn ways(self, alone: bool) -> Vec<Strategy> {
-        let mut ways = Vec::new();
+    /// Returns the strategies to try, in order.
+    fn strategies(self, alone: bool) -> Vec<Strategy> {
+        let mut all = Vec::new();
         let quarters = self.turns == Turns::Quarters;
         if alone {
-            ways.extend(
+            all.extend(
                 [Some(Strategy::Grid(0)), quarters.then_some(Strategy::Grid(1))]
                     .into_iter()
                     .flatten(),
             );
         } else {
-            ways.extend(
+            all.extend(
                 PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Boxes, Turns::None, order)),
             );
         }
         if quarters {
-            ways.extend(
+            all.extend(
                 PlacingRule::ALL
                     .map(|order| Strategy::Greedy(PackBy::Boxes, Turns::Quarters, order)),
             );
@@ -97,30 +98,33 @@ impl Pack {
         if self.by == PackBy::Outlines {
             let allowed = Turns::ALL.into_iter().filter(|turns| *turns <= self.turns);
             for turns in allowed {
-                ways.extend(
+                all.extend(
                     PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Outlines, turns, order)),
                 );
             }
         }
-        ways
+        all
     }
 }
 
-/// One way to find places.
+/// A way to find places.
 #[derive(Clone, Copy, Debug)]
 enum Strategy {
-    /// All copies of the one part in rows and columns, turned by so many right
-    /// angles.
+    /// Puts all copies of the only part in rows and columns, after these quarter turns.
     Grid(u32),
-    /// Copy by copy, where there is room.
+    /// Puts copy after copy where there is room.
     Greedy(PackBy, Turns, PlacingRule),
 }
 
-/// More copies than anyone builds: of a part of a pixel, that is how many are
-/// as many as fit.
+/// More copies than anyone builds. Parts of a pixel would otherwise fill the area with
+/// billions of them.
 const MAX_COPIES: u32 = 1 << 20;
 
-/// Finds places for all copies, or says how many found one.
+/// Finds places for all copies.
+///
+/// # Errors
+/// Returns an error if a part is larger than the area, or not all copies asked for
+/// find a place.
 pub(super) fn pack(
     layout: &Layout,
     counts: &[Option<u32>],
@@ -131,24 +135,24 @@ pub(super) fn pack(
     for part in 0..counts.len() {
         check_fits(layout, part, how.turns)?;
     }
-    // As many as fit is more than all.
+    // Without a count, a single part gets more copies than fit.
     let wanted: Vec<u32> = counts
         .iter()
         .map(|count| count.unwrap_or(if alone { u32::MAX } else { 1 }).min(MAX_COPIES))
         .collect();
     let all = wanted.iter().map(|&count| count as usize).fold(0, usize::saturating_add);
     let mut best: Vec<CopyPlacement> = Vec::new();
-    let mut shapes: Option<NoFitRegions> = None;
-    for way in how.ways(alone) {
-        let found = match way {
+    let mut regions: Option<NoFitRegions> = None;
+    for strategy in how.strategies(alone) {
+        let found = match strategy {
             Strategy::Grid(quarters) => {
                 grid::grid(layout, Orientation::new(quarters, false), wanted[0], gap)
             }
             Strategy::Greedy(by, turns, order) => {
-                let current = shapes.take().filter(|shapes| shapes.are_by(by));
-                let shapes =
-                    shapes.insert(current.unwrap_or_else(|| NoFitRegions::new(layout, gap, by)));
-                greedy::place(layout, shapes, &wanted, turns, order)
+                let current = regions.take().filter(|regions| regions.are_by(by));
+                let regions =
+                    regions.insert(current.unwrap_or_else(|| NoFitRegions::new(layout, gap, by)));
+                greedy::place(layout, regions, &wanted, turns, order)
             }
         };
         if found.len() > best.len() {
@@ -176,7 +180,7 @@ pub(super) fn pack(
 
 fn check_fits(layout: &Layout, part: usize, turns: Turns) -> Result<(), TileError> {
     let area = layout.pixels();
-    let fits = turns.all().iter().any(|&quarters| {
+    let fits = turns.quarters().iter().any(|&quarters| {
         let size = layout.parts()[part].size(Orientation::new(quarters, false));
         size.width <= area.width && size.height <= area.height
     });

@@ -1,10 +1,8 @@
-//! Which displacements make two parts overlap.
+//! No-fit regions: the displacements at which two parts overlap.
 //!
-//! The displacements of a part from another at which they meet are a region of
-//! its own (the no-fit region): row by row, runs of columns. It is found once
-//! for each two parts and ways they are turned, from their outlines in cells of
-//! some pixels, a cell being white where any of its pixels is. So outlines take
-//! up a little more room than they must, never less.
+//! A region is found once for each two parts and orientations, as runs of columns in
+//! rows, from outlines in cells of some pixels. A cell is white if any of its pixels
+//! is, so that outlines take a little more room than they must, never less.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -15,35 +13,35 @@ use super::super::{Layout, PixelSize};
 use super::PackBy;
 use crate::offset::offset_one_bit;
 
-/// The columns from the first up to, but without, the second.
+/// The columns from the first up to but excluding the second.
 pub(super) type CellRun = (i32, i32);
 
-/// A part is so many cells long, the shortest at least, the longest at most.
+/// The number of cells along the shortest part, at least, and along the longest, at
+/// most.
 const MIN_CELLS: u32 = 256;
 const MAX_CELLS: u32 = 768;
 
-/// Parts as shapes in cells.
+/// The outlines of parts in cells, and the regions that were found from them.
 pub(super) struct NoFitRegions {
     by: PackBy,
     gap: u32,
     /// Pixels on a side of a cell.
     pub(super) cell: u32,
-    turned: HashMap<(usize, Orientation), Rc<CellOutline>>,
-    no_fits: HashMap<[(usize, Orientation); 2], Rc<NoFitRegion>>,
+    outlines: HashMap<(usize, Orientation), Rc<CellOutline>>,
+    regions: HashMap<[(usize, Orientation); 2], Rc<NoFitRegion>>,
 }
 
-/// A part's outline in cells, turned.
+/// A part's oriented outline in cells.
 struct CellOutline {
     rows: Vec<Vec<CellRun>>,
-    /// Grown by the gap; its first row and column stand so many cells before
-    /// the shape's.
+    /// The outline grown by the gap, which begins `margin` cells above and to the left.
     grown: Vec<Vec<CellRun>>,
     margin: i32,
 }
 
-/// The displacements at which a shape meets another.
+/// The displacements at which an outline overlaps another.
 pub(super) struct NoFitRegion {
-    /// How far up the first row is.
+    /// The number of cells that the first row is up.
     pub(super) top: i32,
     pub(super) rows: Vec<Rc<[CellRun]>>,
 }
@@ -62,22 +60,22 @@ impl NoFitRegions {
                 fine.max(most.unwrap_or(0).div_ceil(MAX_CELLS)).max(1)
             }
         };
-        Self { by, gap, cell, turned: HashMap::new(), no_fits: HashMap::new() }
+        Self { by, gap, cell, outlines: HashMap::new(), regions: HashMap::new() }
     }
 
     pub(super) fn are_by(&self, by: PackBy) -> bool {
         self.by == by
     }
 
-    /// The displacements of `placed`'s shape from which `moving`'s meets it or
-    /// comes nearer than the gap.
+    /// Returns the displacements at which the outline of `moving` overlaps that of
+    /// `placed` or comes nearer than the gap.
     pub(super) fn no_fit(
         &mut self,
         layout: &Layout,
         moving: (usize, Orientation),
         placed: (usize, Orientation),
     ) -> Rc<NoFitRegion> {
-        if let Some(known) = self.no_fits.get(&[moving, placed]) {
+        if let Some(known) = self.regions.get(&[moving, placed]) {
             return Rc::clone(known);
         }
         let no_fit = Rc::new(match self.by {
@@ -87,26 +85,26 @@ impl NoFitRegions {
                 NoFitRegion::of_boxes(moving, placed, self.gap)
             }
             PackBy::Outlines => {
-                let [moving, placed] = [moving, placed].map(|key| self.shape(layout, key));
-                NoFitRegion::of_shapes(&moving, &placed)
+                let [moving, placed] = [moving, placed].map(|key| self.outline(layout, key));
+                NoFitRegion::of_outlines(&moving, &placed)
             }
         });
-        self.no_fits.insert([moving, placed], Rc::clone(&no_fit));
+        self.regions.insert([moving, placed], Rc::clone(&no_fit));
         no_fit
     }
 
-    fn shape(&mut self, layout: &Layout, key: (usize, Orientation)) -> Rc<CellOutline> {
+    fn outline(&mut self, layout: &Layout, key: (usize, Orientation)) -> Rc<CellOutline> {
         let (gap, cell) = (self.gap, self.cell);
-        let shape =
+        let outline =
             || Rc::new(CellOutline::new(&layout.parts()[key.0].silhouette(key.1), gap, cell));
-        Rc::clone(self.turned.entry(key).or_insert_with(shape))
+        Rc::clone(self.outlines.entry(key).or_insert_with(outline))
     }
 }
 
 impl CellOutline {
     fn new(outline: &Mask, gap: u32, cell: u32) -> Self {
         let size = PixelSize { width: outline.width(), height: outline.height() };
-        // Growing goes to the nearest pixel, which may be one further.
+        // Growing rounds to whole pixels, perhaps up.
         let margin = if gap == 0 { 0 } else { (gap + 1).div_ceil(cell) };
         let around = margin * cell;
         let wide = outline.framed(Frame {
@@ -120,7 +118,7 @@ impl CellOutline {
     }
 }
 
-/// The cells that hold a white pixel.
+/// Returns the cells that hold a white pixel.
 fn cells(mask: &Mask, cell: u32) -> Vec<Vec<CellRun>> {
     let mut rows = vec![Vec::new(); mask.height().div_ceil(cell) as usize];
     for (index, row) in (0..).zip(mask.rows()) {
@@ -132,7 +130,7 @@ fn cells(mask: &Mask, cell: u32) -> Vec<Vec<CellRun>> {
     rows
 }
 
-/// Brings runs in order and joins those that touch.
+/// Sorts runs and joins those that touch.
 fn join_runs(runs: &mut Vec<CellRun>) {
     runs.sort_unstable();
     runs.dedup_by(|next, last| {
@@ -152,7 +150,7 @@ impl NoFitRegion {
         Self { top: height - 1, rows: vec![run; rows as usize] }
     }
 
-    fn of_shapes(moving: &CellOutline, placed: &CellOutline) -> Self {
+    fn of_outlines(moving: &CellOutline, placed: &CellOutline) -> Self {
         let (high, margin) = (moving.rows.len() as i32, placed.margin);
         let top = high - 1 + margin;
         let rows = -top..placed.grown.len() as i32 - margin;
