@@ -1,7 +1,7 @@
 //! Parts as layers in memory, whole and broken in one frame.
 
 use lamp_fixtures::{Defect, Mesh, inject};
-use lamp_slicer::{GridRule, Model, SliceError, SliceOptions, Slices};
+use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, Mask};
 
 /// A part's layers, bottom first.
@@ -12,7 +12,7 @@ pub type Layers = Vec<Layer>;
 /// # Errors
 /// As [`Slices`].
 pub fn slice(mesh: &Mesh, options: &SliceOptions) -> Result<(Layers, GridRule), SliceError> {
-    let slices = Slices::new(Model::from_facets("part", mesh.facets.clone()), options)?;
+    let slices = Slices::new(Part::from_facets("part", mesh.facets.clone()), options)?;
     let grid = slices.grid();
     let grid = GridRule::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] };
     Ok((slices.collect::<Result<_, _>>()?, grid))

@@ -8,12 +8,12 @@
 //!
 //! ```
 //! use lamp_adaptive::{HeightSearch, LayeredPart, Thicknesses, VolumeDeviation};
-//! use lamp_slicer::{FacetIndex, Fill, Model, Placement, Units};
+//! use lamp_slicer::{FacetIndex, Fill, Part, Placement, Units};
 //! use lamp_stack::Length;
 //!
 //! // A tetrahedron, 1 mm high.
 //! let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
-//! let model = Model::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
+//! let model = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
 //! let facets = FacetIndex::new(model, &Placement::default(), Units::Millimetres)?;
 //! let part = LayeredPart::new(facets, Length::from_um(10.0), Fill::EvenOdd)?;
 //! let [min, max, step] = [10.0, 100.0, 1.0].map(Length::from_um);

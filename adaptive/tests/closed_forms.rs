@@ -8,11 +8,11 @@ use lamp_adaptive::{
     VolumeDeviation,
 };
 use lamp_fixtures::{Mesh, cone, sphere};
-use lamp_slicer::{FacetIndex, Fill, Model, Placement, Units};
+use lamp_slicer::{FacetIndex, Fill, Part, Placement, Units};
 use lamp_stack::Length;
 
 fn part(mesh: &Mesh) -> LayeredPart {
-    let model = Model::from_facets("part", mesh.facets.clone());
+    let model = Part::from_facets("part", mesh.facets.clone());
     let facets = FacetIndex::new(model, &Placement::default(), Units::Millimetres).unwrap();
     LayeredPart::new(facets, Length::from_um(5.0), Fill::EvenOdd).unwrap()
 }

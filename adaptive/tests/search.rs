@@ -5,7 +5,7 @@ use lamp_adaptive::{
     Thicknesses, VolumeDeviation, uniform_heights,
 };
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, tower};
-use lamp_slicer::{Axis, FacetIndex, Fill, Model, Placement, Units};
+use lamp_slicer::{Axis, FacetIndex, Fill, Part, Placement, Units};
 use lamp_stack::Length;
 
 const INCH_UM: f64 = 25_400.0;
@@ -15,7 +15,7 @@ fn part(mesh: &Mesh) -> LayeredPart {
 }
 
 fn placed(mesh: &Mesh, placement: &Placement) -> LayeredPart {
-    let model = Model::from_facets("part", mesh.facets.clone());
+    let model = Part::from_facets("part", mesh.facets.clone());
     let facets = FacetIndex::new(model, placement, Units::Millimetres).unwrap();
     LayeredPart::new(facets, Length::from_um(50.0), Fill::EvenOdd).unwrap()
 }
@@ -268,7 +268,7 @@ fn what_is_above_the_last_layer_is_lost() {
 #[test]
 fn rows_are_not_too_near() {
     let facets = FacetIndex::new(
-        Model::from_facets("plate", plate(0.0, 1.0).facets),
+        Part::from_facets("plate", plate(0.0, 1.0).facets),
         &Placement::default(),
         Units::Millimetres,
     );

@@ -4,7 +4,7 @@
 use lamp_adaptive::{LayeredPart, Slab};
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
 use lamp_slicer::{
-    Axis, FacetIndex, Fill, Inside, Model, Placement, SectionOptions, Units, section,
+    Axis, FacetIndex, Fill, Inside, Part, Placement, SectionOptions, Units, section,
 };
 use lamp_stack::{Dpi, Length};
 
@@ -19,8 +19,8 @@ struct Twin {
 }
 
 impl Twin {
-    fn model(&self) -> Model {
-        Model::from_facets("part", self.mesh.facets.clone())
+    fn model(&self) -> Part {
+        Part::from_facets("part", self.mesh.facets.clone())
     }
 
     fn section(&self, z_um: f64, top_mm: f64, rows: u32) -> Vec<Inside> {

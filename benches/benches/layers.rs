@@ -11,7 +11,7 @@ use lamp_adaptive::LayeredPart;
 use lamp_fixtures::{Sample, build};
 use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
-use lamp_slicer::{FacetIndex, Fill, LayerLevels, Model, Placement, SliceOptions, Slices, Units};
+use lamp_slicer::{FacetIndex, Fill, LayerLevels, Part, Placement, SliceOptions, Slices, Units};
 use lamp_stack::{
     DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo,
     PageWriter, g4,
@@ -23,7 +23,7 @@ const LAYERS: std::ops::Range<u32> = 440..460;
 fn slices(facets: usize, gray: Option<DepthLevels>) -> impl Fn() -> Slices {
     let facets = build(Sample::Blade, facets).expect("enough facets").facets;
     move || {
-        let model = Model::from_facets("blade", facets.clone());
+        let model = Part::from_facets("blade", facets.clone());
         let gray = gray.clone().map(LayerLevels::from);
         let options = SliceOptions { layers: Some(LAYERS), gray, ..SliceOptions::default() };
         Slices::new(model, &options).expect("the blade slices")
@@ -122,7 +122,7 @@ fn page(runs: u32, length: u32) -> GrayMask {
 
 fn heights(criterion: &mut Criterion) {
     let facets = build(Sample::Blade, 750_000).expect("enough facets").facets;
-    let model = Model::from_facets("blade", facets);
+    let model = Part::from_facets("blade", facets);
     let body =
         FacetIndex::new(model, &Placement::default(), Units::Millimetres).expect("it is finite");
     let part = LayeredPart::new(body, Length::from_um(68.0), Fill::EvenOdd);

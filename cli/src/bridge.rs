@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use anyhow::anyhow;
-use lamp_slicer::{GridRule, Model, SliceError, SliceOptions, Slices};
+use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, PageInfo};
 
 use crate::part::PartOptions;
@@ -102,7 +102,7 @@ impl Fallback {
             Stop::Failed(anyhow!("it is not the same part as the STEP file: its box {what}"))
         };
         let fallback =
-            Slices::new(Model::open(path, &opening)?, &options).map_err(|error| match error {
+            Slices::new(Part::open(path, &opening)?, &options).map_err(|error| match error {
                 SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
                 error => Stop::from(error),
             })?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
-use lamp_slicer::{GridRule, LayerHeights, LayerLevels, Model, PlaneRule, SliceOptions, Slices};
+use lamp_slicer::{GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOptions, Slices};
 use lamp_stack::{Dpi, Layer, Length, Size};
 use serde::{Deserialize, Serialize};
 
@@ -154,7 +154,7 @@ impl PartOptions {
     /// name of its file, or of several.
     pub(crate) fn slices(
         &self,
-        model: Model,
+        model: Part,
         part: &str,
         layers: Option<Range<u32>>,
         memory: Option<u64>,
@@ -192,7 +192,7 @@ impl PartOptions {
     /// How thick each layer is to be; `say` is told what people should know of it.
     fn layer_heights(
         &self,
-        model: &Model,
+        model: &Part,
         exposure: Option<&Exposure>,
         say: &dyn Fn(&str),
     ) -> Result<LayerHeights, Stop> {

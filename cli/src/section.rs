@@ -8,7 +8,7 @@ use std::str::FromStr;
 use anyhow::{Context, anyhow};
 use lamp_grayscale::resin::{ExposureTime, GrayLevel, Resin};
 use lamp_grayscale::{CuredLine, PixelLine, SolidHeights, excess};
-use lamp_slicer::{Axis, Model, SectionOptions, SliceError, section};
+use lamp_slicer::{Axis, Part, SectionOptions, SliceError, section};
 use lamp_stack::{Dpi, Image, Layer, Length, write_rgb_png};
 
 use crate::part::PartOptions;
@@ -118,7 +118,7 @@ impl Course {
     /// level, and the heights lie along its rows.
     pub(crate) fn outline(
         &self,
-        model: Model,
+        model: Part,
         options: &PartOptions,
     ) -> Result<Vec<SolidHeights>, SliceError> {
         let options = options.for_slicing();

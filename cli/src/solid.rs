@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_slicer::brep::Prepared;
-use lamp_slicer::{FacetIndex, Fill, Model, OpenOptions, Placement, SliceError, Units};
+use lamp_slicer::{FacetIndex, Fill, OpenOptions, Part, Placement, SliceError, Units};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
@@ -46,29 +46,29 @@ impl SolidOptions {
     }
 
     /// The part in memory.
-    pub(crate) fn body(&self, model: Model) -> Result<FacetIndex, SliceError> {
+    pub(crate) fn body(&self, model: Part) -> Result<FacetIndex, SliceError> {
         FacetIndex::new(model, &self.placement(), self.units)
     }
 
     /// Opens all files of a part.
-    pub(crate) fn open(&self, paths: &[PathBuf], reading: &Reading<'_>) -> Result<Model, Stop> {
+    pub(crate) fn open(&self, paths: &[PathBuf], reading: &Reading<'_>) -> Result<Part, Stop> {
         if paths.iter().filter(|path| is_stream(path)).count() > 1 {
             return Err(Stop::usage("standard input can be read only once: give - for one part"));
         }
         let open =
             |path: &PathBuf| self.open_one(path, reading).map_err(|stop| stop.at(input_name(path)));
-        Ok(Model::joined(paths.iter().map(open).collect::<Result<_, _>>()?))
+        Ok(Part::joined(paths.iter().map(open).collect::<Result<_, _>>()?))
     }
 
-    fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Model, Stop> {
+    fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Part, Stop> {
         let tolerance = self.brep.tolerance(reading.dpi);
         let options = OpenOptions {
             allow_gaps: reading.may_be_open,
             ..self.brep.reader.for_opening(tolerance)
         };
         let model = match is_stream(path) {
-            true => Model::from_stream("stdin", io::stdin().lock(), &options)?,
-            false => Model::open(path, &options)?,
+            true => Part::from_stream("stdin", io::stdin().lock(), &options)?,
+            false => Part::open(path, &options)?,
         };
         for prepared in model.prepared() {
             self.check_step(prepared, tolerance, reading)?;

@@ -6,7 +6,7 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{GrayLevel, Resin};
 use lamp_grayscale::{CuredLine, PixelLine, excess};
 use lamp_slicer::{
-    Axis, Fill, Model, PixelGrid, Placement, SectionOptions, SliceOptions, Slices, Units, section,
+    Axis, Fill, Part, PixelGrid, Placement, SectionOptions, SliceOptions, Slices, Units, section,
 };
 use lamp_stack::{Catalogued, Dpi, Layer, Length};
 
@@ -17,8 +17,8 @@ fn resin() -> Resin {
     Material::builtin("lamp-suspension").unwrap().resin().unwrap()
 }
 
-fn model(mesh: &Mesh) -> Model {
-    Model::from_facets("part", mesh.facets.clone())
+fn model(mesh: &Mesh) -> Part {
+    Part::from_facets("part", mesh.facets.clone())
 }
 
 fn slices(mesh: &Mesh, overcure: f64, gray: bool) -> Slices {

@@ -15,8 +15,8 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use crate::facet::Facet;
-use crate::model::map;
-use crate::placement::{PlacedFacet, PlacedModel, facet_heights};
+use crate::part::map;
+use crate::placement::{PlacedFacet, PlacedPart, facet_heights};
 use crate::planes::Planes;
 use crate::table::FacetSource;
 
@@ -44,7 +44,7 @@ impl Buckets {
     /// # Errors
     /// Where the part cannot be read or the temporary file not be written.
     pub(crate) fn sort(
-        model: &PlacedModel,
+        model: &PlacedPart,
         planes: &Planes,
         reach_um: f64,
         slabs: &[Range<usize>],
@@ -83,7 +83,7 @@ impl Buckets {
     }
 
     /// The facets of a slab.
-    pub(crate) fn of_slab<'a>(&'a self, slab: usize, model: &'a PlacedModel) -> SlabFacets<'a> {
+    pub(crate) fn of_slab<'a>(&'a self, slab: usize, model: &'a PlacedPart) -> SlabFacets<'a> {
         let buckets = &self.chunks[slab * self.per_slab..][..self.per_slab];
         SlabFacets { file: &self.file, chunks: buckets.concat(), model }
     }
@@ -162,7 +162,7 @@ fn write(writer: &Mutex<BucketWriter>, bucket: usize, records: &mut Vec<u8>) -> 
 pub(crate) struct SlabFacets<'a> {
     file: &'a File,
     chunks: Vec<Range<u64>>,
-    model: &'a PlacedModel,
+    model: &'a PlacedPart,
 }
 
 impl FacetSource for SlabFacets<'_> {
@@ -189,20 +189,20 @@ mod tests {
 
     use super::*;
     use crate::facet::Units;
-    use crate::model::Model;
+    use crate::part::Part;
     use crate::placement::Placement;
     use crate::planes::PlaneRule;
     use crate::survey::Survey;
 
     /// Facets all over 10 mm, of which a few stand through all of it.
-    fn scattered() -> PlacedModel {
+    fn scattered() -> PlacedPart {
         let facet = |k: usize| {
             let low = (k * 7919 % 10_000) as f32 / 1000.0;
             let high = if k.is_multiple_of(1000) { 10.0 } else { (low + 0.3).min(10.0) };
             [[k as f32, 0.0, low], [0.0, 1.0, low], [1.0, 0.0, high]]
         };
-        let model = Model::from_facets("scattered", (0..20_000).map(facet).collect());
-        PlacedModel::new(model, &Placement::default(), Units::default())
+        let model = Part::from_facets("scattered", (0..20_000).map(facet).collect());
+        PlacedPart::new(model, &Placement::default(), Units::default())
     }
 
     #[test]

@@ -6,15 +6,15 @@ use lamp_stack::{Grouped, KeyCounts};
 
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
-use crate::model::Model;
-use crate::placement::{PlacedFacet, PlacedModel, Placement, facet_heights};
+use crate::part::Part;
+use crate::placement::{PlacedFacet, PlacedPart, Placement, facet_heights};
 use crate::survey::Survey;
 
 /// A part in its place, of which the facets between two heights are found
 /// without a look at the others. It takes about 45 bytes a facet.
 #[derive(Debug)]
 pub struct FacetIndex {
-    model: PlacedModel,
+    model: PlacedPart,
     bins: HeightBins,
     /// By the bin in which they begin.
     facets: Grouped<Facet>,
@@ -66,8 +66,8 @@ impl FacetIndex {
     /// # Errors
     /// Where the part is empty, not finite or 1000 km away, cannot be read, or has
     /// more than 2^32 facets.
-    pub fn new(model: Model, placement: &Placement, units: Units) -> Result<Self, SliceError> {
-        let model = PlacedModel::new(model, placement, units);
+    pub fn new(model: Part, placement: &Placement, units: Units) -> Result<Self, SliceError> {
+        let model = PlacedPart::new(model, placement, units);
         let survey = Survey::of(&model)?;
         survey.check_distance()?;
         let bins = HeightBins::new(&survey);
@@ -138,7 +138,7 @@ mod tests {
         // One that stands through all bins.
         facets.push([[0.0, 0.0, -5.0], [1.0, 0.0, 80.0], [0.0, 1.0, 80.0]]);
         for placement in [Placement::default(), Placement::default().rotated(Axis::X, 90.0)] {
-            let model = Model::from_facets("tower", facets.clone());
+            let model = Part::from_facets("tower", facets.clone());
             let body = FacetIndex::new(model, &placement, Units::Millimetres).unwrap();
             let (min, max) = (body.min()[2], body.max()[2]);
             let mut all = Vec::new();
@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn a_flat_part_is_one_bin() {
         let flat = vec![[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]];
-        let model = Model::from_facets("flat", flat);
+        let model = Part::from_facets("flat", flat);
         let body = FacetIndex::new(model, &Placement::default(), Units::Inches).unwrap();
         assert_eq!(body.between(25_399.0, 25_500.0).len(), 1);
         assert!(body.between(25_400.0, 25_500.0).is_empty());

@@ -1,18 +1,18 @@
 //! CAD parts to layer images, straight from facets to runs.
 //!
-//! A [`Model`] is a part as a source of facets; [`Slices`] are its layers. No
+//! A [`Part`] is a part as a source of facets; [`Slices`] are its layers. No
 //! contour is ever linked and no pixel is painted: each facet's crossings
 //! with the planes of the layers and the rows of the images go straight into
 //! a table of (layer, row), and sorting a row's crossings gives its runs
 //! (002 section 2.3.4, algorithm 9).
 //!
 //! ```
-//! use lamp_slicer::{Model, SliceOptions, Slices};
+//! use lamp_slicer::{Part, SliceOptions, Slices};
 //! use lamp_stack::{Dpi, Image, Length};
 //!
 //! // A tetrahedron: four facets, counter-clockwise seen from outside.
 //! let [o, x, y, z] = [[0.0; 3], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 10.0f32]];
-//! let model = Model::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
+//! let model = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
 //! let options = SliceOptions {
 //!     dpi: Dpi::new(254.0).unwrap(), // 0.1 mm pixels
 //!     thickness: Length::from_mm(2.0),
@@ -41,8 +41,8 @@ mod facet;
 mod facet_index;
 mod gray;
 mod grid;
-mod model;
 mod open;
+mod part;
 mod placement;
 mod planes;
 pub mod scan;
@@ -62,8 +62,8 @@ pub use facet::{Facet, Units};
 pub use facet_index::FacetIndex;
 pub use gray::LayerLevels;
 pub use grid::PixelGrid;
-pub use model::Model;
 pub use open::{OpenOptions, body_name, read_step};
+pub use part::Part;
 pub use placement::{Axis, PlacedFacet, Placement, facet_heights};
 pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};

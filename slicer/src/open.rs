@@ -14,7 +14,7 @@ use lamp_brep::{
 use lamp_stack::{Length, one_line};
 
 use crate::error::SliceError;
-use crate::model::Model;
+use crate::part::Part;
 
 /// How STEP files are read. STL files take no options.
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ impl Default for OpenOptions {
     }
 }
 
-impl Model {
+impl Part {
     /// Opens an STL or STEP file. Which one it is follows from its content.
     ///
     /// A binary STL must not change while the part is in use.

@@ -10,7 +10,7 @@ use lamp_brep::Prepared;
 
 use crate::exact::PlacedSurfaces;
 use crate::facet::{Facet, Units};
-use crate::model::Model;
+use crate::part::Part;
 
 /// An axis of part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,8 +114,8 @@ pub fn facet_heights(facet: &PlacedFacet) -> (f64, f64) {
 
 /// A part in its place.
 #[derive(Debug)]
-pub(crate) struct PlacedModel {
-    pub(crate) model: Model,
+pub(crate) struct PlacedPart {
+    pub(crate) model: Part,
     transform: Transform,
     /// Each file's surfaces in place, if it has some.
     surfaces: Vec<Option<PlacedSurfaces>>,
@@ -129,8 +129,8 @@ enum Transform {
     Affine([[f64; 4]; 3]),
 }
 
-impl PlacedModel {
-    pub(crate) fn new(model: Model, placement: &Placement, units: Units) -> Self {
+impl PlacedPart {
+    pub(crate) fn new(model: Part, placement: &Placement, units: Units) -> Self {
         let place = |prepared: Option<&Prepared>| {
             let rows = placement.rows.map(|[x, y, z, shift]| {
                 let unit = units.mm();

@@ -7,8 +7,8 @@ use crate::cut::Cutter;
 use crate::error::SliceError;
 use crate::facet::Units;
 use crate::grid::PixelGrid;
-use crate::model::Model;
-use crate::placement::{PlacedModel, Placement};
+use crate::part::Part;
+use crate::placement::{PlacedPart, Placement};
 use crate::planes::Planes;
 use crate::survey::Survey;
 use crate::table::Fill;
@@ -42,8 +42,8 @@ pub type Inside = Vec<[f64; 2]>;
 /// # Errors
 /// Where the part is empty, not finite or 1000 km away, or the rows are too
 /// many.
-pub fn section(model: Model, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
-    let model = PlacedModel::new(model, &options.placement, options.units);
+pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
+    let model = PlacedPart::new(model, &options.placement, options.units);
     let survey = Survey::of(&model)?;
     survey.check_distance()?;
     let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
@@ -112,7 +112,7 @@ mod tests {
     fn a_sphere_has_chords() {
         let ball = sphere(5.0, 40_000);
         let lowest = ball.bounds_mm().0[2];
-        let model = Model::from_facets("ball", ball.facets);
+        let model = Part::from_facets("ball", ball.facets);
         let rows = section(model, &options(lowest + 8.0, 6.0, 120)).unwrap();
         for (row, inside) in rows.iter().enumerate() {
             let y = 6.0 - (row as f64 + 0.5) * 0.1;
@@ -129,7 +129,7 @@ mod tests {
     /// Rounded to columns, they are the layer's transitions.
     #[test]
     fn rows_are_those_of_the_layer() {
-        let model = || Model::from_facets("tower", tower(5_000).facets);
+        let model = || Part::from_facets("tower", tower(5_000).facets);
         let slicing = SliceOptions {
             dpi: Dpi::new(254.0).unwrap(),
             thickness: Length::from_mm(5.0),

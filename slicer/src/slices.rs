@@ -14,8 +14,8 @@ use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::Units;
 use crate::gray::{DepthSpan, LayerLevels};
 use crate::grid::PixelGrid;
-use crate::model::Model;
-use crate::placement::{PlacedFacet, PlacedModel, Placement};
+use crate::part::Part;
+use crate::placement::{PlacedFacet, PlacedPart, Placement};
 use crate::planes::{LayerHeights, PlaneRule, Planes};
 use crate::survey::Survey;
 use crate::table::{CutLayer, FacetSource, Fill, OpenRows, Table, open_rows};
@@ -117,7 +117,7 @@ impl Default for SliceOptions {
 /// and bytes do not depend on them.
 #[derive(Debug)]
 pub struct Slices {
-    model: PlacedModel,
+    model: PlacedPart,
     survey: Survey,
     grid: PixelGrid,
     planes: Planes,
@@ -144,11 +144,11 @@ impl Slices {
     /// Where the part is empty, not finite or 1000 km away, or the images or
     /// layers would be too many; where gray layers do not have their sections
     /// at the top.
-    pub fn new(model: Model, options: &SliceOptions) -> Result<Self, SliceError> {
+    pub fn new(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
         if options.gray.is_some() && options.plane != PlaneRule::Top {
             return Err(SliceError::GrayPlane);
         }
-        let model = PlacedModel::new(model, &options.placement, options.units);
+        let model = PlacedPart::new(model, &options.placement, options.units);
         let survey = Survey::of(&model)?;
         survey.check_distance()?;
         let model = if options.polish { model } else { model.on_facets() };
@@ -420,14 +420,14 @@ fn fill(
 
 /// The facets of some blocks of a part.
 struct MetBlocks<'a> {
-    model: &'a PlacedModel,
+    model: &'a PlacedPart,
     blocks: Vec<usize>,
 }
 
 impl<'a> MetBlocks<'a> {
     /// Those that some layers meet, which look so far below their planes.
     fn of(
-        model: &'a PlacedModel,
+        model: &'a PlacedPart,
         survey: &Survey,
         layers: &Range<usize>,
         planes: &Planes,

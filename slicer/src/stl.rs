@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use stl_io::{Normal, Triangle, Vertex};
 
 use crate::facet::Facet;
-use crate::model::Model;
+use crate::part::Part;
 
-impl Model {
+impl Part {
     /// Writes the facets as binary STL, in the file's units: those of exact surfaces
     /// in millimetres.
     ///

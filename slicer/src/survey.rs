@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::error::SliceError;
 use crate::exact::PlacedSurfaces;
-use crate::placement::{PlacedFacet, PlacedModel};
+use crate::placement::{PlacedFacet, PlacedPart};
 use crate::planes::Planes;
 
 /// Places are exact to a nanometre as far as this.
@@ -39,7 +39,7 @@ impl BlockSurvey {
     const EMPTY: Self =
         Self { min: [f64::MAX; 3], max: [f64::MIN; 3], yz_area: 0.0, facets: 0, heights_um: 0.0 };
 
-    fn of(model: &PlacedModel, block: usize) -> io::Result<Result<Self, SliceError>> {
+    fn of(model: &PlacedPart, block: usize) -> io::Result<Result<Self, SliceError>> {
         let mut whole = Self::EMPTY;
         let mut finite = true;
         model.for_each_in_block(block, |facet| {
@@ -76,7 +76,7 @@ fn facet_box([a, b, c]: &PlacedFacet) -> ([f64; 3], [f64; 3]) {
 }
 
 /// The error that names a block's first facet without a finite place.
-fn not_finite(model: &PlacedModel, block: usize) -> io::Result<SliceError> {
+fn not_finite(model: &PlacedPart, block: usize) -> io::Result<SliceError> {
     let (file, facets) = model.model.place_of(block);
     let mut facet = facets.start;
     let mut found = None;
@@ -94,7 +94,7 @@ impl Survey {
     ///
     /// # Errors
     /// Where there is no facet, or one has a coordinate that is no number.
-    pub(crate) fn of(model: &PlacedModel) -> Result<Self, SliceError> {
+    pub(crate) fn of(model: &PlacedPart) -> Result<Self, SliceError> {
         let blocks: Vec<_> = (0..model.model.block_count())
             .into_par_iter()
             .map(|block| BlockSurvey::of(model, block))

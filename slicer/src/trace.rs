@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use crate::cut::{Cutter, SegmentEnd};
 use crate::facet::Facet;
-use crate::placement::PlacedModel;
+use crate::placement::PlacedPart;
 use crate::survey::Survey;
 use crate::table::Fill;
 
@@ -112,7 +112,7 @@ type EdgeName = [[u32; 3]; 2];
 
 /// Looks at a mesh for the second time.
 pub(crate) struct Tracer<'a> {
-    pub(crate) model: &'a PlacedModel,
+    pub(crate) model: &'a PlacedPart,
     pub(crate) survey: &'a Survey,
     pub(crate) cutter: Cutter<'a>,
     /// About how many bytes it may take for one look.

@@ -2,21 +2,21 @@
 
 use lamp_fixtures::{StepSample, StepUnit, step};
 use lamp_slicer::{
-    Axis, LayerHeights, LayerLevels, Model, OpenOptions, Placement, SliceOptions, Slices,
+    Axis, LayerHeights, LayerLevels, OpenOptions, Part, Placement, SliceOptions, Slices,
 };
 use lamp_stack::{DepthLevels, Dpi, Image, Length};
 
-fn model(part: StepSample, chord_mm: f64) -> Model {
+fn model(part: StepSample, chord_mm: f64) -> Part {
     let tolerance = Length::from_mm(chord_mm);
     let options = OpenOptions { tolerance, ..OpenOptions::default() };
-    Model::from_step("part", step(part, StepUnit::Inch).as_bytes(), &options).unwrap()
+    Part::from_step("part", step(part, StepUnit::Inch).as_bytes(), &options).unwrap()
 }
 
 /// Counts the pixels of a part's layers that are not what the closed form says:
 /// how far outside their centres are, in millimetres. Nearer than a nanometre, to
 /// which pages round heights, they may be either.
 fn wrong_pixels(
-    model: Model,
+    model: Part,
     options: &SliceOptions,
     outside_mm: impl Fn([f64; 3]) -> f64,
 ) -> (u64, u64) {

@@ -8,7 +8,7 @@ use std::io::{Cursor, Read, repeat};
 use std::path::Path;
 
 use lamp_fixtures::sphere;
-use lamp_slicer::{Model, OpenOptions};
+use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Layer, Pages, g4};
 use lamp_tests::Scratch;
 use lamp_tests::hostile::classic_tiff;
@@ -124,7 +124,7 @@ fn codes_that_lie() {
 }
 
 fn part_is_refused(path: &Path, words: &str) {
-    is_cheaply_refused(words, || Ok(Model::open(path, &OpenOptions::default())?));
+    is_cheaply_refused(words, || Ok(Part::open(path, &OpenOptions::default())?));
 }
 
 fn parts_that_lie(scratch: &Scratch) {
@@ -134,7 +134,7 @@ fn parts_that_lie(scratch: &Scratch) {
     scratch.write("lying.stl", &lying);
     part_is_refused(&scratch.path("lying.stl"), "declares 4294967295 facets");
     is_cheaply_refused("declares 4294967295 facets", || {
-        Ok(Model::from_stream("part", Cursor::new(lying), &OpenOptions::default())?)
+        Ok(Part::from_stream("part", Cursor::new(lying), &OpenOptions::default())?)
     });
     // Lines that do not end, and a file that is all empty solids but the last.
     for (start, middle, words) in [

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
-use lamp_slicer::Model;
+use lamp_slicer::Part;
 use lamp_slicer::brep::{START_BYTES, is_step};
 use lamp_stack::{Layer, Length, StackError, png_of_layer, write_png_folder};
 
@@ -109,7 +109,7 @@ impl ConvertArgs {
         check_beside(stl, Path::new("-"), [path])?;
         let name = input_name(path);
         let options = self.reader.for_opening(self.chord);
-        let model = bytes_of(path).and_then(|bytes| Model::from_step(&name, bytes, &options));
+        let model = bytes_of(path).and_then(|bytes| Part::from_step(&name, bytes, &options));
         let model = model.map_err(|error| Stop::from(error).at(name))?;
         if !common.quiet {
             let notes = model.prepared().flat_map(notes);

@@ -11,7 +11,7 @@ use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
     FixOptions, HeightOptions, Layout, MeshOptions, Pack, PartStack, TileOptions, fix, tile,
 };
-use lamp_slicer::{Model, OpenOptions};
+use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Catalogued, Layer, Pages, StackError};
 
 use crate::options::{Common, Output, parse_count};
@@ -109,7 +109,7 @@ fn part_layers(
     report: &Report,
 ) -> Result<impl Iterator<Item = Result<Layer, Stop>>, Stop> {
     let options = PartOptions::default();
-    let model = Model::open(stl, &OpenOptions::default())?;
+    let model = Part::open(stl, &OpenOptions::default())?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
     let (slices, name_command) = options.slices(model, &file, range, None, None, &|_| {})?;
     report.expect(slices.layer_count() as u64);

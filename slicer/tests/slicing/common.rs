@@ -1,7 +1,7 @@
 //! What the tests share: small parts, options, and the way to layers.
 
 use lamp_fixtures::Mesh;
-use lamp_slicer::{Model, SliceError, SliceOptions, Slices};
+use lamp_slicer::{Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask};
 use proptest::test_runner::Config;
 
@@ -18,11 +18,11 @@ pub(crate) fn cases(cases: u32) -> Config {
     Config { cases, failure_persistence: None, ..Config::default() }
 }
 
-pub(crate) fn model(mesh: &Mesh) -> Model {
-    Model::from_facets("part", mesh.facets.clone())
+pub(crate) fn model(mesh: &Mesh) -> Part {
+    Part::from_facets("part", mesh.facets.clone())
 }
 
-pub(crate) fn try_layers(model: Model, options: &SliceOptions) -> Result<Vec<Layer>, SliceError> {
+pub(crate) fn try_layers(model: Part, options: &SliceOptions) -> Result<Vec<Layer>, SliceError> {
     Slices::new(model, options)?.collect()
 }
 

@@ -4,7 +4,7 @@
 use std::fs;
 
 use lamp_fixtures::{Mesh, sphere, tower};
-use lamp_slicer::{Fill, LayerHeights, LayerLevels, Model, OpenOptions, SliceOptions, Slices};
+use lamp_slicer::{Fill, LayerHeights, LayerLevels, OpenOptions, Part, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Layer, Length};
 
 use crate::common::{
@@ -21,25 +21,25 @@ fn several_files_are_one_part() {
     meshes[1].write_ascii_stl("b", &mut text).unwrap();
     let read = || {
         let [a, b] = [("a", &binary), ("b", &text)].map(|(name, bytes)| {
-            Model::from_stream(name, &bytes[..], &OpenOptions::default()).unwrap()
+            Part::from_stream(name, &bytes[..], &OpenOptions::default()).unwrap()
         });
-        [a, b, Model::from_facets("c", meshes[2].facets.clone())]
+        [a, b, Part::from_facets("c", meshes[2].facets.clone())]
     };
     let whole = joined(&meshes);
     for fill in [Fill::EvenOdd, Fill::NonZero] {
         for memory in [30_000, 1 << 30] {
             let options = SliceOptions { fill, memory, ..coarse() };
-            let layers = try_layers(Model::joined(read().into()), &options).unwrap();
+            let layers = try_layers(Part::joined(read().into()), &options).unwrap();
             assert!(without_stack(layers) == without_stack(slice(&whole, &options)));
         }
     }
-    let model = Model::joined(read().into());
+    let model = Part::joined(read().into());
     assert_eq!((model.name(), model.facet_count()), ("a+b+c", whole.facets.len()));
     let digests = read().map(|model| model.digest().to_owned()).concat();
     assert_eq!(model.digest(), format!("blake3:{}", blake3::hash(digests.as_bytes()).to_hex()));
     let [alone, ..] = read();
     let (name, digest) = (alone.name().to_owned(), alone.digest().to_owned());
-    let alone = Model::joined(vec![alone]);
+    let alone = Part::joined(vec![alone]);
     assert_eq!((alone.name(), alone.digest()), (name.as_str(), digest.as_str()));
 }
 
@@ -149,8 +149,8 @@ fn files_streams_and_memory_give_the_same_layers() {
     for bytes in [binary, text] {
         fs::write(&path, &bytes).unwrap();
         let from_file =
-            try_layers(Model::open(&path, &OpenOptions::default()).unwrap(), &coarse()).unwrap();
-        let stream = Model::from_stream("part", &bytes[..], &OpenOptions::default()).unwrap();
+            try_layers(Part::open(&path, &OpenOptions::default()).unwrap(), &coarse()).unwrap();
+        let stream = Part::from_stream("part", &bytes[..], &OpenOptions::default()).unwrap();
         assert_eq!(stream.facet_count(), mesh.facets.len());
         assert!(try_layers(stream, &coarse()).unwrap() == from_file);
 

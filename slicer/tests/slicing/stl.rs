@@ -1,13 +1,13 @@
 //! STL files: good ones of every style, and bad ones of every kind.
 
 use lamp_fixtures::{Mesh, sphere};
-use lamp_slicer::{Facet, Fill, Model, OpenOptions, SliceError, SliceOptions};
+use lamp_slicer::{Facet, Fill, OpenOptions, Part, SliceError, SliceOptions};
 use proptest::prelude::*;
 
 use crate::common::{cases, cube, options, slice, try_layers, without_stack};
 
-fn read(bytes: &[u8]) -> Result<Model, SliceError> {
-    Model::from_stream("part", bytes, &OpenOptions::default())
+fn read(bytes: &[u8]) -> Result<Part, SliceError> {
+    Part::from_stream("part", bytes, &OpenOptions::default())
 }
 
 fn refusal(bytes: &[u8]) -> String {
@@ -158,7 +158,7 @@ fn the_first_coordinate_that_is_no_number_is_named() {
             broken.facets[facet][corner][corner] = value;
         }
         let named = format!("facet {} has a coordinate", bad.iter().min().unwrap());
-        let from_memory = Model::from_facets("part", broken.facets.clone());
+        let from_memory = Part::from_facets("part", broken.facets.clone());
         let error = try_layers(from_memory, &options(100.0, 500.0)).unwrap_err();
         for message in [error.to_string(), refusal(&binary(&broken))] {
             assert!(message.starts_with(&named), "{message}");
@@ -177,7 +177,7 @@ fn a_coordinate_that_is_no_number_names_its_file() {
             }
             read(&binary(&mesh)).unwrap()
         });
-        let error = try_layers(Model::joined(models.collect()), &options(100.0, 500.0));
+        let error = try_layers(Part::joined(models.collect()), &options(100.0, 500.0));
         let told = matches!(error, Err(SliceError::NotFinite { file: f, facet: n }) if (f, n) == (file, facet));
         assert!(told, "{error:?}");
     }

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use lamp_fixtures::{Defect, Facet, Mesh, Sample, build, inject, sphere};
 use lamp_slicer::{
-    Axis, EdgeFacet, Fill, Model, Placement, SliceError, SliceOptions, Slices, StrayBand, Trace,
+    Axis, EdgeFacet, Fill, Part, Placement, SliceError, SliceOptions, Slices, StrayBand, Trace,
 };
 use proptest::prelude::*;
 
 use crate::common::{cases, joined, model, options};
 
 /// The bands of a part, and their trace.
-fn traced(model: Model, options: &SliceOptions) -> (Vec<StrayBand>, Trace) {
+fn traced(model: Part, options: &SliceOptions) -> (Vec<StrayBand>, Trace) {
     let mut slices = Slices::new(model, options).unwrap();
     let layers = slices.by_ref().map(|layer| layer.unwrap().info);
     let bands: Vec<_> = layers.flat_map(|info| StrayBand::of(&info).collect::<Vec<_>>()).collect();
@@ -134,7 +134,7 @@ fn facets_are_numbered_in_their_files() {
     inject(&mut second, Defect::Drop, 1, 12);
     let models = || [model(&ball), model(&second)].into();
     let options = coarse(Fill::EvenOdd);
-    let (bands, trace) = traced(Model::joined(models()), &options);
+    let (bands, trace) = traced(Part::joined(models()), &options);
     let (_, alone) = traced(model(&joined(&[ball.clone(), second])), &options);
     assert!(!bands.is_empty() && trace.edges.len() == alone.edges.len());
     for (of_file, of_all) in trace.edges.iter().zip(&alone.edges) {

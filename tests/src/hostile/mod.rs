@@ -11,7 +11,7 @@ use std::io::{Cursor, Write};
 use std::path::Path;
 
 use fax::decoder::decode_g4;
-use lamp_slicer::{Fill, Model, OpenOptions, SliceError, SliceOptions, Slices};
+use lamp_slicer::{Fill, OpenOptions, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{
     Dpi, EncodedPage, Format, Image, Layer, Length, Mask, MaskBuilder, PageWriter, Pages,
     StackError, g4 as codec,
@@ -57,7 +57,7 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
         memory,
         ..SliceOptions::default()
     };
-    let slices = Slices::new(Model::open(path, &OpenOptions::default())?, &options)?;
+    let slices = Slices::new(Part::open(path, &OpenOptions::default())?, &options)?;
     if slices.grid().height > MOST_ROWS { Ok(Vec::new()) } else { slices.collect() }
 }
 
@@ -69,7 +69,7 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
 pub fn step(bytes: &[u8]) {
     // Parts of files that make sense are some centimetres large.
     let options = OpenOptions { tolerance: Length::from_mm(0.5), ..OpenOptions::default() };
-    let model = match Model::from_step("part", bytes, &options) {
+    let model = match Part::from_step("part", bytes, &options) {
         Ok(model) => model,
         Err(error) => return drop(one_line(&error)),
     };

@@ -5,7 +5,7 @@ use lamp_fixtures::{
     Defect, Mesh, Sample, StepDefect, StepSample, StepUnit, broken_step, build, inject, sphere,
     step, torus,
 };
-use lamp_slicer::{Model, SliceOptions, Slices};
+use lamp_slicer::{Part, SliceOptions, Slices};
 use lamp_stack::{
     Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
     png_of_layer,
@@ -104,7 +104,7 @@ fn layers(dpi: f64) -> Vec<Layer> {
         thickness: Length::from_mm(2.0),
         ..SliceOptions::default()
     };
-    let slices = Slices::new(Model::from_facets("ball", ball.facets), &options);
+    let slices = Slices::new(Part::from_facets("ball", ball.facets), &options);
     slices.and_then(Iterator::collect).expect("a part that can be sliced")
 }
 

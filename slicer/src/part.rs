@@ -26,7 +26,7 @@ const BLOCK_SURFACE_FACETS: usize = 128;
 /// stays in its file, of which only a few blocks are mapped at a time. Clones
 /// share the facets.
 #[derive(Clone, Debug)]
-pub struct Model {
+pub struct Part {
     name: String,
     /// The files' facets. No block has facets of two files.
     files: Vec<FileFacets>,
@@ -61,7 +61,7 @@ impl FileFacets {
     }
 }
 
-impl Model {
+impl Part {
     /// A part of these facets.
     pub fn from_facets(name: &str, facets: Vec<Facet>) -> Self {
         let mut hasher = Hasher::new();
@@ -254,7 +254,7 @@ fn parse(record: &[u8; FACET_BYTES]) -> Facet {
 #[expect(unsafe_code, reason = "mapping a file is unsafe, since others may change it")]
 pub(crate) fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
     // SAFETY: the map is private and read only. Its bytes are undefined only
-    // if another process changes the file meanwhile, which `Model::open`
+    // if another process changes the file meanwhile, which `Part::open`
     // forbids (temporary files have no name); any bytes are valid numbers here.
     unsafe { MmapOptions::new().offset(offset).len(length).map(file) }
 }
