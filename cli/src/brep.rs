@@ -38,11 +38,11 @@ pub(crate) struct BrepOptions {
 #[derive(Args, Clone, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct ReaderOptions {
-    /// What reads STEP parts: LAMP itself, or OpenCASCADE (in builds with --features occt)
+    /// Kernel that reads STEP parts: LAMP's own, or OpenCASCADE (in builds with --features occt)
     #[arg(long, value_enum, default_value_t, help_heading = HEADING)]
     kernel: KernelArg,
 
-    /// Give up on a STEP part that takes longer to read, in seconds
+    /// Time limit for reading a STEP part, in seconds
     #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = parse_seconds)]
     #[arg(help_heading = HEADING)]
     #[serde(skip)]
@@ -91,7 +91,7 @@ impl ReaderOptions {
 pub(crate) fn parse_tolerance(text: &str) -> Result<Length, String> {
     let length = parse_distance(text)?;
     let has_some = length.um() > 0.0;
-    if has_some { Ok(length) } else { Err("facets lie some way from surfaces".to_owned()) }
+    if has_some { Ok(length) } else { Err("the length must be above zero".to_owned()) }
 }
 
 fn parse_seconds(text: &str) -> Result<Duration, String> {
@@ -118,12 +118,12 @@ pub(crate) fn boxes_overlap(prepared: &Prepared) -> bool {
 pub(crate) fn notes(prepared: &Prepared) -> Vec<String> {
     let mut notes = findings(&prepared.mesh.findings);
     if prepared.heal_mm > 0.0 {
-        notes.push(format!("edges that lie within {} were joined", length(prepared.heal_mm)));
+        notes.push(format!("edges within {} of each other were joined", length(prepared.heal_mm)));
     }
     let wanted_mm = prepared.tries.first().map_or(prepared.chord_mm, |first| first.chord_mm);
     if prepared.chord_mm > wanted_mm {
         notes.push(format!(
-            "its facets lie up to {} from their surfaces, for with less some were wrong",
+            "its facets lie up to {} from the surfaces, because finer ones were faulty",
             length(prepared.chord_mm)
         ));
     }

@@ -128,7 +128,8 @@ impl Walls {
         }
         if let Some((first, count)) = &self.cut_off {
             lines.push(format!(
-                "{first}, the first of {count}, should grow beyond its image, which cuts it off: slice with a larger --margin"
+                "{first}, the first of {count}, grows beyond its image and is cut off: slice \
+                 with a larger --margin"
             ));
         }
         lines

@@ -35,7 +35,7 @@ impl Evidence {
         let name = || folder.display().to_string();
         fs::create_dir_all(folder).with_context(name)?;
         if fs::read_dir(folder).with_context(name)?.next().is_some() {
-            return Err(Stop::usage(format!("{}: pictures go to an empty folder", name())));
+            return Err(Stop::usage(format!("{}: the folder for pictures is not empty", name())));
         }
         Ok(Self { folder: folder.to_owned(), failed: None })
     }

@@ -24,20 +24,20 @@ const LARGEST_TABLE: u64 = 1 << 20;
 #[derive(Args, Clone, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct ExposureOptions {
-    /// The resin: a name of `lamp material list`, or a file. Pages then say how long they are
-    /// exposed
+    /// Resin: a built-in material's name (see lamp material list) or a file. Pages then state their
+    /// exposure time
     #[arg(long, value_name = "NAME|FILE", help_heading = EXPOSURE)]
     material: Option<PathBuf>,
 
-    /// How deep full white cures, in layers: 1 cures just the layer, more binds it to the one
+    /// Depth that full white cures, in layers: 1 cures just the layer, more bonds it to the one
     /// below
     #[arg(long, value_name = "LAYERS", default_value = "1", value_parser = parse_overcure)]
     #[arg(requires = "material", help_heading = EXPOSURE)]
     #[serde(with = "text")]
     overcure: f64,
 
-    /// How long layers of each thickness are exposed, instead of by a material: a table with the
-    /// columns thickness_um and exposure_ms. Between two thicknesses times go along a straight line
+    /// Exposure times by layer thickness, instead of a material: a table with the columns
+    /// thickness_um and exposure_ms. Times between two rows are interpolated linearly
     #[arg(long, value_name = "FILE.csv", conflicts_with = "material", help_heading = EXPOSURE)]
     exposure_table: Option<PathBuf>,
 }
@@ -110,7 +110,7 @@ impl Exposure {
             }
             Source::Table(times) => times.of(thickness).ok_or_else(|| {
                 let [least, most] = times.limits();
-                self.failed(anyhow!("the table goes from {least} to {most}, not to {thickness}"))
+                self.failed(anyhow!("the table covers {least} to {most}, not {thickness}"))
             })?,
         };
         Ok(ExposureTime::from_ms((time.ms() * 1000.0).round() / 1000.0))
@@ -122,7 +122,7 @@ impl Exposure {
     /// Where the resin does not say them; a table of times never does.
     pub(crate) fn levels(&self, thickness: Length) -> Result<DepthLevels, Stop> {
         let Source::Resin { resin, .. } = &self.source else {
-            return Err(self.failed(anyhow!("gray levels follow from a material, not from times")));
+            return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
         };
         resin.depth_levels(self.time(thickness)?).map_err(|error| self.failed(error.into()))
     }
@@ -136,6 +136,8 @@ impl Exposure {
 fn parse_overcure(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(layers) if (0.1..=100.0).contains(&layers) => Ok(layers),
-        _ => Err(format!("`{text}` is not how deep white cures: write 1 for the layer, 1.5 or 2")),
+        _ => Err(format!(
+            "`{text}` is not a depth in layers: write a number from 0.1 to 100, as 1.5"
+        )),
     }
 }

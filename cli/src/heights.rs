@@ -27,64 +27,63 @@ const PIXELS_PER_ROW: f64 = 4.0;
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct HeightOptions {
-    /// The thinnest layer that the machine builds [default: 25um]
+    /// Thinnest layer that the machine builds [default: 25um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     #[serde(with = "optional")]
     min: Option<Length>,
 
-    /// The thickest [default: 100um]
+    /// Thickest layer [default: 100um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     #[serde(with = "optional")]
     max: Option<Length>,
 
-    /// Layers are whole steps thick [default: 1um]
+    /// Step of layer thickness: all are multiples of it [default: 1um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     #[serde(with = "optional")]
     step: Option<Length>,
 
-    /// How far a layer is off the part: by the volume it lacks and has too much, by the cusps at
-    /// its edge, or by how the section's area changes [default: volume, or cusp where --cusp is
-    /// given]
+    /// Measure of a layer's error: the volume it lacks or has in excess, the height of cusps at its
+    /// edge, or the change of its section's area [default: volume, or cusp with --cusp]
     #[arg(long, value_parser = one_of::<Measure>(), help_heading = HEADING)]
     #[serde(with = "optional")]
     criterion: Option<Measure>,
 
-    /// The most that a layer may be off, as a share of its volume (or, by --criterion area, of its
-    /// section): 2% or 0.02 [default: 2%]
+    /// Largest error of a layer, as a share of its volume (with --criterion area, of its section's
+    /// area): 2% or 0.02 [default: 2%]
     #[arg(long, value_name = "SHARE", value_parser = parse_share, help_heading = HEADING)]
     #[serde(with = "optional")]
     deviation: Option<f64>,
 
-    /// The highest cusp: how far a layer's edge may be off the surface, along its normal
+    /// Largest cusp height: how far a layer's edge may be off the surface, along its normal
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     #[arg(conflicts_with = "deviation")]
     #[serde(with = "optional")]
     cusp: Option<Length>,
 
-    /// At most so many layers: the smallest bound that needs no more is found, to one percent
+    /// Use at most N layers, with the smallest error that allows it (found to one percent)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     #[arg(conflicts_with_all = ["deviation", "cusp", "time_budget"], help_heading = HEADING)]
     #[serde(with = "optional")]
     layers_budget: Option<u32>,
 
-    /// At most so long for all layers, as 8h, 90min or 1200s: their exposures, by --material or
-    /// --exposure-table, and --layer-overhead
+    /// Build all layers within this time, for example 8h, 90min or 1200s: exposures, from
+    /// --material or --exposure-table, plus --layer-overhead
     #[arg(long, value_name = "TIME", help_heading = HEADING)]
     #[arg(conflicts_with_all = ["deviation", "cusp"])]
     #[serde(with = "optional")]
     time_budget: Option<Seconds>,
 
-    /// What each layer takes besides its exposure, as 30s: recoating, most of all
+    /// Time per layer besides its exposure, mostly for recoating, for example 30s
     #[arg(long, value_name = "TIME", help_heading = HEADING)]
     #[serde(with = "optional")]
     layer_overhead: Option<Seconds>,
 
-    /// End layers at flat faces, wherever the limits allow
+    /// End layers at flat faces where the limits allow
     #[arg(long, help_heading = HEADING)]
     snap: bool,
 
-    /// How far apart the rows are along which the part is measured: what is thinner across them
-    /// may be missed [default: four pixels]
+    /// Distance between the rows along which the part is measured; thinner features may be missed
+    /// [default: four pixels]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     #[serde(with = "optional")]
     row_pitch: Option<Length>,
@@ -148,13 +147,11 @@ impl Found {
         });
         if rows > 0 {
             say(&format!(
-                "{rows} rows in {layers} layers do not balance: the mesh has gaps; how thick these \
-                 layers are follows from the other rows"
+                "{rows} rows in {layers} layers do not balance: the mesh has gaps; the other \
+                 rows decide the thickness of these layers"
             ));
         } else if self.heights.volumes_mm3()[2] == 0.0 {
-            say(
-                "the part has no volume in any row: it is flat, or too thin for such a --row-pitch",
-            );
+            say("the part has no volume in any row: it is flat, or too thin for this --row-pitch");
         }
     }
 }
@@ -200,9 +197,9 @@ impl HeightOptions {
         let default = if self.cusp.is_some() { Measure::Cusp } else { Measure::Volume };
         let criterion = self.criterion.unwrap_or(default);
         match (criterion == Measure::Cusp, self.cusp.is_some()) {
-            (false, true) => Err(Stop::usage("--cusp goes with --criterion cusp")),
+            (false, true) => Err(Stop::usage("--cusp needs --criterion cusp")),
             (true, false) if self.deviation.is_some() || !self.has_budget() => {
-                Err(Stop::usage("--criterion cusp takes its bound from --cusp, as --cusp 10um"))
+                Err(Stop::usage("--criterion cusp needs a bound, as --cusp 10um"))
             }
             _ => Ok(criterion),
         }

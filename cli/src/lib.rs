@@ -42,7 +42,7 @@ use report::say;
 use signals::{clean_up_on_signals, wait_if_ending};
 use stop::Stop;
 
-/// CAD parts to the layer images of projection photopolymerization.
+/// Turn CAD parts into layer images for projection photopolymerization.
 #[derive(Parser)]
 #[command(name = "lamp", version, max_term_width = 100, after_help = EXAMPLES)]
 struct Lamp {

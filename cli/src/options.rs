@@ -13,11 +13,11 @@ use crate::stop::Stop;
 /// Options of every command.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Common {
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(short, long, global = true, help_heading = "General options")]
     pub(crate) quiet: bool,
 
-    /// Work on N threads [default: all processors]
+    /// Use N threads [default: one per processor]
     #[arg(long, value_name = "N", global = true, help_heading = "General options")]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
     threads: Option<u16>,
@@ -40,7 +40,7 @@ pub(crate) struct Input {
     #[arg(value_name = "STACK", default_value = "-")]
     pub(crate) stack: PathBuf,
 
-    /// Only these layers: A..B is A to B - 1; A.. and ..B are open ended
+    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     pub(crate) layers: Option<Range<u32>>,
 }
@@ -91,7 +91,7 @@ pub(crate) fn parse_layers(text: &str) -> Result<Range<u32>, String> {
         }
     };
     if start >= end {
-        return Err(format!("`{text}` holds no layer: the end must be above the start"));
+        return Err(format!("`{text}` contains no layer: the end must be above the start"));
     }
     Ok(start..end)
 }
@@ -105,15 +105,17 @@ pub(crate) fn parse_distance(text: &str) -> Result<Length, String> {
 /// Parses a length above zero.
 pub(crate) fn parse_thickness(text: &str) -> Result<Length, String> {
     let length = parse_distance(text)?;
-    if length.um() == 0.0 { Err("a layer has some thickness".to_owned()) } else { Ok(length) }
+    if length.um() == 0.0 { Err("the length must be above zero".to_owned()) } else { Ok(length) }
 }
 
 /// Parses the light of full white, which is some.
 pub(crate) fn parse_light(text: &str) -> Result<Intensity, String> {
     match text.parse::<Intensity>() {
-        Ok(light) if light.mw_per_cm2() == 0.0 => Err("full white has some light".to_owned()),
+        Ok(light) if light.mw_per_cm2() == 0.0 => {
+            Err("the intensity must be above zero".to_owned())
+        }
         Ok(light) if Intensity::PLAUSIBLE.contains(&light) => Ok(light),
-        Ok(_) => Err("no lamp is that bright or dim: write 1e-6 to 1e9 mW/cm2".to_owned()),
+        Ok(_) => Err("the intensity must be between 1e-6 and 1e9 mW/cm2".to_owned()),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -135,7 +137,7 @@ pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
 pub(crate) fn parse_memory(text: &str) -> Result<u64, String> {
     match parse_bytes(text)? {
         bytes @ 16_000_000.. => Ok(bytes),
-        _ => Err(format!("{text} is too little to work in: 16MB is the least")),
+        _ => Err(format!("{text} is too little memory: at least 16MB is needed")),
     }
 }
 

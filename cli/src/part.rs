@@ -27,14 +27,14 @@ pub(crate) struct PartOptions {
     #[serde(with = "text")]
     pub(crate) dpi: Dpi,
 
-    /// Thickness of the layers, as 100um, 0.1mm, 4mil or 0.004in
+    /// Layer thickness, for example 100um, 0.1mm, 4mil or 0.004in
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
     #[arg(default_value_t = Self::default().thickness)]
     #[arg(allow_hyphen_values = true, conflicts_with = "adaptive")]
     #[serde(with = "text")]
     thickness: Length,
 
-    /// Where in its layer a section is taken
+    /// Height in each layer at which the part is cut
     #[arg(long, value_parser = one_of::<PlaneRule>(), default_value_t)]
     #[serde(with = "text")]
     plane: PlaneRule,
@@ -48,24 +48,24 @@ pub(crate) struct PartOptions {
     #[arg(long, help_heading = HEADING)]
     no_polish: bool,
 
-    /// Black pixels around the part's box
+    /// Black pixels around the part's bounding box
     #[arg(long, value_name = "PIXELS", default_value_t = Self::default().margin)]
     #[serde(with = "text")]
     margin: u32,
 
-    /// Top left corner of the image in part coordinates, in millimetres, instead of the part's
-    /// box; the image must hold the part, and leave its last column black
+    /// Top left corner of the image in part coordinates, in millimetres, instead of around the
+    /// part's bounding box; the image must contain the part and keep its last column black
     #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
     #[arg(allow_hyphen_values = true)]
     #[serde(with = "optional")]
     origin: Option<Numbers<2>>,
 
-    /// Size of the image, as 80x80mm or 4x4.5in; goes with --origin
+    /// Size of the image, for example 80x80mm or 4x4.5in; needs --origin
     #[arg(long, value_name = "WxH", requires = "origin")]
     #[serde(with = "optional")]
     size: Option<Size>,
 
-    /// Make each layer as thick as the part's slopes allow, by the options below
+    /// Make each layer as thick as the part's slopes allow, within the limits below
     #[arg(long, help_heading = heights::HEADING)]
     adaptive: bool,
 
@@ -77,8 +77,8 @@ pub(crate) struct PartOptions {
     #[serde(flatten)]
     exposure: ExposureOptions,
 
-    /// Write gray layers: each pixel as bright as it takes to cure the part below it, down to
-    /// where the part ends. White where it does not end within what white cures
+    /// Write gray layers: each pixel just bright enough to cure down to where the part ends below
+    /// it, or white if that is deeper than white cures
     #[arg(long, requires = "material", conflicts_with = "exposure_table")]
     #[arg(help_heading = EXPOSURE)]
     gray: bool,
@@ -202,7 +202,7 @@ impl PartOptions {
         found.warn(say);
         if self.heights.has_budget() {
             let layers = found.heights.slabs.len();
-            say(&format!("{layers} layers keep the budget, within {}", found.bound()));
+            say(&format!("{layers} layers keep the budget, with errors up to {}", found.bound()));
         }
         Ok(found.heights.layer_heights()?)
     }
@@ -221,13 +221,13 @@ impl PartOptions {
         if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)
             && self.plane != PlaneRule::Top
         {
-            let why = format!("{option} takes sections at the layers' tops: leave --plane away");
+            let why = format!("{option} cuts layers at their tops: leave out --plane");
             return Err(Stop::usage(why));
         }
         if !self.adaptive
             && let Some(option) = to_words(&self.heights, |_| true).split_whitespace().next()
         {
-            return Err(Stop::usage(format!("{option} goes with --adaptive")));
+            return Err(Stop::usage(format!("{option} needs --adaptive")));
         }
         let exposure = self.exposure.exposure()?;
         if self.adaptive {

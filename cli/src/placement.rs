@@ -16,27 +16,27 @@ const HEADING: &str = "Placement of the part, in this order";
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct PlacementOptions {
-    /// Make the part larger, by one factor or one for each axis: 1.02 makes up for about 2 % of
-    /// shrinkage
+    /// Scale the part, by one factor or one for each axis: 1.02 makes up for about 2% of shrinkage
     #[arg(long, value_name = "F|X,Y,Z", value_parser = parse_scale, help_heading = HEADING)]
     #[arg(allow_hyphen_values = true)]
     #[serde(with = "optional")]
     scale: Option<Numbers<3>>,
 
-    /// Mirror the part: x swaps its left and its right
+    /// Mirror the part: x swaps left and right
     #[arg(long, value_name = "AXIS", value_parser = one_of::<Axis>(), value_delimiter = ',')]
     #[arg(help_heading = HEADING)]
     #[serde(with = "list")]
     mirror: Vec<Axis>,
 
-    /// Turn the part about an axis through 0, by degrees counter-clockwise seen from the axis's
-    /// tip; several one after another, as x:90,z:-12.5. Quarter turns are exact
+    /// Rotate the part about an axis through the origin, in degrees, counter-clockwise seen from
+    /// the axis's tip. Several rotations apply in order, as in x:90,z:-12.5. Quarter turns are
+    /// exact
     #[arg(long, value_name = "AXIS:DEGREES", value_delimiter = ',', help_heading = HEADING)]
     #[serde(with = "list")]
     rotate: Vec<Rotation>,
 
-    /// Move the part, in millimetres. The image goes with it: its origin and the heights of the
-    /// layers are in the coordinates that the part then has
+    /// Move the part, in millimetres. The image moves along: its origin and the layers' heights are
+    /// in the moved part's coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, help_heading = HEADING)]
     #[arg(allow_hyphen_values = true)]
     #[serde(with = "optional")]
@@ -115,17 +115,18 @@ fn parse_scale(text: &str) -> Result<Numbers<3>, String> {
     })?;
     match factors {
         Numbers(factors) if factors.contains(&0.0) => {
-            Err(format!("`{text}` leaves nothing of the part"))
+            Err(format!("`{text}` would leave nothing of the part"))
         }
         Numbers(factors) if factors.iter().any(|&f| f < 0.0) => {
-            Err(format!("`{text}` is below zero: --mirror turns a part over"))
+            Err(format!("`{text}` is below zero: mirror the part with --mirror"))
         }
         factors => Ok(factors),
     }
 }
 
 fn parse_translation(text: &str) -> Result<Numbers<3>, String> {
-    let wrong = || format!("`{text}` is not a way: write X,Y,Z in millimetres, as -5,0,12.7");
+    let wrong =
+        || format!("`{text}` is not a translation: write X,Y,Z in millimetres, as -5,0,12.7");
     text.trim_end_matches("mm").parse().map_err(|_| wrong())
 }
 

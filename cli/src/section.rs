@@ -48,7 +48,7 @@ impl fmt::Display for Plane {
 
 /// Parses `3mm..6mm`.
 pub(crate) fn parse_along(text: &str) -> Result<Range<f64>, String> {
-    let wrong = || format!("`{text}` is no stretch of the section: write A..B, as 3mm..6mm");
+    let wrong = || format!("`{text}` is not a stretch of the section: write A..B, as 3mm..6mm");
     let (from, to) = text.split_once("..").ok_or_else(wrong)?;
     let mm = |text: &str| text.parse().map_err(|_| wrong()).map(Length::mm);
     let range = mm(from)?..mm(to)?;
@@ -69,7 +69,7 @@ impl Course {
     /// like the layer's.
     pub(crate) fn new(plane: Plane, layer: &Layer) -> anyhow::Result<Self> {
         let corner_mm =
-            layer.info.origin_mm.context("its pages do not say where they lie on the part")?;
+            layer.info.origin_mm.context("its pages do not state their position on the part")?;
         let dpi = layer.dpi.context("its pages do not state their resolution")?;
         let [x0, y1] = corner_mm;
         let pitch = dpi.pitch().mm();
@@ -180,12 +180,12 @@ impl<'a> Exposures<'a> {
     pub(crate) fn add(&mut self, layer: &Layer) -> anyhow::Result<()> {
         let name = || layer.info.name();
         let of_page = layer.info.z_um.zip(layer.info.thickness_um);
-        let (z, thickness) =
-            of_page.with_context(|| format!("{} does not say its height and thickness", name()))?;
+        let (z, thickness) = of_page
+            .with_context(|| format!("{} does not state its height and thickness", name()))?;
         let wrong = |number: f64| !(number > 0.0 && number.is_finite());
         if wrong(thickness) || layer.info.exposure_ms.is_some_and(wrong) {
             return Err(anyhow!(
-                "{} says a thickness or an exposure that is not above zero",
+                "{} states a thickness or an exposure that is not above zero",
                 name()
             ));
         }
@@ -197,7 +197,7 @@ impl<'a> Exposures<'a> {
             None => self
                 .resin
                 .exposure_time(Length::from_um(thickness), 1.0)
-                .with_context(|| format!("{} says no exposure", name()))?,
+                .with_context(|| format!("{} states no exposure", name()))?,
         };
         if self.depths.as_ref().is_none_or(|(of, _)| *of != time) {
             let depth = |level| self.resin.depth(GrayLevel::from_u8(level), time);
@@ -245,7 +245,7 @@ impl Panels {
         let Exposures { course, in_full, by_levels, has_gray, heights_um, .. } = exposures;
         let pixels = along_mm.map_or(0..course.pixels, |along| course.within(along));
         if pixels.is_empty() {
-            return Err(anyhow!("no pixel of the section lies between these places"));
+            return Err(anyhow!("no pixel of the section lies in this stretch"));
         }
         let clipped =
             |solids: &[SolidHeights]| solids.iter().map(|s| clip(s, heights_um)).collect();

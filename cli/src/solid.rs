@@ -20,13 +20,13 @@ use crate::streams::{input_name, is_stream};
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct SolidOptions {
-    /// What the numbers of an STL mean; a STEP file says so itself
+    /// Unit of an STL's coordinates; a STEP file states its own
     #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
     #[serde(with = "text")]
     pub(crate) units: Units,
 
-    /// What is inside: between odd and even crossings, or wherever contours wind around (for
-    /// bodies that overlap)
+    /// Rule for what is inside: between odd and even crossings, or wherever contours wind around
+    /// (for bodies that overlap)
     #[arg(long, value_parser = one_of::<Fill>(), default_value_t)]
     #[serde(with = "text")]
     pub(crate) fill: Fill,
@@ -84,19 +84,19 @@ impl SolidOptions {
         reading: &Reading<'_>,
     ) -> Result<(), Stop> {
         if self.units == Units::Inches {
-            let why = "a STEP file says itself what its numbers mean: leave --units away";
+            let why = "a STEP file states its own unit: leave out --units";
             return Err(Stop::usage(why));
         }
         if tolerance.um() > reading.dpi.pitch().um() {
             (reading.say)(&format!(
                 "--tolerance {tolerance} is more than a pixel: pixels may be wrong where faces \
-                 meet, and where they go along rows"
+                 meet or run along rows"
             ));
         }
         if self.fill == Fill::EvenOdd && boxes_overlap(prepared) {
             (reading.say)(
-                "the boxes of bodies overlap: where the bodies do, too, they cut each other out, \
-                 or unite with --fill nonzero",
+                "the bounding boxes of bodies overlap: where the bodies overlap, too, they \
+                 cancel out, or unite with --fill nonzero",
             );
         }
         notes(prepared).iter().for_each(|note| (reading.say)(note));

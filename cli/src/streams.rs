@@ -216,7 +216,7 @@ fn destination(path: &Path) -> Result<Destination, Stop> {
     if is_stream(path) {
         if io::stdout().is_terminal() {
             return Err(Stop::usage(
-                "a stack is no text for a terminal: name a file with -o, or pipe it on",
+                "a stack is not for terminals: name a file with -o, or pipe it on",
             ));
         }
         widen_pipe(&io::stdout());
@@ -227,7 +227,7 @@ fn destination(path: &Path) -> Result<Destination, Stop> {
     }
     if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) {
         return Err(Stop::usage(format!(
-            "{}: a stack is a TIFF; lamp convert makes PNGs of it",
+            "{}: a stack is a TIFF; lamp convert turns it into PNGs",
             path.display()
         )));
     }
@@ -246,7 +246,7 @@ pub(crate) fn is_folder(path: &Path) -> bool {
 pub(crate) fn folder_to_make(path: &Path) -> Result<&Path, Stop> {
     match path.file_name() {
         Some(_) if !is_stream(path) => Ok(path),
-        _ => Err(Stop::usage(format!("{}: name the folder that is to be made", path.display()))),
+        _ => Err(Stop::usage(format!("{}: name the folder to write to", path.display()))),
     }
 }
 
@@ -266,7 +266,7 @@ pub(crate) fn check_beside<'a>(
         return Err(Stop::Failed(anyhow!("{beside}: there is no folder {folder}")));
     }
     if is_same(beside, stack) || (is_stream(stack) && is_stdout(beside)) {
-        return Err(Stop::usage(format!("{}: the stack goes there", beside.display())));
+        return Err(Stop::usage(format!("{}: the stack is written there", beside.display())));
     }
     check_not_input(beside, inputs)
 }
@@ -278,7 +278,7 @@ pub(crate) fn check_not_input<'a>(
     inputs: impl IntoIterator<Item = &'a PathBuf>,
 ) -> Result<(), Stop> {
     match inputs.into_iter().find(|input| is_same(output, input)) {
-        Some(_) => Err(Stop::usage(format!("{}: that is the input", output.display()))),
+        Some(_) => Err(Stop::usage(format!("{}: that is an input", output.display()))),
         None => Ok(()),
     }
 }

@@ -148,7 +148,10 @@ fn the_two_depth_model_comes_back_from_its_films() {
     let straight = (1..9).map(|i| format!("{},{}\n", 10 * i, 30 * i - 20)).collect::<String>();
     scratch.write("straight.csv", format!("dose_mj_per_cm2,depth_um\n{straight}").as_bytes());
     let ran = scratch.run("lamp calibrate depth straight.csv --model two-depth").succeeds();
-    assert!(ran.stderr.contains("do not bend") && ran.stderr.contains("2200000 um"), "{ran:?}");
+    assert!(
+        ran.stderr.contains("lie on a straight line") && ran.stderr.contains("2200000 um"),
+        "{ran:?}"
+    );
 }
 
 /// Squares that grow by lines of these sizes in pixels, `E_c^w` and `D_p^w`, measured
@@ -278,9 +281,9 @@ fn wrong_usage_is_status_2() {
         ("lamp calibrate", "Usage"),
         ("lamp calibrate depth a.csv --plot a.pdf", "an SVG or a PNG"),
         ("lamp calibrate depth a.csv -o -", "name a file with -o"),
-        ("lamp calibrate depth a.csv -o a.csv", "that is the input"),
-        ("lamp calibrate depth a.csv -o a.svg --plot a.svg", "the material goes there"),
-        ("lamp calibrate depth a.csv --intensity 0W/cm2", "some light"),
+        ("lamp calibrate depth a.csv -o a.csv", "that is an input"),
+        ("lamp calibrate depth a.csv -o a.svg --plot a.svg", "the material is written there"),
+        ("lamp calibrate depth a.csv --intensity 0W/cm2", "above zero"),
         ("lamp calibrate depth a.csv --intensity 1e99W/cm2", "1e-6 to 1e9 mW/cm2"),
         ("lamp calibrate depth a.csv --intensity 1.6W/cm2 -o My_Resin.toml", "--name"),
         ("lamp calibrate depth a.csv --name mine", "--output"),

@@ -285,7 +285,7 @@ fn what_was_done_before_is_said_once() {
     assert_eq!(page["inwards_um"], serde_json::json!([100.0, 100.0]));
     for (again, words) in [
         ("--uniform 100um", "out.tif: its layers were compensated before"),
-        ("--shrinkage 2%", "out.tif: its layers were made larger for shrinkage before"),
+        ("--shrinkage 2%", "out.tif: its layers were enlarged for shrinkage before"),
     ] {
         let line = format!("lamp compensate out.tif {again}");
         let said = scratch.run(&format!("{line} -o twice.tif")).succeeds().stderr;

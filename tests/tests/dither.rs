@@ -82,7 +82,7 @@ fn pixels_too_wide_to_cure_evenly_are_told_of_once() {
     let even = with_gray_stack(1500.0);
     assert_eq!(even.run("dither gray.tif -o dots.tif").succeeds().stderr, "");
     for (dpi, words) in [
-        (1000.0, ["25.4 um", "dots of 17 um cured evenly", "between them nothing is known"]),
+        (1000.0, ["25.4 um", "dots of 17 um cured evenly", "sizes between are untested"]),
         (300.0, ["84.7 um", "those of 85 um did not", "will cure as spots"]),
     ] {
         let scratch = with_gray_stack(dpi);

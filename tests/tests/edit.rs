@@ -237,7 +237,7 @@ fn what_is_wrong_is_said_with_the_edit_and_the_key() {
     }
     scratch.write("high.toml", b"[[edit]]\nz = [\"1in\", \"2in\"]\nbox = { x = [\"1mm\", \"2mm\"], y = [\"1mm\", \"2mm\"] }\n");
     let said = scratch.run("lamp edit cube.tif high.toml -o out.tif").succeeds().stderr;
-    assert!(said.contains("edit 1 was for no layer"), "{said}");
+    assert!(said.contains("edit 1 applies to no layer"), "{said}");
 }
 
 #[test]

@@ -77,7 +77,7 @@ fn what_cannot_be_exposed_is_refused() {
         ("--gray", "--material"),
         ("--overcure 2", "--material"),
         ("--gray --material lamp-suspension --plane middle", "--plane"),
-        ("--gray --material lamp-suspension --overcure 0", "how deep white cures"),
+        ("--gray --material lamp-suspension --overcure 0", "is not a depth in layers"),
     ] {
         let line = format!("slice tower.stl {COARSE} {options} -o out.tif");
         is_wrong_usage(&scratch.run(&line), word);
@@ -111,7 +111,7 @@ fn no_input_is_overwritten() {
         &format!("{cure} -o tower.stl"),
         &format!("{cure} -o gray.tif"),
     ] {
-        is_wrong_usage(&scratch.run(line), "that is the input");
+        is_wrong_usage(&scratch.run(line), "that is an input");
     }
     scratch.run(&format!("{cure} -o s.png")).succeeds();
 }
@@ -196,7 +196,7 @@ fn a_section_needs_its_own_part() {
     assert_eq!(areas(&ran.stdout).len(), 1);
     let said = scratch.run(&format!("{cure} -o s.png")).succeeds().stdout;
     assert!(String::from_utf8(said).unwrap().contains("cured 14"));
-    is_wrong_usage(&scratch.run(&format!("{cure} -o white.tif")), "that is the input");
+    is_wrong_usage(&scratch.run(&format!("{cure} -o white.tif")), "that is an input");
     let upright = cure.replace("y=0mm", "z=0mm");
     is_wrong_usage(&scratch.run(&format!("{upright} -o t.png")), "is not a section");
     let line = format!("{cure} --along 90mm..95mm -o t.png");

@@ -180,15 +180,15 @@ fn what_cannot_be_is_said() {
         assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
         assert!(ran.stderr.contains(word) && !ran.stderr.contains("tower.stl:"), "{ran:?}");
     };
-    usage("slice tower.stl --deviation 2%", "--deviation goes with --adaptive");
-    usage("slice tower.stl --adaptive --plane middle", "leave --plane away");
+    usage("slice tower.stl --deviation 2%", "--deviation needs --adaptive");
+    usage("slice tower.stl --adaptive --plane middle", "leave out --plane");
     usage("slice tower.stl --adaptive --thickness 50um", "cannot be used with");
     usage("slice tower.stl --adaptive --min 50um --max 25um", "between 50 and 25 um thick");
     usage("slice tower.stl --adaptive --cusp 9um --criterion volume", "--criterion cusp");
-    usage("lamp heights tower.stl --criterion cusp", "takes its bound from --cusp");
+    usage("lamp heights tower.stl --criterion cusp", "needs a bound, as --cusp");
     usage("lamp heights tower.stl --time-budget 1h", "give --material or --exposure-table");
     usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg or .png");
-    usage("lamp heights tower.stl --plot x.svg --report x.svg", "name one file");
+    usage("lamp heights tower.stl --plot x.svg --report x.svg", "name the same file");
     usage("lamp heights tower.stl --deviation 2", "write 2% or 0.02");
     usage(
         "slice tower.stl --adaptive --gray --material lamp-suspension --exposure-table times.csv",
@@ -199,13 +199,13 @@ fn what_cannot_be_is_said() {
         .is_refused_with(&["take 762 layers, more than the budget of 9 layers"]);
     scratch
         .run("lamp heights tower.stl --exposure-table times.csv")
-        .is_refused_with(&["times.csv: the table goes from 100um to 2.5mm"]);
+        .is_refused_with(&["times.csv: the table covers 100um to 2.5mm"]);
     scratch.write("bad.csv", b"thickness_um,exposure_ms\n100,soon\n");
     scratch
         .run("lamp heights tower.stl --exposure-table bad.csv")
         .is_refused_with(&["bad.csv", "line 2", "soon"]);
     let ran = scratch.run("slice tower.stl --adaptive --exposure-table times.csv -o times.csv");
-    assert!(ran.stderr.contains("times.csv: that is the input"), "{ran:?}");
+    assert!(ran.stderr.contains("times.csv: that is an input"), "{ran:?}");
 }
 
 #[test]
@@ -215,6 +215,6 @@ fn gaps_are_told_of() {
     let ran = scratch.run(&format!("lamp heights gaps.stl {LIMITS}")).succeeds();
     assert!(ran.stderr.contains("do not balance: the mesh has gaps"), "{ran:?}");
     let ran = scratch.run(&format!("slice gaps.stl --dpi 100 --adaptive {LIMITS} -o gaps.tif"));
-    assert!(ran.stderr.contains("how thick these layers are follows"), "{ran:?}");
+    assert!(ran.stderr.contains("decide the thickness of these layers"), "{ran:?}");
     scratch.run(&format!("lamp heights gaps.stl {LIMITS} -q")).succeeds_quietly();
 }

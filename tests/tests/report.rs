@@ -22,7 +22,7 @@ fn report(scratch: &Scratch, parts: &str, options: &str) -> Value {
         let layers = &report["stray_layers"];
         let says = format!(
             "slice: {rows} rows in {layers} layers do not balance: the mesh has gaps; \
-             fix corrects them, gaps.json names the facets\n"
+             fix corrects them, and gaps.json lists the facets\n"
         );
         assert_eq!(ran.stderr, says);
     }
@@ -218,7 +218,7 @@ fn a_report_needs_a_file_of_its_own() {
     let (broken, _) = spoiled(&tilted_ball(), Defect::Drop, 2);
     scratch.mesh("ball.stl", &broken);
     for (options, word) in
-        [("--report -", "name a file"), ("-o a.json --report a.json", "the stack goes there")]
+        [("--report -", "name a file"), ("-o a.json --report a.json", "the stack is written there")]
     {
         let ran = scratch.run(&format!("slice ball.stl {options}"));
         assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
@@ -228,7 +228,7 @@ fn a_report_needs_a_file_of_its_own() {
     ran.is_refused_with(&["no/such/gaps.json"]);
     assert_eq!(scratch.names(), ["ball.stl"]);
     let ran = scratch.run("slice ball.stl -o part.tif").succeeds();
-    assert!(ran.stderr.ends_with("; fix corrects them, --report FILE.json names the facets\n"));
+    assert!(ran.stderr.ends_with("; fix corrects them, and --report FILE.json lists the facets\n"));
 }
 
 /// A part whose facets belong to no whole, from elsewhere.

@@ -26,7 +26,7 @@ fn said(scratch: &Scratch, line: &str) -> String {
 fn a_tower_in_inches_has_its_discs() {
     let scratch = with(StepSample::Tower);
     let text = said(&scratch, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
-    assert!(text.contains("crossings were moved from facets to surfaces"), "{text}");
+    assert!(text.contains("crossings were moved from facets to exact surfaces"), "{text}");
     let layers = scratch.layers("part.tif");
     assert_eq!(layers.len(), 76);
     let pitch = 25.4 / 600.0;
@@ -152,7 +152,7 @@ fn layers_with_gaps_come_from_the_fallback() {
         .is_refused_with(&["other.stl: it is not the same part"]);
     scratch
         .run("slice whole.stl --fallback whole.stl -o wrong.tif")
-        .is_wrong_usage(&["--fallback stands in for STEP parts"]);
+        .is_wrong_usage(&["--fallback needs a STEP part"]);
 }
 
 /// A face that closes around the part leaves no gap in a section, but no contour.
@@ -186,7 +186,7 @@ fn layers_without_a_contour_come_from_the_fallback() {
 #[test]
 fn wrong_usage_is_told() {
     let scratch = with(StepSample::Sphere);
-    scratch.run("slice part.step --units inch -o a.tif").is_wrong_usage(&["leave --units away"]);
+    scratch.run("slice part.step --units inch -o a.tif").is_wrong_usage(&["leave out --units"]);
     scratch.run("slice part.step --tolerance 0um -o a.tif").is_wrong_usage(&["--tolerance"]);
     scratch.run("slice part.step --timeout 0 -o a.tif").is_wrong_usage(&["write seconds"]);
     scratch.run("lamp convert part.step part.obj").is_wrong_usage(&[".stl"]);

@@ -232,9 +232,9 @@ fn what_cannot_be_cut_leaves_nothing() {
         ("--strips s --mirrors 0", &["--mirrors"]),
         ("--strips s --mirrors 100 --overlap 50", &["share less than half"]),
         ("--strips s --mirrors 99999999", &["wider than any image"]),
-        ("--strips s --mirrors 100 -o s", &["the stack goes there"]),
+        ("--strips s --mirrors 100 -o s", &["the stack is written there"]),
         ("--strips - --mirrors 100", &["name the folder"]),
-        ("--strips s --mirrors 100 --layout-out s", &["the stack goes there"]),
+        ("--strips s --mirrors 100 --layout-out s", &["the stack is written there"]),
     ] {
         scratch.run(&format!("{TILE} {options}")).is_wrong_usage(words);
         assert_eq!(scratch.names(), before, "{options}");

@@ -291,10 +291,10 @@ fn what_cannot_be_meant_is_wrong_usage() {
         ("tile tower.tif:0", &["`0` is not a number of copies"]),
         ("tile tower.tif tower.tif:3", &["tower.tif is given twice"]),
         ("tile - tower.tif -- -:2", &["standard input is given twice"]),
-        ("tile tower.tif:3 --layout l.json", &["leave the counts out"]),
+        ("tile tower.tif:3 --layout l.json", &["leave out the counts"]),
         ("tile tower.tif --layout l.json --gap 2mm", &["--layout"]),
         ("tile tower.tif --layout-picture p.jpg", &[".svg or .png"]),
-        ("tile tower.tif --layout-out tower.tif", &["that is the input"]),
+        ("tile tower.tif --layout-out tower.tif", &["that is an input"]),
         ("tile tower.tif --pack tight", &["box", "outline"]),
     ] {
         scratch.run(&line.replacen("tile", "tile -o x.tif", 1)).is_wrong_usage(words);

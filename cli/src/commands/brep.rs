@@ -10,11 +10,11 @@ use crate::brep::{BrepOptions, bytes_of, length, notes};
 use crate::stop::Stop;
 use crate::streams::{input_name, print};
 
-/// Say what a STEP part holds, and whether it can be sliced
+/// Describe a STEP part, and check whether it can be sliced
 ///
-/// For each body its faces by their surfaces, its box, volume and area, by the facets that `slice`
-/// would make. A body is sliced only if these close, keep inside the control points of its
-/// surfaces, and hold the same volume as the surfaces.
+/// Lists for each body its faces by kind of surface, and its bounding box, volume and area by the
+/// facets that `slice` would make. A body is sliced only if its facets close, stay inside the
+/// control points of its surfaces, and enclose the same volume as the surfaces.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -25,15 +25,14 @@ pub(crate) struct BrepArgs {
     #[arg(value_name = "PART")]
     part: PathBuf,
 
-    /// Resolution of the images that the part is checked for, of which the tolerance is a quarter
-    /// of a pixel
+    /// Resolution to check the part for; the default tolerance is a quarter of a pixel
     #[arg(long, value_name = "DPI", default_value = "1500")]
     dpi: Dpi,
 
     #[command(flatten)]
     brep: BrepOptions,
 
-    /// End with status 3 if a body would not be sliced
+    /// Exit with status 3 if a body would not be sliced
     #[arg(long)]
     strict: bool,
 }

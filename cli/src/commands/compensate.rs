@@ -16,13 +16,13 @@ use crate::streams::{
     check_beside, check_not_input, input_name, read_layers, report, write_layers,
 };
 
-/// Narrow images by what the resin cures beyond them, and make up for firing shrinkage
+/// Narrow images by the width that resin cures beyond them, and make up for firing shrinkage
 ///
-/// Edges move by an exact Euclidean distance; what is no whole pixel becomes a gray one, which
-/// dither realises. Walls that would become thinner than --min-feature are narrowed less, none
-/// breaks or is lost, and each such place is told of; with --min-feature 0um walls go, and each
-/// piece that is lost or breaks apart is told of. Gray layers shrink by their outlines. Shrinkage is
-/// made up for first, by pixels; where the mesh is at hand, slice --scale does it better.
+/// Edges move by an exact Euclidean distance; fractions of a pixel become gray, which `dither`
+/// turns into dots. Walls that would become thinner than --min-feature are narrowed less, so that
+/// none breaks or is lost, and each is reported; with --min-feature 0um walls may vanish, and each
+/// piece that is lost or breaks apart is reported. Gray layers move by their outlines. Images are
+/// first enlarged for shrinkage; if you have the mesh, slice --scale is more exact.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +34,7 @@ pub(crate) struct CompensateArgs {
     #[command(flatten)]
     input: Input,
 
-    /// Move all edges inwards by so much, or outwards if it is below zero
+    /// Move all edges inwards by this distance, or outwards if it is negative
     #[arg(long, value_name = "LENGTH", value_parser = parse_offset, allow_hyphen_values = true)]
     uniform: Option<Length>,
 
@@ -42,24 +42,25 @@ pub(crate) struct CompensateArgs {
     #[arg(long, value_name = "M", conflicts_with = "uniform")]
     material: Option<PathBuf>,
 
-    /// The dose of full white, as 300mJ/cm2 [default: the page's exposure times the material's
+    /// Dose of full white, for example 300mJ/cm2 [default: the page's exposure times the material's
     /// intensity]
     #[arg(long, value_name = "DOSE", value_parser = parse_dose, requires = "material")]
     dose: Option<Dose>,
 
-    /// Leave walls so wide, or as they are if they are thinner; 0um lets them go [default: two pixels]
+    /// Keep walls at least this wide, or as they are if thinner; 0um lets them vanish [default: two
+    /// pixels]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     min_feature: Option<Length>,
 
-    /// Make edges of whole pixels, the nearest, without gray
+    /// Round edges to whole pixels, without gray
     #[arg(long)]
     one_bit: bool,
 
-    /// How much firing shrinks parts, as 2.1% or x:2.1%,y:1.8%: images become larger by 1 / (1 - s)
+    /// Shrinkage s in firing, for example 2.1% or x:2.1%,y:1.8%: images are enlarged by 1 / (1 - s)
     #[arg(long, value_name = "SHARE", value_parser = parse_shrinkage, allow_hyphen_values = true)]
     shrinkage: Option<Shrinkage>,
 
-    /// Write where walls were narrowed less than asked, or pieces lost, as JSON
+    /// Write the walls that were narrowed less than asked, and lost pieces, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
@@ -127,11 +128,11 @@ impl DoneBefore {
         let again = [
             (
                 self.moved && moves,
-                "its layers were compensated before, and their edges moved again",
+                "its layers were compensated before, and their edges have moved again",
             ),
             (
                 self.enlarged && enlarges,
-                "its layers were made larger for shrinkage before, and now again",
+                "its layers were enlarged for shrinkage before, and now again",
             ),
         ];
         again.iter().filter(|(is, _)| *is).map(|(_, text)| format!("{name}: {text}")).collect()
@@ -160,9 +161,9 @@ impl By {
     fn of(args: &CompensateArgs) -> Result<Self, Stop> {
         let Some(path) = &args.material else {
             return match (args.uniform, args.shrinkage) {
-                (None, None) => Err(Stop::usage(
-                    "say by how much: --uniform 25um, --material M or --shrinkage 2.1%",
-                )),
+                (None, None) => {
+                    Err(Stop::usage("give --uniform 25um, --material M or --shrinkage 2.1%"))
+                }
                 (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
             };
         };
@@ -172,7 +173,7 @@ impl By {
             material.cure_width().map_err(|error| Stop::Failed(error.into()).at(name.clone()))?;
         let width = width.ok_or_else(|| {
             Stop::Failed(anyhow!(
-                "{name} does not say how wide it cures: add [[cure-width]] to its file, or give --uniform"
+                "{name} states no cure width: add [[cure-width]] to its file, or give --uniform"
             ))
         })?;
         Ok(Self::CureWidth { width, material: Box::new(material), dose: args.dose })
@@ -196,11 +197,14 @@ impl By {
 fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, Stop> {
     let no_dose = |text: String| Stop::Failed(NoDose(text).into());
     let time = layer.info.exposure_ms.filter(|ms| *ms >= 0.0).ok_or_else(|| {
-        no_dose(format!("{} does not say how long it is exposed: give --dose", layer.info.name()))
+        no_dose(format!("{} states no exposure time: give --dose", layer.info.name()))
     })?;
     let light = material.intensity.as_ref().ok_or_else(|| {
         let name = &material.name;
-        no_dose(format!("{name} does not say how bright full white is: give --dose, or add [intensity] to its file"))
+        no_dose(format!(
+            "{name} states no intensity of full white: give --dose, or add [intensity] to its \
+             file"
+        ))
     })?;
     Ok(light.value * ExposureTime::from_ms(time))
 }

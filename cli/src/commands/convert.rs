@@ -17,10 +17,10 @@ use crate::streams::{
     write_file, write_layers, written_to,
 };
 
-/// Write a stack in another shape: a file, a folder of pages, PNGs; or a STEP part as STL
+/// Convert a stack to a file, a folder of pages or PNGs, or a STEP part to STL
 ///
-/// The images and what is known of them stay as they are, so nothing is added to the commands
-/// that made the stack: a stack that goes from file to folder and back has the same bytes.
+/// Images and their metadata stay as they are, and the command is not recorded: a stack converted
+/// from file to folder and back has the same bytes.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -32,7 +32,7 @@ Examples:
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     input: Input,
-    /// Where the facets of a STEP part go, as binary STL in millimetres
+    /// Binary STL to write for a STEP part, in millimetres
     #[arg(value_name = "PART.stl", value_parser = parse_stl)]
     stl: Option<PathBuf>,
 
@@ -103,7 +103,7 @@ impl ConvertArgs {
     fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), Stop> {
         let path = &self.input.stack;
         if self.input.layers.is_some() || self.png || self.output.classic {
-            let why = "--layers, --png and --classic are for stacks: a part becomes a whole STL";
+            let why = "--layers, --png and --classic are for stacks, not for parts";
             return Err(Stop::usage(why));
         }
         check_beside(stl, Path::new("-"), [path])?;
@@ -124,7 +124,7 @@ impl ConvertArgs {
         match (is_folder(output), self.png) {
             (true, true) => folder_to_make(output).map(|_| Shape::Pngs),
             (false, _) if named_png && *classic => {
-                Err(Stop::usage("a PNG is no TIFF: leave --classic out, or name a .tif"))
+                Err(Stop::usage("--classic is for TIFFs: leave it out, or name a .tif file"))
             }
             (false, _) if named_png => Ok(Shape::Png),
             (false, true) => Err(Stop::usage("PNGs go into a folder: name it, as -o pictures/")),

@@ -17,14 +17,14 @@ use crate::solid::{Reading, name_of_all};
 use crate::stop::Stop;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 
-/// Draw what a stack cures, in a vertical section, against the part
+/// Draw a vertical section of what a stack cures, compared with the part
 ///
-/// Each exposure cures down from its layer's top, as deep as its gray level reaches under the
-/// material's cure model. A stack with gray layers is drawn twice: on the left with all that is not
-/// black exposed in full, on the right by its gray levels. What is cured outside the part is red,
-/// what of the part is not cured is blue, the part's outline yellow; the areas are printed. Light
-/// does not spread sideways, and exposures do not add up. Dots count as they stand: draw a stack
-/// before `dither`.
+/// Each exposure cures down from its layer's top, as deep as its gray level reaches in the
+/// material's cure model. A stack with gray layers is drawn twice: on the left with every pixel
+/// that is not black exposed in full, on the right by its gray levels. Resin cured outside the part
+/// is red, uncured places of the part are blue, and the part's outline is yellow; the areas are
+/// printed. The model ignores light that spreads sideways and exposures that add up. Dots are drawn
+/// as they are, so use a stack from before `dither`.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -35,7 +35,7 @@ pub(crate) struct CureArgs {
     #[command(flatten)]
     input: Input,
 
-    /// The resin: a name of `lamp material list`, or a file
+    /// Resin: a built-in material's name (see lamp material list) or a file
     #[arg(long, value_name = "NAME|FILE")]
     material: PathBuf,
 
@@ -43,20 +43,20 @@ pub(crate) struct CureArgs {
     #[arg(long, value_name = "AXIS=LENGTH")]
     section: Plane,
 
-    /// The part that the stack was sliced from, for its outline; it is placed as the stack says that
-    /// it was. Several files as they were given to slice
+    /// Part that the stack was sliced from, for its outline; it is placed as the stack records.
+    /// Give several files in the order in which slice got them
     #[arg(long, value_name = "FILE")]
     part: Vec<PathBuf>,
 
-    /// Only what lies between two places along the section
+    /// Draw only this stretch of the section, for example 10mm..14mm
     #[arg(long, value_name = "A..B", value_parser = parse_along, allow_hyphen_values = true)]
     along: Option<Range<f64>>,
 
-    /// 4 draws each pixel of the images as 4 x 4, 1/8 only every eighth
+    /// Scale of the picture: 4 draws each pixel as 4 x 4, 1/8 only every eighth
     #[arg(long, value_name = "N|1/N", default_value = "1")]
     scale: Scale,
 
-    /// Where to write the PNG
+    /// PNG file to write
     #[arg(short, long, value_name = "FILE.png")]
     output: PathBuf,
 }
@@ -74,10 +74,10 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Stop> {
         let layer = layer?;
         if exposures.is_none() {
             if layer.info.other.contains_key("dither") {
-                report.say("these layers are dots: gray shows in a stack before dither");
+                report.say("these layers are dots: use a stack from before dither to see its gray");
             }
             if layer.info.other.contains_key("compensate") {
-                report.say("these layers were compensated: they differ from the part by that, too");
+                report.say("these layers were compensated, so that they differ from the part");
             }
             let course = Course::new(args.section, &layer).map_err(failed)?;
             exposures = Some(Exposures::new(&resin, course));
@@ -111,13 +111,15 @@ fn outline(
         Some((options, &stack.digest))
     });
     let (options, digest) = sliced.with_context(|| {
-        format!("{name} does not say how its part was sliced: leave --part away")
+        format!("{name} does not record how its part was sliced: leave out --part")
     })?;
     let reading = Reading { dpi: options.dpi, may_be_open: false, say: &|_| () };
     let model = options.solid.open(parts, &reading)?;
     let part = name_of_all(parts);
     if model.digest() != digest {
-        return Err(Stop::Failed(anyhow!("{name} was not sliced from {part}, or it has changed")));
+        return Err(Stop::Failed(anyhow!(
+            "{name} was not sliced from {part}, or the part has changed"
+        )));
     }
     course.outline(model, &options).map_err(|error| Stop::from(error).at(part))
 }

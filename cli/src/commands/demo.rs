@@ -21,7 +21,7 @@ use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{failed_at, print, write_file, write_layers};
 
-/// Do the main job on a built-in blade mould: model, pipeline, stack, pictures
+/// Run the whole pipeline on a built-in blade mould, and draw the result
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -29,16 +29,16 @@ Examples:
   lamp demo /tmp/lamp --facets 5.5M
   lamp demo --whole-build")]
 pub(crate) struct DemoArgs {
-    /// The folder to work in
+    /// Folder to work in
     #[arg(value_name = "DIR", default_value = "lamp-demo")]
     folder: PathBuf,
 
-    /// About how many facets the mould has
+    /// Approximate number of facets of the mould
     #[arg(long, value_name = "N", default_value = "750k", value_parser = parse_count)]
     facets: usize,
 
-    /// Make all layers of the build in its mesh, not twenty of them: the mesh has many more edges
-    /// than the mould, so that this takes many times as long
+    /// Make all layers of the build in its mesh instead of twenty. This takes many times as long,
+    /// because the mesh has many more edges than the mould
     #[arg(long)]
     whole_build: bool,
 }

@@ -8,10 +8,10 @@ use crate::streams::{read_layers, report, write_layers};
 
 /// Turn gray layers into dots; 1-bit layers pass unchanged
 ///
-/// A gray level becomes the share of its pixels that are white. Solid black and white are left
-/// alone: no dot appears outside the part. The pattern moves from layer to layer, so that holes do
-/// not stack; the same layer always becomes the same dots. Resin averages dots of 17 um, but not of
-/// 85 um: pixels wider than 17 um are told of.
+/// A gray level becomes the share of white pixels. Solid black and white stay as they are: no dot
+/// appears outside the part. The pattern moves from layer to layer, so that holes do not line up;
+/// the same layer always becomes the same dots. Resin averages dots of 17 um, but not of 85 um, so
+/// wider pixels than 17 um cause a warning.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -23,7 +23,7 @@ pub(crate) struct DitherArgs {
     #[command(flatten)]
     input: Input,
 
-    /// How gray becomes dots
+    /// Dithering method
     #[arg(long, default_value_t, value_parser = one_of_described::<DitherMethod>(&[
         "Dots far from each other, in no pattern: a mask of 128 x 128 thresholds",
         "Bayer's pattern of 16 x 16 thresholds",
@@ -56,7 +56,7 @@ fn unevenness(layer: &Layer) -> Option<String> {
     let fear = match homogeneity(pitch) {
         Homogeneity::Even => return None,
         Homogeneity::Unknown => {
-            "between them nothing is known: expose a test film, or slice at 1500 dpi or more"
+            "sizes between are untested: expose a test film, or slice at 1500 dpi or more"
         }
         Homogeneity::Uneven => "gray will cure as spots: slice at 1500 dpi or more",
     };
@@ -94,7 +94,7 @@ mod tests {
         let unknown = told(Some(1000.0), gray()).unwrap();
         let uneven = told(Some(300.0), gray()).unwrap();
         assert!(unknown.contains("pixels, 25.4 um; dots of 17 um cured evenly"), "{unknown}");
-        assert!(unknown.contains("those of 85 um did not; between them"), "{unknown}");
+        assert!(unknown.contains("those of 85 um did not; sizes between"), "{unknown}");
         assert!(uneven.contains("pixels, 84.7 um") && uneven.contains("spots"), "{uneven}");
     }
 }

@@ -17,10 +17,10 @@ const LARGEST_LIST: u64 = 1 << 20;
 
 /// Change a design at image level, without slicing it again
 ///
-/// Adds boxes, cylinders, lines, labels and other stacks to a range of heights, or subtracts them;
-/// crops, pads, mirrors and rotates all layers. Lengths and places are the part's. The edits are a
-/// TOML file, done one after the other; docs/edit.md has every key. Layers that no edit is for pass
-/// byte for byte.
+/// Adds or subtracts boxes, cylinders, lines, labels and other stacks in a range of heights; crops,
+/// pads, mirrors and rotates all layers. Lengths and positions are in part coordinates. Edits are
+/// listed in a TOML file and applied in order; docs/edit.md describes every key. Layers that no
+/// edit applies to pass byte for byte.
 #[derive(Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["edits", "union", "intersect", "difference", "xor"]))]
 #[command(override_usage = "\
@@ -41,23 +41,23 @@ pub(crate) struct EditArgs {
     #[command(flatten)]
     input: Input,
 
-    /// The edits, as TOML
+    /// The edits, a TOML file
     #[arg(value_name = "EDITS.toml")]
     edits: Option<PathBuf>,
 
-    /// White where it or that stack is
+    /// Keep what is white in either stack
     #[arg(long, value_name = "STACK")]
     union: Option<PathBuf>,
 
-    /// White where both it and that stack are
+    /// Keep what is white in both stacks
     #[arg(long, value_name = "STACK")]
     intersect: Option<PathBuf>,
 
-    /// White where it is and that stack is not
+    /// Remove what is white in this stack
     #[arg(long, value_name = "STACK")]
     difference: Option<PathBuf>,
 
-    /// White where it or that stack is, but not both
+    /// Keep what is white in exactly one of the stacks
     #[arg(long, value_name = "STACK")]
     xor: Option<PathBuf>,
 
@@ -129,7 +129,7 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Stop> {
         stop => stop,
     })?;
     for (number, _) in (1..).zip(counts).filter(|(_, count)| *count == 0) {
-        report.say(&format!("edit {number} was for no layer: look at its z or layers"));
+        report.say(&format!("edit {number} applies to no layer: check its z or layers"));
     }
     Ok(())
 }

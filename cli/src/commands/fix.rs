@@ -11,15 +11,15 @@ use crate::options::{Common, Input, Output, one_of_described};
 use crate::stop::Stop;
 use crate::streams::{check_beside, read_layers, report, write_layers};
 
-/// Find and correct stray rows: rows that a gap in the mesh made run across the image
+/// Find and correct stray rows, where a gap in the mesh lets white run across the image
 ///
-/// A row is stray if it ends white (every part leaves the last column black), if `slice` found that
-/// its crossings do not balance, or if it lacks crossings that the rows above and below have, or has
-/// a run that they have not, where `slice` found that contours break off. The crossings that were
-/// missed are added; those that a row has stay, unless they contradict the contours around them. A
-/// band of rows that is too wide, or whose correction is not sure enough, is left and told of. What
-/// was changed is said for each layer and stands on its page; all other layers pass byte for byte.
-/// Gray layers are corrected by their outlines.
+/// A row is stray if it ends white (the last column of every part is black) or if `slice` found
+/// that its crossings do not balance. Where `slice` found that contours break off, a row is also
+/// stray if it lacks crossings that the rows above and below have, or has a run that they lack.
+/// Missing crossings are added; existing ones stay unless they contradict the contours around them.
+/// A band of rows that is too wide, or whose correction is too uncertain, is left and reported.
+/// Changes are reported for each layer and recorded on its page; all other layers pass byte for
+/// byte. Gray layers are corrected by their outlines.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -31,36 +31,36 @@ pub(crate) struct FixArgs {
     #[command(flatten)]
     input: Input,
 
-    /// Where the missed crossings come from
+    /// Source of the missing crossings
     #[arg(long, default_value_t, value_parser = one_of_described::<FixMethod>(&[
-        "What the good rows above and below share (edges of wide bands become steps)",
+        "What the good rows above and below share; edges of wide bands become steps",
         "Smooth curves along the part's contours",
     ]))]
     method: FixMethod,
 
-    /// Leave bands of more rows: half the part's smallest feature is a good limit
+    /// Leave bands of more rows as they are; half the part's smallest feature is a good limit
     #[arg(long, value_name = "ROWS", default_value_t = FixOptions::default().max_width)]
     max_width: u32,
 
-    /// Leave bands whose correction is less sure than this, from 0 to 1
+    /// Leave bands whose correction is less certain than this as they are, from 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = FixOptions::default().min_confidence)]
     #[arg(value_parser = parse_share)]
     min_confidence: f64,
 
-    /// Let the layers below and above say where contours cross bands of three rows and more
+    /// Use the layers below and above to find where contours cross bands of three rows and more
     #[arg(long)]
     use_neighbours: bool,
 
-    /// Write what was found and done as JSON
+    /// Write all bands, and what was done about them, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Write a picture of each band into a new folder: before, after and the difference (what became
-    /// white in blue, what became black in red); of a band that was left, how it is
+    /// Write a picture of each band into a new folder: before, after and the difference (new white
+    /// in blue, new black in red), or just the band if it was left as it is
     #[arg(long, value_name = "DIR")]
     evidence: Option<PathBuf>,
 
-    /// End with status 3 if a band was left
+    /// Exit with status 3 if a band was left as it is
     #[arg(long)]
     strict: bool,
 
@@ -119,7 +119,8 @@ fn left_in_all(bands: usize) -> String {
     let (bands, were) =
         if bands == 1 { ("1 band".to_owned(), "was") } else { (format!("{bands} bands"), "were") };
     format!(
-        "{bands} of stray rows {were} left: repair the CAD, or look at the report and pictures and change the limits"
+        "{bands} of stray rows {were} left: repair the CAD model, or check the report and \
+         pictures and change the limits"
     )
 }
 
@@ -142,7 +143,7 @@ fn describe(fixed: &Fixed<'_>, options: &FixOptions) -> Vec<String> {
             }
         };
         lines.push(format!(
-            "{} {}: {why}; repair the CAD near {}",
+            "{} {}: {why}; repair the CAD model near {}",
             info.name(),
             rows_of(band),
             whereabouts(fixed.before, band)
@@ -229,15 +230,16 @@ mod tests {
         assert_eq!(
             described(&bands, info),
             [
-                "layer 812 (z 81.20 mm) rows 1034-1071: 38 rows wide, limit 15; \
-                 repair the CAD near x 32.0-33.0 y 12.8-16.6 mm",
-                "layer 812 (z 81.20 mm) row 1080: confidence 0.31, limit 0.35; \
-                 repair the CAD near x 32.0-33.0 y 11.9-12.0 mm",
+                "layer 812 (z 81.20 mm) rows 1034-1071: 38 rows wide, limit 15; repair the CAD \
+                 model near x 32.0-33.0 y 12.8-16.6 mm",
+                "layer 812 (z 81.20 mm) row 1080: confidence 0.31, limit 0.35; repair the CAD \
+                 model near x 32.0-33.0 y 11.9-12.0 mm",
             ]
         );
         assert_eq!(
             described(&bands[1..], PageInfo::default()),
-            ["layer 0 row 1080: confidence 0.31, limit 0.35; repair the CAD near columns 120-129"]
+            ["layer 0 row 1080: confidence 0.31, limit 0.35; repair the CAD model near \
+                 columns 120-129"]
         );
     }
 }

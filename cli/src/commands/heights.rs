@@ -18,9 +18,9 @@ use crate::streams::{check_beside, print, write_file};
 
 /// Find how thick each layer of a part may be, and what that saves
 ///
-/// Each layer is built as its section at the top, swept down; what that lacks of the part and has
-/// too much is bounded as `slice --adaptive` with the same options does. The layers are compared
-/// with uniform ones; no images are written.
+/// Each layer is built as its section at the top, swept down. Its error is kept within a bound, as
+/// by `slice --adaptive` with the same options. The layers are compared with uniform ones; no
+/// images are written.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -33,21 +33,20 @@ pub(crate) struct HeightsArgs {
     #[arg(value_name = "PART", required = true)]
     parts: Vec<PathBuf>,
 
-    /// Write a table of the layers: for each its height and thickness, the volume lost and gained,
-    /// and its measure by every criterion
+    /// Write a table of the layers: height, thickness, volume lost and gained, and the error by
+    /// every criterion
     #[arg(long, value_name = "FILE.csv")]
     report: Option<PathBuf>,
 
-    /// Plot the layers' thickness and deviation over z: a file that ends in .svg or .png
+    /// Plot thickness and deviation over z: a file that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
-    /// The uniform layers to compare with; the first are plotted [default: the thickest]
+    /// Uniform thicknesses to compare with; the first is plotted [default: the thickest layer]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, value_delimiter = ',')]
     uniform: Vec<Length>,
 
-    /// Resolution of the images, which decides how far apart the rows are along which the part is
-    /// measured
+    /// Resolution of the images, which sets the distance between the rows that are measured
     #[arg(long, value_name = "DPI", default_value = "1500")]
     dpi: Dpi,
 
@@ -102,7 +101,7 @@ impl HeightsArgs {
             check_beside(file, Path::new("-"), inputs())?;
         }
         if self.report.is_some() && self.report == self.plot {
-            return Err(Stop::usage("--report and --plot name one file"));
+            return Err(Stop::usage("--report and --plot name the same file"));
         }
         Ok(())
     }

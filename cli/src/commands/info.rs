@@ -5,7 +5,7 @@ use crate::options::Input;
 use crate::stop::Stop;
 use crate::streams::{failed_at, input_name, print, read_pages};
 
-/// Say what a stack holds: pages, size, resolution, heights, runs, bytes
+/// Describe a stack: pages, size, resolution, heights, runs, bytes
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

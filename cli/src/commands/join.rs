@@ -9,16 +9,15 @@ use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream, report, write_layers};
 
-/// Join stacks of ranges of layers to the one stack that they are parts of
+/// Join stacks of consecutive layers into one stack
 ///
-/// Ranges that were made apart, by `slice --layers` and the stages behind it or by `lamp split`,
-/// give the bytes of the stack made at once. They are joined only if they are of one part, size
-/// and resolution, made by the same commands from the same input, and if each starts with the
-/// layer behind the last of the one before it: a build that lacks layers is scrap. Whether layers
-/// are missing below the first or above the last, only you can tell: `lamp info` says how many
-/// there are.
+/// Ranges made separately, by `slice --layers` and later stages or by `lamp split`, give the same
+/// bytes as a stack made at once. They are joined only if they are of one part, size and
+/// resolution, made by the same commands from the same input, and if each starts right after the
+/// last layer of the one before: a build that lacks layers is scrap. Layers missing below the first
+/// or above the last go unnoticed: `lamp info` shows how many there are.
 ///
-/// A folder of strips, as `tile --strips` writes it, gives the build that they were cut from.
+/// A folder of strips from `tile --strips` gives the build that they were cut from.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -28,7 +27,7 @@ Examples:
   lamp join ranges/*.tif | tile > build.tif
   lamp join strips/ -o build.tif")]
 pub(crate) struct JoinArgs {
-    /// The stacks, files or folders of pages, in the order of their layers
+    /// Stacks to join, files or folders of pages, in the order of their layers
     #[arg(value_name = "STACK", required = true)]
     stacks: Vec<PathBuf>,
 
@@ -39,7 +38,8 @@ pub(crate) struct JoinArgs {
 pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Stop> {
     if args.stacks.iter().any(|stack| is_stream(stack)) {
         return Err(Stop::usage(
-            "stacks to join are looked at before they are read, which standard input does not allow: name files or folders",
+            "stacks to join are checked before they are read, which standard input does not \
+             allow: name files or folders",
         ));
     }
     let report = report("join", common, &args.output);

@@ -8,7 +8,7 @@ use crate::catalogue;
 use crate::stop::Stop;
 use crate::streams::print;
 
-/// List or show machines: how large a build may be, and in what pixels and layers
+/// List or show machines: build area, resolution and layer thickness
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -24,7 +24,7 @@ pub(crate) struct MachineArgs {
 enum Action {
     /// List the built-in machines
     List,
-    /// Print a machine's file as it was written, once it is checked: to read, or to start one from
+    /// Check a machine's file and print it as it was written, to read or to start a new one from
     Show {
         /// Which machine: a built-in machine's name, a file, or - for standard input
         #[arg(value_name = "MACHINE")]

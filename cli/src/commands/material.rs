@@ -25,13 +25,13 @@ pub(crate) struct MaterialArgs {
 enum Action {
     /// List the built-in materials
     List,
-    /// Print a material's file as it was written, once it is checked: to read, or to start one from
+    /// Check a material's file and print it as it was written, to read or to start a new one from
     Show {
-        /// Which material: a built-in material's name, a file, or - for standard input
+        /// Material: a built-in material's name, a file, or - for standard input
         #[arg(value_name = "MATERIAL")]
         material: PathBuf,
     },
-    /// Check a material file and say what it allows
+    /// Check a material file and report what it allows
     Check {
         /// The file, or - for standard input
         file: PathBuf,

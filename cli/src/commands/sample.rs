@@ -21,11 +21,11 @@ Examples:
   lamp sample tower -o tower.step
   lamp sample tower --defect drop --count 20 --seed 7 -o broken.stl")]
 pub(crate) struct SampleArgs {
-    /// Which part
+    /// Part to write
     #[arg(value_parser = parts())]
     part: Sample,
 
-    /// About how many facets
+    /// Approximate number of facets
     #[arg(long, value_name = "N", default_value = "100k", value_parser = parse_count)]
     facets: usize,
 
@@ -38,15 +38,15 @@ pub(crate) struct SampleArgs {
     #[arg(long, value_parser = PossibleValuesParser::new(Defect::NAMES))]
     defect: Option<String>,
 
-    /// How many facets to break
+    /// Number of facets to break
     #[arg(long, value_name = "N", default_value = "10", value_parser = parse_count, requires = "defect")]
     count: usize,
 
-    /// Which facets to break: the same seed breaks the same ones
+    /// Seed of the choice of facets: the same seed breaks the same ones
     #[arg(long, value_name = "N", default_value_t = 1, requires = "defect")]
     seed: u64,
 
-    /// How far a nudge moves a corner, or how wide a gap is
+    /// Distance that a nudge moves a corner, or width of a gap
     #[arg(long, value_name = "LENGTH", default_value = "50um", requires = "defect")]
     by: Length,
 
@@ -85,9 +85,7 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
         return Ok(());
     }
     if io::stdout().is_terminal() {
-        return Err(Stop::usage(
-            "an STL is no text for a terminal: name a file with -o, or pipe it on",
-        ));
+        return Err(Stop::usage("an STL is not for terminals: name a file with -o, or pipe it on"));
     }
     let mut out = BufWriter::new(io::stdout().lock());
     let written = write(&mut out).and_then(|()| out.flush());
@@ -102,12 +100,12 @@ impl SampleArgs {
             Sample::Cone => StepSample::Cone,
             Sample::Tower => StepSample::Tower,
             Sample::Blade | Sample::Cube => {
-                let why = format!("{} is made as STL only: write it to a .stl", part.name());
+                let why = format!("{} is available as STL only: name a .stl file", part.name());
                 return Err(Stop::usage(why));
             }
         };
         if self.ascii || self.defect.is_some() {
-            return Err(Stop::usage("--ascii and --defect are for STL: write it to a .stl"));
+            return Err(Stop::usage("--ascii and --defect are for STL: name a .stl file"));
         }
         let text = step(part, StepUnit::Millimetre);
         write_file(&self.output, |out| out.write_all(text.as_bytes()))

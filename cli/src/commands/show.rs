@@ -11,7 +11,7 @@ use crate::streams::{failed_at, input_name, is_stream, open_pages, write_file};
 
 /// Show a layer as a PNG picture, whole or in part
 ///
-/// The stack is read up to the layer, and no further: one that was cut off behind it shows, too.
+/// The stack is read only up to the layer, so one that is cut off after it works, too.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -22,15 +22,15 @@ pub(crate) struct ShowArgs {
     #[arg(value_name = "STACK", default_value = "-")]
     stack: PathBuf,
 
-    /// The layer's index
+    /// Index of the layer
     #[arg(long, value_name = "K")]
     layer: u32,
 
-    /// Only a part of the image: left column, top row, width and height in pixels
+    /// Show only this part of the image: left column, top row, width and height in pixels
     #[arg(long, value_name = "X,Y,W,H")]
     region: Option<Region>,
 
-    /// 4 shows each pixel as 4 x 4; 1/8 shows the mean of 8 x 8
+    /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 the mean of 8 x 8
     #[arg(long, value_name = "N|1/N", default_value = "1")]
     scale: Scale,
 
@@ -41,7 +41,9 @@ pub(crate) struct ShowArgs {
 
 pub(crate) fn run(args: &ShowArgs) -> Result<(), Stop> {
     if is_stream(&args.output) && io::stdout().is_terminal() {
-        return Err(Stop::usage("a picture is no text for a terminal: name a file with -o"));
+        return Err(Stop::usage(
+            "a picture is not for terminals: name a file with -o, or pipe it on",
+        ));
     }
     let Layer { image, .. } = find_layer(args)?;
     let whole = Region::of(&image);

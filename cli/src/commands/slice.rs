@@ -19,8 +19,8 @@ use crate::streams::{check_beside, check_not_input, report, write_layers};
 /// Slice an STL or STEP part into a stack of layer images
 ///
 /// A pixel is white (cured) exactly when its centre is inside the part's section at the layer's
-/// plane. Rows whose crossings do not balance, because the mesh has a gap, are listed on their
-/// page: `fix` corrects them.
+/// plane. Gaps in the mesh leave rows whose crossings do not balance; they are listed on their
+/// page, and `fix` corrects them.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -33,33 +33,33 @@ Examples:
   slice blade.stl --gray --material lamp-suspension | fix | dither > blade.tif
   slice broken.stl -o broken.tif --report gaps.json")]
 pub(crate) struct SliceArgs {
-    /// The part: STL files, binary or ASCII, STEP files, or - for standard input. Several stand in the same
-    /// coordinates; where they overlap they cut each other out, or unite with --fill nonzero
+    /// The part: STL (binary or ASCII) or STEP files, or - for standard input. Several files share
+    /// one coordinate system; where they overlap they cancel out, or unite with --fill nonzero
     #[arg(value_name = "PART", required = true)]
     parts: Vec<PathBuf>,
 
     #[command(flatten)]
     pub(crate) options: PartOptions,
 
-    /// Only these layers: A..B is A to B - 1; A.. and ..B are open ended
+    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     layers: Option<Range<u32>>,
 
-    /// Memory for the table of crossings and what goes with it, from 16MB up: less means smaller
-    /// slabs of layers [default: a quarter of the machine's, though no more is used than helps]. A
-    /// part whose facets are in no order of height is sorted first, in a temporary file of 36 bytes a
-    /// facet. --adaptive holds the mesh besides, in 45 bytes a facet
+    /// Memory for the table of crossings, at least 16MB; with less, fewer layers are cut at a time
+    /// [default: a quarter of the machine's, as far as it helps]. Facets in no order of height are
+    /// first sorted in a temporary file, 36 bytes per facet. --adaptive also holds the mesh in
+    /// memory, 45 bytes per facet
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
-    /// An STL of the same STEP part, in millimetres. Where the STEP part has gaps, layers are cut up
-    /// to 10 um beside their planes, or else taken from here; so are those that lack contours of it
+    /// An STL of the same STEP part, in millimetres. Layers where the STEP part has gaps are cut up
+    /// to 10 um off their plane, or else taken from this STL, as are layers that lack contours of
+    /// it
     #[arg(long, value_name = "PART.stl", help_heading = HEADING)]
     fallback: Option<PathBuf>,
 
-    /// Write what is wrong with the mesh to a file, in JSON: for each band of rows that do not
-    /// balance, the edges that are open or shared by too many, and the facets there by number and
-    /// corners, as they stand in the part's file
+    /// Write the mesh's faults as JSON: for each band of unbalanced rows, the edges that are open
+    /// or shared by too many facets, with those facets' numbers and corners in the part's file
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
@@ -80,7 +80,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         Reading { dpi: args.options.dpi, may_be_open: args.fallback.is_some(), say: &say };
     let model = args.options.solid.open(&args.parts, &reading)?;
     if args.fallback.is_some() && model.prepared().next().is_none() {
-        return Err(Stop::usage("--fallback stands in for STEP parts: give it with one"));
+        return Err(Stop::usage("--fallback needs a STEP part"));
     }
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args
@@ -138,8 +138,9 @@ fn polish_text(polished: Polished) -> String {
         kept => format!(", {kept} stayed on their facets"),
     };
     format!(
-        "{moved} crossings were moved from facets to surfaces, by {mean} on average and {most} at \
-         most along their rows{kept}; where contours turn, {mended} were added or taken away"
+        "{moved} crossings were moved from facets to exact surfaces, by {mean} on average and \
+         {most} at most along their rows{kept}; {mended} were added or removed where contours \
+         turn"
     )
 }
 
@@ -147,8 +148,8 @@ fn say_stray_rows(report: &Report, counts: Counts, written: Option<&Path>) {
     let Counts { stray_rows: rows, stray_layers: layers, .. } = counts;
     if rows > 0 {
         let names = match written {
-            Some(path) => format!("{} names the facets", path.display()),
-            None => "--report FILE.json names the facets".to_owned(),
+            Some(path) => format!("and {} lists the facets", path.display()),
+            None => "and --report FILE.json lists the facets".to_owned(),
         };
         report.say(&format!(
             "{rows} rows in {layers} layers do not balance: the mesh has gaps; fix corrects them, {names}"

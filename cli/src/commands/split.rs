@@ -9,10 +9,10 @@ use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{folder_to_make, format, input_name, read_layers, written_to};
 
-/// Split a stack into files of a range of layers each
+/// Split a stack into files, each with a range of layers
 ///
-/// Each file is a stack in itself, named after its first and last layer:
-/// `layers_00500-00999.tif`. `lamp join` makes the same bytes of them again.
+/// Each file is a stack of its own, named after its first and last layer: `layers_00500-00999.tif`.
+/// `lamp join` puts them together again, byte for byte.
 #[derive(Args)]
 #[command(group = ArgGroup::new("cuts").required(true))]
 #[command(after_help = "\
@@ -25,15 +25,15 @@ pub(crate) struct SplitArgs {
     #[command(flatten)]
     input: Input,
 
-    /// Put N layers into each file; the last takes what is left
+    /// Put N layers into each file; the last takes the rest
     #[arg(long, value_name = "N", group = "cuts", value_parser = parse_every)]
     every: Option<NonZeroU32>,
 
-    /// Start a file with each of these layers
+    /// Start a new file at each of these layers
     #[arg(long, value_name = "LAYER,...", group = "cuts", value_delimiter = ',')]
     at: Vec<u32>,
 
-    /// The folder of files to make; it must not exist, or be empty
+    /// Folder to write to; it must not exist, or be empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 
@@ -46,7 +46,11 @@ pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Stop> {
     let cuts = match args.every {
         Some(layers) => Cuts::Every(layers),
         None if args.at.is_sorted_by(|a, b| a < b) => Cuts::At(args.at.clone()),
-        None => return Err(Stop::usage("the layers of --at go up: write --at 500,900")),
+        None => {
+            return Err(Stop::usage(
+                "the layers of --at must be in ascending order, as --at 500,900",
+            ));
+        }
     };
     let folder = folder_to_make(&args.output)?;
     let report = Report::new("split", common.quiet, true);

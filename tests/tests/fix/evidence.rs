@@ -140,7 +140,7 @@ fn pictures_go_to_an_empty_folder() {
     let names = scratch.names();
     let ran = scratch.run("fix stray.tif --evidence pictures -o fixed.tif");
     assert_eq!(ran.statuses, [Some(2)]);
-    assert!(ran.stderr.contains("pictures: pictures go to an empty folder"), "{ran:?}");
+    assert!(ran.stderr.contains("pictures: the folder for pictures is not empty"), "{ran:?}");
     assert_eq!((scratch.names(), pictures(&scratch)), (names, vec!["mine.txt".to_owned()]));
 
     fs::remove_file(scratch.path("pictures/mine.txt")).unwrap();

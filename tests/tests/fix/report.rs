@@ -139,9 +139,9 @@ fn a_report_needs_a_file_of_its_own() {
     let names = scratch.names();
     for (options, words) in [
         ("--report -", "name a file"),
-        ("-o a.tif --report a.tif", "the stack goes there"),
-        ("-o a.tif --report ./a.tif", "the stack goes there"),
-        ("-o a.tif --report stray.tif", "that is the input"),
+        ("-o a.tif --report a.tif", "the stack is written there"),
+        ("-o a.tif --report ./a.tif", "the stack is written there"),
+        ("-o a.tif --report stray.tif", "that is an input"),
     ] {
         let ran = scratch.run(&format!("fix stray.tif {options}"));
         assert_eq!(ran.statuses, [Some(2)], "{ran:?}");

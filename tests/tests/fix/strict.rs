@@ -15,7 +15,7 @@ fn bands_that_are_left_end_with_status_3_and_the_same_stack() {
     for ran in [lax, strict] {
         let last = ran.stderr.lines().last().unwrap();
         assert!(last.contains(&format!("{left} bands of stray rows were left")), "{last}");
-        assert_eq!(ran.stderr.matches("; repair the CAD near ").count(), left);
+        assert_eq!(ran.stderr.matches("; repair the CAD model near ").count(), left);
     }
     let ran = scratch.run("fix stray.tif --max-width 4 --strict --quiet -o quiet.tif");
     assert_eq!(ran.statuses, [Some(3)]);
@@ -67,7 +67,8 @@ fn a_band_that_is_left_names_the_place_of_the_missing_facet() {
         let left: Vec<_> = bands(&report).iter().filter(|band| !is_corrected(band)).collect();
         assert_eq!(ran.statuses, [Some(if left.is_empty() { 0 } else { 3 })]);
         let stray = scratch.layers("stray.tif");
-        let mut lines = ran.stderr.lines().filter(|line| line.contains("repair the CAD near"));
+        let mut lines =
+            ran.stderr.lines().filter(|line| line.contains("repair the CAD model near"));
         for band in left {
             let [layer, first, last] =
                 ["layer", "first_row", "last_row"].map(|key| number(&band[key]));
@@ -76,7 +77,7 @@ fn a_band_that_is_left_names_the_place_of_the_missing_facet() {
             let line = lines.next().expect("a line for each band that was left");
             let start = format!(
                 "fix: layer {layer} (z {z_mm:.2} mm) rows {first}-{last}: {} rows wide, limit 15; \
-                 repair the CAD near x ",
+                 repair the CAD model near x ",
                 last - first + 1
             );
             let place = line.strip_prefix(&start).unwrap_or_else(|| panic!("{line}\n{start}"));

@@ -16,11 +16,11 @@ use crate::plots::{Axis, Plot, Series, highest};
 use crate::report::Report;
 use crate::stop::Stop;
 
-/// Find the working curve from measured cure depths
+/// Fit a working curve to measured cure depths
 ///
 /// The CSV file has a header with the columns dose_mj_per_cm2 (or exposure_ms, with --intensity)
 /// and depth_um, and gray (0 black to 1 white) for the gray model. Doses are those of full white.
-/// Rows of depth 0 or less are uncured: they lie on no curve, and are left out.
+/// Rows with a depth of 0 or less are uncured and left out.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -31,7 +31,7 @@ pub(super) struct DepthArgs {
     #[command(flatten)]
     files: Files,
 
-    /// Which model to fit [default: gray where the file has such a column, else jacobs]
+    /// Model to fit [default: gray if the file has that column, else jacobs]
     #[arg(long, value_enum)]
     model: Option<ModelArg>,
 }
@@ -40,9 +40,9 @@ pub(super) struct DepthArgs {
 enum ModelArg {
     /// The working curve Dp ln(E / Ec)
     Jacobs,
-    /// Own penetration depths for liquid and solid
+    /// Separate penetration depths for liquid and solid
     TwoDepth,
-    /// A working curve whose Ec and Dp are lines over the gray level
+    /// A working curve whose Ec and Dp are linear in the gray level
     Gray,
 }
 
@@ -86,8 +86,8 @@ fn say_what_was_changed(fit: &Fit, report: &Report) {
     match fit {
         Fit::Jacobs(_) => {}
         Fit::TwoDepth(fit) if fit.straight => report.say(&format!(
-            "the points do not bend: the solid is as good as clear, and its penetration depth \
-             stands as {} um, 10000 times the deepest point",
+            "the points lie on a straight line: the solid is practically clear, and its \
+             penetration depth is taken as {} um, 10000 times the deepest point",
             short(fit.solid_depth.value.um())
         )),
         Fit::TwoDepth(_) => {}
@@ -103,8 +103,9 @@ fn levelled<T: Quantity>(line: &LineEstimate<T>, what: &str, unit: &str, report:
     let [fall, high, level] =
         [-rise.number(), line.rise.high.number(), line.at_zero.value.number()].map(short);
     report.say(&format!(
-        "{what} falls by {fall} {unit} from black to white, which scatter may do (it might as well \
-         rise by {high}): the gray model takes no falling line, so it stands level at {level} {unit}"
+        "{what} falls by {fall} {unit} from black to white, perhaps by chance (it might as well \
+         rise by {high}): the gray model takes no falling line, so it is kept level at {level} \
+         {unit}"
     ));
 }
 

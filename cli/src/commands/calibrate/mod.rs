@@ -21,10 +21,10 @@ use crate::plots::{self, Plot, drawn};
 use crate::stop::Stop;
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
 
-/// Find a resin's numbers from measured cure depths or widths
+/// Fit a resin's parameters to measured cure depths or widths
 ///
-/// Prints each number with its 95% confidence interval; writes them into a material file, and
-/// plots them with the points that they come from.
+/// Prints each parameter with its 95% confidence interval, writes them into a material file, and
+/// plots the fit with the measured points.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -51,28 +51,28 @@ pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Stop> {
 /// What both kinds read and write.
 #[derive(Args)]
 struct Files {
-    /// The measurements: a CSV file, or - for standard input
+    /// Measurements: a CSV file, or - for standard input
     #[arg(value_name = "DATA")]
     data: PathBuf,
 
-    /// The light of full white, which makes doses of exposure_ms; it goes into the material
+    /// Intensity of full white, which turns exposure_ms into doses; it is written into the material
     /// [default: the material's]
     #[arg(long, value_name = "INTENSITY", value_parser = parse_light)]
     intensity: Option<Intensity>,
 
-    /// Add to what this material says: a file, or a built-in material's name
+    /// Material to add the parameters to: a file or a built-in material's name
     #[arg(long, value_name = "MATERIAL")]
     material: Option<PathBuf>,
 
-    /// Where to write the material file
+    /// Material file to write
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
-    /// What to call the material [default: as --material, or as the file]
+    /// Name of the material [default: that of --material, or of the file]
     #[arg(long, value_name = "NAME", requires = "output")]
     name: Option<String>,
 
-    /// Plot the points and the curves: a file that ends in .svg or .png
+    /// Plot points and curves: a file that ends in .svg or .png
     #[arg(long, value_name = "PLOT")]
     plot: Option<PathBuf>,
 }
@@ -95,7 +95,7 @@ impl Files {
         let Some(plot) = &self.plot else { return Ok(()) };
         plots::check_name(plot)?;
         if self.output.as_ref() == Some(plot) {
-            return Err(Stop::usage(format!("{}: the material goes there", plot.display())));
+            return Err(Stop::usage(format!("{}: the material is written there", plot.display())));
         }
         check_beside(plot, Path::new("-"), self.material.iter().chain([&self.data]))
     }

@@ -16,12 +16,12 @@ use crate::plots::{Axis, Plot, Series, highest};
 use crate::report::Report;
 use crate::stop::Stop;
 
-/// Find the cure width of features of several sizes from measured squares
+/// Fit the cure width of features of several sizes to measured squares
 ///
 /// The CSV file has a header with the columns feature_px (the squares' side in the image; or
 /// feature_um), dose_mj_per_cm2 (or exposure_ms, with --intensity), and cured_um (the side after
-/// curing; or width_um, how far each edge lies outside its image). Rows whose square is no larger
-/// than its image lie on no line, and are left out. lamp target squares writes a file to fill in.
+/// curing; or width_um, the distance of each edge outside its image). Rows whose square is no
+/// larger than its image are left out. lamp target squares writes a file to fill in.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -31,11 +31,11 @@ pub(super) struct WidthArgs {
     #[command(flatten)]
     files: Files,
 
-    /// The resolution that feature_px is of
+    /// Resolution of feature_px, in dots per inch
     #[arg(long, default_value = "1500")]
     dpi: Dpi,
 
-    /// Tell the broadening depth by this material's cure depth [default: that of --material]
+    /// Compute the broadening depth from this material's cure depth [default: that of --material]
     #[arg(long, value_name = "MATERIAL")]
     depth_material: Option<PathBuf>,
 }
@@ -57,7 +57,8 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Stop> {
     let report = Report::new("calibrate", common.quiet, true);
     if depths.is_none() {
         report.say(
-            "no broadening depth, as no cure depth is known: name a material with --depth-material",
+            "there is no broadening depth, as no cure depth is known: name a material with \
+             --depth-material",
         );
     }
     let mut text = Text::new(&measured, "not wider");

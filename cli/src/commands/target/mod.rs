@@ -10,7 +10,7 @@ use lamp_stack::{Dpi, Length};
 use crate::options::{Common, parse_distance};
 use crate::stop::Stop;
 
-/// Write test images to expose, measure and calibrate by
+/// Write test images to expose, measure and calibrate with
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -42,7 +42,7 @@ fn whole_pixels(length: Length, dpi: Dpi) -> u32 {
 /// Parses how far squares stand apart, which is some way.
 fn parse_gap(text: &str) -> Result<Length, String> {
     let gap = parse_distance(text)?;
-    if gap.um() == 0.0 { Err("a gap has some width".to_owned()) } else { Ok(gap) }
+    if gap.um() == 0.0 { Err("the gap must be above zero".to_owned()) } else { Ok(gap) }
 }
 
 /// Impossible targets come from options.

@@ -10,38 +10,39 @@ use crate::options::{Common, Output};
 use crate::stop::Stop;
 use crate::streams::{report, write_layers};
 
-/// A gray tile and screens of it in squares of several sizes
+/// Write a gray tile, and screens of it with squares of several sizes
 ///
-/// The films that they cure show up to which size of squares a screen cures evenly. The first tile
-/// is gray, for lamp dither to make dots of; the others are black and white.
+/// The cured films show up to which size of squares a screen cures evenly. The first tile is gray,
+/// for lamp dither to turn into dots; the others are black and white.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp target screens -o screens.tif
   lamp target screens --gray 25% --exposure 600ms | dither > screens.tif")]
 pub(super) struct ScreensArgs {
-    /// The resolution
+    /// Resolution in dots per inch
     #[arg(long, default_value = "1500")]
     dpi: Dpi,
 
-    /// The gray level of all tiles, to the nearest 64th on the screens; half is a checkerboard
+    /// Gray level of all tiles, to the nearest 64th on the screens; 50% is a checkerboard
     #[arg(long, value_name = "PERCENT", default_value = "50%", value_parser = parse_level)]
     gray: GrayLevel,
 
-    /// The sides of the screens' squares in pixels; 1, 5, 10 and 15 are 17, 85, 170 and 255 um at
-    /// 1500 dpi
+    /// Sides of the screens' squares, in pixels; 1, 5, 10 and 15 are 17, 85, 170 and 255 um at 1500
+    /// dpi
     #[arg(long, value_name = "PIXELS,...", value_delimiter = ',', default_value = "1,5,10,15")]
     cells: Vec<u32>,
 
-    /// The side of a tile in pixels; a multiple of eight times each square has just the gray level
+    /// Side of a tile, in pixels; a multiple of eight times each square gives exactly the gray
+    /// level
     #[arg(long, value_name = "PIXELS", default_value_t = 720)]
     tile: u32,
 
-    /// How far the tiles stand apart
+    /// Distance between tiles
     #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_gap)]
     gap: Length,
 
-    /// How long to expose
+    /// Exposure time
     #[arg(long, value_name = "TIME")]
     exposure: Option<ExposureTime>,
 

@@ -19,12 +19,12 @@ use crate::report::Report;
 use crate::stop::Stop;
 use crate::streams::{folder_to_make, write_file};
 
-/// Squares of several sizes, each at several doses, for the cure width
+/// Write squares of several sizes, each at several doses, to calibrate the cure width
 ///
 /// Writes a stack for each size, squares_00025px.tif and so on, and squares.csv, a table to fill in
 /// for lamp calibrate width. Expose all pages of a stack onto one layer, each for its exposure_ms:
-/// page by page one square fewer is white, so that the k-th square, counted in rows from the top
-/// left, gets the k-th dose in all.
+/// each page has one white square fewer, so that the k-th square, counted in rows from the top
+/// left, gets the k-th dose in total.
 #[derive(Args)]
 #[command(group = ArgGroup::new("light").required(true))]
 #[command(after_help = "\
@@ -33,32 +33,32 @@ Examples:
   lamp target squares --doses 50,70,100,150mJ/cm2 --sizes 25,450 --intensity 20mW/cm2 -o targets/
   lamp calibrate width targets/squares.csv")]
 pub(super) struct SquaresArgs {
-    /// The resolution
+    /// Resolution in dots per inch
     #[arg(long, default_value = "1500")]
     dpi: Dpi,
 
-    /// The squares' sides in pixels
+    /// Sides of the squares, in pixels
     #[arg(long, value_name = "PIXELS,...", value_delimiter = ',')]
     #[arg(default_value = "25,50,75,100,200,300,450,600,750,900")]
     sizes: Vec<u32>,
 
-    /// The doses: A..B for ten from A to B in equal steps, or a list that goes up
+    /// Doses: A..B for ten from A to B in equal steps, or a list in ascending order
     #[arg(long, value_name = "A..BmJ/cm2|A,B,...mJ/cm2", value_parser = parse_doses)]
     doses: Doses,
 
-    /// The light of full white, which makes times of doses
+    /// Intensity of full white, which turns doses into times
     #[arg(long, value_name = "INTENSITY", value_parser = parse_light, group = "light")]
     intensity: Option<Intensity>,
 
-    /// Take the light from this material: a file, or a built-in material's name
+    /// Take the intensity from this material: a file or a built-in material's name
     #[arg(long, value_name = "MATERIAL", group = "light")]
     material: Option<PathBuf>,
 
-    /// How far the squares stand apart
+    /// Distance between squares
     #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_gap)]
     gap: Length,
 
-    /// The folder to make; it must not exist, or be empty
+    /// Folder to write to; it must not exist, or be empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
@@ -70,7 +70,7 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Stop> {
     let mut sizes = args.sizes.clone();
     sizes.sort_unstable();
     if let Some(twice) = sizes.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Stop::usage(format!("--sizes: {} stands twice", twice[0])));
+        return Err(Stop::usage(format!("--sizes: {} is given twice", twice[0])));
     }
     // All of them, before there is a folder: a size may be impossible.
     let doses = &args.doses.0;
@@ -120,7 +120,7 @@ impl SquaresArgs {
         let material: Material = entry(path)?;
         let name = path.display();
         material.intensity.map(|light| light.value).ok_or_else(|| {
-            Stop::usage(format!("{name} does not say how bright full white is: give --intensity"))
+            Stop::usage(format!("{name} states no intensity of full white: give --intensity"))
         })
     }
 
@@ -185,7 +185,7 @@ fn parse_doses(text: &str) -> Result<Doses, String> {
             format!("`{text}` is not a dose: write --doses 60..600mJ/cm2 or 60,90,140mJ/cm2")
         })?;
         if dose.mj_per_cm2() > 0.0 && !Dose::PLAUSIBLE.contains(&dose) {
-            return Err(format!("`{text}` is beyond any resin: doses are 1e-6 to 1e9 mJ/cm2"));
+            return Err(format!("`{text}` is not a plausible dose: write 1e-6 to 1e9 mJ/cm2"));
         }
         Ok(dose)
     };
@@ -194,7 +194,7 @@ fn parse_doses(text: &str) -> Result<Doses, String> {
     };
     let [from, to] = [dose(from)?, dose(to)?].map(Dose::mj_per_cm2);
     if from >= to {
-        return Err(format!("`{text}` holds no doses: the end must be above the start"));
+        return Err(format!("`{text}` contains no doses: the end must be above the start"));
     }
     let step = (to - from) / f64::from(RANGE_STEPS - 1);
     let dose = |i| Dose::from_mj_per_cm2(from + step * f64::from(i));

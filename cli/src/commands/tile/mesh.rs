@@ -16,41 +16,40 @@ const HEADING: &str = "Mesh around the parts";
 /// Options of the mesh.
 #[derive(Args)]
 pub(super) struct MeshArgs {
-    /// What fills the places around the parts, so that the suspension does not slosh: hexagon,
-    /// square, an image that is repeated, or none
+    /// Mesh around the parts, which keeps the suspension from sloshing: hexagon, square, an image
+    /// that is repeated, or none
     #[arg(long, value_name = "hexagon|square|none|FILE", default_value = "hexagon")]
     #[arg(help_heading = HEADING)]
     mesh: PathBuf,
 
-    /// From the middle of a cell to that of the next [default: 5mm]
+    /// Distance between the centres of neighbouring cells [default: 5mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     cell: Option<Length>,
 
-    /// The thickness of the walls between cells [default: 500um]
+    /// Thickness of the walls between cells [default: 500um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     wall: Option<Length>,
 
-    /// How wide the moat is that stays free around each part, along its outline in each layer
-    /// [default: 1mm]
+    /// Width of the moat that stays free around each part [default: 1mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
     clearance: Option<Length>,
 
-    /// Whether the moat follows the part in each layer, or what is white in any layer: then no mesh
-    /// stands on the part's faces or in bores that lie across. It implies --fit [default: layer]
+    /// Whether the moat follows the part in each layer or its outline over all layers, so that no
+    /// mesh stands on its faces or in cross bores; outline implies --fit [default: layer]
     #[arg(long, value_name = "layer|outline", value_parser = one_of::<Moat>())]
     #[arg(help_heading = HEADING)]
     moat: Option<Moat>,
 
-    /// How wide break lines are, which cut the mesh from each part up, down, left and right to the
+    /// Width of the break lines, which cut the mesh from each part up, down, left and right to the
     /// next part or the area's edge; 0um makes none [default: 500um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
     break_width: Option<Length>,
 
-    /// How far apart the break lines of a part are [default: 20mm]
+    /// Distance between the break lines of a part [default: 20mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     break_pitch: Option<Length>,
 
-    /// So many layers of mesh alone below the parts, which break off it [default: 5]
+    /// Number of layers of mesh alone below the parts, for them to break off from [default: 5]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..100_000))]
     #[arg(help_heading = HEADING)]
     base_layers: Option<u32>,
@@ -83,11 +82,11 @@ impl MeshArgs {
         if self.mesh == Path::new("none")
             && let Some(option) = given(&of_cells).or(given(&lengths)).or(base)
         {
-            return Err(Stop::usage(format!("{option} goes with a mesh, not with --mesh none")));
+            return Err(Stop::usage(format!("{option} has no effect with --mesh none")));
         }
         match (self.file(), given(&of_cells)) {
             (Some(_), Some(option)) => Err(Stop::usage(format!(
-                "{option} goes with --mesh hexagon or square: an image has its own walls"
+                "{option} needs --mesh hexagon or square: an image has its own walls"
             ))),
             _ => Ok(()),
         }

@@ -25,16 +25,15 @@ use mesh::MeshArgs;
 use stacks::{Stack, StackArg};
 use strips::StripArgs;
 
-/// Lay copies of parts out on a build area, in a mesh
+/// Lay out copies of parts on a build area, in a mesh
 ///
-/// Copies of one part stand in rows from the top left, and the whole is centred; --pack outline
-/// places them by their outlines where that gains parts. Where copies stand is written on the first
-/// page. Several stacks are joined by the heights of their layers, and shorter parts end. Gray layers
-/// make a gray build.
+/// Copies of one part stand in rows from the top left, centred as a whole; --pack outline places
+/// them by their outlines if more fit. The first page records where they stand. Several stacks are
+/// matched by the heights of their layers; shorter parts end first. Gray layers make a gray build.
 ///
-/// A mesh fills what is left of the area, around a moat that follows each part's outline, and break
-/// lines cut it through; the first layers are mesh alone. All of its measures are this program's
-/// own. --mesh none leaves the area black.
+/// A mesh fills the rest of the area. A moat along each part's outline stays free, and break lines
+/// cut through the mesh; the first layers are mesh alone. The default dimensions of the mesh are
+/// LAMP's own. --mesh none leaves the area black.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -46,73 +45,73 @@ Examples:
   tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif
   tile blade.tif --machine beta --strips strips/ --mirrors 1920 --overlap 64")]
 pub(crate) struct TileArgs {
-    /// The stacks to read, each with how many copies: TIFF or PNG files, folders of pages, or - for
-    /// standard input [without a count: as many as fit of one stack, one each of several]
+    /// Stacks to read, each with its number of copies: TIFF or PNG files, folders of pages, or -
+    /// for standard input [default count: as many as fit of one stack, one each of several]
     #[arg(value_name = "STACK[:COPIES]", default_value = "-", value_parser = StackArg::parse)]
     stacks: Vec<StackArg>,
 
-    /// Only these layers: A..B is A to B - 1; A.. and ..B are open ended
+    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     layers: Option<Range<u32>>,
 
-    /// The machine: alpha, beta or a file (see lamp machine); stacks must be of a resolution and
-    /// thickness that it builds in
+    /// Machine: alpha, beta or a file (see lamp machine); it must build in the stacks' resolution
+    /// and layer thickness
     #[arg(long, value_name = "M")]
     machine: Option<PathBuf>,
 
-    /// The build area, as 4x4.5in or 100x80mm [default: the machine's, or 4x4.5in]
+    /// Build area, for example 4x4.5in or 100x80mm [default: the machine's, or 4x4.5in]
     #[arg(long, value_name = "WxH")]
     area: Option<Size>,
 
-    /// How many copies of the one stack [default: as many as fit]
+    /// Number of copies of a single stack [default: as many as fit]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     copies: Option<u32>,
 
-    /// The least distance between copies [default: twice the mesh's clearance and 2mm; 1mm with
+    /// Smallest distance between copies [default: twice the mesh's clearance and 2mm; 1mm with
     /// --mesh none]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     gap: Option<Length>,
 
-    /// Place the parts' extents, what is white in any layer, not their whole images. Stacks are
-    /// read twice; standard input is kept in a temporary file
+    /// Place parts by the extent of what is white in any layer, not by their whole images. Stacks
+    /// are read twice; standard input is kept in a temporary file
     #[arg(long)]
     fit: bool,
 
-    /// By what copies keep apart; outline implies --fit
+    /// What copies are kept apart by; outline implies --fit
     #[arg(long, default_value_t, value_parser = one_of_described::<PackBy>(&[
         "The boxes around the parts",
-        "The parts' outlines, where boxes place fewer",
+        "The parts' outlines, if boxes place fewer",
     ]))]
     pack: PackBy,
 
-    /// Which turns packing may use where that gains parts [default: none, or quarters with --pack
+    /// Turns that packing may use if more copies fit [default: none, or quarters with --pack
     /// outline]
     #[arg(long, value_parser = one_of_described::<Turns>(&[
-        "Parts lie as they were sliced",
+        "Parts stay as they were sliced",
         "By 180 degrees",
         "By 90, 180 and 270 degrees",
     ]))]
     turns: Option<Turns>,
 
-    /// Place the copies as this file says, instead of packing them
+    /// Place copies as this file says, instead of packing them
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     #[arg(conflicts_with_all = ["copies", "gap", "pack", "turns"])]
     layout: Option<PathBuf>,
 
-    /// Write where the copies stand, for --layout
+    /// Write the copies' positions, for --layout
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     layout_out: Option<PathBuf>,
 
-    /// Draw where the copies stand, with their numbers, as SVG or PNG
+    /// Draw the numbered copies on the build area, as SVG or PNG
     #[arg(long, value_name = "FILE")]
     layout_picture: Option<PathBuf>,
 
-    /// Let heights count from each stack's first layer, so that all stand on the platform
+    /// Count heights from each stack's first layer, so that all parts stand on the platform
     #[arg(long)]
     settle: bool,
 
-    /// Take layers that do not match: the build has the heights of the first stack, and of each
-    /// other stack the layer that holds the top of the build's layer
+    /// Accept layers that do not match: the build has the heights of the first stack, and takes
+    /// from each other stack the layer at the top of its own
     #[arg(long)]
     resample: bool,
 
@@ -189,9 +188,7 @@ impl TileArgs {
             ));
         }
         if self.layout.is_some() && counted {
-            return Err(Stop::usage(
-                "--layout says how many copies there are: leave the counts out",
-            ));
+            return Err(Stop::usage("--layout gives the number of copies: leave out the counts"));
         }
         self.mesh.check()?;
         let inputs = || {

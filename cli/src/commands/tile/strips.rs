@@ -17,18 +17,19 @@ const HEADING: &str = "Strips of a projector that scans";
 /// Options of the strips.
 #[derive(Args)]
 pub(super) struct StripArgs {
-    /// Cut each layer into the swaths that a scanning projector exposes: one stack for each and an
-    /// index of them, strips.json, in this new folder. lamp join makes the build of it again
+    /// Cut each layer into the swaths that a scanning projector exposes: writes one stack per swath
+    /// and an index, strips.json, into this new folder. lamp join puts the build together again
     #[arg(long, value_name = "DIR", help_heading = HEADING)]
     strips: Option<PathBuf>,
 
-    /// How many mirrors lie across the projector's way: pixels of a swath [default: the machine's]
+    /// Number of mirrors across the projector's path, the width of a swath in pixels [default: the
+    /// machine's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     #[arg(requires = "strips", help_heading = HEADING)]
     mirrors: Option<u32>,
 
-    /// How many pixels a swath shares with the next, where the one's dose falls as the other's
-    /// rises [default: the machine's, or 0 with --mirrors]
+    /// Number of pixels that a swath shares with the next, where their doses blend [default: the
+    /// machine's, or 0 with --mirrors]
     #[arg(long, value_name = "N", requires = "strips", help_heading = HEADING)]
     overlap: Option<u32>,
 }
