@@ -5,6 +5,7 @@
 use std::error::Error;
 
 use lamp_adaptive::HeightsError;
+use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::material::MaterialError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
 use lamp_postprocess::{EditError, EditProblem, LayerProblem, LayoutError, TileError};
@@ -27,6 +28,9 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
     }
     if let Some(error) = error.downcast_ref() {
         return machine_limit(error);
+    }
+    if let Some(DataError::NoLight) = error.downcast_ref() {
+        return Some("give --intensity, as 1.6W/cm2".to_owned());
     }
     if let Some(error) = error.downcast_ref::<CatalogueError<MaterialError>>() {
         return catalogue(error);

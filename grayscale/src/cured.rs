@@ -41,7 +41,7 @@ impl PixelLine {
     /// Gives the pixels along it that are not black, as first, end and level.
     ///
     /// # Panics
-    /// Where it does not cross the image.
+    /// Panics if it does not cross the image.
     fn for_each_run(self, image: &Image, mut each: impl FnMut(u32, u32, u8)) {
         match self {
             Self::Row(row) => for_each_run_of_row(image, row, each),
@@ -84,7 +84,7 @@ impl CuredLine {
     /// from `top` down by the depth of its level.
     ///
     /// # Panics
-    /// Where the line does not cross the image.
+    /// Panics if the line does not cross the image.
     pub fn expose(
         &mut self,
         line: PixelLine,

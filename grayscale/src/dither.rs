@@ -48,7 +48,7 @@ pub enum DitherError {
 /// unchanged. A layer's dots depend on its image and its index alone.
 ///
 /// # Errors
-/// Those of `layers` and of [`dither_image`].
+/// Returns the errors of `layers` and of [`dither_image`].
 pub fn dither<E: From<DitherError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     method: DitherMethod,
@@ -69,7 +69,7 @@ pub fn dither<E: From<DitherError> + Send>(
 /// gives, so that the holes of one layer do not lie on those of the next.
 ///
 /// # Errors
-/// Where the dots make more runs than [`MAX_RUNS`].
+/// Returns an error if the dots make more runs than [`MAX_RUNS`].
 pub fn dither_image(
     gray: &GrayMask,
     method: DitherMethod,

@@ -53,7 +53,7 @@ const WIDTH_STEP: u32 = 32;
 /// and around them.
 ///
 /// # Errors
-/// Where the doses are none, too many or do not go up from above zero, or a length
+/// Returns an error if the doses are none, too many or do not go up from above zero, or a length
 /// makes no image.
 pub fn squares(side: u32, gap: u32, doses: &[Dose]) -> Result<Vec<TargetExposure>, TargetError> {
     check_pixels("squares", side, MAX_PIXELS)?;
@@ -107,7 +107,7 @@ fn squares_from(first: usize, count: usize, side: u32, gap: u32) -> Mask {
 /// them: tiles of a multiple of all cells' eightfold have just that share.
 ///
 /// # Errors
-/// Where a length makes no image.
+/// Returns an error if a length makes no image.
 pub fn screens(
     level: GrayLevel,
     tile: u32,

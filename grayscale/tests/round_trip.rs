@@ -3,9 +3,9 @@
 
 use lamp_grayscale::material::{
     Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine, Material,
-    TwoDepthNumbers, WidthNumbers, Written,
+    TwoDepthNumbers, WidthNumbers,
 };
-use lamp_grayscale::resin::{Dose, Intensity, WidthSensitivity};
+use lamp_grayscale::resin::{Dose, Intensity, Quantity, WidthSensitivity};
 use lamp_stack::{Catalogued, Length};
 use proptest::option;
 use proptest::prelude::*;
@@ -27,7 +27,7 @@ fn text() -> impl Strategy<Value = String> {
     "[ -~äµ²\n\"]{0,12}x"
 }
 
-fn given<T: Written + std::fmt::Debug>(
+fn given<T: Quantity + std::fmt::Debug>(
     value: impl Strategy<Value = T> + Clone,
 ) -> impl Strategy<Value = Given<T>> {
     (value.clone(), option::of(value), text()).prop_map(|(value, plus_minus, source)| Given {

@@ -16,10 +16,13 @@ pub(super) const EXPOSURE: &str = "exposure_ms";
 pub(super) const LENGTHS: RangeInclusive<f64> = 1e-3..=1e6;
 
 /// A misspelt column must not be silently left out.
-pub(super) fn check_columns(table: &CsvTable, known: &[&str]) -> Result<(), DataError> {
+pub(super) fn check_columns(
+    table: &CsvTable,
+    known: &'static [&'static str],
+) -> Result<(), DataError> {
     let is_known = |column: &&String| known.contains(&column.as_str()) || column.as_str() == "note";
     match table.columns().iter().find(|column| !is_known(column)) {
-        Some(column) => Err(DataError::Unknown { column: column.clone(), known: known.join(", ") }),
+        Some(column) => Err(DataError::Unknown { column: column.clone(), known }),
         None => Ok(()),
     }
 }

@@ -63,7 +63,7 @@ impl CsvTable {
     /// are skipped; quotes around a cell are taken off.
     ///
     /// # Errors
-    /// Where there is no header, or a row has more or fewer cells than it.
+    /// Returns an error if there is no header, or a row has more or fewer cells than it.
     pub fn parse(text: &str) -> Result<Self, TableError> {
         // Spreadsheets mark their files as UTF-8.
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);

@@ -25,7 +25,7 @@ impl ExposureTimes {
     /// Takes times from a table of `thickness_um` and `exposure_ms`.
     ///
     /// # Errors
-    /// Where a column is missing or unknown, a cell is no possible number, or a
+    /// Returns an error if a column is missing or unknown, a cell is no possible number, or a
     /// thickness stands twice.
     pub fn new(table: &CsvTable) -> Result<Self, DataError> {
         check_columns(table, &[THICKNESS, EXPOSURE])?;

@@ -29,7 +29,7 @@ pub struct CurveFit {
 /// from Fieller's theorem, and is longer upwards than downwards or the reverse.
 ///
 /// # Errors
-/// Where there are fewer than three points or two doses, or the depth does not
+/// Returns an error if there are fewer than three points or two doses, or the depth does not
 /// rise with the dose for sure or leaves no critical dose that can be written down.
 pub fn fit_curve(points: &[DepthPoint]) -> Result<CurveFit, FitError> {
     let log = |p: &DepthPoint| (p.arriving().mj_per_cm2().ln(), p.depth.um());

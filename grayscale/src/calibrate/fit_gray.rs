@@ -6,9 +6,9 @@ use super::fit_curve::{CurveFit, fit_curve};
 use super::measurements::DepthPoint;
 use super::regression::LineFit;
 use super::significant::round_significant;
-use super::{Estimate, FitError, Quantity};
+use super::{Estimate, FitError, PointGroup};
 use crate::material::{CurveLines, GivenLine};
-use crate::resin::{Dose, GrayLevel};
+use crate::resin::{Dose, GrayLevel, Quantity};
 
 /// How the working curve moves with the gray level, found from measurements.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +50,7 @@ pub struct LineEstimate<T> {
 /// A line that falls, but not for sure, is kept level.
 ///
 /// # Errors
-/// Where there are fewer than three levels, a level has no working curve, a line
+/// Returns an error if there are fewer than three levels, a level has no working curve, a line
 /// falls for sure, or begins at no more than zero.
 pub fn fit_gray(points: &[DepthPoint]) -> Result<GrayFit, FitError> {
     let mut sorted = points.to_vec();
@@ -60,7 +60,7 @@ pub fn fit_gray(points: &[DepthPoint]) -> Result<GrayFit, FitError> {
         let curve = fit_curve(group);
         curve
             .map(|curve| LevelFit { gray, curve })
-            .map_err(|error| error.within(format!("gray level {}", gray.get())))
+            .map_err(|error| error.within(PointGroup::Gray(gray)))
     };
     let levels: Vec<LevelFit> =
         sorted.chunk_by(|a, b| a.gray == b.gray).map(fit).collect::<Result<_, _>>()?;
@@ -69,16 +69,16 @@ pub fn fit_gray(points: &[DepthPoint]) -> Result<GrayFit, FitError> {
     }
     let doses = levels.iter().map(|level| (level.gray, level.curve.critical_dose.value));
     let depths = levels.iter().map(|level| (level.gray, level.curve.penetration_depth.value));
-    let critical_dose = line(doses, "the critical dose", "mJ/cm2")?;
-    let penetration_depth = line(depths, "the penetration depth", "um")?;
+    let critical_dose = line(doses, "the critical dose")?;
+    let penetration_depth = line(depths, "the penetration depth")?;
     Ok(GrayFit { critical_dose, penetration_depth, levels })
 }
 
 fn line<T: Quantity>(
     values: impl Iterator<Item = (GrayLevel, T)>,
     what: &'static str,
-    unit: &'static str,
 ) -> Result<LineEstimate<T>, FitError> {
+    let unit = T::UNIT;
     let values: Vec<_> = values.map(|(gray, value)| (gray.get(), value.number())).collect();
     let fit = LineFit::new(&values)?;
     let (rise, half) = (fit.slope, fit.slope_half());
@@ -111,13 +111,14 @@ impl GrayFit {
     /// interval but the source.
     pub fn lines(&self, source: &str) -> CurveLines {
         CurveLines {
-            critical_dose: given(&self.critical_dose, source, "mJ/cm2"),
-            penetration_depth: given(&self.penetration_depth, source, "um"),
+            critical_dose: given(&self.critical_dose, source),
+            penetration_depth: given(&self.penetration_depth, source),
         }
     }
 }
 
-fn given<T: Quantity>(line: &LineEstimate<T>, source: &str, unit: &str) -> GivenLine<T> {
+fn given<T: Quantity>(line: &LineEstimate<T>, source: &str) -> GivenLine<T> {
+    let unit = T::UNIT;
     let half = |estimate: &Estimate<T>| round_significant(estimate.plus_minus().number(), 3);
     let (zero, rise) = (half(&line.at_zero), half(&line.rise));
     GivenLine {

@@ -46,7 +46,7 @@ const CLEAR: f64 = 1e4;
 /// interval has no upper end where the solid may be clear.
 ///
 /// # Errors
-/// Where there are fewer than four points or three doses, the depth does not rise
+/// Returns an error if there are fewer than four points or three doses, the depth does not rise
 /// with the dose, no positive numbers fit, or the interval of `E_c` or `D_pL`
 /// reaches zero.
 pub fn fit_two_depth(points: &[DepthPoint]) -> Result<TwoDepthFit, FitError> {

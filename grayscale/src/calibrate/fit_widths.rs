@@ -4,7 +4,7 @@ use lamp_stack::Length;
 
 use super::measurements::WidthPoint;
 use super::regression::LineFit;
-use super::{Estimate, FitError};
+use super::{Estimate, FitError, PointGroup};
 use crate::material::WidthNumbers;
 use crate::resin::{Dose, WidthSensitivity};
 
@@ -37,7 +37,7 @@ pub struct WidthFit {
 /// theorem.
 ///
 /// # Errors
-/// Where a size has fewer than three points or two doses, its width does not rise
+/// Returns an error if a size has fewer than three points or two doses, its width does not rise
 /// with the dose for sure, or begins at no dose above zero; or there is no size.
 pub fn fit_widths(points: &[WidthPoint]) -> Result<Vec<WidthFit>, FitError> {
     let mut sorted = points.to_vec();
@@ -48,7 +48,7 @@ pub fn fit_widths(points: &[WidthPoint]) -> Result<Vec<WidthFit>, FitError> {
     let groups = sorted.chunk_by(|a, b| a.feature_size == b.feature_size);
     let fit = |group: &[WidthPoint]| {
         let size = group[0].feature_size;
-        fit_size(size, group).map_err(|error| error.within(format!("squares of {size}")))
+        fit_size(size, group).map_err(|error| error.within(PointGroup::Squares(size)))
     };
     groups.map(fit).collect()
 }

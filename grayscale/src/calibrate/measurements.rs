@@ -58,15 +58,15 @@ pub enum DataError {
     #[error("columns {0} and {1} say the same thing twice: keep one")]
     Both(&'static str, &'static str),
     /// A column that means nothing here.
-    #[error("column `{column}` is not known: the columns are {known}, and note for remarks")]
+    #[error("column `{column}` is not known: the columns are {}, and note for remarks", known.join(", "))]
     Unknown {
         /// Its name.
         column: String,
         /// Those that are.
-        known: String,
+        known: &'static [&'static str],
     },
     /// Exposures without a light.
-    #[error("exposure_ms needs the light of full white: give --intensity, as 1.6W/cm2")]
+    #[error("exposure_ms makes doses only with the light of full white, which is not known")]
     NoLight,
     /// A cell that is no number.
     #[error("line {line}, column {column}: `{text}` is not a number")]
@@ -107,7 +107,7 @@ const WIDTH: &str = "width_um";
 /// those of full white. DepthRange of zero and below cured nothing.
 ///
 /// # Errors
-/// Where a column is missing or unknown, or a cell is no possible number.
+/// Returns an error if a column is missing or unknown, or a cell is no possible number.
 pub fn depth_points(
     table: &CsvTable,
     light: Option<Intensity>,
@@ -141,7 +141,7 @@ pub fn depth_points(
 /// eq. 60). Widths of zero and below grew by nothing.
 ///
 /// # Errors
-/// Where a column is missing or unknown, or a cell is no possible number.
+/// Returns an error if a column is missing or unknown, or a cell is no possible number.
 pub fn width_points(
     table: &CsvTable,
     light: Option<Intensity>,
@@ -262,7 +262,7 @@ mod tests {
             assert!(error.contains(words), "{error} for {text:?}");
         }
         let error = widths("feature_px,exposure_ms,width_um\n25,1,1").unwrap_err().to_string();
-        assert!(error.contains("--intensity"), "{error}");
+        assert!(error.contains("light of full white"), "{error}");
         let error = widths("feature_px,dose_mj_per_cm2,width_um\n0,1,1").unwrap_err();
         assert!(error.to_string().contains("column feature_px: 0 is not a size"), "{error}");
         let error = widths("feature_um,dose_mj_per_cm2,cured_um\n9,1,1e9").unwrap_err();

@@ -32,11 +32,13 @@ mod significant;
 mod student_t;
 mod two_depth_curve;
 
+use std::fmt;
+
 use lamp_stack::Length;
 use thiserror::Error;
 
 use crate::material::Given;
-use crate::resin::{Dose, WidthSensitivity};
+use crate::resin::{GrayLevel, Quantity};
 use significant::round_significant;
 
 pub use csv_table::{CsvTable, TableError};
@@ -58,36 +60,6 @@ pub struct Estimate<T> {
     /// The upper end.
     pub high: T,
 }
-
-/// What has a number to estimate, in the unit that its name says.
-pub trait Quantity: Copy + PartialOrd {
-    /// From a number in its unit.
-    fn of(number: f64) -> Self;
-    /// In its unit.
-    fn number(self) -> f64;
-}
-
-macro_rules! quantity {
-    ($name:ty, $of:path, $number:path) => {
-        impl Quantity for $name {
-            fn of(number: f64) -> Self {
-                $of(number)
-            }
-
-            fn number(self) -> f64 {
-                $number(self)
-            }
-        }
-    };
-}
-
-quantity!(Dose, Dose::from_mj_per_cm2, Dose::mj_per_cm2);
-quantity!(Length, Length::from_um, Length::um);
-quantity!(
-    WidthSensitivity,
-    WidthSensitivity::from_um_per_mj_per_cm2,
-    WidthSensitivity::um_per_mj_per_cm2
-);
 
 impl<T: Quantity> Estimate<T> {
     fn new(value: f64, low: f64, high: f64) -> Self {
@@ -232,11 +204,30 @@ pub enum FitError {
     /// The points of one group.
     #[error("{group}: {error}")]
     Within {
-        /// Which points, as `gray level 0.4`.
-        group: String,
+        /// Which points.
+        group: PointGroup,
         /// What is wrong with them.
         error: Box<FitError>,
     },
+}
+
+/// The points that one line is fitted to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PointGroup {
+    /// The cure depths of a gray level.
+    Gray(GrayLevel),
+    /// The cure widths of squares of a side.
+    Squares(Length),
+}
+
+impl fmt::Display for PointGroup {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Gray(level) => write!(f, "gray level {}", level.get()),
+            Self::Squares(side) => write!(f, "squares of {side}"),
+        }
+    }
 }
 
 /// A number for an error.
@@ -257,7 +248,7 @@ fn too_few_points(points: usize, needed: usize) -> String {
 }
 
 impl FitError {
-    fn within(self, group: String) -> Self {
+    fn within(self, group: PointGroup) -> Self {
         Self::Within { group, error: Box::new(self) }
     }
 }
@@ -268,7 +259,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::resin::GrayLevel;
+    use crate::resin::Dose;
 
     /// A number of any size, often a small round one.
     fn any_size() -> impl Strategy<Value = f64> {

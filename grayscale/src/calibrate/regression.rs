@@ -25,7 +25,7 @@ impl LineFit {
     /// Fits points (x, y).
     ///
     /// # Errors
-    /// Where they are fewer than three, or have one x.
+    /// Returns an error if they are fewer than three, or have one x.
     pub(super) fn new(points: &[(f64, f64)]) -> Result<Self, FitError> {
         if points.len() < 3 {
             return Err(FitError::TooFew { points: points.len(), needed: 3 });

@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_2_PI;
 /// finite sum: that takes less code than a dependency, and is exact.
 ///
 /// # Panics
-/// Where there is no degree of freedom.
+/// Panics if there is no degree of freedom.
 pub(super) fn t_95(freedom: usize) -> f64 {
     assert!(freedom > 0, "an interval needs a degree of freedom");
     // 12.7 for one degree, 1.96 for infinitely many.

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use file::MaterialError;
-pub use number::{Constant, Given, GivenDepths, GivenLine, Written};
+pub use number::{Constant, Given, GivenDepths, GivenLine};
 
 use crate::resin::{
     CureModel, CureWidth, DepthRange, Dose, GrayCurve, Intensity, IntensityLines, ModelError,
@@ -144,7 +144,7 @@ impl Material {
     /// Returns its working curve, if it has one.
     ///
     /// # Errors
-    /// Where a number is not above zero.
+    /// Returns an error if a number is not above zero.
     pub fn working_curve(&self) -> Result<Option<WorkingCurve>, MaterialError> {
         let curve = |numbers: &CurveNumbers| {
             WorkingCurve::new(numbers.critical_dose.value, numbers.penetration_depth.value)
@@ -155,7 +155,7 @@ impl Material {
     /// Returns how its working curve moves with the lamp's light, if it says.
     ///
     /// # Errors
-    /// Where the line falls or does not begin above zero, or there is no
+    /// Returns an error if the line falls or does not begin above zero, or there is no
     /// working curve to keep the penetration depth of.
     pub fn dimmed_lamp(&self) -> Result<Option<IntensityLines>, MaterialError> {
         let Some(lines) = &self.dimmed_lamp else { return Ok(None) };
@@ -168,7 +168,7 @@ impl Material {
     /// Returns the working curve of each gray level, if it has them.
     ///
     /// # Errors
-    /// Where a line falls or does not begin above zero.
+    /// Returns an error if a line falls or does not begin above zero.
     pub fn gray_curve(&self) -> Result<Option<GrayCurve>, MaterialError> {
         let curve = |lines: &CurveLines| {
             GrayCurve::new(lines.critical_dose.line(), lines.penetration_depth.line())
@@ -180,7 +180,7 @@ impl Material {
     /// pass, if it says.
     ///
     /// # Errors
-    /// Where a line falls or does not begin above zero.
+    /// Returns an error if a line falls or does not begin above zero.
     pub fn gray_lines(&self) -> Result<Option<IntensityLines>, MaterialError> {
         let curve = |lines: &CurveLines| {
             IntensityLines::new(lines.critical_dose.line(), lines.penetration_depth.line())
@@ -191,7 +191,7 @@ impl Material {
     /// Returns its model of two penetration depths, if it has one.
     ///
     /// # Errors
-    /// Where a number is not above zero, or the depths are none.
+    /// Returns an error if a number is not above zero, or the depths are none.
     pub fn two_depth(&self) -> Result<Option<TwoDepth>, MaterialError> {
         let model = |numbers: &TwoDepthNumbers| {
             let depths = numbers.depths.as_ref().map_or(DepthRange::ALL, GivenDepths::depths);
@@ -204,7 +204,7 @@ impl Material {
     /// Returns its cure width, if it has one.
     ///
     /// # Errors
-    /// Where a number is not above zero, or a size stands twice.
+    /// Returns an error if a number is not above zero, or a size stands twice.
     pub fn cure_width(&self) -> Result<Option<CureWidth>, MaterialError> {
         if self.cure_width.is_empty() {
             return Ok(None);
@@ -229,7 +229,7 @@ impl Material {
     /// penetration depths, or the working curve.
     ///
     /// # Errors
-    /// Where it has no cure model or no intensity, or its numbers make none.
+    /// Returns an error if it has no cure model or no intensity, or its numbers make none.
     pub fn resin(&self) -> Result<Resin, ResinError> {
         let light = match &self.intensity {
             Some(light) => light.value,

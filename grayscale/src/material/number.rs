@@ -2,18 +2,17 @@
 
 use std::fmt;
 use std::marker::PhantomData;
-use std::str::FromStr;
 
 use lamp_stack::{Length, nonempty_text};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::resin::{DepthRange, Dose, Intensity, StraightLine, WidthSensitivity};
+use crate::resin::{DepthRange, Quantity, StraightLine};
 
 /// A number with its unit, and where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-#[serde(bound(serialize = "T: Written", deserialize = "T: Written"))]
+#[serde(bound(serialize = "T: Quantity", deserialize = "T: Quantity"))]
 pub struct Given<T> {
     /// The number.
     #[serde(with = "written")]
@@ -29,7 +28,7 @@ pub struct Given<T> {
 /// A straight line, and where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-#[serde(bound(serialize = "T: Written", deserialize = "T: Written"))]
+#[serde(bound(serialize = "T: Quantity", deserialize = "T: Quantity"))]
 pub struct GivenLine<T> {
     /// The value in the dark.
     #[serde(with = "written")]
@@ -83,56 +82,20 @@ pub struct Constant {
     pub source: String,
 }
 
-/// A quantity as a material file writes it: a text of a number and its unit.
-pub trait Written: Copy + FromStr<Err: fmt::Display> {
-    /// What a reader is told to write.
-    const EXAMPLE: &'static str;
-
-    /// Writes it so that reading gives the same number to the last bit.
-    fn text(self) -> String;
-}
-
 /// A number to the last bit, with an exponent where it would be long otherwise.
 fn exact(number: f64) -> String {
     let plain = number == 0.0 || (1e-6..1e15).contains(&number.abs());
     if plain { number.to_string() } else { format!("{number:e}") }
 }
 
-impl Written for Dose {
-    const EXAMPLE: &'static str = "131.5 mJ/cm2";
-
-    fn text(self) -> String {
-        format!("{} mJ/cm2", exact(self.mj_per_cm2()))
-    }
-}
-
-impl Written for Intensity {
-    const EXAMPLE: &'static str = "1.6 W/cm2";
-
-    fn text(self) -> String {
-        format!("{} mW/cm2", exact(self.mw_per_cm2()))
-    }
-}
-
-impl Written for WidthSensitivity {
-    const EXAMPLE: &'static str = "0.2 um/(mJ/cm2)";
-
-    fn text(self) -> String {
-        format!("{} um/(mJ/cm2)", exact(self.um_per_mj_per_cm2()))
-    }
-}
-
-impl Written for Length {
-    const EXAMPLE: &'static str = "211 um";
-
-    fn text(self) -> String {
-        format!("{} um", exact(self.um()))
-    }
+/// Writes a quantity so that reading gives the same number to the last bit.
+fn text<T: Quantity>(value: T) -> String {
+    format!("{} {}", exact(value.number()), T::UNIT)
 }
 
 struct TextOf<T>(PhantomData<T>);
 
-impl<T: Written> Visitor<'_> for TextOf<T> {
+impl<T: Quantity> Visitor<'_> for TextOf<T> {
     type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -145,16 +108,16 @@ impl<T: Written> Visitor<'_> for TextOf<T> {
 }
 
 pub(super) mod written {
-    use super::{Deserializer, PhantomData, Serializer, TextOf, Written};
+    use super::{Deserializer, PhantomData, Quantity, Serializer, TextOf, text};
 
-    pub(in super::super) fn serialize<T: Written, S: Serializer>(
+    pub(in super::super) fn serialize<T: Quantity, S: Serializer>(
         value: &T,
         to: S,
     ) -> Result<S::Ok, S::Error> {
-        to.serialize_str(&value.text())
+        to.serialize_str(&text(*value))
     }
 
-    pub(in super::super) fn deserialize<'de, T: Written, D: Deserializer<'de>>(
+    pub(in super::super) fn deserialize<'de, T: Quantity, D: Deserializer<'de>>(
         from: D,
     ) -> Result<T, D::Error> {
         from.deserialize_str(TextOf(PhantomData))
@@ -162,9 +125,9 @@ pub(super) mod written {
 }
 
 mod written_or_none {
-    use super::{Deserializer, Serializer, Written, written};
+    use super::{Deserializer, Quantity, Serializer, written};
 
-    pub(super) fn serialize<T: Written, S: Serializer>(
+    pub(super) fn serialize<T: Quantity, S: Serializer>(
         value: &Option<T>,
         to: S,
     ) -> Result<S::Ok, S::Error> {
@@ -175,7 +138,7 @@ mod written_or_none {
     }
 
     /// Called only where the key stands.
-    pub(super) fn deserialize<'de, T: Written, D: Deserializer<'de>>(
+    pub(super) fn deserialize<'de, T: Quantity, D: Deserializer<'de>>(
         from: D,
     ) -> Result<Option<T>, D::Error> {
         written::deserialize(from).map(Some)
@@ -188,10 +151,11 @@ mod tests {
 
     #[test]
     fn far_numbers_are_written_short_and_read_back() {
-        for (um, text) in [(423.333, "423.333 um"), (1e-92, "1e-92 um"), (-2.5e20, "-2.5e20 um")] {
+        for (um, written) in [(423.333, "423.333 um"), (1e-92, "1e-92 um"), (-2.5e20, "-2.5e20 um")]
+        {
             let length = Length::from_um(um);
-            assert_eq!(length.text(), text);
-            assert_eq!(text.parse(), Ok(length));
+            assert_eq!(text(length), written);
+            assert_eq!(written.parse(), Ok(length));
         }
     }
 }

@@ -21,7 +21,7 @@ impl GaussianBeam {
     /// The beam of a Gaussian width `W_o`, twice the standard deviation.
     ///
     /// # Errors
-    /// Where the width is not above zero.
+    /// Returns an error if the width is not above zero.
     pub fn new(width: Length) -> Result<Self, ModelError> {
         positive(width.um(), "beam-width")?;
         Ok(Self { width })

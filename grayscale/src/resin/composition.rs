@@ -107,7 +107,7 @@ impl Suspension {
     /// Returns the working curve of 002 eq. 57 and 58.
     ///
     /// # Errors
-    /// Where the composition lets all light through, holds nothing that inhibits
+    /// Returns an error if the composition lets all light through, holds nothing that inhibits
     /// or no photoinitiator.
     pub fn working_curve(&self, inhibition: &Inhibition) -> Result<WorkingCurve, ModelError> {
         WorkingCurve::new(self.critical_dose(inhibition), self.penetration_depth())

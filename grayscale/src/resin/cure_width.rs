@@ -51,7 +51,7 @@ impl CureWidth {
     /// The model of features of these sizes, in any order.
     ///
     /// # Errors
-    /// Where there is no size, one stands twice, or a number is not above
+    /// Returns an error if there is no size, one stands twice, or a number is not above
     /// zero.
     pub fn new(mut lines: Vec<WidthLine>) -> Result<Self, ModelError> {
         for line in &lines {

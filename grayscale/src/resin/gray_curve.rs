@@ -3,7 +3,7 @@
 use lamp_stack::Length;
 
 use super::model::{CureError, CureModel, ModelError, check_reach, positive};
-use super::units::{Dose, GrayLevel, Intensity};
+use super::units::{Dose, GrayLevel, Intensity, Quantity};
 use super::working_curve::WorkingCurve;
 
 /// A straight line `at_zero + rise x`.
@@ -15,37 +15,48 @@ pub struct StraightLine<T> {
     pub rise: T,
 }
 
-impl StraightLine<Dose> {
-    fn at(self, x: f64) -> Dose {
-        Dose::from_mj_per_cm2(line(self.at_zero.mj_per_cm2(), self.rise.mj_per_cm2(), x))
+impl<T: Quantity> StraightLine<T> {
+    fn at(self, x: f64) -> T {
+        T::of(self.at_zero.number() + self.rise.number() * x)
     }
 
-    fn check(self) -> Result<(), ModelError> {
-        positive(self.at_zero.mj_per_cm2(), "critical-dose.at-zero")?;
-        no_fall(self.rise.mj_per_cm2(), "critical-dose.rise")
+    /// Checks the line of a parameter, given the keys of its numbers.
+    ///
+    /// With `E_c` and `D_p` that rise, the cure depth rises with the gray level wherever
+    /// anything cures: `D_p` does, `G I_0 t / E_c(G)` does where `E_c(0) > 0`, and its
+    /// logarithm is above zero there.
+    fn check(self, at_zero: &'static str, rise: &'static str) -> Result<(), ModelError> {
+        positive(self.at_zero.number(), at_zero)?;
+        let no_fall = self.rise.number() >= 0.0 && self.rise.number().is_finite();
+        if no_fall { Ok(()) } else { Err(ModelError::Falls(rise)) }
+    }
+
+    /// Returns the line over a unit that is `times` as large.
+    fn over(self, times: f64) -> Self {
+        Self { rise: T::of(self.rise.number() * times), ..self }
     }
 }
 
-impl StraightLine<Length> {
-    fn at(self, x: f64) -> Length {
-        Length::from_um(line(self.at_zero.um(), self.rise.um(), x))
-    }
-
-    fn check(self) -> Result<(), ModelError> {
-        positive(self.at_zero.um(), "penetration-depth.at-zero")?;
-        no_fall(self.rise.um(), "penetration-depth.rise")
-    }
+/// The lines of `E_c` and `D_p`, over the gray level or the intensity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct ParameterLines {
+    critical_dose: StraightLine<Dose>,
+    penetration_depth: StraightLine<Length>,
 }
 
-fn line(at_zero: f64, rise: f64, x: f64) -> f64 {
-    at_zero + rise * x
-}
+impl ParameterLines {
+    fn new(
+        critical_dose: StraightLine<Dose>,
+        penetration_depth: StraightLine<Length>,
+    ) -> Result<Self, ModelError> {
+        critical_dose.check("critical-dose.at-zero", "critical-dose.rise")?;
+        penetration_depth.check("penetration-depth.at-zero", "penetration-depth.rise")?;
+        Ok(Self { critical_dose, penetration_depth })
+    }
 
-/// With `E_c` and `D_p` that rise, the cure depth rises with the gray level
-/// wherever anything cures: `D_p` does, `G I_0 t / E_c(G)` does where
-/// `E_c(0) > 0`, and its logarithm is above zero there.
-fn no_fall(rise: f64, what: &'static str) -> Result<(), ModelError> {
-    if rise >= 0.0 && rise.is_finite() { Ok(()) } else { Err(ModelError::Falls(what)) }
+    fn at(&self, x: f64) -> WorkingCurve {
+        WorkingCurve::of_checked(self.critical_dose.at(x), self.penetration_depth.at(x))
+    }
 }
 
 /// Returns a light in the units that a line's rise is for: W/cm², as in 002
@@ -60,42 +71,33 @@ fn watts_per_cm2(light: Intensity) -> f64 {
 /// # Guarantees
 /// Every intensity has a working curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IntensityLines {
-    critical_dose: StraightLine<Dose>,
-    penetration_depth: StraightLine<Length>,
-}
+pub struct IntensityLines(ParameterLines);
 
 impl IntensityLines {
     /// The lines of `E_c` and `D_p`; what they rise is for each W/cm².
     ///
     /// # Errors
-    /// Where a line starts at no more than zero, or falls.
+    /// Returns an error if a line starts at no more than zero, or falls.
     pub fn new(
         critical_dose: StraightLine<Dose>,
         penetration_depth: StraightLine<Length>,
     ) -> Result<Self, ModelError> {
-        critical_dose.check()?;
-        penetration_depth.check()?;
-        Ok(Self { critical_dose, penetration_depth })
+        ParameterLines::new(critical_dose, penetration_depth).map(Self)
     }
 
     /// Returns the working curve under a light.
     pub fn at(&self, light: Intensity) -> WorkingCurve {
-        let watts = watts_per_cm2(light);
-        WorkingCurve::of_checked(self.critical_dose.at(watts), self.penetration_depth.at(watts))
+        self.0.at(watts_per_cm2(light))
     }
 
     /// Returns the same lines over the gray levels of a lamp: `I = G I_0`
     /// (002 eq. 34).
     pub fn under(&self, lamp: Intensity) -> GrayCurve {
         let watts = watts_per_cm2(lamp);
-        let Self { critical_dose: dose, penetration_depth: depth } = *self;
-        let dose_rise = Dose::from_mj_per_cm2(dose.rise.mj_per_cm2() * watts);
-        let depth_rise = Length::from_um(depth.rise.um() * watts);
-        GrayCurve {
-            critical_dose: StraightLine { rise: dose_rise, ..dose },
-            penetration_depth: StraightLine { rise: depth_rise, ..depth },
-        }
+        GrayCurve(ParameterLines {
+            critical_dose: self.0.critical_dose.over(watts),
+            penetration_depth: self.0.penetration_depth.over(watts),
+        })
     }
 }
 
@@ -108,29 +110,23 @@ impl IntensityLines {
 /// Every gray level has a working curve, and a whiter one cures deeper
 /// wherever anything cures.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GrayCurve {
-    critical_dose: StraightLine<Dose>,
-    penetration_depth: StraightLine<Length>,
-}
+pub struct GrayCurve(ParameterLines);
 
 impl GrayCurve {
     /// The lines of `E_c` and `D_p`; what they rise is from black to white.
     ///
     /// # Errors
-    /// Where a line starts at no more than zero, or falls.
+    /// Returns an error if a line starts at no more than zero, or falls.
     pub fn new(
         critical_dose: StraightLine<Dose>,
         penetration_depth: StraightLine<Length>,
     ) -> Result<Self, ModelError> {
-        critical_dose.check()?;
-        penetration_depth.check()?;
-        Ok(Self { critical_dose, penetration_depth })
+        ParameterLines::new(critical_dose, penetration_depth).map(Self)
     }
 
     /// Returns the working curve of a gray level: of the dose that arrives.
     pub fn at(&self, gray: GrayLevel) -> WorkingCurve {
-        let g = gray.get();
-        WorkingCurve::of_checked(self.critical_dose.at(g), self.penetration_depth.at(g))
+        self.0.at(gray.get())
     }
 }
 

@@ -24,7 +24,9 @@ pub use filter::OpticalDensity;
 pub use gray_curve::{GrayCurve, IntensityLines, StraightLine};
 pub use model::{CureError, CureModel, DepthRange, ModelError};
 pub use two_depth::TwoDepth;
-pub use units::{Dose, ExposureTime, GrayLevel, Intensity, QuantityError, WidthSensitivity};
+pub use units::{
+    Dose, ExposureTime, GrayLevel, Intensity, Quantity, QuantityError, WidthSensitivity,
+};
 pub use working_curve::WorkingCurve;
 
 /// A cure model under a lamp: gray levels and times instead of doses.
@@ -38,7 +40,7 @@ impl Resin {
     /// A cure model under a lamp whose full white is `light`, `I_0`.
     ///
     /// # Errors
-    /// Where the light is not above zero.
+    /// Returns an error if the light is not above zero.
     pub fn new(light: Intensity, model: Box<dyn CureModel>) -> Result<Self, ModelError> {
         model::positive(light.mw_per_cm2(), "intensity")?;
         Ok(Self { light, model })
@@ -63,7 +65,7 @@ impl Resin {
     /// 15, line 14).
     ///
     /// # Errors
-    /// Those of [`CureModel::gray_for`]; most of all, where no gray level cures
+    /// Returns the errors of [`CureModel::gray_for`]; most of all, where no gray level cures
     /// as deep.
     pub fn gray_for(&self, depth: Length, time: ExposureTime) -> Result<GrayLevel, CureError> {
         self.model.gray_for(depth, self.light * time)
@@ -74,7 +76,7 @@ impl Resin {
     /// more binds it to the one below.
     ///
     /// # Errors
-    /// Those of [`CureModel::dose`], for the thickness times `overcure`.
+    /// Returns the errors of [`CureModel::dose`], for the thickness times `overcure`.
     pub fn exposure_time(
         &self,
         thickness: Length,
@@ -89,7 +91,7 @@ impl Resin {
     /// full white cures are white.
     ///
     /// # Errors
-    /// Where the model does not hold for all depths up to that of white.
+    /// Returns an error if the model does not hold for all depths up to that of white.
     pub fn depth_levels(&self, time: ExposureTime) -> Result<DepthLevels, CureError> {
         let depths = self.model.depths();
         let reach = self.depth(GrayLevel::WHITE, time);

@@ -22,7 +22,7 @@ pub trait CureModel: fmt::Debug + Send + Sync {
     /// dose (000 eq. 3.10), though any up to the critical dose would do.
     ///
     /// # Errors
-    /// Where the depth is below zero or no number, outside [`Self::depths`], or
+    /// Returns an error if the depth is below zero or no number, outside [`Self::depths`], or
     /// takes a dose beyond any number.
     fn dose(&self, depth: Length) -> Result<Dose, CureError>;
 
@@ -45,7 +45,7 @@ pub trait CureModel: fmt::Debug + Send + Sync {
     /// brings the dose `white`. No depth is black.
     ///
     /// # Errors
-    /// Where [`Self::dose`] has none, and where white itself does not cure as
+    /// Returns an error if [`Self::dose`] has none, and where white itself does not cure as
     /// deep.
     fn gray_for(&self, depth: Length, white: Dose) -> Result<GrayLevel, CureError> {
         let dose = self.dose(depth)?;

@@ -27,7 +27,7 @@ impl TwoDepth {
     /// liquid and the solid, which holds for `depths`.
     ///
     /// # Errors
-    /// Where a number is not above zero, or `depths` are none.
+    /// Returns an error if a number is not above zero, or `depths` are none.
     pub fn new(
         critical_dose: Dose,
         liquid_depth: Length,

@@ -5,7 +5,33 @@ use std::fmt;
 use std::ops::{Div, Mul, RangeInclusive};
 use std::str::FromStr;
 
+use lamp_stack::Length;
 use thiserror::Error;
+
+/// What is written as a number and a unit, as `131.5 mJ/cm2`.
+pub trait Quantity: Copy + PartialOrd + FromStr<Err: fmt::Display> {
+    /// The unit of [`number`](Self::number), as files have it.
+    const UNIT: &'static str;
+    /// A text that can be read, for messages.
+    const EXAMPLE: &'static str;
+    /// Creates the quantity of a number of its unit.
+    fn of(number: f64) -> Self;
+    /// Returns the number of its unit.
+    fn number(self) -> f64;
+}
+
+impl Quantity for Length {
+    const UNIT: &'static str = "um";
+    const EXAMPLE: &'static str = "211 um";
+
+    fn of(number: f64) -> Self {
+        Self::from_um(number)
+    }
+
+    fn number(self) -> f64 {
+        self.um()
+    }
+}
 
 /// Why a text is not a quantity.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -49,6 +75,19 @@ macro_rules! quantity {
             }
         }
 
+        impl Quantity for $name {
+            const UNIT: &'static str = $unit;
+            const EXAMPLE: &'static str = $example;
+
+            fn of(number: f64) -> Self {
+                Self(number)
+            }
+
+            fn number(self) -> f64 {
+                self.0
+            }
+        }
+
         impl fmt::Display for $name {
             #[doc = concat!("Writes ", $unit_name, ", as many decimals as asked for or needed.")]
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -63,7 +102,7 @@ macro_rules! quantity {
             /// Parses a number of zero or more and its unit.
             ///
             /// # Errors
-            /// Where the number or the unit is missing, unknown or impossible.
+            /// Returns an error if the number or the unit is missing, unknown or impossible.
             fn from_str(text: &str) -> Result<Self, QuantityError> {
                 let wrong =
                     || QuantityError { text: text.to_owned(), what: $what, example: $example };

@@ -20,7 +20,7 @@ impl WorkingCurve {
     /// seed calls it the sensitivity).
     ///
     /// # Errors
-    /// Where one is not above zero.
+    /// Returns an error if one is not above zero.
     pub fn new(critical_dose: Dose, penetration_depth: Length) -> Result<Self, ModelError> {
         positive(critical_dose.mj_per_cm2(), "critical-dose")?;
         positive(penetration_depth.um(), "penetration-depth")?;

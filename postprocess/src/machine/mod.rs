@@ -135,7 +135,7 @@ impl Machine {
     /// as far as both are known.
     ///
     /// # Errors
-    /// Where it does not.
+    /// Returns an error if it does not.
     pub fn check(&self, layer: &Layer) -> Result<(), MachineLimit> {
         if let (Some(DpiRange { least, most, .. }), Some(dpi)) = (&self.dpi, layer.dpi)
             && !(*least..=*most).contains(&dpi.get())

@@ -2,11 +2,11 @@
 
 use clap::{Args, ValueEnum};
 use lamp_grayscale::calibrate::{
-    CurveFit, DepthPoint, Estimate, GrayFit, LevelFit, LineEstimate, Quantity, TwoDepthFit,
-    depth_points, fit_curve, fit_gray, fit_two_depth,
+    CurveFit, DepthPoint, Estimate, GrayFit, LevelFit, LineEstimate, TwoDepthFit, depth_points,
+    fit_curve, fit_gray, fit_two_depth,
 };
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::{CureModel, Dose, GrayCurve, GrayLevel, StraightLine};
+use lamp_grayscale::resin::{CureModel, Dose, GrayCurve, GrayLevel, Quantity, StraightLine};
 use lamp_stack::Length;
 
 use super::Files;

@@ -1,6 +1,7 @@
 //! The table that calibrations print.
 
-use lamp_grayscale::calibrate::{Estimate, Measured, Quantity, format_significant};
+use lamp_grayscale::calibrate::{Estimate, Measured, format_significant};
+use lamp_grayscale::resin::Quantity;
 
 /// The numbers of a calibration, a line each.
 pub(super) struct Text {
