@@ -1,18 +1,16 @@
-//! What a stack cures, seen in a vertical section: where each pixel of a line
-//! is solid.
+//! Simulates what a stack cures along one line of pixels.
 //!
-//! An exposure cures down from its layer's top, as deep as its gray level
-//! reaches. Exposures do not add up, light does not spread sideways, and what
-//! is cured stays so: the single-layer experiment of 002 figure 67, layer after
-//! layer.
+//! An exposure cures down from its layer's top to the depth of its gray level.
+//! Exposures do not add up, light does not spread sideways, and what is cured stays
+//! cured: the single-layer experiment of 002 figure 67, repeated layer by layer.
 
 use lamp_stack::{Image, Length, gray_runs, white_runs};
 
-/// Heights between which a vertical line is inside something: from and to, in
-/// micrometres, rising, without gaps of nothing between them.
+/// The intervals of height in which a vertical line is inside something, as from and to
+/// in micrometres. They rise and do not touch.
 pub type SolidHeights = Vec<[f64; 2]>;
 
-/// A line of an image's pixels, from the left or from the top.
+/// A line of an image's pixels, counted from the left or the top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelLine {
     /// A row.
@@ -22,7 +20,7 @@ pub enum PixelLine {
 }
 
 impl PixelLine {
-    /// How many pixels of an image are on it.
+    /// Returns the number of an image's pixels on the line.
     pub fn len(self, image: &Image) -> u32 {
         match self {
             Self::Row(_) => image.width(),
@@ -30,7 +28,7 @@ impl PixelLine {
         }
     }
 
-    /// Whether it crosses an image.
+    /// Returns whether the line crosses an image.
     pub fn crosses(self, image: &Image) -> bool {
         match self {
             Self::Row(row) => row < image.height(),
@@ -38,10 +36,11 @@ impl PixelLine {
         }
     }
 
-    /// Gives the pixels along it that are not black, as first, end and level.
+    /// Calls `each` with the runs along the line that are not black: first pixel, end
+    /// and level.
     ///
     /// # Panics
-    /// Panics if it does not cross the image.
+    /// Panics if the line does not cross the image.
     fn for_each_run(self, image: &Image, mut each: impl FnMut(u32, u32, u8)) {
         match self {
             Self::Row(row) => for_each_run_of_row(image, row, each),
@@ -73,15 +72,27 @@ fn for_each_run_of_row(image: &Image, row: u32, mut each: impl FnMut(u32, u32, u
     }
 }
 
-/// What exposures have cured along a line.
+/// The heights that exposures have cured along a line.
+///
+/// ```
+/// use lamp_grayscale::{CuredLine, PixelLine};
+/// use lamp_stack::{Image, Length, Mask};
+///
+/// let image = Image::Mask(Mask::new(4, vec![0, 2], vec![1, 3]).unwrap());
+/// let mut cured = CuredLine::default();
+/// // White cures 150 um down from the layer's top at 100 um.
+/// let depth = |level: u8| Length::from_um(150.0 * f64::from(level) / 255.0);
+/// cured.expose(PixelLine::Row(0), &image, Length::from_um(100.0), depth);
+/// assert_eq!(cured.pixels()[..2], [vec![], vec![[-50.0, 100.0]]]);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CuredLine {
     pixels: Vec<SolidHeights>,
 }
 
 impl CuredLine {
-    /// Exposes a layer upon those before, whose tops are no higher: each pixel
-    /// from `top` down by the depth of its level.
+    /// Exposes a layer on top of those before: each pixel cures from `top` down by the
+    /// depth of its level. Layers must come from the bottom up.
     ///
     /// # Panics
     /// Panics if the line does not cross the image.
@@ -104,16 +115,16 @@ impl CuredLine {
         });
     }
 
-    /// Where each pixel of the line is solid.
+    /// Returns the heights at which each pixel of the line is solid.
     pub fn pixels(&self) -> &[SolidHeights] {
         &self.pixels
     }
 }
 
-/// Adds what an exposure cures to what was cured from below.
+/// Adds the interval that an exposure cures, merged with those that it meets.
 fn cure(solid: &mut SolidHeights, [mut from, to]: [f64; 2]) {
     while let Some(&[before, reached]) = solid.last() {
-        // A layer and the next touch, but for the last digits of their heights.
+        // Touching layers differ in the last digits of their heights.
         if reached < from - 1e-6 {
             break;
         }
@@ -123,7 +134,7 @@ fn cure(solid: &mut SolidHeights, [mut from, to]: [f64; 2]) {
     solid.push([from, to]);
 }
 
-/// Returns how much of `a` is not in `b`.
+/// Returns the length of `a` that is outside `b`.
 pub fn excess(a: &[[f64; 2]], b: &[[f64; 2]]) -> Length {
     let mut length = 0.0;
     for &[from, to] in a {

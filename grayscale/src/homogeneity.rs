@@ -1,4 +1,4 @@
-//! Whether the resin averages dots of a size, or cures each by itself.
+//! Tells whether a resin averages dots of a size or cures each by itself.
 //!
 //! Source: 002 section 3.3.6 and figure 57. Checkerboards of one mean level
 //! cured to an even film with squares of 17 um, and to distinct cured and
@@ -12,24 +12,29 @@ pub const EVEN_DOTS: Length = Length::from_um(17.0);
 /// The narrowest dots that did not.
 pub const UNEVEN_DOTS: Length = Length::from_um(85.0);
 
-/// The source's figures are pixels of 1500 dpi in whole micrometres: 85 stands
-/// for 84.67.
+/// The source rounds pixels of 1500 dpi to whole micrometres: 85 stands for 84.67.
 const ROUNDING: f64 = 0.01;
 
-/// How a film cures under dots of some size.
+/// How evenly a film cures under dots of some size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Homogeneity {
     /// Evenly: the dots are no wider than those that did.
     Even,
-    /// Not known: the dots are wider than those that cured evenly, but not as
-    /// wide as those that did not.
+    /// Unknown: the dots are wider than those that cured evenly, and narrower than
+    /// those that did not.
     Unknown,
     /// Each dot by itself.
     Uneven,
 }
 
-/// Says how a film cures under dots as wide as the pixels of a pitch: the cells
-/// of every method are single pixels.
+/// Returns how evenly a film cures under dots of one pixel, as all methods make them.
+///
+/// ```
+/// use lamp_grayscale::{Homogeneity, homogeneity};
+///
+/// let pitch = lamp_stack::Dpi::new(1500.0).unwrap().pitch();
+/// assert_eq!(homogeneity(pitch), Homogeneity::Even);
+/// ```
 pub fn homogeneity(pitch: Length) -> Homogeneity {
     if pitch.um() <= EVEN_DOTS.um() * (1.0 + ROUNDING) {
         Homogeneity::Even

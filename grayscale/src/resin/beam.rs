@@ -1,4 +1,4 @@
-//! What a beam of light cures where its edges are soft.
+//! The depth and width that a Gaussian beam cures.
 
 use lamp_stack::Length;
 
@@ -6,9 +6,9 @@ use super::model::{CureModel, ModelError, positive};
 use super::units::{Dose, GrayLevel};
 use super::working_curve::WorkingCurve;
 
-/// A beam whose light falls off as `exp(-2 y²/W_o²)` at the distance `y` from
-/// its centre (002 eq. 41): a laser's, and nearly that of one projected pixel.
-/// Several pixels in a row are as many beams side by side (002 figure 69).
+/// A beam whose light falls off as `exp(-2 y²/W_o²)` with the distance `y` from its
+/// centre (002 eq. 41), as that of a laser and nearly that of one projected pixel.
+/// Adjacent pixels are beams side by side (002 figure 69).
 ///
 /// # Guarantees
 /// The width is above zero.
@@ -18,7 +18,7 @@ pub struct GaussianBeam {
 }
 
 impl GaussianBeam {
-    /// The beam of a Gaussian width `W_o`, twice the standard deviation.
+    /// Creates the beam of a Gaussian width `W_o`, twice the standard deviation.
     ///
     /// # Errors
     /// Returns an error if the width is not above zero.
@@ -35,16 +35,16 @@ impl GaussianBeam {
     }
 
     /// Returns the dose at a distance `y` from the centre and a depth `z`, in a
-    /// resin that absorbs by Beer and Lambert; `peak` is that at the centre of
-    /// the surface (002 eq. 43, whose left side says `z = 0` by mistake).
+    /// resin that absorbs by Beer and Lambert; `peak` is the dose at the centre
+    /// of the surface (002 eq. 43, whose left side says `z = 0` by mistake).
     pub fn dose(&self, peak: Dose, y: Length, z: Length, resin: &WorkingCurve) -> Dose {
         let through = (-z.um() / resin.penetration_depth().um()).exp();
         let at_surface = peak * self.share(y);
         Dose::from_mj_per_cm2(at_surface.mj_per_cm2() * through)
     }
 
-    /// Returns how deep a resin cures at a distance from the centre: `z* = D_p
-    /// ln(E/E_c) - 2 D_p y²/W_o²` (002 eq. 44), zero where that is below zero.
+    /// Returns the depth that cures at a distance from the centre: `z* = D_p
+    /// ln(E/E_c) - 2 D_p y²/W_o²` (002 eq. 44), or zero if that is below zero.
     pub fn cure_depth(&self, peak: Dose, y: Length, resin: &WorkingCurve) -> Length {
         resin.depth(peak * self.share(y))
     }
@@ -56,7 +56,7 @@ impl GaussianBeam {
     /// the beam's width and `E_Hincz` as the critical dose.
     pub fn cured_width(&self, peak: Dose, critical: Dose) -> Length {
         let ratio = peak.mj_per_cm2() / critical.mj_per_cm2();
-        // Also where the dose is no number.
+        // NaN also ends here.
         let log = if ratio > 1.0 { ratio.ln() } else { 0.0 };
         Length::from_um(self.width.um() * (2.0 * log).sqrt())
     }

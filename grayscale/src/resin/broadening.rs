@@ -1,23 +1,21 @@
-//! Where a resin that cures deeper begins to cure wider.
+//! The depth from which a resin cures wider, too.
 
 use lamp_stack::Length;
 
 use super::model::CureModel;
 use super::units::Dose;
 
-/// Returns how far each edge of a cured square lies outside its image: `C_w =
-/// (l_cured - l_o)/2` (002 eq. 60). It is below zero where the square shrank.
+/// Returns the distance of a cured square's edges outside its image: `C_w =
+/// (l_cured - l_o)/2` (002 eq. 60). It is below zero if the square shrank.
 pub fn cure_width_of_square(cured: Length, nominal: Length) -> Length {
     Length::from_um((cured.um() - nominal.um()) / 2.0)
 }
 
-/// Returns the broadening depth `B_d = D_p^d ln(E_c^w/E_c^d)` (002 eq. 61): how
-/// deep a dose may cure before edges begin to grow; `width_critical` is `E_c^w`,
-/// the dose at which they do. Other cure models than the working curve answer
-/// alike.
+/// Returns the broadening depth `B_d = D_p^d ln(E_c^w/E_c^d)` (002 eq. 61): the
+/// greatest depth that cures before edges grow. `width_critical` is `E_c^w`, the dose from
+/// which they grow. Any cure model may stand in place of the working curve.
 ///
-/// It is zero where edges grow before anything cures in depth; eq. 61 would be
-/// below zero there.
+/// It is zero if edges grow before anything cures in depth, where eq. 61 is below zero.
 pub fn broadening_depth(depth: &dyn CureModel, width_critical: Dose) -> Length {
     depth.depth(width_critical)
 }

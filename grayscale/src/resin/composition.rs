@@ -1,7 +1,7 @@
-//! The working curve that a suspension's composition leads one to expect.
+//! Predicts a suspension's working curve from its composition.
 //!
-//! These are models of trends: 002 (section 3.4.2.4) gives no number of theirs,
-//! and compares its measurements with them by shape alone.
+//! These models show trends: 002 (section 3.4.2.4) gives no numbers for them and compares
+//! only their shape with its measurements.
 
 use lamp_stack::Length;
 
@@ -15,18 +15,18 @@ const MOLAR_PHOTON: f64 = 6.022_140_76e23 * 6.626_070_15e-34 * 299_792_458.0;
 /// Micrometres in a centimetre.
 const UM_PER_CM: f64 = 1e4;
 
-/// What absorbs light in the liquid: the photoinitiator or the dye.
+/// A substance that absorbs light in the liquid: the photoinitiator or the dye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absorber {
     /// `c`, in mol a litre of liquid.
     pub concentration: f64,
-    /// `ε`, in l/(mol cm), of natural logarithms: `I = I_0 exp(-c ε z)`. Tables
-    /// mostly have it of decimal ones, which is `ln 10` times less.
+    /// `ε`, in l/(mol cm), to base e: `I = I_0 exp(-c ε z)`. Most tables give it
+    /// to base 10, which is smaller by `ln 10`.
     pub extinction: f64,
 }
 
 impl Absorber {
-    /// Nothing.
+    /// No absorber.
     pub const NONE: Self = Self { concentration: 0.0, extinction: 0.0 };
 
     /// `c ε`, for each centimetre of liquid.
@@ -35,8 +35,8 @@ impl Absorber {
     }
 }
 
-/// What attenuates light in a suspension, at one wavelength. The ceramic itself
-/// is taken to be clear: it scatters only (002 eq. 57).
+/// The parts of a suspension that attenuate light of one wavelength. The ceramic is
+/// assumed to scatter without absorbing (002 eq. 57).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Suspension {
     /// The scattering length `l_sc`; none in a liquid without particles.
@@ -49,7 +49,7 @@ pub struct Suspension {
     pub dye: Absorber,
 }
 
-/// What keeps a resin from curing until it is used up.
+/// The inhibitor, which keeps a resin from curing until it is used up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inhibition {
     /// `c_INH`: oxygen and what stabilises the monomer, in mol a litre of liquid.
@@ -87,7 +87,7 @@ impl Suspension {
         self.dose_over(inhibition, path)
     }
 
-    /// Returns the critical dose where the photoinitiator alone attenuates:
+    /// Returns the critical dose if only the photoinitiator attenuates:
     /// `E_c = (1 - Φ) hν/Ω (γ_INH c_INH + γ_D c_D)/(c_P ε_P)` (002 eq. 59).
     pub fn critical_dose_of_initiator(&self, inhibition: &Inhibition) -> Dose {
         let path = (1.0 - self.ceramic) / self.photoinitiator.attenuation();
@@ -107,8 +107,8 @@ impl Suspension {
     /// Returns the working curve of 002 eq. 57 and 58.
     ///
     /// # Errors
-    /// Returns an error if the composition lets all light through, holds nothing that inhibits
-    /// or no photoinitiator.
+    /// Returns an error if the composition is clear, inhibits nothing or holds no
+    /// photoinitiator.
     pub fn working_curve(&self, inhibition: &Inhibition) -> Result<WorkingCurve, ModelError> {
         WorkingCurve::new(self.critical_dose(inhibition), self.penetration_depth())
     }

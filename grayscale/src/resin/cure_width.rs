@@ -1,23 +1,22 @@
-//! How far a cured region grows beyond its image.
+//! The cure width: how far a cured region grows beyond its image.
 
 use lamp_stack::Length;
 
 use super::model::{ModelError, positive};
 use super::units::{Dose, WidthSensitivity};
 
-/// The cure width `C_w = D_p^w (E - E_c^w)`, by which every edge of an exposed
-/// region lies outside its image (002 eq. 60 and section 3.4.4: linear in the
-/// dose, not in its logarithm).
+/// The cure width `C_w = D_p^w (E - E_c^w)`, the distance of the edges of a
+/// cured region outside its image (002 eq. 60). By section 3.4.4 it is linear in the dose,
+/// not in its logarithm.
 ///
 /// Both parameters depend on the feature's size, the side of the squares that
 /// were measured. Between measured sizes they are interpolated linearly, below
 /// the smallest and above the largest they are constant.
 ///
-/// The seed says that they level off beyond a size of "450 um" (section 3.4.4)
-/// and of "450 px" (three paragraphs on). It must be pixels, of 1/1500 in,
-/// that is 7.62 mm: 450 um are not 27 pixels, and 25 is the smallest size of
-/// which it has data. Its figures 76 and 77 have the numbers; its text gives
-/// none.
+/// 002 says that they level off beyond a size of "450 um" (section 3.4.4) and of "450 px"
+/// (three paragraphs on). It must be pixels of 1/1500 in, that is 7.62 mm: 450 um are
+/// under 27 pixels, and its smallest measured size is 25. Its figures 76 and 77 have the
+/// numbers; its text gives none.
 ///
 /// # Guarantees
 /// There is a size; sizes strictly increase; all numbers are above zero.
@@ -26,33 +25,33 @@ pub struct CureWidth {
     lines: Vec<WidthLine>,
 }
 
-/// The cure width over the dose, of features of one size.
+/// The cure width of features of one size, as a line over the dose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WidthLine {
-    /// The side of the squares measured.
+    /// The side of the measured squares.
     pub feature_size: Length,
-    /// The dose at which they begin to grow sideways, `E_c^w`.
+    /// The dose from which they grow sideways, `E_c^w`.
     pub critical_dose: Dose,
-    /// How much they grow with the dose above that, `D_p^w`.
+    /// The growth of each edge per dose above that, `D_p^w`.
     pub sensitivity: WidthSensitivity,
 }
 
 impl WidthLine {
-    /// Returns how far each edge grows; nothing up to the critical dose.
+    /// Returns the growth of each edge: zero up to the critical dose.
     pub fn width(&self, dose: Dose) -> Length {
         let above = dose.mj_per_cm2() - self.critical_dose.mj_per_cm2();
-        // Also where the dose is no number.
+        // NaN also grows nothing.
         let above = if above > 0.0 { above } else { 0.0 };
         Length::from_um(self.sensitivity.um_per_mj_per_cm2() * above)
     }
 }
 
 impl CureWidth {
-    /// The model of features of these sizes, in any order.
+    /// Creates the model of features of these sizes, in any order.
     ///
     /// # Errors
-    /// Returns an error if there is no size, one stands twice, or a number is not above
-    /// zero.
+    /// Returns an error if there is no size, one stands twice, or a number is not
+    /// above zero.
     pub fn new(mut lines: Vec<WidthLine>) -> Result<Self, ModelError> {
         for line in &lines {
             positive(line.feature_size.um(), "feature-size")?;
@@ -67,7 +66,7 @@ impl CureWidth {
         Ok(Self { lines })
     }
 
-    /// The sizes that were measured, from the smallest.
+    /// Returns the measured sizes, from the smallest.
     pub fn lines(&self) -> &[WidthLine] {
         &self.lines
     }
@@ -92,8 +91,8 @@ impl CureWidth {
         }
     }
 
-    /// Returns how far each edge of features of a size grows by a dose; nothing
-    /// up to the critical dose.
+    /// Returns the growth of each edge of features of a size: zero up to the critical
+    /// dose.
     pub fn width(&self, dose: Dose, feature_size: Length) -> Length {
         self.at(feature_size).width(dose)
     }

@@ -1,33 +1,33 @@
-//! Neutral density filters before the lamp.
+//! Neutral density filters in front of the lamp.
 
 use super::units::Intensity;
 
-/// How much a filter holds back, over all wavelengths alike: `OD = log10(I_o/I)`
+/// The optical density of a filter, equal at all wavelengths: `OD = log10(I_o/I)`
 /// (002 eq. 35).
 ///
-/// By it 002's filters of 0.3 and 0.5 pass 50.1% and 31.6% of 1600 mW/cm²: 802
-/// and 506 mW/cm², where 002 goes on with 896 and 512 mW/cm².
+/// By this equation the filters of 0.3 and 0.5 in 002 pass 50.1% and 31.6% of
+/// 1600 mW/cm²: 802 and 506 mW/cm². 002 itself continues with 896 and 512 mW/cm².
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct OpticalDensity(f64);
 
 impl OpticalDensity {
-    /// The density `od`, if it is zero or more.
+    /// Returns the density `od` if it is zero or more.
     pub fn new(od: f64) -> Option<Self> {
         (od >= 0.0 && od.is_finite()).then_some(Self(od))
     }
 
-    /// The density of a filter that passes `passed` of `light`; `None` where
-    /// that is more light than comes, or none.
+    /// Returns the density of a filter that passes `passed` of `light`; `None` if that is
+    /// more than `light`, or no light at all.
     pub fn of(light: Intensity, passed: Intensity) -> Option<Self> {
         Self::new((light.mw_per_cm2() / passed.mw_per_cm2()).log10())
     }
 
-    /// As a number.
+    /// Returns the density as a number.
     pub const fn get(self) -> f64 {
         self.0
     }
 
-    /// Returns what passes of a light.
+    /// Returns the part of a light that passes.
     pub fn pass(self, light: Intensity) -> Intensity {
         Intensity::from_mw_per_cm2(light.mw_per_cm2() * 10.0_f64.powf(-self.0))
     }

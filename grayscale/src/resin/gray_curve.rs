@@ -1,4 +1,4 @@
-//! A resin whose working curve itself changes with the gray level.
+//! The cure model of a resin whose working curve changes with the gray level.
 
 use lamp_stack::Length;
 
@@ -11,7 +11,7 @@ use super::working_curve::WorkingCurve;
 pub struct StraightLine<T> {
     /// The value at zero.
     pub at_zero: T,
-    /// What one unit adds.
+    /// The increase for one unit of `x`.
     pub rise: T,
 }
 
@@ -65,8 +65,8 @@ fn watts_per_cm2(light: Intensity) -> f64 {
     light.mw_per_cm2() / 1000.0
 }
 
-/// How the working curve moves with the intensity, for a dimmed lamp
-/// (002 eq. 36) or a gray image (eq. 37 and 38).
+/// The working curve as a function of the intensity, for a dimmed lamp (002 eq. 36) or a
+/// gray image (eq. 37 and 38).
 ///
 /// # Guarantees
 /// Every intensity has a working curve.
@@ -74,7 +74,7 @@ fn watts_per_cm2(light: Intensity) -> f64 {
 pub struct IntensityLines(ParameterLines);
 
 impl IntensityLines {
-    /// The lines of `E_c` and `D_p`; what they rise is for each W/cm².
+    /// Creates the lines of `E_c` and `D_p`, whose rise is for each W/cm².
     ///
     /// # Errors
     /// Returns an error if a line starts at no more than zero, or falls.
@@ -113,7 +113,7 @@ impl IntensityLines {
 pub struct GrayCurve(ParameterLines);
 
 impl GrayCurve {
-    /// The lines of `E_c` and `D_p`; what they rise is from black to white.
+    /// Creates the lines of `E_c` and `D_p`, whose rise is from black to white.
     ///
     /// # Errors
     /// Returns an error if a line starts at no more than zero, or falls.
@@ -124,7 +124,7 @@ impl GrayCurve {
         ParameterLines::new(critical_dose, penetration_depth).map(Self)
     }
 
-    /// Returns the working curve of a gray level: of the dose that arrives.
+    /// Returns the working curve of a gray level, over the dose that arrives.
     pub fn at(&self, gray: GrayLevel) -> WorkingCurve {
         self.0.at(gray.get())
     }
@@ -143,17 +143,16 @@ impl CureModel for GrayCurve {
         self.at(gray).depth(white * gray)
     }
 
-    /// Halves the bracket from black to white until no number lies between:
-    /// about 60 logarithms. Deeper never gives a darker level, not even by
-    /// rounding, since both searches ask the same questions up to where they
-    /// part.
+    // Halves the bracket from black to white until no number lies between, about 60
+    // logarithms. A greater depth never gives a darker level, not even by rounding:
+    // both searches take the same steps until they part.
     fn gray_for(&self, depth: Length, white: Dose) -> Result<GrayLevel, CureError> {
         self.depths().check(depth)?;
         check_reach(depth, self.depth(white))?;
         if depth.um() == 0.0 {
             return Ok(GrayLevel::BLACK);
         }
-        // `low` cures less deep than asked for, `high` as deep.
+        // `low` cures less deep than asked for, `high` at least as deep.
         let [mut low, mut high] = [0.0, 1.0];
         loop {
             let middle = f64::midpoint(low, high);

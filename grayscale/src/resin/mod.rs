@@ -1,4 +1,4 @@
-//! What light does to a resin: how deep a dose cures, and back.
+//! Models of light and resin: cure depth and width for a dose, and back.
 
 mod beam;
 mod broadening;
@@ -29,7 +29,19 @@ pub use units::{
 };
 pub use working_curve::WorkingCurve;
 
-/// A cure model under a lamp: gray levels and times instead of doses.
+/// A cure model under a lamp, asked in gray levels and exposure times instead of doses.
+///
+/// ```
+/// use lamp_grayscale::resin::{Dose, GrayLevel, Intensity, Resin, WorkingCurve};
+/// use lamp_stack::Length;
+///
+/// let curve = WorkingCurve::new(Dose::from_mj_per_cm2(131.5), Length::from_um(211.0))?;
+/// let resin = Resin::new(Intensity::from_mw_per_cm2(1600.0), Box::new(curve))?;
+/// let time = resin.exposure_time(Length::from_um(100.0), 1.0)?;
+/// assert_eq!(time.ms().round(), 132.0);
+/// assert_eq!(resin.depth(GrayLevel::WHITE, time).um().round(), 100.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Resin {
     light: Intensity,
@@ -37,7 +49,7 @@ pub struct Resin {
 }
 
 impl Resin {
-    /// A cure model under a lamp whose full white is `light`, `I_0`.
+    /// Creates a resin under a lamp whose full white is `light`, `I_0`.
     ///
     /// # Errors
     /// Returns an error if the light is not above zero.
@@ -46,12 +58,12 @@ impl Resin {
         Ok(Self { light, model })
     }
 
-    /// The light of full white.
+    /// Returns the light of full white.
     pub const fn light(&self) -> Intensity {
         self.light
     }
 
-    /// The cure model.
+    /// Returns the cure model.
     pub fn model(&self) -> &dyn CureModel {
         &*self.model
     }
@@ -65,15 +77,14 @@ impl Resin {
     /// 15, line 14).
     ///
     /// # Errors
-    /// Returns the errors of [`CureModel::gray_for`]; most of all, where no gray level cures
-    /// as deep.
+    /// Returns the errors of [`CureModel::gray_for`], above all if no gray level cures as
+    /// deep.
     pub fn gray_for(&self, depth: Length, time: ExposureTime) -> Result<GrayLevel, CureError> {
         self.model.gray_for(depth, self.light * time)
     }
 
-    /// Returns how long to expose so that full white cures `overcure` times the
-    /// layer's thickness: 1 cures just the layer (002 algorithm 15, line 13),
-    /// more binds it to the one below.
+    /// Returns the time in which full white cures `overcure` times the layer's thickness:
+    /// 1 cures just the layer (002 algorithm 15, line 13), more binds it to the one below.
     ///
     /// # Errors
     /// Returns the errors of [`CureModel::dose`], for the thickness times `overcure`.

@@ -1,4 +1,4 @@
-//! What every cure model answers.
+//! The trait of cure models, and their errors.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::units::{Dose, GrayLevel};
 
-/// How deep light cures a resin, and what a depth takes.
+/// A model of how deep light cures a resin: depths for doses and gray levels, and back.
 ///
 /// # Guarantees
 /// More dose, and a whiter level, never cure less deep. `dose` undoes `depth`
@@ -18,16 +18,16 @@ pub trait CureModel: fmt::Debug + Send + Sync {
     /// critical dose.
     fn depth(&self, dose: Dose) -> Length;
 
-    /// Returns the dose of full white that cures a depth. No depth takes no
-    /// dose (000 eq. 3.10), though any up to the critical dose would do.
+    /// Returns the dose of full white that cures a depth. A depth of zero gives a dose
+    /// of zero (000 eq. 3.10), though any dose up to the critical one would do.
     ///
     /// # Errors
-    /// Returns an error if the depth is below zero or no number, outside [`Self::depths`], or
-    /// takes a dose beyond any number.
+    /// Returns an error if the depth is below zero, not finite or outside
+    /// [`Self::depths`], or if its dose overflows.
     fn dose(&self, depth: Length) -> Result<Dose, CureError>;
 
-    /// Returns the depths that the model holds for. `depth` answers outside
-    /// them too, as its equation has it.
+    /// Returns the depths that the model holds for. [`depth`](Self::depth) applies its
+    /// equation outside them, too.
     fn depths(&self) -> DepthRange {
         DepthRange::ALL
     }
@@ -35,18 +35,16 @@ pub trait CureModel: fmt::Debug + Send + Sync {
     /// Returns the depth that a gray level cures in an exposure whose white
     /// brings the dose `white`.
     ///
-    /// Unless the model knows better, gray is nothing but less light
-    /// (002 eq. 34).
+    /// By default gray is the same as less light (002 eq. 34).
     fn gray_depth(&self, gray: GrayLevel, white: Dose) -> Length {
         self.depth(white * gray)
     }
 
     /// Returns the gray level that cures a depth in an exposure whose white
-    /// brings the dose `white`. No depth is black.
+    /// brings the dose `white`. A depth of zero is black.
     ///
     /// # Errors
-    /// Returns an error if [`Self::dose`] has none, and where white itself does not cure as
-    /// deep.
+    /// Returns an error if [`Self::dose`] does, or if even white does not cure as deep.
     fn gray_for(&self, depth: Length, white: Dose) -> Result<GrayLevel, CureError> {
         let dose = self.dose(depth)?;
         check_reach(depth, self.depth(white))?;
@@ -67,7 +65,7 @@ pub(super) fn check_reach(depth: Length, deepest: Length) -> Result<(), CureErro
 pub struct DepthRange {
     /// The shallowest.
     pub from: Length,
-    /// The deepest, where there is one.
+    /// The deepest, if there is a limit.
     pub to: Option<Length>,
 }
 
@@ -102,15 +100,15 @@ impl fmt::Display for DepthRange {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CureError {
-    /// Below zero, or no number.
+    /// The depth is below zero or not finite.
     #[error("a cure depth is zero or more, not {0}")]
     NotADepth(Length),
-    /// The model does not hold there.
+    /// The model does not hold for the depth.
     #[error("the cure model holds for depths of {depths}, not for {depth}")]
     Outside {
         /// The depth asked for.
         depth: Length,
-        /// Those it holds for.
+        /// The depths that the model holds for.
         depths: DepthRange,
     },
     /// The model does not hold for all that a gray layer needs.
@@ -121,10 +119,10 @@ pub enum CureError {
     NotAllTo {
         /// The depth that white cures.
         reach: Length,
-        /// Those it holds for.
+        /// The depths that the model holds for.
         depths: DepthRange,
     },
-    /// White does not cure as deep.
+    /// Even white does not cure as deep.
     #[error(
         "no gray level cures {:.2} um, as full white cures {:.2} um: expose for longer",
         depth.um(), deepest.um()
@@ -135,30 +133,30 @@ pub enum CureError {
         /// The depth that white cures.
         deepest: Length,
     },
-    /// The dose is beyond any number.
+    /// The dose overflows.
     #[error("no dose that can be written down cures {0}")]
     NoDose(Length),
 }
 
-/// Why numbers make no model.
+/// Why numbers make no cure model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ModelError {
-    /// Not above zero, or no number.
+    /// A number is not above zero, or not finite.
     #[error("{0} must be above zero")]
     NotPositive(&'static str),
-    /// Below zero, or no number.
+    /// A slope is below zero, or not finite.
     #[error("{0} must be zero or more: a model whose value falls towards white has no inverse")]
     Falls(&'static str),
-    /// The deepest is not above the shallowest.
+    /// The deepest depth is not above the shallowest.
     #[error("depths must begin at zero or more and end above where they begin")]
     NoDepths,
-    /// No size, or one twice.
+    /// There is no feature size, or one stands twice.
     #[error("feature-size must be there, and another one in each entry")]
     NoSizes,
 }
 
-/// Checks what must be above zero.
+/// Checks that a number is above zero and finite.
 pub(super) fn positive(number: f64, what: &'static str) -> Result<(), ModelError> {
     let fine = number > 0.0 && number.is_finite();
     if fine { Ok(()) } else { Err(ModelError::NotPositive(what)) }

@@ -1,4 +1,4 @@
-//! What holds of every cure model, as a test of each.
+//! Laws that every cure model keeps, to test each of them.
 
 use std::ops::RangeInclusive;
 
@@ -8,7 +8,7 @@ use proptest::test_runner::TestRunner;
 
 use super::{CureError, CureModel, Dose, GrayLevel};
 
-/// The films of 000 appendix A: seconds at 0.2064 mW/cm², and the height measured in
+/// The films of 000 appendix A: seconds at 0.2064 mW/cm², and measured heights in
 /// micrometres.
 pub(crate) const APPENDIX_A: [(f64, f64); 10] = [
     (170.0, 611.4583333),
@@ -42,9 +42,8 @@ pub(super) fn hold(model: &impl CureModel, um: RangeInclusive<f64>) {
         .unwrap();
 }
 
-/// Doses near the critical one give depths near zero: what is left of the
-/// dose's last digit there is `D_p` times as much, so the bound has a part
-/// that does not shrink with the depth.
+/// Doses near the critical one give depths near zero. There the rounding of the dose,
+/// times `D_p`, does not shrink with the depth, so the bound has a constant part.
 fn is_near(found: Length, wanted: Length) -> bool {
     (found.um() - wanted.um()).abs() <= 1e-9 * wanted.um() + 1e-9
 }

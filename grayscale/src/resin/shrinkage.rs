@@ -1,10 +1,10 @@
-//! How much a resin shrinks as it cures.
+//! The shrinkage of a resin as it cures.
 //!
-//! Each acrylate group that reacts takes the same volume away, so the shrinkage
-//! is that volume times the groups that react in a volume of suspension (002
-//! eq. 47 to 54). Shares are from 0 to 1 where 002 has per cent.
+//! Each acrylate group that reacts removes the same volume, so the shrinkage is that
+//! volume times the number of groups that react in a volume of suspension (002 eq. 47 to
+//! 54). Shares are from 0 to 1 where 002 has per cent.
 
-/// What a mole of acrylate groups shrinks by as it reacts, `ΔV_C=C`, in cm³
+/// The volume by which a mole of acrylate groups shrinks as it reacts, `ΔV_C=C`, in cm³
 /// (002 section 3.4.2.2, from its reference 118).
 pub const SHRINKAGE_PER_GROUP: f64 = 22.5;
 

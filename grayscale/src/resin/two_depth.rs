@@ -1,16 +1,16 @@
-//! A resin that lets light through better, or worse, once it is solid.
+//! The cure model of a resin whose penetration depth changes once it is solid.
 
 use lamp_stack::Length;
 
 use super::model::{CureError, CureModel, DepthRange, ModelError, positive};
 use super::units::Dose;
 
-/// The cure model with its own penetration depth for the liquid (`D_pL`) and
-/// for the solid (`D_pS`): `z = D_pS ln(D_pL/D_pS (E/E_c - 1) + 1)` (000
+/// The cure model with separate penetration depths of the liquid (`D_pL`) and the
+/// solid (`D_pS`): `z = D_pS ln(D_pL/D_pS (E/E_c - 1) + 1)` (000
 /// eq. 3.8 and 3.9, 003 eq. 2).
 ///
-/// Where both depths agree it is the Jacobs working curve; where the solid is
-/// all but clear, the depth grows as the dose does.
+/// If both depths agree it is the Jacobs working curve; if the solid is almost clear,
+/// the depth grows in proportion to the dose.
 ///
 /// # Guarantees
 /// All numbers are above zero.
@@ -23,11 +23,11 @@ pub struct TwoDepth {
 }
 
 impl TwoDepth {
-    /// The model of a critical dose `E_c` and the penetration depths of the
-    /// liquid and the solid, which holds for `depths`.
+    /// Creates the model of a critical dose `E_c` and the penetration depths of liquid
+    /// and solid. It holds for `depths`.
     ///
     /// # Errors
-    /// Returns an error if a number is not above zero, or `depths` are none.
+    /// Returns an error if a number is not above zero, or `depths` is empty.
     pub fn new(
         critical_dose: Dose,
         liquid_depth: Length,
@@ -50,7 +50,7 @@ impl CureModel for TwoDepth {
         let above = dose.mj_per_cm2() / self.critical_dose.mj_per_cm2() - 1.0;
         let cures = above > 0.0;
         if !cures {
-            // Also where the dose is no number.
+            // NaN also ends here.
             return Length::default();
         }
         let [liquid, solid] = [self.liquid_depth.um(), self.solid_depth.um()];

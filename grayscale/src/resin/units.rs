@@ -1,5 +1,4 @@
-//! Doses, intensities, exposure times and gray levels, parsed from what people
-//! write.
+//! Doses, intensities, exposure times and gray levels, parsed from texts with units.
 
 use std::fmt;
 use std::ops::{Div, Mul, RangeInclusive};
@@ -8,11 +7,19 @@ use std::str::FromStr;
 use lamp_stack::Length;
 use thiserror::Error;
 
-/// What is written as a number and a unit, as `131.5 mJ/cm2`.
+/// A quantity that is written as a number and a unit, as `131.5 mJ/cm2`.
+///
+/// ```
+/// use lamp_grayscale::resin::{Dose, ExposureTime, Intensity};
+///
+/// let light: Intensity = "1.6 W/cm2".parse()?;
+/// assert_eq!(light * ExposureTime::from_ms(200.0), Dose::from_mj_per_cm2(320.0));
+/// # Ok::<(), lamp_grayscale::resin::QuantityError>(())
+/// ```
 pub trait Quantity: Copy + PartialOrd + FromStr<Err: fmt::Display> {
-    /// The unit of [`number`](Self::number), as files have it.
+    /// The unit of [`number`](Self::number), as files write it.
     const UNIT: &'static str;
-    /// A text that can be read, for messages.
+    /// An example of a text that parses, for messages.
     const EXAMPLE: &'static str;
     /// Creates the quantity of a number of its unit.
     fn of(number: f64) -> Self;
@@ -42,8 +49,8 @@ pub struct QuantityError {
     example: &'static str,
 }
 
-/// Parses a number and one of `units`, each with what its number is multiplied
-/// and divided by (two factors, so that tenths stay exact).
+/// Parses a number and one of `units`, each with a factor to multiply by and one to
+/// divide by: a tenth as a divisor of 10 stays exact.
 fn parse(text: &str, units: &[(&str, f64, f64)]) -> Option<f64> {
     let text = text.trim().replace('²', "2");
     let number = |&(unit, times, over): &(&str, f64, f64)| {
@@ -64,12 +71,12 @@ macro_rules! quantity {
         pub struct $name(f64);
 
         impl $name {
-            #[doc = concat!("From a number of ", $unit_name, ".")]
+            #[doc = concat!("Creates the quantity of a number of ", $unit_name, ".")]
             pub const fn $from(number: f64) -> Self {
                 Self(number)
             }
 
-            #[doc = concat!("In ", $unit_name, ".")]
+            #[doc = concat!("Returns the number of ", $unit_name, ".")]
             pub const fn $get(self) -> f64 {
                 self.0
             }
@@ -89,7 +96,7 @@ macro_rules! quantity {
         }
 
         impl fmt::Display for $name {
-            #[doc = concat!("Writes ", $unit_name, ", as many decimals as asked for or needed.")]
+            #[doc = concat!("Writes ", $unit_name, ", to the precision of the format if it has one.")]
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 self.0.fmt(f)?;
                 f.write_str(concat!(" ", $unit))
@@ -113,42 +120,39 @@ macro_rules! quantity {
 }
 
 quantity! {
-    /// The energy that light brings to a unit of surface (002 eq. 27). Parsed
-    /// from `mJ/cm2`, `J/cm2` or `J/m2`.
+    /// The energy of light per unit of surface (002 eq. 27). Parsed from `mJ/cm2`, `J/cm2` or `J/m2`.
     Dose, "a dose", "mJ/cm²", from_mj_per_cm2, mj_per_cm2, "mJ/cm2", "131.5 mJ/cm2",
     [("J/cm2", 1000.0, 1.0), ("J/m2", 1.0, 10.0)]
 }
 
 quantity! {
-    /// The power that light brings to a unit of surface. Parsed from `mW/cm2`,
+    /// The power of light per unit of surface. Parsed from `mW/cm2`,
     /// `W/cm2` or `W/m2`.
     Intensity, "an intensity", "mW/cm²", from_mw_per_cm2, mw_per_cm2, "mW/cm2", "1.6 W/cm2",
     [("W/cm2", 1000.0, 1.0), ("W/m2", 1.0, 10.0)]
 }
 
 quantity! {
-    /// How long a layer is exposed. Parsed from `ms` or `s`.
+    /// The time for which a layer is exposed. Parsed from `ms` or `s`.
     ExposureTime, "an exposure time", "milliseconds", from_ms, ms, "ms", "200 ms",
     [("s", 1000.0, 1.0)]
 }
 
 quantity! {
-    /// How far an edge grows with the dose: the sensitivity `D_p^w` of the cure
-    /// width (002 section 3.4.3). Parsed from `um/(mJ/cm2)` or `mm/(J/cm2)`,
-    /// which is as much.
+    /// The growth of an edge per dose: the sensitivity `D_p^w` of the cure width (002
+    /// section 3.4.3). Parsed from `um/(mJ/cm2)` or the equal `mm/(J/cm2)`.
     WidthSensitivity, "a width sensitivity", "µm per mJ/cm²",
     from_um_per_mj_per_cm2, um_per_mj_per_cm2, "um/(mJ/cm2)", "0.2 um/(mJ/cm2)",
     [("mm/(J/cm2)", 1.0, 1.0)]
 }
 
 impl Dose {
-    /// 1e-6 to 1e9 mJ/cm²: what no resin's measurement passes, but a slip of the pen
-    /// may.
+    /// 1e-6 to 1e9 mJ/cm². No measurement of a resin lies outside, but a typing error may.
     pub const PLAUSIBLE: RangeInclusive<Self> = Self(1e-6)..=Self(1e9);
 }
 
 impl Intensity {
-    /// 1e-6 to 1e9 mW/cm²: what no lamp passes, but a slip of the pen may.
+    /// 1e-6 to 1e9 mW/cm². No lamp lies outside, but a typing error may.
     pub const PLAUSIBLE: RangeInclusive<Self> = Self(1e-6)..=Self(1e9);
 }
 
@@ -182,27 +186,27 @@ impl GrayLevel {
     /// Full exposure.
     pub const WHITE: Self = Self(1.0);
 
-    /// The level `g`, if that is from 0 to 1.
+    /// Returns the level `g` if that is from 0 to 1.
     pub fn new(g: f64) -> Option<Self> {
         (0.0..=1.0).contains(&g).then_some(Self(g))
     }
 
-    /// The level nearest to `g`, which is a number.
+    /// Returns the level nearest to `g`, which must not be NaN.
     pub(crate) fn clamped(g: f64) -> Self {
         Self(g.clamp(0.0, 1.0))
     }
 
-    /// From 0 to 1.
+    /// Returns the level as a number from 0 to 1.
     pub const fn get(self) -> f64 {
         self.0
     }
 
-    /// The level of a pixel of 8 bits: 0 is black, 255 white.
+    /// Creates the level of an 8-bit pixel: 0 is black, 255 white.
     pub fn from_u8(level: u8) -> Self {
         Self(f64::from(level) / 255.0)
     }
 
-    /// The nearest level of 8 bits.
+    /// Returns the nearest 8-bit level.
     pub fn to_u8(self) -> u8 {
         (self.0 * 255.0).round() as u8
     }

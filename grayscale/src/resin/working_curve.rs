@@ -7,6 +7,16 @@ use super::units::Dose;
 
 /// The Jacobs working curve `C_d = D_p ln(E / E_c)` (002 eq. 30).
 ///
+/// ```
+/// use lamp_grayscale::resin::{CureModel, Dose, WorkingCurve};
+/// use lamp_stack::Length;
+///
+/// let curve = WorkingCurve::new(Dose::from_mj_per_cm2(131.5), Length::from_um(211.0))?;
+/// let depth = curve.depth(Dose::from_mj_per_cm2(320.0));
+/// assert_eq!(depth.um().round(), 188.0);
+/// # Ok::<(), lamp_grayscale::resin::ModelError>(())
+/// ```
+///
 /// # Guarantees
 /// Both numbers are above zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,28 +26,28 @@ pub struct WorkingCurve {
 }
 
 impl WorkingCurve {
-    /// The curve of a critical dose `E_c` and a penetration depth `D_p` (the
-    /// seed calls it the sensitivity).
+    /// Creates the curve of a critical dose `E_c` and a penetration depth `D_p`, which 002
+    /// calls the sensitivity.
     ///
     /// # Errors
-    /// Returns an error if one is not above zero.
+    /// Returns an error if either is not above zero.
     pub fn new(critical_dose: Dose, penetration_depth: Length) -> Result<Self, ModelError> {
         positive(critical_dose.mj_per_cm2(), "critical-dose")?;
         positive(penetration_depth.um(), "penetration-depth")?;
         Ok(Self { critical_dose, penetration_depth })
     }
 
-    /// For numbers that a model has checked.
+    /// Creates the curve of numbers that a model has checked.
     pub(super) const fn of_checked(critical_dose: Dose, penetration_depth: Length) -> Self {
         Self { critical_dose, penetration_depth }
     }
 
-    /// The dose at which the resin begins to gel, `E_c`.
+    /// Returns the dose at which the resin begins to gel, `E_c`.
     pub const fn critical_dose(&self) -> Dose {
         self.critical_dose
     }
 
-    /// The depth over which the dose falls to 1/e, `D_p`.
+    /// Returns the depth over which the dose falls to 1/e, `D_p`.
     pub const fn penetration_depth(&self) -> Length {
         self.penetration_depth
     }
@@ -46,7 +56,7 @@ impl WorkingCurve {
 impl CureModel for WorkingCurve {
     fn depth(&self, dose: Dose) -> Length {
         let ratio = dose.mj_per_cm2() / self.critical_dose.mj_per_cm2();
-        // Also where the dose is no number.
+        // NaN also ends here.
         let cured = if ratio > 1.0 { ratio.ln() } else { 0.0 };
         Length::from_um(self.penetration_depth.um() * cured)
     }
