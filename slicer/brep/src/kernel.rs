@@ -41,7 +41,7 @@ pub trait Kernel: Send + Sync {
     /// along their edges.
     ///
     /// What could not be made into facets is missing, and is among the findings:
-    /// whether bodies are closed is for the [gate](crate::check) to say.
+    /// whether bodies are closed is for [`check`](crate::check) to say.
     ///
     /// # Errors
     /// Where the chord is not a positive length, or there would be too many facets.

@@ -37,7 +37,6 @@
 //! ```
 
 mod error;
-mod gate;
 mod geometry;
 mod heal;
 mod kernel;
@@ -48,12 +47,13 @@ mod orient;
 mod prepare;
 mod step;
 mod tessellate;
+mod validate;
 pub mod vector;
 
 pub use error::BrepError;
-pub use gate::{BodyFault, BodyReport, check};
 pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellation};
 #[cfg(feature = "occt")]
 pub use occt::OcctModel;
-pub use prepare::{KernelName, Prepared, Try, prepare};
+pub use prepare::{Attempt, KernelName, Prepared, prepare};
 pub use step::{START_BYTES, StepError, StepModel, is_step};
+pub use validate::{BodyFault, BodyReport, check};

@@ -6,10 +6,10 @@ use crate::vector::Vec3;
 
 /// All bodies of a file.
 #[derive(Debug, Default)]
-pub(crate) struct Model {
+pub(crate) struct BrepModel {
     pub(crate) bodies: Vec<Body>,
     pub(crate) faces: Vec<Face>,
-    pub(crate) edges: Vec<Edge>,
+    pub(crate) edges: Vec<BrepEdge>,
     pub(crate) vertices: Vec<Vec3>,
     /// The name of the file's length unit.
     pub(crate) unit: String,
@@ -41,7 +41,7 @@ pub(crate) enum Loop {
 
 /// A piece of a curve between two vertices.
 #[derive(Debug)]
-pub(crate) struct Edge {
+pub(crate) struct BrepEdge {
     pub(crate) curve: Curve,
     /// Where it starts and ends, among the vertices.
     pub(crate) ends: [usize; 2],

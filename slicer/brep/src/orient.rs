@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::gate::{BodyReport, bounds, doubled, sides, volume};
 use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
+use crate::validate::{BodyReport, bounds, doubled, sides, volume};
 use crate::vector::{length, middle};
 
 /// Of two groups of faces that contradict each other the smaller one is inside out,

@@ -6,12 +6,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use crate::error::BrepError;
-use crate::gate::{BodyFault, BodyReport, apart, check};
 use crate::kernel::{Kernel, Tessellation};
 #[cfg(feature = "occt")]
 use crate::occt::OcctModel;
 use crate::orient::turn_over;
 use crate::step::StepModel;
+use crate::validate::{BodyFault, BodyReport, apart, check};
 
 /// Which program reads the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,10 +30,10 @@ pub struct Prepared {
     pub kernel: Arc<dyn Kernel>,
     /// Its facets. What was found and done is among their findings.
     pub mesh: Arc<Tessellation>,
-    /// What the gate says of each body.
+    /// What [`check`](crate::check) says of each body.
     pub reports: Vec<BodyReport>,
     /// What was tried before and was worse, in order.
-    pub tries: Vec<Try>,
+    pub tries: Vec<Attempt>,
     /// Within which distance what belongs together was joined, in millimetres;
     /// 0 if the file was taken as it is.
     pub heal_mm: f64,
@@ -43,7 +43,7 @@ pub struct Prepared {
 
 /// A way in which a model could not be prepared.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Try {
+pub struct Attempt {
     /// As in [`Prepared`].
     pub heal_mm: f64,
     /// As in [`Prepared`].
@@ -79,7 +79,7 @@ pub fn prepare(bytes: &[u8], name: KernelName, chord_mm: f64) -> Result<Prepared
     let opened = open(bytes, name, 0.0)?;
     let own_mm = opened.kernel.uncertainty_mm().unwrap_or(USUAL_MM);
     let first = facets(opened.kernel, 0.0, chord_mm);
-    let first_try = Try::of(&first, 0.0, chord_mm);
+    let first_try = Attempt::of(&first, 0.0, chord_mm);
     let mut search =
         Search { bytes, name, chord_mm, tries: vec![first_try], best: first.map(|made| (0, made)) };
     let heals = HEALS.map(|by| by * own_mm).into_iter().chain(LOOSEST.map(|by| by * chord_mm));
@@ -101,7 +101,7 @@ struct Search<'a> {
     /// The chord that is wanted.
     chord_mm: f64,
     /// All, the best one too.
-    tries: Vec<Try>,
+    tries: Vec<Attempt>,
     /// Which one it is; an error if none gave facets, that of the first.
     best: Result<(usize, Prepared), BrepError>,
 }
@@ -140,7 +140,7 @@ impl Search<'_> {
                 report.faults.extend(apart(report, self.chord_mm));
             }
         }
-        self.tries.push(Try::of(&made, heal_mm, chord_mm));
+        self.tries.push(Attempt::of(&made, heal_mm, chord_mm));
         let Ok(made) = made else { return };
         let is_better = match &self.best {
             // Fewer facets have fewer open edges, but are no better for that.
@@ -180,7 +180,7 @@ impl Prepared {
     }
 }
 
-impl Try {
+impl Attempt {
     fn of(made: &Result<Prepared, BrepError>, heal_mm: f64, chord_mm: f64) -> Self {
         let why = match made {
             Ok(made) => faults(&made.reports),
@@ -211,7 +211,7 @@ fn wrong(reports: &[BodyReport]) -> [usize; 3] {
 }
 
 /// A file as a kernel has read it.
-struct Opened {
+struct OpenedModel {
     kernel: Arc<dyn Kernel>,
     /// Whether healing changed anything.
     is_changed: bool,
@@ -219,12 +219,12 @@ struct Opened {
 
 /// Reads a file, and joins what lies within a tolerance; with 0 it is taken as it
 /// is.
-fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<Opened, BrepError> {
+fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<OpenedModel, BrepError> {
     caught("reading the file", || match name {
         KernelName::Lamp => {
             let model = StepModel::read_healed(bytes, heal_mm)?;
             let is_changed = model.is_healed();
-            Ok(Opened { kernel: Arc::new(model), is_changed })
+            Ok(OpenedModel { kernel: Arc::new(model), is_changed })
         }
         #[cfg(feature = "occt")]
         KernelName::Occt => {
@@ -234,7 +234,7 @@ fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<Opened, BrepErro
             } else {
                 OcctModel::read(bytes)?
             };
-            Ok(Opened { kernel: Arc::new(model), is_changed })
+            Ok(OpenedModel { kernel: Arc::new(model), is_changed })
         }
     })
 }

@@ -56,14 +56,14 @@ pub fn unit(a: Vec3) -> Option<Vec3> {
 
 /// A right-handed frame: where it stands, and its axes, each of length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Frame {
+pub(crate) struct Axes {
     pub(crate) origin: Vec3,
-    pub(crate) axes: [Vec3; 3],
+    pub(crate) directions: [Vec3; 3],
 }
 
-impl Frame {
+impl Axes {
     pub(crate) const WORLD: Self =
-        Self { origin: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
+        Self { origin: [0.0; 3], directions: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
 
     /// The frame with this z axis, and the x axis as near to `x` as is at a
     /// right angle to it. Without a usable `x` it is the first of the world's axes
@@ -73,7 +73,7 @@ impl Frame {
         let across = |x: Vec3| unit(along(x, z, -dot(x, z)));
         let default = if z[0].abs() < 1.0 - 1e-9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let x = x.and_then(unit).and_then(across).or_else(|| across(default))?;
-        Some(Self { origin, axes: [x, cross(z, x), z] })
+        Some(Self { origin, directions: [x, cross(z, x), z] })
     }
 
     /// Where a point given in this frame lies.
@@ -83,34 +83,34 @@ impl Frame {
 
     /// Where a direction given in this frame points.
     pub(crate) fn direction(&self, d: Vec3) -> Vec3 {
-        let [x, y, z] = self.axes;
+        let [x, y, z] = self.directions;
         along(along(scale(x, d[0]), y, d[1]), z, d[2])
     }
 
     /// A point as this frame sees it.
     pub(crate) fn local(&self, p: Vec3) -> Vec3 {
         let d = sub(p, self.origin);
-        self.axes.map(|axis| dot(axis, d))
+        self.directions.map(|axis| dot(axis, d))
     }
 
     /// The frame that `inner`, given in this one, is.
-    pub(crate) fn then(&self, inner: &Frame) -> Frame {
-        let axes = inner.axes.map(|axis| self.direction(axis));
-        Frame { origin: self.point(inner.origin), axes }
+    pub(crate) fn then(&self, inner: &Axes) -> Axes {
+        let directions = inner.directions.map(|axis| self.direction(axis));
+        Axes { origin: self.point(inner.origin), directions }
     }
 
     /// This frame, turned by half a turn about its first axis.
-    pub(crate) fn turned(&self) -> Frame {
-        let [x, y, z] = self.axes;
-        Frame { origin: self.origin, axes: [x, scale(y, -1.0), scale(z, -1.0)] }
+    pub(crate) fn turned(&self) -> Axes {
+        let [x, y, z] = self.directions;
+        Axes { origin: self.origin, directions: [x, scale(y, -1.0), scale(z, -1.0)] }
     }
 
     /// This frame undone: `self.then(&self.inverse())` is the world.
-    pub(crate) fn inverse(&self) -> Frame {
-        let [x, y, z] = self.axes;
-        let axes = [0, 1, 2].map(|k| [x[k], y[k], z[k]]);
-        let origin = self.axes.map(|axis| -dot(axis, self.origin));
-        Frame { origin, axes }
+    pub(crate) fn inverse(&self) -> Axes {
+        let [x, y, z] = self.directions;
+        let directions = [0, 1, 2].map(|k| [x[k], y[k], z[k]]);
+        let origin = self.directions.map(|axis| -dot(axis, self.origin));
+        Axes { origin, directions }
     }
 }
 
@@ -122,20 +122,20 @@ mod tests {
     fn a_frame_without_x_is_whole_wherever_z_points() {
         for z in [[1.0, 0.0, 0.0], [-3.0, 0.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1e-13, 0.0]] {
             for x in [None, Some(z), Some([0.0; 3])] {
-                let [x, y, z] = Frame::new([0.0; 3], z, x).unwrap().axes;
+                let [x, y, z] = Axes::new([0.0; 3], z, x).unwrap().directions;
                 assert!(dot(x, y).abs() < 1e-12 && dot(x, z).abs() < 1e-12);
                 assert!((length(x) - 1.0).abs() < 1e-12 && distance(cross(x, y), z) < 1e-12);
             }
         }
-        assert_eq!(Frame::new([0.0; 3], [0.0; 3], None), None);
-        assert_eq!(Frame::new([0.0; 3], [f64::NAN; 3], None), None);
+        assert_eq!(Axes::new([0.0; 3], [0.0; 3], None), None);
+        assert_eq!(Axes::new([0.0; 3], [f64::NAN; 3], None), None);
     }
 
     #[test]
     fn a_frame_undone_is_the_world() {
-        let frame = Frame::new([1.0, 2.0, 3.0], [1.0, 1.0, 0.5], Some([0.0, 1.0, 0.0])).unwrap();
+        let axes = Axes::new([1.0, 2.0, 3.0], [1.0, 1.0, 0.5], Some([0.0, 1.0, 0.0])).unwrap();
         let p = [4.0, -5.0, 6.0];
-        assert!(distance(frame.local(frame.point(p)), p) < 1e-12);
-        assert!(distance(frame.then(&frame.inverse()).point(p), p) < 1e-12);
+        assert!(distance(axes.local(axes.point(p)), p) < 1e-12);
+        assert!(distance(axes.then(&axes.inverse()).point(p), p) < 1e-12);
     }
 }

@@ -86,12 +86,12 @@ impl Chain {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::Frame;
+    use crate::vector::Axes;
     use std::f64::consts::PI;
 
     /// Half a circle of radius 2 from the right to the left, and the way back.
     fn half() -> Vec<Link> {
-        let circle = Curve::Ellipse { frame: Frame::WORLD, radii: [2.0; 2] };
+        let circle = Curve::Ellipse { axes: Axes::WORLD, radii: [2.0; 2] };
         let line = Curve::Line { point: [0.0; 3], direction: [1.0, 0.0, 0.0] };
         vec![Link { curve: circle, range: [0.0, PI] }, Link { curve: line, range: [-2.0, 2.0] }]
     }

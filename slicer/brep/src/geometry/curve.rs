@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::chain::Chain;
 use super::spline::SplineCurve;
-use crate::vector::{Frame, Vec3, along, distance, dot, scale, sub};
+use crate::vector::{Axes, Vec3, along, distance, dot, scale, sub};
 
 /// A curve in space, in millimetres, as ISO 10303-42 gives its parameter.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,15 +15,15 @@ pub(crate) enum Curve {
     },
     /// A circle has two equal radii.
     Ellipse {
-        frame: Frame,
+        axes: Axes,
         radii: [f64; 2],
     },
     Hyperbola {
-        frame: Frame,
-        axes: [f64; 2],
+        axes: Axes,
+        half_axes: [f64; 2],
     },
     Parabola {
-        frame: Frame,
+        axes: Axes,
         focal: f64,
     },
     Spline(SplineCurve),
@@ -31,24 +31,24 @@ pub(crate) enum Curve {
 }
 
 /// Steps of the search for the nearest point.
-const MOST_STEPS: usize = 30;
+const MAX_STEPS: usize = 30;
 
 impl Curve {
     /// The point and the derivative at `t`.
     pub(crate) fn at(&self, t: f64) -> [Vec3; 2] {
-        let in_frame = |frame: &Frame, p: Vec3, d: Vec3| [frame.point(p), frame.direction(d)];
+        let in_axes = |axes: &Axes, p: Vec3, d: Vec3| [axes.point(p), axes.direction(d)];
         match self {
             Self::Line { point, direction } => [along(*point, *direction, t), *direction],
-            Self::Ellipse { frame, radii: [a, b] } => {
+            Self::Ellipse { axes, radii: [a, b] } => {
                 let (sin, cos) = t.sin_cos();
-                in_frame(frame, [a * cos, b * sin, 0.0], [-a * sin, b * cos, 0.0])
+                in_axes(axes, [a * cos, b * sin, 0.0], [-a * sin, b * cos, 0.0])
             }
-            Self::Hyperbola { frame, axes: [a, b] } => {
+            Self::Hyperbola { axes, half_axes: [a, b] } => {
                 let (sinh, cosh) = (t.sinh(), t.cosh());
-                in_frame(frame, [a * cosh, b * sinh, 0.0], [a * sinh, b * cosh, 0.0])
+                in_axes(axes, [a * cosh, b * sinh, 0.0], [a * sinh, b * cosh, 0.0])
             }
-            Self::Parabola { frame, focal } => in_frame(
-                frame,
+            Self::Parabola { axes, focal } => in_axes(
+                axes,
                 [focal * t * t, 2.0 * focal * t, 0.0],
                 [2.0 * focal * t, 2.0 * focal, 0.0],
             ),
@@ -63,9 +63,11 @@ impl Curve {
             Self::Line { point, direction } => {
                 Self::Line { point, direction: scale(direction, -1.0) }
             }
-            Self::Ellipse { frame, radii } => Self::Ellipse { frame: frame.turned(), radii },
-            Self::Hyperbola { frame, axes } => Self::Hyperbola { frame: frame.turned(), axes },
-            Self::Parabola { frame, focal } => Self::Parabola { frame: frame.turned(), focal },
+            Self::Ellipse { axes, radii } => Self::Ellipse { axes: axes.turned(), radii },
+            Self::Hyperbola { axes, half_axes } => {
+                Self::Hyperbola { axes: axes.turned(), half_axes }
+            }
+            Self::Parabola { axes, focal } => Self::Parabola { axes: axes.turned(), focal },
             Self::Spline(spline) => Self::Spline(spline.reversed()),
             Self::Chain(chain) => Self::Chain(chain.reversed()),
         }
@@ -123,15 +125,15 @@ impl Curve {
             Self::Line { point, direction } => {
                 dot(sub(p, *point), *direction) / dot(*direction, *direction)
             }
-            Self::Ellipse { frame, radii: [a, b] } => {
-                let [x, y, _] = frame.local(p);
+            Self::Ellipse { axes, radii: [a, b] } => {
+                let [x, y, _] = axes.local(p);
                 let t = (y / b).atan2(x / a);
                 if a == b { t } else { self.nearer(p, t) }
             }
-            Self::Hyperbola { frame, axes } => {
-                self.nearer(p, (frame.local(p)[1] / axes[1]).asinh())
+            Self::Hyperbola { axes, half_axes } => {
+                self.nearer(p, (axes.local(p)[1] / half_axes[1]).asinh())
             }
-            Self::Parabola { frame, focal } => self.nearer(p, frame.local(p)[1] / (2.0 * focal)),
+            Self::Parabola { axes, focal } => self.nearer(p, axes.local(p)[1] / (2.0 * focal)),
             Self::Chain(chain) => chain.project(p),
             Self::Spline(_) => {
                 let far = |t: &f64| distance(self.at(*t)[0], p);
@@ -161,7 +163,7 @@ impl Curve {
             _ => t,
         };
         let (mut t, mut best) = (start, (distance(self.at(start)[0], p), start));
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let [at, slope] = self.at(t);
             let step = dot(sub(p, at), slope) / dot(slope, slope);
             let next = clamp(t + step);
@@ -269,7 +271,7 @@ mod tests {
     use crate::vector::length;
 
     fn circle() -> Curve {
-        Curve::Ellipse { frame: Frame::WORLD, radii: [5.0; 2] }
+        Curve::Ellipse { axes: Axes::WORLD, radii: [5.0; 2] }
     }
 
     #[test]
@@ -316,9 +318,9 @@ mod tests {
 
     #[test]
     fn projection_finds_the_parameter() {
-        let ellipse = Curve::Ellipse { frame: Frame::WORLD, radii: [5.0, 2.0] };
-        let hyperbola = Curve::Hyperbola { frame: Frame::WORLD, axes: [3.0, 2.0] };
-        let parabola = Curve::Parabola { frame: Frame::WORLD, focal: 1.5 };
+        let ellipse = Curve::Ellipse { axes: Axes::WORLD, radii: [5.0, 2.0] };
+        let hyperbola = Curve::Hyperbola { axes: Axes::WORLD, half_axes: [3.0, 2.0] };
+        let parabola = Curve::Parabola { axes: Axes::WORLD, focal: 1.5 };
         for curve in [circle(), ellipse, hyperbola, parabola] {
             for t in [-1.4, -0.2, 0.0, 0.9, 2.0] {
                 assert!((curve.project(curve.at(t)[0]) - t).abs() < 1e-12, "{curve:?} {t}");

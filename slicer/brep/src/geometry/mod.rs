@@ -4,7 +4,7 @@
 pub(crate) mod chain;
 pub(crate) mod curve;
 mod offset;
-mod pieces;
+mod polynomials;
 mod project;
 pub(crate) mod spline;
 pub(crate) mod spline_surface;

@@ -15,20 +15,20 @@ impl Surface {
             return None;
         }
         let moved = match self {
-            Self::Plane(mut frame) => {
-                frame.origin = along(frame.origin, frame.axes[2], by_mm);
-                Self::Plane(frame)
+            Self::Plane(mut axes) => {
+                axes.origin = along(axes.origin, axes.directions[2], by_mm);
+                Self::Plane(axes)
             }
-            Self::Cylinder { frame, radius } => Self::Cylinder { frame, radius: radius + by_mm },
-            Self::Sphere { frame, radius } => Self::Sphere { frame, radius: radius + by_mm },
-            Self::Torus { frame, major, minor, part: TorusPart::Whole }
+            Self::Cylinder { axes, radius } => Self::Cylinder { axes, radius: radius + by_mm },
+            Self::Sphere { axes, radius } => Self::Sphere { axes, radius: radius + by_mm },
+            Self::Torus { axes, major, minor, part: TorusPart::Whole }
                 if minor + by_mm <= major =>
             {
-                Self::Torus { frame, major, minor: minor + by_mm, part: TorusPart::Whole }
+                Self::Torus { axes, major, minor: minor + by_mm, part: TorusPart::Whole }
             }
-            Self::Cone { frame, radius, slope } => {
+            Self::Cone { axes, radius, slope } => {
                 let radius = radius + by_mm * (1.0 + slope * slope).sqrt();
-                Self::Cone { frame, radius, slope }
+                Self::Cone { axes, radius, slope }
             }
             basis => Self::Offset { basis: Box::new(basis), by_mm },
         };
@@ -84,18 +84,18 @@ fn steps(basis: &Surface) -> [f64; 2] {
 mod tests {
     use super::*;
     use crate::geometry::Curve;
-    use crate::vector::{Frame, distance};
+    use crate::vector::{Axes, distance};
 
     /// A cylinder of radius 3 as a circle that is moved up.
     fn drum() -> Surface {
-        let curve = Curve::Ellipse { frame: Frame::WORLD, radii: [3.0; 2] };
+        let curve = Curve::Ellipse { axes: Axes::WORLD, radii: [3.0; 2] };
         Surface::Extrusion { curve, direction: [0.0, 0.0, 1.0] }
     }
 
     #[test]
     fn an_offset_lies_on_the_normals() {
         let offset = drum().offset(1.5).unwrap();
-        let plain = Surface::Cylinder { frame: Frame::WORLD, radius: 3.0 }.offset(1.5).unwrap();
+        let plain = Surface::Cylinder { axes: Axes::WORLD, radius: 3.0 }.offset(1.5).unwrap();
         for uv in [[0.0, 0.0], [1.0, 2.0], [4.0, -3.0]] {
             let (a, b) = (offset.at(uv), plain.at(uv));
             assert!(distance(a.point, b.point) < 1e-14);
@@ -108,9 +108,9 @@ mod tests {
 
     #[test]
     fn cones_and_tori_stay_what_they_are() {
-        let cone = Surface::Cone { frame: Frame::WORLD, radius: 3.0, slope: 0.5 };
+        let cone = Surface::Cone { axes: Axes::WORLD, radius: 3.0, slope: 0.5 };
         let torus =
-            Surface::Torus { frame: Frame::WORLD, major: 5.0, minor: 2.0, part: TorusPart::Whole };
+            Surface::Torus { axes: Axes::WORLD, major: 5.0, minor: 2.0, part: TorusPart::Whole };
         for surface in [cone, torus] {
             let offset = surface.clone().offset(0.7).unwrap();
             assert_eq!(offset.kind(), surface.kind());
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn what_vanishes_is_nothing() {
-        let ball = Surface::Sphere { frame: Frame::WORLD, radius: 3.0 };
+        let ball = Surface::Sphere { axes: Axes::WORLD, radius: 3.0 };
         assert_eq!(ball.clone().offset(-3.0), None);
         assert_eq!(ball.offset(f64::NAN), None);
     }

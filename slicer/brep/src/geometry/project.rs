@@ -20,8 +20,8 @@ impl Surface {
                 };
                 curve.samples().iter().map(along).collect()
             }
-            Self::Revolution { frame, curve } => {
-                let [x, y, z] = frame.local(p);
+            Self::Revolution { axes, curve } => {
+                let [x, y, z] = axes.local(p);
                 let mut samples = curve.samples();
                 let around = (0..8).map(|k| f64::from(k) * TAU / 8.0);
                 samples.extend(around.map(|turn| {
@@ -53,26 +53,26 @@ impl Surface {
     pub(crate) fn project(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
         let azimuth = |q: Vec3| q[1].atan2(q[0]);
         match self {
-            Self::Plane(frame) => {
-                let [u, v, _] = frame.local(p);
+            Self::Plane(axes) => {
+                let [u, v, _] = axes.local(p);
                 [u, v]
             }
-            Self::Cylinder { frame, .. } => {
-                let q = frame.local(p);
+            Self::Cylinder { axes, .. } => {
+                let q = axes.local(p);
                 [azimuth(q), q[2]]
             }
-            Self::Cone { frame, radius, slope } => {
-                let q = frame.local(p);
+            Self::Cone { axes, radius, slope } => {
+                let q = axes.local(p);
                 let off = q[0].hypot(q[1]) - radius;
                 let v = (q[2] + slope * off) / (1.0 + slope * slope);
                 [azimuth(q), v]
             }
-            Self::Sphere { frame, .. } => {
-                let q = frame.local(p);
+            Self::Sphere { axes, .. } => {
+                let q = axes.local(p);
                 [azimuth(q), q[2].atan2(q[0].hypot(q[1]))]
             }
-            Self::Torus { frame, major, part, .. } => {
-                let q = frame.local(p);
+            Self::Torus { axes, major, part, .. } => {
+                let q = axes.local(p);
                 let out = q[0].hypot(q[1]);
                 if *part == TorusPart::Lemon {
                     // The tube's far side: behind the axis, as seen from u.

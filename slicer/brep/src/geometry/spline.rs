@@ -3,7 +3,7 @@
 use crate::vector::Vec3;
 
 /// The highest degree that is read.
-pub(crate) const MOST_DEGREE: usize = 25;
+pub(crate) const MAX_DEGREE: usize = 25;
 
 /// Knots and degree along one parameter.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub(crate) struct Knots {
 }
 
 /// The basis functions at a parameter that are not zero, and their derivatives.
-pub(super) struct Basis<const MOST: usize> {
+pub(super) struct BasisValues<const MOST: usize> {
     /// The first control point that counts.
     pub(super) first: usize,
     pub(super) values: [f64; MOST],
@@ -24,7 +24,7 @@ pub(super) struct Basis<const MOST: usize> {
 impl Knots {
     /// Knots for `count` control points; nothing if they do not fit or fall.
     pub(crate) fn new(degree: usize, knots: Vec<f64>, count: usize) -> Option<Self> {
-        let fits = (1..=MOST_DEGREE).contains(&degree)
+        let fits = (1..=MAX_DEGREE).contains(&degree)
             && count > degree
             && knots.len() == count + degree + 1
             && knots.iter().all(|knot| knot.is_finite())
@@ -89,10 +89,10 @@ impl Knots {
 
     /// The basis at `t`; beyond the domain, that of the last piece continued
     /// (algorithms A2.1 to A2.3 of *The NURBS Book*).
-    pub(super) fn basis(&self, t: f64) -> Basis<{ MOST_DEGREE + 1 }> {
+    pub(super) fn basis(&self, t: f64) -> BasisValues<{ MAX_DEGREE + 1 }> {
         let (p, k, span) = (self.degree, &self.knots, self.span(t));
-        let mut values = [0.0; MOST_DEGREE + 1];
-        let mut slopes = [0.0; MOST_DEGREE + 1];
+        let mut values = [0.0; MAX_DEGREE + 1];
+        let mut slopes = [0.0; MAX_DEGREE + 1];
         values[0] = 1.0;
         for degree in 1..=p {
             if degree == p {
@@ -115,7 +115,7 @@ impl Knots {
             }
             values[degree] = saved;
         }
-        Basis { first: span - p, values, slopes }
+        BasisValues { first: span - p, values, slopes }
     }
 }
 

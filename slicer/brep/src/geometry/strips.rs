@@ -1,6 +1,6 @@
 //! B-spline surfaces as polynomials, for fast evaluation.
 
-use super::pieces::{Pieces, horner};
+use super::polynomials::{PolynomialBasis, horner};
 use super::spline::{Knots, Weighted};
 use crate::kernel::Jet;
 use crate::vector::Vec3;
@@ -11,8 +11,8 @@ use crate::vector::Vec3;
 /// times. Polynomials along both would be faster yet, but take that for u as well.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Strips {
-    u: Pieces,
-    v: Pieces,
+    u: PolynomialBasis,
+    v: PolynomialBasis,
     /// How many control points there are along u.
     rows: usize,
     /// Piece by piece along v, row by row of the control points, and power by power,
@@ -27,7 +27,7 @@ impl Strips {
     pub(super) fn new(u: &Knots, v: &Knots, points: &[Weighted]) -> Option<Self> {
         let is_rational = points.iter().any(|point| point[3] != 1.0);
         let (rows, columns) = (u.count(), v.count());
-        let (u, v) = (Pieces::new(u)?, Pieces::new(v)?);
+        let (u, v) = (PolynomialBasis::new(u)?, PolynomialBasis::new(v)?);
         let mut powers = Vec::with_capacity(v.count() * rows * (v.degree() + 1));
         for piece in 0..v.count() {
             points.chunks(columns).for_each(|row| powers.extend(v.summed(piece, row)));
@@ -71,7 +71,7 @@ impl Strips {
     /// The point, and the derivatives along u and v, each with its weight.
     #[inline(always)]
     fn sums<const M: usize, const N: usize>(&self, [u, v]: [f64; 2]) -> [Weighted; 3] {
-        let (along_u, along_v) = (self.u.basis::<M>(u), self.v.place(v));
+        let (along_u, along_v) = (self.u.basis::<M>(u), self.v.local(v));
         let first = (along_v.number * self.rows + along_u.first) * N;
         let (rows, _) = self.powers[first..][..M * N].as_chunks::<N>();
         let mut sums = [[0.0; 4]; 3];
@@ -88,13 +88,13 @@ impl Strips {
     }
 }
 
-fn place([x, y, z, _]: Weighted) -> Vec3 {
+fn position([x, y, z, _]: Weighted) -> Vec3 {
     [x, y, z]
 }
 
 #[inline(always)]
 fn plain(sums: &[Weighted; 3]) -> Jet {
-    let [point, du, dv] = sums.map(place);
+    let [point, du, dv] = sums.map(position);
     Jet { point, du, dv }
 }
 
@@ -102,7 +102,7 @@ fn plain(sums: &[Weighted; 3]) -> Jet {
 #[inline(always)]
 fn divided(sums: &[Weighted; 3]) -> Jet {
     let per_weight = 1.0 / sums[0][3];
-    let point = place(sums[0]).map(|x| x * per_weight);
+    let point = position(sums[0]).map(|x| x * per_weight);
     let slope = |d: Weighted| [0, 1, 2].map(|k| (d[k] - d[3] * point[k]) * per_weight);
     Jet { point, du: slope(sums[1]), dv: slope(sums[2]) }
 }

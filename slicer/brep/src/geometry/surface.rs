@@ -6,28 +6,28 @@ use super::curve::Curve;
 use super::offset;
 use super::spline_surface::SplineSurface;
 use crate::kernel::Jet;
-use crate::vector::{Frame, Vec3, add, scale};
+use crate::vector::{Axes, Vec3, add, scale};
 
 /// A surface in millimetres, as ISO 10303-42 gives its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Surface {
-    Plane(Frame),
+    Plane(Axes),
     Cylinder {
-        frame: Frame,
+        axes: Axes,
         radius: f64,
     },
     /// The radius at v = 0, and how much it grows with v.
     Cone {
-        frame: Frame,
+        axes: Axes,
         radius: f64,
         slope: f64,
     },
     Sphere {
-        frame: Frame,
+        axes: Axes,
         radius: f64,
     },
     Torus {
-        frame: Frame,
+        axes: Axes,
         major: f64,
         minor: f64,
         part: TorusPart,
@@ -38,7 +38,7 @@ pub(crate) enum Surface {
     },
     /// About the z axis of the frame, along which the curve's points are given too.
     Revolution {
-        frame: Frame,
+        axes: Axes,
         curve: Curve,
     },
     Spline(Box<SplineSurface>),
@@ -80,39 +80,39 @@ impl Surface {
 
     /// The point and the first derivatives.
     pub(crate) fn at(&self, [u, v]: [f64; 2]) -> Jet {
-        let jet = |frame: &Frame, p: Vec3, du: Vec3, dv: Vec3| Jet {
-            point: frame.point(p),
-            du: frame.direction(du),
-            dv: frame.direction(dv),
+        let jet = |axes: &Axes, p: Vec3, du: Vec3, dv: Vec3| Jet {
+            point: axes.point(p),
+            du: axes.direction(du),
+            dv: axes.direction(dv),
         };
         let (sin, cos) = u.sin_cos();
         // A profile of radius r and height z, turned.
-        let turned = |frame: &Frame, [r, z]: [f64; 2], [dr, dz]: [f64; 2]| {
-            jet(frame, [r * cos, r * sin, z], [-r * sin, r * cos, 0.0], [dr * cos, dr * sin, dz])
+        let turned = |axes: &Axes, [r, z]: [f64; 2], [dr, dz]: [f64; 2]| {
+            jet(axes, [r * cos, r * sin, z], [-r * sin, r * cos, 0.0], [dr * cos, dr * sin, dz])
         };
         match self {
-            Self::Plane(frame) => jet(frame, [u, v, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
-            Self::Cylinder { frame, radius } => turned(frame, [*radius, v], [0.0, 1.0]),
-            Self::Cone { frame, radius, slope } => {
-                turned(frame, [radius + v * slope, v], [*slope, 1.0])
+            Self::Plane(axes) => jet(axes, [u, v, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
+            Self::Cylinder { axes, radius } => turned(axes, [*radius, v], [0.0, 1.0]),
+            Self::Cone { axes, radius, slope } => {
+                turned(axes, [radius + v * slope, v], [*slope, 1.0])
             }
-            Self::Sphere { frame, radius: r } => {
+            Self::Sphere { axes, radius: r } => {
                 let (s, c) = v.sin_cos();
-                turned(frame, [r * c, r * s], [-r * s, r * c])
+                turned(axes, [r * c, r * s], [-r * s, r * c])
             }
-            Self::Torus { frame, major, minor: r, .. } => {
+            Self::Torus { axes, major, minor: r, .. } => {
                 let (s, c) = v.sin_cos();
-                turned(frame, [major + r * c, r * s], [-r * s, r * c])
+                turned(axes, [major + r * c, r * s], [-r * s, r * c])
             }
             Self::Extrusion { curve, direction } => {
                 let [point, du] = curve.at(inside(u, curve.domain(), curve.period()));
                 Jet { point: add(point, scale(*direction, v)), du, dv: *direction }
             }
-            Self::Revolution { frame, curve } => {
+            Self::Revolution { axes, curve } => {
                 let [p, d] = curve.at(inside(v, curve.domain(), curve.period()));
                 let turn = |p: Vec3| [p[0] * cos - p[1] * sin, p[0] * sin + p[1] * cos, p[2]];
                 let [x, y, _] = turn(p);
-                jet(frame, turn(p), [-y, x, 0.0], turn(d))
+                jet(axes, turn(p), [-y, x, 0.0], turn(d))
             }
             Self::Spline(spline) => spline.at(spline.inside([u, v])),
             Self::Offset { basis, by_mm } => offset::at(basis, *by_mm, [u, v]),
@@ -185,9 +185,9 @@ impl Surface {
             Self::Torus { part: TorusPart::Apple | TorusPart::Lemon, .. } => {
                 self.domain()[1].into_iter().flatten().map(|v| pole(1, v)).collect()
             }
-            Self::Revolution { frame, curve } => {
+            Self::Revolution { axes, curve } => {
                 let on_axis = |v: &f64| {
-                    let [x, y, _] = frame.local(self.point([0.0, *v]));
+                    let [x, y, _] = axes.local(self.point([0.0, *v]));
                     x.hypot(y) < SAME_MM
                 };
                 curve.domain().into_iter().flatten().filter(on_axis).map(|v| pole(1, v)).collect()

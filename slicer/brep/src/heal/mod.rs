@@ -4,21 +4,21 @@
 //! places where the edges of a loop do not meet. Vertices that lie within the
 //! tolerance become one; edges are cut where a vertex of another lies on them; of
 //! two between the same vertices that run within the tolerance of each other one
-//! stays. What a body's facets are worth then is for the gate to say.
+//! stays. Whether a body's facets are closed then is for validation to say.
 
-mod span;
+mod edge_curve;
 mod vertices;
 
 use std::collections::{HashMap, HashSet};
 
-use self::span::Span;
+use self::edge_curve::EdgeCurve;
 use crate::geometry::edge_range;
 use crate::kernel::{Fault, Finding};
-use crate::model::{Edge, Face, Loop, Model};
+use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::Vec3;
 
 /// Joins what lies within a tolerance, and says at which faces.
-pub(crate) fn heal(model: &mut Model, tolerance_mm: f64) -> Vec<Finding> {
+pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<Finding> {
     let mut findings = Vec::new();
     for body in model.bodies.clone() {
         let faces = body.faces.start as usize..body.faces.end as usize;
@@ -45,7 +45,7 @@ pub(crate) fn heal(model: &mut Model, tolerance_mm: f64) -> Vec<Finding> {
 /// One body.
 struct Healing<'a> {
     faces: &'a mut [Face],
-    edges: &'a mut Vec<Edge>,
+    edges: &'a mut Vec<BrepEdge>,
     vertices: &'a mut [Vec3],
     tolerance_mm: f64,
     /// For edges that were joined or whose ends were, how far apart that was.
@@ -93,7 +93,7 @@ impl Healing<'_> {
         loose
     }
 
-    fn range(&self, edge: &Edge) -> [f64; 2] {
+    fn range(&self, edge: &BrepEdge) -> [f64; 2] {
         let [start, end] = edge.ends.map(|vertex| self.vertices[vertex]);
         edge_range(&edge.curve, start, end, edge.forward)
     }
@@ -108,11 +108,11 @@ impl Healing<'_> {
             if cuts.is_empty() {
                 continue;
             }
-            let Edge { ref curve, ends: [first, last], forward } = self.edges[edge];
+            let BrepEdge { ref curve, ends: [first, last], forward } = self.edges[edge];
             let curve = curve.clone();
             let stops: Vec<usize> = [first].into_iter().chain(cuts).chain([last]).collect();
             let new = self.edges.len();
-            let parts = stops.windows(2).map(|pair| Edge {
+            let parts = stops.windows(2).map(|pair| BrepEdge {
                 curve: curve.clone(),
                 ends: [pair[0], pair[1]],
                 forward,
@@ -136,8 +136,8 @@ impl Healing<'_> {
 
     /// The vertices that lie on an edge away from its ends, in its order. `ends`
     /// go along x.
-    fn cuts(&self, edge: &Edge, ends: &[usize]) -> Vec<usize> {
-        let span = Span::new(edge, self.range(edge), self.tolerance_mm);
+    fn cuts(&self, edge: &BrepEdge, ends: &[usize]) -> Vec<usize> {
+        let span = EdgeCurve::new(edge, self.range(edge), self.tolerance_mm);
         let low = span.low[0] - 2.0 * self.tolerance_mm;
         let high = span.high[0] + 2.0 * self.tolerance_mm;
         let first = ends.partition_point(|&end| self.vertices[end][0] < low);
@@ -184,8 +184,8 @@ impl Healing<'_> {
 
     /// Whether an edge runs within the tolerance of another between the same
     /// vertices: then in the same direction or not, and how far away.
-    fn is_twin(&self, edge: &Edge, other: &Edge) -> Option<(bool, f64)> {
-        let span = Span::new(edge, self.range(edge), self.tolerance_mm);
+    fn is_twin(&self, edge: &BrepEdge, other: &BrepEdge) -> Option<(bool, f64)> {
+        let span = EdgeCurve::new(edge, self.range(edge), self.tolerance_mm);
         let [from, to] = self.range(other);
         let (mut parts, mut widest) = (Vec::new(), 0.0f64);
         for k in 1..SAMPLES {

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::*;
-use crate::gate::{BodyReport, check};
 use crate::kernel::Kernel;
 use crate::step::StepModel;
+use crate::validate::{BodyReport, check};
 use lamp_fixtures::{SplitMix, StepSample, StepUnit, step};
 
 /// How a model is torn apart.
@@ -20,7 +20,7 @@ enum Tear {
 }
 
 /// Gives every face edges of its own, whose ends are moved.
-fn torn(model: &mut Model, by_mm: f64, tear: Tear) {
+fn torn(model: &mut BrepModel, by_mm: f64, tear: Tear) {
     let mut random = SplitMix(7);
     let mut moved = |p: Vec3| p.map(|x| x + by_mm * (random.below(2001) as f64 / 1000.0 - 1.0));
     for (number, face) in model.faces.iter_mut().enumerate() {
@@ -29,7 +29,7 @@ fn torn(model: &mut Model, by_mm: f64, tear: Tear) {
             let Loop::Edges(edges) = around else { continue };
             let mut new = Vec::new();
             for &(edge, is_along) in edges.iter() {
-                let Edge { curve, ends, forward } = &model.edges[edge];
+                let BrepEdge { curve, ends, forward } = &model.edges[edge];
                 let (curve, forward) = (curve.clone(), *forward);
                 let [from, to] = ends.map(|end| model.vertices[end]);
                 if tear == Tear::Edges {
@@ -47,7 +47,7 @@ fn torn(model: &mut Model, by_mm: f64, tear: Tear) {
                     stops.insert(1, model.vertices.len() - 1);
                 }
                 let first = model.edges.len();
-                let parts = stops.windows(2).map(|pair| Edge {
+                let parts = stops.windows(2).map(|pair| BrepEdge {
                     curve: curve.clone(),
                     ends: [pair[0], pair[1]],
                     forward,

@@ -8,7 +8,7 @@ use crate::vector::{Vec3, add, distance, scale};
 
 /// Steps of a vertex to where its edges meet, and how short the last one is, in
 /// millimetres.
-const MOST_STEPS: usize = 50;
+const MAX_STEPS: usize = 50;
 const SETTLED_MM: f64 = 1e-9;
 impl Healing<'_> {
     /// Makes one of vertices that lie within the tolerance.
@@ -47,7 +47,7 @@ impl Healing<'_> {
         for (&vertex, edges) in &around {
             let start = self.vertices[vertex];
             let mut place = start;
-            for _ in 0..MOST_STEPS {
+            for _ in 0..MAX_STEPS {
                 let feet = edges.iter().map(|edge| {
                     let curve = &self.edges[*edge].curve;
                     curve.place(curve.project(place))

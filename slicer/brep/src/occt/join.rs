@@ -8,7 +8,7 @@ use super::calls::{Chain, Mesh, Node};
 use super::refine::Patch;
 use crate::error::BrepError;
 use crate::kernel::{Facet, Fault, Finding, Kernel, Tessellation};
-use crate::tessellate::MOST_FACETS;
+use crate::tessellate::MAX_FACETS;
 
 /// No number.
 const NONE: u32 = u32::MAX;
@@ -29,8 +29,8 @@ pub(super) fn joined(
     let refine = |patch: &mut Patch| (patch.face, patch.refine(kernel, chord_mm));
     let off: Vec<(u32, f64)> = patches.par_iter_mut().map(refine).collect();
     let count: usize = patches.iter().map(|patch| patch.triangles.len()).sum();
-    if count > MOST_FACETS {
-        return Err(BrepError::TooMany { most: MOST_FACETS });
+    if count > MAX_FACETS {
+        return Err(BrepError::TooMany { most: MAX_FACETS });
     }
     let mut joined = Tessellation { chord_mm, ..Tessellation::default() };
     let mut points = Points { same: joins(mesh), numbers: vec![NONE; mesh.nodes().len()] };

@@ -8,7 +8,7 @@ mod refine;
 use crate::error::BrepError;
 use crate::kernel::{Body, FaceInfo, Jet, Kernel, Tessellation};
 use crate::step;
-use crate::tessellate::MOST_FACETS;
+use crate::tessellate::MAX_FACETS;
 
 /// A STEP file in memory, read by OpenCASCADE.
 ///
@@ -109,8 +109,8 @@ impl Kernel for OcctModel {
             return Err(BrepError::Chord { chord_mm });
         }
         // It would not end.
-        if count::facets(self, &self.ranges, chord_mm)? > MOST_FACETS as f64 {
-            return Err(BrepError::TooMany { most: MOST_FACETS });
+        if count::facets(self, &self.ranges, chord_mm)? > MAX_FACETS as f64 {
+            return Err(BrepError::TooMany { most: MAX_FACETS });
         }
         let parallel = rayon::current_num_threads() > 1;
         let mesh = self.inner.mesh(chord_mm, parallel);

@@ -3,50 +3,50 @@
 use std::collections::{HashMap, HashSet};
 
 use super::StepError;
-use super::file::{Entities, Item};
+use super::entities::{Entities, Item};
 use super::product;
-use super::shape::Shapes;
+use super::read_placement::GeometryReader;
 use super::units::Units;
-use crate::vector::Frame;
+use crate::vector::Axes;
 
 /// A solid or a shell in one of its places.
 #[derive(Clone, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedSolid {
     pub(crate) solid: u64,
     pub(crate) units: Units,
-    pub(crate) place: Frame,
+    pub(crate) place: Axes,
     /// What its product is called; may be empty.
     pub(crate) product: String,
 }
 
 /// More parts than any assembly that is built at once.
-const MOST_PARTS: usize = 100_000;
-const MOST_LEVELS: usize = 64;
+const MAX_PARTS: usize = 100_000;
+const MAX_LEVELS: usize = 64;
 
 /// What bodies are made of.
 const SOLIDS: [&str; 4] =
     ["MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP", "SHELL_BASED_SURFACE_MODEL"];
 
 /// A shape: items in one system of coordinates.
-struct Shape {
+struct Representation {
     items: Vec<u64>,
     units: Option<Units>,
     /// Its group: shapes that are the same part in the same coordinates.
     group: usize,
     /// Parts, and where they stand.
-    parts: Vec<Part>,
+    parts: Vec<SubShape>,
 }
 
 /// A part of a shape: the shape, and the placement that comes to lie on another.
-struct Part {
+struct SubShape {
     shape: u64,
     from: u64,
     to: u64,
 }
 
 /// All solids of a file in their places.
-pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
-    let mut tree = Tree {
+pub(crate) fn placed(entities: &Entities) -> Result<Vec<PlacedSolid>, StepError> {
+    let mut tree = AssemblyTree {
         entities,
         names: product::names(entities),
         shapes: HashMap::new(),
@@ -58,14 +58,10 @@ pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
     tree.read_same()?;
     tree.read_parts()?;
     tree.read_mapped()?;
-    let mut found = Found::default();
+    let mut found = PlacedSolids::default();
     for group in &tree.groups {
         if !group.iter().any(|shape| tree.is_part.contains(shape)) {
-            tree.place(
-                group[0],
-                Within { place: Frame::WORLD, product: "", level: 0 },
-                &mut found,
-            )?;
+            tree.place(group[0], Within { place: Axes::WORLD, product: "", level: 0 }, &mut found)?;
         }
     }
     if found.list.is_empty() { Err(StepError::Empty) } else { Ok(found.list) }
@@ -73,17 +69,17 @@ pub(crate) fn placed(entities: &Entities) -> Result<Vec<Placed>, StepError> {
 
 /// Solids as they are found.
 #[derive(Default)]
-struct Found {
-    list: Vec<Placed>,
+struct PlacedSolids {
+    list: Vec<PlacedSolid>,
     seen: HashSet<(u64, [u64; 12])>,
     /// Shapes that were placed, with or without solids.
     visits: usize,
 }
 
-impl Found {
+impl PlacedSolids {
     /// Shapes that carry properties name a solid a second time in the same place.
-    fn add(&mut self, placed: Placed) {
-        let [x, y, z] = placed.place.axes;
+    fn add(&mut self, placed: PlacedSolid) {
+        let [x, y, z] = placed.place.directions;
         let numbers = [placed.place.origin, x, y, z];
         let mut bits = [0; 12];
         for (bits, number) in bits.iter_mut().zip(numbers.as_flattened()) {
@@ -98,18 +94,18 @@ impl Found {
 /// What a shape stands in.
 #[derive(Clone, Copy)]
 struct Within<'a> {
-    place: Frame,
+    place: Axes,
     /// The product, whose name holds for shapes without one of their own.
     product: &'a str,
     /// How many assemblies are around it.
     level: usize,
 }
 
-struct Tree<'a> {
+struct AssemblyTree<'a> {
     entities: &'a Entities,
     /// What the products are called that shapes are of.
     names: HashMap<u64, &'a str>,
-    shapes: HashMap<u64, Shape>,
+    shapes: HashMap<u64, Representation>,
     order: Vec<u64>,
     /// Shapes that are the same, in the order in which they are met.
     groups: Vec<Vec<u64>>,
@@ -117,7 +113,7 @@ struct Tree<'a> {
     is_part: HashSet<u64>,
 }
 
-impl Tree<'_> {
+impl AssemblyTree<'_> {
     fn read_shapes(&mut self) -> Result<(), StepError> {
         for item in self.entities.every() {
             let is_shape = item.name().ends_with("SHAPE_REPRESENTATION")
@@ -129,7 +125,7 @@ impl Tree<'_> {
                 continue;
             };
             let units = Units::of_context(self.entities, context)?;
-            let shape = Shape { items, units, group: 0, parts: Vec::new() };
+            let shape = Representation { items, units, group: 0, parts: Vec::new() };
             if self.shapes.insert(item.id, shape).is_none() {
                 self.order.push(item.id);
             }
@@ -207,7 +203,7 @@ impl Tree<'_> {
             let (part, whole, from, to) =
                 if is_swapped { (b, a, second, first) } else { (a, b, first, second) };
             self.is_part.insert(part);
-            self.shape(whole)?.parts.push(Part { shape: part, from, to });
+            self.shape(whole)?.parts.push(SubShape { shape: part, from, to });
         }
         Ok(())
     }
@@ -223,7 +219,7 @@ impl Tree<'_> {
         Ok(())
     }
 
-    fn shape(&mut self, id: u64) -> Result<&mut Shape, StepError> {
+    fn shape(&mut self, id: u64) -> Result<&mut Representation, StepError> {
         self.shapes.get_mut(&id).ok_or(StepError::Missing { id })
     }
 
@@ -232,11 +228,11 @@ impl Tree<'_> {
         self.shapes.get(&shape).map_or(&[], |shape| &self.groups[shape.group])
     }
 
-    fn place(&self, shape: u64, within: Within, found: &mut Found) -> Result<(), StepError> {
+    fn place(&self, shape: u64, within: Within, found: &mut PlacedSolids) -> Result<(), StepError> {
         let group = self.group(shape);
         found.visits += group.len().max(1);
-        if within.level > MOST_LEVELS || found.visits > MOST_PARTS {
-            return Err(StepError::Endless { most: MOST_PARTS });
+        if within.level > MAX_LEVELS || found.visits > MAX_PARTS {
+            return Err(StepError::Endless { most: MAX_PARTS });
         }
         let named = group.iter().find_map(|shape| self.names.get(shape).copied());
         let within = Within { product: named.unwrap_or(within.product), ..within };
@@ -246,7 +242,7 @@ impl Tree<'_> {
                 if SOLIDS.iter().any(|name| self.entities.find(item, name).is_some()) {
                     let units = shape.units.clone().ok_or(StepError::NoUnit { id })?;
                     let (place, product) = (within.place, within.product.to_owned());
-                    found.add(Placed { solid: item, units, place, product });
+                    found.add(PlacedSolid { solid: item, units, place, product });
                 } else if let Some(mapped) = self.entities.find(item, "MAPPED_ITEM") {
                     self.place_mapped(mapped, id, within, found)?;
                 }
@@ -264,7 +260,7 @@ impl Tree<'_> {
         mapped: Item,
         whole: u64,
         within: Within,
-        found: &mut Found,
+        found: &mut PlacedSolids,
     ) -> Result<(), StepError> {
         let map = self.entities.get(mapped.reference(1)?, "REPRESENTATION_MAP")?;
         let (from, part, to) = (map.reference(0)?, map.reference(1)?, mapped.reference(2)?);
@@ -279,18 +275,18 @@ impl Tree<'_> {
         from: (u64, u64),
         to: (u64, u64),
     ) -> Result<Within<'a>, StepError> {
-        let frame = |(shape, placement): (u64, u64)| {
+        let axes = |(shape, placement): (u64, u64)| {
             let units = self.shapes.get(&shape).and_then(|shape| shape.units.as_ref());
             let units = units.ok_or(StepError::NoUnit { id: shape })?;
-            let shapes = Shapes { entities: self.entities, units, place: Frame::WORLD };
+            let shapes = GeometryReader { entities: self.entities, units, place: Axes::WORLD };
             let item = self.entities.simple(placement)?;
             if item.name() != "AXIS2_PLACEMENT_3D" {
                 let name = item.name().to_owned();
                 return Err(StepError::Unsupported { id: placement, name });
             }
-            shapes.frame(placement)
+            shapes.axes(placement)
         };
-        let place = within.place.then(&frame(to)?.then(&frame(from)?.inverse()));
+        let place = within.place.then(&axes(to)?.then(&axes(from)?.inverse()));
         Ok(Within { place, level: within.level + 1, ..within })
     }
 }

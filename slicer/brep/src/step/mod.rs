@@ -1,12 +1,12 @@
 //! Reading STEP files (ISO 10303-21, AP203, AP214, AP242).
 
 mod assembly;
-mod curve;
-mod file;
+mod entities;
 mod product;
-mod shape;
-mod spline;
-mod surface;
+mod read_curve;
+mod read_placement;
+mod read_spline;
+mod read_surface;
 mod token;
 mod topology;
 mod units;
@@ -14,7 +14,7 @@ mod units;
 use crate::error::BrepError;
 use crate::heal::heal;
 use crate::kernel::{Body, FaceInfo, Finding, Jet, Kernel, Tessellation};
-use crate::model::Model;
+use crate::model::BrepModel;
 use crate::tessellate;
 
 /// Why a STEP file cannot be read.
@@ -105,13 +105,13 @@ pub fn is_step(start: &[u8]) -> bool {
 /// Reads the text alone.
 #[cfg(feature = "occt")]
 pub(crate) fn check_text(bytes: &[u8]) -> Result<(), StepError> {
-    file::Entities::read(bytes).map(drop)
+    entities::Entities::read(bytes).map(drop)
 }
 
 /// A STEP file in memory, read by this crate alone.
 #[derive(Debug)]
 pub struct StepModel {
-    model: Model,
+    model: BrepModel,
     /// What was joined.
     healed: Vec<Finding>,
 }
@@ -131,14 +131,14 @@ impl StepModel {
     /// # Errors
     /// Where they are not STEP, or hold what is not supported.
     pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
-        let mut model = topology::model(&file::Entities::read(bytes)?)?;
+        let mut model = topology::model(&entities::Entities::read(bytes)?)?;
         let healed = if heal_mm > 0.0 { heal(&mut model, heal_mm) } else { Vec::new() };
         Ok(Self { model, healed })
     }
 
     /// The model, to be spoilt.
     #[cfg(test)]
-    pub(crate) fn model_mut(&mut self) -> &mut Model {
+    pub(crate) fn model_mut(&mut self) -> &mut BrepModel {
         &mut self.model
     }
 

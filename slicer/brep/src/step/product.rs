@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::StepError;
-use super::file::{Entities, Item};
+use super::entities::{Entities, Item};
 
 /// What each definition of a shape defines the shape of.
 fn definitions(entities: &Entities) -> HashMap<u64, u64> {

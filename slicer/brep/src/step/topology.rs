@@ -3,24 +3,24 @@
 use std::collections::HashMap;
 
 use super::StepError;
-use super::assembly::{Placed, placed};
-use super::file::{Entities, Item};
-use super::shape::Shapes;
+use super::assembly::{PlacedSolid, placed};
+use super::entities::{Entities, Item};
+use super::read_placement::GeometryReader;
 use crate::geometry::Curve;
 use crate::kernel::Body;
-use crate::model::{Edge, Face, Loop, Model};
+use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::{sub, unit};
 
 /// All bodies of a file.
-pub(crate) fn model(entities: &Entities) -> Result<Model, StepError> {
-    let mut model = Model::default();
+pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
+    let mut model = BrepModel::default();
     for placed in placed(entities)? {
         if model.unit.is_empty() {
             model.unit.clone_from(&placed.units.name);
             model.uncertainty_mm = placed.units.uncertainty_mm;
         }
         let first = model.faces.len() as u32;
-        let mut reader = Reader::new(entities, &placed, &mut model);
+        let mut reader = SolidReader::new(entities, &placed, &mut model);
         reader.solid(placed.solid)?;
         let faces = first..model.faces.len() as u32;
         let own = entities.simple(placed.solid)?.text(0);
@@ -32,10 +32,10 @@ pub(crate) fn model(entities: &Entities) -> Result<Model, StepError> {
 }
 
 /// Reads one solid.
-struct Reader<'a> {
+struct SolidReader<'a> {
     entities: &'a Entities,
-    shapes: Shapes<'a>,
-    model: &'a mut Model,
+    geometry: GeometryReader<'a>,
+    model: &'a mut BrepModel,
     /// The places of vertices and edges in the model by entity.
     vertices: HashMap<u64, usize>,
     edges: HashMap<u64, usize>,
@@ -43,11 +43,11 @@ struct Reader<'a> {
     sides: HashMap<[usize; 2], usize>,
 }
 
-impl<'a> Reader<'a> {
-    fn new(entities: &'a Entities, placed: &'a Placed, model: &'a mut Model) -> Self {
-        let shapes = Shapes { entities, units: &placed.units, place: placed.place };
+impl<'a> SolidReader<'a> {
+    fn new(entities: &'a Entities, placed: &'a PlacedSolid, model: &'a mut BrepModel) -> Self {
+        let geometry = GeometryReader { entities, units: &placed.units, place: placed.place };
         let (vertices, edges, sides) = (HashMap::new(), HashMap::new(), HashMap::new());
-        Self { entities, shapes, model, vertices, edges, sides }
+        Self { entities, geometry, model, vertices, edges, sides }
     }
 
     fn solid(&mut self, id: u64) -> Result<(), StepError> {
@@ -93,7 +93,7 @@ impl<'a> Reader<'a> {
                 let bounds = item.references(1)?;
                 let loops =
                     bounds.into_iter().map(|bound| self.bound(bound)).collect::<Result<_, _>>()?;
-                let surface = self.shapes.surface(item.reference(2)?)?;
+                let surface = self.geometry.surface(item.reference(2)?)?;
                 let outwards = along_normal == outwards;
                 self.model.faces.push(Face { entity: id, surface, along_normal, outwards, loops });
                 Ok(())
@@ -132,7 +132,7 @@ impl<'a> Reader<'a> {
             return Ok(vertex);
         }
         let vertex = self.model.vertices.len();
-        self.model.vertices.push(self.shapes.point(id)?);
+        self.model.vertices.push(self.geometry.point(id)?);
         self.vertices.insert(id, vertex);
         Ok(vertex)
     }
@@ -151,9 +151,9 @@ impl<'a> Reader<'a> {
         }
         let item = self.entities.get(id, "EDGE_CURVE")?;
         let ends = [self.vertex(item.reference(1)?)?, self.vertex(item.reference(2)?)?];
-        let (curve, forward) = (self.shapes.curve(item.reference(3)?)?, item.truth(4)?);
+        let (curve, forward) = (self.geometry.curve(item.reference(3)?)?, item.truth(4)?);
         let edge = self.model.edges.len();
-        self.model.edges.push(Edge { curve, ends, forward });
+        self.model.edges.push(BrepEdge { curve, ends, forward });
         self.edges.insert(id, edge);
         Ok(edge)
     }
@@ -176,7 +176,7 @@ impl<'a> Reader<'a> {
         let [point, end] = ends.map(|vertex| self.model.vertices[vertex]);
         let direction = unit(sub(end, point)).ok_or(StepError::Numbers { id, what: "polygon" })?;
         let edge = self.model.edges.len();
-        self.model.edges.push(Edge {
+        self.model.edges.push(BrepEdge {
             curve: Curve::Line { point, direction },
             ends,
             forward: true,

@@ -1,7 +1,7 @@
 //! The units of a representation's context.
 
 use super::StepError;
-use super::file::{Entities, Item};
+use super::entities::{Entities, Item};
 
 /// What numbers of a representation mean.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub(crate) struct Units {
 }
 
 /// Conversions that follow from each other; more are a circle.
-const MOST_STEPS: usize = 8;
+const MAX_STEPS: usize = 8;
 
 impl Units {
     /// The units of a context; nothing without a unit of length.
@@ -63,7 +63,7 @@ fn size(entities: &Entities, unit: u64, step: usize) -> Result<f64, StepError> {
     let records = entities.records(measure)?;
     let with_unit = records.iter().find(|record| record.values.len() >= 2);
     let item = Item { id: measure, record: with_unit.ok_or(bad.clone())? };
-    if step == MOST_STEPS {
+    if step == MAX_STEPS {
         return Err(bad);
     }
     let size = item.number(0)? * size(entities, item.reference(1)?, step + 1)?;

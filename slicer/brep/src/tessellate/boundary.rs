@@ -5,7 +5,7 @@
 //! the same points.
 
 use super::unwrap::{Unwrapped, between, near, unwrap};
-use super::{Node, Points, Ring};
+use super::{FacePoints, Node, PointRing};
 use crate::geometry::{Pole, Surface};
 use crate::kernel::Fault;
 use crate::model::Face;
@@ -13,8 +13,8 @@ use crate::model::Face;
 /// The polygons between which a face lies: within an odd number of them.
 pub(super) fn polygons(
     face: &Face,
-    rings: &[Ring],
-    points: &mut Points,
+    rings: &[PointRing],
+    points: &mut FacePoints,
     chord_mm: f64,
 ) -> Result<Vec<Vec<Node>>, Fault> {
     let poles = face.surface.poles();
@@ -22,12 +22,12 @@ pub(super) fn polygons(
     let mut loops = Vec::new();
     for ring in rings {
         match ring {
-            Ring::Point(point) => tips.push(*point),
-            Ring::Points(None) => return Err(Fault::Broken),
-            Ring::Points(Some(ring)) => loops.push(unwrap(face, &poles, ring, points)),
+            PointRing::Point(point) => tips.push(*point),
+            PointRing::Points(None) => return Err(Fault::Broken),
+            PointRing::Points(Some(ring)) => loops.push(unwrap(face, &poles, ring, points)),
         }
     }
-    let mut work = Work { face, poles: &poles, tips, points, chord_mm };
+    let mut work = FaceOutline { face, poles: &poles, tips, points, chord_mm };
     let (around, mut closed): (Vec<_>, Vec<_>) =
         loops.into_iter().partition(|loop_| loop_.turns != [0, 0]);
     let outer = match around.as_slice() {
@@ -42,15 +42,15 @@ pub(super) fn polygons(
     Ok(polygons)
 }
 
-struct Work<'a, 'b> {
+struct FaceOutline<'a, 'b> {
     face: &'a Face,
     poles: &'a [Pole],
     tips: Vec<u32>,
-    points: &'a mut Points<'b>,
+    points: &'a mut FacePoints<'b>,
     chord_mm: f64,
 }
 
-impl Work<'_, '_> {
+impl FaceOutline<'_, '_> {
     /// Takes the outer loop out of loops that do not go around, or makes it of the
     /// whole surface.
     fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {

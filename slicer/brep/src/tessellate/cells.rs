@@ -10,7 +10,7 @@ use crate::vector::{Vec3, along, distance, dot, length, middle, sub, unit};
 const LONGEST: f64 = 30.0;
 
 /// From parameters to the plane of the triangulation.
-pub(super) struct Scale {
+pub(super) struct CellScale {
     low: [f64; 2],
     /// Cells in one unit of a parameter.
     cells: [f64; 2],
@@ -18,7 +18,7 @@ pub(super) struct Scale {
     pub(super) count: [f64; 2],
 }
 
-impl Scale {
+impl CellScale {
     pub(super) fn new(surface: &Surface, polygons: &[Vec<Node>], chord_mm: f64) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for node in polygons.iter().flatten() {
@@ -89,7 +89,7 @@ pub(super) struct Borders {
 const CLEAR: f64 = 0.3;
 
 impl Borders {
-    pub(super) fn new(polygons: &[Vec<Node>], scale: &Scale) -> Self {
+    pub(super) fn new(polygons: &[Vec<Node>], scale: &CellScale) -> Self {
         let count = scale.count[1].ceil().clamp(1.0, 1000.0) as usize;
         let step = scale.count[1] / count as f64;
         let mut rows = vec![Vec::new(); count];

@@ -10,19 +10,19 @@ use std::collections::{HashMap, HashSet};
 use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-use super::cells::{Borders, Scale};
-use super::{Node, Points};
+use super::cells::{Borders, CellScale};
+use super::{FacePoints, Node};
 use crate::geometry::Surface;
 use crate::kernel::Fault;
 use crate::model::Face;
 use crate::vector::{Vec3, cross, distance, dot, middle, sub, unit};
 
-type Mesh = ConstrainedDelaunayTriangulation<Point2<f64>>;
+type Triangles = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
 /// Rounds of halving.
-const MOST_ROUNDS: usize = 40;
+const MAX_ROUNDS: usize = 40;
 /// Cells of a face: those of a sphere of 100 mm at a chord of 0.3 um.
-const MOST_CELLS: f64 = 1e6;
+const MAX_CELLS: f64 = 1e6;
 /// Corners that halving may add: for each cell, and in any case.
 const MORE: [usize; 2] = [4, 20_000];
 
@@ -32,20 +32,20 @@ type Filled = (Vec<[Node; 3]>, Option<Fault>);
 pub(super) fn fill(
     face: &Face,
     polygons: &[Vec<Node>],
-    points: &mut Points,
+    points: &mut FacePoints,
     chord_mm: f64,
 ) -> Result<Filled, Fault> {
-    let scale = Scale::new(&face.surface, polygons, chord_mm);
+    let scale = CellScale::new(&face.surface, polygons, chord_mm);
     let cells = scale.count[0] * scale.count[1];
     // Not a number is too many.
-    if !matches!(cells.partial_cmp(&MOST_CELLS), Some(Ordering::Less)) {
+    if !matches!(cells.partial_cmp(&MAX_CELLS), Some(Ordering::Less)) {
         return Err(Fault::Fine { cells });
     }
-    let mut work = Work {
+    let mut work = FaceTriangulation {
         surface: &face.surface,
         chord_mm,
         scale,
-        mesh: Mesh::new(),
+        mesh: Triangles::new(),
         corners: Vec::new(),
         borders: HashMap::new(),
     };
@@ -55,18 +55,18 @@ pub(super) fn fill(
     Ok((work.triangles(points), coarse))
 }
 
-struct Work<'a> {
+struct FaceTriangulation<'a> {
     surface: &'a Surface,
     chord_mm: f64,
-    scale: Scale,
-    mesh: Mesh,
+    scale: CellScale,
+    mesh: Triangles,
     /// What the mesh's vertices are.
-    corners: Vec<Corner>,
+    corners: Vec<MeshCorner>,
     /// How often polygons follow an edge.
     borders: HashMap<[FixedVertexHandle; 2], usize>,
 }
 
-struct Corner {
+struct MeshCorner {
     uv: [f64; 2],
     /// The place on the surface, or that of an edge's point.
     place: Vec3,
@@ -77,7 +77,7 @@ fn ordered(a: FixedVertexHandle, b: FixedVertexHandle) -> [FixedVertexHandle; 2]
     if a.index() < b.index() { [a, b] } else { [b, a] }
 }
 
-impl Work<'_> {
+impl FaceTriangulation<'_> {
     fn add_borders(&mut self, polygons: &[Vec<Node>]) -> Result<(), Fault> {
         let mut rings = Vec::new();
         for polygon in polygons {
@@ -109,7 +109,7 @@ impl Work<'_> {
             return if is_same { Ok(handle) } else { Err(Fault::Crossing) };
         }
         let place = self.surface.point(node.uv);
-        self.corners.push(Corner { uv: node.uv, place, point: Some(node.point) });
+        self.corners.push(MeshCorner { uv: node.uv, place, point: Some(node.point) });
         Ok(handle)
     }
 
@@ -122,7 +122,7 @@ impl Work<'_> {
         let handle = self.insert(at)?;
         if handle.index() == self.corners.len() {
             let uv = self.scale.uv(at);
-            self.corners.push(Corner { uv, place: self.surface.point(uv), point: None });
+            self.corners.push(MeshCorner { uv, place: self.surface.point(uv), point: None });
         }
         Ok(())
     }
@@ -148,7 +148,7 @@ impl Work<'_> {
     }
 
     /// Halves edges until the surface is near all triangles.
-    fn refine(&mut self, points: &Points) -> Result<Option<Fault>, Fault> {
+    fn refine(&mut self, points: &FacePoints) -> Result<Option<Fault>, Fault> {
         for corner in &mut self.corners {
             if let Some(point) = corner.point {
                 corner.place = points.get(point);
@@ -157,7 +157,7 @@ impl Work<'_> {
         let mut worst = 0.0;
         let cells = (self.scale.count[0] * self.scale.count[1]) as usize;
         let most = self.corners.len() + MORE[0] * cells + MORE[1];
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let (list, off) = self.too_far();
             worst = off;
             if list.is_empty() || self.corners.len() > most {
@@ -257,7 +257,7 @@ impl Work<'_> {
     }
 
     /// The triangles with their nodes.
-    fn triangles(&mut self, points: &mut Points) -> Vec<[Node; 3]> {
+    fn triangles(&mut self, points: &mut FacePoints) -> Vec<[Node; 3]> {
         let inside = self.inside();
         let mut list = Vec::with_capacity(inside.len());
         for face in inside {

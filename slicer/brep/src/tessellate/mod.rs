@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::error::BrepError;
 use crate::geometry::edge_range;
 use crate::kernel::{Facet, Fault, Finding, Tessellation};
-use crate::model::{Edge, Face, Loop, Model};
+use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::{Vec3, distance};
 
 /// A corner in a face's parameters.
@@ -29,17 +29,17 @@ struct Node {
 /// How much further from a vertex than the end of its curve points of an edge are.
 const CLEAR: f64 = 4.0;
 /// More facets than any part that is built takes: about 5 GB of memory.
-pub(crate) const MOST_FACETS: usize = 50_000_000;
+pub(crate) const MAX_FACETS: usize = 50_000_000;
 /// Points on edges.
-const MOST_POINTS: usize = 20_000_000;
+const MAX_POINTS: usize = 20_000_000;
 
 /// Points of a face: those of its edges, which it shares, and its own.
-struct Points<'a> {
+struct FacePoints<'a> {
     shared: &'a [Vec3],
     own: Vec<Vec3>,
 }
 
-impl Points<'_> {
+impl FacePoints<'_> {
     fn get(&self, point: u32) -> Vec3 {
         let point = point as usize;
         self.shared.get(point).copied().unwrap_or_else(|| self.own[point - self.shared.len()])
@@ -52,7 +52,7 @@ impl Points<'_> {
 }
 
 /// What a face became.
-struct Patch {
+struct FacePatch {
     own: Vec<Vec3>,
     facets: Vec<Facet>,
     tips: Vec<Facet>,
@@ -60,7 +60,7 @@ struct Patch {
 }
 
 /// All faces of a model as facets.
-pub(crate) fn model(model: &Model, chord_mm: f64) -> Result<Tessellation, BrepError> {
+pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
     }
@@ -68,12 +68,12 @@ pub(crate) fn model(model: &Model, chord_mm: f64) -> Result<Tessellation, BrepEr
     let mut chains = Vec::with_capacity(model.edges.len());
     for edge in &model.edges {
         chains.push(chain(edge, model, chord_mm, &mut points));
-        if points.len() > MOST_POINTS {
-            return Err(BrepError::TooMany { most: MOST_FACETS });
+        if points.len() > MAX_POINTS {
+            return Err(BrepError::TooMany { most: MAX_FACETS });
         }
     }
     let shared = points.len();
-    let patches: Vec<Patch> = (0u32..)
+    let patches: Vec<FacePatch> = (0u32..)
         .zip(&model.faces)
         .collect::<Vec<_>>()
         .into_par_iter()
@@ -85,8 +85,8 @@ pub(crate) fn model(model: &Model, chord_mm: f64) -> Result<Tessellation, BrepEr
         // A face counts its own points from where the shared ones end.
         let moved = (points.len() - shared) as u32;
         points.extend(patch.own);
-        if facets.len() + patch.facets.len() > MOST_FACETS {
-            return Err(BrepError::TooMany { most: MOST_FACETS });
+        if facets.len() + patch.facets.len() > MAX_FACETS {
+            return Err(BrepError::TooMany { most: MAX_FACETS });
         }
         let renumbered = |mut facet: Facet| {
             for corner in facet.corners.iter_mut().filter(|corner| **corner >= shared as u32) {
@@ -103,7 +103,7 @@ pub(crate) fn model(model: &Model, chord_mm: f64) -> Result<Tessellation, BrepEr
 }
 
 /// An edge as points, from its start to its end.
-fn chain(edge: &Edge, model: &Model, chord_mm: f64, points: &mut Vec<Vec3>) -> Vec<u32> {
+fn chain(edge: &BrepEdge, model: &BrepModel, chord_mm: f64, points: &mut Vec<Vec3>) -> Vec<u32> {
     let [start, end] = edge.ends;
     let range = edge_range(&edge.curve, model.vertices[start], model.vertices[end], edge.forward);
     let line = edge.curve.polyline(range, chord_mm);
@@ -121,8 +121,14 @@ fn chain(edge: &Edge, model: &Model, chord_mm: f64, points: &mut Vec<Vec3>) -> V
     [start as u32].into_iter().chain(inner).chain([end as u32]).collect()
 }
 
-fn patch(number: u32, face: &Face, chains: &[Vec<u32>], shared: &[Vec3], chord_mm: f64) -> Patch {
-    let mut points = Points { shared, own: Vec::new() };
+fn patch(
+    number: u32,
+    face: &Face,
+    chains: &[Vec<u32>],
+    shared: &[Vec3],
+    chord_mm: f64,
+) -> FacePatch {
+    let mut points = FacePoints { shared, own: Vec::new() };
     let mut faults = Vec::new();
     let mut outwards = face.outwards;
     let mut fill = || {
@@ -147,7 +153,7 @@ fn patch(number: u32, face: &Face, chains: &[Vec<u32>], shared: &[Vec3], chord_m
         Facet { corners: nodes.map(|node| node.point), uv: nodes.map(|node| node.uv), face: number }
     };
     let (facets, tips) = corners.into_iter().map(facet).partition(has_three_corners);
-    Patch { facets, tips, own: points.own, faults }
+    FacePatch { facets, tips, own: points.own, faults }
 }
 
 fn has_three_corners(facet: &Facet) -> bool {
@@ -156,13 +162,13 @@ fn has_three_corners(facet: &Facet) -> bool {
 }
 
 /// A face's loops as points, each once.
-enum Ring {
+enum PointRing {
     Point(u32),
     /// Nothing if its edges do not follow each other.
     Points(Option<Vec<u32>>),
 }
 
-fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<Ring> {
+fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<PointRing> {
     let ring = |edges: &Vec<(usize, bool)>| {
         let mut ring: Vec<u32> = Vec::new();
         let mut end = None;
@@ -182,15 +188,15 @@ fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<Ring> {
         (end.is_some() && end == ring.first().copied()).then_some(ring)
     };
     let rings = face.loops.iter().map(|around| match around {
-        Loop::Vertex(vertex) => Ring::Point(*vertex as u32),
-        Loop::Edges(edges) => Ring::Points(ring(edges)),
+        Loop::Vertex(vertex) => PointRing::Point(*vertex as u32),
+        Loop::Edges(edges) => PointRing::Points(ring(edges)),
     });
     rings.collect()
 }
 
 /// How far the points of the edges lie off the surface, if that is more than
 /// facets do.
-fn off(face: &Face, polygons: &[Vec<Node>], points: &Points, chord_mm: f64) -> Option<Fault> {
+fn off(face: &Face, polygons: &[Vec<Node>], points: &FacePoints, chord_mm: f64) -> Option<Fault> {
     let apart =
         |node: &Node| crate::vector::distance(points.get(node.point), face.surface.point(node.uv));
     let off_mm = polygons.iter().flatten().map(apart).fold(0.0, f64::max);

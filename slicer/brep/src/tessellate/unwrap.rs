@@ -1,6 +1,6 @@
 //! Loops in the parameters of their surface, followed through seams and poles.
 
-use super::{Node, Points};
+use super::{FacePoints, Node};
 use crate::geometry::{Pole, Surface};
 use crate::model::Face;
 use crate::vector::distance;
@@ -20,7 +20,7 @@ const AT_POLE_MM: f64 = 1e-5;
 const POLE_PARTS: f64 = 16.0;
 
 /// Finds a loop's parameters, each as near to those before as periods allow.
-pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &Points) -> Unwrapped {
+pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &FacePoints) -> Unwrapped {
     let surface = &face.surface;
     let periods = surface.periods();
     let pole_at = |point: u32| {

@@ -1,11 +1,11 @@
 //! The parts of curves that edges are, as places to be near to.
 
 use crate::geometry::Curve;
-use crate::model::Edge;
+use crate::model::BrepEdge;
 use crate::vector::{Vec3, distance};
 
 /// An edge's part of its curve.
-pub(super) struct Span<'a> {
+pub(super) struct EdgeCurve<'a> {
     curve: &'a Curve,
     range: [f64; 2],
     pub(super) low: Vec3,
@@ -13,8 +13,8 @@ pub(super) struct Span<'a> {
     tolerance_mm: f64,
 }
 
-impl<'a> Span<'a> {
-    pub(super) fn new(edge: &'a Edge, range: [f64; 2], tolerance_mm: f64) -> Self {
+impl<'a> EdgeCurve<'a> {
+    pub(super) fn new(edge: &'a BrepEdge, range: [f64; 2], tolerance_mm: f64) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for p in edge.curve.polyline(range, tolerance_mm) {
             for k in 0..3 {

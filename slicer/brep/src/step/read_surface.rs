@@ -1,12 +1,12 @@
 //! Surfaces out of entities.
 
 use super::StepError;
-use super::file::Item;
-use super::shape::{MOST_NESTED, Shapes};
+use super::entities::Item;
+use super::read_placement::{GeometryReader, MAX_NESTED};
 use crate::geometry::{Surface, TorusPart};
-use crate::vector::{Frame, unit};
+use crate::vector::{Axes, unit};
 
-impl Shapes<'_> {
+impl GeometryReader<'_> {
     /// The surface of a face.
     pub(crate) fn surface(&self, id: u64) -> Result<Surface, StepError> {
         self.surface_within(id, 0)
@@ -17,11 +17,11 @@ impl Shapes<'_> {
             return Ok(Surface::Spline(Box::new(spline)));
         }
         let item = self.entities.simple(id)?;
-        let frame = || self.frame(item.reference(1)?);
+        let axes = || self.axes(item.reference(1)?);
         Ok(match item.name() {
-            "PLANE" => Surface::Plane(frame()?),
+            "PLANE" => Surface::Plane(axes()?),
             "CYLINDRICAL_SURFACE" => {
-                Surface::Cylinder { frame: frame()?, radius: self.length(item, 2)? }
+                Surface::Cylinder { axes: axes()?, radius: self.length(item, 2)? }
             }
             "CONICAL_SURFACE" => {
                 let radius = item.number(2)? * self.units.mm;
@@ -29,11 +29,9 @@ impl Shapes<'_> {
                 if !(radius >= 0.0 && slope.is_finite() && radius.is_finite()) {
                     return Err(StepError::Numbers { id, what: "cone" });
                 }
-                Surface::Cone { frame: frame()?, radius, slope }
+                Surface::Cone { axes: axes()?, radius, slope }
             }
-            "SPHERICAL_SURFACE" => {
-                Surface::Sphere { frame: frame()?, radius: self.length(item, 2)? }
-            }
+            "SPHERICAL_SURFACE" => Surface::Sphere { axes: axes()?, radius: self.length(item, 2)? },
             "TOROIDAL_SURFACE" | "DEGENERATE_TOROIDAL_SURFACE" => {
                 let (major, minor) = (self.length(item, 2)?, self.length(item, 3)?);
                 let part = match item.truth(4) {
@@ -41,7 +39,7 @@ impl Shapes<'_> {
                     Ok(false) => TorusPart::Lemon,
                     _ => TorusPart::Apple,
                 };
-                Surface::Torus { frame: frame()?, major, minor, part }
+                Surface::Torus { axes: axes()?, major, minor, part }
             }
             "SURFACE_OF_LINEAR_EXTRUSION" => {
                 let vector = self.entities.get(item.reference(2)?, "VECTOR")?;
@@ -52,10 +50,10 @@ impl Shapes<'_> {
             }
             "SURFACE_OF_REVOLUTION" => self.revolution(item)?,
             // The face's own loops say where it ends.
-            "RECTANGULAR_TRIMMED_SURFACE" | "CURVE_BOUNDED_SURFACE" if depth < MOST_NESTED => {
+            "RECTANGULAR_TRIMMED_SURFACE" | "CURVE_BOUNDED_SURFACE" if depth < MAX_NESTED => {
                 self.surface_within(item.reference(1)?, depth + 1)?
             }
-            "OFFSET_SURFACE" if depth < MOST_NESTED => {
+            "OFFSET_SURFACE" if depth < MAX_NESTED => {
                 let basis = self.surface_within(item.reference(1)?, depth + 1)?;
                 let by_mm = item.number(2)? * self.units.mm;
                 let bad = StepError::Numbers { id, what: "offset surface" };
@@ -67,12 +65,12 @@ impl Shapes<'_> {
 
     fn revolution(&self, item: Item) -> Result<Surface, StepError> {
         let axis = self.entities.get(item.reference(2)?, "AXIS1_PLACEMENT")?;
-        let z = self.optional_direction(axis.optional(2))?.unwrap_or(self.place.axes[2]);
-        let frame = Frame::new(self.point(axis.reference(1)?)?, z, None);
-        let frame = frame.ok_or(StepError::Numbers { id: item.id, what: "axis" })?;
+        let z = self.optional_direction(axis.optional(2))?.unwrap_or(self.place.directions[2]);
+        let axes = Axes::new(self.point(axis.reference(1)?)?, z, None);
+        let axes = axes.ok_or(StepError::Numbers { id: item.id, what: "axis" })?;
         // The curve is read as the frame sees it.
-        let place = frame.inverse().then(&self.place);
-        let seen = Shapes { entities: self.entities, units: self.units, place };
-        Ok(Surface::Revolution { frame, curve: seen.curve(item.reference(1)?)? })
+        let place = axes.inverse().then(&self.place);
+        let seen = GeometryReader { entities: self.entities, units: self.units, place };
+        Ok(Surface::Revolution { axes, curve: seen.curve(item.reference(1)?)? })
     }
 }

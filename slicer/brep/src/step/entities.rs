@@ -6,7 +6,7 @@ use super::StepError;
 use super::token::{Token, Tokens};
 
 /// More brackets within brackets than any schema has.
-const MOST_NESTED: usize = 32;
+const MAX_NESTED: usize = 32;
 
 /// An attribute.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +41,7 @@ pub(crate) struct Entities {
 impl Entities {
     /// Reads a whole file.
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, StepError> {
-        let mut reader = Reader { tokens: Tokens::new(bytes) };
+        let mut reader = EntityReader { tokens: Tokens::new(bytes) };
         match reader.next() {
             Ok(Token::Word(word)) if word.starts_with("ISO-10303-21") => {}
             _ => return Err(StepError::NotStep),
@@ -209,11 +209,11 @@ impl Value {
     }
 }
 
-struct Reader<'a> {
+struct EntityReader<'a> {
     tokens: Tokens<'a>,
 }
 
-impl Reader<'_> {
+impl EntityReader<'_> {
     fn next(&mut self) -> Result<Token, StepError> {
         self.tokens.next()?.ok_or(StepError::CutOff)
     }
@@ -247,7 +247,7 @@ impl Reader<'_> {
     /// Values up to the closing bracket.
     fn values(&mut self, depth: usize) -> Result<Vec<Value>, StepError> {
         let mut values = Vec::new();
-        if depth > MOST_NESTED {
+        if depth > MAX_NESTED {
             return Err(self.unreadable());
         }
         loop {

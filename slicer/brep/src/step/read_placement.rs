@@ -1,21 +1,21 @@
 //! Points, directions and frames out of entities.
 
 use super::StepError;
-use super::file::{Entities, Item};
+use super::entities::{Entities, Item};
 use super::units::Units;
-use crate::vector::{Frame, Vec3, dot, scale, unit};
+use crate::vector::{Axes, Vec3, dot, scale, unit};
 
 /// Reads shapes of a representation, in millimetres and where it is placed.
-pub(crate) struct Shapes<'a> {
+pub(crate) struct GeometryReader<'a> {
     pub(crate) entities: &'a Entities,
     pub(crate) units: &'a Units,
-    pub(crate) place: Frame,
+    pub(crate) place: Axes,
 }
 
 /// Curves of curves and surfaces of surfaces; more are a circle.
-pub(super) const MOST_NESTED: usize = 8;
+pub(super) const MAX_NESTED: usize = 8;
 
-impl Shapes<'_> {
+impl GeometryReader<'_> {
     /// A vertex's or a cartesian point's place.
     pub(crate) fn point(&self, id: u64) -> Result<Vec3, StepError> {
         let id = match self.entities.find(id, "VERTEX_POINT") {
@@ -44,17 +44,17 @@ impl Shapes<'_> {
     }
 
     /// An `AXIS2_PLACEMENT_3D`; axes that are left out have their defaults.
-    pub(crate) fn frame(&self, id: u64) -> Result<Frame, StepError> {
+    pub(crate) fn axes(&self, id: u64) -> Result<Axes, StepError> {
         let item = self.entities.get(id, "AXIS2_PLACEMENT_3D")?;
         let z = self.optional_direction(item.optional(2))?;
         let x = self.optional_direction(item.optional(3))?;
-        let z = z.and_then(unit).unwrap_or(self.place.axes[2]);
+        let z = z.and_then(unit).unwrap_or(self.place.directions[2]);
         // By default the first axis of the representation, or the second if the
         // first is along z.
-        let [first, second, _] = self.place.axes;
+        let [first, second, _] = self.place.directions;
         let default = if dot(z, first).abs() < 1.0 - 1e-9 { first } else { second };
-        let frame = Frame::new(self.point(item.reference(1)?)?, z, x.or(Some(default)));
-        frame.ok_or(StepError::Numbers { id, what: "axes" })
+        let axes = Axes::new(self.point(item.reference(1)?)?, z, x.or(Some(default)));
+        axes.ok_or(StepError::Numbers { id, what: "axes" })
     }
 
     pub(super) fn length(&self, item: Item, k: usize) -> Result<f64, StepError> {

@@ -1,15 +1,17 @@
 //! B-splines out of entities.
 
 use super::StepError;
-use super::file::{Entities, Item, Value};
-use super::shape::Shapes;
+use super::entities::{Entities, Item, Value};
+use super::read_placement::GeometryReader;
 use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::spline_surface::SplineSurface;
 
-impl Shapes<'_> {
+impl GeometryReader<'_> {
     /// A `B_SPLINE_CURVE` of any kind, simple or complex.
     pub(super) fn spline_curve(&self, id: u64) -> Result<Option<SplineCurve>, StepError> {
-        let Some(part) = Spline::find(self.entities, id, Shape::Curve) else { return Ok(None) };
+        let Some(part) = SplineRecords::find(self.entities, id, SplineKind::Curve) else {
+            return Ok(None);
+        };
         let bad = StepError::Numbers { id, what: "curve" };
         let degree = part.base.count(part.skip)?;
         let points = part.base.references(part.skip + 1)?;
@@ -33,7 +35,9 @@ impl Shapes<'_> {
     }
 
     pub(super) fn spline_surface(&self, id: u64) -> Result<Option<SplineSurface>, StepError> {
-        let Some(part) = Spline::find(self.entities, id, Shape::Surface) else { return Ok(None) };
+        let Some(part) = SplineRecords::find(self.entities, id, SplineKind::Surface) else {
+            return Ok(None);
+        };
         let bad = || StepError::Numbers { id, what: "surface" };
         let degrees = [part.base.count(part.skip)?, part.base.count(part.skip + 1)?];
         let rows = part.base.list(part.skip + 2)?;
@@ -60,15 +64,15 @@ impl Shapes<'_> {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Shape {
+enum SplineKind {
     Curve,
     Surface,
 }
 
 /// The records of a B-spline, which stand in one or in several.
-struct Spline<'a> {
+struct SplineRecords<'a> {
     id: u64,
-    shape: Shape,
+    shape: SplineKind,
     /// The record with degree and points, after how many other attributes.
     base: Item<'a>,
     skip: usize,
@@ -76,10 +80,10 @@ struct Spline<'a> {
     kind: &'static str,
 }
 
-impl<'a> Spline<'a> {
-    fn find(entities: &'a Entities, id: u64, shape: Shape) -> Option<Self> {
+impl<'a> SplineRecords<'a> {
+    fn find(entities: &'a Entities, id: u64, shape: SplineKind) -> Option<Self> {
         let (base, kinds) = match shape {
-            Shape::Curve => (
+            SplineKind::Curve => (
                 "B_SPLINE_CURVE",
                 [
                     "B_SPLINE_CURVE_WITH_KNOTS",
@@ -88,7 +92,7 @@ impl<'a> Spline<'a> {
                     "BEZIER_CURVE",
                 ],
             ),
-            Shape::Surface => (
+            SplineKind::Surface => (
                 "B_SPLINE_SURFACE",
                 [
                     "B_SPLINE_SURFACE_WITH_KNOTS",
@@ -109,8 +113,8 @@ impl<'a> Spline<'a> {
 
     fn weights(&self, entities: &'a Entities) -> Option<Item<'a>> {
         let name = match self.shape {
-            Shape::Curve => "RATIONAL_B_SPLINE_CURVE",
-            Shape::Surface => "RATIONAL_B_SPLINE_SURFACE",
+            SplineKind::Curve => "RATIONAL_B_SPLINE_CURVE",
+            SplineKind::Surface => "RATIONAL_B_SPLINE_SURFACE",
         };
         entities.find(self.id, name)
     }

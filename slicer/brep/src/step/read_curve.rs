@@ -1,17 +1,17 @@
 //! Curves out of entities.
 
 use super::StepError;
-use super::file::{Item, Value};
-use super::shape::{MOST_NESTED, Shapes};
+use super::entities::{Item, Value};
+use super::read_placement::{GeometryReader, MAX_NESTED};
 use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::{Chain, Curve, Link, edge_range};
 use crate::vector::unit;
 
 /// How deep pieces of a chain count as nested, so that none is a chain of its own:
 /// one of itself would never end.
-const DEEPEST_PIECE: usize = MOST_NESTED - 2;
+const DEEPEST_PIECE: usize = MAX_NESTED - 2;
 
-impl Shapes<'_> {
+impl GeometryReader<'_> {
     /// The curve of an edge.
     pub(crate) fn curve(&self, id: u64) -> Result<Curve, StepError> {
         self.curve_within(id, 0)
@@ -34,26 +34,26 @@ impl Shapes<'_> {
             }
             "CIRCLE" => {
                 let radius = self.length(item, 2)?;
-                Ok(Curve::Ellipse { frame: self.frame(item.reference(1)?)?, radii: [radius; 2] })
+                Ok(Curve::Ellipse { axes: self.axes(item.reference(1)?)?, radii: [radius; 2] })
             }
             "ELLIPSE" => Ok(Curve::Ellipse {
-                frame: self.frame(item.reference(1)?)?,
+                axes: self.axes(item.reference(1)?)?,
                 radii: [self.length(item, 2)?, self.length(item, 3)?],
             }),
             "HYPERBOLA" => Ok(Curve::Hyperbola {
-                frame: self.frame(item.reference(1)?)?,
-                axes: [self.length(item, 2)?, self.length(item, 3)?],
+                axes: self.axes(item.reference(1)?)?,
+                half_axes: [self.length(item, 2)?, self.length(item, 3)?],
             }),
             "PARABOLA" => Ok(Curve::Parabola {
-                frame: self.frame(item.reference(1)?)?,
+                axes: self.axes(item.reference(1)?)?,
                 focal: self.length(item, 2)?,
             }),
             "POLYLINE" => self.polyline(item),
-            "SURFACE_CURVE" | "SEAM_CURVE" | "INTERSECTION_CURVE" if depth < MOST_NESTED => {
+            "SURFACE_CURVE" | "SEAM_CURVE" | "INTERSECTION_CURVE" if depth < MAX_NESTED => {
                 self.curve_within(item.reference(1)?, depth + 1)
             }
             // An edge's vertices say where it ends, but it may go the other way.
-            "TRIMMED_CURVE" if depth < MOST_NESTED => {
+            "TRIMMED_CURVE" if depth < MAX_NESTED => {
                 let curve = self.curve_within(item.reference(1)?, depth + 1)?;
                 Ok(if item.truth(4)? { curve } else { curve.reversed() })
             }

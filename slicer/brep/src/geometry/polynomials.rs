@@ -1,9 +1,9 @@
 //! Basis functions of B-splines as polynomials, piece by piece.
 
-use super::spline::{Basis, Knots, Weighted, add_times};
+use super::spline::{BasisValues, Knots, Weighted, add_times};
 
 /// The highest degree of the polynomials: higher ones would lose digits.
-const MOST_DEGREE: usize = 7;
+const MAX_DEGREE: usize = 7;
 
 /// The basis functions between each two knots, as polynomials.
 ///
@@ -11,12 +11,12 @@ const MOST_DEGREE: usize = 7;
 /// up to 1 there, whatever the knots, so that the coefficients stay small, and
 /// Horner's scheme gives all digits.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Pieces {
+pub(super) struct PolynomialBasis {
     degree: usize,
     /// The knots of the domain, each once.
     breaks: Vec<f64>,
-    pieces: Vec<Piece>,
-    /// Piece by piece and power by power, the highest first: the coefficients of all
+    pieces: Vec<KnotInterval>,
+    /// Interval by interval and power by power, the highest first: the coefficients of all
     /// functions that are not zero.
     coefficients: Vec<f64>,
     /// The domain in equal parts: the piece in which each begins, and the last piece.
@@ -26,7 +26,7 @@ pub(super) struct Pieces {
 
 /// What lies between two knots.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Piece {
+struct KnotInterval {
     /// The first control point that counts.
     first: usize,
     middle: f64,
@@ -35,7 +35,7 @@ struct Piece {
 }
 
 /// A parameter within its piece.
-pub(super) struct Place {
+pub(super) struct LocalParameter {
     pub(super) number: usize,
     /// From −1 to 1.
     pub(super) t: f64,
@@ -43,10 +43,10 @@ pub(super) struct Place {
     pub(super) scale: f64,
 }
 
-impl Pieces {
+impl PolynomialBasis {
     /// The pieces; nothing for degrees that are too high, or knots hardly apart.
     pub(super) fn new(knots: &Knots) -> Option<Self> {
-        if knots.degree() > MOST_DEGREE {
+        if knots.degree() > MAX_DEGREE {
             return None;
         }
         let breaks = knots.breaks();
@@ -56,7 +56,7 @@ impl Pieces {
         for pair in breaks.windows(2) {
             let (middle, half) = (pair[0] / 2.0 + pair[1] / 2.0, pair[1] / 2.0 - pair[0] / 2.0);
             let span = knots.span(pair[0]);
-            pieces.push(Piece { first: span - knots.degree(), middle, scale: 1.0 / half });
+            pieces.push(KnotInterval { first: span - knots.degree(), middle, scale: 1.0 / half });
             coefficients.extend(polynomials(knots, span, middle, half));
         }
         let parts_per_unit = count as f64 / (breaks[count] - breaks[0]);
@@ -124,19 +124,19 @@ impl Pieces {
 
     /// Where a parameter lies; beyond the domain, that of the last piece continued.
     #[inline(always)]
-    pub(super) fn place(&self, t: f64) -> Place {
+    pub(super) fn local(&self, t: f64) -> LocalParameter {
         let number = self.find(t);
         let piece = &self.pieces[number];
-        Place { number, t: (t - piece.middle) * piece.scale, scale: piece.scale }
+        LocalParameter { number, t: (t - piece.middle) * piece.scale, scale: piece.scale }
     }
 
     /// The basis at `t`; `N` is one more than the degree.
     #[inline(always)]
-    pub(super) fn basis<const N: usize>(&self, t: f64) -> Basis<N> {
-        let place = self.place(t);
+    pub(super) fn basis<const N: usize>(&self, t: f64) -> BasisValues<N> {
+        let place = self.local(t);
         let (values, slopes) = horner(self.powers::<N>(place.number), place.t);
         let slopes = slopes.map(|slope| slope * place.scale);
-        Basis { first: self.pieces[place.number].first, values, slopes }
+        BasisValues { first: self.pieces[place.number].first, values, slopes }
     }
 
     /// The coefficients of a piece.
@@ -196,7 +196,7 @@ mod tests {
     fn parameters_lie_between_their_knots() {
         // Far from even, so that parts of the domain hold many knots or none.
         let knots = [0.0, 0.0, 1e-9, 2e-9, 3e-9, 0.1, 0.1, 0.3, 0.7, 0.7000001, 5.0, 5.0];
-        let pieces = Pieces::new(&Knots::new(1, knots.to_vec(), 10).unwrap()).unwrap();
+        let pieces = PolynomialBasis::new(&Knots::new(1, knots.to_vec(), 10).unwrap()).unwrap();
         let breaks = &pieces.breaks;
         assert_eq!(breaks.len(), 9);
         for (number, pair) in breaks.windows(2).enumerate() {
@@ -212,11 +212,11 @@ mod tests {
     fn degrees_that_lose_digits_are_left_out() {
         let knots = |degree: usize| {
             let ends = [0.0, 1.0].map(|end| vec![end; degree + 1]);
-            Pieces::new(&Knots::new(degree, ends.concat(), degree + 1).unwrap())
+            PolynomialBasis::new(&Knots::new(degree, ends.concat(), degree + 1).unwrap())
         };
-        assert!(knots(MOST_DEGREE).is_some() && knots(MOST_DEGREE + 1).is_none());
+        assert!(knots(MAX_DEGREE).is_some() && knots(MAX_DEGREE + 1).is_none());
         // One over half the length is no number.
         let narrow = Knots::new(1, vec![0.0, 0.0, 1e-310, 1e-310], 2).unwrap();
-        assert_eq!(Pieces::new(&narrow), None);
+        assert_eq!(PolynomialBasis::new(&narrow), None);
     }
 }
