@@ -45,15 +45,30 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
 }
 
 fn slicing(error: &SliceError) -> Option<String> {
-    match error {
-        SliceError::Faulty { .. } => Some(format!(
-            "lamp brep tells more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
-        )),
-        SliceError::Timeout { tolerance, .. } => Some(format!(
-            "give it more with --timeout, or let facets lie more than {tolerance} from the surfaces"
-        )),
-        _ => None,
-    }
+    let hint = match error {
+        SliceError::EmptyFile | SliceError::Ascii { .. } => "export the part again",
+        SliceError::Count { .. } => "export it again",
+        SliceError::NotAFile => "pipe it in and give - as the part",
+        SliceError::OtherFormat(_) => "export the part as one",
+        SliceError::NotFinite { .. } => "repair or export the part again",
+        SliceError::TooFar { .. } => "check --units, --scale and --translate",
+        SliceError::TooLarge { .. } => "check --units and --dpi",
+        SliceError::OutsideFrame { .. } => "move or enlarge the frame with --origin and --size",
+        SliceError::TooManyLayers { .. } => "check --units and --thickness",
+        SliceError::GrayPlane => "slice them with --plane top",
+        SliceError::Faulty { .. } => {
+            return Some(format!(
+                "lamp brep tells more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
+            ));
+        }
+        SliceError::Timeout { tolerance, .. } => {
+            return Some(format!(
+                "give it more with --timeout, or let facets lie more than {tolerance} from the surfaces"
+            ));
+        }
+        _ => return None,
+    };
+    Some(hint.to_owned())
 }
 
 #[cfg(feature = "occt")]

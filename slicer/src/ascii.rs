@@ -1,13 +1,13 @@
-//! ASCII STL.
+//! Reads ASCII STL: any number of solids, in any case, however long their lines.
 
 use std::io::{self, BufRead, Cursor, Read, Seek, SeekFrom};
 
-use crate::error::SliceError;
+use crate::error::{AsciiFault, SliceError};
 use crate::facet::Facet;
 
-/// Whether a file that starts with these bytes is ASCII STL: text that begins
+/// Returns true if a file that starts with these bytes is ASCII STL: text that begins
 /// with `solid` and goes on with a facet, or ends at once, or has a first line
-/// too long to tell.
+/// longer than these bytes.
 pub(crate) fn looks_ascii(start: &[u8], is_whole: bool) -> bool {
     let text = without_mark(start).to_ascii_lowercase();
     let holds = |word: &[u8]| text.windows(word.len()).any(|window| window == word);
@@ -17,12 +17,12 @@ pub(crate) fn looks_ascii(start: &[u8], is_whole: bool) -> bool {
         && (holds(b"facet") || holds(b"endsolid") || !is_whole)
 }
 
-/// Text without the byte order mark that some editors put before it.
+/// Returns a text without the byte order mark that some editors put before it.
 fn without_mark(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text)
 }
 
-/// The facets of all solids of an ASCII file.
+/// Reads the facets of all solids of an ASCII file.
 pub(crate) fn read(text: &[u8]) -> Result<Vec<Facet>, SliceError> {
     let mut facets = Vec::new();
     let text = without_mark(text);
@@ -37,7 +37,7 @@ pub(crate) fn read(text: &[u8]) -> Result<Vec<Facet>, SliceError> {
     Ok(facets)
 }
 
-/// Where the solid at the start of `text` ends: behind its `endsolid` line.
+/// Returns where the solid at the start of `text` ends: behind its `endsolid` line.
 fn end_of_solid(text: &[u8], end_of_line: u8) -> usize {
     let mut end = 0;
     for line in text.split_inclusive(|&byte| byte == end_of_line) {
@@ -51,27 +51,23 @@ fn end_of_solid(text: &[u8], end_of_line: u8) -> usize {
 }
 
 fn read_solid(text: &[u8], end_of_line: u8, facets: &mut Vec<Facet>) -> Result<(), SliceError> {
-    // The reason may quote all of a line.
-    let failed = |facet, reason: &dyn ToString| SliceError::Ascii {
-        facet,
-        reason: reason.to_string().chars().take(LONGEST_REASON).collect(),
-    };
+    let failed = |facet, fault| SliceError::Ascii { facet, fault };
     if text.len() < 5 || !text[..5].eq_ignore_ascii_case(b"solid") {
-        return Err(failed(facets.len(), &"a line stands where `solid` should"));
+        return Err(failed(facets.len(), AsciiFault::NoSolid));
     }
     let end_of_header = text.iter().position(|&byte| byte == end_of_line).unwrap_or(text.len());
     let mut source = PlainText::new(&text[end_of_header..], end_of_line);
-    let triangles = stl_io::create_stl_reader(&mut source).map_err(|e| failed(facets.len(), &e))?;
+    let triangles = stl_io::create_stl_reader(&mut source).map_err(|e| failed(facets.len(), AsciiFault::Line(e)))?;
     for triangle in triangles {
-        let triangle = triangle.map_err(|e| failed(facets.len(), &e))?;
+        let triangle = triangle.map_err(|e| failed(facets.len(), AsciiFault::Line(e)))?;
         facets.push(triangle.vertices.map(|corner| corner.0));
     }
     Ok(())
 }
 
-/// A solid as stl_io wants it, line by line: in lower case, and without what
-/// it would refuse though nothing here needs it, names that are not UTF-8 and
-/// normals that are no numbers. No line is long, however long the text's are.
+/// A solid as stl_io reads it, line by line: in lower case, and without names, which
+/// may not be UTF-8, and normals, which may be no numbers. It would refuse both, though
+/// facets need neither. No line is long, however long the text's are.
 struct PlainText<'a> {
     /// All but the first line.
     body: &'a [u8],
@@ -82,17 +78,15 @@ struct PlainText<'a> {
 }
 
 /// More words than any line has, and more bytes than any number.
-const MOST_WORDS: usize = 6;
-const LONGEST_WORD: usize = 1000;
-/// More characters than a reason needs.
-const LONGEST_REASON: usize = 150;
+const MAX_WORDS: usize = 6;
+const MAX_WORD_BYTES: usize = 1000;
 
 impl<'a> PlainText<'a> {
     fn new(body: &'a [u8], end_of_line: u8) -> Self {
         Self { body, rest: body, end_of_line, line: Self::header() }
     }
 
-    /// The first line, whatever the text's is.
+    /// Returns a first line, whatever the text's is.
     fn header() -> Cursor<Vec<u8>> {
         Cursor::new(b"solid part\n".to_vec())
     }
@@ -127,9 +121,10 @@ impl Seek for PlainText<'_> {
     }
 }
 
+/// Returns a line as stl_io reads it.
 fn plain(line: &[u8]) -> Vec<u8> {
     let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    let words: Vec<&[u8]> = words.take(MOST_WORDS).collect();
+    let words: Vec<&[u8]> = words.take(MAX_WORDS).collect();
     let is = |i: usize, name: &str| {
         words.get(i).is_some_and(|w| w.eq_ignore_ascii_case(name.as_bytes()))
     };
@@ -141,7 +136,7 @@ fn plain(line: &[u8]) -> Vec<u8> {
     }
     let mut plain = Vec::new();
     for word in words {
-        plain.extend_from_slice(if word.len() > LONGEST_WORD { b"..." } else { word });
+        plain.extend_from_slice(if word.len() > MAX_WORD_BYTES { b"..." } else { word });
         plain.push(b' ');
     }
     plain.make_ascii_lowercase();

@@ -1,4 +1,4 @@
-//! What can be wrong with a part.
+//! Why a part cannot be sliced.
 
 use std::io;
 use std::time::Duration;
@@ -12,10 +12,10 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum SliceError {
     /// The file holds nothing.
-    #[error("the file is empty: export the part again")]
+    #[error("the file is empty")]
     EmptyFile,
     /// A folder or a device.
-    #[error("this is not a file that can be mapped: pipe it in and give - as the part")]
+    #[error("this is not a file that can be mapped")]
     NotAFile,
     /// Neither binary nor ASCII STL.
     #[error(
@@ -25,14 +25,14 @@ pub enum SliceError {
         /// The file's size in bytes.
         size: u64,
     },
-    /// A file of a format that is known, but not read.
-    #[error("this is a {0} file, not an STL or STEP file: export the part as one")]
+    /// A file of a known format that is not read.
+    #[error("this is a {0} file, not an STL or STEP file")]
     OtherFormat(&'static str),
     /// A binary STL whose header does not agree with its size.
     #[error(
         "the header declares {declared} facets, which take {} bytes, but the file has {size}: {}",
         84 + 50 * u64::from(*.declared),
-        count_advice(*.declared, *.size)
+        where_count_is_wrong(*.declared, *.size)
     )]
     Count {
         /// How many facets the header declares.
@@ -41,37 +41,36 @@ pub enum SliceError {
         size: u64,
     },
     /// An ASCII STL that breaks off or has a line of another kind.
-    #[error("facet {facet} of the ASCII file: {reason}; export the part again")]
+    #[error("facet {facet} of the ASCII file: {fault}")]
     Ascii {
         /// The facet, from 0, in the whole file.
         facet: usize,
-        /// What the line parser says.
-        reason: String,
+        /// The fault there.
+        fault: AsciiFault,
     },
     /// A coordinate that is no number.
-    #[error(
-        "facet {facet} has a coordinate that is not a finite number: repair or export the part again"
-    )]
+    #[error("facet {facet} has a coordinate that is not a finite number")]
     NotFinite {
         /// The file, from 0, among those joined.
         file: usize,
         /// The facet in the file, from 0.
         facet: usize,
     },
-    /// A part more than 1000 km away, where places are no longer exact.
+    /// A part more than 1000 km away, where coordinates are no longer exact.
     #[error(
-        "the part reaches {mm:.3e} mm from the origin, where places are no longer exact: check --units, --scale and --translate"
+        "the part reaches {:.3e} mm from the origin, where coordinates are no longer exact",
+        distance.mm()
     )]
     TooFar {
-        /// The greatest distance along an axis, in millimetres.
-        mm: f64,
+        /// The greatest distance along an axis.
+        distance: Length,
     },
     /// There is nothing to slice.
     #[error("the file holds no facets: there is nothing to slice")]
     NoFacets,
     /// An image would have too many pixels on a side.
     #[error(
-        "an image would be {width} x {height} pixels, more than {} on a side: check --units and --dpi",
+        "an image would be {width} x {height} pixels, more than {} on a side",
         crate::grid::MAX_SIDE
     )]
     TooLarge {
@@ -80,10 +79,10 @@ pub enum SliceError {
         /// Height in pixels.
         height: f64,
     },
-    /// The part sticks out of the frame given for it.
+    /// The part does not fit the place given for the images.
     #[error(
         "the part spans x {:.3} to {:.3} and y {:.3} to {:.3} mm, which sticks out of the frame of the images \
-         or leaves no black column on their right: move or enlarge the frame",
+         or leaves no black column on their right",
         part_mm[0][0], part_mm[1][0], part_mm[0][1], part_mm[1][1]
     )]
     OutsideFrame {
@@ -91,34 +90,30 @@ pub enum SliceError {
         part_mm: [[f64; 2]; 2],
     },
     /// The part would have too many layers.
-    #[error(
-        "the part is {height_mm} mm high, {layers:.0} layers of {thickness_um} um: check --units and --thickness"
-    )]
+    #[error("the part is {height} high, {layers:.0} layers of {thickness}")]
     TooManyLayers {
-        /// The part's height in millimetres.
-        height_mm: f64,
-        /// The thickness asked for, in micrometres.
-        thickness_um: f64,
+        /// The part's height.
+        height: Length,
+        /// The thickness asked for.
+        thickness: Length,
         /// How many layers that makes.
         layers: f64,
     },
     /// Heights that make no layers, or too many.
-    #[error("these heights make {layers} layers: give between one and four million")]
+    #[error("these heights make {layers} layers, not between one and four million")]
     LayerCount {
         /// How many layers they make.
         layers: usize,
     },
     /// A layer's top not above its bottom.
-    #[error(
-        "layer {layer} would lie between {bottom_um} and {top_um} um: heights of layers must rise"
-    )]
+    #[error("layer {layer} would lie between {bottom} and {top}: heights of layers must rise")]
     NoThickness {
         /// The layer, from 0.
         layer: usize,
-        /// Its bottom in micrometres.
-        bottom_um: f64,
-        /// Its top in micrometres.
-        top_um: f64,
+        /// Its bottom.
+        bottom: Length,
+        /// Its top.
+        top: Length,
     },
     /// The layers asked for do not exist.
     #[error("layers {start}..{end} were asked for, but the part has layers 0..{count}")]
@@ -130,8 +125,8 @@ pub enum SliceError {
         /// How many layers there are.
         count: u32,
     },
-    /// Gray layers with their sections elsewhere than at their tops.
-    #[error("gray layers are as deep as the part below their tops: slice them with --plane top")]
+    /// Gray layers whose sections are not at their tops.
+    #[error("gray layers are as deep as the part below their tops, so their sections must be there")]
     GrayPlane,
     /// A STEP file could not be read, or no facets could be made of it.
     #[error(transparent)]
@@ -165,11 +160,29 @@ pub enum SliceError {
     Io(#[from] io::Error),
 }
 
-fn count_advice(declared: u32, size: u64) -> String {
+fn where_count_is_wrong(declared: u32, size: u64) -> String {
     let held = size.saturating_sub(84) / 50;
     if held < u64::from(declared) {
-        format!("it was cut off after facet {held}; export it again")
+        format!("it was cut off after facet {held}")
     } else {
-        "bytes follow the last facet; export it again".to_owned()
+        "bytes follow the last facet".to_owned()
     }
+}
+
+/// A fault of an ASCII STL.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum AsciiFault {
+    /// A solid that does not begin as one.
+    #[error("a line stands where `solid` should")]
+    NoSolid,
+    /// A line that the parser refuses.
+    #[error("{}", start_of(.0))]
+    Line(#[source] io::Error),
+}
+
+/// Returns the start of an error's text, which may quote all of a long line.
+fn start_of(error: &io::Error) -> String {
+    const MAX_CHARACTERS: usize = 150;
+    error.to_string().chars().take(MAX_CHARACTERS).collect()
 }

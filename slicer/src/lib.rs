@@ -56,7 +56,7 @@ mod trace;
 /// B-rep models: kernels, and reports of what they read.
 pub use lamp_brep as brep;
 
-pub use error::SliceError;
+pub use error::{AsciiFault, SliceError};
 pub use exact::Polished;
 pub use facet::{Facet, Units};
 pub use facet_index::FacetIndex;

@@ -1,4 +1,4 @@
-//! Where the part is cut.
+//! The planes at which a part is cut, one a layer.
 
 use std::ops::Range;
 
@@ -8,9 +8,9 @@ use crate::error::SliceError;
 use crate::scan::count_at_or_below;
 
 /// More layers than any machine builds.
-const MOST_LAYERS: f64 = 4e6;
+const MAX_LAYERS: f64 = 4e6;
 
-/// Which plane of a layer its section is taken at.
+/// The plane of a layer at which its section is taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PlaneRule {
     /// The layer's top: the section is swept down (002 section 3.2.2).
@@ -18,46 +18,54 @@ pub enum PlaneRule {
     Top,
     /// Half way up.
     Middle,
-    /// The layer's bottom, seen from inside the layer: a flat underside on it
-    /// belongs to the section.
+    /// Just above the layer's bottom: a flat underside there belongs to the section.
     Bottom,
 }
 
 lamp_stack::named!(PlaneRule { Top = "top", Middle = "middle", Bottom = "bottom" });
 
 /// Layers of any thickness: the heights between which each one lies.
+///
+/// ```
+/// use lamp_slicer::LayerHeights;
+///
+/// let heights = LayerHeights::new(vec![0.0, 100.0, 150.0])?;
+/// assert_eq!(heights.thicknesses_um().collect::<Vec<_>>(), [100.0, 50.0]);
+/// assert!(LayerHeights::new(vec![0.0, 100.0, 50.0]).is_err());
+/// # Ok::<(), lamp_slicer::SliceError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerHeights {
     boundaries_um: Vec<f64>,
 }
 
 impl LayerHeights {
-    /// Layers between boundaries that rise, in micrometres, the first layer's
+    /// Creates layers between rising boundaries in micrometres, the first layer's
     /// bottom first.
     ///
     /// # Errors
-    /// Where there is no layer, one has no thickness or no finite place, or there
-    /// are more than any machine builds.
+    /// Returns an error if there is no layer, one has no thickness or is not finite, or
+    /// there are more than any machine builds.
     pub fn new(boundaries_um: Vec<f64>) -> Result<Self, SliceError> {
         let layers = boundaries_um.len().saturating_sub(1);
-        if layers == 0 || layers as f64 >= MOST_LAYERS {
+        if layers == 0 || layers as f64 >= MAX_LAYERS {
             return Err(SliceError::LayerCount { layers });
         }
         let is_good = |pair: &[f64]| pair[0] < pair[1] && (pair[1] - pair[0]).is_finite();
         if let Some(layer) = boundaries_um.windows(2).position(|pair| !is_good(pair)) {
-            let [bottom_um, top_um] = [boundaries_um[layer], boundaries_um[layer + 1]];
-            return Err(SliceError::NoThickness { layer, bottom_um, top_um });
+            let [bottom, top] = [layer, layer + 1].map(|k| Length::from_um(boundaries_um[k]));
+            return Err(SliceError::NoThickness { layer, bottom, top });
         }
         Ok(Self { boundaries_um })
     }
 
-    /// The boundaries: one more than layers, in micrometres.
+    /// Returns the boundaries in micrometres, one more than layers.
     pub fn boundaries_um(&self) -> &[f64] {
         &self.boundaries_um
     }
 
-    /// How thick each layer is, in micrometres, to the nanometre: differences of
-    /// heights miss what they stand for by rounding.
+    /// Returns the layers' thicknesses in micrometres, to the nanometre, so that the
+    /// rounding of differences does not show.
     pub fn thicknesses_um(&self) -> impl Iterator<Item = f64> {
         self.boundaries_um.windows(2).map(|pair| to_nanometres(pair[1] - pair[0]))
     }
@@ -65,9 +73,9 @@ impl LayerHeights {
 
 /// The planes at which a part is cut, one a layer, bottom first.
 ///
-/// Where all layers are of one thickness, a part's height is rounded to whole
-/// layers, at least one. A plane above the part, in a layer that holds the part's
-/// top, is moved down to that top, where flat tops still have their section.
+/// If all layers are of one thickness, the part's height is rounded to whole layers,
+/// at least one. A plane above the part, in the layer that holds the part's top, is
+/// moved down to that top, where flat tops still have their section.
 #[derive(Clone, Debug)]
 pub(crate) struct Planes {
     z_um: Vec<f64>,
@@ -76,7 +84,7 @@ pub(crate) struct Planes {
     spacing: Spacing,
 }
 
-/// What is known of how far the planes are apart.
+/// The distances between planes.
 #[derive(Clone, Debug)]
 enum Spacing {
     Even { thickness_um: f64 },
@@ -84,10 +92,10 @@ enum Spacing {
 }
 
 impl Planes {
-    /// The planes of a part between two heights (micrometres).
+    /// Creates the planes of a part between two heights (micrometres).
     ///
     /// # Errors
-    /// Where there would be more layers than any machine builds.
+    /// Returns an error if there would be more layers than any machine builds.
     pub(crate) fn uniform(
         bottom_um: f64,
         top_um: f64,
@@ -96,10 +104,10 @@ impl Planes {
     ) -> Result<Self, SliceError> {
         let thickness_um = thickness.um();
         let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
-        // Written so that a thickness of NaN or below zero fails, too.
-        if !(thickness_um > 0.0 && count < MOST_LAYERS) {
-            let height_mm = (top_um - bottom_um) / 1000.0;
-            return Err(SliceError::TooManyLayers { height_mm, thickness_um, layers: count });
+        // Negated, so that a thickness of NaN fails, too.
+        if !(thickness_um > 0.0 && count < MAX_LAYERS) {
+            let height = Length::from_um(top_um - bottom_um).to_whole_nm();
+            return Err(SliceError::TooManyLayers { height, thickness, layers: count });
         }
         let height = |k: f64| bottom_um + k * thickness_um;
         let plane = |k: u32| {
@@ -118,7 +126,7 @@ impl Planes {
         })
     }
 
-    /// The planes of given layers, of a part that ends at `top_um`.
+    /// Creates the planes of given layers, of a part that ends at `top_um`.
     pub(crate) fn of(heights: &LayerHeights, top_um: f64, rule: PlaneRule) -> Self {
         let plane = |layer: &[f64]| {
             let [bottom, top] = [layer[0], layer[1]];
@@ -134,7 +142,7 @@ impl Planes {
         Self { spacing: Spacing::Uneven(PlaneBins::new(&z_um)), z_um, boundaries_um }
     }
 
-    /// A single plane.
+    /// Creates a single plane.
     pub(crate) fn one(z: Length) -> Self {
         Self {
             z_um: vec![z.um()],
@@ -143,8 +151,8 @@ impl Planes {
         }
     }
 
-    /// The same with one plane moved, by no more than half of the way to its neighbours,
-    /// and not out of the part between two heights.
+    /// Returns the planes with one of them moved: by no more than half of the way to its
+    /// neighbours, and not at all if that were out of the part between two heights.
     pub(crate) fn moved(&self, layer: usize, by_um: f64, part_um: [f64; 2]) -> Self {
         let mut planes = self.clone();
         let here = self.z_um[layer];
@@ -161,39 +169,40 @@ impl Planes {
         planes
     }
 
-    /// The heights of the layers.
+    /// Returns the heights of the layers.
     pub(crate) fn heights(&self) -> LayerHeights {
         LayerHeights { boundaries_um: self.boundaries_um.clone() }
     }
 
-    /// How many layers there are.
+    /// Returns the number of layers.
     pub(crate) fn len(&self) -> usize {
         self.z_um.len()
     }
 
-    /// The height of a plane, in micrometres.
+    /// Returns the height of a plane, in micrometres.
     #[inline]
     pub(crate) fn z_um(&self, layer: usize) -> f64 {
         self.z_um[layer]
     }
 
-    /// The height of a layer's bottom, in micrometres, to the nanometre.
+    /// Returns the height of a layer's bottom, in micrometres, to the nanometre.
     pub(crate) fn layer_bottom_um(&self, layer: usize) -> f64 {
         to_nanometres(self.boundaries_um[layer])
     }
 
-    /// The height of a layer's top, where its exposure begins, in micrometres.
+    /// Returns the height of a layer's top, where its exposure begins, in micrometres.
     #[inline]
     pub(crate) fn top_um(&self, layer: usize) -> f64 {
         self.boundaries_um[layer + 1]
     }
 
-    /// The height of the first layer's bottom, in micrometres.
+    /// Returns the height of the first layer's bottom, in micrometres.
     pub(crate) fn bottom_um(&self) -> f64 {
         self.boundaries_um[0]
     }
 
-    /// The thickness of a layer, in micrometres; of given layers to the nanometre.
+    /// Returns the thickness of a layer, in micrometres; that of given layers to the
+    /// nanometre.
     pub(crate) fn thickness_um(&self, layer: usize) -> f64 {
         match self.spacing {
             Spacing::Even { thickness_um } => thickness_um,
@@ -201,20 +210,20 @@ impl Planes {
         }
     }
 
-    /// How high some layers are together, in micrometres.
+    /// Returns the height of some layers together, in micrometres.
     pub(crate) fn depth_um(&self, layers: &Range<usize>) -> f64 {
         self.boundaries_um[layers.end] - self.boundaries_um[layers.start]
     }
 
-    /// The layers whose planes lie between two heights: above `low_um`, and
-    /// at or below `high_um`. A vertex is above a plane when its z is at or
-    /// above the plane's, so these are the planes that part the two.
+    /// Returns the layers whose planes lie between two heights: above `low_um`, and at
+    /// or below `high_um`. A vertex counts as above a plane if its z is at or above the
+    /// plane's, so these are the planes with one of the heights on either side.
     #[inline]
     pub(crate) fn between(&self, low_um: f64, high_um: f64) -> Range<usize> {
         self.at_or_below(low_um)..self.at_or_below(high_um)
     }
 
-    /// How many planes lie at or below a height.
+    /// Returns the number of planes at or below a height.
     #[inline]
     pub(crate) fn at_or_below(&self, z_um: f64) -> usize {
         match &self.spacing {
@@ -362,7 +371,7 @@ mod tests {
             assert!(LayerHeights::new(boundaries.clone()).is_err(), "{boundaries:?}");
         }
         let error = LayerHeights::new(vec![0.0, 5.0, 5.0]).unwrap_err().to_string();
-        assert_eq!(error, "layer 1 would lie between 5 and 5 um: heights of layers must rise");
+        assert_eq!(error, "layer 1 would lie between 5um and 5um: heights of layers must rise");
     }
 
     proptest! {

@@ -1,9 +1,10 @@
-//! What one look at every facet tells: the part's box, and where in z the
-//! blocks of facets lie.
+//! Looks at every facet once, for the part's box and the heights of its blocks of
+//! facets.
 
 use std::io;
 use std::ops::Range;
 
+use lamp_stack::Length;
 use rayon::prelude::*;
 
 use crate::error::SliceError;
@@ -11,8 +12,8 @@ use crate::exact::PlacedSurfaces;
 use crate::placement::{PlacedFacet, PlacedPart};
 use crate::planes::Planes;
 
-/// Places are exact to a nanometre as far as this.
-const FARTHEST_MM: f64 = 1e9;
+/// Coordinates are exact to a nanometre as far as this.
+const MAX_DISTANCE_MM: f64 = 1e9;
 
 /// A part's box and blocks: x and y in millimetres, z in micrometres.
 #[derive(Debug)]
@@ -27,8 +28,8 @@ pub(crate) struct Survey {
 struct BlockSurvey {
     min: [f64; 3],
     max: [f64; 3],
-    /// Half the sum of the facets' boxes in y and z: what the block's
-    /// crossings are in proportion to.
+    /// Half the areas of the facets' boxes in y and z, summed. The number of crossings
+    /// is in proportion to it.
     yz_area: f64,
     facets: usize,
     /// The sum of the facets' heights.
@@ -75,7 +76,8 @@ fn facet_box([a, b, c]: &PlacedFacet) -> ([f64; 3], [f64; 3]) {
     )
 }
 
-/// The error that names a block's first facet without a finite place.
+/// Returns the error that names a block's first facet with a coordinate that is not
+/// finite.
 fn not_finite(model: &PlacedPart, block: usize) -> io::Result<SliceError> {
     let (file, facets) = model.model.place_of(block);
     let mut facet = facets.start;
@@ -93,7 +95,8 @@ impl Survey {
     /// Looks at every facet once, on all threads.
     ///
     /// # Errors
-    /// Where there is no facet, or one has a coordinate that is no number.
+    /// Returns an error if there is no facet, or one has a coordinate that is not
+    /// finite.
     pub(crate) fn of(model: &PlacedPart) -> Result<Self, SliceError> {
         let blocks: Vec<_> = (0..model.model.block_count())
             .into_par_iter()
@@ -109,7 +112,7 @@ impl Survey {
         for [low, high] in model.surfaces().filter_map(PlacedSurfaces::box_mm) {
             for (axis, unit) in [1.0, 1.0, 1000.0].into_iter().enumerate() {
                 let (low, high) = (low[axis] * unit, high[axis] * unit);
-                // Not for rounding's sake: a flat end is where its facets are.
+                // Not for rounding's sake: a flat end stays where its facets are.
                 let rounding = f64::from(f32::EPSILON) * low.abs().max(high.abs());
                 if low < min[axis] - rounding {
                     min[axis] = low;
@@ -122,15 +125,18 @@ impl Survey {
         Ok(Self { min, max, blocks: good })
     }
 
-    /// Checks that the part is near enough for places to be exact to a
-    /// nanometre.
+    /// Checks that the part is near enough for coordinates to be exact to a nanometre.
+    ///
+    /// # Errors
+    /// Returns an error if it is not.
     pub(crate) fn check_distance(&self) -> Result<(), SliceError> {
         let [x, y, z] = [0, 1, 2].map(|axis| self.max[axis].max(-self.min[axis]));
         let mm = x.max(y).max(z / 1000.0);
-        if mm > FARTHEST_MM { Err(SliceError::TooFar { mm }) } else { Ok(()) }
+        let distance = Length::from_mm(mm);
+        if mm > MAX_DISTANCE_MM { Err(SliceError::TooFar { distance }) } else { Ok(()) }
     }
 
-    /// The blocks that planes part between two heights (micrometres): above
+    /// Returns the blocks that planes between two heights (micrometres) may meet: above
     /// the first, and up to the second.
     pub(crate) fn blocks_between(&self, low_um: f64, high_um: f64) -> Vec<usize> {
         (0..self.blocks.len())
@@ -141,14 +147,14 @@ impl Survey {
             .collect()
     }
 
-    /// The layers whose planes a block meets.
+    /// Returns the layers whose planes a block meets.
     pub(crate) fn planes_of_block(&self, block: usize, planes: &Planes) -> Range<usize> {
         let BlockSurvey { min, max, .. } = self.blocks[block];
         planes.between(min[2], max[2])
     }
 
-    /// Whether the blocks lie so much all over the part that sorting the facets
-    /// by slab costs less than reading, for each of `slabs` (their planes'
+    /// Returns true if the blocks are spread over the part so widely that sorting the
+    /// facets by slab costs less than reading, for each of `slabs` (given by their
     /// heights), all blocks that it meets.
     pub(crate) fn wants_sorting(&self, slabs: &[(f64, f64)]) -> bool {
         let height_um = (self.max[2] - self.min[2]) / slabs.len() as f64;
@@ -159,17 +165,17 @@ impl Survey {
             visits += count as f64 * slabs.count() as f64;
             met += count as f64 + heights_um / height_um;
         }
-        // Writing a facet and reading it again costs about as much as four looks.
+        // Writing a facet and reading it back costs about as much as four looks.
         visits - met > 4.0 * facets
     }
 
-    /// How high facets are on average.
+    /// Returns the mean height of facets.
     pub(crate) fn mean_height_um(&self) -> f64 {
         let facets: usize = self.blocks.iter().map(|block| block.facets).sum();
         self.blocks.iter().map(|block| block.heights_um).sum::<f64>() / facets as f64
     }
 
-    /// About how many crossings each layer has, with rows `pitch_mm` apart.
+    /// Estimates the number of crossings of each layer, with rows `pitch_mm` apart.
     pub(crate) fn crossings_per_layer(&self, planes: &Planes, pitch_mm: f64) -> Vec<f64> {
         // Each block is spread evenly over its layers; summing steps up and
         // down costs nothing for the layers between.
