@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
-use lamp_stack::{Image, Layer, PageInfo};
+use lamp_stack::{Image, Layer, Length, PageInfo};
 
 use crate::part::PartOptions;
 use crate::stop::Stop;
@@ -127,7 +127,7 @@ impl Fallback {
         }
         let stack = layer.info.stack.clone();
         for by_um in NUDGES_UM.into_iter().filter(|_| !is_whole(&layer)) {
-            let again = slices.cut_again(number, by_um)?;
+            let again = slices.cut_again(number, Length::from_um(by_um))?;
             if is_good(&again) {
                 self.nudged.push(number);
                 return Ok(Layer { info: PageInfo { stack, ..again.info }, ..again });

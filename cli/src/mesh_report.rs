@@ -102,7 +102,7 @@ fn edge_line((edge, FaultyEdge { ends, facets }): (usize, &FaultyEdge)) -> EdgeL
     }
 }
 
-fn band_line(TracedBand { band, plane_mm, ends }: &TracedBand, rows: Rows) -> BandLine {
+fn band_line(TracedBand { band, plane, ends }: &TracedBand, rows: Rows) -> BandLine {
     let y_mm = |row: u32| to_nm(rows.top_mm - f64::from(row) * rows.dpi.pitch().mm());
     let end = |OpenEnd { at_mm, edges }: &OpenEnd| EndLine {
         at_mm: at_mm.map(to_nm),
@@ -110,7 +110,7 @@ fn band_line(TracedBand { band, plane_mm, ends }: &TracedBand, rows: Rows) -> Ba
     };
     BandLine {
         layer: band.layer,
-        plane_mm: to_nm(*plane_mm),
+        plane_mm: to_nm(plane.mm()),
         first_row: band.rows.start,
         last_row: band.rows.end - 1,
         y_mm: [y_mm(band.rows.end), y_mm(band.rows.start)],

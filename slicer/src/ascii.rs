@@ -57,7 +57,8 @@ fn read_solid(text: &[u8], end_of_line: u8, facets: &mut Vec<Facet>) -> Result<(
     }
     let end_of_header = text.iter().position(|&byte| byte == end_of_line).unwrap_or(text.len());
     let mut source = PlainText::new(&text[end_of_header..], end_of_line);
-    let triangles = stl_io::create_stl_reader(&mut source).map_err(|e| failed(facets.len(), AsciiFault::Line(e)))?;
+    let triangles = stl_io::create_stl_reader(&mut source)
+        .map_err(|e| failed(facets.len(), AsciiFault::Line(e)))?;
     for triangle in triangles {
         let triangle = triangle.map_err(|e| failed(facets.len(), AsciiFault::Line(e)))?;
         facets.push(triangle.vertices.map(|corner| corner.0));

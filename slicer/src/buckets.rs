@@ -1,11 +1,10 @@
-//! Facets in no order of height, sorted once by slab.
+//! Sorts facets by slab into a temporary file, if their file is in no order of height.
 //!
-//! A slab reads the blocks of the file that it meets. Where the facets of each
-//! block lie all over the part, that is the whole file for every slab; then
-//! one pass writes each facet into a bucket of each of its slabs, in a
-//! temporary file, and every slab reads its own. A slab has several buckets,
-//! by the lowest layer met, so that facets which follow one another fill the
-//! same lists.
+//! A slab reads the blocks of the file that it meets. If each block's facets are
+//! spread over the whole part, that is the whole file for every slab. Then one pass
+//! writes each facet into a bucket of each of its slabs, in a temporary file, and
+//! every slab reads its own. A slab has several buckets, by the lowest layer met, so
+//! that neighbouring facets add to the same lists.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -23,26 +22,25 @@ use crate::table::FacetSource;
 /// A facet in a bucket: three corners.
 const RECORD_BYTES: usize = 36;
 
-/// All slabs together have at least so many buckets.
+/// All slabs together have at least this many buckets.
 const BUCKETS: usize = 128;
 
 /// A part's facets by slab.
 #[derive(Debug)]
 pub(crate) struct Buckets {
     file: File,
-    /// By bucket: where its chunks stand in the file.
+    /// The places of each bucket's chunks in the file.
     chunks: Vec<Vec<Range<u64>>>,
-    /// How many buckets each slab has.
+    /// The number of buckets of each slab.
     per_slab: usize,
 }
 
 impl Buckets {
-    /// Sorts the facets of a part into `slabs`, which follow one another and look
-    /// `reach_um` below their planes, with about `memory` bytes to gather them
-    /// in.
+    /// Sorts the facets of a part into consecutive `slabs`, which look `reach_um` below
+    /// their planes. Gathers facets in about `memory` bytes.
     ///
     /// # Errors
-    /// Where the part cannot be read or the temporary file not be written.
+    /// Returns an error if the part cannot be read, or the temporary file not written.
     pub(crate) fn sort(
         model: &PlacedPart,
         planes: &Planes,
@@ -82,19 +80,19 @@ impl Buckets {
         Ok(writer.into_inner().expect("no writer panics").buckets)
     }
 
-    /// The facets of a slab.
+    /// Returns the facets of a slab.
     pub(crate) fn of_slab<'a>(&'a self, slab: usize, model: &'a PlacedPart) -> SlabFacets<'a> {
         let buckets = &self.chunks[slab * self.per_slab..][..self.per_slab];
         SlabFacets { file: &self.file, chunks: buckets.concat(), model }
     }
 }
 
-/// Which buckets a facet belongs in.
+/// Finds the buckets of facets.
 struct BucketOrder<'a> {
     planes: &'a Planes,
     reach_um: f64,
     slabs: &'a [Range<usize>],
-    /// How many buckets each slab has.
+    /// The number of buckets of each slab.
     per_slab: usize,
     /// The bucket of each layer, from the first slab's first layer on.
     of_layer: Vec<usize>,
@@ -116,7 +114,7 @@ impl<'a> BucketOrder<'a> {
         }
     }
 
-    /// Gives the bucket of the lowest layer met in each slab met.
+    /// Calls `each` with the bucket of the lowest layer met, for each slab met.
     #[inline]
     fn for_each_bucket(&self, facet: &PlacedFacet, mut each: impl FnMut(usize)) {
         let (low, high) = facet_heights(facet);

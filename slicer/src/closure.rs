@@ -1,12 +1,10 @@
-//! Whether a layer's contours close, without linking them.
+//! Tells whether a layer's contours close, without linking them.
 //!
-//! Every contour is a chain of segments, and closes when each of its points
-//! ends as many of them as it should: an even number under the even-odd rule;
-//! as many as it starts where the facets' orientation counts. Equal points
-//! have equal bits: `cut.rs` says why, and no coordinate in pixels is -0, for
-//! each is a number less 1/2, or a sum with such a one. A sum over hashes of
-//! the points is therefore zero when all contours close, in whatever order it
-//! is taken, and some other of 2^64 values otherwise.
+//! A contour is a chain of segments. It closes if an even number of segments ends at
+//! each of its points (even-odd rule), or as many start there as stop (non-zero rule).
+//! Equal points have equal bits, as `cut.rs` shows; and no coordinate in pixels is -0,
+//! since 1/2 was subtracted from it. So a sum over hashes of the points, in any order,
+//! is zero if all contours close, and otherwise some other of 2^64 values.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -17,21 +15,20 @@ use crate::table::Fill;
 pub(crate) struct EndSum(u64);
 
 impl EndSum {
-    /// Adds the ends of a segment from `a` to `b`, or if `turned` from `b` to
-    /// `a`.
+    /// Adds the ends of a segment from `a` to `b`, or from `b` to `a` if `is_reversed`.
     #[inline]
-    pub(crate) fn add(&mut self, a: [f64; 2], b: [f64; 2], turned: bool, fill: Fill) {
+    pub(crate) fn add(&mut self, a: [f64; 2], b: [f64; 2], is_reversed: bool, fill: Fill) {
         let (a, b) = (hash(a), hash(b));
         self.0 = match fill {
             Fill::EvenOdd => self.0 ^ a ^ b,
             Fill::NonZero => {
                 let along = a.wrapping_sub(b);
-                self.0.wrapping_add(if turned { along.wrapping_neg() } else { along })
+                self.0.wrapping_add(if is_reversed { along.wrapping_neg() } else { along })
             }
         };
     }
 
-    /// The sum over the segments of both.
+    /// Returns the sum over the segments of both.
     pub(crate) fn joined(self, other: Self, fill: Fill) -> Self {
         Self(match fill {
             Fill::EvenOdd => self.0 ^ other.0,
@@ -39,24 +36,24 @@ impl EndSum {
         })
     }
 
-    /// Whether every contour closes.
+    /// Returns true if every contour closes.
     pub(crate) fn is_closed(self) -> bool {
         self == Self::default()
     }
 }
 
-/// The sums over the ends of segments by row, which all workers add to: not
-/// zero where contours break off in the row.
+/// Sums over the ends of segments in each row, which all workers add to. A sum is not
+/// zero if a contour breaks off in its row.
 #[derive(Debug)]
 pub(crate) struct RowSums(Vec<AtomicU64>);
 
 impl RowSums {
-    /// For rows 0 to `last`, with no ends yet.
+    /// Starts without ends in rows 0 to `last`.
     pub(crate) fn new(last: u32) -> Self {
         Self((0..=last).map(|_| AtomicU64::new(0)).collect())
     }
 
-    /// Adds an end of a segment, which starts there or stops.
+    /// Adds an end of a segment that starts or stops there.
     #[inline]
     pub(crate) fn add(&self, row: u32, point: [f64; 2], starts: bool, fill: Fill) {
         let (sum, hash) = (&self.0[row as usize], hash(point));
@@ -67,16 +64,16 @@ impl RowSums {
         };
     }
 
-    /// The rows with ends that leave a contour open, increasing.
+    /// Returns the rows where contours break off, rising.
     pub(crate) fn open_rows(&self) -> Vec<u32> {
         let rows = (0..).zip(&self.0).filter(|(_, sum)| sum.load(Relaxed) != 0);
         rows.map(|(row, _)| row).collect()
     }
 }
 
-/// A number that tells points apart: the halves of a product of both
-/// coordinates' bits, one over the other. No sum of a few such numbers is zero
-/// because of the way their points lie, such as at the corners of a rectangle.
+/// Returns a hash of a point: the two halves of the product of its coordinates' bits,
+/// combined. Sums of a few hashes do not cancel because of how points lie, such as at
+/// the corners of a rectangle.
 #[inline]
 fn hash(point: [f64; 2]) -> u64 {
     // Whole numbers end in zeros. These bits, of pi, do not.

@@ -1,17 +1,18 @@
-//! A facet's crossings with planes and rows.
+//! Cuts facets with planes into segments, and these with rows into crossings.
 //!
-//! Both facets on an edge find its point on a plane by the same arithmetic on
-//! the same two endpoints, ordered by z. The points of a closed mesh on a
-//! plane therefore form closed chains, whatever the rounding; and since a
-//! point is past a row or it is not, every row is crossed an even number of
-//! times. Only the column of a crossing depends on one facet alone.
+//! # Why rows are even
+//! Both facets on an edge find its point on a plane by the same arithmetic on the
+//! same two ends, sorted by z. The segments of a closed mesh on a plane therefore
+//! form closed chains, whatever the rounding. Since each of their points is either
+//! past a row or not, a chain crosses every row an even number of times. Only the
+//! column of a crossing depends on one facet alone.
 //!
-//! That takes no more than equal corners (0 equals -0) coming out equal, and an
+//! This needs no more than equal results for equal corners (0 equals -0), and an
 //! even number of facets on each edge. An edge that is cut has its ends on both
-//! sides of the plane, so it rises, however little, and its ends have an order,
-//! whatever third corner ties with them. A facet without area that is cut has
-//! two edges, too. An overflow would move a point to a row's end, the same for
-//! both facets.
+//! sides of the plane. So it rises, however little, and its ends have an order,
+//! even if the third corner is as high as one of them. A facet without area that
+//! is cut has two such edges, too. An overflow would move a point to a row's end,
+//! but the same way for both facets.
 
 use std::ops::Range;
 
@@ -23,9 +24,9 @@ use crate::planes::Planes;
 use crate::scan::{SortedFacet, Z, ceil_clamped};
 use crate::table::Fill;
 
-/// A crossing of a row: the row in the high half; in the low half the first
-/// column whose centre is past it, and in the lowest bit the direction in
-/// which the contour crosses. Sorting orders crossings along a layer's rows.
+/// A crossing of a row in 64 bits: the row, the first column whose centre is past the
+/// crossing, and in the lowest bit the direction of the contour. Sorted, crossings
+/// are in the order of rows and columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Crossing(u64);
 
@@ -35,14 +36,14 @@ impl Crossing {
         Self(u64::from(row) << 32 | u64::from(column) << 1 | u64::from(rising))
     }
 
-    /// That of a row at a column in pixels. The last column is black: rounding takes
-    /// no crossing past it.
+    /// Creates the crossing of a row at a column in pixels. The last column is black:
+    /// rounding takes no crossing past it.
     #[inline]
     pub(crate) fn at(grid: &PixelGrid, row: u32, column: f64, rising: bool) -> Self {
         Self::new(row, ceil_clamped(column, grid.width - 1), rising)
     }
 
-    /// The other way round.
+    /// Returns the crossing in the other direction.
     pub(crate) fn reversed(self) -> Self {
         Self(self.0 ^ 1)
     }
@@ -52,14 +53,14 @@ impl Crossing {
         (self.0 >> 32) as usize
     }
 
-    /// Column and direction in one, to sort by.
+    /// Returns the column and direction.
     #[inline]
     pub(crate) fn in_row(self) -> RowCrossing {
         RowCrossing(self.0 as u32)
     }
 }
 
-/// Where in its row a crossing is, and in which direction the contour goes.
+/// A crossing in its row: column and direction in 32 bits, to sort by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct RowCrossing(u32);
 
@@ -69,7 +70,7 @@ impl RowCrossing {
         self.0 >> 1
     }
 
-    /// +1 or -1.
+    /// Returns the step of the winding number, +1 or -1.
     #[inline]
     pub(crate) fn winding(self) -> i32 {
         (self.0 & 1) as i32 * 2 - 1
@@ -84,19 +85,19 @@ pub(crate) struct Cutter<'a> {
     pub(crate) fill: Fill,
 }
 
-/// What a worker finds of a layer.
+/// The share of a layer that one worker finds.
 #[derive(Debug, Default)]
 pub(crate) struct LayerShare {
     pub(crate) crossings: Vec<Crossing>,
-    /// Those of B-rep facets for which no point of the surface was found.
+    /// Crossings of B-rep facets near which no point of the surface was found.
     pub(crate) kept: Vec<Crossing>,
     pub(crate) ends: EndSum,
-    /// What lies below the section, for gray layers.
+    /// Facets below the section, for gray layers.
     pub(crate) spans: Vec<DepthSpan>,
 }
 
 impl LayerShare {
-    /// Empties it; the lists keep their memory.
+    /// Empties the lists, which keep their memory.
     pub(crate) fn clear(&mut self) {
         self.crossings.clear();
         self.kept.clear();
@@ -105,27 +106,26 @@ impl LayerShare {
     }
 }
 
-/// A facet's section with a plane. Where the facet faces outwards, and the
-/// segment goes from its start to its end, the part is on its left, as seen
-/// from above.
+/// A facet's section with a plane. If the facet faces outwards, the part is on the
+/// left of the way from start to end, seen from above.
 pub(crate) struct Segment {
     pub(crate) ends: [SegmentEnd; 2],
     /// Whether the second end is the start.
-    pub(crate) turned: bool,
+    pub(crate) is_reversed: bool,
 }
 
 /// An end of a segment.
 #[derive(Clone, Copy)]
 pub(crate) struct SegmentEnd {
-    /// In pixels.
+    /// Column and row in pixels.
     pub(crate) at: [f64; 2],
-    /// Which corners of the facet its edge joins.
+    /// The corners of the facet, 0 to 2, that its edge joins.
     pub(crate) edge: [u8; 2],
 }
 
 impl Cutter<'_> {
-    /// Adds the facet's crossings in `layers` to the shares of those layers,
-    /// and says how many there are.
+    /// Adds the facet's crossings in `layers` to the shares of those layers, and returns
+    /// their number.
     #[inline]
     pub(crate) fn cut(
         &self,
@@ -137,15 +137,14 @@ impl Cutter<'_> {
         self.for_each_segment(facet, layers, |layer, segment| {
             let share = &mut shares[layer - layers.start];
             let [a, b] = segment.ends.map(|end| end.at);
-            share.ends.add(a, b, segment.turned, self.fill);
-            count += self.cross_rows(a, b, segment.turned, &mut share.crossings);
+            share.ends.add(a, b, segment.is_reversed, self.fill);
+            count += self.cross_rows(a, b, segment.is_reversed, &mut share.crossings);
         });
         count
     }
 
-    /// Adds what the rows of `layers` meet of the facet below their sections, as
-    /// deep as they are exposed, and says how many crossings would take as much
-    /// memory.
+    /// Adds the depths at which the rows of `layers` meet the facet below their sections,
+    /// within `reach_um`. Returns the number of crossings that take as much memory.
     pub(crate) fn look_down(
         &self,
         facet: &PlacedFacet,
@@ -168,7 +167,7 @@ impl Cutter<'_> {
         count * size_of::<DepthSpan>() / size_of::<Crossing>()
     }
 
-    /// Gives the facet's segments in `layers`, from below.
+    /// Calls `each` with the facet's segments in `layers`, from below.
     #[inline]
     pub(crate) fn for_each_segment(
         &self,
@@ -202,41 +201,41 @@ impl Cutter<'_> {
             |layer, [a, b], half| {
                 let ends =
                     [SegmentEnd { at: a, edge: long }, SegmentEnd { at: b, edge: short[half] }];
-                each(layer, Segment { ends, turned: sorted.is_flipped });
+                each(layer, Segment { ends, is_reversed: sorted.is_flipped });
             },
         );
     }
 
-    /// Adds the crossings of rows with a segment between two points of a
-    /// plane, in pixels.
+    /// Adds the crossings of rows with a segment between two points of a plane, in
+    /// pixels, and returns their number.
     #[inline]
     fn cross_rows(
         &self,
         a: [f64; 2],
         b: [f64; 2],
-        turned: bool,
+        is_reversed: bool,
         list: &mut Vec<Crossing>,
     ) -> usize {
         let before = list.len();
-        self.for_each_crossing(a, b, turned, |row, column, rising| {
+        self.for_each_crossing(a, b, is_reversed, |row, column, rising| {
             list.push(Crossing::at(self.grid, row, column, rising));
         });
         list.len() - before
     }
 
-    /// Gives where a segment between two points of a plane crosses rows: the row,
-    /// the column in pixels and the direction.
+    /// Calls `each` with the row, the column in pixels and the direction of each
+    /// crossing of a segment between two points of a plane.
     #[inline]
     pub(crate) fn for_each_crossing(
         &self,
         a: [f64; 2],
         b: [f64; 2],
-        turned: bool,
+        is_reversed: bool,
         mut each: impl FnMut(u32, f64, bool),
     ) {
         let down = a[1] < b[1];
         let (upper, lower) = if down { (a, b) } else { (b, a) };
-        let rising = down != turned;
+        let rising = down != is_reversed;
         let (first, end) = (self.first_row(upper), self.first_row(lower));
         if first >= end {
             return;
@@ -247,8 +246,7 @@ impl Cutter<'_> {
         }
     }
 
-    /// The first row that a point in pixels is past: whose centre is at or
-    /// below it.
+    /// Returns the first row whose centre is at or below a point in pixels.
     #[inline]
     pub(crate) fn first_row(&self, point: [f64; 2]) -> u32 {
         ceil_clamped(point[1], self.grid.height)

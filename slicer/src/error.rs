@@ -126,7 +126,9 @@ pub enum SliceError {
         count: u32,
     },
     /// Gray layers whose sections are not at their tops.
-    #[error("gray layers are as deep as the part below their tops, so their sections must be there")]
+    #[error(
+        "gray layers are as deep as the part below their tops, so their sections must be there"
+    )]
     GrayPlane,
     /// A STEP file could not be read, or no facets could be made of it.
     #[error(transparent)]

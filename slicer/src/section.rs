@@ -55,7 +55,7 @@ pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, Sli
         model.for_each_in_block(block, |facet| {
             cutter.for_each_segment(facet, &(0..1), |_, segment| {
                 let [a, b] = segment.ends.map(|end| end.at);
-                cutter.for_each_crossing(a, b, segment.turned, |row, column, rising| {
+                cutter.for_each_crossing(a, b, segment.is_reversed, |row, column, rising| {
                     crossings.push((row, grid.to_mm(column, 0.0)[0], if rising { 1 } else { -1 }));
                 });
             });

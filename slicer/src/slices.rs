@@ -1,4 +1,4 @@
-//! A part's layers, in order.
+//! Slices a part into layers, a slab at a time.
 
 use std::collections::VecDeque;
 use std::io;
@@ -21,43 +21,42 @@ use crate::survey::Survey;
 use crate::table::{CutLayer, FacetSource, Fill, OpenRows, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
 
-/// How a part is sliced.
+/// Options of slicing.
 #[derive(Clone, Debug)]
 pub struct SliceOptions {
     /// Resolution in the plane.
     pub dpi: Dpi,
-    /// Thickness of the layers, where `heights` does not say.
+    /// Thickness of the layers, unless `heights` is given.
     pub thickness: Length,
-    /// The layers' heights, where they are not all of one thickness. What of the
-    /// part lies outside them is left out.
+    /// The layers' heights, if they are not all of one thickness. Parts of the model
+    /// outside them are left out.
     pub heights: Option<LayerHeights>,
-    /// Where in the layer the section is taken.
+    /// The plane of a layer at which its section is taken.
     pub plane: PlaneRule,
-    /// What the file's coordinates mean.
+    /// The unit of the file's coordinates.
     pub units: Units,
-    /// What is done to the part first.
+    /// Scaling, turns and moves of the part.
     pub placement: Placement,
-    /// What is inside.
+    /// The rule that tells inside from outside.
     pub fill: Fill,
-    /// The gray level of each depth below a layer's top, for layers that are
-    /// gray where the part is less deep. They begin at their tops, so the plane
-    /// must be [`PlaneRule::Top`].
+    /// The gray level of each depth below a layer's top, for layers that are gray where
+    /// the part is less deep. The plane must then be [`PlaneRule::Top`].
     pub gray: Option<LayerLevels>,
-    /// Whether crossings of B-rep parts are moved from facets onto the exact surfaces.
+    /// Moves crossings of B-rep parts from facets onto the exact surfaces.
     pub polish: bool,
-    /// The layers wanted, all where `None`.
+    /// The layers to be made; all if `None`.
     pub layers: Option<Range<u32>>,
-    /// The frame of the images.
+    /// The pixels of the images.
     pub grid: GridRule,
-    /// About how many bytes the table of crossings may take; at least one
-    /// layer's is held.
+    /// The bytes that the table of crossings may take, about. It holds at least one
+    /// layer.
     pub memory: u64,
 }
 
-/// Which part of the plane the images show.
+/// The part of the plane that images show.
 #[derive(Clone, Copy, Debug)]
 pub enum GridRule {
-    /// The part's box and a margin of so many pixels.
+    /// The part's box and a margin.
     Around {
         /// Black pixels on every side.
         margin: u32,
@@ -89,7 +88,7 @@ impl GridRule {
 }
 
 impl Default for SliceOptions {
-    /// 1500 dpi and 100 um, the seed's resolution; everything else plain.
+    /// 1500 dpi and 100 um, as in 002; the default of everything else.
     fn default() -> Self {
         Self {
             dpi: Dpi::new(1500.0).expect("1500 is a resolution"),
@@ -110,11 +109,11 @@ impl Default for SliceOptions {
 
 /// The layers of a part, bottom first.
 ///
-/// The part is looked at once for its box; then z is processed in slabs of as
-/// many layers as the memory holds, each slab reading only those blocks of
-/// the file that it meets; a file without any order in z is first sorted into a
-/// temporary one. All threads of the current rayon pool work; order
-/// and bytes do not depend on them.
+/// One look at all facets finds the part's box. Then z is processed in slabs of as
+/// many layers as the memory holds, each of which reads only those blocks of the
+/// file that it meets. A file without any order in z is first sorted into a
+/// temporary one. All threads of the current rayon pool work, and layers do not
+/// depend on them.
 #[derive(Debug)]
 pub struct Slices {
     model: PlacedPart,
@@ -124,12 +123,12 @@ pub struct Slices {
     fill: Fill,
     gray: Option<LayerLevels>,
     wanted: Range<usize>,
-    most_crossings: usize,
-    /// Slabs of layers that fit by the estimate.
+    max_crossings: usize,
+    /// Slabs of layers that fit the memory, by an estimate.
     slabs: Vec<Range<usize>>,
     buckets: Option<Buckets>,
     table: Table,
-    /// What was done to the crossings of slabs before.
+    /// What polishing did to the crossings of slabs before.
     polished: Polished,
     open_rows: OpenRows,
     /// The layers of the table that are still to be made into images.
@@ -141,9 +140,9 @@ impl Slices {
     /// Prepares to slice a part.
     ///
     /// # Errors
-    /// Where the part is empty, not finite or 1000 km away, or the images or
-    /// layers would be too many; where gray layers do not have their sections
-    /// at the top.
+    /// Returns an error if the part is empty, not finite or 1000 km away, if images or
+    /// layers would be too large or too many, or if the sections of gray layers are not
+    /// at their tops.
     pub fn new(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
         if options.gray.is_some() && options.plane != PlaneRule::Top {
             return Err(SliceError::GrayPlane);
@@ -161,7 +160,7 @@ impl Slices {
         };
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
         // A list that grows holds up to twice what it needs.
-        let most_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
+        let max_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
         let reach_um = options.gray.as_ref().map_or(0.0, LayerLevels::reach_um);
         let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
         if options.gray.is_some() {
@@ -169,11 +168,11 @@ impl Slices {
                 *crossings *= 1.0 + spans_per_crossing(reach_um / planes.thickness_um(layer));
             }
         }
-        let slabs = slabs(&wanted, &expected, most_crossings);
+        let slabs = slabs(&wanted, &expected, max_crossings);
         let heights: Vec<_> =
             slabs.iter().map(|slab| heights_of(slab, &planes, reach_um)).collect();
-        // Where no temporary file can be written, slabs read all they meet.
-        // Buckets do not say which facet is whose, and B-rep facets are in memory.
+        // If no temporary file can be written, slabs read all blocks that they meet.
+        // B-rep facets are in memory; and buckets would lose their numbers.
         let wants_sorting = model.surfaces().next().is_none() && survey.wants_sorting(&heights);
         let buckets = wants_sorting
             .then(|| Buckets::sort(&model, &planes, reach_um, &slabs, options.memory as usize).ok())
@@ -184,7 +183,7 @@ impl Slices {
             grid,
             fill: options.fill,
             gray: options.gray.clone(),
-            most_crossings,
+            max_crossings,
             pending: wanted.start..wanted.start,
             wanted,
             planes,
@@ -197,35 +196,35 @@ impl Slices {
         })
     }
 
-    /// The pixels of the layers.
+    /// Returns the pixels of the layers.
     pub fn grid(&self) -> &PixelGrid {
         &self.grid
     }
 
-    /// How many layers there will be.
+    /// Returns the number of layers.
     pub fn layer_count(&self) -> usize {
         self.wanted.len()
     }
 
-    /// What was done to the crossings of B-rep parts so far, if there are such.
+    /// Returns what polishing did to the crossings of B-rep parts so far, if there are
+    /// any.
     pub fn polished(&self) -> Option<Polished> {
         self.model.surfaces().next().map(|_| self.polished.joined(self.table.polished()))
     }
 
-    /// Cuts a layer once more, with its plane moved up by so many micrometres but not
-    /// past its neighbours' or out of the part, and everything else as it is: 002 section 2.2.3 gets
-    /// by with sections that fail in this way.
+    /// Cuts a layer once more, with its plane moved up, but not past its neighbours' or
+    /// out of the part. So 002 section 2.2.3 avoids sections that fail.
     ///
     /// # Errors
-    /// Where there is no such layer, or the file cannot be read.
-    pub fn cut_again(&self, layer: u32, by_um: f64) -> Result<Layer, SliceError> {
+    /// Returns an error if there is no such layer, or the file cannot be read.
+    pub fn cut_again(&self, layer: u32, up: Length) -> Result<Layer, SliceError> {
         let count = self.planes.len();
         let index = layer as usize;
         if index >= count {
             let (start, end) = (layer, layer.saturating_add(1));
             return Err(SliceError::NoSuchLayers { start, end, count: count as u32 });
         }
-        let planes = self.planes.moved(index, by_um, [self.survey.min[2], self.survey.max[2]]);
+        let planes = self.planes.moved(index, up.um(), [self.survey.min[2], self.survey.max[2]]);
         let cutter = Cutter { grid: &self.grid, planes: &planes, fill: self.fill };
         let reach_um = self.gray.as_ref().map(LayerLevels::reach_um);
         let layers = index..index + 1;
@@ -236,23 +235,24 @@ impl Slices {
         Ok(self.image_of(index, &table, cutter, &open.unwrap_or_default()))
     }
 
-    /// The heights of the layers.
+    /// Returns the heights of the layers.
     pub fn layer_heights(&self) -> LayerHeights {
         self.planes.heights()
     }
 
-    /// The gray levels of depths, if layers are gray.
+    /// Returns the gray levels of depths, if layers are gray.
     pub fn levels(&self) -> Option<&LayerLevels> {
         self.gray.as_ref()
     }
 
-    /// The least and the greatest corner of the part in its place, in millimetres.
+    /// Returns the least and the greatest corner of the part in its place, in
+    /// millimetres.
     pub fn box_mm(&self) -> [[f64; 3]; 2] {
         [self.survey.min, self.survey.max].map(|[x, y, z_um]| [x, y, z_um / 1000.0])
     }
 
-    /// Fills the table with the next slab, as the iterator does when it needs
-    /// to. Benchmarks call it, to time the table and the images apart.
+    /// Fills the table with the next slab, as the iterator does when it needs to.
+    /// Benchmarks time the table and the images separately with it.
     #[doc(hidden)]
     pub fn fill_slab(&mut self) -> Result<(), SliceError> {
         let start = self.pending.end;
@@ -264,14 +264,14 @@ impl Slices {
         self.polished = self.polished.joined(self.table.polished());
         loop {
             let layers = start..end;
-            let most = self.most_crossings;
+            let max = self.max_crossings;
             let open_rows = if let Some(buckets) = &self.buckets {
                 let facets = buckets.of_slab(slab, &self.model);
-                fill(&mut self.table, &facets, cutter, gray, layers, most)?
+                fill(&mut self.table, &facets, cutter, gray, layers, max)?
             } else {
                 let facets =
                     MetBlocks::of(&self.model, &self.survey, &layers, &self.planes, reach_um);
-                fill(&mut self.table, &facets, cutter, gray, layers, most)?
+                fill(&mut self.table, &facets, cutter, gray, layers, max)?
             };
             if let Some(open_rows) = open_rows {
                 self.open_rows = open_rows;
@@ -283,15 +283,14 @@ impl Slices {
         }
     }
 
-    /// Finds what is wrong with the mesh where rows of its layers do not
-    /// balance, by a second look at the facets there. `bands` are such rows, of
-    /// any of the part's layers; [`StrayBand::of`] has them from a page.
+    /// Finds the faulty edges of the mesh behind bands of stray rows, by a second look
+    /// at the facets there. [`StrayBand::of`] returns the bands of a page.
     ///
-    /// Threads and memory do not change what is found. The memory allowed
-    /// bounds what is held on the way, but for the layer with the most.
+    /// Findings depend on neither threads nor memory. At least one layer's are held at
+    /// a time, and more as far as the memory allows.
     ///
     /// # Errors
-    /// Where a band is of no layer of the part, or the file cannot be read.
+    /// Returns an error if the part has no such layer, or the file cannot be read.
     pub fn trace(&self, bands: &[StrayBand]) -> Result<Trace, SliceError> {
         let mut bands = bands.to_vec();
         bands.sort_by_key(|band| (band.layer, band.rows.start));
@@ -303,7 +302,7 @@ impl Slices {
             model: &self.model,
             survey: &self.survey,
             cutter: Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill },
-            memory: 2 * size_of::<Crossing>() * self.most_crossings,
+            memory: 2 * size_of::<Crossing>() * self.max_crossings,
         };
         Ok(tracer.trace(&bands)?)
     }
@@ -339,12 +338,12 @@ impl Slices {
         }
     }
 
-    /// How many layers become images at once: enough that handing them out
-    /// costs little, but no more than the table takes.
+    /// Returns the number of layers to make into images at once: enough for all threads,
+    /// but no more memory than the table takes.
     fn batch_len(&self) -> usize {
         let row_offsets = size_of::<u32>() * self.grid.height as usize;
-        let table = size_of::<Crossing>() * self.most_crossings;
-        let most = (table / row_offsets).clamp(1, 16 * rayon::current_num_threads());
+        let table = size_of::<Crossing>() * self.max_crossings;
+        let max = (table / row_offsets).clamp(1, 16 * rayon::current_num_threads());
         // Gray pixels may all differ.
         let mut room = table / size_of::<LevelChange>();
         let fits = |layer: &usize| {
@@ -353,10 +352,10 @@ impl Slices {
             room = room.saturating_sub(pixels);
             fits
         };
-        self.pending.clone().take(most).take_while(fits).count().max(1)
+        self.pending.clone().take(max).take_while(fits).count().max(1)
     }
 
-    /// What is known of a layer before it is cut.
+    /// Returns a page's information, without its findings.
     fn page_info(&self, layer: usize) -> PageInfo {
         let stack = StackInfo {
             part: self.model.model.name().to_owned(),
@@ -395,22 +394,22 @@ impl Iterator for Slices {
     }
 }
 
-/// Fills the table with the crossings of some layers, and finds the rows where
-/// their contours break off. `None` where the crossings are too many.
+/// Fills the table with the crossings of some layers, and returns the rows where their
+/// contours break off, or `None` if there are too many crossings.
 fn fill(
     table: &mut Table,
     facets: &impl FacetSource,
     cutter: Cutter<'_>,
     reach_um: Option<f64>,
     layers: Range<usize>,
-    most_crossings: usize,
+    max_crossings: usize,
 ) -> io::Result<Option<OpenRows>> {
-    if !table.fill(facets, cutter, reach_um, layers, most_crossings)? {
+    if !table.fill(facets, cutter, reach_um, layers, max_crossings)? {
         return Ok(None);
     }
     // A row takes as much memory as a crossing.
     let open = table.open_layers(cutter.fill);
-    let at_once = (most_crossings / cutter.grid.height as usize).max(1);
+    let at_once = (max_crossings / cutter.grid.height as usize).max(1);
     let mut rows = OpenRows::new();
     for layers in open.chunks(at_once) {
         rows.extend(open_rows(facets, cutter, layers)?);
@@ -425,7 +424,8 @@ struct MetBlocks<'a> {
 }
 
 impl<'a> MetBlocks<'a> {
-    /// Those that some layers meet, which look so far below their planes.
+    /// Finds the blocks that some layers meet between `reach_um` below their planes and
+    /// these.
     fn of(
         model: &'a PlacedPart,
         survey: &Survey,
@@ -452,21 +452,21 @@ impl FacetSource for MetBlocks<'_> {
     }
 }
 
-/// The heights between which some layers look at facets: from `reach_um` below
+/// Returns the heights between which some layers look at facets: from `reach_um` below
 /// their first plane to their last.
 fn heights_of(layers: &Range<usize>, planes: &Planes, reach_um: f64) -> (f64, f64) {
     (planes.z_um(layers.start) - reach_um, planes.z_um(layers.end - 1))
 }
 
-/// About how much memory what lies below the sections takes for each crossing
-/// in them, where layers are exposed so many times as deep as they are thick. A
-/// facet crosses as many rows between planes as on them.
+/// Estimates the memory, in crossings, that facets below sections take for each crossing
+/// in these. `reach` is the depth of exposure in thicknesses of layers: a facet crosses
+/// as many rows between two planes as on one.
 fn spans_per_crossing(reach: f64) -> f64 {
     (1.0 + reach) * (size_of::<DepthSpan>() / size_of::<Crossing>()) as f64
 }
 
-/// Cuts layers into slabs of at most `most` crossings, and at least a layer.
-fn slabs(layers: &Range<usize>, crossings: &[f64], most: usize) -> Vec<Range<usize>> {
+/// Cuts layers into slabs of at most `max` crossings, but at least one layer.
+fn slabs(layers: &Range<usize>, crossings: &[f64], max: usize) -> Vec<Range<usize>> {
     let mut slabs: Vec<Range<usize>> = Vec::new();
     let mut room = 0.0;
     for layer in layers.clone() {
@@ -474,7 +474,7 @@ fn slabs(layers: &Range<usize>, crossings: &[f64], most: usize) -> Vec<Range<usi
             Some(slab) if crossings[layer] < room => slab.end += 1,
             _ => {
                 slabs.push(layer..layer + 1);
-                room = most as f64;
+                room = max as f64;
             }
         }
         room -= crossings[layer];

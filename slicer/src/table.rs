@@ -1,8 +1,7 @@
-//! The intersection table: crossings in cells of (layer, row), and rows from
-//! cells.
+//! The intersection table: gathers crossings by layer, and makes rows of them.
 //!
-//! Source: 002 section 2.3.4, algorithm 9 and figure 26. The seed keeps the
-//! table of the whole part; here it holds one slab of layers at a time.
+//! Source: 002 section 2.3.4, algorithm 9 and figure 26. There the table holds the
+//! whole part, here one slab of layers at a time, so that memory is bounded.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -18,21 +17,28 @@ use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
 use crate::gray::{DepthSpan, LayerLevels, Shader};
 use crate::placement::PlacedFacet;
 
-/// What is inside.
+/// The rule that tells inside from outside.
+///
+/// ```
+/// use lamp_slicer::Fill;
+///
+/// // Where two bodies overlap, contours wind around a point twice.
+/// assert!(!Fill::EvenOdd.is_inside(2) && Fill::NonZero.is_inside(2));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fill {
-    /// Every crossing toggles the colour, as the seed does.
+    /// Every crossing toggles the colour, as in 002.
     #[default]
     EvenOdd,
-    /// White where the contours wind around the pixel, for bodies that
-    /// overlap; the facets' orientation gives the sign.
+    /// Pixels that contours wind around are white, for bodies that overlap. The
+    /// facets' orientation gives the sign.
     NonZero,
 }
 
 lamp_stack::named!(Fill { EvenOdd = "even-odd", NonZero = "nonzero" | "non-zero" });
 
 impl Fill {
-    /// Returns true if a point is inside that contours wind around this often.
+    /// Returns true if a point with this winding number is inside.
     #[inline]
     pub fn is_inside(self, winding: i32) -> bool {
         match self {
@@ -46,7 +52,7 @@ impl Fill {
 pub(crate) trait FacetSource: Sync {
     fn pieces(&self) -> usize;
 
-    /// Gives every facet of a piece.
+    /// Calls `each` with every facet of a piece.
     fn for_each_in(&self, piece: usize, each: impl FnMut(&PlacedFacet)) -> io::Result<()>;
 
     /// The exact surfaces below a piece's facets, if it has some, and its first
@@ -60,14 +66,13 @@ pub(crate) trait FacetSource: Sync {
 #[derive(Debug, Default)]
 pub(crate) struct Table {
     layers: Range<usize>,
-    /// What each worker found of each layer. Lists keep their memory from slab
-    /// to slab.
-    parts: Vec<Vec<LayerShare>>,
+    /// Each worker's share of each layer. Lists keep their memory from slab to slab.
+    shares: Vec<Vec<LayerShare>>,
     /// What polishing did to the crossings of these layers.
     tally: Tally,
 }
 
-/// What a layer's crossings make.
+/// A layer made of its crossings.
 pub(crate) struct CutLayer {
     pub(crate) image: Image,
     /// The rows whose crossings do not balance.
@@ -76,17 +81,17 @@ pub(crate) struct CutLayer {
     pub(crate) closed: bool,
 }
 
-/// How many crossings all workers may make together.
+/// A limit to the crossings that all workers make together.
 struct CrossingLimit {
     used: AtomicUsize,
-    most: usize,
+    max: usize,
     /// Whether the slab could be smaller.
     must_fit: bool,
 }
 
 impl CrossingLimit {
-    /// Claims crossings that were made, a few thousand at a time, so that the
-    /// workers seldom meet.
+    /// Counts crossings that were made, a few thousand at a time, so that workers seldom
+    /// contend for the counter.
     #[inline]
     fn claim(&self, unclaimed: &mut usize) {
         if *unclaimed > 4096 {
@@ -96,27 +101,27 @@ impl CrossingLimit {
 
     #[inline]
     fn is_spent(&self) -> bool {
-        self.must_fit && self.used.load(Relaxed) > self.most
+        self.must_fit && self.used.load(Relaxed) > self.max
     }
 }
 
 impl Table {
-    /// Fills the table with the crossings of `layers`. Gives up, returning
-    /// `false`, once the crossings pass `most` in a slab that could be smaller.
+    /// Fills the table with the crossings of `layers`. Returns false once there are more
+    /// than `max` in a slab that could be smaller.
     pub(crate) fn fill(
         &mut self,
         facets: &impl FacetSource,
         cutter: Cutter<'_>,
         reach_um: Option<f64>,
         layers: Range<usize>,
-        most: usize,
+        max: usize,
     ) -> io::Result<bool> {
-        self.parts.resize_with(rayon::current_num_threads(), Vec::new);
-        let budget = CrossingLimit { used: AtomicUsize::new(0), most, must_fit: layers.len() > 1 };
+        self.shares.resize_with(rayon::current_num_threads(), Vec::new);
+        let budget = CrossingLimit { used: AtomicUsize::new(0), max, must_fit: layers.len() > 1 };
         let next = AtomicUsize::new(0);
         self.tally = Tally::default();
         let tally = &self.tally;
-        self.parts.par_iter_mut().try_for_each(|shares| -> io::Result<()> {
+        self.shares.par_iter_mut().try_for_each(|shares| -> io::Result<()> {
             shares.iter_mut().for_each(LayerShare::clear);
             shares.resize_with(shares.len().max(layers.len()), LayerShare::default);
             let mut unclaimed = 0;
@@ -152,12 +157,12 @@ impl Table {
         Ok(!budget.is_spent())
     }
 
-    /// What polishing did to the crossings of its layers so far.
+    /// Returns what polishing did to the crossings of its layers so far.
     pub(crate) fn polished(&self) -> Polished {
         self.tally.total()
     }
 
-    /// The layers with a contour that does not close.
+    /// Returns the layers with a contour that does not close.
     pub(crate) fn open_layers(&self, fill: Fill) -> Vec<usize> {
         self.layers.clone().filter(|&layer| !self.is_closed(layer, fill)).collect()
     }
@@ -168,16 +173,16 @@ impl Table {
     }
 
     fn shares(&self, layer: usize) -> impl Iterator<Item = &LayerShare> {
-        self.parts.iter().map(move |shares| &shares[layer - self.layers.start])
+        self.shares.iter().map(move |shares| &shares[layer - self.layers.start])
     }
 
-    /// How many pixels of a layer lie over facets below, at most.
+    /// Returns an upper limit to the pixels of a layer that lie over facets.
     pub(crate) fn pixels_over_facets(&self, layer: usize) -> usize {
         let spans = self.shares(layer).flat_map(|share| &share.spans);
         spans.map(|span| (span.end - span.start) as usize).sum()
     }
 
-    /// What lies below a layer's section, row by row.
+    /// Returns the facets' spans below a layer's section, row by row.
     fn spans(&self, layer: usize) -> Vec<DepthSpan> {
         let mut spans: Vec<_> =
             self.shares(layer).flat_map(|share| &share.spans).copied().collect();
@@ -185,8 +190,8 @@ impl Table {
         spans
     }
 
-    /// The crossings of a layer that are kept on facets or are added where contours
-    /// turn.
+    /// Returns the crossings of a layer that are kept on facets, or added near extrema of
+    /// contours.
     fn more(
         &self,
         layer: usize,
@@ -201,7 +206,7 @@ impl Table {
         settle(surfaces, &self.tally, layer, cutter, crossings, kept)
     }
 
-    /// A layer of the slab.
+    /// Makes a layer of the slab.
     pub(crate) fn layer(
         &self,
         layer: usize,
@@ -252,8 +257,8 @@ impl Table {
     }
 }
 
-/// The rows where contours break off, by layer: the first row that such an end
-/// is past, up to the one below the image.
+/// The rows where contours break off, by layer: the first row below each such point, up
+/// to the one below the image.
 pub(crate) type OpenRows = BTreeMap<usize, Vec<u32>>;
 
 /// Finds the rows where the contours of some layers, in order, break off, by a
@@ -274,15 +279,15 @@ pub(crate) fn open_rows(
             cutter.for_each_segment(facet, &span, |layer, segment| {
                 let Some(sums) = sums_of[layer - span.start] else { return };
                 let [a, b] = segment.ends.map(|end| end.at);
-                sums.add(cutter.first_row(a), a, !segment.turned, cutter.fill);
-                sums.add(cutter.first_row(b), b, segment.turned, cutter.fill);
+                sums.add(cutter.first_row(a), a, !segment.is_reversed, cutter.fill);
+                sums.add(cutter.first_row(b), b, segment.is_reversed, cutter.fill);
             });
         })
     })?;
     Ok(layers.iter().copied().zip(sums.iter().map(RowSums::open_rows)).collect())
 }
 
-/// Sorts the places of a row. Most rows have a few, and need no call.
+/// Sorts the crossings of a row: few by insertion, without a call.
 #[inline]
 fn sort(places: &mut [RowCrossing]) {
     if places.len() > 16 {
@@ -299,8 +304,8 @@ fn sort(places: &mut [RowCrossing]) {
     }
 }
 
-/// Adds a row's transitions: it toggles at every place; two at one column
-/// cancel. Says whether the number of places is even.
+/// Adds a row's transitions, one at every crossing, where two at one column cancel.
+/// Returns true if the number of crossings is even.
 #[inline]
 fn even_odd(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bool {
     let start = transitions.len();
@@ -314,8 +319,8 @@ fn even_odd(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bool {
     places.len().is_multiple_of(2)
 }
 
-/// Adds a row's transitions: it toggles where the winding number leaves or
-/// reaches zero. Says whether it is zero at the end.
+/// Adds a row's transitions, wherever the winding number leaves or reaches zero.
+/// Returns true if it is zero at the end.
 fn non_zero(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bool {
     let mut winding = 0;
     for group in places.chunk_by(|a, b| a.column() == b.column()) {

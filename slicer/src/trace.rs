@@ -1,19 +1,19 @@
-//! Where in the mesh the rows come from that do not balance.
+//! Traces stray rows to the faulty edges of the mesh.
 //!
-//! From one row to the next, a layer's balance changes only where a contour
-//! has an open end: a point in which an odd number of segments end (see
-//! `cut.rs`), or under [`Fill::NonZero`] not as many as start. A band of stray
-//! rows therefore lies between open ends, and the edges that these lie on are
-//! what is wrong with the mesh. A second look at the blocks that the bands'
-//! planes meet finds them, by the arithmetic that cut the layers. No plane meets
-//! an edge that lies level: a hole's other edges lead to it.
+//! From one row to the next, a layer's balance changes only where a contour has an
+//! open end: a point where an odd number of segments ends (see `cut.rs`), or under
+//! [`Fill::NonZero`] more of them stop than start, or fewer. A band of stray rows
+//! therefore lies between open ends, and the mesh is faulty at the edges on which
+//! these lie. A second look at the facets near the bands finds them, by the
+//! arithmetic that cut the layers. No plane meets a level edge; but a hole's other
+//! edges lead to it.
 
 use std::collections::BTreeMap;
 use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use lamp_stack::PageInfo;
+use lamp_stack::{Length, PageInfo};
 use rayon::prelude::*;
 
 use crate::cut::{Cutter, SegmentEnd};
@@ -22,7 +22,7 @@ use crate::placement::PlacedPart;
 use crate::survey::Survey;
 use crate::table::Fill;
 
-/// Rows of a layer that do not balance and follow one another.
+/// Neighbouring rows of a layer that do not balance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StrayBand {
     /// The layer's index.
@@ -32,32 +32,30 @@ pub struct StrayBand {
 }
 
 impl StrayBand {
-    /// The bands of a layer, from the top.
+    /// Returns the bands of a layer, from the top.
     pub fn of(info: &PageInfo) -> impl Iterator<Item = Self> {
         let bands = info.stray_rows.chunk_by(|above, row| above + 1 == *row);
         bands.map(|rows| Self { layer: info.index, rows: rows[0]..rows[rows.len() - 1] + 1 })
     }
 }
 
-/// What [`Slices::trace`](crate::Slices::trace) found.
+/// The findings of [`Slices::trace`](crate::Slices::trace).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
-    /// The bands by layer and row, and the open ends that they lie between.
+    /// The bands by layer and row, with the open ends around them.
     pub bands: Vec<TracedBand>,
-    /// The edges that the ends lie on, each once, as the bands come to them.
+    /// The edges on which the ends lie, each once, in the order of the bands.
     pub edges: Vec<FaultyEdge>,
 }
 
-/// A band of stray rows, and what spoils it.
+/// A band of stray rows, and its open ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TracedBand {
     /// The band.
     pub band: StrayBand,
-    /// The height at which the layer was cut, in part coordinates, in
-    /// millimetres.
-    pub plane_mm: f64,
-    /// The open ends above, in and below it: by y from the top, then by x. At
-    /// least one starts the band, and one ends it.
+    /// The height at which the layer was cut, in part coordinates.
+    pub plane: Length,
+    /// The open ends just above, in and just below it: by y from the top, then by x.
     pub ends: Vec<OpenEnd>,
 }
 
@@ -66,14 +64,13 @@ pub struct TracedBand {
 pub struct OpenEnd {
     /// x and y in part coordinates (the placed part's), in millimetres.
     pub at_mm: [f64; 2],
-    /// The edges it lies on, as positions in [`Trace::edges`]: one, but where
-    /// edges meet.
+    /// The edges on which it lies, as positions in [`Trace::edges`]: several where edges
+    /// meet, otherwise one.
     pub edges: Vec<usize>,
 }
 
-/// An edge that does not join two facets as those of a closed mesh do: one
-/// facet alone has it, or three; or two do that face opposite ways, which
-/// matters under [`Fill::NonZero`].
+/// An edge that does not join two facets as in a closed mesh: an odd number of facets
+/// has it, or two that face opposite ways, which matters under [`Fill::NonZero`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultyEdge {
     /// Its ends, in the file's coordinates and units.
@@ -89,13 +86,13 @@ pub struct EdgeFacet {
     pub file: usize,
     /// The facet in the file, from 0.
     pub facet: usize,
-    /// Its corners, in the file's coordinates and units.
+    /// The facet's corners, in the file's coordinates and units.
     pub corners: Facet,
-    /// Whether its corners go along the edge from the first end to the second.
+    /// Whether the facet's corners follow the edge from its first end to its second.
     pub forwards: bool,
 }
 
-/// A segment's end close to a band. They sort by point.
+/// A segment's end near a band. Sorted, those at one point are together.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Sighting {
     layer: u32,
@@ -107,15 +104,15 @@ struct Sighting {
     starts: bool,
 }
 
-/// The bits of an edge's corners, the lesser first: its name.
+/// The bits of an edge's corners, the lesser first, which identify it.
 type EdgeName = [[u32; 3]; 2];
 
-/// Looks at a mesh for the second time.
+/// Looks at a mesh a second time.
 pub(crate) struct Tracer<'a> {
     pub(crate) model: &'a PlacedPart,
     pub(crate) survey: &'a Survey,
     pub(crate) cutter: Cutter<'a>,
-    /// About how many bytes it may take for one look.
+    /// The bytes that one look may take, about.
     pub(crate) memory: usize,
 }
 
@@ -138,8 +135,8 @@ impl Tracer<'_> {
         Ok(trace)
     }
 
-    /// The ends of segments close to the bands, sorted; `None` where they are
-    /// too many, and fewer layers would do.
+    /// Returns the ends of segments near the bands, sorted, or `None` if they take too
+    /// much memory and fewer layers would take less.
     fn sightings(&self, layers: &[&[StrayBand]]) -> io::Result<Option<Vec<Sighting>>> {
         let index = |bands: &[StrayBand]| bands[0].layer as usize;
         let span = index(layers[0])..index(layers[layers.len() - 1]) + 1;
@@ -180,8 +177,8 @@ impl Tracer<'_> {
                         }
                     };
                     let [a, b] = segment.ends;
-                    look(a, !segment.turned);
-                    look(b, segment.turned);
+                    look(a, !segment.is_reversed);
+                    look(b, segment.is_reversed);
                 });
                 if sightings.len() > before {
                     found.fetch_add(sightings.len() - before, Relaxed);
@@ -199,8 +196,7 @@ impl Tracer<'_> {
         Ok(Some(sightings))
     }
 
-    /// Adds bands to the trace, with the ends among the sightings that are
-    /// open, and their edges.
+    /// Adds bands to the trace, with the open ends among the sightings and their edges.
     fn explain(
         &self,
         bands: Vec<StrayBand>,
@@ -224,13 +220,13 @@ impl Tracer<'_> {
                 let ([x, y], [other_x, other_y]) = (a.at_mm, b.at_mm);
                 other_y.total_cmp(&y).then(x.total_cmp(&other_x))
             });
-            let plane_mm = self.cutter.planes.z_um(band.layer as usize) / 1000.0;
-            trace.bands.push(TracedBand { band, plane_mm, ends });
+            let plane = Length::from_um(self.cutter.planes.z_um(band.layer as usize));
+            trace.bands.push(TracedBand { band, plane, ends });
         }
         Ok(())
     }
 
-    /// Whether the segments that meet in a point, or on an edge, leave it open.
+    /// Returns true if the segments that meet at a point, or on an edge, leave it open.
     fn is_open(&self, sightings: &[Sighting]) -> bool {
         match self.cutter.fill {
             Fill::EvenOdd => !sightings.len().is_multiple_of(2),
@@ -238,7 +234,7 @@ impl Tracer<'_> {
         }
     }
 
-    /// The edges that leave a point open, as positions in `edges`.
+    /// Returns the edges that leave a point open, as positions in `edges`.
     fn edges(
         &self,
         group: &[Sighting],

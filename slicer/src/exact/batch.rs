@@ -49,9 +49,9 @@ impl<'a> Batch<'a> {
         cutter.for_each_segment(facet, &self.layers.clone(), |layer, segment| {
             let [a, b] = segment.ends.map(|end| end.at);
             let share = &mut shares[layer - self.layers.start];
-            share.ends.add(a, b, segment.turned, cutter.fill);
+            share.ends.add(a, b, segment.is_reversed, cutter.fill);
             let z_mm = cutter.planes.z_um(layer) / 1000.0;
-            cutter.for_each_crossing(a, b, segment.turned, |row, column, rising| {
+            cutter.for_each_crossing(a, b, segment.is_reversed, |row, column, rising| {
                 count += 1;
                 let [x_mm, y_mm] = cutter.grid.to_mm(column, f64::from(row));
                 if let Some(flat) = &flat {
