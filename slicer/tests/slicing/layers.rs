@@ -191,7 +191,7 @@ fn images_too_large_are_refused() {
     let long = block([0.0; 3], [5_000.0, 1.0, 1.0]);
     let error = try_layers(model(&long), &options(100_000.0, 1000.0)).unwrap_err();
     assert!(matches!(error, SliceError::TooLarge { .. }), "{error}");
-    assert!(error.to_string().contains("--dpi"), "{error}");
+    assert!(error.to_string().contains("pixels"), "{error}");
     for pixels in [[0, 5], [5, 0], [(1 << 24) + 1, 5], [5, u32::MAX]] {
         let grid = GridRule::At { origin_mm: [0.0; 2], pixels };
         let error = refusal(&SliceOptions { grid, ..options(254.0, 100.0) });
@@ -205,6 +205,6 @@ fn too_many_layers_are_refused() {
         let thickness = Length::from_um(thickness_um);
         let error = refusal(&SliceOptions { thickness, ..options(254.0, 100.0) });
         assert!(matches!(error, SliceError::TooManyLayers { .. }), "{error}");
-        assert!(error.to_string().contains("1 mm high"), "{error}");
+        assert!(error.to_string().contains("1mm high"), "{error}");
     }
 }
