@@ -1,8 +1,8 @@
-//! Error diffusion.
+//! Dithers by error diffusion.
 //!
 //! Sources: R. W. Floyd and L. Steinberg, An adaptive algorithm for spatial
-//! greyscale, 1976: the shares that neighbours get. R. A. Ulichney, Digital
-//! Halftoning, 1987: thresholds that vary, against worms and checkerboards.
+//! greyscale, 1976: the shares of the neighbours. R. A. Ulichney, Digital
+//! Halftoning, 1987: varied thresholds against worms and checkerboards.
 
 use lamp_stack::{GrayMask, Mask, gray_runs};
 
@@ -12,12 +12,11 @@ use crate::dots::{Dots, TooManyRuns};
 /// Levels are counted in sixteenths, so that errors divide without loss.
 const WHITE: i32 = 255 * 16;
 
-/// Dithers by error diffusion, rows from the top, each from the left. Solid
-/// black and white take no part: error that falls on them is dropped, so that
-/// it cannot make dots where there is no gray.
+/// Dithers by error diffusion, from the top row down, each row from the left. Errors that
+/// fall on black and white are dropped, so that no dot appears where there is no gray.
 ///
-/// A pixel's threshold is that of the blue-noise mask, which starts at `shift`:
-/// other thresholds make other dots of the same density, so layers differ.
+/// The thresholds are those of the blue-noise mask from `shift` on. Other thresholds give
+/// other dots of the same density, so layers differ.
 pub(crate) fn diffuse(gray: &GrayMask, shift: [u32; 2]) -> Result<Mask, TooManyRuns> {
     let width = gray.width();
     let mut dots = Dots::new(width);
@@ -42,23 +41,22 @@ pub(crate) fn diffuse(gray: &GrayMask, shift: [u32; 2]) -> Result<Mask, TooManyR
     Ok(dots.finish())
 }
 
-/// The thresholds of a row, in sixteenths of a level. They keep half of the
-/// mask's distance from the middle: with more windows are less even, with less
-/// more layers have the same dots.
+/// Returns the thresholds of a row, in sixteenths of a level. They keep half of the mask's
+/// distance from the middle: more makes windows less even, less gives more layers the same
+/// dots.
 fn thresholds(least: &[u8]) -> [i32; SIDE] {
     std::array::from_fn(|column| WHITE / 2 + (i32::from(least[column]) - 128) * 8)
 }
 
-/// The errors that wait for this row's and the next row's pixels. Both hold a
-/// place more on each side, so that errors may fall off the image; column c
-/// is at c + 1.
+/// The errors passed on to this row's and the next row's pixels. Both rows have an extra
+/// place on each side for errors that fall off the image; column c is at c + 1.
 struct Errors {
     here: Vec<i32>,
     below: Vec<i32>,
-    /// The runs that left something below, first column and end.
+    /// The runs that passed errors down, as first column and end.
     touched: Vec<(usize, usize)>,
     touched_here: Vec<(usize, usize)>,
-    /// What the last pixel settled gives to its right neighbour.
+    /// The error that the last settled pixel passes to its right neighbour.
     right: i32,
     right_column: u32,
 }
@@ -76,7 +74,7 @@ impl Errors {
         }
     }
 
-    /// The errors of the pixels from `start` to `end`, which are now settled.
+    /// Starts to settle the pixels from `start` to `end`.
     fn of_run(&mut self, start: u32, end: u32) -> RunErrors<'_> {
         let right = if self.right_column == start { self.right } else { 0 };
         self.right_column = end;
@@ -100,19 +98,19 @@ impl Errors {
     }
 }
 
-/// The errors of a run's pixels, from the left.
+/// The errors around a run's pixels, from the left.
 struct RunErrors<'a> {
-    /// What waits for the run's pixels.
+    /// The errors passed on to the run's pixels.
     here: &'a [i32],
-    /// What waits below them, and below their neighbours on both sides.
+    /// The errors passed on to the pixels below them and below their neighbours.
     below: &'a mut [i32],
-    /// What waits for the next pixel from its left.
+    /// The error passed on to the next pixel from its left.
     right: i32,
     settled: usize,
 }
 
 impl RunErrors<'_> {
-    /// Whether the next pixel becomes white; its error is passed on.
+    /// Returns whether the next pixel becomes white, and passes its error on.
     fn settle(&mut self, level: i32, threshold: i32) -> bool {
         let at = self.settled;
         let wanted = level + self.here[at] + self.right;
@@ -120,7 +118,7 @@ impl RunErrors<'_> {
         let error = wanted - if white { WHITE } else { 0 };
         let [right, left_below, right_below] = [7, 3, 1].map(|share| error * share / 16);
         self.below[at] += left_below;
-        // What division leaves over goes straight down: nothing is lost.
+        // The remainder of the divisions goes straight down: no error is lost.
         self.below[at + 1] += error - right - left_below - right_below;
         self.below[at + 2] += right_below;
         self.right = right;

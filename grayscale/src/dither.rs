@@ -1,4 +1,4 @@
-//! Dithering as a stage.
+//! The dithering stage: gray layers to dots.
 
 use lamp_stack::{GrayMask, Image, Layer, MAX_RUNS, Mask, map_in_order};
 use thiserror::Error;
@@ -6,17 +6,17 @@ use thiserror::Error;
 use crate::dots::TooManyRuns;
 use crate::{blue_noise, diffusion, ordered, threshold};
 
-/// How gray becomes dots.
+/// A method that turns gray into dots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DitherMethod {
-    /// A mask of 128 x 128 thresholds that keeps dots apart and follows no
-    /// pattern; it moves from layer to layer.
+    /// A mask of 128 x 128 thresholds that keeps dots apart, in no regular pattern. It moves
+    /// from layer to layer.
     #[default]
     BlueNoise,
-    /// Bayer's pattern of 16 x 16 thresholds; it moves from layer to layer.
+    /// Bayer's pattern of 16 x 16 thresholds. It moves from layer to layer.
     Ordered,
-    /// Each pixel's error goes to the gray pixels right of and below it; the
-    /// thresholds are those of the blue-noise mask.
+    /// Error diffusion: each pixel's error goes to the gray pixels right of and below it.
+    /// The thresholds are those of the blue-noise mask.
     FloydSteinberg,
     /// No dots: pixels of at least half the full level (128 of 255) are white.
     Threshold,
@@ -29,7 +29,7 @@ lamp_stack::named!(DitherMethod {
     Threshold = "threshold",
 });
 
-/// Why a layer was not dithered.
+/// Why a layer cannot be dithered.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DitherError {
@@ -44,8 +44,8 @@ pub enum DitherError {
     },
 }
 
-/// Turns gray layers into masks; their pages then name the method. Masks pass
-/// unchanged. A layer's dots depend on its image and its index alone.
+/// Turns gray layers into masks, and records the method in their pages. Masks pass
+/// unchanged. A layer's dots depend on its image and its index only.
 ///
 /// # Errors
 /// Returns the errors of `layers` and of [`dither_image`].
@@ -62,11 +62,10 @@ pub fn dither<E: From<DitherError> + Send>(
     })
 }
 
-/// Turns the gray image of the layer of that index into dots. Level 0 stays
-/// black and level 255 white.
+/// Turns the gray image of a layer into dots. Level 0 stays black and level 255 white.
 ///
-/// The pattern starts at the image's top left corner, at a place that the index
-/// gives, so that the holes of one layer do not lie on those of the next.
+/// The layer's index shifts the pattern, so that the holes of one layer do not lie on
+/// those of the next.
 ///
 /// # Errors
 /// Returns an error if the dots make more runs than [`MAX_RUNS`].

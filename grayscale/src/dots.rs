@@ -1,19 +1,19 @@
-//! Images of dots, gathered run by run from the top left.
+//! Builds images of dots, run by run from the top left.
 
 use lamp_stack::{MAX_RUNS, Mask, MaskBuilder};
 
-/// The dots are more runs than a reader of stacks takes.
+/// The dots make more runs than a reader of stacks takes.
 #[derive(Debug)]
 pub(crate) struct TooManyRuns;
 
-/// An image of dots in the making. Within a row, runs come from the left and
-/// do not overlap; what lies between them is black.
+/// Builds an image of dots. Within a row, runs must come from the left without overlap;
+/// pixels between them are black.
 pub(crate) struct Dots {
     mask: MaskBuilder,
     width: u32,
-    /// The row's transitions so far. Between two calls their number is even.
+    /// The transitions of the row. Between calls their number is even.
     row: Vec<u32>,
-    /// The transitions of the rows above.
+    /// The number of transitions of the rows above.
     above: usize,
 }
 
@@ -30,7 +30,7 @@ impl Dots {
         self.row.push(end);
     }
 
-    /// Asks for each pixel from `start` to `end` whether it is white.
+    /// Makes those pixels from `start` to `end` white for which `is_white` is true.
     pub(crate) fn push_each(
         &mut self,
         start: u32,
@@ -40,7 +40,7 @@ impl Dots {
         let mut white = self.reopen(start);
         let mut len = self.row.len();
         self.row.resize(len + (end - start) as usize + 1, 0);
-        // Half of all dots change colour, at random: no branch foresees that.
+        // Dots change colour at random half of the time, which branches cannot predict.
         for column in start..end {
             let next = is_white(column);
             self.row[len] = column;
@@ -51,8 +51,8 @@ impl Dots {
         self.row.truncate(len + usize::from(white));
     }
 
-    /// Repeats a pattern of `period` pixels from `start` to `end`, which
-    /// begins at the pattern's column `phase`.
+    /// Repeats a pattern of `period` pixels from `start` to `end`, beginning with the
+    /// pattern's column `phase`.
     pub(crate) fn push_pattern(
         &mut self,
         (start, end): (u32, u32),
@@ -85,7 +85,7 @@ impl Dots {
         self.row.extend(changes.iter().map(|&column| origin.wrapping_add(column.into())));
     }
 
-    /// Whether the pixel left of `start` is white; its run is then open again.
+    /// Reopens the run that ends at `start`, and returns whether there is one.
     fn reopen(&mut self, start: u32) -> bool {
         self.row.pop_if(|end| *end == start).is_some()
     }
@@ -102,17 +102,17 @@ impl Dots {
         Ok(())
     }
 
-    /// The image of the rows ended.
+    /// Returns the image of the finished rows.
     pub(crate) fn finish(self) -> Mask {
         self.mask.finish()
     }
 }
 
-/// A row of dots that repeats.
+/// A repeating row of dots.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pattern<'a> {
-    /// The columns whose colour is not that of the column left of them; left of
-    /// column 0 is the last one. Their number is even.
+    /// The columns whose colour differs from that of the column to their left, which is
+    /// the last column for column 0. Their number is even.
     pub(crate) changes: &'a [u8],
     /// The colour of the last column.
     pub(crate) ends_white: bool,
@@ -126,7 +126,7 @@ mod tests {
 
     const WIDTH: u32 = 60;
 
-    /// What one run of pixels is given as.
+    /// The call that adds a run of pixels.
     #[derive(Clone, Debug)]
     enum RunKind {
         Black,

@@ -1,11 +1,14 @@
-//! Light and resin: how deep a dose cures ([`resin`], [`material`]), how to find
-//! that from measurements ([`calibrate`]), and gray levels to dots: a machine that
-//! can only expose or not realises a gray level as the share of its pixels that are
-//! white (002 section 3.3.1).
+//! Light and resin: cure depths, calibration and dithering.
 //!
-//! All dithering methods leave solid black and white alone, so their cost follows the
-//! gray pixels, and no dot appears outside the part. [`homogeneity`] says whether the
-//! resin averages dots of a size.
+//! - [`material`] reads a resin's numbers from TOML files, some of which are built in.
+//! - [`resin`] has the cure models: depth and width for a dose or gray level, and back.
+//! - [`calibrate`] finds a material's numbers from measurements, of images that [`target`]
+//!   makes.
+//! - [`dither`] turns gray layers into dots, for machines that expose a pixel or not: a
+//!   gray level becomes the share of white pixels (002 section 3.3.1). Black and white
+//!   stay as they are, so no dot appears outside the part. [`homogeneity`] tells whether
+//!   the resin averages dots of a size.
+//! - [`CuredLine`] simulates what a stack cures.
 //!
 //! ```
 //! use lamp_grayscale::{DitherMethod, dither_image};

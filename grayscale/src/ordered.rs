@@ -1,4 +1,4 @@
-//! Ordered dithering.
+//! Dithers by Bayer's pattern.
 //!
 //! Source: B. E. Bayer, An optimum method for two-level rendition of
 //! continuous-tone pictures, 1973.
@@ -9,25 +9,25 @@ use crate::screen::Screen;
 
 /// The bits of a column or row of the pattern.
 const BITS: u32 = 4;
-/// The side of the threshold pattern. 256 thresholds tell 8-bit levels apart.
+/// The side of the pattern. Its 256 thresholds tell 8-bit levels apart.
 const SIDE: u32 = 1 << BITS;
 
-/// Bayer's pattern.
+/// Bayer's pattern as thresholds.
 pub(crate) static SCREEN: LazyLock<Screen> = LazyLock::new(|| {
     let places = (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| [column, row]));
     Screen::new(SIDE as usize, places.map(bayer_rank))
 });
 
-/// The place of a pixel in Bayer's order of filling: from the bits of its
-/// column and row, lowest first, as the highest bits of the rank.
+/// Returns a pixel's rank in Bayer's order of filling. The lowest bits of its column and
+/// row become the highest bits of the rank.
 fn bayer_rank([column, row]: [u32; 2]) -> usize {
     let bits = (0..BITS).map(|bit| (column >> bit & 1, row >> bit & 1));
     bits.fold(0, |rank, (c, r)| rank << 2 | ((c ^ r) << 1 | r) as usize)
 }
 
-/// Where a layer's pattern starts: at the place whose rank is the layer's
-/// index with its 8 bits reversed (van der Corput's sequence). In every 4, 16,
-/// 64, 256 layers from a multiple of that, a pixel's thresholds are then one of
+/// Returns the column and row at which a layer's pattern starts: the place whose rank is
+/// the layer's index with its 8 bits reversed (van der Corput's sequence). In each
+/// aligned group of 4, 16, 64 or 256 layers, a pixel's thresholds then fall once into
 /// each quarter, sixteenth and so on.
 pub(crate) fn shift(layer: u32) -> [u32; 2] {
     let bits = (0..BITS).map(|bit| (bit, layer >> (2 * bit) & 1, layer >> (2 * bit + 1) & 1));

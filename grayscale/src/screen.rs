@@ -1,4 +1,4 @@
-//! A square of thresholds that repeats over the image.
+//! Dithers by a square of thresholds that repeats over the image.
 
 use std::sync::OnceLock;
 
@@ -6,23 +6,25 @@ use lamp_stack::{GrayMask, Mask, gray_runs};
 
 use crate::dots::{Dots, Pattern, TooManyRuns};
 
-/// Thresholds of `side` x `side` places, each as the least level that is white
-/// there. A level makes the share of places white that is nearest to it.
+/// Thresholds of `side` x `side` places, each the least level that is white there. A level
+/// turns the nearest possible share of places white.
 pub(crate) struct Screen {
     side: usize,
     least: Vec<u8>,
-    /// What the levels make of the rows, each from its first use on.
+    /// The patterns of each level, made at its first use.
     levels: [OnceLock<Patterns>; 256],
 }
 
-/// Runs shorter than this are dithered pixel by pixel: looking the pattern up
-/// costs as much as so many pixels.
+/// Runs shorter than this are dithered pixel by pixel, as looking up the pattern costs as
+/// much as this many pixels.
 const SHORT: u32 = 16;
 
 impl Screen {
-    /// The screen that fills its places in the order of their ranks, which
-    /// stand row by row and are all the numbers below `side` squared. The side
-    /// is a power of two, at most 256.
+    /// Creates the screen that fills its places in the order of their ranks, which are given
+    /// row by row and are all the numbers below `side` squared.
+    ///
+    /// # Panics
+    /// Panics if the side is not a power of two up to 256, or ranks are missing.
     pub(crate) fn new(side: usize, ranks: impl Iterator<Item = usize>) -> Self {
         let places = side * side;
         // White are the first round(level / 255 * places) ranks.
@@ -31,18 +33,18 @@ impl Screen {
         Self { side, least, levels: [const { OnceLock::new() }; 256] }
     }
 
-    /// The least levels that are white in a row. Rows repeat.
+    /// Returns the least levels that are white in a row. Rows repeat.
     pub(crate) fn row(&self, row: usize) -> &[u8] {
         let first = row % self.side * self.side;
         &self.least[first..first + self.side]
     }
 
-    /// Turns gray into dots. The image's top left corner is the screen's place
-    /// `shift`, column and row.
+    /// Turns gray into dots. `shift` is the screen's column and row at the image's top left
+    /// corner.
     pub(crate) fn dither(&self, gray: &GrayMask, shift: [u32; 2]) -> Result<Mask, TooManyRuns> {
         let mut dots = Dots::new(gray.width());
         let last = self.side as u32 - 1;
-        // The side divides 2^32, so that columns may wrap.
+        // The side divides 2^32, so columns may wrap.
         let place = |column: u32| column.wrapping_add(shift[0]) & last;
         for (row, changes) in gray.rows().enumerate() {
             let row = row + shift[1] as usize;
@@ -68,9 +70,9 @@ impl Screen {
     }
 }
 
-/// What a level makes of each row of a screen.
+/// The patterns of a level, one for each row of a screen.
 struct Patterns {
-    /// Where each row's changes end.
+    /// The end of each row's changes.
     ends: Vec<usize>,
     changes: Vec<u8>,
     end_white: Vec<bool>,
@@ -94,7 +96,7 @@ impl Patterns {
         patterns
     }
 
-    /// The pattern of a row. Rows repeat.
+    /// Returns the pattern of a row. Rows repeat.
     fn row(&self, row: usize) -> Pattern<'_> {
         let row = row % self.ends.len();
         let first = if row == 0 { 0 } else { self.ends[row - 1] };

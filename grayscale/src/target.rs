@@ -1,60 +1,67 @@
-//! Images to expose and measure: squares for the cure width (002 section 3.4.3,
-//! figure 73), and screens for the homogeneous transition (002 section 3.3.6,
-//! figure 56).
+//! Images to expose and measure: squares for the cure width (002 section 3.4.3, figure
+//! 73) and screens for the homogeneous transition (002 section 3.3.6, figure 56).
 
 use lamp_stack::{GrayMask, Mask, MaskBuilder};
 use thiserror::Error;
 
 use crate::resin::{Dose, GrayLevel};
 
-/// One exposure of a target. Every square that is white in it gets its dose.
+/// One exposure of a target. It adds its dose to every white square.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetExposure {
-    /// What is white.
+    /// The image to expose.
     pub image: Mask,
     /// The dose that the exposure adds.
     pub dose: Dose,
 }
 
-/// Why there is no such target.
+/// Why a target cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum TargetError {
-    /// No dose, too many, or some that do not go up.
+    /// There are no doses or too many, or they do not go up.
     #[error("the doses must be 1 to 100, above zero, and go up")]
     Doses,
-    /// A length in pixels that makes no image.
+    /// A length in pixels is zero or too large.
     #[error("{what} of {pixels} pixels: they have 1 to {most}")]
     Pixels {
-        /// Of what.
+        /// The parts of that length.
         what: &'static str,
-        /// How many there are.
+        /// The length.
         pixels: u32,
-        /// How many there may be.
+        /// The largest length.
         most: u32,
     },
 }
 
-/// Squares and gaps are no wider than this; it is 33 in at 1500 dpi.
+/// The widest squares and gaps in pixels: 33 in at 1500 dpi.
 const MAX_PIXELS: u32 = 50_000;
-/// Tiles of screens are no wider than this: a screen has many runs.
+/// The widest tiles of screens in pixels, fewer as a screen has many runs.
 const MAX_TILE: u32 = 5_000;
 const MAX_DOSES: usize = 100;
 
 /// Image widths are multiples of this (002 section 2.2.2).
 const WIDTH_STEP: u32 = 32;
 
-/// Makes squares of one side, each of which gets another of `doses` in all.
+/// Makes squares of one side, one for each of `doses`.
 ///
-/// A machine exposes an image for one time. So there are as many exposures as
-/// doses: the first shows all squares, for the least dose; each further one leaves
-/// out the square that has its dose, and adds to the others what the next dose is
-/// more. The squares stand in two rows from the top left, with `gap` pixels between
-/// and around them.
+/// A machine exposes an image for one time, so there are as many exposures as doses. The
+/// first shows all squares, for the least dose. Each further one leaves out the square
+/// that has its dose, and adds the difference to the next dose to the others. The squares
+/// stand in two rows from the top left, with `gap` pixels between and around them.
+///
+/// ```
+/// use lamp_grayscale::{resin::Dose, target::squares};
+///
+/// let exposures = squares(25, 60, &[60.0, 120.0].map(Dose::from_mj_per_cm2))?;
+/// assert_eq!(exposures[0].image.white_pixels(), 2 * 25 * 25);
+/// assert_eq!(exposures[1].image.white_pixels(), 25 * 25);
+/// # Ok::<(), lamp_grayscale::target::TargetError>(())
+/// ```
 ///
 /// # Errors
-/// Returns an error if the doses are none, too many or do not go up from above zero, or a length
-/// makes no image.
+/// Returns an error if there are no doses or too many, if they do not go up from above
+/// zero, or if a length is zero or too large.
 pub fn squares(side: u32, gap: u32, doses: &[Dose]) -> Result<Vec<TargetExposure>, TargetError> {
     check_pixels("squares", side, MAX_PIXELS)?;
     check_pixels("gaps", gap, MAX_PIXELS)?;
@@ -78,7 +85,7 @@ fn check_pixels(what: &'static str, pixels: u32, most: u32) -> Result<(), Target
     if fine { Ok(()) } else { Err(TargetError::Pixels { what, pixels, most }) }
 }
 
-/// The image of `count` squares of which those before `first` are left out.
+/// Returns the image of `count` squares without those before `first`.
 fn squares_from(first: usize, count: usize, side: u32, gap: u32) -> Mask {
     let columns = count.div_ceil(2);
     let width = gap + columns as u32 * (side + gap);
@@ -99,15 +106,15 @@ fn squares_from(first: usize, count: usize, side: u32, gap: u32) -> Mask {
     mask.finish()
 }
 
-/// Makes tiles of one gray level: the level itself, then screens of it in squares
-/// of each of `cells` pixels that are black or white. At a level of one half the
-/// screens are checkerboards.
+/// Makes tiles of one gray level: the level itself, then a screen of black and white
+/// squares for each side of `cells` pixels. At a level of one half the screens are
+/// checkerboards.
 ///
-/// The share of white squares is the level to the nearest 64th, on every 8 x 8 of
-/// them: tiles of a multiple of all cells' eightfold have just that share.
+/// Every 8 x 8 squares have the level as their share of white, to the nearest 64th. So do
+/// tiles whose side is a multiple of eight times each cell.
 ///
 /// # Errors
-/// Returns an error if a length makes no image.
+/// Returns an error if a length is zero or too large.
 pub fn screens(
     level: GrayLevel,
     tile: u32,
@@ -130,7 +137,7 @@ pub fn screens(
         let mut runs = vec![(gap, 0), (tile, level.to_u8()), (gap, 0)];
         for &cell in cells {
             let squares = (0..tile).step_by(cell as usize).map(|x| {
-                let white = threshold(x / cell, y / cell) < sixty_fourths;
+                let white = bayer_rank(x / cell, y / cell) < sixty_fourths;
                 (cell.min(tile - x), if white { 255 } else { 0 })
             });
             runs.extend(squares);
@@ -142,9 +149,9 @@ pub fn screens(
     Ok(image)
 }
 
-/// The place of a square among the 64 of its 8 x 8, of which as many are white as
-/// the level has 64ths (Bayer's order: the first 32 make a checkerboard).
-fn threshold(x: u32, y: u32) -> u32 {
+/// Returns a square's rank among the 64 of its 8 x 8. Ranks below the level's 64ths are
+/// white. In this order, Bayer's, the first 32 make a checkerboard.
+fn bayer_rank(x: u32, y: u32) -> u32 {
     let bit = |of: u32, i: u32| (of >> i) & 1;
     (0..3).fold(0, |place, i| place << 2 | (bit(x ^ y, i) << 1) | bit(y, i))
 }

@@ -1,4 +1,4 @@
-//! No dots at all: every pixel to the nearer of black and white.
+//! Rounds every pixel to the nearer of black and white.
 
 use lamp_stack::{GrayMask, Mask, gray_runs};
 

@@ -1,32 +1,30 @@
-//! How the blue-noise mask was made, and that it was made so. Compiled for
-//! tests only: the mask is a file, `masks/blue_noise.ranks`.
+//! Makes the blue-noise mask, to test the file `masks/blue_noise.ranks` that holds it.
 //!
 //! Source: R. A. Ulichney, The void-and-cluster method for dither array
 //! generation, Proc. SPIE 1913, 1993. Each point adds energy to the places
 //! around it; the tightest cluster is the point of most energy, the largest
-//! void the empty place of least. Besides the nearness of points, energy is
-//! here made of two more parts:
+//! void the empty place of least. Besides the nearness of points, the
+//! energy here has two more parts:
 //!
-//! - how many windows of 16 x 16 pixels a place shares with points, so that
-//!   every window has its share of them. The sum of that over all pairs of
-//!   points is, but for a constant, the variance of what windows hold.
-//! - whether a point is one to six steps away by which the mask moves from layer
-//!   to layer, so that a pixel is not white (or black) for long.
+//! - the number of windows of 16 x 16 pixels that a place shares with points, so that
+//!   every window gets its share. Summed over all pairs of points it is the variance of
+//!   the windows' counts, up to a constant.
+//! - points that are one to six of the mask's steps from layer to layer away, so that no
+//!   pixel stays white (or black) for long.
 //!
-//! All energies are whole numbers, so that the mask is the same everywhere.
+//! All energies are whole numbers, so the mask is the same on every machine.
 
 use crate::blue_noise::{RANKS, SIDE, STEP};
 
 const PLACES: usize = SIDE * SIDE;
 
-/// The binomial coefficients of 10, nearly a Gaussian with a variance of 2.5:
-/// the energy of nearness, along columns and along rows. A point has 252 x 252
-/// at its own place.
+/// The energy of nearness along columns and rows: the binomial coefficients of 10, nearly
+/// a Gaussian with a variance of 2.5. A point adds 252 x 252 at its own place.
 const NEAR: [i64; 11] = [1, 10, 45, 120, 210, 252, 210, 120, 45, 10, 1];
-/// The windows whose content is to be even.
+/// The side of the windows whose counts are to be even.
 const WINDOW: i64 = 16;
-/// The energy for each window shared. Less leaves windows uneven; twice as much
-/// begins to be seen in the spectrum of light and dark levels.
+/// The energy for each shared window. Less leaves windows uneven; twice as much begins to
+/// show in the spectrum of light and dark levels.
 const SHARED: i64 = 200;
 /// The energy of a point one step away, two steps, and so on.
 const STEPS: [i64; 6] = [32_000, 24_000, 16_000, 8_000, 4_000, 2_000];
@@ -35,7 +33,7 @@ const FIRST: usize = PLACES / 10;
 
 /// Points on a torus and the energy that they make.
 struct Field {
-    /// What a point adds to places around it: columns, rows, energy.
+    /// The energy that a point adds around it: columns, rows, energy.
     kernel: Vec<(usize, usize, i64)>,
     energy: Vec<i64>,
     points: Vec<bool>,
@@ -93,8 +91,8 @@ fn kernel() -> Vec<(usize, usize, i64)> {
     places.map(|(place, energy)| (place % SIDE, place / SIDE, energy)).collect()
 }
 
-/// Points thrown at random, then moved from clusters into voids until the
-/// point moved came from the largest void.
+/// Returns random points, moved from clusters into voids until a moved point comes from
+/// the largest void.
 fn first_points() -> Field {
     let mut field = Field::new();
     let mut random = 1u64;
@@ -124,10 +122,10 @@ fn splitmix(state: &mut u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The order in which places become white. The first points are ranked by
-/// taking clusters away; all others by filling voids. (Ulichney's third phase
-/// fills the tightest clusters of what is left black: the same places, for
-/// the energy of black and that of white make a constant sum.)
+/// Returns the order in which places become white. The first points are ranked by
+/// removing clusters, all others by filling voids. (Ulichney's third phase fills the
+/// tightest clusters of black: the same places, as the energies of black and white have a
+/// constant sum.)
 fn ranks() -> Vec<u16> {
     let mut field = first_points();
     let first: Vec<usize> = (0..PLACES).filter(|&place| field.points[place]).collect();

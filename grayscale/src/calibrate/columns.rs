@@ -1,4 +1,4 @@
-//! The columns of tables of measurements.
+//! Finds columns in tables of measurements and reads their cells.
 
 use std::ops::RangeInclusive;
 
@@ -11,11 +11,11 @@ use crate::resin::{Dose, ExposureTime, Intensity};
 pub(super) const DOSE: &str = "dose_mj_per_cm2";
 pub(super) const EXPOSURE: &str = "exposure_ms";
 
-/// DepthRange, widths and sides in um, from a nanometre to a metre: what no measurement
-/// passes, but a slip of the pen may.
+/// The plausible depths, widths and sides in um, from a nanometre to a metre. No measurement
+/// lies outside, but a typing error may.
 pub(super) const LENGTHS: RangeInclusive<f64> = 1e-3..=1e6;
 
-/// A misspelt column must not be silently left out.
+/// Checks that all columns are known: a misspelt one must not be silently left out.
 pub(super) fn check_columns(
     table: &CsvTable,
     known: &'static [&'static str],
@@ -27,7 +27,7 @@ pub(super) fn check_columns(
     }
 }
 
-/// A column that a table has.
+/// A column of a table.
 #[derive(Clone, Copy)]
 pub(super) struct Column {
     name: &'static str,
@@ -39,7 +39,7 @@ impl Column {
         table.find(name).map(|index| Self { name, index })
     }
 
-    /// The one of two columns that is there, and whether it is the first.
+    /// Returns the one of two columns that is there, and whether it is the first.
     pub(super) fn either(
         table: &CsvTable,
         first: &'static str,
@@ -67,8 +67,8 @@ impl Column {
         number.ok_or_else(|| DataError::NotANumber { line, column, text: text.to_owned() })
     }
 
-    /// A length in um, or a blank. None and less than none are lengths too: a film
-    /// may be uncured, and a balance may show less than nothing.
+    /// Returns a length in um, or `None` if the cell is blank. Lengths may be zero, as of
+    /// films that did not cure, and below zero by errors of measurement.
     pub(super) fn length_or_blank(self, row: &TableRow) -> Result<Option<Length>, DataError> {
         let Some(um) = self.number_or_blank(row)? else { return Ok(None) };
         if LENGTHS.contains(&um) || (um <= 0.0 && -um <= *LENGTHS.end()) {
@@ -83,7 +83,7 @@ impl Column {
     }
 }
 
-/// The doses, as such or as exposures under a light.
+/// The doses, given directly or as exposure times under a light.
 pub(super) struct DoseColumn {
     column: Column,
     light: Option<Intensity>,

@@ -1,4 +1,4 @@
-//! Tables of numbers as text: comma-separated values under a header.
+//! Reads tables of comma-separated values under a header.
 
 use thiserror::Error;
 
@@ -17,7 +17,7 @@ pub struct CsvTable {
     rows: Vec<TableRow>,
 }
 
-/// A row's texts, as many as there are columns.
+/// The texts of a row, one for each column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct TableRow {
     /// Its line in the file, from 1.
@@ -25,20 +25,20 @@ pub(super) struct TableRow {
     cells: Vec<String>,
 }
 
-/// Why a text is no table.
+/// Why a text cannot be read as a table.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum TableError {
-    /// Nothing but blank lines and comments.
+    /// There are only blank lines and comments.
     #[error("the file is empty: write a header, as dose_mj_per_cm2,depth_um, and rows below it")]
     Empty,
-    /// A header in columns that are not separated by commas.
+    /// The header's columns are not separated by commas.
     #[error("line {line}: separate columns by commas, and write 1.5 for one and a half")]
     Separator {
         /// The header's line, from 1.
         line: usize,
     },
-    /// A column that is there twice.
+    /// A column stands twice.
     #[error("line {line}: column {column} stands twice")]
     Twice {
         /// The header's line, from 1.
@@ -46,21 +46,21 @@ pub enum TableError {
         /// The column.
         column: String,
     },
-    /// A row that does not fit the header.
+    /// A row has another number of cells than the header.
     #[error("line {line}: {cells} columns, where the header has {columns}")]
     Ragged {
-        /// From 1.
+        /// The line, from 1.
         line: usize,
-        /// How many the row has.
+        /// The number of cells in the row.
         cells: usize,
-        /// How many the header has.
+        /// The number of columns in the header.
         columns: usize,
     },
 }
 
 impl CsvTable {
     /// Reads a table: a header, then rows. Blank lines and those that start with `#`
-    /// are skipped; quotes around a cell are taken off.
+    /// are skipped; quotes around a cell are removed.
     ///
     /// # Errors
     /// Returns an error if there is no header, or a row has more or fewer cells than it.
@@ -93,7 +93,7 @@ impl CsvTable {
         Ok(Self { columns, rows })
     }
 
-    /// The columns' names, in order.
+    /// Returns the columns' names, in order.
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
@@ -102,20 +102,20 @@ impl CsvTable {
         &self.rows
     }
 
-    /// Which column has a name.
+    /// Returns the index of the column of a name.
     pub(super) fn find(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column == name)
     }
 }
 
 impl TableRow {
-    /// The text of a column that the table has.
+    /// Returns the text of the cell in a column.
     pub(super) fn cell(&self, column: usize) -> &str {
         &self.cells[column]
     }
 }
 
-/// The cells of a line, none of which steers a terminal.
+/// Returns the cells of a line, without control characters that could steer a terminal.
 fn cells(line: &str) -> Vec<String> {
     let cell = |cell: &str| cell.trim().trim_matches('"').trim().replace(char::is_control, " ");
     line.split(',').map(cell).collect()

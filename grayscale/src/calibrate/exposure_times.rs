@@ -1,4 +1,4 @@
-//! How long layers of each thickness are exposed, from a table.
+//! Reads exposure times by layer thickness from a table.
 
 use std::ops::RangeInclusive;
 
@@ -11,7 +11,7 @@ use crate::resin::ExposureTime;
 
 const THICKNESS: &str = "thickness_um";
 
-/// Times in ms, from a microsecond to eleven days.
+/// The plausible times in ms, from a microsecond to eleven days.
 const TIMES: RangeInclusive<f64> = 1e-3..=1e9;
 
 /// Exposure times by thickness.
@@ -22,11 +22,11 @@ pub struct ExposureTimes {
 }
 
 impl ExposureTimes {
-    /// Takes times from a table of `thickness_um` and `exposure_ms`.
+    /// Reads times from a table of `thickness_um` and `exposure_ms`.
     ///
     /// # Errors
-    /// Returns an error if a column is missing or unknown, a cell is no possible number, or a
-    /// thickness stands twice.
+    /// Returns an error if a column is missing or unknown, a cell is not a number in its range,
+    /// or a thickness stands twice.
     pub fn new(table: &CsvTable) -> Result<Self, DataError> {
         check_columns(table, &[THICKNESS, EXPOSURE])?;
         let column = |name| Column::find(table, name).ok_or(DataError::NoColumn(name));
@@ -53,8 +53,7 @@ impl ExposureTimes {
         Ok(Self { times })
     }
 
-    /// Returns the time for a thickness, along a straight line between the two
-    /// nearest; `None` outside the table.
+    /// Returns the time for a thickness, interpolated linearly; `None` outside the table.
     pub fn of(&self, thickness: Length) -> Option<ExposureTime> {
         let um = thickness.um();
         let above = self.times.partition_point(|time| time.0 < um);
@@ -67,7 +66,7 @@ impl ExposureTimes {
         Some(ExposureTime::from_ms(low_ms + share * (high_ms - low_ms)))
     }
 
-    /// The least and the greatest thickness of the table.
+    /// Returns the least and the greatest thickness of the table.
     pub fn limits(&self) -> [Length; 2] {
         [self.times[0], self.times[self.times.len() - 1]].map(|time| Length::from_um(time.0))
     }

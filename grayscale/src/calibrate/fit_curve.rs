@@ -1,4 +1,4 @@
-//! The working curve of measured cure depths.
+//! Fits the working curve to measured cure depths.
 
 use lamp_stack::Length;
 
@@ -17,7 +17,7 @@ pub struct CurveFit {
     pub penetration_depth: Estimate<Length>,
     /// The share of the depths' scatter that the line explains.
     pub r2: f64,
-    /// How many points it is of.
+    /// The number of points.
     pub points: usize,
     line: LineFit,
 }
@@ -26,11 +26,11 @@ pub struct CurveFit {
 /// on the logarithm of the dose that arrives (002 section 3.3.5).
 ///
 /// The interval of `D_p` is that of the slope, by Student's t; that of `E_c` comes
-/// from Fieller's theorem, and is longer upwards than downwards or the reverse.
+/// from Fieller's theorem, and is not symmetric.
 ///
 /// # Errors
-/// Returns an error if there are fewer than three points or two doses, or the depth does not
-/// rise with the dose for sure or leaves no critical dose that can be written down.
+/// Returns an error if there are fewer than three points or two doses, if the depth does
+/// not clearly rise with the dose, or if the critical dose is not plausible.
 pub fn fit_curve(points: &[DepthPoint]) -> Result<CurveFit, FitError> {
     let log = |p: &DepthPoint| (p.arriving().mj_per_cm2().ln(), p.depth.um());
     let logs: Vec<_> = points.iter().map(log).collect();
@@ -49,8 +49,8 @@ pub fn fit_curve(points: &[DepthPoint]) -> Result<CurveFit, FitError> {
 }
 
 impl CurveFit {
-    /// Returns the depth of a dose that arrives, below zero up to the critical one,
-    /// and the 95% interval of the curve there.
+    /// Returns the depth of a dose that arrives, with its 95% interval. It is below zero up
+    /// to the critical dose.
     pub fn depth(&self, dose: Dose) -> Estimate<Length> {
         let log = dose.mj_per_cm2().ln();
         Estimate::even(self.line.at(log), self.line.half_at(log))
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn of_100_intervals_95_hold_the_truth() {
-        // DepthRange to 5 um as in 002 section 3.3.5; and far coarser ones, where the
+        // Depths to 5 um as in 002 section 3.3.5, and far coarser ones, for which the
         // interval of E_c is lopsided.
         for spread in [5.0, 40.0] {
             let mut noise = SplitMix(7);

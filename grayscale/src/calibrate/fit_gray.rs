@@ -1,4 +1,4 @@
-//! The working curve over the gray level, of measured cure depths.
+//! Fits the working curve over the gray level to measured cure depths.
 
 use lamp_stack::Length;
 
@@ -10,7 +10,7 @@ use super::{Estimate, FitError, PointGroup};
 use crate::material::{CurveLines, GivenLine};
 use crate::resin::{Dose, GrayLevel, Quantity};
 
-/// How the working curve moves with the gray level, found from measurements.
+/// The working curve over the gray level, found from measurements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrayFit {
     /// The working curve of each level, from the darkest.
@@ -24,7 +24,7 @@ pub struct GrayFit {
 /// The working curve of a gray level, over the dose that arrives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelFit {
-    /// The level.
+    /// The gray level.
     pub gray: GrayLevel,
     /// Its curve.
     pub curve: CurveFit,
@@ -35,10 +35,10 @@ pub struct LevelFit {
 pub struct LineEstimate<T> {
     /// The value at level 0.
     pub at_zero: Estimate<T>,
-    /// What it rises from black to white; zero where it was `levelled`.
+    /// The rise from black to white; zero if the line was `levelled`.
     pub rise: Estimate<T>,
-    /// What it would rise, below zero, where that might as well be nothing: the
-    /// line is then the mean, since the model takes none that falls.
+    /// The negative rise of a line that falls by no more than its interval. The line is then
+    /// the mean, since the model takes no falling line.
     pub levelled: Option<T>,
     /// The share of the scatter that the line explains.
     pub r2: f64,
@@ -47,11 +47,11 @@ pub struct LineEstimate<T> {
 /// Fits the lines `E_c(G)` and `D_p(G)` (002 eq. 40): the working curve of each gray
 /// level first, then a straight line through the curves' numbers.
 ///
-/// A line that falls, but not for sure, is kept level.
+/// A line whose fall is within its interval is kept level.
 ///
 /// # Errors
-/// Returns an error if there are fewer than three levels, a level has no working curve, a line
-/// falls for sure, or begins at no more than zero.
+/// Returns an error if there are fewer than three levels, a level has no working curve, or
+/// a line falls by more than its interval or begins at zero or less.
 pub fn fit_gray(points: &[DepthPoint]) -> Result<GrayFit, FitError> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.gray.get().total_cmp(&b.gray.get()));
@@ -107,8 +107,8 @@ fn line<T: Quantity>(
 }
 
 impl GrayFit {
-    /// Returns the lines for a material file, whose lines have no place for an
-    /// interval but the source.
+    /// Returns the lines for a material file. Their intervals stand in the source, as lines
+    /// have no other place for them.
     pub fn lines(&self, source: &str) -> CurveLines {
         CurveLines {
             critical_dose: given(&self.critical_dose, source),
@@ -146,8 +146,8 @@ mod tests {
         GrayCurve::new(critical_dose, StraightLine { at_zero: dp, rise: dp_rise }).unwrap()
     }
 
-    /// What a model says of white's doses of three to twenty times 131.5 mJ/cm²
-    /// over the level, each depth with an error.
+    /// The depths of a model with errors, at doses of three to twenty times 131.5 mJ/cm²
+    /// divided by the level.
     fn points(depth: impl Fn(GrayLevel, Dose) -> f64, spread: f64, seed: u64) -> Vec<DepthPoint> {
         let mut noise = SplitMix(seed);
         let mut points = Vec::new();

@@ -1,4 +1,4 @@
-//! The two-depth model of measured cure depths.
+//! Fits the two-depth model to measured cure depths.
 
 use lamp_stack::Length;
 
@@ -17,33 +17,31 @@ pub struct TwoDepthFit {
     pub critical_dose: Estimate<Dose>,
     /// `D_pL`.
     pub liquid_depth: Estimate<Length>,
-    /// `D_pS`. Where the points lie on a straight line over the dose, or bend the
-    /// other way, it is 10 000 times the deepest, from where on it makes no
-    /// difference.
+    /// `D_pS`. If the points lie on a straight line over the dose or bend the other way, it
+    /// is 10 000 times the deepest point; larger values make no difference.
     pub solid_depth: Estimate<Length>,
-    /// Whether that is so.
+    /// Whether the points are straight or bend the other way.
     pub straight: bool,
     /// The share of the depths' scatter that the curve explains.
     pub r2: f64,
-    /// How many points it is of.
+    /// The number of points.
     pub points: usize,
     curve: TwoDepthCurve,
     /// The parameters' covariance, times the square of Student's t.
     spread: [[f64; 3]; 3],
 }
 
-/// How many times the deepest point a solid's penetration depth is where it makes
-/// no difference any more: a 20 000th of the depth.
+/// The penetration depth of a solid, in times the deepest point, from which on it changes
+/// depths by less than a 20 000th.
 const CLEAR: f64 = 1e4;
 
 /// Fits `z = D_pS ln(D_pL/D_pS (E/E_c - 1) + 1)` (000 eq. 3.8, 003 eq. 2) by
 /// nonlinear least squares (Levenberg and Marquardt).
 ///
-/// Its parameters here are `E_c`, the depth that a dose adds at first, `D_pL/E_c`,
-/// and the bend `1/D_pS`: these the points hold as near to straight as can be.
-/// Intervals come from their covariance, by Student's t: for `E_c` as they are,
-/// for `D_pL` on a logarithmic scale, for `D_pS` over its inverse, so that the
-/// interval has no upper end where the solid may be clear.
+/// It is fitted in `E_c`, the initial slope `D_pL/E_c` and the bend `1/D_pS`, in which it
+/// is nearest to linear. Intervals come from their covariance, by Student's t: directly for
+/// `E_c`, on a logarithmic scale for `D_pL`, and over the inverse for `D_pS`, so that the
+/// interval has no upper end if the solid may be clear.
 ///
 /// # Errors
 /// Returns an error if there are fewer than four points or three doses, the depth does not rise
@@ -58,7 +56,7 @@ pub fn fit_two_depth(points: &[DepthPoint]) -> Result<TwoDepthFit, FitError> {
         bends.iter().filter_map(|&bend| TwoDepthCurve::from_line(&data, bend)?.fitted(&data));
     let best = fits.min_by(|a, b| a.squares(&data).total_cmp(&b.squares(&data)));
     let curve = best.filter(|curve| curve.onset > 0.0).ok_or(FitError::NoFit)?;
-    TwoDepthFit::of(curve, &data, deepest).ok_or(FitError::NoFit)?.told()
+    TwoDepthFit::of(curve, &data, deepest).ok_or(FitError::NoFit)?.above_zero()
 }
 
 fn check(data: &[(f64, f64)]) -> Result<(), FitError> {
@@ -107,9 +105,9 @@ impl TwoDepthFit {
         })
     }
 
-    /// Checks that the numbers are told apart from zero. `D_pL`'s interval is told
-    /// on a logarithmic scale: it reaches zero where its half is one.
-    fn told(self) -> Result<Self, FitError> {
+    /// Checks that no interval reaches zero. That of `D_pL` is on a logarithmic scale, where
+    /// a half width of one counts as reaching zero.
+    fn above_zero(self) -> Result<Self, FitError> {
         let vague = |what, value, half, unit| Err(FitError::Vague { what, value, half, unit });
         let onset = self.critical_dose;
         if onset.low.mj_per_cm2() <= 0.0 {
@@ -125,8 +123,8 @@ impl TwoDepthFit {
         Ok(self)
     }
 
-    /// Returns the depth of a dose that arrives, below zero up to the critical one,
-    /// and the 95% interval of the curve there; no number far below.
+    /// Returns the depth of a dose that arrives, with its 95% interval. It is below zero up
+    /// to the critical dose, and NaN far below.
     pub fn depth(&self, dose: Dose) -> Estimate<Length> {
         let (depth, slopes) = self.curve.at(dose.mj_per_cm2());
         let half = dot(&slopes, &product(&self.spread, &slopes)).max(0.0).sqrt();

@@ -1,4 +1,4 @@
-//! The cure width of measured squares.
+//! Fits the cure width to measured squares.
 
 use lamp_stack::Length;
 
@@ -8,7 +8,7 @@ use super::{Estimate, FitError, PointGroup};
 use crate::material::WidthNumbers;
 use crate::resin::{Dose, WidthSensitivity};
 
-/// The cure width of squares of one size over the dose.
+/// The cure width of squares of one size, found from measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WidthFit {
     /// The squares' side in the image.
@@ -19,9 +19,9 @@ pub struct WidthFit {
     pub sensitivity: Estimate<WidthSensitivity>,
     /// The share of the widths' scatter that the line explains.
     pub r2: f64,
-    /// How many points it is of.
+    /// The number of points.
     pub points: usize,
-    /// How many more lie below the critical dose.
+    /// The number of further points below the critical dose.
     pub below: usize,
     line: LineFit,
 }
@@ -30,15 +30,15 @@ pub struct WidthFit {
 /// by linear regression of the width on the dose, not on its logarithm (002
 /// section 3.4.4).
 ///
-/// Below the critical dose the width is zero and no line: a square that came out a
-/// little wider there, by an error, is left out.
+/// Below the critical dose the width is zero and does not follow the line: squares that
+/// are wider there by an error are left out.
 ///
 /// Intervals are those of the working curve's fit, by Student's t and Fieller's
 /// theorem.
 ///
 /// # Errors
-/// Returns an error if a size has fewer than three points or two doses, its width does not rise
-/// with the dose for sure, or begins at no dose above zero; or there is no size.
+/// Returns an error if there are no points, if a size has fewer than three points or two
+/// doses, or if its width does not clearly rise with the dose from a dose above zero.
 pub fn fit_widths(points: &[WidthPoint]) -> Result<Vec<WidthFit>, FitError> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));
@@ -62,7 +62,7 @@ fn fit_size(feature_size: Length, points: &[WidthPoint]) -> Result<WidthFit, Fit
     }
     Ok(WidthFit {
         feature_size,
-        // No dose is below zero: the interval holds the truth as often without those.
+        // No dose is below zero: without those the interval holds the truth as often.
         critical_dose: Estimate::new(value, low.max(0.0), high),
         sensitivity: Estimate::even(line.slope, line.slope_half()),
         r2: line.r2,
@@ -72,7 +72,7 @@ fn fit_size(feature_size: Length, points: &[WidthPoint]) -> Result<WidthFit, Fit
     })
 }
 
-/// Fits a rising line to those points that are not left of its zero.
+/// Fits a rising line, leaving out points to the left of its zero.
 fn line_above_zero(mut points: Vec<(f64, f64)>) -> Result<LineFit, FitError> {
     loop {
         let line = LineFit::new(&points)?.rising("um for each mJ/cm2")?;
@@ -85,8 +85,8 @@ fn line_above_zero(mut points: Vec<(f64, f64)>) -> Result<LineFit, FitError> {
 }
 
 impl WidthFit {
-    /// Returns the width at a dose, below zero up to the critical one, and the 95%
-    /// interval of the line there.
+    /// Returns the width at a dose, with its 95% interval. It is below zero up to the
+    /// critical dose.
     pub fn width(&self, dose: Dose) -> Estimate<Length> {
         let mj = dose.mj_per_cm2();
         Estimate::even(self.line.at(mj), self.line.half_at(mj))

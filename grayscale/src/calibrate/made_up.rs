@@ -1,11 +1,11 @@
-//! Measurements made up for tests.
+//! Makes up measurements for tests.
 
 use lamp_stack::Length;
 
 use super::{DepthPoint, FitError};
 use crate::resin::{CureModel, Dose, GrayLevel};
 
-/// The depths of white that a model says, each with an error in um.
+/// Returns a model's depths of white, each with an error in um.
 pub(super) fn depth_points(
     model: &impl CureModel,
     doses: &[f64],
@@ -19,7 +19,7 @@ pub(super) fn depth_points(
     doses.iter().map(point).collect()
 }
 
-/// The share of fits for which each of `checks` holds.
+/// Returns the share of fits for which each of `checks` holds.
 pub(super) fn share_held<F, const N: usize>(
     fits: impl Iterator<Item = Result<F, FitError>>,
     checks: impl Fn(&F) -> [bool; N],

@@ -1,6 +1,6 @@
-//! Small systems of linear equations.
+//! Inverts small symmetric matrices.
 
-/// Inverts a symmetric matrix; `None` where it is singular to rounding. Rows and
+/// Inverts a symmetric matrix; `None` if it is singular to rounding. Rows and
 /// columns are scaled first, so that their units do not matter.
 pub(super) fn inverse<const N: usize>(matrix: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
     let scale: [f64; N] = std::array::from_fn(|i| matrix[i][i].sqrt());
@@ -11,7 +11,7 @@ pub(super) fn inverse<const N: usize>(matrix: [[f64; N]; N]) -> Option<[[f64; N]
         std::array::from_fn(|i| std::array::from_fn(|j| matrix[i][j] / (scale[i] * scale[j])));
     let mut right: [[f64; N]; N] =
         std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
-    // Gauss and Jordan: a positive matrix needs no exchange of rows.
+    // Gauss-Jordan elimination: a positive matrix needs no exchange of rows.
     for i in 0..N {
         let pivot = left[i][i];
         if pivot.is_nan() || pivot < 1e-13 {
@@ -37,7 +37,7 @@ pub(super) fn product<const N: usize>(matrix: &[[f64; N]; N], vector: &[f64; N])
     std::array::from_fn(|i| dot(&matrix[i], vector))
 }
 
-/// Returns the sum of the products of two vectors' parts.
+/// Returns the dot product of two vectors.
 pub(super) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

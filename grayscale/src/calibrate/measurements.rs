@@ -1,4 +1,4 @@
-//! Measurements from tables.
+//! Reads cure depths and widths from tables.
 
 use lamp_stack::{Dpi, Length};
 use thiserror::Error;
@@ -12,14 +12,14 @@ use crate::resin::{Dose, GrayLevel, Intensity, cure_width_of_square};
 pub struct DepthPoint {
     /// The gray level that was exposed.
     pub gray: GrayLevel,
-    /// The dose that white has in the same exposure.
+    /// The dose of white in the same exposure.
     pub dose: Dose,
-    /// How deep it cured.
+    /// The cure depth.
     pub depth: Length,
 }
 
 impl DepthPoint {
-    /// The dose that arrived (002 eq. 34).
+    /// Returns the dose that arrived (002 eq. 34).
     pub fn arriving(&self) -> Dose {
         self.dose * self.gray
     }
@@ -30,67 +30,67 @@ impl DepthPoint {
 pub struct WidthPoint {
     /// The square's side in the image, to the nanometre.
     pub feature_size: Length,
-    /// The dose that it was exposed with.
+    /// The dose.
     pub dose: Dose,
-    /// How far each edge lies outside the image.
+    /// The distance of the edges outside the image.
     pub width: Length,
 }
 
-/// The points of a table, and the rows that gave none.
+/// The points of a table, and the numbers of rows without a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured<T> {
-    /// What was measured.
+    /// The measurements.
     pub points: Vec<T>,
-    /// How many rows cured nothing, or grew by nothing, and lie on no line.
+    /// The number of rows that cured or grew by nothing, and so lie on no line.
     pub none: usize,
-    /// How many rows have an empty measurement.
+    /// The number of rows with an empty measurement.
     pub blank: usize,
 }
 
-/// Why a table holds no measurements.
+/// Why measurements cannot be read from a table.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum DataError {
     /// A column is missing.
     #[error("there is no column {0}")]
     NoColumn(&'static str),
-    /// Two columns say the same.
+    /// Two columns mean the same.
     #[error("columns {0} and {1} say the same thing twice: keep one")]
     Both(&'static str, &'static str),
-    /// A column that means nothing here.
+    /// A column is not known.
     #[error("column `{column}` is not known: the columns are {}, and note for remarks", known.join(", "))]
     Unknown {
         /// Its name.
         column: String,
-        /// Those that are.
+        /// The known columns.
         known: &'static [&'static str],
     },
-    /// Exposures without a light.
+    /// There are exposure times but no light.
     #[error("exposure_ms makes doses only with the light of full white, which is not known")]
     NoLight,
-    /// A cell that is no number.
+    /// A cell is not a number.
     #[error("line {line}, column {column}: `{text}` is not a number")]
     NotANumber {
-        /// From 1.
+        /// The line, from 1.
         line: usize,
-        /// Which column.
+        /// The column.
         column: &'static str,
-        /// What stands there.
+        /// The cell's text.
         text: String,
     },
-    /// A number that cannot be.
+    /// A number is out of range.
     #[error("line {line}, column {column}: {text} is not {wanted}")]
     Impossible {
-        /// From 1.
+        /// The line, from 1.
         line: usize,
-        /// Which column.
+        /// The column.
         column: &'static str,
-        /// What stands there.
+        /// The cell's text.
         text: String,
-        /// What should.
+        /// What it should be.
         wanted: &'static str,
     },
-    /// No row.
+    /// No row has a measurement.
     #[error("no row below the header holds a measurement")]
     NoRows,
 }
@@ -102,12 +102,12 @@ const SIZE: &str = "feature_um";
 const CURED: &str = "cured_um";
 const WIDTH: &str = "width_um";
 
-/// Takes cure depths from a table of `dose_mj_per_cm2` or, under a light,
-/// `exposure_ms`; `depth_um`; and `gray`, white where that is absent. The doses are
-/// those of full white. DepthRange of zero and below cured nothing.
+/// Reads cure depths from a table of `dose_mj_per_cm2` or, under a light,
+/// `exposure_ms`; `depth_um`; and `gray`, white if that is absent. The doses are
+/// those of full white. Depths of zero and below cured nothing.
 ///
 /// # Errors
-/// Returns an error if a column is missing or unknown, or a cell is no possible number.
+/// Returns an error if a column is missing or unknown, or a cell is not a number in its range.
 pub fn depth_points(
     table: &CsvTable,
     light: Option<Intensity>,
@@ -135,13 +135,13 @@ pub fn depth_points(
     })
 }
 
-/// Takes cure widths from a table of `dose_mj_per_cm2` or, under a light,
+/// Reads cure widths from a table of `dose_mj_per_cm2` or, under a light,
 /// `exposure_ms`; `feature_px` or `feature_um`, the squares' side in the image; and
 /// `cured_um`, their side after curing, or `width_um`, the cure width itself (002
 /// eq. 60). Widths of zero and below grew by nothing.
 ///
 /// # Errors
-/// Returns an error if a column is missing or unknown, or a cell is no possible number.
+/// Returns an error if a column is missing or unknown, or a cell is not a number in its range.
 pub fn width_points(
     table: &CsvTable,
     light: Option<Intensity>,
@@ -160,14 +160,14 @@ pub fn width_points(
         }
         let Some(of_row) = width.length_or_blank(row)? else { return Ok(Read::Blank) };
         let width = if is_side { cure_width_of_square(of_row, side) } else { of_row };
-        // Less than the shortest length is what rounding leaves of nothing.
+        // Widths below the shortest length are zero with a rounding error.
         let feature_size = side.to_whole_nm();
         let grew = width.um() >= *LENGTHS.start();
         Ok(if grew { Read::Point(WidthPoint { feature_size, dose, width }) } else { Read::Nothing })
     })
 }
 
-/// What a row says.
+/// The content of a row.
 enum Read<T> {
     Point(T),
     Nothing,

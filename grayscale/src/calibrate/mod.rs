@@ -1,6 +1,5 @@
-//! The numbers of a material from measurements: cure depths (002 section 3.3.5)
-//! and cure widths (002 section 3.4.3) over doses, each number with its 95%
-//! confidence interval.
+//! Finds a material's numbers from measured cure depths (002 section 3.3.5) and cure
+//! widths (002 section 3.4.3) over doses, each with its 95% confidence interval.
 //!
 //! ```
 //! use lamp_grayscale::calibrate::{CsvTable, depth_points, fit_curve};
@@ -13,8 +12,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The errors of the measurements are taken to be independent, of one spread and
-//! normal, and the doses to be exact.
+//! Measurement errors are assumed to be independent and normal with one spread, and doses
+//! to be exact.
 
 mod columns;
 mod csv_table;
@@ -66,24 +65,24 @@ impl<T: Quantity> Estimate<T> {
         Self { value: T::of(value), low: T::of(low), high: T::of(high) }
     }
 
-    /// An interval that reaches as far up as down.
+    /// Creates an estimate with a symmetric interval.
     fn even(value: f64, half: f64) -> Self {
         Self::new(value, value - half, value + half)
     }
 
-    /// Whether its interval holds a value.
+    /// Returns whether the interval holds a value.
     pub fn holds(&self, value: T) -> bool {
         self.low <= value && value <= self.high
     }
 
-    /// The distance from the value to the farther end of its interval.
+    /// Returns the distance from the value to the farther end of its interval.
     pub fn plus_minus(&self) -> T {
         let value = self.value.number();
         T::of((value - self.low.number()).max(self.high.number() - value))
     }
 
-    /// As a material file has it, to six digits; `plus-minus` is the longer side of
-    /// the interval, none where that has no end.
+    /// Returns the number for a material file, to six digits. Its `plus-minus` is the longer
+    /// side of the interval, absent if that is infinite.
     pub fn given(&self, source: &str) -> Given<T> {
         let plus_minus = self.plus_minus().number();
         Given {
@@ -94,27 +93,27 @@ impl<T: Quantity> Estimate<T> {
     }
 }
 
-/// Why measurements give no numbers.
+/// Why a model cannot be fitted to measurements.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FitError {
-    /// Not enough points for an interval.
+    /// There are too few points for an interval.
     #[error("{}", too_few_points(*points, *needed))]
     TooFew {
-        /// How many there are.
+        /// The number there is.
         points: usize,
-        /// How many it takes.
+        /// The least number.
         needed: usize,
     },
-    /// Not enough doses to tell the model's numbers apart.
+    /// There are too few doses for the model's parameters.
     #[error("{} too few: {needed} different ones are the least", are(*doses, "dose"))]
     TooFewDoses {
-        /// How many there are.
+        /// The number there is.
         doses: usize,
-        /// How many it takes.
+        /// The least number.
         needed: usize,
     },
-    /// What is measured falls with the dose.
+    /// The measurements fall with the dose.
     #[error("more dose cures less here ({} {unit}): are the columns exchanged?", short(*slope))]
     Falls {
         /// The slope.
@@ -137,14 +136,14 @@ pub enum FitError {
         /// Its unit.
         unit: &'static str,
     },
-    /// What is measured is the same at all doses.
+    /// All measurements are the same.
     #[error(
         "all points measure {} um, whatever the dose: is it the right column? \
          Measure lower doses too",
         short(*.0)
     )]
     Level(f64),
-    /// The points leave a number that is above zero open down to zero.
+    /// The interval of a number that must be above zero reaches zero.
     #[error(
         "the points do not tell {what}: {} +- {} {unit} reaches zero; \
          measure more doses, and several films of each",
@@ -152,7 +151,7 @@ pub enum FitError {
         short(*half)
     )]
     Vague {
-        /// Which number.
+        /// The number's name.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -161,17 +160,17 @@ pub enum FitError {
         /// Its unit.
         unit: &'static str,
     },
-    /// The line meets zero at no dose that a resin has.
+    /// The line meets zero at a dose that is not plausible.
     #[error(
         "the line begins at a dose of {} mJ/cm2, and a critical dose is above zero, \
          from 1e-6 to 1e9 mJ/cm2: measure lower doses",
         short(*.0)
     )]
     NoCriticalDose(f64),
-    /// Not enough gray levels.
+    /// There are too few gray levels.
     #[error("{} too few: 3 are the least", are(*.0, "gray level"))]
     TooFewLevels(usize),
-    /// A line of the gray model falls for sure.
+    /// A line of the gray model falls by more than its interval.
     #[error(
         "{what} falls by {} +- {} {unit} from black to white, but the gray model \
          takes no falling line, as a whiter level might cure less: fit the working curve of one level",
@@ -179,19 +178,19 @@ pub enum FitError {
         short(*half)
     )]
     GrayFalls {
-        /// Which number.
+        /// The number's name.
         what: &'static str,
-        /// By how much.
+        /// The fall from black to white.
         fall: f64,
         /// Half of its 95% confidence interval.
         half: f64,
         /// Its unit.
         unit: &'static str,
     },
-    /// A line of the gray model begins at no more than zero.
+    /// A line of the gray model begins at zero or less.
     #[error("{what} would be {} {unit} in the dark, and must be above zero", short(*at_zero))]
     GrayBegins {
-        /// Which number.
+        /// The number's name.
         what: &'static str,
         /// The line's value at gray level 0.
         at_zero: f64,
@@ -201,10 +200,10 @@ pub enum FitError {
     /// The model does not fit.
     #[error("the two-depth model does not fit these points: try the working curve")]
     NoFit,
-    /// The points of one group.
+    /// The points of one group cannot be fitted.
     #[error("{group}: {error}")]
     Within {
-        /// Which points.
+        /// The group.
         group: PointGroup,
         /// What is wrong with them.
         error: Box<FitError>,
@@ -230,12 +229,12 @@ impl fmt::Display for PointGroup {
     }
 }
 
-/// A number for an error.
+/// Writes a number for a message.
 fn short(number: f64) -> String {
     format_significant(number, 4)
 }
 
-/// So many of something are.
+/// Writes a count of something with its verb.
 fn are(count: usize, what: &str) -> String {
     if count == 1 { format!("1 {what} is") } else { format!("{count} {what}s are") }
 }

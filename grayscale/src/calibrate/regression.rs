@@ -1,18 +1,18 @@
-//! A straight line through points, by least squares.
+//! Fits a straight line to points by least squares.
 
 use super::FitError;
 use super::student_t::t_95;
 
-/// The least-squares line through points, and how sure it is.
+/// The least-squares line through points, with its 95% intervals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LineFit {
     mean_x: f64,
     mean_y: f64,
-    /// How many points it is of.
+    /// The number of points.
     pub(super) points: usize,
     /// Whether all y are the same.
     level: bool,
-    /// What all y rise for one x.
+    /// The rise of y for one x.
     pub(super) slope: f64,
     /// The share of the scatter of y that the line explains.
     pub(super) r2: f64,
@@ -25,7 +25,7 @@ impl LineFit {
     /// Fits points (x, y).
     ///
     /// # Errors
-    /// Returns an error if they are fewer than three, or have one x.
+    /// Returns an error if there are fewer than three points, or all have one x.
     pub(super) fn new(points: &[(f64, f64)]) -> Result<Self, FitError> {
         if points.len() < 3 {
             return Err(FitError::TooFew { points: points.len(), needed: 3 });
@@ -71,7 +71,7 @@ impl LineFit {
         (self.mean_half2 + self.slope_half2 * (x - self.mean_x).powi(2)).sqrt()
     }
 
-    /// Checks that the line rises for sure. `unit` is the slope's.
+    /// Checks that the line rises by more than its interval. `unit` is the slope's.
     pub(super) fn rising(self, unit: &'static str) -> Result<Self, FitError> {
         let (slope, half) = (self.slope, self.slope_half());
         if self.level {
@@ -86,8 +86,8 @@ impl LineFit {
     }
 
     /// Returns the x where a rising line is zero, and the ends of its 95% interval
-    /// by Fieller's theorem: those x at which the interval of y holds zero. Unlike
-    /// the delta method's it is exact, and lopsided as the truth is.
+    /// by Fieller's theorem: those x at which the interval of y holds zero. Unlike that of
+    /// the delta method, this interval is exact, and lopsided.
     pub(super) fn zero(&self) -> [f64; 3] {
         let (a, b) = (self.mean_y, self.slope);
         // (a + b u)² = mean_half2 + slope_half2 u², with u = x - mean_x.

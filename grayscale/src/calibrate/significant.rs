@@ -1,14 +1,14 @@
-//! Numbers with as many digits as mean something.
+//! Rounds numbers to significant digits.
 
-/// Writes a number to so many digits, with an exponent where it would be long
-/// otherwise; `-` where it has no end.
+/// Writes a number to `digits` significant digits, with an exponent if it would be long
+/// otherwise, or `-` if it is not finite.
 pub fn format_significant(number: f64, digits: usize) -> String {
     if !number.is_finite() {
         return "-".to_owned();
     }
     let decimals = digits.saturating_sub(1);
     let text = format!("{number:.decimals$e}");
-    // As written: 99.9999 has three digits before the point.
+    // Taken from the rounded text: 99.9999 has three digits before the point.
     let exponent: i32 = text.split('e').nth(1).and_then(|e| e.parse().ok()).unwrap_or(0);
     match exponent {
         _ if number == 0.0 => "0".to_owned(),
@@ -17,10 +17,10 @@ pub fn format_significant(number: f64, digits: usize) -> String {
     }
 }
 
-/// Rounds to so many digits.
+/// Rounds a number to `digits` significant digits.
 pub(super) fn round_significant(number: f64, digits: usize) -> f64 {
     let text = format!("{number:.*e}", digits - 1);
-    text.parse().expect("what is written as a number reads as one")
+    text.parse().expect("a written number reads back")
 }
 
 #[cfg(test)]

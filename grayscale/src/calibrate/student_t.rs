@@ -1,13 +1,13 @@
-//! Student's t distribution, of whole degrees of freedom.
+//! Quantiles of Student's t distribution.
 
 use std::f64::consts::FRAC_2_PI;
 
-/// Returns the `t` that 95% of a Student's t distribution lie within, from `-t` to
-/// `t`. Regressions have whole degrees of freedom, for which the share within is a
-/// finite sum: that takes less code than a dependency, and is exact.
+/// Returns the `t` for which 95% of Student's t distribution lie between `-t` and `t`.
+/// For whole degrees of freedom, as regressions have, that share is a finite sum: exact,
+/// and shorter than a dependency.
 ///
 /// # Panics
-/// Panics if there is no degree of freedom.
+/// Panics if `freedom` is zero.
 pub(super) fn t_95(freedom: usize) -> f64 {
     assert!(freedom > 0, "an interval needs a degree of freedom");
     // 12.7 for one degree, 1.96 for infinitely many.

@@ -1,4 +1,4 @@
-//! The two-depth model's curve, in the parameters that it is fitted in.
+//! The curve of the two-depth model, in parameters suited to fitting.
 
 use super::matrix::{inverse, product};
 
@@ -14,7 +14,8 @@ pub(super) struct TwoDepthCurve {
 }
 
 impl TwoDepthCurve {
-    /// The curve of a bend, by the line that `(exp(k z) - 1)/k = a (E - E_c)` is.
+    /// Fits the curve of a given bend by linear regression of `(exp(k z) - 1)/k`, which is
+    /// `a (E - E_c)`.
     pub(super) fn from_line(data: &[(f64, f64)], bend: f64) -> Option<Self> {
         let straight = |z: f64| if bend > 0.0 { (bend * z).exp_m1() / bend } else { z };
         let n = data.len() as f64;
@@ -30,8 +31,8 @@ impl TwoDepthCurve {
         (rate > 0.0).then_some(Self { onset, log_rate: rate.ln(), bend })
     }
 
-    /// The depth of a dose, and its derivatives over the three parameters; no
-    /// number below where the curve begins.
+    /// Returns the depth of a dose and its derivatives over the three parameters. They are
+    /// NaN below the pole of the logarithm.
     pub(super) fn at(&self, dose: f64) -> (f64, [f64; 3]) {
         let (rate, k) = (self.log_rate.exp(), self.bend);
         let u = rate * (dose - self.onset);
@@ -45,14 +46,14 @@ impl TwoDepthCurve {
         (depth, [-rate * grows, u * grows, over_bend])
     }
 
-    /// The sum of the squares that the curve leaves; infinite where it does not
-    /// reach a point.
+    /// Returns the sum of squared residuals; infinite if the curve does not reach a point.
     pub(super) fn squares(&self, data: &[(f64, f64)]) -> f64 {
         let sum: f64 = data.iter().map(|&(dose, z)| (z - self.at(dose).0).powi(2)).sum();
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
-    /// The products of the derivatives with each other, and with what is left.
+    /// Returns the normal equations: the products of the derivatives with each other and
+    /// with the residuals.
     pub(super) fn normal(&self, data: &[(f64, f64)]) -> ([[f64; 3]; 3], [f64; 3]) {
         let (mut matrix, mut vector) = ([[0.0; 3]; 3], [0.0; 3]);
         for &(dose, z) in data {
@@ -67,7 +68,7 @@ impl TwoDepthCurve {
         (matrix, vector)
     }
 
-    /// Steps downhill until no step helps.
+    /// Improves the parameters by Levenberg and Marquardt's method until no step helps.
     pub(super) fn fitted(mut self, data: &[(f64, f64)]) -> Option<Self> {
         let mut squares = self.squares(data);
         let mut damping = 1e-3;

@@ -1,4 +1,4 @@
-//! Material files: reading, and writing what reads back the same.
+//! Reads and writes material files, and lists the built-in ones.
 
 use lamp_stack::{Builtin, CatalogueError, Catalogued, one_line};
 use thiserror::Error;
@@ -11,7 +11,7 @@ use crate::resin::ModelError;
 #[non_exhaustive]
 pub enum MaterialError {
     /// The numbers of a table make no model.
-    // Not a source: its text is in this one's.
+    // No source: this message contains the problem's text.
     #[error("{table}.{problem}")]
     Model {
         /// The model's table.

@@ -1,5 +1,4 @@
-//! Materials: the numbers of a resin, each with its unit and its source, in
-//! TOML files.
+//! Materials: the numbers of a resin in TOML files, each with its unit and source.
 //!
 //! ```
 //! use lamp_grayscale::material::Material;
@@ -31,14 +30,14 @@ use crate::resin::{
     Resin, StraightLine, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
 };
 
-/// What is known of a resin. What a source does not give is absent. The default
-/// knows nothing, and has no name yet.
+/// The known numbers of a resin; unknown ones are absent. The default is empty and has no
+/// name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Material {
-    /// Its name, for commands: small letters, digits and `-`.
+    /// The name: small letters, digits and `-`.
     pub name: String,
-    /// What it is, in a line.
+    /// A description of one line.
     pub description: String,
     /// The light of full white, `I_0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -59,11 +58,10 @@ pub struct Material {
     /// The model of two penetration depths (000 eq. 3.8).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub two_depth: Option<TwoDepthNumbers>,
-    /// How far cured regions grow beyond their images, by the features' size
-    /// (002 section 3.4.4).
+    /// The cure width of features of several sizes (002 section 3.4.4).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cure_width: Vec<WidthNumbers>,
-    /// What else its source gives.
+    /// Other numbers of its source.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, Constant>,
 }
@@ -78,7 +76,7 @@ pub struct CurveNumbers {
     pub penetration_depth: Given<Length>,
 }
 
-/// The lines of a working curve that moves with the gray level or the light.
+/// The lines of a working curve over the gray level or the light.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct CurveLines {
@@ -88,12 +86,11 @@ pub struct CurveLines {
     pub penetration_depth: GivenLine<Length>,
 }
 
-/// The line of a working curve that moves with the lamp's light. `D_p` stays
-/// (002 figure 62).
+/// The line of a working curve over the lamp's light. `D_p` is constant (002 figure 62).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DimmedLines {
-    /// `E_c`, which rises for each W/cm².
+    /// `E_c`, with its rise for each W/cm².
     pub critical_dose: GivenLine<Dose>,
 }
 
@@ -107,7 +104,7 @@ pub struct TwoDepthNumbers {
     pub liquid_depth: Given<Length>,
     /// `D_pS`.
     pub solid_depth: Given<Length>,
-    /// What it holds for, if not for all depths.
+    /// The depths that it holds for, if not all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depths: Option<GivenDepths>,
 }
@@ -116,7 +113,7 @@ pub struct TwoDepthNumbers {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct WidthNumbers {
-    /// The side of the squares measured.
+    /// The side of the measured squares.
     #[serde(with = "number::written")]
     pub feature_size: Length,
     /// `E_c^w`.
@@ -125,7 +122,7 @@ pub struct WidthNumbers {
     pub sensitivity: Given<WidthSensitivity>,
 }
 
-/// Why a material says nothing of exposures.
+/// Why no exposure follows from a material.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ResinError {
@@ -141,7 +138,7 @@ pub enum ResinError {
 }
 
 impl Material {
-    /// Returns its working curve, if it has one.
+    /// Returns the working curve, if there is one.
     ///
     /// # Errors
     /// Returns an error if a number is not above zero.
@@ -152,11 +149,11 @@ impl Material {
         self.working_curve.as_ref().map(curve).transpose().map_err(of("working-curve"))
     }
 
-    /// Returns how its working curve moves with the lamp's light, if it says.
+    /// Returns the working curve over the lamp's light, if there is one.
     ///
     /// # Errors
-    /// Returns an error if the line falls or does not begin above zero, or there is no
-    /// working curve to keep the penetration depth of.
+    /// Returns an error if the line falls or does not begin above zero, or if no working
+    /// curve gives the penetration depth.
     pub fn dimmed_lamp(&self) -> Result<Option<IntensityLines>, MaterialError> {
         let Some(lines) = &self.dimmed_lamp else { return Ok(None) };
         let curve = self.working_curve()?.ok_or(MaterialError::NoWorkingCurve)?;
@@ -165,7 +162,7 @@ impl Material {
         lines.map(Some).map_err(of("dimmed-lamp"))
     }
 
-    /// Returns the working curve of each gray level, if it has them.
+    /// Returns the working curve of each gray level, if there is one.
     ///
     /// # Errors
     /// Returns an error if a line falls or does not begin above zero.
@@ -176,8 +173,7 @@ impl Material {
         self.gray.as_ref().map(curve).transpose().map_err(of("gray"))
     }
 
-    /// Returns how its working curve moves with the light that gray levels
-    /// pass, if it says.
+    /// Returns the working curve over the light that gray levels pass, if there is one.
     ///
     /// # Errors
     /// Returns an error if a line falls or does not begin above zero.
@@ -188,10 +184,10 @@ impl Material {
         self.gray_light.as_ref().map(curve).transpose().map_err(of("gray-light"))
     }
 
-    /// Returns its model of two penetration depths, if it has one.
+    /// Returns the model of two penetration depths, if there is one.
     ///
     /// # Errors
-    /// Returns an error if a number is not above zero, or the depths are none.
+    /// Returns an error if a number is not above zero, or the range of depths is empty.
     pub fn two_depth(&self) -> Result<Option<TwoDepth>, MaterialError> {
         let model = |numbers: &TwoDepthNumbers| {
             let depths = numbers.depths.as_ref().map_or(DepthRange::ALL, GivenDepths::depths);
@@ -201,7 +197,7 @@ impl Material {
         self.two_depth.as_ref().map(model).transpose().map_err(of("two-depth"))
     }
 
-    /// Returns its cure width, if it has one.
+    /// Returns the cure width, if there is one.
     ///
     /// # Errors
     /// Returns an error if a number is not above zero, or a size stands twice.
@@ -218,18 +214,19 @@ impl Material {
         CureWidth::new(lines).map(Some).map_err(of("cure-width"))
     }
 
-    /// Whether it has a cure model.
+    /// Returns whether there is a cure model.
     fn has_model(&self) -> bool {
         let gray = self.gray.is_some() || self.gray_light.is_some();
         gray || self.two_depth.is_some() || self.working_curve.is_some()
     }
 
-    /// Returns the resin under its lamp, by the model that says most: the gray
-    /// levels' curves, those of the light that gray levels pass, two
-    /// penetration depths, or the working curve.
+    /// Returns the resin under its lamp, by the most detailed model: the curves of the gray
+    /// levels, those of the light that gray levels pass, two penetration depths, or the
+    /// working curve.
     ///
     /// # Errors
-    /// Returns an error if it has no cure model or no intensity, or its numbers make none.
+    /// Returns an error if there is no cure model or no intensity, or if numbers are
+    /// impossible.
     pub fn resin(&self) -> Result<Resin, ResinError> {
         let light = match &self.intensity {
             Some(light) => light.value,

@@ -1,4 +1,4 @@
-//! The numbers of a material file, each with where it comes from.
+//! The numbers of a material file, each with its source.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::resin::{DepthRange, Quantity, StraightLine};
 
-/// A number with its unit, and where it comes from.
+/// A number with its unit and its source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 #[serde(bound(serialize = "T: Quantity", deserialize = "T: Quantity"))]
@@ -17,7 +17,7 @@ pub struct Given<T> {
     /// The number.
     #[serde(with = "written")]
     pub value: T,
-    /// Half the width of its 95% confidence interval, where it is known.
+    /// Half the width of its 95% confidence interval, if known.
     #[serde(with = "written_or_none", default, skip_serializing_if = "Option::is_none")]
     pub plus_minus: Option<T>,
     /// The equation, table, figure or measurement.
@@ -25,7 +25,7 @@ pub struct Given<T> {
     pub source: String,
 }
 
-/// A straight line, and where it comes from.
+/// A straight line and its source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 #[serde(bound(serialize = "T: Quantity", deserialize = "T: Quantity"))]
@@ -33,7 +33,7 @@ pub struct GivenLine<T> {
     /// The value in the dark.
     #[serde(with = "written")]
     pub at_zero: T,
-    /// What is added by full white, or for each W/cm².
+    /// The increase to full white, or for each W/cm².
     #[serde(with = "written")]
     pub rise: T,
     /// The equation, table, figure or measurement.
@@ -47,14 +47,14 @@ impl<T: Copy> GivenLine<T> {
     }
 }
 
-/// The depths that a model holds for, and where that comes from.
+/// The depths that a model holds for, and their source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct GivenDepths {
     /// The shallowest.
     #[serde(with = "written")]
     pub from: Length,
-    /// The deepest, where there is one.
+    /// The deepest, if there is a limit.
     #[serde(with = "written_or_none", default, skip_serializing_if = "Option::is_none")]
     pub to: Option<Length>,
     /// The section, figure or measurement.
@@ -68,7 +68,7 @@ impl GivenDepths {
     }
 }
 
-/// A number that no cure model reads, kept for who plans by it.
+/// A number that no cure model reads, kept for planning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Constant {
@@ -82,7 +82,7 @@ pub struct Constant {
     pub source: String,
 }
 
-/// A number to the last bit, with an exponent where it would be long otherwise.
+/// Writes a number to the last bit, with an exponent if it would be long otherwise.
 fn exact(number: f64) -> String {
     let plain = number == 0.0 || (1e-6..1e15).contains(&number.abs());
     if plain { number.to_string() } else { format!("{number:e}") }
@@ -137,7 +137,7 @@ mod written_or_none {
         }
     }
 
-    /// Called only where the key stands.
+    // Called only if the key is there.
     pub(super) fn deserialize<'de, T: Quantity, D: Deserializer<'de>>(
         from: D,
     ) -> Result<Option<T>, D::Error> {

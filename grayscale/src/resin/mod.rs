@@ -97,9 +97,9 @@ impl Resin {
         Ok(self.model.dose(depth)? / self.light)
     }
 
-    /// Returns the gray levels that cure each depth in an exposure, for slicing:
-    /// what [`Self::gray_for`] gives, to the nearest of 255. DepthRange from what
-    /// full white cures are white.
+    /// Returns the gray levels that cure each depth in an exposure, for slicing: those of
+    /// [`Self::gray_for`], rounded to 8 bits. Depths that white just cures, and deeper
+    /// ones, are white.
     ///
     /// # Errors
     /// Returns an error if the model does not hold for all depths up to that of white.
