@@ -44,7 +44,7 @@ pub fn broken(mesh: &Mesh, defect: Defect, count: usize, seed: u32) -> Mesh {
 /// # Panics
 /// If the layer is gray, which no slice is.
 pub fn mask(layer: &Layer) -> &Mask {
-    match &layer.image {
+    match &*layer.image {
         Image::Mask(mask) => mask,
         Image::Gray(_) => panic!("slices are masks"),
     }

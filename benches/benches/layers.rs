@@ -13,8 +13,8 @@ use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
 use lamp_slicer::{FacetIndex, Fill, LayerLevels, Part, Placement, SliceOptions, Slices, Units};
 use lamp_stack::{
-    DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo,
-    PageWriter, g4,
+    DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, LayerImage, Length, Mask,
+    PageInfo, PageWriter, g4,
 };
 
 /// Layers with pins and holes, 1500 dpi.
@@ -36,11 +36,12 @@ fn depth_levels() -> DepthLevels {
 }
 
 fn masks(slices: Slices) -> Vec<Mask> {
-    let mask = |layer| match layer {
-        Ok(lamp_stack::Layer { image: Image::Mask(mask), .. }) => mask,
-        _ => unreachable!("slices are masks"),
+    let image = |layer: Result<Layer, _>| layer.expect("facets in memory can be read").image;
+    let mask = |image: LayerImage| match image.into_image() {
+        Image::Mask(mask) => mask,
+        Image::Gray(_) => unreachable!("slices are masks"),
     };
-    slices.map(mask).collect()
+    slices.map(|layer| mask(image(layer))).collect()
 }
 
 fn filled(mut slices: Slices) -> Slices {
@@ -66,7 +67,7 @@ fn fax_encode(mask: &Mask) -> Vec<u8> {
 fn layers(criterion: &mut Criterion) {
     let slice = slices(100_000, None);
     let masks = masks(slice());
-    let transitions: usize = masks.iter().map(Mask::transition_count).sum();
+    let transitions: usize = masks.iter().map(Mask::change_count).sum();
     let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
     let size = (masks[0].width(), masks[0].height());
 
@@ -89,7 +90,7 @@ fn layers(criterion: &mut Criterion) {
     });
     group.bench_function("decode", |b| {
         let decode = |strip: &Vec<u8>| g4::decode(strip, size.0, size.1).expect("our own strip");
-        b.iter(|| strips.iter().map(|strip| decode(strip).transition_count()).sum::<usize>());
+        b.iter(|| strips.iter().map(|strip| decode(strip).change_count()).sum::<usize>());
     });
     group.bench_function("encode, fax crate", |b| {
         b.iter(|| masks.iter().map(|mask| fax_encode(mask).len()).sum::<usize>());
@@ -200,7 +201,7 @@ fn fill(bytes: &mut [u8], first: usize, end: usize) {
 /// Cure-width compensation of whole layers, beside decoding them to bitmaps.
 fn compensation(criterion: &mut Criterion) {
     let masks = masks(slices(100_000, None)());
-    let transitions: usize = masks.iter().map(Mask::transition_count).sum();
+    let transitions: usize = masks.iter().map(Mask::change_count).sum();
     let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
     let size = (masks[0].width(), masks[0].height());
     let by = 25.0 * 1500.0 / 25_400.0;
@@ -214,7 +215,7 @@ fn compensation(criterion: &mut Criterion) {
         b.iter(|| masks.iter().map(|mask| offset(mask, by).change_count()).sum::<usize>());
     });
     group.bench_function("1 bit", |b| {
-        let moved = |mask| offset_one_bit(mask, by).transition_count();
+        let moved = |mask| offset_one_bit(mask, by).change_count();
         b.iter(|| masks.iter().map(moved).sum::<usize>());
     });
     group.bench_function("decode to bitmaps, fax crate", |b| {
@@ -236,11 +237,8 @@ fn compensation(criterion: &mut Criterion) {
 
 /// A stack of one page, in memory.
 fn tiff_file(mask: &Mask) -> Vec<u8> {
-    let layer = Layer {
-        info: PageInfo::default(),
-        dpi: Dpi::new(1500.0),
-        image: Image::Mask(mask.clone()),
-    };
+    let layer =
+        Layer { info: PageInfo::default(), dpi: Dpi::new(1500.0), image: mask.clone().into() };
     let mut file = Vec::new();
     let mut writer = PageWriter::new(&mut file, Format::Classic);
     writer.push(EncodedPage::new(&layer)).expect("memory takes all");

@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let stack = std::env::args().nth(1).ok_or("name a stack")?;
     let mut masks = Vec::new();
     for layer in Pages::open(Path::new(&stack))?.layers() {
-        match layer?.image {
+        match layer?.image.into_image() {
             Image::Mask(mask) => masks.push(mask),
             Image::Gray(_) => return Err("only 1-bit stacks are in Group 4".into()),
         }
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .ok_or("the fax crate cannot decode our strip")?;
         assert!(same && rows.next().is_none(), "the fax crate decodes page {page} otherwise");
     }
-    println!("transitions {}", masks.iter().map(Mask::transition_count).sum::<usize>());
+    println!("transitions {}", masks.iter().map(Mask::change_count).sum::<usize>());
     let decode = |(strip, mask): (&Vec<u8>, &Mask)| {
         let decoded = g4::decode(strip, mask.width(), mask.height()).expect("our own strip");
         drop(black_box(decoded));

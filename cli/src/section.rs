@@ -207,7 +207,7 @@ impl<'a> Exposures<'a> {
         let (line, image, top) = (self.course.line, &layer.image, Length::from_um(z + thickness));
         self.in_full.expose(line, image, top, |_| depths[255]);
         self.by_levels.expose(line, image, top, |level| depths[usize::from(level)]);
-        self.has_gray |= matches!(image, Image::Gray(_));
+        self.has_gray |= matches!(&**image, Image::Gray(_));
         self.heights_um.start = self.heights_um.start.min(z);
         self.heights_um.end = self.heights_um.end.max(z + thickness);
         Ok(())

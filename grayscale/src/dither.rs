@@ -54,8 +54,8 @@ pub fn dither<E: From<DitherError> + Send>(
     method: DitherMethod,
 ) -> impl Iterator<Item = Result<Layer, E>> {
     map_in_order(layers, move |mut layer| {
-        if let Image::Gray(gray) = &layer.image {
-            layer.image = Image::Mask(dither_image(gray, method, layer.info.index)?);
+        if let Image::Gray(gray) = &*layer.image {
+            layer.image = dither_image(gray, method, layer.info.index)?.into();
             layer.info.other.insert("dither".to_owned(), method.name().into());
         }
         Ok(layer)

@@ -41,13 +41,13 @@ proptest! {
 fn masks_pass_unchanged_and_gray_pages_name_the_method() {
     let info = PageInfo { index: 3, ..PageInfo::default() };
     let mask = Image::Mask(Mask::new(8, vec![0, 2], vec![1, 4]).unwrap());
-    let masked = Layer { info: info.clone(), dpi: None, image: mask };
-    let gray = Layer { info, dpi: None, image: Image::Gray(GrayMask::new(8)) };
+    let masked = Layer { info: info.clone(), dpi: None, image: mask.into() };
+    let gray = Layer { info, dpi: None, image: GrayMask::new(8).into() };
     let layers = [Ok::<_, DitherError>(masked.clone()), Ok(gray)];
     let out: Vec<_> =
         dither(layers.into_iter(), DitherMethod::FloydSteinberg).map(Result::unwrap).collect();
     assert_eq!(out[0], masked);
-    assert!(matches!(out[1].image, Image::Mask(_)));
+    assert!(matches!(*out[1].image, Image::Mask(_)));
     assert_eq!(out[1].info.other["dither"], "floyd-steinberg");
 }
 

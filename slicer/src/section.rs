@@ -139,7 +139,9 @@ mod tests {
         let grid = *slices.grid();
         let mut transitions = 0;
         for (k, layer) in slices.enumerate() {
-            let lamp_stack::Image::Mask(mask) = layer.unwrap().image else { panic!("a mask") };
+            let lamp_stack::Image::Mask(mask) = layer.unwrap().image.into_image() else {
+                panic!("a mask")
+            };
             let z_mm = (5.0 * (k as f64 + 1.0)).min(76.2);
             let rows = section(model(), &options(z_mm, grid.origin_mm[1], grid.height)).unwrap();
             for (row, inside) in rows.iter().enumerate() {

@@ -334,7 +334,7 @@ impl Slices {
         Layer {
             info: PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) },
             dpi: Some(self.grid.dpi),
-            image,
+            image: image.into(),
         }
     }
 

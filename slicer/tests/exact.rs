@@ -29,7 +29,7 @@ fn wrong_pixels(
         assert!(layer.info.stray_rows.is_empty() && layer.info.closed == Some(true));
         let z_mm = (layer.info.z_um.unwrap() + layer.info.thickness_um.unwrap()) / 1000.0;
         let z_mm = z_mm.min(top_mm);
-        let Image::Mask(mask) = layer.image else { panic!("a mask") };
+        let Image::Mask(mask) = layer.image.into_image() else { panic!("a mask") };
         for row in 0..grid.height {
             let mut is_white = false;
             let mut transitions = mask.row(row).iter().peekable();
@@ -170,7 +170,7 @@ fn gray_levels_are_those_of_the_exact_depth() {
         for layer in slices {
             let layer = layer.unwrap();
             let top_mm = (layer.info.z_um.unwrap() + layer.info.thickness_um.unwrap()) / 1000.0;
-            let Image::Gray(image) = layer.image else { panic!("a gray layer") };
+            let Image::Gray(image) = layer.image.into_image() else { panic!("a gray layer") };
             for (row, changes) in (0..).zip(image.rows()) {
                 let ends = changes.iter().skip(1).map(|change| change.column);
                 for (change, end) in changes.iter().zip(ends.chain([grid.width])) {

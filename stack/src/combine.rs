@@ -1,11 +1,11 @@
-//! Images out of others of their size, pixel by pixel, on runs.
+//! Combines images pixel by pixel, on their runs.
 
-use crate::gray::{GrayMask, LevelChange};
+use crate::gray::GrayMask;
 use crate::layer::Image;
 use crate::limits::MAX_RUNS;
-use crate::mask::{Mask, MaskBuilder};
+use crate::runs::{Change, Pixel, RunImage};
 
-/// What becomes of two images, pixel by pixel.
+/// An operation that combines two images pixel by pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Op {
     /// White where either is.
@@ -19,7 +19,7 @@ pub enum Op {
 }
 
 impl Op {
-    /// Whether the pixel is white that two make.
+    /// Returns true if the combination of two pixels is white.
     pub fn is_white(self, a: bool, b: bool) -> bool {
         match self {
             Self::Union => a | b,
@@ -29,9 +29,10 @@ impl Op {
         }
     }
 
-    /// The level that two levels make: the higher or the lower one, the lower of
-    /// the first and what the second leaves to 255, or how far they are apart.
-    /// Of 0 and 255 it makes what [`is_white`](Self::is_white) says.
+    /// Returns the combination of two levels: their maximum for a union, their
+    /// minimum for an intersection, the lower of `a` and `255 - b` for a
+    /// difference, and `|a - b|` for an exclusive or. For the levels 0 and 255
+    /// this agrees with [`is_white`](Self::is_white).
     pub fn level(self, a: u8, b: u8) -> u8 {
         match self {
             Self::Union => a.max(b),
@@ -41,8 +42,8 @@ impl Op {
         }
     }
 
-    /// Makes `out` the row that two rows' transitions make.
-    pub fn rows(self, a: &[u32], b: &[u32], out: &mut Vec<u32>) {
+    /// Replaces `out` by the combination of two rows.
+    pub fn rows<C: Change<Pixel: Combine>>(self, a: &[C], b: &[C], out: &mut Vec<C>) {
         match (a, b, self) {
             (row, [], Self::Union | Self::Difference | Self::Xor)
             | ([], row, Self::Union | Self::Xor) => {
@@ -50,7 +51,7 @@ impl Op {
                 out.extend_from_slice(row);
             }
             ([], _, _) | (_, [], _) => out.clear(),
-            _ => combine_rows([a, b], |[a, b]| self.is_white(a, b), out),
+            _ => combine_rows([a, b], |[a, b]| Combine::combined(self, a, b), out),
         }
     }
 }
@@ -62,103 +63,95 @@ crate::named!(Op {
     Xor = "xor",
 });
 
-/// Makes `out` the row whose every pixel is what `colour` makes of the pixels
-/// of `rows` there. `colour` must leave black what is black in all.
-pub fn combine_rows<const N: usize>(
-    mut rows: [&[u32]; N],
-    colour: impl Fn([bool; N]) -> bool,
-    out: &mut Vec<u32>,
-) {
-    out.clear();
-    let mut colours = [false; N];
-    let mut white = false;
-    while let Some(column) = rows.iter().filter_map(|row| row.first().copied()).min() {
-        for (row, colour) in rows.iter_mut().zip(&mut colours) {
-            if row.first() == Some(&column) {
-                *row = &row[1..];
-                *colour = !*colour;
-            }
-        }
-        if white != colour(colours) {
-            white = !white;
-            out.push(column);
-        }
+/// A pixel's value that an [`Op`] knows how to combine.
+pub trait Combine: Pixel {
+    /// Returns the combination of two pixels.
+    fn combined(op: Op, a: Self, b: Self) -> Self;
+}
+
+impl Combine for bool {
+    #[inline]
+    fn combined(op: Op, a: bool, b: bool) -> bool {
+        op.is_white(a, b)
     }
 }
 
-/// Makes `out` the row whose every pixel has the level that `level` makes of
-/// those of `rows` there. `level` must leave black what is black in all.
-pub fn combine_levels<const N: usize>(
-    mut rows: [&[LevelChange]; N],
-    level: impl Fn([u8; N]) -> u8,
-    out: &mut Vec<LevelChange>,
-) {
-    out.clear();
-    let mut levels = [0; N];
-    let mut last = 0;
-    while let Some(column) = rows.iter().filter_map(|row| Some(row.first()?.column)).min() {
-        for (row, level) in rows.iter_mut().zip(&mut levels) {
-            if let Some((change, rest)) = row.split_first().filter(|(c, _)| c.column == column) {
-                (*level, *row) = (change.level, rest);
-            }
-        }
-        let next = level(levels);
-        if std::mem::replace(&mut last, next) != next {
-            out.push(LevelChange { column, level: next });
-        }
+impl Combine for u8 {
+    #[inline]
+    fn combined(op: Op, a: u8, b: u8) -> u8 {
+        op.level(a, b)
     }
 }
 
-impl Mask {
-    /// What an operation makes of this image and another of its size; `None`
-    /// where that has more runs than any image may have.
+/// Replaces `out` by the row whose every pixel is what `pixel` makes of the
+/// pixels of `rows` there. `pixel` must leave black what is black in all rows.
+#[inline]
+pub fn combine_rows<C: Change, const N: usize>(
+    rows: [&[C]; N],
+    pixel: impl Fn([C::Pixel; N]) -> C::Pixel,
+    out: &mut Vec<C>,
+) {
+    out.clear();
+    let mut last = C::Pixel::default();
+    walk_rows(rows, |column, pixels| {
+        let next = pixel(pixels);
+        if next != last {
+            last = next;
+            out.push(C::new(column, next));
+        }
+    });
+}
+
+/// Calls `each` at every column where some of the rows change, with the rows'
+/// pixels from there on.
+#[inline]
+pub(crate) fn walk_rows<C: Change, const N: usize>(
+    mut rows: [&[C]; N],
+    mut each: impl FnMut(u32, [C::Pixel; N]),
+) {
+    let mut pixels = [C::Pixel::default(); N];
+    while let Some(column) = rows.iter().filter_map(|row| Some(row.first()?.column())).min() {
+        for (row, pixel) in rows.iter_mut().zip(&mut pixels) {
+            if let Some((change, rest)) = row.split_first()
+                && change.column() == column
+            {
+                (*pixel, *row) = (change.after(*pixel), rest);
+            }
+        }
+        each(column, pixels);
+    }
+}
+
+impl<C: Change<Pixel: Combine>> RunImage<C> {
+    /// Returns the combination of this image and another of its size by
+    /// [`Op::is_white`] or [`Op::level`], or `None` if it has more than
+    /// [`MAX_RUNS`].
     ///
     /// # Panics
-    /// If the sizes differ.
+    /// Panics if the sizes differ.
     pub fn combined(&self, op: Op, other: &Self) -> Option<Self> {
         assert_eq!((self.width(), self.height()), (other.width(), other.height()));
-        let mut mask = MaskBuilder::new(self.width());
-        mask.reserve(self.height() as usize, self.transition_count());
+        let mut image = Self::without_rows(self.width());
+        image.reserve(self.height() as usize, self.change_count());
         let mut row = Vec::new();
         for (a, b) in self.rows().zip(other.rows()) {
             op.rows(a, b, &mut row);
-            if mask.transition_count() + row.len() > MAX_RUNS {
+            if image.change_count() + row.len() > MAX_RUNS {
                 return None;
             }
-            mask.push_checked(&row);
+            image.push(&row);
         }
-        Some(mask.finish())
-    }
-}
-
-impl GrayMask {
-    /// What an operation makes of this image and another of its size, by
-    /// [`Op::level`]; `None` where that has more runs than any image may have.
-    ///
-    /// # Panics
-    /// If the sizes differ.
-    pub fn combined(&self, op: Op, other: &Self) -> Option<Self> {
-        assert_eq!((self.width(), self.height()), (other.width(), other.height()));
-        let mut gray = Self::new(self.width());
-        let mut row = Vec::new();
-        for (a, b) in self.rows().zip(other.rows()) {
-            combine_levels([a, b], |[a, b]| op.level(a, b), &mut row);
-            if gray.change_count() + row.len() > MAX_RUNS {
-                return None;
-            }
-            gray.push_row(&row).expect("both rows are of images as wide");
-        }
-        Some(gray)
+        Some(image)
     }
 }
 
 impl Image {
-    /// What an operation makes of this image and another of its size: a mask of
-    /// two masks, else a gray image. `None` where that has more runs than any
-    /// image may have.
+    /// Returns the combination of this image and another of its size: a mask of
+    /// two masks, else a gray mask. Returns `None` if it has more than
+    /// [`MAX_RUNS`].
     ///
     /// # Panics
-    /// If the sizes differ.
+    /// Panics if the sizes differ.
     pub fn combined(&self, op: Op, other: &Self) -> Option<Self> {
         Some(match (self, other) {
             (Self::Mask(a), Self::Mask(b)) => Self::Mask(a.combined(op, b)?),

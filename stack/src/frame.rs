@@ -1,26 +1,25 @@
-//! Images cropped and padded, on runs.
+//! Crops and pads images, on their runs.
 
-use crate::gray::{GrayMask, LevelChange};
 use crate::layer::Image;
-use crate::mask::{Mask, MaskBuilder};
+use crate::runs::{Change, RunImage};
 
-/// A part of an image's plane, which may reach beyond the image: what is
-/// outside is black.
+/// The rectangle that an image is cropped or padded to. It may reach beyond the
+/// image, where it is black.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// The image's column that becomes the first.
     pub left: i64,
     /// The image's row that becomes the top one.
     pub top: i64,
-    /// How many columns there are.
+    /// The width in pixels.
     pub width: u32,
-    /// How many rows there are.
+    /// The height in pixels.
     pub height: u32,
 }
 
 impl Frame {
-    /// The rows of an image of `height` that the frame shows, after how many
-    /// black ones, and before how many.
+    /// Returns the number of black rows above an image of `height`, the image's
+    /// rows that the frame shows, and the number of black rows below.
     fn rows(&self, height: u32) -> (u32, std::ops::Range<u32>, u32) {
         let within = |row: i64| row.clamp(0, height.into()) as u32;
         let shown = within(self.top)..within(self.top.saturating_add(self.height.into()));
@@ -30,108 +29,72 @@ impl Frame {
         (above, shown, below)
     }
 
-    /// Whether it shows all of an image, and no more.
-    fn is_whole(&self, width: u32, height: u32) -> bool {
+    /// Returns true if the frame is that of an image of this size.
+    pub fn is_whole(&self, width: u32, height: u32) -> bool {
         *self == Self { left: 0, top: 0, width, height }
     }
 }
 
-/// Adds to `out`, a row's transitions in an image of `into` columns, those of a
-/// row of `width` columns whose first stands at `left` there; what lies outside
-/// is cut off. The last transition in `out` must not be past `left`: one that
-/// stands there goes, if the row begins white, and white goes on.
-pub fn place_row(transitions: &[u32], width: u32, left: i64, into: u32, out: &mut Vec<u32>) {
+/// Appends a row to `out`, a row of an image of `into` columns, such that its
+/// first column stands at `left` there. What lies outside is cut off.
+///
+/// `width` is that of the appended row. `out` must not change behind `left`; a
+/// change at `left` itself goes if both rows have the same value there.
+pub fn place_row<C: Change>(changes: &[C], width: u32, left: i64, into: u32, out: &mut Vec<C>) {
     let (start, end) = (left.clamp(0, into.into()), left.saturating_add(width.into()));
-    let hidden = transitions.partition_point(|&column| left.saturating_add(column.into()) <= start);
-    let (hidden, shown) = transitions.split_at(hidden);
-    if hidden.len() % 2 == 1 && start < end {
-        toggle(start, into, out);
+    let place = |change: C| left.saturating_add(change.column().into());
+    let (hidden, shown) = changes.split_at(changes.partition_point(|&c| place(c) <= start));
+    let black = C::Pixel::default();
+    let (first, last) = (C::last_pixel(hidden), C::last_pixel(changes));
+    if first != black && start < end {
+        change_to(first, start, into, out);
     }
-    let last = shown.partition_point(|&column| left.saturating_add(column.into()) < into.into());
-    out.extend(shown[..last].iter().map(|&column| (left + i64::from(column)) as u32));
-    if transitions.len() % 2 == 1 && end > start {
-        toggle(end, into, out);
+    let visible = shown.partition_point(|&change| place(change) < into.into());
+    let mut pixel = first;
+    out.extend(shown[..visible].iter().map(|&change| {
+        pixel = change.after(pixel);
+        C::new(place(change) as u32, pixel)
+    }));
+    if last != black && end > start {
+        change_to(black, end, into, out);
     }
 }
 
-/// Changes a row's colour from a column on, which is past its others or the last.
-fn toggle(column: i64, width: u32, row: &mut Vec<u32>) {
+/// Changes a row's value from a column on, which is that of its last change or
+/// behind it.
+fn change_to<C: Change>(pixel: C::Pixel, column: i64, width: u32, row: &mut Vec<C>) {
     if column >= width.into() {
         return;
     }
     let column = column as u32;
-    if row.pop_if(|last| *last == column).is_none() {
-        row.push(column);
+    row.pop_if(|last| last.column() == column);
+    if C::last_pixel(row) != pixel {
+        row.push(C::new(column, pixel));
     }
 }
 
-impl Mask {
-    /// What a frame shows of the image: crops and pads it.
+impl<C: Change> RunImage<C> {
+    /// Crops and pads the image to a frame.
     pub fn framed(&self, frame: Frame) -> Self {
         if frame.is_whole(self.width(), self.height()) {
             return self.clone();
         }
         let (above, shown, below) = frame.rows(self.height());
-        let mut mask = MaskBuilder::new(frame.width);
-        mask.push_black(above);
-        let mut row = Vec::new();
+        let mut image = Self::without_rows(frame.width);
+        image.push_black_rows(above);
+        let (left, mut row) = (frame.left.saturating_neg(), Vec::new());
         for index in shown {
             row.clear();
-            place_row(
-                self.row(index),
-                self.width(),
-                frame.left.saturating_neg(),
-                frame.width,
-                &mut row,
-            );
-            mask.push_checked(&row);
+            place_row(self.row(index), self.width(), left, frame.width, &mut row);
+            image.push(&row);
         }
-        mask.push_black(below);
-        mask.finish()
+        image.push_black_rows(below);
+        image
     }
-}
-
-impl GrayMask {
-    /// What a frame shows of the image: crops and pads it.
-    pub fn framed(&self, frame: Frame) -> Self {
-        if frame.is_whole(self.width(), self.height()) {
-            return self.clone();
-        }
-        let (above, shown, below) = frame.rows(self.height());
-        let mut gray = Self::new(frame.width);
-        let blank = |gray: &mut Self, rows| {
-            (0..rows).for_each(|_| gray.push_row(&[]).expect("a black row fits"));
-        };
-        blank(&mut gray, above);
-        for index in shown {
-            let row = framed_levels(self.row(index), self.width(), frame);
-            gray.push_row(&row).expect("changes within the frame");
-        }
-        blank(&mut gray, below);
-        gray
-    }
-}
-
-/// What a frame shows of a gray row of `width` columns.
-fn framed_levels(changes: &[LevelChange], width: u32, frame: Frame) -> Vec<LevelChange> {
-    let end = LevelChange { column: width, level: 0 };
-    let mut row: Vec<LevelChange> = Vec::new();
-    for change in changes.iter().chain([&end]) {
-        let column = i64::from(change.column).saturating_sub(frame.left).max(0);
-        if column >= frame.width.into() {
-            break;
-        }
-        let column = column as u32;
-        row.pop_if(|last| last.column == column);
-        if row.last().map_or(0, |last| last.level) != change.level {
-            row.push(LevelChange { column, level: change.level });
-        }
-    }
-    row
 }
 
 impl Image {
-    /// What a frame shows of the image: crops and pads it.
+    /// Crops and pads the image to a frame.
     pub fn framed(&self, frame: Frame) -> Self {
         match self {
             Self::Mask(mask) => Self::Mask(mask.framed(frame)),
@@ -145,6 +108,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::Mask;
     use crate::testing::{arbitrary_gray, arbitrary_mask, level};
 
     fn arbitrary_frame() -> impl Strategy<Value = Frame> {

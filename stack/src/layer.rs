@@ -5,9 +5,9 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value};
 
-use crate::gray::GrayMask;
+use crate::gray::{GrayMask, gray_runs};
 use crate::length::{Dpi, Length};
-use crate::mask::Mask;
+use crate::mask::{Mask, white_runs};
 use crate::ordered::MemorySize;
 
 /// What is exposed at one height: an image, and where and how it is exposed.
@@ -19,30 +19,100 @@ pub struct Layer {
     /// centimetres.
     pub dpi: Option<Dpi>,
     /// The image.
-    pub image: Image,
+    pub image: LayerImage,
 }
 
 impl MemorySize for Layer {
     fn bytes(&self) -> usize {
-        let (rows, changes) = (self.image.height() as usize, self.image.changes());
-        match self.image {
+        let (rows, changes) = (self.image.height() as usize, self.image.change_count());
+        match *self.image {
             Image::Mask(_) => 4 * (rows + changes),
             Image::Gray(_) => 4 * rows + 8 * changes,
         }
     }
 }
 
-/// A layer's image: 1-bit or 8-bit.
+/// A layer's image, which may remember the T.6 strip of the page that it was
+/// read from: an image that passes through a stage unchanged is not encoded
+/// again.
+///
+/// It dereferences to its [`Image`]. To change it, replace it by another image
+/// with `into`, which then has no strip.
+///
+/// ```
+/// use lamp_stack::{Image, Layer, Mask, PageInfo};
+///
+/// let image = Mask::black(8, 2).into();
+/// let mut layer = Layer { info: PageInfo::default(), dpi: None, image };
+/// if let Image::Mask(mask) = &*layer.image {
+///     layer.image = mask.inverted().into();
+/// }
+/// assert_eq!(layer.image.change_count(), 2);
+/// ```
+#[derive(Clone, Debug)]
+pub struct LayerImage {
+    image: Image,
+    strip: Option<Box<[u8]>>,
+}
+
+impl LayerImage {
+    pub(crate) fn with_strip(image: Image, strip: Vec<u8>) -> Self {
+        Self { image, strip: Some(strip.into()) }
+    }
+
+    pub(crate) fn strip(&self) -> Option<&[u8]> {
+        self.strip.as_deref()
+    }
+
+    /// Returns the image alone.
+    pub fn into_image(self) -> Image {
+        self.image
+    }
+}
+
+impl std::ops::Deref for LayerImage {
+    type Target = Image;
+
+    fn deref(&self) -> &Image {
+        &self.image
+    }
+}
+
+impl PartialEq for LayerImage {
+    fn eq(&self, other: &Self) -> bool {
+        self.image == other.image
+    }
+}
+
+impl<I: Into<Image>> From<I> for LayerImage {
+    fn from(image: I) -> Self {
+        Self { image: image.into(), strip: None }
+    }
+}
+
+/// A layer's pixels: 1-bit or 8-bit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Image {
-    /// Exposed or not.
+    /// Every pixel is exposed or not.
     Mask(Mask),
-    /// Exposed by degrees.
+    /// Every pixel is exposed by a level.
     Gray(GrayMask),
 }
 
+impl From<Mask> for Image {
+    fn from(mask: Mask) -> Self {
+        Self::Mask(mask)
+    }
+}
+
+impl From<GrayMask> for Image {
+    fn from(gray: GrayMask) -> Self {
+        Self::Gray(gray)
+    }
+}
+
 impl Image {
-    /// Width in pixels.
+    /// Returns the width in pixels.
     pub fn width(&self) -> u32 {
         match self {
             Self::Mask(mask) => mask.width(),
@@ -50,7 +120,7 @@ impl Image {
         }
     }
 
-    /// Height in pixels.
+    /// Returns the height in pixels.
     pub fn height(&self) -> u32 {
         match self {
             Self::Mask(mask) => mask.height(),
@@ -58,13 +128,28 @@ impl Image {
         }
     }
 
-    /// How many runs of one colour the rows hold, black ends not counted:
-    /// what the image costs.
-    pub fn changes(&self) -> usize {
+    /// Returns the number of changes in all rows, with which the image's cost
+    /// grows.
+    pub fn change_count(&self) -> usize {
         match self {
-            Self::Mask(mask) => mask.transition_count(),
+            Self::Mask(mask) => mask.change_count(),
             Self::Gray(gray) => gray.change_count(),
         }
+    }
+
+    /// Returns the runs of a row that are not black, as the first column, the
+    /// column after the last, and the level.
+    ///
+    /// # Panics
+    /// Panics if `row` is not below the height.
+    pub fn runs(&self, row: u32) -> impl Iterator<Item = (u32, u32, u8)> {
+        let width = self.width();
+        let (mask, gray) = match self {
+            Self::Mask(mask) => (Some(white_runs(mask.row(row), width)), None),
+            Self::Gray(gray) => (None, Some(gray_runs(gray.row(row), width))),
+        };
+        let white = mask.into_iter().flatten().map(|(start, end)| (start, end, 255));
+        white.chain(gray.into_iter().flatten())
     }
 }
 

@@ -6,11 +6,11 @@
 //! bottom first, in TIFF or PNG. A stage is a function from layers to layers.
 //!
 //! ```
-//! use lamp_stack::{Destination, Format, Image, Layer, Mask, PageInfo, Pages, write_stack};
+//! use lamp_stack::{Destination, Format, Layer, Mask, PageInfo, Pages, write_stack};
 //! # fn main() -> Result<(), lamp_stack::StackError> {
 //! // Two rows: `.##.` and `....`.
 //! let mask = Mask::new(4, vec![0, 2, 2], vec![1, 3]).unwrap();
-//! let layer = Layer { info: PageInfo::default(), dpi: None, image: Image::Mask(mask) };
+//! let layer = Layer { info: PageInfo::default(), dpi: None, image: mask.into() };
 //!
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("one.tif");
@@ -44,6 +44,7 @@ mod output;
 mod packbits;
 mod png_page;
 mod png_write;
+mod runs;
 mod split;
 mod temporary;
 #[cfg(test)]
@@ -53,23 +54,24 @@ mod threshold;
 mod tiff;
 
 pub use catalogue::{Builtin, CatalogueError, Catalogued, nonempty_text};
-pub use combine::{Op, combine_levels, combine_rows};
+pub use combine::{Combine, Op, combine_rows};
 pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use depth_levels::DepthLevels;
 pub use error::StackError;
 pub use frame::{Frame, place_row};
-pub use gray::{GrayMask, GrayMaskError, LevelChange, gray_runs};
+pub use gray::{GrayMask, LevelChange, gray_runs};
 pub use input::Pages;
 pub use join::{JoinError, join};
-pub use layer::{Image, Layer, PageInfo, StackInfo};
+pub use layer::{Image, Layer, LayerImage, PageInfo, StackInfo};
 pub use length::{Dpi, Length, LengthError, Size};
 pub use limits::{Limits, MAX_RUNS, MAX_SIDE};
-pub use mask::{Mask, MaskBuilder, MaskError, white_in_row, white_runs};
+pub use mask::{Mask, MaskBuilder, white_in_row, white_runs};
 pub use named::{Named, UnknownName};
 pub use ordered::{MemorySize, map_in_order};
 pub use orientation::{Orientation, OrientationError};
 pub use output::{Destination, write_stack};
 pub use png_write::{png_of_layer, write_gray_png, write_png_folder, write_rgb_png};
+pub use runs::{Change, Pixel, RunError, RunImage};
 pub use split::{Cuts, SplitError, write_split};
 pub use temporary::{FileBeside, FolderBeside, remove_temporaries};
 pub use text::{line_of, one_line};

@@ -1,4 +1,4 @@
-//! Images rotated and mirrored, on runs.
+//! Rotates and mirrors images, on their runs.
 
 use std::fmt;
 use std::ops::Range;
@@ -6,10 +6,10 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::gray::{GrayMask, LevelChange};
+use crate::combine::walk_rows;
 use crate::layer::Image;
 use crate::limits::MAX_RUNS;
-use crate::mask::{Mask, MaskBuilder};
+use crate::runs::{Change, RunImage};
 
 /// One of the eight isometries of an image: mirrored left to right or not, then
 /// rotated anticlockwise by right angles, as seen with row 0 on top.
@@ -123,7 +123,7 @@ impl FromStr for Orientation {
     }
 }
 
-impl Mask {
+impl<C: Change> RunImage<C> {
     /// Returns the image in another orientation, or `None` if that has more
     /// than [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
     pub fn oriented(&self, orientation: Orientation) -> Option<Self> {
@@ -135,108 +135,53 @@ impl Mask {
         Some(if rows { image.with_rows_reversed() } else { image })
     }
 
-    /// The image with its last row first.
-    pub(crate) fn with_rows_reversed(&self) -> Self {
-        let mut mask = MaskBuilder::new(self.width());
-        mask.reserve(self.height() as usize, self.transition_count());
+    /// Returns the image with its last row first.
+    fn with_rows_reversed(&self) -> Self {
+        let mut image = Self::without_rows(self.width());
+        image.reserve(self.height() as usize, self.change_count());
         for row in (0..self.height()).rev() {
-            mask.push_checked(self.row(row));
+            image.push(self.row(row));
         }
-        mask.finish()
+        image
     }
 
-    /// The image with its last column first.
-    pub(crate) fn with_columns_reversed(&self) -> Self {
+    /// Returns the image with its last column first.
+    fn with_columns_reversed(&self) -> Self {
         let width = self.width();
-        let mut mask = MaskBuilder::new(width);
-        mask.reserve(self.height() as usize, self.transition_count());
+        let mut image = Self::without_rows(width);
+        image.reserve(self.height() as usize, self.change_count());
         let mut reversed = Vec::new();
         for row in self.rows() {
             reversed.clear();
-            // A row that ends white starts white when reversed, and the other
-            // way round.
-            if row.len() % 2 == 1 {
-                reversed.push(0);
+            let last = C::last_pixel(row);
+            if last != C::Pixel::default() {
+                reversed.push(C::new(0, last));
             }
-            let starts_white = row.first() == Some(&0);
-            let inner = &row[usize::from(starts_white)..];
-            reversed.extend(inner.iter().rev().map(|&column| width - column));
-            mask.push_checked(&reversed);
+            // A change at column 0 would come to lie at the width.
+            let first = usize::from(row.first().is_some_and(|change| change.column() == 0));
+            reversed.extend((first..row.len()).rev().map(|i| {
+                // From right to left, a change is back to the value before it.
+                C::new(width - row[i].column(), C::last_pixel(&row[..i]))
+            }));
+            image.push(&reversed);
         }
-        mask.finish()
+        image
     }
 
-    /// The image with rows and columns exchanged; `None` where that has more
-    /// runs than any image may have. It costs the edges along rows.
-    pub(crate) fn transposed(&self) -> Option<Self> {
-        let (offsets, transitions) = by_column(self.width(), 0, |each| {
-            let mut above: &[u32] = &[];
+    /// Returns the image with rows and columns exchanged, or `None` if that has
+    /// more than [`MAX_RUNS`]. Where two rows differ, each column has a change.
+    fn transposed(&self) -> Option<Self> {
+        let black = C::Pixel::default();
+        let (offsets, changes) = by_column(self.width(), C::new(0, black), |each| {
+            let mut above: &[C] = &[];
             for (row, index) in self.rows().zip(0..) {
-                stretches_that_differ(above, row, self.width(), |stretch| each(stretch, index));
-                above = row;
-            }
-        })?;
-        Some(Self::new(self.height(), offsets, transitions).expect("rows come in order"))
-    }
-}
-
-impl GrayMask {
-    /// Returns the image in another orientation, or `None` if that has more
-    /// than [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
-    pub fn oriented(&self, orientation: Orientation) -> Option<Self> {
-        let mut image = if orientation.is_across() { self.transposed()? } else { self.clone() };
-        let (columns, rows) = orientation.reversed();
-        if columns {
-            image = image.with_columns_reversed();
-        }
-        Some(if rows { image.with_rows_reversed() } else { image })
-    }
-
-    /// The image with its last row first.
-    pub(crate) fn with_rows_reversed(&self) -> Self {
-        let rows: Vec<_> = self.rows().collect();
-        let mut gray = Self::new(self.width());
-        for row in rows.into_iter().rev() {
-            gray.push_row(row).expect("it was a row of an image as wide");
-        }
-        gray
-    }
-
-    /// The image with its last column first.
-    pub(crate) fn with_columns_reversed(&self) -> Self {
-        let width = self.width();
-        let mut gray = Self::new(width);
-        for row in self.rows() {
-            let mut runs = Vec::new();
-            let mut end = width;
-            for &LevelChange { column, level } in row.iter().rev() {
-                runs.push((end - column, level));
-                end = column;
-            }
-            gray.push_runs(runs).expect("a row reversed is as long");
-        }
-        gray
-    }
-
-    /// The image with rows and columns exchanged; `None` where that has more
-    /// runs than any image may have. It costs the edges along rows.
-    pub(crate) fn transposed(&self) -> Option<Self> {
-        let blank = LevelChange { column: 0, level: 0 };
-        let (offsets, changes) = by_column(self.width(), blank, |each| {
-            let mut above: &[LevelChange] = &[];
-            for (row, index) in self.rows().zip(0..) {
-                levels_that_differ(above, row, self.width(), |stretch, level| {
-                    each(stretch, LevelChange { column: index, level });
+                stretches_that_differ(above, row, self.width(), |stretch, pixel| {
+                    each(stretch, C::new(index, pixel));
                 });
                 above = row;
             }
         })?;
-        let rows = offsets.windows(2).map(|ends| &changes[ends[0] as usize..ends[1] as usize]);
-        let mut gray = Self::new(self.height());
-        for row in rows {
-            gray.push_row(row).expect("rows come in order");
-        }
-        Some(gray)
+        Some(Self::from_arrays(self.height(), offsets, changes).expect("rows come in order"))
     }
 }
 
@@ -251,59 +196,30 @@ impl Image {
     }
 }
 
-/// Gives each stretch of columns where two rows of a mask differ.
-fn stretches_that_differ(above: &[u32], row: &[u32], width: u32, mut each: impl FnMut(Range<u32>)) {
-    let (mut i, mut j) = (0, 0);
-    let mut start = None;
-    loop {
-        let (a, b) = (above.get(i), row.get(j));
-        let Some(&column) = a.into_iter().chain(b).min() else { break };
-        i += usize::from(a == Some(&column));
-        j += usize::from(b == Some(&column));
-        if a != b {
-            match start.take() {
-                None => start = Some(column),
-                Some(start) => each(start..column),
-            }
-        }
-    }
-    if let Some(start) = start {
-        each(start..width);
-    }
-}
-
-/// Gives each stretch of columns where two rows of a gray mask differ, and the
-/// second row's level there.
-fn levels_that_differ(
-    above: &[LevelChange],
-    row: &[LevelChange],
+/// Calls `each` with every stretch of columns where two rows differ, and the
+/// second row's value there.
+fn stretches_that_differ<C: Change>(
+    above: &[C],
+    row: &[C],
     width: u32,
-    mut each: impl FnMut(Range<u32>, u8),
+    mut each: impl FnMut(Range<u32>, C::Pixel),
 ) {
-    let (mut i, mut j) = (0, 0);
-    let (mut start, mut level_above, mut level) = (0, 0, 0);
-    while start < width {
-        let (a, b) = (above.get(i), row.get(j));
-        let column = a.into_iter().chain(b).map(|change| change.column).min().unwrap_or(width);
-        if level_above != level && start < column {
-            each(start..column, level);
+    let (mut start, mut pixels) = (0, [C::Pixel::default(); 2]);
+    let mut end = |column, next| {
+        if pixels[0] != pixels[1] {
+            each(start..column, pixels[1]);
         }
-        if let Some(change) = a.filter(|change| change.column == column) {
-            level_above = change.level;
-            i += 1;
-        }
-        if let Some(change) = b.filter(|change| change.column == column) {
-            level = change.level;
-            j += 1;
-        }
-        start = column;
-    }
+        (start, pixels) = (column, next);
+    };
+    walk_rows([above, row], &mut end);
+    end(width, [C::Pixel::default(); 2]);
 }
 
-/// Gathers values that `visit` gives for stretches of columns, by column: where
-/// each column's values start (and one entry more), and the values. `visit` is
-/// called several times and must give the same each time. `None` where the
-/// values are more than the runs that an image may have.
+/// Sorts the values that `visit` gives for stretches of columns by column.
+/// Returns where each column's values start (and one entry more), and the
+/// values, or `None` if these are more than [`MAX_RUNS`]. `visit` is called
+/// several times and must give the same each time: it is cheaper to compare
+/// rows again than to keep what was found.
 fn by_column<T: Copy>(
     width: u32,
     blank: T,
@@ -314,7 +230,7 @@ fn by_column<T: Copy>(
     if total > MAX_RUNS as u64 {
         return None;
     }
-    // At each column, how many values more than the column before it has.
+    // By how many values each column has more than the one before it.
     let mut starts = vec![0u32; width as usize + 1];
     visit(&mut |stretch, _| {
         for (column, step) in [(stretch.start, 1), (stretch.end, u32::MAX)] {
@@ -346,6 +262,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::Mask;
     use crate::testing::{arbitrary_gray, arbitrary_mask, level, mask_of};
 
     fn drawn(mask: &Mask) -> Vec<String> {
@@ -454,10 +371,7 @@ mod tests {
 
     #[test]
     fn an_image_that_transposed_has_too_many_runs_is_refused() {
-        let mut mask = MaskBuilder::new(1 << 26);
-        for row in 0..4 {
-            mask.push_checked(if row % 2 == 0 { &[0] } else { &[] });
-        }
-        assert_eq!(mask.finish().transposed(), None);
+        let wide = mask_of(1 << 26, [&[0][..], &[], &[0], &[]]);
+        assert_eq!(wide.transposed(), None);
     }
 }

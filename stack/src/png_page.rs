@@ -9,7 +9,7 @@ use crate::gray::GrayMask;
 use crate::layer::{Image, PageInfo};
 use crate::length::Dpi;
 use crate::limits::Limits;
-use crate::mask::MaskBuilder;
+use crate::mask::Mask;
 use crate::tiff::{bit_transitions, byte_runs};
 
 /// What every PNG starts with.
@@ -86,14 +86,13 @@ fn decode_mask(
     max_runs: usize,
 ) -> Result<Image, PngFault> {
     let width = reader.info().width;
-    let mut mask = MaskBuilder::new(width);
+    let mut mask = Mask::without_rows(width);
     let mut runs = Vec::new();
     while let Some(row) = reader.next_row()? {
         byte_runs(row.data(), &mut runs);
-        mask.push_checked(&bit_transitions(&runs, width));
-        check_runs(mask.transition_count(), max_runs)?;
+        mask.push(&bit_transitions(&runs, width));
+        check_runs(mask.change_count(), max_runs)?;
     }
-    let mask = mask.finish();
     Ok(Image::Mask(if samples.levels[0] == 0 { mask } else { mask.inverted() }))
 }
 

@@ -66,7 +66,7 @@ pub fn png_of_layer(layer: &Layer) -> Result<Vec<u8>, StackError> {
     encoder.set_pixel_dims(layer.dpi.map(pixel_dims));
     let written = encoder.add_text_chunk(DESCRIPTION.to_owned(), line(layer));
     written
-        .and_then(|()| match &layer.image {
+        .and_then(|()| match &*layer.image {
             Image::Mask(mask) => {
                 encoder.set_depth(BitDepth::One);
                 write_rows(encoder, mask.rows().map(|row| bits(row, mask.width())))
@@ -229,7 +229,7 @@ mod tests {
     fn layer(dpi: f64, part: &str) -> Layer {
         let stack = StackInfo { part: part.to_owned(), ..StackInfo::default() };
         let info = PageInfo { index: 3, stack: Some(stack), ..PageInfo::default() };
-        Layer { info, dpi: Dpi::new(dpi), image: Image::Mask(Mask::black(8, 1)) }
+        Layer { info, dpi: Dpi::new(dpi), image: Mask::black(8, 1).into() }
     }
 
     #[test]
@@ -269,7 +269,7 @@ mod tests {
     #[test]
     fn an_image_without_pixels_is_no_png() {
         let image = Image::Mask(Mask::black(0, 0));
-        let layer = Layer { image, ..layer(1500.0, "cube") };
+        let layer = Layer { image: image.into(), ..layer(1500.0, "cube") };
         assert!(png_of_layer(&layer).is_err());
     }
 }

@@ -170,17 +170,17 @@ proptest! {
                 Tiff::new(size, depth, number, packed(&tiles)).tiled(width as u32, 16 * down as u32)
             };
             for page in [strips_of(bits, 1), tiles_of(bits, 1, 128 * across)] {
-                prop_assert_eq!(read(page.bytes()).unwrap().image, mask_of(&rows, bits.0));
+                prop_assert_eq!(read(page.bytes()).unwrap().image.into_image(), mask_of(&rows, bits.0));
             }
             for page in [strips_of(grays, 8), tiles_of(grays, 8, 16 * across)] {
-                prop_assert_eq!(read(page.bytes()).unwrap().image, gray_of(&rows));
+                prop_assert_eq!(read(page.bytes()).unwrap().image.into_image(), gray_of(&rows));
             }
             if number == 1 {
                 continue;
             }
             let mut page = strips_of(grays, 8).with(317, 2);
             page.pieces = strips.iter().map(|s| compress(&differences(s, width))).collect();
-            prop_assert_eq!(read(page.bytes()).unwrap().image, gray_of(&rows));
+            prop_assert_eq!(read(page.bytes()).unwrap().image.into_image(), gray_of(&rows));
         }
     }
 
@@ -217,7 +217,7 @@ fn tiles_may_stand_in_any_order() {
         (0..40u8).map(|row| (0..6).map(|i| row ^ (i * 37)).collect()).collect();
     let mut page = Tiff::new((48, 40), 1, 1, tiles(&rows, 2, 16)).tiled(16, 16);
     page.order = vec![8, 3, 5, 0, 1, 7, 2, 4, 6];
-    assert_eq!(read(page.bytes()).unwrap().image, mask_of(&rows, 48));
+    assert_eq!(read(page.bytes()).unwrap().image.into_image(), mask_of(&rows, 48));
 }
 
 #[test]
@@ -225,7 +225,7 @@ fn orientations_are_turned_upright() {
     let rows = [vec![0b1000_0000], vec![0b1100_0000]];
     let upright = |orientation| {
         let page = Tiff::new((3, 2), 1, 1, vec![rows.concat()]).with(274, orientation);
-        let Image::Mask(mask) = read(page.bytes()).unwrap().image else { panic!() };
+        let Image::Mask(mask) = read(page.bytes()).unwrap().image.into_image() else { panic!() };
         let line = |row| -> String {
             (0..mask.width()).map(|c| if mask.is_white(c, row) { '#' } else { '.' }).collect()
         };
@@ -242,7 +242,7 @@ fn orientations_are_turned_upright() {
 #[test]
 fn what_is_not_read_is_named() {
     let page = || Tiff::new((8, 1), 1, 1, vec![vec![0x55]]);
-    assert_eq!(read(page().bytes()).unwrap().image, mask_of(&[vec![0x55]], 8));
+    assert_eq!(read(page().bytes()).unwrap().image.into_image(), mask_of(&[vec![0x55]], 8));
     for (tag, value, words) in [
         (258, 16, "1 x 16 bits is not read here"),
         (258, 4, "1 x 4 bits is not read here"),

@@ -40,7 +40,8 @@ fn layers(count: u32) -> Vec<Layer> {
         image: Image::Mask(mask(
             64,
             &[&[], &[3 + index, 40], &[0, 5, 60], &[2, 40 + index], &[63]],
-        )),
+        ))
+        .into(),
     };
     (0..count).map(layer).collect()
 }
@@ -49,7 +50,7 @@ fn gray_layer() -> Layer {
     let mut gray = GrayMask::new(300);
     gray.push_runs([(10, 0), (200, 255), (1, 128), (1, 127)]).unwrap();
     gray.push_runs([]).unwrap();
-    Layer { info: PageInfo::default(), dpi: None, image: Image::Gray(gray) }
+    Layer { info: PageInfo::default(), dpi: None, image: Image::Gray(gray).into() }
 }
 
 fn write(layers: &[Layer], format: Format) -> Vec<u8> {
@@ -138,7 +139,7 @@ fn the_tiff_crate_reads_what_we_write() {
             decoder.seek_to_image(index).unwrap();
             assert_eq!(decoder.dimensions().unwrap(), (64, 5));
             let DecodingResult::U8(bits) = decoder.read_image().unwrap() else { panic!() };
-            let Image::Mask(mask) = &layer.image else { panic!() };
+            let Image::Mask(mask) = &*layer.image else { panic!() };
             for (pixel, row) in (0..5).flat_map(|row| (0..64).map(move |column| (column, row))) {
                 let bit = bits[(row * 8 + pixel / 8) as usize] >> (7 - pixel % 8) & 1;
                 assert_eq!(bit == 1, mask.is_white(pixel, row), "layer {index} {pixel},{row}");
@@ -303,7 +304,7 @@ fn pillow_reads_what_we_write() {
     let expected: String = layers(3)
         .iter()
         .map(|layer| {
-            let Image::Mask(mask) = &layer.image else { panic!() };
+            let Image::Mask(mask) = &*layer.image else { panic!() };
             format!("(64, 5) 1 {}\n", mask.white_pixels())
         })
         .collect();

@@ -177,7 +177,7 @@ fn a_folder_of_pngs_is_a_stack() {
         let layer = page.decode().unwrap();
         let mut mask = MaskBuilder::new(16);
         mask.push_row(&[column, column + 1]).unwrap();
-        assert_eq!((layer.info.index, layer.image), (index, Image::Mask(mask.finish())));
+        assert_eq!((layer.info.index, layer.image), (index, mask.finish().into()));
     }
 
     fs::write(folder.path().join("page.tif"), "").unwrap();

@@ -242,7 +242,7 @@ impl Ran {
 /// # Panics
 /// If it is gray.
 pub fn mask(layer: &Layer) -> &Mask {
-    match &layer.image {
+    match &*layer.image {
         Image::Mask(mask) => mask,
         Image::Gray(_) => panic!("{} is gray", layer.info.name()),
     }
@@ -282,7 +282,7 @@ pub fn write_gray_ramp(path: &Path, width: u32, height: u32) {
     for _ in 0..height {
         gray.push_runs((0..width).map(level)).expect("as many pixels as the width");
     }
-    let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: Image::Gray(gray) };
+    let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: gray.into() };
     let to = Destination::File(path.to_owned());
     let layers = std::iter::once(Ok::<_, StackError>(layer));
     write_stack(layers, to, Format::Big).expect("the file can be written");

@@ -15,7 +15,7 @@ fn layer(index: u32, image: Image) -> Layer {
         stack: (index == 0).then_some(stack),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(254.0), image }
+    Layer { info, dpi: Dpi::new(254.0), image: image.into() }
 }
 
 /// Blocks as columns and rows, each first and end.
@@ -29,7 +29,7 @@ fn blocks(blocks: &[[u32; 4]]) -> Mask {
 }
 
 fn gray(layer: &Layer) -> &GrayMask {
-    match &layer.image {
+    match &*layer.image {
         Image::Gray(gray) => gray,
         Image::Mask(_) => panic!("{} is a mask", layer.info.name()),
     }

@@ -1,8 +1,6 @@
 //! `dither` on stacks of gray layers.
 
-use lamp_stack::{
-    Destination, Dpi, Format, GrayMask, Image, Layer, PageInfo, StackError, write_stack,
-};
+use lamp_stack::{Destination, Dpi, Format, GrayMask, Layer, PageInfo, StackError, write_stack};
 use lamp_tests::{Scratch, masks, read_stack};
 
 const METHODS: [&str; 4] = ["blue-noise", "ordered", "floyd-steinberg", "threshold"];
@@ -19,7 +17,7 @@ fn with_gray_stack(dpi: f64) -> Scratch {
                 .unwrap();
         }
         let info = PageInfo { index, ..PageInfo::default() };
-        Ok::<_, StackError>(Layer { info, dpi: Dpi::new(dpi), image: Image::Gray(gray) })
+        Ok::<_, StackError>(Layer { info, dpi: Dpi::new(dpi), image: gray.into() })
     };
     let scratch = Scratch::new();
     let to = Destination::File(scratch.path("gray.tif"));

@@ -20,7 +20,7 @@ fn white_at(layer: &Layer, [x, y]: [f64; 2]) -> bool {
 }
 
 fn bytes_of_pages(layers: &[Layer]) -> Vec<(&Image, u32)> {
-    layers.iter().map(|layer| (&layer.image, layer.info.index)).collect()
+    layers.iter().map(|layer| (&*layer.image, layer.info.index)).collect()
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn gray_pages_are_edited_and_foreign_ones_have_their_corner_at_zero() {
     scratch.write("box.toml", b"[[edit]]\nop = \"subtract\"\nlayers = [0, 1]\nbox = { x = [\"0in\", \"1in\"], y = [\"0in\", \"0.5in\"] }\n");
     scratch.run("lamp edit ramp.tif box.toml -o out.tif").succeeds_quietly();
     let (before, after) = (&scratch.layers("ramp.tif")[0], &scratch.layers("out.tif")[0]);
-    let (Image::Gray(before), Image::Gray(after)) = (&before.image, &after.image) else {
+    let (Image::Gray(before), Image::Gray(after)) = (&*before.image, &*after.image) else {
         panic!("gray")
     };
     assert_eq!(after.row(49), before.row(49));

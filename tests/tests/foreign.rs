@@ -72,7 +72,7 @@ fn stack(scratch: &Scratch, name: &str, image: fn(u32, &mut Dice) -> Image) -> V
         .map(|(index, width)| Layer {
             info: PageInfo { index, thickness_um: Some(100.0), ..PageInfo::default() },
             dpi: Dpi::new(300.0),
-            image: image(width, &mut dice),
+            image: image(width, &mut dice).into(),
         })
         .collect();
     let pages = layers.iter().cloned().map(Ok::<_, StackError>);
@@ -145,7 +145,7 @@ fn python_writes(scratch: &Scratch, script: &str) {
         let layer: Layer = layers.next().unwrap_or_else(|| panic!("{name} lacks a page"));
         let size = format!("{width} {height}");
         assert_eq!(format!("{} {}", layer.image.width(), layer.image.height()), size, "{name}");
-        assert_eq!(mode == "1", matches!(layer.image, Image::Mask(_)), "{name}");
+        assert_eq!(mode == "1", matches!(*layer.image, Image::Mask(_)), "{name}");
         assert!(packed(&layer.image) == rows_of_hex(hex, height), "{name}, {size}");
     }
     assert!(!last.is_empty(), "the script tells something");
@@ -228,7 +228,7 @@ fn stages_read_pngs_from_files_folders_and_pipes() {
         scratch.run(&show).succeeds_quietly();
     }
     let images = |name: &str| -> Vec<Image> {
-        scratch.layers(name).into_iter().map(|layer| layer.image).collect()
+        scratch.layers(name).into_iter().map(|layer| layer.image.into_image()).collect()
     };
     scratch.run("dither pngs -o all.tif").succeeds_quietly();
     assert_eq!(images("all.tif"), images("masks.tif")[..3]);

@@ -28,7 +28,7 @@ fn gray_stacks_go_through_the_pipeline() {
     let gray = scratch.layers("gray.tif");
     assert_eq!(gray.len(), 190);
     // The cylinder and the cone face no downward slope.
-    assert!(gray[..90].iter().all(|layer| matches!(layer.image, Image::Mask(_))));
+    assert!(gray[..90].iter().all(|layer| matches!(*layer.image, Image::Mask(_))));
     assert!(gray.iter().map(|layer| gray_pixels(&layer.image)).sum::<u64>() > 1_000);
     // 137.4 mJ/cm2 exp(400/215.2) at 1.6 W/cm2.
     assert!(gray.iter().all(|layer| layer.info.exposure_ms == Some(550.942)));
@@ -40,7 +40,7 @@ fn gray_stacks_go_through_the_pipeline() {
     );
     scratch.run(&line).succeeds_quietly();
     let dots = scratch.layers("dots.tif");
-    assert!(dots.iter().all(|layer| matches!(layer.image, Image::Mask(_))));
+    assert!(dots.iter().all(|layer| matches!(*layer.image, Image::Mask(_))));
     assert!(dots.iter().all(|layer| layer.info.exposure_ms == Some(550.942)));
     let said = scratch.run("lamp info gray.tif").succeeds().stdout;
     let said = String::from_utf8(said).unwrap();

@@ -124,7 +124,7 @@ fn gray_layers_have_the_levels_of_their_thickness() {
     let slice = "slice tower.stl --dpi 200 --adaptive --min 100um --max 600um --step 10um";
     scratch.run(&format!("{slice} --deviation 3% {gray} -o gray.tif")).succeeds_quietly();
     let layers = scratch.layers("gray.tif");
-    assert!(layers.iter().filter(|layer| matches!(layer.image, Image::Gray(_))).count() > 20);
+    assert!(layers.iter().filter(|layer| matches!(*layer.image, Image::Gray(_))).count() > 20);
     let line =
         "lamp cure gray.tif --material lamp-suspension --section y=0mm --part tower.stl -o x.png";
     let said = String::from_utf8(scratch.run(line).succeeds().stdout).unwrap();

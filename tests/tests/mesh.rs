@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use lamp_fixtures::Sample;
-use lamp_stack::{Frame, Image, Layer, Mask, Op};
+use lamp_stack::{Frame, Layer, Mask, Op};
 use lamp_tests::{Scratch, ends_white, mask, write_gray_ramp};
 
 /// The default clearance in pixels, at 100 dpi.
@@ -132,11 +132,8 @@ fn an_image_is_repeated_as_the_mesh() {
     };
     let mut template = lamp_stack::MaskBuilder::new(7);
     text.iter().for_each(|line| template.push_row(&row(line)).unwrap());
-    let layer = Layer {
-        info: lamp_stack::PageInfo::default(),
-        dpi: None,
-        image: Image::Mask(template.finish()),
-    };
+    let layer =
+        Layer { info: lamp_stack::PageInfo::default(), dpi: None, image: template.finish().into() };
     scratch.stack("walls.tif", [layer]);
     scratch.run("tile torus.tif --mesh walls.tif --copies 1 -o build.tif").succeeds_quietly();
     let build = scratch.layers("build.tif");

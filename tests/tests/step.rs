@@ -83,7 +83,7 @@ fn heights_gray_and_sections_work_as_for_an_stl() {
     let line = "--material lamp-suspension --dpi 300 --quiet -o gray.tif";
     scratch.run(&format!("slice part.step --gray {line}")).succeeds_quietly();
     let layers = scratch.layers("gray.tif");
-    assert!(layers.iter().any(|layer| matches!(layer.image, Image::Gray(_))));
+    assert!(layers.iter().any(|layer| matches!(*layer.image, Image::Gray(_))));
     let cure = "lamp cure gray.tif --part part.step --material lamp-suspension --section y=0mm";
     scratch.run(&format!("{cure} -o cure.png")).succeeds();
 }

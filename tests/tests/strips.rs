@@ -99,7 +99,7 @@ fn strips_add_up_to_the_build_and_join_to_its_bytes() {
         scratch.run(&line).succeeds_quietly();
         let strips = check_sum(&scratch, &folder, &format!("{k}.tif"));
         assert_eq!(strips.len(), files, "{options}");
-        let is_gray = |layer: &Layer| matches!(layer.image, Image::Gray(_));
+        let is_gray = |layer: &Layer| matches!(*layer.image, Image::Gray(_));
         assert!(strips.iter().flatten().all(|layer| is_gray(layer) == gray), "{options}");
         let mut expected: Vec<_> = (0..files).map(|k| format!("strip_{k:03}.tif")).collect();
         expected.push("strips.json".to_owned());
@@ -163,7 +163,7 @@ fn gray_layers_and_ranges_come_back() {
             stack,
             ..PageInfo::default()
         };
-        Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(ramp) }
+        Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(ramp).into() }
     };
     scratch.stack("gray.tif", (0..9).map(layer));
     let tile = "tile gray.tif --area 100x80mm";
@@ -175,7 +175,7 @@ fn gray_layers_and_ranges_come_back() {
     scratch.run("lamp join s -o back.tif").succeeds_quietly();
     assert!(scratch.bytes("back.tif") == scratch.bytes("build.tif"));
     let back = scratch.layers("back.tif");
-    let grays = back.iter().filter(|layer| matches!(layer.image, Image::Gray(_))).count();
+    let grays = back.iter().filter(|layer| matches!(*layer.image, Image::Gray(_))).count();
     assert_eq!((grays, back.len()), (9, 14));
     let range = format!("{tile} --layers 3..7");
     scratch.run(&format!("{range} --strips r --mirrors 40 --overlap 11")).succeeds_quietly();
@@ -197,7 +197,10 @@ fn dithered_strips_give_seams_their_full_dose() {
     let mut white = GrayMask::new(320);
     (0..320).for_each(|_| white.push_runs([(320, 255)]).unwrap());
     let info = PageInfo { stack: Some(StackInfo::default()), ..PageInfo::default() };
-    scratch.stack("white.tif", [Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(white) }]);
+    scratch.stack(
+        "white.tif",
+        [Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(white).into() }],
+    );
     scratch
         .run("tile white.tif --area 320x320mm --mesh none --strips s --mirrors 192 --overlap 64")
         .succeeds_quietly();

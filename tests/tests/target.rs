@@ -90,7 +90,7 @@ fn screens_are_checkerboards_of_the_study() {
     let pages = scratch.layers("screens.tif");
     let [page] = &pages[..] else { panic!("{} pages", pages.len()) };
     assert_eq!(page.info.exposure_ms, Some(600.0));
-    let Image::Gray(image) = &page.image else { panic!("it is gray") };
+    let Image::Gray(image) = &*page.image else { panic!("it is gray") };
     let level = |x: u32, y: u32| {
         let row = image.row(y);
         row.iter().take_while(|change| change.column <= x).last().map_or(0, |change| change.level)

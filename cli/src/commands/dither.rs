@@ -51,7 +51,7 @@ pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Stop> {
 /// What is to be feared of the dots of a gray layer, if its pixels are wider
 /// than what is known to cure evenly.
 fn unevenness(layer: &Layer) -> Option<String> {
-    let Image::Gray(_) = layer.image else { return None };
+    let Image::Gray(_) = *layer.image else { return None };
     let pitch = layer.dpi?.pitch();
     let fear = match homogeneity(pitch) {
         Homogeneity::Even => return None,
@@ -81,7 +81,7 @@ mod tests {
 
     fn told(dpi: Option<f64>, image: Image) -> Option<String> {
         let dpi = dpi.map(|dpi| Dpi::new(dpi).unwrap());
-        unevenness(&Layer { info: PageInfo::default(), dpi, image })
+        unevenness(&Layer { info: PageInfo::default(), dpi, image: image.into() })
     }
 
     #[test]

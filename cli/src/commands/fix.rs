@@ -184,7 +184,7 @@ fn parse_share(text: &str) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use lamp_postprocess::BandKinds;
-    use lamp_stack::{Dpi, Image, Layer, Mask};
+    use lamp_stack::{Dpi, Layer, Mask};
 
     use super::*;
 
@@ -202,8 +202,7 @@ mod tests {
     }
 
     fn described(bands: &[Band], info: PageInfo) -> Vec<String> {
-        let layer =
-            Layer { info, dpi: Dpi::new(254.0), image: Image::Mask(Mask::black(500, 2000)) };
+        let layer = Layer { info, dpi: Dpi::new(254.0), image: Mask::black(500, 2000).into() };
         let fixed = Fixed { before: &layer, after: &layer, bands };
         describe(&fixed, &FixOptions::default())
     }

@@ -91,11 +91,11 @@ impl Totals {
 
     fn add(&mut self, layer: &Layer, bytes: u64, compression: Compression) {
         self.pages += 1;
-        self.gray_pages += u64::from(matches!(layer.image, Image::Gray(_)));
+        self.gray_pages += u64::from(matches!(*layer.image, Image::Gray(_)));
         if !self.compressions.contains(&compression) {
             self.compressions.push(compression);
         }
-        self.changes += layer.image.changes() as u64;
+        self.changes += layer.image.change_count() as u64;
         self.bytes += bytes;
         self.stray_rows += layer.info.stray_rows.len() as u64;
         self.stray_layers += u64::from(!layer.info.stray_rows.is_empty());

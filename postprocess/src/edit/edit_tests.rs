@@ -20,7 +20,7 @@ fn layer(index: u32, image: Image) -> Layer {
         stack: (index == 0).then_some(stack),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(25.4), image }
+    Layer { info, dpi: Dpi::new(25.4), image: image.into() }
 }
 
 /// The middle of a pixel and its layer, in millimetres.
@@ -55,7 +55,7 @@ fn edited(
 }
 
 fn mask(layer: &Layer) -> &Mask {
-    match &layer.image {
+    match &*layer.image {
         Image::Mask(mask) => mask,
         Image::Gray(_) => panic!("a mask was edited"),
     }
@@ -228,7 +228,7 @@ fn gray_layers_are_edited_too() {
     };
     let levels = |op: &str| -> Vec<(u32, u8)> {
         let after = edited(vec![layer(0, Image::Gray(gray.clone()))], &list(op), vec![]).unwrap();
-        let Image::Gray(after) = &after[0].image else { panic!("it stays gray") };
+        let Image::Gray(after) = &*after[0].image else { panic!("it stays gray") };
         after.row(4).iter().map(|change| (change.column, change.level)).collect()
     };
     assert_eq!(levels("add"), [(2, 100), (4, 255), (6, 100), (10, 0)]);

@@ -140,7 +140,11 @@ impl EditPlan {
                 _ => true,
             };
             if holds {
-                image = step.of_image(&image, &info, other)?.ok_or_else(too_many)?;
+                let is_whole = matches!(step, PlannedEdit::Frame { frame, .. }
+                    if frame.is_whole(image.width(), image.height()));
+                if !is_whole {
+                    image = step.of_image(&image, &info, other)?.ok_or_else(too_many)?.into();
+                }
                 step.follow(&mut info)?;
                 done.push(k);
             }

@@ -68,7 +68,7 @@ impl EditShape {
             })
         };
         let mask = mask.ok_or_else(|| wrong(EditProblem::TooManyRuns))?;
-        if mask.transition_count() == 0 {
+        if mask.change_count() == 0 {
             let lain = copies.first().map_or(place, |copy| &copy.part);
             return Err(wrong(EditProblem::NoPixel(*lain)));
         }

@@ -105,7 +105,7 @@ impl Scene<'_> {
 
     /// Finds rows that lack contours which cross good rows above and below them.
     fn find_pairs(&self, strays: &mut Strays, crossings: &[u32], max_width: u32) {
-        let mut effort = MAX_EFFORT * (crossings.len() + self.mask.transition_count());
+        let mut effort = MAX_EFFORT * (crossings.len() + self.mask.change_count());
         for row in 1..crossings.len() {
             // Most rows have as many crossings as the one above: nothing is missing there.
             if crossings[row] >= crossings[row - 1] && strays.kinds[row - 1].is_empty() {

@@ -57,7 +57,7 @@ fn whole(shape: ShapeCrossings) -> Mask {
 
 fn layer(index: u32, mask: Mask) -> Layer {
     let info = PageInfo { index, ..PageInfo::default() };
-    Layer { info, dpi: None, image: Image::Mask(mask) }
+    Layer { info, dpi: None, image: mask.into() }
 }
 
 fn fixed(layers: Vec<Layer>, options: FixOptions) -> (Vec<Layer>, Vec<Band>) {
@@ -69,7 +69,7 @@ fn fixed(layers: Vec<Layer>, options: FixOptions) -> (Vec<Layer>, Vec<Band>) {
 
 fn fixed_mask(mask: &Mask, options: FixOptions) -> (Mask, Vec<Band>) {
     let (mut layers, bands) = fixed(vec![layer(0, mask.clone())], options);
-    let Image::Mask(fixed) = layers.remove(0).image else { unreachable!() };
+    let Image::Mask(fixed) = layers.remove(0).image.into_image() else { unreachable!() };
     (fixed, bands)
 }
 
@@ -182,7 +182,7 @@ fn two_crossings_missed_in_a_row_are_found_where_contours_break_off() {
     for rows in [150..151, 150..158] {
         let stray = with_open_rows(barred(0, rows.clone()), &[rows.start, rows.end]);
         let (layers, bands) = fixed(vec![stray], FixOptions::default());
-        let Image::Mask(mended) = &layers[0].image else { unreachable!() };
+        let Image::Mask(mended) = &*layers[0].image else { unreachable!() };
         assert!(off(mended, &whole(bars)).1 <= 1);
         let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
         assert_eq!(
@@ -261,7 +261,7 @@ fn a_sliver_goes_only_if_contours_break_off_there_and_no_other_layer_has_it() {
     let mut broken = of(vec![clean(), with_sliver(), clean()]);
     broken[1] = with_open_rows(broken[1].clone(), &[250, 251]);
     let (layers, bands) = fixed(broken.clone(), FixOptions::default());
-    assert_eq!(layers[1].image, Image::Mask(clean()));
+    assert_eq!(layers[1].image, clean().into());
     assert_eq!((bands[0].kinds, bands[0].outcome), (sliver, BandOutcome::Corrected));
 
     // No contour breaks off there.
@@ -330,7 +330,7 @@ fn neighbours_hold_a_wide_band_between_them() {
     let layers = vec![layer(0, whole(notched)), layer(1, stray), layer(2, whole(notched))];
     let with = |use_neighbours| {
         let options = FixOptions { use_neighbours, ..FixOptions::default() };
-        let Image::Mask(mended) = &fixed(layers.clone(), options).0[1].image else {
+        let Image::Mask(mended) = &*fixed(layers.clone(), options).0[1].image else {
             unreachable!()
         };
         off(mended, &whole(notched)).0
@@ -388,10 +388,10 @@ fn gray_rows_take_the_levels_of_the_good_rows_along_new_edges() {
         let rows = 140..146;
         let stray = gray_bars(|row| if rows.contains(&row) { missed } else { &[] });
         let image = Image::Gray(stray);
-        let stray = Layer { info: PageInfo::default(), dpi: None, image };
+        let stray = Layer { info: PageInfo::default(), dpi: None, image: image.into() };
         let (layers, bands) = fixed(vec![stray], FixOptions::default());
         assert_eq!((bands.len(), bands[0].outcome), (1, BandOutcome::Corrected));
-        let Image::Gray(mended) = &layers[0].image else { panic!("gray stays gray") };
+        let Image::Gray(mended) = &*layers[0].image else { panic!("gray stays gray") };
         let clean = gray_bars(|_| &[]);
         for row in rows.clone() {
             // Of the leaning bar an edge may be a pixel off.

@@ -184,14 +184,14 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
     if corrected.is_empty() {
         return (None, bands);
     }
-    let image = match &layer.image {
+    let image = match &*layer.image {
         Image::Mask(mask) => Image::Mask(with_rows(mask, &corrected)),
         Image::Gray(gray) => Image::Gray(gray_with_rows(gray, &exposed, &corrected)),
     };
     let mut info = layer.info.clone();
     info.stray_rows.retain(|&row| corrected_row(&corrected, row).is_none());
     info.other.insert("fix".to_owned(), page_entry(&bands, options.method));
-    (Some(Layer { info, dpi: layer.dpi, image }), bands)
+    (Some(Layer { info, dpi: layer.dpi, image: image.into() }), bands)
 }
 
 /// Returns what a corrected layer's page says under `fix`.
@@ -302,7 +302,7 @@ fn corrected_row(bands: &[CorrectedBand], row: u32) -> Option<(&Range<u32>, &[u3
 /// Returns the mask with the rows of some bands replaced.
 fn with_rows(mask: &Mask, corrected: &[CorrectedBand]) -> Mask {
     let mut fixed = MaskBuilder::new(mask.width());
-    fixed.reserve(mask.height() as usize, mask.transition_count());
+    fixed.reserve(mask.height() as usize, mask.change_count());
     for (row, had) in (0..).zip(mask.rows()) {
         let new = corrected_row(corrected, row).map_or(had, |(_, new)| new);
         fixed.push_row(new).expect("corrected rows are canonical");

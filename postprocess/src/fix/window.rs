@@ -14,7 +14,7 @@ pub(super) struct Window {
 impl Window {
     /// Returns the images of the layers below and above.
     pub(super) fn neighbours(&self) -> [Option<&Image>; 2] {
-        [&self.below, &self.above].map(|layer| layer.as_ref().map(|layer| &layer.image))
+        [&self.below, &self.above].map(|layer| layer.as_ref().map(|layer| &*layer.image))
     }
 }
 

@@ -166,13 +166,13 @@ impl Machine {
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{Catalogued, Dpi, Image, Mask, PageInfo};
+    use lamp_stack::{Catalogued, Dpi, Mask, PageInfo};
 
     use super::*;
 
     fn layer(dpi: f64, thickness_um: f64) -> Layer {
         let info = PageInfo { thickness_um: Some(thickness_um), ..PageInfo::default() };
-        Layer { info, dpi: Dpi::new(dpi), image: Image::Mask(Mask::black(1, 1)) }
+        Layer { info, dpi: Dpi::new(dpi), image: Mask::black(1, 1).into() }
     }
 
     #[test]

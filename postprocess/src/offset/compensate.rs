@@ -192,7 +192,7 @@ fn scale(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensateErro
     if width.max(rows.after()) > MAX_SIDE.into() {
         return Err(CompensateError::TooLarge { layer: layer.info.name() });
     }
-    layer.image = scaled(&layer.image, &columns, &rows, width as u32);
+    layer.image = scaled(&layer.image, &columns, &rows, width as u32).into();
     let info = &mut layer.info;
     for listed in [&mut info.stray_rows, &mut info.open_rows] {
         listed.iter_mut().for_each(|row| *row = rows.first_past(*row) as u32);
@@ -220,7 +220,7 @@ fn move_edges(
     options: &CompensateOptions,
     dpi: Dpi,
 ) -> Result<Option<MovedEdges>, CompensateError> {
-    if widths.are_zero() || layer.image.changes() == 0 {
+    if widths.are_zero() || layer.image.change_count() == 0 {
         return Ok(None);
     }
     let [least, most] = widths.range();
@@ -249,7 +249,7 @@ fn move_edges(
         }
         gray
     };
-    let gray = match &layer.image {
+    let gray = match &*layer.image {
         Image::Mask(mask) if least < 0.0 => {
             done.cut_off = is_near_border(mask, -least);
             offset(mask, least)
@@ -265,15 +265,15 @@ fn move_edges(
             components::lower(gray, &outline)
         }
     };
-    let image = match &layer.image {
+    let image = match &*layer.image {
         Image::Mask(_) if options.one_bit => Image::Mask(gray.at_least(128)),
         Image::Mask(_) => gray.to_mask().map_or_else(|| Image::Gray(gray), Image::Mask),
         Image::Gray(_) => Image::Gray(gray),
     };
-    if image == layer.image && done.walls.is_empty() && !done.cut_off {
+    if image == *layer.image && done.walls.is_empty() && !done.cut_off {
         return Ok(None);
     }
-    layer.image = image;
+    layer.image = image.into();
     Ok(Some(done))
 }
 

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use lamp_stack::{GrayMask, Mask, combine_levels};
+use lamp_stack::{GrayMask, Mask, combine_rows};
 
 use super::row_runs::RowRuns;
 
@@ -84,7 +84,7 @@ pub(super) fn lower(a: &GrayMask, b: &GrayMask) -> GrayMask {
     let mut out = GrayMask::new(a.width());
     let mut row = Vec::new();
     for (a, b) in a.rows().zip(b.rows()) {
-        combine_levels([a, b], |[a, b]| a.min(b), &mut row);
+        combine_rows([a, b], |[a, b]| a.min(b), &mut row);
         out.push_row(&row).expect("both rows are of images as wide");
     }
     out

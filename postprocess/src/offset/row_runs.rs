@@ -21,7 +21,7 @@ impl RowRuns {
     /// The white runs of a mask.
     pub(super) fn white(mask: &Mask) -> Self {
         let mut rows = Self::new();
-        rows.runs.reserve(mask.transition_count() / 2 + 1);
+        rows.runs.reserve(mask.change_count() / 2 + 1);
         for row in mask.rows() {
             let runs = white_runs(row, mask.width());
             rows.runs.extend(runs.map(|(start, end)| (start as i32, end as i32)));

@@ -115,7 +115,11 @@ impl Swaths {
     /// # Panics
     /// As [`cut`](Self::cut) does.
     pub fn cut_layer(&self, layer: &Layer, swath: u32) -> Layer {
-        let image = self.cut(&layer.image, swath);
+        let image = match *layer.image {
+            // One swath is the layer itself: nothing is to be encoded again.
+            Image::Mask(_) if self.mirrors == self.width => layer.image.clone(),
+            _ => self.cut(&layer.image, swath).into(),
+        };
         let Range { start, end } = self.columns(swath);
         let mut info = layer.info.clone();
         // The first lies where the build does.
@@ -124,7 +128,7 @@ impl Swaths {
             let frame = Frame { left: start.into(), top: 0, width: self.mirrors, height };
             frame_page(&mut info, frame, &ImageBounds::of(layer).framed(frame));
         }
-        let bits = if matches!(layer.image, Image::Mask(_)) { 1 } else { 8 };
+        let bits = if matches!(*layer.image, Image::Mask(_)) { 1 } else { 8 };
         let strip =
             json!({ "number": swath, "of": self.count(), "columns": [start, end], "bits": bits });
         info.other.insert("strip".to_owned(), strip);

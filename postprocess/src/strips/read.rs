@@ -127,7 +127,9 @@ impl LayerPages {
     fn join(self) -> Result<Layer, StripsError> {
         let decoded = self.pages.into_iter().zip(0..).map(|(page, swath)| {
             let in_file = |source| StripsError::In { file: file_name(swath), source };
-            page.decode().map_err(in_file).map(|layer| ((layer.info, layer.dpi), layer.image))
+            page.decode()
+                .map_err(in_file)
+                .map(|layer| ((layer.info, layer.dpi), layer.image.into_image()))
         });
         let decoded: Vec<_> = decoded.collect::<Result<_, _>>()?;
         let (mut pages, images): (Vec<_>, Vec<Image>) = decoded.into_iter().unzip();
@@ -149,6 +151,6 @@ impl LayerPages {
             let of_strip = self.swaths.command(0);
             stack.commands.retain(|command| *command != of_strip);
         }
-        Ok(Layer { info, dpi, image })
+        Ok(Layer { info, dpi, image: image.into() })
     }
 }

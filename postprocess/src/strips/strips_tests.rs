@@ -86,7 +86,7 @@ fn a_column_is_in_one_swath_or_two() {
 fn a_page_says_where_its_swath_lies() {
     let info = PageInfo { origin_mm: Some([1.0, 5.0]), stray_rows: vec![0], ..PageInfo::default() };
     let image = Image::Mask(Mask::black(22, 1));
-    let layer = Layer { info, dpi: Dpi::new(25.4), image };
+    let layer = Layer { info, dpi: Dpi::new(25.4), image: image.into() };
     let swath = Swaths::new(10, 4, 22).unwrap().cut_layer(&layer, 2);
     assert_eq!(swath.info.origin_mm, Some([13.0, 5.0]));
     assert_eq!(swath.info.stray_rows, [0]);

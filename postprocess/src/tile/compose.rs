@@ -6,8 +6,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use lamp_stack::{
-    GrayMask, Image, LevelChange, MAX_RUNS, Mask, MaskBuilder, combine_levels, combine_rows,
-    place_row,
+    GrayMask, Image, LevelChange, MAX_RUNS, Mask, MaskBuilder, combine_rows, place_row,
 };
 
 use super::PixelSize;
@@ -56,7 +55,7 @@ pub(super) fn united(images: &[PlacedImage], build: PixelSize) -> Result<Mask, C
 
 fn check_runs(images: &[PlacedImage]) -> Result<(), ComposeError> {
     let runs =
-        images.iter().map(|placed| placed.at.len().saturating_mul(placed.image.changes() + 1));
+        images.iter().map(|placed| placed.at.len().saturating_mul(placed.image.change_count() + 1));
     let runs = runs.fold(0, usize::saturating_add);
     if runs > MAX_RUNS { Err(ComposeError::TooManyRuns) } else { Ok(()) }
 }
@@ -68,7 +67,7 @@ fn compose_masks(
     may_overlap: bool,
 ) -> Result<Mask, ComposeError> {
     let mut mask = MaskBuilder::new(build.width);
-    let runs = images.iter().map(|placed| placed.at.len() * placed.image.changes());
+    let runs = images.iter().map(|placed| placed.at.len() * placed.image.change_count());
     mask.reserve(build.height as usize, runs.sum());
     let mut row =
         MaskRow { width: build.width, row: Vec::new(), one: Vec::new(), spare: Vec::new() };
@@ -223,7 +222,7 @@ fn add_levels(
         overlap.set(overlap.get() | (a > 0 && b > 0));
         a.max(b)
     };
-    combine_levels([row, one], brighter, spare);
+    combine_rows([row, one], brighter, spare);
     std::mem::swap(row, spare);
     if overlap.get() { Err(ComposeError::Overlap) } else { Ok(()) }
 }

@@ -279,7 +279,7 @@ mod tests {
     fn part(outline: bool) -> PartStack {
         let image =
             Image::Mask(mask_of(&["........", ".##.....", ".##.....", ".####...", "........"]));
-        let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image };
+        let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image: image.into() };
         if outline {
             PartStack::of_outline("l.tif", std::iter::once(Ok::<_, TileError>(layer)))
                 .unwrap()

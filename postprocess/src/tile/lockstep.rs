@@ -253,7 +253,7 @@ where
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{Image, Mask, PageInfo};
+    use lamp_stack::{Mask, PageInfo};
 
     use super::*;
 
@@ -270,7 +270,7 @@ mod tests {
                 ..PageInfo::default()
             };
             z += thickness;
-            Ok(Layer { info, dpi: None, image: Image::Mask(Mask::black(1, 1)) })
+            Ok(Layer { info, dpi: None, image: Mask::black(1, 1).into() })
         };
         (0..).zip(thicknesses).map(layer).collect()
     }

@@ -162,8 +162,11 @@ impl Layout {
             named.map(|(k, (stack, part))| (part.name().to_owned(), self.copies_of(k), stack));
         let steps = Lockstep::new(stacks, heights, mesh_bytes);
         let layers = map_in_order(steps, move |step: LayerSet| {
-            let layer =
-                Layer { info: self.page(&step)?, dpi: Some(self.dpi), image: self.image(&step)? };
+            let layer = Layer {
+                info: self.page(&step)?,
+                dpi: Some(self.dpi),
+                image: self.image(&step)?.into(),
+            };
             Ok((layer, self.stray_rows(&step)))
         });
         let layers = layers.map(move |made| {

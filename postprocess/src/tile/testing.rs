@@ -21,5 +21,5 @@ pub(super) fn layer(index: u32, image: Image) -> Layer {
         thickness_um: Some(100.0),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(25.4), image }
+    Layer { info, dpi: Dpi::new(25.4), image: image.into() }
 }

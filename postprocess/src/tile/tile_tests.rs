@@ -122,7 +122,7 @@ fn a_copy_lies_as_the_layout_says() {
     // Mirrored: ..##. on its side.
     let expected =
         mask_of(&["......", "..##..", "...#..", "......", "......", "......", "......", "......"]);
-    let Image::Mask(build) = build.image else { panic!() };
+    let Image::Mask(build) = build.image.into_image() else { panic!() };
     assert_eq!(build, expected);
     let again = layout.to_file();
     assert_eq!(LayoutFile::from_json(&again.to_json()).unwrap(), again);
@@ -313,9 +313,9 @@ proptest! {
                 let around = expected.oriented(at.turn).unwrap().framed(Frame {
                     left: -place.left, top: -place.top, width: 60, height: 40,
                 });
-                rest = rest.combined(lamp_stack::Op::Xor, &around).unwrap();
+                rest = rest.combined(lamp_stack::Op::Xor, &around).unwrap().into();
             }
-            prop_assert_eq!(rest.changes(), 0);
+            prop_assert_eq!(rest.change_count(), 0);
         }
     }
 

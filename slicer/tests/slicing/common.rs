@@ -31,7 +31,7 @@ pub(crate) fn slice(mesh: &Mesh, options: &SliceOptions) -> Vec<Layer> {
 }
 
 pub(crate) fn mask(layer: &Layer) -> &Mask {
-    match &layer.image {
+    match &*layer.image {
         Image::Mask(mask) => mask,
         Image::Gray(_) => panic!("slices are masks"),
     }

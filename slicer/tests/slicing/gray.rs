@@ -34,7 +34,7 @@ fn depth_levels(overcure: f64, thickness: Length) -> DepthLevels {
 
 /// The levels of every pixel, row by row.
 fn levels(layer: &Layer) -> Vec<Vec<u8>> {
-    match &layer.image {
+    match &*layer.image {
         Image::Mask(mask) => {
             let level = |c, r| u8::from(mask.is_white(c, r)) * 255;
             (0..mask.height()).map(|r| (0..mask.width()).map(|c| level(c, r)).collect()).collect()
@@ -370,7 +370,7 @@ fn a_wide_underside_is_a_run_a_row() {
     ]);
     let layers =
         slice(&table, &SliceOptions { fill: Fill::NonZero, ..gray(1.0, &options(600.0, 100.0)) });
-    let Image::Gray(gray) = &layers[9].image else { panic!("the underside is gray") };
+    let Image::Gray(gray) = &*layers[9].image else { panic!("the underside is gray") };
     assert_eq!(
         levels(&layers[9]).concat().iter().filter(|level| **level == 128).count(),
         213 * 213 - 24 * 24
@@ -403,7 +403,7 @@ fn a_foot_that_was_turned_into_place_stands() {
         let placement = Placement::default().rotated(Axis::X, -degrees);
         let options = SliceOptions { placement, ..gray(2.0, &options(300.0, 100.0)) };
         let layers = slice(&turned, &options);
-        assert!(matches!(layers[0].image, Image::Mask(_)), "{degrees}");
+        assert!(matches!(*layers[0].image, Image::Mask(_)), "{degrees}");
         assert!(mask(&layers[0]).white_pixels() > 50_000);
     }
 }
@@ -413,7 +413,7 @@ fn threads_memory_and_order_do_not_change_gray_layers() {
     let mesh = turned(&tower(6_000), [2.5, 0.3, 0.0]);
     let coarse = gray(1.7, &options(120.0, 700.0));
     let expected = without_stack(slice(&mesh, &coarse));
-    let some_gray = |layer: &&Layer| matches!(layer.image, Image::Gray(_));
+    let some_gray = |layer: &&Layer| matches!(*layer.image, Image::Gray(_));
     assert!(expected.iter().filter(some_gray).count() > 50);
     let mut mixed = mesh.clone();
     mixed.facets.sort_by_key(|facet| facet[0][0].to_bits().wrapping_mul(2_654_435_761));

@@ -9,7 +9,7 @@ use super::codes::{
 use super::row::{LOOK, Row, TOGETHER, WIDE};
 use super::{G4Error, G4Fault};
 use crate::limits::MAX_RUNS;
-use crate::mask::{Mask, MaskBuilder};
+use crate::mask::Mask;
 
 /// Decodes a T.6 (CCITT Group 4) strip of `height` rows, most significant
 /// bit first, into a mask. T.6's white is black (0).
@@ -23,9 +23,9 @@ use crate::mask::{Mask, MaskBuilder};
 ///
 /// Source: ITU-T Recommendation T.6, section 2.2.
 pub fn decode(strip: &[u8], width: u32, height: u32) -> Result<Mask, G4Error> {
-    let mut mask = MaskBuilder::new(width);
+    let mut mask = Mask::without_rows(width);
     decode_rows(strip, width, height, MAX_RUNS, &mut mask)?;
-    Ok(mask.finish())
+    Ok(mask)
 }
 
 /// Decodes a strip below the rows that `mask` has.
@@ -34,7 +34,7 @@ pub(crate) fn decode_rows(
     width: u32,
     height: u32,
     max_runs: usize,
-    mask: &mut MaskBuilder,
+    mask: &mut Mask,
 ) -> Result<(), G4Error> {
     let mut bits = BitReader::new(strip);
     let (mut above, mut row) = (Row::black(width), Row::black(width));
@@ -42,7 +42,7 @@ pub(crate) fn decode_rows(
     while index < height {
         if above.len == 0 {
             let black = bits.take_ones(height - index);
-            mask.push_black(black);
+            mask.push_black_rows(black);
             index += black;
             if index == height {
                 break;
@@ -51,7 +51,7 @@ pub(crate) fn decode_rows(
         decode_row(&mut bits, &above, &mut row, width)
             .map_err(|fault| G4Error { row: index, fault })?;
         mask.push_padded(&row.places, row.len);
-        if mask.transition_count() > max_runs {
+        if mask.change_count() > max_runs {
             return Err(G4Error { row: index, fault: G4Fault::TooManyRuns });
         }
         std::mem::swap(&mut above, &mut row);

@@ -14,7 +14,7 @@ use crate::mask::Mask;
 ///
 /// Source: ITU-T Recommendation T.6, sections 2.2.1 to 2.2.5.
 pub fn encode(mask: &Mask) -> Vec<u8> {
-    let mut bits = BitWriter::new(mask.transition_count() / 2 + mask.height() as usize / 8 + 16);
+    let mut bits = BitWriter::new(mask.change_count() / 2 + mask.height() as usize / 8 + 16);
     let mut reference: &[u32] = &[];
     for row in mask.rows() {
         if row.is_empty() && reference.is_empty() {

@@ -4,7 +4,7 @@ use super::codes::EOL;
 use super::decode::{BitReader, decode_row};
 use super::row::Row;
 use super::{G4Error, G4Fault};
-use crate::mask::MaskBuilder;
+use crate::mask::Mask;
 
 /// The kinds of Group 3 that TIFF knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,7 @@ pub(crate) fn decode_group3_rows(
     width: u32,
     height: u32,
     max_runs: usize,
-    mask: &mut MaskBuilder,
+    mask: &mut Mask,
 ) -> Result<(), G4Error> {
     let mut rows = Rows { bits: BitReader::new(strip), kind, ends_of_line: false };
     let (mut above, mut row) = (Row::black(width), Row::black(width));
@@ -47,7 +47,7 @@ pub(crate) fn decode_group3_rows(
             rows.runs(&mut row, width).map_err(failed)?;
         }
         mask.push_padded(&row.places, row.len);
-        if mask.transition_count() > max_runs {
+        if mask.change_count() > max_runs {
             return Err(failed(G4Fault::TooManyRuns));
         }
         std::mem::swap(&mut above, &mut row);
@@ -118,7 +118,6 @@ mod tests {
 
     use super::super::codes::{Code, LONGEST_MAKE_UP, TERMINATING_0, TERMINATING_1, make_up};
     use super::*;
-    use crate::mask::Mask;
     use crate::testing::{arbitrary_mask, mask_of};
 
     const KINDS: [Group3; 3] =
@@ -197,9 +196,9 @@ mod tests {
     }
 
     fn decode(strip: &[u8], kind: Group3, width: u32, height: u32) -> Result<Mask, G4Error> {
-        let mut mask = MaskBuilder::new(width);
+        let mut mask = Mask::without_rows(width);
         decode_group3_rows(kind, strip, width, height, crate::MAX_RUNS, &mut mask)?;
-        Ok(mask.finish())
+        Ok(mask)
     }
 
     fn check(mask: &Mask, style: Style) {

@@ -5,16 +5,17 @@ use std::ops::Range;
 use crate::error::StackError;
 use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
-use crate::layer::{Image, Layer, PageInfo};
+use crate::layer::{Image, Layer, LayerImage, PageInfo};
 use crate::length::Dpi;
 use crate::limits::Limits;
-use crate::mask::{Mask, MaskBuilder};
+use crate::mask::Mask;
 use crate::ordered::MemorySize;
 use crate::orientation::Orientation;
 use crate::png_page::{self, Header};
+use crate::runs::{Change, RunImage};
 use crate::tiff::fields::malformed;
 use crate::tiff::layout::Layout;
-use crate::tiff::tiles::{join_grays, join_masks};
+use crate::tiff::tiles::join_tiles;
 use crate::tiff::unpack::{Cut, Fault, unpack};
 
 /// How a page's image is compressed.
@@ -62,7 +63,7 @@ pub struct Page {
 
 /// Room is made for so many transitions before the codes are read: a strip may
 /// hold fewer than its length promises.
-const MOST_RESERVED: usize = 1 << 20;
+const MAX_RESERVED: usize = 1 << 20;
 
 impl MemorySize for Page {
     fn bytes(&self) -> usize {
@@ -125,67 +126,60 @@ impl Page {
             true => Image::Gray(self.decode_gray()?),
             false => Image::Mask(self.decode_mask()?),
         };
-        let image = if self.orientation == Orientation::default() {
-            image
+        let image = if self.is_in_our_layout() {
+            LayerImage::with_strip(image, self.pieces.remove(0))
+        } else if self.orientation == Orientation::default() {
+            image.into()
         } else {
-            image.oriented(self.orientation).ok_or_else(|| self.too_many_runs())?
+            image.oriented(self.orientation).ok_or_else(|| self.too_many_runs())?.into()
         };
         Ok(Layer { info: self.info, dpi: self.dpi, image })
     }
 
-    fn decode_mask(&mut self) -> Result<Mask, StackError> {
-        let mut mask = MaskBuilder::new(self.width);
+    fn decode_mask(&self) -> Result<Mask, StackError> {
+        let mut mask = Mask::without_rows(self.width);
         if self.compression == Compression::G4 {
             // A row takes a bit at least, a transition about four.
             let bytes = self.strip_bytes() as usize;
             mask.reserve(
                 bytes.saturating_mul(8).min(self.layout.page_height as usize),
-                (2 * bytes).min(MOST_RESERVED),
+                (2 * bytes).min(MAX_RESERVED),
             );
         }
-        for (band, rows) in self.bands() {
-            if !self.layout.tiled {
-                self.mask_rows(&band[0], &rows, &mut mask)?;
-                continue;
-            }
-            let mut tiles = Vec::new();
-            for tile in band {
-                let mut rows_of_tile = MaskBuilder::new(self.layout.width);
-                self.mask_rows(tile, &rows, &mut rows_of_tile)?;
-                tiles.push(rows_of_tile.finish());
-                self.check_runs(tiles.iter().map(Mask::transition_count).sum())?;
-            }
-            join_masks(&tiles, self.width, &mut mask);
-            self.check_runs(mask.transition_count())?;
-        }
-        let mask = mask.finish();
-        Ok(if self.white_is_zero {
-            mask.inverted()
-        } else if self.is_in_our_layout() {
-            mask.with_strip(self.pieces.remove(0))
-        } else {
-            mask
-        })
+        self.decode_pieces(&mut mask, |piece, rows, mask| self.mask_rows(piece, rows, mask))?;
+        Ok(if self.white_is_zero { mask.inverted() } else { mask })
     }
 
     fn decode_gray(&self) -> Result<GrayMask, StackError> {
         let mut gray = GrayMask::new(self.width);
+        self.decode_pieces(&mut gray, |piece, rows, gray| {
+            self.gray_rows(piece, rows.len() as u32, gray)
+        })?;
+        Ok(gray)
+    }
+
+    /// Adds the rows of every strip, or of the tiles side by side, to the image.
+    fn decode_pieces<C: Change>(
+        &self,
+        image: &mut RunImage<C>,
+        decode: impl Fn(&[u8], &Range<u32>, &mut RunImage<C>) -> Result<(), StackError>,
+    ) -> Result<(), StackError> {
         for (band, rows) in self.bands() {
             if !self.layout.tiled {
-                self.gray_rows(&band[0], rows.len() as u32, &mut gray)?;
+                decode(&band[0], &rows, image)?;
                 continue;
             }
-            let mut tiles = Vec::new();
-            for tile in band {
-                let mut rows_of_tile = GrayMask::new(self.layout.width);
-                self.gray_rows(tile, rows.len() as u32, &mut rows_of_tile)?;
-                tiles.push(rows_of_tile);
-                self.check_runs(tiles.iter().map(GrayMask::change_count).sum())?;
+            let mut tiles: Vec<RunImage<C>> = Vec::new();
+            for piece in band {
+                let mut tile = RunImage::without_rows(self.layout.width);
+                decode(piece, &rows, &mut tile)?;
+                tiles.push(tile);
+                self.check_runs(tiles.iter().map(RunImage::change_count).sum())?;
             }
-            join_grays(&tiles, self.width, &mut gray);
-            self.check_runs(gray.change_count())?;
+            join_tiles(&tiles, image);
+            self.check_runs(image.change_count())?;
         }
-        Ok(gray)
+        Ok(())
     }
 
     /// Whether a 1-bit page stands as we would write it.
@@ -207,7 +201,7 @@ impl Page {
         &self,
         piece: &[u8],
         rows: &Range<u32>,
-        mask: &mut MaskBuilder,
+        mask: &mut Mask,
     ) -> Result<(), StackError> {
         let (width, height) = (self.layout.width, rows.end - rows.start);
         let max_runs = self.limits.runs;
@@ -220,8 +214,8 @@ impl Page {
             Compression::G4 => g4::decode_rows(piece, width, height, max_runs, mask),
             _ => {
                 return self.unpack(piece, width.div_ceil(8), height, |row| {
-                    mask.push_checked(&bit_transitions(row, width));
-                    mask.transition_count() <= max_runs
+                    mask.push(&bit_transitions(row, width));
+                    mask.change_count() <= max_runs
                 });
             }
         };

@@ -64,11 +64,10 @@ impl EncodedPage {
     /// Encodes a layer: a mask as G4, a gray mask as PackBits. A mask that is
     /// as it was read keeps its codes.
     pub fn new(layer: &Layer) -> Self {
-        let (gray, strip) = match &layer.image {
-            Image::Mask(mask) => {
-                (false, mask.strip().map_or_else(|| g4::encode(mask), <[u8]>::to_vec))
-            }
-            Image::Gray(image) => (true, packbits::encode(image)),
+        let (gray, strip) = match (&*layer.image, layer.image.strip()) {
+            (Image::Mask(_), Some(strip)) => (false, strip.to_vec()),
+            (Image::Mask(mask), None) => (false, g4::encode(mask)),
+            (Image::Gray(gray), _) => (true, packbits::encode(gray)),
         };
         Self {
             index: layer.info.index,

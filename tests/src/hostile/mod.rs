@@ -95,7 +95,7 @@ pub fn step(bytes: &[u8]) {
 }
 
 fn check_section(layer: &Layer) {
-    let Image::Mask(mask) = &layer.image else { panic!("slices are masks") };
+    let Image::Mask(mask) = &*layer.image else { panic!("slices are masks") };
     check_canonical(mask);
     let ends_white = (0..mask.height()).filter(|&row| mask.row(row).len() % 2 == 1);
     assert_eq!(ends_white.collect::<Vec<_>>(), layer.info.stray_rows);
@@ -127,7 +127,7 @@ fn decoded(pages: Result<Pages, StackError>) -> Result<Vec<Layer>, StackError> {
 
 fn check_stack(layers: &[Layer]) {
     for layer in layers {
-        if let Image::Mask(mask) = &layer.image {
+        if let Image::Mask(mask) = &*layer.image {
             check_canonical(mask);
         }
     }

@@ -113,7 +113,7 @@ fn gray_layer() -> Layer {
     gray.push_runs([(10, 0), (200, 255), (1, 128), (1, 127)]).expect("inside the width");
     gray.push_runs([]).expect("inside the width");
     gray.push_runs((0..=255).map(|level| (1, level))).expect("inside the width");
-    Layer { info: PageInfo::default(), dpi: None, image: Image::Gray(gray) }
+    Layer { info: PageInfo::default(), dpi: None, image: gray.into() }
 }
 
 fn stack(layers: &[Layer], format: Format) -> Vec<u8> {
@@ -238,7 +238,7 @@ fn g4_codes() -> Named {
     let coded = |mask: &Mask| sized(mask.width(), mask.height(), &g4::encode(mask));
     let section = |dpi| {
         let layers = layers(dpi);
-        let Image::Mask(mask) = &layers[1].image else { unreachable!("slices are masks") };
+        let Image::Mask(mask) = &*layers[1].image else { unreachable!("slices are masks") };
         coded(mask)
     };
     let columns: Vec<u32> = (0..60).map(|i| i * i).collect();

@@ -20,7 +20,7 @@ fn a_stack_without_metadata_is_corrected_to_the_same_pixels() {
 
 fn gray(layers: &[Layer]) -> Vec<Layer> {
     let soft =
-        |layer: &Layer| Layer { image: Image::Gray(with_soft_edges(mask(layer))), ..layer.clone() };
+        |layer: &Layer| Layer { image: with_soft_edges(mask(layer)).into(), ..layer.clone() };
     layers.iter().map(soft).collect()
 }
 
@@ -37,7 +37,7 @@ fn gray_rows_end_black_and_good_ones_stay() {
         let fixed = scratch.layers("fixed.tif");
         let mut stray_rows = 0;
         for (stray, fixed) in stray.iter().zip(&fixed) {
-            let (Image::Gray(before), Image::Gray(after)) = (&stray.image, &fixed.image) else {
+            let (Image::Gray(before), Image::Gray(after)) = (&*stray.image, &*fixed.image) else {
                 panic!("gray stays gray");
             };
             for row in 0..before.height() {
@@ -62,7 +62,7 @@ fn gray_outlines_are_corrected_as_masks_are() {
     scratch.stack("stray.tif", gray(&scratch.layers("stray.tif")));
     scratch.run("fix stray.tif --max-width 40 -o fixed.tif").succeeds();
     for (gray, whole) in scratch.layers("fixed.tif").iter().zip(&masks) {
-        let Image::Gray(gray) = &gray.image else { panic!("gray stays gray") };
+        let Image::Gray(gray) = &*gray.image else { panic!("gray stays gray") };
         assert!(at_least(gray, 1) == *mask(whole), "{}", whole.info.name());
     }
 }

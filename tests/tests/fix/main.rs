@@ -55,7 +55,7 @@ fn layer_of<'a>(layers: &'a [Layer], band: &Value) -> &'a Layer {
 }
 
 fn images(layers: &[Layer]) -> Vec<&Image> {
-    layers.iter().map(|layer| &layer.image).collect()
+    layers.iter().map(|layer| &*layer.image).collect()
 }
 
 /// How many pixels differ between two stacks.

@@ -49,7 +49,8 @@ fn corrected(scratch: &Scratch, layer: u32, kinds: &[&str], options: &str) -> [I
     assert!(of_layer.iter().all(|band| band["outcome"] == "corrected"), "{of_layer:?}");
     ["stray.tif", "fixed.tif"].map(|name| {
         let layers = scratch.layers(name);
-        layers.into_iter().find(|of| of.info.index == layer).expect("such a layer").image
+        let found = layers.into_iter().find(|of| of.info.index == layer);
+        found.expect("such a layer").image.into_image()
     })
 }
 
@@ -90,7 +91,7 @@ fn paired() -> (String, Mask) {
         (50, &[first, _, _, last]) => vec![first, last],
         _ => had.to_vec(),
     };
-    layer.image = Image::Mask(edited(whole, missed));
+    layer.image = edited(whole, missed).into();
     (layer.info.closed, layer.info.open_rows) = (Some(false), vec![50, 51]);
     scratch.stack("stray.tif", [layer]);
     pair("fix_paired", &corrected(&scratch, 1, &["paired"], ""))
@@ -104,7 +105,7 @@ fn sliver() -> (String, Mask) {
         (60, &[a, b, c, d]) => vec![a, b, b + 12, c - 8, c, d],
         _ => had.to_vec(),
     };
-    layers[1].image = Image::Mask(edited(mask(&layers[1]), added));
+    layers[1].image = edited(mask(&layers[1]), added).into();
     (layers[1].info.closed, layers[1].info.open_rows) = (Some(false), vec![60, 61]);
     scratch.stack("stray.tif", layers);
     pair("fix_sliver", &corrected(&scratch, 1, &["sliver"], ""))
@@ -142,7 +143,7 @@ fn gray() -> (String, Mask) {
     let scratch = broken("sphere --facets 1k --defect drop --count 12 --seed 7", "");
     let mut layers = scratch.layers("stray.tif");
     for layer in &mut layers {
-        layer.image = Image::Gray(with_soft_edges(mask(layer)));
+        layer.image = with_soft_edges(mask(layer)).into();
     }
     scratch.stack("stray.tif", layers);
     let images = corrected(&scratch, 11, &["ends white", "unbalanced"], "");

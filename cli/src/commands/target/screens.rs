@@ -3,7 +3,7 @@
 use clap::Args;
 use lamp_grayscale::resin::{ExposureTime, GrayLevel};
 use lamp_grayscale::target::screens;
-use lamp_stack::{Dpi, Image, Layer, Length, PageInfo, StackInfo};
+use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
 
 use super::{parse_gap, whole_pixels};
 use crate::options::{Common, Output};
@@ -64,7 +64,7 @@ pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Stop> {
         stack: Some(stack),
         ..PageInfo::default()
     };
-    let layer = Layer { info, dpi: Some(args.dpi), image: Image::Gray(image) };
+    let layer = Layer { info, dpi: Some(args.dpi), image: image.into() };
     let report = report("target", common, &args.output);
     write_layers(std::iter::once(Ok(layer)), &args.output, &report)
 }

@@ -9,7 +9,7 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_grayscale::target::{TargetExposure, squares};
 use lamp_stack::{
-    Destination, Dpi, FolderBeside, Format, Image, Layer, Length, PageInfo, StackInfo, write_stack,
+    Destination, Dpi, FolderBeside, Format, Layer, Length, PageInfo, StackInfo, write_stack,
 };
 
 use super::{parse_gap, whole_pixels};
@@ -149,7 +149,7 @@ impl SquaresArgs {
             // The first square that is white has its whole dose after this page.
             info.other.insert("feature_px".to_owned(), size.into());
             info.other.insert("dose_mj_per_cm2".to_owned(), doses[index as usize].into());
-            Ok(Layer { info, dpi: Some(dpi), image: Image::Mask(exposure.image) })
+            Ok(Layer { info, dpi: Some(dpi), image: exposure.image.into() })
         })
     }
 

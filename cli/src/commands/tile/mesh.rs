@@ -122,7 +122,7 @@ fn template(path: &Path) -> Result<MeshPattern, Stop> {
     let place = input_name(path);
     let first = layers_of(open_pages(path)?, &place, None).next();
     let layer = first.unwrap_or_else(|| Err(failed_at(place.clone(), StackError::NoLayers)))?;
-    let image = match layer.image {
+    let image = match layer.image.into_image() {
         Image::Mask(image) => image,
         Image::Gray(gray) => dither_image(&gray, DitherMethod::Threshold, 0)
             .map_err(|error| Stop::Failed(error.into()).at(place))?,

@@ -28,7 +28,7 @@ pub(in crate::tile) fn on_base<E>(
             if let Some(layers) = info.stack.as_mut().and_then(|stack| stack.layers.as_mut()) {
                 *layers += count;
             }
-            let layer = Layer { info, dpi: first.dpi, image: Image::Mask(mesh.whole()) };
+            let layer = Layer { info, dpi: first.dpi, image: Image::Mask(mesh.whole()).into() };
             next += 1;
             return Some(Ok(layer));
         }

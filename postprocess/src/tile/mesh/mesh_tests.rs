@@ -27,7 +27,7 @@ fn built(layout: &Layout, stacks: Vec<Vec<Layer>>) -> Vec<Layer> {
 }
 
 fn mask(layer: &Layer) -> &Mask {
-    let Image::Mask(mask) = &layer.image else { panic!("the build is 1-bit") };
+    let Image::Mask(mask) = &*layer.image else { panic!("the build is 1-bit") };
     mask
 }
 
@@ -204,7 +204,7 @@ fn gray_parts_keep_their_levels() {
     let layout = layout.with_mesh(&mesh(CellShape::Hexagon, [6.0, 2.0, 3.0])).unwrap();
     let at = layout.placements()[0];
     let build = built(&layout, vec![vec![part]]);
-    let Image::Gray(gray) = &build[0].image else { panic!("the build is gray") };
+    let Image::Gray(gray) = &*build[0].image else { panic!("the build is gray") };
     let level = |column: u32, row: u32| {
         gray.row(row).iter().rfind(|change| change.column <= column).map_or(0, |c| c.level)
     };

@@ -146,7 +146,7 @@ impl BuildMesh {
         let PixelSize { width, height } = self.build;
         let reach = self.reach();
         let mut mask = MaskBuilder::new(width);
-        mask.reserve(height as usize, self.changes + parts.transition_count());
+        mask.reserve(height as usize, self.changes + parts.change_count());
         let (mut wall, mut moat, mut free) = (Vec::new(), Vec::new(), Vec::new());
         let mut row = Vec::new();
         for index in 0..height {

@@ -1,0 +1,281 @@
+//! What 1-bit and gray images share: rows of runs in two flat arrays.
+
+use std::fmt::Debug;
+
+use thiserror::Error;
+
+/// A pixel's value: `bool` in a mask, `u8` in a gray mask. The default is
+/// black.
+pub trait Pixel: Copy + Debug + Default + Eq {}
+
+impl Pixel for bool {}
+impl Pixel for u8 {}
+
+/// A place in a row where pixels change their value: a `u32` in a
+/// [`Mask`](crate::Mask), which stands for the column alone, or a
+/// [`LevelChange`](crate::LevelChange).
+pub trait Change: Copy + Debug + Eq {
+    /// What changes.
+    type Pixel: Pixel;
+
+    /// Creates the change to `pixel` at a column. Between two values, the column
+    /// tells all.
+    fn new(column: u32, pixel: Self::Pixel) -> Self;
+
+    /// Returns the first column of the new value.
+    fn column(self) -> u32;
+
+    /// Returns the new value of pixels that were `before`.
+    fn after(self, before: Self::Pixel) -> Self::Pixel;
+
+    /// Returns the value behind the last of a row's changes.
+    fn last_pixel(changes: &[Self]) -> Self::Pixel;
+}
+
+impl Change for u32 {
+    type Pixel = bool;
+
+    #[inline]
+    fn new(column: u32, _: bool) -> Self {
+        column
+    }
+
+    #[inline]
+    fn column(self) -> u32 {
+        self
+    }
+
+    #[inline]
+    fn after(self, before: bool) -> bool {
+        !before
+    }
+
+    #[inline]
+    fn last_pixel(changes: &[Self]) -> bool {
+        changes.len() % 2 == 1
+    }
+}
+
+/// An image kept as the columns where each row changes: [`Mask`](crate::Mask)
+/// and [`GrayMask`](crate::GrayMask) are its two kinds.
+///
+/// Row 0 is at the largest y, column 0 at the smallest x; pixel `x` covers
+/// `[x, x + 1)`. Every row starts black.
+///
+/// # Guarantees
+/// The columns of a row's changes strictly increase and are below the width,
+/// and every change is to another value. This is the only form an image has, so
+/// `==` compares images.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunImage<C> {
+    width: u32,
+    /// Where each row's changes start, and one entry more: the end.
+    row_offsets: Vec<u32>,
+    changes: Vec<C>,
+}
+
+/// Arrays or rows that break the guarantees of a [`RunImage`].
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// The columns of a row do not strictly increase.
+    #[error("row {row}: columns do not strictly increase")]
+    NotIncreasing {
+        /// The row, from the top.
+        row: usize,
+    },
+    /// A change is to the value that pixels have already.
+    #[error("row {row}: nothing changes at column {column}")]
+    NoChange {
+        /// The row, from the top.
+        row: usize,
+        /// The column of the change.
+        column: u32,
+    },
+    /// A change is at or past the width.
+    #[error("row {row}: column {column} is outside an image {width} pixels wide")]
+    OutsideWidth {
+        /// The row, from the top.
+        row: usize,
+        /// The offending column.
+        column: u32,
+        /// The image's width in pixels.
+        width: u32,
+    },
+    /// There are more changes than 32 bits can count.
+    #[error("row {row}: the image has more than 2^32 changes")]
+    TooMany {
+        /// The row that does not fit.
+        row: usize,
+    },
+    /// The row offsets do not start at 0, decrease, or miss the end.
+    #[error("the row offsets do not partition the changes")]
+    Offsets,
+}
+
+impl<C: Change> RunImage<C> {
+    /// Creates an image without rows.
+    pub(crate) fn without_rows(width: u32) -> Self {
+        Self { width, row_offsets: vec![0], changes: Vec::new() }
+    }
+
+    /// Creates an image from its two arrays, where these keep the guarantees.
+    pub(crate) fn from_arrays(
+        width: u32,
+        row_offsets: Vec<u32>,
+        changes: Vec<C>,
+    ) -> Result<Self, RunError> {
+        let ends_right = row_offsets.first() == Some(&0)
+            && row_offsets.last().map(|&end| end as usize) == Some(changes.len());
+        if !ends_right || !row_offsets.is_sorted() {
+            return Err(RunError::Offsets);
+        }
+        let image = Self { width, row_offsets, changes };
+        for (row, changes) in image.rows().enumerate() {
+            image.check_row(row, changes)?;
+        }
+        Ok(image)
+    }
+
+    /// Creates an all-black image.
+    pub fn black(width: u32, height: u32) -> Self {
+        Self { width, row_offsets: vec![0; height as usize + 1], changes: Vec::new() }
+    }
+
+    /// Returns the width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Returns the height in pixels.
+    pub fn height(&self) -> u32 {
+        (self.row_offsets.len() - 1) as u32
+    }
+
+    /// Returns the changes of a row.
+    ///
+    /// # Panics
+    /// Panics if `row` is not below the height.
+    pub fn row(&self, row: u32) -> &[C] {
+        let row = row as usize;
+        &self.changes[self.row_offsets[row] as usize..self.row_offsets[row + 1] as usize]
+    }
+
+    /// Returns the changes of every row, from the top.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &[C]> {
+        self.row_offsets.windows(2).map(|ends| &self.changes[ends[0] as usize..ends[1] as usize])
+    }
+
+    /// Returns the number of changes in all rows, with which the image's cost
+    /// grows.
+    pub fn change_count(&self) -> usize {
+        self.changes.len()
+    }
+
+    /// Makes room for this many more rows and changes.
+    pub(crate) fn reserve(&mut self, rows: usize, changes: usize) {
+        self.row_offsets.reserve(rows);
+        self.changes.reserve(changes);
+    }
+
+    /// Checks a row that comes from outside this crate and adds it.
+    pub(crate) fn push_row_checked(&mut self, changes: &[C]) -> Result<(), RunError> {
+        let row = self.row_offsets.len() - 1;
+        self.check_row(row, changes)?;
+        if u32::try_from(self.changes.len() + changes.len()).is_err() {
+            return Err(RunError::TooMany { row });
+        }
+        self.push(changes);
+        Ok(())
+    }
+
+    /// Adds the row that `make` appends to the image's changes, given the width
+    /// and the row's number; adds nothing if it fails.
+    pub(crate) fn push_row_with(
+        &mut self,
+        make: impl FnOnce(u32, usize, &mut Vec<C>) -> Result<(), RunError>,
+    ) -> Result<(), RunError> {
+        let first = self.changes.len();
+        let made = make(self.width, self.row_offsets.len() - 1, &mut self.changes);
+        match made {
+            Ok(()) => self.row_offsets.push(self.changes.len() as u32),
+            Err(_) => self.changes.truncate(first),
+        }
+        made
+    }
+
+    /// Adds a row that this crate has made in canonical form.
+    pub(crate) fn push(&mut self, changes: &[C]) {
+        debug_assert_eq!(self.check_row(self.row_offsets.len() - 1, changes), Ok(()));
+        self.changes.extend_from_slice(changes);
+        self.row_offsets.push(self.changes.len() as u32);
+    }
+
+    /// Adds the row of the first `len` of `changes`, in canonical form, which are
+    /// at least three more: rows are short, and are copied faster in fours.
+    #[inline]
+    pub(crate) fn push_padded(&mut self, changes: &[C], len: usize) {
+        debug_assert_eq!(self.check_row(self.row_offsets.len() - 1, &changes[..len]), Ok(()));
+        let end = self.changes.len() + len;
+        for four in changes.as_chunks::<4>().0.iter().take(len.div_ceil(4)) {
+            self.changes.extend_from_slice(four);
+        }
+        self.changes.truncate(end);
+        self.row_offsets.push(end as u32);
+    }
+
+    /// Adds black rows.
+    pub(crate) fn push_black_rows(&mut self, rows: u32) {
+        let end = self.changes.len() as u32;
+        self.row_offsets.resize(self.row_offsets.len() + rows as usize, end);
+    }
+
+    fn check_row(&self, row: usize, changes: &[C]) -> Result<(), RunError> {
+        if !changes.is_sorted_by(|a, b| a.column() < b.column()) {
+            return Err(RunError::NotIncreasing { row });
+        }
+        if let Some(column) = changes.last().map(|last| last.column())
+            && column >= self.width
+        {
+            return Err(RunError::OutsideWidth { row, column, width: self.width });
+        }
+        let mut pixel = C::Pixel::default();
+        for change in changes {
+            let next = change.after(pixel);
+            if next == pixel {
+                return Err(RunError::NoChange { row, column: change.column() });
+            }
+            pixel = next;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GrayMask, LevelChange, Mask};
+
+    #[test]
+    fn only_the_canonical_form_is_taken() {
+        assert!(Mask::new(8, vec![0, 3, 3], vec![1, 4, 6]).is_ok());
+        assert_eq!(Mask::new(8, vec![0, 2], vec![4, 4]), Err(RunError::NotIncreasing { row: 0 }));
+        assert_eq!(
+            Mask::new(8, vec![0, 0, 1], vec![8]),
+            Err(RunError::OutsideWidth { row: 1, column: 8, width: 8 })
+        );
+        for offsets in [vec![], vec![1], vec![0, 1], vec![0, 3, 2], vec![1, 2]] {
+            assert_eq!(Mask::new(8, offsets, vec![1, 2]), Err(RunError::Offsets));
+        }
+        let mut image = GrayMask::new(10);
+        let mut push = |row: [(u32, u8); 2]| {
+            image.push_row(&row.map(|(column, level)| LevelChange { column, level }))
+        };
+        assert_eq!(push([(2, 7), (6, 0)]), Ok(()));
+        assert_eq!(push([(2, 0), (6, 1)]), Err(RunError::NoChange { row: 1, column: 2 }));
+        assert_eq!(push([(2, 7), (6, 7)]), Err(RunError::NoChange { row: 1, column: 6 }));
+        assert_eq!(push([(6, 7), (6, 0)]), Err(RunError::NotIncreasing { row: 1 }));
+        let outside = RunError::OutsideWidth { row: 1, column: 10, width: 10 };
+        assert_eq!(push([(2, 7), (10, 0)]), Err(outside));
+    }
+}
