@@ -1,4 +1,4 @@
-//! The copies of parts that `tile` made, by what the first page says of them.
+//! Finds the copies of parts on a build, which its first page lists.
 
 use lamp_stack::{Frame, Mask, MaskBuilder, Op, Orientation, PageInfo, StackInfo, place_row};
 use serde::Deserialize;
@@ -8,22 +8,22 @@ use super::edit_error::{EditError, LayerProblem};
 use super::image_bounds::ImageBounds;
 use super::schema::CopySelection;
 
-/// Copies stand within so many pixels of an image's corner.
+/// The largest distance of a copy from an image's corner, in pixels.
 const MAX_OFFSET: i64 = 1 << 40;
-/// The images of all copies have at most so many rows together.
+/// The largest number of rows of all copies together.
 const MAX_ROWS: u64 = 1 << 27;
 
 /// A part's image as it stands in a build, or the whole image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BuildCopy {
-    /// Where the part's pixels lie in it, as it was before it was turned.
+    /// The bounds of the part's image before it was turned.
     pub(super) part: ImageBounds,
     pub(super) turn: Orientation,
     pub(super) left: i64,
     pub(super) top: i64,
 }
 
-/// What the first page says of the copies of a part.
+/// The first page's entry for a part.
 #[derive(Deserialize)]
 struct TiledPart {
     part: Option<String>,
@@ -35,11 +35,11 @@ struct TiledPart {
 }
 
 impl BuildCopy {
-    /// The copies that an edit is for, in a stack whose first page is `info` and
-    /// whose pixels lie at `place`: the whole image, if it is for none.
+    /// Returns the copies that an edit is for, or the whole image if it is for none.
+    /// `info` is the stack's first page, `place` the bounds of its images.
     ///
     /// # Errors
-    /// What the first page lacks.
+    /// Returns an error if the first page does not say where the copies stand.
     pub(super) fn all(
         wanted: &CopySelection,
         info: &PageInfo,
@@ -78,13 +78,13 @@ impl BuildCopy {
         Ok(part.copies.into_iter().zip(turns).map(copy).collect())
     }
 
-    /// Whether it is all of an image, as it is.
+    /// Returns true if it is all of an image, not turned.
     fn is_whole(&self, place: &ImageBounds) -> bool {
         *self == Self { part: *place, turn: Orientation::default(), left: 0, top: 0 }
     }
 }
 
-/// The part whose copies are wanted.
+/// Returns the part whose copies are wanted.
 fn chosen(
     mut parts: Vec<TiledPart>,
     wanted: &CopySelection,
@@ -101,8 +101,8 @@ fn chosen(
     Ok(parts.swap_remove(index))
 }
 
-/// An image at `place` that is white where a copy is, of which `mask` gives each
-/// one's image. `None` where that has more runs than any may have.
+/// Returns the union of all copies on an image at `place`, given each copy's `mask`, or
+/// `None` if that has more runs than an image can hold.
 pub(super) fn composed(
     copies: &[BuildCopy],
     place: &ImageBounds,
@@ -118,7 +118,8 @@ pub(super) fn composed(
         .enumerate()
         .map(|(k, copy)| mask(k, &copy.part).oriented(copy.turn))
         .collect::<Option<_>>()?;
-    // Which rows of which copies have anything, by the build's rows.
+    // The rows of copies that are not black, by the build's rows. Labels are small, and
+    // rows without any cost nothing.
     let mut rows: Vec<(u32, u32, usize)> = Vec::new();
     for (k, (copy, mask)) in copies.iter().zip(&masks).enumerate() {
         let white = (0..mask.height()).filter(|&row| !mask.row(row).is_empty());
@@ -152,7 +153,7 @@ pub(super) fn composed(
     Some(build.finish())
 }
 
-/// Makes a first page say where copies stand in what a frame shows.
+/// Adapts the copies on a first page to a frame of the image.
 pub(super) fn move_copies(stack: &mut StackInfo, frame: Frame) {
     let Some(tile) = stack.other.get_mut("tile") else { return };
     each_part(tile, |part| {
@@ -165,7 +166,7 @@ pub(super) fn move_copies(stack: &mut StackInfo, frame: Frame) {
     });
 }
 
-/// Does something to what is said of each part.
+/// Calls `with` on the entry for each part.
 fn each_part(tile: &mut Value, mut with: impl FnMut(&mut Value)) {
     match tile.get_mut("parts").and_then(Value::as_array_mut) {
         Some(parts) => parts.iter_mut().for_each(with),
@@ -173,7 +174,7 @@ fn each_part(tile: &mut Value, mut with: impl FnMut(&mut Value)) {
     }
 }
 
-/// Makes a first page say no more where copies stand.
+/// Removes the copies from a first page.
 pub(super) fn forget_copies(stack: &mut StackInfo) {
     stack.other.shift_remove("tile");
 }

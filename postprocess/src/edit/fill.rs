@@ -1,14 +1,14 @@
-//! Outlines filled: which pixels have their centres inside.
+//! Fills outlines: finds the pixels whose centres are inside.
 
 use lamp_stack::{Mask, MaskBuilder};
 
-/// A point in pixels, as a [`PixelMap`](super::image_bounds::PixelMap) maps it: column, row.
+/// A point as column and row, as a [`PixelMap`](super::image_bounds::PixelMap) returns it.
 pub(super) type Point = [f64; 2];
 
-/// The pixels inside closed lines: those that they wind about, whichever way.
+/// Returns the pixels inside closed lines, by the non-zero rule.
 ///
-/// A line crosses a row of centres as in slicing: a point on the row counts as
-/// below it. So lines that share a point, or an edge, leave no gap between.
+/// As in slicing, a point on a row of pixel centres counts as below it. So shapes that
+/// share a point or an edge leave no gap between them and share no pixel.
 pub(super) fn polygons(lines: &[Vec<Point>], width: u32, height: u32) -> Mask {
     let mut crossings = Vec::new();
     for line in lines {
@@ -34,7 +34,7 @@ pub(super) fn polygons(lines: &[Vec<Point>], width: u32, height: u32) -> Mask {
     })
 }
 
-/// The pixels within a distance of a point.
+/// Returns the pixels nearer to a point than `radius`.
 pub(super) fn disc([x, y]: Point, radius: f64, width: u32, height: u32) -> Mask {
     rows(width, height, |row, out| {
         let square = radius * radius - (f64::from(row) - y).powi(2);
@@ -44,7 +44,7 @@ pub(super) fn disc([x, y]: Point, radius: f64, width: u32, height: u32) -> Mask 
     })
 }
 
-/// Where a line crosses a row, and whether it goes down (1) or up (-1).
+/// Where an outline crosses a row, downwards (`winding` 1) or upwards (-1).
 struct OutlineCrossing {
     row: u32,
     x: f64,
@@ -63,12 +63,12 @@ fn cross(a: Point, b: Point, height: u32, out: &mut Vec<OutlineCrossing>) {
     }
 }
 
-/// An image whose rows are made of ends of runs, in rising order.
+/// Creates an image from the ends of each row's runs, in rising order.
 fn rows(width: u32, height: u32, mut of_row: impl FnMut(u32, &mut Vec<[f64; 2]>)) -> Mask {
     let mut mask = MaskBuilder::new(width);
     let mut runs = Vec::new();
     let mut row: Vec<u32> = Vec::new();
-    // Values below zero become zero.
+    // The cast makes negative values zero.
     let column = |x: f64| (x.ceil() as u32).min(width);
     for index in 0..height {
         runs.clear();

@@ -1,4 +1,4 @@
-//! The frames that edits ask for, in pixels.
+//! Frames in pixels: of padding, of cropping, and of an image in another stack's.
 
 use lamp_stack::{Frame, Layer, PageInfo};
 
@@ -6,12 +6,12 @@ use super::edit_error::{EditError, EditProblem};
 use super::image_bounds::ImageBounds;
 use super::schema::{OtherStack, Pad, Rectangle};
 
-/// A frame with so much black around the image, in whole pixels.
+/// Returns a frame with black around the image, in whole pixels.
 pub(super) fn padded(pad: Pad, place: &ImageBounds) -> Result<Frame, EditError> {
     let grid = place.grid()?;
     let [left, right, top, bottom] =
         [pad.left, pad.right, pad.top, pad.bottom].map(|length| grid.length(length).round() as i64);
-    // Lengths are at most 10 m, so that 32 bits hold all.
+    // Lengths are at most 10 m, which 32 bits hold at any resolution.
     let side = |size: u32, more: i64| (i64::from(size) + more) as u32;
     Ok(Frame {
         left: -left,
@@ -21,10 +21,10 @@ pub(super) fn padded(pad: Pad, place: &ImageBounds) -> Result<Frame, EditError> 
     })
 }
 
-/// What of another stack's images lies in those at `place`.
+/// Returns the frame of images at `place` in another stack's images.
 ///
 /// # Errors
-/// Why that cannot be said.
+/// Returns an error if the stacks differ in resolution, or only one says where it lies.
 pub(super) fn frame_of(
     other: &Layer,
     OtherStack { by, .. }: &OtherStack,
@@ -42,7 +42,7 @@ pub(super) fn frame_of(
         return Err(EditProblem::OtherOrigin { stack });
     }
     let Ok(grid) = place.grid() else {
-        // Without a size of pixels all images begin at the top left.
+        // Without a resolution, all images begin at the top left.
         let moved = by[..2].iter().any(|by| by.um() != 0.0);
         return if moved {
             Err(EditProblem::OtherLengths { stack })
@@ -52,13 +52,12 @@ pub(super) fn frame_of(
     };
     let [x, y] = from.origin_mm;
     let [left, top] = grid.to_pixels([x + by[0].mm(), y + by[1].mm()]);
-    // The centres of its first column and row stand half a pixel further.
+    // The centres of its first column and row lie half a pixel further.
     let [left, top] = [left, top].map(|pixels| -(pixels + 0.5).round() as i64);
     Ok(Frame { left, top, width: place.width, height: place.height })
 }
 
-/// What of an image lies in a box: from the first centre inside to the first that
-/// is not.
+/// Returns the frame of the pixels whose centres are in a box.
 pub(super) fn cropped(
     crop: Rectangle,
     number: usize,

@@ -1,4 +1,4 @@
-//! Where a stack's pixels lie, and what becomes of that.
+//! Where a stack's pixels lie in the part's coordinates.
 
 use std::fmt;
 
@@ -6,19 +6,21 @@ use lamp_stack::{Dpi, Frame, Layer, Length, Orientation};
 
 use super::edit_error::EditError;
 
-/// The pixels of every layer in part coordinates.
+/// The rectangle that a stack's images cover in the part's coordinates.
+///
+/// It is written as `x 1.000 to 4.000 and y 3.000 to 5.000 mm`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageBounds {
     /// The top left corner, in millimetres.
     pub(super) origin_mm: [f64; 2],
-    /// The resolution, where it is known.
+    /// The resolution, if it is known.
     pub(super) dpi: Option<Dpi>,
     pub(super) width: u32,
     pub(super) height: u32,
 }
 
 impl ImageBounds {
-    /// Where a layer's pixels lie. Where its page does not say, its lower left
+    /// Returns the bounds of a layer. If its page does not state them, the lower left
     /// corner is 0, 0.
     pub(crate) fn of(layer: &Layer) -> Self {
         let (width, height) = (layer.image.width(), layer.image.height());
@@ -27,19 +29,19 @@ impl ImageBounds {
         Self { origin_mm, dpi: layer.dpi, width, height }
     }
 
-    /// What maps points of the part to pixels.
+    /// Returns the map from points of the part to pixels.
     pub(super) fn grid(&self) -> Result<PixelMap, EditError> {
         let dpi = self.dpi.ok_or(EditError::NoResolution)?;
         Ok(PixelMap { origin_mm: self.origin_mm, dpi })
     }
 
-    /// Whether a point in pixels is on the image.
+    /// Returns true if a point in pixels is on the image.
     pub(super) fn holds(&self, [x, y]: [f64; 2]) -> bool {
         let on = |place: f64, size: u32| (-0.5..=f64::from(size) - 0.5).contains(&place);
         on(x, self.width) && on(y, self.height)
     }
 
-    /// Where the pixels lie that a frame shows.
+    /// Returns the bounds of a frame of the image.
     pub(crate) fn framed(&self, frame: Frame) -> Self {
         let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
         let [x0, y1] = self.origin_mm;
@@ -51,7 +53,7 @@ impl ImageBounds {
         }
     }
 
-    /// Where the pixels lie when the part is turned about x = y = 0.
+    /// Returns the bounds after the part is turned about x = y = 0.
     pub(super) fn turned(&self, turn: Orientation) -> Self {
         let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
         let [mut x0, mut y1] = self.origin_mm;
@@ -68,7 +70,6 @@ impl ImageBounds {
     }
 }
 
-/// Where the image reaches, in millimetres.
 impl fmt::Display for ImageBounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let pitch = self.dpi.map_or(Length::default(), Dpi::pitch).mm();
@@ -79,7 +80,7 @@ impl fmt::Display for ImageBounds {
     }
 }
 
-/// What maps points in millimetres to pixels.
+/// Maps points in millimetres to pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelMap {
     origin_mm: [f64; 2],
@@ -87,16 +88,16 @@ pub(super) struct PixelMap {
 }
 
 impl PixelMap {
-    /// A point in pixels: the columns from its first coordinate on have their
-    /// centres right of it or on it, the rows from its second on below it or on
-    /// it. What lies on a centre is a whole number, as in slicing.
+    /// Returns a point in pixels. Pixel centres are whole numbers, as in slicing: columns
+    /// from the first coordinate on have their centres at or right of the point, rows from
+    /// the second on at or below it.
     pub(super) fn to_pixels(self, [x_mm, y_mm]: [f64; 2]) -> [f64; 2] {
         let pixels = |mm: f64| mm * (self.dpi.get() * 5.0) / 127.0 - 0.5;
         let [x0, y1] = self.origin_mm;
         [pixels(x_mm - x0), pixels(y1 - y_mm)]
     }
 
-    /// A length in pixels.
+    /// Returns a length in pixels.
     pub(super) fn length(self, length: Length) -> f64 {
         length.pixels(self.dpi)
     }

@@ -1,4 +1,4 @@
-//! Letters as closed lines.
+//! Outlines of labels' letters, as closed lines.
 
 use lamp_stack::Orientation;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
@@ -8,7 +8,7 @@ use super::fill::Point;
 
 const FONT: &[u8] = include_bytes!("../../../fonts/roboto-subset.ttf");
 
-/// Where a text begins at its place.
+/// The end of a text, or its middle, that is at its place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Align {
@@ -18,12 +18,12 @@ pub(super) enum Align {
     Right,
 }
 
-/// A text's outlines: closed lines as a pen draws them, x to the right and y up
-/// from where the text stands on its base line, in units of a capital's height.
-/// They bend by pieces of straight lines that are off by at most `tolerance`.
+/// Returns a text's outlines as closed lines, x to the right and y up from the text's
+/// place on its base line, in units of a capital's height. Straight pieces approximate
+/// curves within `tolerance`.
 ///
 /// # Errors
-/// The first letter that the font has not.
+/// Returns the first letter that the font lacks.
 pub(super) fn outlines(
     text: &str,
     align: Align,
@@ -55,7 +55,7 @@ fn glyph(face: &Face<'_>, letter: char) -> Option<GlyphId> {
     face.glyph_index(letter).filter(|id| id.0 != 0)
 }
 
-/// A point turned about the zero, with y up.
+/// Turns a point about the origin, with y up.
 fn turned([x, y]: Point, turn: Orientation) -> Point {
     let start = if turn.is_mirrored() { [-x, y] } else { [x, y] };
     (0..turn.quarters()).fold(start, |[x, y], _| [-y, x])
@@ -64,7 +64,7 @@ fn turned([x, y]: Point, turn: Orientation) -> Point {
 /// Draws a font's curves as straight lines.
 struct Pen {
     lines: Vec<Vec<Point>>,
-    /// Where the letter begins.
+    /// The start of the letter.
     x: f64,
     scale: f64,
     tolerance: f64,
@@ -83,8 +83,8 @@ impl Pen {
         self.lines.last_mut().expect("a curve starts somewhere").push(point);
     }
 
-    /// Draws a curve of which the second differences are at most `bend`: a piece
-    /// of an `n`th is off by at most `bend / (8 n^2)`.
+    /// Draws a curve whose second derivative is at most `bend`. The chord of an `n`th of
+    /// it is off by at most `bend / (8 n^2)`.
     fn draw(&mut self, bend: f64, at: impl Fn(f64) -> Point) {
         let pieces = (bend / (8.0 * self.tolerance)).sqrt().ceil().clamp(1.0, 1000.0) as u32;
         for piece in 1..=pieces {
@@ -117,7 +117,7 @@ impl OutlineBuilder for Pen {
     fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
         let (a, b) = (self.last(), self.point(x1, y1));
         let (c, d) = (self.point(x2, y2), self.point(x, y));
-        // The second derivative is six times what is between these two.
+        // The second derivative lies between six times these two differences.
         let second = |a: Point, b: Point, c: Point| {
             (a[0] - 2.0 * b[0] + c[0]).hypot(a[1] - 2.0 * b[1] + c[1])
         };
@@ -137,11 +137,11 @@ impl OutlineBuilder for Pen {
     fn close(&mut self) {}
 }
 
-/// A text with the number `n` in it, where it says `{n}`, or `{n:4}` or
-/// `{n:04}` for four places filled with blanks or zeros.
+/// Puts the number `n` into a text for `{n}`, or for `{n:4}` and `{n:04}` with four
+/// digits, filled with blanks or zeros.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// Returns an error if the text has single braces, or something else in them.
 pub(super) fn numbered(text: &str, n: i64) -> Result<String, EditProblem> {
     let mut out = String::new();
     let mut rest = text;
@@ -157,7 +157,7 @@ pub(super) fn numbered(text: &str, n: i64) -> Result<String, EditProblem> {
     Ok(out + rest)
 }
 
-/// A number as the field of a text asks for it.
+/// Formats a number as a field of a text asks for it.
 fn number(field: &str, n: i64) -> Option<String> {
     let Some(places) = field.strip_prefix("n:") else {
         return (field == "n").then(|| n.to_string());

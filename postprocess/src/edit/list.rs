@@ -1,4 +1,4 @@
-//! Lists of edits as people write them, in TOML.
+//! Reads lists of edits from TOML, and checks each edit.
 
 use std::path::PathBuf;
 
@@ -10,11 +10,21 @@ use serde_path_to_error::Segment;
 use super::edit_error::{EditError, EditProblem};
 use super::schema::{CylinderAxis, Edit, OtherStack};
 
-/// What is to be done to a stack, one after the other.
+/// A list of edits, made one after the other.
+///
+/// ```
+/// use lamp_postprocess::Edits;
+///
+/// let edits = Edits::from_toml("[[edit]]\nrotate = 90\n[[edit]]\nmirror = \"x\"\n")?;
+/// assert_eq!(edits.count(), 2);
+/// let error = Edits::from_toml("[[edit]]\nrotate = 45\n").unwrap_err();
+/// assert_eq!(error.to_string(), "edit 1: images rotate by 90, 180 or 270 degrees");
+/// # Ok::<(), lamp_postprocess::EditError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Edits {
     pub(super) list: Vec<Edit>,
-    /// The list as it is told of in the output.
+    /// The list as the result's first page has it.
     pub(super) told: Vec<Value>,
 }
 
@@ -22,8 +32,8 @@ impl Edits {
     /// Reads a list of edits.
     ///
     /// # Errors
-    /// Where the text is no TOML, or a key is unknown, missing or wrong; the error
-    /// names the edit and the key.
+    /// Returns an error that names the line, the edit and the key if the text is no TOML,
+    /// or a key is unknown, missing or wrong.
     pub fn from_toml(text: &str) -> Result<Self, EditError> {
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -54,7 +64,7 @@ impl Edits {
         Ok(edits)
     }
 
-    /// The one edit that makes of a stack and another what `op` says.
+    /// Creates the one edit that combines a stack with another.
     pub fn combine(op: Op, file: PathBuf) -> Self {
         let other = OtherStack { file, by: [Length::default(); 3] };
         let edit = Edit { op: Some(op), stack: Some(other), ..Edit::default() };
@@ -64,19 +74,19 @@ impl Edits {
         }
     }
 
-    /// How many edits there are.
+    /// Returns the number of edits.
     pub fn count(&self) -> usize {
         self.list.len()
     }
 
-    /// The files of the other stacks that it names, in order.
+    /// Returns the files of the stacks that the edits name, in order.
     pub fn stacks(&self) -> impl Iterator<Item = &PathBuf> {
         self.list.iter().filter_map(|edit| Some(&edit.stack.as_ref()?.file))
     }
 }
 
 impl Edit {
-    /// Checks what single keys cannot show.
+    /// Checks that the keys go together.
     fn check(&self, number: usize) -> Result<(), EditError> {
         self.problem().map_or(Ok(()), |problem| Err(problem.of_edit(number)))
     }
@@ -117,7 +127,7 @@ impl Edit {
     }
 }
 
-/// A key's path as people count: `edit 2, box.x`.
+/// Returns a key's path with edits counted from 1: `edit 2, box.x`.
 fn key_of(path: &serde_path_to_error::Path) -> String {
     let mut key = String::new();
     for segment in path {

@@ -1,7 +1,7 @@
-//! Changes to a design at image level, without slicing it again.
+//! Changes a design at image level, without slicing it again.
 //!
-//! A list of edits, as people write it in TOML, becomes a plan in the pixels of
-//! the stack once its first layer is known; then each layer is edited by itself.
+//! A list of edits is read from TOML. The stack's first layer turns it into a plan in
+//! pixels; then each layer is edited independently of the others.
 //!
 //! Source: 002 section 2.4.3.
 
@@ -33,12 +33,12 @@ pub(crate) use page_changes::frame_page;
 use other_stacks::AlignedStack;
 use plan::EditPlan;
 
-/// Does edits to every layer of a stack. `others` are the stacks that the edits
-/// name, in order; `done` is told of each layer which edits were for it, by their
-/// numbers from 0.
+/// Makes a list of edits in every layer of a stack. `others` are the stacks that the
+/// edits name, in order. `done` is called with each layer and the indices of the edits
+/// that were made in it.
 ///
-/// Shapes and stacks lie in the part's coordinates; a pixel is in a shape when its
-/// centre is, a layer in a range of heights when its middle is.
+/// Shapes and stacks lie in the part's coordinates. A pixel is in a shape if its centre
+/// is, a layer in a range of heights if its middle is.
 ///
 /// ```
 /// use lamp_postprocess::{EditError, Edits, edit};
@@ -61,13 +61,12 @@ use plan::EditPlan;
 /// ```
 ///
 /// # Errors
-/// Layers come with errors where they cannot be read, where they differ in size or
-/// place from the first, or where the edits cannot be done to them. Where a stack
-/// is added over all heights and has layers above the last, that is an error at
-/// the end.
+/// A layer comes with an error if it cannot be read, differs in size or place from the
+/// first, or does not allow an edit. An error at the end says that a stack that was
+/// added over all heights has layers above the last.
 ///
 /// # Panics
-/// If there are fewer `others` than the edits name.
+/// Panics if there are fewer `others` than the edits name.
 pub fn edit<E: From<EditError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     edits: Edits,
@@ -99,7 +98,7 @@ pub fn edit<E: From<EditError> + Send>(
     })
 }
 
-/// A layer, and those of other stacks at its height.
+/// A layer, and the layers of the other stacks at its height.
 struct ToEdit {
     layer: Layer,
     others: Vec<Option<Arc<Layer>>>,
@@ -113,10 +112,10 @@ impl MemorySize for ToEdit {
     }
 }
 
-/// The other stacks, at the height that has been reached.
+/// The other stacks, read up to the height of the edited one.
 struct AlignedStacks<E> {
     others: Vec<AlignedStack<E>>,
-    /// For each, the edit's number from 1, if it adds the whole stack.
+    /// The number of each stack's edit, from 1, if that adds the whole stack.
     whole: Vec<Option<usize>>,
     last: Option<PageInfo>,
 }
@@ -137,7 +136,7 @@ impl<E: From<EditError>> AlignedStacks<E> {
         beside
     }
 
-    /// The layers at the height of one.
+    /// Returns the layers at a layer's height.
     fn at(&mut self, info: &PageInfo) -> Result<Vec<Option<Arc<Layer>>>, E> {
         if self.last.is_none() {
             self.check(|other| other.below(info), false)?;
@@ -146,13 +145,13 @@ impl<E: From<EditError>> AlignedStacks<E> {
         self.others.iter_mut().map(|other| other.at(info)).collect()
     }
 
-    /// Checks, once, that no layer of a stack that is added is left.
+    /// Checks, once, that no layer of a stack that is added lies above the last.
     fn left_over(&mut self) -> Result<(), E> {
         let Some(last) = self.last.take() else { return Ok(()) };
         self.check(|other| other.above(&last), true)
     }
 
-    /// Checks that stacks that are added have no layer that lies outside.
+    /// Checks that no stack that is added has a layer outside.
     fn check(
         &mut self,
         outside: impl Fn(&mut AlignedStack<E>) -> Result<Option<String>, E>,

@@ -1,4 +1,4 @@
-//! Other stacks, brought to the heights of the one that is edited.
+//! Reads the stacks that edits name along with the edited one, by height.
 
 use std::sync::Arc;
 
@@ -9,23 +9,23 @@ use super::image_bounds::ImageBounds;
 
 /// A stack that an edit names.
 pub struct OtherLayers<E> {
-    /// Its name in messages.
+    /// The name in messages.
     pub name: String,
-    /// Its layers, from the bottom.
+    /// The layers, from the bottom.
     pub layers: Box<dyn Iterator<Item = Result<Layer, E>>>,
-    /// Whether it may have layers below or above all that are edited, where it is
-    /// added over all heights.
+    /// Whether layers below or above the edited ones may be lost if the stack is added
+    /// over all heights.
     pub may_reach_beyond: bool,
 }
 
-/// A stack that is read along with the one that is edited.
+/// A stack that is read along with the edited one.
 pub(super) struct AlignedStack<E> {
     pub(super) name: String,
     layers: Box<dyn Iterator<Item = Result<Layer, E>>>,
-    /// How far up it is moved.
+    /// The distance by which it is moved up.
     up: Length,
     current: Option<Arc<Layer>>,
-    /// Where its layers lie, all of them.
+    /// The bounds of all its layers.
     place: Option<ImageBounds>,
 }
 
@@ -34,10 +34,10 @@ impl<E: From<EditError>> AlignedStack<E> {
         Self { name, layers, up, current: None, place: None }
     }
 
-    /// Its first layer; an edit of that number names it.
+    /// Returns the first layer. `number` is that of the edit that names the stack.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// Returns an error if there is none or it cannot be read.
     pub(super) fn first(&mut self, number: usize) -> Result<&Layer, E> {
         if self.place.is_none() {
             self.advance()?;
@@ -46,7 +46,7 @@ impl<E: From<EditError>> AlignedStack<E> {
         self.current.as_deref().ok_or_else(none)
     }
 
-    /// Goes on to its next layer.
+    /// Goes on to the next layer.
     fn advance(&mut self) -> Result<(), E> {
         self.current = self.layers.next().transpose()?.map(Arc::new);
         let Some(layer) = &self.current else { return Ok(()) };
@@ -58,11 +58,11 @@ impl<E: From<EditError>> AlignedStack<E> {
         Ok(())
     }
 
-    /// The layer that holds the middle of one that is edited. Heights must not go
-    /// down from call to call.
+    /// Returns the layer that holds the middle of an edited one. Heights must not
+    /// decrease from call to call.
     ///
     /// # Errors
-    /// Where a layer cannot be read, or does not say where it is.
+    /// Returns an error if a layer cannot be read or does not say its height.
     pub(super) fn at(&mut self, info: &PageInfo) -> Result<Option<Arc<Layer>>, E> {
         let middle = middle(info).map(Length::um);
         loop {
@@ -79,10 +79,10 @@ impl<E: From<EditError>> AlignedStack<E> {
         }
     }
 
-    /// The name of a layer that lies above all of the last one edited.
+    /// Returns the name of a layer that lies above the last edited one.
     ///
     /// # Errors
-    /// Where a layer cannot be read, or does not say where it is.
+    /// Returns an error if a layer cannot be read or does not say its height.
     pub(super) fn above(&mut self, last: &PageInfo) -> Result<Option<String>, E> {
         let top = last.z_um.zip(last.thickness_um).map(|(z, thickness)| z + thickness);
         while let Some(layer) = &self.current {
@@ -95,10 +95,10 @@ impl<E: From<EditError>> AlignedStack<E> {
         Ok(None)
     }
 
-    /// The name of its first layer, if it lies below all of the first one edited.
+    /// Returns the name of the first layer if it lies below the first edited one.
     ///
     /// # Errors
-    /// Where it does not say where it is.
+    /// Returns an error if it does not say its height.
     pub(super) fn below(&self, first: &PageInfo) -> Result<Option<String>, E> {
         let bottom = first.z_um.filter(|_| first.thickness_um.is_some());
         let Some(layer) = &self.current else { return Ok(None) };
@@ -107,8 +107,8 @@ impl<E: From<EditError>> AlignedStack<E> {
         Ok(is_below.then(|| layer.info.name()))
     }
 
-    /// From where to where a layer reaches: in micrometres, or by its number where
-    /// heights are not known.
+    /// Returns a layer's bottom and top in micrometres, or by its index if heights are
+    /// unknown.
     fn span(&self, info: &PageInfo, by_height: bool) -> Result<[f64; 2], EditError> {
         match (info.z_um, info.thickness_um) {
             (Some(z), Some(thickness)) if by_height => {
@@ -129,7 +129,7 @@ impl<E: From<EditError>> AlignedStack<E> {
     }
 }
 
-/// The height of a layer's middle, where its page says it.
+/// Returns the height of a layer's middle, if its page says it.
 pub(super) fn middle(info: &PageInfo) -> Option<Length> {
     Some(Length::from_um(info.z_um? + info.thickness_um? / 2.0))
 }

@@ -1,12 +1,11 @@
-//! What pages say of images that were cropped, padded or turned.
+//! Adapts pages to images that were cropped, padded or turned.
 
 use super::copies::{forget_copies, move_copies};
 use super::edit_error::{EditError, LayerProblem};
 use super::image_bounds::ImageBounds;
 use lamp_stack::{Frame, Orientation, PageInfo};
 
-/// Makes a page say what holds for the rows that a frame shows, which lie at
-/// `place`.
+/// Adapts a page to a frame of its image, which lies at `place`.
 pub(crate) fn frame_page(info: &mut PageInfo, frame: Frame, place: &ImageBounds) {
     move_to(info, place);
     let moved = |row: u32, end: i64| {
@@ -15,18 +14,18 @@ pub(crate) fn frame_page(info: &mut PageInfo, frame: Frame, place: &ImageBounds)
     };
     let height = i64::from(frame.height);
     info.stray_rows = info.stray_rows.iter().filter_map(|&row| moved(row, height)).collect();
-    // One stands below the last row, if contours break off there.
+    // An open row may stand below the last row, where contours break off.
     info.open_rows = info.open_rows.iter().filter_map(|&row| moved(row, height + 1)).collect();
     if let Some(stack) = &mut info.stack {
         move_copies(stack, frame);
     }
 }
 
-/// Makes a page of `height` rows say what holds for the turned image, which lies
-/// at `place`. Where copies stand is no longer said.
+/// Adapts the page of an image of `height` rows to the turned image, which lies at
+/// `place`. It no longer says where copies stand.
 ///
 /// # Errors
-/// Where stray rows would become columns.
+/// Returns an error if stray rows would become columns.
 pub(super) fn turn_page(
     info: &mut PageInfo,
     turn: Orientation,
@@ -40,9 +39,9 @@ pub(super) fn turn_page(
     if turn.is_across() {
         info.open_rows.clear();
     }
-    // Turned by half, be it mirrored or not: the last row is the first.
+    // A half turn, mirrored or not, makes the last row the first.
     if turn.quarters() == 2 {
-        // What stands beyond the image is left out.
+        // Rows beyond the image are dropped.
         let upside_down = |rows: &[u32], last: Option<u32>| -> Vec<u32> {
             rows.iter().rev().filter_map(|row| last?.checked_sub(*row)).collect()
         };

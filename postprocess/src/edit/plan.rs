@@ -1,4 +1,4 @@
-//! Edits in the pixels of one stack.
+//! Plans edits in the pixels of a stack, and makes them in its layers.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -17,12 +17,12 @@ use super::page_changes::{frame_page, turn_page};
 use super::schema::{Edit, LengthRange, Mirror};
 use super::shape::EditShape;
 
-/// What edits do to the layers of one stack.
+/// The edits of a list in the pixels of one stack.
 pub(super) struct EditPlan {
-    /// Where its layers lie.
+    /// The rectangle that all layers must have.
     place: ImageBounds,
     steps: Vec<PlannedEdit>,
-    /// What is told of the edits, for the first page.
+    /// The command for the first page.
     command: String,
 }
 
@@ -32,7 +32,7 @@ enum PlannedEdit {
         op: Op,
         shape: EditShape,
     },
-    /// Another stack: what of its images lies in this one's.
+    /// Another stack, and the frame of this one's images in it.
     Other {
         reach: LayerSelection,
         op: Op,
@@ -65,7 +65,7 @@ impl LayerSelection {
         }
     }
 
-    /// Whether it holds a layer: by its middle.
+    /// Returns true if a layer, by its middle, is among the selected.
     fn holds(&self, info: &PageInfo) -> Result<bool, EditError> {
         Ok(match self {
             Self::All => true,
@@ -80,8 +80,8 @@ impl LayerSelection {
 }
 
 impl EditPlan {
-    /// What `edits` do to a stack with that first layer. `others` are the stacks
-    /// that they name.
+    /// Plans edits of a stack from its first layer. `others` are the stacks that they
+    /// name.
     pub(super) fn new<E: From<EditError>>(
         edits: &Edits,
         first: &Layer,
@@ -116,8 +116,8 @@ impl EditPlan {
         Ok(plan)
     }
 
-    /// Does the edits to a layer; `others` are those that lie at its height.
-    /// Also returns the numbers of the edits that were for it, from 0.
+    /// Makes the edits in a layer, with the layers of `others` at its height. Also
+    /// returns the indices of the edits that were for it.
     pub(super) fn apply(
         &self,
         layer: Layer,
@@ -157,8 +157,8 @@ impl EditPlan {
 }
 
 impl PlannedEdit {
-    /// What an edit that names no other stack does to a stack that lies at
-    /// `place`, and whose first page is `info`.
+    /// Plans an edit that names no other stack, for images at `place` and the first page
+    /// `info`.
     fn of(
         edit: &Edit,
         number: usize,
@@ -187,7 +187,7 @@ impl PlannedEdit {
         let copies = BuildCopy::all(&edit.copies, info, place)?;
         let shape = EditShape::of(edit, number, place, copies)?;
         let reach = match LayerSelection::of(edit) {
-            // Copies begin above the layers of mesh alone.
+            // Copies begin above the base layers.
             LayerSelection::All if !edit.copies.is_none() => {
                 LayerSelection::Layers(base_layers(info)..u32::MAX)
             }
@@ -196,11 +196,11 @@ impl PlannedEdit {
         Ok(Self::Shape { reach, op: edit.op(), shape })
     }
 
-    /// What becomes of an image; `None` where that has more runs than any may
-    /// have.
+    /// Returns the edited image, or `None` if it has more runs than an image can hold.
     ///
     /// # Errors
-    /// Where a shape's pixels depend on the layer's height, which is not known.
+    /// Returns an error if a shape depends on the layer's height and that is unknown, or
+    /// if another stack would be added beside the image.
     fn of_image(
         &self,
         image: &Image,
@@ -223,13 +223,13 @@ impl PlannedEdit {
                     }
                     combined(*op, &shown)
                 }
-                // A layer that is not there is black.
+                // Where the other stack has no layer it is black.
                 None => combined(*op, &Image::Mask(Mask::black(image.width(), image.height()))),
             },
         })
     }
 
-    /// Makes a page say what holds after the step.
+    /// Changes a page to what holds after the edit.
     fn follow(&self, info: &mut PageInfo) -> Result<(), EditError> {
         match self {
             Self::Frame { frame, place } => frame_page(info, *frame, place),
@@ -241,19 +241,19 @@ impl PlannedEdit {
 }
 
 impl Edit {
-    /// What is done with a shape or a stack: it is added if nothing else is said.
+    /// Returns the operation with a shape or a stack, by default a union.
     fn op(&self) -> Op {
         self.op.unwrap_or(Op::Union)
     }
 
-    /// Whether all of another stack that is not black is to be in the result.
+    /// Returns true if all that is white in another stack must be in the result.
     pub(super) fn adds_at_all_heights(&self) -> bool {
         matches!(LayerSelection::of(self), LayerSelection::All)
             && matches!(self.op(), Op::Union | Op::Xor)
     }
 }
 
-/// How many pixels are not black.
+/// Returns the number of pixels that are not black.
 fn lit(image: &Image) -> u64 {
     match image {
         Image::Mask(mask) => mask.white_pixels(),
@@ -264,14 +264,15 @@ fn lit(image: &Image) -> u64 {
     }
 }
 
-/// How many layers of mesh alone a build begins with.
+/// Returns the number of base layers of a build.
 fn base_layers(info: &PageInfo) -> u32 {
     let tile = info.stack.as_ref().and_then(|stack| stack.other.get("tile"));
     let layers = tile.and_then(|tile| tile["base_layers"].as_u64()).unwrap_or(0);
     layers.try_into().unwrap_or(u32::MAX)
 }
 
-/// What a stack's first page says of where it comes from.
+/// Returns the origin of a stack for another's first page: its part, digest and
+/// commands.
 fn origin_of(first: &Layer) -> serde_json::Value {
     let stack = first.info.stack.clone().unwrap_or_default();
     json!({ "part": stack.part, "digest": stack.digest, "commands": stack.commands })

@@ -1,4 +1,4 @@
-//! The tables of a list of edits, and the values in them.
+//! The TOML tables of a list of edits, and their values.
 
 use std::path::PathBuf;
 
@@ -7,11 +7,10 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::letters::Align;
 
-/// Lengths are at most so long: machines are smaller.
+/// The longest length. Machines are smaller.
 const MAX_LENGTH: Length = Length::from_um(1e7);
 
-/// One edit: what stands in its table, where exactly one of the keys from `box`
-/// to `rotate` does.
+/// An edit's table. Exactly one of the keys from `box` to `rotate` is present.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Edit {
@@ -35,13 +34,13 @@ pub(super) struct Edit {
     pub(super) rotate: Option<u32>,
 }
 
-/// Whether an edit is done to each copy that `tile` made of a part.
+/// The copies of a part that an edit is made in.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged, expecting = "write true, or a part's name")]
 pub(super) enum CopySelection {
-    /// Of the one part, if so.
+    /// Those of the only part, if true.
     Any(bool),
-    /// Of the part of that name.
+    /// Those of the part of this name.
     Of(String),
 }
 
@@ -52,7 +51,7 @@ impl Default for CopySelection {
 }
 
 impl CopySelection {
-    /// Whether the edit is done once, to the whole image.
+    /// Returns true if the edit is made once, in the whole image.
     pub(super) fn is_none(&self) -> bool {
         matches!(self, Self::Any(false))
     }
@@ -73,15 +72,14 @@ pub(super) struct Rectangle {
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Cylinder {
-    /// Where its axis stands: x and y; of one that lies along x, y and z, or along
-    /// y, x and z.
+    /// A point of the axis: x and y, or y and z along x, or x and z along y.
     #[serde(deserialize_with = "lengths")]
     pub(super) at: [Length; 2],
     #[serde(deserialize_with = "size")]
     pub(super) diameter: Length,
     #[serde(default)]
     pub(super) along: CylinderAxis,
-    /// From where to where one lies, along its axis.
+    /// The ends of a lying cylinder along its axis.
     #[serde(default, deserialize_with = "some_span")]
     pub(super) between: Option<LengthRange>,
 }
@@ -111,10 +109,10 @@ pub(super) struct StraightLine {
 #[serde(deny_unknown_fields)]
 pub(super) struct Label {
     pub(super) text: String,
-    /// The places of its base line's start, middle or end, by `align`.
+    /// The places of the base line's start, middle or end, by `align`.
     #[serde(deserialize_with = "places")]
     pub(super) at: Vec<[Length; 2]>,
-    /// How high capitals are.
+    /// The height of capitals.
     #[serde(deserialize_with = "size")]
     pub(super) height: Length,
     #[serde(default)]
@@ -131,7 +129,7 @@ pub(super) struct Label {
 #[serde(deny_unknown_fields)]
 pub(super) struct OtherStack {
     pub(super) file: PathBuf,
-    /// How far it is moved along x, y and z.
+    /// The distances by which it is moved along x, y and z.
     #[serde(default, rename = "move", deserialize_with = "lengths")]
     pub(super) by: [Length; 3],
 }
@@ -149,7 +147,7 @@ pub(super) struct Pad {
     pub(super) bottom: Length,
 }
 
-/// Along which axis left and right, or top and bottom, change places.
+/// The axis along which sides change places: left and right, or top and bottom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Mirror {

@@ -1,4 +1,4 @@
-//! Shapes as the pixels of a layer.
+//! Draws the shapes of edits as masks.
 
 use std::borrow::Cow;
 
@@ -12,22 +12,23 @@ use super::letters::{numbered, outlines};
 use super::other_stacks::middle;
 use super::schema::{Cylinder, CylinderAxis, Edit, Label, Rectangle, StraightLine};
 
-/// Letters' curves are off by at most so many pixels.
+/// The error of letters' curves, in pixels.
 const TOLERANCE: f64 = 1.0 / 64.0;
 
 /// A shape in the pixels of a stack.
 pub(super) enum EditShape {
-    /// One that is the same in each layer.
+    /// The same pixels in each layer.
     Upright(Mask),
     /// A cylinder along x or y.
     Lying { cylinder: Cylinder, copies: Vec<BuildCopy>, place: ImageBounds },
 }
 
 impl EditShape {
-    /// The shape that an edit names, in each of `copies`.
+    /// Creates an edit's shape in each of `copies`.
     ///
     /// # Errors
-    /// Where a letter has no outline, a line no length, or the shape no pixel.
+    /// Returns an error if a letter has no outline, a line no length, or the shape no
+    /// pixel.
     pub(super) fn of(
         edit: &Edit,
         number: usize,
@@ -75,10 +76,11 @@ impl EditShape {
         Ok(Self::Upright(mask))
     }
 
-    /// The pixels of a layer; `None` if they have more runs than an image can hold.
+    /// Returns the shape's pixels in a layer, or `None` if they have more runs than an
+    /// image can hold.
     ///
     /// # Errors
-    /// Where the layer's height matters and is not known.
+    /// Returns an error if the shape depends on the layer's height and that is unknown.
     pub(super) fn at(&self, info: &PageInfo) -> Result<Option<Cow<'_, Mask>>, EditError> {
         let (cylinder, copies, place) = match self {
             Self::Upright(mask) => return Ok(Some(Cow::Borrowed(mask))),
@@ -95,7 +97,7 @@ impl EditShape {
     }
 }
 
-/// What a plane at a height cuts out of a cylinder that lies.
+/// Returns the section of a lying cylinder at a height.
 fn section(cylinder: Cylinder, height: Length) -> Rectangle {
     let [across, z] = cylinder.at.map(Length::um);
     let [radius, off] = [cylinder.diameter.um() / 2.0, height.um() - z];
@@ -127,7 +129,7 @@ fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec
     vec![corner(from, -half), corner(to, -half), corner(to, half), corner(from, half)]
 }
 
-/// The outlines of a label at each of its places in the copy of that number.
+/// Returns the outlines of a label at each of its places in the copy of that index.
 fn letters(
     label: &Label,
     part: &ImageBounds,
@@ -146,7 +148,7 @@ fn letters(
         lines.extend(
             glyphs.into_iter().map(|line| line.into_iter().map(placed).collect::<Vec<_>>()),
         );
-        // Half a number is a wrong one.
+        // A serial number that is cut off would read as another one.
         if !lines.iter().flatten().all(|&point| part.holds(point)) {
             return Err(EditProblem::LabelOutside { text, image: *part });
         }
