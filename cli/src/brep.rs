@@ -1,4 +1,4 @@
-//! B-rep parts: how their files are read, and what is said of them.
+//! Options for reading STEP files, and notes about what was read.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -19,7 +19,7 @@ use crate::streams::is_stream;
 
 pub(crate) const HEADING: &str = "STEP parts";
 
-/// How B-rep parts are read.
+/// Options for reading STEP parts.
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct BrepOptions {
@@ -34,7 +34,7 @@ pub(crate) struct BrepOptions {
     pub(crate) reader: ReaderOptions,
 }
 
-/// What reads B-rep parts, and for how long.
+/// The program that reads STEP parts, and its time limit.
 #[derive(Args, Clone, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct ReaderOptions {
@@ -65,19 +65,19 @@ impl Default for ReaderOptions {
 }
 
 impl BrepOptions {
-    /// How far facets may lie from surfaces, for images of some resolution.
+    /// Returns how far facets may lie from surfaces, for images of a resolution.
     pub(crate) fn tolerance(&self, dpi: Dpi) -> Length {
         self.tolerance.unwrap_or_else(|| Length::from_um(dpi.pitch().um() / 4.0))
     }
 }
 
 impl ReaderOptions {
-    /// Whether it reads files as it does by default.
+    /// Returns whether files are read in the default way.
     pub(crate) fn is_usual(&self) -> bool {
         self.kernel == KernelArg::default()
     }
 
-    /// The options of the library, for facets within a tolerance of surfaces.
+    /// Returns the options of the library, for facets within a tolerance of surfaces.
     pub(crate) fn for_opening(&self, tolerance: Length) -> OpenOptions {
         let kernel = match self.kernel {
             KernelArg::Lamp => KernelName::Lamp,
@@ -102,7 +102,7 @@ fn parse_seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| format!("`{text}` is not a time: write seconds, as 60"))
 }
 
-/// Whether boxes of bodies overlap, and by more than facets are exact.
+/// Returns whether boxes of bodies overlap by more than the facets' tolerance.
 pub(crate) fn boxes_overlap(prepared: &Prepared) -> bool {
     let overlap = |a: &BodyReport, b: &BodyReport| {
         let [low, high] = [0, 1].map(|end| [a.box_mm[end], b.box_mm[end]]);
@@ -114,7 +114,7 @@ pub(crate) fn boxes_overlap(prepared: &Prepared) -> bool {
     (1..reports.len()).any(|k| reports[..k].iter().any(|other| overlap(other, &reports[k])))
 }
 
-/// What people should know of how a file was read.
+/// Returns notes about how a file was read, for people.
 pub(crate) fn notes(prepared: &Prepared) -> Vec<String> {
     let mut notes = findings(&prepared.mesh.findings);
     if prepared.heal_mm > 0.0 {
@@ -130,7 +130,7 @@ pub(crate) fn notes(prepared: &Prepared) -> Vec<String> {
     notes
 }
 
-/// Findings, those of one kind in one line with the worst of them.
+/// Returns a line for each kind of finding, about the worst of that kind.
 fn findings(findings: &[Finding]) -> Vec<String> {
     let mut kinds: Vec<(&Finding, usize)> = Vec::new();
     for finding in findings {
@@ -158,14 +158,14 @@ fn findings(findings: &[Finding]) -> Vec<String> {
     kinds.into_iter().map(line).collect()
 }
 
-/// A length as people read it, to three decimals.
+/// Formats a length for people, to three decimals.
 pub(crate) fn length(mm: f64) -> String {
     let (number, unit) = if mm < 1.0 { (1000.0 * mm, "um") } else { (mm, "mm") };
     let text = format!("{number:.3}");
     format!("{}{unit}", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// The bytes of a file, or of standard input.
+/// Returns the bytes of a file, or of standard input.
 pub(crate) fn bytes_of(path: &Path) -> Result<Arc<[u8]>, SliceError> {
     let mut bytes = Vec::new();
     let read = match is_stream(path) {

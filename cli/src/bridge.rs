@@ -1,5 +1,5 @@
-//! Layers whose sections have gaps, bridged: cut again beside their planes, or taken
-//! from an STL of the same part.
+//! Bridges layers whose sections have gaps: cuts them again beside their planes, or takes
+//! them from another file of the same part.
 
 use std::ops::Range;
 use std::path::Path;
@@ -12,12 +12,18 @@ use crate::part::PartOptions;
 use crate::stop::Stop;
 use crate::streams::input_name;
 
-/// How far planes are moved, in micrometres: no one sees it in a part.
+/// How far planes are moved, in micrometres, the nearest first.
+///
+/// Moved by d, a plane shows the part's own section d higher. On a slope that is off by
+/// d times its cotangent, which is d / t of the step that a layer of thickness t makes
+/// there anyway. A flat face between both heights would show as other contours, which
+/// `has_same_contours` refuses. Gaps higher than 20 um are not passed: the fallback
+/// stands in for those.
 const NUDGES_UM: [f64; 8] = [1.0, -1.0, 2.5, -2.5, 5.0, -5.0, 10.0, -10.0];
-/// How far boxes of the same part may be apart, in parts of its size.
+/// How far boxes of the same part may be apart, as a share of its size.
 const SAME_BOX: f64 = 1e-3;
-/// In so many rows after each other an STL may have more or fewer transitions than
-/// the surfaces that it was made of, where contours turn.
+/// Where contours turn, fewer consecutive rows than this may have more or fewer
+/// transitions in an STL than on the surfaces it was made of.
 const TURNING_ROWS: usize = 4;
 
 /// A part's layers, those with gaps bridged where there is a fallback.
@@ -50,7 +56,7 @@ impl Bridged {
         Ok(Self { slices, fallback })
     }
 
-    /// What was bridged, in a line, if anything was.
+    /// Returns a line about the bridged layers, if there are any.
     pub(crate) fn text(&self) -> Option<String> {
         let Fallback { name, nudged, borrowed, .. } = self.fallback.as_ref()?;
         let counted = |layers: &[u32]| match layers.len() {
@@ -117,7 +123,7 @@ impl Fallback {
         Ok(Self { name: input_name(path), slices: fallback, nudged, borrowed })
     }
 
-    /// The layer, or another image for it where it has gaps or lacks contours.
+    /// Returns the layer, or a replacement if it has gaps or lacks contours.
     fn better(&mut self, layer: Layer, slices: &Slices) -> Result<Layer, SliceError> {
         let Some(other) = self.slices.next().transpose()? else { return Ok(layer) };
         let number = layer.info.index;
@@ -138,13 +144,14 @@ impl Fallback {
     }
 }
 
-/// Whether all contours close, and all rows balance.
+/// Returns whether all contours close, and all rows balance.
 fn is_whole(layer: &Layer) -> bool {
     layer.info.closed == Some(true) && layer.info.stray_rows.is_empty()
 }
 
-/// Whether rows have as many transitions in both, but for those where contours turn. A
-/// face that is missing whole leaves no gap in a section: its contour is not there.
+/// Returns whether rows have as many transitions in both, except where contours
+/// turn. A face that is missing whole leaves no gap in a section: its contour is not
+/// there.
 fn has_same_contours(a: &Layer, b: &Layer) -> bool {
     let [a, b] = [a, b].map(|layer| transitions(&layer.image));
     let rows: Vec<bool> = a.iter().zip(&b).map(|(a, b)| a != b).collect();
@@ -152,7 +159,7 @@ fn has_same_contours(a: &Layer, b: &Layer) -> bool {
         && rows.chunk_by(|a, b| a == b).all(|run| !run[0] || run.len() < TURNING_ROWS)
 }
 
-/// How often each row turns from black to some level, or back.
+/// Returns how often each row turns from black to some level, or back.
 fn transitions(image: &Image) -> Vec<usize> {
     match image {
         Image::Mask(mask) => (0..mask.height()).map(|row| mask.row(row).len()).collect(),
@@ -170,7 +177,7 @@ fn transitions(image: &Image) -> Vec<usize> {
     }
 }
 
-/// Numbers in order, those that follow each other as ranges.
+/// Formats numbers in order, with consecutive ones as ranges.
 fn ranges(numbers: &[u32]) -> String {
     let runs = numbers.chunk_by(|a, b| a + 1 == *b);
     let text = |run: &[u32]| match run {

@@ -1,4 +1,4 @@
-//! The solid that is sliced: its files, and what is inside.
+//! The solid to slice: its files, units, placement and fill rule.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::recorded::text;
 use crate::stop::Stop;
 use crate::streams::{input_name, is_stream};
 
-/// What decides the solid that is sliced.
+/// Options that decide the solid to slice.
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct SolidOptions {
@@ -45,7 +45,7 @@ impl SolidOptions {
         self.placement.placement()
     }
 
-    /// The part in memory.
+    /// Returns an index of the part's facets by height.
     pub(crate) fn body(&self, model: Part) -> Result<FacetIndex, SliceError> {
         FacetIndex::new(model, &self.placement(), self.units)
     }
@@ -76,7 +76,7 @@ impl SolidOptions {
         Ok(model)
     }
 
-    /// Refuses units for a STEP file, and says what people should know of it.
+    /// Refuses units for a STEP file, and passes notes about it on.
     fn check_step(
         &self,
         prepared: &Prepared,
@@ -104,13 +104,13 @@ impl SolidOptions {
     }
 }
 
-/// What files are read for.
+/// The purpose that files are read for.
 pub(crate) struct Reading<'a> {
     /// The resolution of the images.
     pub(crate) dpi: Dpi,
     /// Whether bodies of STEP files may have gaps.
     pub(crate) may_be_open: bool,
-    /// Who is told what was found in STEP files.
+    /// Takes notes about STEP files.
     pub(crate) say: &'a dyn Fn(&str),
 }
 
@@ -123,7 +123,7 @@ pub(crate) fn at_part(stop: Stop, paths: &[PathBuf]) -> Stop {
     stop.at(place)
 }
 
-/// What people call the files of a part together.
+/// Returns one name for all files of a part, for messages.
 pub(crate) fn name_of_all(paths: &[PathBuf]) -> String {
     match paths {
         [path] => input_name(path),

@@ -1,4 +1,4 @@
-//! OpenCASCADE in a process of its own: on broken files it may crash.
+//! Runs OpenCASCADE in a process of its own: on broken files it may crash.
 
 use std::env;
 use std::ffi::OsString;
@@ -8,7 +8,7 @@ use anyhow::{Context, anyhow};
 
 use crate::stop::Stop;
 
-/// Set for the process that does the work.
+/// Set in the environment of the process that does the work.
 const MARK: &str = "LAMP_SUPERVISED";
 
 /// Runs this command once more, as a child that ends with this process, and returns

@@ -1,4 +1,4 @@
-//! Why a model was refused.
+//! Errors of reading a model and making facets of it.
 
 use crate::step::StepError;
 

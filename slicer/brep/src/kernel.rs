@@ -1,4 +1,4 @@
-//! What slicing needs of a B-rep kernel.
+//! The trait of a B-rep kernel, and the facets and surfaces that slicing needs of it.
 
 use crate::error::BrepError;
 
@@ -20,31 +20,33 @@ pub struct Jet {
 /// Faces are numbered through all bodies; each lies on a surface of its own,
 /// which has the face's number.
 pub trait Kernel: Send + Sync {
-    /// The bodies, in the file's order; a body that is placed twice is there twice.
+    /// Returns the bodies, in the file's order; a body that is placed twice is there
+    /// twice.
     fn bodies(&self) -> &[Body];
 
-    /// The face of that number.
+    /// Returns a face by its number.
     ///
     /// # Panics
-    /// Where there is no such face.
+    /// Panics if there is no such face.
     fn face(&self, face: u32) -> FaceInfo;
 
-    /// The length unit that the file has, for a report.
+    /// Returns the name of the file's length unit, for reports.
     fn unit(&self) -> &str;
 
-    /// How far lengths may be off, as the file says for itself, in millimetres.
+    /// Returns the uncertainty of lengths that the file states, in millimetres.
     fn uncertainty_mm(&self) -> Option<f64> {
         None
     }
 
-    /// The faces as facets no further than `chord_mm` from their surfaces, joined
+    /// Makes the faces into facets at most `chord_mm` from their surfaces, joined
     /// along their edges.
     ///
     /// What could not be made into facets is missing, and is among the findings:
     /// whether bodies are closed is for [`check`](crate::check) to say.
     ///
     /// # Errors
-    /// Where the chord is not a positive length, or there would be too many facets.
+    /// Returns an error if the chord is not a positive length, or there would be too many
+    /// facets.
     fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError>;
 
     /// Evaluates a face's surface at many parameters at once.
@@ -54,7 +56,7 @@ pub trait Kernel: Send + Sync {
     /// surface, numbers are NaN.
     ///
     /// # Panics
-    /// Where there is no such face, or the lists differ in length.
+    /// Panics if there is no such face, or the lists differ in length.
     fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]);
 }
 
@@ -108,17 +110,17 @@ pub struct Tessellation {
 }
 
 impl Tessellation {
-    /// A facet's corners.
+    /// Returns a facet's corners.
     pub fn corners(&self, facet: &Facet) -> [[f64; 3]; 3] {
         facet.corners.map(|corner| self.points[corner as usize])
     }
 
-    /// The facets of some faces.
+    /// Returns the facets of some faces.
     pub fn of_faces(&self, faces: &std::ops::Range<u32>) -> &[Facet] {
         of_faces(&self.facets, faces)
     }
 
-    /// The tips of some faces.
+    /// Returns the tips of some faces.
     pub(crate) fn tips_of_faces(&self, faces: &std::ops::Range<u32>) -> &[Facet] {
         of_faces(&self.tips, faces)
     }
@@ -196,7 +198,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// How far something is off, in millimetres; 0 where that is not the question.
+    /// Returns how far something is off, in millimetres, or 0 for other faults.
     pub fn off_mm(&self) -> f64 {
         match self {
             Self::Off { off_mm } | Self::Joined { off_mm, .. } | Self::Coarse { off_mm } => *off_mm,

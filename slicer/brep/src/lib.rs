@@ -1,17 +1,12 @@
-//! B-rep models to closed facets that know their exact surfaces.
+//! Reads B-rep models (STEP) and makes closed facets of them that know their exact
+//! surfaces.
 //!
-//! A [`Kernel`] is a model as slicing needs it: bodies, their faces as facets that
-//! are joined along their edges, and the exact surfaces below, which it evaluates.
-//! [`check`] says whether the facets of a body are what the file means; what does not
-//! pass is not to be sliced.
+//! A [`Kernel`] is a model that has been read: bodies, faces, and surfaces, which it
+//! evaluates. It makes facets that share the points of their edges, so that they close.
+//! [`check`] validates them: a body with faults must not be sliced.
 //!
-//! [`StepModel`] is the kernel that reads STEP in pure Rust. It has to decide little
-//! by itself: the facets close because faces share the points of their edges, and
-//! loops say on which side of them a face lies. [`prepare`] opens, heals and checks a
+//! [`StepModel`] is the kernel in pure Rust. [`prepare`] reads, heals and validates a
 //! file in as many ways as it takes.
-//!
-//! With the feature `occt`, `OcctModel` is the kernel that has OpenCASCADE read the
-//! file and make the facets.
 //!
 //! ```
 //! use lamp_brep::{Jet, Kernel, StepModel, check};

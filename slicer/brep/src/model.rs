@@ -1,4 +1,4 @@
-//! Bodies as faces, edges and vertices, in millimetres and in their places.
+//! The model in memory: bodies, faces, edges and vertices, placed and in millimetres.
 
 use crate::geometry::{Curve, Surface};
 use crate::kernel::Body;

@@ -1,4 +1,4 @@
-//! Faces that are inside out, found by their neighbours and turned over.
+//! Finds faces that are inside out by their neighbours, and turns them over.
 
 use std::collections::HashMap;
 
@@ -52,7 +52,7 @@ fn turn(kernel: &dyn Kernel, mesh: &mut Tessellation, body: &Body, turned: &[boo
     }
 }
 
-/// Which faces of a body are inside out.
+/// Returns which faces of a body are inside out.
 fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     let facets = mesh.of_faces(&body.faces);
     let count = body.faces.len();
@@ -85,8 +85,8 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     turned
 }
 
-/// For each face those that it shares edges with, and whether they contradict it:
-/// both follow the same edge in one direction.
+/// Returns, for each face those that it shares edges with, and whether they contradict
+/// it: both follow the same edge in one direction.
 fn neighbours(
     facets: &[Facet],
     count: usize,
@@ -114,7 +114,7 @@ fn neighbours(
     list
 }
 
-/// Faces that hang together, each with the side that it is on: two on different
+/// Returns faces that hang together, each with the side that it is on: two on different
 /// sides contradict each other. Faces without neighbours are pieces too.
 fn pieces(neighbours: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
     let mut pieces = Vec::new();

@@ -1,4 +1,5 @@
-//! A file read, made into facets and checked, in several ways if it must be.
+//! Prepares a STEP file for slicing: reads it, makes facets and checks them, and heals
+//! or makes longer facets where that fails.
 
 use std::any::Any;
 use std::fmt;
@@ -13,7 +14,7 @@ use crate::orient::turn_over;
 use crate::step::StepModel;
 use crate::validate::{BodyFault, BodyReport, apart, check};
 
-/// Which program reads the file.
+/// The program that reads STEP files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KernelName {
     /// This crate's own, in Rust.
@@ -32,33 +33,33 @@ pub struct Prepared {
     pub mesh: Arc<Tessellation>,
     /// What [`check`](crate::check) says of each body.
     pub reports: Vec<BodyReport>,
-    /// What was tried before and was worse, in order.
+    /// The attempts that were worse, in order.
     pub tries: Vec<Attempt>,
-    /// Within which distance what belongs together was joined, in millimetres;
-    /// 0 if the file was taken as it is.
+    /// The distance within which edges were joined, in millimetres; 0 if the file was read
+    /// as it is.
     pub heal_mm: f64,
     /// How far facets may lie from their surfaces, in millimetres.
     pub chord_mm: f64,
 }
 
-/// A way in which a model could not be prepared.
+/// A way of preparing a model that failed, or was worse than another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attempt {
     /// As in [`Prepared`].
     pub heal_mm: f64,
     /// As in [`Prepared`].
     pub chord_mm: f64,
-    /// What came of it.
+    /// Why it failed.
     pub why: String,
 }
 
-/// How much exactness files without a word about it have, in millimetres.
+/// The uncertainty taken for files that state none, in millimetres.
 const USUAL_MM: f64 = 1e-3;
-/// Healing tolerances in parts of the file's own: that, tighter, looser.
+/// Healing tolerances as multiples of the file's own: that, tighter, looser.
 const HEALS: [f64; 3] = [1.0, 0.1, 10.0];
-/// And in parts of the chord, which none may exceed.
+/// Healing tolerances as multiples of the chord, which none may exceed.
 const LOOSEST: [f64; 2] = [0.1, 1.0];
-/// Chords in parts of the one that is wanted.
+/// Longer chords, as multiples of the one asked for.
 const CHORDS: [f64; 2] = [4.0, 16.0];
 
 /// Reads a file's bytes, makes its bodies into facets and checks them.
@@ -71,7 +72,7 @@ const CHORDS: [f64; 2] = [4.0, 16.0];
 /// reports have them: it is not to be sliced. A panic is caught. There is no time limit.
 ///
 /// # Errors
-/// Where they cannot be read, or no try gives facets.
+/// Returns an error if they cannot be read, or no try gives facets.
 pub fn prepare(bytes: &[u8], name: KernelName, chord_mm: f64) -> Result<Prepared, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
@@ -94,11 +95,11 @@ pub fn prepare(bytes: &[u8], name: KernelName, chord_mm: f64) -> Result<Prepared
     Ok(Prepared { tries: search.tries, ..prepared })
 }
 
-/// What was tried so far.
+/// The attempts so far.
 struct Search<'a> {
     bytes: &'a [u8],
     name: KernelName,
-    /// The chord that is wanted.
+    /// The chord asked for.
     chord_mm: f64,
     /// All, the best one too.
     tries: Vec<Attempt>,
@@ -174,7 +175,7 @@ impl fmt::Debug for Prepared {
 }
 
 impl Prepared {
-    /// Whether all bodies may be sliced.
+    /// Returns whether all bodies may be sliced.
     pub fn is_good(&self) -> bool {
         wrong(&self.reports) == [0; 3]
     }
@@ -190,7 +191,7 @@ impl Attempt {
     }
 }
 
-/// What is wrong with bodies, in one line.
+/// Returns what is wrong with bodies, in one line.
 fn faults(reports: &[BodyReport]) -> String {
     let of_body = |(body, report): (usize, &BodyReport)| {
         report.faults.iter().map(move |fault| format!("body {body}: {fault}")).collect::<Vec<_>>()
@@ -198,8 +199,8 @@ fn faults(reports: &[BodyReport]) -> String {
     (1..).zip(reports).flat_map(of_body).collect::<Vec<_>>().join("; ")
 }
 
-/// How wrong bodies are: the more, the greater. Bodies with faults, then open
-/// edges, then faults of any kind.
+/// Counts bodies with faults, then open edges, then faults: the greater in this order,
+/// the worse.
 fn wrong(reports: &[BodyReport]) -> [usize; 3] {
     let open = |fault: &BodyFault| match fault {
         BodyFault::Open { edges, .. } => *edges,
@@ -217,8 +218,7 @@ struct OpenedModel {
     is_changed: bool,
 }
 
-/// Reads a file, and joins what lies within a tolerance; with 0 it is taken as it
-/// is.
+/// Reads a file, and joins edges within a tolerance unless that is 0.
 fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<OpenedModel, BrepError> {
     caught("reading the file", || match name {
         KernelName::Lamp => {
@@ -239,12 +239,12 @@ fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<OpenedModel, Bre
     })
 }
 
-/// Does something that may panic, and makes the panic an error.
+/// Runs work that may panic, and turns a panic into an error.
 fn caught<T>(
     doing: &'static str,
     work: impl FnOnce() -> Result<T, BrepError>,
 ) -> Result<T, BrepError> {
-    // Nothing that the work changes is looked at after a panic.
+    // Nothing that the work changed is used after a panic.
     catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|panic| Err(BrepError::Panicked { doing, what: message(panic.as_ref()) }))
 }

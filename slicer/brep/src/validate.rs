@@ -1,4 +1,4 @@
-//! Whether bodies as facets are what the file means.
+//! Validates the facets of bodies: that they are closed, and hold the surfaces' volume.
 
 use std::collections::HashMap;
 
@@ -36,7 +36,7 @@ pub enum BodyFault {
         /// How far, in millimetres.
         off_mm: f64,
     },
-    /// The volume within the facets is not that below the surfaces.
+    /// The volume within the facets differs from that within the surfaces.
     #[error(
         "its facets hold {facets_mm3:.6} mm³, its surfaces {surfaces_mm3:.6} mm³; \
          a shorter chord may bring them together"
@@ -70,7 +70,7 @@ pub struct BodyReport {
     pub area_mm2: f64,
     /// The least and the greatest corner, in millimetres.
     pub box_mm: [[f64; 3]; 2],
-    /// What is wrong with it; nothing if it may be sliced.
+    /// What is wrong with it. A body without faults may be sliced.
     pub faults: Vec<BodyFault>,
 }
 
@@ -99,11 +99,11 @@ pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
     kernel.bodies().iter().map(report).collect()
 }
 
-/// Whether a body's two volumes are further apart than a chord lets them be.
+/// Returns whether a body's two volumes are further apart than a chord lets them be.
 pub(crate) fn apart(report: &BodyReport, chord_mm: f64) -> Option<BodyFault> {
     let (facets_mm3, surfaces_mm3) = (report.volume_mm3, report.exact_volume_mm3);
     let most = f64::max(VOLUMES_APART * facets_mm3.abs(), chord_mm * report.area_mm2);
-    // Not a number is not within.
+    // `NaN` is not within.
     let is_within = (facets_mm3 - surfaces_mm3).abs() <= most;
     (!is_within).then_some(BodyFault::Volumes { facets_mm3, surfaces_mm3 })
 }
@@ -138,7 +138,7 @@ pub(crate) fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
     bounds
 }
 
-/// Across the facet, twice its area long.
+/// Returns the facet's normal with the length of twice its area.
 pub(crate) fn doubled(mesh: &Tessellation, facet: &Facet) -> Vec3 {
     let [a, b, c] = mesh.corners(facet);
     cross(sub(b, a), sub(c, a))
@@ -169,7 +169,8 @@ const GAUSS: [([f64; 2], f64); 6] = {
     ]
 };
 
-/// The flux of a third of the place through the surfaces.
+/// Integrates a third of the position vector's flux through the surfaces: by Gauss's
+/// theorem, the volume.
 fn exact_volume(kernel: &dyn Kernel, facets: &[Facet], middle: Vec3) -> f64 {
     let mut sum = 0.0;
     for of_face in facets.chunk_by(|a, b| a.face == b.face) {
@@ -194,7 +195,7 @@ fn exact_volume(kernel: &dyn Kernel, facets: &[Facet], middle: Vec3) -> f64 {
     sum / 3.0
 }
 
-/// Edges that are not shared by exactly two facets, in opposite directions.
+/// Returns the edges that are not shared by exactly two facets, in opposite directions.
 fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
     // How often each edge is followed upwards and downwards in number.
     let mut edges: HashMap<[u32; 2], [u32; 2]> = HashMap::with_capacity(facets.len() * 3 / 2);
@@ -214,7 +215,7 @@ fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<Bo
     })
 }
 
-/// A facet's edges, from point to point.
+/// Returns a facet's edges, from point to point.
 pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
     let [a, b, c] = facet.corners;
     [[a, b], [b, c], [c, a]]

@@ -54,7 +54,7 @@ pub(super) struct CriticalPoints {
     pub(super) saddles: Vec<Saddle>,
 }
 
-/// Normals that differ by less than this along an axis are equal but for rounding.
+/// Normals that differ by less than this along an axis are equal except for rounding.
 const LEVEL: f64 = 1e-9;
 /// Where the normal has less than this along y, the surface faces up or down, and the
 /// contour that turns there is smaller than a pixel.

@@ -5,7 +5,7 @@
 //! to zero, so a row that balances goes on to do so. Crossings that are added lie on
 //! the surface. Those removed are either found twice or were kept on their facet, and
 //! are at most as far from the contour as the facets are, so where a repair guesses
-//! wrong the row is as good as that of the facets alone.
+//! wrong the row is no worse than that of the facets alone.
 
 use std::collections::HashMap;
 use std::ops::{Range, RangeInclusive};

@@ -1,4 +1,4 @@
-//! Curves made of pieces of others, one after the other.
+//! Composite curves: pieces of others, one after the other.
 
 use super::curve::Curve;
 use crate::vector::{Vec3, distance, scale};
@@ -21,7 +21,7 @@ pub(crate) struct Link {
 const JOINED_MM: f64 = 1e-3;
 
 impl Chain {
-    /// A chain; nothing if a piece does not start where the one before ends.
+    /// Returns a chain, or `None` if a piece does not start where the one before ends.
     pub(crate) fn new(links: Vec<Link>) -> Option<Self> {
         let ends = |link: &Link| link.range.map(|t| link.curve.place(t));
         let meet = |pair: &[Link]| distance(ends(&pair[0])[1], ends(&pair[1])[0]) <= JOINED_MM;
@@ -40,14 +40,14 @@ impl Chain {
         [curve.place(inner), scale(curve.at(inner)[1], to - from)]
     }
 
-    /// The same chain, followed the other way.
+    /// Returns the same chain, followed the other way.
     pub(crate) fn reversed(mut self) -> Self {
         self.links.reverse();
         self.links.iter_mut().for_each(|link| link.range.reverse());
         self
     }
 
-    /// Where pieces end, and where within they are not smooth.
+    /// Returns where pieces end, and where within they are not smooth.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let mut breaks = vec![0.0];
         for (k, Link { curve, range: [from, to] }) in (0u32..).zip(&self.links) {
@@ -61,7 +61,7 @@ impl Chain {
         breaks
     }
 
-    /// The parameter of the point nearest to `p`.
+    /// Returns the parameter of the point nearest to `p`.
     pub(crate) fn project(&self, p: Vec3) -> f64 {
         let on_link = |(k, link): (u32, &Link)| {
             let Link { curve, range: [from, to] } = link;

@@ -1,4 +1,4 @@
-//! The curves of edges.
+//! Curves of edges: points, derivatives, nearest points and polylines.
 
 use std::f64::consts::TAU;
 
@@ -34,7 +34,7 @@ pub(crate) enum Curve {
 const MAX_STEPS: usize = 30;
 
 impl Curve {
-    /// The point and the derivative at `t`.
+    /// Returns the point and the derivative at `t`.
     pub(crate) fn at(&self, t: f64) -> [Vec3; 2] {
         let in_axes = |axes: &Axes, p: Vec3, d: Vec3| [axes.point(p), axes.direction(d)];
         match self {
@@ -57,7 +57,7 @@ impl Curve {
         }
     }
 
-    /// The same curve, followed the other way.
+    /// Returns the same curve, followed the other way.
     pub(crate) fn reversed(self) -> Self {
         match self {
             Self::Line { point, direction } => {
@@ -73,7 +73,7 @@ impl Curve {
         }
     }
 
-    /// Where the curve begins and ends, if it does.
+    /// Returns where the curve begins and ends, if it does.
     pub(crate) fn domain(&self) -> Option<[f64; 2]> {
         match self {
             Self::Ellipse { .. } => Some([0.0, TAU]),
@@ -83,7 +83,7 @@ impl Curve {
         }
     }
 
-    /// Where a piece ends: between them the curve is smooth.
+    /// Returns where pieces end. Between these parameters the curve is smooth.
     pub(super) fn breaks(&self) -> Option<Vec<f64>> {
         match self {
             Self::Spline(spline) => Some(spline.knots.breaks()),
@@ -92,7 +92,7 @@ impl Curve {
         }
     }
 
-    /// The length of the parameter after which the curve comes again.
+    /// Returns the period of a closed curve's parameter.
     pub(crate) fn period(&self) -> Option<f64> {
         match self {
             Self::Ellipse { .. } => Some(TAU),
@@ -104,7 +104,7 @@ impl Curve {
         }
     }
 
-    /// Parameters between which the curve bends little.
+    /// Returns parameters between which the curve bends little.
     pub(crate) fn samples(&self) -> Vec<f64> {
         let parts = |breaks: &[f64], n: usize| -> Vec<f64> {
             let within = |pair: &[f64]| -> Vec<f64> {
@@ -119,7 +119,7 @@ impl Curve {
         }
     }
 
-    /// The parameter of the point nearest to `p`.
+    /// Returns the parameter of the point nearest to `p`.
     pub(crate) fn project(&self, p: Vec3) -> f64 {
         match self {
             Self::Line { point, direction } => {
@@ -179,7 +179,7 @@ impl Curve {
         best.1
     }
 
-    /// The part of the curve from one parameter to another as points that lie no
+    /// Returns the part of the curve from one parameter to another as points that lie no
     /// further than `chord_mm` from it; the ends are among them.
     pub(crate) fn polyline(&self, [from, to]: [f64; 2], chord_mm: f64) -> Vec<Vec3> {
         let mut breaks = vec![from];
@@ -211,7 +211,7 @@ impl Curve {
         points
     }
 
-    /// The point at `t`, also past the seam of a closed spline.
+    /// Returns the point at `t`, also past the seam of a closed spline.
     pub(crate) fn place(&self, t: f64) -> Vec3 {
         match (self, self.domain()) {
             (Self::Spline(_) | Self::Chain(_), Some([start, end])) if t < start || t > end => {
@@ -243,7 +243,7 @@ impl Curve {
     }
 }
 
-/// The parameters at which an edge from `start` to `end` begins and ends on its
+/// Returns the parameters at which an edge from `start` to `end` begins and ends on its
 /// curve, which it follows forwards or backwards.
 pub(crate) fn edge_range(curve: &Curve, start: Vec3, end: Vec3, forward: bool) -> [f64; 2] {
     let is_loop = distance(start, end) < 1e-9;

@@ -9,7 +9,7 @@ use crate::vector::{Vec3, along, cross, scale, sub, unit};
 const STEP: f64 = 1e-5;
 
 impl Surface {
-    /// The surface moved along its normals (du × dv); nothing if it would vanish.
+    /// Returns the surface moved along its normals (du × dv), or `None` if it would vanish.
     pub(crate) fn offset(self, by_mm: f64) -> Option<Surface> {
         if !by_mm.is_finite() {
             return None;
@@ -41,7 +41,7 @@ impl Surface {
     }
 }
 
-/// The point and the derivatives of a surface moved along the normals of `basis`.
+/// Returns the point and the derivatives of a surface moved along the normals of `basis`.
 pub(super) fn at(basis: &Surface, by_mm: f64, uv: [f64; 2]) -> Jet {
     let jet = basis.at(uv);
     let here = normal(basis, uv);
@@ -86,7 +86,7 @@ mod tests {
     use crate::geometry::Curve;
     use crate::vector::{Axes, distance};
 
-    /// A cylinder of radius 3 as a circle that is moved up.
+    /// Returns a cylinder of radius 3 as a circle that is moved up.
     fn drum() -> Surface {
         let curve = Curve::Ellipse { axes: Axes::WORLD, radii: [3.0; 2] };
         Surface::Extrusion { curve, direction: [0.0, 0.0, 1.0] }

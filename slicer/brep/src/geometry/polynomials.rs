@@ -1,4 +1,4 @@
-//! Basis functions of B-splines as polynomials, piece by piece.
+//! B-spline basis functions as polynomials between knots, for fast evaluation.
 
 use super::spline::{BasisValues, Knots, Weighted, add_times};
 
@@ -44,7 +44,7 @@ pub(super) struct LocalParameter {
 }
 
 impl PolynomialBasis {
-    /// The pieces; nothing for degrees that are too high, or knots hardly apart.
+    /// Makes the polynomials, or `None` for high degrees and for knots hardly apart.
     pub(super) fn new(knots: &Knots) -> Option<Self> {
         if knots.degree() > MAX_DEGREE {
             return None;
@@ -79,8 +79,8 @@ impl PolynomialBasis {
         self.degree
     }
 
-    /// The polynomials of the spline with these control points in a piece, the highest
-    /// power first.
+    /// Returns the polynomials of the spline with these control points in a piece, the
+    /// highest power first.
     pub(super) fn summed(&self, piece: usize, points: &[Weighted]) -> Vec<Weighted> {
         let points = &points[self.pieces[piece].first..];
         let size = self.degree + 1;
@@ -97,15 +97,15 @@ impl PolynomialBasis {
         self.pieces.len()
     }
 
-    /// In which equal part of the domain a parameter lies.
+    /// Returns the equal part of the domain in which a parameter lies.
     #[inline(always)]
     fn part(&self, t: f64) -> usize {
-        // What lies before the first, or is no number, becomes 0.
+        // Parameters before the first, and `NaN`, become 0.
         let part = ((t - self.breaks[0]) * self.parts_per_unit) as usize;
         part.min(self.pieces.len() - 1)
     }
 
-    /// For each part of the domain the first piece that does not end before it.
+    /// Returns the first piece that does not end before each part of the domain.
     fn first_pieces(&self) -> Vec<u32> {
         let last = self.pieces.len() - 1;
         let ends: Vec<usize> = self.breaks[1..].iter().map(|&end| self.part(end)).collect();
@@ -113,7 +113,7 @@ impl PolynomialBasis {
         (0..=last + 1).map(first).collect()
     }
 
-    /// The piece of a parameter; beyond the domain, the first or the last.
+    /// Returns the piece of a parameter; beyond the domain, the first or the last.
     #[inline(always)]
     fn find(&self, t: f64) -> usize {
         // Parts are taken of knots as of parameters: rounding leads to no other piece.
@@ -122,7 +122,8 @@ impl PolynomialBasis {
         low + self.breaks[low + 1..=high].partition_point(|&knot| knot <= t)
     }
 
-    /// Where a parameter lies; beyond the domain, that of the last piece continued.
+    /// Returns a parameter within its piece. Beyond the domain the first or last piece goes
+    /// on.
     #[inline(always)]
     pub(super) fn local(&self, t: f64) -> LocalParameter {
         let number = self.find(t);
@@ -130,7 +131,7 @@ impl PolynomialBasis {
         LocalParameter { number, t: (t - piece.middle) * piece.scale, scale: piece.scale }
     }
 
-    /// The basis at `t`; `N` is one more than the degree.
+    /// Returns the basis at `t`; `N` is one more than the degree.
     #[inline(always)]
     pub(super) fn basis<const N: usize>(&self, t: f64) -> BasisValues<N> {
         let place = self.local(t);
@@ -139,7 +140,7 @@ impl PolynomialBasis {
         BasisValues { first: self.pieces[place.number].first, values, slopes }
     }
 
-    /// The coefficients of a piece.
+    /// Returns the coefficients of a piece.
     #[inline(always)]
     fn powers<const N: usize>(&self, piece: usize) -> &[[f64; N]] {
         self.coefficients[piece * N * N..][..N * N].as_chunks().0
@@ -163,8 +164,8 @@ pub(super) fn horner<const C: usize>(powers: &[[f64; C]], t: f64) -> ([f64; C], 
     (values, slopes)
 }
 
-/// The coefficients of the functions between two knots, the highest power first: the
-/// recursion of [`Knots::basis`] on polynomials.
+/// Returns the coefficients of the functions between two knots, the highest power first:
+/// the recursion of [`Knots::basis`] on polynomials.
 fn polynomials(knots: &Knots, span: usize, middle: f64, half: f64) -> Vec<f64> {
     let (degree, k) = (knots.degree(), knots.list());
     let mut functions = vec![vec![1.0]];

@@ -7,7 +7,7 @@ use super::surface::{SAME_MM, Surface, TorusPart};
 use crate::vector::{Vec3, distance, dot, length, sub};
 
 impl Surface {
-    /// Parameters from which the nearest point to `p` is looked for.
+    /// Returns parameters from which the nearest point to `p` is looked for.
     fn seeds(&self, p: Vec3) -> Vec<[f64; 2]> {
         match self {
             Self::Extrusion { curve: curve @ Curve::Line { .. }, .. } => {
@@ -40,13 +40,13 @@ impl Surface {
         }
     }
 
-    /// The same for a surface moved along its normals: the foot of a point stays.
+    /// Returns the same for a surface moved along its normals: the foot of a point stays.
     fn offset_seeds(&self, p: Vec3) -> Vec<[f64; 2]> {
         let foot = self.project(p, None);
         self.seeds(p).into_iter().chain([foot]).collect()
     }
 
-    /// The parameters of the point nearest to `p`, looked for near `hint` first.
+    /// Returns the parameters of the point nearest to `p`, looked for near `hint` first.
     ///
     /// At a pole the parameter that has no meaning there is any. What comes
     /// again after a period lies in any of them.
@@ -95,7 +95,7 @@ impl Surface {
             self.seeds(p).into_iter().map(|uv| (distance(self.point(uv), p), uv)).collect();
         seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
         let found = seeds.into_iter().take(6).map(|(_, uv)| self.nearer(p, uv));
-        // The hint wins what is as good as even.
+        // Near ties go to the hint.
         let better = |a: (f64, [f64; 2]), b: (f64, [f64; 2])| if b.0 < a.0 * 0.99 { b } else { a };
         near.into_iter().chain(found).reduce(better).map_or([0.0; 2], |(_, uv)| uv)
     }

@@ -22,7 +22,7 @@ pub(super) struct BasisValues<const MOST: usize> {
 }
 
 impl Knots {
-    /// Knots for `count` control points; nothing if they do not fit or fall.
+    /// Knots for `count` control points, or `None` if they do not fit or fall.
     pub(crate) fn new(degree: usize, knots: Vec<f64>, count: usize) -> Option<Self> {
         let fits = (1..=MAX_DEGREE).contains(&degree)
             && count > degree
@@ -33,19 +33,19 @@ impl Knots {
         fits.then_some(Self { degree, knots })
     }
 
-    /// Where the spline begins and ends.
+    /// Returns where the spline begins and ends.
     pub(crate) fn domain(&self) -> [f64; 2] {
         [self.knots[self.degree], self.knots[self.knots.len() - 1 - self.degree]]
     }
 
-    /// The knots backwards: for control points that are turned over.
+    /// Returns the knots in reverse, for reversed control points.
     fn reversed(&self) -> Self {
         let [start, end] = self.domain();
         let knots = self.knots.iter().rev().map(|knot| start + end - knot).collect();
         Self { degree: self.degree, knots }
     }
 
-    /// The knots of the domain, each once.
+    /// Returns the knots of the domain, each once.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let mut breaks = self.knots[self.degree..self.knots.len() - self.degree].to_vec();
         breaks.dedup();
@@ -56,17 +56,17 @@ impl Knots {
         self.degree
     }
 
-    /// All knots, each as often as it counts.
+    /// Returns all knots, each as often as it counts.
     pub(super) fn list(&self) -> &[f64] {
         &self.knots
     }
 
-    /// How many control points there are.
+    /// Returns how many control points there are.
     pub(super) fn count(&self) -> usize {
         self.knots.len() - self.degree - 1
     }
 
-    /// Parameters between which the spline bends little.
+    /// Returns parameters between which the spline bends little.
     pub(super) fn samples(&self) -> Vec<f64> {
         let breaks = self.breaks();
         let parts = (2 * self.degree).min(6).max(24 / breaks.len());
@@ -77,7 +77,7 @@ impl Knots {
         breaks.windows(2).flat_map(within).chain(breaks.last().copied()).collect()
     }
 
-    /// The last knot at or before `t` that another follows.
+    /// Returns the last knot at or before `t` that another follows.
     pub(super) fn span(&self, t: f64) -> usize {
         let [start, end] = self.domain();
         if t >= end {
@@ -87,7 +87,7 @@ impl Knots {
         }
     }
 
-    /// The basis at `t`; beyond the domain, that of the last piece continued
+    /// Returns the basis at `t`; beyond the domain, that of the last piece continued
     /// (algorithms A2.1 to A2.3 of *The NURBS Book*).
     pub(super) fn basis(&self, t: f64) -> BasisValues<{ MAX_DEGREE + 1 }> {
         let (p, k, span) = (self.degree, &self.knots, self.span(t));
@@ -122,7 +122,7 @@ impl Knots {
 /// A control point times its weight, and the weight.
 pub(crate) type Weighted = [f64; 4];
 
-/// A point with its weight.
+/// Returns a point with its weight.
 pub(crate) fn weighted(p: Vec3, w: f64) -> Weighted {
     [p[0] * w, p[1] * w, p[2] * w, w]
 }
@@ -131,7 +131,7 @@ pub(super) fn add_times(sum: &mut Weighted, p: &Weighted, by: f64) {
     sum.iter_mut().zip(p).for_each(|(sum, p)| *sum += p * by);
 }
 
-/// The point, and the derivative of a quotient.
+/// Returns the point, and the derivative of a quotient.
 pub(super) fn divided(p: &Weighted) -> Vec3 {
     [p[0] / p[3], p[1] / p[3], p[2] / p[3]]
 }
@@ -148,14 +148,14 @@ pub(crate) struct SplineCurve {
 }
 
 impl SplineCurve {
-    /// The same curve, followed the other way.
+    /// Returns the same curve, followed the other way.
     pub(crate) fn reversed(mut self) -> Self {
         self.knots = self.knots.reversed();
         self.points.reverse();
         self
     }
 
-    /// The point and the derivative at `t`.
+    /// Returns the point and the derivative at `t`.
     pub(crate) fn at(&self, t: f64) -> [Vec3; 2] {
         let basis = self.knots.basis(t);
         let (mut point, mut slope) = ([0.0; 4], [0.0; 4]);
@@ -174,7 +174,7 @@ mod tests {
     use super::*;
     use crate::vector::{distance, length};
 
-    /// A quarter of a circle of radius 2, exactly.
+    /// Returns a quarter of a circle of radius 2, exactly.
     fn quarter() -> SplineCurve {
         let w = std::f64::consts::FRAC_1_SQRT_2;
         SplineCurve {

@@ -25,7 +25,7 @@ pub(crate) struct SplineSurface {
 const CLOSED_MM: f64 = 1e-6;
 
 impl SplineSurface {
-    /// A surface; nothing if there are not as many points as the knots say.
+    /// Returns a surface, or `None` if there are not as many points as the knots say.
     pub(crate) fn new(u: Knots, v: Knots, points: Vec<Weighted>) -> Option<Self> {
         let [rows, columns] = [u.count(), v.count()];
         if points.len() != rows * columns {
@@ -46,20 +46,20 @@ impl SplineSurface {
         (is_closed && !is_point(&first)).then_some(end - start)
     }
 
-    /// Parameters all over the surface.
+    /// Returns parameters all over the surface.
     pub(crate) fn seeds(&self) -> Vec<[f64; 2]> {
         let [us, vs] = [&self.u, &self.v].map(Knots::samples);
         us.iter().flat_map(|&u| vs.iter().map(move |&v| [u, v])).collect()
     }
 
-    /// The point and the derivatives along u and v.
+    /// Returns the point and the first derivatives.
     pub(crate) fn at(&self, uv: [f64; 2]) -> Jet {
         let mut jet = [Jet::default()];
         self.evaluate(&[uv], &mut jet);
         jet[0]
     }
 
-    /// The points and the derivatives at many parameters.
+    /// Evaluates many parameters at once.
     pub(super) fn evaluate(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
         match &self.strips {
             Some(strips) => strips.evaluate(uv, jets),
@@ -67,7 +67,7 @@ impl SplineSurface {
         }
     }
 
-    /// The same by the basis functions, for every degree.
+    /// Evaluates by the basis functions, for every degree.
     pub(super) fn by_knots(&self, [u, v]: [f64; 2]) -> Jet {
         let (along_u, along_v) = (self.u.basis(u), self.v.basis(v));
         let mut sums = [[0.0; 4]; 3];
@@ -88,7 +88,7 @@ impl SplineSurface {
         Jet { point, du: slope(&sums[1]), dv: slope(&sums[2]) }
     }
 
-    /// The parameters within the domain, where closed sides come again.
+    /// Moves parameters by periods into the domain, where the surface is closed.
     #[inline]
     pub(super) fn inside(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let u = inside(u, Some(self.u.domain()), self.periods[0]);
@@ -96,7 +96,7 @@ impl SplineSurface {
         [u, v]
     }
 
-    /// Points all along a side of the domain: where u (axis 0) or v (axis 1) is
+    /// Returns points all along a side of the domain: where u (axis 0) or v (axis 1) is
     /// least or greatest. Knots need not be as often there as the side's control
     /// points would take.
     pub(crate) fn side(&self, axis: usize, last: bool) -> Vec<Vec3> {
@@ -106,7 +106,7 @@ impl SplineSurface {
         free.samples().into_iter().map(at).collect()
     }
 
-    /// Whether a side of the domain is one point.
+    /// Returns whether a side of the domain is one point.
     pub(crate) fn is_pole(&self, axis: usize, last: bool) -> bool {
         is_point(&self.side(axis, last))
     }
@@ -172,7 +172,7 @@ mod tests {
         Knots::new(degree, knots, count).unwrap()
     }
 
-    /// A surface through a box of 200 mm, with or without weights.
+    /// Returns a surface through a box of 200 mm, with or without weights.
     fn any_surface(state: &mut u64, is_rational: bool) -> SplineSurface {
         let (u, v) = (any_knots(state), any_knots(state));
         let control = |_| {
@@ -183,7 +183,7 @@ mod tests {
         SplineSurface::new(u, v, points).unwrap()
     }
 
-    /// A parameter: now and then a knot, or a little beyond an end.
+    /// Returns a parameter: now and then a knot, or a little beyond an end.
     fn any_parameter(state: &mut u64, knots: &Knots) -> f64 {
         let ([low, high], breaks) = (knots.domain(), knots.breaks());
         match any(state) {

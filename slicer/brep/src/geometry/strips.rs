@@ -23,7 +23,7 @@ pub(super) struct Strips {
 }
 
 impl Strips {
-    /// The strips; nothing for degrees that are too high.
+    /// Makes the strips, or `None` for high degrees.
     pub(super) fn new(u: &Knots, v: &Knots, points: &[Weighted]) -> Option<Self> {
         let is_rational = points.iter().any(|point| point[3] != 1.0);
         let (rows, columns) = (u.count(), v.count());
@@ -35,7 +35,7 @@ impl Strips {
         Some(Self { u, v, rows, powers, is_rational })
     }
 
-    /// The points and the derivatives at many parameters.
+    /// Evaluates many parameters at once.
     pub(super) fn evaluate(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
         match self.u.degree() {
             1 => self.along_v::<2>(uv, jets),
@@ -68,7 +68,7 @@ impl Strips {
         }
     }
 
-    /// The point, and the derivatives along u and v, each with its weight.
+    /// Returns the point, and the derivatives along u and v, each with its weight.
     #[inline(always)]
     fn sums<const M: usize, const N: usize>(&self, [u, v]: [f64; 2]) -> [Weighted; 3] {
         let (along_u, along_v) = (self.u.basis::<M>(u), self.v.local(v));
@@ -98,7 +98,7 @@ fn plain(sums: &[Weighted; 3]) -> Jet {
     Jet { point, du, dv }
 }
 
-/// The point and the derivatives of a quotient.
+/// Returns the point and the derivatives of a quotient.
 #[inline(always)]
 fn divided(sums: &[Weighted; 3]) -> Jet {
     let per_weight = 1.0 / sums[0][3];

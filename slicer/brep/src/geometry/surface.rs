@@ -1,4 +1,4 @@
-//! The surfaces of faces.
+//! Surfaces of faces: points, derivatives, domains and poles.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -49,7 +49,7 @@ pub(crate) enum Surface {
     },
 }
 
-/// What of a torus is meant: a tube wider than its way round meets itself.
+/// The part of a torus that a face is on: a tube wider than its way round meets itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum TorusPart {
     Whole,
@@ -59,11 +59,11 @@ pub(crate) enum TorusPart {
     Lemon,
 }
 
-/// How far apart points are held to be one, in millimetres.
+/// Points nearer than this are one, in millimetres.
 pub(super) const SAME_MM: f64 = 1e-6;
 
 impl Surface {
-    /// The name of its kind.
+    /// Returns the name of its kind.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Plane(_) => "plane",
@@ -78,7 +78,7 @@ impl Surface {
         }
     }
 
-    /// The point and the first derivatives.
+    /// Returns the point and the first derivatives.
     pub(crate) fn at(&self, [u, v]: [f64; 2]) -> Jet {
         let jet = |axes: &Axes, p: Vec3, du: Vec3, dv: Vec3| Jet {
             point: axes.point(p),
@@ -119,7 +119,7 @@ impl Surface {
         }
     }
 
-    /// The points and the first derivatives at many parameters.
+    /// Evaluates many parameters at once.
     pub(crate) fn evaluate(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
         match self {
             Self::Spline(spline) if spline.periods == [None; 2] => spline.evaluate(uv, jets),
@@ -135,7 +135,7 @@ impl Surface {
         self.at(uv).point
     }
 
-    /// After which lengths u and v come again.
+    /// Returns the periods of u and v where the surface is closed.
     pub(crate) fn periods(&self) -> [Option<f64>; 2] {
         match self {
             Self::Plane(_) => [None, None],
@@ -149,7 +149,7 @@ impl Surface {
         }
     }
 
-    /// Where u and v begin and end.
+    /// Returns the ranges of u and v where they are bounded.
     pub(crate) fn domain(&self) -> [Option<[f64; 2]>; 2] {
         let round = Some([0.0, TAU]);
         match self {
@@ -170,8 +170,8 @@ impl Surface {
         }
     }
 
-    /// Sides of the domain that are one point: for u and for v, at which ends,
-    /// the parameter and the point.
+    /// Returns the sides of the domain that are one point: for u and for v, at which
+    /// ends, the parameter and the point.
     pub(crate) fn poles(&self) -> Vec<Pole> {
         let pole = |axis: usize, at: f64| {
             let mut uv = [0.0; 2];
@@ -199,7 +199,7 @@ impl Surface {
                 let poles = sides.into_iter().filter(is_pole);
                 poles.map(|(axis, last)| pole(axis, ends[axis][usize::from(last)])).collect()
             }
-            // A pole with one normal stays one.
+            // A pole with one normal stays a pole.
             Self::Offset { basis, .. } => {
                 basis.poles().into_iter().map(|at| pole(at.axis, at.at)).collect()
             }
@@ -207,7 +207,7 @@ impl Surface {
         }
     }
 
-    /// The box of all control points, for surfaces that have them: no point of
+    /// Returns the box of all control points, for surfaces that have them: no point of
     /// the surface lies outside.
     pub(crate) fn control_box(&self) -> Option<[Vec3; 2]> {
         let Self::Spline(spline) = self else { return None };
@@ -232,7 +232,7 @@ pub(crate) struct Pole {
     pub(crate) point: Vec3,
 }
 
-/// A parameter within the domain, where it comes again.
+/// Moves a parameter by periods into the domain, if it has a period.
 pub(super) fn inside(t: f64, domain: Option<[f64; 2]>, period: Option<f64>) -> f64 {
     match (domain, period) {
         (Some([low, high]), Some(period)) if t < low || t > high => {

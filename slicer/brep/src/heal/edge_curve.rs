@@ -1,4 +1,4 @@
-//! The parts of curves that edges are, as places to be near to.
+//! The part of a curve that an edge is, for distances to it.
 
 use crate::geometry::Curve;
 use crate::model::BrepEdge;
@@ -29,7 +29,7 @@ impl<'a> EdgeCurve<'a> {
         distance(self.curve.place(self.curve.project(p)), p)
     }
 
-    /// Where along the edge a point lies, from 0 to 1; nothing if it lies further
+    /// Returns where along the edge a point lies, from 0 to 1, or `None` if it lies further
     /// away than the tolerance.
     pub(super) fn part(&self, p: Vec3) -> Option<f64> {
         let near = 2.0 * self.tolerance_mm;
@@ -48,7 +48,7 @@ impl<'a> EdgeCurve<'a> {
         (distance(at, p) <= self.tolerance_mm).then_some(part)
     }
 
-    /// The same for a point that is further than the tolerance from both ends.
+    /// Returns [`along`](Self::along) of a point further than the tolerance from both ends.
     pub(super) fn inner_part(&self, p: Vec3) -> Option<f64> {
         let is_end = |t: f64| distance(self.curve.place(t), p) <= self.tolerance_mm;
         self.part(p).filter(|_| !self.range.into_iter().any(is_end))

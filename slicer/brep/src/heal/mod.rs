@@ -60,7 +60,7 @@ impl Healing<'_> {
         })
     }
 
-    /// Edges that are followed once, in the order of their numbers.
+    /// Returns the edges that are followed once, in the order of their numbers.
     fn open(&self) -> Vec<usize> {
         let mut uses: HashMap<usize, usize> = HashMap::new();
         self.loops().flatten().for_each(|(edge, _)| *uses.entry(*edge).or_default() += 1);
@@ -70,7 +70,7 @@ impl Healing<'_> {
         open
     }
 
-    /// Where an edge of a loop ends and the next one begins, if they do not meet.
+    /// Returns where an edge of a loop ends and the next one begins, if they do not meet.
     fn breaks(&self) -> Vec<[usize; 2]> {
         let end = |&(edge, is_along): &(usize, bool)| self.edges[edge].ends[usize::from(is_along)];
         let start = |&(edge, is_along): &(usize, bool)| end(&(edge, !is_along));
@@ -134,7 +134,7 @@ impl Healing<'_> {
         }
     }
 
-    /// The vertices that lie on an edge away from its ends, in its order. `ends`
+    /// Returns the vertices that lie on an edge away from its ends, in its order. `ends`
     /// go along x.
     fn cuts(&self, edge: &BrepEdge, ends: &[usize]) -> Vec<usize> {
         let span = EdgeCurve::new(edge, self.range(edge), self.tolerance_mm);
@@ -182,7 +182,7 @@ impl Healing<'_> {
         }
     }
 
-    /// Whether an edge runs within the tolerance of another between the same
+    /// Returns whether an edge runs within the tolerance of another between the same
     /// vertices: then in the same direction or not, and how far away.
     fn is_twin(&self, edge: &BrepEdge, other: &BrepEdge) -> Option<(bool, f64)> {
         let span = EdgeCurve::new(edge, self.range(edge), self.tolerance_mm);
@@ -197,7 +197,7 @@ impl Healing<'_> {
         Some((is_along, widest))
     }
 
-    /// How many places of each face were joined, and how far apart they were.
+    /// Returns how many places of each face were joined, and their greatest gap.
     fn joined(&self) -> Vec<(usize, (usize, f64))> {
         let mut joined = Vec::new();
         for (number, face) in self.faces.iter().enumerate() {

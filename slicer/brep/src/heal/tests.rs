@@ -65,7 +65,7 @@ fn torn(model: &mut BrepModel, by_mm: f64, tear: Tear) {
     }
 }
 
-/// The volumes and areas of all bodies; nothing if one has faults.
+/// Returns the volumes and areas of all bodies, or `None` if one has faults.
 fn measured(model: &StepModel, chord_mm: f64) -> Option<Vec<[f64; 2]>> {
     let mesh = model.tessellate(chord_mm).unwrap();
     let reports = check(model, &mesh);

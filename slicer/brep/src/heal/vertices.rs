@@ -1,4 +1,4 @@
-//! Vertices that become one.
+//! Joins vertices within the tolerance.
 
 use std::collections::{HashMap, HashSet};
 

@@ -1,4 +1,4 @@
-//! Where an assembly's solids stand.
+//! Places the solids of an assembly.
 
 use std::collections::{HashMap, HashSet};
 
@@ -15,15 +15,15 @@ pub(crate) struct PlacedSolid {
     pub(crate) solid: u64,
     pub(crate) units: Units,
     pub(crate) place: Axes,
-    /// What its product is called; may be empty.
+    /// The name of its product; may be empty.
     pub(crate) product: String,
 }
 
-/// More parts than any assembly that is built at once.
+/// The most parts of an assembly: more than any that is built at once.
 const MAX_PARTS: usize = 100_000;
 const MAX_LEVELS: usize = 64;
 
-/// What bodies are made of.
+/// The entities that are bodies.
 const SOLIDS: [&str; 4] =
     ["MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP", "SHELL_BASED_SURFACE_MODEL"];
 
@@ -31,20 +31,20 @@ const SOLIDS: [&str; 4] =
 struct Representation {
     items: Vec<u64>,
     units: Option<Units>,
-    /// Its group: shapes that are the same part in the same coordinates.
+    /// The number of its group: shapes that are the same part in the same coordinates.
     group: usize,
     /// Parts, and where they stand.
     parts: Vec<SubShape>,
 }
 
-/// A part of a shape: the shape, and the placement that comes to lie on another.
+/// A shape used in another: its placement `from` comes to lie on the placement `to`.
 struct SubShape {
     shape: u64,
     from: u64,
     to: u64,
 }
 
-/// All solids of a file in their places.
+/// Places all solids of a file.
 pub(crate) fn placed(entities: &Entities) -> Result<Vec<PlacedSolid>, StepError> {
     let mut tree = AssemblyTree {
         entities,
@@ -91,7 +91,7 @@ impl PlacedSolids {
     }
 }
 
-/// What a shape stands in.
+/// The surroundings of a shape in the assembly.
 #[derive(Clone, Copy)]
 struct Within<'a> {
     place: Axes,
@@ -103,7 +103,7 @@ struct Within<'a> {
 
 struct AssemblyTree<'a> {
     entities: &'a Entities,
-    /// What the products are called that shapes are of.
+    /// The product names of shapes.
     names: HashMap<u64, &'a str>,
     shapes: HashMap<u64, Representation>,
     order: Vec<u64>,
@@ -148,7 +148,7 @@ impl AssemblyTree<'_> {
         })
     }
 
-    /// What comes to lie on what in a relation, if it moves a shape.
+    /// Returns the transformation of a relation, if it moves a shape.
     fn moving(&self, relation: u64) -> Option<Item<'_>> {
         self.entities.find(relation, "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")
     }
@@ -223,7 +223,7 @@ impl AssemblyTree<'_> {
         self.shapes.get_mut(&id).ok_or(StepError::Missing { id })
     }
 
-    /// A shape and all that are the same.
+    /// Returns a shape's group.
     fn group(&self, shape: u64) -> &[u64] {
         self.shapes.get(&shape).map_or(&[], |shape| &self.groups[shape.group])
     }
@@ -268,7 +268,8 @@ impl AssemblyTree<'_> {
         self.place(part, within, found)
     }
 
-    /// What a part stands in whose placement comes to lie on another of the whole.
+    /// Returns the surroundings of a part: its placement `from` comes to lie on the
+    /// placement `to` of the whole.
     fn moved<'a>(
         &self,
         within: Within<'a>,

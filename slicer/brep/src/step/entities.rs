@@ -75,24 +75,24 @@ impl Entities {
         Ok(entities)
     }
 
-    /// All records of an instance.
+    /// Returns all records of an instance.
     pub(crate) fn records(&self, id: u64) -> Result<&[Record], StepError> {
         self.map.get(&id).map(Vec::as_slice).ok_or(StepError::Missing { id })
     }
 
-    /// The instance's record of that type, if it has it.
+    /// Returns the instance's record of that type, if it has it.
     pub(crate) fn find(&self, id: u64, name: &str) -> Option<Item<'_>> {
         let record = self.map.get(&id)?.iter().find(|record| record.name == name)?;
         Some(Item { id, record })
     }
 
-    /// The instance's record of that type.
+    /// Returns the instance's record of that type.
     pub(crate) fn get(&self, id: u64, name: &'static str) -> Result<Item<'_>, StepError> {
         self.records(id)?;
         self.find(id, name).ok_or(StepError::Unexpected { id, expected: name })
     }
 
-    /// The instance's only record.
+    /// Returns the instance's only record.
     pub(crate) fn simple(&self, id: u64) -> Result<Item<'_>, StepError> {
         match self.records(id)? {
             [record] => Ok(Item { id, record }),
@@ -100,12 +100,12 @@ impl Entities {
         }
     }
 
-    /// All records of a type, in the file's order.
+    /// Returns all records of a type, in the file's order.
     pub(crate) fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = Item<'a>> {
         self.ids.iter().filter_map(move |&id| self.find(id, name))
     }
 
-    /// All records.
+    /// Returns all records.
     pub(crate) fn every(&self) -> impl Iterator<Item = Item<'_>> {
         self.ids.iter().flat_map(|&id| self.map[&id].iter().map(move |record| Item { id, record }))
     }
@@ -123,7 +123,7 @@ impl<'a> Item<'a> {
         &self.record.name
     }
 
-    /// An attribute, counted from 0.
+    /// Returns an attribute, counted from 0.
     pub(crate) fn value(&self, k: usize) -> Result<&'a Value, StepError> {
         let value = self.record.values.get(k);
         value.ok_or(StepError::Attribute { id: self.id, attribute: k + 1 })
@@ -137,7 +137,7 @@ impl<'a> Item<'a> {
         self.as_a(k, Value::reference)
     }
 
-    /// A reference that may be left out.
+    /// Returns a reference that may be left out.
     pub(crate) fn optional(&self, k: usize) -> Option<u64> {
         self.record.values.get(k).and_then(Value::reference)
     }
@@ -146,7 +146,7 @@ impl<'a> Item<'a> {
         self.as_a(k, Value::number)
     }
 
-    /// A whole number from 0 to a million.
+    /// Returns a whole number from 0 to a million.
     pub(crate) fn count(&self, k: usize) -> Result<usize, StepError> {
         let whole = |x: f64| (0.0..=1e6).contains(&x).then_some(x as usize);
         self.as_a(k, |value| value.number().and_then(whole))
@@ -159,7 +159,7 @@ impl<'a> Item<'a> {
         }
     }
 
-    /// An enumeration's word.
+    /// Returns an enumeration's word.
     pub(crate) fn word(&self, k: usize) -> Result<&'a str, StepError> {
         self.as_a(k, |value| match value {
             Value::Enumeration(word) => Some(word.as_str()),

@@ -120,7 +120,7 @@ impl StepModel {
     /// Reads a file's bytes as they are.
     ///
     /// # Errors
-    /// Where they are not STEP, or hold what is not supported.
+    /// Returns an error if they are not STEP, or hold what is not supported.
     pub fn read(bytes: &[u8]) -> Result<Self, BrepError> {
         Self::read_healed(bytes, 0.0)
     }
@@ -129,20 +129,20 @@ impl StepModel {
     /// within `heal_mm` of each other. The tessellation's findings say where.
     ///
     /// # Errors
-    /// Where they are not STEP, or hold what is not supported.
+    /// Returns an error if they are not STEP, or hold what is not supported.
     pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
         let mut model = topology::model(&entities::Entities::read(bytes)?)?;
         let healed = if heal_mm > 0.0 { heal(&mut model, heal_mm) } else { Vec::new() };
         Ok(Self { model, healed })
     }
 
-    /// The model, to be spoilt.
+    /// Returns the model, for tests to break.
     #[cfg(test)]
     pub(crate) fn model_mut(&mut self) -> &mut BrepModel {
         &mut self.model
     }
 
-    /// Whether anything was joined.
+    /// Returns whether anything was joined.
     pub fn is_healed(&self) -> bool {
         !self.healed.is_empty()
     }

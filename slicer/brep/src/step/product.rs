@@ -1,17 +1,17 @@
-//! Products: what the parts of a file are called, and which are used where.
+//! Reads products: names of parts, and which part is used where.
 
 use std::collections::HashMap;
 
 use super::StepError;
 use super::entities::{Entities, Item};
 
-/// What each definition of a shape defines the shape of.
+/// Returns the product definition that each definition of a shape is for.
 fn definitions(entities: &Entities) -> HashMap<u64, u64> {
     let definitions = entities.all("PRODUCT_DEFINITION_SHAPE");
     definitions.filter_map(|item| Some((item.id, item.optional(2)?))).collect()
 }
 
-/// The names of the products that shapes are of, where they have any.
+/// Returns the names of the products that shapes are of, where they have any.
 pub(super) fn names(entities: &Entities) -> HashMap<u64, &str> {
     let definitions = definitions(entities);
     let named = |item: Item| {
@@ -21,7 +21,7 @@ pub(super) fn names(entities: &Entities) -> HashMap<u64, &str> {
     entities.all("SHAPE_DEFINITION_REPRESENTATION").filter_map(named).collect()
 }
 
-/// The name of a definition's product; its number where the name is empty.
+/// Returns the name of a definition's product; its number where the name is empty.
 fn name(entities: &Entities, definition: u64) -> Option<&str> {
     // Both come in several types, which only add attributes.
     let third = |id: u64, kind: &str| {
@@ -35,8 +35,8 @@ fn name(entities: &Entities, definition: u64) -> Option<&str> {
     [1, 0].map(|k| product.text(k).trim()).into_iter().find(|name| !name.is_empty())
 }
 
-/// For each relation between shapes that belongs to a use of a product: the shape of
-/// the product that is used.
+/// Returns, for each relation between shapes that belongs to a use of a product: the
+/// shape of the product that is used.
 pub(super) fn children(entities: &Entities) -> Result<HashMap<u64, u64>, StepError> {
     let definitions = definitions(entities);
     let mut shapes = HashMap::new();

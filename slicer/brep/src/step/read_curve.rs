@@ -1,4 +1,4 @@
-//! Curves out of entities.
+//! Reads curves from STEP entities.
 
 use super::StepError;
 use super::entities::{Item, Value};
@@ -12,7 +12,7 @@ use crate::vector::unit;
 const DEEPEST_PIECE: usize = MAX_NESTED - 2;
 
 impl GeometryReader<'_> {
-    /// The curve of an edge.
+    /// Reads the curve of an edge.
     pub(crate) fn curve(&self, id: u64) -> Result<Curve, StepError> {
         self.curve_within(id, 0)
     }
@@ -90,7 +90,7 @@ impl GeometryReader<'_> {
         Chain::new(links).map(Curve::Chain).ok_or(bad)
     }
 
-    /// A curve that ends.
+    /// Reads a curve that ends.
     fn bounded(&self, id: u64, depth: usize) -> Result<Link, StepError> {
         if let Some(trimmed) = self.entities.find(id, "TRIMMED_CURVE") {
             return self.trimmed(trimmed, depth);
@@ -100,7 +100,7 @@ impl GeometryReader<'_> {
         Ok(Link { curve, range })
     }
 
-    /// A part of a curve, between points or parameters.
+    /// Reads a part of a curve, between points or parameters.
     fn trimmed(&self, item: Item, depth: usize) -> Result<Link, StepError> {
         let basis = item.reference(1)?;
         let curve = self.curve_within(basis, depth + 1)?;
@@ -128,7 +128,7 @@ impl GeometryReader<'_> {
         Ok(Link { curve, range: [from, to] })
     }
 
-    /// A curve's parameter for one of the file's.
+    /// Returns a curve's parameter for one of the file's.
     fn parameter(&self, id: u64, curve: &Curve) -> Result<f64, StepError> {
         match curve {
             Curve::Line { .. } => {

@@ -1,4 +1,4 @@
-//! Points, directions and frames out of entities.
+//! Reads points, directions and axes from STEP entities.
 
 use super::StepError;
 use super::entities::{Entities, Item};
@@ -12,11 +12,11 @@ pub(crate) struct GeometryReader<'a> {
     pub(crate) place: Axes,
 }
 
-/// Curves of curves and surfaces of surfaces; more are a circle.
+/// How deep curves and surfaces may refer to others. More is taken for a circle.
 pub(super) const MAX_NESTED: usize = 8;
 
 impl GeometryReader<'_> {
-    /// A vertex's or a cartesian point's place.
+    /// Returns a vertex's or a cartesian point's place.
     pub(crate) fn point(&self, id: u64) -> Result<Vec3, StepError> {
         let id = match self.entities.find(id, "VERTEX_POINT") {
             Some(vertex) => vertex.reference(1)?,
@@ -43,7 +43,7 @@ impl GeometryReader<'_> {
         id.map(|id| self.direction(id)).transpose()
     }
 
-    /// An `AXIS2_PLACEMENT_3D`; axes that are left out have their defaults.
+    /// Reads an `AXIS2_PLACEMENT_3D`; axes that are left out have their defaults.
     pub(crate) fn axes(&self, id: u64) -> Result<Axes, StepError> {
         let item = self.entities.get(id, "AXIS2_PLACEMENT_3D")?;
         let z = self.optional_direction(item.optional(2))?;

@@ -1,4 +1,4 @@
-//! B-splines out of entities.
+//! Reads B-spline curves and surfaces from STEP entities.
 
 use super::StepError;
 use super::entities::{Entities, Item, Value};
@@ -7,7 +7,7 @@ use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::spline_surface::SplineSurface;
 
 impl GeometryReader<'_> {
-    /// A `B_SPLINE_CURVE` of any kind, simple or complex.
+    /// Reads a `B_SPLINE_CURVE` of any kind, simple or complex.
     pub(super) fn spline_curve(&self, id: u64) -> Result<Option<SplineCurve>, StepError> {
         let Some(part) = SplineRecords::find(self.entities, id, SplineKind::Curve) else {
             return Ok(None);
@@ -119,7 +119,7 @@ impl<'a> SplineRecords<'a> {
         entities.find(self.id, name)
     }
 
-    /// The knots along one parameter: `before` attributes stand before the first
+    /// Reads the knots along one parameter: `before` attributes stand before the first
     /// list, and `multiplicities` and `values` are the places of the two.
     fn knots(
         &self,

@@ -1,4 +1,4 @@
-//! Surfaces out of entities.
+//! Reads surfaces from STEP entities.
 
 use super::StepError;
 use super::entities::Item;
@@ -7,7 +7,7 @@ use crate::geometry::{Surface, TorusPart};
 use crate::vector::{Axes, unit};
 
 impl GeometryReader<'_> {
-    /// The surface of a face.
+    /// Reads the surface of a face.
     pub(crate) fn surface(&self, id: u64) -> Result<Surface, StepError> {
         self.surface_within(id, 0)
     }

@@ -1,4 +1,4 @@
-//! The text of a STEP file as tokens (ISO 10303-21).
+//! Splits the text of a STEP file into tokens (ISO 10303-21).
 
 use super::StepError;
 
@@ -34,12 +34,12 @@ impl<'a> Tokens<'a> {
         Self { bytes, at: 0 }
     }
 
-    /// Where the next token is looked for, in bytes.
+    /// Returns where the next token is looked for, in bytes.
     pub(crate) fn offset(&self) -> usize {
         self.at
     }
 
-    /// The next token; nothing at the end of the text.
+    /// Returns the next token, or `None` at the end of the text.
     pub(crate) fn next(&mut self) -> Result<Option<Token>, StepError> {
         self.skip_blank()?;
         let Some(&byte) = self.bytes.get(self.at) else { return Ok(None) };
@@ -102,7 +102,7 @@ impl<'a> Tokens<'a> {
         Ok(text)
     }
 
-    /// A quote within a text is written twice.
+    /// Reads a text, in which a quote is written twice.
     fn text(&mut self, start: usize) -> Result<String, StepError> {
         let mut text = self.until(b'\'', start)?;
         while self.peek_is(|b| b == b'\'') {

@@ -1,4 +1,4 @@
-//! Bodies, faces and edges out of entities.
+//! Reads bodies, faces and edges from STEP entities.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,7 @@ use crate::kernel::Body;
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::{sub, unit};
 
-/// All bodies of a file.
+/// Reads all bodies of a file.
 pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
     let mut model = BrepModel::default();
     for placed in placed(entities)? {
@@ -80,7 +80,7 @@ impl<'a> SolidReader<'a> {
         }
     }
 
-    /// Whether an entity only turns another one.
+    /// Returns whether an entity only reverses another.
     fn is_oriented(&self, id: u64) -> bool {
         self.entities.simple(id).is_ok_and(|item| item.name().starts_with("ORIENTED_"))
     }
@@ -158,7 +158,7 @@ impl<'a> SolidReader<'a> {
         Ok(edge)
     }
 
-    /// The sides of a polygon, which are shared by their end points.
+    /// Returns the sides of a polygon, which are shared by their end points.
     fn polygon(&mut self, item: Item) -> Result<Vec<(usize, bool)>, StepError> {
         let points = item.references(1)?;
         let corners: Vec<usize> =

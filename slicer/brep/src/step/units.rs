@@ -20,7 +20,7 @@ pub(crate) struct Units {
 const MAX_STEPS: usize = 8;
 
 impl Units {
-    /// The units of a context; nothing without a unit of length.
+    /// Reads the units of a context, or `None` without a unit of length.
     pub(crate) fn of_context(entities: &Entities, context: u64) -> Result<Option<Self>, StepError> {
         let Some(assigned) = entities.find(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT") else {
             return Ok(None);
@@ -38,7 +38,7 @@ impl Units {
     }
 }
 
-/// The greatest of a context's uncertainties of length, in millimetres.
+/// Returns the greatest uncertainty of length of a context, in millimetres.
 fn uncertainty_mm(entities: &Entities, context: u64) -> Option<f64> {
     let assigned = entities.find(context, "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT")?;
     let mm = |measure: u64| {
@@ -51,7 +51,7 @@ fn uncertainty_mm(entities: &Entities, context: u64) -> Option<f64> {
     assigned.references(0).ok()?.into_iter().filter_map(mm).reduce(f64::max)
 }
 
-/// The SI units (metres, radians) in one unit.
+/// Returns how many SI units (metres, radians) a unit has.
 fn size(entities: &Entities, unit: u64, step: usize) -> Result<f64, StepError> {
     let bad = StepError::Numbers { id: unit, what: "unit" };
     if let Some(si) = entities.find(unit, "SI_UNIT") {

@@ -10,7 +10,7 @@ use crate::geometry::{Pole, Surface};
 use crate::kernel::Fault;
 use crate::model::Face;
 
-/// The polygons between which a face lies: within an odd number of them.
+/// Returns the polygons of a face, which lies within an odd number of them.
 pub(super) fn polygons(
     face: &Face,
     rings: &[PointRing],
@@ -63,7 +63,7 @@ impl FaceOutline<'_, '_> {
         }
     }
 
-    /// Whether the surface bounds a body by itself.
+    /// Returns whether the surface bounds a body by itself.
     fn is_closed(&self) -> bool {
         let periods = self.face.surface.periods();
         (0..2).all(|axis| {
@@ -72,7 +72,7 @@ impl FaceOutline<'_, '_> {
         })
     }
 
-    /// The whole of a closed surface, cut open away from its holes.
+    /// Returns the whole of a closed surface, cut open away from its holes.
     fn whole(&mut self, holes: &[Unwrapped]) -> Result<Vec<Node>, Fault> {
         let surface = &self.face.surface;
         let [Some(u), Some(v)] = surface.domain() else { return Err(Fault::Unbounded) };
@@ -117,7 +117,7 @@ impl FaceOutline<'_, '_> {
         Ok(polygon)
     }
 
-    /// A straight side from its first node up to its last, without that one; all
+    /// Returns a straight side from its first node up to its last, without that one; all
     /// of it is one point if there is one.
     fn side(&mut self, from: Node, to: Node, tip: Option<u32>) -> Vec<Node> {
         let surface = &self.face.surface;
@@ -217,7 +217,7 @@ fn shifted(mut node: Node, axis: usize, by: f64) -> Node {
     node
 }
 
-/// The opposite side of a whole surface, backwards from its corner `start`, with
+/// Returns the opposite side of a whole surface, backwards from its corner `start`, with
 /// the same points.
 fn opposite(side: &[Node], start: Node, axis: usize) -> Vec<Node> {
     let inner = side[1..].iter().rev().map(|node| {
@@ -228,7 +228,7 @@ fn opposite(side: &[Node], start: Node, axis: usize) -> Vec<Node> {
     [start].into_iter().chain(inner).collect()
 }
 
-/// The loop's nodes, and the first again after its turn.
+/// Returns the loop's nodes, and the first again after its turn.
 fn opened(around: &Unwrapped, axis: usize, surface: &Surface) -> Vec<Node> {
     let period = surface.periods()[axis].unwrap_or(0.0);
     let mut nodes = around.nodes.clone();
@@ -236,7 +236,7 @@ fn opened(around: &Unwrapped, axis: usize, surface: &Surface) -> Vec<Node> {
     nodes
 }
 
-/// The loop from another of its nodes on.
+/// Returns the loop from another of its nodes on.
 fn rotated(around: &Unwrapped, start: usize, axis: usize, surface: &Surface) -> Unwrapped {
     let by = surface.periods()[axis].unwrap_or(0.0) * f64::from(around.turns[axis]);
     let (before, after) = around.nodes.split_at(start);
@@ -244,7 +244,7 @@ fn rotated(around: &Unwrapped, start: usize, axis: usize, surface: &Surface) -> 
     Unwrapped { nodes: after.iter().copied().chain(before).collect(), turns: around.turns }
 }
 
-/// Whether the outer polygon goes counter-clockwise as its loops do. One that was
+/// Returns whether the outer polygon goes counter-clockwise as its loops do. One that was
 /// made of a whole surface goes as the face says.
 pub(super) fn is_counter_clockwise(polygons: &[Vec<Node>]) -> bool {
     polygons.last().is_none_or(|outer| area(outer) > 0.0)
@@ -256,7 +256,7 @@ fn area(nodes: &[Node]) -> f64 {
     nodes.iter().zip(next).map(|(a, b)| a.uv[0] * b.uv[1] - b.uv[0] * a.uv[1]).sum()
 }
 
-/// Whether a point lies within a polygon, by the crossings to its right.
+/// Returns whether a point lies within a polygon, by the crossings to its right.
 fn is_within(p: [f64; 2], polygon: &[Node]) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let crosses = |(a, b): &(&Node, &Node)| {
@@ -266,7 +266,7 @@ fn is_within(p: [f64; 2], polygon: &[Node]) -> bool {
     polygon.iter().zip(next).filter(crosses).count() % 2 == 1
 }
 
-/// A hole, moved by periods until it lies within the outer polygon.
+/// Returns a hole, moved by periods until it lies within the outer polygon.
 fn moved_into(mut hole: Vec<Node>, outer: &[Node], surface: &Surface) -> Vec<Node> {
     let [u, v] = surface.periods().map(|period| match period {
         Some(period) => (-2..=2).map(|k| f64::from(k) * period).collect(),

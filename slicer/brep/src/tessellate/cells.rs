@@ -51,7 +51,7 @@ impl CellScale {
     }
 }
 
-/// The lengths of a surface along u and v, and the sag that one cell over all of
+/// Returns the lengths of a surface along u and v, and the sag that one cell over all of
 /// it would have.
 fn measure(surface: &Surface, low: [f64; 2], size: [f64; 2]) -> ([f64; 2], [f64; 2]) {
     const STEPS: usize = 16;

@@ -1,4 +1,4 @@
-//! Triangles between a face's polygons.
+//! Triangulates a face between its polygons.
 //!
 //! The plane of the triangulation is the surface's parameters, scaled so that a
 //! step along either bends about as much. Its edges along the polygons stay;
@@ -28,7 +28,7 @@ const MORE: [usize; 2] = [4, 20_000];
 
 type Filled = (Vec<[Node; 3]>, Option<Fault>);
 
-/// The triangles of a face, counter-clockwise in its parameters.
+/// Triangulates a face. Triangles are counter-clockwise in its parameters.
 pub(super) fn fill(
     face: &Face,
     polygons: &[Vec<Node>],
@@ -37,7 +37,7 @@ pub(super) fn fill(
 ) -> Result<Filled, Fault> {
     let scale = CellScale::new(&face.surface, polygons, chord_mm);
     let cells = scale.count[0] * scale.count[1];
-    // Not a number is too many.
+    // `NaN` is too many.
     if !matches!(cells.partial_cmp(&MAX_CELLS), Some(Ordering::Less)) {
         return Err(Fault::Fine { cells });
     }
@@ -170,7 +170,7 @@ impl FaceTriangulation<'_> {
         Ok((worst > 4.0 * self.chord_mm).then_some(Fault::Coarse { off_mm: worst }))
     }
 
-    /// Where corners are missing, and how far the surface is from the triangles.
+    /// Returns where corners are missing, and the surface's greatest distance from the triangles.
     fn too_far(&self) -> (Vec<Point2<f64>>, f64) {
         let mut list = Vec::new();
         let mut seen = HashSet::new();
@@ -223,7 +223,7 @@ impl FaceTriangulation<'_> {
         (list, worst)
     }
 
-    /// The triangles within an odd number of polygons.
+    /// Returns the triangles within an odd number of polygons.
     fn inside(&self) -> Vec<FixedFaceHandle<InnerTag>> {
         let mesh = &self.mesh;
         let mut is_inside = vec![None; mesh.num_all_faces()];
@@ -256,7 +256,7 @@ impl FaceTriangulation<'_> {
         list
     }
 
-    /// The triangles with their nodes.
+    /// Returns the triangles with their nodes.
     fn triangles(&mut self, points: &mut FacePoints) -> Vec<[Node; 3]> {
         let inside = self.inside();
         let mut list = Vec::with_capacity(inside.len());

@@ -22,15 +22,16 @@ use crate::vector::{Vec3, distance};
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Node {
     uv: [f64; 2],
-    /// Which point it is; a point may be several corners, along a seam or at a pole.
+    /// The point's number. A point may be several corners, along a seam or at a pole.
     point: u32,
 }
 
-/// How much further from a vertex than the end of its curve points of an edge are.
+/// Points of an edge keep this many times the distance between the curve's end and the
+/// vertex from it.
 const CLEAR: f64 = 4.0;
-/// More facets than any part that is built takes: about 5 GB of memory.
+/// The most facets, about 5 GB of memory: more than any part that is built takes.
 pub(crate) const MAX_FACETS: usize = 50_000_000;
-/// Points on edges.
+/// The most points on edges.
 const MAX_POINTS: usize = 20_000_000;
 
 /// Points of a face: those of its edges, which it shares, and its own.
@@ -51,7 +52,7 @@ impl FacePoints<'_> {
     }
 }
 
-/// What a face became.
+/// A face as facets.
 struct FacePatch {
     own: Vec<Vec3>,
     facets: Vec<Facet>,
@@ -59,7 +60,7 @@ struct FacePatch {
     faults: Vec<Fault>,
 }
 
-/// All faces of a model as facets.
+/// Makes all faces of a model into facets.
 pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
@@ -102,7 +103,7 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
     Ok(Tessellation { points, facets, tips, findings, chord_mm })
 }
 
-/// An edge as points, from its start to its end.
+/// Makes an edge into points, from its start to its end.
 fn chain(edge: &BrepEdge, model: &BrepModel, chord_mm: f64, points: &mut Vec<Vec3>) -> Vec<u32> {
     let [start, end] = edge.ends;
     let range = edge_range(&edge.curve, model.vertices[start], model.vertices[end], edge.forward);
@@ -194,7 +195,7 @@ fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<PointRing> {
     rings.collect()
 }
 
-/// How far the points of the edges lie off the surface, if that is more than
+/// Returns how far the points of the edges lie off the surface, if that is more than
 /// facets do.
 fn off(face: &Face, polygons: &[Vec<Node>], points: &FacePoints, chord_mm: f64) -> Option<Fault> {
     let apart =

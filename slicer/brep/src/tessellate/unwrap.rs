@@ -1,4 +1,4 @@
-//! Loops in the parameters of their surface, followed through seams and poles.
+//! Maps loops to the parameters of their surface, through seams and poles.
 
 use super::{FacePoints, Node};
 use crate::geometry::{Pole, Surface};
@@ -61,7 +61,7 @@ pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &FacePoi
     Unwrapped { nodes, turns }
 }
 
-/// Of all parameters that mean the same the one nearest to another.
+/// Moves a parameter by periods to the one nearest to another.
 pub(super) fn near(t: f64, other: f64, period: Option<f64>) -> f64 {
     match period {
         Some(period) => t - ((t - other) / period).round() * period,
@@ -110,7 +110,7 @@ fn around_pole(
     after
 }
 
-/// Parameters on the straight line between two, without these, so that the
+/// Returns parameters on the straight line between two, without these, so that the
 /// surface along it bends less than the chord.
 pub(super) fn between(surface: &Surface, a: [f64; 2], b: [f64; 2], chord_mm: f64) -> Vec<[f64; 2]> {
     let mut list = Vec::new();
