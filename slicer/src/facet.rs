@@ -1,10 +1,10 @@
-//! Facets.
+//! Facets of parts, and the unit of their coordinates.
 
 /// A triangle of a part's surface: three corners (x, y, z) in file units, as
 /// STL holds them, counter-clockwise seen from outside.
 pub type Facet = [[f32; 3]; 3];
 
-/// What the coordinates of a file without a unit mean.
+/// The unit of coordinates in a file that names none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Units {
     /// Millimetres.
@@ -17,7 +17,7 @@ pub enum Units {
 lamp_stack::named!(Units { Millimetres = "mm", Inches = "inch" });
 
 impl Units {
-    /// Millimetres in one unit.
+    /// Returns the millimetres in one unit.
     pub fn mm(self) -> f64 {
         match self {
             Self::Millimetres => 1.0,
@@ -25,7 +25,7 @@ impl Units {
         }
     }
 
-    /// Micrometres in one unit: whole, so that multiplying a 32-bit
+    /// Returns the micrometres in one unit: whole, so that multiplying a 32-bit
     /// coordinate by it is exact.
     pub(crate) fn um(self) -> f64 {
         match self {

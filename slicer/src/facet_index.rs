@@ -1,4 +1,4 @@
-//! A part's facets in memory, found by height.
+//! Finds a part's facets by height, in memory.
 
 use std::ops::Range;
 
@@ -10,16 +10,26 @@ use crate::part::Part;
 use crate::placement::{PlacedFacet, PlacedPart, Placement, facet_heights};
 use crate::survey::Survey;
 
-/// A part in its place, of which the facets between two heights are found
-/// without a look at the others. It takes about 45 bytes a facet.
+/// A part in its place, whose facets between two heights are found without looking at
+/// the others. It takes about 45 bytes a facet.
+///
+/// ```
+/// use lamp_slicer::{FacetIndex, Part, Placement, Units};
+///
+/// let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
+/// let part = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
+/// let facets = FacetIndex::new(part, &Placement::default(), Units::Millimetres)?;
+/// // All but the bottom reach above 100 um.
+/// assert_eq!(facets.between(100.0, 200.0).len(), 3);
+/// # Ok::<(), lamp_slicer::SliceError>(())
+/// ```
 #[derive(Debug)]
 pub struct FacetIndex {
     model: PlacedPart,
     bins: HeightBins,
     /// By the bin in which they begin.
     facets: Grouped<Facet>,
-    /// Of each bin: the facets of lower bins that reach into it, by their place in
-    /// `facets`.
+    /// By bin, the facets of lower bins that reach into it, as positions in `facets`.
     from_below: Grouped<u32>,
     min: [f64; 3],
     max: [f64; 3],
@@ -33,27 +43,27 @@ struct HeightBins {
     count: usize,
 }
 
-/// More would not be met one by one.
-const MOST_BINS: f64 = 65_536.0;
+/// With more, facets would meet several bins each.
+const MAX_BINS: f64 = 65_536.0;
 
 impl HeightBins {
-    /// Twice as high as facets are on average: most facets meet one or two.
+    /// Creates bins twice as high as the mean facet, so that most facets meet one or two.
     fn new(survey: &Survey) -> Self {
         let (start_um, end_um) = (survey.min[2], survey.max[2]);
         let height_um = 2.0 * survey.mean_height_um();
         let count = if height_um > 0.0 { (end_um - start_um) / height_um } else { 1.0 };
-        let count = count.clamp(1.0, MOST_BINS).ceil();
+        let count = count.clamp(1.0, MAX_BINS).ceil();
         let height_um = ((end_um - start_um) / count).max(f64::MIN_POSITIVE);
         Self { start_um, height_um, count: count as usize }
     }
 
-    /// The bin of a height; those outside are in the first or the last.
+    /// Returns the bin of a height: the first or the last for those outside.
     #[inline]
     fn of(&self, z_um: f64) -> usize {
         (((z_um - self.start_um) / self.height_um) as usize).min(self.count - 1)
     }
 
-    /// The bins that a facet meets.
+    /// Returns the bins that a facet meets.
     fn of_facet(&self, facet: &PlacedFacet) -> Range<usize> {
         let (low, high) = facet_heights(facet);
         self.of(low)..self.of(high) + 1
@@ -64,8 +74,11 @@ impl FacetIndex {
     /// Reads a part into memory.
     ///
     /// # Errors
-    /// Where the part is empty, not finite or 1000 km away, cannot be read, or has
-    /// more than 2^32 facets.
+    /// Returns an error if the part is empty, not finite or 1000 km away, or cannot be
+    /// read.
+    ///
+    /// # Panics
+    /// Panics if the part has 2^32 facets.
     pub fn new(model: Part, placement: &Placement, units: Units) -> Result<Self, SliceError> {
         let model = PlacedPart::new(model, placement, units);
         let survey = Survey::of(&model)?;
@@ -94,18 +107,18 @@ impl FacetIndex {
         Ok(Self { model, bins, facets, from_below, min: survey.min, max: survey.max })
     }
 
-    /// The least x and y in millimetres, and z in micrometres.
+    /// Returns the least x and y in millimetres, and z in micrometres.
     pub fn min(&self) -> [f64; 3] {
         self.min
     }
 
-    /// The greatest x and y in millimetres, and z in micrometres.
+    /// Returns the greatest x and y in millimetres, and z in micrometres.
     pub fn max(&self) -> [f64; 3] {
         self.max
     }
 
-    /// The facets that reach above one height and do not begin above the other,
-    /// in no order, but always the same. Heights are in micrometres.
+    /// Returns the facets that reach above one height and do not begin above the other,
+    /// in an arbitrary but fixed order. Heights are in micrometres.
     pub fn between(&self, low_um: f64, high_um: f64) -> Vec<PlacedFacet> {
         let (first, last) = (self.bins.of(low_um), self.bins.of(high_um));
         let facets = self.facets.items();
@@ -119,7 +132,7 @@ impl FacetIndex {
         placed.filter(is_met).collect()
     }
 
-    /// Gives every facet.
+    /// Calls `each` with every facet.
     pub fn for_each(&self, mut each: impl FnMut(&PlacedFacet)) {
         self.facets.items().iter().for_each(|facet| each(&self.model.placed(facet)));
     }

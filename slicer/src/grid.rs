@@ -1,4 +1,4 @@
-//! Where pixels lie on the part.
+//! The grid of a layer's pixels in part coordinates.
 
 use lamp_stack::Dpi;
 
@@ -32,14 +32,24 @@ pub struct PixelGrid {
 }
 
 impl PixelGrid {
-    /// The grid around a box (x, y), with `margin` pixels on every side and
-    /// its width rounded up to a multiple of 32 on the right, where at least
-    /// one column stays black: a row that ends white is a stray row. The origin is
-    /// moved outwards to a whole nanometre, so that six decimals state it
-    /// exactly.
+    /// Creates the grid around a box (x, y), with `margin` pixels on every side. On the
+    /// right its width is rounded up to a multiple of 32, and at least one column stays
+    /// black, since a row that ends white is a stray row. The origin is moved outwards
+    /// to a whole nanometre, so that six decimals state it exactly.
+    ///
+    /// ```
+    /// use lamp_slicer::PixelGrid;
+    /// use lamp_stack::Dpi;
+    ///
+    /// let dpi = Dpi::new(254.0).unwrap(); // 0.1 mm pixels
+    /// let grid = PixelGrid::around([0.0, 0.0], [3.0, 1.0], 1, dpi)?;
+    /// assert_eq!((grid.width, grid.height), (32, 12));
+    /// assert_eq!(grid.origin_mm, [-0.1, 1.1]);
+    /// # Ok::<(), lamp_slicer::SliceError>(())
+    /// ```
     ///
     /// # Errors
-    /// Where a side would pass 2^24 pixels.
+    /// Returns an error if a side would exceed 2^24 pixels.
     ///
     /// Source: 002 section 2.2.2 (equations 1 and 2; width in 32 bits).
     pub fn around(
@@ -58,10 +68,10 @@ impl PixelGrid {
         Self::at([x0, y1], width, height, dpi)
     }
 
-    /// The grid with its top left corner at `origin_mm`.
+    /// Creates the grid with its top left corner at `origin_mm`.
     ///
     /// # Errors
-    /// Where a side is not between 1 and 2^24 pixels.
+    /// Returns an error if a side is not between 1 and 2^24 pixels.
     pub fn at(origin_mm: [f64; 2], width: f64, height: f64, dpi: Dpi) -> Result<Self, SliceError> {
         let allowed = 1.0..=f64::from(MAX_SIDE);
         if !allowed.contains(&width) || !allowed.contains(&height) {
@@ -70,7 +80,7 @@ impl PixelGrid {
         Ok(Self { origin_mm, dpi, width: width as u32, height: height as u32 })
     }
 
-    /// Whether a box lies inside the grid and leaves its last column black.
+    /// Returns true if a box lies inside the grid and leaves its last column black.
     pub(crate) fn holds(&self, min_mm: [f64; 2], max_mm: [f64; 2]) -> bool {
         // In pixels, the grid's edges lie half a pixel outside its centres.
         let [left, bottom] = self.to_pixels(min_mm[0], min_mm[1]);
@@ -81,12 +91,12 @@ impl PixelGrid {
             && bottom <= f64::from(self.height) - 0.5
     }
 
-    /// A point in pixels, such that it lies left of (or on) the centre of
-    /// column c exactly when its first coordinate is at most c, and above (or
-    /// on) the centre of row r exactly when its second is at most r.
+    /// Returns a point in pixels: its column is at most c exactly if it lies left of or
+    /// on the centre of column c, and its row at most r exactly if it lies above or on
+    /// the centre of row r.
     ///
-    /// A coordinate that lies on a centre comes out as that whole number:
-    /// the one division is by a whole number.
+    /// A point on a centre gives whole numbers, since the one division is by a whole
+    /// number.
     #[inline]
     pub fn to_pixels(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
         let scale = pixels_per_127_mm(self.dpi);
@@ -96,8 +106,8 @@ impl PixelGrid {
         ]
     }
 
-    /// Where a point in pixels lies, in millimetres: what
-    /// [`to_pixels`](Self::to_pixels) undoes.
+    /// Returns a point in millimetres, given in pixels: the inverse of
+    /// [`to_pixels`](Self::to_pixels).
     pub fn to_mm(&self, column: f64, row: f64) -> [f64; 2] {
         let scale = pixels_per_127_mm(self.dpi);
         [
@@ -107,7 +117,7 @@ impl PixelGrid {
     }
 }
 
-/// dpi / 25.4 is five dpi / 127: whole for whole resolutions.
+/// Returns the pixels in 127 mm, five times the dpi: whole for whole resolutions.
 fn pixels_per_127_mm(dpi: Dpi) -> f64 {
     dpi.get() * 5.0
 }

@@ -1,10 +1,15 @@
-//! CAD parts to layer images, straight from facets to runs.
+//! Slices CAD parts into layer images, straight from facets to runs.
 //!
-//! A [`Part`] is a part as a source of facets; [`Slices`] are its layers. No
-//! contour is ever linked and no pixel is painted: each facet's crossings
-//! with the planes of the layers and the rows of the images go straight into
-//! a table of (layer, row), and sorting a row's crossings gives its runs
-//! (002 section 2.3.4, algorithm 9).
+//! A [`Part`] is an STL or STEP part as a source of facets; [`Slices`] iterates its
+//! layers. No contour is linked and no pixel painted. Each facet's crossings with the
+//! planes of layers and the rows of images go into a table of (layer, row), and sorting
+//! a row's crossings gives its runs (002 section 2.3.4, algorithm 9).
+//!
+//! - [`Placement`] scales, turns and moves the part; [`PixelGrid`] lays its pixels.
+//! - [`LayerHeights`] are layers of any thickness, [`LayerLevels`] gray levels.
+//! - [`Slices::trace`] finds the faulty edges behind stray rows.
+//! - [`section`](fn@section) cuts one section without rounding to pixels, and
+//!   [`FacetIndex`] finds facets by height.
 //!
 //! ```
 //! use lamp_slicer::{Part, SliceOptions, Slices};
@@ -12,13 +17,13 @@
 //!
 //! // A tetrahedron: four facets, counter-clockwise seen from outside.
 //! let [o, x, y, z] = [[0.0; 3], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 10.0f32]];
-//! let model = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
+//! let part = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
 //! let options = SliceOptions {
 //!     dpi: Dpi::new(254.0).unwrap(), // 0.1 mm pixels
 //!     thickness: Length::from_mm(2.0),
 //!     ..SliceOptions::default()
 //! };
-//! let areas_mm2: Vec<f64> = Slices::new(model, &options)?
+//! let areas_mm2: Vec<f64> = Slices::new(part, &options)?
 //!     .map(|layer| match layer?.image {
 //!         Image::Mask(mask) => Ok(mask.white_pixels() as f64 * 0.01),
 //!         Image::Gray(_) => unreachable!("slices are masks"),

@@ -1,4 +1,4 @@
-//! A part as a source of facets.
+//! Parts as sources of facets, in files or in memory.
 
 use std::fs::File;
 use std::io;
@@ -17,9 +17,9 @@ use crate::facet::Facet;
 const HEADER_BYTES: u64 = 84;
 /// A facet of a binary STL: normal, three corners, attributes.
 const FACET_BYTES: usize = 50;
-/// Facets are read in blocks of so many: 200 kB of a binary file.
+/// The facets of a block, in which they are read: 200 kB of a binary file.
 const BLOCK_FACETS: usize = 4096;
-/// Those of surfaces are fewer and cost more: all threads should have some.
+/// Facets of surfaces are fewer and cost more, and all threads should have some.
 const BLOCK_SURFACE_FACETS: usize = 128;
 
 /// A part: its name and its facets, from one file or several. A binary STL
@@ -62,7 +62,7 @@ impl FileFacets {
 }
 
 impl Part {
-    /// A part of these facets.
+    /// Creates a part of facets in memory.
     pub fn from_facets(name: &str, facets: Vec<Facet>) -> Self {
         let mut hasher = Hasher::new();
         for corner in facets.iter().flatten().flatten() {
@@ -72,12 +72,10 @@ impl Part {
         Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
     }
 
-    /// A part of exact surfaces, in millimetres, from the bytes of its file.
+    /// Creates a part of exact surfaces, in millimetres, from the bytes of its file.
     pub(crate) fn from_surfaces(name: &str, bytes: &[u8], prepared: Prepared) -> Self {
-        let mut hasher = Hasher::new();
-        hasher.update(bytes);
         let files = vec![FileFacets::Surfaces(Arc::new(prepared))];
-        Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
+        Self { name: name.to_owned(), files, digest: digest_text(Hasher::new().update(bytes)) }
     }
 
     /// Returns what was read of each STEP file.
@@ -93,9 +91,9 @@ impl Part {
         })
     }
 
-    /// One part of several that stand in the same coordinates. Its name joins
-    /// theirs with `+`; its digest is that of theirs, one after another. A
-    /// model that stands alone stays as it is.
+    /// Joins parts that stand in the same coordinates into one. Its name joins theirs
+    /// with `+`; its digest is that of theirs, one after another. A single part stays
+    /// as it is.
     pub fn joined(models: Vec<Self>) -> Self {
         let names: Vec<&str> = models.iter().map(Self::name).collect();
         let name = names.join("+");
@@ -140,19 +138,18 @@ impl Part {
         Ok(Self { name, files: vec![facets], digest: digest_of(file, size)? })
     }
 
-    /// The part's name: the file's, without folder and extension.
+    /// Returns the part's name: the file's, without folder and extension.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// How many facets the part has.
+    /// Returns the number of facets.
     pub fn facet_count(&self) -> usize {
         self.files.iter().map(FileFacets::count).sum()
     }
 
-    /// The digest of the file (of the coordinates, where there is no file; of
-    /// the digests, where there are several): `blake3:` and 64 hexadecimal
-    /// digits.
+    /// Returns the digest of the file, `blake3:` and 64 hexadecimal digits. Without a
+    /// file it is that of the coordinates, and with several that of their digests.
     pub fn digest(&self) -> &str {
         &self.digest
     }
@@ -161,7 +158,7 @@ impl Part {
         self.files.iter().map(FileFacets::blocks).sum()
     }
 
-    /// The file that a block is of, and which of its facets are in the block.
+    /// Returns the file of a block, and the block's facets among the file's.
     pub(crate) fn place_of(&self, mut block: usize) -> (usize, Range<usize>) {
         let mut file = 0;
         while block >= self.files[file].blocks() {
@@ -173,7 +170,7 @@ impl Part {
         (file, start..self.files[file].count().min(start + length))
     }
 
-    /// A facet of a file.
+    /// Returns a facet of a file.
     pub(crate) fn facet(&self, file: usize, facet: usize) -> io::Result<Facet> {
         match &self.files[file] {
             FileFacets::Memory(facets) => Ok(facets[facet]),
@@ -189,7 +186,7 @@ impl Part {
         }
     }
 
-    /// Gives every facet of a block.
+    /// Calls `each` with every facet of a block.
     pub(crate) fn for_each_in_block(
         &self,
         block: usize,
@@ -222,7 +219,7 @@ fn why_not_stl(start: &[u8], declared: Option<u32>, size: u64) -> SliceError {
     }
 }
 
-/// The format of a file that is given for an STL by mistake, if it is known.
+/// Returns the format of a file that was given by mistake, if it is known.
 fn other_format(start: &[u8]) -> Option<&'static str> {
     const FORMATS: [(&[u8], &str); 6] = [
         (b"II*\0", "TIFF"),
@@ -240,7 +237,7 @@ fn rounded(corners: [[f64; 3]; 3]) -> Facet {
     corners.map(|corner| corner.map(|c| c as f32))
 }
 
-/// The corners of a binary facet.
+/// Returns the corners of a binary facet.
 #[inline]
 fn parse(record: &[u8; FACET_BYTES]) -> Facet {
     let number = |at: usize| {
@@ -250,7 +247,7 @@ fn parse(record: &[u8; FACET_BYTES]) -> Facet {
     [corner(12), corner(24), corner(36)]
 }
 
-/// Maps a part of a file.
+/// Maps a range of a file into memory.
 #[expect(unsafe_code, reason = "mapping a file is unsafe, since others may change it")]
 pub(crate) fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
     // SAFETY: the map is private and read only. Its bytes are undefined only

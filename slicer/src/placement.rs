@@ -1,8 +1,7 @@
-//! Where a part stands on the machine.
+//! Places a part on the machine: scaled, mirrored, turned and moved.
 //!
-//! Each corner is placed by itself, in 64 bits: corners that are equal in the
-//! file are equal where they come to stand, so a closed mesh stays closed
-//! however it is turned.
+//! Each corner is placed by itself, in 64 bits. Corners that are equal in the file
+//! stay equal, so a closed mesh stays closed however it is turned.
 
 use std::io;
 
@@ -25,8 +24,8 @@ pub enum Axis {
 
 lamp_stack::named!(Axis { X = "x", Y = "y", Z = "z" });
 
-/// What is done to a part before it is sliced: nothing by default. Each step
-/// follows the ones before, and acts about the origin.
+/// Steps that place a part before it is sliced; none by default. Each acts about the
+/// origin, after the steps before.
 ///
 /// ```
 /// use lamp_slicer::{Axis, Placement};
@@ -36,7 +35,7 @@ lamp_stack::named!(Axis { X = "x", Y = "y", Z = "z" });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// x, y and z of the result, by x, y, z and one.
+    /// Coefficients of x, y, z and 1 for the x, y and z in place.
     rows: [[f64; 4]; 3],
 }
 
@@ -47,8 +46,8 @@ impl Default for Placement {
 }
 
 impl Placement {
-    /// Scales x, y and z. A factor below zero mirrors, which turns every facet
-    /// over: neither rule of filling sees that.
+    /// Scales x, y and z. A factor below zero mirrors, and so turns every facet over;
+    /// neither fill rule sees that.
     #[must_use]
     pub fn scaled(mut self, factors: [f64; 3]) -> Self {
         for (row, factor) in self.rows.iter_mut().zip(factors) {
@@ -57,8 +56,7 @@ impl Placement {
         self
     }
 
-    /// Turns by so many degrees, counter-clockwise as seen from the axis's
-    /// tip. Quarter turns are exact.
+    /// Turns counter-clockwise, as seen from the axis's tip. Quarter turns are exact.
     #[must_use]
     pub fn rotated(mut self, axis: Axis, degrees: f64) -> Self {
         let quarters = (degrees / 90.0).round();
@@ -77,7 +75,7 @@ impl Placement {
         self
     }
 
-    /// Moves by so many millimetres.
+    /// Moves along x, y and z.
     #[must_use]
     pub fn translated(mut self, by_mm: [f64; 3]) -> Self {
         for (row, mm) in self.rows.iter_mut().zip(by_mm) {
@@ -86,7 +84,7 @@ impl Placement {
         self
     }
 
-    /// Where a point comes to stand, in millimetres.
+    /// Returns a point in its place, in millimetres.
     pub fn at(&self, point_mm: [f64; 3]) -> [f64; 3] {
         self.rows.map(|row| affine(&row, point_mm))
     }
@@ -121,10 +119,10 @@ pub(crate) struct PlacedPart {
     surfaces: Vec<Option<PlacedSurfaces>>,
 }
 
-/// The way from file units to the place.
+/// The transform from file units to the place.
 #[derive(Debug)]
 enum Transform {
-    /// The axes scaled: most parts stay where they are, and pay for no more.
+    /// Scales the axes. Most parts stay where they are, and need no more.
     Scale([f64; 3]),
     Affine([[f64; 4]; 3]),
 }
@@ -158,25 +156,25 @@ impl PlacedPart {
         }
     }
 
-    /// Without its surfaces: by facets alone.
+    /// Drops the surfaces, so that only facets are left.
     pub(crate) fn on_facets(mut self) -> Self {
         self.surfaces.fill_with(|| None);
         self
     }
 
-    /// The surfaces that there are.
+    /// Returns all surfaces.
     pub(crate) fn surfaces(&self) -> impl Iterator<Item = &PlacedSurfaces> {
         self.surfaces.iter().flatten()
     }
 
-    /// The surfaces below a block's facets, if it has some, and its first facet's
-    /// number among theirs.
+    /// Returns the surfaces of a block's file, if it has some, and the number there of the
+    /// block's first facet.
     pub(crate) fn surfaces_of_block(&self, block: usize) -> Option<(&PlacedSurfaces, u32)> {
         let (file, facets) = self.model.place_of(block);
         Some((self.surfaces[file].as_ref()?, facets.start as u32))
     }
 
-    /// Gives every facet of a block.
+    /// Calls `each` with every facet of a block.
     pub(crate) fn for_each_in_block(
         &self,
         block: usize,
@@ -193,7 +191,7 @@ impl PlacedPart {
         }
     }
 
-    /// A facet of the file in its place.
+    /// Places a facet.
     #[inline]
     pub(crate) fn placed(&self, facet: &Facet) -> PlacedFacet {
         match &self.transform {

@@ -1,4 +1,4 @@
-//! One section of a part, along rows, not rounded to pixels.
+//! Cuts one section of a part along rows, not rounded to pixels.
 
 use lamp_stack::{Dpi, Length};
 use rayon::prelude::*;
@@ -13,35 +13,34 @@ use crate::planes::Planes;
 use crate::survey::Survey;
 use crate::table::Fill;
 
-/// How a part is cut once.
+/// Options of a single section.
 #[derive(Clone, Debug)]
 pub struct SectionOptions {
-    /// What the file's coordinates mean.
+    /// The unit of the file's coordinates.
     pub units: Units,
-    /// What is done to the part first.
+    /// Scaling, turns and moves of the part.
     pub placement: Placement,
-    /// What is inside.
+    /// The rule that tells inside from outside.
     pub fill: Fill,
     /// The height of the plane.
     pub z: Length,
-    /// The rows: their distance, the upper edge of the first in millimetres,
-    /// and how many there are.
+    /// The distance of rows, as a resolution.
     pub dpi: Dpi,
-    /// See [`Self::dpi`].
+    /// The upper edge of the first row, in millimetres.
     pub top_mm: f64,
-    /// See [`Self::dpi`].
+    /// The number of rows.
     pub rows: u32,
 }
 
-/// Where a line is inside a part: from and to, in millimetres, rising.
+/// The stretches of a line that are inside a part: from and to, in millimetres, rising.
 pub type Inside = Vec<[f64; 2]>;
 
-/// Returns where the rows through a part's section are inside it. A crossing
-/// without its fellow, in a row that does not balance, is left out.
+/// Returns where the rows through a part's section are inside it. In a row that does
+/// not balance, a crossing without a partner is left out.
 ///
 /// # Errors
-/// Where the part is empty, not finite or 1000 km away, or the rows are too
-/// many.
+/// Returns an error if the part is empty, not finite or 1000 km away, or there are too
+/// many rows.
 pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
     let model = PlacedPart::new(model, &options.placement, options.units);
     let survey = Survey::of(&model)?;
@@ -63,7 +62,7 @@ pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, Sli
         Ok(crossings)
     });
     let mut crossings = found.collect::<Result<Vec<_>, SliceError>>()?.concat();
-    crossings.par_sort_by(|a, b| a.partial_cmp(b).expect("places are finite"));
+    crossings.par_sort_by(|a, b| a.partial_cmp(b).expect("coordinates are finite"));
     let mut rows = vec![Inside::new(); options.rows as usize];
     for row in crossings.chunk_by(|a, b| a.0 == b.0) {
         rows[row[0].0 as usize] = inside(row, options.fill);
@@ -71,7 +70,7 @@ pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, Sli
     Ok(rows)
 }
 
-/// Pairs the crossings of a row.
+/// Returns the stretches between the crossings of a row.
 fn inside(crossings: &[(u32, f64, i32)], fill: Fill) -> Inside {
     let (mut inside, mut entered, mut winding) = (Inside::new(), None, 0);
     for &(_, x, turn) in crossings {

@@ -1,4 +1,4 @@
-//! Parts as binary STL.
+//! Writes parts as binary STL.
 
 use std::io::{self, Write};
 
@@ -12,7 +12,7 @@ impl Part {
     /// in millimetres.
     ///
     /// # Errors
-    /// Where the part cannot be read, or `out` fails.
+    /// Returns an error if the part cannot be read, or `out` fails.
     pub fn write_stl(&self, mut out: impl Write) -> io::Result<()> {
         let mut triangles = Vec::with_capacity(self.facet_count());
         for block in 0..self.block_count() {

@@ -10,23 +10,23 @@ use crate::planes::LayerHeights;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerLevels {
     distinct: Vec<DepthLevels>,
-    /// Which of them each layer has; the first for layers beyond.
+    /// The position in `distinct` of each layer's levels; layers beyond have the first.
     of_layer: Vec<u32>,
 }
 
 impl From<DepthLevels> for LayerLevels {
-    /// The same levels in all layers.
+    /// Gives all layers the same levels.
     fn from(levels: DepthLevels) -> Self {
         Self { distinct: vec![levels], of_layer: Vec::new() }
     }
 }
 
 impl LayerLevels {
-    /// The levels of layers whose exposures differ: `of_thickness` says them for
-    /// each thickness, to the nanometre.
+    /// Creates the levels of layers whose exposures differ. `of_thickness` returns those
+    /// of a thickness; it is called once for each, to the nanometre.
     ///
     /// # Errors
-    /// Those of `of_thickness`.
+    /// Returns the first error of `of_thickness`.
     pub fn by_thickness<E>(
         heights: &LayerHeights,
         mut of_thickness: impl FnMut(Length) -> Result<DepthLevels, E>,
@@ -51,7 +51,7 @@ impl LayerLevels {
         &self.distinct[self.of_layer.get(layer).map_or(0, |&index| index as usize)]
     }
 
-    /// From this depth on, all is white in all layers.
+    /// Returns the depth from which on all pixels are white in all layers.
     pub(crate) fn reach_um(&self) -> f64 {
         self.distinct.iter().map(|levels| levels.reach().um()).fold(0.0, f64::max)
     }

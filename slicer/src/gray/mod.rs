@@ -1,18 +1,18 @@
-//! Gray layers: each pixel as deep as the part below it.
+//! Gray layers: each pixel cures as deep as the part below it.
 //!
-//! A layer is exposed with its section at its top. Where the part's underside
-//! slopes away within the layer, full exposure cures too deep. The vertical line
-//! through a pixel's centre leaves the part where it meets the first facet
-//! below the section ([`sheet`](self::sheet)); the depth there, counted from the
-//! layer's top, has a gray level ([`DepthLevels`](lamp_stack::DepthLevels)), and the others in its row
-//! make runs of it ([`shade`](self::shade)).
+//! A layer is exposed with its section at its top. Where the part's underside slopes
+//! away within the layer, full exposure cures too deep. The vertical line through a
+//! pixel's centre leaves the part at the first facet below the section
+//! ([`sheet`](self::sheet)). The depth there has a gray level
+//! ([`DepthLevels`](lamp_stack::DepthLevels)), and neighbouring pixels of one level
+//! make a run ([`shade`](self::shade)).
 //!
-//! Source: 002 section 3.3.10, algorithm 15, with the depth from the facets
-//! themselves instead of from a solid cut out for each layer.
+//! Vertical lines meet facets as rows do in a section: whether a line is left or right
+//! of an edge follows from the edge's ends alone. So a line through a closed sheet of
+//! facets meets exactly one of them.
 //!
-//! Facets meet the vertical lines as they meet rows in a section: whether a line
-//! is left or right of an edge follows from the edge's ends alone, so that a line
-//! through a closed sheet of facets meets exactly one of them.
+//! Source: 002 section 3.3.10, algorithm 15, but with depths of the facets themselves
+//! instead of a solid cut out for each layer.
 
 mod levels;
 mod shade;

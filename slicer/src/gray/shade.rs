@@ -1,4 +1,4 @@
-//! A layer's rows of gray levels, from its section and what lies below.
+//! Shades a layer's rows by the depth of the part below its section.
 
 use lamp_stack::{DepthLevels, GrayMask, Image, Length, LevelChange, MaskBuilder};
 
@@ -11,11 +11,11 @@ use crate::table::Fill;
 pub(crate) struct Shader<'a> {
     levels: &'a DepthLevels,
     fill: Fill,
-    /// The layer's plane below the layer's top.
+    /// The depth of the layer's plane below its top.
     plane_depth_um: f64,
-    /// Those of the rows to come, by row.
+    /// The spans of the rows to come, by row.
     spans: &'a [DepthSpan],
-    /// Those over a column, in the order of their starts.
+    /// The spans over a column, in the order of their starts.
     open: Vec<&'a DepthSpan>,
     met: Vec<(f64, &'a DepthSpan)>,
     changes: Vec<LevelChange>,
@@ -23,7 +23,7 @@ pub(crate) struct Shader<'a> {
 }
 
 impl<'a> Shader<'a> {
-    /// For a layer and all that lies below its section, sorted.
+    /// Starts a layer, given the sorted spans below its section.
     pub(crate) fn new(
         levels: &'a DepthLevels,
         fill: Fill,
@@ -44,8 +44,7 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// Adds the next row, given the sorted places where the section's contours
-    /// cross it.
+    /// Adds the next row, given its sorted crossings with the section's contours.
     pub(crate) fn push_row(&mut self, row: u32, places: &[RowCrossing]) {
         let count = self.spans.iter().take_while(|span| span.row <= row).count();
         let (mut spans, rest) = self.spans.split_at(count);
@@ -63,7 +62,7 @@ impl<'a> Shader<'a> {
         self.image.push_row(&self.changes).expect("changes come from the left");
     }
 
-    /// Adds columns between which no contour crosses the row.
+    /// Adds columns between two crossings of the row.
     fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &'a [DepthSpan]) {
         if !self.fill.is_inside(winding) {
             return self.push(start, 0);
@@ -81,7 +80,7 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// Adds columns that lie over the same facets.
+    /// Adds columns over the same facets.
     fn shade_evenly(&mut self, start: u32, end: u32, winding: i32) {
         if self.open.is_empty() {
             return self.push(start, 255);
@@ -94,8 +93,7 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The depth at which the line down from a white pixel leaves the part for
-    /// the first time.
+    /// Returns the depth at which the line down from a white pixel first leaves the part.
     fn exit_um(&mut self, column: u32, winding: i32) -> Option<f64> {
         self.met.clear();
         self.met.extend(self.open.iter().map(|&span| (span.depth_um(column), span)));
@@ -107,8 +105,8 @@ impl<'a> Shader<'a> {
             let (depth, first) = group[0];
             let lost = group.iter().map(|(_, span)| span.winding()).sum::<i32>();
             let below = depth > self.plane_depth_um + first.tie_um();
-            // Within rounding of the plane, the section has seen to those that
-            // lead into the part.
+            // The section accounts for facets within rounding of the plane that lead
+            // into the part.
             if !below && lost * winding.signum() <= 0 {
                 continue;
             }
@@ -131,7 +129,7 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The image: 1-bit where no pixel is gray.
+    /// Returns the image: 1-bit if no pixel is gray.
     pub(crate) fn finish(self) -> Image {
         let image = self.image;
         if image.rows().flatten().any(|change| change.level % 255 != 0) {

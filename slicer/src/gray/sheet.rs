@@ -1,4 +1,4 @@
-//! A facet as part of a sheet that vertical lines meet.
+//! Facets as vertical lines through pixels meet them, and the depths there.
 
 use std::ops::Range;
 
@@ -7,20 +7,19 @@ use crate::placement::{PlacedFacet, facet_heights};
 use crate::planes::Planes;
 use crate::scan::{RowFacet, ceil_clamped};
 
-/// Closer than this to a layer's plane, and to each other, facets are taken to
-/// touch: far more than rounding, far less than anything cures.
+/// Facets closer than this to each other, or to a layer's plane, count as touching: far
+/// more than rounding, far less than anything cures.
 const TOUCHING_UM: f64 = 1e-3;
 
-/// The same sideways: a facet is met as if a pixel's centre could be this far
-/// off.
+/// The same sideways: a pixel's centre may be this far off.
 const ASIDE_PIXELS: f64 = 1e-6;
 
-/// What comes so near to the part's lowest point stands on the platform. A flat
-/// underside that was turned into its place is not level to the last digit.
+/// Facets this near to the part's lowest point stand on the platform. A flat underside
+/// that was turned into its place is not level to the last digit.
 const STANDING_UM: f64 = 1.0;
 
-/// What a row's vertical lines meet of a facet below a section: columns from
-/// `start` to `end`, at depths along a straight line.
+/// The columns of a row, from `start` to `end`, over a facet below a section. Depths
+/// along them lie on a straight line.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(crate) struct DepthSpan {
     pub(crate) row: u32,
@@ -29,57 +28,56 @@ pub(crate) struct DepthSpan {
     /// Below the layer's top, at the first column.
     depth_um: f32,
     um_per_column: f32,
-    /// How far from the plane it may be on its other side, by rounding. Below
-    /// zero where going down enters the part.
+    /// The distance by which rounding may put it on the other side of the plane. Below
+    /// zero if going down enters the part.
     signed_tie_um: f32,
 }
 
 impl DepthSpan {
-    /// Row and first column in one, to sort by.
+    /// Returns the row and first column in one, to sort by.
     #[inline]
     pub(crate) fn place(&self) -> u64 {
         u64::from(self.row) << 32 | u64::from(self.start)
     }
 
-    /// The depth below the layer's top at a column.
+    /// Returns the depth below the layer's top at a column.
     #[inline]
     pub(crate) fn depth_um(&self, column: u32) -> f64 {
         f64::from(self.depth_um) + f64::from(self.um_per_column) * f64::from(column - self.start)
     }
 
-    /// What a line that goes down through it loses: +1 or -1 of the winding
-    /// number.
+    /// Returns the loss of the winding number, +1 or -1, on the way down through it.
     #[inline]
     pub(crate) fn winding(&self) -> i32 {
         if self.signed_tie_um < 0.0 { -1 } else { 1 }
     }
 
-    /// How far from another facet it counts as touching.
+    /// Returns the distance from other facets within which it touches them.
     #[inline]
     pub(crate) fn tie_um(&self) -> f64 {
         f64::from(self.signed_tie_um.abs())
     }
 
-    /// The same at another depth.
+    /// Returns the span at another depth.
     pub(crate) fn at_depth(self, depth_um: f64) -> Self {
         Self { depth_um: depth_um as f32, ..self }
     }
 
-    /// The depths at which a layer looks at it: from just above the section to where
-    /// the exposure ends.
+    /// Returns the depths at which a layer looks at it: from just above the section to
+    /// the end of the exposure.
     pub(crate) fn depths(&self, planes: &Planes, layer: usize, reach_um: f64) -> Range<f64> {
         depths(planes, layer, reach_um, self.tie_um())
     }
 
-    /// The level that its depth has along all of its columns, where it has one.
+    /// Returns true if its depth is the same at all columns.
     #[inline]
     pub(crate) fn is_level(&self) -> bool {
         self.um_per_column == 0.0
     }
 }
 
-/// The depths below a layer's top at which it looks at facets: from just above the
-/// section to where the exposure ends.
+/// Returns the depths below a layer's top at which it looks at facets: from just above
+/// the section to the end of the exposure.
 fn depths(planes: &Planes, layer: usize, reach_um: f64, tie_um: f64) -> Range<f64> {
     let top_um = planes.top_um(layer);
     let end_um = (top_um - reach_um).max(planes.bottom_um() + STANDING_UM);
@@ -92,13 +90,13 @@ pub(crate) struct Sheet {
     low_um: f64,
     high_um: f64,
     tie_um: f64,
-    /// How much longer a way down to it is than one across.
+    /// The ratio of a distance down to it to the distance across.
     steepness: f64,
     winding: i32,
 }
 
 impl Sheet {
-    /// A facet as vertical lines see it, where they can meet it.
+    /// Looks at a facet from above. Returns `None` if no vertical line meets it.
     pub(crate) fn new(cutter: &Cutter<'_>, facet: &PlacedFacet) -> Option<Self> {
         let corners = facet.map(|[x, y, z_um]| {
             let [column, row] = cutter.grid.to_pixels(x, y);
@@ -124,8 +122,8 @@ impl Sheet {
         })
     }
 
-    /// Gives what the rows of `layers`, whose planes are above its lowest corner,
-    /// meet of it: from just above the section to where the exposure ends.
+    /// Calls `each` with the spans of `layers`, whose planes are above its lowest corner:
+    /// from just above the section to the end of the exposure.
     pub(crate) fn for_each_span(
         &self,
         cutter: &Cutter<'_>,
@@ -152,7 +150,7 @@ impl Sheet {
         });
     }
 
-    /// What a row meets of it at one depth.
+    /// Returns a span at one depth.
     fn span(&self, row: u32, columns: Range<u32>, depth_um: f64) -> DepthSpan {
         DepthSpan {
             row,
@@ -164,7 +162,8 @@ impl Sheet {
         }
     }
 
-    /// Gives each pixel that meets it between two heights, and the height there.
+    /// Calls `each` with every pixel that meets it between two heights, and the height
+    /// there.
     pub(crate) fn for_each_pixel(
         &self,
         cutter: &Cutter<'_>,
@@ -183,14 +182,14 @@ impl Sheet {
         });
     }
 
-    /// How much higher or lower a surface may be that is so near to it.
+    /// Returns how much higher or lower a surface at a distance from it may be.
     pub(crate) fn slack_um(&self, near_um: f64) -> f64 {
         // Not more than the facet itself, twice: steeper ones are met by few lines.
         let most = near_um + 2.0 * (self.high_um - self.low_um);
         (near_um * self.steepness).min(most)
     }
 
-    /// What a row meets of it.
+    /// Returns the columns of a row that meet it, if any.
     #[inline]
     fn stretch(&self, ends: [[f64; 2]; 2], width: u32) -> Option<RowStretch> {
         let [long, short] = ends;
@@ -205,8 +204,8 @@ impl Sheet {
     }
 }
 
-/// What a row meets of a facet: columns, of which each is at a height along the
-/// line from edge to edge.
+/// The columns of a row that meet a facet, with heights along the line from edge to
+/// edge.
 struct RowStretch {
     columns: Range<u32>,
     ends: [f64; 2],
@@ -215,14 +214,14 @@ struct RowStretch {
 }
 
 impl RowStretch {
-    /// The lower and the higher end's height.
+    /// Returns the heights of the lower and the higher end.
     #[inline]
     fn heights(&self) -> [f64; 2] {
         let [a, b] = self.heights;
         [a.min(b), a.max(b)]
     }
 
-    /// The height at a column, which rounding does not take off the facet.
+    /// Returns the height at a column, clamped to the facet against rounding.
     #[inline]
     fn height(&self, column: u32) -> f64 {
         let [low, high] = self.heights();
@@ -230,8 +229,8 @@ impl RowStretch {
         z.clamp(low, high)
     }
 
-    /// The columns where the depth below a height is in a range, and the first
-    /// one's depth.
+    /// Returns the columns whose depth below a height is in a range, and the first one's
+    /// depth.
     #[inline]
     fn within(&self, top_um: f64, depths: &Range<f64>) -> Option<(Range<u32>, f64)> {
         let Range { mut start, mut end } = self.columns;
@@ -241,7 +240,7 @@ impl RowStretch {
             let first = depth(start);
             let ends = [depths.start, depths.end].map(|depth| (first - depth) / self.um_per_column);
             let [near, far] = if self.um_per_column < 0.0 { ends } else { [ends[1], ends[0]] };
-            // A column more on each side, to be sure; the loops below are exact.
+            // One column more on each side for rounding; the loops below are exact.
             let length = f64::from(end - start);
             end = start + (far + 2.0).clamp(0.0, length) as u32;
             start += (near - 1.0).clamp(0.0, length) as u32;
