@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use lamp_slicer::brep::{BodyReport, Finding, KernelName, Prepared};
-use lamp_slicer::{OpenOptions, SliceError};
+use lamp_slicer::brep::{BodyReport, Finding, Prepared};
+use lamp_slicer::{KernelName, OpenOptions, SliceError};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 

@@ -67,7 +67,7 @@ pub use facet::{Facet, Units};
 pub use facet_index::FacetIndex;
 pub use gray::LayerLevels;
 pub use grid::PixelGrid;
-pub use open::{OpenOptions, body_name, read_step};
+pub use open::{KernelName, OpenOptions, body_name, read_step};
 pub use part::Part;
 pub use placement::{Axis, PlacedFacet, Placement, facet_heights};
 pub use planes::{LayerHeights, PlaneRule};

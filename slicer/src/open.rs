@@ -9,12 +9,33 @@ use std::thread;
 use std::time::Duration;
 
 use lamp_brep::{
-    BodyFault, BodyReport, BrepError, KernelName, Prepared, START_BYTES, is_step, prepare,
+    BodyFault, BodyReport, BrepError, Prepared, ReadFn, START_BYTES, is_step, prepare,
 };
 use lamp_stack::{Length, one_line};
 
 use crate::error::SliceError;
 use crate::part::Part;
+
+/// The program that reads STEP files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KernelName {
+    /// LAMP itself.
+    #[default]
+    Lamp,
+    /// OpenCASCADE.
+    #[cfg(feature = "occt")]
+    Occt,
+}
+
+impl KernelName {
+    fn read(self) -> ReadFn {
+        match self {
+            Self::Lamp => lamp_brep::read_step,
+            #[cfg(feature = "occt")]
+            Self::Occt => lamp_brep_occt::read,
+        }
+    }
+}
 
 /// How STEP files are read. STL files take no options.
 #[derive(Clone, Debug)]
@@ -113,7 +134,7 @@ pub fn read_step(bytes: Arc<[u8]>, options: &OpenOptions) -> Result<Prepared, Sl
     // A thread of its own, which is left behind if it hangs.
     thread::Builder::new().stack_size(STACK_BYTES).spawn(move || {
         // Nobody listens any more once time is up.
-        let _ = sender.send(prepare(&bytes, kernel, tolerance.mm()));
+        let _ = sender.send(prepare(&bytes, kernel.read(), tolerance.mm()));
     })?;
     match receiver.recv_timeout(timeout) {
         Ok(prepared) => Ok(prepared?),

@@ -9,12 +9,13 @@ pub enum BrepError {
     /// The file is not what it should be.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// OpenCASCADE cannot work with it.
-    #[cfg(feature = "occt")]
-    #[error("OpenCASCADE says: {said}")]
-    Occt {
-        /// Why, in its words.
-        said: String,
+    /// The library that a kernel is built on cannot work with the file.
+    #[error("{library} says: {message}")]
+    Library {
+        /// The library's name.
+        library: &'static str,
+        /// Its own words.
+        message: String,
     },
     /// The chord is not a positive length.
     #[error("a chord of {chord_mm} mm is not a positive length")]
@@ -23,14 +24,12 @@ pub enum BrepError {
         chord_mm: f64,
     },
     /// A face has no size, or none that can be built.
-    #[cfg(feature = "occt")]
     #[error("#{entity} is larger than anything that can be built, or has no size")]
     Size {
         /// The entity, or 0.
         entity: u64,
     },
     /// The tolerance to mend with is not a positive length.
-    #[cfg(feature = "occt")]
     #[error("a tolerance of {heal_mm} mm is not a positive length")]
     Heal {
         /// In millimetres.

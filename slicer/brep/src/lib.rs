@@ -8,6 +8,8 @@
 //! [`StepModel`] is the kernel in pure Rust. [`prepare`] reads, heals and validates a
 //! file in as many ways as it takes.
 //!
+//! The crate `lamp-brep-occt` has a kernel on OpenCASCADE.
+//!
 //! ```
 //! use lamp_brep::{Jet, Kernel, StepModel, check};
 //! use lamp_fixtures::{StepPart, StepUnit, step};
@@ -31,13 +33,13 @@
 //! # Ok::<(), lamp_brep::BrepError>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
 mod error;
 mod geometry;
 mod heal;
 mod kernel;
 mod model;
-#[cfg(feature = "occt")]
-mod occt;
 mod orient;
 mod prepare;
 mod step;
@@ -47,8 +49,7 @@ pub mod vector;
 
 pub use error::BrepError;
 pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellation};
-#[cfg(feature = "occt")]
-pub use occt::OcctModel;
-pub use prepare::{Attempt, KernelName, Prepared, prepare};
-pub use step::{START_BYTES, StepError, StepModel, is_step};
+pub use prepare::{Attempt, OpenedModel, Prepared, ReadFn, prepare};
+pub use step::{START_BYTES, StepError, StepModel, check_syntax, is_step, read_step};
+pub use tessellate::MAX_FACETS;
 pub use validate::{BodyFault, BodyReport, check};

@@ -8,21 +8,19 @@ use std::sync::Arc;
 
 use crate::error::BrepError;
 use crate::kernel::{Kernel, Tessellation};
-#[cfg(feature = "occt")]
-use crate::occt::OcctModel;
 use crate::orient::turn_over;
-use crate::step::StepModel;
 use crate::validate::{BodyFault, BodyReport, apart, check};
 
-/// The program that reads STEP files.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum KernelName {
-    /// This crate's own, in Rust.
-    #[default]
-    Lamp,
-    /// OpenCASCADE.
-    #[cfg(feature = "occt")]
-    Occt,
+/// Reads a file's bytes, and joins what lies within a distance in millimetres of
+/// each other; with 0 the file is taken as it is.
+pub type ReadFn = fn(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError>;
+
+/// A file as a kernel has read it.
+pub struct OpenedModel {
+    /// The model.
+    pub kernel: Arc<dyn Kernel>,
+    /// Whether healing changed anything.
+    pub is_changed: bool,
 }
 
 /// A model that is ready to be sliced, unless its reports have faults.
@@ -73,16 +71,16 @@ const CHORDS: [f64; 2] = [4.0, 16.0];
 ///
 /// # Errors
 /// Returns an error if they cannot be read, or no try gives facets.
-pub fn prepare(bytes: &[u8], name: KernelName, chord_mm: f64) -> Result<Prepared, BrepError> {
+pub fn prepare(bytes: &[u8], read: ReadFn, chord_mm: f64) -> Result<Prepared, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
     }
-    let opened = open(bytes, name, 0.0)?;
+    let opened = caught("reading the file", || read(bytes, 0.0))?;
     let own_mm = opened.kernel.uncertainty_mm().unwrap_or(USUAL_MM);
     let first = facets(opened.kernel, 0.0, chord_mm);
     let first_try = Attempt::of(&first, 0.0, chord_mm);
     let mut search =
-        Search { bytes, name, chord_mm, tries: vec![first_try], best: first.map(|made| (0, made)) };
+        Search { bytes, read, chord_mm, tries: vec![first_try], best: first.map(|made| (0, made)) };
     let heals = HEALS.map(|by| by * own_mm).into_iter().chain(LOOSEST.map(|by| by * chord_mm));
     for heal_mm in heals.filter(|heal_mm| *heal_mm <= chord_mm) {
         search.healed(heal_mm, chord_mm)?;
@@ -98,7 +96,7 @@ pub fn prepare(bytes: &[u8], name: KernelName, chord_mm: f64) -> Result<Prepared
 /// The attempts so far.
 struct Search<'a> {
     bytes: &'a [u8],
-    name: KernelName,
+    read: ReadFn,
     /// The chord asked for.
     chord_mm: f64,
     /// All, the best one too.
@@ -112,9 +110,13 @@ impl Search<'_> {
         self.best.as_ref().is_ok_and(|(_, best)| best.is_good())
     }
 
+    fn open(&self, heal_mm: f64) -> Result<OpenedModel, BrepError> {
+        caught("reading the file", || (self.read)(self.bytes, heal_mm))
+    }
+
     fn healed(&mut self, heal_mm: f64, chord_mm: f64) -> Result<(), BrepError> {
         if !self.is_done() {
-            let opened = open(self.bytes, self.name, heal_mm)?;
+            let opened = self.open(heal_mm)?;
             if opened.is_changed {
                 self.take(opened.kernel, heal_mm, chord_mm);
             }
@@ -126,7 +128,7 @@ impl Search<'_> {
     fn longer(&mut self, chord_mm: f64) -> Result<(), BrepError> {
         if !self.is_done() {
             let heal_mm = self.best.as_ref().map_or(0.0, |(_, best)| best.heal_mm);
-            let kernel = open(self.bytes, self.name, heal_mm)?.kernel;
+            let kernel = self.open(heal_mm)?.kernel;
             self.take(kernel, heal_mm, chord_mm);
         }
         Ok(())
@@ -209,34 +211,6 @@ fn wrong(reports: &[BodyReport]) -> [usize; 3] {
     let faults = || reports.iter().flat_map(|report| &report.faults);
     let bodies = reports.iter().filter(|report| !report.faults.is_empty()).count();
     [bodies, faults().map(open).sum(), faults().count()]
-}
-
-/// A file as a kernel has read it.
-struct OpenedModel {
-    kernel: Arc<dyn Kernel>,
-    /// Whether healing changed anything.
-    is_changed: bool,
-}
-
-/// Reads a file, and joins edges within a tolerance unless that is 0.
-fn open(bytes: &[u8], name: KernelName, heal_mm: f64) -> Result<OpenedModel, BrepError> {
-    caught("reading the file", || match name {
-        KernelName::Lamp => {
-            let model = StepModel::read_healed(bytes, heal_mm)?;
-            let is_changed = model.is_healed();
-            Ok(OpenedModel { kernel: Arc::new(model), is_changed })
-        }
-        #[cfg(feature = "occt")]
-        KernelName::Occt => {
-            let is_changed = heal_mm > 0.0;
-            let model = if is_changed {
-                OcctModel::read_healed(bytes, heal_mm)?
-            } else {
-                OcctModel::read(bytes)?
-            };
-            Ok(OpenedModel { kernel: Arc::new(model), is_changed })
-        }
-    })
 }
 
 /// Runs work that may panic, and turns a panic into an error.

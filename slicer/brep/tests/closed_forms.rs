@@ -24,7 +24,7 @@ fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
 
 #[cfg(feature = "occt")]
 fn by_occt(text: &str) -> Option<Arc<dyn Kernel>> {
-    Some(Arc::new(lamp_brep::OcctModel::read(text.as_bytes()).unwrap()))
+    Some(Arc::new(lamp_brep_occt::OcctModel::read(text.as_bytes()).unwrap()))
 }
 
 #[cfg(not(feature = "occt"))]

@@ -1,13 +1,13 @@
 //! Files that are healed, or refused for the right reason and at the right place.
 
-use lamp_brep::{BodyFault, Fault, KernelName, Prepared, prepare};
+use lamp_brep::{BodyFault, Fault, Prepared, prepare, read_step};
 use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
 
 /// The block's volume, in cubic millimetres.
 const BLOCK_MM3: f64 = 6000.0;
 
 fn prepared(text: &str, chord_mm: f64) -> Prepared {
-    prepare(text.as_bytes(), KernelName::Lamp, chord_mm).unwrap()
+    prepare(text.as_bytes(), read_step, chord_mm).unwrap()
 }
 
 fn broken(defect: StepDefect, chord_mm: f64) -> Prepared {

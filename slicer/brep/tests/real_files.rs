@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use lamp_brep::{Facet, Finding, KernelName, Tessellation, prepare};
+use lamp_brep::{Facet, Finding, ReadFn, Tessellation, prepare, read_step};
 
 /// Longer than any file takes, many times over.
 const LIMIT: Duration = Duration::from_secs(300);
@@ -39,7 +39,7 @@ enum Outcome {
     Refused(String),
 }
 
-fn read(path: &Path, kernel: KernelName, chord_mm: f64, heights_mm: &[f64]) -> Outcome {
+fn read(path: &Path, kernel: ReadFn, chord_mm: f64, heights_mm: &[f64]) -> Outcome {
     let prepared = match prepare(&std::fs::read(path).unwrap(), kernel, chord_mm) {
         Ok(prepared) => prepared,
         Err(error) => return Outcome::Refused(error.to_string()),
@@ -91,7 +91,7 @@ fn section_area(mesh: &Tessellation, z: f64) -> f64 {
 }
 
 /// Reads a file on a thread of its own; one that hangs is left behind.
-fn within_limit(path: &Path, kernel: KernelName, chord_mm: f64, heights_mm: Vec<f64>) -> Outcome {
+fn within_limit(path: &Path, kernel: ReadFn, chord_mm: f64, heights_mm: Vec<f64>) -> Outcome {
     let (sender, receiver) = mpsc::channel();
     let path = path.to_owned();
     std::thread::spawn(move || {
@@ -107,17 +107,17 @@ fn within_limit(path: &Path, kernel: KernelName, chord_mm: f64, heights_mm: Vec<
 
 #[test]
 fn every_file_is_right_or_refused() {
-    every_file(KernelName::Lamp, LEAST_RIGHT);
+    every_file(read_step, LEAST_RIGHT);
 }
 
 #[cfg(feature = "occt")]
 #[test]
 fn every_file_is_right_or_refused_with_occt() {
-    every_file(KernelName::Occt, LEAST_RIGHT);
+    every_file(lamp_brep_occt::read, LEAST_RIGHT);
 }
 
 /// Reads every file of the folder, if it is there, and prints a table of them.
-fn every_file(kernel: KernelName, least_right: f64) {
+fn every_file(kernel: ReadFn, least_right: f64) {
     let Ok(figures) = std::fs::read(data().join("step_oracle.json")) else {
         println!("no files at hand");
         return;

@@ -11,10 +11,13 @@ mod token;
 mod topology;
 mod units;
 
+use std::sync::Arc;
+
 use crate::error::BrepError;
 use crate::heal::heal;
 use crate::kernel::{Body, FaceInfo, Finding, Jet, Kernel, Tessellation};
 use crate::model::BrepModel;
+use crate::prepare::OpenedModel;
 use crate::tessellate;
 
 /// Why a STEP file cannot be read.
@@ -102,10 +105,21 @@ pub fn is_step(start: &[u8]) -> bool {
     start.trim_ascii_start().starts_with(b"ISO-10303-21")
 }
 
-/// Reads the text alone.
-#[cfg(feature = "occt")]
-pub(crate) fn check_text(bytes: &[u8]) -> Result<(), StepError> {
+/// Checks that a file's bytes are STEP text, whatever its entities mean.
+///
+/// # Errors
+/// Returns an error that names the byte or the entity at fault.
+pub fn check_syntax(bytes: &[u8]) -> Result<(), StepError> {
     entities::Entities::read(bytes).map(drop)
+}
+
+/// Reads a file's bytes for [`prepare`](crate::prepare).
+///
+/// # Errors
+/// As [`StepModel::read_healed`].
+pub fn read_step(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError> {
+    let model = StepModel::read_healed(bytes, heal_mm)?;
+    Ok(OpenedModel { is_changed: model.is_healed(), kernel: Arc::new(model) })
 }
 
 /// A STEP file in memory, read by this crate alone.

@@ -30,7 +30,7 @@ struct Node {
 /// vertex from it.
 const CLEAR: f64 = 4.0;
 /// The most facets, about 5 GB of memory: more than any part that is built takes.
-pub(crate) const MAX_FACETS: usize = 50_000_000;
+pub const MAX_FACETS: usize = 50_000_000;
 /// The most points on edges.
 const MAX_POINTS: usize = 20_000_000;
 

@@ -4,7 +4,8 @@
 
 use std::fmt::Write;
 
-use lamp_brep::{BodyFault, BrepError, Jet, Kernel, OcctModel, StepModel, check};
+use lamp_brep::{BodyFault, BrepError, Jet, Kernel, StepModel, check};
+use lamp_brep_occt::OcctModel;
 use lamp_fixtures::{StepSample, StepUnit, step};
 
 #[test]

@@ -6,9 +6,9 @@
 
 use std::collections::HashMap;
 
-use super::calls::Node;
-use crate::kernel::{Jet, Kernel};
-use crate::vector::{Vec3, cross, dot, sub, unit};
+use crate::calls::Node;
+use lamp_brep::vector::{Vec3, cross, dot, sub, unit};
+use lamp_brep::{Jet, Kernel};
 
 /// Each round halves an edge once: the last ones are a thousandth as long.
 const MOST_ROUNDS: usize = 10;

@@ -37,7 +37,7 @@ mod occt {
         }
         let headers = headers();
         for file in SOURCES.iter().chain(&HEADERS) {
-            println!("cargo::rerun-if-changed=src/occt/{file}");
+            println!("cargo::rerun-if-changed=src/{file}");
         }
         cc::Build::new()
             .cpp(true)
@@ -46,7 +46,7 @@ mod occt {
             .flag("-isystem")
             .flag(&headers)
             .opt_level(2)
-            .files(SOURCES.map(|file| format!("src/occt/{file}")))
+            .files(SOURCES.map(|file| format!("src/{file}")))
             .compile("lamp_occt");
         if let Ok(folder) = std::env::var("OCCT_LIB_DIR") {
             println!("cargo::rustc-link-search=native={folder}");

@@ -4,11 +4,9 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::calls::{Chain, Mesh, Node};
-use super::refine::Patch;
-use crate::error::BrepError;
-use crate::kernel::{Facet, Fault, Finding, Kernel, Tessellation};
-use crate::tessellate::MAX_FACETS;
+use crate::calls::{Chain, Mesh, Node};
+use crate::refine::Patch;
+use lamp_brep::{BrepError, Facet, Fault, Finding, Kernel, MAX_FACETS, Tessellation};
 
 /// No number.
 const NONE: u32 = u32::MAX;

@@ -5,7 +5,7 @@
 use std::ffi::{CStr, c_char};
 use std::ptr::NonNull;
 
-use crate::kernel::Jet;
+use lamp_brep::Jet;
 
 mod raw {
     use std::ffi::{c_char, c_void};

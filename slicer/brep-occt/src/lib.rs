@@ -1,14 +1,22 @@
-//! Reading STEP with OpenCASCADE.
+//! STEP files read by OpenCASCADE, as a second kernel for B-rep models.
+//!
+//! Without the feature `occt` the crate is empty; with it, OpenCASCADE must be
+//! installed. [`OcctModel`] knows more kinds of surfaces and curves than
+//! `lamp_brep::StepModel`, and mends more. OpenCASCADE can crash on a broken file:
+//! read files that are not trusted in a process of their own.
+
+#![cfg(feature = "occt")]
 
 mod calls;
 mod count;
 mod join;
 mod refine;
 
-use crate::error::BrepError;
-use crate::kernel::{Body, FaceInfo, Jet, Kernel, Tessellation};
-use crate::step;
-use crate::tessellate::MAX_FACETS;
+use std::sync::Arc;
+
+use lamp_brep::{
+    Body, BrepError, FaceInfo, Jet, Kernel, MAX_FACETS, OpenedModel, Tessellation, check_syntax,
+};
 
 /// A STEP file in memory, read by OpenCASCADE.
 ///
@@ -49,8 +57,8 @@ impl OcctModel {
 
     fn of(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
         // OpenCASCADE goes on after text that makes no sense.
-        step::check_text(bytes)?;
-        let inner = calls::Model::read(bytes, heal_mm).map_err(|said| BrepError::Occt { said })?;
+        check_syntax(bytes)?;
+        let inner = calls::Model::read(bytes, heal_mm).map_err(library_error)?;
         let all = inner.faces();
         let body = |(number, name): (u32, String)| {
             let start = all.partition_point(|face| face.body < number) as u32;
@@ -68,6 +76,21 @@ impl std::fmt::Debug for OcctModel {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.debug_struct("OcctModel").field("bodies", &self.bodies).finish_non_exhaustive()
     }
+}
+
+fn library_error(message: String) -> BrepError {
+    BrepError::Library { library: "OpenCASCADE", message }
+}
+
+/// Reads a file's bytes for [`prepare`](lamp_brep::prepare).
+///
+/// # Errors
+/// As [`OcctModel::read_healed`].
+pub fn read(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError> {
+    let is_changed = heal_mm > 0.0;
+    let model =
+        if is_changed { OcctModel::read_healed(bytes, heal_mm)? } else { OcctModel::read(bytes)? };
+    Ok(OpenedModel { kernel: Arc::new(model), is_changed })
 }
 
 fn info(face: &calls::Face) -> FaceInfo {
@@ -114,7 +137,7 @@ impl Kernel for OcctModel {
         }
         let parallel = rayon::current_num_threads() > 1;
         let mesh = self.inner.mesh(chord_mm, parallel);
-        let mesh = mesh.map_err(|said| BrepError::Occt { said })?;
+        let mesh = mesh.map_err(library_error)?;
         join::joined(self, &mesh, chord_mm)
     }
 

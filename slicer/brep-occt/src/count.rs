@@ -1,8 +1,7 @@
 //! About how many facets a model takes, before they are made.
 
-use crate::error::BrepError;
-use crate::kernel::{Jet, Kernel};
-use crate::vector::{Vec3, length};
+use lamp_brep::vector::{Vec3, length};
+use lamp_brep::{BrepError, Jet, Kernel};
 
 /// Each face is measured in so many steps of u and of v.
 const STEPS: usize = 16;
