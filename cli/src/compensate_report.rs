@@ -8,16 +8,16 @@ use lamp_postprocess::{Compensated, Loss, ThinWall};
 use lamp_stack::Layer;
 use serde::Serialize;
 
+use crate::error::CommandError;
 use crate::json_report::{JsonReport, to_nm};
-use crate::place::{Place, millimetres};
-use crate::stop::Stop;
+use crate::pixel_location::{PixelLocation, millimetres};
 
 /// So many walls are listed; others are only counted.
 const MOST_LISTED: usize = 10_000;
 
 /// Collects what was found.
 #[derive(Default)]
-pub(crate) struct Walls {
+pub(crate) struct WallReport {
     changed: usize,
     layers: usize,
     walls: usize,
@@ -70,7 +70,7 @@ struct WallLine {
     pieces_left: Option<usize>,
 }
 
-impl Walls {
+impl WallReport {
     /// Adds what was done to a layer.
     pub(crate) fn add(&mut self, done: &Compensated<'_>) {
         self.changed += 1;
@@ -136,7 +136,7 @@ impl Walls {
     }
 
     /// Writes the report.
-    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), Stop> {
+    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), CommandError> {
         let head = Head {
             layers,
             layers_changed: self.changed,
@@ -172,7 +172,7 @@ fn loss_line(layer: &Layer, loss: &Loss) -> WallLine {
 
 /// A line that says where.
 fn box_line(layer: &Layer, columns: &Range<u32>, rows: &Range<u32>) -> WallLine {
-    let place = Place::of(layer);
+    let place = PixelLocation::of(layer);
     WallLine {
         layer: layer.info.index,
         z_mm: layer.info.z().map(|z| to_nm(z.mm())),
@@ -191,7 +191,7 @@ fn box_line(layer: &Layer, columns: &Range<u32>, rows: &Range<u32>) -> WallLine 
 /// `layer 812 (z 81.20 mm) near x 31.4-33.0 y 12.1-12.8 mm`.
 fn whereabouts(layer: &Layer, columns: &Range<u32>, rows: &Range<u32>) -> String {
     let name = layer.info.name();
-    match Place::of(layer) {
+    match PixelLocation::of(layer) {
         Some(place) => format!(
             "{name} near x {} y {} mm",
             millimetres(place.x_mm(columns)),

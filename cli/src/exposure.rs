@@ -11,8 +11,8 @@ use lamp_stack::{DepthLevels, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::catalogue::{entry, read_text};
+use crate::error::CommandError;
 use crate::recorded::text;
-use crate::stop::Stop;
 use crate::streams::input_name;
 
 pub(crate) const EXPOSURE: &str = "Exposure";
@@ -79,7 +79,7 @@ impl ExposureOptions {
     }
 
     /// How layers are exposed, where a material or a table says.
-    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Stop> {
+    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, CommandError> {
         if let Some(path) = &self.exposure_table {
             // Without blanks, as the stack's commands are words.
             let name = path.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_");
@@ -88,7 +88,7 @@ impl ExposureOptions {
         }
         let Some(path) = &self.material else { return Ok(None) };
         let material: Material = entry(path)?;
-        let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
+        let resin = material.resin().map_err(|error| CommandError::Failed(error.into()))?;
         let source = Source::Resin { resin, overcure: self.overcure };
         Ok(Some(Exposure { name: material.name, source }))
     }
@@ -101,7 +101,7 @@ fn read_times(path: &Path) -> anyhow::Result<ExposureTimes> {
 
 impl Exposure {
     /// How long a layer is exposed, to the microsecond, as people read it.
-    pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, Stop> {
+    pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, CommandError> {
         let thickness = thickness.to_whole_nm();
         let time = match &self.source {
             Source::Resin { resin, overcure } => {
@@ -120,15 +120,15 @@ impl Exposure {
     ///
     /// # Errors
     /// Where the resin does not say them; a table of times never does.
-    pub(crate) fn levels(&self, thickness: Length) -> Result<DepthLevels, Stop> {
+    pub(crate) fn levels(&self, thickness: Length) -> Result<DepthLevels, CommandError> {
         let Source::Resin { resin, .. } = &self.source else {
             return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
         };
         resin.depth_levels(self.time(thickness)?).map_err(|error| self.failed(error.into()))
     }
 
-    fn failed(&self, error: anyhow::Error) -> Stop {
-        Stop::Failed(error).at(self.name.clone())
+    fn failed(&self, error: anyhow::Error) -> CommandError {
+        CommandError::Failed(error).at(self.name.clone())
     }
 }
 

@@ -7,12 +7,12 @@ use lamp_postprocess::{Band, BandKind, BandOutcome, FixOptions, Fixed};
 use lamp_stack::Layer;
 use serde::Serialize;
 
+use crate::error::CommandError;
 use crate::json_report::{JsonReport, to_nm};
-use crate::place::{Place, millimetres};
-use crate::stop::Stop;
+use crate::pixel_location::{PixelLocation, millimetres};
 
 /// Collects what is found.
-pub(crate) struct Findings {
+pub(crate) struct FixReport {
     options: FixOptions,
     bands: Vec<BandLine>,
     corrected: usize,
@@ -55,7 +55,7 @@ struct BandLine {
     outcome: &'static str,
 }
 
-impl Findings {
+impl FixReport {
     pub(crate) fn new(options: FixOptions) -> Self {
         Self { options, bands: Vec::new(), corrected: 0, pixels: 0 }
     }
@@ -77,7 +77,7 @@ impl Findings {
     }
 
     /// Writes the report.
-    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), Stop> {
+    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), CommandError> {
         let head = Head {
             method: self.options.method.name(),
             max_width: self.options.max_width,
@@ -92,7 +92,7 @@ impl Findings {
     }
 
     fn line(&self, layer: &Layer, band: &Band) -> BandLine {
-        let place = Place::of(layer);
+        let place = PixelLocation::of(layer);
         let columns = (!band.columns.is_empty()).then(|| band.columns.clone());
         let x_mm = |columns: &Option<Range<u32>>| Some(place?.x_mm(columns.as_ref()?).map(to_nm));
         let first_and_last = |columns: &Range<u32>| [columns.start, columns.end - 1];
@@ -122,7 +122,7 @@ impl Findings {
 /// Where the mesh is to be repaired: `x 31.4-33.0 y 12.1-12.8 mm`.
 pub(crate) fn whereabouts(layer: &Layer, band: &Band) -> String {
     let columns = band.gap.clone().unwrap_or_else(|| band.columns.clone());
-    let Some(place) = Place::of(layer) else {
+    let Some(place) = PixelLocation::of(layer) else {
         return match columns.is_empty() {
             true => "these rows".to_owned(),
             false => format!("columns {}-{}", columns.start, columns.end - 1),

@@ -4,43 +4,43 @@
 //! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` are the
 //! same code under the names of the pipeline.
 
-mod brep;
-mod bridge;
+mod band_pictures;
 mod catalogue;
 mod commands;
 mod compensate_report;
-mod evidence;
+mod cured_section;
+mod error;
 mod exposure;
+mod fallback;
 mod fix_report;
-mod heights;
+mod height_options;
 mod hints;
 mod json_report;
 mod mesh_report;
+#[cfg(feature = "occt")]
+mod occt_process;
 mod options;
-mod part;
+mod part_options;
 mod picture;
-mod place;
+mod pixel_location;
 mod placement;
 mod plots;
+mod progress;
 mod recorded;
-mod report;
-mod section;
 mod signals;
-mod solid;
-mod stop;
+mod slicing_options;
+mod step_options;
 mod streams;
-#[cfg(feature = "occt")]
-mod supervise;
 
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 
 use commands::Command;
+use error::CommandError;
 use options::Common;
-use report::say;
+use progress::say;
 use signals::{clean_up_on_signals, wait_if_ending};
-use stop::Stop;
 
 /// Turn CAD parts into layer images for projection photopolymerization.
 #[derive(Parser)]
@@ -83,11 +83,11 @@ pub fn run_stage(name: &str) -> ExitCode {
     finish(name, run(&command, &common))
 }
 
-fn run(command: &Command, common: &Common) -> Result<ExitCode, Stop> {
+fn run(command: &Command, common: &Common) -> Result<ExitCode, CommandError> {
     keep_freed_memory();
     clean_up_on_signals()?;
     #[cfg(feature = "occt")]
-    if let Some(status) = supervise::supervised()? {
+    if let Some(status) = occt_process::supervised()? {
         return Ok(status);
     }
     common.apply()?;
@@ -103,12 +103,12 @@ fn keep_freed_memory() {
 }
 
 /// Says in one sentence why a command stopped, and turns it into a status.
-fn finish(name: &str, result: Result<ExitCode, Stop>) -> ExitCode {
+fn finish(name: &str, result: Result<ExitCode, CommandError>) -> ExitCode {
     wait_if_ending();
     match result {
-        Err(stop) if !stop.is_reader_gone() => {
-            say(&format!("{name}: {stop}"));
-            ExitCode::from(stop.status())
+        Err(error) if !error.is_reader_gone() => {
+            say(&format!("{name}: {error}"));
+            ExitCode::from(error.status())
         }
         Err(_) => ExitCode::SUCCESS,
         Ok(status) => status,

@@ -7,8 +7,8 @@ use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
 use lamp_stack::{Dpi, PageInfo};
 use serde::Serialize;
 
+use crate::error::CommandError;
 use crate::json_report::{JsonReport, to_nm};
-use crate::stop::Stop;
 
 /// What is counted while the layers pass.
 #[derive(Clone, Copy, Default, Serialize)]
@@ -31,7 +31,7 @@ impl Counts {
 
 /// What the report is of.
 #[derive(Serialize)]
-pub(crate) struct Subject<'a> {
+pub(crate) struct MeshReport<'a> {
     pub(crate) files: Vec<String>,
     pub(crate) fill: &'a str,
     #[serde(flatten)]
@@ -71,15 +71,20 @@ struct EndLine {
 
 /// Where the rows of the images lie.
 #[derive(Clone, Copy)]
-pub(crate) struct Rows {
+pub(crate) struct RowPositions {
     /// The top of the first.
     pub(crate) top_mm: f64,
     pub(crate) dpi: Dpi,
 }
 
-impl Subject<'_> {
+impl MeshReport<'_> {
     /// Writes the report.
-    pub(crate) fn write(&self, trace: &Trace, rows: Rows, path: &Path) -> Result<(), Stop> {
+    pub(crate) fn write(
+        &self,
+        trace: &Trace,
+        rows: RowPositions,
+        path: &Path,
+    ) -> Result<(), CommandError> {
         let bands = trace.bands.iter().map(|band| band_line(band, rows));
         JsonReport::new(self)
             .list("edges", trace.edges.iter().enumerate().map(edge_line))
@@ -102,7 +107,7 @@ fn edge_line((edge, FaultyEdge { ends, facets }): (usize, &FaultyEdge)) -> EdgeL
     }
 }
 
-fn band_line(TracedBand { band, plane, ends }: &TracedBand, rows: Rows) -> BandLine {
+fn band_line(TracedBand { band, plane, ends }: &TracedBand, rows: RowPositions) -> BandLine {
     let y_mm = |row: u32| to_nm(rows.top_mm - f64::from(row) * rows.dpi.pitch().mm());
     let end = |OpenEnd { at_mm, edges }: &OpenEnd| EndLine {
         at_mm: at_mm.map(to_nm),

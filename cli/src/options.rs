@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::{Length, LengthError, Named};
 
-use crate::stop::Stop;
+use crate::error::CommandError;
 
 /// Options of every command.
 #[derive(Args, Clone, Debug)]
@@ -25,11 +25,11 @@ pub(crate) struct Common {
 
 impl Common {
     /// Sets up the threads. To be called once.
-    pub(crate) fn apply(&self) -> Result<(), Stop> {
+    pub(crate) fn apply(&self) -> Result<(), CommandError> {
         // Zero lets the pool choose.
         let threads = self.threads.unwrap_or(0);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-        pool.map_err(|error| Stop::Failed(anyhow::Error::new(error)))
+        pool.map_err(|error| CommandError::Failed(anyhow::Error::new(error)))
     }
 }
 

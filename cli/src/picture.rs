@@ -63,12 +63,12 @@ impl FromStr for Region {
 /// How many picture pixels an image pixel has, or how many image pixels (on a
 /// side) a picture pixel is the mean of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Scale {
+pub(crate) enum PictureScale {
     Up(u32),
     Down(u32),
 }
 
-impl Scale {
+impl PictureScale {
     /// The longer side of a region's picture, in pixels.
     pub(crate) fn side(self, region: &Region) -> u64 {
         let side = region.columns.len().max(region.rows.len()) as u64;
@@ -79,7 +79,7 @@ impl Scale {
     }
 }
 
-impl FromStr for Scale {
+impl FromStr for PictureScale {
     type Err = String;
 
     /// Parses `4` (each pixel as 4 x 4) or `1/8` (the mean of 8 x 8).
@@ -105,10 +105,10 @@ pub(crate) struct Picture<'a> {
 impl<'a> Picture<'a> {
     /// A picture of a region, which must lie on the image. It is made row by
     /// row, so a large layer takes little memory.
-    pub(crate) fn new(image: &'a Image, region: Region, scale: Scale) -> Self {
+    pub(crate) fn new(image: &'a Image, region: Region, scale: PictureScale) -> Self {
         let (up, down) = match scale {
-            Scale::Up(up) => (up, 1),
-            Scale::Down(down) => (1, down),
+            PictureScale::Up(up) => (up, 1),
+            PictureScale::Down(down) => (1, down),
         };
         let width = region.columns.len().div_ceil(down as usize) as u32;
         let height = region.rows.len().div_ceil(down as usize) as u32;
@@ -212,9 +212,9 @@ mod tests {
         let image = image();
         let all = Region::of(&image);
         let picture = |scale| rows(Picture::new(&image, all.clone(), scale));
-        assert_eq!(picture(Scale::Up(1)), [[0, 255, 255, 0, 255], [255; 5]]);
-        assert_eq!(picture(Scale::Up(2))[1], [0, 0, 255, 255, 255, 255, 0, 0, 255, 255]);
-        assert_eq!(picture(Scale::Down(2)), [[191, 191, 127]]);
+        assert_eq!(picture(PictureScale::Up(1)), [[0, 255, 255, 0, 255], [255; 5]]);
+        assert_eq!(picture(PictureScale::Up(2))[1], [0, 0, 255, 255, 255, 255, 0, 0, 255, 255]);
+        assert_eq!(picture(PictureScale::Down(2)), [[191, 191, 127]]);
     }
 
     #[test]
@@ -222,7 +222,7 @@ mod tests {
         let image = image();
         let region: Region = "3,1,99,99".parse().unwrap();
         let region = region.on(&image).unwrap();
-        assert_eq!(rows(Picture::new(&image, region, Scale::Up(1))), [[255, 255]]);
+        assert_eq!(rows(Picture::new(&image, region, PictureScale::Up(1))), [[255, 255]]);
         assert_eq!("5,0,1,1".parse::<Region>().unwrap().on(&image), None);
         for wrong in ["", "1,2,3", "1,2,0,4", "a,b,c,d", "1,2,3,4,5"] {
             assert!(wrong.parse::<Region>().is_err(), "{wrong}");
@@ -239,10 +239,10 @@ mod tests {
 
     #[test]
     fn scales_parse() {
-        assert_eq!("4".parse(), Ok(Scale::Up(4)));
-        assert_eq!("1/8".parse(), Ok(Scale::Down(8)));
+        assert_eq!("4".parse(), Ok(PictureScale::Up(4)));
+        assert_eq!("1/8".parse(), Ok(PictureScale::Down(8)));
         for wrong in ["", "0", "1/0", "2/3", "-1", "0.5", "1/5000"] {
-            assert!(wrong.parse::<Scale>().is_err(), "{wrong}");
+            assert!(wrong.parse::<PictureScale>().is_err(), "{wrong}");
         }
     }
 
@@ -252,7 +252,7 @@ mod tests {
         gray.push_runs([(1, 0), (2, 100), (1, 255)]).unwrap();
         let image = Image::Gray(gray);
         let mut png = Vec::new();
-        Picture::new(&image, Region::of(&image), Scale::Up(1)).write_png(&mut png).unwrap();
+        Picture::new(&image, Region::of(&image), PictureScale::Up(1)).write_png(&mut png).unwrap();
         let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
         let mut pixels = vec![0; 4];
         reader.next_frame(&mut pixels).unwrap();
@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn pictures_stand_side_by_side() {
         let image = image();
-        let one = || Picture::new(&image, Region::of(&image), Scale::Up(1));
+        let one = || Picture::new(&image, Region::of(&image), PictureScale::Up(1));
         let both = rows(Picture::side_by_side(vec![one(), one()]));
         assert_eq!(both[0][..6], [0, 255, 255, 0, 255, 128]);
         assert_eq!(both[1].len(), 18);

@@ -12,9 +12,9 @@ use lamp_stack::{
     write_stack,
 };
 
+use crate::error::CommandError;
 use crate::options::{Common, Input, Output};
-use crate::report::Report;
-use crate::stop::Stop;
+use crate::progress::Progress;
 
 /// Whether a path stands for standard input or output.
 pub(crate) fn is_stream(path: &Path) -> bool {
@@ -27,13 +27,13 @@ pub(crate) fn input_name(path: &Path) -> String {
 }
 
 /// Prints a text that was asked for.
-pub(crate) fn print(text: &str) -> Result<(), Stop> {
+pub(crate) fn print(text: &str) -> Result<(), CommandError> {
     let written = io::stdout().lock().write_all(text.as_bytes());
-    written.map_err(|error| Stop::output(error, "standard output"))
+    written.map_err(|error| CommandError::output(error, "standard output"))
 }
 
 /// Opens a stack's pages.
-pub(crate) fn open_pages(path: &Path) -> Result<Pages, Stop> {
+pub(crate) fn open_pages(path: &Path) -> Result<Pages, CommandError> {
     let pages = if is_stream(path) {
         refuse_terminal()?;
         widen_pipe(&io::stdin());
@@ -44,9 +44,9 @@ pub(crate) fn open_pages(path: &Path) -> Result<Pages, Stop> {
     pages.map_err(|error| failed_at(input_name(path), error))
 }
 
-fn refuse_terminal() -> Result<(), Stop> {
+fn refuse_terminal() -> Result<(), CommandError> {
     if io::stdin().is_terminal() {
-        return Err(Stop::usage(
+        return Err(CommandError::usage(
             "no stack to read: name a file, or pipe one in (--help shows how)",
         ));
     }
@@ -54,7 +54,7 @@ fn refuse_terminal() -> Result<(), Stop> {
 }
 
 /// Keeps standard input in a temporary file without a name, to be read twice.
-pub(crate) fn spool_stdin() -> Result<File, Stop> {
+pub(crate) fn spool_stdin() -> Result<File, CommandError> {
     refuse_terminal()?;
     widen_pipe(&io::stdin());
     let spool = || -> io::Result<File> {
@@ -66,14 +66,17 @@ pub(crate) fn spool_stdin() -> Result<File, Stop> {
 }
 
 /// A failure to read, and where.
-pub(crate) fn failed_at(place: impl Display + Send + Sync + 'static, error: StackError) -> Stop {
-    Stop::Failed(anyhow::Error::new(error).context(place))
+pub(crate) fn failed_at(
+    place: impl Display + Send + Sync + 'static,
+    error: StackError,
+) -> CommandError {
+    CommandError::Failed(anyhow::Error::new(error).context(place))
 }
 
 /// A report for a command that writes to `output`.
-pub(crate) fn report(command: &'static str, common: &Common, output: &Output) -> Report {
+pub(crate) fn progress(command: &'static str, common: &Common, output: &Output) -> Progress {
     let last = !is_stream(&output.output) || io::stdout().is_terminal() || stdout_is_file();
-    Report::new(command, common.quiet, last)
+    Progress::new(command, common.quiet, last)
 }
 
 /// Whether standard output goes to a file, so that no other stage follows.
@@ -97,13 +100,13 @@ fn stdout_metadata() -> Option<fs::Metadata> {
 /// Reads the wanted layers of a stack, decoded, in order.
 pub(crate) fn read_layers(
     input: &Input,
-    report: &Report,
-) -> Result<impl Iterator<Item = Result<Layer, Stop>> + use<>, Stop> {
-    let report = report.clone();
+    progress: &Progress,
+) -> Result<impl Iterator<Item = Result<Layer, CommandError>> + use<>, CommandError> {
+    let progress = progress.clone();
     let name = input_name(&input.stack);
     let pages = read_pages(input)?.inspect(move |page| {
         if let Ok((_, Some(StackInfo { layers: Some(layers), .. }))) = page {
-            report.expect((*layers).into());
+            progress.expect((*layers).into());
         }
     });
     Ok(decoded(pages, name))
@@ -114,14 +117,14 @@ pub(crate) fn layers_of(
     pages: Pages,
     name: &str,
     layers: Option<Range<u32>>,
-) -> impl Iterator<Item = Result<Layer, Stop>> + use<> {
+) -> impl Iterator<Item = Result<Layer, CommandError>> + use<> {
     decoded(pages_of(pages, name.to_owned(), layers), name.to_owned())
 }
 
 fn decoded(
-    pages: impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>>,
+    pages: impl Iterator<Item = Result<(Page, Option<StackInfo>), CommandError>>,
     name: String,
-) -> impl Iterator<Item = Result<Layer, Stop>> {
+) -> impl Iterator<Item = Result<Layer, CommandError>> {
     map_in_order(pages, move |(page, stack): (Page, _)| {
         let mut layer = page.decode().map_err(|error| failed_at(name.clone(), error))?;
         layer.info.stack = stack;
@@ -132,7 +135,7 @@ fn decoded(
 /// Reads all layers of a stack that is used beside the first, decoded, in order.
 pub(crate) fn read_beside(
     path: &Path,
-) -> Result<impl Iterator<Item = Result<Layer, Stop>> + use<>, Stop> {
+) -> Result<impl Iterator<Item = Result<Layer, CommandError>> + use<>, CommandError> {
     let name = input_name(path);
     let failed = move |error| failed_at(name.clone(), error);
     let pages = open_pages(path)?.map({
@@ -146,7 +149,10 @@ pub(crate) fn read_beside(
 /// stands beside the first of them.
 pub(crate) fn read_pages(
     input: &Input,
-) -> Result<impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>> + use<>, Stop> {
+) -> Result<
+    impl Iterator<Item = Result<(Page, Option<StackInfo>), CommandError>> + use<>,
+    CommandError,
+> {
     let pages = open_pages(&input.stack)?;
     Ok(pages_of(pages, input_name(&input.stack), input.layers.clone()))
 }
@@ -155,7 +161,7 @@ fn pages_of(
     mut pages: Pages,
     name: String,
     layers: Option<Range<u32>>,
-) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Stop>> {
+) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), CommandError>> {
     let mut stack: Option<StackInfo> = None;
     let mut found = false;
     std::iter::from_fn(move || {
@@ -177,20 +183,20 @@ fn pages_of(
             }
         }
         let none_found = layers.is_some() && !std::mem::replace(&mut found, true);
-        none_found.then(|| Err(Stop::Failed(anyhow!("{name}: no layer is in that range"))))
+        none_found.then(|| Err(CommandError::Failed(anyhow!("{name}: no layer is in that range"))))
     })
 }
 
 /// Writes layers where `output` says, counting them in `report`.
 pub(crate) fn write_layers(
-    layers: impl Iterator<Item = Result<Layer, Stop>>,
+    layers: impl Iterator<Item = Result<Layer, CommandError>>,
     output: &Output,
-    report: &Report,
-) -> Result<(), Stop> {
+    progress: &Progress,
+) -> Result<(), CommandError> {
     let to = destination(&output.output)?;
-    let counted = layers.inspect(|_| report.layer_done());
+    let counted = layers.inspect(|_| progress.layer_done());
     let written = write_stack(counted, to, format(output.classic));
-    written_to(&output.output, written, report)
+    written_to(&output.output, written, progress)
 }
 
 /// The shape of a TIFF.
@@ -201,21 +207,21 @@ pub(crate) fn format(classic: bool) -> Format {
 /// Takes the bar away, and names the output where writing it failed.
 pub(crate) fn written_to(
     output: &Path,
-    written: Result<(), Stop>,
-    report: &Report,
-) -> Result<(), Stop> {
-    report.done();
-    written.map_err(|stop| match stop {
-        Stop::Output(_) if is_stream(output) => stop.at("standard output"),
-        Stop::Output(_) => stop.at(output.display().to_string()),
-        stop => stop,
+    written: Result<(), CommandError>,
+    progress: &Progress,
+) -> Result<(), CommandError> {
+    progress.done();
+    written.map_err(|error| match error {
+        CommandError::Output(_) if is_stream(output) => error.at("standard output"),
+        CommandError::Output(_) => error.at(output.display().to_string()),
+        error => error,
     })
 }
 
-fn destination(path: &Path) -> Result<Destination, Stop> {
+fn destination(path: &Path) -> Result<Destination, CommandError> {
     if is_stream(path) {
         if io::stdout().is_terminal() {
-            return Err(Stop::usage(
+            return Err(CommandError::usage(
                 "a stack is not for terminals: name a file with -o, or pipe it on",
             ));
         }
@@ -226,7 +232,7 @@ fn destination(path: &Path) -> Result<Destination, Stop> {
         return Ok(Destination::Folder(folder_to_make(path)?.to_owned()));
     }
     if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) {
-        return Err(Stop::usage(format!(
+        return Err(CommandError::usage(format!(
             "{}: a stack is a TIFF; lamp convert turns it into PNGs",
             path.display()
         )));
@@ -243,10 +249,10 @@ pub(crate) fn is_folder(path: &Path) -> bool {
 }
 
 /// Checks that a folder can be made of that name.
-pub(crate) fn folder_to_make(path: &Path) -> Result<&Path, Stop> {
+pub(crate) fn folder_to_make(path: &Path) -> Result<&Path, CommandError> {
     match path.file_name() {
         Some(_) if !is_stream(path) => Ok(path),
-        _ => Err(Stop::usage(format!("{}: name the folder to write to", path.display()))),
+        _ => Err(CommandError::usage(format!("{}: name the folder to write to", path.display()))),
     }
 }
 
@@ -256,17 +262,20 @@ pub(crate) fn check_beside<'a>(
     beside: &Path,
     stack: &Path,
     inputs: impl IntoIterator<Item = &'a PathBuf>,
-) -> Result<(), Stop> {
+) -> Result<(), CommandError> {
     let folder = match beside.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
     if !folder.is_dir() {
         let (beside, folder) = (beside.display(), folder.display());
-        return Err(Stop::Failed(anyhow!("{beside}: there is no folder {folder}")));
+        return Err(CommandError::Failed(anyhow!("{beside}: there is no folder {folder}")));
     }
     if is_same(beside, stack) || (is_stream(stack) && is_stdout(beside)) {
-        return Err(Stop::usage(format!("{}: the stack is written there", beside.display())));
+        return Err(CommandError::usage(format!(
+            "{}: the stack is written there",
+            beside.display()
+        )));
     }
     check_not_input(beside, inputs)
 }
@@ -276,9 +285,9 @@ pub(crate) fn check_beside<'a>(
 pub(crate) fn check_not_input<'a>(
     output: &Path,
     inputs: impl IntoIterator<Item = &'a PathBuf>,
-) -> Result<(), Stop> {
+) -> Result<(), CommandError> {
     match inputs.into_iter().find(|input| is_same(output, input)) {
-        Some(_) => Err(Stop::usage(format!("{}: that is an input", output.display()))),
+        Some(_) => Err(CommandError::usage(format!("{}: that is an input", output.display()))),
         None => Ok(()),
     }
 }
@@ -324,7 +333,7 @@ fn widen_pipe<T>(_: &T) {}
 
 /// Opens what stands at `path` if that is no file: a pipe or a device is
 /// written to, not replaced.
-fn open_device(path: &Path) -> Result<Option<File>, Stop> {
+fn open_device(path: &Path) -> Result<Option<File>, CommandError> {
     match fs::metadata(path) {
         Ok(metadata) if !metadata.is_file() => {
             let device = OpenOptions::new().write(true).open(path);
@@ -343,10 +352,11 @@ fn behind_links(path: &Path) -> PathBuf {
 pub(crate) fn write_file(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), Stop> {
+) -> Result<(), CommandError> {
     if let Some(mut device) = open_device(path)? {
         let written = write(&mut device);
-        return written.map_err(|error| Stop::Output(error.into()).at(path.display().to_string()));
+        return written
+            .map_err(|error| CommandError::Output(error.into()).at(path.display().to_string()));
     }
     let path = &behind_links(path);
     let whole = || -> io::Result<()> {

@@ -16,15 +16,15 @@
 //! ```
 
 mod binaries;
-mod edit;
 mod golden;
 pub mod hostile;
+mod images;
 mod referees;
 mod scratch;
 
 pub use binaries::{bin, target_dir, workspace_root};
-pub use edit::{at_least, differing, edited, stripped, with_soft_edges};
 pub use golden::{Change, Golden, Shade, difference};
+pub use images::{at_least, differing, edited, stripped, with_soft_edges};
 pub use referees::{Packed, ask, ask_python, packed, packed_mask, plain_pages};
 pub use scratch::{Ran, Scratch, ends_white, mask, masks, read_stack, write_gray_ramp};
 

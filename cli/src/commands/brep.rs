@@ -6,8 +6,8 @@ use lamp_slicer::brep::{Body, BodyReport, Prepared};
 use lamp_slicer::{SliceError, body_name, read_step};
 use lamp_stack::Dpi;
 
-use crate::brep::{BrepOptions, bytes_of, length, notes};
-use crate::stop::Stop;
+use crate::error::CommandError;
+use crate::step_options::{BrepOptions, bytes_of, length, notes};
 use crate::streams::{input_name, print};
 
 /// Describe a STEP part, and check whether it can be sliced
@@ -37,16 +37,19 @@ pub(crate) struct BrepArgs {
     strict: bool,
 }
 
-pub(crate) fn run(args: &BrepArgs) -> Result<(), Stop> {
+pub(crate) fn run(args: &BrepArgs) -> Result<(), CommandError> {
     let name = input_name(&args.part);
     let options = args.brep.reader.for_opening(args.brep.tolerance(args.dpi));
     let read = || read_step(bytes_of(&args.part)?, &options);
-    let prepared = read().map_err(|error: SliceError| Stop::from(error).at(name.clone()))?;
+    let prepared =
+        read().map_err(|error: SliceError| CommandError::from(error).at(name.clone()))?;
     print(&text(&name, &prepared))?;
     let refused = prepared.reports.iter().filter(|report| !report.faults.is_empty()).count();
     if args.strict && refused > 0 {
         let bodies = if refused == 1 { "body" } else { "bodies" };
-        return Err(Stop::Findings(format!("{name}: {refused} {bodies} would not be sliced")));
+        return Err(CommandError::Findings(format!(
+            "{name}: {refused} {bodies} would not be sliced"
+        )));
     }
     Ok(())
 }

@@ -8,12 +8,12 @@ use lamp_postprocess::{CompensateError, CompensateOptions, Shrinkage, Widths};
 use lamp_stack::{Dpi, Layer, Length, LengthError};
 
 use crate::catalogue::entry;
-use crate::compensate_report::Walls;
+use crate::compensate_report::WallReport;
+use crate::error::CommandError;
 use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output, parse_distance};
-use crate::stop::Stop;
 use crate::streams::{
-    check_beside, check_not_input, input_name, read_layers, report, write_layers,
+    check_beside, check_not_input, input_name, progress, read_layers, write_layers,
 };
 
 /// Narrow images by the width that resin cures beyond them, and make up for firing shrinkage
@@ -68,39 +68,39 @@ pub(crate) struct CompensateArgs {
     output: Output,
 }
 
-pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Stop> {
-    let by = By::of(args)?;
+pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), CommandError> {
+    let by = EdgeMove::of(args)?;
     if let Some(beside) = &args.report {
         let inputs = args.material.iter().chain([&args.input.stack]);
         check_beside(beside, &args.output.output, inputs)?;
     }
     check_not_input(&args.output.output, &args.material)?;
-    let report = report("compensate", common, &args.output);
+    let progress = progress("compensate", common, &args.output);
     let name = input_name(&args.input.stack);
     let options = CompensateOptions {
         min_feature: args.min_feature,
         one_bit: args.one_bit,
         shrinkage: args.shrinkage.unwrap_or_default(),
     };
-    let mut walls = Walls::default();
+    let mut walls = WallReport::default();
     let mut layer_count = 0;
     let mut done_before = DoneBefore::default();
-    let layers = read_layers(&args.input, &report)?.inspect(|layer| {
+    let layers = read_layers(&args.input, &progress)?.inspect(|layer| {
         layer_count += 1;
         layer.iter().for_each(|layer| done_before.look_at(layer));
     });
     let widths = |layer: &Layer, dpi| by.widths(layer, dpi);
     let done = lamp_postprocess::compensate(layers, options, widths, |done| walls.add(done));
-    write_layers(done, &args.output, &report).map_err(|stop| match stop {
-        Stop::Failed(error) if error.is::<CompensateError>() || error.is::<NoDose>() => {
-            Stop::Failed(error).at(name.clone())
+    write_layers(done, &args.output, &progress).map_err(|error| match error {
+        CommandError::Failed(error) if error.is::<CompensateError>() || error.is::<NoDose>() => {
+            CommandError::Failed(error).at(name.clone())
         }
-        stop => stop,
+        error => error,
     })?;
     let moves = args.uniform.is_some() || args.material.is_some();
     let again = done_before.lines(&name, moves, args.shrinkage.is_some());
     for line in again.into_iter().chain(walls.lines()) {
-        report.say(&line);
+        progress.say(&line);
     }
     if let Some(path) = &args.report {
         walls.write(layer_count, path)?;
@@ -140,7 +140,7 @@ impl DoneBefore {
 }
 
 /// By what edges move.
-enum By {
+enum EdgeMove {
     Uniform(Length),
     CureWidth { width: CureWidth, material: Box<Material>, dose: Option<Dose> },
 }
@@ -157,29 +157,30 @@ impl std::fmt::Display for NoDose {
 
 impl std::error::Error for NoDose {}
 
-impl By {
-    fn of(args: &CompensateArgs) -> Result<Self, Stop> {
+impl EdgeMove {
+    fn of(args: &CompensateArgs) -> Result<Self, CommandError> {
         let Some(path) = &args.material else {
             return match (args.uniform, args.shrinkage) {
-                (None, None) => {
-                    Err(Stop::usage("give --uniform 25um, --material M or --shrinkage 2.1%"))
-                }
+                (None, None) => Err(CommandError::usage(
+                    "give --uniform 25um, --material M or --shrinkage 2.1%",
+                )),
                 (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
             };
         };
         let material: Material = entry(path)?;
         let name = &material.name;
-        let width =
-            material.cure_width().map_err(|error| Stop::Failed(error.into()).at(name.clone()))?;
+        let width = material
+            .cure_width()
+            .map_err(|error| CommandError::Failed(error.into()).at(name.clone()))?;
         let width = width.ok_or_else(|| {
-            Stop::Failed(anyhow!(
+            CommandError::Failed(anyhow!(
                 "{name} states no cure width: add [[cure-width]] to its file, or give --uniform"
             ))
         })?;
         Ok(Self::CureWidth { width, material: Box::new(material), dose: args.dose })
     }
 
-    fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, Stop> {
+    fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, CommandError> {
         let (width, dose) = match self {
             Self::Uniform(by) => return Ok(Widths::uniform(by.pixels(dpi))),
             Self::CureWidth { width, dose: Some(dose), .. } => (width, *dose),
@@ -194,8 +195,8 @@ impl By {
 }
 
 /// The dose of a layer by its page.
-fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, Stop> {
-    let no_dose = |text: String| Stop::Failed(NoDose(text).into());
+fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, CommandError> {
+    let no_dose = |text: String| CommandError::Failed(NoDose(text).into());
     let time = layer.info.exposure_ms.filter(|ms| *ms >= 0.0).ok_or_else(|| {
         no_dose(format!("{} states no exposure time: give --dose", layer.info.name()))
     })?;

@@ -8,12 +8,12 @@ use lamp_slicer::Part;
 use lamp_slicer::brep::{START_BYTES, is_step};
 use lamp_stack::{Layer, Length, StackError, png_of_layer, write_png_folder};
 
-use crate::brep::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
+use crate::error::CommandError;
 use crate::options::{Common, Input, Output};
-use crate::report::say;
-use crate::stop::Stop;
+use crate::progress::say;
+use crate::step_options::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
 use crate::streams::{
-    check_beside, folder_to_make, input_name, is_folder, is_stream, read_layers, report,
+    check_beside, folder_to_make, input_name, is_folder, is_stream, progress, read_layers,
     write_file, write_layers, written_to,
 };
 
@@ -52,7 +52,7 @@ pub(crate) struct ConvertArgs {
     png: bool,
 }
 
-pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), CommandError> {
     if let Some(stl) = args.stl() {
         return args.write_stl(stl, common);
     }
@@ -63,26 +63,26 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Stop> {
         && is_step(&start)
     {
         let name = input_name(path);
-        return Err(Stop::usage(format!("{name} is a STEP part: name a .stl after it")));
+        return Err(CommandError::usage(format!("{name} is a STEP part: name a .stl after it")));
     }
     let output = args.output.output.as_path();
-    let report = report("convert", common, &args.output);
+    let progress = progress("convert", common, &args.output);
     let shape = args.shape()?;
-    let layers = read_layers(&args.input, &report)?;
+    let layers = read_layers(&args.input, &progress)?;
     match shape {
-        Shape::Tiff => write_layers(layers, &args.output, &report),
-        Shape::Pngs => {
-            let counted = layers.inspect(|_| report.layer_done());
-            written_to(output, write_png_folder(counted, output), &report)
+        OutputKind::Tiff => write_layers(layers, &args.output, &progress),
+        OutputKind::Pngs => {
+            let counted = layers.inspect(|_| progress.layer_done());
+            written_to(output, write_png_folder(counted, output), &progress)
         }
-        Shape::Png => {
+        OutputKind::Png => {
             let png = png_of_layer(&only_layer(layers, &input_name(&args.input.stack))?)?;
             write_file(output, |out| out.write_all(&png))
         }
     }
 }
 
-enum Shape {
+enum OutputKind {
     /// A file, a folder or a stream, as every stage writes it.
     Tiff,
     /// A folder of PNGs.
@@ -100,17 +100,17 @@ impl ConvertArgs {
     }
 
     /// Writes a STEP part as facets.
-    fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), Stop> {
+    fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), CommandError> {
         let path = &self.input.stack;
         if self.input.layers.is_some() || self.png || self.output.classic {
             let why = "--layers, --png and --classic are for stacks, not for parts";
-            return Err(Stop::usage(why));
+            return Err(CommandError::usage(why));
         }
         check_beside(stl, Path::new("-"), [path])?;
         let name = input_name(path);
         let options = self.reader.for_opening(self.chord);
         let model = bytes_of(path).and_then(|bytes| Part::from_step(&name, bytes, &options));
-        let model = model.map_err(|error| Stop::from(error).at(name))?;
+        let model = model.map_err(|error| CommandError::from(error).at(name))?;
         if !common.quiet {
             let notes = model.prepared().flat_map(notes);
             notes.for_each(|note| say(&format!("convert: {note}")));
@@ -118,31 +118,33 @@ impl ConvertArgs {
         write_file(stl, |out| model.write_stl(out))
     }
 
-    fn shape(&self) -> Result<Shape, Stop> {
+    fn shape(&self) -> Result<OutputKind, CommandError> {
         let Output { output, classic } = &self.output;
         let named_png = output.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
         match (is_folder(output), self.png) {
-            (true, true) => folder_to_make(output).map(|_| Shape::Pngs),
-            (false, _) if named_png && *classic => {
-                Err(Stop::usage("--classic is for TIFFs: leave it out, or name a .tif file"))
+            (true, true) => folder_to_make(output).map(|_| OutputKind::Pngs),
+            (false, _) if named_png && *classic => Err(CommandError::usage(
+                "--classic is for TIFFs: leave it out, or name a .tif file",
+            )),
+            (false, _) if named_png => Ok(OutputKind::Png),
+            (false, true) => {
+                Err(CommandError::usage("PNGs go into a folder: name it, as -o pictures/"))
             }
-            (false, _) if named_png => Ok(Shape::Png),
-            (false, true) => Err(Stop::usage("PNGs go into a folder: name it, as -o pictures/")),
-            (_, false) => Ok(Shape::Tiff),
+            (_, false) => Ok(OutputKind::Tiff),
         }
     }
 }
 
 /// The layer of a stack of one; `name` is what people call the stack.
 fn only_layer(
-    mut layers: impl Iterator<Item = Result<Layer, Stop>>,
+    mut layers: impl Iterator<Item = Result<Layer, CommandError>>,
     name: &str,
-) -> Result<Layer, Stop> {
+) -> Result<Layer, CommandError> {
     let layer = layers.next().ok_or(StackError::NoLayers);
-    let layer = layer.map_err(|error| Stop::from(error).at(name.to_owned()))??;
+    let layer = layer.map_err(|error| CommandError::from(error).at(name.to_owned()))??;
     match layers.next().transpose()? {
         None => Ok(layer),
-        Some(_) => Err(Stop::Failed(anyhow!(
+        Some(_) => Err(CommandError::Failed(anyhow!(
             "{name}: a PNG holds one layer: choose it with --layers, or write a folder of them with --png"
         ))),
     }

@@ -8,13 +8,15 @@ use lamp_grayscale::material::Material;
 use lamp_stack::StackInfo;
 
 use crate::catalogue::entry;
+use crate::cured_section::{
+    SectionExposures, SectionLine, SectionPicture, SectionPlane, parse_along,
+};
+use crate::error::CommandError;
 use crate::options::{Common, Input};
-use crate::part::PartOptions;
-use crate::picture::Scale;
-use crate::report::Report;
-use crate::section::{Course, Exposures, Panels, Plane, parse_along};
-use crate::solid::{Reading, name_of_all};
-use crate::stop::Stop;
+use crate::part_options::{Reading, name_of_all};
+use crate::picture::PictureScale;
+use crate::progress::Progress;
+use crate::slicing_options::SlicingOptions;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 
 /// Draw a vertical section of what a stack cures, compared with the part
@@ -41,7 +43,7 @@ pub(crate) struct CureArgs {
 
     /// Where to cut, in part coordinates: y=12mm along a row of pixels, x=12mm along a column
     #[arg(long, value_name = "AXIS=LENGTH")]
-    section: Plane,
+    section: SectionPlane,
 
     /// Part that the stack was sliced from, for its outline; it is placed as the stack records.
     /// Give several files in the order in which slice got them
@@ -54,46 +56,47 @@ pub(crate) struct CureArgs {
 
     /// Scale of the picture: 4 draws each pixel as 4 x 4, 1/8 only every eighth
     #[arg(long, value_name = "N|1/N", default_value = "1")]
-    scale: Scale,
+    scale: PictureScale,
 
     /// PNG file to write
     #[arg(short, long, value_name = "FILE.png")]
     output: PathBuf,
 }
 
-pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), CommandError> {
     let inputs = args.part.iter().chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     let material: Material = entry(&args.material)?;
-    let resin = material.resin().map_err(|error| Stop::Failed(error.into()))?;
+    let resin = material.resin().map_err(|error| CommandError::Failed(error.into()))?;
     let name = input_name(&args.input.stack);
-    let failed = |error: anyhow::Error| Stop::Failed(error).at(name.clone());
-    let report = Report::new("cure", common.quiet, true);
+    let failed = |error: anyhow::Error| CommandError::Failed(error).at(name.clone());
+    let progress = Progress::new("cure", common.quiet, true);
     let (mut exposures, mut stack) = (None, None);
-    for layer in read_layers(&args.input, &report)? {
+    for layer in read_layers(&args.input, &progress)? {
         let layer = layer?;
         if exposures.is_none() {
             if layer.info.other.contains_key("dither") {
-                report.say("these layers are dots: use a stack from before dither to see its gray");
+                progress
+                    .say("these layers are dots: use a stack from before dither to see its gray");
             }
             if layer.info.other.contains_key("compensate") {
-                report.say("these layers were compensated, so that they differ from the part");
+                progress.say("these layers were compensated, so that they differ from the part");
             }
-            let course = Course::new(args.section, &layer).map_err(failed)?;
-            exposures = Some(Exposures::new(&resin, course));
+            let course = SectionLine::new(args.section, &layer).map_err(failed)?;
+            exposures = Some(SectionExposures::new(&resin, course));
             stack = layer.info.stack.clone();
         }
         let exposures = exposures.as_mut().expect("it was made for the first layer");
         exposures.add(&layer).map_err(failed)?;
-        report.layer_done();
+        progress.layer_done();
     }
-    report.done();
+    progress.done();
     let exposures = exposures.ok_or_else(|| failed(anyhow!("there are no such layers")))?;
     let outline = match &args.part[..] {
         [] => None,
         parts => Some(outline(parts, &exposures.course, stack.as_ref(), &name)?),
     };
-    let panels = Panels::new(&exposures, outline, args.along.as_ref()).map_err(failed)?;
+    let panels = SectionPicture::new(&exposures, outline, args.along.as_ref()).map_err(failed)?;
     panels.check_size(args.scale).map_err(failed)?;
     write_file(&args.output, |out| panels.write_png(args.scale, out))?;
     print(&panels.text(&material.name))
@@ -102,12 +105,12 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Stop> {
 /// The part's outline, placed as the stack says.
 fn outline(
     parts: &[PathBuf],
-    course: &Course,
+    course: &SectionLine,
     stack: Option<&StackInfo>,
     name: &str,
-) -> Result<Vec<SolidHeights>, Stop> {
+) -> Result<Vec<SolidHeights>, CommandError> {
     let sliced = stack.and_then(|stack| {
-        let options = PartOptions::of_command(stack.commands.first()?)?;
+        let options = SlicingOptions::of_command(stack.commands.first()?)?;
         Some((options, &stack.digest))
     });
     let (options, digest) = sliced.with_context(|| {
@@ -117,9 +120,9 @@ fn outline(
     let model = options.solid.open(parts, &reading)?;
     let part = name_of_all(parts);
     if model.digest() != digest {
-        return Err(Stop::Failed(anyhow!(
+        return Err(CommandError::Failed(anyhow!(
             "{name} was not sliced from {part}, or the part has changed"
         )));
     }
-    course.outline(model, &options).map_err(|error| Stop::from(error).at(part))
+    course.outline(model, &options).map_err(|error| CommandError::from(error).at(part))
 }

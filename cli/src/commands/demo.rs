@@ -14,11 +14,11 @@ use lamp_postprocess::{
 use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Catalogued, Layer, Pages, StackError};
 
+use crate::error::CommandError;
 use crate::options::{Common, Output, parse_count};
-use crate::part::PartOptions;
-use crate::picture::{Picture, Region, Scale};
-use crate::report::Report;
-use crate::stop::Stop;
+use crate::picture::{Picture, PictureScale, Region};
+use crate::progress::Progress;
+use crate::slicing_options::SlicingOptions;
 use crate::streams::{failed_at, print, write_file, write_layers};
 
 /// Run the whole pipeline on a built-in blade mould, and draw the result
@@ -46,29 +46,29 @@ pub(crate) struct DemoArgs {
 /// The heights of the pictures, as shares of the stack: drains in the flange,
 /// a row of pins and holes, the serpentine between them, the tip plate.
 const PICTURED: [f64; 4] = [0.04, 0.354, 0.76, 0.925];
-const SCALE: Scale = Scale::Down(8);
+const SCALE: PictureScale = PictureScale::Down(8);
 /// Which of them is pictured in its mesh.
 const IN_MESH: usize = 1;
 /// How many layers are made on either side of it.
 const AROUND: u32 = 10;
 
-pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), CommandError> {
     let part = Sample::Blade;
-    let mesh = build(part, args.facets).map_err(Stop::wrong_options)?;
+    let mesh = build(part, args.facets).map_err(CommandError::wrong_options)?;
     fs::create_dir_all(&args.folder).with_context(|| args.folder.display().to_string())?;
     let [stl, stack, sheet, meshed, in_mesh] =
         ["blade.stl", "build.tif", "layers.png", "alpha.tif", "alpha.png"]
             .map(|name| args.folder.join(name));
     write_file(&stl, |out| mesh.write_stl(part.name(), out))?;
-    let report = Report::new("demo", common.quiet, true);
+    let progress = Progress::new("demo", common.quiet, true);
     let started = Instant::now();
-    let size = run_pipeline(&stl, &stack, &report)?;
+    let size = run_pipeline(&stl, &stack, &progress)?;
     let seconds = started.elapsed().as_secs_f64();
     let pictures = draw(&stack, &sheet, size.layers)?;
     let started = Instant::now();
     let middle = pictured(size.layers)[IN_MESH];
     let range = (!args.whole_build).then(|| middle - AROUND..middle + AROUND);
-    let made = build_in_mesh(&stl, &meshed, range.clone(), &report)?;
+    let made = build_in_mesh(&stl, &meshed, range.clone(), &progress)?;
     let mesh_seconds = started.elapsed().as_secs_f64();
     let shown = middle + MeshOptions::default().base_layers;
     draw_in_mesh(&meshed, &in_mesh, shown)?;
@@ -106,35 +106,35 @@ struct StackSize {
 fn part_layers(
     stl: &Path,
     range: Option<Range<u32>>,
-    report: &Report,
-) -> Result<impl Iterator<Item = Result<Layer, Stop>>, Stop> {
-    let options = PartOptions::default();
+    progress: &Progress,
+) -> Result<impl Iterator<Item = Result<Layer, CommandError>>, CommandError> {
+    let options = SlicingOptions::default();
     let model = Part::open(stl, &OpenOptions::default())?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
     let (slices, name_command) = options.slices(model, &file, range, None, None, &|_| {})?;
-    report.expect(slices.layer_count() as u64);
+    progress.expect(slices.layer_count() as u64);
     let layers = slices.map(move |layer| {
         let mut layer = layer?;
         name_command(&mut layer);
-        Ok::<Layer, Stop>(layer)
+        Ok::<Layer, CommandError>(layer)
     });
-    let report = report.clone();
+    let progress = progress.clone();
     let fixed = fix(layers, FixOptions::default(), move |fixed| {
-        report.say(&format!("{} had stray rows", fixed.before.info.name()));
+        progress.say(&format!("{} had stray rows", fixed.before.info.name()));
     });
     Ok(lamp_grayscale::dither(fixed, DitherMethod::default()))
 }
 
 /// All four stages, on a black build area.
-fn run_pipeline(stl: &Path, stack: &Path, report: &Report) -> Result<StackSize, Stop> {
+fn run_pipeline(stl: &Path, stack: &Path, progress: &Progress) -> Result<StackSize, CommandError> {
     let mut size = StackSize::default();
-    let tiled = tile(part_layers(stl, None, report)?, TileOptions::default()).inspect(|layer| {
+    let tiled = tile(part_layers(stl, None, progress)?, TileOptions::default()).inspect(|layer| {
         if let Ok(Layer { image, .. }) = layer {
             size =
                 StackSize { layers: size.layers + 1, width: image.width(), height: image.height() };
         }
     });
-    write(tiled, stack, report)?;
+    write(tiled, stack, progress)?;
     Ok(size)
 }
 
@@ -144,10 +144,10 @@ fn build_in_mesh(
     stl: &Path,
     stack: &Path,
     range: Option<Range<u32>>,
-    report: &Report,
-) -> Result<u32, Stop> {
+    progress: &Progress,
+) -> Result<u32, CommandError> {
     let area = Machine::builtin("alpha").expect("it is built in").area.value;
-    let mut layers = part_layers(stl, range, report)?;
+    let mut layers = part_layers(stl, range, progress)?;
     let first = layers.next().ok_or(StackError::NoLayers)??;
     let parts = vec![PartStack::of_image("the mould", &first)?];
     let mesh = MeshOptions::default();
@@ -155,16 +155,16 @@ fn build_in_mesh(
     let layers = std::iter::once(Ok(first)).chain(layers);
     let build = layout.with_mesh(&mesh)?.build(vec![layers], HeightOptions::default(), |_| {});
     let mut made = 0;
-    write(build.inspect(|_| made += 1), stack, report)?;
+    write(build.inspect(|_| made += 1), stack, progress)?;
     Ok(made)
 }
 
 fn write(
-    layers: impl Iterator<Item = Result<Layer, Stop>>,
+    layers: impl Iterator<Item = Result<Layer, CommandError>>,
     stack: &Path,
-    report: &Report,
-) -> Result<(), Stop> {
-    write_layers(layers, &Output { output: stack.to_owned(), classic: false }, report)
+    progress: &Progress,
+) -> Result<(), CommandError> {
+    write_layers(layers, &Output { output: stack.to_owned(), classic: false }, progress)
 }
 
 /// The layers of a stack that are pictured.
@@ -174,7 +174,7 @@ fn pictured(layers: u32) -> [u32; 4] {
 
 /// Draws some layers as pictures of their own and on one sheet, and names
 /// them.
-fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Stop> {
+fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, CommandError> {
     let shown = read(stack, &pictured(layers))?;
     for layer in &shown {
         let name = format!("layer_{:05}.png", layer.info.index);
@@ -189,14 +189,14 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Stop> {
 }
 
 /// Draws a layer of the build in its mesh.
-fn draw_in_mesh(stack: &Path, picture: &Path, index: u32) -> Result<(), Stop> {
+fn draw_in_mesh(stack: &Path, picture: &Path, index: u32) -> Result<(), CommandError> {
     let layers = read(stack, &[index])?;
     let Layer { image, .. } = layers.first().context("the pictured layer is not there")?;
     write_picture(picture, Picture::new(image, Region::of(image), SCALE))
 }
 
 /// Some layers of a stack.
-fn read(stack: &Path, wanted: &[u32]) -> Result<Vec<Layer>, Stop> {
+fn read(stack: &Path, wanted: &[u32]) -> Result<Vec<Layer>, CommandError> {
     let failed = |error| failed_at(stack.display().to_string(), error);
     let mut layers = Vec::new();
     for page in Pages::open(stack).map_err(failed)? {
@@ -208,6 +208,6 @@ fn read(stack: &Path, wanted: &[u32]) -> Result<Vec<Layer>, Stop> {
     Ok(layers)
 }
 
-fn write_picture(path: &Path, picture: Picture<'_>) -> Result<(), Stop> {
+fn write_picture(path: &Path, picture: Picture<'_>) -> Result<(), CommandError> {
     write_file(path, |out| picture.write_png(out))
 }

@@ -2,9 +2,9 @@ use clap::Args;
 use lamp_grayscale::{DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
 use lamp_stack::{Image, Layer, Length};
 
+use crate::error::CommandError;
 use crate::options::{Common, Input, Output, one_of_described};
-use crate::stop::Stop;
-use crate::streams::{read_layers, report, write_layers};
+use crate::streams::{progress, read_layers, write_layers};
 
 /// Turn gray layers into dots; 1-bit layers pass unchanged
 ///
@@ -36,16 +36,16 @@ pub(crate) struct DitherArgs {
     output: Output,
 }
 
-pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Stop> {
-    let report = report("dither", common, &args.output);
+pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), CommandError> {
+    let progress = progress("dither", common, &args.output);
     let mut told = args.method == DitherMethod::Threshold;
-    let layers = read_layers(&args.input, &report)?.inspect(|layer| {
+    let layers = read_layers(&args.input, &progress)?.inspect(|layer| {
         if let Some(line) = layer.as_ref().ok().filter(|_| !told).and_then(unevenness) {
             told = true;
-            report.say(&line);
+            progress.say(&line);
         }
     });
-    write_layers(lamp_grayscale::dither(layers, args.method), &args.output, &report)
+    write_layers(lamp_grayscale::dither(layers, args.method), &args.output, &progress)
 }
 
 /// What is to be feared of the dots of a gray layer, if its pixels are wider

@@ -6,10 +6,10 @@ use lamp_postprocess::{EditError, Edits, OtherLayers};
 use lamp_stack::Op;
 
 use crate::catalogue::read_text;
+use crate::error::CommandError;
 use crate::options::{Common, Input, Output};
-use crate::stop::Stop;
 use crate::streams::{
-    check_not_input, input_name, is_stream, read_beside, read_layers, report, write_layers,
+    check_not_input, input_name, is_stream, progress, read_beside, read_layers, write_layers,
 };
 
 /// A list of edits is text of a few kilobytes.
@@ -67,7 +67,7 @@ pub(crate) struct EditArgs {
 
 impl EditArgs {
     /// The edits, and the files of the stacks that they name.
-    fn edits(&self) -> Result<(Edits, Vec<PathBuf>), Stop> {
+    fn edits(&self) -> Result<(Edits, Vec<PathBuf>), CommandError> {
         let ways = [
             (Op::Union, &self.union),
             (Op::Intersect, &self.intersect),
@@ -89,7 +89,7 @@ impl EditArgs {
         Ok((edits, files))
     }
 
-    fn check_streams(&self) -> Result<(), Stop> {
+    fn check_streams(&self) -> Result<(), CommandError> {
         let all = [
             Some(&self.input.stack),
             self.edits.as_ref(),
@@ -100,36 +100,38 @@ impl EditArgs {
         ];
         match all.into_iter().flatten().filter(|path| is_stream(path)).count() {
             0 | 1 => Ok(()),
-            _ => Err(Stop::usage(
+            _ => Err(CommandError::usage(
                 "only one input can be standard input (STACK is, unless it is named)",
             )),
         }
     }
 }
 
-pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), CommandError> {
     args.check_streams()?;
     let (edits, files) = args.edits()?;
     check_not_input(&args.output.output, files.iter().chain(&args.edits))?;
-    let report = report("edit", common, &args.output);
+    let progress = progress("edit", common, &args.output);
     let name = input_name(&args.input.stack);
     let may_reach_beyond = args.input.layers.is_some();
     let other = |file: &PathBuf| {
         let layers = Box::new(read_beside(file)?);
         Ok(OtherLayers { name: input_name(file), layers, may_reach_beyond })
     };
-    let others = files.iter().map(other).collect::<Result<_, Stop>>()?;
-    let layers = read_layers(&args.input, &report)?;
+    let others = files.iter().map(other).collect::<Result<_, CommandError>>()?;
+    let layers = read_layers(&args.input, &progress)?;
     let mut counts = vec![0; edits.count()];
     let edited = lamp_postprocess::edit(layers, edits, others, |_, done| {
         done.iter().for_each(|&edit| counts[edit] += 1);
     });
-    write_layers(edited, &args.output, &report).map_err(|stop| match stop {
-        Stop::Failed(error) if error.is::<EditError>() => Stop::Failed(error).at(name),
-        stop => stop,
+    write_layers(edited, &args.output, &progress).map_err(|error| match error {
+        CommandError::Failed(error) if error.is::<EditError>() => {
+            CommandError::Failed(error).at(name)
+        }
+        error => error,
     })?;
     for (number, _) in (1..).zip(counts).filter(|(_, count)| *count == 0) {
-        report.say(&format!("edit {number} applies to no layer: check its z or layers"));
+        progress.say(&format!("edit {number} applies to no layer: check its z or layers"));
     }
     Ok(())
 }

@@ -4,12 +4,12 @@ use clap::Args;
 use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
-use crate::evidence::Evidence;
-use crate::fix_report::{Findings, whereabouts};
+use crate::band_pictures::BandPictures;
+use crate::error::CommandError;
+use crate::fix_report::{FixReport, whereabouts};
 use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output, one_of_described};
-use crate::stop::Stop;
-use crate::streams::{check_beside, read_layers, report, write_layers};
+use crate::streams::{check_beside, progress, read_layers, write_layers};
 
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
 ///
@@ -79,26 +79,26 @@ impl FixArgs {
     }
 }
 
-pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), CommandError> {
     for beside in [&args.report, &args.evidence].into_iter().flatten() {
         check_beside(beside, &args.output.output, [&args.input.stack])?;
     }
-    let report = report("fix", common, &args.output);
+    let progress = progress("fix", common, &args.output);
     let options = args.options();
-    let mut findings = Findings::new(options);
-    let mut evidence = args.evidence.as_deref().map(Evidence::new).transpose()?;
+    let mut findings = FixReport::new(options);
+    let mut evidence = args.evidence.as_deref().map(BandPictures::new).transpose()?;
     let mut layer_count = 0;
-    let layers = read_layers(&args.input, &report)?.inspect(|_| layer_count += 1);
+    let layers = read_layers(&args.input, &progress)?.inspect(|_| layer_count += 1);
     let fixed = lamp_postprocess::fix(layers, options, |fixed| {
         for line in describe(fixed, &options) {
-            report.say(&line);
+            progress.say(&line);
         }
         if let Some(evidence) = &mut evidence {
             evidence.add(fixed);
         }
         findings.add(fixed);
     });
-    write_layers(fixed, &args.output, &report)?;
+    write_layers(fixed, &args.output, &progress)?;
     if let Some(evidence) = evidence {
         evidence.finish()?;
     }
@@ -107,9 +107,9 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Stop> {
     }
     match findings.left() {
         0 => Ok(()),
-        left if args.strict => Err(Stop::Findings(left_in_all(left))),
+        left if args.strict => Err(CommandError::Findings(left_in_all(left))),
         left => {
-            report.say(&left_in_all(left));
+            progress.say(&left_in_all(left));
             Ok(())
         }
     }

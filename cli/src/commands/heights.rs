@@ -7,13 +7,13 @@ use lamp_adaptive::{
 };
 use lamp_stack::{Dpi, Length};
 
+use crate::error::CommandError;
 use crate::exposure::{Exposure, ExposureOptions};
-use crate::heights::{Found, HeightOptions, significant, time_text};
+use crate::height_options::{FoundHeights, HeightOptions, significant, time_text};
 use crate::options::{Common, parse_thickness};
-use crate::plots::{self, Axis, Plot, Series, drawn};
-use crate::report::say;
-use crate::solid::{Reading, SolidOptions, at_part, name_of_all};
-use crate::stop::Stop;
+use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
+use crate::plots::{self, Plot, PlotAxis, Series, drawn};
+use crate::progress::say;
 use crate::streams::{check_beside, print, write_file};
 
 /// Find how thick each layer of a part may be, and what that saves
@@ -51,7 +51,7 @@ pub(crate) struct HeightsArgs {
     dpi: Dpi,
 
     #[command(flatten)]
-    solid: SolidOptions,
+    solid: PartOptions,
 
     #[command(flatten)]
     heights: HeightOptions,
@@ -60,7 +60,7 @@ pub(crate) struct HeightsArgs {
     exposure: ExposureOptions,
 }
 
-pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), CommandError> {
     args.check()?;
     let exposure = args.exposure.exposure()?;
     args.heights.check(exposure.as_ref())?;
@@ -74,8 +74,8 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Stop> {
     let body = args.solid.body(model).map_err(|error| at_part(error.into(), &args.parts))?;
     let part = args.heights.part(body, args.dpi, args.solid.fill)?;
     let found = args.heights.find(&part, exposure.as_ref());
-    let found = found.map_err(|stop| at_part(stop, &args.parts))?;
-    let uniform = args.uniform(&part).map_err(|stop| at_part(stop, &args.parts))?;
+    let found = found.map_err(|error| at_part(error, &args.parts))?;
+    let uniform = args.uniform(&part).map_err(|error| at_part(error, &args.parts))?;
     found.warn(&say);
     if let Some(path) = &args.report {
         write_file(path, |out| write_table(&found.heights, exposure.as_ref(), out))?;
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Stop> {
 
 impl HeightsArgs {
     /// Checks, before the work, what can be checked.
-    fn check(&self) -> Result<(), Stop> {
+    fn check(&self) -> Result<(), CommandError> {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
         }
@@ -101,18 +101,18 @@ impl HeightsArgs {
             check_beside(file, Path::new("-"), inputs())?;
         }
         if self.report.is_some() && self.report == self.plot {
-            return Err(Stop::usage("--report and --plot name the same file"));
+            return Err(CommandError::usage("--report and --plot name the same file"));
         }
         Ok(())
     }
 
     /// The uniform layers to compare with, by what they are called.
-    fn uniform(&self, part: &LayeredPart) -> Result<Vec<(String, Heights)>, Stop> {
+    fn uniform(&self, part: &LayeredPart) -> Result<Vec<(String, Heights)>, CommandError> {
         let thickest = [self.heights.max()];
         let uniform = if self.uniform.is_empty() { &thickest[..] } else { &self.uniform };
         let layers = |thickness: &Length| {
             let heights = uniform_heights(part, *thickness);
-            let heights = heights.map_err(|error| Stop::Failed(error.into()))?;
+            let heights = heights.map_err(|error| CommandError::Failed(error.into()))?;
             Ok((format!("uniform {thickness}"), heights))
         };
         uniform.iter().map(layers).collect()
@@ -151,7 +151,7 @@ fn write_table(
 /// A line for each choice of layers: how many there are, how far they are off by
 /// volume, how far the worst is by the criterion, and how many are past the bound.
 fn summary(
-    found: &Found,
+    found: &FoundHeights,
     all: &[(String, Heights)],
     exposure: Option<&Exposure>,
     overhead: f64,
@@ -211,7 +211,8 @@ fn plots(part: &str, all: &[(String, Heights)]) -> [Plot; 2] {
         let series: Vec<_> = all.iter().map(series).collect();
         let places = series.iter().flat_map(|series| &series.curve).map(|place| place.1);
         let highest = places.fold(0.0, f64::max);
-        let axis = |label: &str, range| Axis { label: label.to_owned(), range, logarithmic: false };
+        let axis =
+            |label: &str, range| PlotAxis { label: label.to_owned(), range, logarithmic: false };
         let y = axis(label, 0.0..if highest > 0.0 { 1.25 * highest } else { 1.0 });
         Plot { title, x: axis("z (mm)", first..last), y, series }
     };

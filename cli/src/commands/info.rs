@@ -1,8 +1,8 @@
 use clap::Args;
 use lamp_stack::{Compression, Image, Layer, Page, StackInfo, map_in_order};
 
+use crate::error::CommandError;
 use crate::options::Input;
-use crate::stop::Stop;
 use crate::streams::{failed_at, input_name, print, read_pages};
 
 /// Describe a stack: pages, size, resolution, heights, runs, bytes
@@ -16,7 +16,7 @@ pub(crate) struct InfoArgs {
     input: Input,
 }
 
-pub(crate) fn run(args: &InfoArgs) -> Result<(), Stop> {
+pub(crate) fn run(args: &InfoArgs) -> Result<(), CommandError> {
     let name = input_name(&args.input.stack);
     let decoded = map_in_order(read_pages(&args.input)?, |(page, stack): (Page, _)| {
         let (bytes, compression) = (page.strip_bytes(), page.compression());
@@ -24,16 +24,16 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Stop> {
         layer.info.stack = stack;
         Ok((layer, bytes, compression))
     });
-    let mut totals: Option<Totals> = None;
+    let mut totals: Option<StackTotals> = None;
     for page in decoded {
         let (layer, bytes, compression) = page?;
-        totals.get_or_insert_with(|| Totals::new(&layer)).add(&layer, bytes, compression);
+        totals.get_or_insert_with(|| StackTotals::new(&layer)).add(&layer, bytes, compression);
     }
     totals.map_or(Ok(()), |totals| print(&totals.text(&name)))
 }
 
 /// What adds up over the layers.
-struct Totals {
+struct StackTotals {
     first: Layer,
     last: Layer,
     /// Those of the pages, in the order of their first use.
@@ -45,18 +45,18 @@ struct Totals {
     stray_rows: u64,
     stray_layers: u64,
     one_size: bool,
-    thickness_um: Reach,
-    exposure_ms: Reach,
+    thickness_um: NumberRange,
+    exposure_ms: NumberRange,
 }
 
 /// From the least to the greatest of the numbers that pages state.
 #[derive(Default)]
-struct Reach {
+struct NumberRange {
     ends: Option<[f64; 2]>,
     sum: f64,
 }
 
-impl Reach {
+impl NumberRange {
     fn add(&mut self, number: Option<f64>) {
         let Some(number) = number else { return };
         let [least, greatest] = self.ends.unwrap_or([number; 2]);
@@ -71,7 +71,7 @@ impl Reach {
     }
 }
 
-impl Totals {
+impl StackTotals {
     fn new(first: &Layer) -> Self {
         Self {
             first: first.clone(),
@@ -84,8 +84,8 @@ impl Totals {
             stray_rows: 0,
             stray_layers: 0,
             one_size: true,
-            thickness_um: Reach::default(),
-            exposure_ms: Reach::default(),
+            thickness_um: NumberRange::default(),
+            exposure_ms: NumberRange::default(),
         }
     }
 

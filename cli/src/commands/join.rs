@@ -4,10 +4,10 @@ use clap::Args;
 use lamp_postprocess::{is_strips, join_strips};
 use lamp_stack::{Layer, join};
 
+use crate::error::CommandError;
 use crate::options::{Common, Output};
-use crate::report::Report;
-use crate::stop::Stop;
-use crate::streams::{input_name, is_stream, report, write_layers};
+use crate::progress::Progress;
+use crate::streams::{input_name, is_stream, progress, write_layers};
 
 /// Join stacks of consecutive layers into one stack
 ///
@@ -35,46 +35,46 @@ pub(crate) struct JoinArgs {
     output: Output,
 }
 
-pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), CommandError> {
     if args.stacks.iter().any(|stack| is_stream(stack)) {
-        return Err(Stop::usage(
+        return Err(CommandError::usage(
             "stacks to join are checked before they are read, which standard input does not \
              allow: name files or folders",
         ));
     }
-    let report = report("join", common, &args.output);
+    let progress = progress("join", common, &args.output);
     match &args.stacks[..] {
-        [folder] if is_strips(folder) => return join_one(folder, &args.output, &report),
+        [folder] if is_strips(folder) => return join_one(folder, &args.output, &progress),
         stacks => {
             if let Some(folder) = stacks.iter().find(|stack| is_strips(stack)) {
                 let folder = folder.display();
-                return Err(Stop::usage(format!(
+                return Err(CommandError::usage(format!(
                     "{folder} holds the strips of one build: join it by itself first"
                 )));
             }
         }
     }
     let layers = join(args.stacks.clone())?.map(|layer| Ok(layer?));
-    write_layers(counted(layers, &report), &args.output, &report)
+    write_layers(counted(layers, &progress), &args.output, &progress)
 }
 
 /// Puts the strips of a folder back together.
-fn join_one(folder: &Path, output: &Output, report: &Report) -> Result<(), Stop> {
+fn join_one(folder: &Path, output: &Output, progress: &Progress) -> Result<(), CommandError> {
     let name = input_name(folder);
-    let failed = |error| Stop::from(error).at(name.clone());
+    let failed = |error| CommandError::from(error).at(name.clone());
     let layers = join_strips(folder).map_err(failed)?;
-    write_layers(counted(layers.map(|layer| layer.map_err(failed)), report), output, report)
+    write_layers(counted(layers.map(|layer| layer.map_err(failed)), progress), output, progress)
 }
 
 /// Tells the report how many layers there will be, where the first says so.
 fn counted(
-    layers: impl Iterator<Item = Result<Layer, Stop>>,
-    report: &Report,
-) -> impl Iterator<Item = Result<Layer, Stop>> {
+    layers: impl Iterator<Item = Result<Layer, CommandError>>,
+    progress: &Progress,
+) -> impl Iterator<Item = Result<Layer, CommandError>> {
     layers.inspect(|layer| {
         let stack = layer.as_ref().ok().and_then(|layer| layer.info.stack.as_ref());
         if let Some(layers) = stack.and_then(|stack| stack.layers) {
-            report.expect(layers.into());
+            progress.expect(layers.into());
         }
     })
 }

@@ -5,7 +5,7 @@ use lamp_postprocess::machine::Machine;
 use lamp_stack::Catalogued;
 
 use crate::catalogue;
-use crate::stop::Stop;
+use crate::error::CommandError;
 use crate::streams::print;
 
 /// List or show machines: build area, resolution and layer thickness
@@ -32,7 +32,7 @@ enum Action {
     },
 }
 
-pub(crate) fn run(args: &MachineArgs) -> Result<(), Stop> {
+pub(crate) fn run(args: &MachineArgs) -> Result<(), CommandError> {
     match &args.action {
         Action::List => print(&table()),
         Action::Show { machine } => catalogue::show::<Machine>(machine),

@@ -6,7 +6,7 @@ use lamp_grayscale::resin::DepthRange;
 use lamp_stack::{Catalogued, Length};
 
 use crate::catalogue;
-use crate::stop::Stop;
+use crate::error::CommandError;
 use crate::streams::{input_name, print};
 
 /// List, show or check materials: how deep light cures a resin
@@ -38,7 +38,7 @@ enum Action {
     },
 }
 
-pub(crate) fn run(args: &MaterialArgs) -> Result<(), Stop> {
+pub(crate) fn run(args: &MaterialArgs) -> Result<(), CommandError> {
     match &args.action {
         Action::List => print(&table()),
         Action::Show { material } => catalogue::show::<Material>(material),
@@ -85,7 +85,7 @@ fn widths(material: &Material) -> Option<String> {
     })
 }
 
-fn check(path: &Path) -> Result<(), Stop> {
+fn check(path: &Path) -> Result<(), CommandError> {
     let (material, _) = catalogue::read_file(path)?;
     print(&format!("{}: {}\n", input_name(path), allows(&material)))
 }

@@ -23,8 +23,8 @@ mod tile;
 
 use clap::{ArgMatches, FromArgMatches, Subcommand};
 
+use crate::error::CommandError;
 use crate::options::Common;
-use crate::stop::Stop;
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
@@ -87,7 +87,7 @@ impl Command {
         }
     }
 
-    pub(crate) fn run(&self, common: &Common) -> Result<(), Stop> {
+    pub(crate) fn run(&self, common: &Common) -> Result<(), CommandError> {
         match self {
             Self::Slice(args) => slice::run(args, common),
             Self::Fix(args) => fix::run(args, common),

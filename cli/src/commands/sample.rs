@@ -7,9 +7,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_fixtures::{Defect, Mesh, Sample, StepSample, StepUnit, build, inject, step};
 use lamp_stack::Length;
 
+use crate::error::CommandError;
 use crate::options::{Common, parse_count};
-use crate::report::Report;
-use crate::stop::Stop;
+use crate::progress::Progress;
 use crate::streams::{is_stream, write_file};
 
 /// Write a sample part as STL, whole or with defects, or as STEP with exact surfaces
@@ -62,12 +62,12 @@ fn parts() -> impl TypedValueParser<Value = Sample> {
         .map(|name| Sample::from_name(&name).expect("only names of parts pass"))
 }
 
-pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), CommandError> {
     let part = args.part;
     if is_step_name(&args.output) {
         return args.write_step(part);
     }
-    let mut mesh = build(part, args.facets).map_err(Stop::wrong_options)?;
+    let mut mesh = build(part, args.facets).map_err(CommandError::wrong_options)?;
     if let Some(name) = &args.defect {
         let defect = Defect::from_name(name, args.by.mm() as f32).expect("only names pass");
         inject(&mut mesh, defect, args.count, args.seed);
@@ -85,15 +85,17 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Stop> {
         return Ok(());
     }
     if io::stdout().is_terminal() {
-        return Err(Stop::usage("an STL is not for terminals: name a file with -o, or pipe it on"));
+        return Err(CommandError::usage(
+            "an STL is not for terminals: name a file with -o, or pipe it on",
+        ));
     }
     let mut out = BufWriter::new(io::stdout().lock());
     let written = write(&mut out).and_then(|()| out.flush());
-    written.map_err(|error| Stop::output(error, "standard output"))
+    written.map_err(|error| CommandError::output(error, "standard output"))
 }
 
 impl SampleArgs {
-    fn write_step(&self, part: Sample) -> Result<(), Stop> {
+    fn write_step(&self, part: Sample) -> Result<(), CommandError> {
         let part = match part {
             Sample::Sphere => StepSample::Sphere,
             Sample::Torus => StepSample::Torus,
@@ -101,11 +103,11 @@ impl SampleArgs {
             Sample::Tower => StepSample::Tower,
             Sample::Blade | Sample::Cube => {
                 let why = format!("{} is available as STL only: name a .stl file", part.name());
-                return Err(Stop::usage(why));
+                return Err(CommandError::usage(why));
             }
         };
         if self.ascii || self.defect.is_some() {
-            return Err(Stop::usage("--ascii and --defect are for STL: name a .stl file"));
+            return Err(CommandError::usage("--ascii and --defect are for STL: name a .stl file"));
         }
         let text = step(part, StepUnit::Millimetre);
         write_file(&self.output, |out| out.write_all(text.as_bytes()))
@@ -118,6 +120,6 @@ fn is_step_name(path: &Path) -> bool {
 }
 
 fn say_size(args: &SampleArgs, common: &Common, mesh: &Mesh) {
-    let report = Report::new("sample", common.quiet, true);
-    report.say(&format!("{}: {} facets", args.output.display(), mesh.facets.len()));
+    let progress = Progress::new("sample", common.quiet, true);
+    progress.say(&format!("{}: {} facets", args.output.display(), mesh.facets.len()));
 }

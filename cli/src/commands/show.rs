@@ -5,8 +5,8 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_stack::Layer;
 
-use crate::picture::{Picture, Region, Scale};
-use crate::stop::Stop;
+use crate::error::CommandError;
+use crate::picture::{Picture, PictureScale, Region};
 use crate::streams::{failed_at, input_name, is_stream, open_pages, write_file};
 
 /// Show a layer as a PNG picture, whole or in part
@@ -32,16 +32,16 @@ pub(crate) struct ShowArgs {
 
     /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 the mean of 8 x 8
     #[arg(long, value_name = "N|1/N", default_value = "1")]
-    scale: Scale,
+    scale: PictureScale,
 
     /// Where to write the PNG: a file, or - for standard output
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     output: PathBuf,
 }
 
-pub(crate) fn run(args: &ShowArgs) -> Result<(), Stop> {
+pub(crate) fn run(args: &ShowArgs) -> Result<(), CommandError> {
     if is_stream(&args.output) && io::stdout().is_terminal() {
-        return Err(Stop::usage(
+        return Err(CommandError::usage(
             "a picture is not for terminals: name a file with -o, or pipe it on",
         ));
     }
@@ -49,19 +49,19 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Stop> {
     let whole = Region::of(&image);
     let region = args.region.as_ref().unwrap_or(&whole).on(&image).ok_or_else(|| {
         let (width, height) = (image.width(), image.height());
-        Stop::usage(format!(
+        CommandError::usage(format!(
             "the region lies outside the image, which is {width} x {height} pixels"
         ))
     })?;
     if args.scale.side(&region) > LARGEST_PICTURE {
-        return Err(Stop::usage(format!(
+        return Err(CommandError::usage(format!(
             "the picture would be more than {LARGEST_PICTURE} pixels wide or high: choose a --region or a smaller --scale"
         )));
     }
     let picture = Picture::new(&image, region, args.scale);
     if is_stream(&args.output) {
         let written = picture.write_png(BufWriter::new(io::stdout().lock()));
-        written.map_err(|error| Stop::output(error, "standard output"))
+        written.map_err(|error| CommandError::output(error, "standard output"))
     } else {
         write_file(&args.output, |out| picture.write_png(out))
     }
@@ -70,7 +70,7 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Stop> {
 /// Pictures wider or higher than this cannot be looked at.
 const LARGEST_PICTURE: u64 = 200_000;
 
-fn find_layer(args: &ShowArgs) -> Result<Layer, Stop> {
+fn find_layer(args: &ShowArgs) -> Result<Layer, CommandError> {
     let name = input_name(&args.stack);
     let failed = |error| failed_at(name.clone(), error);
     let mut last = None;
@@ -82,5 +82,5 @@ fn find_layer(args: &ShowArgs) -> Result<Layer, Stop> {
         last = Some(page.info().index);
     }
     let last = last.map_or_else(String::new, |last| format!("; the last is {last}"));
-    Err(Stop::Failed(anyhow!("{name}: there is no layer {}{last}", args.layer)))
+    Err(CommandError::Failed(anyhow!("{name}: there is no layer {}{last}", args.layer)))
 }

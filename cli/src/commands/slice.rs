@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lamp_slicer::{PixelGrid, Polished, StrayBand};
 
-use crate::brep::{HEADING, length};
-use crate::bridge::Bridged;
+use crate::error::CommandError;
+use crate::fallback::Bridged;
 use crate::json_report::parse_report;
-use crate::mesh_report::{Counts, Rows, Subject};
+use crate::mesh_report::{Counts, MeshReport, RowPositions};
 use crate::options::{Common, Output, parse_layers, parse_memory};
-use crate::part::PartOptions;
-use crate::report::Report;
-use crate::solid::{Reading, at_part, name_of_all};
-use crate::stop::Stop;
-use crate::streams::{check_beside, check_not_input, report, write_layers};
+use crate::part_options::{Reading, at_part, name_of_all};
+use crate::progress::Progress;
+use crate::slicing_options::SlicingOptions;
+use crate::step_options::{HEADING, length};
+use crate::streams::{check_beside, check_not_input, progress, write_layers};
 
 /// Slice an STL or STEP part into a stack of layer images
 ///
@@ -39,7 +39,7 @@ pub(crate) struct SliceArgs {
     parts: Vec<PathBuf>,
 
     #[command(flatten)]
-    pub(crate) options: PartOptions,
+    pub(crate) options: SlicingOptions,
 
     /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
@@ -67,20 +67,20 @@ pub(crate) struct SliceArgs {
     output: Output,
 }
 
-pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), CommandError> {
     let inputs = || args.parts.iter().chain(args.options.files()).chain(&args.fallback);
     if let Some(report) = &args.report {
         check_beside(report, &args.output.output, inputs())?;
     }
     check_not_input(&args.output.output, inputs())?;
     let exposure = args.options.exposure()?;
-    let report = report("slice", common, &args.output);
-    let say = |line: &str| report.say(line);
+    let progress = progress("slice", common, &args.output);
+    let say = |line: &str| progress.say(line);
     let reading =
         Reading { dpi: args.options.dpi, may_be_open: args.fallback.is_some(), say: &say };
     let model = args.options.solid.open(&args.parts, &reading)?;
     if args.fallback.is_some() && model.prepared().next().is_none() {
-        return Err(Stop::usage("--fallback needs a STEP part"));
+        return Err(CommandError::usage("--fallback needs a STEP part"));
     }
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args
@@ -91,13 +91,13 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
     let (slices, name_command) = args
         .options
         .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure, &say)
-        .map_err(|stop| at_part(stop, &args.parts))?;
-    report.expect(slices.layer_count() as u64);
+        .map_err(|error| at_part(error, &args.parts))?;
+    progress.expect(slices.layer_count() as u64);
     let mut bridged =
         Bridged::new(slices, args.fallback.as_deref(), &args.options, args.layers.clone())?;
     let (mut counts, mut bands) = (Counts::default(), Vec::new());
     let layers = bridged.by_ref().map(|layer| {
-        let mut layer = layer.map_err(|error| Stop::from(error).at(name.clone()))?;
+        let mut layer = layer.map_err(|error| CommandError::from(error).at(name.clone()))?;
         name_command(&mut layer);
         counts.add(&layer.info);
         if args.report.is_some() {
@@ -105,26 +105,26 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Stop> {
         }
         Ok(layer)
     });
-    write_layers(layers, &args.output, &report)?;
+    write_layers(layers, &args.output, &progress)?;
     let slices = &bridged.slices;
     if let Some(path) = &args.report {
-        let trace = slices.trace(&bands).map_err(|error| Stop::from(error).at(name))?;
-        let subject = Subject {
+        let trace = slices.trace(&bands).map_err(|error| CommandError::from(error).at(name))?;
+        let subject = MeshReport {
             files: files.into_iter().map(Cow::into_owned).collect(),
             fill: args.options.solid.fill.name(),
             counts,
         };
         let PixelGrid { origin_mm, dpi, .. } = *slices.grid();
-        let rows = Rows { top_mm: origin_mm[1], dpi };
+        let rows = RowPositions { top_mm: origin_mm[1], dpi };
         subject.write(&trace, rows, path)?;
     }
     if let Some(polished) = slices.polished().filter(|it| it.moved + it.kept > 0) {
-        report.say(&polish_text(polished));
+        progress.say(&polish_text(polished));
     }
     if let Some(text) = bridged.text() {
-        report.say(&text);
+        progress.say(&text);
     }
-    say_stray_rows(&report, counts, args.report.as_deref());
+    say_stray_rows(&progress, counts, args.report.as_deref());
     Ok(())
 }
 
@@ -144,14 +144,14 @@ fn polish_text(polished: Polished) -> String {
     )
 }
 
-fn say_stray_rows(report: &Report, counts: Counts, written: Option<&Path>) {
+fn say_stray_rows(progress: &Progress, counts: Counts, written: Option<&Path>) {
     let Counts { stray_rows: rows, stray_layers: layers, .. } = counts;
     if rows > 0 {
         let names = match written {
             Some(path) => format!("and {} lists the facets", path.display()),
             None => "and --report FILE.json lists the facets".to_owned(),
         };
-        report.say(&format!(
+        progress.say(&format!(
             "{rows} rows in {layers} layers do not balance: the mesh has gaps; fix corrects them, {names}"
         ));
     }

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 use lamp_stack::{Cuts, SplitError, write_split};
 
+use crate::error::CommandError;
 use crate::options::{Common, Input};
-use crate::report::Report;
-use crate::stop::Stop;
+use crate::progress::Progress;
 use crate::streams::{folder_to_make, format, input_name, read_layers, written_to};
 
 /// Split a stack into files, each with a range of layers
@@ -42,25 +42,25 @@ pub(crate) struct SplitArgs {
     classic: bool,
 }
 
-pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), CommandError> {
     let cuts = match args.every {
         Some(layers) => Cuts::Every(layers),
         None if args.at.is_sorted_by(|a, b| a < b) => Cuts::At(args.at.clone()),
         None => {
-            return Err(Stop::usage(
+            return Err(CommandError::usage(
                 "the layers of --at must be in ascending order, as --at 500,900",
             ));
         }
     };
     let folder = folder_to_make(&args.output)?;
-    let report = Report::new("split", common.quiet, true);
-    let layers = read_layers(&args.input, &report)?.inspect(|_| report.layer_done());
+    let progress = Progress::new("split", common.quiet, true);
+    let layers = read_layers(&args.input, &progress)?.inspect(|_| progress.layer_done());
     let written = write_split(layers, &cuts, folder, format(args.classic));
-    written_to(&args.output, written, &report).map_err(|stop| match stop {
-        Stop::Failed(error) if error.is::<SplitError>() => {
-            Stop::Failed(error).at(input_name(&args.input.stack))
+    written_to(&args.output, written, &progress).map_err(|error| match error {
+        CommandError::Failed(error) if error.is::<SplitError>() => {
+            CommandError::Failed(error).at(input_name(&args.input.stack))
         }
-        stop => stop,
+        error => error,
     })
 }
 

@@ -10,8 +10,8 @@ use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{FAMILY, Format, GRAY_INK, format_of, inks, png_of, with_font};
-use crate::stop::Stop;
+use super::{FAMILY, GRAY_INK, PlotFormat, format_of, inks, png_of, with_font};
+use crate::error::CommandError;
 
 /// The longer side of a build area, and the room around it, in pixels.
 const SIDE: u32 = 1600;
@@ -20,11 +20,11 @@ const LEGEND: i32 = 60;
 
 /// The bytes of a picture of a layout: outlines where they are known, boxes, and
 /// each copy's number among those of its part.
-pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, Stop> {
-    let picture = Picture::new(layout);
+pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, CommandError> {
+    let picture = LayoutPicture::new(layout);
     let size = picture.size();
     match format_of(path)? {
-        Format::Svg => {
+        PlotFormat::Svg => {
             let mut text = String::new();
             // A text takes all that is drawn on it.
             picture
@@ -32,14 +32,14 @@ pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, St
                 .expect("a text takes all");
             Ok(text.into_bytes())
         }
-        Format::Png => {
+        PlotFormat::Png => {
             let drawn = png_of(size, |area| picture.draw(area));
             Ok(drawn.with_context(|| path.display().to_string())?)
         }
     }
 }
 
-struct Picture<'a> {
+struct LayoutPicture<'a> {
     layout: &'a Layout,
     /// Pixels of the picture for one of the build.
     scale: f64,
@@ -47,7 +47,7 @@ struct Picture<'a> {
     outlines: HashMap<(usize, Orientation), Mask>,
 }
 
-impl<'a> Picture<'a> {
+impl<'a> LayoutPicture<'a> {
     fn new(layout: &'a Layout) -> Self {
         let PixelSize { width, height } = layout.pixels();
         let scale = f64::from(SIDE) / f64::from(width.max(height).max(1));
@@ -123,7 +123,7 @@ impl<'a> Picture<'a> {
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
         let (_, top) = self.at(0, at.top);
         let (_, bottom) = self.at(0, at.top + outline.height());
-        let mut strips = Strips::default();
+        let mut strips = OutlinePolygons::default();
         for y in top..bottom {
             let row = (f64::from(y - MARGIN) + 0.5) / self.scale - f64::from(at.top);
             let row = outline.row((row.max(0.0) as u32).min(outline.height() - 1));
@@ -175,13 +175,13 @@ fn tint(RGBColor(red, green, blue): RGBColor) -> RGBColor {
 
 /// Runs below each other as polygons, which are shorter to write than rows.
 #[derive(Default)]
-struct Strips {
+struct OutlinePolygons {
     /// For each run of the rows that go on, its row and its ends.
     open: Vec<Vec<(i32, [i32; 2])>>,
     done: Vec<Vec<(i32, i32)>>,
 }
 
-impl Strips {
+impl OutlinePolygons {
     /// Adds a row: its runs go on those above, if there are as many and each
     /// meets its own.
     fn add(&mut self, y: i32, runs: Vec<(i32, i32)>) {
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn rows_that_go_on_are_one_polygon() {
-        let mut strips = Strips::default();
+        let mut strips = OutlinePolygons::default();
         strips.add(0, vec![(2, 5)]);
         strips.add(1, vec![(1, 6)]);
         strips.add(2, vec![(1, 3), (4, 6)]);

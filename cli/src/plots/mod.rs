@@ -1,7 +1,7 @@
 //! Curves through measured points, as SVG or PNG.
 
+mod axis_scale;
 mod layout;
-mod scale;
 
 use std::io;
 use std::ops::Range;
@@ -13,24 +13,24 @@ use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
-use scale::Scale;
+use axis_scale::AxisScale;
 
 pub(crate) use layout::layout_picture;
 
-use crate::stop::Stop;
+use crate::error::CommandError;
 
 /// A plot of curves over one axis.
 #[derive(Debug)]
 pub(crate) struct Plot {
     pub(crate) title: String,
-    pub(crate) x: Axis,
-    pub(crate) y: Axis,
+    pub(crate) x: PlotAxis,
+    pub(crate) y: PlotAxis,
     pub(crate) series: Vec<Series>,
 }
 
 /// An axis. What lies outside its range is not to be drawn.
 #[derive(Debug)]
-pub(crate) struct Axis {
+pub(crate) struct PlotAxis {
     /// What it is, with its unit.
     pub(crate) label: String,
     pub(crate) range: Range<f64>,
@@ -38,9 +38,9 @@ pub(crate) struct Axis {
     pub(crate) logarithmic: bool,
 }
 
-impl Axis {
-    fn scale(&self) -> Scale {
-        Scale { range: self.range.clone(), logarithmic: self.logarithmic }
+impl PlotAxis {
+    fn scale(&self) -> AxisScale {
+        AxisScale { range: self.range.clone(), logarithmic: self.logarithmic }
     }
 }
 
@@ -64,7 +64,7 @@ pub(crate) fn highest(series: &[Series]) -> f64 {
 
 /// How plots are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
+enum PlotFormat {
     Svg,
     Png,
 }
@@ -77,28 +77,30 @@ const SCALE: u32 = 2;
 const PIXELS: (u32, u32) = (SIZE.0 * SCALE, SIZE.1 * SCALE);
 
 /// Checks, before the work, that a plot can have that name.
-pub(crate) fn check_name(path: &Path) -> Result<(), Stop> {
+pub(crate) fn check_name(path: &Path) -> Result<(), CommandError> {
     format_of(path).map(|_| ())
 }
 
-fn format_of(path: &Path) -> Result<Format, Stop> {
+fn format_of(path: &Path) -> Result<PlotFormat, CommandError> {
     let is = |end: &str| path.extension().is_some_and(|have| have.eq_ignore_ascii_case(end));
     if is("svg") {
-        Ok(Format::Svg)
+        Ok(PlotFormat::Svg)
     } else if is("png") {
-        Ok(Format::Png)
+        Ok(PlotFormat::Png)
     } else {
         let path = path.display();
-        Err(Stop::usage(format!("{path}: a plot is an SVG or a PNG: end its name in .svg or .png")))
+        Err(CommandError::usage(format!(
+            "{path}: a plot is an SVG or a PNG: end its name in .svg or .png"
+        )))
     }
 }
 
 /// The bytes of plots below each other, in the format that the file's name says.
 /// Equal plots give equal bytes.
-pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, Stop> {
+pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, CommandError> {
     match format_of(path)? {
-        Format::Svg => Ok(svg(plots).into_bytes()),
-        Format::Png => Ok(png(plots).with_context(|| path.display().to_string())?),
+        PlotFormat::Svg => Ok(svg(plots).into_bytes()),
+        PlotFormat::Png => Ok(png(plots).with_context(|| path.display().to_string())?),
     }
 }
 
@@ -243,8 +245,8 @@ fn with_font() {
 mod tests {
     use super::*;
 
-    fn axis(label: &str, range: Range<f64>, logarithmic: bool) -> Axis {
-        Axis { label: label.to_owned(), range, logarithmic }
+    fn axis(label: &str, range: Range<f64>, logarithmic: bool) -> PlotAxis {
+        PlotAxis { label: label.to_owned(), range, logarithmic }
     }
 
     fn plots() -> [Plot; 1] {

@@ -2,9 +2,9 @@
 //! never touches.
 
 mod evidence;
-mod foreign;
+mod fix_report;
+mod no_metadata;
 mod options;
-mod report;
 mod strays;
 mod strict;
 mod thin;

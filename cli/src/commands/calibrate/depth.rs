@@ -9,12 +9,12 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{CureModel, Dose, GrayCurve, GrayLevel, Quantity, StraightLine};
 use lamp_stack::Length;
 
-use super::Files;
-use super::text::{Text, in_legend, short};
+use super::CalibrationFiles;
+use super::estimate_table::{EstimateTable, in_legend, short};
+use crate::error::CommandError;
 use crate::options::Common;
-use crate::plots::{Axis, Plot, Series, highest};
-use crate::report::Report;
-use crate::stop::Stop;
+use crate::plots::{Plot, PlotAxis, Series, highest};
+use crate::progress::Progress;
 
 /// Fit a working curve to measured cure depths
 ///
@@ -29,15 +29,15 @@ Examples:
   lamp calibrate depth depths.csv --model two-depth --material mine.toml -o mine.toml")]
 pub(super) struct DepthArgs {
     #[command(flatten)]
-    files: Files,
+    files: CalibrationFiles,
 
     /// Model to fit [default: gray if the file has that column, else jacobs]
     #[arg(long, value_enum)]
-    model: Option<ModelArg>,
+    model: Option<DepthModel>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum ModelArg {
+enum DepthModel {
     /// The working curve Dp ln(E / Ec)
     Jacobs,
     /// Separate penetration depths for liquid and solid
@@ -46,34 +46,36 @@ enum ModelArg {
     Gray,
 }
 
-enum Fit {
+enum DepthFit {
     Jacobs(CurveFit),
     TwoDepth(TwoDepthFit),
     Gray(GrayFit),
 }
 
-pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Stop> {
+pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), CommandError> {
     let files = &args.files;
     files.check()?;
     let base = files.base()?;
     let table = files.table()?;
-    let at_place = |stop: Stop| stop.at(files.place());
+    let at_place = |error: CommandError| error.at(files.place());
     let measured = depth_points(&table, files.light(base.as_ref()));
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let has_gray = table.columns().iter().any(|column| column == "gray");
-    let model = args.model.unwrap_or(if has_gray { ModelArg::Gray } else { ModelArg::Jacobs });
+    let model = args.model.unwrap_or(if has_gray { DepthModel::Gray } else { DepthModel::Jacobs });
     let points = &measured.points[..];
-    if model != ModelArg::Gray && points.iter().any(|point| point.gray != GrayLevel::WHITE) {
-        return Err(at_place(Stop::usage("some rows are gray: fit them with --model gray")));
+    if model != DepthModel::Gray && points.iter().any(|point| point.gray != GrayLevel::WHITE) {
+        return Err(at_place(CommandError::usage(
+            "some rows are gray: fit them with --model gray",
+        )));
     }
     let fit = match model {
-        ModelArg::Jacobs => fit_curve(points).map(Fit::Jacobs),
-        ModelArg::TwoDepth => fit_two_depth(points).map(Fit::TwoDepth),
-        ModelArg::Gray => fit_gray(points).map(Fit::Gray),
+        DepthModel::Jacobs => fit_curve(points).map(DepthFit::Jacobs),
+        DepthModel::TwoDepth => fit_two_depth(points).map(DepthFit::TwoDepth),
+        DepthModel::Gray => fit_gray(points).map(DepthFit::Gray),
     };
     let fit = fit.map_err(|error| at_place(error.into()))?;
-    say_what_was_changed(&fit, &Report::new("calibrate", common.quiet, true));
-    let mut text = Text::new(&measured, "uncured");
+    say_what_was_changed(&fit, &Progress::new("calibrate", common.quiet, true));
+    let mut text = EstimateTable::new(&measured, "uncured");
     fit.write(&mut text);
     let title = format!("Cure depth: {}", files.source_name());
     let source = files.source(points.len());
@@ -82,35 +84,35 @@ pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Stop> {
 }
 
 /// What is in the material other than measured.
-fn say_what_was_changed(fit: &Fit, report: &Report) {
+fn say_what_was_changed(fit: &DepthFit, progress: &Progress) {
     match fit {
-        Fit::Jacobs(_) => {}
-        Fit::TwoDepth(fit) if fit.straight => report.say(&format!(
+        DepthFit::Jacobs(_) => {}
+        DepthFit::TwoDepth(fit) if fit.straight => progress.say(&format!(
             "the points lie on a straight line: the solid is practically clear, and its \
              penetration depth is taken as {} um, 10000 times the deepest point",
             short(fit.solid_depth.value.um())
         )),
-        Fit::TwoDepth(_) => {}
-        Fit::Gray(fit) => {
-            levelled(&fit.critical_dose, "the critical dose", "mJ/cm2", report);
-            levelled(&fit.penetration_depth, "the penetration depth", "um", report);
+        DepthFit::TwoDepth(_) => {}
+        DepthFit::Gray(fit) => {
+            levelled(&fit.critical_dose, "the critical dose", "mJ/cm2", progress);
+            levelled(&fit.penetration_depth, "the penetration depth", "um", progress);
         }
     }
 }
 
-fn levelled<T: Quantity>(line: &LineEstimate<T>, what: &str, unit: &str, report: &Report) {
+fn levelled<T: Quantity>(line: &LineEstimate<T>, what: &str, unit: &str, progress: &Progress) {
     let Some(rise) = line.levelled else { return };
     let [fall, high, level] =
         [-rise.number(), line.rise.high.number(), line.at_zero.value.number()].map(short);
-    report.say(&format!(
+    progress.say(&format!(
         "{what} falls by {fall} {unit} from black to white, perhaps by chance (it might as well \
          rise by {high}): the gray model takes no falling line, so it is kept level at {level} \
          {unit}"
     ));
 }
 
-impl Fit {
-    fn write(&self, text: &mut Text) {
+impl DepthFit {
+    fn write(&self, text: &mut EstimateTable) {
         match self {
             Self::Jacobs(fit) => {
                 text.line("R^2", &[&short(fit.r2)]);
@@ -166,27 +168,32 @@ impl Fit {
     }
 }
 
-fn write_line<T: Quantity>(text: &mut Text, name: &str, unit: &str, line: &LineEstimate<T>) {
+fn write_line<T: Quantity>(
+    text: &mut EstimateTable,
+    name: &str,
+    unit: &str,
+    line: &LineEstimate<T>,
+) {
     text.estimate(&format!("{name} at zero ({unit})"), &line.at_zero);
     text.estimate(&format!("{name} rise ({unit})"), &line.rise);
     text.line(&format!("R^2 of {name}"), &[&short(line.r2)]);
 }
 
-fn plot(title: String, fit: &Fit, points: &[DepthPoint]) -> Plot {
+fn plot(title: String, fit: &DepthFit, points: &[DepthPoint]) -> Plot {
     let most = points.iter().map(|point| point.dose.mj_per_cm2()).fold(0.0, f64::max);
     let least = points.iter().map(|point| point.dose.mj_per_cm2()).fold(fit.least_dose(), f64::min);
     let range = least / 1.1..most * 1.1;
     let step = |i| range.start * (range.end / range.start).powf(f64::from(i) / 30.0);
     let doses: Vec<_> = (0..=30).map(|i| Dose::from_mj_per_cm2(step(i))).collect();
     let series = match fit {
-        Fit::Jacobs(fit) => {
+        DepthFit::Jacobs(fit) => {
             let dp = in_legend("Dp", "µm", &fit.penetration_depth);
             let name = format!("{dp}, {}", in_legend("Ec", "mJ/cm²", &fit.critical_dose));
             let begins = begins(&fit.critical_dose);
             let curve = |dose| fit.depth(dose).value;
             vec![series(name, points, &doses, begins, curve, |dose| fit.depth(dose))]
         }
-        Fit::TwoDepth(fit) => {
+        DepthFit::TwoDepth(fit) => {
             let liquid = in_legend("DpL", "µm", &fit.liquid_depth);
             let solid = in_legend("DpS", "µm", &fit.solid_depth);
             let ec = in_legend("Ec", "mJ/cm²", &fit.critical_dose);
@@ -195,11 +202,11 @@ fn plot(title: String, fit: &Fit, points: &[DepthPoint]) -> Plot {
             let curve = |dose| fit.depth(dose).value;
             vec![series(name, points, &doses, begins, curve, |dose| fit.depth(dose))]
         }
-        Fit::Gray(fit) => of_levels(fit, points, &doses),
+        DepthFit::Gray(fit) => of_levels(fit, points, &doses),
     };
-    let x = Axis { label: "dose of full white (mJ/cm²)".to_owned(), range, logarithmic: true };
+    let x = PlotAxis { label: "dose of full white (mJ/cm²)".to_owned(), range, logarithmic: true };
     let depths = 0.0..1.08 * highest(&series);
-    let y = Axis { label: "cure depth (µm)".to_owned(), range: depths, logarithmic: false };
+    let y = PlotAxis { label: "cure depth (µm)".to_owned(), range: depths, logarithmic: false };
     Plot { title, x, y, series }
 }
 

@@ -1,7 +1,7 @@
 //! `lamp calibrate`: what its two kinds share.
 
 mod depth;
-mod text;
+mod estimate_table;
 mod width;
 
 use std::io::{self, IsTerminal};
@@ -16,9 +16,9 @@ use lamp_grayscale::resin::Intensity;
 use lamp_stack::CatalogueError;
 
 use crate::catalogue::{entry, read_text};
+use crate::error::CommandError;
 use crate::options::{Common, parse_light};
 use crate::plots::{self, Plot, drawn};
-use crate::stop::Stop;
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
 
 /// Fit a resin's parameters to measured cure depths or widths
@@ -32,25 +32,25 @@ Examples:
   lamp calibrate width widths.csv --material mine.toml -o mine.toml --plot widths.png")]
 pub(crate) struct CalibrateArgs {
     #[command(subcommand)]
-    what: What,
+    what: Calibration,
 }
 
 #[derive(Subcommand)]
-enum What {
+enum Calibration {
     Depth(depth::DepthArgs),
     Width(width::WidthArgs),
 }
 
-pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), CommandError> {
     match &args.what {
-        What::Depth(args) => depth::run(args, common),
-        What::Width(args) => width::run(args, common),
+        Calibration::Depth(args) => depth::run(args, common),
+        Calibration::Width(args) => width::run(args, common),
     }
 }
 
 /// What both kinds read and write.
 #[derive(Args)]
-struct Files {
+struct CalibrationFiles {
     /// Measurements: a CSV file, or - for standard input
     #[arg(value_name = "DATA")]
     data: PathBuf,
@@ -80,28 +80,35 @@ struct Files {
 /// Measurements are some thousands of rows.
 const LARGEST_TABLE: u64 = 16 << 20;
 
-impl Files {
+impl CalibrationFiles {
     /// Checks, before the work, that the outputs can be written.
-    fn check(&self) -> Result<(), Stop> {
+    fn check(&self) -> Result<(), CommandError> {
         if is_stream(&self.data) && io::stdin().is_terminal() {
-            return Err(Stop::usage("no measurements to read: name a file, or pipe one in"));
+            return Err(CommandError::usage(
+                "no measurements to read: name a file, or pipe one in",
+            ));
         }
         if let Some(output) = &self.output {
             if is_stream(output) {
-                return Err(Stop::usage("the table goes to standard output: name a file with -o"));
+                return Err(CommandError::usage(
+                    "the table goes to standard output: name a file with -o",
+                ));
             }
             check_beside(output, Path::new("-"), [&self.data])?;
         }
         let Some(plot) = &self.plot else { return Ok(()) };
         plots::check_name(plot)?;
         if self.output.as_ref() == Some(plot) {
-            return Err(Stop::usage(format!("{}: the material is written there", plot.display())));
+            return Err(CommandError::usage(format!(
+                "{}: the material is written there",
+                plot.display()
+            )));
         }
         check_beside(plot, Path::new("-"), self.material.iter().chain([&self.data]))
     }
 
     /// The material to add to, with the light given.
-    fn base(&self) -> Result<Option<Material>, Stop> {
+    fn base(&self) -> Result<Option<Material>, CommandError> {
         self.material.as_deref().map(entry).transpose()
     }
 
@@ -111,7 +118,7 @@ impl Files {
         self.intensity.or_else(of_base)
     }
 
-    fn table(&self) -> Result<CsvTable, Stop> {
+    fn table(&self) -> Result<CsvTable, CommandError> {
         let read = || -> anyhow::Result<CsvTable> {
             Ok(CsvTable::parse(&read_text(&self.data, LARGEST_TABLE, "a table of measurements")?)?)
         };
@@ -144,10 +151,10 @@ impl Files {
         add: impl FnOnce(&mut Material),
         plot: &Plot,
         table: &str,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), CommandError> {
         let draw = |path| drawn(slice::from_ref(plot), path).map(|bytes| (path, bytes));
         let plot = self.plot.as_deref().map(draw).transpose()?;
-        let material = self.output.as_deref().map(|output| -> Result<_, Stop> {
+        let material = self.output.as_deref().map(|output| -> Result<_, CommandError> {
             let mut material = base.unwrap_or_else(|| self.new_material(output));
             if let Some(name) = &self.name {
                 material.name.clone_from(name);
@@ -176,23 +183,23 @@ impl Files {
         }
     }
 
-    fn no_material(&self, output: &Path, error: CatalogueError<MaterialError>) -> Stop {
+    fn no_material(&self, output: &Path, error: CatalogueError<MaterialError>) -> CommandError {
         match error {
             CatalogueError::Name { .. } => {
-                Stop::usage(format!("{error}; give the material a --name"))
+                CommandError::usage(format!("{error}; give the material a --name"))
             }
-            error => Stop::Failed(anyhow!(error).context(output.display().to_string())),
+            error => CommandError::Failed(anyhow!(error).context(output.display().to_string())),
         }
     }
 }
 
-impl From<DataError> for Stop {
+impl From<DataError> for CommandError {
     fn from(error: DataError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<FitError> for Stop {
+impl From<FitError> for CommandError {
     fn from(error: FitError) -> Self {
         Self::Failed(error.into())
     }

@@ -8,13 +8,13 @@ use lamp_grayscale::material::{Material, MaterialError};
 use lamp_grayscale::resin::{CureModel, Dose, broadening_depth};
 use lamp_stack::Dpi;
 
-use super::Files;
-use super::text::{Text, in_legend, short};
+use super::CalibrationFiles;
+use super::estimate_table::{EstimateTable, in_legend, short};
 use crate::catalogue::entry;
+use crate::error::CommandError;
 use crate::options::Common;
-use crate::plots::{Axis, Plot, Series, highest};
-use crate::report::Report;
-use crate::stop::Stop;
+use crate::plots::{Plot, PlotAxis, Series, highest};
+use crate::progress::Progress;
 
 /// Fit the cure width of features of several sizes to measured squares
 ///
@@ -29,7 +29,7 @@ Examples:
   lamp calibrate width squares.csv --material mine.toml -o mine.toml --plot widths.svg")]
 pub(super) struct WidthArgs {
     #[command(flatten)]
-    files: Files,
+    files: CalibrationFiles,
 
     /// Resolution of feature_px, in dots per inch
     #[arg(long, default_value = "1500")]
@@ -40,7 +40,7 @@ pub(super) struct WidthArgs {
     depth_material: Option<PathBuf>,
 }
 
-pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Stop> {
+pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), CommandError> {
     let files = &args.files;
     files.check()?;
     let base = files.base()?;
@@ -50,18 +50,18 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Stop> {
         None => None,
     };
     let table = files.table()?;
-    let at_place = |stop: Stop| stop.at(files.place());
+    let at_place = |error: CommandError| error.at(files.place());
     let measured = width_points(&table, files.light(base.as_ref()), args.dpi);
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;
-    let report = Report::new("calibrate", common.quiet, true);
+    let progress = Progress::new("calibrate", common.quiet, true);
     if depths.is_none() {
-        report.say(
+        progress.say(
             "there is no broadening depth, as no cure depth is known: name a material with \
              --depth-material",
         );
     }
-    let mut text = Text::new(&measured, "not wider");
+    let mut text = EstimateTable::new(&measured, "not wider");
     for fit in &fits {
         write(&mut text, fit, args.dpi, depths.as_deref());
     }
@@ -86,7 +86,7 @@ fn cure_depths(material: &Material) -> Result<Option<Box<dyn CureModel>>, Materi
     Ok(material.gray_curve()?.map(|curve| Box::new(curve) as Box<dyn CureModel>))
 }
 
-fn write(text: &mut Text, fit: &WidthFit, dpi: Dpi, depths: Option<&dyn CureModel>) {
+fn write(text: &mut EstimateTable, fit: &WidthFit, dpi: Dpi, depths: Option<&dyn CureModel>) {
     let (size, below) = (size_name(fit, dpi), fit.below);
     let below = if below > 0 { format!(" ({below} more below Ec^w)") } else { String::new() };
     text.line(&format!("\n{size}: {} points{below}", fit.points), &[]);
@@ -123,7 +123,7 @@ fn plot(title: String, fits: &[WidthFit], points: &[WidthPoint], dpi: Dpi) -> Pl
     let doses: Vec<_> =
         (0..=30).map(|i| Dose::from_mj_per_cm2(most * f64::from(i) / 30.0)).collect();
     let series: Vec<_> = fits.iter().map(|fit| series(fit, points, &doses, dpi)).collect();
-    let axis = |label: &str, end: f64| Axis {
+    let axis = |label: &str, end: f64| PlotAxis {
         label: label.to_owned(),
         range: 0.0..end,
         logarithmic: false,

@@ -7,8 +7,8 @@ use clap::{Args, Subcommand};
 use lamp_grayscale::target::TargetError;
 use lamp_stack::{Dpi, Length};
 
+use crate::error::CommandError;
 use crate::options::{Common, parse_distance};
-use crate::stop::Stop;
 
 /// Write test images to expose, measure and calibrate with
 #[derive(Args)]
@@ -18,19 +18,19 @@ Examples:
   lamp target screens -o screens.tif")]
 pub(crate) struct TargetArgs {
     #[command(subcommand)]
-    what: What,
+    what: Target,
 }
 
 #[derive(Subcommand)]
-enum What {
+enum Target {
     Squares(squares::SquaresArgs),
     Screens(screens::ScreensArgs),
 }
 
-pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), CommandError> {
     match &args.what {
-        What::Squares(args) => squares::run(args, common),
-        What::Screens(args) => screens::run(args, common),
+        Target::Squares(args) => squares::run(args, common),
+        Target::Screens(args) => screens::run(args, common),
     }
 }
 
@@ -46,7 +46,7 @@ fn parse_gap(text: &str) -> Result<Length, String> {
 }
 
 /// Impossible targets come from options.
-impl From<TargetError> for Stop {
+impl From<TargetError> for CommandError {
     fn from(error: TargetError) -> Self {
         Self::wrong_options(error)
     }

@@ -6,9 +6,9 @@ use lamp_grayscale::target::screens;
 use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
 
 use super::{parse_gap, whole_pixels};
+use crate::error::CommandError;
 use crate::options::{Common, Output};
-use crate::stop::Stop;
-use crate::streams::{report, write_layers};
+use crate::streams::{progress, write_layers};
 
 /// Write a gray tile, and screens of it with squares of several sizes
 ///
@@ -50,7 +50,7 @@ pub(super) struct ScreensArgs {
     output: Output,
 }
 
-pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Stop> {
+pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), CommandError> {
     let gap = whole_pixels(args.gap, args.dpi);
     let image = screens(args.gray, args.tile, gap, &args.cells)?;
     let stack = StackInfo {
@@ -65,8 +65,8 @@ pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Stop> {
         ..PageInfo::default()
     };
     let layer = Layer { info, dpi: Some(args.dpi), image: image.into() };
-    let report = report("target", common, &args.output);
-    write_layers(std::iter::once(Ok(layer)), &args.output, &report)
+    let progress = progress("target", common, &args.output);
+    write_layers(std::iter::once(Ok(layer)), &args.output, &progress)
 }
 
 impl ScreensArgs {

@@ -14,9 +14,9 @@ use lamp_stack::{
 
 use super::{parse_gap, whole_pixels};
 use crate::catalogue::entry;
+use crate::error::CommandError;
 use crate::options::{Common, parse_light};
-use crate::report::Report;
-use crate::stop::Stop;
+use crate::progress::Progress;
 use crate::streams::{folder_to_make, write_file};
 
 /// Write squares of several sizes, each at several doses, to calibrate the cure width
@@ -63,23 +63,23 @@ pub(super) struct SquaresArgs {
     output: PathBuf,
 }
 
-pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Stop> {
+pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), CommandError> {
     let folder = folder_to_make(&args.output)?;
     let light = args.light()?;
     let gap = whole_pixels(args.gap, args.dpi);
     let mut sizes = args.sizes.clone();
     sizes.sort_unstable();
     if let Some(twice) = sizes.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Stop::usage(format!("--sizes: {} is given twice", twice[0])));
+        return Err(CommandError::usage(format!("--sizes: {} is given twice", twice[0])));
     }
     // All of them, before there is a folder: a size may be impossible.
     let doses = &args.doses.0;
     let targets: Vec<(u32, Vec<TargetExposure>)> = sizes
         .into_iter()
         .map(|size| Ok((size, squares(size, gap, doses)?)))
-        .collect::<Result<_, Stop>>()?;
+        .collect::<Result<_, CommandError>>()?;
     let to = FolderBeside::over_nothing(folder)
-        .map_err(|error| Stop::Failed(error.into()).at(folder.display().to_string()))?;
+        .map_err(|error| CommandError::Failed(error.into()).at(folder.display().to_string()))?;
     let mut table = TABLE_HEAD.to_owned();
     let stacks = targets.len();
     for (size, exposures) in targets {
@@ -92,8 +92,8 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Stop> {
     }
     write_file(&to.path().join("squares.csv"), |out| out.write_all(table.as_bytes()))?;
     to.persist().with_context(|| folder.display().to_string())?;
-    let report = Report::new("target", common.quiet, true);
-    report.say(&format!(
+    let progress = Progress::new("target", common.quiet, true);
+    progress.say(&format!(
         "{}: {} of {}, and squares.csv to fill in",
         folder.display(),
         counted(stacks, "stack"),
@@ -113,14 +113,16 @@ feature_px,dose_mj_per_cm2,cured_um
 ";
 
 impl SquaresArgs {
-    fn light(&self) -> Result<Intensity, Stop> {
+    fn light(&self) -> Result<Intensity, CommandError> {
         let Some(path) = &self.material else {
             return Ok(self.intensity.expect("one of the two is required"));
         };
         let material: Material = entry(path)?;
         let name = path.display();
         material.intensity.map(|light| light.value).ok_or_else(|| {
-            Stop::usage(format!("{name} states no intensity of full white: give --intensity"))
+            CommandError::usage(format!(
+                "{name} states no intensity of full white: give --intensity"
+            ))
         })
     }
 
@@ -130,7 +132,7 @@ impl SquaresArgs {
         size: u32,
         exposures: Vec<TargetExposure>,
         light: Intensity,
-    ) -> impl Iterator<Item = Result<Layer, Stop>> + use<> {
+    ) -> impl Iterator<Item = Result<Layer, CommandError>> + use<> {
         let doses: Vec<f64> = self.doses.0.iter().map(|dose| dose.mj_per_cm2()).collect();
         let mut stack = Some(StackInfo {
             part: format!("squares of {size} pixels"),

@@ -7,8 +7,8 @@ use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_postprocess::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_stack::{Image, Length, StackError};
 
+use crate::error::CommandError;
 use crate::options::{one_of, parse_distance, parse_thickness};
-use crate::stop::Stop;
 use crate::streams::{failed_at, input_name, layers_of, open_pages};
 
 const HEADING: &str = "Mesh around the parts";
@@ -68,7 +68,7 @@ impl MeshArgs {
     }
 
     /// Checks that no option is without effect.
-    pub(super) fn check(&self) -> Result<(), Stop> {
+    pub(super) fn check(&self) -> Result<(), CommandError> {
         let lengths = [
             ("--clearance", self.clearance),
             ("--break-width", self.break_width),
@@ -82,10 +82,10 @@ impl MeshArgs {
         if self.mesh == Path::new("none")
             && let Some(option) = given(&of_cells).or(given(&lengths)).or(base)
         {
-            return Err(Stop::usage(format!("{option} has no effect with --mesh none")));
+            return Err(CommandError::usage(format!("{option} has no effect with --mesh none")));
         }
         match (self.file(), given(&of_cells)) {
-            (Some(_), Some(option)) => Err(Stop::usage(format!(
+            (Some(_), Some(option)) => Err(CommandError::usage(format!(
                 "{option} needs --mesh hexagon or square: an image has its own walls"
             ))),
             _ => Ok(()),
@@ -93,7 +93,7 @@ impl MeshArgs {
     }
 
     /// The mesh, unless there is to be none.
-    pub(super) fn options(&self) -> Result<Option<MeshOptions>, Stop> {
+    pub(super) fn options(&self) -> Result<Option<MeshOptions>, CommandError> {
         if self.mesh == Path::new("none") {
             return Ok(None);
         }
@@ -118,14 +118,14 @@ impl MeshArgs {
 }
 
 /// The first image of a file; of a gray one, what is at least half as bright as white.
-fn template(path: &Path) -> Result<MeshPattern, Stop> {
+fn template(path: &Path) -> Result<MeshPattern, CommandError> {
     let place = input_name(path);
     let first = layers_of(open_pages(path)?, &place, None).next();
     let layer = first.unwrap_or_else(|| Err(failed_at(place.clone(), StackError::NoLayers)))?;
     let image = match layer.image.into_image() {
         Image::Mask(image) => image,
         Image::Gray(gray) => dither_image(&gray, DitherMethod::Threshold, 0)
-            .map_err(|error| Stop::Failed(error.into()).at(place))?,
+            .map_err(|error| CommandError::Failed(error.into()).at(place))?,
     };
     // Without blanks, as the stack's commands are words.
     let name = path.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_");

@@ -14,15 +14,15 @@ use lamp_postprocess::{
 use lamp_stack::{Length, Size};
 
 use crate::catalogue::{entry, read_text};
+use crate::error::CommandError;
 use crate::json_report::parse_report;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::plots;
-use crate::report::Report;
-use crate::stop::Stop;
-use crate::streams::{check_beside, check_not_input, report, write_file};
+use crate::progress::Progress;
+use crate::streams::{check_beside, check_not_input, progress, write_file};
 
 use mesh::MeshArgs;
-use stacks::{Stack, StackArg};
+use stacks::{InputStack, StackArg};
 use strips::StripArgs;
 
 /// Lay out copies of parts on a build area, in a mesh
@@ -131,18 +131,18 @@ pub(crate) struct TileArgs {
     classic: bool,
 }
 
-pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
+pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), CommandError> {
     args.check()?;
     let mesh = args.mesh.options()?;
     let output = args.output();
-    let report = match &output {
-        Some(output) => report("tile", common, output),
-        None => Report::new("tile", common.quiet, true),
+    let progress = match &output {
+        Some(output) => progress("tile", common, output),
+        None => Progress::new("tile", common.quiet, true),
     };
     let machine = args.machine.as_deref().map(entry).transpose()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic)?;
     let file = args.layout.as_deref().map(read_layout).transpose()?;
-    let mut stacks = Stack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
+    let mut stacks = InputStack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
     let needs_outlines = args.fit || args.pack == PackBy::Outlines || args.mesh.needs_outlines();
     let parts: Vec<PartStack> =
         stacks.iter_mut().map(|stack| stack.part(needs_outlines)).collect::<Result<_, _>>()?;
@@ -168,27 +168,29 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Stop> {
     let base_layers = mesh.map_or(0, |mesh| mesh.base_layers);
     stacks
         .iter()
-        .filter_map(Stack::layer_count)
+        .filter_map(InputStack::layer_count)
         .max()
-        .inspect(|&layers| report.expect(u64::from(layers) + u64::from(base_layers)));
-    let layers = stacks.into_iter().map(Stack::layers).collect::<Result<Vec<_>, _>>()?;
+        .inspect(|&layers| progress.expect(u64::from(layers) + u64::from(base_layers)));
+    let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
     let heights = HeightOptions { settle: args.settle, resample: args.resample };
-    let build = layout.build(layers, heights, |stray| say_stray(&report, stray));
-    strips::write(build, strips, output.as_ref(), &report)?;
+    let build = layout.build(layers, heights, |stray| say_stray(&progress, stray));
+    strips::write(build, strips, output.as_ref(), &progress)?;
     args.tell(&placed)
 }
 
 impl TileArgs {
     /// Checks, before the work, what can be checked.
-    fn check(&self) -> Result<(), Stop> {
+    fn check(&self) -> Result<(), CommandError> {
         let counted = self.stacks.iter().any(|stack| stack.copies.is_some());
         if self.copies.is_some() && (counted || self.stacks.len() > 1) {
-            return Err(Stop::usage(
+            return Err(CommandError::usage(
                 "--copies is for one stack without a count: write blade.tif:120 core.tif:40",
             ));
         }
         if self.layout.is_some() && counted {
-            return Err(Stop::usage("--layout gives the number of copies: leave out the counts"));
+            return Err(CommandError::usage(
+                "--layout gives the number of copies: leave out the counts",
+            ));
         }
         self.mesh.check()?;
         let inputs = || {
@@ -232,7 +234,7 @@ impl TileArgs {
     }
 
     /// Writes where the copies stand, as was asked.
-    fn tell(&self, layout: &Layout) -> Result<(), Stop> {
+    fn tell(&self, layout: &Layout) -> Result<(), CommandError> {
         if let Some(path) = &self.layout_out {
             write_file(path, |out| out.write_all(layout.to_file().to_json().as_bytes()))?;
         }
@@ -247,7 +249,7 @@ impl TileArgs {
 /// A layout takes a line for each copy.
 const LARGEST_LAYOUT: u64 = 64 << 20;
 
-fn read_layout(path: &Path) -> Result<LayoutFile, Stop> {
+fn read_layout(path: &Path) -> Result<LayoutFile, CommandError> {
     let read = || anyhow::Ok(LayoutFile::from_json(&read_text(path, LARGEST_LAYOUT, "a layout")?)?);
     Ok(read().with_context(|| path.display().to_string())?)
 }
@@ -257,15 +259,16 @@ fn place(
     parts: Vec<PartStack>,
     area: Size,
     path: Option<&Path>,
-) -> Result<Layout, Stop> {
+) -> Result<Layout, CommandError> {
     let path = path.unwrap_or(Path::new("-")).display();
-    file.place(parts, area).map_err(|error| Stop::Failed(anyhow!(error)).at(path.to_string()))
+    file.place(parts, area)
+        .map_err(|error| CommandError::Failed(anyhow!(error)).at(path.to_string()))
 }
 
 /// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
-fn say_stray(report: &Report, StrayRows { part, layer, rows }: &StrayRows) {
+fn say_stray(progress: &Progress, StrayRows { part, layer, rows }: &StrayRows) {
     let word = if rows.len() == 1 { "row" } else { "rows" };
-    report.say(&format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows)));
+    progress.say(&format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows)));
 }
 
 /// `3, 7-9`.

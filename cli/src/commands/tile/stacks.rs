@@ -10,7 +10,7 @@ use lamp_postprocess::PartStack;
 use lamp_postprocess::machine::Machine;
 use lamp_stack::{Layer, Pages, StackError};
 
-use crate::stop::Stop;
+use crate::error::CommandError;
 use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages, spool_stdin};
 
 /// A stack and how many copies there are to be: `blade.tif:120`.
@@ -42,10 +42,10 @@ impl StackArg {
     }
 }
 
-type Layers = Box<dyn Iterator<Item = Result<Layer, Stop>>>;
+type Layers = Box<dyn Iterator<Item = Result<Layer, CommandError>>>;
 
 /// A stack of a build.
-pub(super) struct Stack {
+pub(super) struct InputStack {
     name: String,
     path: PathBuf,
     range: Option<Range<u32>>,
@@ -57,17 +57,17 @@ pub(super) struct Stack {
     layer_count: Option<u32>,
 }
 
-impl Stack {
+impl InputStack {
     /// Sets the stacks up. None is given twice: its counts would be one.
     pub(super) fn open_all(
         stacks: &[StackArg],
         range: &Option<Range<u32>>,
         machine: Option<&Machine>,
-    ) -> Result<Vec<Self>, Stop> {
+    ) -> Result<Vec<Self>, CommandError> {
         for (k, stack) in stacks.iter().enumerate() {
             if stacks[..k].iter().any(|before| before.path == stack.path) {
                 let name = input_name(&stack.path);
-                return Err(Stop::usage(format!(
+                return Err(CommandError::usage(format!(
                     "{name} is given twice: give it once, with the sum of the counts"
                 )));
             }
@@ -91,7 +91,7 @@ impl Stack {
 
     /// Reads what must be known to place the part: its first layer, or all of
     /// them to find its outline.
-    pub(super) fn part(&mut self, outline: bool) -> Result<PartStack, Stop> {
+    pub(super) fn part(&mut self, outline: bool) -> Result<PartStack, CommandError> {
         let no_layers = failed_at(self.name.clone(), StackError::NoLayers);
         if outline {
             if is_stream(&self.path) {
@@ -103,7 +103,7 @@ impl Stack {
                     count = count.or(count_of(layer));
                 }
             });
-            let part = PartStack::of_outline::<Stop>(&self.name, layers)?.ok_or(no_layers);
+            let part = PartStack::of_outline::<CommandError>(&self.name, layers)?.ok_or(no_layers);
             self.layer_count = count;
             return part;
         }
@@ -116,7 +116,7 @@ impl Stack {
     }
 
     /// Its layers.
-    pub(super) fn layers(mut self) -> Result<Layers, Stop> {
+    pub(super) fn layers(mut self) -> Result<Layers, CommandError> {
         match self.layers.take() {
             Some(layers) => Ok(layers),
             None => self.read(),
@@ -124,7 +124,7 @@ impl Stack {
     }
 
     /// Reads it from its start, checking that the machine builds it.
-    fn read(&mut self) -> Result<Layers, Stop> {
+    fn read(&mut self) -> Result<Layers, CommandError> {
         let pages = match &mut self.spool {
             Some(spool) => {
                 let again = |spool: &mut File| -> io::Result<File> {
@@ -141,7 +141,7 @@ impl Stack {
         let name = self.name.clone();
         Ok(Box::new(layers.map(move |layer| {
             let layer = layer?;
-            machine.check(&layer).map_err(|limit| Stop::from(limit).at(name.clone()))?;
+            machine.check(&layer).map_err(|limit| CommandError::from(limit).at(name.clone()))?;
             Ok(layer)
         })))
     }

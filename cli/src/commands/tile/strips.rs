@@ -7,9 +7,9 @@ use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{StripWriter, StripsError};
 use lamp_stack::Layer;
 
+use crate::error::CommandError;
 use crate::options::Output;
-use crate::report::Report;
-use crate::stop::Stop;
+use crate::progress::Progress;
 use crate::streams::{folder_to_make, format, write_layers};
 
 const HEADING: &str = "Strips of a projector that scans";
@@ -45,13 +45,13 @@ impl StripArgs {
         &self,
         machine: Option<&Machine>,
         classic: bool,
-    ) -> Result<Option<Strips>, Stop> {
+    ) -> Result<Option<StripOutput>, CommandError> {
         let Some(folder) = &self.strips else { return Ok(None) };
         let folder = folder_to_make(folder)?;
         let of_machine = machine.and_then(|machine| machine.strips.as_ref());
         let mirrors = self.mirrors.or(of_machine.map(|strips| strips.mirrors));
         let Some(mirrors) = mirrors else {
-            return Err(Stop::usage(match machine {
+            return Err(CommandError::usage(match machine {
                 None => "--strips needs --mirrors, or a --machine that has [strips]".to_owned(),
                 Some(Machine { name, .. }) => format!(
                     "--strips needs --mirrors: the machine {name} has no [strips] (docs/tile.md)"
@@ -61,54 +61,59 @@ impl StripArgs {
         let of_machine = of_machine.filter(|_| self.mirrors.is_none());
         let overlap = self.overlap.or(of_machine.map(|strips| strips.overlap)).unwrap_or(0);
         match StripWriter::new(folder, mirrors, overlap, format(classic)) {
-            Ok(writer) => Ok(Some(Strips { folder: folder.to_owned(), writer })),
+            Ok(writer) => Ok(Some(StripOutput { folder: folder.to_owned(), writer })),
             Err(error @ (StripsError::Swaths(_) | StripsError::Mirrors { .. })) => {
-                Err(Stop::wrong_options(error))
+                Err(CommandError::wrong_options(error))
             }
             Err(error) => Err(failed(folder, error)),
         }
     }
 }
 
-fn failed(folder: &Path, error: StripsError) -> Stop {
-    Stop::Failed(error.into()).at(folder.display().to_string())
+fn failed(folder: &Path, error: StripsError) -> CommandError {
+    CommandError::Failed(error.into()).at(folder.display().to_string())
 }
 
 /// The strips that are being written.
-pub(super) struct Strips {
+pub(super) struct StripOutput {
     folder: PathBuf,
     writer: StripWriter,
 }
 
 /// Writes a build, its strips, or both.
 pub(super) fn write(
-    build: impl Iterator<Item = Result<Layer, Stop>>,
-    strips: Option<Strips>,
+    build: impl Iterator<Item = Result<Layer, CommandError>>,
+    strips: Option<StripOutput>,
     output: Option<&Output>,
-    report: &Report,
-) -> Result<(), Stop> {
+    progress: &Progress,
+) -> Result<(), CommandError> {
     let mut strips = strips;
     let cut = build.map(|layer| {
         let layer = layer?;
-        if let Some(Strips { folder, writer }) = &mut strips {
+        if let Some(StripOutput { folder, writer }) = &mut strips {
             writer.push(&layer).map_err(|error| failed(folder, error))?;
         }
         Ok(layer)
     });
     match output {
-        Some(output) => write_layers(cut, output, report)?,
-        None => drain(cut, report)?,
+        Some(output) => write_layers(cut, output, progress)?,
+        None => drain(cut, progress)?,
     }
     match strips {
-        Some(Strips { folder, writer }) => writer.finish().map_err(|error| failed(&folder, error)),
+        Some(StripOutput { folder, writer }) => {
+            writer.finish().map_err(|error| failed(&folder, error))
+        }
         None => Ok(()),
     }
 }
 
 /// Takes all layers, counting them in `report`.
-fn drain(layers: impl Iterator<Item = Result<Layer, Stop>>, report: &Report) -> Result<(), Stop> {
-    let mut layers = layers.inspect(|_| report.layer_done());
+fn drain(
+    layers: impl Iterator<Item = Result<Layer, CommandError>>,
+    progress: &Progress,
+) -> Result<(), CommandError> {
+    let mut layers = layers.inspect(|_| progress.layer_done());
     let done = layers.try_for_each(|layer| layer.map(drop));
-    report.done();
+    progress.done();
     done
 }

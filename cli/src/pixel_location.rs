@@ -6,13 +6,13 @@ use lamp_stack::Layer;
 
 /// Where the pixels of a layer lie, if its page says so.
 #[derive(Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct PixelLocation {
     left_mm: f64,
     top_mm: f64,
     pitch_mm: f64,
 }
 
-impl Place {
+impl PixelLocation {
     pub(crate) fn of(layer: &Layer) -> Option<Self> {
         let [left_mm, top_mm] = layer.info.origin_mm?;
         Some(Self { left_mm, top_mm, pitch_mm: layer.dpi?.pitch().mm() })

@@ -9,17 +9,17 @@ use lamp_slicer::{FacetIndex, Fill, OpenOptions, Part, Placement, SliceError, Un
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
-use crate::brep::{BrepOptions, boxes_overlap, notes};
+use crate::error::CommandError;
 use crate::options::one_of;
 use crate::placement::PlacementOptions;
 use crate::recorded::text;
-use crate::stop::Stop;
+use crate::step_options::{BrepOptions, boxes_overlap, notes};
 use crate::streams::{input_name, is_stream};
 
 /// Options that decide the solid to slice.
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
-pub(crate) struct SolidOptions {
+pub(crate) struct PartOptions {
     /// Unit of an STL's coordinates; a STEP file states its own
     #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
     #[serde(with = "text")]
@@ -40,7 +40,7 @@ pub(crate) struct SolidOptions {
     pub(crate) brep: BrepOptions,
 }
 
-impl SolidOptions {
+impl PartOptions {
     pub(crate) fn placement(&self) -> Placement {
         self.placement.placement()
     }
@@ -51,16 +51,23 @@ impl SolidOptions {
     }
 
     /// Opens all files of a part.
-    pub(crate) fn open(&self, paths: &[PathBuf], reading: &Reading<'_>) -> Result<Part, Stop> {
+    pub(crate) fn open(
+        &self,
+        paths: &[PathBuf],
+        reading: &Reading<'_>,
+    ) -> Result<Part, CommandError> {
         if paths.iter().filter(|path| is_stream(path)).count() > 1 {
-            return Err(Stop::usage("standard input can be read only once: give - for one part"));
+            return Err(CommandError::usage(
+                "standard input can be read only once: give - for one part",
+            ));
         }
-        let open =
-            |path: &PathBuf| self.open_one(path, reading).map_err(|stop| stop.at(input_name(path)));
+        let open = |path: &PathBuf| {
+            self.open_one(path, reading).map_err(|error| error.at(input_name(path)))
+        };
         Ok(Part::joined(paths.iter().map(open).collect::<Result<_, _>>()?))
     }
 
-    fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Part, Stop> {
+    fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Part, CommandError> {
         let tolerance = self.brep.tolerance(reading.dpi);
         let options = OpenOptions {
             allow_gaps: reading.may_be_open,
@@ -82,10 +89,10 @@ impl SolidOptions {
         prepared: &Prepared,
         tolerance: Length,
         reading: &Reading<'_>,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), CommandError> {
         if self.units == Units::Inches {
             let why = "a STEP file states its own unit: leave out --units";
-            return Err(Stop::usage(why));
+            return Err(CommandError::usage(why));
         }
         if tolerance.um() > reading.dpi.pitch().um() {
             (reading.say)(&format!(
@@ -115,12 +122,12 @@ pub(crate) struct Reading<'a> {
 }
 
 /// Puts before a message the file whose facet it is about, or all files.
-pub(crate) fn at_part(stop: Stop, paths: &[PathBuf]) -> Stop {
-    let place = match stop.cause() {
+pub(crate) fn at_part(error: CommandError, paths: &[PathBuf]) -> CommandError {
+    let place = match error.cause() {
         Some(&SliceError::NotFinite { file, .. }) => input_name(&paths[file]),
         _ => name_of_all(paths),
     };
-    stop.at(place)
+    error.at(place)
 }
 
 /// Returns one name for all files of a part, for messages.

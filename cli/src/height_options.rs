@@ -13,10 +13,10 @@ use lamp_slicer::{FacetIndex, Fill};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
+use crate::error::CommandError;
 use crate::exposure::Exposure;
 use crate::options::{one_of, parse_thickness};
 use crate::recorded::optional;
-use crate::stop::Stop;
 
 pub(crate) const HEADING: &str = "Adaptive layer heights";
 
@@ -90,7 +90,7 @@ pub(crate) struct HeightOptions {
 }
 
 /// The layers found, and the bound that they keep.
-pub(crate) struct Found {
+pub(crate) struct FoundHeights {
     pub(crate) measure: Measure,
     pub(crate) bound: f64,
     pub(crate) heights: Heights,
@@ -127,7 +127,7 @@ impl Measure {
     }
 }
 
-impl Found {
+impl FoundHeights {
     /// `volume 2.00%`.
     pub(crate) fn bound(&self) -> String {
         format!("{} {}", self.measure, self.measure.text(self.bound))
@@ -166,10 +166,15 @@ impl HeightOptions {
     }
 
     /// The part as rows see it.
-    pub(crate) fn part(&self, body: FacetIndex, dpi: Dpi, fill: Fill) -> Result<LayeredPart, Stop> {
+    pub(crate) fn part(
+        &self,
+        body: FacetIndex,
+        dpi: Dpi,
+        fill: Fill,
+    ) -> Result<LayeredPart, CommandError> {
         let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
         let part = LayeredPart::new(body, self.row_pitch.unwrap_or(pitch), fill);
-        part.map_err(|error| Stop::Failed(error.into()))
+        part.map_err(|error| CommandError::Failed(error.into()))
     }
 
     /// Whether a budget decides the bound.
@@ -178,13 +183,13 @@ impl HeightOptions {
     }
 
     /// What the machine builds.
-    fn thicknesses(&self) -> Result<Thicknesses, Stop> {
+    fn thicknesses(&self) -> Result<Thicknesses, CommandError> {
         let step = self.step.unwrap_or(Length::from_um(1.0));
-        Thicknesses::new(self.min(), self.max(), step).map_err(Stop::wrong_options)
+        Thicknesses::new(self.min(), self.max(), step).map_err(CommandError::wrong_options)
     }
 
     /// Checks, before the work, what the parser cannot.
-    pub(crate) fn check(&self, exposure: Option<&Exposure>) -> Result<(), Stop> {
+    pub(crate) fn check(&self, exposure: Option<&Exposure>) -> Result<(), CommandError> {
         self.thicknesses()?;
         self.measure()?;
         if self.time_budget.is_some() {
@@ -193,13 +198,13 @@ impl HeightOptions {
         Ok(())
     }
 
-    fn measure(&self) -> Result<Measure, Stop> {
+    fn measure(&self) -> Result<Measure, CommandError> {
         let default = if self.cusp.is_some() { Measure::Cusp } else { Measure::Volume };
         let criterion = self.criterion.unwrap_or(default);
         match (criterion == Measure::Cusp, self.cusp.is_some()) {
-            (false, true) => Err(Stop::usage("--cusp needs --criterion cusp")),
+            (false, true) => Err(CommandError::usage("--cusp needs --criterion cusp")),
             (true, false) if self.deviation.is_some() || !self.has_budget() => {
-                Err(Stop::usage("--criterion cusp needs a bound, as --cusp 10um"))
+                Err(CommandError::usage("--criterion cusp needs a bound, as --cusp 10um"))
             }
             _ => Ok(criterion),
         }
@@ -210,12 +215,12 @@ impl HeightOptions {
         &self,
         part: &LayeredPart,
         exposure: Option<&Exposure>,
-    ) -> Result<Found, Stop> {
+    ) -> Result<FoundHeights, CommandError> {
         let thicknesses = self.thicknesses()?;
         let measure = self.measure()?;
         let criterion = measure.criterion();
         let search = HeightSearch { part, thicknesses: &thicknesses, criterion, snap: self.snap };
-        let failed = |error: HeightsError| Stop::Failed(error.into());
+        let failed = |error: HeightsError| CommandError::Failed(error.into());
         let (bound, heights) = if let Some(layers) = self.layers_budget {
             search
                 .within_budget(|_| 1.0, layers.into())
@@ -232,16 +237,18 @@ impl HeightOptions {
                 exposure.time(Length::from_um(slab.thickness_um))?;
             }
         }
-        Ok(Found { measure, bound, heights })
+        Ok(FoundHeights { measure, bound, heights })
     }
 
     /// Returns the time in seconds that a layer takes by its thickness.
     fn seconds_of_layers<'a>(
         &self,
         exposure: Option<&'a Exposure>,
-    ) -> Result<impl Fn(Length) -> f64 + use<'a>, Stop> {
+    ) -> Result<impl Fn(Length) -> f64 + use<'a>, CommandError> {
         let exposure = exposure.ok_or_else(|| {
-            Stop::usage("--time-budget needs exposures: give --material or --exposure-table")
+            CommandError::usage(
+                "--time-budget needs exposures: give --material or --exposure-table",
+            )
         })?;
         // What holds for the limits holds between them.
         exposure.time(self.min())?;
@@ -260,8 +267,8 @@ impl HeightOptions {
 }
 
 /// Describes a budget that is too small, in its unit.
-fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Stop {
-    Stop::Failed(match error {
+fn over(error: HeightsError, say: impl Fn(f64) -> String) -> CommandError {
+    CommandError::Failed(match error {
         HeightsError::Budget { least, budget } => {
             let [least, budget] = [least, budget].map(say);
             anyhow::anyhow!(

@@ -7,8 +7,8 @@ use anyhow::Context;
 use lamp_postprocess::{Band, BandOutcome, Fixed};
 use lamp_stack::{Image, write_rgb_png};
 
+use crate::error::CommandError;
 use crate::picture::{Region, levels_of_region};
-use crate::stop::Stop;
 use crate::streams::write_file;
 
 /// Good rows above and below a band that are shown with it, and columns.
@@ -24,18 +24,21 @@ const SCALE: usize = 4;
 const GUTTER: [u8; 3] = [128; 3];
 
 /// A folder of pictures, one for each band.
-pub(crate) struct Evidence {
+pub(crate) struct BandPictures {
     folder: PathBuf,
-    failed: Option<Stop>,
+    failed: Option<CommandError>,
 }
 
-impl Evidence {
+impl BandPictures {
     /// Makes the folder, which must not hold anything yet.
-    pub(crate) fn new(folder: &Path) -> Result<Self, Stop> {
+    pub(crate) fn new(folder: &Path) -> Result<Self, CommandError> {
         let name = || folder.display().to_string();
         fs::create_dir_all(folder).with_context(name)?;
         if fs::read_dir(folder).with_context(name)?.next().is_some() {
-            return Err(Stop::usage(format!("{}: the folder for pictures is not empty", name())));
+            return Err(CommandError::usage(format!(
+                "{}: the folder for pictures is not empty",
+                name()
+            )));
         }
         Ok(Self { folder: folder.to_owned(), failed: None })
     }
@@ -50,11 +53,11 @@ impl Evidence {
     }
 
     /// Says whether all were drawn.
-    pub(crate) fn finish(self) -> Result<(), Stop> {
+    pub(crate) fn finish(self) -> Result<(), CommandError> {
         self.failed.map_or(Ok(()), Err)
     }
 
-    fn draw(&self, fixed: &Fixed<'_>, band: &Band) -> Result<(), Stop> {
+    fn draw(&self, fixed: &Fixed<'_>, band: &Band) -> Result<(), CommandError> {
         let region = region(&fixed.before.image, band);
         let panel = |image: &Image| -> Vec<Vec<u8>> { levels_of_region(image, &region).collect() };
         let before = panel(&fixed.before.image);

@@ -11,17 +11,17 @@ use lamp_grayscale::{CuredLine, PixelLine, SolidHeights, excess};
 use lamp_slicer::{Axis, Part, SectionOptions, SliceError, section};
 use lamp_stack::{Dpi, Image, Layer, Length, write_rgb_png};
 
-use crate::part::PartOptions;
-use crate::picture::Scale;
+use crate::picture::PictureScale;
+use crate::slicing_options::SlicingOptions;
 
 /// Where a stack is cut, in part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Plane {
+pub(crate) enum SectionPlane {
     X(Length),
     Y(Length),
 }
 
-impl FromStr for Plane {
+impl FromStr for SectionPlane {
     type Err = String;
 
     /// Parses `y=12mm`.
@@ -37,7 +37,7 @@ impl FromStr for Plane {
     }
 }
 
-impl fmt::Display for Plane {
+impl fmt::Display for SectionPlane {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::X(at) => write!(f, "x = {:.3} mm", at.mm()),
@@ -57,17 +57,17 @@ pub(crate) fn parse_along(text: &str) -> Result<Range<f64>, String> {
 
 /// The pixels along a section, and where they lie on the part.
 #[derive(Clone, Copy)]
-pub(crate) struct Course {
+pub(crate) struct SectionLine {
     pub(crate) line: PixelLine,
     corner_mm: [f64; 2],
     dpi: Dpi,
     pixels: u32,
 }
 
-impl Course {
+impl SectionLine {
     /// The line of pixels that a plane runs through, in the images that are
     /// like the layer's.
-    pub(crate) fn new(plane: Plane, layer: &Layer) -> anyhow::Result<Self> {
+    pub(crate) fn new(plane: SectionPlane, layer: &Layer) -> anyhow::Result<Self> {
         let corner_mm =
             layer.info.origin_mm.context("its pages do not state their position on the part")?;
         let dpi = layer.dpi.context("its pages do not state their resolution")?;
@@ -76,28 +76,30 @@ impl Course {
         let image = &layer.image;
         let [width, height] = [image.width(), image.height()];
         let (number, count, low) = match plane {
-            Plane::X(x) => ((x.mm() - x0) / pitch, width, x0),
-            Plane::Y(y) => ((y1 - y.mm()) / pitch, height, y1 - f64::from(height) * pitch),
+            SectionPlane::X(x) => ((x.mm() - x0) / pitch, width, x0),
+            SectionPlane::Y(y) => ((y1 - y.mm()) / pitch, height, y1 - f64::from(height) * pitch),
         };
         if !(0.0..f64::from(count)).contains(&number) {
             let high = low + f64::from(count) * pitch;
             return Err(anyhow!("{plane} is outside its images: {low:.3} to {high:.3} mm"));
         }
         let (line, pixels) = match plane {
-            Plane::X(_) => (PixelLine::Column(number as u32), height),
-            Plane::Y(_) => (PixelLine::Row(number as u32), width),
+            SectionPlane::X(_) => (PixelLine::Column(number as u32), height),
+            SectionPlane::Y(_) => (PixelLine::Row(number as u32), width),
         };
         Ok(Self { line, corner_mm, dpi, pixels })
     }
 
     /// Where the centres of its pixels lie.
-    pub(crate) fn plane(&self) -> Plane {
+    pub(crate) fn plane(&self) -> SectionPlane {
         let pitch = self.dpi.pitch().mm();
         let inwards = |pixel: u32| (f64::from(pixel) + 0.5) * pitch;
         match self.line {
-            PixelLine::Row(row) => Plane::Y(Length::from_mm(self.corner_mm[1] - inwards(row))),
+            PixelLine::Row(row) => {
+                SectionPlane::Y(Length::from_mm(self.corner_mm[1] - inwards(row)))
+            }
             PixelLine::Column(column) => {
-                Plane::X(Length::from_mm(self.corner_mm[0] + inwards(column)))
+                SectionPlane::X(Length::from_mm(self.corner_mm[0] + inwards(column)))
             }
         }
     }
@@ -119,14 +121,14 @@ impl Course {
     pub(crate) fn outline(
         &self,
         model: Part,
-        options: &PartOptions,
+        options: &SlicingOptions,
     ) -> Result<Vec<SolidHeights>, SliceError> {
         let options = options.for_slicing();
         let turned = options.placement.rotated(Axis::Y, 90.0);
         let pitch = self.dpi.pitch().mm();
         let (placement, z, top_mm) = match self.plane() {
-            Plane::X(x) => (turned, Length::from_um(-x.um()), self.corner_mm[1]),
-            Plane::Y(y) => {
+            SectionPlane::X(x) => (turned, Length::from_um(-x.um()), self.corner_mm[1]),
+            SectionPlane::Y(y) => {
                 let right = self.corner_mm[0] + f64::from(self.pixels) * pitch;
                 (turned.rotated(Axis::X, 90.0), y, right)
             }
@@ -153,9 +155,9 @@ impl Course {
 }
 
 /// What a stack's layers cure along a section, one after another.
-pub(crate) struct Exposures<'a> {
+pub(crate) struct SectionExposures<'a> {
     resin: &'a Resin,
-    pub(crate) course: Course,
+    pub(crate) course: SectionLine,
     /// How deep each level cures in an exposure of so long.
     depths: Option<(ExposureTime, Vec<Length>)>,
     in_full: CuredLine,
@@ -164,8 +166,8 @@ pub(crate) struct Exposures<'a> {
     heights_um: Range<f64>,
 }
 
-impl<'a> Exposures<'a> {
-    pub(crate) fn new(resin: &'a Resin, course: Course) -> Self {
+impl<'a> SectionExposures<'a> {
+    pub(crate) fn new(resin: &'a Resin, course: SectionLine) -> Self {
         Self {
             resin,
             course,
@@ -215,8 +217,8 @@ impl<'a> Exposures<'a> {
 }
 
 /// A section's pictures side by side: each a name and what is cured.
-pub(crate) struct Panels {
-    course: Course,
+pub(crate) struct SectionPicture {
+    course: SectionLine,
     pixels: Range<u32>,
     heights_um: Range<f64>,
     cured: Vec<(&'static str, Vec<SolidHeights>)>,
@@ -234,15 +236,15 @@ const OVERSHOOT: [u8; 3] = [226, 72, 52];
 const MISSING: [u8; 3] = [52, 130, 226];
 const OUTLINE: [u8; 3] = [255, 205, 60];
 
-impl Panels {
+impl SectionPicture {
     /// The pictures of what was cured, between the first layer's bottom and the
     /// last one's top. `along_mm` is the stretch shown, all where `None`.
     pub(crate) fn new(
-        exposures: &Exposures<'_>,
+        exposures: &SectionExposures<'_>,
         part: Option<Vec<SolidHeights>>,
         along_mm: Option<&Range<f64>>,
     ) -> anyhow::Result<Self> {
-        let Exposures { course, in_full, by_levels, has_gray, heights_um, .. } = exposures;
+        let SectionExposures { course, in_full, by_levels, has_gray, heights_um, .. } = exposures;
         let pixels = along_mm.map_or(0..course.pixels, |along| course.within(along));
         if pixels.is_empty() {
             return Err(anyhow!("no pixel of the section lies in this stretch"));
@@ -296,7 +298,7 @@ impl Panels {
     }
 
     /// Draws the pictures.
-    pub(crate) fn write_png(&self, scale: Scale, out: impl Write) -> io::Result<()> {
+    pub(crate) fn write_png(&self, scale: PictureScale, out: impl Write) -> io::Result<()> {
         let [width, height] = self.size(scale);
         let all = width * self.cured.len() + GAP * (self.cured.len() - 1);
         let rows = (0..height).map(|row| {
@@ -308,7 +310,7 @@ impl Panels {
     }
 
     /// Checks that a picture can be looked at.
-    pub(crate) fn check_size(&self, scale: Scale) -> anyhow::Result<()> {
+    pub(crate) fn check_size(&self, scale: PictureScale) -> anyhow::Result<()> {
         let [width, height] = self.size(scale);
         if width.max(height) as f64 > LARGEST_PICTURE {
             return Err(anyhow!(
@@ -319,7 +321,7 @@ impl Panels {
     }
 
     /// The width and height of one picture, at least a pixel.
-    fn size(&self, scale: Scale) -> [usize; 2] {
+    fn size(&self, scale: PictureScale) -> [usize; 2] {
         let pitch_um = self.course.dpi.pitch().um();
         let height = (self.heights_um.end - self.heights_um.start) / pitch_um;
         [self.pixels.len() as f64, height]
@@ -327,7 +329,13 @@ impl Panels {
     }
 
     /// A row of a picture, from the top: what is at its pixels' centres.
-    fn row(&self, row: usize, cured: &[SolidHeights], scale: Scale, width: usize) -> Vec<u8> {
+    fn row(
+        &self,
+        row: usize,
+        cured: &[SolidHeights],
+        scale: PictureScale,
+        width: usize,
+    ) -> Vec<u8> {
         let step_um = self.course.dpi.pitch().um() / factor(scale);
         let z_at = |row: usize| self.heights_um.end - (row as f64 + 0.5) * step_um;
         let pixel_at = |column: usize| {
@@ -369,10 +377,10 @@ impl Panels {
     }
 }
 
-fn factor(scale: Scale) -> f64 {
+fn factor(scale: PictureScale) -> f64 {
     match scale {
-        Scale::Up(up) => f64::from(up),
-        Scale::Down(down) => 1.0 / f64::from(down),
+        PictureScale::Up(up) => f64::from(up),
+        PictureScale::Down(down) => 1.0 / f64::from(down),
     }
 }
 

@@ -4,11 +4,11 @@ use lamp_grayscale::calibrate::{Estimate, Measured, format_significant};
 use lamp_grayscale::resin::Quantity;
 
 /// The numbers of a calibration, a line each.
-pub(super) struct Text {
+pub(super) struct EstimateTable {
     text: String,
 }
 
-impl Text {
+impl EstimateTable {
     /// Starts with how many rows were used of those that are there. `none` says what
     /// the others are that hold no point.
     pub(super) fn new<T>(measured: &Measured<T>, none: &str) -> Self {

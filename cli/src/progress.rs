@@ -6,14 +6,14 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// Says things, and shows how far the work is.
 #[derive(Clone)]
-pub(crate) struct Report {
+pub(crate) struct Progress {
     command: &'static str,
     quiet: bool,
     watched: bool,
     bar: ProgressBar,
 }
 
-impl Report {
+impl Progress {
     /// A report with a bar, if somebody watches. Of the stages of a pipeline
     /// only the last shows one (`is_last`): they share the terminal.
     pub(crate) fn new(command: &'static str, quiet: bool, is_last: bool) -> Self {

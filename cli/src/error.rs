@@ -13,7 +13,7 @@ use crate::hints::hint;
 
 /// Why a command stops: whose fault it is decides the exit status.
 #[derive(Debug)]
-pub(crate) enum Stop {
+pub(crate) enum CommandError {
     /// Wrong usage: status 2.
     Usage(anyhow::Error),
     /// Bad input, or a failure on the way: status 1.
@@ -24,7 +24,7 @@ pub(crate) enum Stop {
     Findings(String),
 }
 
-impl Stop {
+impl CommandError {
     pub(crate) fn usage(message: impl Into<String>) -> Self {
         Self::Usage(anyhow::Error::msg(message.into()))
     }
@@ -76,7 +76,7 @@ impl Stop {
     }
 }
 
-impl fmt::Display for Stop {
+impl fmt::Display for CommandError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Findings(message) => f.write_str(message),
@@ -91,68 +91,68 @@ impl fmt::Display for Stop {
     }
 }
 
-impl From<SliceError> for Stop {
+impl From<SliceError> for CommandError {
     fn from(error: SliceError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<DitherError> for Stop {
+impl From<DitherError> for CommandError {
     fn from(error: DitherError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<EditError> for Stop {
+impl From<EditError> for CommandError {
     fn from(error: EditError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<TileError> for Stop {
+impl From<TileError> for CommandError {
     fn from(error: TileError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<StripsError> for Stop {
+impl From<StripsError> for CommandError {
     fn from(error: StripsError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<LayoutError> for Stop {
+impl From<LayoutError> for CommandError {
     fn from(error: LayoutError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<MachineLimit> for Stop {
+impl From<MachineLimit> for CommandError {
     fn from(error: MachineLimit) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<CompensateError> for Stop {
+impl From<CompensateError> for CommandError {
     fn from(error: CompensateError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<JoinError> for Stop {
+impl From<JoinError> for CommandError {
     fn from(error: JoinError) -> Self {
         Self::Failed(error.into())
     }
 }
 
-impl From<SplitError> for Stop {
+impl From<SplitError> for CommandError {
     fn from(error: SplitError) -> Self {
         Self::Failed(error.into())
     }
 }
 
 /// What `write_stack` itself reports; errors of the layers it passes on.
-impl From<StackError> for Stop {
+impl From<StackError> for CommandError {
     fn from(error: StackError) -> Self {
         match error {
             StackError::NoLayers => Self::Failed(error.into()),
@@ -161,7 +161,7 @@ impl From<StackError> for Stop {
     }
 }
 
-impl From<anyhow::Error> for Stop {
+impl From<anyhow::Error> for CommandError {
     fn from(error: anyhow::Error) -> Self {
         Self::Failed(error)
     }

@@ -8,8 +8,8 @@ use anyhow::anyhow;
 use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, Length, PageInfo};
 
-use crate::part::PartOptions;
-use crate::stop::Stop;
+use crate::error::CommandError;
+use crate::slicing_options::SlicingOptions;
 use crate::streams::input_name;
 
 /// How far planes are moved, in micrometres, the nearest first.
@@ -45,12 +45,12 @@ impl Bridged {
     pub(crate) fn new(
         slices: Slices,
         fallback: Option<&Path>,
-        options: &PartOptions,
+        options: &SlicingOptions,
         layers: Option<Range<u32>>,
-    ) -> Result<Self, Stop> {
+    ) -> Result<Self, CommandError> {
         let open = |path: &Path| {
             let opened = Fallback::open(path, &slices, options, layers);
-            opened.map_err(|stop| stop.at(input_name(path)))
+            opened.map_err(|error| error.at(input_name(path)))
         };
         let fallback = fallback.map(open).transpose()?;
         Ok(Self { slices, fallback })
@@ -91,9 +91,9 @@ impl Fallback {
     fn open(
         path: &Path,
         slices: &Slices,
-        options: &PartOptions,
+        options: &SlicingOptions,
         layers: Option<Range<u32>>,
-    ) -> Result<Self, Stop> {
+    ) -> Result<Self, CommandError> {
         let grid = slices.grid();
         let brep = &options.solid.brep;
         let opening = brep.reader.for_opening(brep.tolerance(options.dpi));
@@ -105,12 +105,14 @@ impl Fallback {
             ..options.for_slicing()
         };
         let other = |what: String| {
-            Stop::Failed(anyhow!("it is not the same part as the STEP file: its box {what}"))
+            CommandError::Failed(anyhow!(
+                "it is not the same part as the STEP file: its box {what}"
+            ))
         };
         let fallback =
             Slices::new(Part::open(path, &opening)?, &options).map_err(|error| match error {
                 SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
-                error => Stop::from(error),
+                error => CommandError::from(error),
             })?;
         let ([low, high], others) = (slices.box_mm(), fallback.box_mm());
         let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);

@@ -6,13 +6,13 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 
 /// Where an axis has its values.
 #[derive(Clone, Debug)]
-pub(super) struct Scale {
+pub(super) struct AxisScale {
     pub(super) range: Range<f64>,
     /// Whether equal ratios are equally long.
     pub(super) logarithmic: bool,
 }
 
-impl Ranged for Scale {
+impl Ranged for AxisScale {
     type FormatOption = NoDefaultFormatting;
     type ValueType = f64;
 
@@ -34,7 +34,7 @@ impl Ranged for Scale {
     }
 }
 
-impl ValueFormatter<f64> for Scale {
+impl ValueFormatter<f64> for AxisScale {
     fn format(value: &f64) -> String {
         // Ticks are multiples of steps: their last digits are rounding.
         ((value * 1e9).round() / 1e9).to_string()
@@ -96,7 +96,7 @@ mod tests {
         }
         // Less than a decade has too few of 1, 2 and 5.
         assert_eq!(ticks(&(210.0..480.0), true), [250.0, 300.0, 350.0, 400.0, 450.0]);
-        let fine = ticks(&(0.0..0.55), false).iter().map(Scale::format).collect::<Vec<_>>();
+        let fine = ticks(&(0.0..0.55), false).iter().map(AxisScale::format).collect::<Vec<_>>();
         assert_eq!(fine, ["0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
     }
 }

@@ -9,19 +9,19 @@ use lamp_slicer::{GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOpt
 use lamp_stack::{Dpi, Layer, Length, Size};
 use serde::{Deserialize, Serialize};
 
-use crate::brep::HEADING;
+use crate::error::CommandError;
 use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
-use crate::heights::{self, HeightOptions};
+use crate::height_options::{self, HeightOptions};
 use crate::options::{one_of, parse_thickness};
+use crate::part_options::PartOptions;
 use crate::placement::Numbers;
 use crate::recorded::{from_words, optional, text, to_words};
-use crate::solid::SolidOptions;
-use crate::stop::Stop;
+use crate::step_options::HEADING;
 
 /// What decides the images.
 #[derive(Args, Clone, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
-pub(crate) struct PartOptions {
+pub(crate) struct SlicingOptions {
     /// Resolution in dots per inch
     #[arg(long, value_name = "DPI", default_value_t = Self::default().dpi)]
     #[serde(with = "text")]
@@ -41,7 +41,7 @@ pub(crate) struct PartOptions {
 
     #[command(flatten)]
     #[serde(flatten)]
-    pub(crate) solid: SolidOptions,
+    pub(crate) solid: PartOptions,
 
     /// Leave crossings on the facets of STEP parts, instead of moving them onto the exact
     /// surfaces
@@ -66,7 +66,7 @@ pub(crate) struct PartOptions {
     size: Option<Size>,
 
     /// Make each layer as thick as the part's slopes allow, within the limits below
-    #[arg(long, help_heading = heights::HEADING)]
+    #[arg(long, help_heading = height_options::HEADING)]
     adaptive: bool,
 
     #[command(flatten)]
@@ -84,13 +84,13 @@ pub(crate) struct PartOptions {
     gray: bool,
 }
 
-impl Default for PartOptions {
+impl Default for SlicingOptions {
     fn default() -> Self {
         Self {
             dpi: Dpi::new(1500.0).expect("it is a resolution"),
             thickness: Length::from_um(100.0),
             plane: PlaneRule::default(),
-            solid: SolidOptions::default(),
+            solid: PartOptions::default(),
             no_polish: false,
             margin: 1,
             origin: None,
@@ -103,7 +103,7 @@ impl Default for PartOptions {
     }
 }
 
-impl PartOptions {
+impl SlicingOptions {
     pub(crate) fn for_slicing(&self) -> SliceOptions {
         SliceOptions {
             dpi: self.dpi,
@@ -160,7 +160,7 @@ impl PartOptions {
         memory: Option<u64>,
         exposure: Option<Exposure>,
         say: &dyn Fn(&str),
-    ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Stop> {
+    ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), CommandError> {
         let heights = self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref(), say));
         let heights = heights.transpose()?;
         let shown = exposure.as_ref().filter(|_| self.gray);
@@ -195,7 +195,7 @@ impl PartOptions {
         model: &Part,
         exposure: Option<&Exposure>,
         say: &dyn Fn(&str),
-    ) -> Result<LayerHeights, Stop> {
+    ) -> Result<LayerHeights, CommandError> {
         let body = self.solid.body(model.clone())?;
         let part = self.heights.part(body, self.dpi, self.solid.fill)?;
         let found = self.heights.find(&part, exposure)?;
@@ -216,18 +216,18 @@ impl PartOptions {
     ///
     /// # Errors
     /// Where options contradict each other, or the material cannot be read.
-    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Stop> {
+    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, CommandError> {
         let needs_top = [(self.gray, "--gray"), (self.adaptive, "--adaptive")];
         if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)
             && self.plane != PlaneRule::Top
         {
             let why = format!("{option} cuts layers at their tops: leave out --plane");
-            return Err(Stop::usage(why));
+            return Err(CommandError::usage(why));
         }
         if !self.adaptive
             && let Some(option) = to_words(&self.heights, |_| true).split_whitespace().next()
         {
-            return Err(Stop::usage(format!("{option} needs --adaptive")));
+            return Err(CommandError::usage(format!("{option} needs --adaptive")));
         }
         let exposure = self.exposure.exposure()?;
         if self.adaptive {
@@ -276,14 +276,14 @@ mod tests {
              --exposure-table my_times.csv --margin 0",
         ] {
             let command = format!("slice my part.stl {words}");
-            let options = PartOptions::of_command(&command).unwrap();
+            let options = SlicingOptions::of_command(&command).unwrap();
             assert_eq!(options.command("my part.stl", None), command);
         }
-        let of_older = PartOptions::of_command("slice a.stl --dpi 1500").unwrap();
-        assert_eq!(of_older.command("", None), PartOptions::default().command("", None));
+        let of_older = SlicingOptions::of_command("slice a.stl --dpi 1500").unwrap();
+        assert_eq!(of_older.command("", None), SlicingOptions::default().command("", None));
         for wrong in ["fix", "slice a.stl --colour red", "slice a.stl --dpi", "slice a --fill all"]
         {
-            assert!(PartOptions::of_command(wrong).is_none(), "{wrong}");
+            assert!(SlicingOptions::of_command(wrong).is_none(), "{wrong}");
         }
     }
 }
