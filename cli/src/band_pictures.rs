@@ -1,4 +1,4 @@
-//! Pictures of what `fix` did.
+//! Draws a picture of each band that `fix` corrected or left, for `--evidence`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,38 +7,35 @@ use anyhow::Context;
 use lamp_postprocess::{Band, BandOutcome, Fixed};
 use lamp_stack::{Image, write_rgb_png};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::picture::{Region, levels_of_region};
 use crate::streams::write_file;
 
-/// Good rows above and below a band that are shown with it, and columns.
+/// Rows above and below a band, and columns beside it, that are shown with it.
 const ROWS_AROUND: u32 = 16;
 const COLUMNS_AROUND: u32 = 48;
 /// A stray run may cross the image: so many columns of it, from the gap on,
 /// and so many rows, from the first, show how it was mended.
-const WIDEST: u32 = 400;
-const TALLEST: u32 = 200;
-/// Each pixel is shown as so many.
+const MAX_COLUMNS: u32 = 400;
+const MAX_ROWS: u32 = 200;
+/// Picture pixels per image pixel, on a side.
 const SCALE: usize = 4;
-/// What lies between two panels.
+/// Colour of the gap between two panels.
 const GUTTER: [u8; 3] = [128; 3];
 
 /// A folder of pictures, one for each band.
 pub(crate) struct BandPictures {
     folder: PathBuf,
-    failed: Option<CommandError>,
+    failed: Option<Exit>,
 }
 
 impl BandPictures {
     /// Makes the folder, which must not hold anything yet.
-    pub(crate) fn new(folder: &Path) -> Result<Self, CommandError> {
+    pub(crate) fn new(folder: &Path) -> Result<Self, Exit> {
         let name = || folder.display().to_string();
         fs::create_dir_all(folder).with_context(name)?;
         if fs::read_dir(folder).with_context(name)?.next().is_some() {
-            return Err(CommandError::usage(format!(
-                "{}: the folder for pictures is not empty",
-                name()
-            )));
+            return Err(Exit::usage(format!("{}: the folder for pictures is not empty", name())));
         }
         Ok(Self { folder: folder.to_owned(), failed: None })
     }
@@ -52,12 +49,12 @@ impl BandPictures {
         }
     }
 
-    /// Says whether all were drawn.
-    pub(crate) fn finish(self) -> Result<(), CommandError> {
+    /// Returns the first failure to draw, if any.
+    pub(crate) fn finish(self) -> Result<(), Exit> {
         self.failed.map_or(Ok(()), Err)
     }
 
-    fn draw(&self, fixed: &Fixed<'_>, band: &Band) -> Result<(), CommandError> {
+    fn draw(&self, fixed: &Fixed<'_>, band: &Band) -> Result<(), Exit> {
         let region = region(&fixed.before.image, band);
         let panel = |image: &Image| -> Vec<Vec<u8>> { levels_of_region(image, &region).collect() };
         let before = panel(&fixed.before.image);
@@ -83,16 +80,16 @@ impl BandPictures {
     }
 }
 
-/// What is shown of a band: from a little left of its gap on.
+/// Returns the region to show of a band, from a little left of its gap on.
 fn region(image: &Image, band: &Band) -> Region {
     let gap = band.gap.clone().unwrap_or_else(|| band.columns.clone());
     let left = gap.start.min(image.width() - 1).saturating_sub(COLUMNS_AROUND);
     let right = band.columns.end.max(gap.end).saturating_add(COLUMNS_AROUND);
     let [top, bottom] =
         [band.first_row.saturating_sub(ROWS_AROUND), band.end().saturating_add(ROWS_AROUND)];
-    let bottom = bottom.min(top.saturating_add(TALLEST));
+    let bottom = bottom.min(top.saturating_add(MAX_ROWS));
     Region {
-        columns: left..right.min(left.saturating_add(WIDEST)).min(image.width()),
+        columns: left..right.min(left.saturating_add(MAX_COLUMNS)).min(image.width()),
         rows: top..bottom.min(image.height()),
     }
 }
@@ -104,7 +101,7 @@ fn plain(levels: &[Vec<u8>]) -> Panel {
     levels.iter().map(|row| row.iter().map(|&level| [level; 3]).collect()).collect()
 }
 
-/// What became brighter in blue, what became darker in red, the rest dimmed.
+/// Shows brighter pixels in blue, darker ones in red and the rest dimmed.
 fn difference(before: &[Vec<u8>], after: &[Vec<u8>]) -> Panel {
     let shade = |(&before, &after): (&u8, &u8)| match after.cmp(&before) {
         std::cmp::Ordering::Equal => [before / 3; 3],

@@ -1,4 +1,4 @@
-//! Materials and machines by name or file, as options name them.
+//! Finds materials and machines, built in or in files, by the name given in an option.
 
 use std::fs::File;
 use std::io::{self, IsTerminal, Read};
@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use lamp_stack::Catalogued;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::streams::{input_name, is_stream, print};
 
 /// A file of a catalogue is text of a few kilobytes.
@@ -23,13 +23,13 @@ pub(crate) trait Reportable: std::error::Error + Send + Sync + 'static {}
 impl<T: std::error::Error + Send + Sync + 'static> Reportable for T {}
 
 /// Returns the built-in document of a name, or that of a file.
-pub(crate) fn entry<T: Entry>(path: &Path) -> Result<T, CommandError> {
+pub(crate) fn entry<T: Entry>(path: &Path) -> Result<T, Exit> {
     entry_and_text(path).map(|(entry, _)| entry)
 }
 
 /// Returns the built-in document of a name, or that of a file, and its text as it was
 /// written.
-fn entry_and_text<T: Entry>(path: &Path) -> Result<(T, String), CommandError> {
+fn entry_and_text<T: Entry>(path: &Path) -> Result<(T, String), Exit> {
     let builtin = T::BUILTINS.iter().find(|builtin| path.to_str() == Some(builtin.name));
     if let Some(builtin) = builtin {
         let entry = T::from_toml(builtin.toml).map_err(anyhow::Error::new)?;
@@ -39,18 +39,15 @@ fn entry_and_text<T: Entry>(path: &Path) -> Result<(T, String), CommandError> {
         let names: Vec<_> = T::BUILTINS.iter().map(|builtin| builtin.name).collect();
         let (path, kind, names) = (path.display(), T::KIND, names.join(", "));
         let text = format!("{path}: there is no such file, nor a built-in {kind}: {names}");
-        return Err(CommandError::Failed(anyhow!(text)));
+        return Err(Exit::Failed(anyhow!(text)));
     }
     read_file(path)
 }
 
 /// Reads a document's file, and its text.
-pub(crate) fn read_file<T: Entry>(path: &Path) -> Result<(T, String), CommandError> {
+pub(crate) fn read_file<T: Entry>(path: &Path) -> Result<(T, String), Exit> {
     if is_stream(path) && io::stdin().is_terminal() {
-        return Err(CommandError::usage(format!(
-            "no {} to read: name a file, or pipe one in",
-            T::KIND
-        )));
+        return Err(Exit::usage(format!("no {} to read: name a file, or pipe one in", T::KIND)));
     }
     let read = || -> anyhow::Result<(T, String)> {
         let text = read_text(path, MAX_FILE, &format!("a {} file", T::KIND))?;
@@ -60,7 +57,7 @@ pub(crate) fn read_file<T: Entry>(path: &Path) -> Result<(T, String), CommandErr
 }
 
 /// Prints a document's file as it was written, once it is checked.
-pub(crate) fn show<T: Entry>(path: &Path) -> Result<(), CommandError> {
+pub(crate) fn show<T: Entry>(path: &Path) -> Result<(), Exit> {
     print(&entry_and_text::<T>(path)?.1)
 }
 

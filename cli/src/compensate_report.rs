@@ -1,5 +1,4 @@
-//! Walls that `compensate` narrowed less than asked, and pieces that it lost, in
-//! words and as JSON.
+//! Reports walls that `compensate` narrowed less than asked, and lost pieces, as text and JSON.
 
 use std::ops::Range;
 use std::path::Path;
@@ -8,14 +7,14 @@ use lamp_postprocess::{Compensated, Loss, ThinWall};
 use lamp_stack::Layer;
 use serde::Serialize;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::json_report::{JsonReport, to_nm};
 use crate::pixel_location::{PixelLocation, millimetres};
 
-/// So many walls are listed; others are only counted.
-const MOST_LISTED: usize = 10_000;
+/// Walls beyond these are only counted.
+const MAX_LISTED: usize = 10_000;
 
-/// Collects what was found.
+/// The walls and losses of a run of `compensate`.
 #[derive(Default)]
 pub(crate) struct WallReport {
     changed: usize,
@@ -71,7 +70,7 @@ struct WallLine {
 }
 
 impl WallReport {
-    /// Adds what was done to a layer.
+    /// Adds the walls and losses of a layer.
     pub(crate) fn add(&mut self, done: &Compensated<'_>) {
         self.changed += 1;
         self.layers += usize::from(!done.walls.is_empty());
@@ -87,7 +86,7 @@ impl WallReport {
             if self.narrowest.as_ref().is_none_or(|(narrowest, _)| um < *narrowest) {
                 self.narrowest = Some((um, whereabouts(done.layer, &wall.columns, &wall.rows)));
             }
-            if self.listed.len() < MOST_LISTED {
+            if self.listed.len() < MAX_LISTED {
                 self.listed.push(wall_line(done.layer, wall, pitch_um));
             }
         }
@@ -96,13 +95,13 @@ impl WallReport {
             *(if loss.left == 0 { &mut self.lost } else { &mut self.broken }) += 1;
             let place = || whereabouts(done.layer, &loss.columns, &loss.rows);
             self.first_loss.get_or_insert_with(place);
-            if self.listed.len() < MOST_LISTED {
+            if self.listed.len() < MAX_LISTED {
                 self.listed.push(loss_line(done.layer, loss));
             }
         }
     }
 
-    /// What to tell in words.
+    /// Returns the messages about walls and losses.
     pub(crate) fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let s = |count| if count == 1 { "" } else { "s" };
@@ -136,7 +135,7 @@ impl WallReport {
     }
 
     /// Writes the report.
-    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), CommandError> {
+    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), Exit> {
         let head = Head {
             layers,
             layers_changed: self.changed,
@@ -170,7 +169,7 @@ fn loss_line(layer: &Layer, loss: &Loss) -> WallLine {
     }
 }
 
-/// A line that says where.
+/// Returns a line with its place alone.
 fn box_line(layer: &Layer, columns: &Range<u32>, rows: &Range<u32>) -> WallLine {
     let place = PixelLocation::of(layer);
     WallLine {

@@ -1,4 +1,4 @@
-//! Vertical sections of what a stack cures, and their pictures.
+//! Computes and draws vertical sections of what a stack cures.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -14,7 +14,7 @@ use lamp_stack::{Dpi, Image, Layer, Length, write_rgb_png};
 use crate::picture::PictureScale;
 use crate::slicing_options::SlicingOptions;
 
-/// Where a stack is cut, in part coordinates.
+/// The plane of a section, in part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum SectionPlane {
     X(Length),
@@ -55,7 +55,7 @@ pub(crate) fn parse_along(text: &str) -> Result<Range<f64>, String> {
     if range.is_empty() { Err(wrong()) } else { Ok(range) }
 }
 
-/// The pixels along a section, and where they lie on the part.
+/// The row or column of pixels along a section.
 #[derive(Clone, Copy)]
 pub(crate) struct SectionLine {
     pub(crate) line: PixelLine,
@@ -90,7 +90,7 @@ impl SectionLine {
         Ok(Self { line, corner_mm, dpi, pixels })
     }
 
-    /// Where the centres of its pixels lie.
+    /// Returns the plane through the centres of its pixels.
     pub(crate) fn plane(&self) -> SectionPlane {
         let pitch = self.dpi.pitch().mm();
         let inwards = |pixel: u32| (f64::from(pixel) + 0.5) * pitch;
@@ -104,7 +104,7 @@ impl SectionLine {
         }
     }
 
-    /// The pixels whose centres lie in a stretch of the other coordinate.
+    /// Returns the pixels whose centres lie in a stretch of the section.
     fn within(&self, along_mm: &Range<f64>) -> Range<u32> {
         let pitch = self.dpi.pitch().mm();
         let [from, to] = match self.line {
@@ -116,8 +116,8 @@ impl SectionLine {
         pixel(from)..pixel(to)
     }
 
-    /// Where a part is at its pixels. The part is turned so that the section is
-    /// level, and the heights lie along its rows.
+    /// Returns where the part is at each pixel. Turns the part so that the section is level and
+    /// heights run along its rows.
     pub(crate) fn outline(
         &self,
         model: Part,
@@ -154,11 +154,11 @@ impl SectionLine {
     }
 }
 
-/// What a stack's layers cure along a section, one after another.
+/// What a stack's layers cure along a section.
 pub(crate) struct SectionExposures<'a> {
     resin: &'a Resin,
     pub(crate) course: SectionLine,
-    /// How deep each level cures in an exposure of so long.
+    /// The cure depth of each level, for an exposure time.
     depths: Option<(ExposureTime, Vec<Length>)>,
     in_full: CuredLine,
     by_levels: CuredLine,
@@ -228,7 +228,7 @@ pub(crate) struct SectionPicture {
 /// Black pixels between two pictures.
 const GAP: usize = 8;
 /// Pictures wider or higher than this cannot be looked at.
-const LARGEST_PICTURE: f64 = 50_000.0;
+const MAX_PICTURE_SIDE: f64 = 50_000.0;
 
 const EMPTY: [u8; 3] = [24, 26, 30];
 const CURED: [u8; 3] = [200, 204, 208];
@@ -312,7 +312,7 @@ impl SectionPicture {
     /// Checks that a picture can be looked at.
     pub(crate) fn check_size(&self, scale: PictureScale) -> anyhow::Result<()> {
         let [width, height] = self.size(scale);
-        if width.max(height) as f64 > LARGEST_PICTURE {
+        if width.max(height) as f64 > MAX_PICTURE_SIDE {
             return Err(anyhow!(
                 "the picture would be {width} x {height} pixels: choose a smaller --scale, or less with --along and --layers"
             ));
@@ -388,7 +388,7 @@ fn holds(solid: &[[f64; 2]], z_um: f64) -> bool {
     solid.iter().any(|[from, to]| (*from..*to).contains(&z_um))
 }
 
-/// What lies between two heights.
+/// Returns the stretches between two heights.
 fn clip(solid: &[[f64; 2]], heights_um: &Range<f64>) -> SolidHeights {
     let cut = |&[from, to]: &[f64; 2]| [from.max(heights_um.start), to.min(heights_um.end)];
     solid.iter().map(cut).filter(|[from, to]| from < to).collect()

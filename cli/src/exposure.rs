@@ -1,4 +1,4 @@
-//! How long layers are exposed.
+//! Exposure options: a layer's time and gray levels by material or table.
 
 use std::path::{Path, PathBuf};
 
@@ -11,16 +11,16 @@ use lamp_stack::{DepthLevels, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::catalogue::{entry, read_text};
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::recorded::text;
 use crate::streams::input_name;
 
 pub(crate) const EXPOSURE: &str = "Exposure";
 
 /// A table has a row for each thickness.
-const LARGEST_TABLE: u64 = 1 << 20;
+const MAX_TABLE_BYTES: u64 = 1 << 20;
 
-/// Options that say how long layers are exposed.
+/// Options of the exposure.
 #[derive(Args, Clone, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct ExposureOptions {
@@ -42,7 +42,7 @@ pub(crate) struct ExposureOptions {
     exposure_table: Option<PathBuf>,
 }
 
-/// How long layers are exposed, by their thickness.
+/// Exposure times by layer thickness.
 pub(crate) struct Exposure {
     name: String,
     source: Source,
@@ -73,13 +73,13 @@ impl ExposureOptions {
         self.material.is_some()
     }
 
-    /// The files that it reads.
+    /// Returns the files that the options name.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.material.iter().chain(&self.exposure_table)
     }
 
-    /// How layers are exposed, where a material or a table says.
-    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, CommandError> {
+    /// Returns the exposure, if a material or a table is given.
+    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Exit> {
         if let Some(path) = &self.exposure_table {
             // Without blanks, as the stack's commands are words.
             let name = path.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_");
@@ -88,20 +88,20 @@ impl ExposureOptions {
         }
         let Some(path) = &self.material else { return Ok(None) };
         let material: Material = entry(path)?;
-        let resin = material.resin().map_err(|error| CommandError::Failed(error.into()))?;
+        let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
         let source = Source::Resin { resin, overcure: self.overcure };
         Ok(Some(Exposure { name: material.name, source }))
     }
 }
 
 fn read_times(path: &Path) -> anyhow::Result<ExposureTimes> {
-    let table = CsvTable::parse(&read_text(path, LARGEST_TABLE, "a table of exposure times")?)?;
+    let table = CsvTable::parse(&read_text(path, MAX_TABLE_BYTES, "a table of exposure times")?)?;
     Ok(ExposureTimes::new(&table)?)
 }
 
 impl Exposure {
-    /// How long a layer is exposed, to the microsecond, as people read it.
-    pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, CommandError> {
+    /// Returns the exposure time of a layer, rounded to the microsecond.
+    pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, Exit> {
         let thickness = thickness.to_whole_nm();
         let time = match &self.source {
             Source::Resin { resin, overcure } => {
@@ -116,23 +116,23 @@ impl Exposure {
         Ok(ExposureTime::from_ms((time.ms() * 1000.0).round() / 1000.0))
     }
 
-    /// The gray level of each depth in layers of one thickness.
+    /// Returns the gray level of each depth in layers of one thickness.
     ///
     /// # Errors
     /// Where the resin does not say them; a table of times never does.
-    pub(crate) fn levels(&self, thickness: Length) -> Result<DepthLevels, CommandError> {
+    pub(crate) fn levels(&self, thickness: Length) -> Result<DepthLevels, Exit> {
         let Source::Resin { resin, .. } = &self.source else {
             return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
         };
         resin.depth_levels(self.time(thickness)?).map_err(|error| self.failed(error.into()))
     }
 
-    fn failed(&self, error: anyhow::Error) -> CommandError {
-        CommandError::Failed(error).at(self.name.clone())
+    fn failed(&self, error: anyhow::Error) -> Exit {
+        Exit::Failed(error).at(self.name.clone())
     }
 }
 
-/// Parses how many layers deep white cures.
+/// Parses the depth that white cures, in layers.
 fn parse_overcure(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(layers) if (0.1..=100.0).contains(&layers) => Ok(layers),

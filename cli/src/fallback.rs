@@ -8,7 +8,8 @@ use anyhow::anyhow;
 use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, Length, PageInfo};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
+use crate::options::ranges;
 use crate::slicing_options::SlicingOptions;
 use crate::streams::input_name;
 
@@ -26,7 +27,7 @@ const SAME_BOX: f64 = 1e-3;
 /// transitions in an STL than on the surfaces it was made of.
 const TURNING_ROWS: usize = 4;
 
-/// A part's layers, those with gaps bridged where there is a fallback.
+/// A part's layers, with gaps bridged if there is a fallback.
 pub(crate) struct Bridged {
     pub(crate) slices: Slices,
     fallback: Option<Fallback>,
@@ -47,7 +48,7 @@ impl Bridged {
         fallback: Option<&Path>,
         options: &SlicingOptions,
         layers: Option<Range<u32>>,
-    ) -> Result<Self, CommandError> {
+    ) -> Result<Self, Exit> {
         let open = |path: &Path| {
             let opened = Fallback::open(path, &slices, options, layers);
             opened.map_err(|error| error.at(input_name(path)))
@@ -93,7 +94,7 @@ impl Fallback {
         slices: &Slices,
         options: &SlicingOptions,
         layers: Option<Range<u32>>,
-    ) -> Result<Self, CommandError> {
+    ) -> Result<Self, Exit> {
         let grid = slices.grid();
         let brep = &options.solid.brep;
         let opening = brep.reader.for_opening(brep.tolerance(options.dpi));
@@ -105,14 +106,12 @@ impl Fallback {
             ..options.for_slicing()
         };
         let other = |what: String| {
-            CommandError::Failed(anyhow!(
-                "it is not the same part as the STEP file: its box {what}"
-            ))
+            Exit::Failed(anyhow!("it is not the same part as the STEP file: its box {what}"))
         };
         let fallback =
             Slices::new(Part::open(path, &opening)?, &options).map_err(|error| match error {
                 SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
-                error => CommandError::from(error),
+                error => Exit::from(error),
             })?;
         let ([low, high], others) = (slices.box_mm(), fallback.box_mm());
         let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
@@ -177,15 +176,4 @@ fn transitions(image: &Image) -> Vec<usize> {
             gray.rows().map(of_row).collect()
         }
     }
-}
-
-/// Formats numbers in order, with consecutive ones as ranges.
-fn ranges(numbers: &[u32]) -> String {
-    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
-    let text = |run: &[u32]| match run {
-        [one] => one.to_string(),
-        [first, .., last] => format!("{first} to {last}"),
-        [] => String::new(),
-    };
-    runs.map(text).collect::<Vec<_>>().join(", ")
 }

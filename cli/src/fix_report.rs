@@ -1,4 +1,4 @@
-//! What `fix` found and did, as JSON, and where it was.
+//! Reports the bands that `fix` found, as JSON and by their place in the part.
 
 use std::ops::Range;
 use std::path::Path;
@@ -7,11 +7,11 @@ use lamp_postprocess::{Band, BandKind, BandOutcome, FixOptions, Fixed};
 use lamp_stack::Layer;
 use serde::Serialize;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::json_report::{JsonReport, to_nm};
 use crate::pixel_location::{PixelLocation, millimetres};
 
-/// Collects what is found.
+/// The bands of a run of `fix`.
 pub(crate) struct FixReport {
     options: FixOptions,
     bands: Vec<BandLine>,
@@ -60,7 +60,7 @@ impl FixReport {
         Self { options, bands: Vec::new(), corrected: 0, pixels: 0 }
     }
 
-    /// Adds what was found in a layer.
+    /// Adds the bands of a layer.
     pub(crate) fn add(&mut self, fixed: &Fixed<'_>) {
         for band in fixed.bands {
             if band.outcome == BandOutcome::Corrected {
@@ -71,13 +71,13 @@ impl FixReport {
         }
     }
 
-    /// How many bands were left as they are.
+    /// Returns how many bands were left as they are.
     pub(crate) fn left(&self) -> usize {
         self.bands.len() - self.corrected
     }
 
     /// Writes the report.
-    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), CommandError> {
+    pub(crate) fn write(&self, layers: usize, path: &Path) -> Result<(), Exit> {
         let head = Head {
             method: self.options.method.name(),
             max_width: self.options.max_width,

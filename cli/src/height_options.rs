@@ -1,4 +1,4 @@
-//! How thick each layer is, as options say.
+//! Options of adaptive layer heights, and the search that they ask for.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,17 +13,17 @@ use lamp_slicer::{FacetIndex, Fill};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::exposure::Exposure;
 use crate::options::{one_of, parse_thickness};
 use crate::recorded::optional;
 
 pub(crate) const HEADING: &str = "Adaptive layer heights";
 
-/// Rows so many pixels apart are enough: `docs/heights.md` has what that changes.
+/// Pixels between measured rows: `docs/heights.md` shows what a smaller distance changes.
 const PIXELS_PER_ROW: f64 = 4.0;
 
-/// Options that say how thick each layer may be.
+/// Options of adaptive heights.
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct HeightOptions {
@@ -96,7 +96,7 @@ pub(crate) struct FoundHeights {
     pub(crate) heights: Heights,
 }
 
-/// What is measured of a layer, and in which unit.
+/// The measure of a layer's error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Measure {
     Volume,
@@ -133,13 +133,13 @@ impl FoundHeights {
         format!("{} {}", self.measure, self.measure.text(self.bound))
     }
 
-    /// How many layers are farther off.
+    /// Returns how many layers exceed the bound.
     pub(crate) fn past(&self, heights: &Heights) -> usize {
         let is_past = |slab: &&Slab| self.measure.criterion().measure(slab) > self.bound;
         heights.slabs.iter().filter(is_past).count()
     }
 
-    /// Tells of rows that told nothing, or too little.
+    /// Warns of rows that could not be measured.
     pub(crate) fn warn(&self, say: &dyn Fn(&str)) {
         let left_out = self.heights.slabs.iter().filter(|slab| slab.rows_left_out > 0);
         let (layers, rows) = left_out.fold((0, 0), |(layers, rows), slab| {
@@ -165,31 +165,26 @@ impl HeightOptions {
         self.min.unwrap_or(Length::from_um(25.0))
     }
 
-    /// The part as rows see it.
-    pub(crate) fn part(
-        &self,
-        body: FacetIndex,
-        dpi: Dpi,
-        fill: Fill,
-    ) -> Result<LayeredPart, CommandError> {
+    /// Returns the part as measured along rows.
+    pub(crate) fn part(&self, body: FacetIndex, dpi: Dpi, fill: Fill) -> Result<LayeredPart, Exit> {
         let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
         let part = LayeredPart::new(body, self.row_pitch.unwrap_or(pitch), fill);
-        part.map_err(|error| CommandError::Failed(error.into()))
+        part.map_err(|error| Exit::Failed(error.into()))
     }
 
-    /// Whether a budget decides the bound.
+    /// Returns whether a budget decides the bound.
     pub(crate) fn has_budget(&self) -> bool {
         self.layers_budget.is_some() || self.time_budget.is_some()
     }
 
-    /// What the machine builds.
-    fn thicknesses(&self) -> Result<Thicknesses, CommandError> {
+    /// Returns the thicknesses that the machine builds.
+    fn thicknesses(&self) -> Result<Thicknesses, Exit> {
         let step = self.step.unwrap_or(Length::from_um(1.0));
-        Thicknesses::new(self.min(), self.max(), step).map_err(CommandError::wrong_options)
+        Thicknesses::new(self.min(), self.max(), step).map_err(Exit::wrong_options)
     }
 
     /// Checks, before the work, what the parser cannot.
-    pub(crate) fn check(&self, exposure: Option<&Exposure>) -> Result<(), CommandError> {
+    pub(crate) fn check(&self, exposure: Option<&Exposure>) -> Result<(), Exit> {
         self.thicknesses()?;
         self.measure()?;
         if self.time_budget.is_some() {
@@ -198,13 +193,13 @@ impl HeightOptions {
         Ok(())
     }
 
-    fn measure(&self) -> Result<Measure, CommandError> {
+    fn measure(&self) -> Result<Measure, Exit> {
         let default = if self.cusp.is_some() { Measure::Cusp } else { Measure::Volume };
         let criterion = self.criterion.unwrap_or(default);
         match (criterion == Measure::Cusp, self.cusp.is_some()) {
-            (false, true) => Err(CommandError::usage("--cusp needs --criterion cusp")),
+            (false, true) => Err(Exit::usage("--cusp needs --criterion cusp")),
             (true, false) if self.deviation.is_some() || !self.has_budget() => {
-                Err(CommandError::usage("--criterion cusp needs a bound, as --cusp 10um"))
+                Err(Exit::usage("--criterion cusp needs a bound, as --cusp 10um"))
             }
             _ => Ok(criterion),
         }
@@ -215,12 +210,12 @@ impl HeightOptions {
         &self,
         part: &LayeredPart,
         exposure: Option<&Exposure>,
-    ) -> Result<FoundHeights, CommandError> {
+    ) -> Result<FoundHeights, Exit> {
         let thicknesses = self.thicknesses()?;
         let measure = self.measure()?;
         let criterion = measure.criterion();
         let search = HeightSearch { part, thicknesses: &thicknesses, criterion, snap: self.snap };
-        let failed = |error: HeightsError| CommandError::Failed(error.into());
+        let failed = |error: HeightsError| Exit::Failed(error.into());
         let (bound, heights) = if let Some(layers) = self.layers_budget {
             search
                 .within_budget(|_| 1.0, layers.into())
@@ -244,11 +239,9 @@ impl HeightOptions {
     fn seconds_of_layers<'a>(
         &self,
         exposure: Option<&'a Exposure>,
-    ) -> Result<impl Fn(Length) -> f64 + use<'a>, CommandError> {
+    ) -> Result<impl Fn(Length) -> f64 + use<'a>, Exit> {
         let exposure = exposure.ok_or_else(|| {
-            CommandError::usage(
-                "--time-budget needs exposures: give --material or --exposure-table",
-            )
+            Exit::usage("--time-budget needs exposures: give --material or --exposure-table")
         })?;
         // What holds for the limits holds between them.
         exposure.time(self.min())?;
@@ -260,15 +253,15 @@ impl HeightOptions {
         })
     }
 
-    /// How many seconds each layer takes besides its exposure.
+    /// Returns the seconds that each layer takes besides its exposure.
     pub(crate) fn overhead(&self) -> f64 {
         self.layer_overhead.map_or(0.0, |Seconds(seconds)| seconds)
     }
 }
 
 /// Describes a budget that is too small, in its unit.
-fn over(error: HeightsError, say: impl Fn(f64) -> String) -> CommandError {
-    CommandError::Failed(match error {
+fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Exit {
+    Exit::Failed(match error {
         HeightsError::Budget { least, budget } => {
             let [least, budget] = [least, budget].map(say);
             anyhow::anyhow!(
@@ -280,12 +273,12 @@ fn over(error: HeightsError, say: impl Fn(f64) -> String) -> CommandError {
     })
 }
 
-/// To three digits, as tables of heights say numbers.
+/// Formats a number to three digits.
 pub(crate) fn significant(number: f64) -> String {
     format_significant(number, 3)
 }
 
-/// A time in the unit that people would say it in.
+/// Formats a time in seconds, minutes or hours.
 pub(crate) fn time_text(seconds: f64) -> String {
     let (number, unit) = match seconds {
         ..200.0 => (seconds, "s"),

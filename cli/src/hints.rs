@@ -14,34 +14,19 @@ use lamp_stack::{CatalogueError, Length};
 
 /// Returns what to try about an error, to stand after its message.
 pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
-    if let Some(error) = error.downcast_ref() {
-        return heights(error);
-    }
-    if let Some(error) = error.downcast_ref() {
-        return tile(error);
-    }
-    if let Some(error) = error.downcast_ref() {
-        return layout(error);
-    }
-    if let Some(error) = error.downcast_ref() {
-        return edit(error);
-    }
-    if let Some(error) = error.downcast_ref() {
-        return machine_limit(error);
-    }
-    if let Some(DataError::NoLight) = error.downcast_ref() {
-        return Some("give --intensity, as 1.6W/cm2".to_owned());
-    }
-    if let Some(error) = error.downcast_ref::<CatalogueError<MaterialError>>() {
-        return catalogue(error);
-    }
-    if let Some(error) = error.downcast_ref::<CatalogueError<MachineError>>() {
-        return catalogue(error);
-    }
-    if let Some(error) = error.downcast_ref() {
-        return slicing(error);
-    }
-    None
+    let catalogued = || {
+        let material = error.downcast_ref::<CatalogueError<MaterialError>>();
+        let machine = error.downcast_ref::<CatalogueError<MachineError>>();
+        material.and_then(catalogue).or_else(|| machine.and_then(catalogue))
+    };
+    let hint = error.downcast_ref().and_then(slicing);
+    hint.or_else(|| error.downcast_ref().and_then(heights))
+        .or_else(|| error.downcast_ref().and_then(tile))
+        .or_else(|| error.downcast_ref().and_then(layout))
+        .or_else(|| error.downcast_ref().and_then(edit))
+        .or_else(|| error.downcast_ref().and_then(machine_limit))
+        .or_else(|| error.downcast_ref().and_then(data))
+        .or_else(catalogued)
 }
 
 fn slicing(error: &SliceError) -> Option<String> {
@@ -151,6 +136,7 @@ fn edit(error: &EditError) -> Option<String> {
     };
     Some(hint.to_owned())
 }
+
 fn machine_limit(error: &MachineLimit) -> Option<String> {
     let option = match error {
         MachineLimit::Dpi { .. } => "--dpi",
@@ -158,6 +144,13 @@ fn machine_limit(error: &MachineLimit) -> Option<String> {
         _ => return None,
     };
     Some(format!("slice it with such a {option}, or give --area instead of --machine"))
+}
+
+fn data(error: &DataError) -> Option<String> {
+    match error {
+        DataError::NoLight => Some("give --intensity, as 1.6W/cm2".to_owned()),
+        _ => None,
+    }
 }
 
 fn catalogue<F>(error: &CatalogueError<F>) -> Option<String> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::streams::write_file;
 
 /// A JSON object that is being written: first some fields, then lists.
@@ -30,7 +30,7 @@ impl JsonReport {
     }
 
     /// Ends the report and writes it to a file.
-    pub(crate) fn write(self, path: &Path) -> Result<(), CommandError> {
+    pub(crate) fn write(self, path: &Path) -> Result<(), Exit> {
         write_file(path, |out| writeln!(out, "{}}}", self.0))
     }
 }

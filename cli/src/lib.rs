@@ -1,5 +1,4 @@
-//! The commands. Each parses its options, calls one library function and
-//! reports.
+//! The command line. Each command parses its options, calls one library function and reports.
 //!
 //! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` are the
 //! same code under the names of the pipeline.
@@ -9,7 +8,7 @@ mod catalogue;
 mod commands;
 mod compensate_report;
 mod cured_section;
-mod error;
+mod exit;
 mod exposure;
 mod fallback;
 mod fix_report;
@@ -37,7 +36,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser};
 
 use commands::Command;
-use error::CommandError;
+use exit::Exit;
 use options::Common;
 use progress::say;
 use signals::{clean_up_on_signals, wait_if_ending};
@@ -59,12 +58,14 @@ Examples:
   lamp info build.tif
   lamp show build.tif --layer 600 --scale 1/8 -o layer.png
 
-slice, fix, dither and tile stand for lamp slice, lamp fix, lamp dither and lamp tile.";
+slice, fix, dither and tile are short for lamp slice, lamp fix, lamp dither and lamp tile.";
 
 /// Runs `lamp` with the process's arguments.
 pub fn run_lamp() -> ExitCode {
-    let Lamp { command, common } = Lamp::parse();
-    finish(command.name(), run(&command, &common))
+    let matches = Lamp::command().get_matches();
+    let parsed = Lamp::from_arg_matches(&matches);
+    let Lamp { command, common } = parsed.unwrap_or_else(|error| error.exit());
+    finish(matches.subcommand_name().unwrap_or_default(), run(&command, &common))
 }
 
 /// Runs one of the pipeline's stages with the process's arguments.
@@ -83,7 +84,7 @@ pub fn run_stage(name: &str) -> ExitCode {
     finish(name, run(&command, &common))
 }
 
-fn run(command: &Command, common: &Common) -> Result<ExitCode, CommandError> {
+fn run(command: &Command, common: &Common) -> Result<ExitCode, Exit> {
     keep_freed_memory();
     clean_up_on_signals()?;
     #[cfg(feature = "occt")]
@@ -102,8 +103,8 @@ fn keep_freed_memory() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(16 << 20)));
 }
 
-/// Says in one sentence why a command stopped, and turns it into a status.
-fn finish(name: &str, result: Result<ExitCode, CommandError>) -> ExitCode {
+/// Prints why a command exits early, and returns its status.
+fn finish(name: &str, result: Result<ExitCode, Exit>) -> ExitCode {
     wait_if_ending();
     match result {
         Err(error) if !error.is_reader_gone() => {

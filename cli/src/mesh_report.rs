@@ -1,5 +1,5 @@
-//! The report of what is wrong with a mesh, as `slice --report` writes it: one
-//! JSON object, with an edge or a band on each line.
+//! Writes the report of `slice --report`: the faulty edges of a mesh, and the bands of rows they
+//! leave.
 
 use std::path::Path;
 
@@ -7,10 +7,10 @@ use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
 use lamp_stack::{Dpi, PageInfo};
 use serde::Serialize;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::json_report::{JsonReport, to_nm};
 
-/// What is counted while the layers pass.
+/// Counts of layers and stray rows.
 #[derive(Clone, Copy, Default, Serialize)]
 pub(crate) struct Counts {
     pub(crate) layers: usize,
@@ -29,7 +29,7 @@ impl Counts {
     }
 }
 
-/// What the report is of.
+/// The head of the report: the part's files and the counts.
 #[derive(Serialize)]
 pub(crate) struct MeshReport<'a> {
     pub(crate) files: Vec<String>,
@@ -69,22 +69,17 @@ struct EndLine {
     edges: Vec<usize>,
 }
 
-/// Where the rows of the images lie.
+/// Position of the images' rows in the part.
 #[derive(Clone, Copy)]
 pub(crate) struct RowPositions {
-    /// The top of the first.
+    /// The top of the first row.
     pub(crate) top_mm: f64,
     pub(crate) dpi: Dpi,
 }
 
 impl MeshReport<'_> {
     /// Writes the report.
-    pub(crate) fn write(
-        &self,
-        trace: &Trace,
-        rows: RowPositions,
-        path: &Path,
-    ) -> Result<(), CommandError> {
+    pub(crate) fn write(&self, trace: &Trace, rows: RowPositions, path: &Path) -> Result<(), Exit> {
         let bands = trace.bands.iter().map(|band| band_line(band, rows));
         JsonReport::new(self)
             .list("edges", trace.edges.iter().enumerate().map(edge_line))

@@ -6,7 +6,7 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, anyhow};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 
 /// Set in the environment of the process that does the work.
 const MARK: &str = "LAMP_SUPERVISED";
@@ -14,7 +14,7 @@ const MARK: &str = "LAMP_SUPERVISED";
 /// Runs this command once more, as a child that ends with this process, and returns
 /// its status; nothing where this is the child, or OpenCASCADE is not asked for. A
 /// child that crashes is a failure as any other: it has not written anything.
-pub(crate) fn supervised() -> Result<Option<ExitCode>, CommandError> {
+pub(crate) fn supervised() -> Result<Option<ExitCode>, Exit> {
     if env::var_os(MARK).is_some() {
         let signal = Some(rustix::process::Signal::TERM);
         rustix::process::set_parent_process_death_signal(signal)
@@ -31,7 +31,7 @@ pub(crate) fn supervised() -> Result<Option<ExitCode>, CommandError> {
     let status = status.context("a process for OpenCASCADE")?;
     match status.code() {
         Some(code) => Ok(Some(ExitCode::from(u8::try_from(code).unwrap_or(1)))),
-        None => Err(CommandError::Failed(anyhow!(
+        None => Err(Exit::Failed(anyhow!(
             "OpenCASCADE failed ({status}), as it does on some broken files: try --kernel lamp"
         ))),
     }

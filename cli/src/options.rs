@@ -1,4 +1,4 @@
-//! Options that several commands share, and the values people write in them.
+//! Options that several commands share, and parsers of their values.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::{Length, LengthError, Named};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 
 /// Options of every command.
 #[derive(Args, Clone, Debug)]
@@ -25,11 +25,11 @@ pub(crate) struct Common {
 
 impl Common {
     /// Sets up the threads. To be called once.
-    pub(crate) fn apply(&self) -> Result<(), CommandError> {
+    pub(crate) fn apply(&self) -> Result<(), Exit> {
         // Zero lets the pool choose.
         let threads = self.threads.unwrap_or(0);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-        pool.map_err(|error| CommandError::Failed(anyhow::Error::new(error)))
+        pool.map_err(|error| Exit::Failed(anyhow::Error::new(error)))
     }
 }
 
@@ -161,9 +161,25 @@ fn parse_bytes(text: &str) -> Result<u64, String> {
     }
 }
 
+/// Formats numbers in order, those that follow each other as ranges: `3, 7-9`.
+pub(crate) fn ranges(rows: &[u32]) -> String {
+    let text = |run: &[u32]| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        _ => run[0].to_string(),
+    };
+    let runs = rows.chunk_by(|a, b| a.checked_add(1) == Some(*b));
+    runs.map(text).collect::<Vec<_>>().join(", ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_that_touch_are_one_range() {
+        assert_eq!(ranges(&[3, 7, 8, 9, 11, 12]), "3, 7-9, 11-12");
+        assert_eq!(ranges(&[u32::MAX]), u32::MAX.to_string());
+    }
 
     #[test]
     fn ranges_of_layers() {

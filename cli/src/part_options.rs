@@ -9,7 +9,7 @@ use lamp_slicer::{FacetIndex, Fill, OpenOptions, Part, Placement, SliceError, Un
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::one_of;
 use crate::placement::PlacementOptions;
 use crate::recorded::text;
@@ -51,15 +51,9 @@ impl PartOptions {
     }
 
     /// Opens all files of a part.
-    pub(crate) fn open(
-        &self,
-        paths: &[PathBuf],
-        reading: &Reading<'_>,
-    ) -> Result<Part, CommandError> {
+    pub(crate) fn open(&self, paths: &[PathBuf], reading: &Reading<'_>) -> Result<Part, Exit> {
         if paths.iter().filter(|path| is_stream(path)).count() > 1 {
-            return Err(CommandError::usage(
-                "standard input can be read only once: give - for one part",
-            ));
+            return Err(Exit::usage("standard input can be read only once: give - for one part"));
         }
         let open = |path: &PathBuf| {
             self.open_one(path, reading).map_err(|error| error.at(input_name(path)))
@@ -67,7 +61,7 @@ impl PartOptions {
         Ok(Part::joined(paths.iter().map(open).collect::<Result<_, _>>()?))
     }
 
-    fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Part, CommandError> {
+    fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Part, Exit> {
         let tolerance = self.brep.tolerance(reading.dpi);
         let options = OpenOptions {
             allow_gaps: reading.may_be_open,
@@ -89,10 +83,10 @@ impl PartOptions {
         prepared: &Prepared,
         tolerance: Length,
         reading: &Reading<'_>,
-    ) -> Result<(), CommandError> {
+    ) -> Result<(), Exit> {
         if self.units == Units::Inches {
             let why = "a STEP file states its own unit: leave out --units";
-            return Err(CommandError::usage(why));
+            return Err(Exit::usage(why));
         }
         if tolerance.um() > reading.dpi.pitch().um() {
             (reading.say)(&format!(
@@ -121,8 +115,8 @@ pub(crate) struct Reading<'a> {
     pub(crate) say: &'a dyn Fn(&str),
 }
 
-/// Puts before a message the file whose facet it is about, or all files.
-pub(crate) fn at_part(error: CommandError, paths: &[PathBuf]) -> CommandError {
+/// Puts the name of the faulty facet's file, or of all files, before a message.
+pub(crate) fn at_part(error: Exit, paths: &[PathBuf]) -> Exit {
     let place = match error.cause() {
         Some(&SliceError::NotFinite { file, .. }) => input_name(&paths[file]),
         _ => name_of_all(paths),

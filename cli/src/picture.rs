@@ -1,4 +1,4 @@
-//! Layers as PNG pictures.
+//! Draws layers as PNG pictures.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use lamp_stack::{Image, gray_runs, white_runs, write_gray_png};
 
-/// A part of an image, in pixels.
+/// A rectangle of an image, in pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Region {
     pub(crate) columns: Range<u32>,
@@ -19,7 +19,7 @@ impl Region {
         Self { columns: 0..image.width(), rows: 0..image.height() }
     }
 
-    /// The least region that holds everything but black.
+    /// Returns the smallest region that contains all but black.
     pub(crate) fn of_content(image: &Image) -> Option<Self> {
         let runs = || (0..).zip(runs_of_rows(image)).filter(|(_, runs)| !runs.is_empty());
         let rows = runs().next()?.0..runs().last()?.0 + 1;
@@ -28,13 +28,13 @@ impl Region {
         Some(Self { columns: left..right, rows })
     }
 
-    /// The least region that holds both.
+    /// Returns the smallest region that contains both.
     pub(crate) fn joined(self, other: Self) -> Self {
         let join = |a: Range<u32>, b: Range<u32>| a.start.min(b.start)..a.end.max(b.end);
         Self { columns: join(self.columns, other.columns), rows: join(self.rows, other.rows) }
     }
 
-    /// The part that lies on the image; `None` where nothing does.
+    /// Returns the part of the region that lies on the image, if any.
     pub(crate) fn on(&self, image: &Image) -> Option<Self> {
         let columns = self.columns.start..self.columns.end.min(image.width());
         let rows = self.rows.start..self.rows.end.min(image.height());
@@ -95,7 +95,7 @@ impl FromStr for PictureScale {
     }
 }
 
-/// Rows of gray pixels, and how many there are of what width.
+/// A gray picture, made row by row.
 pub(crate) struct Picture<'a> {
     pub(crate) width: u32,
     pub(crate) height: u32,

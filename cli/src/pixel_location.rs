@@ -1,10 +1,10 @@
-//! Where pixels lie in the part.
+//! Converts pixels to part coordinates.
 
 use std::ops::Range;
 
 use lamp_stack::Layer;
 
-/// Where the pixels of a layer lie, if its page says so.
+/// Position of a layer's pixels in the part.
 #[derive(Clone, Copy)]
 pub(crate) struct PixelLocation {
     left_mm: f64,
@@ -18,7 +18,7 @@ impl PixelLocation {
         Some(Self { left_mm, top_mm, pitch_mm: layer.dpi?.pitch().mm() })
     }
 
-    /// From the lower edge of rows to their upper one.
+    /// Returns the y of the lower and upper edge of some rows.
     pub(crate) fn y_mm(self, rows: &Range<u32>) -> [f64; 2] {
         [rows.end, rows.start].map(|row| self.top_mm - f64::from(row) * self.pitch_mm)
     }
@@ -28,7 +28,7 @@ impl PixelLocation {
     }
 }
 
-/// Millimetres as people read them: `12.1-12.8`.
+/// Formats a range of millimetres: `12.1-12.8`.
 pub(crate) fn millimetres([low, high]: [f64; 2]) -> String {
     // Beside a minus a dash would read as another.
     if low < 0.0 { format!("{low:.1} to {high:.1}") } else { format!("{low:.1}-{high:.1}") }

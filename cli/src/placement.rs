@@ -1,4 +1,4 @@
-//! What is done to a part before it is sliced.
+//! Options that scale, mirror, rotate and move a part.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use crate::recorded::{list, optional};
 
 const HEADING: &str = "Placement of the part, in this order";
 
-/// Options that place a part.
+/// Options of a part's placement.
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct PlacementOptions {

@@ -1,10 +1,10 @@
-//! What a command says while it works, on standard error.
+//! Progress and messages on standard error.
 
 use std::io::{self, IsTerminal, Write};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Says things, and shows how far the work is.
+/// Prints messages and a progress bar.
 #[derive(Clone)]
 pub(crate) struct Progress {
     command: &'static str,
@@ -14,8 +14,8 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// A report with a bar, if somebody watches. Of the stages of a pipeline
-    /// only the last shows one (`is_last`): they share the terminal.
+    /// Returns progress with a bar if standard error is a terminal. Of the stages of a pipeline
+    /// only the last shows one (`is_last`), because they share the terminal.
     pub(crate) fn new(command: &'static str, quiet: bool, is_last: bool) -> Self {
         let watched = !quiet && is_last && io::stderr().is_terminal();
         let bar = ProgressBar::hidden();
@@ -24,7 +24,7 @@ impl Progress {
         Self { command, quiet, watched, bar }
     }
 
-    /// Tells how many layers there will be.
+    /// Sets the number of layers to expect.
     pub(crate) fn expect(&self, layers: u64) {
         self.bar.set_length(layers);
         self.bar.set_style(style("{prefix} {bar:40} layer {human_pos} of {human_len}, {eta} left"));
@@ -38,20 +38,20 @@ impl Progress {
         self.bar.inc(1);
     }
 
-    /// Says a line, unless quiet.
+    /// Prints a line, unless quiet.
     pub(crate) fn say(&self, line: &str) {
         if !self.quiet {
             self.bar.suspend(|| say(&format!("{}: {line}", self.command)));
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(crate) fn done(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// Writes a line to standard error. If nobody listens, the work goes on.
+/// Prints a line to standard error. A closed standard error does not stop the work.
 pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
 }

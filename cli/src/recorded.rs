@@ -11,39 +11,10 @@ use serde_json::{Map, Value};
 
 /// The options that decide the images, in the order in which they are recorded. Stacks made
 /// with other paths, or with less memory, are to have the same bytes: such options are left out.
-const RECORDED: [&str; 31] = [
-    "dpi",
-    "adaptive",
-    "min",
-    "max",
-    "step",
-    "criterion",
-    "deviation",
-    "cusp",
-    "layers-budget",
-    "time-budget",
-    "layer-overhead",
-    "row-pitch",
-    "snap",
-    "thickness",
-    "plane",
-    "units",
-    "fill",
-    "scale",
-    "mirror",
-    "rotate",
-    "translate",
-    "tolerance",
-    "kernel",
-    "no-polish",
-    "gray",
-    "material",
-    "overcure",
-    "exposure-table",
-    "origin",
-    "size",
-    "margin",
-];
+const RECORDED: &str = "\
+    dpi adaptive min max step criterion deviation cusp layers-budget time-budget layer-overhead \
+    row-pitch snap thickness plane units fill scale mirror rotate translate tolerance kernel \
+    no-polish gray material overcure exposure-table origin size margin";
 
 /// Returns the options as words: ` --dpi 1500 --snap` and so on, those for which `applies`
 /// holds.
@@ -54,7 +25,7 @@ pub(crate) fn to_words(options: &impl Serialize, applies: impl Fn(&str) -> bool)
         Value::String(value) => format!(" --{key} {value}"),
         _ => String::new(),
     };
-    RECORDED.into_iter().filter(|key| applies(key)).map(word).collect()
+    RECORDED.split(' ').filter(|key| applies(key)).map(word).collect()
 }
 
 /// Reads options from their words. Returns none if there are words of other options.
@@ -62,7 +33,7 @@ pub(crate) fn from_words<T: DeserializeOwned>(words: &str) -> Option<T> {
     let mut options = Map::new();
     let mut words = words.split_whitespace().peekable();
     while let Some(word) = words.next() {
-        let key = word.strip_prefix("--").filter(|key| RECORDED.contains(key))?;
+        let key = word.strip_prefix("--").filter(|key| RECORDED.split(' ').any(|it| it == *key))?;
         let value = words.next_if(|word| !word.starts_with("--"));
         options.insert(key.to_owned(), value.map_or(Value::Bool(true), Value::from));
     }

@@ -1,4 +1,4 @@
-//! What happens when somebody ends a command.
+//! Removes temporary files when a signal ends the command.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
@@ -7,7 +7,7 @@ use lamp_stack::remove_temporaries;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 
 static CAUGHT: AtomicBool = AtomicBool::new(false);
 
@@ -22,11 +22,11 @@ pub(crate) fn wait_if_ending() {
 /// Lets Ctrl-C, and the signals that end a batch, take temporary files away
 /// before the process ends, with status 128 + the signal's number, as shells
 /// have it. A signal that is ignored, as `nohup` arranges, stays so.
-pub(crate) fn clean_up_on_signals() -> Result<(), CommandError> {
+pub(crate) fn clean_up_on_signals() -> Result<(), Exit> {
     let ignored = ignored_signals();
     let wanted = [SIGHUP, SIGINT, SIGTERM];
     let wanted = wanted.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    let mut signals = Signals::new(wanted).map_err(|error| CommandError::Failed(error.into()))?;
+    let mut signals = Signals::new(wanted).map_err(|error| Exit::Failed(error.into()))?;
     thread::spawn(move || {
         if let Some(signal) = signals.forever().next() {
             CAUGHT.store(true, Relaxed);

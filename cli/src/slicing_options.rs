@@ -1,4 +1,4 @@
-//! What decides the images of a part.
+//! Options that decide the images of a part, and the command that stacks record.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use lamp_slicer::{GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOpt
 use lamp_stack::{Dpi, Layer, Length, Size};
 use serde::{Deserialize, Serialize};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
 use crate::height_options::{self, HeightOptions};
 use crate::options::{one_of, parse_thickness};
@@ -18,7 +18,7 @@ use crate::placement::Numbers;
 use crate::recorded::{from_words, optional, text, to_words};
 use crate::step_options::HEADING;
 
-/// What decides the images.
+/// Options that decide the images.
 #[derive(Args, Clone, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct SlicingOptions {
@@ -160,7 +160,7 @@ impl SlicingOptions {
         memory: Option<u64>,
         exposure: Option<Exposure>,
         say: &dyn Fn(&str),
-    ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), CommandError> {
+    ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Exit> {
         let heights = self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref(), say));
         let heights = heights.transpose()?;
         let shown = exposure.as_ref().filter(|_| self.gray);
@@ -189,13 +189,13 @@ impl SlicingOptions {
         Ok((slices, name_command))
     }
 
-    /// How thick each layer is to be; `say` is told what people should know of it.
+    /// Finds the layer heights; `say` prints notes on them.
     fn layer_heights(
         &self,
         model: &Part,
         exposure: Option<&Exposure>,
         say: &dyn Fn(&str),
-    ) -> Result<LayerHeights, CommandError> {
+    ) -> Result<LayerHeights, Exit> {
         let body = self.solid.body(model.clone())?;
         let part = self.heights.part(body, self.dpi, self.solid.fill)?;
         let found = self.heights.find(&part, exposure)?;
@@ -207,27 +207,27 @@ impl SlicingOptions {
         Ok(found.heights.layer_heights()?)
     }
 
-    /// The files that the options read.
+    /// Returns the files that the options name.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.exposure.files()
     }
 
-    /// How the layers are exposed, if that is known.
+    /// Returns the exposure of the layers, if one is given.
     ///
     /// # Errors
     /// Where options contradict each other, or the material cannot be read.
-    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, CommandError> {
+    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Exit> {
         let needs_top = [(self.gray, "--gray"), (self.adaptive, "--adaptive")];
         if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)
             && self.plane != PlaneRule::Top
         {
             let why = format!("{option} cuts layers at their tops: leave out --plane");
-            return Err(CommandError::usage(why));
+            return Err(Exit::usage(why));
         }
         if !self.adaptive
             && let Some(option) = to_words(&self.heights, |_| true).split_whitespace().next()
         {
-            return Err(CommandError::usage(format!("{option} needs --adaptive")));
+            return Err(Exit::usage(format!("{option} needs --adaptive")));
         }
         let exposure = self.exposure.exposure()?;
         if self.adaptive {
@@ -237,15 +237,14 @@ impl SlicingOptions {
     }
 }
 
-/// How much the table of crossings may take of the memory allowed: its lists
-/// double as they grow, and the rest is for the images on their way. More
-/// than 64 MiB would not make it faster.
+/// Returns the share of the allowed memory for the table of crossings: its lists double as they
+/// grow, and the rest is for images in progress. More than 64 MiB would not make it faster.
 fn table_memory(allowed: Option<u64>) -> u64 {
     let allowed = allowed.unwrap_or_else(|| machine_memory() / 4);
     (allowed / 4).min(64 << 20)
 }
 
-/// The machine's memory in bytes; 4 GiB where it does not say.
+/// Returns the machine's memory in bytes, or 4 GiB if it is unknown.
 fn machine_memory() -> u64 {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let total = text.lines().find_map(|line| line.strip_prefix("MemTotal:"));

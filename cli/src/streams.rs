@@ -1,4 +1,4 @@
-//! Where a stage's layers come from and go to.
+//! Reads and writes stacks: files, folders, pipes and what stands beside them.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
@@ -12,28 +12,28 @@ use lamp_stack::{
     write_stack,
 };
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::progress::Progress;
 
-/// Whether a path stands for standard input or output.
+/// Returns whether a path means standard input or output.
 pub(crate) fn is_stream(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// What people call an input.
+/// Returns the name of an input for messages.
 pub(crate) fn input_name(path: &Path) -> String {
     if is_stream(path) { "standard input".to_owned() } else { path.display().to_string() }
 }
 
-/// Prints a text that was asked for.
-pub(crate) fn print(text: &str) -> Result<(), CommandError> {
+/// Prints the result of a command to standard output.
+pub(crate) fn print(text: &str) -> Result<(), Exit> {
     let written = io::stdout().lock().write_all(text.as_bytes());
-    written.map_err(|error| CommandError::output(error, "standard output"))
+    written.map_err(|error| Exit::output(error, "standard output"))
 }
 
 /// Opens a stack's pages.
-pub(crate) fn open_pages(path: &Path) -> Result<Pages, CommandError> {
+pub(crate) fn open_pages(path: &Path) -> Result<Pages, Exit> {
     let pages = if is_stream(path) {
         refuse_terminal()?;
         widen_pipe(&io::stdin());
@@ -44,9 +44,9 @@ pub(crate) fn open_pages(path: &Path) -> Result<Pages, CommandError> {
     pages.map_err(|error| failed_at(input_name(path), error))
 }
 
-fn refuse_terminal() -> Result<(), CommandError> {
+fn refuse_terminal() -> Result<(), Exit> {
     if io::stdin().is_terminal() {
-        return Err(CommandError::usage(
+        return Err(Exit::usage(
             "no stack to read: name a file, or pipe one in (--help shows how)",
         ));
     }
@@ -54,7 +54,7 @@ fn refuse_terminal() -> Result<(), CommandError> {
 }
 
 /// Keeps standard input in a temporary file without a name, to be read twice.
-pub(crate) fn spool_stdin() -> Result<File, CommandError> {
+pub(crate) fn spool_stdin() -> Result<File, Exit> {
     refuse_terminal()?;
     widen_pipe(&io::stdin());
     let spool = || -> io::Result<File> {
@@ -65,21 +65,18 @@ pub(crate) fn spool_stdin() -> Result<File, CommandError> {
     Ok(spool().context("standard input, which is kept in a temporary file")?)
 }
 
-/// A failure to read, and where.
-pub(crate) fn failed_at(
-    place: impl Display + Send + Sync + 'static,
-    error: StackError,
-) -> CommandError {
-    CommandError::Failed(anyhow::Error::new(error).context(place))
+/// Returns a failure to read, with its place.
+pub(crate) fn failed_at(place: impl Display + Send + Sync + 'static, error: StackError) -> Exit {
+    Exit::Failed(anyhow::Error::new(error).context(place))
 }
 
-/// A report for a command that writes to `output`.
+/// Returns the progress of a command that writes to `output`.
 pub(crate) fn progress(command: &'static str, common: &Common, output: &Output) -> Progress {
     let last = !is_stream(&output.output) || io::stdout().is_terminal() || stdout_is_file();
     Progress::new(command, common.quiet, last)
 }
 
-/// Whether standard output goes to a file, so that no other stage follows.
+/// Returns whether standard output goes to a file, so that no stage follows.
 fn stdout_is_file() -> bool {
     #[cfg(unix)]
     {
@@ -89,7 +86,7 @@ fn stdout_is_file() -> bool {
     false
 }
 
-/// What the system knows of where standard output goes.
+/// Returns the metadata of the file or pipe behind standard output.
 #[cfg(unix)]
 fn stdout_metadata() -> Option<fs::Metadata> {
     use std::os::fd::AsFd;
@@ -101,7 +98,7 @@ fn stdout_metadata() -> Option<fs::Metadata> {
 pub(crate) fn read_layers(
     input: &Input,
     progress: &Progress,
-) -> Result<impl Iterator<Item = Result<Layer, CommandError>> + use<>, CommandError> {
+) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
     let progress = progress.clone();
     let name = input_name(&input.stack);
     let pages = read_pages(input)?.inspect(move |page| {
@@ -117,14 +114,14 @@ pub(crate) fn layers_of(
     pages: Pages,
     name: &str,
     layers: Option<Range<u32>>,
-) -> impl Iterator<Item = Result<Layer, CommandError>> + use<> {
+) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
     decoded(pages_of(pages, name.to_owned(), layers), name.to_owned())
 }
 
 fn decoded(
-    pages: impl Iterator<Item = Result<(Page, Option<StackInfo>), CommandError>>,
+    pages: impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>>,
     name: String,
-) -> impl Iterator<Item = Result<Layer, CommandError>> {
+) -> impl Iterator<Item = Result<Layer, Exit>> {
     map_in_order(pages, move |(page, stack): (Page, _)| {
         let mut layer = page.decode().map_err(|error| failed_at(name.clone(), error))?;
         layer.info.stack = stack;
@@ -135,7 +132,7 @@ fn decoded(
 /// Reads all layers of a stack that is used beside the first, decoded, in order.
 pub(crate) fn read_beside(
     path: &Path,
-) -> Result<impl Iterator<Item = Result<Layer, CommandError>> + use<>, CommandError> {
+) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
     let name = input_name(path);
     let failed = move |error| failed_at(name.clone(), error);
     let pages = open_pages(path)?.map({
@@ -145,14 +142,10 @@ pub(crate) fn read_beside(
     Ok(map_in_order(pages, move |page: Page| page.decode().map_err(&failed)))
 }
 
-/// Reads the pages of the layers wanted. What the first page says of the stack
-/// stands beside the first of them.
+/// Reads the pages of the wanted layers. The stack's own metadata goes with the first of them.
 pub(crate) fn read_pages(
     input: &Input,
-) -> Result<
-    impl Iterator<Item = Result<(Page, Option<StackInfo>), CommandError>> + use<>,
-    CommandError,
-> {
+) -> Result<impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>> + use<>, Exit> {
     let pages = open_pages(&input.stack)?;
     Ok(pages_of(pages, input_name(&input.stack), input.layers.clone()))
 }
@@ -161,7 +154,7 @@ fn pages_of(
     mut pages: Pages,
     name: String,
     layers: Option<Range<u32>>,
-) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), CommandError>> {
+) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>> {
     let mut stack: Option<StackInfo> = None;
     let mut found = false;
     std::iter::from_fn(move || {
@@ -183,45 +176,45 @@ fn pages_of(
             }
         }
         let none_found = layers.is_some() && !std::mem::replace(&mut found, true);
-        none_found.then(|| Err(CommandError::Failed(anyhow!("{name}: no layer is in that range"))))
+        none_found.then(|| Err(Exit::Failed(anyhow!("{name}: no layer is in that range"))))
     })
 }
 
 /// Writes layers where `output` says, counting them in `report`.
 pub(crate) fn write_layers(
-    layers: impl Iterator<Item = Result<Layer, CommandError>>,
+    layers: impl Iterator<Item = Result<Layer, Exit>>,
     output: &Output,
     progress: &Progress,
-) -> Result<(), CommandError> {
+) -> Result<(), Exit> {
     let to = destination(&output.output)?;
     let counted = layers.inspect(|_| progress.layer_done());
     let written = write_stack(counted, to, format(output.classic));
     written_to(&output.output, written, progress)
 }
 
-/// The shape of a TIFF.
+/// Returns the format of TIFFs to write.
 pub(crate) fn format(classic: bool) -> Format {
     if classic { Format::Classic } else { Format::Big }
 }
 
-/// Takes the bar away, and names the output where writing it failed.
+/// Removes the bar, and adds the output's name to a failure to write it.
 pub(crate) fn written_to(
     output: &Path,
-    written: Result<(), CommandError>,
+    written: Result<(), Exit>,
     progress: &Progress,
-) -> Result<(), CommandError> {
+) -> Result<(), Exit> {
     progress.done();
     written.map_err(|error| match error {
-        CommandError::Output(_) if is_stream(output) => error.at("standard output"),
-        CommandError::Output(_) => error.at(output.display().to_string()),
+        Exit::Output(_) if is_stream(output) => error.at("standard output"),
+        Exit::Output(_) => error.at(output.display().to_string()),
         error => error,
     })
 }
 
-fn destination(path: &Path) -> Result<Destination, CommandError> {
+fn destination(path: &Path) -> Result<Destination, Exit> {
     if is_stream(path) {
         if io::stdout().is_terminal() {
-            return Err(CommandError::usage(
+            return Err(Exit::usage(
                 "a stack is not for terminals: name a file with -o, or pipe it on",
             ));
         }
@@ -232,7 +225,7 @@ fn destination(path: &Path) -> Result<Destination, CommandError> {
         return Ok(Destination::Folder(folder_to_make(path)?.to_owned()));
     }
     if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) {
-        return Err(CommandError::usage(format!(
+        return Err(Exit::usage(format!(
             "{}: a stack is a TIFF; lamp convert turns it into PNGs",
             path.display()
         )));
@@ -243,51 +236,47 @@ fn destination(path: &Path) -> Result<Destination, CommandError> {
     })
 }
 
-/// Whether an output is to be a folder.
+/// Returns whether an output names a folder.
 pub(crate) fn is_folder(path: &Path) -> bool {
     path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir()
 }
 
-/// Checks that a folder can be made of that name.
-pub(crate) fn folder_to_make(path: &Path) -> Result<&Path, CommandError> {
+/// Returns the path if a folder can have that name.
+pub(crate) fn folder_to_make(path: &Path) -> Result<&Path, Exit> {
     match path.file_name() {
         Some(_) if !is_stream(path) => Ok(path),
-        _ => Err(CommandError::usage(format!("{}: name the folder to write to", path.display()))),
+        _ => Err(Exit::usage(format!("{}: name the folder to write to", path.display()))),
     }
 }
 
-/// Checks, before the work, that what is written beside the stack can be: that
-/// its folder is there, and that it is neither the stack nor an input.
+/// Checks, before the work, that a file can be written beside the stack: its folder exists, and it
+/// is neither the stack nor an input.
 pub(crate) fn check_beside<'a>(
     beside: &Path,
     stack: &Path,
     inputs: impl IntoIterator<Item = &'a PathBuf>,
-) -> Result<(), CommandError> {
+) -> Result<(), Exit> {
     let folder = match beside.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
     if !folder.is_dir() {
         let (beside, folder) = (beside.display(), folder.display());
-        return Err(CommandError::Failed(anyhow!("{beside}: there is no folder {folder}")));
+        return Err(Exit::Failed(anyhow!("{beside}: there is no folder {folder}")));
     }
     if is_same(beside, stack) || (is_stream(stack) && is_stdout(beside)) {
-        return Err(CommandError::usage(format!(
-            "{}: the stack is written there",
-            beside.display()
-        )));
+        return Err(Exit::usage(format!("{}: the stack is written there", beside.display())));
     }
     check_not_input(beside, inputs)
 }
 
-/// Checks, before the work, that what is written does not take the place of an
-/// input.
+/// Checks, before the work, that an output does not replace an input.
 pub(crate) fn check_not_input<'a>(
     output: &Path,
     inputs: impl IntoIterator<Item = &'a PathBuf>,
-) -> Result<(), CommandError> {
+) -> Result<(), Exit> {
     match inputs.into_iter().find(|input| is_same(output, input)) {
-        Some(_) => Err(CommandError::usage(format!("{}: that is an input", output.display()))),
+        Some(_) => Err(Exit::usage(format!("{}: that is an input", output.display()))),
         None => Ok(()),
     }
 }
@@ -296,7 +285,7 @@ fn is_same(path: &Path, other: &Path) -> bool {
     !is_stream(path) && !is_stream(other) && place_of(other) == place_of(path)
 }
 
-/// A name that two paths to one place share, be there a file yet or not.
+/// Returns a path that two names of one file share, whether it exists yet or not.
 fn place_of(path: &Path) -> Option<PathBuf> {
     let folder = path.parent().filter(|folder| *folder != Path::new(""));
     let absent =
@@ -304,7 +293,7 @@ fn place_of(path: &Path) -> Option<PathBuf> {
     fs::canonicalize(path).ok().or_else(absent)
 }
 
-/// Whether standard output goes to that file.
+/// Returns whether standard output goes to that file.
 fn is_stdout(path: &Path) -> bool {
     #[cfg(unix)]
     {
@@ -331,9 +320,8 @@ fn widen_pipe(end: &impl std::os::fd::AsFd) {
 #[cfg(not(target_os = "linux"))]
 fn widen_pipe<T>(_: &T) {}
 
-/// Opens what stands at `path` if that is no file: a pipe or a device is
-/// written to, not replaced.
-fn open_device(path: &Path) -> Result<Option<File>, CommandError> {
+/// Opens `path` if it is a pipe or a device, which is written to and not replaced.
+fn open_device(path: &Path) -> Result<Option<File>, Exit> {
     match fs::metadata(path) {
         Ok(metadata) if !metadata.is_file() => {
             let device = OpenOptions::new().write(true).open(path);
@@ -343,7 +331,7 @@ fn open_device(path: &Path) -> Result<Option<File>, CommandError> {
     }
 }
 
-/// The file that a link stands for: it is to be replaced, not the link.
+/// Returns the file behind a link, so that it is replaced and not the link.
 fn behind_links(path: &Path) -> PathBuf {
     fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
 }
@@ -352,11 +340,10 @@ fn behind_links(path: &Path) -> PathBuf {
 pub(crate) fn write_file(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), CommandError> {
+) -> Result<(), Exit> {
     if let Some(mut device) = open_device(path)? {
         let written = write(&mut device);
-        return written
-            .map_err(|error| CommandError::Output(error.into()).at(path.display().to_string()));
+        return written.map_err(|error| Exit::Output(error.into()).at(path.display().to_string()));
     }
     let path = &behind_links(path);
     let whole = || -> io::Result<()> {

@@ -1,3 +1,5 @@
+//! `lamp brep`: describes a STEP part and checks that it can be sliced.
+
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -6,7 +8,7 @@ use lamp_slicer::brep::{Body, BodyReport, Prepared};
 use lamp_slicer::{SliceError, body_name, read_step};
 use lamp_stack::Dpi;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::step_options::{BrepOptions, bytes_of, length, notes};
 use crate::streams::{input_name, print};
 
@@ -37,19 +39,16 @@ pub(crate) struct BrepArgs {
     strict: bool,
 }
 
-pub(crate) fn run(args: &BrepArgs) -> Result<(), CommandError> {
+pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
     let name = input_name(&args.part);
     let options = args.brep.reader.for_opening(args.brep.tolerance(args.dpi));
     let read = || read_step(bytes_of(&args.part)?, &options);
-    let prepared =
-        read().map_err(|error: SliceError| CommandError::from(error).at(name.clone()))?;
+    let prepared = read().map_err(|error: SliceError| Exit::from(error).at(name.clone()))?;
     print(&text(&name, &prepared))?;
     let refused = prepared.reports.iter().filter(|report| !report.faults.is_empty()).count();
     if args.strict && refused > 0 {
         let bodies = if refused == 1 { "body" } else { "bodies" };
-        return Err(CommandError::Findings(format!(
-            "{name}: {refused} {bodies} would not be sliced"
-        )));
+        return Err(Exit::Findings(format!("{name}: {refused} {bodies} would not be sliced")));
     }
     Ok(())
 }
@@ -102,7 +101,7 @@ fn body_text(number: usize, body: &Body, report: &BodyReport, prepared: &Prepare
     )
 }
 
-/// How many faces a body has of each kind, the most frequent first.
+/// Lists the number of faces of each kind, the most frequent first.
 fn faces(body: &Body, prepared: &Prepared) -> String {
     let mut kinds: Vec<(&str, usize)> = Vec::new();
     for face in body.faces.clone() {

@@ -1,3 +1,5 @@
+//! `lamp compensate`: moves edges by the cure width, and enlarges images for shrinkage.
+
 use std::path::PathBuf;
 
 use anyhow::anyhow;
@@ -9,7 +11,7 @@ use lamp_stack::{Dpi, Layer, Length, LengthError};
 
 use crate::catalogue::entry;
 use crate::compensate_report::WallReport;
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output, parse_distance};
 use crate::streams::{
@@ -68,7 +70,7 @@ pub(crate) struct CompensateArgs {
     output: Output,
 }
 
-pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     let by = EdgeMove::of(args)?;
     if let Some(beside) = &args.report {
         let inputs = args.material.iter().chain([&args.input.stack]);
@@ -92,8 +94,8 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), CommandE
     let widths = |layer: &Layer, dpi| by.widths(layer, dpi);
     let done = lamp_postprocess::compensate(layers, options, widths, |done| walls.add(done));
     write_layers(done, &args.output, &progress).map_err(|error| match error {
-        CommandError::Failed(error) if error.is::<CompensateError>() || error.is::<NoDose>() => {
-            CommandError::Failed(error).at(name.clone())
+        Exit::Failed(error) if error.is::<CompensateError>() || error.is::<NoDose>() => {
+            Exit::Failed(error).at(name.clone())
         }
         error => error,
     })?;
@@ -108,7 +110,7 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), CommandE
     Ok(())
 }
 
-/// What the pages say was done to the layers before.
+/// What was already done to the layers, according to their pages.
 #[derive(Default)]
 struct DoneBefore {
     moved: bool,
@@ -123,7 +125,7 @@ impl DoneBefore {
         self.enlarged |= page.get("shrinkage").is_some();
     }
 
-    /// What was done before and now again.
+    /// Returns messages about what has now been done twice.
     fn lines(&self, name: &str, moves: bool, enlarges: bool) -> Vec<String> {
         let again = [
             (
@@ -145,7 +147,7 @@ enum EdgeMove {
     CureWidth { width: CureWidth, material: Box<Material>, dose: Option<Dose> },
 }
 
-/// Why a layer has no dose.
+/// A layer without a dose, and why.
 #[derive(Debug)]
 struct NoDose(String);
 
@@ -158,29 +160,28 @@ impl std::fmt::Display for NoDose {
 impl std::error::Error for NoDose {}
 
 impl EdgeMove {
-    fn of(args: &CompensateArgs) -> Result<Self, CommandError> {
+    fn of(args: &CompensateArgs) -> Result<Self, Exit> {
         let Some(path) = &args.material else {
             return match (args.uniform, args.shrinkage) {
-                (None, None) => Err(CommandError::usage(
-                    "give --uniform 25um, --material M or --shrinkage 2.1%",
-                )),
+                (None, None) => {
+                    Err(Exit::usage("give --uniform 25um, --material M or --shrinkage 2.1%"))
+                }
                 (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
             };
         };
         let material: Material = entry(path)?;
         let name = &material.name;
-        let width = material
-            .cure_width()
-            .map_err(|error| CommandError::Failed(error.into()).at(name.clone()))?;
+        let width =
+            material.cure_width().map_err(|error| Exit::Failed(error.into()).at(name.clone()))?;
         let width = width.ok_or_else(|| {
-            CommandError::Failed(anyhow!(
+            Exit::Failed(anyhow!(
                 "{name} states no cure width: add [[cure-width]] to its file, or give --uniform"
             ))
         })?;
         Ok(Self::CureWidth { width, material: Box::new(material), dose: args.dose })
     }
 
-    fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, CommandError> {
+    fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, Exit> {
         let (width, dose) = match self {
             Self::Uniform(by) => return Ok(Widths::uniform(by.pixels(dpi))),
             Self::CureWidth { width, dose: Some(dose), .. } => (width, *dose),
@@ -194,9 +195,9 @@ impl EdgeMove {
     }
 }
 
-/// The dose of a layer by its page.
-fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, CommandError> {
-    let no_dose = |text: String| CommandError::Failed(NoDose(text).into());
+/// Returns the dose of a layer from its page's exposure time.
+fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, Exit> {
+    let no_dose = |text: String| Exit::Failed(NoDose(text).into());
     let time = layer.info.exposure_ms.filter(|ms| *ms >= 0.0).ok_or_else(|| {
         no_dose(format!("{} states no exposure time: give --dose", layer.info.name()))
     })?;

@@ -1,3 +1,5 @@
+//! `lamp convert`: writes a stack in another form, or a STEP part as STL.
+
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -8,7 +10,7 @@ use lamp_slicer::Part;
 use lamp_slicer::brep::{START_BYTES, is_step};
 use lamp_stack::{Layer, Length, StackError, png_of_layer, write_png_folder};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::progress::say;
 use crate::step_options::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
@@ -52,7 +54,7 @@ pub(crate) struct ConvertArgs {
     png: bool,
 }
 
-pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     if let Some(stl) = args.stl() {
         return args.write_stl(stl, common);
     }
@@ -63,7 +65,7 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), CommandErro
         && is_step(&start)
     {
         let name = input_name(path);
-        return Err(CommandError::usage(format!("{name} is a STEP part: name a .stl after it")));
+        return Err(Exit::usage(format!("{name} is a STEP part: name a .stl after it")));
     }
     let output = args.output.output.as_path();
     let progress = progress("convert", common, &args.output);
@@ -100,17 +102,17 @@ impl ConvertArgs {
     }
 
     /// Writes a STEP part as facets.
-    fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), CommandError> {
+    fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), Exit> {
         let path = &self.input.stack;
         if self.input.layers.is_some() || self.png || self.output.classic {
             let why = "--layers, --png and --classic are for stacks, not for parts";
-            return Err(CommandError::usage(why));
+            return Err(Exit::usage(why));
         }
         check_beside(stl, Path::new("-"), [path])?;
         let name = input_name(path);
         let options = self.reader.for_opening(self.chord);
         let model = bytes_of(path).and_then(|bytes| Part::from_step(&name, bytes, &options));
-        let model = model.map_err(|error| CommandError::from(error).at(name))?;
+        let model = model.map_err(|error| Exit::from(error).at(name))?;
         if !common.quiet {
             let notes = model.prepared().flat_map(notes);
             notes.for_each(|note| say(&format!("convert: {note}")));
@@ -118,18 +120,16 @@ impl ConvertArgs {
         write_file(stl, |out| model.write_stl(out))
     }
 
-    fn shape(&self) -> Result<OutputKind, CommandError> {
+    fn shape(&self) -> Result<OutputKind, Exit> {
         let Output { output, classic } = &self.output;
         let named_png = output.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
         match (is_folder(output), self.png) {
             (true, true) => folder_to_make(output).map(|_| OutputKind::Pngs),
-            (false, _) if named_png && *classic => Err(CommandError::usage(
-                "--classic is for TIFFs: leave it out, or name a .tif file",
-            )),
-            (false, _) if named_png => Ok(OutputKind::Png),
-            (false, true) => {
-                Err(CommandError::usage("PNGs go into a folder: name it, as -o pictures/"))
+            (false, _) if named_png && *classic => {
+                Err(Exit::usage("--classic is for TIFFs: leave it out, or name a .tif file"))
             }
+            (false, _) if named_png => Ok(OutputKind::Png),
+            (false, true) => Err(Exit::usage("PNGs go into a folder: name it, as -o pictures/")),
             (_, false) => Ok(OutputKind::Tiff),
         }
     }
@@ -137,14 +137,14 @@ impl ConvertArgs {
 
 /// The layer of a stack of one; `name` is what people call the stack.
 fn only_layer(
-    mut layers: impl Iterator<Item = Result<Layer, CommandError>>,
+    mut layers: impl Iterator<Item = Result<Layer, Exit>>,
     name: &str,
-) -> Result<Layer, CommandError> {
+) -> Result<Layer, Exit> {
     let layer = layers.next().ok_or(StackError::NoLayers);
-    let layer = layer.map_err(|error| CommandError::from(error).at(name.to_owned()))??;
+    let layer = layer.map_err(|error| Exit::from(error).at(name.to_owned()))??;
     match layers.next().transpose()? {
         None => Ok(layer),
-        Some(_) => Err(CommandError::Failed(anyhow!(
+        Some(_) => Err(Exit::Failed(anyhow!(
             "{name}: a PNG holds one layer: choose it with --layers, or write a folder of them with --png"
         ))),
     }

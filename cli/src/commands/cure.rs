@@ -1,3 +1,5 @@
+//! `lamp cure`: draws a vertical section of what a stack cures.
+
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +13,7 @@ use crate::catalogue::entry;
 use crate::cured_section::{
     SectionExposures, SectionLine, SectionPicture, SectionPlane, parse_along,
 };
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Input};
 use crate::part_options::{Reading, name_of_all};
 use crate::picture::PictureScale;
@@ -63,13 +65,13 @@ pub(crate) struct CureArgs {
     output: PathBuf,
 }
 
-pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = args.part.iter().chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     let material: Material = entry(&args.material)?;
-    let resin = material.resin().map_err(|error| CommandError::Failed(error.into()))?;
+    let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let name = input_name(&args.input.stack);
-    let failed = |error: anyhow::Error| CommandError::Failed(error).at(name.clone());
+    let failed = |error: anyhow::Error| Exit::Failed(error).at(name.clone());
     let progress = Progress::new("cure", common.quiet, true);
     let (mut exposures, mut stack) = (None, None);
     for layer in read_layers(&args.input, &progress)? {
@@ -108,7 +110,7 @@ fn outline(
     course: &SectionLine,
     stack: Option<&StackInfo>,
     name: &str,
-) -> Result<Vec<SolidHeights>, CommandError> {
+) -> Result<Vec<SolidHeights>, Exit> {
     let sliced = stack.and_then(|stack| {
         let options = SlicingOptions::of_command(stack.commands.first()?)?;
         Some((options, &stack.digest))
@@ -120,9 +122,9 @@ fn outline(
     let model = options.solid.open(parts, &reading)?;
     let part = name_of_all(parts);
     if model.digest() != digest {
-        return Err(CommandError::Failed(anyhow!(
+        return Err(Exit::Failed(anyhow!(
             "{name} was not sliced from {part}, or the part has changed"
         )));
     }
-    course.outline(model, &options).map_err(|error| CommandError::from(error).at(part))
+    course.outline(model, &options).map_err(|error| Exit::from(error).at(part))
 }

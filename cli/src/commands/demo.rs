@@ -1,3 +1,5 @@
+//! `lamp demo`: runs the whole pipeline on a sample part.
+
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -14,7 +16,7 @@ use lamp_postprocess::{
 use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Catalogued, Layer, Pages, StackError};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Output, parse_count};
 use crate::picture::{Picture, PictureScale, Region};
 use crate::progress::Progress;
@@ -52,9 +54,9 @@ const IN_MESH: usize = 1;
 /// How many layers are made on either side of it.
 const AROUND: u32 = 10;
 
-pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Exit> {
     let part = Sample::Blade;
-    let mesh = build(part, args.facets).map_err(CommandError::wrong_options)?;
+    let mesh = build(part, args.facets).map_err(Exit::wrong_options)?;
     fs::create_dir_all(&args.folder).with_context(|| args.folder.display().to_string())?;
     let [stl, stack, sheet, meshed, in_mesh] =
         ["blade.stl", "build.tif", "layers.png", "alpha.tif", "alpha.png"]
@@ -107,7 +109,7 @@ fn part_layers(
     stl: &Path,
     range: Option<Range<u32>>,
     progress: &Progress,
-) -> Result<impl Iterator<Item = Result<Layer, CommandError>>, CommandError> {
+) -> Result<impl Iterator<Item = Result<Layer, Exit>>, Exit> {
     let options = SlicingOptions::default();
     let model = Part::open(stl, &OpenOptions::default())?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
@@ -116,7 +118,7 @@ fn part_layers(
     let layers = slices.map(move |layer| {
         let mut layer = layer?;
         name_command(&mut layer);
-        Ok::<Layer, CommandError>(layer)
+        Ok::<Layer, Exit>(layer)
     });
     let progress = progress.clone();
     let fixed = fix(layers, FixOptions::default(), move |fixed| {
@@ -126,7 +128,7 @@ fn part_layers(
 }
 
 /// All four stages, on a black build area.
-fn run_pipeline(stl: &Path, stack: &Path, progress: &Progress) -> Result<StackSize, CommandError> {
+fn run_pipeline(stl: &Path, stack: &Path, progress: &Progress) -> Result<StackSize, Exit> {
     let mut size = StackSize::default();
     let tiled = tile(part_layers(stl, None, progress)?, TileOptions::default()).inspect(|layer| {
         if let Ok(Layer { image, .. }) = layer {
@@ -145,7 +147,7 @@ fn build_in_mesh(
     stack: &Path,
     range: Option<Range<u32>>,
     progress: &Progress,
-) -> Result<u32, CommandError> {
+) -> Result<u32, Exit> {
     let area = Machine::builtin("alpha").expect("it is built in").area.value;
     let mut layers = part_layers(stl, range, progress)?;
     let first = layers.next().ok_or(StackError::NoLayers)??;
@@ -160,10 +162,10 @@ fn build_in_mesh(
 }
 
 fn write(
-    layers: impl Iterator<Item = Result<Layer, CommandError>>,
+    layers: impl Iterator<Item = Result<Layer, Exit>>,
     stack: &Path,
     progress: &Progress,
-) -> Result<(), CommandError> {
+) -> Result<(), Exit> {
     write_layers(layers, &Output { output: stack.to_owned(), classic: false }, progress)
 }
 
@@ -174,7 +176,7 @@ fn pictured(layers: u32) -> [u32; 4] {
 
 /// Draws some layers as pictures of their own and on one sheet, and names
 /// them.
-fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, CommandError> {
+fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Exit> {
     let shown = read(stack, &pictured(layers))?;
     for layer in &shown {
         let name = format!("layer_{:05}.png", layer.info.index);
@@ -189,14 +191,14 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, CommandError>
 }
 
 /// Draws a layer of the build in its mesh.
-fn draw_in_mesh(stack: &Path, picture: &Path, index: u32) -> Result<(), CommandError> {
+fn draw_in_mesh(stack: &Path, picture: &Path, index: u32) -> Result<(), Exit> {
     let layers = read(stack, &[index])?;
     let Layer { image, .. } = layers.first().context("the pictured layer is not there")?;
     write_picture(picture, Picture::new(image, Region::of(image), SCALE))
 }
 
 /// Some layers of a stack.
-fn read(stack: &Path, wanted: &[u32]) -> Result<Vec<Layer>, CommandError> {
+fn read(stack: &Path, wanted: &[u32]) -> Result<Vec<Layer>, Exit> {
     let failed = |error| failed_at(stack.display().to_string(), error);
     let mut layers = Vec::new();
     for page in Pages::open(stack).map_err(failed)? {
@@ -208,6 +210,6 @@ fn read(stack: &Path, wanted: &[u32]) -> Result<Vec<Layer>, CommandError> {
     Ok(layers)
 }
 
-fn write_picture(path: &Path, picture: Picture<'_>) -> Result<(), CommandError> {
+fn write_picture(path: &Path, picture: Picture<'_>) -> Result<(), Exit> {
     write_file(path, |out| picture.write_png(out))
 }

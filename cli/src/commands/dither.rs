@@ -1,8 +1,10 @@
+//! `lamp dither`: turns gray layers into dots.
+
 use clap::Args;
 use lamp_grayscale::{DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
 use lamp_stack::{Image, Layer, Length};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Input, Output, one_of_described};
 use crate::streams::{progress, read_layers, write_layers};
 
@@ -36,7 +38,7 @@ pub(crate) struct DitherArgs {
     output: Output,
 }
 
-pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("dither", common, &args.output);
     let mut told = args.method == DitherMethod::Threshold;
     let layers = read_layers(&args.input, &progress)?.inspect(|layer| {
@@ -48,8 +50,8 @@ pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), CommandError
     write_layers(lamp_grayscale::dither(layers, args.method), &args.output, &progress)
 }
 
-/// What is to be feared of the dots of a gray layer, if its pixels are wider
-/// than what is known to cure evenly.
+/// Returns a warning if the pixels of a gray layer are wider than dots that are known to cure
+/// evenly.
 fn unevenness(layer: &Layer) -> Option<String> {
     let Image::Gray(_) = *layer.image else { return None };
     let pitch = layer.dpi?.pitch();
@@ -67,7 +69,7 @@ fn unevenness(layer: &Layer) -> Option<String> {
     ))
 }
 
-/// Micrometres with as many digits as matter.
+/// Formats a length in micrometres, to one decimal.
 fn short(length: Length) -> String {
     let um = (length.um() * 10.0).round() / 10.0;
     um.to_string()

@@ -1,3 +1,5 @@
+//! `lamp edit`: changes a stack at image level.
+
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -6,14 +8,14 @@ use lamp_postprocess::{EditError, Edits, OtherLayers};
 use lamp_stack::Op;
 
 use crate::catalogue::read_text;
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::streams::{
     check_not_input, input_name, is_stream, progress, read_beside, read_layers, write_layers,
 };
 
 /// A list of edits is text of a few kilobytes.
-const LARGEST_LIST: u64 = 1 << 20;
+const MAX_LIST_BYTES: u64 = 1 << 20;
 
 /// Change a design at image level, without slicing it again
 ///
@@ -67,7 +69,7 @@ pub(crate) struct EditArgs {
 
 impl EditArgs {
     /// The edits, and the files of the stacks that they name.
-    fn edits(&self) -> Result<(Edits, Vec<PathBuf>), CommandError> {
+    fn edits(&self) -> Result<(Edits, Vec<PathBuf>), Exit> {
         let ways = [
             (Op::Union, &self.union),
             (Op::Intersect, &self.intersect),
@@ -80,7 +82,7 @@ impl EditArgs {
         }
         let list = self.edits.as_deref().expect("one of the group is given");
         let edits = || -> anyhow::Result<Edits> {
-            Ok(Edits::from_toml(&read_text(list, LARGEST_LIST, "a list of edits")?)?)
+            Ok(Edits::from_toml(&read_text(list, MAX_LIST_BYTES, "a list of edits")?)?)
         };
         let edits = edits().with_context(|| input_name(list))?;
         // Files stand beside the list that names them.
@@ -89,7 +91,7 @@ impl EditArgs {
         Ok((edits, files))
     }
 
-    fn check_streams(&self) -> Result<(), CommandError> {
+    fn check_streams(&self) -> Result<(), Exit> {
         let all = [
             Some(&self.input.stack),
             self.edits.as_ref(),
@@ -100,14 +102,14 @@ impl EditArgs {
         ];
         match all.into_iter().flatten().filter(|path| is_stream(path)).count() {
             0 | 1 => Ok(()),
-            _ => Err(CommandError::usage(
+            _ => Err(Exit::usage(
                 "only one input can be standard input (STACK is, unless it is named)",
             )),
         }
     }
 }
 
-pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
     args.check_streams()?;
     let (edits, files) = args.edits()?;
     check_not_input(&args.output.output, files.iter().chain(&args.edits))?;
@@ -118,16 +120,14 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), CommandError> 
         let layers = Box::new(read_beside(file)?);
         Ok(OtherLayers { name: input_name(file), layers, may_reach_beyond })
     };
-    let others = files.iter().map(other).collect::<Result<_, CommandError>>()?;
+    let others = files.iter().map(other).collect::<Result<_, Exit>>()?;
     let layers = read_layers(&args.input, &progress)?;
     let mut counts = vec![0; edits.count()];
     let edited = lamp_postprocess::edit(layers, edits, others, |_, done| {
         done.iter().for_each(|&edit| counts[edit] += 1);
     });
     write_layers(edited, &args.output, &progress).map_err(|error| match error {
-        CommandError::Failed(error) if error.is::<EditError>() => {
-            CommandError::Failed(error).at(name)
-        }
+        Exit::Failed(error) if error.is::<EditError>() => Exit::Failed(error).at(name),
         error => error,
     })?;
     for (number, _) in (1..).zip(counts).filter(|(_, count)| *count == 0) {

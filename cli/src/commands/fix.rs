@@ -1,3 +1,5 @@
+//! `lamp fix`: corrects stray rows, and reports them.
+
 use std::path::PathBuf;
 
 use clap::Args;
@@ -5,7 +7,7 @@ use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
 use crate::band_pictures::BandPictures;
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::fix_report::{FixReport, whereabouts};
 use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output, one_of_described};
@@ -79,7 +81,7 @@ impl FixArgs {
     }
 }
 
-pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     for beside in [&args.report, &args.evidence].into_iter().flatten() {
         check_beside(beside, &args.output.output, [&args.input.stack])?;
     }
@@ -107,7 +109,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), CommandError> {
     }
     match findings.left() {
         0 => Ok(()),
-        left if args.strict => Err(CommandError::Findings(left_in_all(left))),
+        left if args.strict => Err(Exit::Findings(left_in_all(left))),
         left => {
             progress.say(&left_in_all(left));
             Ok(())

@@ -1,3 +1,5 @@
+//! `lamp heights`: finds layer thicknesses, and compares them with uniform ones.
+
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -7,7 +9,7 @@ use lamp_adaptive::{
 };
 use lamp_stack::{Dpi, Length};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::exposure::{Exposure, ExposureOptions};
 use crate::height_options::{FoundHeights, HeightOptions, significant, time_text};
 use crate::options::{Common, parse_thickness};
@@ -60,7 +62,7 @@ pub(crate) struct HeightsArgs {
     exposure: ExposureOptions,
 }
 
-pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     args.check()?;
     let exposure = args.exposure.exposure()?;
     args.heights.check(exposure.as_ref())?;
@@ -92,7 +94,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), CommandErro
 
 impl HeightsArgs {
     /// Checks, before the work, what can be checked.
-    fn check(&self) -> Result<(), CommandError> {
+    fn check(&self) -> Result<(), Exit> {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
         }
@@ -101,18 +103,18 @@ impl HeightsArgs {
             check_beside(file, Path::new("-"), inputs())?;
         }
         if self.report.is_some() && self.report == self.plot {
-            return Err(CommandError::usage("--report and --plot name the same file"));
+            return Err(Exit::usage("--report and --plot name the same file"));
         }
         Ok(())
     }
 
     /// The uniform layers to compare with, by what they are called.
-    fn uniform(&self, part: &LayeredPart) -> Result<Vec<(String, Heights)>, CommandError> {
+    fn uniform(&self, part: &LayeredPart) -> Result<Vec<(String, Heights)>, Exit> {
         let thickest = [self.heights.max()];
         let uniform = if self.uniform.is_empty() { &thickest[..] } else { &self.uniform };
         let layers = |thickness: &Length| {
             let heights = uniform_heights(part, *thickness);
-            let heights = heights.map_err(|error| CommandError::Failed(error.into()))?;
+            let heights = heights.map_err(|error| Exit::Failed(error.into()))?;
             Ok((format!("uniform {thickness}"), heights))
         };
         uniform.iter().map(layers).collect()

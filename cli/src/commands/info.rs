@@ -1,7 +1,9 @@
+//! `lamp info`: describes a stack.
+
 use clap::Args;
 use lamp_stack::{Compression, Image, Layer, Page, StackInfo, map_in_order};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::Input;
 use crate::streams::{failed_at, input_name, print, read_pages};
 
@@ -16,7 +18,7 @@ pub(crate) struct InfoArgs {
     input: Input,
 }
 
-pub(crate) fn run(args: &InfoArgs) -> Result<(), CommandError> {
+pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
     let name = input_name(&args.input.stack);
     let decoded = map_in_order(read_pages(&args.input)?, |(page, stack): (Page, _)| {
         let (bytes, compression) = (page.strip_bytes(), page.compression());
@@ -32,7 +34,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), CommandError> {
     totals.map_or(Ok(()), |totals| print(&totals.text(&name)))
 }
 
-/// What adds up over the layers.
+/// Sums over the layers.
 struct StackTotals {
     first: Layer,
     last: Layer,
@@ -49,7 +51,7 @@ struct StackTotals {
     exposure_ms: NumberRange,
 }
 
-/// From the least to the greatest of the numbers that pages state.
+/// The range and sum of the numbers that pages state.
 #[derive(Default)]
 struct NumberRange {
     ends: Option<[f64; 2]>,

@@ -1,10 +1,12 @@
+//! `lamp join`: joins ranges of layers, or the strips of a build.
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::{is_strips, join_strips};
 use lamp_stack::{Layer, join};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Output};
 use crate::progress::Progress;
 use crate::streams::{input_name, is_stream, progress, write_layers};
@@ -35,9 +37,9 @@ pub(crate) struct JoinArgs {
     output: Output,
 }
 
-pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Exit> {
     if args.stacks.iter().any(|stack| is_stream(stack)) {
-        return Err(CommandError::usage(
+        return Err(Exit::usage(
             "stacks to join are checked before they are read, which standard input does not \
              allow: name files or folders",
         ));
@@ -48,7 +50,7 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), CommandError> 
         stacks => {
             if let Some(folder) = stacks.iter().find(|stack| is_strips(stack)) {
                 let folder = folder.display();
-                return Err(CommandError::usage(format!(
+                return Err(Exit::usage(format!(
                     "{folder} holds the strips of one build: join it by itself first"
                 )));
             }
@@ -59,18 +61,18 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), CommandError> 
 }
 
 /// Puts the strips of a folder back together.
-fn join_one(folder: &Path, output: &Output, progress: &Progress) -> Result<(), CommandError> {
+fn join_one(folder: &Path, output: &Output, progress: &Progress) -> Result<(), Exit> {
     let name = input_name(folder);
-    let failed = |error| CommandError::from(error).at(name.clone());
+    let failed = |error| Exit::from(error).at(name.clone());
     let layers = join_strips(folder).map_err(failed)?;
     write_layers(counted(layers.map(|layer| layer.map_err(failed)), progress), output, progress)
 }
 
 /// Tells the report how many layers there will be, where the first says so.
 fn counted(
-    layers: impl Iterator<Item = Result<Layer, CommandError>>,
+    layers: impl Iterator<Item = Result<Layer, Exit>>,
     progress: &Progress,
-) -> impl Iterator<Item = Result<Layer, CommandError>> {
+) -> impl Iterator<Item = Result<Layer, Exit>> {
     layers.inspect(|layer| {
         let stack = layer.as_ref().ok().and_then(|layer| layer.info.stack.as_ref());
         if let Some(layers) = stack.and_then(|stack| stack.layers) {

@@ -1,3 +1,5 @@
+//! `lamp machine`: lists and shows machines.
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -5,7 +7,7 @@ use lamp_postprocess::machine::Machine;
 use lamp_stack::Catalogued;
 
 use crate::catalogue;
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::streams::print;
 
 /// List or show machines: build area, resolution and layer thickness
@@ -32,7 +34,7 @@ enum Action {
     },
 }
 
-pub(crate) fn run(args: &MachineArgs) -> Result<(), CommandError> {
+pub(crate) fn run(args: &MachineArgs) -> Result<(), Exit> {
     match &args.action {
         Action::List => print(&table()),
         Action::Show { machine } => catalogue::show::<Machine>(machine),

@@ -1,3 +1,5 @@
+//! `lamp material`: lists, shows and checks materials.
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
@@ -6,7 +8,7 @@ use lamp_grayscale::resin::DepthRange;
 use lamp_stack::{Catalogued, Length};
 
 use crate::catalogue;
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::streams::{input_name, print};
 
 /// List, show or check materials: how deep light cures a resin
@@ -38,7 +40,7 @@ enum Action {
     },
 }
 
-pub(crate) fn run(args: &MaterialArgs) -> Result<(), CommandError> {
+pub(crate) fn run(args: &MaterialArgs) -> Result<(), Exit> {
     match &args.action {
         Action::List => print(&table()),
         Action::Show { material } => catalogue::show::<Material>(material),
@@ -85,7 +87,7 @@ fn widths(material: &Material) -> Option<String> {
     })
 }
 
-fn check(path: &Path) -> Result<(), CommandError> {
+fn check(path: &Path) -> Result<(), Exit> {
     let (material, _) = catalogue::read_file(path)?;
     print(&format!("{}: {}\n", input_name(path), allows(&material)))
 }

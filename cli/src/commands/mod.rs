@@ -1,4 +1,4 @@
-//! One file a command: its options, and what it does with them.
+//! The commands, one file each: options, a library call, a report.
 
 mod brep;
 mod calibrate;
@@ -23,7 +23,7 @@ mod tile;
 
 use clap::{ArgMatches, FromArgMatches, Subcommand};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::Common;
 
 #[derive(Subcommand)]
@@ -62,32 +62,7 @@ impl Command {
         })
     }
 
-    pub(crate) fn name(&self) -> &'static str {
-        match self {
-            Self::Slice(_) => "slice",
-            Self::Fix(_) => "fix",
-            Self::Dither(_) => "dither",
-            Self::Compensate(_) => "compensate",
-            Self::Edit(_) => "edit",
-            Self::Tile(_) => "tile",
-            Self::Sample(_) => "sample",
-            Self::Demo(_) => "demo",
-            Self::Info(_) => "info",
-            Self::Show(_) => "show",
-            Self::Convert(_) => "convert",
-            Self::Join(_) => "join",
-            Self::Split(_) => "split",
-            Self::Machine(_) => "machine",
-            Self::Material(_) => "material",
-            Self::Cure(_) => "cure",
-            Self::Calibrate(_) => "calibrate",
-            Self::Target(_) => "target",
-            Self::Heights(_) => "heights",
-            Self::Brep(_) => "brep",
-        }
-    }
-
-    pub(crate) fn run(&self, common: &Common) -> Result<(), CommandError> {
+    pub(crate) fn run(&self, common: &Common) -> Result<(), Exit> {
         match self {
             Self::Slice(args) => slice::run(args, common),
             Self::Fix(args) => fix::run(args, common),

@@ -1,3 +1,5 @@
+//! `lamp sample`: writes sample parts.
+
 use std::ffi::OsStr;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -7,7 +9,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_fixtures::{Defect, Mesh, Sample, StepSample, StepUnit, build, inject, step};
 use lamp_stack::Length;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, parse_count};
 use crate::progress::Progress;
 use crate::streams::{is_stream, write_file};
@@ -62,12 +64,12 @@ fn parts() -> impl TypedValueParser<Value = Sample> {
         .map(|name| Sample::from_name(&name).expect("only names of parts pass"))
 }
 
-pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Exit> {
     let part = args.part;
     if is_step_name(&args.output) {
         return args.write_step(part);
     }
-    let mut mesh = build(part, args.facets).map_err(CommandError::wrong_options)?;
+    let mut mesh = build(part, args.facets).map_err(Exit::wrong_options)?;
     if let Some(name) = &args.defect {
         let defect = Defect::from_name(name, args.by.mm() as f32).expect("only names pass");
         inject(&mut mesh, defect, args.count, args.seed);
@@ -85,17 +87,15 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), CommandError
         return Ok(());
     }
     if io::stdout().is_terminal() {
-        return Err(CommandError::usage(
-            "an STL is not for terminals: name a file with -o, or pipe it on",
-        ));
+        return Err(Exit::usage("an STL is not for terminals: name a file with -o, or pipe it on"));
     }
     let mut out = BufWriter::new(io::stdout().lock());
     let written = write(&mut out).and_then(|()| out.flush());
-    written.map_err(|error| CommandError::output(error, "standard output"))
+    written.map_err(|error| Exit::output(error, "standard output"))
 }
 
 impl SampleArgs {
-    fn write_step(&self, part: Sample) -> Result<(), CommandError> {
+    fn write_step(&self, part: Sample) -> Result<(), Exit> {
         let part = match part {
             Sample::Sphere => StepSample::Sphere,
             Sample::Torus => StepSample::Torus,
@@ -103,11 +103,11 @@ impl SampleArgs {
             Sample::Tower => StepSample::Tower,
             Sample::Blade | Sample::Cube => {
                 let why = format!("{} is available as STL only: name a .stl file", part.name());
-                return Err(CommandError::usage(why));
+                return Err(Exit::usage(why));
             }
         };
         if self.ascii || self.defect.is_some() {
-            return Err(CommandError::usage("--ascii and --defect are for STL: name a .stl file"));
+            return Err(Exit::usage("--ascii and --defect are for STL: name a .stl file"));
         }
         let text = step(part, StepUnit::Millimetre);
         write_file(&self.output, |out| out.write_all(text.as_bytes()))

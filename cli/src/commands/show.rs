@@ -1,3 +1,5 @@
+//! `lamp show`: draws a layer.
+
 use std::io::{self, BufWriter, IsTerminal};
 use std::path::PathBuf;
 
@@ -5,7 +7,7 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_stack::Layer;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::picture::{Picture, PictureScale, Region};
 use crate::streams::{failed_at, input_name, is_stream, open_pages, write_file};
 
@@ -39,9 +41,9 @@ pub(crate) struct ShowArgs {
     output: PathBuf,
 }
 
-pub(crate) fn run(args: &ShowArgs) -> Result<(), CommandError> {
+pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
     if is_stream(&args.output) && io::stdout().is_terminal() {
-        return Err(CommandError::usage(
+        return Err(Exit::usage(
             "a picture is not for terminals: name a file with -o, or pipe it on",
         ));
     }
@@ -49,28 +51,28 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), CommandError> {
     let whole = Region::of(&image);
     let region = args.region.as_ref().unwrap_or(&whole).on(&image).ok_or_else(|| {
         let (width, height) = (image.width(), image.height());
-        CommandError::usage(format!(
+        Exit::usage(format!(
             "the region lies outside the image, which is {width} x {height} pixels"
         ))
     })?;
-    if args.scale.side(&region) > LARGEST_PICTURE {
-        return Err(CommandError::usage(format!(
-            "the picture would be more than {LARGEST_PICTURE} pixels wide or high: choose a --region or a smaller --scale"
+    if args.scale.side(&region) > MAX_PICTURE_SIDE {
+        return Err(Exit::usage(format!(
+            "the picture would be more than {MAX_PICTURE_SIDE} pixels wide or high: choose a --region or a smaller --scale"
         )));
     }
     let picture = Picture::new(&image, region, args.scale);
     if is_stream(&args.output) {
         let written = picture.write_png(BufWriter::new(io::stdout().lock()));
-        written.map_err(|error| CommandError::output(error, "standard output"))
+        written.map_err(|error| Exit::output(error, "standard output"))
     } else {
         write_file(&args.output, |out| picture.write_png(out))
     }
 }
 
 /// Pictures wider or higher than this cannot be looked at.
-const LARGEST_PICTURE: u64 = 200_000;
+const MAX_PICTURE_SIDE: u64 = 200_000;
 
-fn find_layer(args: &ShowArgs) -> Result<Layer, CommandError> {
+fn find_layer(args: &ShowArgs) -> Result<Layer, Exit> {
     let name = input_name(&args.stack);
     let failed = |error| failed_at(name.clone(), error);
     let mut last = None;
@@ -82,5 +84,5 @@ fn find_layer(args: &ShowArgs) -> Result<Layer, CommandError> {
         last = Some(page.info().index);
     }
     let last = last.map_or_else(String::new, |last| format!("; the last is {last}"));
-    Err(CommandError::Failed(anyhow!("{name}: there is no layer {}{last}", args.layer)))
+    Err(Exit::Failed(anyhow!("{name}: there is no layer {}{last}", args.layer)))
 }

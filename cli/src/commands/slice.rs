@@ -1,3 +1,5 @@
+//! `lamp slice`: slices a part into a stack.
+
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -5,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lamp_slicer::{PixelGrid, Polished, StrayBand};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::fallback::Bridged;
 use crate::json_report::parse_report;
 use crate::mesh_report::{Counts, MeshReport, RowPositions};
@@ -67,7 +69,7 @@ pub(crate) struct SliceArgs {
     output: Output,
 }
 
-pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     let inputs = || args.parts.iter().chain(args.options.files()).chain(&args.fallback);
     if let Some(report) = &args.report {
         check_beside(report, &args.output.output, inputs())?;
@@ -80,7 +82,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), CommandError>
         Reading { dpi: args.options.dpi, may_be_open: args.fallback.is_some(), say: &say };
     let model = args.options.solid.open(&args.parts, &reading)?;
     if args.fallback.is_some() && model.prepared().next().is_none() {
-        return Err(CommandError::usage("--fallback needs a STEP part"));
+        return Err(Exit::usage("--fallback needs a STEP part"));
     }
     let name = name_of_all(&args.parts);
     let files: Vec<_> = args
@@ -97,7 +99,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), CommandError>
         Bridged::new(slices, args.fallback.as_deref(), &args.options, args.layers.clone())?;
     let (mut counts, mut bands) = (Counts::default(), Vec::new());
     let layers = bridged.by_ref().map(|layer| {
-        let mut layer = layer.map_err(|error| CommandError::from(error).at(name.clone()))?;
+        let mut layer = layer.map_err(|error| Exit::from(error).at(name.clone()))?;
         name_command(&mut layer);
         counts.add(&layer.info);
         if args.report.is_some() {
@@ -108,7 +110,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), CommandError>
     write_layers(layers, &args.output, &progress)?;
     let slices = &bridged.slices;
     if let Some(path) = &args.report {
-        let trace = slices.trace(&bands).map_err(|error| CommandError::from(error).at(name))?;
+        let trace = slices.trace(&bands).map_err(|error| Exit::from(error).at(name))?;
         let subject = MeshReport {
             files: files.into_iter().map(Cow::into_owned).collect(),
             fill: args.options.solid.fill.name(),

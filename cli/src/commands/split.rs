@@ -1,10 +1,12 @@
+//! `lamp split`: splits a stack into files of ranges of layers.
+
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 use lamp_stack::{Cuts, SplitError, write_split};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Input};
 use crate::progress::Progress;
 use crate::streams::{folder_to_make, format, input_name, read_layers, written_to};
@@ -42,12 +44,12 @@ pub(crate) struct SplitArgs {
     classic: bool,
 }
 
-pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Exit> {
     let cuts = match args.every {
         Some(layers) => Cuts::Every(layers),
         None if args.at.is_sorted_by(|a, b| a < b) => Cuts::At(args.at.clone()),
         None => {
-            return Err(CommandError::usage(
+            return Err(Exit::usage(
                 "the layers of --at must be in ascending order, as --at 500,900",
             ));
         }
@@ -57,8 +59,8 @@ pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), CommandError>
     let layers = read_layers(&args.input, &progress)?.inspect(|_| progress.layer_done());
     let written = write_split(layers, &cuts, folder, format(args.classic));
     written_to(&args.output, written, &progress).map_err(|error| match error {
-        CommandError::Failed(error) if error.is::<SplitError>() => {
-            CommandError::Failed(error).at(input_name(&args.input.stack))
+        Exit::Failed(error) if error.is::<SplitError>() => {
+            Exit::Failed(error).at(input_name(&args.input.stack))
         }
         error => error,
     })

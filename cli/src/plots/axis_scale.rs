@@ -1,14 +1,14 @@
-//! The axes of plots.
+//! Axes of plots: linear or logarithmic, with round ticks.
 
 use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-/// Where an axis has its values.
+/// The range of an axis and how values lie on it.
 #[derive(Clone, Debug)]
 pub(super) struct AxisScale {
     pub(super) range: Range<f64>,
-    /// Whether equal ratios are equally long.
+    /// Whether the axis is logarithmic.
     pub(super) logarithmic: bool,
 }
 
@@ -41,8 +41,8 @@ impl ValueFormatter<f64> for AxisScale {
     }
 }
 
-/// An axis has no more ticks than can be read.
-const MOST_TICKS: usize = 30;
+/// More ticks than this cannot be read.
+const MAX_TICKS: usize = 30;
 
 /// Round numbers of a range: multiples of 1, 2 or 5 times a power of ten, or over
 /// many decades powers of ten; none where the range is none.
@@ -62,7 +62,7 @@ fn ticks(range: &Range<f64>, logarithmic: bool) -> Vec<f64> {
     let step = [1.0, 2.0, 5.0, 10.0].map(|step| step * power).into_iter().find(|&s| s >= rough);
     let step = step.unwrap_or(rough);
     let first = (range.start / step).ceil();
-    (0..MOST_TICKS)
+    (0..MAX_TICKS)
         .map(|i| (first + i as f64) * step)
         .take_while(|tick| *tick <= range.end)
         .collect()
@@ -72,8 +72,8 @@ fn logarithmic_ticks(range: &Range<f64>) -> Vec<f64> {
     let [first, last] = [range.start.log10().floor(), range.end.log10().ceil()]
         .map(|power| power.clamp(-330.0, 330.0) as i32);
     let decades = (last - first).unsigned_abs() as usize;
-    let steps = if decades * 3 <= MOST_TICKS { &[1.0, 2.0, 5.0][..] } else { &[1.0] };
-    let every = decades.div_ceil(MOST_TICKS).max(1);
+    let steps = if decades * 3 <= MAX_TICKS { &[1.0, 2.0, 5.0][..] } else { &[1.0] };
+    let every = decades.div_ceil(MAX_TICKS).max(1);
     (first..=last)
         .step_by(every)
         .flat_map(|decade| steps.iter().map(move |step| step * 10.0_f64.powi(decade)))

@@ -1,4 +1,4 @@
-//! Where copies stand on a build area, as a picture.
+//! Draws the copies on a build area.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::{FAMILY, GRAY_INK, PlotFormat, format_of, inks, png_of, with_font};
-use crate::error::CommandError;
+use crate::exit::Exit;
 
 /// The longer side of a build area, and the room around it, in pixels.
 const SIDE: u32 = 1600;
@@ -20,7 +20,7 @@ const LEGEND: i32 = 60;
 
 /// The bytes of a picture of a layout: outlines where they are known, boxes, and
 /// each copy's number among those of its part.
-pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, CommandError> {
+pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, Exit> {
     let picture = LayoutPicture::new(layout);
     let size = picture.size();
     match format_of(path)? {

@@ -1,4 +1,4 @@
-//! Curves through measured points, as SVG or PNG.
+//! Plots curves and measured points as SVG or PNG.
 
 mod axis_scale;
 mod layout;
@@ -17,7 +17,7 @@ use axis_scale::AxisScale;
 
 pub(crate) use layout::layout_picture;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 
 /// A plot of curves over one axis.
 #[derive(Debug)]
@@ -28,13 +28,13 @@ pub(crate) struct Plot {
     pub(crate) series: Vec<Series>,
 }
 
-/// An axis. What lies outside its range is not to be drawn.
+/// An axis. Values must lie in its range.
 #[derive(Debug)]
 pub(crate) struct PlotAxis {
-    /// What it is, with its unit.
+    /// The quantity, with its unit.
     pub(crate) label: String,
     pub(crate) range: Range<f64>,
-    /// Whether equal ratios are equally long; the range is then above zero.
+    /// Whether the axis is logarithmic; its range is then above zero.
     pub(crate) logarithmic: bool,
 }
 
@@ -47,29 +47,29 @@ impl PlotAxis {
 /// Measured points, the curve through them, or both.
 #[derive(Debug)]
 pub(crate) struct Series {
-    /// What stands in the legend.
+    /// Text in the legend.
     pub(crate) name: String,
     pub(crate) points: Vec<(f64, f64)>,
     pub(crate) curve: Vec<(f64, f64)>,
-    /// Where the curve may lie: x, and the lowest and the highest y.
+    /// Confidence band of the curve: x, and the lowest and highest y.
     pub(crate) band: Vec<[f64; 3]>,
 }
 
-/// The highest place that is drawn of any of them.
+/// Returns the highest y of all points and bands.
 pub(crate) fn highest(series: &[Series]) -> f64 {
     let points = series.iter().flat_map(|series| &series.points).map(|point| point.1);
     let bands = series.iter().flat_map(|series| &series.band).map(|ends| ends[2]);
     points.chain(bands).fold(0.0, f64::max)
 }
 
-/// How plots are written.
+/// File formats of plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PlotFormat {
     Svg,
     Png,
 }
 
-/// How large a plot is looked at, in points.
+/// Size of a plot, in points.
 const SIZE: (u32, u32) = (860, 560);
 /// How many pixels of a PNG, or units of an SVG, a point has: places are whole
 /// numbers of them.
@@ -77,11 +77,11 @@ const SCALE: u32 = 2;
 const PIXELS: (u32, u32) = (SIZE.0 * SCALE, SIZE.1 * SCALE);
 
 /// Checks, before the work, that a plot can have that name.
-pub(crate) fn check_name(path: &Path) -> Result<(), CommandError> {
+pub(crate) fn check_name(path: &Path) -> Result<(), Exit> {
     format_of(path).map(|_| ())
 }
 
-fn format_of(path: &Path) -> Result<PlotFormat, CommandError> {
+fn format_of(path: &Path) -> Result<PlotFormat, Exit> {
     let is = |end: &str| path.extension().is_some_and(|have| have.eq_ignore_ascii_case(end));
     if is("svg") {
         Ok(PlotFormat::Svg)
@@ -89,15 +89,13 @@ fn format_of(path: &Path) -> Result<PlotFormat, CommandError> {
         Ok(PlotFormat::Png)
     } else {
         let path = path.display();
-        Err(CommandError::usage(format!(
-            "{path}: a plot is an SVG or a PNG: end its name in .svg or .png"
-        )))
+        Err(Exit::usage(format!("{path}: a plot is an SVG or a PNG: end its name in .svg or .png")))
     }
 }
 
 /// The bytes of plots below each other, in the format that the file's name says.
 /// Equal plots give equal bytes.
-pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, CommandError> {
+pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, Exit> {
     match format_of(path)? {
         PlotFormat::Svg => Ok(svg(plots).into_bytes()),
         PlotFormat::Png => Ok(png(plots).with_context(|| path.display().to_string())?),

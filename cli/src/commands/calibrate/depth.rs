@@ -1,4 +1,4 @@
-//! `lamp calibrate depth`.
+//! `lamp calibrate depth`: fits cure models to measured depths.
 
 use clap::{Args, ValueEnum};
 use lamp_grayscale::calibrate::{
@@ -11,7 +11,7 @@ use lamp_stack::Length;
 
 use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::Common;
 use crate::plots::{Plot, PlotAxis, Series, highest};
 use crate::progress::Progress;
@@ -52,21 +52,19 @@ enum DepthFit {
     Gray(GrayFit),
 }
 
-pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), CommandError> {
+pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Exit> {
     let files = &args.files;
     files.check()?;
     let base = files.base()?;
     let table = files.table()?;
-    let at_place = |error: CommandError| error.at(files.place());
+    let at_place = |error: Exit| error.at(files.place());
     let measured = depth_points(&table, files.light(base.as_ref()));
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let has_gray = table.columns().iter().any(|column| column == "gray");
     let model = args.model.unwrap_or(if has_gray { DepthModel::Gray } else { DepthModel::Jacobs });
     let points = &measured.points[..];
     if model != DepthModel::Gray && points.iter().any(|point| point.gray != GrayLevel::WHITE) {
-        return Err(at_place(CommandError::usage(
-            "some rows are gray: fit them with --model gray",
-        )));
+        return Err(at_place(Exit::usage("some rows are gray: fit them with --model gray")));
     }
     let fit = match model {
         DepthModel::Jacobs => fit_curve(points).map(DepthFit::Jacobs),
@@ -83,7 +81,7 @@ pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), CommandError>
     files.finish(base, |material| fit.add_to(material, &source), &plot, &text.finish())
 }
 
-/// What is in the material other than measured.
+/// Reports parameters that differ from what was measured.
 fn say_what_was_changed(fit: &DepthFit, progress: &Progress) {
     match fit {
         DepthFit::Jacobs(_) => {}

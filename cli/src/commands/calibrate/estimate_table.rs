@@ -1,4 +1,4 @@
-//! The table that calibrations print.
+//! Prints the parameters of a calibration with their intervals, as a table.
 
 use lamp_grayscale::calibrate::{Estimate, Measured, format_significant};
 use lamp_grayscale::resin::Quantity;

@@ -1,4 +1,4 @@
-//! `lamp calibrate`: what its two kinds share.
+//! `lamp calibrate`: the files and options that both kinds of calibration share.
 
 mod depth;
 mod estimate_table;
@@ -10,13 +10,13 @@ use std::slice;
 
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
-use lamp_grayscale::calibrate::{CsvTable, DataError, FitError};
+use lamp_grayscale::calibrate::CsvTable;
 use lamp_grayscale::material::{Given, Material, MaterialError};
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::CatalogueError;
 
 use crate::catalogue::{entry, read_text};
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, parse_light};
 use crate::plots::{self, Plot, drawn};
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
@@ -41,14 +41,14 @@ enum Calibration {
     Width(width::WidthArgs),
 }
 
-pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
         Calibration::Depth(args) => depth::run(args, common),
         Calibration::Width(args) => width::run(args, common),
     }
 }
 
-/// What both kinds read and write.
+/// The files that both kinds of calibration read and write.
 #[derive(Args)]
 struct CalibrationFiles {
     /// Measurements: a CSV file, or - for standard input
@@ -78,37 +78,30 @@ struct CalibrationFiles {
 }
 
 /// Measurements are some thousands of rows.
-const LARGEST_TABLE: u64 = 16 << 20;
+const MAX_TABLE_BYTES: u64 = 16 << 20;
 
 impl CalibrationFiles {
     /// Checks, before the work, that the outputs can be written.
-    fn check(&self) -> Result<(), CommandError> {
+    fn check(&self) -> Result<(), Exit> {
         if is_stream(&self.data) && io::stdin().is_terminal() {
-            return Err(CommandError::usage(
-                "no measurements to read: name a file, or pipe one in",
-            ));
+            return Err(Exit::usage("no measurements to read: name a file, or pipe one in"));
         }
         if let Some(output) = &self.output {
             if is_stream(output) {
-                return Err(CommandError::usage(
-                    "the table goes to standard output: name a file with -o",
-                ));
+                return Err(Exit::usage("the table goes to standard output: name a file with -o"));
             }
             check_beside(output, Path::new("-"), [&self.data])?;
         }
         let Some(plot) = &self.plot else { return Ok(()) };
         plots::check_name(plot)?;
         if self.output.as_ref() == Some(plot) {
-            return Err(CommandError::usage(format!(
-                "{}: the material is written there",
-                plot.display()
-            )));
+            return Err(Exit::usage(format!("{}: the material is written there", plot.display())));
         }
         check_beside(plot, Path::new("-"), self.material.iter().chain([&self.data]))
     }
 
     /// The material to add to, with the light given.
-    fn base(&self) -> Result<Option<Material>, CommandError> {
+    fn base(&self) -> Result<Option<Material>, Exit> {
         self.material.as_deref().map(entry).transpose()
     }
 
@@ -118,9 +111,13 @@ impl CalibrationFiles {
         self.intensity.or_else(of_base)
     }
 
-    fn table(&self) -> Result<CsvTable, CommandError> {
+    fn table(&self) -> Result<CsvTable, Exit> {
         let read = || -> anyhow::Result<CsvTable> {
-            Ok(CsvTable::parse(&read_text(&self.data, LARGEST_TABLE, "a table of measurements")?)?)
+            Ok(CsvTable::parse(&read_text(
+                &self.data,
+                MAX_TABLE_BYTES,
+                "a table of measurements",
+            )?)?)
         };
         Ok(read().with_context(|| self.place())?)
     }
@@ -151,10 +148,10 @@ impl CalibrationFiles {
         add: impl FnOnce(&mut Material),
         plot: &Plot,
         table: &str,
-    ) -> Result<(), CommandError> {
+    ) -> Result<(), Exit> {
         let draw = |path| drawn(slice::from_ref(plot), path).map(|bytes| (path, bytes));
         let plot = self.plot.as_deref().map(draw).transpose()?;
-        let material = self.output.as_deref().map(|output| -> Result<_, CommandError> {
+        let material = self.output.as_deref().map(|output| -> Result<_, Exit> {
             let mut material = base.unwrap_or_else(|| self.new_material(output));
             if let Some(name) = &self.name {
                 material.name.clone_from(name);
@@ -183,24 +180,12 @@ impl CalibrationFiles {
         }
     }
 
-    fn no_material(&self, output: &Path, error: CatalogueError<MaterialError>) -> CommandError {
+    fn no_material(&self, output: &Path, error: CatalogueError<MaterialError>) -> Exit {
         match error {
             CatalogueError::Name { .. } => {
-                CommandError::usage(format!("{error}; give the material a --name"))
+                Exit::usage(format!("{error}; give the material a --name"))
             }
-            error => CommandError::Failed(anyhow!(error).context(output.display().to_string())),
+            error => Exit::Failed(anyhow!(error).context(output.display().to_string())),
         }
-    }
-}
-
-impl From<DataError> for CommandError {
-    fn from(error: DataError) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-impl From<FitError> for CommandError {
-    fn from(error: FitError) -> Self {
-        Self::Failed(error.into())
     }
 }

@@ -1,4 +1,4 @@
-//! `lamp calibrate width`.
+//! `lamp calibrate width`: fits cure widths to measured squares.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use lamp_stack::Dpi;
 use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
 use crate::catalogue::entry;
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::Common;
 use crate::plots::{Plot, PlotAxis, Series, highest};
 use crate::progress::Progress;
@@ -40,7 +40,7 @@ pub(super) struct WidthArgs {
     depth_material: Option<PathBuf>,
 }
 
-pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), CommandError> {
+pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     let files = &args.files;
     files.check()?;
     let base = files.base()?;
@@ -50,7 +50,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), CommandError>
         None => None,
     };
     let table = files.table()?;
-    let at_place = |error: CommandError| error.at(files.place());
+    let at_place = |error: Exit| error.at(files.place());
     let measured = width_points(&table, files.light(base.as_ref()), args.dpi);
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;

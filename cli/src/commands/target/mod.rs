@@ -1,4 +1,4 @@
-//! `lamp target`: what its kinds share.
+//! `lamp target`: the kinds of test images.
 
 mod screens;
 mod squares;
@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use lamp_grayscale::target::TargetError;
 use lamp_stack::{Dpi, Length};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, parse_distance};
 
 /// Write test images to expose, measure and calibrate with
@@ -27,7 +27,7 @@ enum Target {
     Screens(screens::ScreensArgs),
 }
 
-pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
         Target::Squares(args) => squares::run(args, common),
         Target::Screens(args) => screens::run(args, common),
@@ -46,7 +46,7 @@ fn parse_gap(text: &str) -> Result<Length, String> {
 }
 
 /// Impossible targets come from options.
-impl From<TargetError> for CommandError {
+impl From<TargetError> for Exit {
     fn from(error: TargetError) -> Self {
         Self::wrong_options(error)
     }

@@ -1,4 +1,4 @@
-//! `lamp target screens`.
+//! `lamp target screens`: writes screens of squares of several sizes.
 
 use clap::Args;
 use lamp_grayscale::resin::{ExposureTime, GrayLevel};
@@ -6,7 +6,7 @@ use lamp_grayscale::target::screens;
 use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
 
 use super::{parse_gap, whole_pixels};
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, Output};
 use crate::streams::{progress, write_layers};
 
@@ -50,7 +50,7 @@ pub(super) struct ScreensArgs {
     output: Output,
 }
 
-pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), CommandError> {
+pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Exit> {
     let gap = whole_pixels(args.gap, args.dpi);
     let image = screens(args.gray, args.tile, gap, &args.cells)?;
     let stack = StackInfo {

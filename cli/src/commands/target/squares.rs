@@ -1,4 +1,4 @@
-//! `lamp target squares`.
+//! `lamp target squares`: writes squares at several doses, and a table to fill in.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use lamp_stack::{
 
 use super::{parse_gap, whole_pixels};
 use crate::catalogue::entry;
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{Common, parse_light};
 use crate::progress::Progress;
 use crate::streams::{folder_to_make, write_file};
@@ -63,23 +63,23 @@ pub(super) struct SquaresArgs {
     output: PathBuf,
 }
 
-pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), CommandError> {
+pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
     let folder = folder_to_make(&args.output)?;
     let light = args.light()?;
     let gap = whole_pixels(args.gap, args.dpi);
     let mut sizes = args.sizes.clone();
     sizes.sort_unstable();
     if let Some(twice) = sizes.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(CommandError::usage(format!("--sizes: {} is given twice", twice[0])));
+        return Err(Exit::usage(format!("--sizes: {} is given twice", twice[0])));
     }
     // All of them, before there is a folder: a size may be impossible.
     let doses = &args.doses.0;
     let targets: Vec<(u32, Vec<TargetExposure>)> = sizes
         .into_iter()
         .map(|size| Ok((size, squares(size, gap, doses)?)))
-        .collect::<Result<_, CommandError>>()?;
+        .collect::<Result<_, Exit>>()?;
     let to = FolderBeside::over_nothing(folder)
-        .map_err(|error| CommandError::Failed(error.into()).at(folder.display().to_string()))?;
+        .map_err(|error| Exit::Failed(error.into()).at(folder.display().to_string()))?;
     let mut table = TABLE_HEAD.to_owned();
     let stacks = targets.len();
     for (size, exposures) in targets {
@@ -113,16 +113,14 @@ feature_px,dose_mj_per_cm2,cured_um
 ";
 
 impl SquaresArgs {
-    fn light(&self) -> Result<Intensity, CommandError> {
+    fn light(&self) -> Result<Intensity, Exit> {
         let Some(path) = &self.material else {
             return Ok(self.intensity.expect("one of the two is required"));
         };
         let material: Material = entry(path)?;
         let name = path.display();
         material.intensity.map(|light| light.value).ok_or_else(|| {
-            CommandError::usage(format!(
-                "{name} states no intensity of full white: give --intensity"
-            ))
+            Exit::usage(format!("{name} states no intensity of full white: give --intensity"))
         })
     }
 
@@ -132,7 +130,7 @@ impl SquaresArgs {
         size: u32,
         exposures: Vec<TargetExposure>,
         light: Intensity,
-    ) -> impl Iterator<Item = Result<Layer, CommandError>> + use<> {
+    ) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
         let doses: Vec<f64> = self.doses.0.iter().map(|dose| dose.mj_per_cm2()).collect();
         let mut stack = Some(StackInfo {
             part: format!("squares of {size} pixels"),

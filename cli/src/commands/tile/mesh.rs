@@ -1,4 +1,4 @@
-//! The mesh around the parts, as options say.
+//! Options of the mesh around the parts.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_postprocess::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_stack::{Image, Length, StackError};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::{one_of, parse_distance, parse_thickness};
 use crate::streams::{failed_at, input_name, layers_of, open_pages};
 
@@ -56,19 +56,19 @@ pub(super) struct MeshArgs {
 }
 
 impl MeshArgs {
-    /// Whether it must know the parts' outlines.
+    /// Returns whether the mesh needs the parts' outlines.
     pub(super) fn needs_outlines(&self) -> bool {
         self.moat == Some(Moat::Outline)
     }
 
-    /// The file that it reads, if any.
+    /// Returns the file of the mesh's pattern, if any.
     pub(super) fn file(&self) -> Option<&PathBuf> {
         let is_shape = self.mesh.to_str().is_some_and(|name| name.parse::<CellShape>().is_ok());
         (!is_shape && self.mesh != Path::new("none")).then_some(&self.mesh)
     }
 
     /// Checks that no option is without effect.
-    pub(super) fn check(&self) -> Result<(), CommandError> {
+    pub(super) fn check(&self) -> Result<(), Exit> {
         let lengths = [
             ("--clearance", self.clearance),
             ("--break-width", self.break_width),
@@ -82,18 +82,18 @@ impl MeshArgs {
         if self.mesh == Path::new("none")
             && let Some(option) = given(&of_cells).or(given(&lengths)).or(base)
         {
-            return Err(CommandError::usage(format!("{option} has no effect with --mesh none")));
+            return Err(Exit::usage(format!("{option} has no effect with --mesh none")));
         }
         match (self.file(), given(&of_cells)) {
-            (Some(_), Some(option)) => Err(CommandError::usage(format!(
+            (Some(_), Some(option)) => Err(Exit::usage(format!(
                 "{option} needs --mesh hexagon or square: an image has its own walls"
             ))),
             _ => Ok(()),
         }
     }
 
-    /// The mesh, unless there is to be none.
-    pub(super) fn options(&self) -> Result<Option<MeshOptions>, CommandError> {
+    /// Returns the mesh, unless it is none.
+    pub(super) fn options(&self) -> Result<Option<MeshOptions>, Exit> {
         if self.mesh == Path::new("none") {
             return Ok(None);
         }
@@ -117,15 +117,16 @@ impl MeshArgs {
     }
 }
 
-/// The first image of a file; of a gray one, what is at least half as bright as white.
-fn template(path: &Path) -> Result<MeshPattern, CommandError> {
+/// Reads the first image of a file; a gray one becomes white where it is at least half as bright as
+/// white.
+fn template(path: &Path) -> Result<MeshPattern, Exit> {
     let place = input_name(path);
     let first = layers_of(open_pages(path)?, &place, None).next();
     let layer = first.unwrap_or_else(|| Err(failed_at(place.clone(), StackError::NoLayers)))?;
     let image = match layer.image.into_image() {
         Image::Mask(image) => image,
         Image::Gray(gray) => dither_image(&gray, DitherMethod::Threshold, 0)
-            .map_err(|error| CommandError::Failed(error.into()).at(place))?,
+            .map_err(|error| Exit::Failed(error.into()).at(place))?,
     };
     // Without blanks, as the stack's commands are words.
     let name = path.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_");

@@ -1,3 +1,5 @@
+//! `lamp tile`: lays out copies on a build area.
+
 mod mesh;
 mod stacks;
 mod strips;
@@ -14,9 +16,9 @@ use lamp_postprocess::{
 use lamp_stack::{Length, Size};
 
 use crate::catalogue::{entry, read_text};
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::json_report::parse_report;
-use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
+use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers, ranges};
 use crate::plots;
 use crate::progress::Progress;
 use crate::streams::{check_beside, check_not_input, progress, write_file};
@@ -131,7 +133,7 @@ pub(crate) struct TileArgs {
     classic: bool,
 }
 
-pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), CommandError> {
+pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     args.check()?;
     let mesh = args.mesh.options()?;
     let output = args.output();
@@ -180,17 +182,15 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), CommandError> 
 
 impl TileArgs {
     /// Checks, before the work, what can be checked.
-    fn check(&self) -> Result<(), CommandError> {
+    fn check(&self) -> Result<(), Exit> {
         let counted = self.stacks.iter().any(|stack| stack.copies.is_some());
         if self.copies.is_some() && (counted || self.stacks.len() > 1) {
-            return Err(CommandError::usage(
+            return Err(Exit::usage(
                 "--copies is for one stack without a count: write blade.tif:120 core.tif:40",
             ));
         }
         if self.layout.is_some() && counted {
-            return Err(CommandError::usage(
-                "--layout gives the number of copies: leave out the counts",
-            ));
+            return Err(Exit::usage("--layout gives the number of copies: leave out the counts"));
         }
         self.mesh.check()?;
         let inputs = || {
@@ -214,7 +214,7 @@ impl TileArgs {
         check_not_input(main, read)
     }
 
-    /// Where the whole build goes.
+    /// Returns the output of the whole build, if it is wanted.
     fn output(&self) -> Option<Output> {
         let unless_strips = || self.strips.folder().is_none().then(|| PathBuf::from("-"));
         let output = self.output.clone().or_else(unless_strips)?;
@@ -233,8 +233,8 @@ impl TileArgs {
         Pack { by: self.pack, turns: self.turns.unwrap_or(usual) }
     }
 
-    /// Writes where the copies stand, as was asked.
-    fn tell(&self, layout: &Layout) -> Result<(), CommandError> {
+    /// Writes the layout as a file and as a picture, if wanted.
+    fn tell(&self, layout: &Layout) -> Result<(), Exit> {
         if let Some(path) = &self.layout_out {
             write_file(path, |out| out.write_all(layout.to_file().to_json().as_bytes()))?;
         }
@@ -247,10 +247,11 @@ impl TileArgs {
 }
 
 /// A layout takes a line for each copy.
-const LARGEST_LAYOUT: u64 = 64 << 20;
+const MAX_LAYOUT_BYTES: u64 = 64 << 20;
 
-fn read_layout(path: &Path) -> Result<LayoutFile, CommandError> {
-    let read = || anyhow::Ok(LayoutFile::from_json(&read_text(path, LARGEST_LAYOUT, "a layout")?)?);
+fn read_layout(path: &Path) -> Result<LayoutFile, Exit> {
+    let read =
+        || anyhow::Ok(LayoutFile::from_json(&read_text(path, MAX_LAYOUT_BYTES, "a layout")?)?);
     Ok(read().with_context(|| path.display().to_string())?)
 }
 
@@ -259,35 +260,13 @@ fn place(
     parts: Vec<PartStack>,
     area: Size,
     path: Option<&Path>,
-) -> Result<Layout, CommandError> {
+) -> Result<Layout, Exit> {
     let path = path.unwrap_or(Path::new("-")).display();
-    file.place(parts, area)
-        .map_err(|error| CommandError::Failed(anyhow!(error)).at(path.to_string()))
+    file.place(parts, area).map_err(|error| Exit::Failed(anyhow!(error)).at(path.to_string()))
 }
 
 /// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
 fn say_stray(progress: &Progress, StrayRows { part, layer, rows }: &StrayRows) {
     let word = if rows.len() == 1 { "row" } else { "rows" };
     progress.say(&format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows)));
-}
-
-/// `3, 7-9`.
-fn ranges(rows: &[u32]) -> String {
-    let text = |run: &[u32]| match run {
-        [first, .., last] => format!("{first}-{last}"),
-        _ => run[0].to_string(),
-    };
-    let runs = rows.chunk_by(|a, b| a.checked_add(1) == Some(*b));
-    runs.map(text).collect::<Vec<_>>().join(", ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_that_touch_are_one_range() {
-        assert_eq!(ranges(&[3, 7, 8, 9, 11, 12]), "3, 7-9, 11-12");
-        assert_eq!(ranges(&[u32::MAX]), u32::MAX.to_string());
-    }
 }

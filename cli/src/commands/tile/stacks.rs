@@ -1,4 +1,4 @@
-//! The stacks of a build.
+//! Opens and reads the stacks of a build.
 
 use std::fs::File;
 use std::io::{self, Seek};
@@ -10,10 +10,10 @@ use lamp_postprocess::PartStack;
 use lamp_postprocess::machine::Machine;
 use lamp_stack::{Layer, Pages, StackError};
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages, spool_stdin};
 
-/// A stack and how many copies there are to be: `blade.tif:120`.
+/// A stack and the number of its copies: `blade.tif:120`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StackArg {
     pub(super) path: PathBuf,
@@ -42,7 +42,7 @@ impl StackArg {
     }
 }
 
-type Layers = Box<dyn Iterator<Item = Result<Layer, CommandError>>>;
+type Layers = Box<dyn Iterator<Item = Result<Layer, Exit>>>;
 
 /// A stack of a build.
 pub(super) struct InputStack {
@@ -58,16 +58,16 @@ pub(super) struct InputStack {
 }
 
 impl InputStack {
-    /// Sets the stacks up. None is given twice: its counts would be one.
+    /// Prepares the stacks. Refuses one that is given twice, because its counts would be ambiguous.
     pub(super) fn open_all(
         stacks: &[StackArg],
         range: &Option<Range<u32>>,
         machine: Option<&Machine>,
-    ) -> Result<Vec<Self>, CommandError> {
+    ) -> Result<Vec<Self>, Exit> {
         for (k, stack) in stacks.iter().enumerate() {
             if stacks[..k].iter().any(|before| before.path == stack.path) {
                 let name = input_name(&stack.path);
-                return Err(CommandError::usage(format!(
+                return Err(Exit::usage(format!(
                     "{name} is given twice: give it once, with the sum of the counts"
                 )));
             }
@@ -84,14 +84,13 @@ impl InputStack {
         Ok(stacks.iter().map(stack).collect())
     }
 
-    /// How many layers it has, where it says so.
+    /// Returns the number of layers, if the stack states it.
     pub(super) fn layer_count(&self) -> Option<u32> {
         self.layer_count
     }
 
-    /// Reads what must be known to place the part: its first layer, or all of
-    /// them to find its outline.
-    pub(super) fn part(&mut self, outline: bool) -> Result<PartStack, CommandError> {
+    /// Reads what placing the part needs: its first layer, or all layers if it needs the outline.
+    pub(super) fn part(&mut self, outline: bool) -> Result<PartStack, Exit> {
         let no_layers = failed_at(self.name.clone(), StackError::NoLayers);
         if outline {
             if is_stream(&self.path) {
@@ -103,7 +102,7 @@ impl InputStack {
                     count = count.or(count_of(layer));
                 }
             });
-            let part = PartStack::of_outline::<CommandError>(&self.name, layers)?.ok_or(no_layers);
+            let part = PartStack::of_outline::<Exit>(&self.name, layers)?.ok_or(no_layers);
             self.layer_count = count;
             return part;
         }
@@ -116,7 +115,7 @@ impl InputStack {
     }
 
     /// Its layers.
-    pub(super) fn layers(mut self) -> Result<Layers, CommandError> {
+    pub(super) fn layers(mut self) -> Result<Layers, Exit> {
         match self.layers.take() {
             Some(layers) => Ok(layers),
             None => self.read(),
@@ -124,7 +123,7 @@ impl InputStack {
     }
 
     /// Reads it from its start, checking that the machine builds it.
-    fn read(&mut self) -> Result<Layers, CommandError> {
+    fn read(&mut self) -> Result<Layers, Exit> {
         let pages = match &mut self.spool {
             Some(spool) => {
                 let again = |spool: &mut File| -> io::Result<File> {
@@ -141,7 +140,7 @@ impl InputStack {
         let name = self.name.clone();
         Ok(Box::new(layers.map(move |layer| {
             let layer = layer?;
-            machine.check(&layer).map_err(|limit| CommandError::from(limit).at(name.clone()))?;
+            machine.check(&layer).map_err(|limit| Exit::from(limit).at(name.clone()))?;
             Ok(layer)
         })))
     }

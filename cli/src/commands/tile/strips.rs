@@ -1,4 +1,4 @@
-//! The build, and its strips beside it, as options say.
+//! Writes a build, its strips, or both.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{StripWriter, StripsError};
 use lamp_stack::Layer;
 
-use crate::error::CommandError;
+use crate::exit::Exit;
 use crate::options::Output;
 use crate::progress::Progress;
 use crate::streams::{folder_to_make, format, write_layers};
@@ -35,23 +35,23 @@ pub(super) struct StripArgs {
 }
 
 impl StripArgs {
-    /// The folder of the strips, if there are to be any.
+    /// Returns the folder of the strips, if any are wanted.
     pub(super) fn folder(&self) -> Option<&PathBuf> {
         self.strips.as_ref()
     }
 
-    /// What writes the strips, if there are to be any.
+    /// Returns the writer of the strips, if any are wanted.
     pub(super) fn writer(
         &self,
         machine: Option<&Machine>,
         classic: bool,
-    ) -> Result<Option<StripOutput>, CommandError> {
+    ) -> Result<Option<StripOutput>, Exit> {
         let Some(folder) = &self.strips else { return Ok(None) };
         let folder = folder_to_make(folder)?;
         let of_machine = machine.and_then(|machine| machine.strips.as_ref());
         let mirrors = self.mirrors.or(of_machine.map(|strips| strips.mirrors));
         let Some(mirrors) = mirrors else {
-            return Err(CommandError::usage(match machine {
+            return Err(Exit::usage(match machine {
                 None => "--strips needs --mirrors, or a --machine that has [strips]".to_owned(),
                 Some(Machine { name, .. }) => format!(
                     "--strips needs --mirrors: the machine {name} has no [strips] (docs/tile.md)"
@@ -63,15 +63,15 @@ impl StripArgs {
         match StripWriter::new(folder, mirrors, overlap, format(classic)) {
             Ok(writer) => Ok(Some(StripOutput { folder: folder.to_owned(), writer })),
             Err(error @ (StripsError::Swaths(_) | StripsError::Mirrors { .. })) => {
-                Err(CommandError::wrong_options(error))
+                Err(Exit::wrong_options(error))
             }
             Err(error) => Err(failed(folder, error)),
         }
     }
 }
 
-fn failed(folder: &Path, error: StripsError) -> CommandError {
-    CommandError::Failed(error.into()).at(folder.display().to_string())
+fn failed(folder: &Path, error: StripsError) -> Exit {
+    Exit::Failed(error.into()).at(folder.display().to_string())
 }
 
 /// The strips that are being written.
@@ -82,11 +82,11 @@ pub(super) struct StripOutput {
 
 /// Writes a build, its strips, or both.
 pub(super) fn write(
-    build: impl Iterator<Item = Result<Layer, CommandError>>,
+    build: impl Iterator<Item = Result<Layer, Exit>>,
     strips: Option<StripOutput>,
     output: Option<&Output>,
     progress: &Progress,
-) -> Result<(), CommandError> {
+) -> Result<(), Exit> {
     let mut strips = strips;
     let cut = build.map(|layer| {
         let layer = layer?;
@@ -109,9 +109,9 @@ pub(super) fn write(
 
 /// Takes all layers, counting them in `report`.
 fn drain(
-    layers: impl Iterator<Item = Result<Layer, CommandError>>,
+    layers: impl Iterator<Item = Result<Layer, Exit>>,
     progress: &Progress,
-) -> Result<(), CommandError> {
+) -> Result<(), Exit> {
     let mut layers = layers.inspect(|_| progress.layer_done());
     let done = layers.try_for_each(|layer| layer.map(drop));
     progress.done();

@@ -1,9 +1,10 @@
-//! Why a command stops.
+//! Why a command exits early, and with which status.
 
 use std::fmt;
 use std::io;
 
 use lamp_grayscale::DitherError;
+use lamp_grayscale::calibrate::{DataError, FitError};
 use lamp_postprocess::machine::MachineLimit;
 use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, TileError};
 use lamp_slicer::SliceError;
@@ -11,9 +12,9 @@ use lamp_stack::{JoinError, SplitError, StackError};
 
 use crate::hints::hint;
 
-/// Why a command stops: whose fault it is decides the exit status.
+/// Why a command exits early. The cause decides the status.
 #[derive(Debug)]
-pub(crate) enum CommandError {
+pub(crate) enum Exit {
     /// Wrong usage: status 2.
     Usage(anyhow::Error),
     /// Bad input, or a failure on the way: status 1.
@@ -24,12 +25,12 @@ pub(crate) enum CommandError {
     Findings(String),
 }
 
-impl CommandError {
+impl Exit {
     pub(crate) fn usage(message: impl Into<String>) -> Self {
         Self::Usage(anyhow::Error::msg(message.into()))
     }
 
-    /// An error of a library that the options caused.
+    /// Returns a library's error as wrong usage, where options caused it.
     pub(crate) fn wrong_options(error: impl std::error::Error + Send + Sync + 'static) -> Self {
         Self::Usage(error.into())
     }
@@ -48,7 +49,7 @@ impl CommandError {
         }
     }
 
-    /// The error of one kind that it comes from, if any.
+    /// Returns the error of one type that caused it, if any.
     pub(crate) fn cause<E: std::error::Error + Send + Sync + 'static>(&self) -> Option<&E> {
         let Self::Failed(error) = self else { return None };
         error.chain().find_map(|cause| cause.downcast_ref())
@@ -62,7 +63,7 @@ impl CommandError {
         }
     }
 
-    /// Whether the program that reads the output ended, as `head` does: no
+    /// Returns whether the program that reads the output has ended, as `head` does. That is no
     /// failure of this one.
     pub(crate) fn is_reader_gone(&self) -> bool {
         let Self::Output(error) = self else { return false };
@@ -76,7 +77,7 @@ impl CommandError {
     }
 }
 
-impl fmt::Display for CommandError {
+impl fmt::Display for Exit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Findings(message) => f.write_str(message),
@@ -91,68 +92,35 @@ impl fmt::Display for CommandError {
     }
 }
 
-impl From<SliceError> for CommandError {
-    fn from(error: SliceError) -> Self {
-        Self::Failed(error.into())
-    }
+/// Makes errors of libraries failures.
+macro_rules! failures {
+    ($($error:ty),+ $(,)?) => {
+        $(impl From<$error> for Exit {
+            fn from(error: $error) -> Self {
+                Self::Failed(error.into())
+            }
+        })+
+    };
 }
 
-impl From<DitherError> for CommandError {
-    fn from(error: DitherError) -> Self {
-        Self::Failed(error.into())
-    }
-}
+failures!(
+    SliceError,
+    DitherError,
+    EditError,
+    TileError,
+    StripsError,
+    LayoutError,
+    MachineLimit,
+    CompensateError,
+    JoinError,
+    SplitError,
+    DataError,
+    FitError
+);
 
-impl From<EditError> for CommandError {
-    fn from(error: EditError) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-impl From<TileError> for CommandError {
-    fn from(error: TileError) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-impl From<StripsError> for CommandError {
-    fn from(error: StripsError) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-impl From<LayoutError> for CommandError {
-    fn from(error: LayoutError) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-impl From<MachineLimit> for CommandError {
-    fn from(error: MachineLimit) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-impl From<CompensateError> for CommandError {
-    fn from(error: CompensateError) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-impl From<JoinError> for CommandError {
-    fn from(error: JoinError) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-impl From<SplitError> for CommandError {
-    fn from(error: SplitError) -> Self {
-        Self::Failed(error.into())
-    }
-}
-
-/// What `write_stack` itself reports; errors of the layers it passes on.
-impl From<StackError> for CommandError {
+/// Tells failures to write from stacks without layers; errors of the layers pass through as they
+/// are.
+impl From<StackError> for Exit {
     fn from(error: StackError) -> Self {
         match error {
             StackError::NoLayers => Self::Failed(error.into()),
@@ -161,7 +129,7 @@ impl From<StackError> for CommandError {
     }
 }
 
-impl From<anyhow::Error> for CommandError {
+impl From<anyhow::Error> for Exit {
     fn from(error: anyhow::Error) -> Self {
         Self::Failed(error)
     }
