@@ -81,9 +81,9 @@ pub fn join(
 ) -> Result<impl Iterator<Item = Result<Layer, JoinError>> + use<>, JoinError> {
     let stack = survey(&stacks)?;
     let pages = Joined { stacks: stacks.into_iter(), open: None, last: None, stack };
-    Ok(map_in_order(pages, |(page, place): (Page, Place)| {
-        let mut layer = page.decode().map_err(|source| in_stack(&place.path, source))?;
-        layer.info.stack = place.stack;
+    Ok(map_in_order(pages, |(page, origin): (Page, PageOrigin)| {
+        let mut layer = page.decode().map_err(|source| in_stack(&origin.path, source))?;
+        layer.info.stack = origin.stack;
         Ok(layer)
     }))
 }
@@ -159,7 +159,7 @@ struct Joined {
 }
 
 /// Where a page comes from, and what it is to say of the stack.
-struct Place {
+struct PageOrigin {
     path: Arc<Path>,
     stack: Option<StackInfo>,
 }
@@ -176,8 +176,8 @@ impl Joined {
         })
     }
 
-    /// Finds the place of a page.
-    fn place(&mut self, page: &Page, path: Arc<Path>) -> Result<Place, JoinError> {
+    /// Returns where a page comes from, if it follows the one before it.
+    fn origin(&mut self, page: &Page, path: Arc<Path>) -> Result<PageOrigin, JoinError> {
         let layer = page.info().index;
         let stack = match self.last.replace((layer, Arc::clone(&path))) {
             None => self.stack.take(),
@@ -193,12 +193,12 @@ impl Joined {
                 });
             }
         };
-        Ok(Place { path, stack })
+        Ok(PageOrigin { path, stack })
     }
 }
 
 impl Iterator for Joined {
-    type Item = Result<(Page, Place), JoinError>;
+    type Item = Result<(Page, PageOrigin), JoinError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
@@ -207,7 +207,7 @@ impl Iterator for Joined {
             {
                 let path = Arc::clone(path);
                 return Some(match page {
-                    Ok(page) => self.place(&page, path).map(|place| (page, place)),
+                    Ok(page) => self.origin(&page, path).map(|origin| (page, origin)),
                     Err(source) => Err(in_stack(&path, source)),
                 });
             }

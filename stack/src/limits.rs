@@ -83,7 +83,7 @@ mod tests {
             let error = |limits: Limits| {
                 let pages = Pages::from_stream(Cursor::new(file.clone())).unwrap();
                 let read = pages.with_limits(limits).layers().next().unwrap();
-                read.map_err(|error| format!("{error:?}")).map(drop)
+                read.map_err(|error| format!("{error} {error:?}")).map(drop)
             };
             let default = Limits::default();
             assert_eq!(error(default), Ok(()));

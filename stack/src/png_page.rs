@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, Info, Reader, Unit};
 
-use crate::error::StackError;
+use crate::error::{PageFault, StackError, UnsupportedFeature};
 use crate::gray::GrayMask;
 use crate::layer::{Image, PageInfo};
 use crate::length::Dpi;
@@ -34,27 +34,27 @@ pub(crate) struct Header {
 /// Why a PNG is no page.
 #[derive(Debug)]
 pub(crate) enum PngFault {
-    Unsupported(&'static str),
-    Malformed(String),
+    Unsupported(UnsupportedFeature),
+    Malformed(PageFault),
 }
 
 impl PngFault {
     pub(crate) fn on(self, page: u32) -> StackError {
         match self {
-            Self::Unsupported(what) => StackError::Unsupported { page, what: what.to_owned() },
-            Self::Malformed(what) => StackError::Malformed { page, what },
+            Self::Unsupported(feature) => StackError::Unsupported { page, feature },
+            Self::Malformed(fault) => StackError::Malformed { page, fault },
         }
     }
 }
 
 impl From<png::DecodingError> for PngFault {
     fn from(error: png::DecodingError) -> Self {
-        Self::Malformed(format!("its PNG is damaged: {error}"))
+        Self::Malformed(PageFault::Png(error))
     }
 }
 
 /// Gives a PNG's rows.
-type Rows<'a> = Reader<Cursor<&'a [u8]>>;
+type PngRows<'a> = Reader<Cursor<&'a [u8]>>;
 
 /// Reads what stands before the image data.
 pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PngFault> {
@@ -81,7 +81,7 @@ pub(crate) fn decode(file: &[u8], limits: &Limits) -> Result<Image, PngFault> {
 }
 
 fn decode_mask(
-    mut reader: Rows<'_>,
+    mut reader: PngRows<'_>,
     samples: &Samples,
     max_runs: usize,
 ) -> Result<Image, PngFault> {
@@ -97,7 +97,7 @@ fn decode_mask(
 }
 
 fn decode_gray(
-    mut reader: Rows<'_>,
+    mut reader: PngRows<'_>,
     samples: &Samples,
     max_runs: usize,
 ) -> Result<Image, PngFault> {
@@ -111,7 +111,7 @@ fn decode_gray(
             *sample = *samples
                 .levels
                 .get(usize::from(*sample))
-                .ok_or_else(|| PngFault::Malformed(format!("its palette has no entry {sample}")))?;
+                .ok_or_else(|| PngFault::Malformed(PageFault::PaletteEntry(*sample)))?;
         }
         gray.push_runs(runs.iter().copied()).expect("a row is as long as the width");
         check_runs(gray.change_count(), max_runs)?;
@@ -121,22 +121,22 @@ fn decode_gray(
 
 fn check_runs(runs: usize, max: usize) -> Result<(), PngFault> {
     if runs > max {
-        return Err(PngFault::Malformed("it has more runs than an image may have".to_owned()));
+        return Err(PngFault::Malformed(PageFault::TooManyRuns));
     }
     Ok(())
 }
 
-fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(Rows<'a>, Samples), PngFault> {
+fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(PngRows<'a>, Samples), PngFault> {
     let mut decoder = Decoder::new(Cursor::new(file));
     decoder.set_ignore_iccp_chunk(true);
     let reader = decoder.read_info()?;
     let info = reader.info();
     let side = info.width.max(info.height);
     if side > limits.side {
-        return Err(PngFault::Malformed(format!("it claims a side of {side} pixels")));
+        return Err(PngFault::Malformed(PageFault::Side(side.into())));
     }
     if info.interlaced {
-        return Err(PngFault::Unsupported("an interlaced PNG"));
+        return Err(PngFault::Unsupported(UnsupportedFeature::Interlaced));
     }
     let samples = Samples::of(info)?;
     Ok((reader, samples))
@@ -152,10 +152,12 @@ struct Samples {
 impl Samples {
     fn of(info: &Info<'_>) -> Result<Self, PngFault> {
         if info.trns.is_some() {
-            return Err(PngFault::Unsupported("a PNG with transparency"));
+            return Err(PngFault::Unsupported(UnsupportedFeature::Transparency));
         }
         let bits = match info.bit_depth {
-            BitDepth::Sixteen => return Err(PngFault::Unsupported("a PNG of 16 bits")),
+            BitDepth::Sixteen => {
+                return Err(PngFault::Unsupported(UnsupportedFeature::SixteenBits));
+            }
             depth => depth as usize,
         };
         let levels = match info.color_type {
@@ -165,10 +167,10 @@ impl Samples {
             }
             ColorType::Indexed => gray_palette(info.palette.as_deref().unwrap_or_default())?,
             ColorType::GrayscaleAlpha => {
-                return Err(PngFault::Unsupported("a PNG with transparency"));
+                return Err(PngFault::Unsupported(UnsupportedFeature::Transparency));
             }
             ColorType::Rgb | ColorType::Rgba => {
-                return Err(PngFault::Unsupported("a PNG in colour"));
+                return Err(PngFault::Unsupported(UnsupportedFeature::PngColour));
             }
         };
         Ok(Self { bits, levels })
@@ -194,7 +196,7 @@ impl Samples {
 fn gray_palette(palette: &[u8]) -> Result<Vec<u8>, PngFault> {
     let level = |entry: &[u8]| match *entry {
         [r, g, b] if r == g && g == b => Ok(r),
-        _ => Err(PngFault::Unsupported("a PNG with a palette of colours")),
+        _ => Err(PngFault::Unsupported(UnsupportedFeature::PngPalette)),
     };
     palette.chunks(3).map(level).collect()
 }

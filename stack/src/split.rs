@@ -40,14 +40,14 @@ pub enum SplitError {
 
 /// Where a stack is split.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Cuts {
+pub enum SplitPoints {
     /// Behind so many layers each; the last file takes what is left.
     Every(NonZeroU32),
     /// Before each of these layers, which go up.
     At(Vec<u32>),
 }
 
-impl Cuts {
+impl SplitPoints {
     /// The layers of the file that starts with layer `first`.
     fn file_from(&self, first: u32) -> Range<u32> {
         let end = match self {
@@ -68,7 +68,7 @@ impl Cuts {
 /// must not exist, or be empty.
 pub fn write_split<E>(
     layers: impl Iterator<Item = Result<Layer, E>>,
-    cuts: &Cuts,
+    cuts: &SplitPoints,
     folder: &Path,
     format: Format,
 ) -> Result<(), E>
@@ -95,7 +95,7 @@ where
 
 /// Which layer goes into which file.
 struct Plan<'a> {
-    cuts: &'a Cuts,
+    cuts: &'a SplitPoints,
     /// What the first layer says of the stack.
     stack: Option<StackInfo>,
     first: u32,
@@ -125,7 +125,7 @@ impl Plan<'_> {
     }
 
     fn check_cuts(&self) -> Result<(), SplitError> {
-        let (Cuts::At(cuts), Some(last)) = (self.cuts, self.last) else { return Ok(()) };
+        let (SplitPoints::At(cuts), Some(last)) = (self.cuts, self.last) else { return Ok(()) };
         let first = self.first;
         match cuts.iter().find(|&&cut| cut <= first || cut > last) {
             Some(&cut) => Err(SplitError::NoCut { cut, first, last }),

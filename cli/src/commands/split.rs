@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
-use lamp_stack::{Cuts, SplitError, write_split};
+use lamp_stack::{SplitError, SplitPoints, write_split};
 
 use crate::exit::Exit;
 use crate::options::{Common, Input};
@@ -46,8 +46,8 @@ pub(crate) struct SplitArgs {
 
 pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Exit> {
     let cuts = match args.every {
-        Some(layers) => Cuts::Every(layers),
-        None if args.at.is_sorted_by(|a, b| a < b) => Cuts::At(args.at.clone()),
+        Some(layers) => SplitPoints::Every(layers),
+        None if args.at.is_sorted_by(|a, b| a < b) => SplitPoints::At(args.at.clone()),
         None => {
             return Err(Exit::usage(
                 "the layers of --at must be in ascending order, as --at 500,900",

@@ -2,11 +2,11 @@
 
 use std::sync::LazyLock;
 
+use super::coded_row::{AT_ONCE, CodedRow, LOOK, WIDE};
 use super::codes::{
     Code, EOL, HORIZONTAL, MAKE_UP_0, MAKE_UP_1, MAKE_UP_LONG, PASS, TERMINATING_0, TERMINATING_1,
     VERTICAL,
 };
-use super::row::{LOOK, Row, TOGETHER, WIDE};
 use super::{G4Error, G4Fault};
 use crate::limits::MAX_RUNS;
 use crate::mask::Mask;
@@ -37,7 +37,7 @@ pub(crate) fn decode_rows(
     mask: &mut Mask,
 ) -> Result<(), G4Error> {
     let mut bits = BitReader::new(strip);
-    let (mut above, mut row) = (Row::black(width), Row::black(width));
+    let (mut above, mut row) = (CodedRow::black(width), CodedRow::black(width));
     let mut index = 0;
     while index < height {
         if above.len == 0 {
@@ -64,8 +64,8 @@ pub(crate) fn decode_rows(
 /// [`encode_row`](super::encode).
 pub(super) fn decode_row(
     bits: &mut BitReader<'_>,
-    above: &Row,
-    row: &mut Row,
+    above: &CodedRow,
+    row: &mut CodedRow,
     width: u32,
 ) -> Result<(), G4Fault> {
     row.len = 0;
@@ -121,10 +121,10 @@ pub(super) fn decode_row(
 #[inline]
 fn take_verticals(
     bits: &mut BitReader<'_>,
-    above: &Row,
+    above: &CodedRow,
     j: usize,
     a0: u32,
-    row: &mut Row,
+    row: &mut CodedRow,
     width: u32,
 ) -> Option<usize> {
     if j > above.len {
@@ -145,8 +145,8 @@ fn take_verticals(
     if !alone || narrow >> 31 != 0 || count == 0 {
         return None;
     }
-    let moved: &mut [u32; TOGETHER] = row.places.get_mut(row.len..)?.first_chunk_mut()?;
-    for k in 0..TOGETHER {
+    let moved: &mut [u32; AT_ONCE] = row.places.get_mut(row.len..)?.first_chunk_mut()?;
+    for k in 0..AT_ONCE {
         moved[k] = b[k].wrapping_add_signed(codes.shifts[k].into());
     }
     if moved[count - 1] > width {
@@ -196,7 +196,7 @@ static MODES: LazyLock<Vec<Entry<Mode>>> = LazyLock::new(|| {
 /// The vertical codes that some bits begin with, at most four.
 #[derive(Clone, Copy, Default)]
 struct Verticals {
-    shifts: [i8; TOGETHER],
+    shifts: [i8; AT_ONCE],
     count: u8,
     /// How many bits the codes up to each take, in 4 bits each.
     ends: u16,
@@ -222,7 +222,7 @@ static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {
     let begin = |bits: usize| {
         let mut found = Verticals::default();
         let mut end = 0;
-        while usize::from(found.count) < TOGETHER {
+        while usize::from(found.count) < AT_ONCE {
             let rest = bits << end & ((1 << VERTICALS_BITS) - 1);
             let entry = MODES[rest >> (VERTICALS_BITS - MODE_BITS)];
             let Mode::Vertical(shift) = entry.value else { break };

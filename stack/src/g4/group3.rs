@@ -1,8 +1,8 @@
 //! T.4 (Group 3) codes to runs.
 
+use super::coded_row::CodedRow;
 use super::codes::EOL;
 use super::decode::{BitReader, decode_row};
-use super::row::Row;
 use super::{G4Error, G4Fault};
 use crate::mask::Mask;
 
@@ -37,8 +37,8 @@ pub(crate) fn decode_group3_rows(
     max_runs: usize,
     mask: &mut Mask,
 ) -> Result<(), G4Error> {
-    let mut rows = Rows { bits: BitReader::new(strip), kind, ends_of_line: false };
-    let (mut above, mut row) = (Row::black(width), Row::black(width));
+    let mut rows = Group3Rows { bits: BitReader::new(strip), kind, ends_of_line: false };
+    let (mut above, mut row) = (CodedRow::black(width), CodedRow::black(width));
     for index in 0..height {
         let failed = |fault| G4Error { row: index, fault };
         if rows.start(index).map_err(failed)? {
@@ -55,14 +55,14 @@ pub(crate) fn decode_group3_rows(
     Ok(())
 }
 
-struct Rows<'a> {
+struct Group3Rows<'a> {
     bits: BitReader<'a>,
     kind: Group3,
     /// Whether an end of line stood before the last row.
     ends_of_line: bool,
 }
 
-impl Rows<'_> {
+impl Group3Rows<'_> {
     /// Goes to the codes of row `index`. Gives whether they refer to the row
     /// above.
     fn start(&mut self, index: u32) -> Result<bool, G4Fault> {
@@ -99,7 +99,7 @@ impl Rows<'_> {
     }
 
     /// A row coded as runs, black (T.4's white) first.
-    fn runs(&mut self, row: &mut Row, width: u32) -> Result<(), G4Fault> {
+    fn runs(&mut self, row: &mut CodedRow, width: u32) -> Result<(), G4Fault> {
         row.len = 0;
         let (mut column, mut white) = (0, false);
         while column < width {

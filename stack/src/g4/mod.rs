@@ -4,11 +4,11 @@
 //! Both are defined on the places where a row changes colour, which is what a
 //! [`Mask`](crate::Mask) holds: neither direction makes a bitmap.
 
+mod coded_row;
 mod codes;
 mod decode;
 mod encode;
 mod group3;
-mod row;
 
 pub use decode::decode;
 pub(crate) use decode::decode_rows;

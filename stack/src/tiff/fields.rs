@@ -12,7 +12,7 @@ use super::tags::{
     T4_OPTIONS, T6, TILE_BYTE_COUNTS, TILE_LENGTH, TILE_OFFSETS, TILE_WIDTH, TWO_DIMENSIONAL,
     UNCOMPRESSED, UNCOMPRESSED_MODE, WHITE_IS_ZERO, X_RESOLUTION, type_size,
 };
-use crate::error::StackError;
+use crate::error::{PageFault, StackError, UnsupportedFeature};
 use crate::layer::PageInfo;
 use crate::length::Dpi;
 use crate::limits::Limits;
@@ -54,22 +54,20 @@ pub(super) struct Fields {
 
 impl Fields {
     pub(super) fn numbers(&self, tag: u16) -> Result<Vec<u64>, StackError> {
-        let (kind, bytes) = self
-            .values
-            .get(&tag)
-            .ok_or_else(|| malformed(self.page, format!("it lacks tag {tag}")))?;
+        let (kind, bytes) =
+            self.values.get(&tag).ok_or_else(|| malformed(self.page, PageFault::NoTag(tag)))?;
         match *kind {
             SHORT | LONG | LONG8 => Ok(bytes
                 .chunks_exact(type_size(*kind) as usize)
                 .map(|value| number(value, self.little_endian))
                 .collect()),
-            kind => Err(malformed(self.page, format!("its tag {tag} has type {kind}"))),
+            kind => Err(malformed(self.page, PageFault::TagType { tag, kind })),
         }
     }
 
     fn number(&self, tag: u16) -> Result<u64, StackError> {
         let first = self.numbers(tag)?.first().copied();
-        first.ok_or_else(|| malformed(self.page, format!("its tag {tag} is empty")))
+        first.ok_or_else(|| malformed(self.page, PageFault::EmptyTag(tag)))
     }
 
     pub(super) fn number_or(&self, tag: u16, default: u64) -> Result<u64, StackError> {
@@ -79,7 +77,7 @@ impl Fields {
     fn side(&self, tag: u16) -> Result<u32, StackError> {
         match self.number(tag)? {
             side if (1..=self.limits.side.into()).contains(&side) => Ok(side as u32),
-            side => Err(malformed(self.page, format!("it claims a side of {side} pixels"))),
+            side => Err(malformed(self.page, PageFault::Side(side))),
         }
     }
 
@@ -109,19 +107,18 @@ impl Fields {
         let white_is_zero = match self.number(PHOTOMETRIC)? {
             WHITE_IS_ZERO => true,
             BLACK_IS_ZERO => false,
-            2 => return Err(self.unsupported("an RGB image")),
-            3 => return Err(self.unsupported("an image with a palette")),
+            2 => return Err(self.unsupported(UnsupportedFeature::Rgb)),
+            3 => return Err(self.unsupported(UnsupportedFeature::Palette)),
             other => {
-                return Err(self.unsupported(format!("photometric interpretation {other}")));
+                return Err(self.unsupported(UnsupportedFeature::Photometric(other)));
             }
         };
         let tag = self.number_or(ORIENTATION, 1)?;
         let orientation = Orientation::of_tiff_tag(tag)
-            .ok_or_else(|| malformed(self.page, format!("there is no orientation {tag}")))?;
+            .ok_or_else(|| malformed(self.page, PageFault::Orientation(tag)))?;
         let (width, height) = (self.side(IMAGE_WIDTH)?, self.side(IMAGE_LENGTH)?);
         if orientation.is_across() && width > self.limits.rows_from_columns {
-            let what = format!("it claims {width} columns, too many to turn it upright");
-            return Err(malformed(self.page, what));
+            return Err(malformed(self.page, PageFault::TooWideToTurn(width)));
         }
         Ok(Page {
             number: self.page,
@@ -144,12 +141,12 @@ impl Fields {
         let gray = match self.number_or(BITS_PER_SAMPLE, 1)? {
             1 if samples == 1 => false,
             8 if samples == 1 => true,
-            bits => return Err(self.unsupported(format!("an image of {samples} x {bits} bits"))),
+            bits => return Err(self.unsupported(UnsupportedFeature::PixelBits { samples, bits })),
         };
         match self.number_or(SAMPLE_FORMAT, 1)? {
             // Unsigned, or not stated.
             1 | 4 => Ok(gray),
-            other => Err(self.unsupported(format!("sample format {other}"))),
+            other => Err(self.unsupported(UnsupportedFeature::SampleFormat(other))),
         }
     }
 
@@ -159,7 +156,7 @@ impl Fields {
             MODIFIED_HUFFMAN if !gray => Compression::ModifiedHuffman,
             T4 if !gray => match self.number_or(T4_OPTIONS, 0)? {
                 options if options & UNCOMPRESSED_MODE != 0 => {
-                    return Err(self.unsupported("Group 3 with its uncompressed mode"));
+                    return Err(self.unsupported(UnsupportedFeature::UncompressedMode));
                 }
                 options if options & TWO_DIMENSIONAL != 0 => Compression::Group3TwoDimensional,
                 _ => Compression::Group3,
@@ -168,8 +165,8 @@ impl Fields {
             LZW => Compression::Lzw,
             DEFLATE | OLD_DEFLATE => Compression::Deflate,
             PACK_BITS => Compression::PackBits,
-            6 | 7 => return Err(self.unsupported("JPEG in a TIFF")),
-            other => return Err(self.unsupported(format!("TIFF compression {other}"))),
+            6 | 7 => return Err(self.unsupported(UnsupportedFeature::Jpeg)),
+            other => return Err(self.unsupported(UnsupportedFeature::Compression(other))),
         })
     }
 
@@ -180,9 +177,9 @@ impl Fields {
             1 => Ok(false),
             _ if !matches!(compression, Compression::Lzw | Compression::Deflate) => Ok(false),
             2 if gray => Ok(true),
-            other => {
+            predictor => {
                 let bits = if gray { 8 } else { 1 };
-                Err(self.unsupported(format!("predictor {other} of {bits}-bit pixels")))
+                Err(self.unsupported(UnsupportedFeature::Predictor { predictor, bits }))
             }
         }
     }
@@ -198,7 +195,7 @@ impl Fields {
 
     /// Where the strips or tiles stand, and how many bytes each takes.
     pub(super) fn places(&self, layout: &Layout) -> Result<Vec<(u64, u64)>, StackError> {
-        let (name, offsets, counts) = if layout.tiled {
+        let (pieces, offsets, counts) = if layout.tiled {
             ("tiles", TILE_OFFSETS, TILE_BYTE_COUNTS)
         } else {
             ("strips", STRIP_OFFSETS, STRIP_BYTE_COUNTS)
@@ -206,19 +203,19 @@ impl Fields {
         let (offsets, counts) = (self.numbers(offsets)?, self.numbers(counts)?);
         let wanted = layout.count();
         if offsets.len() as u64 != wanted || counts.len() as u64 != wanted {
-            let what = format!("it has {} {name} where its size makes {wanted}", offsets.len());
-            return Err(malformed(self.page, what));
+            let found = offsets.len();
+            return Err(malformed(self.page, PageFault::PieceCount { pieces, found, wanted }));
         }
         Ok(offsets.into_iter().zip(counts).collect())
     }
 
-    fn unsupported(&self, what: impl Into<String>) -> StackError {
-        StackError::Unsupported { page: self.page, what: what.into() }
+    fn unsupported(&self, feature: UnsupportedFeature) -> StackError {
+        StackError::Unsupported { page: self.page, feature }
     }
 }
 
-pub(super) fn malformed(page: u32, what: impl Into<String>) -> StackError {
-    StackError::Malformed { page, what: what.into() }
+pub(super) fn malformed(page: u32, fault: PageFault) -> StackError {
+    StackError::Malformed { page, fault }
 }
 
 /// An unsigned number of up to 8 bytes.

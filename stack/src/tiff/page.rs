@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::error::StackError;
+use crate::error::{PageFault, StackError};
 use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
 use crate::layer::{Image, Layer, LayerImage, PageInfo};
@@ -16,7 +16,7 @@ use crate::runs::{Change, RunImage};
 use crate::tiff::fields::malformed;
 use crate::tiff::layout::Layout;
 use crate::tiff::tiles::join_tiles;
-use crate::tiff::unpack::{Cut, Fault, unpack};
+use crate::tiff::unpack::{PieceShape, UnpackError, unpack};
 
 /// How a page's image is compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -245,13 +245,11 @@ impl Page {
         each: impl FnMut(&[(u32, u8)]) -> bool,
     ) -> Result<(), StackError> {
         let name = if self.layout.tiled { "tile" } else { "strip" };
-        let cut = Cut { row_bytes, rows, differences: self.differences };
-        unpack(self.compression, piece, &cut, each).map_err(|fault| match fault {
-            Fault::TooShort => malformed(self.number, format!("a {name} is shorter than its rows")),
-            Fault::Damaged => {
-                malformed(self.number, format!("a {name} does not decode: it is damaged"))
-            }
-            Fault::Enough => self.too_many_runs(),
+        let shape = PieceShape { row_bytes, rows, differences: self.differences };
+        unpack(self.compression, piece, &shape, each).map_err(|fault| match fault {
+            UnpackError::TooShort => malformed(self.number, PageFault::TooShort(name)),
+            UnpackError::Damaged => malformed(self.number, PageFault::Damaged(name)),
+            UnpackError::Enough => self.too_many_runs(),
         })
     }
 
@@ -260,7 +258,7 @@ impl Page {
     }
 
     fn too_many_runs(&self) -> StackError {
-        malformed(self.number, "it has more runs than an image may have")
+        malformed(self.number, PageFault::TooManyRuns)
     }
 }
 

@@ -8,7 +8,7 @@ use super::fields::{Fields, KNOWN, malformed, number};
 use super::page::Page;
 use super::source::Source;
 use super::tags::{FILL_ORDER, type_size};
-use crate::error::StackError;
+use crate::error::{PageFault, StackError};
 use crate::limits::Limits;
 use crate::png_page;
 
@@ -124,10 +124,7 @@ impl PageReader {
     /// The next page, and the link behind it.
     fn read_tiff_page(&mut self) -> Result<(Page, u64), StackError> {
         if !self.seen.insert(self.next) {
-            return Err(malformed(
-                self.number,
-                "its directory was met before: the links form a loop",
-            ));
+            return Err(malformed(self.number, PageFault::Loop));
         }
         let (entries, next) = self.read_directory()?;
         let fields = self.read_values(&entries)?;
@@ -151,7 +148,7 @@ impl PageReader {
         let (count_size, entry_size, word) = if self.big { (8, 20, 8) } else { (2, 12, 4) };
         let count = number(&self.read(self.next, count_size)?, self.little_endian);
         if count > self.limits.directory_entries {
-            return Err(malformed(self.number, format!("its directory claims {count} entries")));
+            return Err(malformed(self.number, PageFault::Entries(count)));
         }
         let bytes = self.read(self.next + count_size, count * entry_size + word)?;
         let (entries, link) = bytes.split_at((count * entry_size) as usize);
@@ -183,8 +180,8 @@ impl PageReader {
         for entry in entries.iter().filter(first) {
             let length = entry.count.saturating_mul(type_size(entry.kind));
             if length > self.limits.field_bytes {
-                let what = format!("its tag {} claims {length} bytes", entry.tag);
-                return Err(malformed(self.number, what));
+                let fault = PageFault::TagBytes { tag: entry.tag, bytes: length };
+                return Err(malformed(self.number, fault));
             }
             if length <= entry.value.len() as u64 {
                 let value = entry.value[..length as usize].to_vec();
@@ -205,8 +202,7 @@ impl PageReader {
         let mut places: Vec<_> = fields.places(&page.layout)?.into_iter().enumerate().collect();
         let bytes = places.iter().fold(0u64, |sum, (_, (_, length))| sum.saturating_add(*length));
         if bytes > page.layout.most_bytes() {
-            let what = format!("its strips claim {bytes} bytes, more than its pixels can take");
-            return Err(malformed(self.number, what));
+            return Err(malformed(self.number, PageFault::PieceBytes(bytes)));
         }
         page.pieces = vec![Vec::new(); places.len()];
         places.sort_by_key(|(_, (offset, _))| *offset);
@@ -215,7 +211,7 @@ impl PageReader {
         for (i, (offset, length)) in places {
             // Strips that overlap would take more memory than the file has.
             if offset < end {
-                return Err(malformed(self.number, "its strips overlap"));
+                return Err(malformed(self.number, PageFault::Overlap));
             }
             end = offset.saturating_add(length);
             let mut piece = self.read(offset, length)?;
@@ -234,13 +230,12 @@ impl PageReader {
             let head = self.read(file.len() as u64, 8)?;
             let (length, kind) = (number(&head[..4], false), &head[4..]);
             if !kind.iter().all(u8::is_ascii_alphabetic) {
-                return Err(malformed(self.number, "its PNG has bytes between its chunks"));
+                return Err(malformed(self.number, PageFault::PngGap));
             }
             file.extend_from_slice(&head);
             let most = self.limits.png_bytes;
             if file.len() as u64 + length > most {
-                let what = format!("its PNG has more than {most} bytes");
-                return Err(malformed(self.number, what));
+                return Err(malformed(self.number, PageFault::PngBytes(most)));
             }
             // The data, and its checksum.
             let body = self.read(file.len() as u64, length + 4)?;

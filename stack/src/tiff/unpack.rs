@@ -10,7 +10,7 @@ use crate::packbits;
 
 /// Why bytes do not make rows.
 #[derive(Debug)]
-pub(super) enum Fault {
+pub(super) enum UnpackError {
     /// They end before the last row does.
     TooShort,
     /// They are not what the compression makes.
@@ -19,8 +19,8 @@ pub(super) enum Fault {
     Enough,
 }
 
-/// What bytes are to be cut into.
-pub(super) struct Cut {
+/// The rows of a strip or tile in bytes.
+pub(super) struct PieceShape {
     pub(super) row_bytes: u32,
     pub(super) rows: u32,
     /// Whether each byte is stored as what it differs by from the one before
@@ -33,30 +33,30 @@ pub(super) struct Cut {
 pub(super) fn unpack(
     compression: Compression,
     bytes: &[u8],
-    cut: &Cut,
+    shape: &PieceShape,
     each: impl FnMut(&[(u32, u8)]) -> bool,
-) -> Result<(), Fault> {
+) -> Result<(), UnpackError> {
     match compression {
-        Compression::PackBits => cut_runs(packbits::Runs::new(bytes), cut, each),
-        Compression::Lzw => cut_bytes(LzwReader::new(bytes), cut, each),
-        Compression::Deflate => cut_bytes(ZlibDecoder::new(bytes), cut, each),
-        _ => cut_bytes(bytes, cut, each),
+        Compression::PackBits => cut_runs(packbits::Runs::new(bytes), shape, each),
+        Compression::Lzw => cut_bytes(LzwReader::new(bytes), shape, each),
+        Compression::Deflate => cut_bytes(ZlibDecoder::new(bytes), shape, each),
+        _ => cut_bytes(bytes, shape, each),
     }
 }
 
 fn cut_runs(
     mut runs: impl Iterator<Item = (u32, u8)>,
-    cut: &Cut,
+    shape: &PieceShape,
     mut each: impl FnMut(&[(u32, u8)]) -> bool,
-) -> Result<(), Fault> {
+) -> Result<(), UnpackError> {
     let (mut length, mut byte) = (0, 0);
     let mut row = Vec::new();
-    for _ in 0..cut.rows {
+    for _ in 0..shape.rows {
         row.clear();
-        let mut room = cut.row_bytes;
+        let mut room = shape.row_bytes;
         while room > 0 {
             if length == 0 {
-                (length, byte) = runs.next().ok_or(Fault::TooShort)?;
+                (length, byte) = runs.next().ok_or(UnpackError::TooShort)?;
             }
             let part = length.min(room);
             push_run(&mut row, part, byte);
@@ -64,7 +64,7 @@ fn cut_runs(
             room -= part;
         }
         if !each(&row) {
-            return Err(Fault::Enough);
+            return Err(UnpackError::Enough);
         }
     }
     Ok(())
@@ -72,22 +72,22 @@ fn cut_runs(
 
 fn cut_bytes(
     mut bytes: impl Read,
-    cut: &Cut,
+    shape: &PieceShape,
     mut each: impl FnMut(&[(u32, u8)]) -> bool,
-) -> Result<(), Fault> {
+) -> Result<(), UnpackError> {
     let (mut row, mut runs) = (Vec::new(), Vec::new());
-    for _ in 0..cut.rows {
+    for _ in 0..shape.rows {
         row.clear();
         // Memory grows with the bytes that come, not with the width claimed.
-        match bytes.by_ref().take(cut.row_bytes.into()).read_to_end(&mut row) {
-            Ok(length) if length == cut.row_bytes as usize => {}
-            Ok(_) => return Err(Fault::TooShort),
+        match bytes.by_ref().take(shape.row_bytes.into()).read_to_end(&mut row) {
+            Ok(length) if length == shape.row_bytes as usize => {}
+            Ok(_) => return Err(UnpackError::TooShort),
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-                return Err(Fault::TooShort);
+                return Err(UnpackError::TooShort);
             }
-            Err(_) => return Err(Fault::Damaged),
+            Err(_) => return Err(UnpackError::Damaged),
         }
-        if cut.differences {
+        if shape.differences {
             let mut before = 0u8;
             for byte in &mut row {
                 before = before.wrapping_add(*byte);
@@ -96,7 +96,7 @@ fn cut_bytes(
         }
         byte_runs(&row, &mut runs);
         if !each(&runs) {
-            return Err(Fault::Enough);
+            return Err(UnpackError::Enough);
         }
     }
     Ok(())
@@ -162,9 +162,9 @@ mod tests {
             // Some writers leave the last code out.
             for cut in [0, 1] {
                 strip.truncate(strip.len() - cut);
-                let cut = Cut { row_bytes, rows, differences: false };
+                let shape = PieceShape { row_bytes, rows, differences: false };
                 let mut count = 0;
-                let done = unpack(Compression::Lzw, &strip, &cut, |row| {
+                let done = unpack(Compression::Lzw, &strip, &shape, |row| {
                     assert_eq!(row, [(row_bytes, 0)]);
                     count += 1;
                     true

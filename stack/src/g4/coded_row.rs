@@ -1,20 +1,20 @@
 //! A row that several transitions can be looked at, or written, at once.
 
 /// How many vertical codes are taken together.
-pub(super) const TOGETHER: usize = 4;
+pub(super) const AT_ONCE: usize = 4;
 /// Those, and the place after them.
-pub(super) const LOOK: usize = TOGETHER + 1;
+pub(super) const LOOK: usize = AT_ONCE + 1;
 /// Transitions so far apart stay in order when each moves by three pixels.
 pub(super) const WIDE: u32 = 7;
 
 /// A row's transitions, and [`LOOK`] places behind the last: the width, and on
 /// from there in wide steps.
-pub(super) struct Row {
+pub(super) struct CodedRow {
     pub(super) places: Vec<u32>,
     pub(super) len: usize,
 }
 
-impl Row {
+impl CodedRow {
     pub(super) fn black(width: u32) -> Self {
         let mut row = Self { places: Vec::new(), len: 0 };
         row.end(width);
