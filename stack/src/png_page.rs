@@ -111,7 +111,7 @@ fn decode_gray(
             *sample = *samples
                 .levels
                 .get(usize::from(*sample))
-                .ok_or_else(|| PngFault::Malformed(PageFault::PaletteEntry(*sample)))?;
+                .ok_or(PngFault::Malformed(PageFault::PaletteEntry(*sample)))?;
         }
         gray.push_runs(runs.iter().copied()).expect("a row is as long as the width");
         check_runs(gray.change_count(), max_runs)?;
