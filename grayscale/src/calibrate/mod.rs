@@ -49,6 +49,19 @@ pub use fit_widths::{WidthFit, fit_widths};
 pub use measurements::{DataError, DepthPoint, Measured, WidthPoint, depth_points, width_points};
 pub use significant::format_significant;
 
+/// The cure models that can be fitted to depths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthModel {
+    /// The working curve, by [`fit_curve`].
+    Jacobs,
+    /// The model of two penetration depths, by [`fit_two_depth`].
+    TwoDepth,
+    /// The working curve over the gray level, by [`fit_gray`].
+    Gray,
+}
+
+lamp_stack::named!(DepthModel { Jacobs = "jacobs", TwoDepth = "two-depth", Gray = "gray" });
+
 /// A number found from measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate<T> {

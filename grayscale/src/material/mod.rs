@@ -40,23 +40,17 @@ pub struct Material {
     /// A description of one line.
     pub description: String,
     /// The light of full white, `I_0`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intensity: Option<Given<Intensity>>,
     /// The working curve (002 eq. 30).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub working_curve: Option<CurveNumbers>,
     /// The working curve over the gray level (002 eq. 40).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gray: Option<CurveLines>,
     /// The working curve over the light that a gray level passes (002 eq. 37
     /// and 38).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gray_light: Option<CurveLines>,
     /// The working curve over the lamp's own light (002 eq. 36).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dimmed_lamp: Option<DimmedLines>,
     /// The model of two penetration depths (000 eq. 3.8).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub two_depth: Option<TwoDepthNumbers>,
     /// The cure width of features of several sizes (002 section 3.4.4).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -105,7 +99,6 @@ pub struct TwoDepthNumbers {
     /// `D_pS`.
     pub solid_depth: Given<Length>,
     /// The depths that it holds for, if not all.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depths: Option<GivenDepths>,
 }
 

@@ -1,9 +1,9 @@
 //! `lamp calibrate depth`: fits cure models to measured depths.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lamp_grayscale::calibrate::{
-    CurveFit, DepthPoint, Estimate, GrayFit, LevelFit, LineEstimate, TwoDepthFit, depth_points,
-    fit_curve, fit_gray, fit_two_depth,
+    CurveFit, DepthModel, DepthPoint, Estimate, GrayFit, LevelFit, LineEstimate, TwoDepthFit,
+    depth_points, fit_curve, fit_gray, fit_two_depth,
 };
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{CureModel, Dose, GrayCurve, GrayLevel, Quantity, StraightLine};
@@ -12,7 +12,7 @@ use lamp_stack::Length;
 use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
 use crate::exit::Exit;
-use crate::options::Common;
+use crate::options::{Common, one_of_described};
 use crate::plots::{Plot, PlotAxis, Series, highest};
 use crate::progress::Progress;
 
@@ -32,18 +32,12 @@ pub(super) struct DepthArgs {
     files: CalibrationFiles,
 
     /// Model to fit [default: gray if the file has that column, else jacobs]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of_described::<DepthModel>(&[
+        "The working curve Dp ln(E / Ec)",
+        "Separate penetration depths for liquid and solid",
+        "A working curve whose Ec and Dp are linear in the gray level",
+    ]))]
     model: Option<DepthModel>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum DepthModel {
-    /// The working curve Dp ln(E / Ec)
-    Jacobs,
-    /// Separate penetration depths for liquid and solid
-    TwoDepth,
-    /// A working curve whose Ec and Dp are linear in the gray level
-    Gray,
 }
 
 enum DepthFit {
