@@ -13,7 +13,7 @@
 //! // Row 1 missed its second crossing and runs to the image's edge.
 //! let mask = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5]).unwrap();
 //! let layer =
-//!     Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: Image::Mask(mask) };
+//!     Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: Image::Mask(mask).into() };
 //!
 //! let layers = std::iter::once(Ok::<_, TileError>(layer));
 //! let fixed = fix(layers, FixOptions::default(), |fixed| {
@@ -22,7 +22,7 @@
 //! });
 //! let options = TileOptions { area: "0.2x0.1in".parse()?, ..TileOptions::default() };
 //! let mut build = tile(fixed, options);
-//! let Image::Mask(build) = build.next().unwrap()?.image else { unreachable!() };
+//! let Image::Mask(build) = build.next().unwrap()?.image.into_image() else { unreachable!() };
 //! assert_eq!((build.width(), build.height()), (20, 10));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

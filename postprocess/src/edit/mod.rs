@@ -46,7 +46,7 @@ use plan::EditPlan;
 ///
 /// // At 25.4 dpi a pixel is a millimetre, and the lower left corner is 0, 0.
 /// let image = Image::Mask(Mask::black(8, 4).inverted());
-/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image };
+/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image: image.into() };
 /// let list = r#"
 ///     [[edit]]
 ///     op = "subtract"
@@ -55,7 +55,7 @@ use plan::EditPlan;
 ///
 /// let layers = std::iter::once(Ok::<_, EditError>(layer));
 /// let mut edited = edit(layers, Edits::from_toml(list)?, vec![], |_, _| {});
-/// let Image::Mask(mask) = edited.next().unwrap()?.image else { unreachable!() };
+/// let Image::Mask(mask) = edited.next().unwrap()?.image.into_image() else { unreachable!() };
 /// assert_eq!((mask.row(2), mask.row(3)), (&[0][..], &[0, 2, 5][..]));
 /// # Ok::<(), EditError>(())
 /// ```

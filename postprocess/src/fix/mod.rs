@@ -123,14 +123,14 @@ pub struct Fixed<'a> {
 ///
 /// // Row 1 missed its second crossing and is white up to the image's edge.
 /// let stray = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5])?;
-/// let layer = Layer { info: PageInfo::default(), dpi: None, image: Image::Mask(stray) };
+/// let layer = Layer { info: PageInfo::default(), dpi: None, image: Image::Mask(stray).into() };
 /// let layers = std::iter::once(Ok::<_, std::io::Error>(layer));
 ///
 /// let mut fixed = fix(layers, FixOptions::default(), |fixed| {
 ///     assert_eq!(fixed.bands[0].first_row, 1);
 ///     assert_eq!(fixed.bands[0].outcome, BandOutcome::Corrected);
 /// });
-/// let Image::Mask(mask) = fixed.next().unwrap()?.image else { unreachable!() };
+/// let Image::Mask(mask) = fixed.next().unwrap()?.image.into_image() else { unreachable!() };
 /// assert_eq!(mask.row(1), [2, 5]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -17,7 +17,7 @@ use super::{CopyName, PartStack, PixelSize, TileError};
 ///
 /// // At 254 dpi, 10 pixels are a millimetre.
 /// let image = Image::Mask(Mask::black(30, 20).inverted());
-/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image };
+/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image: image.into() };
 /// let part = PartStack::of_image("blade.tif", &layer)?;
 ///
 /// // As many copies as fit, 1 mm apart: two, in the middle of the area.
