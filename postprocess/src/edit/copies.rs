@@ -1,12 +1,13 @@
 //! Finds the copies of parts on a build, which its first page lists.
 
-use lamp_stack::{Frame, Mask, MaskBuilder, Op, Orientation, PageInfo, StackInfo, place_row};
+use lamp_stack::{Frame, Image, Mask, Orientation, PageInfo, StackInfo};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::edit_error::{EditError, LayerProblem};
 use super::image_bounds::ImageBounds;
 use super::schema::CopySelection;
+use crate::tile::{PixelSize, PlacedImage, united};
 
 /// The largest distance of a copy from an image's corner, in pixels.
 const MAX_OFFSET: i64 = 1 << 40;
@@ -113,44 +114,28 @@ pub(super) fn composed(
     {
         return Some(mask(0, place));
     }
-    let masks: Vec<Mask> = copies
-        .iter()
-        .enumerate()
-        .map(|(k, copy)| mask(k, &copy.part).oriented(copy.turn))
-        .collect::<Option<_>>()?;
-    // The rows of copies that are not black, by the build's rows. Labels are small, and
-    // rows without any cost nothing.
-    let mut rows: Vec<(u32, u32, usize)> = Vec::new();
-    for (k, (copy, mask)) in copies.iter().zip(&masks).enumerate() {
-        let white = (0..mask.height()).filter(|&row| !mask.row(row).is_empty());
-        rows.extend(white.filter_map(|row| {
-            let on_build = u32::try_from(copy.top + i64::from(row)).ok()?;
-            (on_build < place.height).then_some((on_build, row, k))
-        }));
-    }
-    rows.sort_unstable();
-    let mut build = MaskBuilder::new(place.width);
-    let (mut done, mut union, mut next, mut placed) = (0, Vec::new(), Vec::new(), Vec::new());
-    for group in rows.chunk_by(|a, b| a.0 == b.0) {
-        union.clear();
-        for &(_, row, k) in group {
-            placed.clear();
-            place_row(
-                masks[k].row(row),
-                masks[k].width(),
-                copies[k].left,
-                place.width,
-                &mut placed,
-            );
-            Op::Union.rows(&union, &placed, &mut next);
-            std::mem::swap(&mut union, &mut next);
+    let mut placed = Vec::new();
+    for (k, copy) in copies.iter().enumerate() {
+        let mask = mask(k, &copy.part).oriented(copy.turn)?;
+        // On a build that was cropped, copies may reach beyond the image.
+        let shown = |start: i64, size: u32, limit: u32| {
+            start.max(0)..(start + i64::from(size)).min(limit.into())
+        };
+        let columns = shown(copy.left, mask.width(), place.width);
+        let rows = shown(copy.top, mask.height(), place.height);
+        if columns.is_empty() || rows.is_empty() {
+            continue;
         }
-        build.push_black(group[0].0 - done);
-        build.push_row(&union).ok()?;
-        done = group[0].0 + 1;
+        let shown = mask.framed(Frame {
+            left: columns.start - copy.left,
+            top: rows.start - copy.top,
+            width: (columns.end - columns.start) as u32,
+            height: (rows.end - rows.start) as u32,
+        });
+        let at = vec![(columns.start as u32, rows.start as u32)];
+        placed.push(PlacedImage { image: Image::Mask(shown), at });
     }
-    build.push_black(place.height - done);
-    Some(build.finish())
+    united(&placed, PixelSize { width: place.width, height: place.height }).ok()
 }
 
 /// Adapts the copies on a first page to a frame of the image.
@@ -181,6 +166,7 @@ pub(super) fn forget_copies(stack: &mut StackInfo) {
 
 #[cfg(test)]
 mod tests {
+    use lamp_stack::{MaskBuilder, Op};
     use proptest::prelude::*;
 
     use super::*;

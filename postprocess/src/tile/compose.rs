@@ -1,56 +1,53 @@
-//! A build's rows as a merge of shifted rows.
+//! Merges the shifted rows of copies into a build's rows.
 
-use std::borrow::Cow;
+use std::borrow::{Borrow, Cow};
 use std::cell::Cell;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use lamp_stack::{
-    GrayMask, Image, LevelChange, MAX_RUNS, Mask, MaskBuilder, combine_rows, place_row,
+    Change, Combine, GrayMask, Image, MAX_RUNS, Mask, MaskBuilder, Op, RunImage, combine_rows,
+    place_row,
 };
 
 use super::PixelSize;
 
 /// An image and the places where it stands.
-pub(super) struct PlacedImage {
-    pub(super) image: Image,
+pub(crate) struct PlacedImage {
+    pub(crate) image: Image,
     /// Left column and top row. All of the image is on the build.
-    pub(super) at: Vec<(u32, u32)>,
+    pub(crate) at: Vec<(u32, u32)>,
 }
 
 /// Why images make no build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ComposeError {
+pub(crate) enum ComposeError {
     /// A pixel is white in two copies.
     Overlap,
-    /// There are more runs than an image may have.
+    /// There are more runs than an image can hold.
     TooManyRuns,
 }
 
-/// Puts images on a black build: a gray one if any of them is gray.
+/// Puts images on a black build, which is gray if any of them is.
 pub(super) fn compose(images: &[PlacedImage], build: PixelSize) -> Result<Image, ComposeError> {
-    check_runs(images)?;
-    let masks = images.iter().map(|placed| match &placed.image {
-        Image::Mask(mask) => Some(mask),
-        Image::Gray(_) => None,
-    });
-    match masks.collect::<Option<Vec<_>>>() {
-        Some(masks) => compose_masks(&masks, images, build, false).map(Image::Mask),
-        None => compose_grays(images, build).map(Image::Gray),
+    if images.iter().all(|placed| matches!(placed.image, Image::Mask(_))) {
+        return compose_masks(images, build, false).map(Image::Mask);
     }
+    check_runs(images)?;
+    let grays: Vec<_> = images.iter().map(|placed| gray_of(&placed.image)).collect();
+    let mut gray = GrayMask::new(build.width);
+    merge(&grays, images, build, false, |row| {
+        gray.push_row(row).expect("copies stand on the build");
+    })?;
+    Ok(Image::Gray(gray))
 }
 
-/// What is white in any of some masks, which may lie on each other.
+/// Returns the union of masks, which may overlap.
 ///
 /// # Panics
-/// If one is gray.
-pub(super) fn united(images: &[PlacedImage], build: PixelSize) -> Result<Mask, ComposeError> {
-    check_runs(images)?;
-    let masks = images.iter().map(|placed| match &placed.image {
-        Image::Mask(mask) => mask,
-        Image::Gray(_) => panic!("gray images are not united"),
-    });
-    compose_masks(&masks.collect::<Vec<_>>(), images, build, true)
+/// Panics if an image is gray.
+pub(crate) fn united(images: &[PlacedImage], build: PixelSize) -> Result<Mask, ComposeError> {
+    compose_masks(images, build, true)
 }
 
 fn check_runs(images: &[PlacedImage]) -> Result<(), ComposeError> {
@@ -61,28 +58,48 @@ fn check_runs(images: &[PlacedImage]) -> Result<(), ComposeError> {
 }
 
 fn compose_masks(
-    masks: &[&Mask],
     images: &[PlacedImage],
     build: PixelSize,
     may_overlap: bool,
 ) -> Result<Mask, ComposeError> {
+    check_runs(images)?;
+    let masks = images.iter().map(|placed| match &placed.image {
+        Image::Mask(mask) => mask,
+        Image::Gray(_) => panic!("gray images are composed apart"),
+    });
+    let masks: Vec<&Mask> = masks.collect();
     let mut mask = MaskBuilder::new(build.width);
     let runs = images.iter().map(|placed| placed.at.len() * placed.image.change_count());
     mask.reserve(build.height as usize, runs.sum());
+    merge(&masks, images, build, may_overlap, |row| {
+        mask.push_row(row).expect("copies stand on the build");
+    })?;
+    Ok(mask.finish())
+}
+
+/// Calls `push` with each row of the build, from the top. `sources` are the pixels of
+/// `images`.
+fn merge<C: Change<Pixel: Combine>>(
+    sources: &[impl Borrow<RunImage<C>>],
+    images: &[PlacedImage],
+    build: PixelSize,
+    may_overlap: bool,
+    mut push: impl FnMut(&[C]),
+) -> Result<(), ComposeError> {
     let mut row =
-        MaskRow { width: build.width, row: Vec::new(), one: Vec::new(), spare: Vec::new() };
+        MergedRow { width: build.width, row: Vec::new(), one: Vec::new(), spare: Vec::new() };
     for_each_row(images, build.height, |met| {
         row.row.clear();
         for &CopyRow { image, left, row: index } in met {
-            let overlaps = row.add(masks[image].row(index), masks[image].width(), left);
+            let source = sources[image].borrow();
+            let overlaps = row.add(source.row(index), source.width(), left);
             if overlaps && !may_overlap {
                 return Err(ComposeError::Overlap);
             }
         }
-        mask.push_row(&row.row).expect("copies stand on the build");
+        push(&row.row);
         Ok(())
-    })?;
-    Ok(mask.finish())
+    })
 }
 
 /// A copy's row on a row of the build.
@@ -93,8 +110,8 @@ struct CopyRow {
     row: u32,
 }
 
-/// Tells for each row of the build, from the top, the rows of copies that it
-/// meets, by their left columns.
+/// Calls `each` for every row of the build, from the top, with the rows of copies on it
+/// by their left columns.
 fn for_each_row(
     images: &[PlacedImage],
     height: u32,
@@ -122,34 +139,38 @@ fn for_each_row(
     Ok(())
 }
 
-/// A row of a 1-bit build as it grows.
-struct MaskRow {
+/// A row of the build as copies are added to it.
+struct MergedRow<C> {
     width: u32,
-    row: Vec<u32>,
-    one: Vec<u32>,
-    spare: Vec<u32>,
+    row: Vec<C>,
+    one: Vec<C>,
+    spare: Vec<C>,
 }
 
-impl MaskRow {
-    /// Adds a copy's row. Whether a pixel was white before.
-    fn add(&mut self, transitions: &[u32], width: u32, left: u32) -> bool {
-        let Some(first) = transitions.first() else { return false };
+impl<C: Change<Pixel: Combine>> MergedRow<C> {
+    /// Adds a copy's row. Returns true if it overlaps one that was added before.
+    fn add(&mut self, changes: &[C], width: u32, left: u32) -> bool {
+        let Some(first) = changes.first() else { return false };
+        let black = C::Pixel::default();
         let is_behind = match self.row.last() {
             None => true,
-            // White to here, and on.
-            Some(&last) if self.row.len().is_multiple_of(2) => last < left + first || last == left,
+            // At `left` itself, one copy may go on where the other ends.
+            Some(last) if C::last_pixel(&self.row) == black => {
+                last.column() < left + first.column() || last.column() == left
+            }
             Some(_) => false,
         };
+        // Most copies stand side by side, and need no merge.
         if is_behind {
-            place_row(transitions, width, left.into(), self.width, &mut self.row);
+            place_row(changes, width, left.into(), self.width, &mut self.row);
             return false;
         }
         self.one.clear();
-        place_row(transitions, width, left.into(), self.width, &mut self.one);
+        place_row(changes, width, left.into(), self.width, &mut self.one);
         let overlap = Cell::new(false);
-        let union = |[a, b]: [bool; 2]| {
-            overlap.set(overlap.get() | (a & b));
-            a | b
+        let union = |[a, b]: [C::Pixel; 2]| {
+            overlap.set(overlap.get() | (a != black && b != black));
+            C::Pixel::combined(Op::Union, a, b)
         };
         combine_rows([&self.row, &self.one], union, &mut self.spare);
         std::mem::swap(&mut self.row, &mut self.spare);
@@ -157,74 +178,11 @@ impl MaskRow {
     }
 }
 
-fn compose_grays(images: &[PlacedImage], build: PixelSize) -> Result<GrayMask, ComposeError> {
-    let grays: Vec<Cow<'_, GrayMask>> =
-        images.iter().map(|placed| gray_of(&placed.image)).collect();
-    let mut gray = GrayMask::new(build.width);
-    let (mut row, mut one, mut spare) = (Vec::new(), Vec::new(), Vec::new());
-    for_each_row(images, build.height, |met| {
-        row.clear();
-        for &CopyRow { image, left, row: index } in met {
-            shift_levels(
-                grays[image].row(index),
-                grays[image].width(),
-                left,
-                build.width,
-                &mut one,
-            );
-            add_levels(&mut row, &one, &mut spare)?;
-        }
-        gray.push_row(&row).expect("copies stand on the build");
-        Ok(())
-    })?;
-    Ok(gray)
-}
-
 fn gray_of(image: &Image) -> Cow<'_, GrayMask> {
     match image {
         Image::Mask(mask) => Cow::Owned(GrayMask::from(mask)),
         Image::Gray(gray) => Cow::Borrowed(gray),
     }
-}
-
-/// Makes `out` a row of `width` columns in a build of `into` columns.
-fn shift_levels(
-    changes: &[LevelChange],
-    width: u32,
-    left: u32,
-    into: u32,
-    out: &mut Vec<LevelChange>,
-) {
-    out.clear();
-    out.extend(
-        changes
-            .iter()
-            .map(|&LevelChange { column, level }| LevelChange { column: left + column, level }),
-    );
-    if changes.last().is_some_and(|last| last.level > 0) && left + width < into {
-        out.push(LevelChange { column: left + width, level: 0 });
-    }
-}
-
-/// Adds a copy's row to a row of a gray build.
-fn add_levels(
-    row: &mut Vec<LevelChange>,
-    one: &[LevelChange],
-    spare: &mut Vec<LevelChange>,
-) -> Result<(), ComposeError> {
-    let Some(first) = one.first() else { return Ok(()) };
-    if row.last().is_none_or(|last| last.level == 0 && last.column < first.column) {
-        row.extend_from_slice(one);
-        return Ok(());
-    }
-    let overlap = Cell::new(false);
-    let brighter = |[a, b]: [u8; 2]| {
-        overlap.set(overlap.get() | (a > 0 && b > 0));
-        a.max(b)
-    };
-    combine_rows([row, one], brighter, spare);
-    std::mem::swap(row, spare);
-    if overlap.get() { Err(ComposeError::Overlap) } else { Ok(()) }
 }
 
 #[cfg(test)]

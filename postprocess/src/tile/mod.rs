@@ -28,11 +28,12 @@ use std::collections::HashMap;
 
 use lamp_stack::{Image, Layer, Length, Mask, Op, Orientation, Size, map_in_order};
 
-use compose::{ComposeError, PlacedImage};
+use compose::ComposeError;
 use lockstep::{LayerSet, Lockstep};
 use mesh::{BuildMesh, on_base};
 
 pub use build_page::StrayRows;
+pub(crate) use compose::{PlacedImage, united};
 pub use layout::{CopyPlacement, Layout};
 pub use layout_file::{LayoutError, LayoutFile};
 pub use lockstep::HeightOptions;
@@ -97,12 +98,13 @@ impl std::fmt::Display for PixelSize {
 /// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
 ///
 /// let image = Image::Mask(Mask::black(30, 20).inverted());
-/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image };
+/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image: image.into() };
 /// let layers = std::iter::once(Ok::<_, TileError>(layer));
 ///
 /// // At 254 dpi, 10 pixels are a millimetre: three columns and four rows of copies.
 /// let options = TileOptions { area: "12x12mm".parse()?, ..TileOptions::default() };
-/// let Image::Mask(build) = tile(layers, options).next().unwrap()?.image else { unreachable!() };
+/// let built = tile(layers, options).next().unwrap()?.image.into_image();
+/// let Image::Mask(build) = built else { unreachable!() };
 /// assert_eq!(build.white_pixels(), 3 * 4 * 30 * 20);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -212,7 +214,7 @@ impl Layout {
     fn moats(&self, mesh: &BuildMesh, images: &[(usize, Image)]) -> Option<Mask> {
         let moat = |(part, image): &(usize, Image)| (*part, Image::Mask(mesh.moat(image)));
         let moats = self.placed_images(&images.iter().map(moat).collect::<Vec<_>>())?;
-        compose::united(&moats, self.pixels.grown(mesh.reach())).ok()
+        united(&moats, self.pixels.grown(mesh.reach())).ok()
     }
 
     /// Orients parts' images in each way in which copies lie. Returns `None` if one

@@ -1,7 +1,8 @@
 //! The stack of a part before it is placed: its size, and its outline if that is known.
 
 use lamp_stack::{
-    Dpi, Frame, GrayMask, Image, Layer, LevelChange, Mask, MaskBuilder, Op, Orientation, StackInfo,
+    Change, Dpi, Frame, Image, Layer, LevelChange, Mask, MaskBuilder, Op, Orientation, RunImage,
+    StackInfo,
 };
 
 use super::{PixelSize, TileError};
@@ -138,21 +139,16 @@ impl PartStack {
 
 /// Returns a mask of the pixels that are not black.
 pub(super) fn white_of(image: &Image) -> Mask {
-    match image {
-        Image::Mask(mask) => mask.clone(),
-        Image::Gray(gray) => white_of_gray(gray),
-    }
-}
-
-fn white_of_gray(gray: &GrayMask) -> Mask {
+    let gray = match image {
+        Image::Mask(mask) => return mask.clone(),
+        Image::Gray(gray) => gray,
+    };
     let mut mask = MaskBuilder::new(gray.width());
     let mut row = Vec::new();
     for changes in gray.rows() {
         row.clear();
-        let mut white = false;
         for &LevelChange { column, level } in changes {
-            if (level > 0) != white {
-                white = !white;
+            if (level > 0) != (row.len() % 2 == 1) {
                 row.push(column);
             }
         }
@@ -161,42 +157,30 @@ fn white_of_gray(gray: &GrayMask) -> Mask {
     mask.finish()
 }
 
-/// Returns the least frame that holds all that is white, or `None` if nothing is.
-fn extents(mask: &Mask) -> Option<Frame> {
-    let rows = || (0..).zip(mask.rows()).filter(|(_, row)| !row.is_empty());
-    let (top, bottom) = (rows().next()?.0, rows().last()?.0);
-    let left = rows().map(|(_, row)| row[0]).min()?;
-    let right = rows().map(|(_, row)| end_of(row, mask.width())).max()?;
+/// Returns the least frame that holds all that is not black, or `None` if nothing is.
+fn extents<C: Change>(image: &RunImage<C>) -> Option<Frame> {
+    let white = (0..).zip(image.rows()).filter(|(_, row)| !row.is_empty());
+    let mut white = white.map(|(y, row): (u32, &[C])| {
+        let is_black = C::last_pixel(row) == C::Pixel::default();
+        (y, row[0].column(), if is_black { row[row.len() - 1].column() } else { image.width() })
+    });
+    let (top, left, right) = white.next()?;
+    let (bottom, left, right) = white.fold((top, left, right), |(_, left, right), row| {
+        (row.0, left.min(row.1), right.max(row.2))
+    });
     let (width, height) = (right - left, bottom - top + 1);
-    Some(Frame { left: left.into(), top: i64::from(top), width, height })
-}
-
-/// Returns the end of the last white run in a row that is not black.
-fn end_of(row: &[u32], width: u32) -> u32 {
-    match row {
-        [.., last] if row.len().is_multiple_of(2) => *last,
-        _ => width,
-    }
+    Some(Frame { left: left.into(), top: top.into(), width, height })
 }
 
 fn is_within(image: &Image, frame: Frame) -> bool {
-    let holds = |row: u32, first: u32, end: u32| {
-        let (row, first, end) = (i64::from(row), i64::from(first), i64::from(end));
-        (frame.top..frame.top + i64::from(frame.height)).contains(&row)
-            && first >= frame.left
-            && end <= frame.left + i64::from(frame.width)
+    let extents = match image {
+        Image::Mask(mask) => extents(mask),
+        Image::Gray(gray) => extents(gray),
     };
-    match image {
-        Image::Mask(mask) => (0..)
-            .zip(mask.rows())
-            .all(|(index, row)| row.is_empty() || holds(index, row[0], end_of(row, mask.width()))),
-        Image::Gray(gray) => (0..).zip(gray.rows()).all(|(index, row)| match row {
-            [] => true,
-            [first, ..] => {
-                let last = row[row.len() - 1];
-                let end = if last.level == 0 { last.column } else { gray.width() };
-                holds(index, first.column, end)
-            }
-        }),
-    }
+    let ends =
+        |frame: Frame| [frame.left + i64::from(frame.width), frame.top + i64::from(frame.height)];
+    extents.is_none_or(|white| {
+        let [[right, bottom], [last, lowest]] = [ends(frame), ends(white)];
+        white.left >= frame.left && white.top >= frame.top && last <= right && lowest <= bottom
+    })
 }
