@@ -1,0 +1,59 @@
+//! CAD parts to the layer images of large-area projection photopolymerization.
+//!
+//! LAMP slices a part into one image for each layer, corrects what a faulty mesh left in
+//! them, makes dots of gray, and lays copies out on a machine's build area. This crate has
+//! all stages under one name, a module for each room:
+//!
+//! - [`slicer`] opens STL and STEP parts and cuts them into layers.
+//! - [`adaptive`] finds how thick each layer may be.
+//! - [`grayscale`] knows resins: cure depths, calibration, dithering.
+//! - [`postprocess`] turns images into images: correction, compensation, builds, edits.
+//! - [`stack`] has what they share: images as runs, layers, lengths, files and streams.
+//!
+//! A stage takes and gives an iterator over `Result<Layer, E>`, so stages are chained
+//! without coding images in between:
+//!
+//! ```
+//! use std::error::Error;
+//!
+//! use lamp::postprocess::{FixOptions, fix};
+//! use lamp::slicer::{OpenOptions, Part, SliceOptions, Slices};
+//! use lamp::stack::{Destination, Dpi, Format, Length, Pages, write_stack};
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let stl = folder.path().join("wedge.stl");
+//! # let facets = [[[0, 0, 0], [0, 9, 0], [9, 0, 0]], [[0, 0, 0], [9, 0, 0], [0, 0, 9]],
+//! #     [[0, 0, 0], [0, 0, 9], [0, 9, 0]], [[9, 0, 0], [0, 9, 0], [0, 0, 9]]];
+//! # let corner = |[x, y, z]: &[i32; 3]| format!("vertex {x} {y} {z}\n");
+//! # let facet = |facet: &[[i32; 3]; 3]| {
+//! #     let corners: String = facet.iter().map(corner).collect();
+//! #     format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+//! # };
+//! # let facets: String = facets.iter().map(facet).collect();
+//! # std::fs::write(&stl, format!("solid wedge\n{facets}endsolid wedge\n"))?;
+//! // wedge.stl is 9 mm high.
+//! let part = Part::open(&stl, &OpenOptions::default())?;
+//! let options = SliceOptions {
+//!     dpi: Dpi::new(600.0).expect("it is positive"),
+//!     thickness: Length::from_um(100.0),
+//!     ..SliceOptions::default()
+//! };
+//! let layers = Slices::new(part, &options)?;
+//! let fixed = fix(layers, FixOptions::default(), |fixed| {
+//!     println!("layer {}: {} bands corrected", fixed.before.info.index, fixed.bands.len());
+//! });
+//! let tiff = folder.path().join("wedge.tif");
+//! let fixed = fixed.map(|layer| layer.map_err(Box::<dyn Error + Send + Sync>::from));
+//! write_stack(fixed, Destination::File(tiff.clone()), Format::Big)?;
+//!
+//! assert_eq!(Pages::open(&tiff)?.layers().count(), 90);
+//! # Ok::<(), Box<dyn Error + Send + Sync>>(())
+//! ```
+
+#![forbid(unsafe_code)]
+
+pub use lamp_adaptive as adaptive;
+pub use lamp_grayscale as grayscale;
+pub use lamp_postprocess as postprocess;
+pub use lamp_slicer as slicer;
+pub use lamp_stack as stack;
