@@ -5,13 +5,13 @@ use std::ops::{AddAssign, Range};
 use lamp_stack::{Mask, white_in_row};
 
 /// The classes of bands: the most rows of each. The last takes all wider ones.
-pub const MOST_ROWS: [usize; 4] = [2, 5, 15, usize::MAX];
+pub const MAX_ROWS: [usize; 4] = [2, 5, 15, usize::MAX];
 
 /// What a correction made of broken layers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Score {
-    /// The broken bands, in the classes of [`MOST_ROWS`].
-    pub bands: [Bands; MOST_ROWS.len()],
+    /// The broken bands, in the classes of [`MAX_ROWS`].
+    pub bands: [Bands; MAX_ROWS.len()],
     /// Wrong pixels after the correction in rows that were good before.
     pub harmed: u64,
     /// Rows that end white after the correction.
@@ -68,7 +68,7 @@ impl Score {
             if is_good(&band[0]) {
                 score.harmed += wrong(2);
             } else {
-                let class = MOST_ROWS.partition_point(|&most| most < band.len());
+                let class = MAX_ROWS.partition_point(|&most| most < band.len());
                 score.bands[class] += Bands { count: 1, injected: wrong(1), left: wrong(2) };
             }
         }
@@ -99,7 +99,7 @@ fn pixels_that_differ(a: &[u32], b: &[u32], width: u32) -> u64 {
         return 0;
     }
     // Each toggle of either row parts the two or joins them again: of their
-    // exclusive or, these are the transitions, but for empty runs.
+    // exclusive or, these are the transitions, except those of empty runs.
     let mut toggles = [a, b].concat();
     toggles.sort_unstable();
     white_in_row(&toggles, width)

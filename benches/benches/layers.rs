@@ -1,7 +1,7 @@
-//! Slicing, encoding and decoding of blade-mould layers, beside the `fax`
-//! crate on the same pixels; throughput counts transitions. Dithering of a
-//! page of 900 megapixels; throughput counts gray pixels. What layers of 25 to 100 um
-//! lack and have too much; throughput counts layers' bottoms.
+//! Times the hot loops: slicing, encoding and decoding of blade-mould layers beside the
+//! `fax` crate (throughput in transitions); dithering of a page of 900 megapixels (in
+//! gray pixels); errors of layers of 25 to 100 um (in bottoms of layers); and
+//! compensation (in transitions).
 
 use std::io::Cursor;
 
@@ -109,7 +109,7 @@ fn layers(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The page of a large machine, 34,500 x 26,000 pixels: white, with so many
+/// The page of a large machine, 34,500 x 26,000 pixels: white, with `runs`
 /// runs of gray in each row.
 fn page(runs: u32, length: u32) -> GrayMask {
     let mut page = GrayMask::new(34_500);
@@ -124,9 +124,9 @@ fn page(runs: u32, length: u32) -> GrayMask {
 fn heights(criterion: &mut Criterion) {
     let facets = build(Sample::Blade, 750_000).expect("enough facets").facets;
     let model = Part::from_facets("blade", facets);
-    let body =
+    let facets =
         FacetIndex::new(model, &Placement::default(), Units::Millimetres).expect("it is finite");
-    let part = LayeredPart::new(body, Length::from_um(68.0), Fill::EvenOdd);
+    let part = LayeredPart::new(facets, Length::from_um(68.0), Fill::EvenOdd);
     let part = part.expect("its rows are few");
     let mut group = criterion.benchmark_group("heights");
     group.throughput(Throughput::Elements(LAYERS.len() as u64));

@@ -1,11 +1,10 @@
-//! Facets along lines: where planes and rows meet a facet's edges.
+//! Finds where planes and rows meet the edges of facets.
 //!
 //! The slicer meets facets with planes, then the segments there with rows; gray
 //! layers and adaptive heights meet facets with rows straight away. All do so
-//! alike. A facet's corners are sorted along an axis. Of the lines across it
-//! (planes across z, rows across y) each meets the long edge, from the first
-//! corner to the last, and one of the two short edges, before or behind the
-//! middle corner.
+//! the same way. A facet's corners are sorted along an axis. Each line across this
+//! axis (planes across z, rows across y) meets the long edge, from the first corner
+//! to the last, and one of the two short edges, before or behind the middle corner.
 //!
 //! Both facets on an edge find its point on a line by the same arithmetic on the
 //! same two ends, sorted alike. The points of a closed mesh on a line are
@@ -72,9 +71,9 @@ impl<const ALONG: usize> SortedFacet<ALONG> {
         }
     }
 
-    /// Gives each of some lines across the facet, with the points of the long and of
-    /// the short edge there, and which of the short edges that is, 0 or 1. `second`
-    /// is the first line past the middle corner, `at` says where a line is.
+    /// Calls `each` with each of some lines across the facet, the points of the long and
+    /// the short edge there, and which short edge that is, 0 or 1. `second` is the first
+    /// line past the middle corner; `at` returns a line's coordinate.
     #[inline]
     pub fn for_each_line(
         &self,
@@ -157,8 +156,7 @@ impl RowFacet {
         self.rows[0]..self.rows[2]
     }
 
-    /// Returns true if its short edges and its long one, in this order, go around it
-    /// the way its corners do not.
+    /// Returns true if sorting its corners from the top row down turned it over.
     #[inline]
     pub fn is_flipped(&self) -> bool {
         self.sorted.is_flipped
@@ -184,8 +182,8 @@ impl RowFacet {
         ceil_clamped(first - 1e-3, end).max(start)..ceil_clamped(last + 1e-3, end)
     }
 
-    /// Gives each of some rows that cross it, with the points (x, z) where its long
-    /// and its short edge are there.
+    /// Calls `each` with each of some rows that cross it, and the points (x, z) of its
+    /// long and its short edge there.
     #[inline]
     pub fn for_each_row(&self, rows: Range<u32>, mut each: impl FnMut(u32, [[f64; 2]; 2])) {
         let rows = rows.start as usize..rows.end as usize;

@@ -25,7 +25,7 @@ use lamp_stack::Layer;
 
 use crate::common::{mask, model, options};
 
-/// Errors stay below so many standard deviations.
+/// The limit to errors, in standard deviations.
 const SIGMAS: f64 = 6.0;
 const FACETS: usize = 200_000;
 

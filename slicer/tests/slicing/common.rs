@@ -13,7 +13,7 @@ pub(crate) fn options(dpi: f64, thickness_um: f64) -> SliceOptions {
     }
 }
 
-/// Proptest's settings for so many cases.
+/// Returns proptest's settings for a number of cases.
 pub(crate) fn cases(cases: u32) -> Config {
     Config { cases, failure_persistence: None, ..Config::default() }
 }
@@ -77,7 +77,7 @@ pub(crate) fn inside_out(mesh: &Mesh) -> Mesh {
     Mesh { facets: mesh.facets.iter().map(|&[a, b, c]| [a, c, b]).collect() }
 }
 
-/// A part turned about x, y and z in turn, by so many radians.
+/// Returns a part turned about x, y and z in turn, by angles in radians.
 pub(crate) fn turned(mesh: &Mesh, angles: [f64; 3]) -> Mesh {
     mesh.map(|mut p| {
         for (axis, angle) in angles.into_iter().enumerate() {

@@ -17,7 +17,7 @@ use crate::common::{
 
 type Point = [f64; 3];
 
-/// Depths in proportion to the level, up to so many layers.
+/// Depths in proportion to the level, up to a number of layers.
 fn gray(overcure: f64, options: &SliceOptions) -> SliceOptions {
     let of = |thickness: Length| depth_levels(overcure, thickness);
     let levels = match &options.heights {
@@ -395,7 +395,7 @@ fn depths_may_begin_below_a_last_layer_that_is_not_full() {
     assert!(ledge.contains(&204) && ledge.iter().all(|level| [0, 204, 255].contains(level)));
 }
 
-/// A foot turned away and back is level but for rounding.
+/// A foot turned away and back is level only up to rounding.
 #[test]
 fn a_foot_that_was_turned_into_place_stands() {
     for degrees in [10.0, 25.0, 45.0, 63.0] {
