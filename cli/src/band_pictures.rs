@@ -14,8 +14,8 @@ use crate::streams::write_file;
 /// Rows above and below a band, and columns beside it, that are shown with it.
 const ROWS_AROUND: u32 = 16;
 const COLUMNS_AROUND: u32 = 48;
-/// A stray run may cross the image: so many columns of it, from the gap on,
-/// and so many rows, from the first, show how it was mended.
+/// Largest region shown, from the gap and the first row on: a stray run may cross the whole image,
+/// and this much shows how it was corrected.
 const MAX_COLUMNS: u32 = 400;
 const MAX_ROWS: u32 = 200;
 /// Picture pixels per image pixel, on a side.

@@ -119,7 +119,7 @@ impl FixReport {
     }
 }
 
-/// Where the mesh is to be repaired: `x 31.4-33.0 y 12.1-12.8 mm`.
+/// Returns the place to repair the mesh at: `x 31.4-33.0 y 12.1-12.8 mm`.
 pub(crate) fn whereabouts(layer: &Layer, band: &Band) -> String {
     let columns = band.gap.clone().unwrap_or_else(|| band.columns.clone());
     let Some(place) = PixelLocation::of(layer) else {

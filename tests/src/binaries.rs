@@ -1,4 +1,4 @@
-//! Where the binaries are.
+//! Builds the binaries, and finds them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

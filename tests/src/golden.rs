@@ -1,4 +1,4 @@
-//! Comparison with golden images, pixel for pixel.
+//! Compares images with golden ones, pixel for pixel.
 
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter, Write};

@@ -1,4 +1,4 @@
-//! Images made out of others, and what differs between two.
+//! Makes images out of others, and finds where two differ.
 
 use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo};
 

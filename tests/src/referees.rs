@@ -1,5 +1,5 @@
-//! Other programs that read and write images. One that is not installed is
-//! skipped, which is said.
+//! Runs other programs that read and write images. Those that are not installed are skipped with
+//! a note.
 
 use std::fs::File;
 use std::path::Path;

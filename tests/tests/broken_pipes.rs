@@ -1,5 +1,5 @@
-//! Pipes that break: nobody downstream takes a cut stack for a whole one,
-//! and nobody upstream complains of a reader that has seen enough.
+//! Broken pipes: no later stage takes a truncated stack for a whole one, and no earlier stage
+//! complains when its reader stops.
 
 use std::io::{Read, Write};
 use std::process::{ChildStdout, Command, Stdio};

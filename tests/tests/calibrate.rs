@@ -1,4 +1,4 @@
-//! `lamp calibrate`: from made-up measurements back to the material they are of.
+//! `lamp calibrate`: made-up measurements give back the material that they were made from.
 
 use lamp_fixtures::SplitMix;
 use lamp_tests::{Scratch, workspace_root};

@@ -1,4 +1,4 @@
-//! `lamp compensate`: edges moved, walls kept and told of, shrinkage made up for.
+//! `lamp compensate`: moves edges, keeps and reports walls, makes up for shrinkage.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Dpi, GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo, StackInfo};

@@ -1,4 +1,4 @@
-//! `lamp convert`: the same layers in other shapes, and back byte for byte.
+//! `lamp convert`: writes the same layers in other forms, and back byte for byte.
 
 use std::fs;
 use std::io::Cursor;

@@ -1,5 +1,5 @@
-//! Broken meshes: `slice` says which rows do not balance, `fix` mends them,
-//! and what is whole passes untouched.
+//! Broken meshes: `slice` reports unbalanced rows, `fix` corrects them, and whole parts pass
+//! unchanged.
 
 use lamp_fixtures::Sample;
 use lamp_stack::Layer;

@@ -1,4 +1,4 @@
-//! `lamp edit`: shapes, labels and other stacks, and what the pages say then.
+//! `lamp edit`: adds shapes, labels and other stacks, and records them on the pages.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Image, Layer, Mask};

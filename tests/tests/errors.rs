@@ -1,5 +1,4 @@
-//! What goes wrong is said in one sentence, the exit status says whose fault
-//! it is, and nothing appears under a final name.
+//! Errors: one sentence, a status that tells usage from input, and no file under its final name.
 
 use std::fs;
 

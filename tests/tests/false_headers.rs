@@ -1,6 +1,6 @@
-//! A header that lies costs nothing but an error: memory is counted.
+//! Headers with false sizes give an error and take no memory.
 //!
-//! One test, since all threads of the process are counted together.
+//! There is one test, because memory is counted for all threads of the process together.
 
 use std::error::Error;
 use std::fs;
@@ -62,7 +62,7 @@ fn page_with(tag: u16, kind: u16, count: u32) -> Vec<u8> {
     bytes
 }
 
-/// A BigTIFF whose first directory claims so many entries.
+/// A BigTIFF whose first directory claims `count` entries.
 fn with_entries(count: u64) -> Vec<u8> {
     let header = b"II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0";
     [&header[..], &count.to_le_bytes(), &[0; 4000]].concat()

@@ -1,5 +1,5 @@
-//! Stacks as other programs write them: libtiff and Pillow write every kind of
-//! TIFF and PNG that is read here, and we see the pixels that they put in.
+//! Stacks by other programs: every kind of TIFF and PNG that libtiff and Pillow write is read
+//! with the same pixels.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! Gray slicing and what it cures, by the commands.
+//! `slice --gray` and `lamp cure`: gray layers, and what they cure.
 
 use std::io::Cursor;
 

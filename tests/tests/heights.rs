@@ -1,4 +1,4 @@
-//! Layers of adaptive heights, by the commands.
+//! `slice --adaptive` and `lamp heights`: layers of adaptive heights.
 
 use lamp_fixtures::{Mesh, Sample, cone};
 use lamp_stack::{Image, Layer};

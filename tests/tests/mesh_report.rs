@@ -1,5 +1,4 @@
-//! `slice --report`: the edges and facets that rows do not balance for, as
-//! they stand in the part's file.
+//! `slice --report`: lists the edges and facets behind unbalanced rows, as in the part's file.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,5 +1,5 @@
-//! Other programs open what the pipeline makes, and see the same pixels.
-//! A program that is not installed is skipped, which is said.
+//! Other programs open the pipeline's stacks, and see the same pixels. Programs that are not
+//! installed are skipped with a note.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Layer, Mask};

@@ -1,5 +1,4 @@
-//! Whole pipelines of real processes: whichever way the layers travel, the
-//! same ones arrive.
+//! Whole pipelines of real processes: the same layers arrive by pipe, file and folder.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Layer, PageInfo, StackInfo};
@@ -16,7 +15,7 @@ fn with_tower() -> Scratch {
     scratch
 }
 
-/// What the layers hold, but for what only a whole stack can say.
+/// Returns the layers without the metadata of their stack.
 fn without_stack(layers: &[Layer]) -> Vec<Layer> {
     let mut layers = layers.to_vec();
     layers.iter_mut().for_each(|layer| layer.info.stack = None);

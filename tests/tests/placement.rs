@@ -1,5 +1,4 @@
-//! Parts scaled, mirrored, turned and moved on their way in; several parts in
-//! one job.
+//! Parts that are scaled, mirrored, rotated and moved; several parts at once.
 
 use lamp_fixtures::{Mesh, Sample, sphere, torus};
 use lamp_stack::{Layer, StackInfo};

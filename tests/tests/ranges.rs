@@ -1,5 +1,4 @@
-//! `lamp join` and `lamp split`: ranges of layers made apart are the whole,
-//! byte for byte.
+//! `lamp join` and `lamp split`: ranges of layers join to the whole stack, byte for byte.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! STEP parts, by the commands.
+//! STEP parts: slicing, checking and converting them, and what is refused.
 
 use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
 use lamp_stack::Image;

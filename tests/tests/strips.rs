@@ -1,5 +1,4 @@
-//! `tile --strips`: a build cut into the swaths of a scanning projector, and put
-//! back together.
+//! `tile --strips` cuts a build into a scanning projector's swaths; `lamp join` joins them again.
 
 use std::fs;
 

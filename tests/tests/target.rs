@@ -1,4 +1,4 @@
-//! `lamp target`: the images, counted pixel by pixel.
+//! `lamp target`: test images, checked pixel by pixel.
 
 use lamp_stack::Image;
 use lamp_tests::{Scratch, mask};

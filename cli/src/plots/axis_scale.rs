@@ -20,7 +20,7 @@ impl Ranged for AxisScale {
         let along = |value: f64| if self.logarithmic { value.ln() } else { value };
         let (start, end) = (along(self.range.start), along(self.range.end));
         let share = (along(*value) - start) / (end - start);
-        // Far outside is as good as outside, and no axis is longer than a picture.
+        // Values far outside need not be drawn to scale: coordinates must stay small.
         let share = if share.is_nan() { 0.0 } else { share.clamp(-1.0, 2.0) };
         limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
     }

@@ -22,10 +22,10 @@ pub use seeds::{Seed, classic_tiff, seeds};
 
 /// Parts are sliced only where their images are at most this high: the cost of
 /// a few facets grows with the rows they cross.
-const MOST_ROWS: u32 = 1000;
-/// Images are encoded only where that takes about so many codes at most: a
+const MAX_ROWS: u32 = 1000;
+/// Images are encoded only if that takes about this many codes at most: a
 /// run costs one for every 2560 pixels.
-const MOST_CODES: u64 = 1 << 20;
+const MAX_CODES: u64 = 1 << 20;
 
 /// Reads bytes as STL and slices a few layers of what they hold, by both rules
 /// of filling. The images are in canonical form, their rows end white exactly
@@ -58,7 +58,7 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
         ..SliceOptions::default()
     };
     let slices = Slices::new(Part::open(path, &OpenOptions::default())?, &options)?;
-    if slices.grid().height > MOST_ROWS { Ok(Vec::new()) } else { slices.collect() }
+    if slices.grid().height > MAX_ROWS { Ok(Vec::new()) } else { slices.collect() }
 }
 
 /// Reads bytes as STEP and slices a few layers of what passes the gate, on facets and on
@@ -82,7 +82,7 @@ pub fn step(bytes: &[u8]) {
             ..SliceOptions::default()
         };
         let slices = match Slices::new(model.clone(), &options) {
-            Ok(slices) if slices.grid().height <= MOST_ROWS => slices,
+            Ok(slices) if slices.grid().height <= MAX_ROWS => slices,
             Ok(_) => return,
             Err(error) => return drop(one_line(&error)),
         };
@@ -132,7 +132,7 @@ fn check_stack(layers: &[Layer]) {
         }
     }
     let codes = |image: &Image| u64::from(image.height()) * u64::from(1 + image.width() / 2560);
-    if layers.is_empty() || layers.iter().map(|layer| codes(&layer.image)).sum::<u64>() > MOST_CODES
+    if layers.is_empty() || layers.iter().map(|layer| codes(&layer.image)).sum::<u64>() > MAX_CODES
     {
         return;
     }
@@ -193,7 +193,7 @@ fn mask_of_runs(width: u32, runs: &[u8]) -> Mask {
 fn check_codec(mask: &Mask) {
     check_canonical(mask);
     let (width, height) = (mask.width(), mask.height());
-    if u64::from(height) * u64::from(1 + width / 2560) > MOST_CODES {
+    if u64::from(height) * u64::from(1 + width / 2560) > MAX_CODES {
         return;
     }
     let strip = codec::encode(mask);

@@ -1,4 +1,4 @@
-//! `--report`: what was done, as it stands in the stacks.
+//! `--report`: agrees with the changes in the stacks.
 
 use std::collections::BTreeSet;
 

@@ -1,5 +1,4 @@
-//! `fix` with the real binaries: what it says, shows, corrects, leaves and
-//! never touches.
+//! `fix`: its messages, pictures and corrections, and the rows that it leaves.
 
 mod evidence;
 mod fix_report;

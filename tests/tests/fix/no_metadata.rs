@@ -1,4 +1,4 @@
-//! Stacks of programs that know nothing of ours, and gray ones.
+//! Stacks without our metadata, as other programs write them, and gray stacks.
 
 use lamp_stack::{Image, Layer};
 use lamp_tests::{Scratch, at_least, mask, stripped, with_soft_edges};

@@ -1,4 +1,4 @@
-//! Broken parts, corrected.
+//! Broken parts are corrected to what whole ones give.
 
 use lamp_tests::{Scratch, ends_white, mask, masks};
 
@@ -65,7 +65,7 @@ fn fixing_twice_changes_no_byte() {
 }
 
 /// `tile` ends what runs across where the copy's image ends, so that rows end
-/// black; each copy is corrected as the part alone, but for some pixels where
+/// black; each copy is corrected as the part alone, except for some pixels where
 /// contours close.
 #[test]
 fn copies_are_corrected_as_the_part_is() {

@@ -1,4 +1,4 @@
-//! `--strict`, and where a band that was left says that the mesh has its gap.
+//! `--strict`, and the place of the gap in messages about bands that were left.
 
 use lamp_fixtures::Facet;
 
@@ -51,8 +51,7 @@ fn range(text: &str) -> [f64; 2] {
     [low, high].map(|number| number.parse().expect("a number"))
 }
 
-/// Each left band's line, word for word, but for the place, which is that of
-/// the facet that is missing.
+/// Each left band has its message, whose place is that of the missing facet.
 #[test]
 fn a_band_that_is_left_names_the_place_of_the_missing_facet() {
     /// The place is rounded to 0.1 mm; a curve is a little off the facet, and

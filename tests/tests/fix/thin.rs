@@ -5,7 +5,7 @@ use lamp_tests::{Scratch, stripped};
 
 use crate::pixels_off;
 
-/// A box from one corner to the other, leaning along y by so much a millimetre
+/// A box from one corner to the other, leaning along y by `lean` per millimetre
 /// of height.
 fn plate(low: [f64; 3], high: [f64; 3], lean: f64) -> Vec<Facet> {
     let corner = |k: usize| {
@@ -23,7 +23,7 @@ fn plate(low: [f64; 3], high: [f64; 3], lean: f64) -> Vec<Facet> {
     sides.into_iter().flat_map(facets).collect()
 }
 
-/// Plates above each other in y, with slits of so many millimetres between
+/// Plates above each other in y, with slits of `slit_mm` between
 /// them and webs across the slits, and a body beside them.
 fn plates(slit_mm: f64, lean: f64) -> Mesh {
     let mut facets = Vec::new();

@@ -1,4 +1,4 @@
-//! What is whole passes byte for byte, and what is corrected stays so.
+//! Whole parts pass byte for byte, and corrected ones stay as they are.
 
 use lamp_fixtures::Sample;
 use lamp_tests::{Scratch, stripped};

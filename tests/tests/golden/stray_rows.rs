@@ -1,4 +1,4 @@
-//! Each kind of stray rows and what `fix` makes of them, one below the other.
+//! Each kind of stray rows above its correction by `fix`.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Image, Layer, Mask, MaskBuilder};

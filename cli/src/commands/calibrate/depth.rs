@@ -142,7 +142,7 @@ impl DepthFit {
         }
     }
 
-    /// The dose below which nothing is to be seen.
+    /// Returns the dose below which there is nothing to plot.
     fn least_dose(&self) -> f64 {
         let least = |ec: &Estimate<Dose>| {
             let [value, low] = [ec.value, ec.low].map(Dose::mj_per_cm2);

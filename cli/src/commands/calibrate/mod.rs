@@ -135,7 +135,7 @@ impl CalibrationFiles {
         }
     }
 
-    /// The source line of a number of so many points.
+    /// Returns the source line of a parameter fitted to `points` points.
     fn source(&self, points: usize) -> String {
         format!("calibrated from {}, {points} points", self.source_name())
     }
