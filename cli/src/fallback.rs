@@ -13,7 +13,7 @@ use crate::options::ranges;
 use crate::slicing_options::SlicingOptions;
 use crate::streams::input_name;
 
-/// How far planes are moved, in micrometres, the nearest first.
+/// Distances that planes are moved by, in micrometres, the nearest first.
 ///
 /// Moved by d, a plane shows the part's own section d higher. On a slope that is off by
 /// d times its cotangent, which is d / t of the step that a layer of thickness t makes
@@ -21,7 +21,7 @@ use crate::streams::input_name;
 /// `has_same_contours` refuses. Gaps higher than 20 um are not passed: the fallback
 /// stands in for those.
 const NUDGES_UM: [f64; 8] = [1.0, -1.0, 2.5, -2.5, 5.0, -5.0, 10.0, -10.0];
-/// How far boxes of the same part may be apart, as a share of its size.
+/// The greatest distance of two boxes of the same part, as a share of its size.
 const SAME_BOX: f64 = 1e-3;
 /// Where contours turn, fewer consecutive rows than this may have more or fewer
 /// transitions in an STL than on the surfaces it was made of.

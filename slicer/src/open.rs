@@ -1,4 +1,4 @@
-//! Parts opened from files and streams, STL or STEP, as their content says.
+//! Opens parts from files and streams, STL or STEP, as their content says.
 
 use std::fs::File;
 use std::io::{Cursor, Read};
@@ -37,14 +37,14 @@ impl KernelName {
     }
 }
 
-/// How STEP files are read. STL files take no options.
+/// Options for reading STEP files. STL files take none.
 #[derive(Clone, Debug)]
 pub struct OpenOptions {
     /// The program that reads them.
     pub kernel: KernelName,
-    /// How far facets may lie from the exact surfaces.
+    /// The greatest distance of facets from the exact surfaces.
     pub tolerance: Length,
-    /// How long reading may take.
+    /// The time limit.
     pub timeout: Duration,
     /// Whether bodies may have gaps, because something else stands in for the layers
     /// that have them.

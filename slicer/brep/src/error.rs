@@ -44,7 +44,7 @@ pub enum BrepError {
     /// A panic: an error of the program, not of the file.
     #[error("{doing} failed within the program: {what}")]
     Panicked {
-        /// What was done.
+        /// The work that failed.
         doing: &'static str,
         /// The panic's message.
         what: String,

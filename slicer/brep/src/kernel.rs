@@ -41,7 +41,7 @@ pub trait Kernel: Send + Sync {
     /// Makes the faces into facets at most `chord_mm` from their surfaces, joined
     /// along their edges.
     ///
-    /// What could not be made into facets is missing, and is among the findings:
+    /// Faces that could not be made into facets are missing, and among the findings:
     /// whether bodies are closed is for [`check`](crate::check) to say.
     ///
     /// # Errors
@@ -69,7 +69,7 @@ pub struct Body {
     pub faces: std::ops::Range<u32>,
 }
 
-/// What a report says of a face.
+/// A face's properties for reports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaceInfo {
     /// The kind of its surface: `plane`, `cylinder`, `B-spline`.
@@ -103,9 +103,9 @@ pub struct Tessellation {
     /// Triangles with two corners at one pole, face after face: they have no area
     /// in space, and are no facets, but their parameters belong to the faces.
     pub tips: Vec<Facet>,
-    /// What was found to be wrong with faces.
+    /// The faults found in faces.
     pub findings: Vec<Finding>,
-    /// How far facets may lie from their surfaces, in millimetres.
+    /// The greatest distance of facets from their surfaces, in millimetres.
     pub chord_mm: f64,
 }
 
@@ -139,11 +139,11 @@ pub struct Finding {
     pub face: u32,
     /// The entity of the file.
     pub entity: u64,
-    /// What is wrong with it.
+    /// The fault.
     pub fault: Fault,
 }
 
-/// What may be wrong with a face.
+/// A fault of a face.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
@@ -162,7 +162,7 @@ pub enum Fault {
     /// An edge lies off the surface.
     #[error("an edge lies {off_mm:.6} mm off its surface")]
     Off {
-        /// How far, in millimetres.
+        /// The distance, in millimetres.
         off_mm: f64,
     },
     /// Its loops go clockwise where they should not; they were followed, and the
@@ -172,9 +172,9 @@ pub enum Fault {
     /// Edges that it gives apart from its neighbours were joined with theirs.
     #[error("{joints} of its edges were joined, up to {off_mm:.6} mm apart")]
     Joined {
-        /// How many edges, each end or its whole length.
+        /// The number of joints: ends of edges, or whole edges.
         joints: usize,
-        /// How far apart they were, in millimetres.
+        /// The greatest gap, in millimetres.
         off_mm: f64,
     },
     /// It points inwards where its neighbours point outwards.
@@ -186,13 +186,13 @@ pub enum Fault {
     /// It is too large for the chord, or bends too much.
     #[error("it takes about {cells:.0} cells of facets; give a longer chord")]
     Fine {
-        /// How many.
+        /// The number of cells.
         cells: f64,
     },
     /// It bends more than the facets could follow.
     #[error("facets lie {off_mm:.4} mm off its surface")]
     Coarse {
-        /// How far, in millimetres.
+        /// The distance, in millimetres.
         off_mm: f64,
     },
 }

@@ -12,10 +12,10 @@
 //!
 //! ```
 //! use lamp_brep::{Jet, Kernel, StepModel, check};
-//! use lamp_fixtures::{StepPart, StepUnit, step};
+//! use lamp_fixtures::{StepSample, StepUnit, step};
 //!
 //! // A sphere of radius 15 mm that stands on z = 0, in inches.
-//! let model = StepModel::read(step(StepPart::Sphere, StepUnit::Inch).as_bytes())?;
+//! let model = StepModel::read(step(StepSample::Sphere, StepUnit::Inch).as_bytes())?;
 //! assert_eq!((model.unit(), model.face(0).kind), ("inch", "sphere"));
 //!
 //! let mesh = model.tessellate(0.1)?;

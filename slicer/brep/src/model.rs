@@ -13,7 +13,7 @@ pub(crate) struct BrepModel {
     pub(crate) vertices: Vec<Vec3>,
     /// The name of the file's length unit.
     pub(crate) unit: String,
-    /// How far lengths may be off, as the file says, in millimetres.
+    /// The uncertainty of lengths that the file states, in millimetres.
     pub(crate) uncertainty_mm: Option<f64>,
 }
 
@@ -43,7 +43,7 @@ pub(crate) enum Loop {
 #[derive(Debug)]
 pub(crate) struct BrepEdge {
     pub(crate) curve: Curve,
-    /// Where it starts and ends, among the vertices.
+    /// The numbers of its first and last vertex.
     pub(crate) ends: [usize; 2],
     /// Whether it follows the curve's direction.
     pub(crate) forward: bool,

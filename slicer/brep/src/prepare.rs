@@ -29,14 +29,14 @@ pub struct Prepared {
     pub kernel: Arc<dyn Kernel>,
     /// Its facets. What was found and done is among their findings.
     pub mesh: Arc<Tessellation>,
-    /// What [`check`](crate::check) says of each body.
+    /// The report of [`check`](crate::check) on each body.
     pub reports: Vec<BodyReport>,
     /// The attempts that were worse, in order.
     pub tries: Vec<Attempt>,
     /// The distance within which edges were joined, in millimetres; 0 if the file was read
     /// as it is.
     pub heal_mm: f64,
-    /// How far facets may lie from their surfaces, in millimetres.
+    /// The greatest distance of facets from their surfaces, in millimetres.
     pub chord_mm: f64,
 }
 
@@ -62,7 +62,7 @@ const CHORDS: [f64; 2] = [4.0, 16.0];
 
 /// Reads a file's bytes, makes its bodies into facets and checks them.
 ///
-/// What does not pass is healed first with the tolerance that the file gives for
+/// A file with faults is healed first with the tolerance that the file gives for
 /// itself, then with a tighter and with looser ones, never more than the chord;
 /// and then made into facets with chords 4 and 16 times as long. Faces that are
 /// inside out are turned over, which the findings say. The first try without
@@ -99,9 +99,9 @@ struct Search<'a> {
     read: ReadFn,
     /// The chord asked for.
     chord_mm: f64,
-    /// All, the best one too.
+    /// All of them, in order.
     tries: Vec<Attempt>,
-    /// Which one it is; an error if none gave facets, that of the first.
+    /// The best attempt by number. The first one's error if none gave facets.
     best: Result<(usize, Prepared), BrepError>,
 }
 

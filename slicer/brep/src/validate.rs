@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::kernel::{Facet, Jet, Kernel, Tessellation};
 use crate::vector::{Vec3, cross, dot, length, scale, sub};
 
-/// How far apart the two volumes of a body may be, as a part of it.
+/// The greatest difference of a body's two volumes, as a share of them.
 const VOLUMES_APART: f64 = 1e-3;
 
 /// Why a body cannot be sliced as it is.
@@ -21,9 +21,9 @@ pub enum BodyFault {
         at_mm[0], at_mm[1], at_mm[2]
     )]
     Open {
-        /// How many there are.
+        /// The number of open edges.
         edges: usize,
-        /// Where the first one starts, in millimetres.
+        /// The start of the first one, in millimetres.
         at_mm: [f64; 3],
         /// The entity of its face.
         entity: u64,
@@ -33,7 +33,7 @@ pub enum BodyFault {
     Outside {
         /// The entity of the face.
         entity: u64,
-        /// How far, in millimetres.
+        /// The distance, in millimetres.
         off_mm: f64,
     },
     /// The volume within the facets differs from that within the surfaces.
@@ -60,7 +60,7 @@ pub enum BodyFault {
 pub struct BodyReport {
     /// The body's name in the file.
     pub name: String,
-    /// How many facets it has.
+    /// The number of facets.
     pub facets: usize,
     /// The volume within the facets, in cubic millimetres.
     pub volume_mm3: f64,
@@ -70,7 +70,7 @@ pub struct BodyReport {
     pub area_mm2: f64,
     /// The least and the greatest corner, in millimetres.
     pub box_mm: [[f64; 3]; 2],
-    /// What is wrong with it. A body without faults may be sliced.
+    /// The reasons not to slice it. A body without faults may be sliced.
     pub faults: Vec<BodyFault>,
 }
 
@@ -152,7 +152,7 @@ pub(crate) fn volume(mesh: &Tessellation, facets: &[Facet], middle: Vec3) -> f64
     facets.iter().map(six).sum::<f64>() / 6.0
 }
 
-/// Where a triangle's integral is taken, and with which weight (Strang and Fix,
+/// The points at which a triangle's integral is taken, with weights (Strang and Fix,
 /// six points, exact to the fourth degree).
 const GAUSS: [([f64; 2], f64); 6] = {
     const A: f64 = 0.445_948_490_915_965;

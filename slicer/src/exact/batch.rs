@@ -1,4 +1,4 @@
-//! Crossings gathered by a worker, and polished together.
+//! Gathers a worker's crossings with curved facets, and polishes them together.
 
 use std::ops::Range;
 

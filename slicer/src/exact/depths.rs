@@ -1,4 +1,4 @@
-//! Depths below sections on exact surfaces, gathered by a worker.
+//! Gathers a worker's depths below sections, and polishes them together.
 
 use std::ops::Range;
 

@@ -1,11 +1,11 @@
-//! Points where surfaces are level, and how far surfaces reach along the axes.
+//! Finds points where surfaces are level, and the surfaces' box.
 
 use lamp_brep::Jet;
 use lamp_brep::vector::Vec3;
 
 use super::placed::PlacedSurfaces;
 
-/// How many facets are searched for each end: around a level ring all are as high.
+/// The most facets searched for each end: around a level ring all are as high.
 const MAX_FACETS: usize = 64;
 const MAX_STEPS: usize = 30;
 /// Steps for differences, in parts of a facet.

@@ -1,5 +1,5 @@
-//! Extrema of a section's contours: where they turn back along the rows, on the exact
-//! surfaces.
+//! Finds the extrema of a section's contours, where they turn back along the rows, on
+//! the exact surfaces.
 //!
 //! Facets cut corners. Where a contour turns, some rows pass between the corner
 //! that the facets make and the one that the surface makes: facets cross them
@@ -23,7 +23,7 @@ use super::saddle::Saddle;
 pub struct Extremum {
     /// The point, in millimetres.
     pub at_mm: [f64; 3],
-    /// How far along y facets may be from the contour here, in millimetres.
+    /// The greatest distance of facets from the contour along y here, in millimetres.
     pub reach_mm: f64,
     facet: u32,
     uv: [f64; 2],
@@ -31,7 +31,7 @@ pub struct Extremum {
     is_above: bool,
     /// The contour is y = y* + bend/2 (x - x*)^2 here.
     bend_per_mm: f64,
-    /// How the parameters change with x along the contour.
+    /// The derivatives of the parameters by x along the contour.
     along: [f64; 2],
 }
 
@@ -47,7 +47,7 @@ struct CandidateFacet {
     may_be_level: bool,
 }
 
-/// Where the contours of any section may have extrema or meet.
+/// The places where the contours of any section may have extrema or meet.
 #[derive(Debug)]
 pub(super) struct CriticalPoints {
     candidates: Vec<CandidateFacet>,
@@ -59,7 +59,7 @@ const LEVEL: f64 = 1e-9;
 /// Where the normal has less than this along y, the surface faces up or down, and the
 /// contour that turns there is smaller than a pixel.
 const STEEP: f64 = 1e-4;
-/// How many facets are evaluated at once.
+/// The number of facets evaluated at once.
 const BATCH: usize = 4096;
 /// Extrema nearer to each other are the same, in millimetres.
 pub(super) const SAME_MM: f64 = 1e-6;

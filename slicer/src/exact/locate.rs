@@ -1,5 +1,5 @@
-//! Where points of surfaces lie: below which facet, found by walking from facet to
-//! facet, and at which parameters.
+//! Locates points of surfaces: the facet below, by walking from facet to facet, and the
+//! parameters.
 
 use lamp_brep::Tessellation;
 use lamp_brep::vector::{Vec3, add, distance, dot, scale, sub};
@@ -9,14 +9,14 @@ use super::placed::PlacedSurfaces;
 use super::polish::FacetPoint;
 use super::solve::{Wanted, solve};
 
-/// How far from its facet a point may be, in tolerances of the tessellation.
+/// The greatest distance of a point from its facet, in tolerances of the tessellation.
 const NEAR: f64 = 2.0;
-/// How many facets a walk passes at most.
+/// The most facets that a walk passes.
 const MAX_FACETS: usize = 256;
-/// How many faces a contour is followed through: one and its neighbours.
+/// The most faces that a contour is followed through: one and its neighbours.
 const MAX_FACES: usize = 3;
 
-/// What a row of a section has near an extremum or a saddle of the contour.
+/// A row's crossings near an extremum or a saddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RowContact {
     /// Two crossings with the contour, from the left.

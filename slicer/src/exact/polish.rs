@@ -1,4 +1,4 @@
-//! Points of facets moved onto the exact surfaces.
+//! Moves points of facets onto the exact surfaces.
 
 use lamp_brep::Jet;
 
@@ -27,13 +27,13 @@ impl FacetPoint {
     }
 }
 
-/// How far a point may move across the surface, in tolerances of the tessellation:
+/// The greatest move across the surface, in tolerances of the tessellation:
 /// once for the facet's distance, and once more because the normal differs where the
 /// point comes from.
 const MAX_MOVE: f64 = 2.0;
 /// A surface whose normal has less than this along the axis may face either way.
 const LEVEL: f64 = 1e-6;
-/// How far beyond its facet a point may lie, in facets.
+/// The greatest distance of a point beyond its facet, in facets.
 const MAX_BEYOND: f64 = 1.0;
 
 /// Moves points along an axis, 0 for x or 2 for z, to where the surfaces have the

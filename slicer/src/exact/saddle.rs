@@ -1,4 +1,4 @@
-//! Saddles of surfaces, where a section's contours meet.
+//! Finds saddles of surfaces, where a section's contours meet.
 //!
 //! At the height of a saddle four contours come together in a cross. A little above
 //! and below they part, two by two, one way above and the other way below. Within the
@@ -23,7 +23,7 @@ pub(super) struct Saddle {
     is_above: bool,
     /// The surface is z* + (a dx^2 + 2 b dx dy + c dy^2) / 2 here.
     form: [f64; 3],
-    /// How u and v change with x and y.
+    /// The derivatives of u and v by x and y.
     uv_by: [[f64; 2]; 2],
 }
 

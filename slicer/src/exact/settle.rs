@@ -1,5 +1,5 @@
-//! Rows near extrema and saddles of contours, where facets miss crossings or have too
-//! many.
+//! Repairs rows near extrema and saddles of contours, where facets miss crossings or
+//! have too many.
 //!
 //! Three repairs follow each other. Each adds or removes crossings whose windings sum
 //! to zero, so a row that balances goes on to do so. Crossings that are added lie on

@@ -1,24 +1,24 @@
-//! What polishing did, counted by all workers.
+//! Counts what polishing did, for all workers together.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// What polishing did to the crossings of facets.
+/// Counts of what polishing did to crossings of facets.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Polished {
     /// Crossings that lie on their surface now.
     pub moved: u64,
-    /// Those kept on their facet: no point of the surface was found near it.
+    /// Crossings kept on their facet: no point of the surface was found near it.
     pub kept: u64,
     /// Crossings added or taken away where contours turn.
     pub mended: u64,
-    /// How far crossings were moved along their rows on average, in millimetres.
+    /// The mean move along the rows, in millimetres.
     pub mean_mm: f64,
-    /// How far at most, in millimetres.
+    /// The greatest move, in millimetres.
     pub most_mm: f64,
 }
 
 impl Polished {
-    /// What was done to the crossings of both.
+    /// Returns the counts of both.
     pub(crate) fn joined(self, other: Self) -> Self {
         let moved = self.moved + other.moved;
         let sum_mm = self.mean_mm * self.moved as f64 + other.mean_mm * other.moved as f64;

@@ -17,7 +17,7 @@ pub(crate) struct Link {
     pub(crate) range: [f64; 2],
 }
 
-/// How far apart pieces may lie, in millimetres: as far as programs write places.
+/// The greatest gap between pieces, in millimetres: programs round points to less.
 const JOINED_MM: f64 = 1e-3;
 
 impl Chain {

@@ -24,7 +24,7 @@ pub(super) struct PolynomialBasis {
     parts_per_unit: f64,
 }
 
-/// What lies between two knots.
+/// The interval between two knots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct KnotInterval {
     /// The first control point that counts.
@@ -39,7 +39,7 @@ pub(super) struct LocalParameter {
     pub(super) number: usize,
     /// From −1 to 1.
     pub(super) t: f64,
-    /// How much that grows with the parameter.
+    /// The derivative of `t` by the parameter.
     pub(super) scale: f64,
 }
 

@@ -13,15 +13,15 @@ pub(crate) struct SplineSurface {
     pub(crate) v: Knots,
     /// Row by row: those of one u beside each other.
     pub(crate) points: Vec<Weighted>,
-    /// How many points there are along v.
+    /// The number of points along v.
     columns: usize,
     /// The same as polynomials, unless the degrees are too high.
     strips: Option<Strips>,
-    /// After which lengths u and v come again, where the surface is closed.
+    /// The periods of u and v, where the surface is closed.
     pub(crate) periods: [Option<f64>; 2],
 }
 
-/// How far apart the sides of a closed surface may lie, in millimetres.
+/// The greatest gap between the sides of a closed surface, in millimetres.
 const CLOSED_MM: f64 = 1e-6;
 
 impl SplineSurface {

@@ -13,7 +13,7 @@ use crate::vector::Vec3;
 pub(super) struct Strips {
     u: PolynomialBasis,
     v: PolynomialBasis,
-    /// How many control points there are along u.
+    /// The number of control points along u.
     rows: usize,
     /// Piece by piece along v, row by row of the control points, and power by power,
     /// the highest first.

@@ -225,7 +225,7 @@ impl Surface {
 /// A side of a surface's domain that is one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pole {
-    /// Which parameter is constant along the side: 0 for u, 1 for v.
+    /// The parameter that is constant along the side: 0 for u, 1 for v.
     pub(crate) axis: usize,
     /// Its value.
     pub(crate) at: f64,

@@ -8,7 +8,7 @@ use crate::step::StepModel;
 use crate::validate::{BodyReport, check};
 use lamp_fixtures::{SplitMix, StepSample, StepUnit, step};
 
-/// How a model is torn apart.
+/// A way of tearing a model apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Tear {
     /// The edges of a face meet, but its neighbours have others.

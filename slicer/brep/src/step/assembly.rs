@@ -97,7 +97,7 @@ struct Within<'a> {
     place: Axes,
     /// The product, whose name holds for shapes without one of their own.
     product: &'a str,
-    /// How many assemblies are around it.
+    /// The number of assemblies around it.
     level: usize,
 }
 

@@ -33,7 +33,7 @@ pub enum StepError {
     /// A part of the text makes no sense.
     #[error("the text makes no sense at byte {offset}")]
     Unreadable {
-        /// Where, from 0.
+        /// The byte, from 0.
         offset: usize,
     },
     /// An entity is given twice.
@@ -53,7 +53,7 @@ pub enum StepError {
     Unexpected {
         /// The entity.
         id: u64,
-        /// What it should be.
+        /// The type it should have.
         expected: &'static str,
     },
     /// An attribute is missing or of another kind.
@@ -61,7 +61,7 @@ pub enum StepError {
     Attribute {
         /// The entity.
         id: u64,
-        /// Which one, from 1.
+        /// The attribute, from 1.
         attribute: usize,
     },
     /// Numbers that give no shape, such as a negative radius.
@@ -69,7 +69,7 @@ pub enum StepError {
     Numbers {
         /// The entity.
         id: u64,
-        /// What they should give.
+        /// The shape they should give.
         what: &'static str,
     },
     /// A type that is not read.
@@ -126,7 +126,7 @@ pub fn read_step(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError> {
 #[derive(Debug)]
 pub struct StepModel {
     model: BrepModel,
-    /// What was joined.
+    /// A finding for each face with joined edges.
     healed: Vec<Finding>,
 }
 

@@ -76,7 +76,7 @@ struct SplineRecords<'a> {
     /// The record with degree and points, after how many other attributes.
     base: Item<'a>,
     skip: usize,
-    /// How the knots are given.
+    /// The entity that gives the knots.
     kind: &'static str,
 }
 

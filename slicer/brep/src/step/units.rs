@@ -3,7 +3,7 @@
 use super::StepError;
 use super::entities::{Entities, Item};
 
-/// What numbers of a representation mean.
+/// The units of a representation.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Units {
     /// Millimetres in one unit of length.
@@ -12,7 +12,7 @@ pub(crate) struct Units {
     pub(crate) radians: f64,
     /// The unit of length by name.
     pub(crate) name: String,
-    /// How far lengths may be off, in millimetres, if that is said.
+    /// The uncertainty of lengths, in millimetres, if it is stated.
     pub(crate) uncertainty_mm: Option<f64>,
 }
 

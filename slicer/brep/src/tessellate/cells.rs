@@ -6,7 +6,7 @@ use super::Node;
 use crate::geometry::Surface;
 use crate::vector::{Vec3, along, distance, dot, length, middle, sub, unit};
 
-/// How many times longer a cell may be than wide.
+/// The greatest ratio of a cell's length and width.
 const LONGEST: f64 = 30.0;
 
 /// From parameters to the plane of the triangulation.
@@ -85,7 +85,7 @@ pub(super) struct Borders {
     step: f64,
 }
 
-/// How near to a side corners of the grid may be, in cells.
+/// The least distance of the grid's corners from sides, in cells.
 const CLEAR: f64 = 0.3;
 
 impl Borders {

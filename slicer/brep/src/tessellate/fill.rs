@@ -60,9 +60,9 @@ struct FaceTriangulation<'a> {
     chord_mm: f64,
     scale: CellScale,
     mesh: Triangles,
-    /// What the mesh's vertices are.
+    /// The corners that are the mesh's vertices, in their order.
     corners: Vec<MeshCorner>,
-    /// How often polygons follow an edge.
+    /// The number of times that polygons follow each edge.
     borders: HashMap<[FixedVertexHandle; 2], usize>,
 }
 

@@ -9,12 +9,12 @@ use crate::vector::distance;
 #[derive(Clone, Debug)]
 pub(super) struct Unwrapped {
     pub(super) nodes: Vec<Node>,
-    /// How often it goes around a closed surface, along u and along v, before it
+    /// The number of times that it goes around a closed surface, along u and along v, before it
     /// is back at its start.
     pub(super) turns: [i32; 2],
 }
 
-/// How near a point at a pole lies to it, in millimetres.
+/// Points nearer than this to a pole are at it, in millimetres.
 const AT_POLE_MM: f64 = 1e-5;
 /// Corners that stand for a pole, for a whole turn around it.
 const POLE_PARTS: f64 = 16.0;
