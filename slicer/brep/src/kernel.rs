@@ -17,7 +17,7 @@ pub struct Jet {
 
 /// A model as a kernel has read it: bodies in their places, in millimetres.
 ///
-/// Faces are numbered through all bodies; each lies on a surface of its own,
+/// Faces are numbered across all bodies. Each lies on a surface of its own,
 /// which has the face's number.
 pub trait Kernel: Send + Sync {
     /// Returns the bodies, in the file's order; a body that is placed twice is there

@@ -67,7 +67,7 @@ const CHORDS: [f64; 2] = [4.0, 16.0];
 /// and then made into facets with chords 4 and 16 times as long. Faces that are
 /// inside out are turned over, which the findings say. The first try without
 /// faults is returned, or else the one of the first chord with the fewest, whose
-/// reports have them: it is not to be sliced. A panic is caught. There is no time limit.
+/// reports have them: it must not be sliced. A panic is caught. There is no time limit.
 ///
 /// # Errors
 /// Returns an error if they cannot be read, or no try gives facets.

@@ -36,7 +36,7 @@ pub(crate) enum Surface {
         curve: Curve,
         direction: Vec3,
     },
-    /// About the z axis of the frame, along which the curve's points are given too.
+    /// About the z axis of `axes`, in which the curve's points are given.
     Revolution {
         axes: Axes,
         curve: Curve,

@@ -9,13 +9,13 @@ use crate::geometry::spline_surface::SplineSurface;
 impl GeometryReader<'_> {
     /// Reads a `B_SPLINE_CURVE` of any kind, simple or complex.
     pub(super) fn spline_curve(&self, id: u64) -> Result<Option<SplineCurve>, StepError> {
-        let Some(part) = SplineRecords::find(self.entities, id, SplineKind::Curve) else {
+        let Some(part) = SplineRecords::find(self.entities, id, &CURVE) else {
             return Ok(None);
         };
         let bad = StepError::Numbers { id, what: "curve" };
         let degree = part.base.count(part.skip)?;
         let points = part.base.references(part.skip + 1)?;
-        let weights = match part.weights(self.entities) {
+        let weights = match part.weights {
             Some(weights) => weights.numbers(0)?,
             None => vec![1.0; points.len()],
         };
@@ -35,7 +35,7 @@ impl GeometryReader<'_> {
     }
 
     pub(super) fn spline_surface(&self, id: u64) -> Result<Option<SplineSurface>, StepError> {
-        let Some(part) = SplineRecords::find(self.entities, id, SplineKind::Surface) else {
+        let Some(part) = SplineRecords::find(self.entities, id, &SURFACE) else {
             return Ok(None);
         };
         let bad = || StepError::Numbers { id, what: "surface" };
@@ -47,7 +47,7 @@ impl GeometryReader<'_> {
         let columns = cells.first().map_or(0, Vec::len);
         let ids: Option<Vec<u64>> = cells.iter().flatten().map(Value::reference).collect();
         let ids = ids.ok_or_else(bad)?;
-        let weights = match part.weights(self.entities) {
+        let weights = match part.weights {
             Some(weights) => {
                 let rows = weights.list(0)?.iter().filter_map(Value::list).flatten();
                 rows.filter_map(Value::number).collect()
@@ -63,60 +63,52 @@ impl GeometryReader<'_> {
     }
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum SplineKind {
-    Curve,
-    Surface,
+/// The entities of a kind of spline.
+struct SplineNames {
+    base: &'static str,
+    rational: &'static str,
+    /// The entities that give the knots.
+    knots: [&'static str; 4],
 }
+
+const CURVE: SplineNames = SplineNames {
+    base: "B_SPLINE_CURVE",
+    rational: "RATIONAL_B_SPLINE_CURVE",
+    knots: ["B_SPLINE_CURVE_WITH_KNOTS", "UNIFORM_CURVE", "QUASI_UNIFORM_CURVE", "BEZIER_CURVE"],
+};
+
+const SURFACE: SplineNames = SplineNames {
+    base: "B_SPLINE_SURFACE",
+    rational: "RATIONAL_B_SPLINE_SURFACE",
+    knots: [
+        "B_SPLINE_SURFACE_WITH_KNOTS",
+        "UNIFORM_SURFACE",
+        "QUASI_UNIFORM_SURFACE",
+        "BEZIER_SURFACE",
+    ],
+};
 
 /// The records of a B-spline, which stand in one or in several.
 struct SplineRecords<'a> {
     id: u64,
-    shape: SplineKind,
     /// The record with degree and points, after how many other attributes.
     base: Item<'a>,
     skip: usize,
     /// The entity that gives the knots.
     kind: &'static str,
+    /// The weights, if the spline is rational.
+    weights: Option<Item<'a>>,
 }
 
 impl<'a> SplineRecords<'a> {
-    fn find(entities: &'a Entities, id: u64, shape: SplineKind) -> Option<Self> {
-        let (base, kinds) = match shape {
-            SplineKind::Curve => (
-                "B_SPLINE_CURVE",
-                [
-                    "B_SPLINE_CURVE_WITH_KNOTS",
-                    "UNIFORM_CURVE",
-                    "QUASI_UNIFORM_CURVE",
-                    "BEZIER_CURVE",
-                ],
-            ),
-            SplineKind::Surface => (
-                "B_SPLINE_SURFACE",
-                [
-                    "B_SPLINE_SURFACE_WITH_KNOTS",
-                    "UNIFORM_SURFACE",
-                    "QUASI_UNIFORM_SURFACE",
-                    "BEZIER_SURFACE",
-                ],
-            ),
-        };
-        let kind = kinds.into_iter().find(|kind| entities.find(id, kind).is_some())?;
-        let (base, skip) = match entities.find(id, base) {
+    fn find(entities: &'a Entities, id: u64, names: &SplineNames) -> Option<Self> {
+        let kind = names.knots.into_iter().find(|kind| entities.find(id, kind).is_some())?;
+        let (base, skip) = match entities.find(id, names.base) {
             Some(base) => (base, 0),
             // A simple entity has them all in one, after its name.
             None => (entities.find(id, kind)?, 1),
         };
-        Some(Self { id, shape, base, skip, kind })
-    }
-
-    fn weights(&self, entities: &'a Entities) -> Option<Item<'a>> {
-        let name = match self.shape {
-            SplineKind::Curve => "RATIONAL_B_SPLINE_CURVE",
-            SplineKind::Surface => "RATIONAL_B_SPLINE_SURFACE",
-        };
-        entities.find(self.id, name)
+        Some(Self { id, base, skip, kind, weights: entities.find(id, names.rational) })
     }
 
     /// Reads the knots along one parameter: `before` attributes stand before the first

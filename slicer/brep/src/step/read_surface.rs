@@ -68,7 +68,7 @@ impl GeometryReader<'_> {
         let z = self.optional_direction(axis.optional(2))?.unwrap_or(self.place.directions[2]);
         let axes = Axes::new(self.point(axis.reference(1)?)?, z, None);
         let axes = axes.ok_or(StepError::Numbers { id: item.id, what: "axis" })?;
-        // The curve is read as the frame sees it.
+        // The curve is read in the coordinates of the axes.
         let place = axes.inverse().then(&self.place);
         let seen = GeometryReader { entities: self.entities, units: self.units, place };
         Ok(Surface::Revolution { axes, curve: seen.curve(item.reference(1)?)? })
