@@ -27,14 +27,14 @@ impl HeightSearch<'_> {
         let within = |bound| self.heights_within(bound, Some(budget));
         let free = Budget { max: f64::INFINITY, ..budget };
         let cheapest = self.heights_within(f64::INFINITY, Some(free))?.expect("it may cost all");
-        let least = free.of_all(&cheapest.slabs);
+        let least = free.of_all(&cheapest.layers);
         if least > max {
             return Err(HeightsError::Budget { least, budget: max });
         }
         if let Some(heights) = within(0.0)? {
             return Ok((0.0, heights));
         }
-        let measures = cheapest.slabs.iter().map(|slab| self.criterion.measure(slab));
+        let measures = cheapest.layers.iter().map(|layer| self.criterion.measure(layer));
         let mut high = measures.filter(|measure| measure.is_finite()).fold(0.0, f64::max);
         let Some(mut best) = within(high)? else { return Ok((f64::INFINITY, cheapest)) };
         let mut low = 0.0;

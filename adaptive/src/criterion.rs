@@ -2,25 +2,25 @@
 
 use std::fmt::Debug;
 
-use crate::slab::{Slab, Slabs, share};
+use crate::swept_layer::{SweptLayer, SweptLayers, share};
 
-/// A measure of a layer's error. It depends on the slab alone.
+/// A measure of a layer's error. It depends on the layer alone.
 ///
 /// ```
-/// use lamp_adaptive::{Criterion, CuspHeight, Slab};
+/// use lamp_adaptive::{Criterion, CuspHeight, SweptLayer};
 ///
 /// // Walls at 30 degrees to the vertical: half of each normal points up.
-/// let slab = Slab { thickness_um: 100.0, steepest: 0.5, ..Slab::default() };
-/// assert_eq!(CuspHeight.measure(&slab), 50.0);
+/// let layer = SweptLayer { thickness_um: 100.0, steepest: 0.5, ..SweptLayer::default() };
+/// assert_eq!(CuspHeight.measure(&layer), 50.0);
 /// ```
 pub trait Criterion: Debug + Send + Sync {
     /// Returns the error, to be compared with a bound.
-    fn measure(&self, slab: &Slab) -> f64;
+    fn measure(&self, layer: &SweptLayer) -> f64;
 
-    /// Returns true if no layer thicker than the last of `slabs`, up to `max_um`, can
+    /// Returns true if no layer thicker than the last of `layers`, up to `max_um`, can
     /// be within the bound. If false, all of them are looked at.
-    fn rules_out_thicker(&self, slabs: &Slabs, max_um: f64, bound: f64) -> bool {
-        let _ = (slabs, max_um, bound);
+    fn rules_out_thicker(&self, layers: &SweptLayers, max_um: f64, bound: f64) -> bool {
+        let _ = (layers, max_um, bound);
         false
     }
 }
@@ -31,11 +31,11 @@ pub trait Criterion: Debug + Send + Sync {
 pub struct VolumeDeviation;
 
 impl Criterion for VolumeDeviation {
-    fn measure(&self, slab: &Slab) -> f64 {
-        slab.deviation()
+    fn measure(&self, layer: &SweptLayer) -> f64 {
+        layer.deviation()
     }
 
-    // Let the last of the slabs be `w` thick and hold the volume `V1`, of which at
+    // Let the last of the layers be `w` thick and hold the volume `V1`, of which at
     // least `L` is wrong in any thicker layer. A layer of thickness `(1 + r) w` whose
     // section has the area `a` holds `V1 + V2`, of which `S1` and `S2` are wrong.
     // What its section lacks of the part above `w` is wrong, so `V2 <= S2 + r w a`;
@@ -43,16 +43,17 @@ impl Criterion for VolumeDeviation {
     // within the bound `d`, then `S1 + S2 <= d (V1 + V2)`, and with `m = max(1, r)`
     // follows `V1 + V2 <= V1 (1 + r) / (1 - m d)`. But `L <= S1`: where `L` is more
     // than `d` times that, no such layer is within the bound.
-    fn rules_out_thicker(&self, slabs: &Slabs, max_um: f64, bound: f64) -> bool {
-        let Some(last) = slabs.each.last() else { return false };
+    fn rules_out_thicker(&self, layers: &SweptLayers, max_um: f64, bound: f64) -> bool {
+        let Some(last) = layers.each.last() else { return false };
         let r = max_um / last.thickness_um - 1.0;
         let left = 1.0 - r.max(1.0) * bound;
         // By more than rounding.
-        left > 0.0 && slabs.unavoidable_mm3 * left > 1.000_001 * bound * (1.0 + r) * last.volume_mm3
+        left > 0.0
+            && layers.unavoidable_mm3 * left > 1.000_001 * bound * (1.0 + r) * last.volume_mm3
     }
 }
 
-/// The cusp height in micrometres: the distance of the slab's edge from the part's
+/// The cusp height in micrometres: the distance of the layer's edge from the part's
 /// surface, along its normal, `c = t |N_z|`.
 ///
 /// Source: Dolenc and Makela, by 002 equations 7 to 10.
@@ -60,13 +61,13 @@ impl Criterion for VolumeDeviation {
 pub struct CuspHeight;
 
 impl Criterion for CuspHeight {
-    fn measure(&self, slab: &Slab) -> f64 {
-        slab.thickness_um * slab.steepest
+    fn measure(&self, layer: &SweptLayer) -> f64 {
+        layer.thickness_um * layer.steepest
     }
 
     // Thicker layers hold all facets of thinner ones.
-    fn rules_out_thicker(&self, slabs: &Slabs, _max_um: f64, bound: f64) -> bool {
-        slabs.each.last().is_some_and(|last| self.measure(last) > bound)
+    fn rules_out_thicker(&self, layers: &SweptLayers, _max_um: f64, bound: f64) -> bool {
+        layers.each.last().is_some_and(|last| self.measure(last) > bound)
     }
 }
 
@@ -79,7 +80,7 @@ impl Criterion for CuspHeight {
 pub struct AreaDeviation;
 
 impl Criterion for AreaDeviation {
-    fn measure(&self, slab: &Slab) -> f64 {
-        share((slab.top_area_mm2 - slab.bottom_area_mm2).abs(), slab.bottom_area_mm2)
+    fn measure(&self, layer: &SweptLayer) -> f64 {
+        share((layer.top_area_mm2 - layer.bottom_area_mm2).abs(), layer.bottom_area_mm2)
     }
 }

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use crate::error::HeightsError;
 use crate::profile::{Profile, ProfileChange};
 use crate::row_cuts::RowCuts;
-use crate::slab::{Slab, Slabs};
 use crate::sweep::{Slope, Sweep, Toggle};
+use crate::swept_layer::{SweptLayer, SweptLayers};
 
 /// The number of stripes of rows that are worked on at once. It does not follow
 /// the threads, so that sums do not depend on them.
@@ -92,13 +92,13 @@ impl LayeredPart {
         large.map(|faces| faces[0].0).collect()
     }
 
-    /// Returns the slabs from one height to each of several rising tops, all in
+    /// Returns the layers from one height to each of several rising tops, all in
     /// micrometres. A layer that holds the part's top has its section there, as in the
     /// slicer.
     ///
     /// # Panics
     /// Panics if there is no top, or one is not above the bottom.
-    pub fn slabs(&self, bottom_um: f64, tops_um: &[f64]) -> Slabs {
+    pub fn layers(&self, bottom_um: f64, tops_um: &[f64]) -> SweptLayers {
         assert!(tops_um.first().is_some_and(|&top| top > bottom_um), "a layer has some thickness");
         let part_top_um = self.facets.max()[2];
         let plane = |top: f64| if bottom_um <= part_top_um { top.min(part_top_um) } else { top };
@@ -109,14 +109,14 @@ impl LayeredPart {
             self.rise(&facets, [bottom_um, last_um], &planes);
         let steepest = steepest(&facets, bottom_um, tops_um);
         let pitch_mm = self.rows.pitch_mm;
-        let slab = |k: usize| {
+        let layer = |k: usize| {
             let ProfileChange { width, lost, gained } = changes[k];
             let top_width = (bottom_width + width).max(0.0);
             let (lost, gained) = (lost.max(0.0), gained.max(0.0));
             let thickness_um = tops_um[k] - bottom_um;
-            // Above the part's top all of the slab is too much.
+            // Above the part's top all of the layer is too much.
             let above = top_width * (thickness_um - planes[k]);
-            Slab {
+            SweptLayer {
                 bottom_um,
                 thickness_um,
                 volume_mm3: (top_width * planes[k] + lost - gained).max(0.0) * pitch_mm / 1000.0,
@@ -128,8 +128,8 @@ impl LayeredPart {
                 rows_left_out,
             }
         };
-        Slabs {
-            each: (0..tops_um.len()).map(slab).collect(),
+        SweptLayers {
+            each: (0..tops_um.len()).map(layer).collect(),
             unavoidable_mm3: unavoidable * pitch_mm / 1000.0,
         }
     }

@@ -1,8 +1,8 @@
 //! Layers as thick as the part allows.
 //!
-//! A layer is built as a slab: the part's section at its top, swept down. A
-//! [`LayeredPart`] compares such [`Slab`]s with the part, for all tops that a
-//! layer may have at once. A [`Criterion`] measures a slab's error. A
+//! A layer is built as the part's section at its top, swept down. A
+//! [`LayeredPart`] compares such [`SweptLayer`]s with the part, for all tops that a
+//! layer may have at once. A [`Criterion`] measures a layer's error. A
 //! [`HeightSearch`] takes, from the bottom up, the thickest layers whose error is
 //! within a bound, or the most accurate ones within a budget (002 section 3.2).
 //!
@@ -22,9 +22,9 @@
 //! let search = HeightSearch { part: &part, thicknesses: &thicknesses, criterion, snap: false };
 //! let heights = search.heights(0.05)?;
 //! // Sections shrink faster towards the tip, and layers with them.
-//! assert_eq!(heights.slabs[0].thickness_um, 49.0);
-//! assert!(heights.slabs[10].thickness_um < 30.0);
-//! assert_eq!(heights.slabs.last().unwrap().top_um(), 1000.0);
+//! assert_eq!(heights.layers[0].thickness_um, 49.0);
+//! assert!(heights.layers[10].thickness_um < 30.0);
+//! assert_eq!(heights.layers.last().unwrap().top_um(), 1000.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -35,13 +35,13 @@ mod layered_part;
 mod profile;
 mod row_cuts;
 mod search;
-mod slab;
 mod sweep;
+mod swept_layer;
 mod thicknesses;
 
 pub use criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
 pub use error::HeightsError;
 pub use layered_part::LayeredPart;
 pub use search::{HeightSearch, Heights, uniform_heights};
-pub use slab::{Slab, Slabs};
+pub use swept_layer::{SweptLayer, SweptLayers};
 pub use thicknesses::Thicknesses;

@@ -6,7 +6,7 @@ use lamp_stack::Length;
 use crate::criterion::Criterion;
 use crate::error::HeightsError;
 use crate::layered_part::LayeredPart;
-use crate::slab::Slab;
+use crate::swept_layer::SweptLayer;
 use crate::thicknesses::Thicknesses;
 
 /// More than any machine builds.
@@ -29,19 +29,20 @@ pub struct HeightSearch<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heights {
     /// The layers.
-    pub slabs: Vec<Slab>,
+    pub layers: Vec<SweptLayer>,
     /// The part's volume above the last layer, in cubic millimetres: heights are
     /// rounded to whole layers or steps.
     pub unbuilt_mm3: f64,
 }
 
 impl Heights {
-    fn of(part: &LayeredPart, slabs: Vec<Slab>) -> Self {
-        let (end_um, top_um) = (slabs.last().map_or(0.0, Slab::top_um), part.heights_um()[1]);
-        let is_left = !slabs.is_empty() && end_um < top_um;
+    fn of(part: &LayeredPart, layers: Vec<SweptLayer>) -> Self {
+        let (end_um, top_um) =
+            (layers.last().map_or(0.0, SweptLayer::top_um), part.heights_um()[1]);
+        let is_left = !layers.is_empty() && end_um < top_um;
         let unbuilt_mm3 =
-            if is_left { part.slabs(end_um, &[top_um]).each[0].volume_mm3 } else { 0.0 };
-        Self { slabs, unbuilt_mm3 }
+            if is_left { part.layers(end_um, &[top_um]).each[0].volume_mm3 } else { 0.0 };
+        Self { layers, unbuilt_mm3 }
     }
 
     /// Returns the layers' heights, as the slicer takes them.
@@ -49,18 +50,21 @@ impl Heights {
     /// # Errors
     /// Returns an error if there are too many layers.
     pub fn layer_heights(&self) -> Result<LayerHeights, SliceError> {
-        let ends = self.slabs.iter().map(Slab::top_um);
+        let ends = self.layers.iter().map(SweptLayer::top_um);
         LayerHeights::new(
-            self.slabs.iter().take(1).map(|slab| slab.bottom_um).chain(ends).collect(),
+            self.layers.iter().take(1).map(|layer| layer.bottom_um).chain(ends).collect(),
         )
     }
 
     /// Returns the volume lost (and not built), the volume gained and the part's
     /// volume, in cubic millimetres.
     pub fn volumes_mm3(&self) -> [f64; 3] {
-        let sum = |of: fn(&Slab) -> f64| self.slabs.iter().map(of).sum::<f64>();
-        let [lost, gained, volume] =
-            [sum(|slab| slab.lost_mm3), sum(|slab| slab.gained_mm3), sum(|slab| slab.volume_mm3)];
+        let sum = |of: fn(&SweptLayer) -> f64| self.layers.iter().map(of).sum::<f64>();
+        let [lost, gained, volume] = [
+            sum(|layer| layer.lost_mm3),
+            sum(|layer| layer.gained_mm3),
+            sum(|layer| layer.volume_mm3),
+        ];
         [lost + self.unbuilt_mm3, gained, volume + self.unbuilt_mm3]
     }
 }
@@ -74,12 +78,12 @@ pub(crate) struct Budget<'a> {
 }
 
 impl Budget<'_> {
-    fn of(&self, slab: &Slab) -> f64 {
-        (self.cost)(Length::from_um(slab.thickness_um))
+    fn of(&self, layer: &SweptLayer) -> f64 {
+        (self.cost)(Length::from_um(layer.thickness_um))
     }
 
-    pub(crate) fn of_all(&self, slabs: &[Slab]) -> f64 {
-        slabs.iter().map(|slab| self.of(slab)).sum()
+    pub(crate) fn of_all(&self, layers: &[SweptLayer]) -> f64 {
+        layers.iter().map(|layer| self.of(layer)).sum()
     }
 }
 
@@ -119,12 +123,12 @@ impl HeightSearch<'_> {
         }
         let end = end as usize;
         let ends = self.ends(end);
-        let (mut step, mut spent, mut slabs) = (0, 0.0, Vec::new());
+        let (mut step, mut spent, mut layers) = (0, 0.0, Vec::new());
         let mut last_um = f64::INFINITY;
         while step < end {
             let choices = self.thicknesses.choices(step, &ends);
             let tops: Vec<f64> = choices.iter().map(|choice| at(step + choice)).collect();
-            let found = self.slabs(at(step), &tops, last_um, bound);
+            let found = self.layers(at(step), &tops, last_um, bound);
             let chosen = self.choose(&found, bound, budget);
             step += choices[chosen];
             last_um = found[chosen].thickness_um;
@@ -132,34 +136,34 @@ impl HeightSearch<'_> {
             if budget.is_some_and(|budget| spent > budget.max) {
                 return Ok(None);
             }
-            slabs.push(found[chosen]);
+            layers.push(found[chosen]);
         }
-        Ok(Some(Heights::of(self.part, slabs)))
+        Ok(Some(Heights::of(self.part, layers)))
     }
 
-    /// Returns the slabs of all tops, or of the lower ones if no other can be within the
+    /// Returns the layers of all tops, or of the lower ones if no other can be within the
     /// bound. The thickness of the layer before hints at how many these are.
-    fn slabs(&self, bottom_um: f64, tops_um: &[f64], last_um: f64, bound: f64) -> Vec<Slab> {
+    fn layers(&self, bottom_um: f64, tops_um: &[f64], last_um: f64, bound: f64) -> Vec<SweptLayer> {
         let max_um = tops_um[tops_um.len() - 1] - bottom_um;
         // These suffice where errors grow as the thickness squared.
         let near_um = 1.2 * (2.0 * last_um * max_um).sqrt();
         if near_um < NEAR * max_um {
             let near = tops_um.partition_point(|top| top - bottom_um <= near_um).max(1);
-            let slabs = self.part.slabs(bottom_um, &tops_um[..near]);
-            if self.criterion.rules_out_thicker(&slabs, max_um, bound) {
-                return slabs.each;
+            let layers = self.part.layers(bottom_um, &tops_um[..near]);
+            if self.criterion.rules_out_thicker(&layers, max_um, bound) {
+                return layers.each;
             }
         }
-        self.part.slabs(bottom_um, tops_um).each
+        self.part.layers(bottom_um, tops_um).each
     }
 
-    fn choose(&self, slabs: &[Slab], bound: f64, budget: Option<Budget<'_>>) -> usize {
-        let measures: Vec<f64> = slabs.iter().map(|slab| self.criterion.measure(slab)).collect();
-        let mut good = (0..slabs.len()).rev().filter(|&k| measures[k] <= bound);
+    fn choose(&self, layers: &[SweptLayer], bound: f64, budget: Option<Budget<'_>>) -> usize {
+        let measures: Vec<f64> = layers.iter().map(|layer| self.criterion.measure(layer)).collect();
+        let mut good = (0..layers.len()).rev().filter(|&k| measures[k] <= bound);
         let cheapest = match budget {
             None => good.next(),
             Some(budget) => {
-                let per_um = |k: &usize| budget.of(&slabs[*k]) / slabs[*k].thickness_um;
+                let per_um = |k: &usize| budget.of(&layers[*k]) / layers[*k].thickness_um;
                 // The thickest of those that cost the same.
                 good.min_by(|a, b| per_um(a).total_cmp(&per_um(b)))
             }
@@ -201,8 +205,8 @@ pub fn uniform_heights(part: &LayeredPart, thickness: Length) -> Result<Heights,
         return Err(too_high([bottom_um, top_um]));
     }
     let at = |k: u32| bottom_um + f64::from(k) * thickness_um;
-    let slab = |k: u32| part.slabs(at(k), &[at(k + 1)]).each[0];
-    Ok(Heights::of(part, (0..count as u32).map(slab).collect()))
+    let layer = |k: u32| part.layers(at(k), &[at(k + 1)]).each[0];
+    Ok(Heights::of(part, (0..count as u32).map(layer).collect()))
 }
 
 fn too_high([bottom_um, top_um]: [f64; 2]) -> HeightsError {

@@ -1,10 +1,10 @@
-//! Slabs of round bodies against closed forms: lost and gained volumes within 0.1%
+//! Swept layers of round bodies against closed forms: lost and gained volumes within 0.1%
 //! of the layer's volume.
 
 use std::f64::consts::PI;
 
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, HeightSearch, LayeredPart, Slab, Thicknesses,
+    AreaDeviation, Criterion, CuspHeight, HeightSearch, LayeredPart, SweptLayer, Thicknesses,
     VolumeDeviation,
 };
 use lamp_fixtures::{Mesh, cone, sphere};
@@ -37,11 +37,11 @@ fn discs(bottom: f64, top: f64, radius: impl Fn(f64) -> f64) -> [f64; 3] {
     integrated(bottom, top, |z| [(area(z) - at_top).max(0.0), (at_top - area(z)).max(0.0), area(z)])
 }
 
-fn check(slab: &Slab, [lost, gained, volume]: [f64; 3]) {
+fn check(layer: &SweptLayer, [lost, gained, volume]: [f64; 3]) {
     let allowed = 1e-3 * volume;
-    assert!((slab.lost_mm3 - lost).abs() < allowed, "{slab:?}: {lost} lost of {volume}");
-    assert!((slab.gained_mm3 - gained).abs() < allowed, "{slab:?}: {gained} gained of {volume}");
-    assert!((slab.volume_mm3 - volume).abs() < allowed, "{slab:?}: {volume}");
+    assert!((layer.lost_mm3 - lost).abs() < allowed, "{layer:?}: {lost} lost of {volume}");
+    assert!((layer.gained_mm3 - gained).abs() < allowed, "{layer:?}: {gained} gained of {volume}");
+    assert!((layer.volume_mm3 - volume).abs() < allowed, "{layer:?}: {volume}");
 }
 
 /// Checks layers at many heights and of many thicknesses, with the tops of each
@@ -58,8 +58,8 @@ fn check_all(part: &LayeredPart, height: f64, of: impl Fn(f64, f64) -> [f64; 3])
             .collect();
         if !tops.is_empty() {
             let tops_um: Vec<f64> = tops.iter().map(|top| top * 1000.0).collect();
-            for (slab, top) in part.slabs(bottom * 1000.0, &tops_um).each.iter().zip(tops) {
-                check(slab, of(bottom, top));
+            for (layer, top) in part.layers(bottom * 1000.0, &tops_um).each.iter().zip(tops) {
+                check(layer, of(bottom, top));
             }
         }
     }
@@ -119,31 +119,31 @@ fn inclined_cylinders() {
 #[test]
 fn the_area_is_blind_to_an_inclined_cylinder() {
     let part = part(&inclined_cylinder());
-    let slab = part.slabs(3000.0, &[4000.0]).each[0];
-    assert!(AreaDeviation.measure(&slab) < 1e-3);
-    assert!(VolumeDeviation.measure(&slab) > 0.2);
+    let layer = part.layers(3000.0, &[4000.0]).each[0];
+    assert!(AreaDeviation.measure(&layer) < 1e-3);
+    assert!(VolumeDeviation.measure(&layer) > 0.2);
     // Its walls lean by 45 degrees at the steepest.
-    let cusp = CuspHeight.measure(&slab);
+    let cusp = CuspHeight.measure(&layer);
     assert!((cusp - 1000.0 * 0.5_f64.sqrt()).abs() < 1.0, "{cusp}");
     let [min, max, step] = [50.0, 1000.0, 10.0].map(Length::from_um);
     let thicknesses = Thicknesses::new(min, max, step).unwrap();
     let layers = |criterion: &dyn Criterion| {
         let search =
             HeightSearch { part: &part, thicknesses: &thicknesses, criterion, snap: false };
-        search.heights(0.02).unwrap().slabs
+        search.heights(0.02).unwrap().layers
     };
     assert_eq!(layers(&AreaDeviation).len(), 10);
     let by_volume = layers(&VolumeDeviation);
-    assert!(by_volume.len() > 100 && by_volume.iter().all(|slab| slab.deviation() <= 0.02));
+    assert!(by_volume.len() > 100 && by_volume.iter().all(|layer| layer.deviation() <= 0.02));
 }
 
 /// Cones have one slope, and so one cusp height for each thickness.
 #[test]
 fn the_cusp_of_a_cone_follows_from_its_slope() {
     let part = part(&cone(5.0, 1.0, 4.0, 20_000));
-    let slabs = part.slabs(1000.0, &[1010.0, 1100.0, 2000.0]).each;
-    for slab in slabs {
-        let expected = slab.thickness_um * 0.5_f64.sqrt();
-        assert!((CuspHeight.measure(&slab) / expected - 1.0).abs() < 1e-3, "{slab:?}");
+    let layers = part.layers(1000.0, &[1010.0, 1100.0, 2000.0]).each;
+    for layer in layers {
+        let expected = layer.thickness_um * 0.5_f64.sqrt();
+        assert!((CuspHeight.measure(&layer) / expected - 1.0).abs() < 1e-3, "{layer:?}");
     }
 }

@@ -1,8 +1,8 @@
 //! The search for heights: bounds kept, degenerate parts, budgets, flat faces.
 
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart, Slab,
-    Thicknesses, VolumeDeviation, uniform_heights,
+    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart,
+    SweptLayer, Thicknesses, VolumeDeviation, uniform_heights,
 };
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, tower};
 use lamp_slicer::{Axis, FacetIndex, Fill, Part, Placement, Units};
@@ -30,7 +30,7 @@ fn by_volume<'a>(part: &'a LayeredPart, thicknesses: &'a Thicknesses) -> HeightS
 }
 
 fn built_um(heights: &Heights) -> Vec<f64> {
-    heights.slabs.iter().map(|slab| (slab.thickness_um * 1e3).round() / 1e3).collect()
+    heights.layers.iter().map(|layer| (layer.thickness_um * 1e3).round() / 1e3).collect()
 }
 
 /// A box from one height to another.
@@ -47,25 +47,26 @@ fn joined(meshes: &[Mesh]) -> Mesh {
 fn the_part_of_figure_48() {
     let part = part(&tower(60_000));
     let thicknesses = buildable(0.001 * INCH_UM, 0.1 * INCH_UM, 0.001 * INCH_UM);
-    let slabs = by_volume(&part, &thicknesses).heights(0.02).unwrap().slabs;
+    let layers = by_volume(&part, &thicknesses).heights(0.02).unwrap().layers;
     let between = |low: f64, high: f64| {
-        slabs.iter().filter(move |slab| slab.bottom_um >= low && slab.top_um() <= high)
+        layers.iter().filter(move |layer| layer.bottom_um >= low && layer.top_um() <= high)
     };
     // The cylinder, the cone and the upper half of the sphere.
-    assert!(between(0.0, 17_780.0).all(|slab| (slab.thickness_um - 2540.0).abs() < 1e-6));
-    let cone: Vec<f64> = between(19_050.0, 38_100.0).map(|slab| slab.thickness_um).collect();
+    assert!(between(0.0, 17_780.0).all(|layer| (layer.thickness_um - 2540.0).abs() < 1e-6));
+    let cone: Vec<f64> = between(19_050.0, 38_100.0).map(|layer| layer.thickness_um).collect();
     let (least, most) =
         cone.iter().fold((f64::MAX, 0.0), |(l, m), &t| (f64::min(l, t), f64::max(m, t)));
     assert!(cone.len() > 20 && most < 800.0 && least > 300.0, "{least} to {most}");
-    let ball: Vec<f64> = between(47_000.0, 53_000.0).map(|slab| slab.thickness_um).collect();
+    let ball: Vec<f64> = between(47_000.0, 53_000.0).map(|layer| layer.thickness_um).collect();
     assert!(ball.len() > 5 && ball.is_sorted_by(|a, b| a >= b), "{ball:?}");
-    for slab in &slabs {
-        assert!(slab.deviation() <= 0.02 || slab.thickness_um < 26.0, "{slab:?}");
+    for layer in &layers {
+        assert!(layer.deviation() <= 0.02 || layer.thickness_um < 26.0, "{layer:?}");
     }
-    let worst = |slabs: &[Slab]| slabs.iter().map(Slab::deviation).fold(0.0, f64::max);
+    let worst =
+        |layers: &[SweptLayer]| layers.iter().map(SweptLayer::deviation).fold(0.0, f64::max);
     let uniform = uniform_heights(&part, Length::from_um(0.1 * INCH_UM)).unwrap();
-    assert_eq!(uniform.slabs.len(), 30);
-    assert!(worst(&uniform.slabs) > 0.2 && worst(&slabs) <= 0.02);
+    assert_eq!(uniform.layers.len(), 30);
+    assert!(worst(&uniform.layers) > 0.2 && worst(&layers) <= 0.02);
 }
 
 #[test]
@@ -76,10 +77,10 @@ fn layers_fill_the_part() {
         for snap in [false, true] {
             let search = HeightSearch { snap, ..by_volume(&part, &thicknesses) };
             let heights = search.heights(0.01).unwrap();
-            for pair in heights.slabs.windows(2) {
+            for pair in heights.layers.windows(2) {
                 assert!((pair[0].top_um() - pair[1].bottom_um).abs() < 1e-9);
             }
-            let top = heights.slabs.last().unwrap().top_um();
+            let top = heights.layers.last().unwrap().top_um();
             assert!((top - 76_200.0).abs() <= step / 2.0 + 1e-3, "{top}");
             assert!(built_um(&heights).iter().all(|t| (min..=max).contains(t)));
         }
@@ -116,10 +117,10 @@ fn bodies_above_each_other_with_nothing_between() {
         let search = HeightSearch { criterion, snap: true, ..by_volume(&part, &thicknesses) };
         let heights = search.heights(0.02).unwrap();
         let [lost, gained, volume] = heights.volumes_mm3();
-        assert!(heights.slabs.len() < 50);
+        assert!(heights.layers.len() < 50);
         assert!((lost + gained) / volume < 1e-3, "{lost} {gained} of {volume}");
-        let empty: Vec<_> = heights.slabs.iter().filter(|slab| slab.volume_mm3 == 0.0).collect();
-        assert!(empty.len() >= 4 && empty.iter().all(|slab| slab.deviation() == 0.0));
+        let empty: Vec<_> = heights.layers.iter().filter(|layer| layer.volume_mm3 == 0.0).collect();
+        assert!(empty.len() >= 4 && empty.iter().all(|layer| layer.deviation() == 0.0));
     }
 }
 
@@ -132,7 +133,7 @@ fn layers_snap_to_flat_faces() {
     let tops = |snap: bool| {
         let search = HeightSearch { snap, ..by_volume(&part, &thicknesses) };
         let heights = search.heights(0.5).unwrap();
-        heights.slabs.iter().map(|slab| slab.top_um().round()).collect::<Vec<_>>()
+        heights.layers.iter().map(|layer| layer.top_um().round()).collect::<Vec<_>>()
     };
     assert!(tops(true).contains(&1030.0) || tops(true).contains(&1029.0), "{:?}", tops(true));
     assert!(!tops(false).contains(&1030.0) && !tops(false).contains(&1029.0));
@@ -145,7 +146,7 @@ fn budgets_are_kept_and_used() {
     let search = by_volume(&part, &thicknesses);
     for layers in [90.0, 150.0, 300.0] {
         let (bound, heights) = search.within_budget(|_| 1.0, layers).unwrap();
-        let count = heights.slabs.len() as f64;
+        let count = heights.layers.len() as f64;
         assert!(count <= layers && count > 0.9 * layers, "{count} of {layers}");
         assert_eq!(search.heights(bound).unwrap(), heights);
     }
@@ -153,10 +154,10 @@ fn budgets_are_kept_and_used() {
     let cost = |thickness: Length| 2000.0 + 10.0 * thickness.um();
     let (_, heights) = search.within_budget(cost, 1.2e6).unwrap();
     let spent: f64 =
-        heights.slabs.iter().map(|slab| cost(Length::from_um(slab.thickness_um))).sum();
+        heights.layers.iter().map(|layer| cost(Length::from_um(layer.thickness_um))).sum();
     assert!((1.1e6..=1.2e6).contains(&spent), "{spent}");
     let (bound, heights) = search.within_budget(|_| 1.0, 1e4).unwrap();
-    assert!(bound == 0.0 && heights.slabs.len() < 763);
+    assert!(bound == 0.0 && heights.layers.len() < 763);
     let too_few = search.within_budget(|_| 1.0, 70.0);
     assert!(matches!(too_few, Err(HeightsError::Budget { least: 77.0, .. })), "{too_few:?}");
 }
@@ -177,8 +178,8 @@ fn threads_do_not_change_the_heights() {
 struct LookingAtAll;
 
 impl Criterion for LookingAtAll {
-    fn measure(&self, slab: &Slab) -> f64 {
-        VolumeDeviation.measure(slab)
+    fn measure(&self, layer: &SweptLayer) -> f64 {
+        VolumeDeviation.measure(layer)
     }
 }
 
@@ -211,7 +212,7 @@ fn a_budget_of_time_is_kept_by_the_quickest_layers() {
     let quickest = 6_000.0 / 150.0 * cost(Length::from_um(150.0));
     let search = by_volume(&part, &thicknesses);
     let (bound, heights) = search.within_budget(cost, 1.01 * quickest).unwrap();
-    assert!(bound == 0.0 && heights.slabs.iter().all(|slab| slab.thickness_um < 200.0));
+    assert!(bound == 0.0 && heights.layers.iter().all(|layer| layer.thickness_um < 200.0));
     assert!(search.within_budget(cost, 0.99 * quickest).is_err());
 }
 
@@ -243,13 +244,13 @@ fn layers_of_which_nothing_is_known_are_the_thinnest() {
     let whole = part(&mesh);
     let thicknesses = buildable(25.0, 100.0, 1.0);
     let closed = by_volume(&whole, &thicknesses).heights(0.5).unwrap();
-    assert!(closed.slabs.iter().all(|slab| slab.rows_left_out == 0));
+    assert!(closed.layers.iter().all(|layer| layer.rows_left_out == 0));
     // Without the side to the right, no row balances.
     mesh.facets.retain(|facet| facet.iter().map(|corner| corner[0]).sum::<f32>() < 0.0);
     let open = part(&mesh);
     let heights = by_volume(&open, &thicknesses).heights(0.5).unwrap();
-    assert_eq!(heights.slabs.len(), 120);
-    assert!(heights.slabs.iter().all(|slab| slab.rows_left_out > 0));
+    assert_eq!(heights.layers.len(), 120);
+    assert!(heights.layers.iter().all(|layer| layer.rows_left_out > 0));
 }
 
 #[test]
@@ -257,7 +258,7 @@ fn what_is_above_the_last_layer_is_lost() {
     let part = part(&plate(0.0, 1.013));
     let heights = uniform_heights(&part, Length::from_um(100.0)).unwrap();
     let [lost, _, volume] = heights.volumes_mm3();
-    assert_eq!(heights.slabs.len(), 10);
+    assert_eq!(heights.layers.len(), 10);
     assert!((lost / volume - 13.0 / 1013.0).abs() < 1e-6, "{lost} of {volume}");
     assert!(matches!(
         uniform_heights(&part, Length::from_um(1e-4)),

@@ -1,7 +1,7 @@
-//! Slabs against a slow obvious twin: sections at very many heights, compared
+//! Swept layers against a slow obvious twin: sections at very many heights, compared
 //! with the one at the top, row by row.
 
-use lamp_adaptive::{LayeredPart, Slab};
+use lamp_adaptive::{LayeredPart, SweptLayer};
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
 use lamp_slicer::{
     Axis, FacetIndex, Fill, Inside, Part, Placement, SectionOptions, Units, section,
@@ -46,7 +46,7 @@ impl Twin {
             let [bottom, top] = layer.map(|share| min[2] + share * height);
             // Among other tops, as the search asks.
             let tops = [0.5, 0.75, 1.0, 1.2].map(|share| bottom + share * (top - bottom));
-            let slab = part.slabs(bottom, &tops).each[2];
+            let layer = part.layers(bottom, &tops).each[2];
             let top_section = self.section(top.min(max[2]), max[1], rows);
             let (mut lost, mut gained, mut volume) = (0.0, 0.0, 0.0);
             let each = (top - bottom) / f64::from(SECTIONS) / 1000.0 * PITCH_MM;
@@ -64,12 +64,12 @@ impl Twin {
                 let face = 0.002 * volume + 2.0 * (lost + gained + volume) / f64::from(SECTIONS);
                 (found - expected).abs() < face
             };
-            let Slab { lost_mm3, gained_mm3, volume_mm3, .. } = slab;
-            assert!(near(lost_mm3, lost), "{layer:?}: {slab:?}, {lost} lost");
-            assert!(near(gained_mm3, gained), "{layer:?}: {slab:?}, {gained} gained");
-            assert!(near(volume_mm3, volume), "{layer:?}: {slab:?}, {volume}");
+            let SweptLayer { lost_mm3, gained_mm3, volume_mm3, .. } = layer;
+            assert!(near(lost_mm3, lost), "{layer:?}, {lost} lost");
+            assert!(near(gained_mm3, gained), "{layer:?}, {gained} gained");
+            assert!(near(volume_mm3, volume), "{layer:?}, {volume}");
             let area = top_section.iter().map(length).sum::<f64>() * PITCH_MM;
-            assert!((slab.top_area_mm2 - area).abs() < 1e-6 * (1.0 + area), "{layer:?}: {area}");
+            assert!((layer.top_area_mm2 - area).abs() < 1e-6 * (1.0 + area), "{layer:?}: {area}");
         }
     }
 }

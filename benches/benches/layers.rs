@@ -137,7 +137,7 @@ fn heights(criterion: &mut Criterion) {
                     let bottom_um = f64::from(layer) * 100.0;
                     let tops: Vec<f64> =
                         (0..steps).map(|step| bottom_um + 100.0 - f64::from(step)).rev().collect();
-                    std::hint::black_box(part.slabs(bottom_um, &tops));
+                    std::hint::black_box(part.layers(bottom_um, &tops));
                 }
             });
         });

@@ -67,7 +67,7 @@ const HEADING: &str = "\
 fn main() -> Result<(), Box<dyn Error>> {
     let mut tables = METHODS.map(|(name, _)| format!("### {name}\n\n{HEADING}\n"));
     let mut totals = METHODS.map(|_| Outcome::default());
-    let mut trust = [Bands::default(); MOST_CONFIDENT.len()];
+    let mut trust = [Bands::default(); MAX_CONFIDENCE.len()];
     for (part, facets) in PARTS {
         let whole = build(part, facets)?;
         let count = facets / FACETS_PER_DEFECT;
@@ -96,7 +96,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("| all parts | {name} |{}", total.cells());
     }
     println!("\n### Spline, by confidence\n\n| below | bands | wrong pixels left |\n|---|---|---|");
-    for (below, bands) in MOST_CONFIDENT.iter().zip(trust) {
+    for (below, bands) in MAX_CONFIDENCE.iter().zip(trust) {
         println!("| {below} | {} |{}", bands.count, left(bands));
     }
     Ok(())
@@ -164,10 +164,10 @@ fn left(Bands { injected, left, .. }: Bands) -> String {
 }
 
 /// The classes of confidence: what each is below.
-const MOST_CONFIDENT: [f64; 4] = [0.35, 0.7, 0.95, 1.01];
+const MAX_CONFIDENCE: [f64; 4] = [0.35, 0.7, 0.95, 1.01];
 
 /// Adds the bands of up to 15 rows to their classes of confidence.
-fn by_confidence(clean: &Layers, stray: &Layers, trust: &mut [Bands; MOST_CONFIDENT.len()]) {
+fn by_confidence(clean: &Layers, stray: &Layers, trust: &mut [Bands; MAX_CONFIDENCE.len()]) {
     let options = FixOptions { max_width: 15, ..UNRESTRAINED };
     let layers = stray.iter().cloned().map(Ok::<_, Infallible>);
     let first = clean[0].info.index;
@@ -175,7 +175,7 @@ fn by_confidence(clean: &Layers, stray: &Layers, trust: &mut [Bands; MOST_CONFID
         let clean = &clean[(fixed.before.info.index - first) as usize];
         let corrected = |band: &&Band| band.outcome == BandOutcome::Corrected;
         for band in fixed.bands.iter().filter(corrected) {
-            let class = MOST_CONFIDENT.partition_point(|&below| below <= band.confidence);
+            let class = MAX_CONFIDENCE.partition_point(|&below| below <= band.confidence);
             let rows = band.first_row..band.end();
             trust[class] += Bands::of(mask(clean), mask(fixed.before), mask(fixed.after), rows);
         }

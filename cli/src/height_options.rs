@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use clap::Args;
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart, Slab,
-    Thicknesses, VolumeDeviation,
+    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart,
+    SweptLayer, Thicknesses, VolumeDeviation,
 };
 use lamp_grayscale::calibrate::format_significant;
 use lamp_slicer::{FacetIndex, Fill};
@@ -135,15 +135,15 @@ impl FoundHeights {
 
     /// Returns how many layers exceed the bound.
     pub(crate) fn past(&self, heights: &Heights) -> usize {
-        let is_past = |slab: &&Slab| self.measure.criterion().measure(slab) > self.bound;
-        heights.slabs.iter().filter(is_past).count()
+        let is_past = |layer: &&SweptLayer| self.measure.criterion().measure(layer) > self.bound;
+        heights.layers.iter().filter(is_past).count()
     }
 
     /// Warns of rows that could not be measured.
     pub(crate) fn warn(&self, say: &dyn Fn(&str)) {
-        let left_out = self.heights.slabs.iter().filter(|slab| slab.rows_left_out > 0);
-        let (layers, rows) = left_out.fold((0, 0), |(layers, rows), slab| {
-            (layers + 1, rows + u64::from(slab.rows_left_out))
+        let left_out = self.heights.layers.iter().filter(|layer| layer.rows_left_out > 0);
+        let (layers, rows) = left_out.fold((0, 0), |(layers, rows), layer| {
+            (layers + 1, rows + u64::from(layer.rows_left_out))
         });
         if rows > 0 {
             say(&format!(
@@ -228,8 +228,8 @@ impl HeightOptions {
             (bound, search.heights(bound).map_err(failed)?)
         };
         if let Some(exposure) = exposure {
-            for slab in &heights.slabs {
-                exposure.time(Length::from_um(slab.thickness_um))?;
+            for layer in &heights.layers {
+                exposure.time(Length::from_um(layer.thickness_um))?;
             }
         }
         Ok(FoundHeights { measure, bound, heights })

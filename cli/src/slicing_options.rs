@@ -201,7 +201,7 @@ impl SlicingOptions {
         let found = self.heights.find(&part, exposure)?;
         found.warn(say);
         if self.heights.has_budget() {
-            let layers = found.heights.slabs.len();
+            let layers = found.heights.layers.len();
             say(&format!("{layers} layers keep the budget, with errors up to {}", found.bound()));
         }
         Ok(found.heights.layer_heights()?)

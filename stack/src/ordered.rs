@@ -18,7 +18,7 @@ impl<T: MemorySize, U> MemorySize for (T, U) {
 
 /// Batches are at most so large, in items a thread: enough that handing them
 /// out costs little.
-const MOST_A_THREAD: usize = 16;
+const MAX_A_THREAD: usize = 16;
 /// From so many bytes on, a batch has no more than an item a thread.
 const ENOUGH_BYTES: usize = 32 << 20;
 
@@ -61,7 +61,7 @@ fn take_batch<T: MemorySize, E>(
 ) -> Vec<Result<T, E>> {
     let mut batch = Vec::new();
     let mut bytes = 0;
-    while batch.len() < threads || (batch.len() < MOST_A_THREAD * threads && bytes < ENOUGH_BYTES) {
+    while batch.len() < threads || (batch.len() < MAX_A_THREAD * threads && bytes < ENOUGH_BYTES) {
         let Some(item) = input.next() else { break };
         bytes += item.as_ref().map_or(ENOUGH_BYTES, MemorySize::bytes);
         batch.push(item);

@@ -18,7 +18,7 @@ use peak_alloc::PeakAlloc;
 static MEMORY: PeakAlloc = PeakAlloc;
 
 /// What a refusal may take at its peak: a few buffers.
-const MOST_BYTES: usize = 2 << 20;
+const MAX_BYTES: usize = 2 << 20;
 
 /// Runs something that must refuse its input in one line with these words,
 /// within little memory.
@@ -30,7 +30,7 @@ fn is_cheaply_refused<T>(words: &str, read: impl FnOnce() -> Result<T, Box<dyn E
     let took = MEMORY.peak_usage() - before;
     let said = refused.expect(words).to_string();
     assert!(said.contains(words) && said.lines().count() == 1 && said.len() < 400, "{said}");
-    assert!(took < MOST_BYTES, "{took} bytes for `{said}`");
+    assert!(took < MAX_BYTES, "{took} bytes for `{said}`");
 }
 
 fn layers(pages: Pages) -> Result<Vec<Layer>, Box<dyn Error>> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, Heights, LayeredPart, Slab, uniform_heights,
+    AreaDeviation, Criterion, CuspHeight, Heights, LayeredPart, SweptLayer, uniform_heights,
 };
 use lamp_stack::{Dpi, Length};
 
@@ -131,19 +131,19 @@ fn write_table(
         "layer,z_um,thickness_um,volume_mm3,lost_mm3,gained_mm3,deviation_percent,cusp_um,\
          area_percent,exposure_ms"
     )?;
-    for (layer, slab) in heights.slabs.iter().enumerate() {
-        let time = exposure.and_then(|e| e.time(Length::from_um(slab.thickness_um)).ok());
+    for (index, layer) in heights.layers.iter().enumerate() {
+        let time = exposure.and_then(|e| e.time(Length::from_um(layer.thickness_um)).ok());
         writeln!(
             out,
-            "{layer},{},{},{:.6},{:.6},{:.6},{:.4},{:.3},{:.4},{}",
-            Length::from_um(slab.bottom_um).to_whole_nm().um(),
-            Length::from_um(slab.thickness_um).to_whole_nm().um(),
-            slab.volume_mm3,
-            slab.lost_mm3,
-            slab.gained_mm3,
-            100.0 * slab.deviation(),
-            CuspHeight.measure(slab),
-            100.0 * AreaDeviation.measure(slab),
+            "{index},{},{},{:.6},{:.6},{:.6},{:.4},{:.3},{:.4},{}",
+            Length::from_um(layer.bottom_um).to_whole_nm().um(),
+            Length::from_um(layer.thickness_um).to_whole_nm().um(),
+            layer.volume_mm3,
+            layer.lost_mm3,
+            layer.gained_mm3,
+            100.0 * layer.deviation(),
+            CuspHeight.measure(layer),
+            100.0 * AreaDeviation.measure(layer),
             time.map_or(String::new(), |time| time.ms().to_string()),
         )?;
     }
@@ -171,16 +171,17 @@ fn summary(
     );
     for (name, heights) in all {
         let [lost, gained, volume] = heights.volumes_mm3();
-        let measures = heights.slabs.iter().map(|slab| found.measure.criterion().measure(slab));
+        let measures = heights.layers.iter().map(|layer| found.measure.criterion().measure(layer));
         let worst = measures.fold(0.0, f64::max);
-        let time =
-            |slab: &Slab| Some(exposure?.time(Length::from_um(slab.thickness_um)).ok()?.ms());
-        let ms: Option<f64> = heights.slabs.iter().map(time).sum();
-        let time = ms.map(|ms| ms / 1000.0 + overhead * heights.slabs.len() as f64);
+        let time = |layer: &SweptLayer| {
+            Some(exposure?.time(Length::from_um(layer.thickness_um)).ok()?.ms())
+        };
+        let ms: Option<f64> = heights.layers.iter().map(time).sum();
+        let time = ms.map(|ms| ms / 1000.0 + overhead * heights.layers.len() as f64);
         let percent = if volume > 0.0 { 100.0 * (lost + gained) / volume } else { f64::NAN };
         text += &format!(
             "{name:<20}{:>8}{:>13}{:>14}{:>12}{:>13}{:>12}{:>10}\n",
-            heights.slabs.len(),
+            heights.layers.len(),
             significant(lost),
             significant(gained),
             if percent.is_finite() { significant(percent) + "%" } else { "-".to_owned() },
@@ -194,15 +195,15 @@ fn summary(
 
 /// Thickness and deviation over z (002 figures 49 and 50).
 fn plots(part: &str, all: &[(String, Heights)]) -> [Plot; 2] {
-    let percent = |slab: &Slab| 100.0 * slab.deviation();
-    let thickness = |slab: &Slab| slab.thickness_um;
-    let z = |slab: &Slab| [slab.bottom_um, slab.top_um()].map(|um| um / 1000.0);
-    let slabs = &all[0].1.slabs;
-    let (first, last) = (z(&slabs[0])[0], z(&slabs[slabs.len() - 1])[1]);
-    let plot = |title: String, label: &str, value: &dyn Fn(&Slab) -> f64| {
+    let percent = |layer: &SweptLayer| 100.0 * layer.deviation();
+    let thickness = |layer: &SweptLayer| layer.thickness_um;
+    let z = |layer: &SweptLayer| [layer.bottom_um, layer.top_um()].map(|um| um / 1000.0);
+    let layers = &all[0].1.layers;
+    let (first, last) = (z(&layers[0])[0], z(&layers[layers.len() - 1])[1]);
+    let plot = |title: String, label: &str, value: &dyn Fn(&SweptLayer) -> f64| {
         let series = |(name, heights): &(String, Heights)| {
-            let stairs = heights.slabs.iter().filter(|slab| value(slab).is_finite());
-            let stairs = stairs.flat_map(|slab| z(slab).map(|z| (z, value(slab))));
+            let stairs = heights.layers.iter().filter(|layer| value(layer).is_finite());
+            let stairs = stairs.flat_map(|layer| z(layer).map(|z| (z, value(layer))));
             Series {
                 name: name.clone(),
                 points: Vec::new(),

@@ -6,7 +6,7 @@ use lamp_brep::{BrepError, Jet, Kernel};
 /// Each face is measured in so many steps of u and of v.
 const STEPS: usize = 16;
 /// No part is a kilometre long.
-const MOST_MM: f64 = 1e6;
+const MAX_MM: f64 = 1e6;
 
 /// The facets of all faces, from how much these bend within their ranges of u and v.
 pub(super) fn facets(
@@ -17,7 +17,7 @@ pub(super) fn facets(
     let mut sum = 0.0;
     for (face, range) in (0..).zip(ranges) {
         let grid = grid(kernel, face, range);
-        let is_sound = |p: &Vec3| p.iter().all(|x| x.abs() < MOST_MM);
+        let is_sound = |p: &Vec3| p.iter().all(|x| x.abs() < MAX_MM);
         if !grid.iter().all(is_sound) {
             return Err(BrepError::Size { entity: kernel.face(face).entity });
         }

@@ -11,7 +11,7 @@ use lamp_brep::vector::{Vec3, cross, dot, sub, unit};
 use lamp_brep::{Jet, Kernel};
 
 /// Each round halves an edge once: the last ones are a thousandth as long.
-const MOST_ROUNDS: usize = 10;
+const MAX_ROUNDS: usize = 10;
 /// Facets that are added to those of a face, as a multiple of them, and in all.
 const MORE: [usize; 2] = [8, 20_000];
 
@@ -32,7 +32,7 @@ impl Patch {
     /// chord; returns how far it is where that cannot be had, in millimetres.
     pub(super) fn refine(&mut self, kernel: &dyn Kernel, chord_mm: f64) -> f64 {
         let most = self.triangles.len() * (1 + MORE[0]) + MORE[1];
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let sides = Sides::new(&self.triangles);
             let halves = self.far_halves(&sides, kernel, chord_mm);
             if halves.iter().all(Option::is_none) || self.triangles.len() > most {

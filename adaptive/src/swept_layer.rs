@@ -3,21 +3,21 @@
 /// A layer as it is built, the part's section at its top swept down, compared with
 /// the part between the same heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Slab {
+pub struct SweptLayer {
     /// The height of its bottom, in micrometres.
     pub bottom_um: f64,
     /// Its thickness, in micrometres.
     pub thickness_um: f64,
     /// The part's volume between its bottom and its top, in cubic millimetres.
     pub volume_mm3: f64,
-    /// The volume of the part that the slab lacks (algorithm 14, line 10).
+    /// The volume of the part that the layer lacks (algorithm 14, line 10).
     pub lost_mm3: f64,
-    /// The volume of the slab outside the part (algorithm 14, line 12).
+    /// The volume of the layer outside the part (algorithm 14, line 12).
     pub gained_mm3: f64,
-    /// The area of the part's section just above the slab's bottom, in square
+    /// The area of the part's section just above the layer's bottom, in square
     /// millimetres.
     pub bottom_area_mm2: f64,
-    /// The area of its section at the top, which is the slab's.
+    /// The area of its section at the top, which is the layer's.
     pub top_area_mm2: f64,
     /// The greatest |N_z| of the unit normals of the facets inside the layer: 0 for
     /// upright walls, 1 for flat faces between bottom and top.
@@ -27,18 +27,18 @@ pub struct Slab {
     pub rows_left_out: u32,
 }
 
-/// Slabs that begin at one height.
+/// Swept layers that begin at one height.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Slabs {
+pub struct SweptLayers {
     /// One for each top, the lowest first.
-    pub each: Vec<Slab>,
-    /// The least error, in cubic millimetres, below the last slab's top of any layer
+    pub each: Vec<SweptLayer>,
+    /// The least error, in cubic millimetres, below the last layer's top of any layer
     /// that reaches this top or higher: along each vertical line, the lesser of the
     /// lengths inside and outside the part.
     pub unavoidable_mm3: f64,
 }
 
-impl Slab {
+impl SweptLayer {
     /// Returns the height of its top, in micrometres.
     pub fn top_um(&self) -> f64 {
         self.bottom_um + self.thickness_um
