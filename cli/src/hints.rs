@@ -8,7 +8,10 @@ use lamp_adaptive::HeightsError;
 use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::material::MaterialError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
-use lamp_postprocess::{EditError, EditProblem, LayerProblem, LayoutError, TileError};
+use lamp_postprocess::{
+    CompensateError, CompensateProblem, EditError, EditProblem, LayerProblem, LayoutError,
+    StripsError, TileError,
+};
 use lamp_slicer::SliceError;
 use lamp_stack::{CatalogueError, Length};
 
@@ -24,6 +27,8 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(tile))
         .or_else(|| error.downcast_ref().and_then(layout))
         .or_else(|| error.downcast_ref().and_then(edit))
+        .or_else(|| error.downcast_ref().and_then(compensate))
+        .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
         .or_else(|| error.downcast_ref().and_then(data))
         .or_else(catalogued)
@@ -132,6 +137,28 @@ fn edit(error: &EditError) -> Option<String> {
             LayerProblem::NoCopies => "copies are for builds that tile made",
             _ => return None,
         },
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn compensate(error: &CompensateError) -> Option<String> {
+    let hint = match error.problem {
+        CompensateProblem::GrayGrows => "dither the stack first",
+        CompensateProblem::TooDeep { .. } => "give a smaller --min-feature, or 0um to let walls go",
+        CompensateProblem::TooFarForWalls { .. } => {
+            "--min-feature 0um lets walls go and reports what is lost"
+        }
+        CompensateProblem::Tiled => "make up for shrinkage before tile",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn strips(error: &StripsError) -> Option<String> {
+    let hint = match error {
+        StripsError::TooMany { .. } => "give more --mirrors",
+        StripsError::Already { .. } => "lamp join makes the build of its folder again",
         _ => return None,
     };
     Some(hint.to_owned())

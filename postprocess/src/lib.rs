@@ -37,11 +37,12 @@ mod tile;
 pub use edit::{EditError, EditProblem, Edits, ImageBounds, LayerProblem, OtherLayers, edit};
 pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
 pub use offset::{
-    CompensateError, CompensateOptions, Compensated, Loss, Shrinkage, ThinWall, Widths, compensate,
-    offset, offset_one_bit, shrink,
+    CompensateError, CompensateOptions, CompensateProblem, Compensated, Loss, Shrinkage, ThinWall,
+    Widths, compensate, offset, offset_one_bit, shrink,
 };
 pub use strips::{
-    JoinSwathsError, StripWriter, StripsError, Swaths, SwathsError, is_strips, join_strips,
+    IndexError, JoinSwathsError, StripDifference, StripWriter, StripsError, Swaths, SwathsError,
+    is_strips, join_strips,
 };
 pub use tile::{
     CellShape, CopyName, CopyPlacement, HeightOptions, Layout, LayoutError, LayoutFile,

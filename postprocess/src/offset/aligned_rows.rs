@@ -1,43 +1,44 @@
-//! Rows whose edges run along those above and below.
+//! A fast path for rows whose edges run along those of the rows above and below, as in most rows
+//! of a part.
 //!
-//! Most rows of a part do. Where each row of a disc has as many runs as the one
-//! at its centre, and none lies beside another one's neighbour, each side of a run
-//! is measured by itself, against its like in the other rows.
+//! If each row that a disc reaches has as many runs as the row at its centre, and no run comes
+//! near another one's neighbour, each end of a run is measured only against the same end in the
+//! other rows.
 
 use super::erode::{Disc, Sources};
 use super::row_runs::Run;
 
-/// As many rows on each side are looked at.
+/// The greatest number of rows on each side: larger discs take the general path.
 const MAX_REACH: usize = 16;
 
-/// The rows around one.
+/// The rows around a row.
 #[derive(Debug)]
 pub(super) struct AlignedRows<'a> {
     sources: &'a Sources,
     discs: [&'a Disc; 2],
     width: i32,
-    /// The rows above and below, from the row itself on.
+    /// The rows above and below by their distance, from the row itself on.
     rows: Vec<[&'a [Run]; 2]>,
 }
 
-/// A run of such a row.
+/// A run of a row that runs along the others.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AlignedRun {
-    /// What lies outside the sources' outer discs.
+    /// The columns that lie in no source's outer disc.
     pub(super) outer: Run,
-    /// What lies outside their inner ones; at least a pixel.
+    /// The columns that lie in no source's inner disc; at least one.
     pub(super) inner: Run,
-    /// The innermost ends, of rows that are so many rows away.
+    /// The innermost ends by the distance in rows.
     ends: [Run; MAX_REACH],
 }
 
 impl<'a> AlignedRows<'a> {
-    /// For discs of which the outer is the smaller one.
+    /// Sets up for an outer and an inner disc, of which the inner one is the larger.
     pub(super) fn new(sources: &'a Sources, discs: [&'a Disc; 2], width: u32) -> Self {
         Self { sources, discs, width: width as i32, rows: Vec::new() }
     }
 
-    /// Makes `out` the runs of a row, if they run along those of its like.
+    /// Makes `out` the runs of a row. Returns false if they do not run along those around them.
     pub(super) fn row(&mut self, row: u32, out: &mut Vec<AlignedRun>) -> bool {
         out.clear();
         let reach = self.discs[1].halves().len();
@@ -56,14 +57,14 @@ impl<'a> AlignedRows<'a> {
         }
         let mut before = i32::MIN;
         (0..runs.len()).all(|run| {
-            let sides = self.sides(run, &mut before);
-            out.extend(sides);
-            sides.is_some()
+            let aligned = self.aligned_run(run, &mut before);
+            out.extend(aligned);
+            aligned.is_some()
         })
     }
 
-    /// The sides of a run, if it lies right of where the one before ends.
-    fn sides(&self, run: usize, before: &mut i32) -> Option<AlignedRun> {
+    /// Returns a run, unless it or its like in another row lies left of the end of the one before.
+    fn aligned_run(&self, run: usize, before: &mut i32) -> Option<AlignedRun> {
         let mut ends = [(0, 0); MAX_REACH];
         let mut hull = (i32::MAX, i32::MIN);
         for (end, rows) in ends.iter_mut().zip(&self.rows) {
@@ -85,8 +86,8 @@ impl<'a> AlignedRows<'a> {
 }
 
 impl AlignedRun {
-    /// The squared distances of the pixels left of the inner ones, then of those
-    /// right of them, by how many rows count.
+    /// Makes `squares` the squared distances of the outer pixels to the left of the inner ones, or
+    /// to the right, from sources less than `reach` rows away.
     pub(super) fn squares(&self, reach: usize, left: bool, squares: &mut Vec<u32>) {
         squares.clear();
         let columns = if left { self.outer.0..self.inner.0 } else { self.inner.1..self.outer.1 };

@@ -1,15 +1,15 @@
-//! The squared distances of the pixels along an edge.
+//! Squared distances of pixels from the nearest source.
 
 use super::erode::Sources;
 use super::row_runs::Run;
 
-/// Distances along a row are measured up to here: edges move less far, and the
-/// sum of two squares of them is a number of 32 bits.
+/// The greatest distance along a row, in pixels. Edges move less far, and the sum of two such
+/// squares fits in 32 bits.
 const MAX_DISTANCE: u32 = 1 << 15;
 
 impl Sources {
-    /// Makes `squares` the squared distance of each pixel of a run in row
-    /// `row` from the nearest source, where that is below `limit`.
+    /// Makes `squares` the squared distance of each pixel of a run in row `row` from the nearest
+    /// source, or `limit` if that is smaller.
     pub(super) fn squares(&self, row: u32, run: Run, limit: u64, squares: &mut Vec<u32>) {
         squares.clear();
         let mut furthest = u32::try_from(limit).unwrap_or(u32::MAX);
@@ -29,8 +29,8 @@ impl Sources {
     }
 }
 
-/// Lowers the squares of a run's pixels to those of the way to the nearest
-/// source in a row, whose own distance has the square `away`.
+/// Lowers the squares of a run's pixels to those of the distance from the nearest source in a
+/// row whose own distance has the square `away`.
 fn nearer(between: &[Run], (start, end): Run, away: u32, squares: &mut [u32]) {
     let mut next = between.partition_point(|run| run.1 <= start);
     let mut column = start;

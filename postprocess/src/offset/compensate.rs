@@ -1,4 +1,4 @@
-//! Compensation as a stage.
+//! Compensation as a stage: layers enlarged for firing, then their edges moved.
 
 use lamp_stack::{Dpi, GrayMask, Image, Layer, Length, MAX_SIDE, Mask, map_in_order};
 use serde_json::{Value, json};
@@ -10,118 +10,133 @@ use super::walls::ThinWall;
 use super::widths::Widths;
 use super::{offset, shrink};
 
-/// How layers are compensated.
+/// Options of [`compensate`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CompensateOptions {
-    /// Walls that were as wide stay as wide, others as they are; two pixels
-    /// where `None`. Where zero all may go, and losses are told of.
+    /// The width that thin walls keep, or less if they are thinner; two pixels if `None`. If
+    /// zero, walls may vanish, and losses are reported.
     pub min_feature: Option<Length>,
-    /// Whether edges go to the nearest pixel, without gray ones.
+    /// Whether edges move to the nearest pixel, without gray.
     pub one_bit: bool,
-    /// What firing takes away.
+    /// The firing shrinkage to make up for.
     pub shrinkage: Shrinkage,
 }
 
-/// The share of a length along each side that firing takes away.
+/// The share of a length along each side that firing takes away, from 0 to less than 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shrinkage {
-    /// From 0 to less than 1.
+    /// Along the rows.
     pub x: f64,
-    /// From 0 to less than 1.
+    /// Along the columns.
     pub y: f64,
 }
 
-/// What was done to a layer.
+/// A changed layer, and what is to be known about it.
 #[derive(Debug)]
 pub struct Compensated<'a> {
-    /// The layer as it goes.
+    /// The layer as it is passed on.
     pub layer: &'a Layer,
-    /// The thin walls, from the top, in its pixels.
+    /// The thin walls from the top, in its pixels.
     pub walls: &'a [ThinWall],
-    /// The pieces that were lost or broke apart, from the top, in its pixels;
-    /// looked for where walls are not kept.
+    /// The components that vanished or broke apart, from the top, in its pixels; empty if walls
+    /// are kept.
     pub losses: &'a [Loss],
     /// Whether it should have grown beyond its image.
     pub cut_off: bool,
 }
 
-/// Why a layer cannot be compensated.
+/// A layer that cannot be compensated.
 #[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum CompensateError {
-    /// The resolution is not known, so lengths have no meaning in pixels.
-    #[error("{layer} has no resolution, so a length has no size in pixels")]
-    NoResolution {
-        /// The layer's name.
-        layer: String,
-    },
-    /// A gray layer that should grow.
-    #[error("{layer} is gray, and only 1-bit layers can grow: dither the stack first")]
-    GrayGrows {
-        /// The layer's name.
-        layer: String,
-    },
-    /// Edges move further than any resin makes them.
-    #[error("the edges of {layer} would move by {pixels:.0} pixels: {most} is the most")]
-    TooFar {
-        /// The layer's name.
-        layer: String,
-        /// How far they would move.
-        pixels: f64,
-        /// How far they may.
-        most: f64,
-    },
-    /// Thin walls are looked after only so far.
-    #[error(
-        "in {layer}, keeping walls needs {pixels:.0} pixels at each edge, and {most} is the most: give a smaller --min-feature, or 0um to let walls go"
-    )]
-    TooDeep {
-        /// The layer's name.
-        layer: String,
-        /// How deep edges would have to be looked at.
-        pixels: f64,
-        /// How deep they may.
-        most: f64,
-    },
-    /// Thin walls are looked after only so far, which edges move alone.
-    #[error(
-        "in {layer}, edges would move by {pixels:.0} pixels: walls can be kept where they move by up to {most_um:.0} um at this resolution, and --min-feature 0um lets walls go and tells of what is lost"
-    )]
-    TooFarForWalls {
-        /// The layer's name.
-        layer: String,
-        /// How far they would move.
-        pixels: f64,
-        /// How far they may, in micrometres.
-        most_um: f64,
-    },
-    /// The larger image is larger than any reader of stacks takes.
-    #[error("{layer} would be more than 2^26 pixels wide or high with that shrinkage")]
-    TooLarge {
-        /// The layer's name.
-        layer: String,
-    },
-    /// Copies of a part on a build area keep their places.
-    #[error("{layer} is a build that tile laid out: make up for shrinkage before tile")]
-    Tiled {
-        /// The layer's name.
-        layer: String,
-    },
+#[error("{layer} {problem}")]
+pub struct CompensateError {
+    /// The layer's name.
+    pub layer: String,
+    /// The reason.
+    pub problem: CompensateProblem,
 }
 
-/// The most that edges move, in pixels.
+/// The reason why a layer cannot be compensated.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CompensateProblem {
+    /// The resolution is unknown, so lengths have no meaning in pixels.
+    #[error("has no resolution, so a length has no size in pixels")]
+    NoResolution,
+    /// The layer is gray and should grow.
+    #[error("is gray, and only 1-bit layers can grow")]
+    GrayGrows,
+    /// Edges would move further than any resin makes them.
+    #[error("has edges that would move by {pixels:.0} pixels: {max} is the most")]
+    TooFar {
+        /// The distance that they would move.
+        pixels: f64,
+        /// The greatest distance.
+        max: f64,
+    },
+    /// Keeping walls takes too many pixels at each edge.
+    #[error("needs {pixels:.0} pixels at each edge to keep walls: {max} is the most")]
+    TooDeep {
+        /// The pixels needed.
+        pixels: f64,
+        /// The greatest number.
+        max: f64,
+    },
+    /// Edges would move too far for walls to be kept.
+    #[error(
+        "has edges that would move by {pixels:.0} pixels: walls can be kept where edges move by up to {:.0} um at this resolution",
+        .max.um()
+    )]
+    TooFarForWalls {
+        /// The distance that edges would move.
+        pixels: f64,
+        /// The greatest distance at which walls are kept.
+        max: Length,
+    },
+    /// The enlarged image would be larger than any image.
+    #[error("would be more than 2^26 pixels wide or high with that shrinkage")]
+    TooLarge,
+    /// The layer is of a build, on which the copies keep their places.
+    #[error("is of a build, whose copies would not keep their places")]
+    Tiled,
+}
+
+/// The greatest distance in pixels that edges move: no resin cures further.
 const MAX_MOVE: f64 = 4096.0;
-/// How deep, in pixels, edges are looked at for thin walls.
+/// The greatest depth in pixels at which edges are searched for thin walls, as the cost follows
+/// the pixels up to there.
 const MAX_DEPTH: f64 = 64.0;
-/// Images are as wide as a multiple of this (002 section 2.2.2).
+/// The unit of the width of images in pixels (002 section 2.2.2).
 const WIDTH_UNIT: u64 = 32;
 
-/// Makes each layer larger for what firing takes away, then moves its edges by
-/// `widths` of the layer, and tells `report` of each layer that it changed. The
-/// page of such a layer says so under `compensate`; all others pass unchanged.
+/// Enlarges each layer by what firing takes away, then moves its edges inwards by the layer's
+/// `widths`, and calls `report` for each layer that it changed. The page of such a layer says so
+/// under `compensate`; all others pass unchanged.
 ///
-/// Of a gray layer the outline shrinks, the places where anything is exposed;
-/// inside, levels stay: each pixel has the lower of the two levels.
+/// In gray layers the edges of the exposed pixels move. Inside, levels stay: each pixel has the
+/// lower of its level and what is left of it.
+///
+/// ```
+/// use lamp_postprocess::{CompensateError, CompensateOptions, Widths, compensate};
+/// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
+///
+/// // A square of 20 pixels at 25.4 um, whose edges move by a pixel.
+/// let rows = (0..22).map(|row| if row == 0 || row == 21 { vec![] } else { vec![1, 21] });
+/// let mut square = lamp_stack::MaskBuilder::new(22);
+/// rows.for_each(|row| square.push_row(&row).unwrap());
+/// let image = Image::Mask(square.finish());
+/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(1000.0), image };
+///
+/// let layers = std::iter::once(Ok::<_, CompensateError>(layer));
+/// let widths = |_: &Layer, _: Dpi| Ok(Widths::uniform(1.0));
+/// let mut narrower = compensate(layers, CompensateOptions::default(), widths, |_| {});
+/// let Image::Mask(mask) = narrower.next().unwrap()?.image else { unreachable!() };
+/// assert_eq!((mask.row(1), mask.row(2)), (&[][..], &[2, 20][..]));
+/// # Ok::<(), CompensateError>(())
+/// ```
+///
+/// # Errors
+/// Passes on errors of `layers` and `widths`, and returns [`CompensateError`] in place of a layer
+/// that cannot be compensated.
 pub fn compensate<E: From<CompensateError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     options: CompensateOptions,
@@ -129,44 +144,44 @@ pub fn compensate<E: From<CompensateError> + Send>(
     mut report: impl FnMut(&Compensated<'_>),
 ) -> impl Iterator<Item = Result<Layer, E>> {
     let done = map_in_order(layers, move |mut layer: Layer| {
-        let Some(dpi) = layer.dpi else {
-            return Err(CompensateError::NoResolution { layer: layer.info.name() }.into());
-        };
+        let name = layer.info.name();
+        let failed = |problem| CompensateError { layer: name.clone(), problem };
+        let dpi = layer.dpi.ok_or_else(|| failed(CompensateProblem::NoResolution))?;
         let widths = widths(&layer, dpi)?;
-        let is_scaled = scale(&mut layer, options.shrinkage)?;
-        let done = move_edges(&mut layer, &widths, &options, dpi)?;
-        if !is_scaled && done.is_none() {
+        let is_enlarged = enlarge(&mut layer, options.shrinkage).map_err(failed)?;
+        let moved = move_edges(&mut layer, &widths, &options, dpi).map_err(failed)?;
+        if !is_enlarged && moved.is_none() {
             return Ok((layer, None));
         }
-        let done = done.unwrap_or_default();
+        let moved = moved.unwrap_or_default();
         let before = layer.info.other.remove("compensate");
-        let page = on_page(before, &widths, &options, dpi, &done);
+        let page = page_entry(before, &widths, &options, dpi, &moved);
         layer.info.other.insert("compensate".to_owned(), page);
-        Ok((layer, Some(done)))
+        Ok((layer, Some(moved)))
     });
     done.map(move |done| {
-        let (layer, done) = done?;
-        if let Some(MovedEdges { walls, losses, cut_off }) = done {
+        let (layer, moved) = done?;
+        if let Some(MovedEdges { walls, losses, cut_off }) = moved {
             report(&Compensated { layer: &layer, walls: &walls, losses: &losses, cut_off });
         }
         Ok(layer)
     })
 }
 
-/// What a page says; of what was done `before`, the last of its kind.
-fn on_page(
+/// Returns what a page says: the last of each kind, if something was done `before`.
+fn page_entry(
     before: Option<Value>,
     widths: &Widths,
     options: &CompensateOptions,
     dpi: Dpi,
-    done: &MovedEdges,
+    moved: &MovedEdges,
 ) -> Value {
     let nm = |um: f64| (um * 1e3).round() / 1e3 + 0.0;
     let mut page = before.filter(Value::is_object).unwrap_or_else(|| json!({}));
     if !widths.are_zero() || page.get("inwards_um").is_none() {
         page["inwards_um"] = json!(widths.range().map(|by| nm(by * dpi.pitch().um())));
     }
-    for (key, count) in [("thin_walls", done.walls.len()), ("losses", done.losses.len())] {
+    for (key, count) in [("thin_walls", moved.walls.len()), ("losses", moved.losses.len())] {
         if count > 0 {
             page[key] = count.into();
         }
@@ -178,91 +193,87 @@ fn on_page(
     page
 }
 
-/// Makes a layer larger, if firing takes anything away.
-fn scale(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensateError> {
+/// Enlarges a layer. Returns false if firing takes nothing away.
+fn enlarge(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensateProblem> {
     if shrinkage == Shrinkage::default() {
         return Ok(false);
     }
     if layer.info.stack.as_ref().is_some_and(|stack| stack.other.contains_key("tile")) {
-        return Err(CompensateError::Tiled { layer: layer.info.name() });
+        return Err(CompensateProblem::Tiled);
     }
     let columns = AxisScale::new(layer.image.width(), shrinkage.x);
     let rows = AxisScale::new(layer.image.height(), shrinkage.y);
     let width = columns.after().next_multiple_of(WIDTH_UNIT);
     if width.max(rows.after()) > MAX_SIDE.into() {
-        return Err(CompensateError::TooLarge { layer: layer.info.name() });
+        return Err(CompensateProblem::TooLarge);
     }
     layer.image = scaled(&layer.image, &columns, &rows, width as u32).into();
     let info = &mut layer.info;
     for listed in [&mut info.stray_rows, &mut info.open_rows] {
         listed.iter_mut().for_each(|row| *row = rows.first_past(*row) as u32);
     }
-    // The part grows about the origin of its coordinates, as the mesh would.
+    // The part grows about the origin of its coordinates, as a scaled mesh would.
     if let Some([x, y]) = &mut info.origin_mm {
         (*x, *y) = (*x / (1.0 - shrinkage.x), *y / (1.0 - shrinkage.y));
     }
     Ok(true)
 }
 
-/// What is to tell of a layer whose edges moved.
+/// What is to be reported of a layer whose edges moved.
 #[derive(Default)]
 struct MovedEdges {
     walls: Vec<ThinWall>,
     losses: Vec<Loss>,
-    /// Whether the image was too small to grow in.
+    /// Whether the layer should have grown beyond its image.
     cut_off: bool,
 }
 
-/// Moves the edges of a layer; `None` where that changes nothing.
+/// Moves the edges of a layer. Returns `None` if that changes nothing.
 fn move_edges(
     layer: &mut Layer,
     widths: &Widths,
     options: &CompensateOptions,
     dpi: Dpi,
-) -> Result<Option<MovedEdges>, CompensateError> {
+) -> Result<Option<MovedEdges>, CompensateProblem> {
     if widths.are_zero() || layer.image.change_count() == 0 {
         return Ok(None);
     }
     let [least, most] = widths.range();
     let furthest = most.max(-least);
     if furthest > MAX_MOVE {
-        let layer = layer.info.name();
-        return Err(CompensateError::TooFar { layer, pixels: furthest, most: MAX_MOVE });
+        return Err(CompensateProblem::TooFar { pixels: furthest, max: MAX_MOVE });
     }
     let min_feature = options.min_feature.map_or(2.0, |length| length.pixels(dpi));
     let depth = most + min_feature / 2.0;
     if most > 0.0 && min_feature > 0.0 && depth > MAX_DEPTH {
-        let layer = layer.info.name();
-        let most_moved = MAX_DEPTH - min_feature.min(2.0) / 2.0;
-        if most > most_moved {
-            let most_um = (most_moved * dpi.pitch().um()).floor();
-            return Err(CompensateError::TooFarForWalls { layer, pixels: most, most_um });
+        // Only if edges would still move too far with walls of two pixels are they to blame.
+        let max_moved = MAX_DEPTH - min_feature.min(2.0) / 2.0;
+        if most > max_moved {
+            let max = Length::from_um((max_moved * dpi.pitch().um()).floor());
+            return Err(CompensateProblem::TooFarForWalls { pixels: most, max });
         }
-        return Err(CompensateError::TooDeep { layer, pixels: depth, most: MAX_DEPTH });
+        return Err(CompensateProblem::TooDeep { pixels: depth, max: MAX_DEPTH });
     }
-    let mut done = MovedEdges::default();
+    let mut moved = MovedEdges::default();
     let mut shrunk = |mask: &Mask| {
         let (gray, walls) = shrink(mask, widths, min_feature);
-        done.walls = walls;
+        moved.walls = walls;
         if min_feature == 0.0 {
-            done.losses = components::losses(mask, &gray.at_least(128));
+            moved.losses = components::losses(mask, &gray.at_least(128));
         }
         gray
     };
     let gray = match &*layer.image {
         Image::Mask(mask) if least < 0.0 => {
-            done.cut_off = is_near_border(mask, -least);
+            moved.cut_off = is_near_border(mask, -least);
             offset(mask, least)
         }
         Image::Mask(mask) => shrunk(mask),
-        Image::Gray(_) if least < 0.0 => {
-            return Err(CompensateError::GrayGrows { layer: layer.info.name() });
-        }
+        Image::Gray(_) if least < 0.0 => return Err(CompensateProblem::GrayGrows),
         Image::Gray(gray) => {
-            let outline = shrunk(&gray.at_least(1));
-            let outline =
-                if options.one_bit { GrayMask::from(&outline.at_least(128)) } else { outline };
-            components::lower(gray, &outline)
+            let left = shrunk(&gray.at_least(1));
+            let left = if options.one_bit { GrayMask::from(&left.at_least(128)) } else { left };
+            components::lower(gray, &left)
         }
     };
     let image = match &*layer.image {
@@ -270,14 +281,14 @@ fn move_edges(
         Image::Mask(_) => gray.to_mask().map_or_else(|| Image::Gray(gray), Image::Mask),
         Image::Gray(_) => Image::Gray(gray),
     };
-    if image == *layer.image && done.walls.is_empty() && !done.cut_off {
+    if image == *layer.image && moved.walls.is_empty() && !moved.cut_off {
         return Ok(None);
     }
     layer.image = image.into();
-    Ok(Some(done))
+    Ok(Some(moved))
 }
 
-/// Whether there is white so near the image's border that it would grow beyond.
+/// Returns whether there is white near enough to the image's border to grow beyond it.
 fn is_near_border(mask: &Mask, by: f64) -> bool {
     let by = by.ceil() as u32;
     let (width, height) = (mask.width(), mask.height());

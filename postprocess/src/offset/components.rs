@@ -1,7 +1,7 @@
-//! The pieces that a shape is in, and what becomes of each.
+//! The connected components of a shape, and what becomes of each as edges move.
 //!
-//! A piece is what touches, at sides or corners. Runs of neighbouring rows are
-//! joined, so the cost follows the runs.
+//! Pixels are connected if they touch at sides or corners. Runs of neighbouring rows are joined
+//! (union-find), so the cost follows the runs.
 
 use std::ops::Range;
 
@@ -9,77 +9,77 @@ use lamp_stack::{GrayMask, Mask, combine_rows};
 
 use super::row_runs::RowRuns;
 
-/// A piece of an image that edges took away or broke apart as they moved.
+/// A component of an image that edges removed or broke apart as they moved.
 ///
 /// A pixel counts as left from half level on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loss {
-    /// The columns of the piece as it was.
+    /// The columns of the component before.
     pub columns: Range<u32>,
-    /// The rows of the piece as it was.
+    /// The rows of the component before.
     pub rows: Range<u32>,
-    /// How many pieces are left of it: none, or more than one.
+    /// The number of components that are left of it: none, or more than one.
     pub left: usize,
 }
 
-/// The pieces of which nothing is left, and those that broke apart, from the
-/// top. All that is white `after` was so `before`.
+/// Returns the components that vanish and those that break apart, from the top. All pixels that
+/// are white `after` must be white `before`.
 pub(super) fn losses(before: &Mask, after: &Mask) -> Vec<Loss> {
     let [before, after] = [before, after].map(|mask| Components::of(RowRuns::white(mask)));
-    let mut left = vec![0; before.runs.len()];
-    for (run, &(row, column)) in after.runs.iter().enumerate() {
+    let mut left = vec![0; before.first.len()];
+    for (run, row, (start, _)) in after.runs() {
         if after.first[run] as usize == run {
-            left[before.at(column, row)] += 1;
+            left[before.at(start, row)] += 1;
         }
     }
     let mut losses: Vec<Loss> = Vec::new();
-    // Where the losses of pieces stand, by their first runs.
-    let mut places = vec![usize::MAX; before.runs.len()];
-    for (run, &(row, start)) in before.runs.iter().enumerate() {
+    // The index in `losses` of each component, by its first run.
+    let mut indices = vec![usize::MAX; before.first.len()];
+    for (run, row, (start, end)) in before.runs() {
         let first = before.first[run] as usize;
         if left[first] == 1 {
             continue;
         }
-        let [start, end] = [start, before.ends[run]].map(|column| column as u32);
+        let (start, end) = (start as u32, end as u32);
         if first == run {
-            places[run] = losses.len();
+            indices[run] = losses.len();
             losses.push(Loss { columns: start..end, rows: row..row + 1, left: left[run] });
         }
-        let Loss { columns, rows, .. } = &mut losses[places[first]];
+        let Loss { columns, rows, .. } = &mut losses[indices[first]];
         *columns = columns.start.min(start)..columns.end.max(end);
         rows.end = row + 1;
     }
     losses
 }
 
-/// Takes away pieces that are nowhere as bright as half: what is left of gray
-/// edges where the wall that they belonged to is elsewhere.
+/// Removes components without a pixel of half level: faint rests of the edges of a wall that is
+/// kept elsewhere.
 pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
-    // Whether a part of the row, between black ones, is nowhere as bright.
-    let faint = |row: u32| {
+    // Most images have no specks: no row has a run between black pixels that stays faint.
+    let is_faint = |row: u32| {
         let parts = gray.row(row).split(|change| change.level == 0);
         let brightest = parts.filter_map(|part| part.iter().map(|change| change.level).max());
         brightest.min().is_some_and(|level| level < 128)
     };
-    if !(0..gray.height()).any(faint) {
+    if !(0..gray.height()).any(is_faint) {
         return gray;
     }
-    let pieces = Components::of(RowRuns::white(&gray.at_least(1)));
-    let mut stays = vec![false; pieces.runs.len()];
+    let components = Components::of(RowRuns::white(&gray.at_least(1)));
+    let mut is_bright = vec![false; components.first.len()];
     for (row, bright) in (0..).zip(gray.at_least(128).rows()) {
         for start in bright.iter().step_by(2) {
-            stays[pieces.at(*start as i32, row)] = true;
+            is_bright[components.at(*start as i32, row)] = true;
         }
     }
-    let stays = |run: usize| stays[pieces.first[run] as usize];
-    if (0..pieces.runs.len()).all(stays) {
+    let is_bright = |run: usize| is_bright[components.first[run] as usize];
+    if (0..components.first.len()).all(is_bright) {
         return gray;
     }
-    let kept = pieces.filtered(gray.height(), stays).mask(gray.width());
+    let kept = components.rows.filtered(is_bright).mask(gray.width());
     lower(&gray, &GrayMask::from(&kept))
 }
 
-/// The lower level of two images of one size at each pixel.
+/// Returns the lower level of two images of one size at each pixel.
 pub(super) fn lower(a: &GrayMask, b: &GrayMask) -> GrayMask {
     let mut out = GrayMask::new(a.width());
     let mut row = Vec::new();
@@ -90,84 +90,58 @@ pub(super) fn lower(a: &GrayMask, b: &GrayMask) -> GrayMask {
     out
 }
 
-/// Makes white what is black and does not touch the black of the top left pixel.
+/// Makes white all black that is not connected to the top left pixel.
 pub(crate) fn without_holes(mask: &Mask) -> Mask {
     let black = Components::of(RowRuns::white(&mask.inverted()));
     let outside = black.first.first().copied();
-    let outside = black.filtered(mask.height(), |run| Some(black.first[run]) == outside);
+    let outside = black.rows.filtered(|run| Some(black.first[run]) == outside);
     outside.mask(mask.width()).inverted()
 }
 
-/// The runs of a shape, by the pieces that they belong to.
+/// The runs of a shape by connected component.
 struct Components {
     rows: RowRuns,
-    /// The row and first column of each run.
-    runs: Vec<(u32, i32)>,
-    /// Where each run ends.
-    ends: Vec<i32>,
-    /// The first run of its piece, for each run.
+    /// The first run of its component, for each run.
     first: Vec<u32>,
 }
 
 impl Components {
     fn of(rows: RowRuns) -> Self {
-        let mut pieces = Self { runs: Vec::new(), ends: Vec::new(), first: Vec::new(), rows };
-        let mut above = 0;
-        for row in 0..pieces.rows.height() {
-            let below = pieces.runs.len();
-            pieces.runs.extend(pieces.rows.row(row).iter().map(|run| (row, run.0)));
-            pieces.ends.extend(pieces.rows.row(row).iter().map(|run| run.1));
-            pieces.first.extend(below as u32..pieces.runs.len() as u32);
-            let [mut upper, mut lower] = [above, below];
-            while upper < below && lower < pieces.runs.len() {
-                let [a, b] = [upper, lower].map(|run| (pieces.runs[run].1, pieces.ends[run]));
-                if a.0 <= b.1 && b.0 <= a.1 {
-                    pieces.join(upper, lower);
-                }
-                if a.1 < b.1 { upper += 1 } else { lower += 1 }
-            }
-            above = below;
+        let mut first: Vec<u32> = (0..rows.all().len() as u32).collect();
+        rows.for_each_touching(|upper, lower| {
+            let [a, b] = [upper, lower].map(|run| root(&mut first, run));
+            first[a.max(b) as usize] = a.min(b);
+        });
+        for run in 0..first.len() {
+            // Runs point at earlier ones, which by now point at the first.
+            first[run] = first[first[run] as usize];
         }
-        for run in 0..pieces.first.len() {
-            // Runs point at earlier ones, which by now point at their first.
-            pieces.first[run] = pieces.first[pieces.first[run] as usize];
-        }
-        pieces
+        Self { rows, first }
     }
 
-    fn join(&mut self, a: usize, b: usize) {
-        let [a, b] = [a, b].map(|run| self.first_of(run));
-        self.first[a.max(b) as usize] = a.min(b);
+    /// Returns each run with its index and row.
+    fn runs(&self) -> impl Iterator<Item = (usize, u32, (i32, i32))> {
+        let rows = (0..self.rows.height())
+            .flat_map(|row| self.rows.row(row).iter().map(move |run| (row, *run)));
+        rows.enumerate().map(|(index, (row, run))| (index, row, run))
     }
 
-    fn first_of(&mut self, run: usize) -> u32 {
-        let mut run = run as u32;
-        while self.first[run as usize] != run {
-            let next = self.first[self.first[run as usize] as usize];
-            self.first[run as usize] = next;
-            run = next;
-        }
-        run
-    }
-
-    /// The first run of the piece that holds a pixel.
+    /// Returns the first run of the component that holds a pixel.
     fn at(&self, column: i32, row: u32) -> usize {
-        let next = self.runs.partition_point(|&run| run <= (row, column));
-        self.first[next - 1] as usize
+        let run = self.rows.find(column, row).expect("the pixel is in the shape");
+        self.first[run] as usize
     }
+}
 
-    /// The runs that stay.
-    fn filtered(&self, height: u32, stays: impl Fn(usize) -> bool) -> RowRuns {
-        let mut rows = RowRuns::new();
-        let mut all = 0..self.runs.len();
-        for row in 0..height {
-            let runs = self.rows.row(row).iter().zip(all.by_ref());
-            let staying: Vec<_> =
-                runs.filter(|(_, run)| stays(*run)).map(|(run, _)| *run).collect();
-            rows.push(&staying);
-        }
-        rows
+/// Returns the first run known of a run's component, and shortens the way there.
+fn root(first: &mut [u32], run: usize) -> u32 {
+    let mut run = run as u32;
+    while first[run as usize] != run {
+        let next = first[first[run as usize] as usize];
+        first[run as usize] = next;
+        run = next;
     }
+    run
 }
 
 #[cfg(test)]

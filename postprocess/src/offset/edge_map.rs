@@ -1,16 +1,18 @@
-//! An image near its edges: what lies deep inside, and how far each other
-//! pixel is from the edge.
+//! The edge map of an image: runs deep inside, and the distance and level of every pixel near an
+//! edge.
+
+use lamp_stack::GrayMask;
 
 use super::aligned_rows::{AlignedRows, AlignedRun};
 use super::erode::{Disc, Erosion, Sources, at_least, more_than};
 use super::row_runs::{RowRuns, Run, subtract};
 
-/// A region of an image, and how far its edges move.
+/// A region of an image whose edges move by one distance.
 #[derive(Debug)]
 pub(super) struct SizeClass {
-    /// Pixels that are no sources of distance.
+    /// The pixels of the region, none of them sources.
     pub(super) region: RowRuns,
-    /// How far, in pixels; not below zero.
+    /// The distance in pixels, not below zero.
     pub(super) by: f64,
 }
 
@@ -18,35 +20,33 @@ pub(super) struct SizeClass {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EdgeRun {
     pub(super) columns: Run,
-    /// Where its pixels stand in the edge's arrays; a run deep inside has none.
+    /// The index of its first pixel in the map's arrays; `None` for a run deep inside.
     pub(super) first: Option<u32>,
 }
 
-/// A pixel along the edge.
+/// A pixel near an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EdgePixel {
     pub(super) column: i32,
     pub(super) row: u32,
-    /// Where it stands in the edge's arrays.
+    /// The index in the map's arrays.
     pub(super) index: u32,
 }
 
-/// The pixels of some regions, from a distance on that leaves nothing of them.
+/// The runs of an image, with the distances and levels of the pixels near its edges.
 #[derive(Debug, Default)]
 pub(super) struct EdgeMap {
     ends: Vec<usize>,
     runs: Vec<EdgeRun>,
-    /// The squared distance of each pixel along the edge from the nearest
-    /// source.
+    /// The squared distance of each pixel near an edge from the nearest source.
     pub(super) squares: Vec<u32>,
-    /// How much is left of each of these, when the edge has moved.
+    /// The level of each of these pixels after the edge has moved.
     pub(super) levels: Vec<u8>,
 }
 
 impl EdgeMap {
-    /// Where the edges of `classes` lie when they have moved. Pixels from
-    /// `depth` further in on are deep inside. Where `all`, pixels of which
-    /// nothing is left are there, too.
+    /// Moves the edges of `classes`. Pixels at least `depth` further inside are deep inside. If
+    /// `all`, the map has pixels of level zero, too.
     pub(super) fn new(
         sources: &Sources,
         width: u32,
@@ -101,7 +101,7 @@ impl EdgeMap {
         edge
     }
 
-    /// Adds a row of runs whose sides are measured by themselves.
+    /// Adds a row of aligned runs.
     fn push_along(
         &mut self,
         runs: &[AlignedRun],
@@ -134,7 +134,7 @@ impl EdgeMap {
         (self.ends.len() - 1) as u32
     }
 
-    /// The runs of a row, from the left; of rows outside the image none.
+    /// Returns the runs of a row from the left; none if the row lies outside the image.
     pub(super) fn row(&self, row: i64) -> &[EdgeRun] {
         match usize::try_from(row) {
             Ok(row) if row + 1 < self.ends.len() => &self.runs[self.ends[row]..self.ends[row + 1]],
@@ -142,7 +142,7 @@ impl EdgeMap {
         }
     }
 
-    /// Where a pixel of the regions stands in the arrays; deep inside, nowhere.
+    /// Returns the index of a pixel of the regions in the arrays: none inside deep runs.
     pub(super) fn at(&self, column: i32, row: i64) -> Option<Option<u32>> {
         let runs = self.row(row);
         let next = runs.partition_point(|run| run.columns.1 <= column);
@@ -150,8 +150,7 @@ impl EdgeMap {
         Some(run.first.map(|first| first + (column - run.columns.0) as u32))
     }
 
-    /// Shows all pixels along the edge, row by row, but those of runs that are
-    /// `plain`.
+    /// Calls `show` with each pixel near an edge, row by row, except in runs that are `plain`.
     pub(super) fn for_each(&self, plain: &[bool], mut show: impl FnMut(EdgePixel)) {
         let mut plain = plain.iter();
         for row in 0..self.height() {
@@ -165,15 +164,20 @@ impl EdgeMap {
         }
     }
 
-    /// Makes `runs` a row as runs of length and level, where the rest is
-    /// `level_outside`, 0 or 255, and deep inside is the other.
-    pub(super) fn levels_of_row(
-        &self,
-        row: u32,
-        width: u32,
-        level_outside: u8,
-        runs: &mut Vec<(u32, u8)>,
-    ) {
+    /// Returns the map as an image of `width` columns. Pixels outside the regions have
+    /// `level_outside`, 0 or 255, and those deep inside the other.
+    pub(super) fn gray(&self, width: u32, level_outside: u8) -> GrayMask {
+        let mut gray = GrayMask::new(width);
+        let mut runs = Vec::new();
+        for row in 0..self.height() {
+            self.levels_of_row(row, width, level_outside, &mut runs);
+            gray.push_runs(runs.iter().copied()).expect("runs as wide as the image");
+        }
+        gray
+    }
+
+    /// Makes `runs` the runs of a row, (length, level).
+    fn levels_of_row(&self, row: u32, width: u32, level_outside: u8, runs: &mut Vec<(u32, u8)>) {
         runs.clear();
         let mut column = 0;
         for run in self.row(row.into()) {
@@ -194,12 +198,12 @@ impl EdgeMap {
     }
 }
 
-/// The levels of pixels by their squared distance.
+/// Levels of pixels by their squared distance. Most squares are small, so a table spares roots.
 struct LevelTable {
     by: f64,
-    /// Squares are below.
+    /// The end of the squares.
     limit: u64,
-    /// Of the first squares.
+    /// The levels of the first squares.
     table: Vec<u8>,
 }
 
@@ -219,7 +223,7 @@ impl LevelTable {
     }
 }
 
-/// The level of which a share is exposed.
+/// Returns the level of a pixel of which a share, from 0 to 1, is exposed.
 pub(super) fn level(share: f64) -> u8 {
     (255.0 * share.clamp(0.0, 1.0)).round() as u8
 }

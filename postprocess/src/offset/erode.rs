@@ -1,28 +1,30 @@
-//! What is far from a colour: erosion by a disc, exactly, on runs.
+//! Erosion by a disc, exactly, on runs.
+//!
+//! A row is cut by one row of the disc after the other, so the cost follows runs and the disc's
+//! height, not pixels.
 
 use lamp_stack::Mask;
 
 use super::row_runs::{RowRuns, Run, subtract};
 
-/// Columns that no image reaches.
+/// A column that no image reaches.
 const BEYOND: i32 = 1 << 29;
 const EVERYTHING: [Run; 1] = [(-BEYOND, BEYOND)];
 
-/// From which pixels distances are measured.
+/// The colour of the pixels that distances are measured from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SourceColour {
-    /// Black ones. Outside the image all is black.
+    /// Black. Outside the image all is black.
     Black,
-    /// White ones.
+    /// White.
     White,
 }
 
-/// An image as the pixels that distances are measured from, centre to centre.
+/// The pixels that distances are measured from, centre to centre.
 #[derive(Debug)]
 pub(super) struct Sources {
     colour: SourceColour,
-    /// The runs of the other colour. Those that black ones end beside the
-    /// image's edges go on for ever.
+    /// The runs of the other colour. If black ones, they continue past the image's edges.
     between: RowRuns,
 }
 
@@ -41,7 +43,7 @@ impl Sources {
         Self { colour, between }
     }
 
-    /// The runs without a source in a row, which may lie outside the image.
+    /// Returns the runs without a source in a row, which may lie outside the image.
     pub(super) fn row(&self, row: i64) -> &[Run] {
         match u32::try_from(row) {
             Ok(row) if row < self.between.height() => self.between.row(row),
@@ -50,8 +52,7 @@ impl Sources {
         }
     }
 
-    /// Makes `out` what is left of a region's runs in row `row` without the
-    /// pixels that lie in the disc of a source.
+    /// Makes `out` the pixels of a region's runs in row `row` that lie in no source's disc.
     pub(super) fn erode(&self, disc: &Disc, row: u32, region: &[Run], out: &mut Erosion) {
         out.runs.clear();
         out.runs.extend_from_slice(region);
@@ -68,7 +69,7 @@ impl Sources {
         }
     }
 
-    /// What is left of all rows of a region.
+    /// Returns the pixels of a region that lie in no source's disc.
     pub(super) fn erode_all(&self, disc: &Disc, region: &RowRuns) -> RowRuns {
         let mut rows = RowRuns::new();
         let mut out = Erosion::default();
@@ -80,7 +81,7 @@ impl Sources {
     }
 }
 
-/// Runs as they are narrowed.
+/// Runs as they are eroded, with a spare list so that no row allocates.
 #[derive(Debug, Default)]
 pub(super) struct Erosion {
     pub(super) runs: Vec<Run>,
@@ -88,7 +89,7 @@ pub(super) struct Erosion {
 }
 
 impl Erosion {
-    /// Leaves what is further than `half` columns inside the runs `between`
+    /// Keeps only pixels more than `half` columns away from the ends of the runs `between`
     /// sources.
     fn narrow(&mut self, between: &[Run], half: i32) {
         let Some(first) = self.runs.first() else { return };
@@ -110,42 +111,42 @@ impl Erosion {
     }
 }
 
-/// The pixels nearer to a centre than some distance.
+/// The pixels nearer to a centre than a distance.
 #[derive(Debug)]
 pub(super) struct Disc {
-    /// How many columns it reaches to each side, so many rows from its centre.
+    /// The columns it reaches to each side, by the distance in rows from its centre.
     halves: Vec<i32>,
-    /// The rows from the centre, those first that are likely to show that
-    /// nothing is left.
+    /// The distances in rows, in an order that is likely to show early that nothing stays.
     order: Vec<u32>,
 }
 
-/// The radius of the largest disc, in pixels: more than any image is wide.
+/// The radius of the largest disc in pixels: more than any image is wide.
 const MAX_RADIUS: f64 = (1 << 27) as f64;
 
-/// Squares of lengths in pixels that are whole but for rounding are whole.
+/// Squared lengths in pixels this close to a whole number are whole: lengths come from
+/// micrometres and are rounded.
 const ROUNDING: f64 = 1e-7;
 
-/// The squared distance from which on pixels are at least `radius` away.
+/// Returns the squared distance from which on pixels are at least `radius` away.
 pub(super) fn at_least(radius: f64) -> u64 {
     let radius = radius.clamp(0.0, MAX_RADIUS);
     (radius * radius - ROUNDING).ceil() as u64
 }
 
-/// The squared distance from which on pixels are more than `radius` away.
+/// Returns the squared distance from which on pixels are more than `radius` away.
 pub(super) fn more_than(radius: f64) -> u64 {
     let radius = radius.clamp(0.0, MAX_RADIUS);
     (radius * radius + ROUNDING).floor() as u64 + 1
 }
 
 impl Disc {
-    /// How many columns it reaches to each side, so many rows from its centre.
+    /// Returns the columns it reaches to each side, by the distance in rows from its centre.
     pub(super) fn halves(&self) -> &[i32] {
         &self.halves
     }
 
-    /// The pixels whose squared distance from the centre is below `square`. An
-    /// image of `height` rows needs no more.
+    /// Returns the pixels whose squared distance from the centre is below `square`, as far as an
+    /// image of `height` rows needs them.
     pub(super) fn below(square: u64, height: u32) -> Self {
         let rows = (0..u64::from(height) + 1).take_while(|away| away * away < square);
         let half = |away: u64| (square - 1 - away * away).isqrt().min(BEYOND as u64 / 2) as i32;

@@ -228,7 +228,7 @@ fn places_are_as_wide_as_the_squares_they_lie_in() {
     let mask = drawn(200, 200, |c, r| square(c, r) || upright(c, r) || turned(c, r));
     let sizes = [5.0, 10.0, 15.0, 59.0, 62.0];
     let parts = local_thickness::by_size(&mask, &sizes);
-    let class = |column, row| parts.iter().position(|part| part.holds(column, row));
+    let class = |column, row| parts.iter().position(|part| part.find(column, row).is_some());
     for row in [0, 1, 9, 10, 70, 199] {
         assert_eq!(class(0, row), None);
     }
@@ -244,7 +244,7 @@ fn places_are_as_wide_as_the_squares_they_lie_in() {
     // Every pixel has one size, and only white ones have one.
     for row in 0..200 {
         for column in 0..200 {
-            let holds = parts.iter().filter(|part| part.holds(column, row)).count();
+            let holds = parts.iter().filter(|part| part.find(column, row).is_some()).count();
             assert_eq!(holds, usize::from(mask.is_white(column as u32, row)));
         }
     }

@@ -1,11 +1,12 @@
-//! Rows as runs with both ends.
+//! Rows as runs with both ends, which erosion and components work on.
 
 use lamp_stack::{Mask, MaskBuilder, white_runs};
 
-/// The columns from the first up to, but without, the second.
+/// The columns from the first up to, but without, the second. Signed, as discs reach beyond the
+/// image.
 pub(super) type Run = (i32, i32);
 
-/// For each row of an image its runs, from the left, apart from each other.
+/// The runs of each row of an image, from the left and apart from each other.
 #[derive(Clone, Debug)]
 pub(super) struct RowRuns {
     ends: Vec<usize>,
@@ -13,12 +14,12 @@ pub(super) struct RowRuns {
 }
 
 impl RowRuns {
-    /// No rows yet.
+    /// Returns an image without rows.
     pub(super) fn new() -> Self {
         Self { ends: vec![0], runs: Vec::new() }
     }
 
-    /// The white runs of a mask.
+    /// Returns the white runs of a mask.
     pub(super) fn white(mask: &Mask) -> Self {
         let mut rows = Self::new();
         rows.runs.reserve(mask.change_count() / 2 + 1);
@@ -45,19 +46,44 @@ impl RowRuns {
         &self.runs[self.ends[row]..self.ends[row + 1]]
     }
 
-    /// Whether a pixel is in a run.
-    pub(super) fn holds(&self, column: i32, row: u32) -> bool {
+    /// Returns the runs of all rows.
+    pub(super) fn all(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// Returns the index of the run that holds a pixel, counted through all rows.
+    pub(super) fn find(&self, column: i32, row: u32) -> Option<usize> {
         let runs = self.row(row);
         let next = runs.partition_point(|run| run.1 <= column);
-        runs.get(next).is_some_and(|run| run.0 <= column)
+        runs.get(next).filter(|run| run.0 <= column).map(|_| self.ends[row as usize] + next)
     }
 
-    /// Whether no row has a run.
-    pub(super) fn are_empty(&self) -> bool {
-        self.runs.is_empty()
+    /// Calls `touch` with the indices of each two runs of neighbouring rows that touch, at sides
+    /// or corners: the upper one, then the lower one.
+    pub(super) fn for_each_touching(&self, mut touch: impl FnMut(usize, usize)) {
+        for row in self.ends.windows(3) {
+            let [mut upper, mut lower] = [row[0], row[1]];
+            while upper < row[1] && lower < row[2] {
+                let [a, b] = [self.runs[upper], self.runs[lower]];
+                if a.0 <= b.1 && b.0 <= a.1 {
+                    touch(upper, lower);
+                }
+                if a.1 < b.1 { upper += 1 } else { lower += 1 }
+            }
+        }
     }
 
-    /// As a mask of so many columns, which hold all runs.
+    /// Returns the runs whose indices are to be kept.
+    pub(super) fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut kept = Self::new();
+        for row in self.ends.windows(2) {
+            kept.runs.extend((row[0]..row[1]).filter(|&run| keep(run)).map(|run| self.runs[run]));
+            kept.ends.push(kept.runs.len());
+        }
+        kept
+    }
+
+    /// Returns the runs as a mask of `width` columns, which hold all runs.
     pub(super) fn mask(&self, width: u32) -> Mask {
         let mut mask = MaskBuilder::new(width);
         mask.reserve(self.height() as usize, 2 * self.runs.len());
@@ -78,7 +104,7 @@ impl RowRuns {
     }
 }
 
-/// Makes `out` the parts of `runs` that are in no run of `others`.
+/// Makes `out` the parts of `runs` that are in none of `others`.
 pub(super) fn subtract(runs: &[Run], others: &[Run], out: &mut Vec<Run>) {
     out.clear();
     let mut next = 0;

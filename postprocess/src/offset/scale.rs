@@ -1,37 +1,36 @@
-//! Images made larger, for what firing takes away.
+//! Images enlarged by what firing takes away.
 
 use lamp_stack::{GrayMask, Image, LevelChange, MaskBuilder};
 
-/// Along one side: which pixels of the larger image show which of the image.
+/// The enlargement along one side of an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AxisScale {
-    /// What is left of a length after firing.
+    /// The share of a length that is left after firing.
     left: f64,
-    /// The pixels of the image.
+    /// The pixels before.
     before: u32,
 }
 
 impl AxisScale {
-    /// Of a side of so many pixels that firing shrinks by a share, from 0 to
-    /// less than 1.
+    /// Sets up for a side of `before` pixels that firing shrinks by a share, from 0 to less than 1.
     pub(super) fn new(before: u32, shrinkage: f64) -> Self {
         Self { left: 1.0 - shrinkage, before }
     }
 
-    /// The first pixel whose centre is past a pixel's near edge when it is
-    /// fired. Increases, as pixels become larger.
+    /// Returns the first pixel of the larger image whose centre, when it is fired, is past the
+    /// near edge of pixel `before`. Increases strictly, as pixels only become larger.
     pub(super) fn first_past(&self, before: u32) -> u64 {
         (f64::from(before) / self.left - 0.5).ceil().max(0.0) as u64
     }
 
-    /// The pixels of the larger image.
+    /// Returns the pixels of the larger image.
     pub(super) fn after(&self) -> u64 {
         self.first_past(self.before)
     }
 }
 
-/// An image as large as it must be for the fired part to have its size. Each
-/// pixel has the colour of the pixel that its centre then lies in.
+/// Enlarges an image so that the fired part has the image's size. Each pixel takes the colour of
+/// the pixel that its centre lies in after firing.
 pub(super) fn scaled(image: &Image, columns: &AxisScale, rows: &AxisScale, width: u32) -> Image {
     let column = |column: u32| columns.first_past(column) as u32;
     let times = |row: u32| rows.first_past(row + 1) - rows.first_past(row);
@@ -76,7 +75,7 @@ fn scaled_gray(
     out
 }
 
-/// Ends a row's last run where the image ended, if the new one is wider.
+/// Ends a row's last run where the image ended, if the larger image is wider than that.
 fn close(is_open: bool, end: u32, width: u32, push: impl FnOnce(u32)) {
     if is_open && end < width {
         push(end);

@@ -1,12 +1,10 @@
-//! What is left of walls that are too thin for the edges to move as asked.
+//! The skeleton of walls that are too thin for their edges to move as asked.
 //!
-//! Pixels are taken away from the edges inwards, as long as neither a wall
-//! breaks nor two gaps join (a simple point of the (8, 4) topology: Yokoi's
-//! number is one) and no pixel that lies furthest inside among its neighbours
-//! goes: that is distance-ordered homotopic thinning (Pudney 1998). What then
-//! is left of the pixels that are not deep inside is the core of thin walls.
-//! Of a convex corner nothing is left, as pixels further inside lie beside
-//! each pixel there.
+//! Pixels are removed from the edges inwards, by distance-ordered homotopic thinning (Pudney
+//! 1998): a pixel goes if that neither breaks a wall nor joins two gaps (a simple point of the
+//! (8, 4) topology: Yokoi's number is one), unless it lies furthest inside among its neighbours.
+//! The remaining pixels that are not deep inside are the cores of thin walls. A convex corner
+//! leaves none, as each pixel there has a neighbour further inside.
 
 use lamp_stack::Grouped;
 
@@ -14,32 +12,29 @@ use super::edge_map::{EdgeMap, EdgePixel, level};
 use super::erode;
 use super::plain::plain_runs;
 
-/// The neighbours, counter-clockwise from the right, as (column, row) steps.
+/// The steps to the neighbours, (column, row), counter-clockwise from the right.
 const AROUND: [(i32, i32); 8] =
     [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
 
-/// What a neighbour is: black, deep inside, or from `FIRST` on where it stands
-/// along the edge.
+/// Neighbours are black, deep inside, or, from `FIRST` on, an index in the edge map.
 const BLACK: u32 = 0;
 const DEEP: u32 = 1;
 const FIRST: u32 = 2;
 
-/// The cores of thin walls.
+/// The cores of thin walls: groups of connected skeleton pixels.
 #[derive(Debug)]
 pub(super) struct Cores {
-    /// The neighbours of each pixel that is in question.
+    /// The neighbours of each pixel near an edge, unless its run is plain.
     around: Vec<[u32; 8]>,
     /// The pixels of each core.
     pub(super) cores: Vec<Vec<EdgePixel>>,
 }
 
 impl Cores {
-    /// Finds the cores.
-    ///
-    /// Pixels from `depth` on are deep inside.
+    /// Finds the cores of an edge map in which pixels from `depth` on are deep inside.
     pub(super) fn of(edge: &EdgeMap, depth: f64) -> Self {
-        // Past a corner of 60 degrees, and further than what is taken away of
-        // one place can reach from another.
+        // The first reaches past a corner of 60 degrees, the second further than thinning at
+        // one place can affect another.
         let [beside, margin] = [2.0 * depth, depth + 2.0].map(f64::ceil);
         let plain = plain_runs(edge, beside as i32, margin as u32);
         if plain.iter().all(|plain| *plain) {
@@ -51,22 +46,22 @@ impl Cores {
         Self { around, cores }
     }
 
-    /// Exposes each core, so wide as `width` pixels or as the wall is.
+    /// Exposes each core to a width of `width` pixels, or as wide as the wall is.
     pub(super) fn widen(&self, edge: &mut EdgeMap, width: f64) {
-        // A slanted core has fewer pixels for its length, so it gets more beside.
+        // A slanted core has fewer pixels for its length, so each exposes a little more.
         let mut ball = Ball::new(width / 2.0 + 0.75);
-        // All of a wall that is no wider itself.
-        let mut whole = Ball::new(width / 2.0 + 1.0);
+        // A wall that is not wider than that stays whole.
+        let mut whole_wall = Ball::new(width / 2.0 + 1.0);
         let no_wider = erode::more_than(width / 2.0 + 0.5);
         for core in self.cores.iter().flatten() {
             let square = u64::from(edge.squares[core.index as usize]);
-            let ball = if square < no_wider { &mut whole } else { &mut ball };
+            let ball = if square < no_wider { &mut whole_wall } else { &mut ball };
             ball.expose(core.index, &self.around, &mut edge.levels);
         }
     }
 }
 
-/// The pixels around one.
+/// A search of the pixels around a pixel, and the memory that it uses again.
 struct Ball {
     radius: f64,
     reach: i32,
@@ -81,8 +76,8 @@ impl Ball {
         Self { radius, reach, seen, open: Vec::new() }
     }
 
-    /// Exposes the pixels along the edge that are near a core's pixel, and
-    /// joined to it by others that are: not those of a wall beside.
+    /// Exposes the pixels that are near a pixel of a core and connected to it by others that
+    /// are, which leaves out those of a wall beside.
     fn expose(&mut self, core: u32, around: &[[u32; 8]], levels: &mut [u8]) {
         self.seen.fill(false);
         self.open.push((0, 0, core));
@@ -108,7 +103,7 @@ impl Ball {
     }
 }
 
-/// The neighbours of each pixel that is not in a plain run.
+/// Returns the neighbours of each pixel that is not in a plain run.
 fn neighbours(edge: &EdgeMap, plain: &[bool]) -> Vec<[u32; 8]> {
     let mut all = vec![[BLACK; 8]; edge.squares.len()];
     let mut plain = plain.iter();
@@ -119,7 +114,7 @@ fn neighbours(edge: &EdgeMap, plain: &[bool]) -> Vec<[u32; 8]> {
             let is_plain = *plain.next().expect("one for each run");
             let Some(first) = run.first.filter(|_| !is_plain) else { continue };
             let (start, end) = run.columns;
-            // What stands in the columns left of, at and right of the pixel.
+            // The three columns around the pixel, each with three rows.
             let mut columns = [[BLACK; 3]; 3];
             for column in start - 1..=end {
                 columns.rotate_left(1);
@@ -149,8 +144,7 @@ fn neighbours(edge: &EdgeMap, plain: &[bool]) -> Vec<[u32; 8]> {
     all
 }
 
-/// Takes away all pixels that may go, and says which are left. Those in plain
-/// runs go.
+/// Removes all pixels that may go, and those in plain runs. Returns which are left.
 fn thinned(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     let mut left = vec![false; edge.squares.len()];
     edge.for_each(plain, |pixel| left[pixel.index as usize] = true);
@@ -170,15 +164,15 @@ fn thinned(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     }
 }
 
-/// The pixels that are there by their distance, those of the same as they stand.
+/// Returns the pixels that are present, the nearest to an edge first (a counting sort, stable).
 fn outside_first(squares: &[u32], there: &[bool]) -> Vec<u32> {
     let those = || (0..).zip(squares).zip(there).filter(|(_, there)| **there).map(|(of, _)| of);
     let most = squares.iter().copied().max().map_or(0, |most| most as usize);
     Grouped::new(most + 1, || those().map(|(of, &square)| (square as usize, of))).into_items()
 }
 
-/// Says which pixels walls must not be shortened beyond: those that lie
-/// furthest inside among their neighbours, but for those in a corner.
+/// Returns which pixels must stay so that walls keep their length: those furthest inside among
+/// their neighbours, except in corners.
 fn ends(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     let square = |index: u32| match index {
         BLACK => 0,
@@ -190,15 +184,15 @@ fn ends(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
         let index = pixel.index as usize;
         let own = edge.squares[index];
         let is_furthest = around[index].iter().all(|&other| square(other) <= own);
-        // What stays anyway must stay joined.
+        // A pixel that stays exposed anyway must stay connected.
         ends[index] = is_furthest && (edge.levels[index] >= 128 || !is_in_corner(edge, &pixel));
     });
     ends
 }
 
-/// Whether a pixel lies within twice the radius of a disc inside the shape, which
-/// is larger than its own by a pixel or deep inside: a corner, a blunt tip or a
-/// knob that is no longer than it is wide.
+/// Returns whether a pixel lies in a corner, a blunt tip or a knob no longer than it is wide:
+/// within twice the radius from a pixel that is deep inside, or the centre of a disc inside the
+/// shape that is larger than its own by a pixel.
 fn is_in_corner(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
     let radius = f64::from(edge.squares[pixel.index as usize]).sqrt() + 1.0;
     let larger = erode::at_least(radius);
@@ -215,6 +209,7 @@ fn is_in_corner(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
         .any(|row| (-reach..=reach).any(|column| is_near(column, row) && is_larger(column, row)))
 }
 
+/// Returns whether removing a pixel neither breaks a wall nor joins gaps: Yokoi's number is one.
 fn is_simple(around: &[u32; 8], left: &[bool]) -> bool {
     let is_black = |side: usize| match around[side % 8] {
         BLACK => true,
@@ -227,7 +222,7 @@ fn is_simple(around: &[u32; 8], left: &[bool]) -> bool {
     number.count() == 1
 }
 
-/// Pixels that are left, those together that touch.
+/// Groups the pixels that are left by connection.
 fn group(
     edge: &EdgeMap,
     plain: &[bool],
@@ -247,7 +242,7 @@ fn group(
     groups
 }
 
-/// The pixels that can be reached from one.
+/// Returns the pixels connected to a pixel.
 fn reached(from: EdgePixel, around: &[[u32; 8]], unseen: &mut [bool]) -> Vec<EdgePixel> {
     let mut group = vec![from];
     let mut next = 0;

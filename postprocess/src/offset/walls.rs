@@ -1,33 +1,31 @@
-//! How wide thin walls were, and what was made of them.
+//! Thin walls: their width before and after edges moved.
 
 use std::ops::Range;
 
 use super::edge_map::{EdgeMap, EdgePixel};
 
-/// A place where a wall was narrowed less than asked, as it would have become
-/// too thin or been lost. All widths are in pixels, where half of
-/// its core is wider.
+/// A wall that was narrowed less than asked, as it would have become too thin or vanished.
+///
+/// Widths are in pixels and medians along the wall's core.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThinWall {
     /// The columns of its core.
     pub columns: Range<u32>,
     /// The rows of its core.
     pub rows: Range<u32>,
-    /// How wide it was.
+    /// The width before.
     pub width: f64,
-    /// How wide it should have become; zero where nothing should have been
-    /// left.
+    /// The width asked for; zero if nothing should have been left.
     pub asked: f64,
-    /// How wide it became.
+    /// The width made.
     pub made: f64,
 }
 
-/// Differences of width below so much are the raster's.
+/// The least difference of widths in pixels that is reported: smaller ones come from the raster.
 const MIN_DIFFERENCE: f64 = 0.25;
 
 impl ThinWall {
-    /// The wall of a core whose sides should move by `by` each, if it was
-    /// narrowed less.
+    /// Returns the wall of a core whose sides should move by `by` each, if they moved less.
     pub(super) fn of(
         edge: &EdgeMap,
         core: &[EdgePixel],
@@ -50,8 +48,8 @@ impl ThinWall {
     }
 }
 
-/// How wide a wall is at a pixel, the shortest of four ways across, and how
-/// much of that is exposed.
+/// Returns the width of a wall at a pixel, along the shortest of four ways across, and how much
+/// of that is exposed.
 fn across(edge: &EdgeMap, pixel: &EdgePixel) -> (f64, f64) {
     let radius = f64::from(edge.squares[pixel.index as usize]).sqrt();
     let most = (3.0 * radius) as i64 + 2;

@@ -1,33 +1,40 @@
-//! How far edges move, by the sizes of places.
+//! The distances that edges move, by the sizes of places.
 
-/// How far the edges of places of each size move inwards, in pixels.
+/// Distances that edges move inwards, in pixels, by the size of the place.
+///
+/// ```
+/// use lamp_postprocess::Widths;
+///
+/// assert_eq!(Widths::uniform(1.5).range(), [1.5, 1.5]);
+/// let by_size = Widths::by_size(&[20.0, 40.0], |size| size / 20.0);
+/// assert_eq!(by_size.range(), [1.0, 2.0]);
+/// ```
 ///
 /// # Guarantees
-/// Sizes increase; there is one distance more than there are sizes, the first
-/// for places smaller than all. Where there are sizes, no distance is below
-/// zero.
+/// Sizes increase. There is one more distance than sizes; the first is for places smaller than
+/// all. If there are sizes, no distance is below zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Widths {
     sizes: Vec<f64>,
     by: Vec<f64>,
 }
 
-/// From one class of sizes to the next the distance changes by no more.
+/// The greatest change of distance from one class of sizes to the next, in pixels.
 const STEP: f64 = 0.25;
-/// Sizes are parted no finer.
+/// The greatest number of classes between two sizes, as each costs as much as one distance.
 const MAX_STEPS: f64 = 32.0;
 
 impl Widths {
-    /// The same for all places; outwards where below zero.
+    /// Returns one distance for all places; outwards if below zero.
     pub fn uniform(inwards: f64) -> Self {
         Self { sizes: Vec::new(), by: vec![inwards] }
     }
 
-    /// By size: `width` of the size, inwards, which goes by the first of
-    /// `sizes` below it and by the last above it. All are in pixels.
+    /// Returns the distance `width` for each size, in pixels: that of the first of `sizes` for
+    /// smaller places, and that of the last for larger ones.
     ///
-    /// Between two of `sizes` it is taken at so many places that it changes by a
-    /// quarter of a pixel from one to the next. Widths below zero count as zero.
+    /// Between two of `sizes` the distance changes in steps of up to a quarter of a pixel.
+    /// Distances below zero count as zero.
     pub fn by_size(sizes: &[f64], width: impl Fn(f64) -> f64) -> Self {
         let width = |size: f64| width(size).max(0.0);
         let mut widths = Self::uniform(sizes.first().map_or(0.0, |&size| width(size)));
@@ -47,7 +54,7 @@ impl Widths {
         widths
     }
 
-    /// Adds a class of larger places, unless it moves as the one before.
+    /// Adds a class of larger places, unless their edges move like those of the class before.
     fn push(&mut self, size: f64, by: f64) {
         if self.by.last() != Some(&by) {
             self.sizes.push(size);
@@ -55,23 +62,23 @@ impl Widths {
         }
     }
 
-    /// Where classes of sizes begin.
+    /// Returns the sizes at which classes begin.
     pub(super) fn sizes(&self) -> &[f64] {
         &self.sizes
     }
 
-    /// How far the edges of each class move.
+    /// Returns the distance of each class.
     pub(super) fn by(&self) -> &[f64] {
         &self.by
     }
 
-    /// The least and the most that edges move.
+    /// Returns the least and the greatest distance.
     pub fn range(&self) -> [f64; 2] {
         let least = self.by.iter().copied().fold(f64::INFINITY, f64::min);
         [least, self.by.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
     }
 
-    /// Whether no edge moves.
+    /// Returns whether no edge moves.
     pub fn are_zero(&self) -> bool {
         self.by.iter().all(|&by| by == 0.0)
     }

@@ -7,24 +7,37 @@ use std::path::Path;
 
 use lamp_stack::{MAX_SIDE, StackError};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 use super::{StripsError, Swaths};
 
 /// The index's name in its folder.
 pub(super) const INDEX: &str = "strips.json";
 
-/// So many strips are written at most: each is an open file.
+/// The greatest number of strips that are written: each is an open file.
 pub(super) const MAX_STRIPS: u32 = 512;
-/// No index is longer, in bytes.
+/// The greatest size of an index in bytes.
 const MAX_INDEX_BYTES: u64 = 1 << 20;
 
-/// What the index says of a build and its strips.
+/// A malformed index.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum IndexError {
+    /// It is not JSON of this form.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// The strips that it lists are not those of a build of its size.
+    #[error("its strips are not those of such a build")]
+    Strips,
+}
+
+/// The index of a build and its strips.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StripIndex {
     /// The build's name.
     pub(super) name: String,
-    /// Its width and height.
+    /// The build's width and height.
     pub(super) pixels: [u32; 2],
     pub(super) layers: u32,
     pub(super) mirrors: u32,
@@ -32,12 +45,12 @@ pub(super) struct StripIndex {
     pub(super) strips: Vec<StripLine>,
 }
 
-/// A strip as it stands in the index.
+/// A strip in the index.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StripLine {
     pub(super) file: String,
-    /// The first column of the build, and the one behind the last.
+    /// The first column of the build, and the one after the last.
     pub(super) columns: [u32; 2],
 }
 
@@ -48,7 +61,7 @@ impl StripLine {
     }
 }
 
-/// The file of a strip.
+/// Returns the name of a strip's file.
 pub(super) fn file_name(swath: u32) -> String {
     format!("strip_{swath:03}.tif")
 }
@@ -65,7 +78,7 @@ impl StripIndex {
         }
     }
 
-    /// The text, a line for each strip.
+    /// Returns the text, a line for each strip.
     pub(super) fn to_json(&self) -> String {
         let Self { name, pixels: [width, height], layers, mirrors, overlap, strips } = self;
         let line = |strip| serde_json::to_string(strip).expect("texts and numbers are JSON");
@@ -91,25 +104,16 @@ impl StripIndex {
     }
 
     fn parse(text: &str) -> Result<Self, StripsError> {
-        let no_index = |problem: String| StripsError::Index { problem };
-        let index: Self =
-            serde_json::from_str(text).map_err(|error| no_index(error.to_string()))?;
-        if !index.swaths()?.map(|swaths| index.lists(&swaths)).unwrap_or(false) {
-            return Err(no_index("its strips are not those of such a build".to_owned()));
+        let json = |error| StripsError::Index(IndexError::Json(error));
+        let index: Self = serde_json::from_str(text).map_err(json)?;
+        let swaths = Swaths::new(index.mirrors, index.overlap, index.pixels[0])?;
+        // A lying index must not make a list of millions of strips.
+        let is_written = index.mirrors <= MAX_SIDE && swaths.count() <= MAX_STRIPS;
+        let lines = (0..swaths.count()).map(|swath| StripLine::of(&swaths, swath));
+        if !is_written || !lines.eq(index.strips.iter().cloned()) {
+            return Err(StripsError::Index(IndexError::Strips));
         }
         Ok(index)
-    }
-
-    /// How its strips lie, if they are not too many or too wide.
-    fn swaths(&self) -> Result<Option<Swaths>, StripsError> {
-        let swaths = Swaths::new(self.mirrors, self.overlap, self.pixels[0])?;
-        let is_some = self.mirrors <= MAX_SIDE && swaths.count() <= MAX_STRIPS;
-        Ok(is_some.then_some(swaths))
-    }
-
-    fn lists(&self, swaths: &Swaths) -> bool {
-        let lines = (0..swaths.count()).map(|swath| StripLine::of(swaths, swath));
-        lines.eq(self.strips.iter().cloned())
     }
 }
 

@@ -1,4 +1,4 @@
-//! Swaths put back together.
+//! Layers joined from their swaths.
 
 use std::borrow::Cow;
 
@@ -7,14 +7,14 @@ use thiserror::Error;
 
 use super::Swaths;
 
-/// Why swaths make no layer.
+/// An error in joining swaths to a layer.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum JoinSwathsError {
-    /// There are too many or too few, or one has another size.
+    /// There are too many or too few swaths, or one has another size.
     #[error("the swaths are not those of such a layer")]
     Unlike,
-    /// Swaths expose more than there is, or beyond the layer.
+    /// Swaths add up to more than full exposure, or expose pixels beyond the layer.
     #[error("row {row}, column {column}: the swaths add up to more than full exposure")]
     TooMuch {
         /// The row, from the top.
@@ -25,10 +25,10 @@ pub enum JoinSwathsError {
 }
 
 impl Swaths {
-    /// The levels that swaths add up to: a layer's, if they were cut from it.
+    /// Adds up the levels of swaths, which gives the layer that they were cut from.
     ///
     /// # Errors
-    /// Where the swaths are not those of a layer, or add up to more than full
+    /// Returns an error if the swaths are not those of a layer, or add up to more than full
     /// exposure.
     pub fn join(&self, swaths: &[Image]) -> Result<GrayMask, JoinSwathsError> {
         let height = swaths.first().map_or(0, Image::height);
@@ -51,7 +51,7 @@ impl Swaths {
         Ok(layer)
     }
 
-    /// Adds by how much a swath's row steps up or down, and where on the layer.
+    /// Adds the columns and heights of the steps between the levels of a swath's row.
     fn steps_of(&self, changes: &[LevelChange], swath: u32, steps: &mut Vec<(u32, i32)>) {
         let start = self.columns(swath).start;
         let mut before = 0;
@@ -64,7 +64,7 @@ impl Swaths {
         }
     }
 
-    /// The levels that steps lead to.
+    /// Returns the levels that steps lead to.
     fn changes(
         &self,
         steps: &[(u32, i32)],

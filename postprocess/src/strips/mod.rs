@@ -7,9 +7,9 @@
 //!   swath 2                                   //////##########
 //! ```
 //!
-//! A swath is as many columns wide as the projector has mirrors across its way,
-//! and shares some with the next, so that a seam shows no edge. There the one's
-//! dose falls as the other's rises, and both are the layer's.
+//! A swath is as wide as the projector has mirrors across its path, in columns. It shares some
+//! columns with the next swath, so that no seam shows: there the dose of one falls as that of the
+//! other rises, and their sum is the layer's.
 
 mod index;
 mod join_swaths;
@@ -29,12 +29,26 @@ use crate::edit::{ImageBounds, frame_page};
 
 use index::INDEX;
 
+pub use index::IndexError;
 pub use join_swaths::JoinSwathsError;
-pub use read::{is_strips, join_strips};
+pub use read::{StripDifference, is_strips, join_strips};
 pub use strips_error::StripsError;
 pub use write::StripWriter;
 
-/// How build layers are cut into swaths, from the left.
+/// The swaths that build layers are cut into, from the left.
+///
+/// ```
+/// use lamp_postprocess::Swaths;
+/// use lamp_stack::{Image, Mask};
+///
+/// let swaths = Swaths::new(10, 4, 22)?;
+/// assert_eq!((swaths.count(), swaths.columns(1)), (3, 6..16));
+///
+/// let layer = Image::Mask(Mask::black(22, 5).inverted());
+/// let cut: Vec<Image> = (0..3).map(|swath| swaths.cut(&layer, swath)).collect();
+/// assert_eq!(swaths.join(&cut)?, layer.to_gray().into_owned());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Swaths {
     mirrors: u32,
@@ -42,28 +56,28 @@ pub struct Swaths {
     width: u32,
 }
 
-/// Why a layer cannot be cut into swaths.
+/// An error in cutting layers into swaths.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum SwathsError {
-    /// A column would be in three swaths, or none.
+    /// Swaths share half of their columns or more, so a column would be in three of them.
     #[error(
         "swaths of {mirrors} mirrors cannot share {overlap} of them: they share less than half"
     )]
     Overlap {
-        /// How wide a swath is.
+        /// The width of a swath in pixels.
         mirrors: u32,
-        /// What it shares with the next.
+        /// The columns that it shares with the next.
         overlap: u32,
     },
 }
 
 impl Swaths {
-    /// Swaths of so many mirrors, of which each shares `overlap` with the next,
-    /// for layers of `width` columns.
+    /// Returns the swaths of `mirrors` columns, each of which shares `overlap` columns with the
+    /// next, of layers of `width` columns.
     ///
     /// # Errors
-    /// Where they would share half or more.
+    /// Returns an error if they share half of their columns or more.
     pub fn new(mirrors: u32, overlap: u32, width: u32) -> Result<Self, SwathsError> {
         if u64::from(overlap) * 2 < u64::from(mirrors) {
             Ok(Self { mirrors, overlap, width })
@@ -72,29 +86,29 @@ impl Swaths {
         }
     }
 
-    /// How many swaths there are: at least one.
+    /// Returns the number of swaths: at least one.
     pub fn count(&self) -> u32 {
         1 + self.width.saturating_sub(self.mirrors).div_ceil(self.step())
     }
 
-    /// The columns of a layer that a swath exposes. The last may have mirrors
-    /// beyond them, which stay black.
+    /// Returns the columns of a layer that a swath exposes. The last may have mirrors beyond them,
+    /// which stay black.
     pub fn columns(&self, swath: u32) -> Range<u32> {
         let start = u64::from(swath) * u64::from(self.step());
         let within = |column: u64| column.min(self.width.into()) as u32;
         within(start)..within(start + u64::from(self.mirrors))
     }
 
-    /// How far the first column of a swath is from that of the next.
+    /// Returns the distance from the first column of a swath to that of the next.
     fn step(&self) -> u32 {
         self.mirrors - self.overlap
     }
 
-    /// The image of a swath: as wide as there are mirrors. Where it shares columns
-    /// its levels are parts of the layer's, which add up to them exactly.
+    /// Returns the image of a swath, as wide as there are mirrors. In shared columns the levels of
+    /// the two swaths add up to the layer's exactly.
     ///
     /// # Panics
-    /// If the image is not as wide as the layers, or there is no such swath.
+    /// Panics if the image is not as wide as the layers, or there is no such swath.
     pub fn cut(&self, image: &Image, swath: u32) -> Image {
         assert_eq!(image.width(), self.width);
         assert!(swath < self.count());
@@ -108,12 +122,11 @@ impl Swaths {
         }
     }
 
-    /// A layer's swath, with a page that says where it lies: `strip` has its
-    /// number, how many there are, the columns of the build that it exposes, and how
-    /// many bits the build's pixels have.
+    /// Returns a layer's swath. Its page says under `strip` its number, the number of swaths, the
+    /// columns of the build that it exposes, and the bits of the build's pixels.
     ///
     /// # Panics
-    /// As [`cut`](Self::cut) does.
+    /// Panics if [`cut`](Self::cut) does.
     pub fn cut_layer(&self, layer: &Layer, swath: u32) -> Layer {
         let image = match *layer.image {
             // One swath is the layer itself: nothing is to be encoded again.
@@ -122,7 +135,7 @@ impl Swaths {
         };
         let Range { start, end } = self.columns(swath);
         let mut info = layer.info.clone();
-        // The first lies where the build does.
+        // The first swath's image lies where the build's does.
         if start > 0 {
             let height = layer.image.height();
             let frame = Frame { left: start.into(), top: 0, width: self.mirrors, height };
@@ -138,13 +151,13 @@ impl Swaths {
         Layer { info, dpi: layer.dpi, image }
     }
 
-    /// What a swath's first page says of how it was made.
+    /// Returns the command that a swath's first page records.
     fn command(&self, swath: u32) -> String {
         let Self { mirrors, overlap, .. } = self;
         format!("strip {swath} --mirrors {mirrors} --overlap {overlap}")
     }
 
-    /// What a swath exposes of what lies there.
+    /// Returns what a swath exposes of an image of its columns.
     fn ramped(&self, image: &GrayMask, swath: u32) -> GrayMask {
         let overlap = self.overlap;
         let rises = if swath == 0 { 0 } else { overlap };
@@ -169,9 +182,8 @@ impl Swaths {
     }
 }
 
-/// What the second of two swaths exposes of a level in a column that they share,
-/// counted from the first such: it rises in equal steps. The first exposes the
-/// rest.
+/// Returns what the second of two swaths exposes of a level in a shared column, counted from the
+/// first shared one: it rises in equal steps. The first swath exposes the rest.
 fn second_share(level: u8, column: u32, overlap: u32) -> u8 {
     let (steps, all) = (u64::from(column) + 1, u64::from(overlap) + 1);
     // Rounded to the nearest level.

@@ -1,23 +1,24 @@
-//! A folder of strips as the build that they were cut from.
+//! The build that a folder of strips was cut from.
 
 use std::path::Path;
 
 use lamp_stack::{Image, Layer, MemorySize, Page, PageInfo, Pages, map_in_order};
+use thiserror::Error;
 
 use super::index::{INDEX, StripIndex, file_name};
 use super::{JoinSwathsError, StripsError, Swaths};
 
-/// Whether a folder holds strips: then it has an index of them.
+/// Returns whether a folder holds strips: then it has an index of them.
 pub fn is_strips(folder: &Path) -> bool {
     folder.join(INDEX).is_file()
 }
 
-/// The layers of the build that a folder's strips were cut from. Where strips
-/// are as they were cut, that is the build, byte for byte.
+/// Returns the layers of the build that a folder's strips were cut from. If the strips are as
+/// they were cut, that is the build, byte for byte.
 ///
 /// # Errors
-/// Where the index or a strip cannot be read. The layers' own errors come in
-/// their places; so do those of strips that do not belong together.
+/// Returns an error if the index or a strip cannot be opened. Errors of single layers, and of
+/// strips that do not belong together, come in the layers' place.
 pub fn join_strips(
     folder: &Path,
 ) -> Result<impl Iterator<Item = Result<Layer, StripsError>> + use<>, StripsError> {
@@ -33,14 +34,58 @@ pub fn join_strips(
     Ok(map_in_order(strips, LayerPages::join))
 }
 
-/// The strips, read in step.
+/// The way in which a file is not the strip that the index lists.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum StripDifference {
+    /// It has another layer than the first strip.
+    #[error(
+        "it has {} where {} has {}",
+        name_or_none(.had), file_name(0), name_or_none(.first)
+    )]
+    Layer {
+        /// The name of its layer, if it has one.
+        had: Option<String>,
+        /// The name of the first strip's, if it has one.
+        first: Option<String>,
+    },
+    /// It ends before the index says.
+    #[error("{layers} layers that {INDEX} lists are missing")]
+    Missing {
+        /// The number of layers that are missing.
+        layers: u32,
+    },
+    /// It has more layers than the index says.
+    #[error("it has {layer}, which {INDEX} does not list")]
+    Unlisted {
+        /// The name of the first such layer.
+        layer: String,
+    },
+    /// A page does not say that it is of this strip.
+    #[error("{layer} does not say that it is strip {number}")]
+    Number {
+        /// The layer's name.
+        layer: String,
+        /// The strip that it should be of.
+        number: u32,
+    },
+    /// It was made of another input than the first strip.
+    #[error("it was made of another input")]
+    Input,
+}
+
+fn name_or_none(layer: &Option<String>) -> &str {
+    layer.as_deref().unwrap_or("no layer")
+}
+
+/// The strips, read in lockstep.
 struct StripReader {
     files: Vec<(String, Pages)>,
     swaths: Swaths,
     height: u32,
-    /// How many layers are still to come.
+    /// The number of layers still to come.
     left: u32,
-    /// The digest of the build's input, from the first pages on.
+    /// The digest of the build's input, once the first pages are read.
     digest: Option<String>,
 }
 
@@ -56,14 +101,13 @@ impl Iterator for StripReader {
                 page.map_err(|source| StripsError::In { file: file.clone(), source })
             })
             .collect();
-        let slice = pages.and_then(|pages| self.slice(pages));
-        slice.transpose()
+        pages.and_then(|pages| self.layer_pages(pages)).transpose()
     }
 }
 
 impl StripReader {
-    /// The pages of a layer, once they are seen to be one's.
-    fn slice(&mut self, pages: Vec<Option<Page>>) -> Result<Option<LayerPages>, StripsError> {
+    /// Checks that pages belong to one layer, and returns them together.
+    fn layer_pages(&mut self, pages: Vec<Option<Page>>) -> Result<Option<LayerPages>, StripsError> {
         let of_first = pages[0].as_ref().map(|page| page.info().clone());
         for (page, swath) in pages.iter().zip(0..) {
             let info = page.as_ref().map(Page::info);
@@ -77,40 +121,34 @@ impl StripReader {
         Ok(pages.map(|pages| LayerPages { pages, swaths: self.swaths, height: self.height }))
     }
 
-    /// In what a page is not that of a swath beside the first swath's, if at all.
+    /// Returns how a page differs from the page of a swath of the first swath's layer, if it does.
     fn difference(
         &mut self,
         info: Option<&PageInfo>,
         first: Option<&PageInfo>,
         swath: u32,
-    ) -> Option<String> {
-        let named = |info: Option<&PageInfo>| info.map_or("no layer".to_owned(), PageInfo::name);
+    ) -> Option<StripDifference> {
         let index = |info: Option<&PageInfo>| info.map(|info| info.index);
         if index(info) != index(first) {
-            return Some(format!(
-                "it has {} where {} has {}",
-                named(info),
-                file_name(0),
-                named(first)
-            ));
+            let [had, first] = [info, first].map(|info| info.map(PageInfo::name));
+            return Some(StripDifference::Layer { had, first });
         }
         let Some(info) = info else {
-            let left = self.left;
-            return (left > 0).then(|| format!("{left} layers that {INDEX} tells of are missing"));
+            return (self.left > 0).then_some(StripDifference::Missing { layers: self.left });
         };
         if self.left == 0 {
-            return Some(format!("it has {}, of which {INDEX} does not tell", info.name()));
+            return Some(StripDifference::Unlisted { layer: info.name() });
         }
         if info.other.get("strip").map(|strip| &strip["number"]) != Some(&swath.into()) {
-            return Some(format!("{} does not say that it is strip {swath}", info.name()));
+            return Some(StripDifference::Number { layer: info.name(), number: swath });
         }
         let digest = info.stack.as_ref().map(|stack| stack.digest.clone())?;
         let first = self.digest.get_or_insert_with(|| digest.clone());
-        (*first != digest).then(|| "it was made of another input".to_owned())
+        (*first != digest).then_some(StripDifference::Input)
     }
 }
 
-/// The pages of one layer, a strip after the other.
+/// The pages of one layer, strip by strip.
 struct LayerPages {
     pages: Vec<Page>,
     swaths: Swaths,

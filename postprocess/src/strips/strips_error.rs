@@ -1,86 +1,88 @@
-//! What can be wrong with a build's strips.
+//! Errors of strips.
 
 use lamp_stack::StackError;
 use thiserror::Error;
 
+use super::index::IndexError;
+use super::read::StripDifference;
 use super::{JoinSwathsError, SwathsError};
 
-/// Why strips cannot be written, or put back together.
+/// An error in writing strips, or in making a build of them.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StripsError {
-    /// Such swaths cannot be.
+    /// There are no such swaths.
     #[error(transparent)]
     Swaths(#[from] SwathsError),
-    /// No image is so wide.
-    #[error("a swath of {mirrors} mirrors is wider than any image: at most {most} are read again")]
+    /// A swath is wider than any image.
+    #[error("a swath of {mirrors} mirrors is wider than any image: at most {max} are read again")]
     Mirrors {
-        /// How wide a swath would be.
+        /// The width of a swath in pixels.
         mirrors: u32,
-        /// The widest image.
-        most: u32,
+        /// The width of the widest image.
+        max: u32,
     },
-    /// More files than may be open at once.
+    /// There are more strips than files may be open at once.
     #[error(
-        "a build {width} pixels wide would be {strips} strips of {mirrors} mirrors, and at most {most} are written: give more mirrors"
+        "a build {width} pixels wide would be {strips} strips of {mirrors} mirrors, and at most {max} are written"
     )]
     TooMany {
-        /// How wide the build is.
+        /// The width of the build in pixels.
         width: u32,
-        /// How many strips there would be.
+        /// The number of strips.
         strips: u32,
-        /// How wide they would be.
+        /// The width of a strip in pixels.
         mirrors: u32,
-        /// The most strips.
-        most: u32,
+        /// The greatest number of strips.
+        max: u32,
     },
     /// A layer has another size than the first.
-    #[error("{layer} has {size} pixels, and the first layer {first}: a build has one size")]
+    #[error(
+        "{layer} has {} x {} pixels, and the first layer {} x {}: a build has one size",
+        .size[0], .size[1], .first[0], .first[1]
+    )]
     Size {
         /// The layer's name.
         layer: String,
-        /// Its width and height, as `640 x 480`.
-        size: String,
-        /// Those of the first.
-        first: String,
+        /// Its width and height in pixels.
+        size: [u32; 2],
+        /// The width and height of the first.
+        first: [u32; 2],
     },
     /// A page says that it is a strip.
-    #[error("{layer} is a strip already: lamp join makes the build of its folder again")]
+    #[error("{layer} is a strip already")]
     Already {
         /// The layer's name.
         layer: String,
     },
-    /// The index is none.
-    #[error("{index}: this is no index of strips: {problem}", index = super::INDEX)]
-    Index {
-        /// What is wrong with it.
-        problem: String,
-    },
+    /// The index is malformed.
+    #[error("{index}: this is no index of strips", index = super::INDEX)]
+    Index(#[source] IndexError),
     /// A strip cannot be read.
     #[error("{file}")]
     In {
         /// The file's name.
         file: String,
-        /// What is wrong with it.
+        /// The error.
         source: StackError,
     },
-    /// A strip is not the one of the build that the index says.
+    /// A file is not the strip that the index lists.
     #[error("{file} is not that strip of the build: {difference}")]
     Unlike {
         /// The file's name.
         file: String,
-        /// In what it differs.
-        difference: String,
+        /// The difference.
+        difference: StripDifference,
     },
-    /// The strips make no layer.
+    /// The strips do not make a layer.
     #[error("{layer}")]
     Join {
         /// The layer's name.
         layer: String,
-        /// Why.
+        /// The error.
         source: JoinSwathsError,
     },
-    /// A layer of a 1-bit page has grays.
+    /// The strips of a 1-bit layer add up to gray.
     #[error("{layer} was black and white, and its strips add up to gray: they were changed")]
     Gray {
         /// The layer's name.

@@ -1,4 +1,4 @@
-//! A build's layers as a folder of strips.
+//! A build's layers written as a folder of strips.
 
 use std::fs::{self, File};
 use std::io::BufWriter;
@@ -12,11 +12,12 @@ use lamp_stack::{
 use super::index::{INDEX, MAX_STRIPS, StripIndex, file_name};
 use super::{StripsError, Swaths};
 
-/// Enough for the pages of a narrow strip; hundreds of files are open at once.
+/// The size of a file's buffer in bytes: enough for a page of a narrow strip, as hundreds of
+/// files are open at once.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// Cuts a build's layers into swaths, and writes a stack of each and their index.
-/// The folder gets its name when all are whole.
+/// Cuts a build's layers into swaths and writes a stack of each, and their index. The folder gets
+/// its name when all are complete.
 pub struct StripWriter {
     folder: FolderBeside,
     format: Format,
@@ -25,7 +26,7 @@ pub struct StripWriter {
     open: Option<OpenStrips>,
 }
 
-/// What is known from the first layer on.
+/// The strips, open from the first layer on.
 struct OpenStrips {
     swaths: Swaths,
     name: String,
@@ -35,12 +36,12 @@ struct OpenStrips {
 }
 
 impl StripWriter {
-    /// Sets up a folder of strips of so many mirrors, of which each shares
-    /// `overlap` with the next.
+    /// Prepares a folder of strips of `mirrors` columns, each of which shares `overlap` columns
+    /// with the next.
     ///
     /// # Errors
-    /// Where there are no such swaths, or no folder can be made there: it must not
-    /// exist, or be empty.
+    /// Returns an error if there are no such swaths, or the folder exists and is not empty, or
+    /// cannot be made.
     pub fn new(
         folder: &Path,
         mirrors: u32,
@@ -49,7 +50,7 @@ impl StripWriter {
     ) -> Result<Self, StripsError> {
         Swaths::new(mirrors, overlap, 0)?;
         if mirrors > MAX_SIDE {
-            return Err(StripsError::Mirrors { mirrors, most: MAX_SIDE });
+            return Err(StripsError::Mirrors { mirrors, max: MAX_SIDE });
         }
         let folder = FolderBeside::over_nothing(folder)?;
         Ok(Self { folder, format, mirrors, overlap, open: None })
@@ -58,8 +59,8 @@ impl StripWriter {
     /// Adds a layer to every strip, cut and encoded on all threads.
     ///
     /// # Errors
-    /// Where the layer is not as wide and high as the first, there would be too
-    /// many strips, or writing fails.
+    /// Returns an error if the layer has another size than the first, there would be too many
+    /// strips, or writing fails.
     pub fn push(&mut self, layer: &Layer) -> Result<(), StripsError> {
         if layer.info.other.contains_key("strip") {
             return Err(StripsError::Already { layer: layer.info.name() });
@@ -71,7 +72,6 @@ impl StripWriter {
         let swaths = open.swaths;
         let (size, first) = ([layer.image.width(), layer.image.height()], open.size());
         if size != first {
-            let [size, first] = [size, first].map(|[width, height]| format!("{width} x {height}"));
             return Err(StripsError::Size { layer: layer.info.name(), size, first });
         }
         let cuts = (0..swaths.count()).map(|swath| Ok(SwathCut { layer, swaths, swath }));
@@ -90,7 +90,7 @@ impl StripWriter {
         let swaths = Swaths::new(mirrors, self.overlap, width)?;
         let strips = swaths.count();
         if strips > MAX_STRIPS {
-            return Err(StripsError::TooMany { width, strips, mirrors, most: MAX_STRIPS });
+            return Err(StripsError::TooMany { width, strips, mirrors, max: MAX_STRIPS });
         }
         let file = |swath| -> Result<_, StripsError> {
             let file = File::create_new(self.folder.path().join(file_name(swath)));
@@ -109,7 +109,7 @@ impl StripWriter {
     /// Ends the strips, writes their index, and gives the folder its name.
     ///
     /// # Errors
-    /// Where writing fails, or there was no layer.
+    /// Returns an error if writing fails or there was no layer.
     pub fn finish(self) -> Result<(), StripsError> {
         let open = self.open.ok_or(StackError::NoLayers)?;
         let index = StripIndex::new(&open.name, open.size(), open.layers, &open.swaths);
@@ -127,7 +127,7 @@ impl OpenStrips {
     }
 }
 
-/// A swath that is to be cut.
+/// A swath of a layer that is to be cut.
 struct SwathCut<'a> {
     layer: &'a Layer,
     swaths: Swaths,
