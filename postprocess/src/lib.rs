@@ -1,10 +1,14 @@
-//! Images in, images out: what happens to layers between slicing and the
-//! machine. Everything works on runs.
+//! Stages between slicing and the machine: images in, images out, all on runs.
 //!
-//! [`fix`] corrects stray rows, [`edit`] changes a design, [`tile`] lays copies of a
-//! part out on a build area. All are adaptors from layers to layers. A [`Layout`] is
-//! for several parts; a [`Machine`](machine::Machine) says how large a build may be;
-//! [`Swaths`] cuts build layers for a projector that scans.
+//! - [`fix`] corrects stray rows.
+//! - [`compensate`] narrows images by the cure width and makes up for firing shrinkage.
+//! - [`edit`] changes a design without slicing it again.
+//! - [`tile`] lays copies of parts out on a build area; a [`Layout`] says where copies of several
+//!   parts stand, a [`Machine`](machine::Machine) how large a build may be.
+//! - [`StripWriter`] cuts build layers into [`Swaths`] for a projector that scans, and
+//!   [`join_strips`] joins them again.
+//!
+//! Stages are adaptors from layers to layers, so they can be chained:
 //!
 //! ```
 //! use lamp_postprocess::{FixOptions, TileError, TileOptions, fix, tile};

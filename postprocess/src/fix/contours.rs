@@ -307,60 +307,31 @@ fn through(knots: &KnownColumns, rows: Range<usize>) -> Vec<Guess> {
         // once.
         let from = row.checked_sub(1).map(|row| above(knots, row)).filter(|line| !line.is_empty());
         let to = next.map(|row| below(knots, row));
-        let curve = LineCurve::between(from, to);
-        guesses.extend((row..end).map(|row| curve.at(row as f64)));
+        let ends = [from, to].map(|line| line.map(|line| (line[0], slope(&line))));
+        guesses.extend((row..end).map(|row| between(ends, row as f64)));
         row = end;
     }
     guesses
 }
 
-/// A line between rows where it is known.
-enum LineCurve {
-    Between {
-        from: (f64, f64),
-        from_slope: f64,
-        to: (f64, f64),
-        to_slope: f64,
-    },
-    /// Known on one side only: the line goes straight on.
-    On {
-        from: (f64, f64),
-        slope: f64,
-    },
-}
+/// A point of a line, and its slope there.
+type LineEnd = ((f64, f64), f64);
 
-impl LineCurve {
-    /// Returns the curve between two lines, of which at least one is known.
-    fn between(from: Option<LinePoints>, to: Option<LinePoints>) -> Self {
-        match (from, to) {
-            (Some(from), Some(to)) => Self::Between {
-                from: from[0],
-                from_slope: slope(&from),
-                to: to[0],
-                to_slope: slope(&to),
-            },
-            (Some(line), None) | (None, Some(line)) => Self::on(&line),
-            (None, None) => unreachable!("a line was found in a good row beside the band"),
+/// Returns where a line should cross a row between the ends of its known parts: along a cubic, or
+/// straight on from the only end.
+fn between(ends: [Option<LineEnd>; 2], row: f64) -> Guess {
+    match ends {
+        [Some((from, from_slope)), Some((to, to_slope))] => {
+            let column = hermite(from, from_slope, to, to_slope, row);
+            let chord = (to.1 - from.1) / (to.0 - from.0);
+            let straight = from.1 + chord * (row - from.0);
+            (column, 0.5 + 0.5 * (column - straight).abs() + 0.15 * chord.abs())
         }
-    }
-
-    fn on(line: &LinePoints) -> Self {
-        Self::On { from: line[0], slope: slope(line) }
-    }
-
-    fn at(&self, row: f64) -> Guess {
-        match *self {
-            Self::Between { from, from_slope, to, to_slope } => {
-                let column = hermite(from, from_slope, to, to_slope, row);
-                let chord = (to.1 - from.1) / (to.0 - from.0);
-                let straight = from.1 + chord * (row - from.0);
-                (column, 0.5 + 0.5 * (column - straight).abs() + 0.15 * chord.abs())
-            }
-            Self::On { from, slope } => {
-                let away = row - from.0;
-                (from.1 + slope * away, 0.5 + away.abs() * (0.2 + 0.2 * slope.abs()))
-            }
+        [Some((from, slope)), None] | [None, Some((from, slope))] => {
+            let away = row - from.0;
+            (from.1 + slope * away, 0.5 + away.abs() * (0.2 + 0.2 * slope.abs()))
         }
+        [None, None] => unreachable!("a line was found in a good row beside the band"),
     }
 }
 

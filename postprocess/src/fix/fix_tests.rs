@@ -1,3 +1,5 @@
+//! Tests of the correction on drawn shapes.
+
 use lamp_stack::{LevelChange, PageInfo};
 use proptest::prelude::*;
 

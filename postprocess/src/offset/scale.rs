@@ -1,6 +1,6 @@
 //! Images enlarged by what firing takes away.
 
-use lamp_stack::{GrayMask, Image, LevelChange, MaskBuilder};
+use lamp_stack::{GrayMask, Image, LevelChange};
 
 /// The enlargement along one side of an image.
 #[derive(Clone, Copy, Debug)]
@@ -32,53 +32,24 @@ impl AxisScale {
 /// Enlarges an image so that the fired part has the image's size. Each pixel takes the colour of
 /// the pixel that its centre lies in after firing.
 pub(super) fn scaled(image: &Image, columns: &AxisScale, rows: &AxisScale, width: u32) -> Image {
+    let before = image.to_gray();
     let column = |column: u32| columns.first_past(column) as u32;
-    let times = |row: u32| rows.first_past(row + 1) - rows.first_past(row);
-    match image {
-        Image::Mask(mask) => {
-            let mut out = MaskBuilder::new(width);
-            let mut transitions: Vec<u32> = Vec::new();
-            for (row, before) in (0..).zip(mask.rows()) {
-                transitions.clear();
-                transitions.extend(before.iter().map(|&t| column(t)));
-                close(before.len() % 2 == 1, column(mask.width()), width, |end| {
-                    transitions.push(end);
-                });
-                for _ in 0..times(row) {
-                    out.push_row(&transitions).expect("columns move apart");
-                }
-            }
-            Image::Mask(out.finish())
-        }
-        Image::Gray(gray) => Image::Gray(scaled_gray(gray, column, times, width)),
-    }
-}
-
-fn scaled_gray(
-    gray: &GrayMask,
-    column: impl Fn(u32) -> u32,
-    times: impl Fn(u32) -> u64,
-    width: u32,
-) -> GrayMask {
+    let end = column(before.width());
     let mut out = GrayMask::new(width);
-    for (row, before) in (0..).zip(gray.rows()) {
+    for (row, changes) in (0..).zip(before.rows()) {
         let moved = |change: &LevelChange| LevelChange { column: column(change.column), ..*change };
-        let mut changes: Vec<_> = before.iter().map(moved).collect();
-        let is_open = before.last().is_some_and(|change| change.level > 0);
-        close(is_open, column(gray.width()), width, |column| {
-            changes.push(LevelChange { column, level: 0 });
-        });
-        for _ in 0..times(row) {
-            out.push_row(&changes).expect("columns move apart");
+        let mut moved: Vec<_> = changes.iter().map(moved).collect();
+        // The last run ends where the image ended, also if the larger image is wider than that.
+        if moved.last().is_some_and(|change| change.level > 0) && end < width {
+            moved.push(LevelChange { column: end, level: 0 });
+        }
+        for _ in rows.first_past(row)..rows.first_past(row + 1) {
+            out.push_row(&moved).expect("columns move apart");
         }
     }
-    out
-}
-
-/// Ends a row's last run where the image ended, if the larger image is wider than that.
-fn close(is_open: bool, end: u32, width: u32, push: impl FnOnce(u32)) {
-    if is_open && end < width {
-        push(end);
+    match image {
+        Image::Mask(_) => Image::Mask(out.to_mask().expect("levels stay as they are")),
+        Image::Gray(_) => Image::Gray(out),
     }
 }
 

@@ -19,11 +19,7 @@ fn image(width: u32, rows: &[Vec<(u32, u8)>], levels: bool) -> Image {
     if levels {
         return Image::Gray(gray);
     }
-    let transitions =
-        |row: &[lamp_stack::LevelChange]| row.iter().map(|c| c.column).collect::<Vec<_>>();
-    let mut mask = lamp_stack::MaskBuilder::new(width);
-    gray.rows().for_each(|row| mask.push_row(&transitions(row)).unwrap());
-    Image::Mask(mask.finish())
+    Image::Mask(gray.to_mask().unwrap())
 }
 
 fn level(image: &Image, column: u32, row: u32) -> u8 {
