@@ -16,8 +16,7 @@
 //!
 //! // Row 1 missed its second crossing and runs to the image's edge.
 //! let mask = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5]).unwrap();
-//! let layer =
-//!     Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: Image::Mask(mask).into() };
+//! let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: mask.into() };
 //!
 //! let layers = std::iter::once(Ok::<_, TileError>(layer));
 //! let fixed = fix(layers, FixOptions::default(), |fixed| {

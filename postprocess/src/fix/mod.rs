@@ -123,7 +123,7 @@ pub struct Fixed<'a> {
 ///
 /// // Row 1 missed its second crossing and is white up to the image's edge.
 /// let stray = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5])?;
-/// let layer = Layer { info: PageInfo::default(), dpi: None, image: Image::Mask(stray).into() };
+/// let layer = Layer { info: PageInfo::default(), dpi: None, image: stray.into() };
 /// let layers = std::iter::once(Ok::<_, std::io::Error>(layer));
 ///
 /// let mut fixed = fix(layers, FixOptions::default(), |fixed| {

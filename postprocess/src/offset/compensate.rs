@@ -123,13 +123,13 @@ const WIDTH_UNIT: u64 = 32;
 /// let rows = (0..22).map(|row| if row == 0 || row == 21 { vec![] } else { vec![1, 21] });
 /// let mut square = lamp_stack::MaskBuilder::new(22);
 /// rows.for_each(|row| square.push_row(&row).unwrap());
-/// let image = Image::Mask(square.finish());
+/// let image = square.finish().into();
 /// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(1000.0), image };
 ///
 /// let layers = std::iter::once(Ok::<_, CompensateError>(layer));
 /// let widths = |_: &Layer, _: Dpi| Ok(Widths::uniform(1.0));
 /// let mut narrower = compensate(layers, CompensateOptions::default(), widths, |_| {});
-/// let Image::Mask(mask) = narrower.next().unwrap()?.image else { unreachable!() };
+/// let Image::Mask(mask) = narrower.next().unwrap()?.image.into_image() else { unreachable!() };
 /// assert_eq!((mask.row(1), mask.row(2)), (&[][..], &[2, 20][..]));
 /// # Ok::<(), CompensateError>(())
 /// ```
