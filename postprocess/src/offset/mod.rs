@@ -59,7 +59,7 @@ const MAX_OFFSET: f64 = 30_000.0;
 /// let bar = Mask::new(9, vec![0, 0, 2, 4, 6, 6], vec![2, 7, 2, 7, 2, 7])?;
 /// let narrower = offset(&bar, 0.25);
 /// assert_eq!([1, 2, 3].map(|column| narrower.level(column, 2)), [0, 191, 255]);
-/// # Ok::<(), lamp_stack::MaskError>(())
+/// # Ok::<(), lamp_stack::RunError>(())
 /// ```
 pub fn offset(mask: &Mask, inwards: f64) -> GrayMask {
     let (colour, level_outside) =
