@@ -1,4 +1,4 @@
-//! Where stacks come from: a file, a folder of pages, a stream.
+//! Reads stacks from a file, a folder of pages or a stream.
 
 use std::fs::{self, File};
 use std::io::Read;
@@ -10,7 +10,7 @@ use crate::limits::Limits;
 use crate::ordered::map_in_order;
 use crate::tiff::{Page, PageReader};
 
-/// The pages of a stack, bottom first.
+/// An iterator over the pages of a stack, bottom first.
 #[derive(Debug)]
 pub struct Pages {
     source: Source,
@@ -23,18 +23,17 @@ pub struct Pages {
 enum Source {
     /// A file or a stream.
     One(PageReader),
-    /// A folder: the files still to be read, last first, and how many pages
-    /// there should be, where the first says so.
+    /// A folder: the unread files, last first, and the number of pages that the first page
+    /// states, if any.
     Folder { files: Vec<PathBuf>, expected: u32 },
 }
 
 impl Pages {
-    /// Opens a TIFF or PNG file, or a folder of TIFF files of one page each or
-    /// of PNG files, in the order of their names (numbers in names count as
-    /// numbers).
+    /// Opens a TIFF or PNG file, or a folder of single-page TIFF files or of PNG files. Files of
+    /// a folder are ordered by name, with numbers in names compared as numbers.
     ///
     /// # Errors
-    /// Where nothing can be read there, or it is neither; where a folder
+    /// Returns an error if the input cannot be read or is of neither format, or if a folder
     /// holds both.
     pub fn open(path: &Path) -> Result<Self, StackError> {
         let source = if path.is_dir() {
@@ -49,18 +48,18 @@ impl Pages {
         Ok(Self::new(source))
     }
 
-    /// Reads a TIFF or PNG file that is open, from its start.
+    /// Reads an open TIFF or PNG file from its start.
     ///
     /// # Errors
-    /// Where nothing can be read there, or it is neither.
+    /// Returns an error if the file cannot be read or is of neither format.
     pub fn from_file(file: File) -> Result<Self, StackError> {
         Ok(Self::new(Source::One(PageReader::from_file(file)?)))
     }
 
-    /// Reads a stack as it arrives, such as from standard input.
+    /// Reads a stack from a stream, such as standard input.
     ///
     /// # Errors
-    /// Where nothing arrives, or it is neither a TIFF nor a PNG.
+    /// Returns an error if the stream is empty or is of neither format.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
         Ok(Self::new(Source::One(PageReader::from_stream(stream)?)))
     }
@@ -69,7 +68,7 @@ impl Pages {
         Self { source, limits: Limits::default(), count: 0, last_whole: None }
     }
 
-    /// Returns the pages, read within these limits instead of the default ones.
+    /// Replaces the default limits of the reader.
     pub fn with_limits(self, limits: Limits) -> Self {
         let source = match self.source {
             Source::One(reader) => Source::One(reader.with_limits(limits)),
@@ -78,7 +77,7 @@ impl Pages {
         Self { source, limits, ..self }
     }
 
-    /// The pages' layers, decoded on all threads, in order.
+    /// Returns the layers in order, decoded on all threads.
     pub fn layers(self) -> impl Iterator<Item = Result<Layer, StackError>> {
         map_in_order(self, Page::decode)
     }
@@ -103,7 +102,7 @@ impl Pages {
         }
     }
 
-    /// Checks that a page goes on from those before it.
+    /// Checks that a page follows the page before it.
     fn check(&mut self, page: &Page) -> Result<(), StackError> {
         let info = page.info();
         let layer = info.index;
@@ -130,7 +129,7 @@ impl Pages {
 impl Iterator for Pages {
     type Item = Result<Page, StackError>;
 
-    /// The next page; after an error, none.
+    /// Returns the next page, or `None` after an error.
     fn next(&mut self) -> Option<Self::Item> {
         let page = self.next_page()?.and_then(|page| self.check(&page).map(|()| page));
         match &page {
@@ -144,7 +143,7 @@ impl Iterator for Pages {
     }
 }
 
-/// The page of a folder's file.
+/// Reads the single page of a folder's file.
 fn one_page(
     file: &Path,
     limits: Limits,
@@ -157,7 +156,7 @@ fn one_page(
     if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
 }
 
-/// The TIFF or PNG files of a folder, last name first.
+/// Lists the TIFF or PNG files of a folder, last name first.
 fn page_files(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
     let (mut files, mut tiffs) = (Vec::new(), 0);
     for entry in fs::read_dir(folder)? {
@@ -177,8 +176,8 @@ fn page_files(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
     Ok(files)
 }
 
-/// A name in pieces, so that `page10` comes behind `page9`: each a text and
-/// the number behind it.
+/// Splits a name into pairs of a text and the number after it, so that `page10` sorts after
+/// `page9`.
 fn name_key(name: &str) -> Vec<(String, u64)> {
     let mut pieces = vec![(String::new(), 0u64)];
     let mut in_number = false;

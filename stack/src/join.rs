@@ -1,4 +1,4 @@
-//! Stacks of ranges of layers as the one stack that they are parts of.
+//! Joins stacks of consecutive layer ranges into one stack.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,71 +11,69 @@ use crate::layer::{Layer, StackInfo};
 use crate::ordered::map_in_order;
 use crate::tiff::Page;
 
-/// Why stacks cannot be joined.
+/// An error that prevents joining stacks.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum JoinError {
-    /// One of them cannot be read.
+    /// A stack cannot be read.
     #[error("{}", path.display())]
     In {
-        /// Where it is.
+        /// The stack's path.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         source: StackError,
     },
-    /// They are not of one part, made in one way.
+    /// The stacks differ in their part, size, resolution or commands.
     #[error("{} is no part of the same stack as {}: {difference}", path.display(), first.display())]
     Different {
         /// The first stack.
         first: PathBuf,
-        /// The one that differs from it.
+        /// The stack that differs from it.
         path: PathBuf,
-        /// In what, as `its resolution is 200 dpi, not 100 dpi`.
+        /// The difference, such as `its resolution is 200 dpi, not 100 dpi`.
         difference: String,
     },
-    /// Their layers do not go up.
+    /// The layer indices do not increase from one stack to the next.
     #[error(
         "{} starts with layer {layer}, but {} before it ends with layer {last}: give each layer once, and the stacks in the order of their layers",
         path.display(), before.display()
     )]
     Order {
-        /// The stack before.
+        /// The preceding stack.
         before: PathBuf,
         /// Its last layer.
         last: u32,
-        /// The stack that does not go on from it.
+        /// The stack that does not continue it.
         path: PathBuf,
         /// Its first layer.
         layer: u32,
     },
-    /// Layers are missing between two of them.
+    /// Layers are missing between two stacks.
     #[error(
         "{} starts with layer {layer}, but {} before it ends with layer {last}: make layers {}..{layer} and give them in between",
         path.display(), before.display(), last + 1
     )]
     Gap {
-        /// The stack before.
+        /// The preceding stack.
         before: PathBuf,
         /// Its last layer.
         last: u32,
-        /// The stack that does not go on from it.
+        /// The stack that does not continue it.
         path: PathBuf,
         /// Its first layer.
         layer: u32,
     },
 }
 
-/// The layers of several stacks (files or folders), one stack after the other.
+/// Returns the layers of several stacks (files or folders), one stack after the other.
 ///
-/// What the first of them says of its stack holds for all; how many layers
-/// there are is the sum, where all say so. If ranges of one stack's layers are
-/// joined, that gives the stack, byte for byte.
+/// The result has the first stack's metadata. Its layer count is the sum of the counts, if
+/// all stacks state one. Joining all parts of a split stack restores it byte for byte.
 ///
 /// # Errors
-/// Where a stack cannot be opened, or is not of the same part, size,
-/// resolution and commands as the first. The layers' own errors come in their
-/// places; so does one where a stack does not go on where the one before it
-/// ends.
+/// Returns an error if a stack cannot be opened, or differs from the first in part, size,
+/// resolution or commands. The iterator yields an error if a layer cannot be read, or if a
+/// stack does not continue the one before it.
 pub fn join(
     stacks: Vec<PathBuf>,
 ) -> Result<impl Iterator<Item = Result<Layer, JoinError>> + use<>, JoinError> {
@@ -92,8 +90,7 @@ fn in_stack(path: &Path, source: StackError) -> JoinError {
     JoinError::In { path: path.to_owned(), source }
 }
 
-/// Compares the stacks' first layers, and returns what is to be said of the
-/// whole.
+/// Compares the stacks' first layers and returns the joined stack's metadata.
 fn survey(stacks: &[PathBuf]) -> Result<Option<StackInfo>, JoinError> {
     let Some((first_path, others)) = stacks.split_first() else { return Ok(None) };
     let mut first = first_layer(first_path)?;
@@ -118,13 +115,13 @@ fn layers_stated(first: &Layer) -> Option<u32> {
     first.info.stack.as_ref()?.layers
 }
 
-/// In what a stack differs from the first.
+/// Describes the first difference between a stack and the first stack.
 fn difference(first: &Layer, other: &Layer) -> Option<String> {
     let mut both = facts(first).into_iter().zip(facts(other));
     both.find(|(first, other)| first != other)
         .map(|((what, first), (_, other))| format!("its {what} is {other}, not {first}"))
         .or_else(|| {
-            // As where `tile` put the copies: too long to be told.
+            // Other metadata, such as the places of tiled copies, is too long to quote.
             let of_stack = |layer: &Layer| Some(layer.info.stack.as_ref()?.other.clone());
             let (first, other) = of_stack(first).zip(of_stack(other))?;
             let mut keys = first.keys().chain(other.keys());
@@ -133,8 +130,8 @@ fn difference(first: &Layer, other: &Layer) -> Option<String> {
         })
 }
 
-/// What stacks of one part share. What comes from files is quoted: it must
-/// not steer the terminal.
+/// Returns the properties that all stacks must share. Text from files is quoted, so that it
+/// cannot control the terminal.
 fn facts(layer: &Layer) -> [(&'static str, String); 5] {
     let Layer { info, dpi, image } = layer;
     let or_unknown = |fact: Option<String>| fact.unwrap_or_else(|| "unknown".to_owned());
@@ -148,17 +145,17 @@ fn facts(layer: &Layer) -> [(&'static str, String); 5] {
     ]
 }
 
-/// The pages of stacks one after the other.
+/// The pages of the stacks, one stack after the other.
 struct Joined {
     stacks: std::vec::IntoIter<PathBuf>,
     open: Option<(Arc<Path>, Pages)>,
-    /// The last layer, and the stack that it is of.
+    /// The last layer and the path of its stack.
     last: Option<(u32, Arc<Path>)>,
-    /// What is to be said of the whole, on its first page.
+    /// The joined stack's metadata, until the first page takes it.
     stack: Option<StackInfo>,
 }
 
-/// Where a page comes from, and what it is to say of the stack.
+/// A page's source and the stack metadata that it will carry.
 struct PageOrigin {
     path: Arc<Path>,
     stack: Option<StackInfo>,
@@ -176,12 +173,12 @@ impl Joined {
         })
     }
 
-    /// Returns where a page comes from, if it follows the one before it.
+    /// Returns a page's origin, or an error if it does not follow the page before it.
     fn origin(&mut self, page: &Page, path: Arc<Path>) -> Result<PageOrigin, JoinError> {
         let layer = page.info().index;
         let stack = match self.last.replace((layer, Arc::clone(&path))) {
             None => self.stack.take(),
-            // The file's own pages go up: its reader sees to that.
+            // The reader has checked the order within one file.
             Some((_, before)) if Arc::ptr_eq(&before, &path) => page.info().stack.clone(),
             Some((last, _)) if last.checked_add(1) == Some(layer) => None,
             Some((last, before)) => {

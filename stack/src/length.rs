@@ -1,51 +1,50 @@
-//! Lengths and resolution, parsed from what people write.
+//! Lengths, sizes and resolutions, with parsers for text such as `100um` and `1500dpi`.
 
 use std::fmt;
 use std::str::FromStr;
 
 use thiserror::Error;
 
-/// A length. It is kept in micrometres; the accessors name their unit.
+/// A length, stored in micrometres.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Default)]
 pub struct Length {
     um: f64,
 }
 
 impl Length {
-    /// The length of `um` micrometres.
+    /// Creates a length from micrometres.
     pub const fn from_um(um: f64) -> Self {
         Self { um }
     }
 
-    /// The length of `mm` millimetres.
+    /// Creates a length from millimetres.
     pub const fn from_mm(mm: f64) -> Self {
         Self { um: mm * 1000.0 }
     }
 
-    /// In micrometres.
+    /// Returns the length in micrometres.
     pub const fn um(self) -> f64 {
         self.um
     }
 
-    /// In millimetres.
+    /// Returns the length in millimetres.
     pub const fn mm(self) -> f64 {
         self.um / 1000.0
     }
 
-    /// The same to the nanometre: sums and differences miss what they stand for by
-    /// rounding.
+    /// Rounds to whole nanometres, which removes the rounding errors of sums and differences.
     pub fn to_whole_nm(self) -> Self {
         Self { um: (self.um * 1000.0).round() / 1000.0 }
     }
 
-    /// In pixels of a resolution (not rounded).
+    /// Returns the length in pixels at a resolution, not rounded.
     pub fn pixels(self, dpi: Dpi) -> f64 {
         self.um * dpi.get() / 25_400.0
     }
 }
 
 impl fmt::Display for Length {
-    /// Writes micrometres below one millimetre, millimetres above.
+    /// Formats in micrometres below one millimetre and in millimetres above.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.um.abs() < 1000.0 {
             write!(f, "{}um", self.um)
@@ -55,31 +54,30 @@ impl fmt::Display for Length {
     }
 }
 
-/// Why a text is not a length, a size or a resolution.
+/// An error in the text of a length, a size or a resolution.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum LengthError {
-    /// No number stands before the unit.
+    /// The text does not start with a number.
     #[error("`{0}` is not a length: write a number and a unit, as 100um, 0.1mm, 4mil or 0.004in")]
     NotALength(String),
     /// The number has no unit, or an unknown one.
     #[error("`{text}` has no unit that is known: add um, mm, mil or in")]
     NoUnit {
-        /// The text as given.
+        /// The given text.
         text: String,
     },
-    /// Not two lengths with an `x` between.
+    /// The text is not two lengths with an `x` between them.
     #[error("`{0}` is not a size: write width x height and a unit, as 4x4.5in or 100x80mm")]
     NotASize(String),
-    /// Not a positive number of dots per inch.
+    /// The text is not a valid number of dots per inch.
     #[error(
         "`{0}` is not a resolution: write dots per inch between 1 and 100000, as 1500, with at most four decimals"
     )]
     NotAResolution(String),
 }
 
-/// Splits `100um` into its number and the micrometres in its unit (`None`
-/// where no unit stands).
+/// Splits `100um` into its number and the micrometres in its unit (`None` without a unit).
 fn split_unit(text: &str) -> Result<(f64, Option<f64>), LengthError> {
     let text = text.trim();
     let digits = text.trim_end_matches(|c: char| c.is_alphabetic() || c == '"').trim_end();
@@ -104,7 +102,7 @@ impl FromStr for Length {
     /// Parses a number and its unit: `um`, `mm`, `in` (or `inch`) or `mil`.
     ///
     /// # Errors
-    /// Where the number or the unit is missing or unknown.
+    /// Returns an error if the number is missing or the unit is missing or unknown.
     fn from_str(text: &str) -> Result<Self, LengthError> {
         match split_unit(text)? {
             (number, Some(um)) if (number * um).is_finite() => Ok(Self::from_um(number * um)),
@@ -114,23 +112,22 @@ impl FromStr for Length {
     }
 }
 
-/// A width and a height, as of a build area.
+/// A width and a height, such as those of a build area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
-    /// Along x.
+    /// The size along x.
     pub width: Length,
-    /// Along y.
+    /// The size along y.
     pub height: Length,
 }
 
 impl FromStr for Size {
     type Err = LengthError;
 
-    /// Parses `4x4.5in` or `100mm x 4in`: the last unit serves both sides
-    /// where the first has none.
+    /// Parses `4x4.5in` or `100mm x 4in`. A width without a unit takes that of the height.
     ///
     /// # Errors
-    /// Where the text is not two positive lengths with an `x` between.
+    /// Returns an error if the text is not two positive lengths with an `x` between them.
     fn from_str(text: &str) -> Result<Self, LengthError> {
         let wrong = || LengthError::NotASize(text.to_owned());
         let (width, height) = text.split_once(['x', 'X', '*']).ok_or_else(wrong)?;
@@ -152,44 +149,43 @@ impl fmt::Display for Size {
     }
 }
 
-/// A resolution in dots per inch: the stored quantity, from which the pixel
-/// pitch follows (25.4 mm / dpi). Always between 1 and 100 000.
+/// A resolution in dots per inch, between 1 and 100 000.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Dpi(f64);
 
 const METRES_PER_INCH: f64 = 0.0254;
 
 impl Dpi {
-    /// A resolution of `dpi` dots per inch, if that is between 1 and 100 000.
+    /// Creates a resolution, or returns `None` if `dpi` is not between 1 and 100 000.
     pub fn new(dpi: f64) -> Option<Self> {
         (1.0..=100_000.0).contains(&dpi).then_some(Self(dpi))
     }
 
-    /// Dots per inch.
+    /// Returns the dots per inch.
     pub const fn get(self) -> f64 {
         self.0
     }
 
-    /// Pixels a metre, to the nearest whole.
+    /// Returns the pixels per metre, rounded to a whole number.
     pub(crate) fn per_metre(self) -> u32 {
         (self.0 / METRES_PER_INCH).round() as u32
     }
 
-    /// The resolution that whole pixels a metre stand for: whole dots per inch
-    /// where they would round to it (59055 are 1500 dpi).
+    /// Converts whole pixels per metre. Prefers whole dots per inch that round to the same
+    /// number (59055 pixels per metre are 1500 dpi).
     pub(crate) fn from_per_metre(pixels: u32) -> Option<Self> {
         let exact = f64::from(pixels) * METRES_PER_INCH;
         let whole = Self::new(exact.round()).filter(|whole| whole.per_metre() == pixels);
         whole.or_else(|| Self::new(exact))
     }
 
-    /// The distance between two pixel centres, 25.4 mm / dpi.
+    /// Returns the distance between two pixel centres, 25.4 mm / dpi.
     pub fn pitch(self) -> Length {
         Length::from_um(25_400.0 / self.0)
     }
 
-    /// As a fraction with the smallest decimal denominator that holds it (at
-    /// most 10 000), for TIFF's rational tags.
+    /// Returns a fraction for TIFF's rational tags, with the smallest sufficient power of ten
+    /// (at most 10 000) as its denominator.
     pub(crate) fn to_rational(self) -> (u32, u32) {
         let holds = |den: &u32| {
             let scaled = self.0 * f64::from(*den);
@@ -206,7 +202,7 @@ impl FromStr for Dpi {
     /// Parses `1500` or `1500dpi`.
     ///
     /// # Errors
-    /// Where the number is missing or out of range.
+    /// Returns an error if the number is missing or out of range.
     fn from_str(text: &str) -> Result<Self, LengthError> {
         let number = text.trim().trim_end_matches("dpi").trim_end();
         number

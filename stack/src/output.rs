@@ -1,4 +1,4 @@
-//! Where stacks go: a file, a folder of pages, a stream.
+//! Writes stacks to a file, a folder of pages or a stream.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -10,13 +10,11 @@ use crate::ordered::map_in_order;
 use crate::temporary::{FileBeside, FolderBeside};
 use crate::tiff::{EncodedPage, Format, PageWriter};
 
-/// Where a stack is to be written.
+/// The place that a stack is written to.
 pub enum Destination {
-    /// One multipage file. It is written beside its name and renamed when it
-    /// is whole.
+    /// One multipage file, written under a temporary name and renamed when complete.
     File(PathBuf),
-    /// A folder of one-page files, made in the same way. The folder must not
-    /// exist, or be empty.
+    /// A folder of single-page files, renamed likewise. It must be empty or not exist.
     Folder(PathBuf),
     /// A stream, such as standard output.
     Stream(Box<dyn Write>),
@@ -25,9 +23,8 @@ pub enum Destination {
 /// Writes layers as a stack, encoding them on all threads.
 ///
 /// # Errors
-/// The first error among the layers, or where writing fails. Nothing then
-/// stands under the final name; a stream is left without its last link, so
-/// that its reader knows.
+/// Returns the first error among the layers, or an error if writing fails. No file then
+/// appears under the final name; a stream lacks its last page link, so that its reader notices.
 pub fn write_stack<E>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     to: Destination,
@@ -57,7 +54,7 @@ enum Sink {
     Stream(PageWriter<BufWriter<Box<dyn Write>>>),
 }
 
-/// Enough that a layer or more goes out with one call.
+/// The write buffer's size: usually enough for a whole layer per call.
 const BUFFER_BYTES: usize = 1 << 18;
 
 impl Sink {
@@ -93,10 +90,10 @@ impl Sink {
         }
     }
 
-    /// Gives a stream's reader all layers that are whole; files go away.
+    /// Flushes all complete layers to a stream; removes files.
     fn abandon(self) {
         if let Self::Stream(pages) = self {
-            // The error that led here is the one to tell.
+            // Only the original error is reported.
             let _ = pages.cut_off();
         }
     }

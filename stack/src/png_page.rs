@@ -1,4 +1,4 @@
-//! A PNG file as a page: its rows become runs as they are decoded.
+//! Reads a PNG file as a page, converting rows to runs as they are decoded.
 
 use std::io::Cursor;
 
@@ -12,17 +12,16 @@ use crate::limits::Limits;
 use crate::mask::Mask;
 use crate::tiff::{bit_transitions, byte_runs};
 
-/// What every PNG starts with.
+/// The first bytes of every PNG.
 pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// The keyword of the text that is a page's JSON line.
+/// The keyword of the text chunk that holds a page's JSON line.
 pub(crate) const DESCRIPTION: &str = "Description";
 
-/// The key of a PNG's line that is the resolution, where whole pixels a metre
-/// do not tell it.
+/// The JSON key of the resolution, used if whole pixels per metre cannot express it.
 pub(crate) const EXACT_DPI: &str = "dpi";
 
-/// What a PNG says of its image.
+/// The properties of a PNG's image, from the chunks before its data.
 pub(crate) struct Header {
     pub(crate) width: u32,
     pub(crate) height: u32,
@@ -31,7 +30,7 @@ pub(crate) struct Header {
     pub(crate) info: Option<PageInfo>,
 }
 
-/// Why a PNG is no page.
+/// A reason why a PNG cannot be read as a page.
 #[derive(Debug)]
 pub(crate) enum PngFault {
     Unsupported(UnsupportedFeature),
@@ -53,10 +52,10 @@ impl From<png::DecodingError> for PngFault {
     }
 }
 
-/// Gives a PNG's rows.
+/// A decoder of a PNG's rows.
 type PngRows<'a> = Reader<Cursor<&'a [u8]>>;
 
-/// Reads what stands before the image data.
+/// Reads the chunks before the image data.
 pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PngFault> {
     let (reader, samples) = open(file, limits)?;
     let info = reader.info();
@@ -142,10 +141,10 @@ fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(PngRows<'a>, Samples), P
     Ok((reader, samples))
 }
 
-/// How a PNG stores gray levels.
+/// A PNG's encoding of gray levels.
 struct Samples {
     bits: usize,
-    /// By sample: its level.
+    /// The level of each sample value.
     levels: Vec<u8>,
 }
 
@@ -176,12 +175,12 @@ impl Samples {
         Ok(Self { bits, levels })
     }
 
-    /// Whether the image is 1-bit, black and white.
+    /// Returns whether the image is 1-bit, black and white.
     fn are_bits(&self) -> bool {
         self.bits == 1 && matches!(*self.levels, [0, 255] | [255, 0])
     }
 
-    /// The samples of a row, a byte each.
+    /// Unpacks the samples of a row to a byte each.
     fn unpack(&self, row: &[u8], width: u32, samples: &mut Vec<u8>) {
         samples.clear();
         let mask = 0xFF >> (8 - self.bits);
@@ -192,7 +191,7 @@ impl Samples {
     }
 }
 
-/// The levels of a palette of grays.
+/// Returns the levels of a palette of grays.
 fn gray_palette(palette: &[u8]) -> Result<Vec<u8>, PngFault> {
     let level = |entry: &[u8]| match *entry {
         [r, g, b] if r == g && g == b => Ok(r),
@@ -201,8 +200,8 @@ fn gray_palette(palette: &[u8]) -> Result<Vec<u8>, PngFault> {
     palette.chunks(3).map(level).collect()
 }
 
-/// The resolution: whole pixels a metre, or what these were rounded from,
-/// which then goes out of the page's line.
+/// Returns the resolution: from the JSON line's key if it rounds to the same whole pixels
+/// per metre (the key is then removed from the line), otherwise from these.
 fn dpi(info: &Info<'_>, line: Option<&mut PageInfo>) -> Option<Dpi> {
     let pixels = info.pixel_dims.filter(|dims| dims.unit == Unit::Meter)?.xppu;
     let whole = Dpi::from_per_metre(pixels);
@@ -214,7 +213,7 @@ fn dpi(info: &Info<'_>, line: Option<&mut PageInfo>) -> Option<Dpi> {
     stated.or(whole)
 }
 
-/// The text, where it stands before the image data.
+/// Returns the description, if it comes before the image data.
 fn description<'a>(info: &'a Info<'_>) -> Option<&'a str> {
     let latin = info.uncompressed_latin1_text.iter().find(|text| text.keyword == DESCRIPTION);
     latin.map(|text| text.text.as_str())

@@ -1,4 +1,4 @@
-//! Layers and pictures as PNG files.
+//! Writes layers and pictures as PNG files.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -18,12 +18,12 @@ use crate::ordered::map_in_order;
 use crate::png_page::{DESCRIPTION, EXACT_DPI};
 use crate::temporary::FolderBeside;
 
-/// Writes layers as a folder of PNGs, `layer_00812.png` each, encoding them on
-/// all threads. The folder gets its name when it is whole.
+/// Writes layers as a folder of PNGs named like `layer_00812.png`, encoded on all threads.
+/// The folder gets its name when it is complete.
 ///
 /// # Errors
-/// The first error among the layers, or where the folder cannot be written;
-/// it must not exist, or be empty.
+/// Returns the first error among the layers, or an error if the folder cannot be written. It
+/// must be empty or not exist.
 pub fn write_png_folder<E>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     folder: &Path,
@@ -47,19 +47,19 @@ where
     Ok(temporary.persist().map_err(StackError::from)?)
 }
 
-/// A layer as a PNG: 1-bit of a mask, 8-bit of a gray mask. The page's JSON
-/// line is its `tEXt` under the keyword `Description`.
+/// Encodes a layer as a PNG: 1-bit for a mask, 8-bit for a gray mask. A `tEXt` chunk with
+/// the keyword `Description` holds the page's JSON line.
 ///
-/// Its `pHYs` has whole pixels a metre. Where these are not enough to tell the
-/// resolution, the line ends with it, as `"dpi":72.25`.
+/// The `pHYs` chunk has whole pixels per metre. If these cannot express the resolution, the
+/// JSON line ends with it, as `"dpi":72.25`.
 ///
 /// # Errors
-/// Where the image has no pixels.
+/// Returns an error if the image has no pixels.
 pub fn png_of_layer(layer: &Layer) -> Result<Vec<u8>, StackError> {
     let mut png = Vec::new();
     let mut encoder = Encoder::new(&mut png, layer.image.width(), layer.image.height());
-    // Most rows are as the one above. Slower ways save a third of the bytes for
-    // twenty times the time.
+    // Most rows equal the row above. Better compression saves a third of the bytes but takes
+    // twenty times as long.
     encoder.set_compression(Compression::Fast);
     encoder.set_color(ColorType::Grayscale);
     encoder.set_filter(Filter::Up);
@@ -86,10 +86,10 @@ pub fn png_of_layer(layer: &Layer) -> Result<Vec<u8>, StackError> {
     Ok(png)
 }
 
-/// Writes rows of 8-bit levels, `width` each, as a PNG.
+/// Writes rows of `width` 8-bit levels as a PNG.
 ///
 /// # Errors
-/// Where writing fails, or the rows are not `height`.
+/// Returns an error if writing fails or the number of rows is not `height`.
 pub fn write_gray_png(
     out: impl Write,
     width: u32,
@@ -99,11 +99,10 @@ pub fn write_gray_png(
     write_picture(out, [width, height], ColorType::Grayscale, rows)
 }
 
-/// Writes rows of red, green and blue levels, three for each of `width` pixels,
-/// as a PNG.
+/// Writes rows of `width` pixels of 8-bit red, green and blue levels as a PNG.
 ///
 /// # Errors
-/// As [`write_gray_png`].
+/// Returns an error in the same cases as [`write_gray_png`].
 pub fn write_rgb_png(
     out: impl Write,
     width: u32,
@@ -129,7 +128,7 @@ fn write_picture(
     })
 }
 
-/// Writes the image row by row, so that a large one takes little memory.
+/// Writes the image row by row, so that a large image takes little memory.
 fn write_rows(
     encoder: Encoder<'_, impl Write>,
     rows: impl Iterator<Item = Vec<u8>>,
@@ -143,7 +142,7 @@ fn write_rows(
     writer.finish()
 }
 
-/// A row's pixels, eight a byte, the first in the highest bit.
+/// Packs a row's pixels, eight per byte, the first in the highest bit.
 fn bits(transitions: &[u32], width: u32) -> Vec<u8> {
     let mut bytes = vec![0; width.div_ceil(8) as usize];
     for (start, end) in white_runs(transitions, width) {
@@ -167,8 +166,7 @@ fn pixel_dims(dpi: Dpi) -> PixelDimensions {
     PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }
 }
 
-/// The page's JSON line in ASCII, which is all that every reader of `tEXt`
-/// agrees on.
+/// Returns the page's JSON line in ASCII, because readers of `tEXt` disagree on other bytes.
 fn line(layer: &Layer) -> String {
     let mut info = layer.info.clone();
     if let Some(dpi) = layer.dpi.filter(|&dpi| Dpi::from_per_metre(dpi.per_metre()) != Some(dpi)) {
@@ -187,7 +185,7 @@ fn line(layer: &Layer) -> String {
     line
 }
 
-/// Notes how writing failed, which the encoder's own errors do not tell.
+/// A writer that keeps the I/O error, which the encoder's own errors do not contain.
 struct Noting<W> {
     out: W,
     failed: Option<io::ErrorKind>,
@@ -221,7 +219,7 @@ mod tests {
             let mask = Mask::new(width, vec![0, row.len() as u32], row).unwrap();
             let white = |column: u32| bytes[column as usize / 8] << (column % 8) & 0x80 != 0;
             prop_assert_eq!(bytes.len(), width.div_ceil(8) as usize);
-            // What fills the last byte is black.
+            // The last byte is padded with black.
             prop_assert!((0..8 * bytes.len() as u32).all(|c| white(c) == mask.is_white(c, 0)));
         }
     }
@@ -251,14 +249,14 @@ mod tests {
     #[test]
     fn every_resolution_and_line_read_back() {
         for dpi in [1.0, 72.25, 203.2, 1500.0, 99_999.999] {
-            // What another program may say of its own under the key.
+            // Values that another program may store under the key.
             for own in [None, Some(0.5), Some(1500.0)] {
                 let mut layer = layer(dpi, "cube");
                 layer.info.other.extend(own.map(|dpi| ("dpi".to_owned(), dpi.into())));
                 let header =
                     png_page::header(&png_of_layer(&layer).unwrap(), &Limits::default()).unwrap();
                 assert_eq!(header.dpi, layer.dpi);
-                // A page that needs the key for itself takes it.
+                // A page that needs the key overwrites it.
                 if own.is_none() || dpi.fract() == 0.0 || dpi == 203.2 {
                     assert_eq!(header.info, Some(layer.info), "{dpi} {own:?}");
                 }

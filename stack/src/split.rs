@@ -1,4 +1,4 @@
-//! A stack as several files of some of its layers each.
+//! Splits a stack into several files of consecutive layers.
 
 use std::fs::{self, File};
 use std::io::BufWriter;
@@ -14,41 +14,41 @@ use crate::ordered::map_in_order;
 use crate::temporary::FolderBeside;
 use crate::tiff::{EncodedPage, Format, PageWriter};
 
-/// Why a stack cannot be split.
+/// An error that prevents splitting a stack.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SplitError {
-    /// It lacks layers, which is to be mended before its parts go their ways.
+    /// The stack lacks layers.
     #[error("layer {layer} stands behind layer {before}: the stack lacks what is between them")]
     Gap {
-        /// The layer behind the gap.
+        /// The layer after the gap.
         layer: u32,
-        /// The one before it.
+        /// The layer before the gap.
         before: u32,
     },
-    /// It has no layer where it is to be split.
+    /// The stack has no layer at a requested cut.
     #[error("no file can start with layer {cut}: the stack has layers {first} to {last}")]
     NoCut {
-        /// Where it was to be split.
+        /// The requested cut.
         cut: u32,
         /// The stack's first layer.
         first: u32,
-        /// Its last.
+        /// The stack's last layer.
         last: u32,
     },
 }
 
-/// Where a stack is split.
+/// The layers at which a stack is split.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SplitPoints {
-    /// Behind so many layers each; the last file takes what is left.
+    /// Each file has this number of layers; the last may have fewer.
     Every(NonZeroU32),
-    /// Before each of these layers, which go up.
+    /// A new file starts at each of these layers, in increasing order.
     At(Vec<u32>),
 }
 
 impl SplitPoints {
-    /// The layers of the file that starts with layer `first`.
+    /// Returns the layers of the file that starts with layer `first`.
     fn file_from(&self, first: u32) -> Range<u32> {
         let end = match self {
             Self::Every(layers) => first.saturating_add(layers.get()),
@@ -58,14 +58,13 @@ impl SplitPoints {
     }
 }
 
-/// Writes layers as a folder of stacks, `layers_00500-00999.tif` each, every
-/// one whole in itself. [`join`](crate::join) makes the one stack of them
-/// again. The folder gets its name when it is whole.
+/// Writes layers as a folder of complete stacks named like `layers_00500-00999.tif`.
+/// [`join`](crate::join) restores the single stack. The folder gets its name when it is
+/// complete.
 ///
 /// # Errors
-/// The first error among the layers; where a layer does not follow the one
-/// before it, or a cut is at no layer; where the folder cannot be written: it
-/// must not exist, or be empty.
+/// Returns the first error among the layers, or an error if layers are missing, a cut is at no
+/// layer, or the folder cannot be written. The folder must be empty or not exist.
 pub fn write_split<E>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     cuts: &SplitPoints,
@@ -93,19 +92,19 @@ where
     Ok(folder.finish()?)
 }
 
-/// Which layer goes into which file.
+/// Assigns layers to files.
 struct Plan<'a> {
     cuts: &'a SplitPoints,
-    /// What the first layer says of the stack.
+    /// The metadata of the whole stack, from its first layer.
     stack: Option<StackInfo>,
     first: u32,
     last: Option<u32>,
-    /// The layers of the file that is being filled.
+    /// The layers of the current file.
     file: Range<u32>,
 }
 
 impl Plan<'_> {
-    /// Whether a layer is the first of its file; it then says what the file is.
+    /// Returns whether a layer is the first of its file, and if so gives it the file's metadata.
     fn place(&mut self, layer: &mut Layer) -> Result<bool, SplitError> {
         let index = layer.info.index;
         match self.last.replace(index) {
@@ -134,7 +133,7 @@ impl Plan<'_> {
     }
 }
 
-/// The folder with the file that is being written.
+/// The output folder and the file being written.
 struct Folder {
     temporary: FolderBeside,
     format: Format,
@@ -160,7 +159,7 @@ impl Folder {
         open.pages.push(page)
     }
 
-    /// Ends the file, and names it after its layers.
+    /// Completes the file and names it after its layers.
     fn close(&mut self) -> Result<(), StackError> {
         if let Some(OpenFile { pages, first, last }) = self.open.take() {
             pages.finish()?;
@@ -178,8 +177,7 @@ impl Folder {
         Ok(self.temporary.persist()?)
     }
 
-    /// The path of the file that is being written: its last layer is not
-    /// known yet.
+    /// Returns the temporary path of the current file, whose last layer is not yet known.
     fn unnamed(&self) -> PathBuf {
         self.temporary.path().join("layers.tif")
     }

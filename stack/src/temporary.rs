@@ -1,4 +1,4 @@
-//! Files and folders that get their name only when they are complete.
+//! Creates files and folders that get their name only when they are complete.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -10,26 +10,26 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 
 use crate::error::StackError;
 
-/// What would remain if the process were ended now.
+/// The temporary files and folders that exist now.
 static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// How temporary names start: hidden, and short whatever the final name.
+/// The prefix of temporary names: hidden, and short even if the final name is long.
 const PREFIX: &str = ".lamp-";
 
-/// Removes the temporary files and folders of this process: to be called
-/// before it ends without running destructors.
+/// Removes the temporary files and folders of this process. Call it before exiting without
+/// running destructors.
 pub fn remove_temporaries() {
-    // A thread that panicked with the lock left the set as good as any.
+    // The set is valid even if a thread panicked while it held the lock.
     let mut live = LIVE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     for path in std::mem::take(&mut *live) {
-        // What is gone or renamed already is as it should be. A folder that
-        // is still being filled may take several goes.
+        // The path may already be removed or renamed. A folder that another thread still
+        // fills may need several attempts.
         let remove = || fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
         let _ = (0..100).find(|_| remove().is_ok() || !path.exists());
     }
 }
 
-/// Keeps a path among those to remove.
+/// Keeps a path in [`LIVE`] until it is dropped.
 struct Registered(PathBuf);
 
 impl Registered {
@@ -45,7 +45,7 @@ impl Drop for Registered {
     }
 }
 
-/// A new file beside its final place, gone again unless [`persist`]ed.
+/// A temporary file in the folder of its final path, removed on drop unless [`persist`]ed.
 ///
 /// [`persist`]: Self::persist
 pub struct FileBeside {
@@ -55,11 +55,10 @@ pub struct FileBeside {
 }
 
 impl FileBeside {
-    /// Makes a file that is to be `path`, with the permissions of what stands
-    /// there now.
+    /// Creates a file that will become `path`, with the permissions of an existing file there.
     ///
     /// # Errors
-    /// Where no file can be made in that folder.
+    /// Returns an error if no file can be created in that folder.
     pub fn new(path: &Path) -> io::Result<Self> {
         let mut builder = Builder::new();
         set_mode(&mut builder, 0o666);
@@ -71,22 +70,22 @@ impl FileBeside {
         Ok(Self { file, _registered: registered, path: path.to_owned() })
     }
 
-    /// The file, to write to.
+    /// Returns the file, for writing.
     pub fn file(&mut self) -> &mut fs::File {
         self.file.as_file_mut()
     }
 
-    /// Gives the file its final name.
+    /// Renames the file to its final name.
     ///
     /// # Errors
-    /// Where it cannot be renamed.
+    /// Returns an error if renaming fails.
     pub fn persist(self) -> io::Result<()> {
         self.file.persist(self.path).map_err(|error| error.error)?;
         Ok(())
     }
 }
 
-/// As [`FileBeside`], a folder.
+/// A temporary folder, otherwise like [`FileBeside`].
 pub struct FolderBeside {
     folder: TempDir,
     _registered: Registered,
@@ -102,11 +101,10 @@ impl FolderBeside {
         Ok(Self { folder, _registered: registered, path: path.to_owned() })
     }
 
-    /// A new folder that is to be `path`, where nothing may stand but an
-    /// empty folder.
+    /// Creates a folder that will become `path`, which must be an empty folder or not exist.
     ///
     /// # Errors
-    /// Where something does, or no folder can be made there.
+    /// Returns an error if `path` is anything else, or no folder can be created there.
     pub fn over_nothing(path: &Path) -> Result<Self, StackError> {
         let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
         if path.exists() && !is_empty() {
@@ -115,24 +113,24 @@ impl FolderBeside {
         Ok(Self::new(path)?)
     }
 
-    /// Where it is for now: what is put there comes along.
+    /// Returns the folder's temporary path.
     pub fn path(&self) -> &Path {
         self.folder.path()
     }
 
-    /// Gives the folder its final name.
+    /// Renames the folder to its final name.
     ///
     /// # Errors
-    /// Where it cannot be renamed.
+    /// Returns an error if renaming fails.
     pub fn persist(self) -> io::Result<()> {
         fs::rename(self.folder.path(), &self.path)?;
-        // The folder has another name now: there is nothing to remove.
+        // The folder has been renamed, so there is nothing to remove.
         let _ = self.folder.keep();
         Ok(())
     }
 }
 
-/// The folder that `path` is to stand in.
+/// Returns the parent folder of `path`.
 fn folder_of(path: &Path) -> io::Result<&Path> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -145,8 +143,8 @@ fn folder_of(path: &Path) -> io::Result<&Path> {
     Err(io::Error::new(io::ErrorKind::NotFound, message))
 }
 
-/// Gives the permissions that other programs' new files have (the umask
-/// applies), not those of private temporary files.
+/// Sets the usual permissions of new files (subject to the umask) instead of the private
+/// ones of temporary files.
 fn set_mode(builder: &mut Builder<'_, '_>, mode: u32) {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
