@@ -1,9 +1,10 @@
-//! The trait of a B-rep kernel, and the facets and surfaces that slicing needs of it.
+//! Defines the trait of a B-rep kernel, and the facets and surface points that it
+//! returns.
 
 use crate::error::BrepError;
 
-/// A point of a surface, in millimetres, and its first derivatives: nine numbers in
-/// this order, so that a kernel in another language can write them.
+/// A point of a surface, in millimetres, and its first derivatives. Kernels in other
+/// languages write it as nine numbers in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Jet {
@@ -15,12 +16,11 @@ pub struct Jet {
     pub dv: [f64; 3],
 }
 
-/// A model as a kernel has read it: bodies in their places, in millimetres.
+/// A model read by a kernel: placed bodies, in millimetres.
 ///
-/// Faces are numbered across all bodies. Each lies on a surface of its own,
-/// which has the face's number.
+/// Faces are numbered across all bodies. Each has a surface with the same number.
 pub trait Kernel: Send + Sync {
-    /// Returns the bodies, in the file's order; a body that is placed twice is there
+    /// Returns the bodies in the file's order. A body that is placed twice appears
     /// twice.
     fn bodies(&self) -> &[Body];
 
@@ -38,34 +38,34 @@ pub trait Kernel: Send + Sync {
         None
     }
 
-    /// Makes the faces into facets at most `chord_mm` from their surfaces, joined
+    /// Tessellates the faces into facets at most `chord_mm` from their surfaces, joined
     /// along their edges.
     ///
-    /// Faces that could not be made into facets are missing, and among the findings:
-    /// whether bodies are closed is for [`check`](crate::check) to say.
+    /// Faces that fail are left out and reported as findings. Call
+    /// [`check`](crate::check) to see whether bodies are closed.
     ///
     /// # Errors
-    /// Returns an error if the chord is not a positive length, or there would be too many
-    /// facets.
+    /// Returns an error if the chord is not a positive length, or there would be too
+    /// many facets.
     fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError>;
 
     /// Evaluates a face's surface at many parameters at once.
     ///
-    /// Parameters may lie beyond the face, and outside the surface's domain as far
-    /// as it goes on there; those of closed surfaces come again. Where there is no
-    /// surface, numbers are NaN.
+    /// Parameters may lie outside the face, and outside the domain where the surface
+    /// can be continued. Parameters of closed surfaces are periodic. Jets are NaN where
+    /// there is no surface.
     ///
     /// # Panics
-    /// Panics if there is no such face, or the lists differ in length.
+    /// Panics if the face does not exist, or the lists differ in length.
     fn evaluate(&self, face: u32, uv: &[[f64; 2]], jets: &mut [Jet]);
 }
 
 /// A body and its faces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Body {
-    /// The name that the file gives it, or else its product; may be empty.
+    /// The name from the file, or that of its product; may be empty.
     pub name: String,
-    /// The numbers of its faces.
+    /// The indices of its faces.
     pub faces: std::ops::Range<u32>,
 }
 
@@ -74,34 +74,34 @@ pub struct Body {
 pub struct FaceInfo {
     /// The kind of its surface: `plane`, `cylinder`, `B-spline`.
     pub kind: &'static str,
-    /// The entity of the file, such as 12 for `#12`; 0 where it is not known.
+    /// The entity's number in the file, such as 12 for `#12`; 0 if unknown.
     pub entity: u64,
-    /// The least and the greatest corner of its surface's control points, in
-    /// millimetres, if it has some: nothing of the surface lies outside.
+    /// The least and the greatest corner of the surface's control points, in
+    /// millimetres, if it has any. They enclose the surface.
     pub control_box_mm: Option<[[f64; 3]; 2]>,
 }
 
 /// A triangle of a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet {
-    /// Its corners among the points, counter-clockwise seen from outside.
+    /// The indices of its corners, counter-clockwise seen from outside.
     pub corners: [u32; 3],
-    /// The corners' parameters on the face's surface. Along a seam or around a pole
-    /// the same point has several.
+    /// The corners' parameters on the face's surface. A point on a seam or at a pole
+    /// has several.
     pub uv: [[f64; 2]; 3],
-    /// The face.
+    /// The index of its face.
     pub face: u32,
 }
 
-/// Bodies as facets.
+/// The facets of all bodies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tessellation {
-    /// All points, in millimetres. Faces that meet share those of their edge.
+    /// All points, in millimetres. Neighbouring faces share the points of their edge.
     pub points: Vec<[f64; 3]>,
-    /// The facets, body after body and face after face.
+    /// The facets, by body and face.
     pub facets: Vec<Facet>,
-    /// Triangles with two corners at one pole, face after face: they have no area
-    /// in space, and are no facets, but their parameters belong to the faces.
+    /// Triangles with two corners at one pole, by face. They have no area in space, but
+    /// they cover parameters of the face, which volume integrals need.
     pub tips: Vec<Facet>,
     /// The faults found in faces.
     pub findings: Vec<Finding>,
@@ -115,12 +115,12 @@ impl Tessellation {
         facet.corners.map(|corner| self.points[corner as usize])
     }
 
-    /// Returns the facets of some faces.
+    /// Returns the facets of a range of faces.
     pub fn of_faces(&self, faces: &std::ops::Range<u32>) -> &[Facet] {
         of_faces(&self.facets, faces)
     }
 
-    /// Returns the tips of some faces.
+    /// Returns the tips of a range of faces.
     pub(crate) fn tips_of_faces(&self, faces: &std::ops::Range<u32>) -> &[Facet] {
         of_faces(&self.tips, faces)
     }
@@ -132,12 +132,12 @@ fn of_faces<'a>(facets: &'a [Facet], faces: &std::ops::Range<u32>) -> &'a [Facet
     &facets[start..end]
 }
 
-/// Something wrong with a face.
+/// A fault and its face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// The face's number.
+    /// The index of the face.
     pub face: u32,
-    /// The entity of the file.
+    /// The entity's number in the file.
     pub entity: u64,
     /// The fault.
     pub fault: Fault,
@@ -147,13 +147,13 @@ pub struct Finding {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Its loops do not bound a piece of its surface.
+    /// Its loops do not bound a region of its surface.
     #[error("its loops bound nothing")]
     Unbounded,
     /// Its loops cross each other or themselves.
     #[error("its loops cross each other or themselves")]
     Crossing,
-    /// No facets could be made of it, for another reason.
+    /// It could not be tessellated, for another reason.
     #[error("no facets could be made of it")]
     Missing,
     /// A loop's edges do not follow each other.
@@ -165,11 +165,11 @@ pub enum Fault {
         /// The distance, in millimetres.
         off_mm: f64,
     },
-    /// Its loops go clockwise where they should not; they were followed, and the
-    /// face turned over.
+    /// Its loops go clockwise although they should not. The face was turned over to fit
+    /// the loops.
     #[error("its sense is against its loops; the loops were followed")]
     Sense,
-    /// Edges that it gives apart from its neighbours were joined with theirs.
+    /// Some of its edges were joined with those of its neighbours.
     #[error("{joints} of its edges were joined, up to {off_mm:.6} mm apart")]
     Joined {
         /// The number of joints: ends of edges, or whole edges.
@@ -183,13 +183,13 @@ pub enum Fault {
     /// All faces of its body point inwards.
     #[error("its body is inside out; all of it was turned over")]
     InsideOut,
-    /// It is too large for the chord, or bends too much.
+    /// It is too large, or bends too much, for the chord.
     #[error("it takes about {cells:.0} cells of facets; give a longer chord")]
     Fine {
         /// The number of cells.
         cells: f64,
     },
-    /// It bends more than the facets could follow.
+    /// It bends too much for its facets to follow.
     #[error("facets lie {off_mm:.4} mm off its surface")]
     Coarse {
         /// The distance, in millimetres.
@@ -198,7 +198,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Returns how far something is off, in millimetres, or 0 for other faults.
+    /// Returns the distance of a fault, in millimetres, or 0 for faults without one.
     pub fn off_mm(&self) -> f64 {
         match self {
             Self::Off { off_mm } | Self::Joined { off_mm, .. } | Self::Coarse { off_mm } => *off_mm,

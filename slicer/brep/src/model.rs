@@ -1,4 +1,4 @@
-//! The model in memory: bodies, faces, edges and vertices, placed and in millimetres.
+//! Holds a model in memory: placed bodies, faces, edges and vertices, in millimetres.
 
 use crate::geometry::{Curve, Surface};
 use crate::kernel::Body;
@@ -20,7 +20,7 @@ pub(crate) struct BrepModel {
 /// A piece of a surface.
 #[derive(Debug)]
 pub(crate) struct Face {
-    /// The entity of the file.
+    /// The entity's number in the file.
     pub(crate) entity: u64,
     pub(crate) surface: Surface,
     /// Whether its loops go counter-clockwise seen against the surface's normal.

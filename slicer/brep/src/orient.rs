@@ -1,4 +1,4 @@
-//! Finds faces that are inside out by their neighbours, and turns them over.
+//! Finds faces that are inside out relative to their neighbours, and turns them over.
 
 use std::collections::HashMap;
 
@@ -6,16 +6,15 @@ use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
 use crate::validate::{BodyReport, bounds, doubled, sides, volume};
 use crate::vector::{length, middle};
 
-/// Of two groups of faces that contradict each other the smaller one is inside out,
-/// if its area is less than this part of the other's.
+/// Of two groups of faces that contradict each other, the smaller is inside out if its
+/// area is less than this part of the other's.
 const CLEARLY_SMALLER: f64 = 0.8;
 
-/// Turns over faces whose facets follow their edges in the same direction as those
-/// of their neighbours, and bodies that are inside out; says whether it did.
+/// Turns over faces that follow a shared edge in the same direction as a neighbour, and
+/// bodies that are inside out. Returns whether any changed.
 ///
-/// Of faces that contradict each other those with less area are turned. A body in
-/// one piece has a positive volume: that decides if the areas are alike. What was
-/// turned is added to the findings.
+/// Of contradicting groups, the one with less area is turned. If their areas are
+/// similar, the sign of the body's volume decides. Changes are added to the findings.
 pub(crate) fn turn_over(
     kernel: &dyn Kernel,
     mesh: &mut Tessellation,
@@ -52,7 +51,7 @@ fn turn(kernel: &dyn Kernel, mesh: &mut Tessellation, body: &Body, turned: &[boo
     }
 }
 
-/// Returns which faces of a body are inside out.
+/// Returns for each face of a body whether it is inside out.
 fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     let facets = mesh.of_faces(&body.faces);
     let count = body.faces.len();
@@ -72,7 +71,7 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
             piece.iter().for_each(|(face, side)| turned[*face] = *side == smaller);
         }
     }
-    // Facets without volume have none to turn.
+    // A body without volume has no sign to decide by.
     let [low, high] = bounds(mesh, facets);
     let about = middle(low, high);
     let signed = |facet: &Facet| {
@@ -85,8 +84,8 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     turned
 }
 
-/// Returns, for each face those that it shares edges with, and whether they contradict
-/// it: both follow the same edge in one direction.
+/// Returns the neighbours of each face, and whether they contradict it by following a
+/// shared edge in the same direction.
 fn neighbours(
     facets: &[Facet],
     count: usize,
@@ -114,8 +113,8 @@ fn neighbours(
     list
 }
 
-/// Returns faces that hang together, each with the side that it is on: two on different
-/// sides contradict each other. Faces without neighbours are pieces too.
+/// Returns the connected groups of faces, each face with its side: faces on different
+/// sides contradict each other. A face without neighbours is a group of its own.
 fn pieces(neighbours: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
     let mut pieces = Vec::new();
     let mut seen = vec![false; neighbours.len()];
@@ -144,8 +143,8 @@ mod tests {
 
     #[test]
     fn pieces_have_sides() {
-        // A ring of four, the third of which contradicts its neighbours, and one
-        // that stands alone.
+        // Four faces in a ring, the third of which contradicts its neighbours, and a
+        // single face.
         let neighbours = vec![
             vec![(1, false), (3, false)],
             vec![(0, false), (2, true)],

@@ -1,5 +1,5 @@
-//! Prepares a STEP file for slicing: reads it, makes facets and checks them, and heals
-//! or makes longer facets where that fails.
+//! Prepares a STEP file for slicing: reads, tessellates and validates it, and retries
+//! with healing or longer chords.
 
 use std::any::Any;
 use std::fmt;
@@ -11,11 +11,11 @@ use crate::kernel::{Kernel, Tessellation};
 use crate::orient::turn_over;
 use crate::validate::{BodyFault, BodyReport, apart, check};
 
-/// Reads a file's bytes, and joins what lies within a distance in millimetres of
-/// each other; with 0 the file is taken as it is.
+/// Reads a file's bytes and joins edges within a distance in millimetres; 0 leaves the
+/// model unchanged.
 pub type ReadFn = fn(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError>;
 
-/// A file as a kernel has read it.
+/// A file read by a kernel.
 pub struct OpenedModel {
     /// The model.
     pub kernel: Arc<dyn Kernel>,
@@ -23,54 +23,53 @@ pub struct OpenedModel {
     pub is_changed: bool,
 }
 
-/// A model that is ready to be sliced, unless its reports have faults.
+/// A prepared model. It may be sliced if its reports have no faults.
 pub struct Prepared {
     /// The model.
     pub kernel: Arc<dyn Kernel>,
-    /// Its facets. What was found and done is among their findings.
+    /// Its facets; their findings include all repairs.
     pub mesh: Arc<Tessellation>,
     /// The report of [`check`](crate::check) on each body.
     pub reports: Vec<BodyReport>,
-    /// The attempts that were worse, in order.
+    /// The rejected attempts, in order.
     pub tries: Vec<Attempt>,
-    /// The distance within which edges were joined, in millimetres; 0 if the file was read
-    /// as it is.
+    /// The distance within which edges were joined, in millimetres; 0 without healing.
     pub heal_mm: f64,
     /// The greatest distance of facets from their surfaces, in millimetres.
     pub chord_mm: f64,
 }
 
-/// A way of preparing a model that failed, or was worse than another.
+/// An attempt that failed, or was worse than another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attempt {
     /// As in [`Prepared`].
     pub heal_mm: f64,
     /// As in [`Prepared`].
     pub chord_mm: f64,
-    /// Why it failed.
+    /// The reason.
     pub why: String,
 }
 
-/// The uncertainty taken for files that state none, in millimetres.
+/// The uncertainty assumed for files that state none, in millimetres.
 const USUAL_MM: f64 = 1e-3;
-/// Healing tolerances as multiples of the file's own: that, tighter, looser.
+/// Healing tolerances, as multiples of the file's own.
 const HEALS: [f64; 3] = [1.0, 0.1, 10.0];
-/// Healing tolerances as multiples of the chord, which none may exceed.
+/// Healing tolerances, as multiples of the chord. The last is the upper limit of all.
 const LOOSEST: [f64; 2] = [0.1, 1.0];
-/// Longer chords, as multiples of the one asked for.
+/// Longer chords, as multiples of the requested one.
 const CHORDS: [f64; 2] = [4.0, 16.0];
 
-/// Reads a file's bytes, makes its bodies into facets and checks them.
+/// Reads a file's bytes, tessellates its bodies and checks them.
 ///
-/// A file with faults is healed first with the tolerance that the file gives for
-/// itself, then with a tighter and with looser ones, never more than the chord;
-/// and then made into facets with chords 4 and 16 times as long. Faces that are
-/// inside out are turned over, which the findings say. The first try without
-/// faults is returned, or else the one of the first chord with the fewest, whose
-/// reports have them: it must not be sliced. A panic is caught. There is no time limit.
+/// A file with faults is healed with its own tolerance, then with a tighter and with
+/// looser ones, at most the chord; then it is tessellated with chords 4 and 16 times as
+/// long. Faces that are inside out are turned over and reported as findings. Returns
+/// the first attempt without faults. If there is none, returns the attempt at the
+/// requested chord with the fewest faults; it must not be sliced. Panics of the kernel
+/// are caught. There is no time limit.
 ///
 /// # Errors
-/// Returns an error if they cannot be read, or no try gives facets.
+/// Returns an error if the file cannot be read, or no attempt gives facets.
 pub fn prepare(bytes: &[u8], read: ReadFn, chord_mm: f64) -> Result<Prepared, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
@@ -93,15 +92,15 @@ pub fn prepare(bytes: &[u8], read: ReadFn, chord_mm: f64) -> Result<Prepared, Br
     Ok(Prepared { tries: search.tries, ..prepared })
 }
 
-/// The attempts so far.
+/// The attempts made.
 struct Search<'a> {
     bytes: &'a [u8],
     read: ReadFn,
-    /// The chord asked for.
+    /// The requested chord.
     chord_mm: f64,
-    /// All of them, in order.
+    /// All attempts, in order.
     tries: Vec<Attempt>,
-    /// The best attempt by number. The first one's error if none gave facets.
+    /// The best attempt and its index, or the first one's error if none gave facets.
     best: Result<(usize, Prepared), BrepError>,
 }
 
@@ -124,7 +123,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Tries a longer chord with the healing that was best.
+    /// Tries a longer chord with the best healing tolerance.
     fn longer(&mut self, chord_mm: f64) -> Result<(), BrepError> {
         if !self.is_done() {
             let heal_mm = self.best.as_ref().map_or(0.0, |(_, best)| best.heal_mm);
@@ -134,11 +133,11 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Makes facets, and keeps them if they are less wrong than those before.
+    /// Tessellates a model, and keeps it if it has fewer faults than the best one.
     fn take(&mut self, kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) {
         let mut made = facets(kernel, heal_mm, chord_mm);
         if let Ok(made) = &mut made {
-            // A longer chord is no excuse for volumes.
+            // A longer chord must not loosen the check of volumes.
             for report in made.reports.iter_mut().filter(|report| report.faults.is_empty()) {
                 report.faults.extend(apart(report, self.chord_mm));
             }
@@ -146,7 +145,8 @@ impl Search<'_> {
         self.tries.push(Attempt::of(&made, heal_mm, chord_mm));
         let Ok(made) = made else { return };
         let is_better = match &self.best {
-            // Fewer facets have fewer open edges, but are no better for that.
+            // At a longer chord, fewer facets have fewer open edges without being
+            // better.
             Ok(_) if chord_mm > self.chord_mm => made.is_good(),
             Ok((_, best)) => wrong(&made.reports) < wrong(&best.reports),
             Err(_) => true,
@@ -157,7 +157,7 @@ impl Search<'_> {
     }
 }
 
-/// Makes facets of a model and checks them.
+/// Tessellates a model and checks it.
 fn facets(kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) -> Result<Prepared, BrepError> {
     let (mesh, reports) = caught("making facets", || {
         let mut mesh = kernel.tessellate(chord_mm)?;
@@ -193,7 +193,7 @@ impl Attempt {
     }
 }
 
-/// Returns what is wrong with bodies, in one line.
+/// Returns the bodies' faults in one line.
 fn faults(reports: &[BodyReport]) -> String {
     let of_body = |(body, report): (usize, &BodyReport)| {
         report.faults.iter().map(move |fault| format!("body {body}: {fault}")).collect::<Vec<_>>()
@@ -201,8 +201,7 @@ fn faults(reports: &[BodyReport]) -> String {
     (1..).zip(reports).flat_map(of_body).collect::<Vec<_>>().join("; ")
 }
 
-/// Counts bodies with faults, then open edges, then faults: the greater in this order,
-/// the worse.
+/// Counts bodies with faults, then open edges, then faults, as a key: greater is worse.
 fn wrong(reports: &[BodyReport]) -> [usize; 3] {
     let open = |fault: &BodyFault| match fault {
         BodyFault::Open { edges, .. } => *edges,
@@ -213,12 +212,12 @@ fn wrong(reports: &[BodyReport]) -> [usize; 3] {
     [bodies, faults().map(open).sum(), faults().count()]
 }
 
-/// Runs work that may panic, and turns a panic into an error.
+/// Runs work and turns a panic into an error.
 fn caught<T>(
     doing: &'static str,
     work: impl FnOnce() -> Result<T, BrepError>,
 ) -> Result<T, BrepError> {
-    // Nothing that the work changed is used after a panic.
+    // Data that the work changed is dropped after a panic.
     catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|panic| Err(BrepError::Panicked { doing, what: message(panic.as_ref()) }))
 }

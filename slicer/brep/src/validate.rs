@@ -1,31 +1,31 @@
-//! Validates the facets of bodies: that they are closed, and hold the surfaces' volume.
+//! Validates that the facets of bodies are closed and enclose the surfaces' volume.
 
 use std::collections::HashMap;
 
 use crate::kernel::{Facet, Jet, Kernel, Tessellation};
 use crate::vector::{Vec3, cross, dot, length, scale, sub};
 
-/// The greatest difference of a body's two volumes, as a share of them.
+/// The greatest relative difference of a body's two volumes.
 const VOLUMES_APART: f64 = 1e-3;
 
-/// Why a body cannot be sliced as it is.
+/// The reason why a body cannot be sliced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BodyFault {
     /// It has no facets.
     #[error("none of its faces could be made into facets")]
     Empty,
-    /// Edges of facets that no other facet meets, or too many do.
+    /// Some edges of facets are not shared by exactly two facets.
     #[error(
         "{edges} edges of facets are open, the first at ({:.3}, {:.3}, {:.3}) mm on #{entity}",
         at_mm[0], at_mm[1], at_mm[2]
     )]
     Open {
-        /// The number of open edges.
+        /// The number of these edges.
         edges: usize,
         /// The start of the first one, in millimetres.
         at_mm: [f64; 3],
-        /// The entity of its face.
+        /// The entity of that edge's face.
         entity: u64,
     },
     /// A face reaches beyond the control points of its surface.
@@ -36,48 +36,48 @@ pub enum BodyFault {
         /// The distance, in millimetres.
         off_mm: f64,
     },
-    /// The volume within the facets differs from that within the surfaces.
+    /// The volume of the facets differs from that of the surfaces.
     #[error(
         "its facets hold {facets_mm3:.6} mm³, its surfaces {surfaces_mm3:.6} mm³; \
          a shorter chord may bring them together"
     )]
     Volumes {
-        /// By the facets, in cubic millimetres.
+        /// The volume of the facets, in cubic millimetres.
         facets_mm3: f64,
-        /// By the surfaces.
+        /// The volume of the surfaces, in cubic millimetres.
         surfaces_mm3: f64,
     },
     /// Its faces point inwards.
     #[error("it is inside out: its volume is {volume_mm3:.6} mm³")]
     InsideOut {
-        /// By the facets, in cubic millimetres.
+        /// The volume of the facets, in cubic millimetres.
         volume_mm3: f64,
     },
 }
 
-/// A body as facets, measured.
+/// The measures and faults of a body's facets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyReport {
     /// The body's name in the file.
     pub name: String,
     /// The number of facets.
     pub facets: usize,
-    /// The volume within the facets, in cubic millimetres.
+    /// The volume of the facets, in cubic millimetres.
     pub volume_mm3: f64,
-    /// The volume below the surfaces over the facets' parameters.
+    /// The volume of the surfaces, integrated over the facets' parameters, in cubic
+    /// millimetres.
     pub exact_volume_mm3: f64,
     /// The area of the facets, in square millimetres.
     pub area_mm2: f64,
     /// The least and the greatest corner, in millimetres.
     pub box_mm: [[f64; 3]; 2],
-    /// The reasons not to slice it. A body without faults may be sliced.
+    /// The reasons not to slice it; empty for a good body.
     pub faults: Vec<BodyFault>,
 }
 
-/// Checks every body: its facets are closed, every edge shared by exactly two in
-/// opposite directions; no face reaches beyond the control points of its surface;
-/// and the volumes by facets and by surfaces agree within 0.1 %, or as far as the
-/// chord lets facets lie from surfaces.
+/// Checks every body: exactly two facets share each edge, in opposite directions; no
+/// face leaves the box of its control points; and the volumes of facets and surfaces
+/// agree within 0.1 %, or within what the chord allows.
 pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
     let report = |body: &crate::kernel::Body| {
         let facets = mesh.of_faces(&body.faces);
@@ -99,11 +99,11 @@ pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
     kernel.bodies().iter().map(report).collect()
 }
 
-/// Returns whether a body's two volumes are further apart than a chord lets them be.
+/// Returns a fault if a body's two volumes differ by more than the chord allows.
 pub(crate) fn apart(report: &BodyReport, chord_mm: f64) -> Option<BodyFault> {
     let (facets_mm3, surfaces_mm3) = (report.volume_mm3, report.exact_volume_mm3);
     let most = f64::max(VOLUMES_APART * facets_mm3.abs(), chord_mm * report.area_mm2);
-    // `NaN` is not within.
+    // `NaN` must fail the comparison.
     let is_within = (facets_mm3 - surfaces_mm3).abs() <= most;
     (!is_within).then_some(BodyFault::Volumes { facets_mm3, surfaces_mm3 })
 }
@@ -138,7 +138,7 @@ pub(crate) fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
     bounds
 }
 
-/// Returns the facet's normal with the length of twice its area.
+/// Returns the facet's normal; its length is twice the facet's area.
 pub(crate) fn doubled(mesh: &Tessellation, facet: &Facet) -> Vec3 {
     let [a, b, c] = mesh.corners(facet);
     cross(sub(b, a), sub(c, a))
@@ -152,8 +152,8 @@ pub(crate) fn volume(mesh: &Tessellation, facets: &[Facet], middle: Vec3) -> f64
     facets.iter().map(six).sum::<f64>() / 6.0
 }
 
-/// The points at which a triangle's integral is taken, with weights (Strang and Fix,
-/// six points, exact to the fourth degree).
+/// Quadrature points of a triangle, and their weights (Strang and Fix, six points,
+/// exact to the fourth degree).
 const GAUSS: [([f64; 2], f64); 6] = {
     const A: f64 = 0.445_948_490_915_965;
     const B: f64 = 0.091_576_213_509_771;
@@ -169,8 +169,8 @@ const GAUSS: [([f64; 2], f64); 6] = {
     ]
 };
 
-/// Integrates a third of the position vector's flux through the surfaces: by Gauss's
-/// theorem, the volume.
+/// Returns the volume within the surfaces: by Gauss's theorem, a third of the flux of
+/// the position vector.
 fn exact_volume(kernel: &dyn Kernel, facets: &[Facet], middle: Vec3) -> f64 {
     let mut sum = 0.0;
     for of_face in facets.chunk_by(|a, b| a.face == b.face) {
@@ -195,9 +195,10 @@ fn exact_volume(kernel: &dyn Kernel, facets: &[Facet], middle: Vec3) -> f64 {
     sum / 3.0
 }
 
-/// Returns the edges that are not shared by exactly two facets, in opposite directions.
+/// Returns a fault unless exactly two facets share each edge, in opposite directions.
 fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
-    // How often each edge is followed upwards and downwards in number.
+    // The number of uses of each edge, with ascending and with descending point
+    // indices.
     let mut edges: HashMap<[u32; 2], [u32; 2]> = HashMap::with_capacity(facets.len() * 3 / 2);
     for [a, b] in facets.iter().flat_map(sides) {
         edges.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
@@ -215,7 +216,7 @@ fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<Bo
     })
 }
 
-/// Returns a facet's edges, from point to point.
+/// Returns a facet's edges, as pairs of points.
 pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
     let [a, b, c] = facet.corners;
     [[a, b], [b, c], [c, a]]
@@ -229,7 +230,7 @@ fn outside(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option
         let [low, high] = bounds(mesh, facets);
         let over = (0..3).map(|k| (least[k] - low[k]).max(high[k] - most[k]));
         let off_mm = over.fold(0.0, f64::max);
-        // Points of edges may lie off the surface as far as facets do.
+        // Points of edges may lie off the surface by as much as facets.
         let is_off = off_mm > mesh.chord_mm;
         is_off.then_some(BodyFault::Outside { entity: info.entity, off_mm })
     };

@@ -1,4 +1,4 @@
-//! Arithmetic of points and directions as three numbers, and placed axes.
+//! Computes with points, directions and placed axes.
 
 /// A point in millimetres, or a direction.
 pub type Vec3 = [f64; 3];
@@ -48,13 +48,13 @@ pub fn middle(a: Vec3, b: Vec3) -> Vec3 {
     scale(add(a, b), 0.5)
 }
 
-/// Returns the direction with length 1, or `None` if it has no length or is not finite.
+/// Returns the direction with length 1, or `None` if its length is 0 or not finite.
 pub fn unit(a: Vec3) -> Option<Vec3> {
     let length = length(a);
     (length > 1e-12 && length.is_finite()).then(|| scale(a, 1.0 / length))
 }
 
-/// A right-handed coordinate system: its origin, and directions of length 1.
+/// A right-handed coordinate system: an origin and three directions of length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axes {
     pub(crate) origin: Vec3,
@@ -65,9 +65,9 @@ impl Axes {
     pub(crate) const WORLD: Self =
         Self { origin: [0.0; 3], directions: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
 
-    /// Returns axes with this z axis, and the x axis as near to `x` as is at a
-    /// right angle to it. Without a usable `x` it is the first of the world's axes
-    /// that is not along z (ISO 10303-42, `first_proj_axis`).
+    /// Returns axes with this z axis, and `x` projected to be at a right angle to it.
+    /// Without a usable `x`, the first world axis that is not parallel to z is used
+    /// (ISO 10303-42, `first_proj_axis`).
     pub(crate) fn new(origin: Vec3, z: Vec3, x: Option<Vec3>) -> Option<Self> {
         let z = unit(z)?;
         let across = |x: Vec3| unit(along(x, z, -dot(x, z)));
@@ -76,30 +76,30 @@ impl Axes {
         Some(Self { origin, directions: [x, cross(z, x), z] })
     }
 
-    /// Returns where a point given in these axes lies.
+    /// Converts a point from these axes to the world's.
     pub(crate) fn point(&self, p: Vec3) -> Vec3 {
         add(self.origin, self.direction(p))
     }
 
-    /// Returns where a direction given in these axes points.
+    /// Converts a direction from these axes to the world's.
     pub(crate) fn direction(&self, d: Vec3) -> Vec3 {
         let [x, y, z] = self.directions;
         along(along(scale(x, d[0]), y, d[1]), z, d[2])
     }
 
-    /// Returns a point's coordinates in these axes.
+    /// Converts a point from the world's axes to these.
     pub(crate) fn local(&self, p: Vec3) -> Vec3 {
         let d = sub(p, self.origin);
         self.directions.map(|axis| dot(axis, d))
     }
 
-    /// Returns axes given in these ones, in the world's.
+    /// Converts axes from these axes to the world's.
     pub(crate) fn then(&self, inner: &Axes) -> Axes {
         let directions = inner.directions.map(|axis| self.direction(axis));
         Axes { origin: self.point(inner.origin), directions }
     }
 
-    /// Returns the axes turned by half a turn about the first one.
+    /// Returns the axes, rotated by half a turn about x.
     pub(crate) fn turned(&self) -> Axes {
         let [x, y, z] = self.directions;
         Axes { origin: self.origin, directions: [x, scale(y, -1.0), scale(z, -1.0)] }

@@ -1,10 +1,10 @@
-//! The part of a curve that an edge is, for distances to it.
+//! Measures distances to an edge's part of its curve.
 
 use crate::geometry::Curve;
 use crate::model::BrepEdge;
 use crate::vector::{Vec3, distance};
 
-/// An edge's part of its curve.
+/// The part of a curve that belongs to an edge.
 pub(super) struct EdgeCurve<'a> {
     curve: &'a Curve,
     range: [f64; 2],
@@ -29,7 +29,7 @@ impl<'a> EdgeCurve<'a> {
         distance(self.curve.place(self.curve.project(p)), p)
     }
 
-    /// Returns where along the edge a point lies, from 0 to 1, or `None` if it lies further
+    /// Returns a point's place along the edge, from 0 to 1, or `None` if it is further
     /// away than the tolerance.
     pub(super) fn part(&self, p: Vec3) -> Option<f64> {
         let near = 2.0 * self.tolerance_mm;
@@ -39,7 +39,7 @@ impl<'a> EdgeCurve<'a> {
         let [from, to] = self.range;
         let mut t = self.curve.project(p);
         if let Some(period) = self.curve.period() {
-            // As near to the middle of the edge as turns allow.
+            // The period's multiple nearest to the middle of the edge.
             let middle = (from + to) / 2.0;
             t -= ((t - middle) / period).round() * period;
         }
@@ -48,7 +48,8 @@ impl<'a> EdgeCurve<'a> {
         (distance(at, p) <= self.tolerance_mm).then_some(part)
     }
 
-    /// Returns [`along`](Self::along) of a point further than the tolerance from both ends.
+    /// Returns [`part`](Self::part) for a point further than the tolerance from both
+    /// ends.
     pub(super) fn inner_part(&self, p: Vec3) -> Option<f64> {
         let is_end = |t: f64| distance(self.curve.place(t), p) <= self.tolerance_mm;
         self.part(p).filter(|_| !self.range.into_iter().any(is_end))

@@ -1,10 +1,9 @@
-//! Edges that faces give apart instead of sharing them, joined within a tolerance.
+//! Joins edges that faces do not share, within a tolerance.
 //!
-//! Only what is open is touched: edges that one face alone follows, their ends, and
-//! places where the edges of a loop do not meet. Vertices that lie within the
-//! tolerance become one; edges are cut where a vertex of another lies on them; of
-//! two between the same vertices that run within the tolerance of each other one
-//! stays. Whether a body's facets are closed then is for validation to say.
+//! Healing changes only what is open: edges used by one face, their ends, and gaps
+//! between the edges of a loop. It merges vertices within the tolerance, splits edges
+//! at vertices that lie on them, and merges edges that run within the tolerance of each
+//! other between the same vertices. Validation then decides whether the facets close.
 
 mod edge_curve;
 mod vertices;
@@ -17,7 +16,8 @@ use crate::kernel::{Fault, Finding};
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::Vec3;
 
-/// Joins what lies within a tolerance, and says at which faces.
+/// Joins vertices and edges within the tolerance, and returns a finding for each face
+/// changed.
 pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<Finding> {
     let mut findings = Vec::new();
     for body in model.bodies.clone() {
@@ -42,13 +42,13 @@ pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<Finding> {
     findings
 }
 
-/// One body.
+/// The healing of one body.
 struct Healing<'a> {
     faces: &'a mut [Face],
     edges: &'a mut Vec<BrepEdge>,
     vertices: &'a mut [Vec3],
     tolerance_mm: f64,
-    /// For edges that were joined or whose ends were, how far apart that was.
+    /// The gap closed at each edge that was joined or whose ends were, in millimetres.
     widest_mm: HashMap<usize, f64>,
 }
 
@@ -60,7 +60,7 @@ impl Healing<'_> {
         })
     }
 
-    /// Returns the edges that are followed once, in the order of their numbers.
+    /// Returns the edges that are used once, in ascending order.
     fn open(&self) -> Vec<usize> {
         let mut uses: HashMap<usize, usize> = HashMap::new();
         self.loops().flatten().for_each(|(edge, _)| *uses.entry(*edge).or_default() += 1);
@@ -70,7 +70,7 @@ impl Healing<'_> {
         open
     }
 
-    /// Returns where an edge of a loop ends and the next one begins, if they do not meet.
+    /// Returns the pairs of vertices between which a loop has a gap.
     fn breaks(&self) -> Vec<[usize; 2]> {
         let end = |&(edge, is_along): &(usize, bool)| self.edges[edge].ends[usize::from(is_along)];
         let start = |&(edge, is_along): &(usize, bool)| end(&(edge, !is_along));
@@ -81,7 +81,7 @@ impl Healing<'_> {
         pairs.filter(|[a, b]| a != b).collect()
     }
 
-    /// Ends of open edges, and of those that do not meet in a loop.
+    /// Returns the ends of open edges, and the vertices at gaps of loops.
     fn loose(&self) -> Vec<usize> {
         let ends = self.open().into_iter().flat_map(|edge| self.edges[edge].ends);
         let mut loose: Vec<usize> = ends
@@ -98,7 +98,7 @@ impl Healing<'_> {
         edge_range(&edge.curve, start, end, edge.forward)
     }
 
-    /// Cuts open edges where ends of others lie on them.
+    /// Splits open edges at the ends of others that lie on them.
     fn cut_edges(&mut self) {
         let mut ends: Vec<usize> = self.loose();
         ends.sort_by(|&a, &b| self.vertices[a][0].total_cmp(&self.vertices[b][0]));
@@ -134,8 +134,8 @@ impl Healing<'_> {
         }
     }
 
-    /// Returns the vertices that lie on an edge away from its ends, in its order. `ends`
-    /// go along x.
+    /// Returns the vertices that lie on an edge away from its ends, in order along it.
+    /// `ends` are sorted by x.
     fn cuts(&self, edge: &BrepEdge, ends: &[usize]) -> Vec<usize> {
         let span = EdgeCurve::new(edge, self.range(edge), self.tolerance_mm);
         let low = span.low[0] - 2.0 * self.tolerance_mm;
@@ -150,7 +150,7 @@ impl Healing<'_> {
         cuts.into_iter().map(|(_, end)| end).collect()
     }
 
-    /// Makes one of open edges that run within the tolerance of each other.
+    /// Merges open edges that run within the tolerance of each other.
     fn join_edges(&mut self) {
         let mut between: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
         let mut becomes: HashMap<usize, (usize, bool)> = HashMap::new();
@@ -182,8 +182,8 @@ impl Healing<'_> {
         }
     }
 
-    /// Returns whether an edge runs within the tolerance of another between the same
-    /// vertices: then in the same direction or not, and how far away.
+    /// Returns whether an edge runs in the same direction as another, and their
+    /// distance, if both have the same vertices and are within the tolerance.
     fn is_twin(&self, edge: &BrepEdge, other: &BrepEdge) -> Option<(bool, f64)> {
         let span = EdgeCurve::new(edge, self.range(edge), self.tolerance_mm);
         let [from, to] = self.range(other);
@@ -197,7 +197,7 @@ impl Healing<'_> {
         Some((is_along, widest))
     }
 
-    /// Returns how many places of each face were joined, and their greatest gap.
+    /// Returns the number of joints of each face, and the greatest gap.
     fn joined(&self) -> Vec<(usize, (usize, f64))> {
         let mut joined = Vec::new();
         for (number, face) in self.faces.iter().enumerate() {
@@ -215,7 +215,7 @@ impl Healing<'_> {
     }
 }
 
-/// Pieces of an edge between which it is compared.
+/// The number of intervals at whose ends edges are compared.
 const SAMPLES: usize = 8;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Models torn apart and healed.
+//! Tests healing on models that are torn apart.
 
 use std::path::Path;
 
@@ -11,15 +11,15 @@ use lamp_fixtures::{SplitMix, StepSample, StepUnit, step};
 /// A way of tearing a model apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Tear {
-    /// The edges of a face meet, but its neighbours have others.
+    /// Each face has its own edges, which meet within the face.
     Faces,
-    /// Nor do those of a face meet.
+    /// The edges within a face do not meet either.
     Edges,
-    /// Every other face has two edges for each one of its neighbours.
+    /// Every other face has two edges for each edge of its neighbours.
     Halves,
 }
 
-/// Gives every face edges of its own, whose ends are moved.
+/// Gives every face its own edges, whose ends are moved.
 fn torn(model: &mut BrepModel, by_mm: f64, tear: Tear) {
     let mut random = SplitMix(7);
     let mut moved = |p: Vec3| p.map(|x| x + by_mm * (random.below(2001) as f64 / 1000.0 - 1.0));
@@ -87,7 +87,7 @@ fn is_healed(read: impl Fn() -> StepModel, name: &str, chord_mm: f64) {
         let healed = measured(&model, chord_mm);
         let healed = healed.unwrap_or_else(|| panic!("{name}, {tear:?}: {findings:?}"));
         for ([healed, _], [whole, area]) in healed.iter().zip(&whole) {
-            // Facets of other edges lie within the chord too.
+            // Healed edges give other facets, each still within the chord.
             let most = f64::max(1e-3 * whole, 0.1 * chord_mm * area);
             assert!((healed - whole).abs() < most, "{name}, {tear:?}: {healed} {whole}");
         }

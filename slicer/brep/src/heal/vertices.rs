@@ -1,4 +1,4 @@
-//! Joins vertices within the tolerance.
+//! Merges vertices within the tolerance.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,10 +11,10 @@ use crate::vector::{Vec3, add, distance, scale};
 const MAX_STEPS: usize = 50;
 const SETTLED_MM: f64 = 1e-9;
 impl Healing<'_> {
-    /// Makes one of vertices that lie within the tolerance.
+    /// Merges vertices that lie within the tolerance of each other.
     pub(super) fn join_vertices(&mut self) {
         let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
-        // Which vertex each becomes: the first within the tolerance.
+        // Each vertex becomes the first one within the tolerance.
         let mut becomes: HashMap<usize, usize> = HashMap::new();
         for vertex in self.loose() {
             let place = self.vertices[vertex];
@@ -78,8 +78,8 @@ impl Healing<'_> {
         }
     }
 
-    /// Takes edges out of loops whose ends become one vertex and which are as short
-    /// as that.
+    /// Removes edges from loops if their ends become one vertex and all of the edge
+    /// lies within twice the tolerance of its start.
     fn collapse(&mut self, becomes: &HashMap<usize, usize>) {
         let at = |vertex: &usize| *becomes.get(vertex).unwrap_or(vertex);
         let is_tiny = |&(edge, _): &(usize, bool)| {

@@ -1,8 +1,8 @@
-//! A face's loops as closed polygons in the parameters of its surface.
+//! Turns a face's loops into closed polygons in the parameters of its surface.
 //!
-//! On a closed surface a loop may go around it: it is then cut open along a line
-//! to the loop on the other side, or to the pole there. Both sides of the cut have
-//! the same points.
+//! A loop may go around a closed surface. The polygon is then cut open along a line to
+//! the loop on the other side, or to the pole there. Both sides of the cut have the
+//! same points.
 
 use super::unwrap::{Unwrapped, between, near, unwrap};
 use super::{FacePoints, Node, PointRing};
@@ -10,7 +10,8 @@ use crate::geometry::{Pole, Surface};
 use crate::kernel::Fault;
 use crate::model::Face;
 
-/// Returns the polygons of a face, which lies within an odd number of them.
+/// Returns the polygons of a face. A point is on the face if an odd number of them
+/// contain it.
 pub(super) fn polygons(
     face: &Face,
     rings: &[PointRing],
@@ -51,8 +52,8 @@ struct FaceOutline<'a, 'b> {
 }
 
 impl FaceOutline<'_, '_> {
-    /// Takes the outer loop out of loops that do not go around, or makes it of the
-    /// whole surface.
+    /// Removes the outer loop from the loops that do not go around the surface. If
+    /// there is none, makes it from the surface's whole domain.
     fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
         let areas: Vec<f64> = closed.iter().map(|loop_| area(&loop_.nodes)).collect();
         let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
@@ -63,7 +64,7 @@ impl FaceOutline<'_, '_> {
         }
     }
 
-    /// Returns whether the surface bounds a body by itself.
+    /// Returns whether the surface is closed both ways, and so bounds a body by itself.
     fn is_closed(&self) -> bool {
         let periods = self.face.surface.periods();
         (0..2).all(|axis| {
@@ -72,7 +73,8 @@ impl FaceOutline<'_, '_> {
         })
     }
 
-    /// Returns the whole of a closed surface, cut open away from its holes.
+    /// Returns the boundary of a closed surface's whole domain, cut open away from its
+    /// holes.
     fn whole(&mut self, holes: &[Unwrapped]) -> Result<Vec<Node>, Fault> {
         let surface = &self.face.surface;
         let [Some(u), Some(v)] = surface.domain() else { return Err(Fault::Unbounded) };
@@ -117,8 +119,8 @@ impl FaceOutline<'_, '_> {
         Ok(polygon)
     }
 
-    /// Returns a straight side from its first node up to its last, without that one; all
-    /// of it is one point if there is one.
+    /// Returns the nodes of a straight side from `from` to `to`, without the last. All
+    /// of them are the point `tip` if there is one.
     fn side(&mut self, from: Node, to: Node, tip: Option<u32>) -> Vec<Node> {
         let surface = &self.face.surface;
         let inner = match tip {
@@ -133,14 +135,15 @@ impl FaceOutline<'_, '_> {
         side
     }
 
-    /// From a loop that goes around to the pole on its left.
+    /// Returns a polygon from a loop that goes around the surface to the pole on the
+    /// loop's left.
     fn up_to_pole(&mut self, around: &Unwrapped) -> Result<Vec<Node>, Fault> {
         let axis = self.axis(around)?;
         let across = 1 - axis;
         let ring = opened(around, axis, &self.face.surface);
         let [first, last] = [ring[0], ring[ring.len() - 1]];
-        // The left of a way along u is where v grows, that of one along v where u
-        // falls.
+        // The left of a loop along u is towards greater v; the left of one along v is
+        // towards smaller u.
         let left = around.turns[axis] * if axis == 0 { 1 } else { -1 };
         let left = f64::from(if self.face.along_normal { left } else { -left });
         let is_there =
@@ -166,7 +169,8 @@ impl FaceOutline<'_, '_> {
         Ok(polygon)
     }
 
-    /// Between two loops that go around in opposite directions.
+    /// Returns the polygon between two loops that go around the surface in opposite
+    /// directions.
     fn band(&mut self, one: &Unwrapped, other: &Unwrapped) -> Result<Vec<Node>, Fault> {
         let axis = self.axis(one)?;
         if other.turns.map(|turn| -turn) != one.turns {
@@ -175,7 +179,8 @@ impl FaceOutline<'_, '_> {
         let ring = opened(one, axis, &self.face.surface);
         let [first, last] = [ring[0], ring[ring.len() - 1]];
         let period = self.face.surface.periods()[axis];
-        // The other loop starts where it is nearest to the end of this one.
+        // The other loop starts at its point nearest to the end of this one, for a
+        // short cut.
         let apart =
             |node: &Node| (near(node.uv[axis], last.uv[axis], period) - last.uv[axis]).abs();
         let nearest = (0..other.nodes.len())
@@ -198,7 +203,7 @@ impl FaceOutline<'_, '_> {
         Ok(polygon)
     }
 
-    /// Around which parameter a loop goes, once.
+    /// Returns the parameter, 0 for u or 1 for v, around which a loop goes once.
     fn axis(&self, around: &Unwrapped) -> Result<usize, Fault> {
         match around.turns {
             [1 | -1, 0] => Ok(0),
@@ -217,7 +222,7 @@ fn shifted(mut node: Node, axis: usize, by: f64) -> Node {
     node
 }
 
-/// Returns the opposite side of a whole surface, backwards from its corner `start`, with
+/// Returns the opposite side of a whole domain, backwards from its corner `start`, with
 /// the same points.
 fn opposite(side: &[Node], start: Node, axis: usize) -> Vec<Node> {
     let inner = side[1..].iter().rev().map(|node| {
@@ -228,7 +233,7 @@ fn opposite(side: &[Node], start: Node, axis: usize) -> Vec<Node> {
     [start].into_iter().chain(inner).collect()
 }
 
-/// Returns the loop's nodes, and the first again after its turn.
+/// Returns the loop's nodes, and the first once more, one period further.
 fn opened(around: &Unwrapped, axis: usize, surface: &Surface) -> Vec<Node> {
     let period = surface.periods()[axis].unwrap_or(0.0);
     let mut nodes = around.nodes.clone();
@@ -236,7 +241,7 @@ fn opened(around: &Unwrapped, axis: usize, surface: &Surface) -> Vec<Node> {
     nodes
 }
 
-/// Returns the loop from another of its nodes on.
+/// Returns the loop, starting at node `start`.
 fn rotated(around: &Unwrapped, start: usize, axis: usize, surface: &Surface) -> Unwrapped {
     let by = surface.periods()[axis].unwrap_or(0.0) * f64::from(around.turns[axis]);
     let (before, after) = around.nodes.split_at(start);
@@ -244,19 +249,19 @@ fn rotated(around: &Unwrapped, start: usize, axis: usize, surface: &Surface) -> 
     Unwrapped { nodes: after.iter().copied().chain(before).collect(), turns: around.turns }
 }
 
-/// Returns whether the outer polygon goes counter-clockwise as its loops do. One that was
-/// made of a whole surface goes as the face says.
+/// Returns whether the outer polygon is counter-clockwise. One made from a whole domain
+/// takes its direction from the face.
 pub(super) fn is_counter_clockwise(polygons: &[Vec<Node>]) -> bool {
     polygons.last().is_none_or(|outer| area(outer) > 0.0)
 }
 
-/// Twice the signed area of a polygon.
+/// Returns twice the signed area of a polygon.
 fn area(nodes: &[Node]) -> f64 {
     let next = nodes.iter().cycle().skip(1);
     nodes.iter().zip(next).map(|(a, b)| a.uv[0] * b.uv[1] - b.uv[0] * a.uv[1]).sum()
 }
 
-/// Returns whether a point lies within a polygon, by the crossings to its right.
+/// Returns whether a point lies in a polygon, from the sides crossed to its right.
 fn is_within(p: [f64; 2], polygon: &[Node]) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let crosses = |(a, b): &(&Node, &Node)| {
@@ -266,7 +271,7 @@ fn is_within(p: [f64; 2], polygon: &[Node]) -> bool {
     polygon.iter().zip(next).filter(crosses).count() % 2 == 1
 }
 
-/// Returns a hole, moved by periods until it lies within the outer polygon.
+/// Returns a hole, moved by periods until it lies in the outer polygon.
 fn moved_into(mut hole: Vec<Node>, outer: &[Node], surface: &Surface) -> Vec<Node> {
     let [u, v] = surface.periods().map(|period| match period {
         Some(period) => (-2..=2).map(|k| f64::from(k) * period).collect(),
@@ -277,7 +282,7 @@ fn moved_into(mut hole: Vec<Node>, outer: &[Node], surface: &Surface) -> Vec<Nod
         let is_in = |node: &&Node| is_within([node.uv[0] + by[0], node.uv[1] + by[1]], outer);
         hole.iter().filter(is_in).count()
     };
-    // Where most of it lies within; if nowhere, it stays.
+    // Chooses the move that puts most nodes inside; if none does, the hole stays.
     let best = all.map(|by| (within(&by), by)).max_by(|a, b| {
         let far = |by: [f64; 2]| by[0].abs() + by[1].abs();
         a.0.cmp(&b.0).then(far(b.1).total_cmp(&far(a.1)))

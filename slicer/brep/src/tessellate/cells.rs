@@ -1,4 +1,5 @@
-//! Parameters as a plane of cells in which a surface bends about as much each way.
+//! Scales parameters to a plane of cells in which a surface bends about equally both
+//! ways.
 
 use spade::Point2;
 
@@ -6,15 +7,15 @@ use super::Node;
 use crate::geometry::Surface;
 use crate::vector::{Vec3, along, distance, dot, length, middle, sub, unit};
 
-/// The greatest ratio of a cell's length and width.
+/// The greatest ratio of a cell's length to its width.
 const LONGEST: f64 = 30.0;
 
-/// From parameters to the plane of the triangulation.
+/// The map from parameters to the plane of the triangulation.
 pub(super) struct CellScale {
     low: [f64; 2],
-    /// Cells in one unit of a parameter.
+    /// The number of cells per unit of each parameter.
     cells: [f64; 2],
-    /// Cells in all.
+    /// The number of cells along each parameter.
     pub(super) count: [f64; 2],
 }
 
@@ -29,7 +30,7 @@ impl CellScale {
         }
         let size = [0, 1].map(|k| (high[k] - low[k]).max(1e-12));
         let (lengths, bends) = measure(surface, low, size);
-        // As many cells as the sag of each takes.
+        // Sag grows with the square of a cell's size, hence the root.
         let wanted = bends.map(|bend| (bend / chord_mm).sqrt().max(1.0));
         let cell = [0, 1].map(|k| lengths[k].max(1e-9) / wanted[k]);
         let most = LONGEST * cell[0].min(cell[1]);
@@ -38,7 +39,7 @@ impl CellScale {
     }
 
     pub(super) fn place(&self, uv: [f64; 2]) -> Point2<f64> {
-        // Rounded, so that corners on a line along a parameter are exactly in line.
+        // Rounded, so that corners along a parameter line are exactly collinear.
         let at = |k: usize| {
             let x = (uv[k] - self.low[k]) * self.cells[k];
             (x * f64::from(1 << 30)).round() / f64::from(1 << 30)
@@ -51,8 +52,8 @@ impl CellScale {
     }
 }
 
-/// Returns the lengths of a surface along u and v, and the sag that one cell over all of
-/// it would have.
+/// Returns the lengths of a surface along u and v, and the sag of a single cell over
+/// the whole surface along each.
 fn measure(surface: &Surface, low: [f64; 2], size: [f64; 2]) -> ([f64; 2], [f64; 2]) {
     const STEPS: usize = 16;
     let at = |i: usize, j: usize| {
@@ -70,7 +71,8 @@ fn measure(surface: &Surface, low: [f64; 2], size: [f64; 2]) -> ([f64; 2], [f64;
                 let off = sub(three[1], middle(three[0], three[2]));
                 let way = unit(sub(three[2], three[0])).unwrap_or([0.0; 3]);
                 let sag = length(along(off, way, -dot(off, way)));
-                // Sag grows with the square of the step; this is that of two.
+                // Sag grows with the square of the step, and each sample spans two
+                // steps.
                 let whole = sag * (STEPS * STEPS) as f64 / 4.0;
                 bends[axis] = f64::max(bends[axis], whole);
             }
@@ -79,13 +81,13 @@ fn measure(surface: &Surface, low: [f64; 2], size: [f64; 2]) -> ([f64; 2], [f64;
     (lengths, bends)
 }
 
-/// The sides of all polygons by their height, to find those near a point.
+/// The sides of all polygons, sorted by height to find those near a point.
 pub(super) struct Borders {
     rows: Vec<Vec<[[f64; 2]; 2]>>,
     step: f64,
 }
 
-/// The least distance of the grid's corners from sides, in cells.
+/// The least distance between grid corners and sides, in cells.
 const CLEAR: f64 = 0.3;
 
 impl Borders {

@@ -1,8 +1,8 @@
 //! Triangulates a face between its polygons.
 //!
-//! The plane of the triangulation is the surface's parameters, scaled so that a
-//! step along either bends about as much. Its edges along the polygons stay;
-//! others are halved until the surface above them is near.
+//! The triangulation is in the surface's parameters, scaled so that the surface bends
+//! about equally along both. Edges along the polygons stay; others are halved until the
+//! triangles are within the chord of the surface.
 
 use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
@@ -19,11 +19,12 @@ use crate::vector::{Vec3, cross, distance, dot, middle, sub, unit};
 
 type Triangles = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
-/// Rounds of halving.
+/// The greatest number of rounds of halving.
 const MAX_ROUNDS: usize = 40;
-/// Cells of a face: those of a sphere of 100 mm at a chord of 0.3 um.
+/// The greatest number of cells of a face: a sphere of 100 mm at a chord of 0.3 um.
 const MAX_CELLS: f64 = 1e6;
-/// Corners that halving may add: for each cell, and in any case.
+/// The greatest number of corners that halving may add: per cell, and regardless of
+/// cells.
 const MORE: [usize; 2] = [4, 20_000];
 
 type Filled = (Vec<[Node; 3]>, Option<Fault>);
@@ -37,7 +38,7 @@ pub(super) fn fill(
 ) -> Result<Filled, Fault> {
     let scale = CellScale::new(&face.surface, polygons, chord_mm);
     let cells = scale.count[0] * scale.count[1];
-    // `NaN` is too many.
+    // `NaN` counts as too many.
     if !matches!(cells.partial_cmp(&MAX_CELLS), Some(Ordering::Less)) {
         return Err(Fault::Fine { cells });
     }
@@ -60,7 +61,7 @@ struct FaceTriangulation<'a> {
     chord_mm: f64,
     scale: CellScale,
     mesh: Triangles,
-    /// The corners that are the mesh's vertices, in their order.
+    /// The corners, in the order of the mesh's vertices.
     corners: Vec<MeshCorner>,
     /// The number of times that polygons follow each edge.
     borders: HashMap<[FixedVertexHandle; 2], usize>,
@@ -68,7 +69,7 @@ struct FaceTriangulation<'a> {
 
 struct MeshCorner {
     uv: [f64; 2],
-    /// The place on the surface, or that of an edge's point.
+    /// The point on the surface, or on the edge.
     place: Vec3,
     point: Option<u32>,
 }
@@ -93,7 +94,7 @@ impl FaceTriangulation<'_> {
                 }
                 self.mesh.add_constraint(a, b);
                 if !self.mesh.exists_constraint(a, b) {
-                    // Another corner lies on it.
+                    // Another corner lies on the edge.
                     return Err(Fault::Crossing);
                 }
             }
@@ -104,7 +105,7 @@ impl FaceTriangulation<'_> {
     fn corner(&mut self, node: &Node) -> Result<FixedVertexHandle, Fault> {
         let handle = self.insert(self.scale.place(node.uv))?;
         if handle.index() < self.corners.len() {
-            // Two points that have become one would leave a gap.
+            // Merging two different points would leave a gap to the neighbouring face.
             let is_same = self.corners[handle.index()].point == Some(node.point);
             return if is_same { Ok(handle) } else { Err(Fault::Crossing) };
         }
@@ -117,7 +118,7 @@ impl FaceTriangulation<'_> {
         self.mesh.insert(at).map_err(|_| Fault::Unbounded)
     }
 
-    /// Adds a corner within the face.
+    /// Adds a corner inside the face.
     fn add_inner(&mut self, at: Point2<f64>) -> Result<(), Fault> {
         let handle = self.insert(at)?;
         if handle.index() == self.corners.len() {
@@ -127,7 +128,7 @@ impl FaceTriangulation<'_> {
         Ok(())
     }
 
-    /// Adds corners where the cells meet, away from the polygons.
+    /// Adds corners at the corners of cells, away from the polygons.
     fn add_grid(&mut self, polygons: &[Vec<Node>]) -> Result<(), Fault> {
         let counts = self.scale.count.map(|count| count.ceil().min(1000.0) as usize);
         if matches!(self.surface, Surface::Plane(_)) || counts.contains(&1) {
@@ -147,7 +148,7 @@ impl FaceTriangulation<'_> {
         Ok(())
     }
 
-    /// Halves edges until the surface is near all triangles.
+    /// Halves edges until all triangles are near the surface.
     fn refine(&mut self, points: &FacePoints) -> Result<Option<Fault>, Fault> {
         for corner in &mut self.corners {
             if let Some(point) = corner.point {
@@ -170,7 +171,8 @@ impl FaceTriangulation<'_> {
         Ok((worst > 4.0 * self.chord_mm).then_some(Fault::Coarse { off_mm: worst }))
     }
 
-    /// Returns where corners are missing, and the surface's greatest distance from the triangles.
+    /// Returns the places that need more corners, and the greatest distance between the
+    /// surface and the triangles.
     fn too_far(&self) -> (Vec<Point2<f64>>, f64) {
         let mut list = Vec::new();
         let mut seen = HashSet::new();
@@ -180,7 +182,8 @@ impl FaceTriangulation<'_> {
             let corners = face.vertices().map(|v| &self.corners[v.fix().index()]);
             let flat = face.vertices().map(|v| v.position());
             let places = corners.map(|corner| corner.place);
-            // Two corners at one pole: no facet, and to stay so.
+            // A triangle with two corners at one pole has no area, so it makes no
+            // facet.
             let is_tip = (0..3).any(|k| {
                 corners[k].point.is_some() && corners[k].point == corners[(k + 1) % 3].point
             });
@@ -223,7 +226,7 @@ impl FaceTriangulation<'_> {
         (list, worst)
     }
 
-    /// Returns the triangles within an odd number of polygons.
+    /// Returns the triangles that an odd number of polygons contain.
     fn inside(&self) -> Vec<FixedFaceHandle<InnerTag>> {
         let mesh = &self.mesh;
         let mut is_inside = vec![None; mesh.num_all_faces()];
@@ -256,7 +259,7 @@ impl FaceTriangulation<'_> {
         list
     }
 
-    /// Returns the triangles with their nodes.
+    /// Returns the triangles and their nodes.
     fn triangles(&mut self, points: &mut FacePoints) -> Vec<[Node; 3]> {
         let inside = self.inside();
         let mut list = Vec::with_capacity(inside.len());

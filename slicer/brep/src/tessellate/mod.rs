@@ -1,9 +1,9 @@
-//! Faces as facets that share the points of their edges.
+//! Tessellates faces into facets that share the points of their edges.
 //!
-//! Each edge is made into a chain of points once, and all faces along it take
-//! these. A face is triangulated in the parameters of its surface, between its
-//! loops; points within it lie on the surface. So facets of neighbouring faces
-//! meet in the same points whatever the surfaces do there.
+//! Each edge becomes a chain of points once, which all its faces share. A face is
+//! triangulated between its loops, in the parameters of its surface; inner points lie
+//! on the surface. Facets of neighbouring faces therefore always meet in the same
+//! points.
 
 mod boundary;
 mod cells;
@@ -22,19 +22,19 @@ use crate::vector::{Vec3, distance};
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Node {
     uv: [f64; 2],
-    /// The point's number. A point may be several corners, along a seam or at a pole.
+    /// The point's index. A point has several corners along a seam or at a pole.
     point: u32,
 }
 
-/// Points of an edge keep this many times the distance between the curve's end and the
-/// vertex from it.
+/// The clearance of an edge's inner points from its vertices, as a multiple of the
+/// distance between a vertex and the curve's end.
 const CLEAR: f64 = 4.0;
-/// The most facets, about 5 GB of memory: more than any part that is built takes.
+/// The greatest number of facets, which take about 5 GB of memory.
 pub const MAX_FACETS: usize = 50_000_000;
-/// The most points on edges.
+/// The greatest number of points on edges.
 const MAX_POINTS: usize = 20_000_000;
 
-/// Points of a face: those of its edges, which it shares, and its own.
+/// The points of a face: those of its edges, which are shared, and its own.
 struct FacePoints<'a> {
     shared: &'a [Vec3],
     own: Vec<Vec3>,
@@ -52,7 +52,7 @@ impl FacePoints<'_> {
     }
 }
 
-/// A face as facets.
+/// The facets of one face.
 struct FacePatch {
     own: Vec<Vec3>,
     facets: Vec<Facet>,
@@ -60,7 +60,7 @@ struct FacePatch {
     faults: Vec<Fault>,
 }
 
-/// Makes all faces of a model into facets.
+/// Tessellates all faces of a model.
 pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
@@ -83,7 +83,7 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
     let (mut facets, mut tips) = (Vec::new(), Vec::new());
     let mut findings = Vec::new();
     for (face, patch) in (0u32..).zip(patches) {
-        // A face counts its own points from where the shared ones end.
+        // A face numbers its own points after the shared ones.
         let moved = (points.len() - shared) as u32;
         points.extend(patch.own);
         if facets.len() + patch.facets.len() > MAX_FACETS {
@@ -103,14 +103,14 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
     Ok(Tessellation { points, facets, tips, findings, chord_mm })
 }
 
-/// Makes an edge into points, from its start to its end.
+/// Turns an edge into points, from its start to its end.
 fn chain(edge: &BrepEdge, model: &BrepModel, chord_mm: f64, points: &mut Vec<Vec3>) -> Vec<u32> {
     let [start, end] = edge.ends;
     let range = edge_range(&edge.curve, model.vertices[start], model.vertices[end], edge.forward);
     let line = edge.curve.polyline(range, chord_mm);
     let first = points.len() as u32;
-    // The vertices stand for the ends, so that all edges of a vertex meet. Where one
-    // lies off the curve, points about as near would turn the way back.
+    // The vertices replace the curve's ends, so that all edges of a vertex meet. If a
+    // vertex lies off the curve, a point close to it would make the chain double back.
     let off = |vertex: usize, end: usize| CLEAR * distance(model.vertices[vertex], line[end]);
     let (off_start, off_end) = (off(start, 0), off(end, line.len() - 1));
     let is_clear = |p: &&Vec3| {
@@ -137,7 +137,7 @@ fn patch(
         faults.extend(off(face, &polygons, &points, chord_mm));
         let (corners, coarse) = fill::fill(face, &polygons, &mut points, chord_mm)?;
         if boundary::is_counter_clockwise(&polygons) != face.along_normal {
-            // The loops are what joins faces; neighbours follow them the other way.
+            // Neighbours share the loops, not the sense flag, so the loops decide.
             outwards = !outwards;
             faults.push(Fault::Sense);
         }
@@ -162,10 +162,10 @@ fn has_three_corners(facet: &Facet) -> bool {
     a != b && b != c && c != a
 }
 
-/// A face's loops as points, each once.
+/// A loop of a face, as points.
 enum PointRing {
     Point(u32),
-    /// Nothing if its edges do not follow each other.
+    /// `None` if its edges do not follow each other.
     Points(Option<Vec<u32>>),
 }
 
@@ -195,8 +195,8 @@ fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<PointRing> {
     rings.collect()
 }
 
-/// Returns how far the points of the edges lie off the surface, if that is more than
-/// facets do.
+/// Returns a fault if the points of the edges lie further off the surface than facets
+/// may.
 fn off(face: &Face, polygons: &[Vec<Node>], points: &FacePoints, chord_mm: f64) -> Option<Fault> {
     let apart =
         |node: &Node| crate::vector::distance(points.get(node.point), face.surface.point(node.uv));

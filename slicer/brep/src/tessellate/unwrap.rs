@@ -1,4 +1,4 @@
-//! Maps loops to the parameters of their surface, through seams and poles.
+//! Maps loops to the parameters of their surface, across seams and poles.
 
 use super::{FacePoints, Node};
 use crate::geometry::{Pole, Surface};
@@ -9,17 +9,17 @@ use crate::vector::distance;
 #[derive(Clone, Debug)]
 pub(super) struct Unwrapped {
     pub(super) nodes: Vec<Node>,
-    /// The number of times that it goes around a closed surface, along u and along v, before it
-    /// is back at its start.
+    /// The number of turns along u and along v around a closed surface, from start to
+    /// start.
     pub(super) turns: [i32; 2],
 }
 
-/// Points nearer than this to a pole are at it, in millimetres.
+/// The distance within which a point counts as at a pole, in millimetres.
 const AT_POLE_MM: f64 = 1e-5;
-/// Corners that stand for a pole, for a whole turn around it.
+/// The number of corners that stand for a pole, per full turn around it.
 const POLE_PARTS: f64 = 16.0;
 
-/// Finds a loop's parameters, each as near to those before as periods allow.
+/// Finds a loop's parameters, each as near to the one before as periods allow.
 pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &FacePoints) -> Unwrapped {
     let surface = &face.surface;
     let periods = surface.periods();
@@ -27,7 +27,7 @@ pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &FacePoi
         let place = points.get(point);
         poles.iter().find(|pole| distance(pole.point, place) < AT_POLE_MM)
     };
-    // Starts away from poles.
+    // Start away from poles, where one parameter is arbitrary.
     let start = ring.iter().position(|&point| pole_at(point).is_none()).unwrap_or(0);
     let order = ring[start..].iter().chain(&ring[..start]).copied();
     let mut nodes: Vec<Node> = Vec::with_capacity(ring.len() + 1);
@@ -61,7 +61,7 @@ pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &FacePoi
     Unwrapped { nodes, turns }
 }
 
-/// Moves a parameter by periods to the one nearest to another.
+/// Returns a parameter, moved by periods to be nearest to another.
 pub(super) fn near(t: f64, other: f64, period: Option<f64>) -> f64 {
     match period {
         Some(period) => t - ((t - other) / period).round() * period,
@@ -69,11 +69,11 @@ pub(super) fn near(t: f64, other: f64, period: Option<f64>) -> f64 {
     }
 }
 
-/// Adds the corners that stand for a pole between two nodes, and says where the
-/// second of them lies.
+/// Adds the corners that stand for a pole between two nodes, and returns the parameters
+/// of the second node.
 ///
-/// A pole is a side of the domain. The face lies on the left of its loop, which
-/// decides in which direction the side is followed.
+/// A pole is a side of the domain. The face lies on the left of its loop, which decides
+/// the direction along that side.
 fn around_pole(
     face: &Face,
     pole: &Pole,
@@ -85,8 +85,7 @@ fn around_pole(
     let free = 1 - pole.axis;
     if let Some(period) = face.surface.periods()[free] {
         let is_last = pole.at > before[pole.axis];
-        // Counter-clockwise: backwards along the side of the greatest v and along
-        // that of the least u.
+        // Counter-clockwise is backwards along the sides of greatest v and of least u.
         let is_forward = (is_last == (pole.axis == 0)) == face.along_normal;
         let way = (after[free] - before[free]).rem_euclid(period);
         let tiny = 1e-6 * period;
@@ -110,8 +109,8 @@ fn around_pole(
     after
 }
 
-/// Returns parameters on the straight line between two, without these, so that the
-/// surface along it bends less than the chord.
+/// Returns parameters strictly between two on a straight line, close enough that the
+/// surface between them bends less than the chord.
 pub(super) fn between(surface: &Surface, a: [f64; 2], b: [f64; 2], chord_mm: f64) -> Vec<[f64; 2]> {
     let mut list = Vec::new();
     halve(surface, [a, b], chord_mm, 0, &mut list);
@@ -131,7 +130,8 @@ fn halve(
         let chord = crate::vector::along(p, crate::vector::sub(q, p), part);
         distance(surface.point(at(part)), chord) <= chord_mm
     };
-    // Two halvings at least where it bends: a whole turn comes back to its start.
+    // Where it bends, halve at least twice: after a full turn the ends coincide and
+    // look straight.
     let is_plain =
         matches!(surface, Surface::Plane(_) | Surface::Cylinder { .. } | Surface::Cone { .. });
     let least = if is_plain && a[0] == b[0] { 0 } else { 2 };
