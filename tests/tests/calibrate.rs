@@ -284,7 +284,7 @@ fn wrong_usage_is_status_2() {
         ("lamp calibrate depth a.csv -o a.csv", "that is an input"),
         ("lamp calibrate depth a.csv -o a.svg --plot a.svg", "the material is written there"),
         ("lamp calibrate depth a.csv --intensity 0W/cm2", "above zero"),
-        ("lamp calibrate depth a.csv --intensity 1e99W/cm2", "1e-6 to 1e9 mW/cm2"),
+        ("lamp calibrate depth a.csv --intensity 1e99W/cm2", "1e-6 and 1e9 mW/cm2"),
         ("lamp calibrate depth a.csv --intensity 1.6W/cm2 -o My_Resin.toml", "--name"),
         ("lamp calibrate depth a.csv --name mine", "--output"),
     ] {

@@ -183,7 +183,7 @@ fn what_cannot_be_is_said() {
     usage("slice tower.stl --deviation 2%", "--deviation needs --adaptive");
     usage("slice tower.stl --adaptive --plane middle", "leave out --plane");
     usage("slice tower.stl --adaptive --thickness 50um", "cannot be used with");
-    usage("slice tower.stl --adaptive --min 50um --max 25um", "between 50 and 25 um thick");
+    usage("slice tower.stl --adaptive --min 50um --max 25um", "between 50um and 25um thick");
     usage("slice tower.stl --adaptive --cusp 9um --criterion volume", "--criterion cusp");
     usage("lamp heights tower.stl --criterion cusp", "needs a bound, as --cusp");
     usage("lamp heights tower.stl --time-budget 1h", "give --material or --exposure-table");

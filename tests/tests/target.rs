@@ -119,7 +119,7 @@ fn impossible_targets_are_wrong_usage() {
         ("lamp target", "Usage"),
         ("lamp target squares -o targets --doses 1,2mJ/cm2", "--intensity"),
         ("lamp target squares -o t --doses 1mJ/cm2 --material sl-5510", "give --intensity"),
-        (&format!("{squares} --doses 2,1mJ/cm2"), "ascending order"),
+        (&format!("{squares} --doses 2,1mJ/cm2"), "go up"),
         (&format!("{squares} --doses 1,2"), "is not a dose"),
         (&format!("{squares} --doses 1,2mJ/cm2 --sizes 25,0"), "squares of 0 pixels"),
         (&format!("{squares} --doses 1,2mJ/cm2 --sizes 25,30,25"), "25 is given twice"),
