@@ -1,4 +1,4 @@
-//! The C++ side, as safe types: shim.hpp has the same declarations.
+//! Wraps the C++ side in safe types; shim.hpp has the same declarations.
 
 #![expect(unsafe_code, reason = "OpenCASCADE is C++, reached through C functions")]
 
@@ -11,14 +11,14 @@ mod raw {
     use std::ffi::{c_char, c_void};
     use std::marker::{PhantomData, PhantomPinned};
 
-    /// Something that only the C++ side knows.
+    /// An opaque type of the C++ side.
     #[repr(C)]
     pub(super) struct Model {
         _data: [u8; 0],
         _marker: PhantomData<(*mut u8, PhantomPinned)>,
     }
 
-    /// Something that only the C++ side knows.
+    /// An opaque type of the C++ side.
     #[repr(C)]
     pub(super) struct Mesh {
         _data: [u8; 0],
@@ -75,14 +75,14 @@ mod raw {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(super) struct Face {
-    /// A number of `GeomAbs_SurfaceType`.
+    /// A value of `GeomAbs_SurfaceType`.
     pub(super) kind: u32,
     pub(super) body: u32,
-    /// The entity of the file, or 0.
+    /// The entity's number in the file, or 0.
     pub(super) entity: u64,
     pub(super) has_box: u64,
     pub(super) box_mm: [[f64; 3]; 2],
-    /// The least and the greatest u, and those of v.
+    /// The ranges of u and of v.
     pub(super) range: [[f64; 2]; 2],
 }
 
@@ -101,39 +101,39 @@ pub(super) struct Node {
 pub(super) struct Chain {
     pub(super) face: u32,
     pub(super) edge: u32,
-    /// The vertices at the edge's ends; `u32::MAX` where it has none.
+    /// The vertices at the edge's ends, or `u32::MAX`.
     pub(super) ends: [u32; 2],
-    /// Where its nodes are among those of all chains.
+    /// The position of its first node among those of all chains.
     pub(super) first: u32,
     pub(super) count: u32,
 }
 
-/// A face that is not as it should be.
+/// A face with faults.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(super) struct Fault {
     pub(super) face: u32,
-    /// Bits of `IMeshData_Status`, and the highest if there are no facets.
+    /// Bits of `IMeshData_Status`; the highest is set if there are no facets.
     pub(super) status: u32,
 }
 
-/// The values of a list.
+/// Returns the values of a list.
 ///
 /// # Safety
-/// The list holds values of this type, which live and stay as they are as long as
-/// the owner is borrowed.
+/// The list holds values of this type, which live and do not change while the owner is
+/// borrowed.
 unsafe fn values<T, O>(_owner: &O, list: raw::List) -> &[T] {
     if list.count == 0 {
         return &[];
     }
-    // SAFETY: what the caller promises. A vector's values are aligned and in a row.
+    // SAFETY: the caller's promise. A vector's values are aligned and contiguous.
     unsafe { std::slice::from_raw_parts(list.data.cast(), list.count) }
 }
 
-/// What the C++ side says when it fails.
+/// Returns the message of an error.
 fn failed(error: &raw::Error) -> String {
-    // SAFETY: the text ends with a zero, at first everywhere and then where it was
-    // written last; it outlives the call.
+    // SAFETY: the text is zero-filled at first and zero-terminated when written; it
+    // outlives the call.
     let text = unsafe { CStr::from_ptr(error.text.as_ptr()) };
     text.to_string_lossy().into_owned()
 }
@@ -146,16 +146,14 @@ pub(super) struct Model {
     faces: usize,
 }
 
-// SAFETY: nothing in it belongs to a thread: OpenCASCADE counts references
-// atomically.
+// SAFETY: nothing in it is bound to a thread; OpenCASCADE counts references atomically.
 unsafe impl Send for Model {}
-// SAFETY: all calls read it, except for making facets, which locks it; that changes
-// nothing of what the others read. Surfaces are evaluated without a cache.
+// SAFETY: all calls only read it, except meshing, which locks it and changes nothing that
+// the others read. Surfaces are evaluated without a cache.
 unsafe impl Sync for Model {}
 
 impl Model {
-    /// Reads the text of a STEP file, closing gaps up to a tolerance if that is
-    /// above zero.
+    /// Reads the text of a STEP file, closing gaps up to a tolerance if it is above zero.
     pub(super) fn read(bytes: &[u8], heal_mm: f64) -> Result<Self, String> {
         let mut error = NO_ERROR;
         // SAFETY: the bytes and the error outlive the call; nothing keeps them.
@@ -167,12 +165,12 @@ impl Model {
         Ok(model)
     }
 
-    /// The names of the bodies.
+    /// Returns the names of the bodies.
     pub(super) fn names(&self) -> Vec<String> {
-        // SAFETY: the model lives; so for each body below, of which there are so many.
+        // SAFETY: the model is alive; below, `body` is less than this count.
         let count = unsafe { raw::lamp_occt_bodies(self.raw.as_ptr()) };
         let name = |body| {
-            // SAFETY: as above; the name's bytes are the model's, which does not change.
+            // SAFETY: as above; the model owns the name's bytes and does not change.
             let list = unsafe { raw::lamp_occt_name(self.raw.as_ptr(), body) };
             // SAFETY: as above.
             String::from_utf8_lossy(unsafe { values(self, list) }).into_owned()
@@ -180,17 +178,17 @@ impl Model {
         (0..count).map(name).collect()
     }
 
-    /// The length unit of the file.
+    /// Returns the file's length unit.
     pub(super) fn unit(&self) -> String {
-        // SAFETY: the bytes are the model's, which lives and does not change.
+        // SAFETY: the model owns the bytes, is alive and does not change.
         let list = unsafe { raw::lamp_occt_unit(self.raw.as_ptr()) };
         // SAFETY: as above.
         String::from_utf8_lossy(unsafe { values(self, list) }).into_owned()
     }
 
-    /// The faces, body after body.
+    /// Returns the faces, body after body.
     pub(super) fn faces(&self) -> Vec<Face> {
-        // SAFETY: the list is the model's, which lives and does not change.
+        // SAFETY: the model owns the list, is alive and does not change.
         let list = unsafe { raw::lamp_occt_faces(self.raw.as_ptr()) };
         // SAFETY: it holds faces.
         unsafe { values(self, list) }.to_vec()
@@ -199,20 +197,20 @@ impl Model {
     /// Evaluates a face's surface.
     ///
     /// # Panics
-    /// Where there is no such face, or the lists differ in length.
+    /// Panics if the face does not exist, or the lists differ in length.
     pub(super) fn evaluate(&self, face: usize, uv: &[[f64; 2]], jets: &mut [Jet]) {
         assert!(face < self.faces, "there is no face {face}");
         assert_eq!(uv.len(), jets.len(), "as many jets as parameters");
         let (at, to) = (uv.as_ptr().cast(), jets.as_mut_ptr().cast());
-        // SAFETY: there is such a face; so many pairs are read, and as many jets,
-        // which are nine numbers each, are written.
+        // SAFETY: the face exists; `uv.len()` pairs are read, and as many jets of nine
+        // numbers written.
         unsafe { raw::lamp_occt_evaluate(self.raw.as_ptr(), face, at, uv.len(), to) };
     }
 
-    /// Makes facets.
+    /// Tessellates the model.
     pub(super) fn mesh(&self, chord_mm: f64, parallel: bool) -> Result<Mesh, String> {
         let mut error = NO_ERROR;
-        // SAFETY: the model and the error outlive the call; the model is locked in it.
+        // SAFETY: the model and the error outlive the call; the C++ side locks the model.
         let raw =
             unsafe { raw::lamp_occt_mesh(self.raw.as_ptr(), chord_mm, parallel, &raw mut error) };
         NonNull::new(raw).map(Mesh).ok_or_else(|| failed(&error))
@@ -226,45 +224,45 @@ impl Drop for Model {
     }
 }
 
-/// Facets of the C++ side, which do not change.
+/// Immutable facets of the C++ side.
 pub(super) struct Mesh(NonNull<raw::Mesh>);
 
 impl Mesh {
-    /// The corners of facets, face after face.
+    /// Returns the corners of facets, face after face.
     pub(super) fn nodes(&self) -> &[Node] {
         // SAFETY: the list is the mesh's, which is borrowed, and holds nodes.
         unsafe { self.list(raw::lamp_occt_nodes) }
     }
 
-    /// Facets as three nodes each, face after face.
+    /// Returns the facets as three nodes each, face after face.
     pub(super) fn triangles(&self) -> &[[u32; 3]] {
         // SAFETY: the list is the mesh's, which is borrowed, and holds three numbers each.
         unsafe { self.list(raw::lamp_occt_triangles) }
     }
 
-    /// The edges of faces.
+    /// Returns the edges of faces.
     pub(super) fn chains(&self) -> &[Chain] {
         // SAFETY: the list is the mesh's, which is borrowed, and holds chains.
         unsafe { self.list(raw::lamp_occt_chains) }
     }
 
-    /// The nodes of a chain.
+    /// Returns the nodes of a chain.
     pub(super) fn of_chain(&self, chain: &Chain) -> &[u32] {
         // SAFETY: the list is the mesh's, which is borrowed, and holds numbers.
         let all: &[u32] = unsafe { self.list(raw::lamp_occt_chain_nodes) };
         &all[chain.first as usize..][..chain.count as usize]
     }
 
-    /// Faces that are not as they should be.
+    /// Returns the faces with faults.
     pub(super) fn faults(&self) -> &[Fault] {
         // SAFETY: the list is the mesh's, which is borrowed, and holds faults.
         unsafe { self.list(raw::lamp_occt_faults) }
     }
 
-    /// A list of the mesh.
+    /// Returns a list of the mesh.
     ///
     /// # Safety
-    /// The list holds values of this type, which are the mesh's.
+    /// The list holds values of this type, owned by the mesh.
     unsafe fn list<T>(&self, of: unsafe extern "C" fn(*const raw::Mesh) -> raw::List) -> &[T] {
         // SAFETY: the mesh lives, and does not change until it is dropped.
         unsafe { values(self, of(self.0.as_ptr())) }

@@ -1,14 +1,14 @@
-//! About how many facets a model takes, before they are made.
+//! Estimates the number of facets of a model before it is tessellated.
 
 use lamp_brep::vector::{Vec3, length};
 use lamp_brep::{BrepError, Jet, Kernel};
 
-/// Each face is measured in so many steps of u and of v.
+/// The number of samples of a face along u and along v.
 const STEPS: usize = 16;
-/// No part is a kilometre long.
+/// The greatest accepted size of a face: a kilometre.
 const MAX_MM: f64 = 1e6;
 
-/// The facets of all faces, from how much these bend within their ranges of u and v.
+/// Returns the estimated number of facets, from how much faces bend within their ranges.
 pub(super) fn facets(
     kernel: &dyn Kernel,
     ranges: &[[[f64; 2]; 2]],
@@ -30,7 +30,7 @@ pub(super) fn facets(
     Ok(sum)
 }
 
-/// Points all over a face's range, row after row.
+/// Returns points spread over a face's range, row after row.
 fn grid(kernel: &dyn Kernel, face: u32, range: &[[f64; 2]; 2]) -> Vec<Vec3> {
     let at = |axis: usize, k: usize| {
         let [low, high] = range[axis];
@@ -43,7 +43,7 @@ fn grid(kernel: &dyn Kernel, face: u32, range: &[[f64; 2]; 2]) -> Vec<Vec3> {
     jets.iter().map(|jet| jet.point).collect()
 }
 
-/// The chords that follow a line of the grid.
+/// Returns the number of chords that follow a line of the grid.
 fn cells(grid: &[Vec3], axis: usize, line: usize, chord_mm: f64) -> f64 {
     let at =
         |k: usize| grid[if axis == 0 { k * (STEPS + 1) + line } else { line * (STEPS + 1) + k }];

@@ -1,4 +1,4 @@
-//! OpenCASCADE's facets, face by face, joined along the edges.
+//! Joins OpenCASCADE's facets of single faces along the edges.
 
 use std::collections::HashMap;
 
@@ -8,16 +8,16 @@ use crate::calls::{Chain, Mesh, Node};
 use crate::refine::Patch;
 use lamp_brep::{BrepError, Facet, Fault, Finding, Kernel, MAX_FACETS, Tessellation};
 
-/// No number.
+/// A missing index.
 const NONE: u32 = u32::MAX;
-/// Bits of a face's status.
+/// The bits of a face's status.
 const OPEN_WIRE: u32 = 0x1;
 const CROSSING_WIRE: u32 = 0x2;
 const MISDIRECTED_WIRE: u32 = 0x10;
-/// Facets may lie this many chords off their surface before it is worth a finding.
+/// The distance of facets from their surface that is reported, in chords.
 const FAR: f64 = 4.0;
 
-/// The facets with common points along edges.
+/// Returns the facets, with shared points along edges.
 pub(super) fn joined(
     kernel: &dyn Kernel,
     mesh: &Mesh,
@@ -53,7 +53,7 @@ pub(super) fn joined(
     Ok(joined)
 }
 
-/// Faces with their facets.
+/// Returns the faces with their facets.
 fn patches(mesh: &Mesh) -> Vec<Patch> {
     let mut triangles = mesh.triangles();
     let mut first = 0;
@@ -75,16 +75,16 @@ fn patches(mesh: &Mesh) -> Vec<Patch> {
     mesh.nodes().chunk_by(|a, b| a.face == b.face).map(patch).collect()
 }
 
-/// Which nodes are the same point, and the points' numbers.
+/// The nodes that are the same point, and the indices of points.
 struct Points {
-    /// For each node of the mesh the first that is the same point.
+    /// For each node of the mesh, the first that is the same point.
     same: Vec<u32>,
-    /// The number of that.
+    /// The point's index, by that node.
     numbers: Vec<u32>,
 }
 
 impl Points {
-    /// The numbers of a patch's nodes; new ones are added to the list.
+    /// Returns the points of a patch's nodes; new ones are added to the list.
     fn of_patch(&mut self, patch: &Patch, list: &mut Vec<[f64; 3]>) -> Vec<u32> {
         let mut add = |point| {
             list.push(point);
@@ -114,7 +114,7 @@ fn fault(status: u32) -> Fault {
     }
 }
 
-/// For each node the first of those that are the same point.
+/// Returns, for each node, the first that is the same point.
 fn joins(mesh: &Mesh) -> Vec<u32> {
     let mut same = Same((0..mesh.nodes().len() as u32).collect());
     let mut edges: HashMap<u32, &Chain> = HashMap::new();
@@ -122,7 +122,7 @@ fn joins(mesh: &Mesh) -> Vec<u32> {
     for chain in mesh.chains() {
         let nodes = mesh.of_chain(chain);
         let other = mesh.of_chain(edges.entry(chain.edge).or_insert(chain));
-        // Faces have the same nodes along an edge, or else stay open there.
+        // Faces normally have equal node counts along an edge; otherwise it stays open.
         if nodes.len() == other.len() {
             nodes.iter().zip(other).for_each(|(&a, &b)| same.join(a, b));
         }
@@ -135,7 +135,7 @@ fn joins(mesh: &Mesh) -> Vec<u32> {
     (0..same.0.len() as u32).map(|node| same.first(node)).collect()
 }
 
-/// For each node one before it that is the same, or itself.
+/// For each node, an earlier one that is the same, or itself.
 struct Same(Vec<u32>);
 
 impl Same {

@@ -1,9 +1,9 @@
 //! STEP files read by OpenCASCADE, as a second kernel for B-rep models.
 //!
-//! Without the feature `occt` the crate is empty; with it, OpenCASCADE must be
-//! installed. [`OcctModel`] knows more kinds of surfaces and curves than
-//! `lamp_brep::StepModel`, and mends more. OpenCASCADE can crash on a broken file:
-//! read files that are not trusted in a process of their own.
+//! Without the feature `occt` the crate is empty; with it, OpenCASCADE must be installed.
+//! [`OcctModel`] supports more surfaces and curves than `lamp_brep::StepModel`, and repairs
+//! more. OpenCASCADE can crash on a broken file: read untrusted files in a separate
+//! process.
 
 #![cfg(feature = "occt")]
 
@@ -20,14 +20,14 @@ use lamp_brep::{
 
 /// A STEP file in memory, read by OpenCASCADE.
 ///
-/// It mends small errors of the file by itself as it reads; edges are put on their
-/// surfaces within 10 nm, whatever the file claims of its own accuracy. Solids are bodies, and
-/// so are shells outside of solids; faces outside of shells are left out. A face
-/// that was mended into another may have lost its entity's number.
+/// Reading repairs small errors of the file. Edges are projected onto their surfaces within
+/// 10 nm, whatever accuracy the file claims. Solids are bodies, and so are shells outside
+/// solids; faces outside shells are left out. A face that was merged into another may have
+/// lost its entity's number.
 pub struct OcctModel {
     inner: calls::Model,
     faces: Vec<FaceInfo>,
-    /// The parameters of each face, from and to.
+    /// The parameter ranges of each face.
     ranges: Vec<[[f64; 2]; 2]>,
     bodies: Vec<Body>,
     unit: String,
@@ -37,16 +37,17 @@ impl OcctModel {
     /// Reads a file's bytes.
     ///
     /// # Errors
-    /// Where they are not STEP, or hold no solid.
+    /// Returns an error if they are not STEP, or contain no solid.
     pub fn read(bytes: &[u8]) -> Result<Self, BrepError> {
         Self::of(bytes, 0.0)
     }
 
-    /// Reads a file's bytes and mends its bodies: edges and vertices may be moved, and
-    /// gaps closed, by up to a tolerance in millimetres.
+    /// Reads a file's bytes and repairs its bodies: edges and vertices may move, and gaps
+    /// are closed, by up to a tolerance in millimetres.
     ///
     /// # Errors
-    /// As [`Self::read`], and where the tolerance is not a positive length.
+    /// Returns an error as [`Self::read`] does, or if the tolerance is not a positive
+    /// length.
     pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
         if heal_mm > 0.0 && heal_mm.is_finite() {
             Self::of(bytes, heal_mm)
@@ -56,7 +57,7 @@ impl OcctModel {
     }
 
     fn of(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
-        // OpenCASCADE goes on after text that makes no sense.
+        // OpenCASCADE continues after invalid text, so the syntax is checked first.
         check_syntax(bytes)?;
         let inner = calls::Model::read(bytes, heal_mm).map_err(library_error)?;
         let all = inner.faces();
@@ -85,7 +86,7 @@ fn library_error(message: String) -> BrepError {
 /// Reads a file's bytes for [`prepare`](lamp_brep::prepare).
 ///
 /// # Errors
-/// As [`OcctModel::read_healed`].
+/// Returns an error if [`OcctModel::read_healed`] does.
 pub fn read(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError> {
     let is_changed = heal_mm > 0.0;
     let model =
@@ -131,7 +132,7 @@ impl Kernel for OcctModel {
         if !(chord_mm > 0.0 && chord_mm.is_finite()) {
             return Err(BrepError::Chord { chord_mm });
         }
-        // It would not end.
+        // OpenCASCADE would practically never finish.
         if count::facets(self, &self.ranges, chord_mm)? > MAX_FACETS as f64 {
             return Err(BrepError::TooMany { most: MAX_FACETS });
         }

@@ -1,4 +1,4 @@
-// Bodies to facets, and points of surfaces.
+// Tessellates bodies, and evaluates surfaces.
 
 #include "model.hpp"
 
@@ -35,15 +35,15 @@ namespace {
 
 constexpr uint32_t NONE = std::numeric_limits<uint32_t>::max();
 
-// Of IMeshData_Status; the others say how facets were made.
+// The faults among the bits of IMeshData_Status; the other bits are informative.
 constexpr uint32_t FAULTS = IMeshData_OpenWire | IMeshData_SelfIntersectingWire |
                             IMeshData_Failure | IMeshData_UnorientedWire;
 
-// What went wrong with faces, by the faces without their places.
+// The faults of faces, by face without its location.
 using Statuses = std::unordered_map<const TopoDS_TShape *, uint32_t>;
 
 Statuses make_facets(const TopoDS_Shape &shape, double chord_mm, bool parallel) {
-    // Facets of another chord would be kept where they are good enough.
+    // OpenCASCADE would keep facets of another chord if they are good enough.
     BRepTools::Clean(shape);
     IMeshTools_Parameters parameters;
     parameters.Deflection = chord_mm;
@@ -115,7 +115,7 @@ struct Collector {
 
     void add_chain(const TopoDS_Edge &edge, uint32_t face, const Handle(Poly_Triangulation) &facets,
                    const TopLoc_Location &location, uint32_t first) {
-        // Of a seam, the side that the edge's orientation says.
+        // On a seam, the edge's orientation selects the side.
         const auto nodes = BRep_Tool::PolygonOnTriangulation(edge, facets, location);
         if (nodes.IsNull())
             return;
@@ -154,7 +154,7 @@ LampOcctMesh *mesh_of(const LampOcctModel &model, double chord_mm, bool parallel
     return mesh.release();
 }
 
-// A parameter within the range after which it comes again.
+// Returns a periodic parameter within its range.
 double wrapped(double t, const double range[2]) {
     if (t >= range[0] && t <= range[1])
         return t;
@@ -194,7 +194,7 @@ void lamp_occt_evaluate(const LampOcctModel *model, size_t face, const double *u
         if (!sheet.surface.IsNull())
             evaluate(sheet, uv, count, jets);
     } catch (...) {
-        // What has not been evaluated stays not a number.
+        // Jets that were not evaluated stay NaN.
     }
 }
 

@@ -1,4 +1,4 @@
-// A model as OpenCASCADE holds it.
+// The model as OpenCASCADE holds it.
 #pragma once
 
 #include "shim.hpp"
@@ -15,13 +15,12 @@
 
 #include <Standard_Failure.hxx>
 
-// A face's surface, and where it stands.
+// A face's surface and its location.
 struct Sheet {
     Handle(Geom_Surface) surface;
     gp_Trsf place;
     bool is_placed = false;
-    // Whether u and v come again though the surface does not know it, and where
-    // they start and end.
+    // Whether u and v are periodic although the surface does not say so, and their ranges.
     bool comes_again[2] = {false, false};
     double range[2][2] = {{0, 0}, {0, 0}};
 };
@@ -34,7 +33,7 @@ struct LampOcctModel {
     std::vector<TopoDS_Face> faces;
     std::vector<LampOcctFace> infos;
     std::vector<Sheet> sheets;
-    // Facets are made on the shapes themselves: one caller at a time.
+    // Meshing changes the shapes themselves: one caller at a time.
     mutable std::mutex meshing;
 };
 
@@ -42,7 +41,7 @@ inline void say(LampOcctError *error, const char *text) {
     std::snprintf(error->text, sizeof error->text, "%s", text);
 }
 
-// Runs something; what it throws becomes a sentence.
+// Runs a function and turns exceptions into an error message.
 template <class F> auto guarded(LampOcctError *error, F run) -> decltype(run()) {
     try {
         return run();

@@ -1,4 +1,4 @@
-// STEP text to bodies.
+// Reads STEP text into bodies.
 
 #include "model.hpp"
 
@@ -59,13 +59,13 @@
 
 namespace {
 
-// How exactly edges are put on surfaces if no other tolerance is given. What the
-// file claims of itself may be a thousandth of the part.
+// The accuracy of edges on surfaces if no tolerance is given. The one that a file claims
+// may be a thousandth of the part.
 constexpr double PRECISION_MM = 1e-5;
-// Coordinates beyond are wrong in any unit: a kilometre in micrometres.
+// Greater coordinates are wrong in any unit: a kilometre in micrometres.
 constexpr double FAR = 1e9;
 
-// Bytes that are read without a copy of them.
+// A stream of bytes without a copy.
 struct Bytes : std::streambuf {
     Bytes(const uint8_t *bytes, size_t count) {
         char *start = const_cast<char *>(reinterpret_cast<const char *>(bytes));
@@ -79,7 +79,7 @@ struct Item {
     std::string name;
 };
 
-// What the file says of shapes, by the shapes without their places.
+// The file's data about shapes, by shape without its location.
 struct Said {
     std::unordered_map<const TopoDS_TShape *, uint64_t> entities;
     std::unordered_map<const TopoDS_TShape *, Item> items;
@@ -120,7 +120,7 @@ Said said(const STEPControl_Reader &reader) {
     return said;
 }
 
-// Solids, and shells that are not part of one; each once in a place.
+// Returns solids, and shells outside solids; each once per location.
 std::vector<TopoDS_Shape> bodies(const TopoDS_Shape &shape) {
     TopTools_IndexedMapOfShape found;
     for (TopExp_Explorer at(shape, TopAbs_SOLID); at.More(); at.Next())
@@ -140,14 +140,14 @@ bool is_closed(const TopoDS_Shape &shape) {
     return true;
 }
 
-// Faces that come of another one keep its entity.
+// Gives faces made from another one its entity.
 void keep(Said &said, const TopoDS_Shape &face, const TopoDS_Shape &made) {
     const auto known = said.entities.find(face.TShape().get());
     if (known != said.entities.end() && !made.IsNull())
         note(said.entities, made, TopAbs_FACE, uint64_t(known->second));
 }
 
-// Mends a body as far as it is one piece.
+// Repairs the geometry of a body.
 TopoDS_Shape mended(const TopoDS_Shape &body, double heal_mm, Said &said) {
     ShapeFix_Shape fix(body);
     fix.SetPrecision(heal_mm);
@@ -158,7 +158,7 @@ TopoDS_Shape mended(const TopoDS_Shape &body, double heal_mm, Said &said) {
     return fix.Shape();
 }
 
-// Joins faces whose edges are no further apart than the tolerance.
+// Joins faces whose edges are within the tolerance.
 TopoDS_Shape sewn(const std::vector<TopoDS_Shape> &pieces, double heal_mm, Said &said) {
     BRepBuilderAPI_Sewing sewing(heal_mm);
     for (const TopoDS_Shape &piece : pieces)
@@ -170,14 +170,14 @@ TopoDS_Shape sewn(const std::vector<TopoDS_Shape> &pieces, double heal_mm, Said 
     return sewing.SewedShape();
 }
 
-// A closed shell becomes a solid, whose faces point outwards.
+// Turns a closed shell into a solid whose faces point outwards.
 TopoDS_Shape outwards(const TopoDS_Shape &body) {
     if (body.ShapeType() != TopAbs_SHELL || !BRep_Tool::IsClosed(body))
         return body;
     return ShapeFix_Solid().SolidFromShell(TopoDS::Shell(body));
 }
 
-// The box of control points; false if the surface has none.
+// Computes the box of control points; returns false if the surface has none.
 bool control_box(const Sheet &sheet, double box[6]) {
     Handle(Geom_Surface) surface = sheet.surface;
     const auto trimmed = Handle(Geom_RectangularTrimmedSurface)::DownCast(surface);
@@ -227,7 +227,7 @@ void add_face(LampOcctModel &model, const TopoDS_Face &face, uint32_t body, cons
     model.sheets.push_back(sheet);
 }
 
-// Whether an entity has to do with shapes and where they stand.
+// Returns whether an entity describes shapes or their locations.
 bool is_shape(const Handle(Standard_Transient) & entity) {
     for (const auto &type :
          {STANDARD_TYPE(StepRepr_RepresentationItem), STANDARD_TYPE(StepShape_ShapeRepresentation),
@@ -243,7 +243,7 @@ bool is_shape(const Handle(Standard_Transient) & entity) {
     return false;
 }
 
-// What is wrong with an entity's numbers and references; nothing if it is only a text.
+// Returns the error in an entity's numbers and references, or null if only a text is wrong.
 const char *failure(const Interface_Check &check) {
     for (int k = 1; k <= check.NbFails(); ++k) {
         const std::string text = check.CFail(k);
@@ -254,8 +254,8 @@ const char *failure(const Interface_Check &check) {
     return nullptr;
 }
 
-// What is wrong with an entity of a shape: OpenCASCADE would take what is missing for
-// given, and work with points at infinity for ever. Empty if nothing is.
+// Returns the error of a shape's entity, or an empty string. OpenCASCADE would assume that
+// missing data exists, and work with points at infinity forever.
 std::string unsound(const StepData_StepModel &model) {
     for (int k = 1; k <= model.NbEntities(); ++k) {
         const Handle(Standard_Transient) entity = model.Value(k);
@@ -266,7 +266,7 @@ std::string unsound(const StepData_StepModel &model) {
             return number + ": " + text;
         const auto point = Handle(StepGeom_CartesianPoint)::DownCast(entity);
         for (int axis = 1; !point.IsNull() && axis <= point->NbCoordinates(); ++axis)
-            // What is not a number is no less than this either.
+            // Negated, so that NaN fails too.
             if (!(std::abs(point->CoordinatesValue(axis)) < FAR))
                 return number + " is no point near a part";
     }
@@ -282,8 +282,7 @@ std::string unit_of(STEPControl_Reader &reader) {
     return unit;
 }
 
-// OpenCASCADE speaks to the terminal otherwise, and keeps its settings in one place
-// for all readers.
+// Silences OpenCASCADE's terminal output and sets its global reader settings.
 void set_up() {
     Message::DefaultMessenger()->ChangePrinters().Clear();
     STEPControl_Controller::Init();
@@ -315,7 +314,7 @@ LampOcctModel *read(const uint8_t *bytes, size_t count, double heal_mm, LampOcct
     reader.TransferRoots();
     const TopoDS_Shape shape = reader.OneShape();
     Said about = said(reader);
-    // Open pieces of one item in one place belong together.
+    // Open pieces of one item in one location belong together.
     std::vector<std::pair<Item, std::vector<TopoDS_Shape>>> wholes;
     std::map<std::pair<int, int>, size_t> open;
     for (const TopoDS_Shape &piece : bodies(shape)) {

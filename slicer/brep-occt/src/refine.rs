@@ -1,8 +1,8 @@
-//! Facets of a face halved until the surface is near.
+//! Halves a face's facets until they are near the surface.
 //!
-//! OpenCASCADE leaves facets on some B-spline surfaces hundreds of chords off,
-//! whatever its parameters. Edges between two facets of a face are halved here;
-//! those of its border stay, since other faces have them too.
+//! OpenCASCADE leaves facets on some B-spline surfaces hundreds of chords off, whatever its
+//! parameters. Edges inside a face are halved here; border edges stay, since other faces
+//! share them.
 
 use std::collections::HashMap;
 
@@ -10,26 +10,26 @@ use crate::calls::Node;
 use lamp_brep::vector::{Vec3, cross, dot, sub, unit};
 use lamp_brep::{Jet, Kernel};
 
-/// Each round halves an edge once: the last ones are a thousandth as long.
+/// Each round halves an edge once: after the last, edges are a thousandth as long.
 const MAX_ROUNDS: usize = 10;
-/// Facets that are added to those of a face, as a multiple of them, and in all.
+/// The greatest number of added facets: a multiple of the face's own, plus a constant.
 const MORE: [usize; 2] = [8, 20_000];
 
 /// Facets of one face.
 pub(super) struct Patch {
     pub(super) face: u32,
-    /// The number that its first node has in the mesh.
+    /// The index of its first node in the mesh.
     pub(super) first: u32,
-    /// How many of its nodes the mesh has; the others were added.
+    /// The number of its nodes in the mesh; the others were added.
     pub(super) count: usize,
     pub(super) nodes: Vec<Node>,
-    /// Three nodes each.
+    /// The nodes of each triangle.
     pub(super) triangles: Vec<[u32; 3]>,
 }
 
 impl Patch {
-    /// Halves edges between facets until the surface is no further off than the
-    /// chord; returns how far it is where that cannot be had, in millimetres.
+    /// Halves edges between facets until the surface is within the chord. Returns the
+    /// remaining distance in millimetres.
     pub(super) fn refine(&mut self, kernel: &dyn Kernel, chord_mm: f64) -> f64 {
         let most = self.triangles.len() * (1 + MORE[0]) + MORE[1];
         for _ in 0..MAX_ROUNDS {
@@ -47,7 +47,7 @@ impl Patch {
         self.off_mm(kernel)
     }
 
-    /// For each side the node in its middle, if the surface is too far there.
+    /// Returns, for each side, the node at its middle if the surface is too far from it.
     fn far_halves(
         &mut self,
         sides: &Sides,
@@ -76,7 +76,7 @@ impl Patch {
         halves
     }
 
-    /// How far the surface is from the middles of facets.
+    /// Returns the greatest distance of the surface from the middles of facets.
     fn off_mm(&self, kernel: &dyn Kernel) -> f64 {
         let middle = |triangle: &[u32; 3]| {
             let uv = triangle.map(|node| self.nodes[node as usize].uv);
@@ -94,7 +94,7 @@ impl Patch {
         jets
     }
 
-    /// How far a point is from a facet's plane; nothing if that is none.
+    /// Returns a point's distance from a facet's plane, or `None` for a facet without area.
     fn off(&self, triangle: &[u32; 3], point: Vec3) -> Option<f64> {
         let [a, b, c] = triangle.map(|node| self.nodes[node as usize].point);
         let normal = unit(cross(sub(b, a), sub(c, a)))?;
@@ -105,9 +105,9 @@ impl Patch {
 /// The sides of triangles, each once.
 struct Sides {
     ends: Vec<[u32; 2]>,
-    /// How many triangles have it.
+    /// The number of triangles with each side.
     uses: Vec<u32>,
-    /// Each triangle's from its corner 0 to 1, 1 to 2 and 2 to 0.
+    /// Each triangle's sides: from corner 0 to 1, 1 to 2 and 2 to 0.
     of_triangles: Vec<[usize; 3]>,
 }
 
@@ -131,7 +131,7 @@ impl Sides {
     }
 }
 
-/// A triangle cut at the middles of some of its sides.
+/// Returns a triangle, split at the middles of some of its sides.
 fn split([a, b, c]: [u32; 3], halves: [Option<u32>; 3]) -> Vec<[u32; 3]> {
     match halves {
         [None, None, None] => vec![[a, b, c]],

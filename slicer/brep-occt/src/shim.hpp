@@ -1,7 +1,7 @@
-// What the Rust side calls: see calls.rs, which has the same types.
+// Declares the functions that Rust calls; calls.rs has the same types.
 //
-// No function throws. Where one may fail, it returns null and leaves a sentence
-// in `error`. Lists belong to what they were asked of, and end with it.
+// No function throws. One that fails returns null and writes a message to `error`. Lists
+// belong to the object that returned them.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ constexpr uint32_t LAMP_OCCT_MISSING = 1u << 31;
 struct LampOcctModel;
 struct LampOcctMesh;
 
-// A place for a sentence, which ends with a zero.
+// A zero-terminated error message.
 struct LampOcctError {
     char text[256];
 };
@@ -25,22 +25,22 @@ struct LampOcctList {
 };
 
 struct LampOcctFace {
-    // A GeomAbs_SurfaceType.
+    // A value of GeomAbs_SurfaceType.
     uint32_t kind;
     uint32_t body;
-    // The number of its entity in the file, or 0.
+    // The entity's number in the file, or 0.
     uint64_t entity;
-    // The box of its surface's control points, if it has some.
+    // Whether the surface has control points, and their box.
     uint64_t has_box;
     double box_mm[6];
-    // The least and the greatest u and v.
+    // The ranges of u and v.
     double range[4];
 };
 
 struct LampOcctNode {
     double point[3];
     double uv[2];
-    // Which face's facets it belongs to.
+    // The face of its facets.
     uint64_t face;
 };
 
@@ -52,17 +52,17 @@ struct LampOcctTriangle {
 struct LampOcctChain {
     uint32_t face;
     uint32_t edge;
-    // The edge's ends; the greatest number where it has none.
+    // The vertices at the edge's ends, or UINT32_MAX.
     uint32_t ends[2];
-    // Where its nodes are in the list of chains' nodes.
+    // The position of its first node among all chains' nodes.
     uint32_t first;
     uint32_t count;
 };
 
-// A face that is not as it should be.
+// A face with faults.
 struct LampOcctFault {
     uint32_t face;
-    // Of IMeshData_Status, and LAMP_OCCT_MISSING if there are no facets.
+    // Bits of IMeshData_Status, and LAMP_OCCT_MISSING if there are no facets.
     uint32_t status;
 };
 
@@ -74,7 +74,7 @@ LampOcctList lamp_occt_name(const LampOcctModel *model, size_t body);
 LampOcctList lamp_occt_unit(const LampOcctModel *model);
 LampOcctList lamp_occt_faces(const LampOcctModel *model);
 
-// `jets` takes nine numbers for each pair in `uv`.
+// Writes nine numbers to `jets` for each pair in `uv`.
 void lamp_occt_evaluate(const LampOcctModel *model, size_t face, const double *uv, size_t count,
                         double *jets);
 

@@ -10,7 +10,7 @@ use super::tally::Tally;
 use crate::cut::{Crossing, Cutter, LayerShare};
 use crate::placement::PlacedFacet;
 
-/// Enough that evaluating surfaces pays for each call; 0.5 MB.
+/// The number of crossings polished at once: enough to amortise each call; 0.5 MB.
 const BATCH: usize = 4096;
 
 /// Crossings with curved facets, before they go into the table.
@@ -20,7 +20,7 @@ pub(super) struct Batch<'a> {
     cutter: Cutter<'a>,
     layers: Range<usize>,
     points: Vec<FacetPoint>,
-    /// Each point's layer, row, and x on its facet in millimetres.
+    /// Each point's layer and row, and its x on the facet in millimetres.
     cells: Vec<(usize, u32, f64)>,
 }
 
@@ -72,7 +72,7 @@ impl<'a> Batch<'a> {
         count
     }
 
-    /// Polishes what was gathered, and puts it into the table.
+    /// Polishes the gathered crossings and puts them into the table.
     pub(super) fn finish(&mut self, shares: &mut [LayerShare]) {
         polish(self.surfaces, 0, &mut self.points);
         self.tally.add(self.points.iter().zip(&self.cells).map(|(point, &(_, _, facet_mm))| {
@@ -88,7 +88,7 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// The plane of a flat face, by its corners before they were rounded to 32 bits.
+/// The plane of a flat face, from its corners before rounding to 32 bits.
 struct FlatFace {
     corner: Vec3,
     normal: Vec3,
@@ -100,15 +100,16 @@ impl FlatFace {
         Self { corner: a, normal: cross(sub(b, a), sub(c, a)) }
     }
 
-    /// Returns where a row crosses the plane. The rounded facet has it at `x_mm`.
+    /// Returns the x of the plane's crossing with a row. The rounded facet crosses it at
+    /// `x_mm`.
     fn x_mm(&self, x_mm: f64, y_mm: f64, z_mm: f64) -> f64 {
         let [nx, ny, nz] = self.normal;
         let [x, y, z] = self.corner;
         let exact = x - (ny * (y_mm - y) + nz * (z_mm - z)) / nx;
-        // A row along the plane crosses it anywhere: the facet says where.
+        // A row along the plane crosses it anywhere, so the facet's x is kept.
         if (exact - x_mm).abs() < ROUNDING_MM { exact } else { x_mm }
     }
 }
 
-/// Corners are rounded by less than this where parts are smaller than 10 m.
+/// The limit of the corners' rounding for parts smaller than 10 m.
 const ROUNDING_MM: f64 = 1e-3;

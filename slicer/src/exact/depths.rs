@@ -8,18 +8,17 @@ use crate::cut::{Crossing, Cutter, LayerShare};
 use crate::gray::{DepthSpan, Sheet};
 use crate::placement::PlacedFacet;
 
-/// Enough that evaluating surfaces pays for each call; 0.3 MB.
+/// The number of pixels evaluated at once: enough to amortise each call; 0.3 MB.
 const BATCH: usize = 4096;
 
-/// Pixels over curved facets, whose exact heights go into the table as spans of one
-/// column.
+/// Pixels over curved facets. Their exact heights go into the table as spans of one column.
 pub(super) struct Depths<'a> {
     surfaces: &'a PlacedSurfaces,
     cutter: Cutter<'a>,
     layers: Range<usize>,
     reach_um: f64,
     points: Vec<FacetPoint>,
-    /// The span that each point becomes, without its depth.
+    /// The span of each point, without its depth.
     pixels: Vec<DepthSpan>,
 }
 
@@ -33,8 +32,8 @@ impl<'a> Depths<'a> {
         Self { surfaces, cutter, layers, reach_um, points: Vec::new(), pixels: Vec::new() }
     }
 
-    /// Adds what rows meet of a facet below the sections, as deep as they are exposed.
-    /// Returns how many crossings would take as much memory.
+    /// Adds the pixels where rows pass a facet below the sections, down to the exposure
+    /// depth. Returns the number of crossings that would take as much memory.
     pub(super) fn look_down(
         &mut self,
         number: u32,
@@ -49,7 +48,7 @@ impl<'a> Depths<'a> {
         let planes = cutter.planes;
         let low_um = planes.z_um(self.layers.start) - self.reach_um;
         let high_um = planes.z_um(self.layers.end - 1);
-        // Where a facet is steep its surface may be much higher or lower.
+        // The surface over a steep facet may be much higher or lower than the facet.
         let slack_um = sheet.slack_um(1000.0 * surfaces.tolerance_mm());
         let chart = surfaces.chart(number);
         let before = self.points.len();
@@ -68,7 +67,7 @@ impl<'a> Depths<'a> {
         count * size_of::<DepthSpan>() / size_of::<Crossing>()
     }
 
-    /// Finds the exact heights of what was gathered, and puts them into the table.
+    /// Finds the exact heights of the gathered pixels and puts them into the table.
     pub(super) fn finish(&mut self, shares: &mut [LayerShare]) {
         polish(self.surfaces, 2, &mut self.points);
         let planes = self.cutter.planes;

@@ -1,17 +1,18 @@
-//! Finds points where surfaces are level, and the surfaces' box.
+//! Finds the points where surfaces are level, and the surfaces' bounding box.
 
 use lamp_brep::Jet;
 use lamp_brep::vector::Vec3;
 
 use super::placed::PlacedSurfaces;
 
-/// The most facets searched for each end: around a level ring all are as high.
+/// The greatest number of facets searched per direction: all facets around a level ring are
+/// as high.
 const MAX_FACETS: usize = 64;
 const MAX_STEPS: usize = 30;
-/// Steps for differences, in parts of a facet.
+/// The step for differences, as a part of a facet.
 pub(super) const DIFFERENCE: f64 = 1e-5;
 
-/// A direction along an axis, or with `sign` -1 against it.
+/// A direction along an axis, or against it if `sign` is -1.
 #[derive(Clone, Copy)]
 pub(super) struct AxisDirection {
     axis: usize,
@@ -26,21 +27,20 @@ impl AxisDirection {
     }
 }
 
-/// A point where a surface is level: where it goes neither up nor down along a
-/// direction.
+/// A point where a surface is perpendicular to a direction.
 pub(super) struct LevelPoint {
     pub(super) uv: [f64; 2],
     pub(super) jet: Jet,
-    /// The second derivatives of the height: by u twice, by u and v, by v twice.
+    /// The second derivatives of the height: uu, uv, vv.
     pub(super) bend: [f64; 3],
 }
 
 impl PlacedSurfaces {
-    /// Returns the least and the greatest corner of the surfaces' box, in millimetres;
-    /// nothing if there are no facets.
+    /// Returns the least and the greatest corner of the surfaces' box, in millimetres, or
+    /// `None` if there are no facets.
     ///
-    /// It is the facets' box where surfaces end at a corner or an edge, and is larger by
-    /// what facets cut off where surfaces are round.
+    /// It equals the facets' box where surfaces end at a corner or an edge. Round surfaces
+    /// bulge beyond it.
     pub fn box_mm(&self) -> Option<[[f64; 3]; 2]> {
         if self.mesh().facets.is_empty() {
             return None;
@@ -50,7 +50,7 @@ impl PlacedSurfaces {
         Some([end(-1.0), end(1.0)])
     }
 
-    /// Returns how far the surfaces reach in a direction.
+    /// Returns the greatest extent of the surfaces in a direction, in millimetres.
     fn end_mm(&self, direction: AxisDirection) -> f64 {
         let top = |facet: u32| {
             let corners = self.corners(facet).map(|corner| direction.along(corner));
@@ -74,7 +74,8 @@ impl PlacedSurfaces {
             .fold(of_facets, f64::max)
     }
 
-    /// Finds where a facet's surface is level, by Newton's method with differences.
+    /// Finds the point where a facet's surface is level, by Newton's method with
+    /// differences.
     pub(super) fn level_point(&self, facet: u32, direction: AxisDirection) -> Option<LevelPoint> {
         let uv = self.facet(facet).uv;
         let size = self.uv_size(facet);
@@ -82,7 +83,7 @@ impl PlacedSurfaces {
         let mut at = [0, 1].map(|k| uv.iter().map(|uv| uv[k]).sum::<f64>() / 3.0);
         for _ in 0..MAX_STEPS {
             let jets = self.jets(facet, at, by);
-            // The rise over a facet's width along either parameter.
+            // The difference of height over a facet's width along either parameter.
             let rise =
                 |jet: &Jet| [direction.along(jet.du) * size[0], direction.along(jet.dv) * size[1]];
             let [g, gu, gv] = [rise(&jets[0]), rise(&jets[1]), rise(&jets[2])];
@@ -93,7 +94,7 @@ impl PlacedSurfaces {
                 let level = LevelPoint { uv: at, jet: jets[0], bend };
                 return self.is_below(facet, jets[0].point).then_some(level);
             }
-            // Along a level ring there is no bend. A little keeps the point in place.
+            // Along a level ring the bend is 0. A small one keeps the point in place.
             let least = 1e-9 * (a.abs() + d.abs());
             let (a, d) = (a - least, d - least);
             let det = a * d - b * b;

@@ -1,10 +1,9 @@
 //! Finds the extrema of a section's contours, where they turn back along the rows, on
 //! the exact surfaces.
 //!
-//! Facets cut corners. Where a contour turns, some rows pass between the corner
-//! that the facets make and the one that the surface makes: facets cross them
-//! twice too often or not at all. Two crossings more or less leave a row in
-//! balance.
+//! Facets cut corners. Near an extremum some rows pass between the corner of the facets and
+//! that of the surface, so facets cross them twice too often or not at all. Either way the
+//! row stays balanced.
 
 use std::ops::Range;
 
@@ -35,15 +34,15 @@ pub struct Extremum {
     along: [f64; 2],
 }
 
-/// A curved facet on whose surface contours may turn.
+/// A curved facet whose surface may have extrema.
 #[derive(Debug)]
 struct CandidateFacet {
     facet: u32,
-    /// The normals' x at the corners.
+    /// The x components of the normals at the corners.
     normal_x: [f64; 3],
     low_mm: f64,
     high_mm: f64,
-    /// Whether the surface may be level somewhere over the facet.
+    /// Whether the surface may be level over the facet.
     may_be_level: bool,
 }
 
@@ -54,19 +53,19 @@ pub(super) struct CriticalPoints {
     pub(super) saddles: Vec<Saddle>,
 }
 
-/// Normals that differ by less than this along an axis are equal except for rounding.
+/// Normals that differ by less than this along an axis differ only by rounding.
 const LEVEL: f64 = 1e-9;
-/// Where the normal has less than this along y, the surface faces up or down, and the
+/// If the normal's y component is less than this, the surface is nearly level, and a
 /// contour that turns there is smaller than a pixel.
 const STEEP: f64 = 1e-4;
 /// The number of facets evaluated at once.
 const BATCH: usize = 4096;
-/// Extrema nearer to each other are the same, in millimetres.
+/// Extrema closer than this are the same, in millimetres.
 pub(super) const SAME_MM: f64 = 1e-6;
 const MAX_STEPS: usize = 20;
 
 impl CriticalPoints {
-    /// Looks at every facet once.
+    /// Examines every facet once.
     pub(super) fn find(surfaces: &PlacedSurfaces) -> Self {
         let count = surfaces.mesh().facets.len();
         let batches: Vec<usize> = (0..count).step_by(BATCH).collect();
@@ -88,8 +87,8 @@ impl CriticalPoints {
 }
 
 impl PlacedSurfaces {
-    /// Returns the extrema of a section's contours, in order of y. The first call looks
-    /// at every facet.
+    /// Returns the extrema of a section's contours, by y. The first call examines every
+    /// facet.
     pub fn extrema(&self, z_mm: f64) -> Vec<Extremum> {
         let is_met = |facet: &&CandidateFacet| (facet.low_mm..=facet.high_mm).contains(&z_mm);
         let mut extrema: Vec<Extremum> = Vec::new();
@@ -117,8 +116,8 @@ impl PlacedSurfaces {
 }
 
 impl Extremum {
-    /// Solves z(u, v) = plane, normal x (u, v) = 0 from a facet's surroundings by
-    /// Newton's method. The normal's derivatives are differences.
+    /// Solves z(u, v) = plane, normal x (u, v) = 0 by Newton's method from a facet's
+    /// surroundings, with differences for the normal's derivatives.
     fn find(surfaces: &PlacedSurfaces, facet: u32, seed: [f64; 2], z_mm: f64) -> Option<Self> {
         let size = surfaces.uv_size(facet);
         let by = size.map(|size| DIFFERENCE * size);
@@ -136,7 +135,7 @@ impl Extremum {
             let ([zu, zv], [xu, xv]) = ([jet.du[2], jet.dv[2]], [turned[0][0], turned[1][0]]);
             let det = zu * xv - zv * xu;
             let step = [(e * xv - f * zv) / det, (f * zu - e * xu) / det];
-            // A step of more than two facets would leave the seed's surroundings.
+            // A step longer than two facets would leave the seed's surroundings.
             let most = step[0].abs() / size[0] / 2.0;
             let most = most.max(step[1].abs() / size[1] / 2.0).max(1.0);
             at = [0, 1].map(|k| at[k] + step[k] / most);
@@ -147,8 +146,8 @@ impl Extremum {
         None
     }
 
-    /// Returns the extremum at a point where the contour goes along x, if it turns
-    /// there. `turned` are the normal's derivatives by u and v.
+    /// Returns the extremum at a point where the contour runs along x, if it turns there.
+    /// `turned` are the normal's derivatives by u and v.
     fn at(
         surfaces: &PlacedSurfaces,
         facet: u32,
@@ -157,7 +156,7 @@ impl Extremum {
         normal: Vec3,
         turned: [Vec3; 2],
     ) -> Option<Self> {
-        // Along the contour, z stays: (u, v) goes by (zv, -zu).
+        // z is constant along the contour: (u, v) moves along (zv, -zu).
         let (zu, zv) = (jet.du[2], jet.dv[2]);
         let x_speed = jet.du[0] * zv - jet.dv[0] * zu;
         let along = [zv / x_speed, -zu / x_speed];
@@ -176,12 +175,12 @@ impl Extremum {
         })
     }
 
-    /// Returns how far along x facets may be from the contour here, in millimetres.
+    /// Returns the greatest distance of facets from the contour along x, in millimetres.
     pub(super) fn width_mm(&self) -> f64 {
         (2.0 * self.reach_mm / self.bend_per_mm.abs()).sqrt()
     }
 
-    /// Returns what a row has near the extremum.
+    /// Returns a row's crossings near the extremum.
     pub fn contact(&self, surfaces: &PlacedSurfaces, y_mm: f64) -> RowContact {
         let [x, y, z_mm] = self.at_mm;
         let square = 2.0 * (y_mm - y) / self.bend_per_mm;
@@ -195,13 +194,13 @@ impl Extremum {
         }))
     }
 
-    /// Returns whether another facet's extremum is the same.
+    /// Returns whether another facet's extremum is the same point.
     fn is_same(&self, other: &Self) -> bool {
         distance(self.at_mm, other.at_mm) < SAME_MM && self.is_above == other.is_above
     }
 }
 
-/// Returns those of some facets on whose surfaces contours may turn.
+/// Returns the facets whose surfaces may have extrema.
 fn candidates(surfaces: &PlacedSurfaces, facets: Range<u32>) -> Vec<CandidateFacet> {
     let mut found = Vec::new();
     let mut jets = Vec::new();
@@ -216,7 +215,7 @@ fn candidates(surfaces: &PlacedSurfaces, facets: Range<u32>) -> Vec<CandidateFac
         surfaces.evaluate(surfaces.facet(of_face[0]).face, &uv, &mut jets);
         found.extend(of_face.iter().zip(jets.chunks(3)).filter_map(|(&facet, jets)| {
             let flat = surfaces.facet_normal(facet)?;
-            // At a pole the surface has none.
+            // At a pole the surface has no normal.
             let normals = [0, 1, 2].map(|k| surfaces.normal(facet, &jets[k]).unwrap_or(flat));
             let [normal_x, normal_y] = [0, 1].map(|axis| normals.map(|normal| normal[axis]));
             let [turns, may_be_level] = [normal_x, normal_y].map(passes_zero);
@@ -229,8 +228,8 @@ fn candidates(surfaces: &PlacedSurfaces, facets: Range<u32>) -> Vec<CandidateFac
     found
 }
 
-/// Returns whether values at a facet's corners may pass zero within it. The surface
-/// may turn by half as much more as its corners do.
+/// Returns whether values at a facet's corners may pass zero within it. The surface may
+/// turn half as much again as between its corners.
 fn passes_zero(values: [f64; 3]) -> bool {
     let (low, high) = range(values);
     let more = 0.5 * (high - low) + LEVEL;
@@ -242,8 +241,8 @@ fn range(values: [f64; 3]) -> (f64, f64) {
     (a.min(b).min(c), a.max(b).max(c))
 }
 
-/// Returns parameters to look for a facet's extremum from: on the facet, where its
-/// contour would turn; or at its corners, where the facet does not reach the plane.
+/// Returns the parameters to start the search from: the facet's own extremum, or its
+/// corners if the facet does not reach the plane.
 fn seeds(surfaces: &PlacedSurfaces, candidate: &CandidateFacet, z_mm: f64) -> Vec<[f64; 2]> {
     let uv = surfaces.facet(candidate.facet).uv;
     let corners = surfaces.corners(candidate.facet);

@@ -1,4 +1,4 @@
-//! Locates points of surfaces: the facet below, by walking from facet to facet, and the
+//! Locates points of surfaces: their facet, by walking from facet to facet, and their
 //! parameters.
 
 use lamp_brep::Tessellation;
@@ -11,25 +11,25 @@ use super::solve::{Wanted, solve};
 
 /// The greatest distance of a point from its facet, in tolerances of the tessellation.
 const NEAR: f64 = 2.0;
-/// The most facets that a walk passes.
+/// The greatest number of facets that a walk visits.
 const MAX_FACETS: usize = 256;
-/// The most faces that a contour is followed through: one and its neighbours.
+/// The greatest number of faces that a contour is followed through: one and its neighbours.
 const MAX_FACES: usize = 3;
 
 /// A row's crossings near an extremum or a saddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RowContact {
-    /// Two crossings with the contour, from the left.
+    /// Two crossings of the contour, the left one first.
     Pair([FacetPoint; 2]),
-    /// A crossing on one side at least. On the other the contour may turn once more.
+    /// A crossing on one side at least; on the other the contour may turn again.
     OneSide(FacetPoint),
     /// No crossing.
     Nothing,
-    /// Not known: no point of the surface was found.
+    /// Unknown: no point of the surface was found.
     Unknown,
 }
 
-/// Groups the facets of a tessellation by the points that are their corners.
+/// Groups the facets of a tessellation by their corner points.
 pub(super) fn facets_by_point(mesh: &Tessellation) -> Grouped<u32> {
     let facets = || (0..).zip(&mesh.facets);
     Grouped::new(mesh.points.len(), || {
@@ -38,8 +38,8 @@ pub(super) fn facets_by_point(mesh: &Tessellation) -> Grouped<u32> {
 }
 
 impl PlacedSurfaces {
-    /// Returns the facet below a point of a surface, walking there from another facet.
-    /// Nothing if the walk ends further away than surfaces are from their facets.
+    /// Returns the facet below a point of a surface, walking from another facet. Returns
+    /// `None` if the walk ends further away than surfaces are from their facets.
     pub(super) fn facet_below(&self, facet: u32, point: Vec3) -> Option<u32> {
         let away = |facet: u32| (self.distance_to(facet, point), facet);
         let mut nearest = away(facet);
@@ -57,7 +57,7 @@ impl PlacedSurfaces {
         (nearest.0 < NEAR * self.tolerance_mm()).then_some(nearest.1)
     }
 
-    /// Returns whether a point is as near to a facet as its surface is.
+    /// Returns whether a point is as near to a facet as the surface is.
     pub(super) fn is_below(&self, facet: u32, point: Vec3) -> bool {
         self.distance_to(facet, point) < NEAR * self.tolerance_mm()
     }
@@ -77,8 +77,7 @@ impl PlacedSurfaces {
         [(a, b), (b, c), (c, a)].map(to_side).into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// Finds where a row crosses a contour twice, from estimates of both places, the
-    /// left one first.
+    /// Finds a row's two crossings of a contour from estimates of both, the left one first.
     pub(super) fn locate_pair(&self, estimates: [FacetPoint; 2]) -> RowContact {
         match estimates.map(|estimate| self.locate_crossing(estimate)) {
             [Some(left), Some(right)] => {
@@ -90,9 +89,9 @@ impl PlacedSurfaces {
         }
     }
 
-    /// Finds where a row crosses a contour, and below which facet.
+    /// Finds a row's crossing of a contour, and the facet below.
     fn locate_crossing(&self, mut point: FacetPoint) -> Option<FacetPoint> {
-        // A contour that goes on into another face is looked for on its surface.
+        // If the contour continues on another face, search on that face's surface.
         for _ in 0..MAX_FACES {
             let face = self.facet(point.facet).face;
             let wanted = Wanted { uv: point.uv, known_mm: [point.at_mm[1], point.at_mm[2]] };

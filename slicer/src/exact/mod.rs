@@ -1,13 +1,11 @@
-//! Crossings on the exact surfaces of B-rep parts.
+//! Finds crossings on the exact surfaces of B-rep parts.
 //!
-//! Facets say which rows are crossed, and so keep every row in balance; the
-//! surfaces say where. A worker gathers the crossings that it finds on facets, with
-//! their parameters, and [`polish`]es them in batches before they go into the table.
-//! Near extrema of contours, facets miss rows or cross some too often, in pairs: those
-//! rows are settled layer by layer.
+//! Facets decide which rows are crossed, which keeps every row balanced; surfaces decide
+//! where. A worker gathers crossings on facets and [`polish`]es them in batches before they
+//! go into the table. Near extrema of contours, facets miss pairs of crossings or have too
+//! many: those rows are settled layer by layer.
 //!
-//! Source: 002 section 2.2, which slices the CAD model itself for the accuracy that
-//! facets lose.
+//! Source: 002 section 2.2, which slices the CAD model itself for accuracy.
 
 mod batch;
 mod depths;
@@ -36,16 +34,16 @@ pub(crate) use tally::Tally;
 use crate::cut::{Cutter, LayerShare};
 use crate::placement::PlacedFacet;
 
-/// A worker's way from consecutive facets of a B-rep model to its share of the table.
+/// A worker that turns consecutive facets of a B-rep model into its share of the table.
 pub(crate) struct ExactCut<'a> {
-    /// The next facet's number.
+    /// The index of the next facet.
     next: u32,
     crossings: Batch<'a>,
     depths: Option<Depths<'a>>,
 }
 
 impl<'a> ExactCut<'a> {
-    /// Begins at a facet. Looks `reach_um` below the sections for gray layers.
+    /// Starts at a facet. Gray layers look `reach_um` below the sections.
     pub(crate) fn new(
         surfaces: &'a PlacedSurfaces,
         first: u32,
@@ -59,7 +57,7 @@ impl<'a> ExactCut<'a> {
         Self { next: first, crossings: Batch::new(surfaces, tally, cutter, layers), depths }
     }
 
-    /// Adds the next facet. Returns how many crossings would take as much memory.
+    /// Adds the next facet. Returns the number of crossings that would take as much memory.
     pub(crate) fn cut(&mut self, facet: &PlacedFacet, shares: &mut [LayerShare]) -> usize {
         let number = self.next;
         self.next += 1;
@@ -68,7 +66,7 @@ impl<'a> ExactCut<'a> {
         below + self.crossings.cut(number, facet, shares)
     }
 
-    /// Puts the rest into the table.
+    /// Puts the remaining crossings into the table.
     pub(crate) fn finish(&mut self, shares: &mut [LayerShare]) {
         self.crossings.finish(shares);
         if let Some(depths) = &mut self.depths {

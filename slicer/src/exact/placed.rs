@@ -1,4 +1,4 @@
-//! The exact surfaces of a B-rep part where it stands on the machine.
+//! Places the exact surfaces of a B-rep part on the machine.
 
 use std::fmt;
 use std::sync::{Arc, OnceLock};
@@ -10,11 +10,12 @@ use lamp_stack::Grouped;
 use super::extrema::CriticalPoints;
 use super::locate::facets_by_point;
 
-/// A model's surfaces and facets: scaled, turned and moved to their place.
+/// A model's surfaces and facets, scaled, rotated and moved into place.
 pub struct PlacedSurfaces {
     kernel: Arc<dyn Kernel>,
     mesh: Arc<Tessellation>,
-    /// x, y and z in place in millimetres, by x, y, z of the model and one.
+    /// The affine map from model to machine coordinates, both in millimetres: one row per
+    /// axis.
     rows: [[f64; 4]; 3],
     tolerance_mm: f64,
     /// Whether each face is flat.
@@ -30,8 +31,8 @@ impl fmt::Debug for PlacedSurfaces {
 }
 
 impl PlacedSurfaces {
-    /// Places a model: `rows` give x, y and z on the machine, in millimetres, by x, y
-    /// and z of the model in millimetres and one.
+    /// Places a model with the affine map `rows` from model to machine coordinates, in
+    /// millimetres.
     pub fn new(kernel: Arc<dyn Kernel>, mesh: Arc<Tessellation>, rows: [[f64; 4]; 3]) -> Self {
         let stretch = |axis: usize| length([rows[0][axis], rows[1][axis], rows[2][axis]]);
         let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
@@ -41,12 +42,12 @@ impl PlacedSurfaces {
         Self { kernel, mesh, rows, tolerance_mm, is_flat, facets_by_point, critical_points }
     }
 
-    /// Returns how far facets may lie from their surfaces, in millimetres.
+    /// Returns the greatest distance of facets from their surfaces, in millimetres.
     pub fn tolerance_mm(&self) -> f64 {
         self.tolerance_mm
     }
 
-    /// Returns the facets, as the model has them before it is placed.
+    /// Returns the facets in model coordinates.
     pub fn mesh(&self) -> &Tessellation {
         &self.mesh
     }
@@ -74,12 +75,13 @@ impl PlacedSurfaces {
         self.rows.map(|[x, y, z, _]| x * direction[0] + y * direction[1] + z * direction[2])
     }
 
-    /// Returns the facets around each point. The first call looks at every facet.
+    /// Returns the facets around each point. The first call examines every facet.
     pub(super) fn facets_by_point(&self) -> &Grouped<u32> {
         self.facets_by_point.get_or_init(|| facets_by_point(&self.mesh))
     }
 
-    /// Returns where contours may turn or meet. The first call looks at every facet.
+    /// Returns the places where contours may turn or meet. The first call examines every
+    /// facet.
     pub(super) fn critical_points(&self) -> &CriticalPoints {
         self.critical_points.get_or_init(|| CriticalPoints::find(self))
     }
@@ -99,8 +101,8 @@ impl PlacedSurfaces {
         [0, 1].map(|k| p[k].max(q[k]).max(r[k]) - p[k].min(q[k]).min(r[k]))
     }
 
-    /// Evaluates a facet's surface at parameters, and a little further along u and
-    /// along v, for second derivatives by differences.
+    /// Evaluates a facet's surface at parameters, and slightly further along u and along v,
+    /// for second derivatives by differences.
     pub(super) fn jets(&self, facet: u32, [u, v]: [f64; 2], by: [f64; 2]) -> [Jet; 3] {
         let mut jets = [Jet::default(); 3];
         let at = [[u, v], [u + by[0], v], [u, v + by[1]]];
@@ -113,14 +115,14 @@ impl PlacedSurfaces {
         Chart::new(&self.corners(facet), self.facet(facet).uv)
     }
 
-    /// Returns the surface's normal on the side to which the facet faces, with length
-    /// 1; nothing at a pole or over a facet without area.
+    /// Returns the surface's unit normal on the facet's outer side, or `None` at a pole or
+    /// on a facet without area.
     pub(super) fn normal(&self, facet: u32, jet: &Jet) -> Option<Vec3> {
         let (across, flat) = (unit(cross(jet.du, jet.dv))?, self.facet_normal(facet)?);
         Some(scale(across, dot(across, flat).signum()))
     }
 
-    /// Returns a facet's normal out of the body, with length 1, if it has an area.
+    /// Returns a facet's outward unit normal, or `None` if it has no area.
     pub(super) fn facet_normal(&self, facet: u32) -> Option<Vec3> {
         let [a, b, c] = self.corners(facet);
         unit(cross(sub(b, a), sub(c, a)))
@@ -131,7 +133,7 @@ impl PlacedSurfaces {
 #[derive(Clone, Copy, Debug)]
 pub struct Chart {
     corner: Vec3,
-    /// Dotted with a way from the corner, these give its shares of the facet's first
+    /// Dotted with the vector from the corner, these give the shares of the facet's first
     /// and last side.
     shares: [Vec3; 2],
     uv: [[f64; 2]; 3],
@@ -148,8 +150,8 @@ impl Chart {
         Self { corner: *a, shares: [share(e, ff, f), share(f, ee, e)], uv }
     }
 
-    /// Returns the barycentric coordinates for the second and the third corner of a
-    /// point projected onto the facet's plane.
+    /// Returns a point's barycentric coordinates for the second and third corner, projected
+    /// onto the facet's plane.
     pub(super) fn shares_of(&self, point: Vec3) -> [f64; 2] {
         let way = sub(point, self.corner);
         self.shares.map(|share| dot(way, share))

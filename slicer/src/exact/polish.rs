@@ -5,45 +5,44 @@ use lamp_brep::Jet;
 use super::placed::PlacedSurfaces;
 use super::solve::{Wanted, solve};
 
-/// A point of a facet that moves along an axis, x or z, to the surface.
+/// A point of a facet to be moved along an axis, x or z, to the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FacetPoint {
-    /// The facet's number in the tessellation.
+    /// The index of the facet in the tessellation.
     pub facet: u32,
     /// The point's parameters on the facet's surface.
     pub uv: [f64; 2],
     /// The point, in millimetres.
     pub at_mm: [f64; 3],
-    /// Whether the part is entered here along the axis, as the facet faces.
+    /// Whether the axis enters the part here, according to the facet.
     pub enters: bool,
     /// Whether the point was found on the surface.
     pub is_exact: bool,
 }
 
 impl FacetPoint {
-    /// A point that is still on its facet.
+    /// Returns a point that is still on its facet.
     pub fn new(facet: u32, uv: [f64; 2], at_mm: [f64; 3], enters: bool) -> Self {
         Self { facet, uv, at_mm, enters, is_exact: false }
     }
 }
 
-/// The greatest move across the surface, in tolerances of the tessellation:
-/// once for the facet's distance, and once more because the normal differs where the
-/// point comes from.
+/// The greatest move across the surface, in tolerances of the tessellation: one for the
+/// facet's distance, one for the difference of the normals.
 const MAX_MOVE: f64 = 2.0;
-/// A surface whose normal has less than this along the axis may face either way.
+/// A surface whose normal is smaller than this along the axis may face either way.
 const LEVEL: f64 = 1e-6;
-/// The greatest distance of a point beyond its facet, in facets.
+/// The greatest distance of a point outside its facet, in facets.
 const MAX_BEYOND: f64 = 1.0;
 
 /// Moves points along an axis, 0 for x or 2 for z, to where the surfaces have the
 /// other two coordinates, by Newton's method from the facets' parameters.
 ///
-/// A point stays on its facet, and is not exact, where that diverges, where the
-/// solution belongs to another facet or to the other side of the part, or where it
-/// lies further across the surface than twice the tessellation's tolerance. (Along a
-/// row that grazes the surface the same error is a longer way.) Points are neither
-/// added nor taken away, so rows balance as before.
+/// A point stays on its facet, and is not exact, if the method diverges, if the solution
+/// belongs to another facet or to the other side of the part, or if it moves across the
+/// surface by more than twice the tessellation's tolerance. (Along a row that grazes the
+/// surface, the same error is a longer move.) The number of points stays the same, so rows
+/// stay balanced.
 ///
 /// # Panics
 /// Panics if a point's facet does not exist.
@@ -71,8 +70,8 @@ pub fn polish(surfaces: &PlacedSurfaces, axis: usize, points: &mut [FacetPoint])
     }
 }
 
-/// Returns whether a solution is where the surface has the facet's point, and not
-/// where it passes the same row once more.
+/// Returns whether a solution is the facet's point, and not another crossing of the same
+/// row.
 fn is_same_point(
     surfaces: &PlacedSurfaces,
     axis: usize,
@@ -83,7 +82,7 @@ fn is_same_point(
     // At a pole the surface has no normal.
     let outwards = surfaces.normal(point.facet, jet).map_or(0.0, |normal| normal[axis]);
     let is_other_side = outwards.abs() > LEVEL && (outwards < 0.0) != point.enters;
-    // At a pole facets are so narrow that a point may pass several.
+    // At a pole facets are so narrow that a point may move past several.
     let is_on_face = || {
         let below = surfaces.facet_below(point.facet, jet.point);
         below.is_some_and(|below| surfaces.facet(below).face == surfaces.facet(point.facet).face)

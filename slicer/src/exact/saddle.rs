@@ -1,8 +1,8 @@
 //! Finds saddles of surfaces, where a section's contours meet.
 //!
-//! At the height of a saddle four contours come together in a cross. A little above
-//! and below they part, two by two, one way above and the other way below. Within the
-//! tolerance of that height facets may have them part the wrong way.
+//! At the height of a saddle four contours meet in a cross. Slightly above and below they
+//! separate in pairs, one way above and the other way below. Within the tolerance of that
+//! height, facets may pair them the wrong way.
 
 use lamp_brep::vector::distance;
 
@@ -21,14 +21,14 @@ pub(super) struct Saddle {
     uv: [f64; 2],
     /// Whether the part is below.
     is_above: bool,
-    /// The surface is z* + (a dx^2 + 2 b dx dy + c dy^2) / 2 here.
+    /// The surface here is z* + (a dx^2 + 2 b dx dy + c dy^2) / 2.
     form: [f64; 3],
-    /// The derivatives of u and v by x and y.
+    /// The derivatives of u and v with respect to x and y.
     uv_by: [[f64; 2]; 2],
 }
 
 impl Saddle {
-    /// Finds the saddle of a facet's surface, if it has one over the facet.
+    /// Finds the saddle of a facet's surface, if there is one over the facet.
     pub(super) fn on(surfaces: &PlacedSurfaces, facet: u32) -> Option<Self> {
         let level = surfaces.level_point(facet, AxisDirection::UP)?;
         let ([xu, yu, _], [xv, yv, _]) = (level.jet.du, level.jet.dv);
@@ -42,20 +42,20 @@ impl Saddle {
         let (x, y) = ([ux, vx], [uy, vy]);
         let form = [bend(x, x), bend(x, y), bend(y, y)];
         let [a, b, c] = form;
-        // Not a ridge, along which rounding alone bends.
+        // Excludes ridges, along which only rounding bends.
         let is_saddle = a * c - b * b < -1e-6 * (a * a + b * b + c * c);
         let is_above = surfaces.normal(facet, &level.jet)?[2] > 0.0;
         let saddle = Self { at_mm: level.jet.point, facet, uv: level.uv, is_above, form, uv_by };
         (is_saddle && a.is_finite()).then_some(saddle)
     }
 
-    /// Returns whether another facet's saddle is the same.
+    /// Returns whether another facet's saddle is the same point.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         distance(self.at_mm, other.at_mm) < SAME_MM && self.is_above == other.is_above
     }
 
-    /// Returns how far along y, and along x, facets may have a section's contours part
-    /// the wrong way, in millimetres; nothing if the section is too far away.
+    /// Returns the extents along y and x in which facets may pair a section's contours the
+    /// wrong way, in millimetres, or `None` if the section is too far away.
     pub(super) fn reach_mm(&self, surfaces: &PlacedSurfaces, z_mm: f64) -> Option<[f64; 2]> {
         let ([a, b, c], off) = (self.form, 2.0 * surfaces.tolerance_mm());
         let rise = (z_mm - self.at_mm[2]).abs();
@@ -64,7 +64,7 @@ impl Saddle {
         (rise <= off && x.is_finite()).then_some([y, x])
     }
 
-    /// Returns what a row of a section has near the saddle.
+    /// Returns a row's crossings near the saddle in a section.
     pub(super) fn contact(&self, surfaces: &PlacedSurfaces, y_mm: f64, z_mm: f64) -> RowContact {
         let ([x, y, z], [a, b, c]) = (self.at_mm, self.form);
         let (dy, dz) = (y_mm - y, z_mm - z);

@@ -1,11 +1,9 @@
-//! Repairs rows near extrema and saddles of contours, where facets miss crossings or
-//! have too many.
+//! Repairs rows near extrema and saddles, where facets miss crossings or have too many.
 //!
-//! Three repairs follow each other. Each adds or removes crossings whose windings sum
-//! to zero, so a row that balances goes on to do so. Crossings that are added lie on
-//! the surface. Those removed are either found twice or were kept on their facet, and
-//! are at most as far from the contour as the facets are, so where a repair guesses
-//! wrong the row is no worse than that of the facets alone.
+//! There are three repairs. Each adds or removes crossings whose windings sum to zero, so a
+//! balanced row stays balanced. Added crossings lie on the surface. Removed ones were found
+//! twice or were kept on their facet; they are at most as far from the contour as the
+//! facets, so a wrong guess leaves the row no worse than with facets alone.
 
 use std::collections::HashMap;
 use std::ops::{Range, RangeInclusive};
@@ -21,21 +19,21 @@ use crate::cut::{Crossing, Cutter};
 /// A row near an extremum or a saddle, or with crossings that were kept on facets.
 #[derive(Default)]
 struct UnsettledRow {
-    /// The crossings on surfaces as polishing found them.
+    /// The crossings on surfaces, as polishing found them.
     found: Vec<Crossing>,
-    /// The crossings on surfaces as the row shall have them.
+    /// The crossings on surfaces, as repaired.
     exact: Vec<Crossing>,
     /// The crossings kept on facets.
     kept: Vec<Crossing>,
-    /// Crossings located on one side of an extremum or a saddle only.
+    /// Crossings located on only one side of an extremum or a saddle.
     sides: Vec<Crossing>,
 }
 
-/// Returns the crossings to add to those of a layer that lie on surfaces.
+/// Returns the crossings to add to a layer's crossings on surfaces.
 ///
-/// They are those `kept` on facets, except pairs that the surfaces do not have near
-/// extrema and saddles; the pairs there that facets do not have; and the reverse of
-/// those on surfaces that are too many.
+/// These are the crossings `kept` on facets, except pairs near extrema and saddles that the
+/// surfaces do not have; the surfaces' pairs there that facets miss; and the reverses of
+/// surplus crossings on surfaces.
 pub(crate) fn settle(
     surfaces: &[&PlacedSurfaces],
     tally: &Tally,
@@ -75,29 +73,29 @@ pub(crate) fn settle(
         near.settle(surfaces, tally, z_mm, cutter, &mut rows);
     }
     rows.values_mut().for_each(|row| row.add_sides(tally));
-    // A map has no order; the table sorts.
+    // A map has no order, but the table sorts.
     rows.into_values().flat_map(UnsettledRow::changes).collect()
 }
 
-/// The longest fold that is looked for, along its row.
+/// The greatest length of a fold along its row, in millimetres.
 ///
-/// A fold is as long as the two or three facets that make it. They are long only where
-/// the surface is straight, and has no folds. The limit bounds the damage where two
-/// contours touch that are not a fold.
+/// A fold is as long as the two or three facets that make it. Facets are long only where
+/// the surface is straight, which has no folds. The limit bounds the damage where two
+/// touching contours look like a fold.
 const MAX_FOLD_MM: f64 = 3.0;
 
 impl UnsettledRow {
-    /// Removes folds: where facets go along a row, they may cross it there, back and
-    /// there again, while the surface does so once.
+    /// Removes folds: facets nearly along a row may cross it forwards, back and forwards
+    /// again, where the surface crosses it once.
     ///
-    /// Polishing takes both crossings there to the same point of the surface, and finds
+    /// Polishing moves both forward crossings to the same point of the surface, and finds
     /// none for the one back, since the surface faces the other way. So a fold is a kept
-    /// crossing with two equal ones of the other winding beside it. Removing it and one
-    /// of the two leaves the crossing that the surface has. Without that, even-odd
-    /// filling would cancel the two and leave the kept one, which is off by the fold.
+    /// crossing beside two equal ones of the other winding. Removing it and one of the two
+    /// leaves the surface's crossing. Otherwise even-odd filling would cancel the two and
+    /// leave the kept one, which is off by the fold.
     ///
-    /// Contours of two bodies that touch within a column, beside a kept crossing of a
-    /// third contour, look the same. Then the third is off, by at most the fold.
+    /// Contours of two bodies that touch within a column, beside a kept crossing of a third
+    /// contour, look the same. Then the third moves by at most the fold.
     fn unfold(&mut self, tally: &Tally, max_columns: u32) {
         let kept = std::mem::take(&mut self.kept);
         for crossing in kept {
@@ -122,9 +120,8 @@ impl UnsettledRow {
     /// neither has a pair of its own.
     ///
     /// Both are crossings of the row with the surface that no facet has, and they balance,
-    /// so the part is between them. With other numbers of sides, or with a kept crossing
-    /// that may stand for one of them, it is open which belong together: the row stays
-    /// without them.
+    /// so the part is between them. With another number of sides, or a kept crossing that
+    /// may stand for one of them, the pairing is ambiguous and the row stays without them.
     fn add_sides(&mut self, tally: &Tally) {
         let mut sides: Vec<Crossing> = Vec::new();
         for side in std::mem::take(&mut self.sides) {
@@ -138,7 +135,7 @@ impl UnsettledRow {
         }
     }
 
-    /// Returns the crossings to add to those found. One that is to go is cancelled by its
+    /// Returns the crossings to add to those found. A surplus one is cancelled by its
     /// reverse in the same column.
     fn changes(mut self) -> impl Iterator<Item = Crossing> {
         let mut cancelled = Vec::new();
@@ -152,11 +149,11 @@ impl UnsettledRow {
     }
 }
 
-/// An extremum or a saddle, and the pixels around it where facets may cross too many or
-/// too few rows.
+/// An extremum or a saddle, and the pixels around it where facets may cross too many or too
+/// few rows.
 struct Near {
     point: CriticalPoint,
-    /// The columns where facets may have crossings instead of the contour's.
+    /// The columns where facets may have crossings in place of the contour's.
     columns: RangeInclusive<i64>,
     rows: Range<u32>,
 }
@@ -181,7 +178,7 @@ impl Near {
         Self::new(CriticalPoint::Extremum(extremum), extremum.at_mm, reach_mm, cutter)
     }
 
-    /// Nothing if the saddle is too far from the section.
+    /// Returns the surroundings of a saddle, or `None` if it is too far from the section.
     fn saddle(
         saddle: &Saddle,
         surfaces: &PlacedSurfaces,
@@ -220,8 +217,7 @@ impl Near {
         }
     }
 
-    /// Returns a row's crossings that were kept on facets near the point, or near a pair
-    /// that the row has there.
+    /// Returns a row's kept crossings near the point, or near the row's pair there.
     fn kept(&self, row: &UnsettledRow, pair: &[Crossing]) -> Vec<Crossing> {
         let width = (self.columns.end() - self.columns.start()) / 2;
         let column = |crossing: &Crossing| i64::from(crossing.in_row().column());
@@ -232,7 +228,7 @@ impl Near {
         row.kept.iter().filter(is_near).copied().collect()
     }
 
-    /// Removes a row's crossings that facets have where the surface has none.
+    /// Removes a row's crossings on facets where the surface has none.
     fn remove_kept(&self, tally: &Tally, row: &mut UnsettledRow) {
         let kept = self.kept(row, &[]);
         if winding(&kept) == 0 {
@@ -265,7 +261,7 @@ fn winding(crossings: &[Crossing]) -> i32 {
     crossings.iter().map(|crossing| crossing.in_row().winding()).sum()
 }
 
-/// Returns whether two crossings are one that was found twice: by rounding it may be in
+/// Returns whether two crossings are the same one found twice: rounding may put it in
 /// either of two columns.
 fn is_same(a: Crossing, b: Crossing) -> bool {
     let [a, b] = [a.in_row(), b.in_row()];

@@ -1,14 +1,14 @@
-//! Newton's method for points of surfaces of which two coordinates are known.
+//! Finds points of surfaces with two known coordinates by Newton's method.
 
 use lamp_brep::Jet;
 
 use super::placed::PlacedSurfaces;
 
-/// Two or three steps are the rule.
+/// The greatest number of steps; two or three are usual.
 const MAX_STEPS: usize = 12;
-/// A point found is this near to the known coordinates, in millimetres.
+/// The greatest distance of a found point from the known coordinates, in millimetres.
 const NEAR_MM: f64 = 1e-10;
-/// After the last step this is near enough: rounding may allow no more.
+/// The distance accepted after the last step, in millimetres: rounding may allow no better.
 const NEAR_AT_LAST_MM: f64 = 1e-7;
 
 /// A point to find on a surface.
@@ -20,10 +20,10 @@ pub(super) struct Wanted {
     pub(super) known_mm: [f64; 2],
 }
 
-/// Finds points on a face's surface whose coordinates along `axes` are known. Returns
-/// their parameters and jets, or nothing where Newton's method diverges.
+/// Finds points on a face's surface with known coordinates along `axes`. Returns their
+/// parameters and jets, or `None` where Newton's method diverges.
 ///
-/// All points take each step together, since kernels evaluate many at once for less.
+/// All points take each step together, since kernels evaluate many at once more cheaply.
 pub(super) fn solve(
     surfaces: &PlacedSurfaces,
     face: u32,

@@ -1,15 +1,15 @@
-//! Counts what polishing did, for all workers together.
+//! Counts the moves of polishing, for all workers together.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Counts of what polishing did to crossings of facets.
+/// Counts and moves of polished crossings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Polished {
-    /// Crossings that lie on their surface now.
+    /// Crossings moved onto their surface.
     pub moved: u64,
-    /// Crossings kept on their facet: no point of the surface was found near it.
+    /// Crossings kept on their facet because no point of the surface was found nearby.
     pub kept: u64,
-    /// Crossings added or taken away where contours turn.
+    /// Crossings added or removed near extrema and saddles.
     pub mended: u64,
     /// The mean move along the rows, in millimetres.
     pub mean_mm: f64,
@@ -18,7 +18,7 @@ pub struct Polished {
 }
 
 impl Polished {
-    /// Returns the counts of both.
+    /// Returns the sum of both counts, with their common mean and maximum.
     pub(crate) fn joined(self, other: Self) -> Self {
         let moved = self.moved + other.moved;
         let sum_mm = self.mean_mm * self.moved as f64 + other.mean_mm * other.moved as f64;
@@ -32,7 +32,7 @@ impl Polished {
     }
 }
 
-/// Sums are whole numbers, so that their order does not matter.
+/// Shared counters. Sums are integers, so that their order does not matter.
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
     moved: AtomicU64,
@@ -45,8 +45,7 @@ pub(crate) struct Tally {
 const PM_PER_MM: f64 = 1e9;
 
 impl Tally {
-    /// Counts crossings by how far they moved along x, in millimetres, or that they were
-    /// kept.
+    /// Counts crossings by their moves along x, in millimetres; `None` is a kept one.
     pub(super) fn add(&self, moves_mm: impl Iterator<Item = Option<f64>>) {
         let (mut moved, mut kept, mut sum, mut most) = (0, 0, 0, 0);
         for by_mm in moves_mm {
@@ -63,7 +62,7 @@ impl Tally {
         self.most_pm.fetch_max(most, Relaxed);
     }
 
-    /// Counts crossings that were added or taken away, and those that are kept no more.
+    /// Counts crossings that were added or removed, and those no longer kept.
     pub(crate) fn mend(&self, mended: usize, kept: usize) {
         self.mended.fetch_add(mended as u64, Relaxed);
         self.kept.fetch_sub(kept as u64, Relaxed);

@@ -1,10 +1,10 @@
-//! Composite curves: pieces of others, one after the other.
+//! Joins pieces of curves into composite curves.
 
 use super::curve::Curve;
 use crate::vector::{Vec3, distance, scale};
 
-/// Pieces of curves, each of which starts where the one before ends. The parameter
-/// of the first goes from 0 to 1, that of the second from 1 to 2.
+/// Pieces of curves, each starting where the one before ends. Piece k has the parameters k
+/// to k + 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Chain {
     links: Vec<Link>,
@@ -17,7 +17,7 @@ pub(crate) struct Link {
     pub(crate) range: [f64; 2],
 }
 
-/// The greatest gap between pieces, in millimetres: programs round points to less.
+/// The greatest gap between pieces, in millimetres: programs round points by less.
 const JOINED_MM: f64 = 1e-3;
 
 impl Chain {
@@ -36,18 +36,18 @@ impl Chain {
         let k = (t.max(0.0).floor() as usize).min(self.links.len() - 1);
         let Link { curve, range: [from, to] } = &self.links[k];
         let inner = from + (to - from) * (t - k as f64);
-        // The slope is that of the curve, also past its seam.
+        // The slope comes from the curve itself, so it also holds past a seam.
         [curve.place(inner), scale(curve.at(inner)[1], to - from)]
     }
 
-    /// Returns the same chain, followed the other way.
+    /// Returns the same chain in the other direction.
     pub(crate) fn reversed(mut self) -> Self {
         self.links.reverse();
         self.links.iter_mut().for_each(|link| link.range.reverse());
         self
     }
 
-    /// Returns where pieces end, and where within they are not smooth.
+    /// Returns the parameters at which pieces end or are not smooth.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let mut breaks = vec![0.0];
         for (k, Link { curve, range: [from, to] }) in (0u32..).zip(&self.links) {
@@ -89,7 +89,7 @@ mod tests {
     use crate::vector::Axes;
     use std::f64::consts::PI;
 
-    /// Half a circle of radius 2 from the right to the left, and the way back.
+    /// Returns half a circle of radius 2 from right to left, and the line back.
     fn half() -> Vec<Link> {
         let circle = Curve::Ellipse { axes: Axes::WORLD, radii: [2.0; 2] };
         let line = Curve::Line { point: [0.0; 3], direction: [1.0, 0.0, 0.0] };
@@ -106,7 +106,7 @@ mod tests {
             assert!(distance(chain.clone().reversed().at(2.0 - t)[0], place) < 1e-14);
         }
         assert_eq!(chain.at(1.5)[1], [4.0, 0.0, 0.0]);
-        // Beside its ends, the nearest is one of them.
+        // Beyond the ends, the nearest point is an end.
         assert_eq!(chain.project([-3.0, -1.0, 0.0]), 1.0);
         let curve = Curve::Chain(chain);
         assert_eq!(curve.period(), Some(2.0));

@@ -1,4 +1,4 @@
-//! Curves of edges: points, derivatives, nearest points and polylines.
+//! Evaluates curves of edges: points, derivatives, nearest points and polylines.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use super::chain::Chain;
 use super::spline::SplineCurve;
 use crate::vector::{Axes, Vec3, along, distance, dot, scale, sub};
 
-/// A curve in space, in millimetres, as ISO 10303-42 gives its parameter.
+/// A curve in space, in millimetres, with the parameter of ISO 10303-42.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Curve {
     Line {
@@ -30,7 +30,7 @@ pub(crate) enum Curve {
     Chain(Chain),
 }
 
-/// Steps of the search for the nearest point.
+/// The greatest number of steps of the search for the nearest point.
 const MAX_STEPS: usize = 30;
 
 impl Curve {
@@ -57,7 +57,7 @@ impl Curve {
         }
     }
 
-    /// Returns the same curve, followed the other way.
+    /// Returns the same curve in the other direction.
     pub(crate) fn reversed(self) -> Self {
         match self {
             Self::Line { point, direction } => {
@@ -73,7 +73,7 @@ impl Curve {
         }
     }
 
-    /// Returns where the curve begins and ends, if it does.
+    /// Returns the range of the parameter, if it is bounded.
     pub(crate) fn domain(&self) -> Option<[f64; 2]> {
         match self {
             Self::Ellipse { .. } => Some([0.0, TAU]),
@@ -83,7 +83,7 @@ impl Curve {
         }
     }
 
-    /// Returns where pieces end. Between these parameters the curve is smooth.
+    /// Returns the parameters between which the curve is smooth.
     pub(super) fn breaks(&self) -> Option<Vec<f64>> {
         match self {
             Self::Spline(spline) => Some(spline.knots.breaks()),
@@ -141,7 +141,7 @@ impl Curve {
                 let samples = self.samples();
                 let nearest = samples.iter().copied().min_by(nearer).unwrap_or(0.0);
                 let found = self.nearer(p, nearest);
-                // A closed curve may go on beyond its end where it begins.
+                // A closed curve continues beyond its end at its start.
                 match (self.period(), samples.as_slice()) {
                     (Some(_), &[first, .., last]) if nearest == first => {
                         let other = self.nearer(p, last);
@@ -153,7 +153,7 @@ impl Curve {
         }
     }
 
-    /// Goes from `t` to the foot of `p`; stays where that leads nowhere.
+    /// Searches for the foot of `p` from a start; returns the start if that diverges.
     fn nearer(&self, p: Vec3, start: f64) -> f64 {
         let clamp = |t: f64| match self {
             Self::Spline(spline) => {
@@ -179,8 +179,8 @@ impl Curve {
         best.1
     }
 
-    /// Returns the part of the curve from one parameter to another as points that lie no
-    /// further than `chord_mm` from it; the ends are among them.
+    /// Returns the curve between two parameters as points, including both ends, whose
+    /// polyline is within `chord_mm` of it.
     pub(crate) fn polyline(&self, [from, to]: [f64; 2], chord_mm: f64) -> Vec<Vec3> {
         let mut breaks = vec![from];
         match (self, self.breaks()) {
@@ -221,7 +221,7 @@ impl Curve {
         }
     }
 
-    /// Adds the points after the first of a piece, halving it while it bends too
+    /// Adds the points of a piece without its first, halving the piece while it bends too
     /// much.
     fn bend(&self, [a, b]: [f64; 2], chord_mm: f64, depth: usize, points: &mut Vec<Vec3>) {
         let (p, q) = (self.place(a), self.place(b));
@@ -243,8 +243,8 @@ impl Curve {
     }
 }
 
-/// Returns the parameters at which an edge from `start` to `end` begins and ends on its
-/// curve, which it follows forwards or backwards.
+/// Returns the parameters of an edge from `start` to `end` on its curve, along it or
+/// against it.
 pub(crate) fn edge_range(curve: &Curve, start: Vec3, end: Vec3, forward: bool) -> [f64; 2] {
     let is_loop = distance(start, end) < 1e-9;
     let (mut from, mut to) = (curve.project(start), curve.project(end));
@@ -253,7 +253,7 @@ pub(crate) fn edge_range(curve: &Curve, start: Vec3, end: Vec3, forward: bool) -
         if is_loop {
             to = if forward { from + period } else { from - period };
         } else {
-            // Ends that are the same for the period are a whole turn apart.
+            // On a closed curve, equal ends mean a full turn.
             let way = if forward { to - from } else { from - to }.rem_euclid(period);
             let way = if way < tiny { period } else { way };
             to = if forward { from + way } else { from - way };

@@ -1,5 +1,4 @@
-//! Curves and surfaces: points, derivatives, and the way back from a point to
-//! its parameters.
+//! Evaluates curves and surfaces, and projects points onto them.
 
 pub(crate) mod chain;
 pub(crate) mod curve;

@@ -1,11 +1,11 @@
-//! Surfaces moved along the normals of others.
+//! Evaluates surfaces offset along the normals of others.
 
 use super::surface::{Surface, TorusPart};
 use crate::kernel::Jet;
 use crate::vector::{Vec3, along, cross, scale, sub, unit};
 
-/// Steps by which the normal's slopes are taken, in parts of the domain: their
-/// errors only make the search for a point take longer.
+/// The step for differences of the normal, as a part of the domain. Its error only slows
+/// the search for points.
 const STEP: f64 = 1e-5;
 
 impl Surface {
@@ -45,7 +45,7 @@ impl Surface {
 pub(super) fn at(basis: &Surface, by_mm: f64, uv: [f64; 2]) -> Jet {
     let jet = basis.at(uv);
     let here = normal(basis, uv);
-    // Where there is none, at a pole or an edge, that beside it.
+    // At a pole or an edge without a normal, use one close by.
     let [u, v] = uv;
     let steps = steps(basis);
     let moved = |axis: usize, by: f64| {
@@ -72,7 +72,7 @@ pub(super) fn at(basis: &Surface, by_mm: f64, uv: [f64; 2]) -> Jet {
 
 fn normal(basis: &Surface, uv: [f64; 2]) -> Option<Vec3> {
     let jet = basis.at(uv);
-    // A product of short vectors is shorter still.
+    // The product of short vectors could underflow, so both are scaled first.
     unit(cross(unit(jet.du)?, unit(jet.dv)?))
 }
 
@@ -86,7 +86,7 @@ mod tests {
     use crate::geometry::Curve;
     use crate::vector::{Axes, distance};
 
-    /// Returns a cylinder of radius 3 as a circle that is moved up.
+    /// Returns a cylinder of radius 3 as an extruded circle.
     fn drum() -> Surface {
         let curve = Curve::Ellipse { axes: Axes::WORLD, radii: [3.0; 2] };
         Surface::Extrusion { curve, direction: [0.0, 0.0, 1.0] }

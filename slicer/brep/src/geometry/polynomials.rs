@@ -1,25 +1,25 @@
-//! B-spline basis functions as polynomials between knots, for fast evaluation.
+//! Converts B-spline basis functions to polynomials between knots, for fast evaluation.
 
 use super::spline::{BasisValues, Knots, Weighted, add_times};
 
-/// The highest degree of the polynomials: higher ones would lose digits.
+/// The highest degree of the polynomials: higher ones would lose precision.
 const MAX_DEGREE: usize = 7;
 
-/// The basis functions between each two knots, as polynomials.
+/// The basis functions between each pair of knots, as polynomials.
 ///
-/// A piece's parameter goes from −1 to 1. The functions are nowhere below 0 and add
-/// up to 1 there, whatever the knots, so that the coefficients stay small, and
-/// Horner's scheme gives all digits.
+/// The parameter of a piece goes from −1 to 1. There the functions are at least 0 and sum
+/// to 1 for any knots, so the coefficients stay small and Horner's scheme is accurate.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PolynomialBasis {
     degree: usize,
     /// The knots of the domain, each once.
     breaks: Vec<f64>,
     pieces: Vec<KnotInterval>,
-    /// Interval by interval and power by power, the highest first: the coefficients of all
-    /// functions that are not zero.
+    /// The coefficients of all functions that are not zero, by interval and power, highest
+    /// power first.
     coefficients: Vec<f64>,
-    /// The domain in equal parts: the piece in which each begins, and the last piece.
+    /// For each of the equal parts of the domain, the piece in which it begins; then the
+    /// last piece.
     parts: Vec<u32>,
     parts_per_unit: f64,
 }
@@ -27,10 +27,10 @@ pub(super) struct PolynomialBasis {
 /// The interval between two knots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct KnotInterval {
-    /// The first control point that counts.
+    /// The first control point that affects it.
     first: usize,
     middle: f64,
-    /// One over half its length.
+    /// The reciprocal of half its length.
     scale: f64,
 }
 
@@ -39,12 +39,12 @@ pub(super) struct LocalParameter {
     pub(super) number: usize,
     /// From −1 to 1.
     pub(super) t: f64,
-    /// The derivative of `t` by the parameter.
+    /// The derivative of `t` with respect to the parameter.
     pub(super) scale: f64,
 }
 
 impl PolynomialBasis {
-    /// Makes the polynomials, or `None` for high degrees and for knots hardly apart.
+    /// Returns the polynomials, or `None` for high degrees or knots that are too close.
     pub(super) fn new(knots: &Knots) -> Option<Self> {
         if knots.degree() > MAX_DEGREE {
             return None;
@@ -79,8 +79,8 @@ impl PolynomialBasis {
         self.degree
     }
 
-    /// Returns the polynomials of the spline with these control points in a piece, the
-    /// highest power first.
+    /// Returns the polynomials in a piece of the spline with these control points, highest
+    /// power first.
     pub(super) fn summed(&self, piece: usize, points: &[Weighted]) -> Vec<Weighted> {
         let points = &points[self.pieces[piece].first..];
         let size = self.degree + 1;
@@ -105,7 +105,7 @@ impl PolynomialBasis {
         part.min(self.pieces.len() - 1)
     }
 
-    /// Returns the first piece that does not end before each part of the domain.
+    /// Returns, for each part of the domain, the first piece that does not end before it.
     fn first_pieces(&self) -> Vec<u32> {
         let last = self.pieces.len() - 1;
         let ends: Vec<usize> = self.breaks[1..].iter().map(|&end| self.part(end)).collect();
@@ -113,17 +113,18 @@ impl PolynomialBasis {
         (0..=last + 1).map(first).collect()
     }
 
-    /// Returns the piece of a parameter; beyond the domain, the first or the last.
+    /// Returns the piece of a parameter; outside the domain, the first or the last.
     #[inline(always)]
     fn find(&self, t: f64) -> usize {
-        // Parts are taken of knots as of parameters: rounding leads to no other piece.
+        // Knots and parameters are rounded to parts alike, so the piece is always the right
+        // one.
         let part = self.part(t);
         let (low, high) = (self.parts[part] as usize, self.parts[part + 1] as usize);
         low + self.breaks[low + 1..=high].partition_point(|&knot| knot <= t)
     }
 
-    /// Returns a parameter within its piece. Beyond the domain the first or last piece goes
-    /// on.
+    /// Returns a parameter within its piece. Outside the domain the first or last piece is
+    /// continued.
     #[inline(always)]
     pub(super) fn local(&self, t: f64) -> LocalParameter {
         let number = self.find(t);
@@ -147,8 +148,8 @@ impl PolynomialBasis {
     }
 }
 
-/// Polynomials beside each other, at least straight lines, and their derivatives: the
-/// highest power is first.
+/// Evaluates several polynomials of degree 1 or more and their derivatives, highest power
+/// first.
 #[inline(always)]
 pub(super) fn horner<const C: usize>(powers: &[[f64; C]], t: f64) -> ([f64; C], [f64; C]) {
     let (mut values, mut slopes) = (powers[1], powers[0]);
@@ -164,8 +165,8 @@ pub(super) fn horner<const C: usize>(powers: &[[f64; C]], t: f64) -> ([f64; C], 
     (values, slopes)
 }
 
-/// Returns the coefficients of the functions between two knots, the highest power first:
-/// the recursion of [`Knots::basis`] on polynomials.
+/// Returns the coefficients of the functions between two knots, highest power first, by the
+/// recursion of [`Knots::basis`] on polynomials.
 fn polynomials(knots: &Knots, span: usize, middle: f64, half: f64) -> Vec<f64> {
     let (degree, k) = (knots.degree(), knots.list());
     let mut functions = vec![vec![1.0]];
@@ -195,7 +196,7 @@ mod tests {
 
     #[test]
     fn parameters_lie_between_their_knots() {
-        // Far from even, so that parts of the domain hold many knots or none.
+        // Very uneven knots, so that a part of the domain holds many knots or none.
         let knots = [0.0, 0.0, 1e-9, 2e-9, 3e-9, 0.1, 0.1, 0.3, 0.7, 0.7000001, 5.0, 5.0];
         let pieces = PolynomialBasis::new(&Knots::new(1, knots.to_vec(), 10).unwrap()).unwrap();
         let breaks = &pieces.breaks;
@@ -216,7 +217,7 @@ mod tests {
             PolynomialBasis::new(&Knots::new(degree, ends.concat(), degree + 1).unwrap())
         };
         assert!(knots(MAX_DEGREE).is_some() && knots(MAX_DEGREE + 1).is_none());
-        // One over half the length is no number.
+        // The reciprocal of half the length overflows.
         let narrow = Knots::new(1, vec![0.0, 0.0, 1e-310, 1e-310], 2).unwrap();
         assert_eq!(PolynomialBasis::new(&narrow), None);
     }

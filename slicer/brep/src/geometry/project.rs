@@ -1,4 +1,4 @@
-//! The way from a point back to a surface's parameters.
+//! Finds the parameters of a surface's point nearest to a given point.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,7 @@ use super::surface::{SAME_MM, Surface, TorusPart};
 use crate::vector::{Vec3, distance, dot, length, sub};
 
 impl Surface {
-    /// Returns parameters from which the nearest point to `p` is looked for.
+    /// Returns the parameters from which to search for the point nearest to `p`.
     fn seeds(&self, p: Vec3) -> Vec<[f64; 2]> {
         match self {
             Self::Extrusion { curve: curve @ Curve::Line { .. }, .. } => {
@@ -40,16 +40,16 @@ impl Surface {
         }
     }
 
-    /// Returns the same for a surface moved along its normals: the foot of a point stays.
+    /// Returns the seeds of an offset surface: a point has the same foot on its basis.
     fn offset_seeds(&self, p: Vec3) -> Vec<[f64; 2]> {
         let foot = self.project(p, None);
         self.seeds(p).into_iter().chain([foot]).collect()
     }
 
-    /// Returns the parameters of the point nearest to `p`, looked for near `hint` first.
+    /// Returns the parameters of the point nearest to `p`, searching near `hint` first.
     ///
-    /// At a pole the parameter that has no meaning there is any. What comes
-    /// again after a period lies in any of them.
+    /// At a pole the undetermined parameter is arbitrary. Periodic parameters may lie in
+    /// any period.
     pub(crate) fn project(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
         let azimuth = |q: Vec3| q[1].atan2(q[0]);
         match self {
@@ -75,7 +75,7 @@ impl Surface {
                 let q = axes.local(p);
                 let out = q[0].hypot(q[1]);
                 if *part == TorusPart::Lemon {
-                    // The tube's far side: behind the axis, as seen from u.
+                    // The far side of the tube lies behind the axis, as seen from u.
                     return [azimuth(q) + TAU / 2.0, q[2].atan2(-out - major).rem_euclid(TAU)];
                 }
                 [azimuth(q), q[2].atan2(out - major)]
@@ -95,20 +95,20 @@ impl Surface {
             self.seeds(p).into_iter().map(|uv| (distance(self.point(uv), p), uv)).collect();
         seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
         let found = seeds.into_iter().take(6).map(|(_, uv)| self.nearer(p, uv));
-        // Near ties go to the hint.
+        // In near ties the hint wins.
         let better = |a: (f64, [f64; 2]), b: (f64, [f64; 2])| if b.0 < a.0 * 0.99 { b } else { a };
         near.into_iter().chain(found).reduce(better).map_or([0.0; 2], |(_, uv)| uv)
     }
 
-    /// Goes from parameters to the foot of `p` (Gauss-Newton), and says how far
-    /// `p` lies from it.
+    /// Searches for the foot of `p` by Gauss-Newton, and returns its distance and
+    /// parameters.
     fn nearer(&self, p: Vec3, start: [f64; 2]) -> (f64, [f64; 2]) {
         let (domain, periods) = (self.domain(), self.periods());
         let clamp = |x: f64, axis: usize| match (domain[axis], periods[axis]) {
             (Some([low, high]), None) => x.clamp(low, high),
             _ => x,
         };
-        // Near a pole a step may go round and round, until no digits are left.
+        // Near a pole a step may be many periods long, which would lose all digits.
         let short = |step: f64, axis: usize| match periods[axis] {
             Some(period) => step.clamp(-period / 4.0, period / 4.0),
             None => step,
@@ -131,7 +131,7 @@ impl Surface {
             let step = if det > 1e-14 * a * c {
                 [(e * c - f * b) / det, (f * a - e * b) / det]
             } else {
-                // At a pole only one parameter has a meaning.
+                // At a pole only one parameter is determined.
                 [if a > c { e / a } else { 0.0 }, if c >= a && c > 0.0 { f / c } else { 0.0 }]
             };
             let next = [0, 1].map(|axis| clamp(uv[axis] + short(step[axis], axis), axis));

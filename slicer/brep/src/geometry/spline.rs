@@ -1,28 +1,29 @@
-//! Rational B-splines: basis functions and curves.
+//! Evaluates rational B-splines: basis functions and curves.
 
 use crate::vector::Vec3;
 
-/// The highest degree that is read.
+/// The highest supported degree.
 pub(crate) const MAX_DEGREE: usize = 25;
 
 /// Knots and degree along one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Knots {
     degree: usize,
-    /// Each as often as it counts, never falling.
+    /// The knots in ascending order, repeated by multiplicity.
     knots: Vec<f64>,
 }
 
-/// The basis functions at a parameter that are not zero, and their derivatives.
+/// The basis functions that are not zero at a parameter, and their derivatives.
 pub(super) struct BasisValues<const MOST: usize> {
-    /// The first control point that counts.
+    /// The first control point that affects it.
     pub(super) first: usize,
     pub(super) values: [f64; MOST],
     pub(super) slopes: [f64; MOST],
 }
 
 impl Knots {
-    /// Knots for `count` control points, or `None` if they do not fit or fall.
+    /// Returns knots for `count` control points, or `None` if their number is wrong or they
+    /// descend.
     pub(crate) fn new(degree: usize, knots: Vec<f64>, count: usize) -> Option<Self> {
         let fits = (1..=MAX_DEGREE).contains(&degree)
             && count > degree
@@ -33,7 +34,7 @@ impl Knots {
         fits.then_some(Self { degree, knots })
     }
 
-    /// Returns where the spline begins and ends.
+    /// Returns the range of the parameter.
     pub(crate) fn domain(&self) -> [f64; 2] {
         [self.knots[self.degree], self.knots[self.knots.len() - 1 - self.degree]]
     }
@@ -45,7 +46,7 @@ impl Knots {
         Self { degree: self.degree, knots }
     }
 
-    /// Returns the knots of the domain, each once.
+    /// Returns the distinct knots of the domain.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let mut breaks = self.knots[self.degree..self.knots.len() - self.degree].to_vec();
         breaks.dedup();
@@ -56,12 +57,12 @@ impl Knots {
         self.degree
     }
 
-    /// Returns all knots, each as often as it counts.
+    /// Returns all knots, repeated by multiplicity.
     pub(super) fn list(&self) -> &[f64] {
         &self.knots
     }
 
-    /// Returns how many control points there are.
+    /// Returns the number of control points.
     pub(super) fn count(&self) -> usize {
         self.knots.len() - self.degree - 1
     }
@@ -77,7 +78,7 @@ impl Knots {
         breaks.windows(2).flat_map(within).chain(breaks.last().copied()).collect()
     }
 
-    /// Returns the last knot at or before `t` that another follows.
+    /// Returns the index of the last knot at or before `t` with a greater one after it.
     pub(super) fn span(&self, t: f64) -> usize {
         let [start, end] = self.domain();
         if t >= end {
@@ -87,8 +88,8 @@ impl Knots {
         }
     }
 
-    /// Returns the basis at `t`; beyond the domain, that of the last piece continued
-    /// (algorithms A2.1 to A2.3 of *The NURBS Book*).
+    /// Returns the basis at `t`; outside the domain the first or last piece is continued
+    /// (*The NURBS Book*, algorithms A2.1 to A2.3).
     pub(super) fn basis(&self, t: f64) -> BasisValues<{ MAX_DEGREE + 1 }> {
         let (p, k, span) = (self.degree, &self.knots, self.span(t));
         let mut values = [0.0; MAX_DEGREE + 1];
@@ -96,7 +97,7 @@ impl Knots {
         values[0] = 1.0;
         for degree in 1..=p {
             if degree == p {
-                // The slopes follow from the basis of one degree less.
+                // The derivatives follow from the basis of one degree less.
                 let mut left = 0.0;
                 for r in 0..degree {
                     let width = k[span + r + 1] - k[span + r + 1 - degree];
@@ -119,10 +120,10 @@ impl Knots {
     }
 }
 
-/// A control point times its weight, and the weight.
+/// A control point times its weight, then the weight.
 pub(crate) type Weighted = [f64; 4];
 
-/// Returns a point with its weight.
+/// Returns a point times its weight, then the weight.
 pub(crate) fn weighted(p: Vec3, w: f64) -> Weighted {
     [p[0] * w, p[1] * w, p[2] * w, w]
 }
@@ -131,7 +132,7 @@ pub(super) fn add_times(sum: &mut Weighted, p: &Weighted, by: f64) {
     sum.iter_mut().zip(p).for_each(|(sum, p)| *sum += p * by);
 }
 
-/// Returns the point, and the derivative of a quotient.
+/// Divides by the weight.
 pub(super) fn divided(p: &Weighted) -> Vec3 {
     [p[0] / p[3], p[1] / p[3], p[2] / p[3]]
 }
@@ -148,7 +149,7 @@ pub(crate) struct SplineCurve {
 }
 
 impl SplineCurve {
-    /// Returns the same curve, followed the other way.
+    /// Returns the same curve in the other direction.
     pub(crate) fn reversed(mut self) -> Self {
         self.knots = self.knots.reversed();
         self.points.reverse();
@@ -174,7 +175,7 @@ mod tests {
     use super::*;
     use crate::vector::{distance, length};
 
-    /// Returns a quarter of a circle of radius 2, exactly.
+    /// Returns an exact quarter of a circle of radius 2.
     fn quarter() -> SplineCurve {
         let w = std::f64::consts::FRAC_1_SQRT_2;
         SplineCurve {

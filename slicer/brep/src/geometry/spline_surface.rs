@@ -1,4 +1,4 @@
-//! Surfaces of rational B-splines.
+//! Evaluates surfaces of rational B-splines.
 
 use super::spline::{Knots, Weighted, add_times, divided, divided_slope};
 use super::strips::Strips;
@@ -11,11 +11,11 @@ use crate::vector::{Vec3, distance};
 pub(crate) struct SplineSurface {
     pub(crate) u: Knots,
     pub(crate) v: Knots,
-    /// Row by row: those of one u beside each other.
+    /// The control points, by u and then v.
     pub(crate) points: Vec<Weighted>,
     /// The number of points along v.
     columns: usize,
-    /// The same as polynomials, unless the degrees are too high.
+    /// The same surface as polynomials, unless its degrees are too high.
     strips: Option<Strips>,
     /// The periods of u and v, where the surface is closed.
     pub(crate) periods: [Option<f64>; 2],
@@ -25,7 +25,7 @@ pub(crate) struct SplineSurface {
 const CLOSED_MM: f64 = 1e-6;
 
 impl SplineSurface {
-    /// Returns a surface, or `None` if there are not as many points as the knots say.
+    /// Returns a surface, or `None` if the number of points does not fit the knots.
     pub(crate) fn new(u: Knots, v: Knots, points: Vec<Weighted>) -> Option<Self> {
         let [rows, columns] = [u.count(), v.count()];
         if points.len() != rows * columns {
@@ -42,11 +42,11 @@ impl SplineSurface {
         let [first, last] = [false, true].map(|last| self.side(axis, last));
         let is_closed = first.iter().zip(&last).all(|(a, b)| distance(*a, *b) < CLOSED_MM);
         let [start, end] = if axis == 0 { self.u.domain() } else { self.v.domain() };
-        // A side that is one point meets itself without being closed.
+        // A side that is a single point is a pole, not a seam.
         (is_closed && !is_point(&first)).then_some(end - start)
     }
 
-    /// Returns parameters all over the surface.
+    /// Returns parameters spread over the surface.
     pub(crate) fn seeds(&self) -> Vec<[f64; 2]> {
         let [us, vs] = [&self.u, &self.v].map(Knots::samples);
         us.iter().flat_map(|&u| vs.iter().map(move |&v| [u, v])).collect()
@@ -67,7 +67,7 @@ impl SplineSurface {
         }
     }
 
-    /// Evaluates by the basis functions, for every degree.
+    /// Evaluates by the basis functions, at any degree.
     pub(super) fn by_knots(&self, [u, v]: [f64; 2]) -> Jet {
         let (along_u, along_v) = (self.u.basis(u), self.v.basis(v));
         let mut sums = [[0.0; 4]; 3];
@@ -96,9 +96,9 @@ impl SplineSurface {
         [u, v]
     }
 
-    /// Returns points all along a side of the domain: where u (axis 0) or v (axis 1) is
-    /// least or greatest. Knots need not be as often there as the side's control
-    /// points would take.
+    /// Returns points along the side of the domain where u (axis 0) or v (axis 1) is least
+    /// or greatest. Evaluated, since the control points are on the side only if its knots
+    /// are clamped.
     pub(crate) fn side(&self, axis: usize, last: bool) -> Vec<Vec3> {
         let (fixed, free) = if axis == 0 { (&self.u, &self.v) } else { (&self.v, &self.u) };
         let fixed = fixed.domain()[usize::from(last)];
@@ -147,13 +147,13 @@ mod tests {
         assert_eq!([side[0], side[side.len() - 1]], ends);
     }
 
-    /// Numbers from 0 to 1 in no order.
+    /// Returns a pseudorandom number from 0 to 1.
     fn any(state: &mut u64) -> f64 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         (*state >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Knots far apart or near, once or several times, with ends that are clamped or not.
+    /// Returns knots of random spacing and multiplicity, with ends clamped or not.
     fn any_knots(state: &mut u64) -> Knots {
         let degree = 1 + (any(state) * 7.0) as usize;
         let (is_even, is_clamped) = (any(state) < 0.3, any(state) < 0.7);
@@ -183,7 +183,7 @@ mod tests {
         SplineSurface::new(u, v, points).unwrap()
     }
 
-    /// Returns a parameter: now and then a knot, or a little beyond an end.
+    /// Returns a random parameter, sometimes a knot or slightly outside the domain.
     fn any_parameter(state: &mut u64, knots: &Knots) -> f64 {
         let ([low, high], breaks) = (knots.domain(), knots.breaks());
         match any(state) {

@@ -1,4 +1,4 @@
-//! B-spline surfaces as polynomials, for fast evaluation.
+//! Converts B-spline surfaces to polynomials along v, for fast evaluation.
 
 use super::polynomials::{PolynomialBasis, horner};
 use super::spline::{Knots, Weighted};
@@ -7,23 +7,22 @@ use crate::vector::Vec3;
 
 /// A surface as polynomials along v, and the basis along u.
 ///
-/// These take as much memory as the control points up to one more than v's degree
-/// times. Polynomials along both would be faster yet, but take that for u as well.
+/// They take up to (degree of v + 1) times the memory of the control points. Polynomials
+/// along both parameters would be faster but multiply that by (degree of u + 1).
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Strips {
     u: PolynomialBasis,
     v: PolynomialBasis,
     /// The number of control points along u.
     rows: usize,
-    /// Piece by piece along v, row by row of the control points, and power by power,
-    /// the highest first.
+    /// The coefficients, by piece along v, row of control points, and power, highest first.
     powers: Vec<Weighted>,
     /// Whether weights differ from 1.
     is_rational: bool,
 }
 
 impl Strips {
-    /// Makes the strips, or `None` for high degrees.
+    /// Returns the strips, or `None` for high degrees.
     pub(super) fn new(u: &Knots, v: &Knots, points: &[Weighted]) -> Option<Self> {
         let is_rational = points.iter().any(|point| point[3] != 1.0);
         let (rows, columns) = (u.count(), v.count());
@@ -48,7 +47,8 @@ impl Strips {
         }
     }
 
-    /// `M` and `N` are one more than the degrees: loops of known length are fast.
+    /// Evaluates with `M` and `N` one more than the degrees: loops of constant length are
+    /// fast.
     fn along_v<const M: usize>(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
         match self.v.degree() {
             1 => self.each::<M, 2>(uv, jets),
@@ -68,7 +68,7 @@ impl Strips {
         }
     }
 
-    /// Returns the point, and the derivatives along u and v, each with its weight.
+    /// Returns the point and the derivatives along u and v, all with weights.
     #[inline(always)]
     fn sums<const M: usize, const N: usize>(&self, [u, v]: [f64; 2]) -> [Weighted; 3] {
         let (along_u, along_v) = (self.u.basis::<M>(u), self.v.local(v));
@@ -98,7 +98,7 @@ fn plain(sums: &[Weighted; 3]) -> Jet {
     Jet { point, du, dv }
 }
 
-/// Returns the point and the derivatives of a quotient.
+/// Divides by the weight, with derivatives by the quotient rule.
 #[inline(always)]
 fn divided(sums: &[Weighted; 3]) -> Jet {
     let per_weight = 1.0 / sums[0][3];

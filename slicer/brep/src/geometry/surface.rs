@@ -1,4 +1,4 @@
-//! Surfaces of faces: points, derivatives, domains and poles.
+//! Evaluates surfaces of faces: points, derivatives, domains and poles.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -8,7 +8,7 @@ use super::spline_surface::SplineSurface;
 use crate::kernel::Jet;
 use crate::vector::{Axes, Vec3, add, scale};
 
-/// A surface in millimetres, as ISO 10303-42 gives its parameters.
+/// A surface in millimetres, with the parameters of ISO 10303-42.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Surface {
     Plane(Axes),
@@ -16,7 +16,7 @@ pub(crate) enum Surface {
         axes: Axes,
         radius: f64,
     },
-    /// The radius at v = 0, and how much it grows with v.
+    /// Its radius at v = 0, and the radius's growth per unit of v.
     Cone {
         axes: Axes,
         radius: f64,
@@ -36,30 +36,30 @@ pub(crate) enum Surface {
         curve: Curve,
         direction: Vec3,
     },
-    /// About the z axis of `axes`, in which the curve's points are given.
+    /// A curve, given in the coordinates of `axes`, rotated about their z axis.
     Revolution {
         axes: Axes,
         curve: Curve,
     },
     Spline(Box<SplineSurface>),
-    /// Another surface, moved along its normals.
+    /// A surface moved along its normals.
     Offset {
         basis: Box<Surface>,
         by_mm: f64,
     },
 }
 
-/// The part of a torus that a face is on: a tube wider than its way round meets itself.
+/// The part of a torus on which a face lies, if the tube intersects itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum TorusPart {
     Whole,
-    /// Outside the points where it meets itself.
+    /// Outside the self-intersection.
     Apple,
-    /// Inside of them.
+    /// Inside the self-intersection.
     Lemon,
 }
 
-/// Points nearer than this are one, in millimetres.
+/// Points closer than this are equal, in millimetres.
 pub(super) const SAME_MM: f64 = 1e-6;
 
 impl Surface {
@@ -86,7 +86,7 @@ impl Surface {
             dv: axes.direction(dv),
         };
         let (sin, cos) = u.sin_cos();
-        // A profile of radius r and height z, turned.
+        // A profile of radius r and height z, rotated about the axis.
         let turned = |axes: &Axes, [r, z]: [f64; 2], [dr, dz]: [f64; 2]| {
             jet(axes, [r * cos, r * sin, z], [-r * sin, r * cos, 0.0], [dr * cos, dr * sin, dz])
         };
@@ -149,7 +149,7 @@ impl Surface {
         }
     }
 
-    /// Returns the ranges of u and v where they are bounded.
+    /// Returns the ranges of u and v, where bounded.
     pub(crate) fn domain(&self) -> [Option<[f64; 2]>; 2] {
         let round = Some([0.0, TAU]);
         match self {
@@ -170,8 +170,7 @@ impl Surface {
         }
     }
 
-    /// Returns the sides of the domain that are one point: for u and for v, at which
-    /// ends, the parameter and the point.
+    /// Returns the sides of the domain that are a single point.
     pub(crate) fn poles(&self) -> Vec<Pole> {
         let pole = |axis: usize, at: f64| {
             let mut uv = [0.0; 2];
@@ -199,7 +198,7 @@ impl Surface {
                 let poles = sides.into_iter().filter(is_pole);
                 poles.map(|(axis, last)| pole(axis, ends[axis][usize::from(last)])).collect()
             }
-            // A pole with one normal stays a pole.
+            // A pole with a single normal stays a pole.
             Self::Offset { basis, .. } => {
                 basis.poles().into_iter().map(|at| pole(at.axis, at.at)).collect()
             }
@@ -207,8 +206,7 @@ impl Surface {
         }
     }
 
-    /// Returns the box of all control points, for surfaces that have them: no point of
-    /// the surface lies outside.
+    /// Returns the box of the control points, if there are any. It encloses the surface.
     pub(crate) fn control_box(&self) -> Option<[Vec3; 2]> {
         let Self::Spline(spline) = self else { return None };
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
@@ -222,17 +220,17 @@ impl Surface {
     }
 }
 
-/// A side of a surface's domain that is one point.
+/// A side of a surface's domain that is a single point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pole {
     /// The parameter that is constant along the side: 0 for u, 1 for v.
     pub(crate) axis: usize,
-    /// Its value.
+    /// The value of that parameter.
     pub(crate) at: f64,
     pub(crate) point: Vec3,
 }
 
-/// Moves a parameter by periods into the domain, if it has a period.
+/// Moves a periodic parameter into the domain.
 pub(super) fn inside(t: f64, domain: Option<[f64; 2]>, period: Option<f64>) -> f64 {
     match (domain, period) {
         (Some([low, high]), Some(period)) if t < low || t > high => {

@@ -1,4 +1,4 @@
-//! Places the solids of an assembly.
+//! Places the solids of an assembly (ISO 10303-43 and -44).
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,7 +9,7 @@ use super::read_placement::GeometryReader;
 use super::units::Units;
 use crate::vector::Axes;
 
-/// A solid or a shell in one of its places.
+/// A placed solid or shell.
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedSolid {
     pub(crate) solid: u64,
@@ -19,7 +19,7 @@ pub(crate) struct PlacedSolid {
     pub(crate) product: String,
 }
 
-/// The most parts of an assembly: more than any that is built at once.
+/// The greatest number of parts of an assembly.
 const MAX_PARTS: usize = 100_000;
 const MAX_LEVELS: usize = 64;
 
@@ -27,17 +27,18 @@ const MAX_LEVELS: usize = 64;
 const SOLIDS: [&str; 4] =
     ["MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP", "SHELL_BASED_SURFACE_MODEL"];
 
-/// A shape: items in one system of coordinates.
+/// A shape: items in one coordinate system.
 struct Representation {
     items: Vec<u64>,
     units: Option<Units>,
-    /// The number of its group: shapes that are the same part in the same coordinates.
+    /// The index of its group of shapes that are the same part in the same coordinates.
     group: usize,
-    /// Parts, and where they stand.
+    /// Its parts.
     parts: Vec<SubShape>,
 }
 
-/// A shape used in another: its placement `from` comes to lie on the placement `to`.
+/// A shape used in another. The placement `from` coincides with the placement `to` of the
+/// whole.
 struct SubShape {
     shape: u64,
     from: u64,
@@ -67,17 +68,17 @@ pub(crate) fn placed(entities: &Entities) -> Result<Vec<PlacedSolid>, StepError>
     if found.list.is_empty() { Err(StepError::Empty) } else { Ok(found.list) }
 }
 
-/// Solids as they are found.
+/// The solids found.
 #[derive(Default)]
 struct PlacedSolids {
     list: Vec<PlacedSolid>,
     seen: HashSet<(u64, [u64; 12])>,
-    /// Shapes that were placed, with or without solids.
+    /// The number of shapes visited, with or without solids.
     visits: usize,
 }
 
 impl PlacedSolids {
-    /// Shapes that carry properties name a solid a second time in the same place.
+    /// Adds a solid once per place: shapes that carry properties name it a second time.
     fn add(&mut self, placed: PlacedSolid) {
         let [x, y, z] = placed.place.directions;
         let numbers = [placed.place.origin, x, y, z];
@@ -91,13 +92,13 @@ impl PlacedSolids {
     }
 }
 
-/// The surroundings of a shape in the assembly.
+/// The context of a shape in the assembly.
 #[derive(Clone, Copy)]
 struct Within<'a> {
     place: Axes,
-    /// The product, whose name holds for shapes without one of their own.
+    /// The product name, for shapes without their own.
     product: &'a str,
-    /// The number of assemblies around it.
+    /// The number of enclosing assemblies.
     level: usize,
 }
 
@@ -107,7 +108,7 @@ struct AssemblyTree<'a> {
     names: HashMap<u64, &'a str>,
     shapes: HashMap<u64, Representation>,
     order: Vec<u64>,
-    /// Shapes that are the same, in the order in which they are met.
+    /// Groups of shapes that are the same, in the file's order.
     groups: Vec<Vec<u64>>,
     /// Shapes that are parts of others.
     is_part: HashSet<u64>,
@@ -133,7 +134,7 @@ impl AssemblyTree<'_> {
         Ok(())
     }
 
-    /// Relations between two shapes of the file.
+    /// Returns the relations between two shapes of the file.
     fn relations(&self) -> impl Iterator<Item = (u64, [u64; 2])> {
         self.entities.every().filter_map(|item| {
             let is_relation = matches!(
@@ -148,12 +149,12 @@ impl AssemblyTree<'_> {
         })
     }
 
-    /// Returns the transformation of a relation, if it moves a shape.
+    /// Returns the transformation of a relation, if it has one.
     fn moving(&self, relation: u64) -> Option<Item<'_>> {
         self.entities.find(relation, "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")
     }
 
-    /// Shapes that are related without being moved are the same.
+    /// Groups shapes that are related without a transformation: they are the same.
     fn read_same(&mut self) -> Result<(), StepError> {
         let mut same: HashMap<u64, Vec<u64>> = HashMap::new();
         for (id, [a, b]) in self.relations() {
@@ -186,7 +187,7 @@ impl AssemblyTree<'_> {
         Ok(())
     }
 
-    /// Shapes that are moved are parts.
+    /// Records shapes that are related by a transformation as parts.
     fn read_parts(&mut self) -> Result<(), StepError> {
         let children = product::children(self.entities)?;
         for (id, [a, b]) in self.relations().collect::<Vec<_>>() {
@@ -268,8 +269,8 @@ impl AssemblyTree<'_> {
         self.place(part, within, found)
     }
 
-    /// Returns the surroundings of a part: its placement `from` comes to lie on the
-    /// placement `to` of the whole.
+    /// Returns the context of a part whose placement `from` coincides with the placement
+    /// `to` of the whole.
     fn moved<'a>(
         &self,
         within: Within<'a>,

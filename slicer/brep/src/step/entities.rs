@@ -1,11 +1,11 @@
-//! The entities of a STEP file.
+//! Parses the entities of a STEP file (ISO 10303-21).
 
 use std::collections::HashMap;
 
 use super::StepError;
 use super::token::{Token, Tokens};
 
-/// More brackets within brackets than any schema has.
+/// The greatest nesting of brackets; schemas need less.
 const MAX_NESTED: usize = 32;
 
 /// An attribute.
@@ -16,25 +16,25 @@ pub(crate) enum Value {
     Text(String),
     Enumeration(String),
     List(Vec<Value>),
-    /// `LENGTH_MEASURE(25.4)`: what stands within.
+    /// A typed value, such as `LENGTH_MEASURE(25.4)`.
     Typed(Box<Value>),
-    /// Left out, or following from others.
+    /// Omitted or derived.
     Nothing,
 }
 
-/// A type's attributes.
+/// The attributes of one type.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Record {
     pub(crate) name: String,
     pub(crate) values: Vec<Value>,
 }
 
-/// The instances of a file's data sections by number. A simple instance is one
-/// record, a complex one a record for each of its types.
+/// The instances of a file's data sections by number. A simple instance is one record; a
+/// complex one has a record per type.
 #[derive(Debug, Default)]
 pub(crate) struct Entities {
     map: HashMap<u64, Vec<Record>>,
-    /// In the file's order.
+    /// The numbers, in the file's order.
     ids: Vec<u64>,
 }
 
@@ -51,7 +51,7 @@ impl Entities {
         loop {
             match reader.next()? {
                 Token::Word(word) if word == "DATA" => {
-                    // A section may have a name in brackets.
+                    // A section may have a name in brackets (edition 2 of ISO 10303-21).
                     while reader.next()? != Token::Sign(b';') {}
                     in_data = true;
                 }
@@ -80,13 +80,13 @@ impl Entities {
         self.map.get(&id).map(Vec::as_slice).ok_or(StepError::Missing { id })
     }
 
-    /// Returns the instance's record of that type, if it has it.
+    /// Returns the instance's record of a type, if it has one.
     pub(crate) fn find(&self, id: u64, name: &str) -> Option<Item<'_>> {
         let record = self.map.get(&id)?.iter().find(|record| record.name == name)?;
         Some(Item { id, record })
     }
 
-    /// Returns the instance's record of that type.
+    /// Returns the instance's record of a type.
     pub(crate) fn get(&self, id: u64, name: &'static str) -> Result<Item<'_>, StepError> {
         self.records(id)?;
         self.find(id, name).ok_or(StepError::Unexpected { id, expected: name })
@@ -111,7 +111,7 @@ impl Entities {
     }
 }
 
-/// A record, and whose it is.
+/// A record and the number of its instance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Item<'a> {
     pub(crate) id: u64,
@@ -137,7 +137,7 @@ impl<'a> Item<'a> {
         self.as_a(k, Value::reference)
     }
 
-    /// Returns a reference that may be left out.
+    /// Returns a reference, or `None` if it is omitted.
     pub(crate) fn optional(&self, k: usize) -> Option<u64> {
         self.record.values.get(k).and_then(Value::reference)
     }
@@ -146,7 +146,7 @@ impl<'a> Item<'a> {
         self.as_a(k, Value::number)
     }
 
-    /// Returns a whole number from 0 to a million.
+    /// Returns an integer from 0 to a million.
     pub(crate) fn count(&self, k: usize) -> Result<usize, StepError> {
         let whole = |x: f64| (0.0..=1e6).contains(&x).then_some(x as usize);
         self.as_a(k, |value| value.number().and_then(whole))
@@ -159,7 +159,7 @@ impl<'a> Item<'a> {
         }
     }
 
-    /// Returns an enumeration's word.
+    /// Returns the word of an enumeration.
     pub(crate) fn word(&self, k: usize) -> Result<&'a str, StepError> {
         self.as_a(k, |value| match value {
             Value::Enumeration(word) => Some(word.as_str()),
@@ -244,7 +244,7 @@ impl EntityReader<'_> {
         }
     }
 
-    /// Values up to the closing bracket.
+    /// Reads values up to the closing bracket.
     fn values(&mut self, depth: usize) -> Result<Vec<Value>, StepError> {
         let mut values = Vec::new();
         if depth > MAX_NESTED {

@@ -1,4 +1,4 @@
-//! Reading STEP files (ISO 10303-21, AP203, AP214, AP242).
+//! Reads STEP files (ISO 10303-21; application protocols AP203, AP214 and AP242).
 
 mod assembly;
 mod entities;
@@ -20,95 +20,95 @@ use crate::model::BrepModel;
 use crate::prepare::OpenedModel;
 use crate::tessellate;
 
-/// Why a STEP file cannot be read.
+/// The reason why a STEP file cannot be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
-    /// It does not begin as STEP files do.
+    /// It does not begin with the signature of STEP files.
     #[error("it is not a STEP file: it does not begin with ISO-10303-21")]
     NotStep,
-    /// It ends too early.
+    /// It ends before its end mark.
     #[error("it is cut off: END-ISO-10303-21 is missing")]
     CutOff,
-    /// A part of the text makes no sense.
+    /// A part of the text is not valid syntax.
     #[error("the text makes no sense at byte {offset}")]
     Unreadable {
-        /// The byte, from 0.
+        /// The offset of the byte, from 0.
         offset: usize,
     },
-    /// An entity is given twice.
+    /// An entity is defined twice.
     #[error("#{id} is given twice")]
     Twice {
-        /// The entity.
+        /// The entity's number.
         id: u64,
     },
-    /// An entity is not there.
+    /// An entity is referenced but not defined.
     #[error("#{id} is named, but not given")]
     Missing {
-        /// The entity.
+        /// The entity's number.
         id: u64,
     },
-    /// An entity is of another type.
+    /// An entity has another type than required.
     #[error("#{id} is not {expected}")]
     Unexpected {
-        /// The entity.
+        /// The entity's number.
         id: u64,
-        /// The type it should have.
+        /// The required type.
         expected: &'static str,
     },
-    /// An attribute is missing or of another kind.
+    /// An attribute is missing or has the wrong type.
     #[error("attribute {attribute} of #{id} is missing or not of its kind")]
     Attribute {
-        /// The entity.
+        /// The entity's number.
         id: u64,
-        /// The attribute, from 1.
+        /// The attribute's number, from 1.
         attribute: usize,
     },
-    /// Numbers that give no shape, such as a negative radius.
+    /// The numbers describe no valid shape: a negative radius, for example.
     #[error("the numbers of #{id} give no {what}")]
     Numbers {
-        /// The entity.
+        /// The entity's number.
         id: u64,
-        /// The shape they should give.
+        /// The shape they should describe.
         what: &'static str,
     },
-    /// A type that is not read.
+    /// An entity type is not supported.
     #[error("#{id} is a {name}, which is not supported")]
     Unsupported {
-        /// The entity.
+        /// The entity's number.
         id: u64,
         /// Its type.
         name: String,
     },
-    /// A shape without a length unit.
+    /// A shape has no length unit.
     #[error("the shape #{id} has no length unit")]
     NoUnit {
-        /// The representation.
+        /// The number of the representation.
         id: u64,
     },
-    /// No solid or shell.
+    /// There is no solid or shell.
     #[error("it holds no solid")]
     Empty,
-    /// An assembly that holds itself, or more parts than can be.
+    /// An assembly contains itself, or has too many parts.
     #[error("its assembly holds itself, or more than {most} parts")]
     Endless {
-        /// The most parts that are placed.
+        /// The greatest number of parts.
         most: usize,
     },
 }
 
-/// As many of a file's first bytes as [`is_step`] needs.
+/// The number of bytes that [`is_step`] needs.
 pub const START_BYTES: u64 = 256;
 
-/// Returns whether a file's first bytes are those of STEP.
+/// Returns whether a file's first bytes have the signature of STEP.
 pub fn is_step(start: &[u8]) -> bool {
     start.trim_ascii_start().starts_with(b"ISO-10303-21")
 }
 
-/// Checks that a file's bytes are STEP text, whatever its entities mean.
+/// Checks the syntax of a STEP file, but not the meaning of its entities.
 ///
 /// # Errors
-/// Returns an error that names the byte or the entity at fault.
+/// Returns an error that names the invalid byte or entity.
 pub fn check_syntax(bytes: &[u8]) -> Result<(), StepError> {
     entities::Entities::read(bytes).map(drop)
 }
@@ -116,13 +116,13 @@ pub fn check_syntax(bytes: &[u8]) -> Result<(), StepError> {
 /// Reads a file's bytes for [`prepare`](crate::prepare).
 ///
 /// # Errors
-/// As [`StepModel::read_healed`].
+/// Returns an error if [`StepModel::read_healed`] does.
 pub fn read_step(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError> {
     let model = StepModel::read_healed(bytes, heal_mm)?;
     Ok(OpenedModel { is_changed: model.is_healed(), kernel: Arc::new(model) })
 }
 
-/// A STEP file in memory, read by this crate alone.
+/// A STEP file in memory, read in pure Rust.
 #[derive(Debug)]
 pub struct StepModel {
     model: BrepModel,
@@ -131,26 +131,26 @@ pub struct StepModel {
 }
 
 impl StepModel {
-    /// Reads a file's bytes as they are.
+    /// Reads a file's bytes without healing.
     ///
     /// # Errors
-    /// Returns an error if they are not STEP, or hold what is not supported.
+    /// Returns an error if they are not STEP or contain something unsupported.
     pub fn read(bytes: &[u8]) -> Result<Self, BrepError> {
         Self::read_healed(bytes, 0.0)
     }
 
-    /// Reads a file's bytes, and joins edges that faces give apart where they run
-    /// within `heal_mm` of each other. The tessellation's findings say where.
+    /// Reads a file's bytes, and joins unshared edges that run within `heal_mm` of each
+    /// other. The tessellation's findings list them.
     ///
     /// # Errors
-    /// Returns an error if they are not STEP, or hold what is not supported.
+    /// Returns an error if they are not STEP or contain something unsupported.
     pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
         let mut model = topology::model(&entities::Entities::read(bytes)?)?;
         let healed = if heal_mm > 0.0 { heal(&mut model, heal_mm) } else { Vec::new() };
         Ok(Self { model, healed })
     }
 
-    /// Returns the model, for tests to break.
+    /// Returns the model, which tests damage.
     #[cfg(test)]
     pub(crate) fn model_mut(&mut self) -> &mut BrepModel {
         &mut self.model

@@ -1,17 +1,18 @@
-//! Reads products: names of parts, and which part is used where.
+//! Reads products: the names of parts, and the uses of parts in assemblies (ISO 10303-41,
+//! -44).
 
 use std::collections::HashMap;
 
 use super::StepError;
 use super::entities::{Entities, Item};
 
-/// Returns the product definition that each definition of a shape is for.
+/// Returns the product definition of each shape definition.
 fn definitions(entities: &Entities) -> HashMap<u64, u64> {
     let definitions = entities.all("PRODUCT_DEFINITION_SHAPE");
     definitions.filter_map(|item| Some((item.id, item.optional(2)?))).collect()
 }
 
-/// Returns the names of the products that shapes are of, where they have any.
+/// Returns the product names of shapes that have one.
 pub(super) fn names(entities: &Entities) -> HashMap<u64, &str> {
     let definitions = definitions(entities);
     let named = |item: Item| {
@@ -21,9 +22,9 @@ pub(super) fn names(entities: &Entities) -> HashMap<u64, &str> {
     entities.all("SHAPE_DEFINITION_REPRESENTATION").filter_map(named).collect()
 }
 
-/// Returns the name of a definition's product; its number where the name is empty.
+/// Returns the name of a definition's product, or its number if the name is empty.
 fn name(entities: &Entities, definition: u64) -> Option<&str> {
-    // Both come in several types, which only add attributes.
+    // Both have several subtypes, which only add attributes.
     let third = |id: u64, kind: &str| {
         let mut records = entities.records(id).ok()?.iter();
         let record = records.find(|record| record.name.starts_with(kind))?;
@@ -35,8 +36,7 @@ fn name(entities: &Entities, definition: u64) -> Option<&str> {
     [1, 0].map(|k| product.text(k).trim()).into_iter().find(|name| !name.is_empty())
 }
 
-/// Returns, for each relation between shapes that belongs to a use of a product: the
-/// shape of the product that is used.
+/// Returns the shape of the used product for each shape relation that belongs to a use.
 pub(super) fn children(entities: &Entities) -> Result<HashMap<u64, u64>, StepError> {
     let definitions = definitions(entities);
     let mut shapes = HashMap::new();

@@ -7,8 +7,8 @@ use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::{Chain, Curve, Link, edge_range};
 use crate::vector::unit;
 
-/// How deep pieces of a chain count as nested, so that none is a chain of its own:
-/// one of itself would never end.
+/// The greatest depth at which a chain's pieces count as nested. No piece may be a chain:
+/// one that contains itself would never end.
 const DEEPEST_PIECE: usize = MAX_NESTED - 2;
 
 impl GeometryReader<'_> {
@@ -52,7 +52,7 @@ impl GeometryReader<'_> {
             "SURFACE_CURVE" | "SEAM_CURVE" | "INTERSECTION_CURVE" if depth < MAX_NESTED => {
                 self.curve_within(item.reference(1)?, depth + 1)
             }
-            // An edge's vertices say where it ends, but it may go the other way.
+            // The edge's vertices bound it, so only the direction of the trim matters.
             "TRIMMED_CURVE" if depth < MAX_NESTED => {
                 let curve = self.curve_within(item.reference(1)?, depth + 1)?;
                 Ok(if item.truth(4)? { curve } else { curve.reversed() })
@@ -75,7 +75,7 @@ impl GeometryReader<'_> {
         Ok(Curve::Spline(SplineCurve { knots, points }))
     }
 
-    /// Bounded curves, one after the other.
+    /// Reads bounded curves joined end to end.
     fn composite(&self, item: Item) -> Result<Curve, StepError> {
         let link = |id: u64| {
             let segment = self.entities.get(id, "COMPOSITE_CURVE_SEGMENT")?;
@@ -90,7 +90,7 @@ impl GeometryReader<'_> {
         Chain::new(links).map(Curve::Chain).ok_or(bad)
     }
 
-    /// Reads a curve that ends.
+    /// Reads a bounded curve.
     fn bounded(&self, id: u64, depth: usize) -> Result<Link, StepError> {
         if let Some(trimmed) = self.entities.find(id, "TRIMMED_CURVE") {
             return self.trimmed(trimmed, depth);
@@ -100,7 +100,7 @@ impl GeometryReader<'_> {
         Ok(Link { curve, range })
     }
 
-    /// Reads a part of a curve, between points or parameters.
+    /// Reads a part of a curve between points or parameters.
     fn trimmed(&self, item: Item, depth: usize) -> Result<Link, StepError> {
         let basis = item.reference(1)?;
         let curve = self.curve_within(basis, depth + 1)?;
@@ -128,7 +128,7 @@ impl GeometryReader<'_> {
         Ok(Link { curve, range: [from, to] })
     }
 
-    /// Returns a curve's parameter for one of the file's.
+    /// Returns a curve's parameter for a parameter of the file.
     fn parameter(&self, id: u64, curve: &Curve) -> Result<f64, StepError> {
         match curve {
             Curve::Line { .. } => {

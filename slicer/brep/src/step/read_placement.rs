@@ -5,18 +5,18 @@ use super::entities::{Entities, Item};
 use super::units::Units;
 use crate::vector::{Axes, Vec3, dot, scale, unit};
 
-/// Reads shapes of a representation, in millimetres and where it is placed.
+/// A reader of a representation's geometry, placed and in millimetres.
 pub(crate) struct GeometryReader<'a> {
     pub(crate) entities: &'a Entities,
     pub(crate) units: &'a Units,
     pub(crate) place: Axes,
 }
 
-/// How deep curves and surfaces may refer to others. More is taken for a circle.
+/// The greatest depth of references between curves and surfaces; more counts as a cycle.
 pub(super) const MAX_NESTED: usize = 8;
 
 impl GeometryReader<'_> {
-    /// Returns a vertex's or a cartesian point's place.
+    /// Returns the position of a vertex or a cartesian point.
     pub(crate) fn point(&self, id: u64) -> Result<Vec3, StepError> {
         let id = match self.entities.find(id, "VERTEX_POINT") {
             Some(vertex) => vertex.reference(1)?,
@@ -43,7 +43,7 @@ impl GeometryReader<'_> {
         id.map(|id| self.direction(id)).transpose()
     }
 
-    /// Reads an `AXIS2_PLACEMENT_3D`; axes that are left out have their defaults.
+    /// Reads an `AXIS2_PLACEMENT_3D`, with defaults for omitted axes.
     pub(crate) fn axes(&self, id: u64) -> Result<Axes, StepError> {
         let item = self.entities.get(id, "AXIS2_PLACEMENT_3D")?;
         let z = self.optional_direction(item.optional(2))?;

@@ -20,7 +20,8 @@ impl GeometryReader<'_> {
             None => vec![1.0; points.len()],
         };
         let points = self.weighted(&points, &weights, id)?;
-        // Degree, points, form, closed, self-intersecting.
+        // The five attributes before the knots: degree, points, form, closed,
+        // self-intersecting.
         let knots = part.knots(self.entities, degree, points.len(), 5, 0, 1)?;
         let knots = knots.ok_or(bad)?;
         Ok(Some(SplineCurve { knots, points }))
@@ -55,7 +56,8 @@ impl GeometryReader<'_> {
             None => vec![1.0; ids.len()],
         };
         let points = self.weighted(&ids, &weights, id)?;
-        // Degrees, points, form, closed twice, self-intersecting.
+        // The seven attributes before the knots: two degrees, points, form, closed twice,
+        // self-intersecting.
         let u = part.knots(self.entities, degrees[0], cells.len(), 7, 0, 2)?;
         let v = part.knots(self.entities, degrees[1], columns, 7, 1, 3)?;
         let surface = SplineSurface::new(u.ok_or_else(bad)?, v.ok_or_else(bad)?, points);
@@ -63,7 +65,7 @@ impl GeometryReader<'_> {
     }
 }
 
-/// The entities of a kind of spline.
+/// The entity names of a kind of spline.
 struct SplineNames {
     base: &'static str,
     rational: &'static str,
@@ -88,10 +90,10 @@ const SURFACE: SplineNames = SplineNames {
     ],
 };
 
-/// The records of a B-spline, which stand in one or in several.
+/// The records of a B-spline, in one entity or several.
 struct SplineRecords<'a> {
     id: u64,
-    /// The record with degree and points, after how many other attributes.
+    /// The record with degree and points, and the number of attributes before them.
     base: Item<'a>,
     skip: usize,
     /// The entity that gives the knots.
@@ -105,14 +107,14 @@ impl<'a> SplineRecords<'a> {
         let kind = names.knots.into_iter().find(|kind| entities.find(id, kind).is_some())?;
         let (base, skip) = match entities.find(id, names.base) {
             Some(base) => (base, 0),
-            // A simple entity has them all in one, after its name.
+            // A simple entity has all attributes in one record, after its name.
             None => (entities.find(id, kind)?, 1),
         };
         Some(Self { id, base, skip, kind, weights: entities.find(id, names.rational) })
     }
 
-    /// Reads the knots along one parameter: `before` attributes stand before the first
-    /// list, and `multiplicities` and `values` are the places of the two.
+    /// Reads the knots along one parameter. `before` attributes precede the first list;
+    /// `multiplicities` and `values` are the positions of both lists.
     fn knots(
         &self,
         entities: &Entities,
@@ -141,7 +143,7 @@ impl<'a> SplineRecords<'a> {
             "UNIFORM_CURVE" | "UNIFORM_SURFACE" => {
                 (0..count + degree + 1).map(|k| k as f64 - degree as f64).collect()
             }
-            // Quasi-uniform; a Bézier curve is one piece of it, or several.
+            // Quasi-uniform knots, or those of one or several Bézier pieces.
             kind => {
                 let pieces =
                     if kind.starts_with("BEZIER") { (count - 1) / degree } else { count - degree };

@@ -45,11 +45,12 @@ impl GeometryReader<'_> {
                 let vector = self.entities.get(item.reference(2)?, "VECTOR")?;
                 let direction = unit(self.direction(vector.reference(1)?)?);
                 let direction = direction.ok_or(StepError::Numbers { id, what: "direction" })?;
-                // v is in units of the vector's length, which is not kept.
+                // v is in units of the vector's length, which is dropped: parameters are
+                // found by projection.
                 Surface::Extrusion { curve: self.curve(item.reference(1)?)?, direction }
             }
             "SURFACE_OF_REVOLUTION" => self.revolution(item)?,
-            // The face's own loops say where it ends.
+            // The face's own loops bound it, so the trim is ignored.
             "RECTANGULAR_TRIMMED_SURFACE" | "CURVE_BOUNDED_SURFACE" if depth < MAX_NESTED => {
                 self.surface_within(item.reference(1)?, depth + 1)?
             }

@@ -2,28 +2,28 @@
 
 use super::StepError;
 
-/// A piece of the text.
+/// A token of the text.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Token {
-    /// A name: of an entity's type, of a section.
+    /// The name of an entity type or a section.
     Word(String),
-    /// `#12`.
+    /// A reference to an entity, such as `#12`.
     Reference(u64),
-    /// A number, whole or not.
+    /// An integer or real number.
     Number(f64),
-    /// `'text'`, its quotes undone.
+    /// A string, `'text'`, with doubled quotes undone.
     Text(String),
-    /// `.T.` without its dots.
+    /// An enumeration, `.T.`, without its dots.
     Enumeration(String),
-    /// `$`: left out.
+    /// An omitted value, `$`.
     Omitted,
-    /// `*`: follows from others.
+    /// A derived value, `*`.
     Derived,
-    /// `( ) , ; =`.
+    /// A delimiter: `( ) , ; =`.
     Sign(u8),
 }
 
-/// Cuts a STEP file into tokens.
+/// An iterator over the tokens of a STEP file.
 pub(crate) struct Tokens<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -34,7 +34,7 @@ impl<'a> Tokens<'a> {
         Self { bytes, at: 0 }
     }
 
-    /// Returns where the next token is looked for, in bytes.
+    /// Returns the offset of the next token, in bytes.
     pub(crate) fn offset(&self) -> usize {
         self.at
     }
@@ -78,7 +78,7 @@ impl<'a> Tokens<'a> {
         String::from_utf8_lossy(&self.bytes[start..self.at]).into_owned()
     }
 
-    /// Spaces and comments.
+    /// Skips spaces and comments.
     fn skip_blank(&mut self) -> Result<(), StepError> {
         loop {
             self.take_while(|b| b.is_ascii_whitespace() || b == 0);
@@ -102,7 +102,7 @@ impl<'a> Tokens<'a> {
         Ok(text)
     }
 
-    /// Reads a text, in which a quote is written twice.
+    /// Reads a string, in which quotes are doubled.
     fn text(&mut self, start: usize) -> Result<String, StepError> {
         let mut text = self.until(b'\'', start)?;
         while self.peek_is(|b| b == b'\'') {
@@ -114,7 +114,7 @@ impl<'a> Tokens<'a> {
     }
 
     fn number_from<N: std::str::FromStr>(&mut self, start: usize) -> Result<N, StepError> {
-        // A sign may only stand first or after an exponent's letter.
+        // A sign may only come first or after an exponent's letter.
         self.take_while(|b| b.is_ascii_digit() || matches!(b, b'.' | b'E' | b'e' | b'+' | b'-'));
         let text = self.slice(start);
         text.parse().map_err(|_| StepError::Unreadable { offset: start })

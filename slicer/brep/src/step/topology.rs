@@ -1,4 +1,4 @@
-//! Reads bodies, faces and edges from STEP entities.
+//! Reads bodies, faces and edges from STEP entities (ISO 10303-42).
 
 use std::collections::HashMap;
 
@@ -24,7 +24,7 @@ pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
         reader.solid(placed.solid)?;
         let faces = first..model.faces.len() as u32;
         let own = entities.simple(placed.solid)?.text(0);
-        // Many programs name products alone.
+        // Many programs name only the product.
         let name = if own.trim().is_empty() { placed.product } else { own.to_owned() };
         model.bodies.push(Body { name, faces });
     }
@@ -36,10 +36,10 @@ struct SolidReader<'a> {
     entities: &'a Entities,
     geometry: GeometryReader<'a>,
     model: &'a mut BrepModel,
-    /// The places of vertices and edges in the model by entity.
+    /// The indices of vertices and edges in the model, by entity.
     vertices: HashMap<u64, usize>,
     edges: HashMap<u64, usize>,
-    /// Edges of polygons by their vertices.
+    /// The edges of polygons, by their vertices.
     sides: HashMap<[usize; 2], usize>,
 }
 
@@ -80,7 +80,7 @@ impl<'a> SolidReader<'a> {
         }
     }
 
-    /// Returns whether an entity only reverses another.
+    /// Returns whether an entity only orients another.
     fn is_oriented(&self, id: u64) -> bool {
         self.entities.simple(id).is_ok_and(|item| item.name().starts_with("ORIENTED_"))
     }
@@ -158,7 +158,7 @@ impl<'a> SolidReader<'a> {
         Ok(edge)
     }
 
-    /// Returns the sides of a polygon, which are shared by their end points.
+    /// Returns the edges of a polygon; polygons with the same vertices share them.
     fn polygon(&mut self, item: Item) -> Result<Vec<(usize, bool)>, StepError> {
         let points = item.references(1)?;
         let corners: Vec<usize> =

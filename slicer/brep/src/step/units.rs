@@ -1,4 +1,4 @@
-//! The units of a representation's context.
+//! Reads the units of a representation's context (ISO 10303-41).
 
 use super::StepError;
 use super::entities::{Entities, Item};
@@ -6,21 +6,21 @@ use super::entities::{Entities, Item};
 /// The units of a representation.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Units {
-    /// Millimetres in one unit of length.
+    /// The millimetres per unit of length.
     pub(crate) mm: f64,
-    /// Radians in one unit of angle.
+    /// The radians per unit of angle.
     pub(crate) radians: f64,
-    /// The unit of length by name.
+    /// The name of the unit of length.
     pub(crate) name: String,
-    /// The uncertainty of lengths, in millimetres, if it is stated.
+    /// The uncertainty of lengths, in millimetres, if stated.
     pub(crate) uncertainty_mm: Option<f64>,
 }
 
-/// Conversions that follow from each other; more are a circle.
+/// The greatest number of chained conversions; more count as a cycle.
 const MAX_STEPS: usize = 8;
 
 impl Units {
-    /// Reads the units of a context, or `None` without a unit of length.
+    /// Reads the units of a context, or returns `None` if it has no unit of length.
     pub(crate) fn of_context(entities: &Entities, context: u64) -> Result<Option<Self>, StepError> {
         let Some(assigned) = entities.find(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT") else {
             return Ok(None);
@@ -38,7 +38,7 @@ impl Units {
     }
 }
 
-/// Returns the greatest uncertainty of length of a context, in millimetres.
+/// Returns the greatest length uncertainty of a context, in millimetres.
 fn uncertainty_mm(entities: &Entities, context: u64) -> Option<f64> {
     let assigned = entities.find(context, "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT")?;
     let mm = |measure: u64| {
@@ -51,13 +51,13 @@ fn uncertainty_mm(entities: &Entities, context: u64) -> Option<f64> {
     assigned.references(0).ok()?.into_iter().filter_map(mm).reduce(f64::max)
 }
 
-/// Returns how many SI units (metres, radians) a unit has.
+/// Returns the size of a unit in SI units (metres, radians).
 fn size(entities: &Entities, unit: u64, step: usize) -> Result<f64, StepError> {
     let bad = StepError::Numbers { id: unit, what: "unit" };
     if let Some(si) = entities.find(unit, "SI_UNIT") {
         return prefix(si).ok_or(bad);
     }
-    // A factor and the unit that it multiplies.
+    // A conversion has a factor and the unit that it multiplies.
     let converted = entities.get(unit, "CONVERSION_BASED_UNIT")?;
     let measure = converted.reference(1)?;
     let records = entities.records(measure)?;
@@ -140,7 +140,7 @@ mod tests {
             #3=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(5.),#4,'','');";
         let uncertainty_mm = units(context).unwrap().unwrap().uncertainty_mm.unwrap();
         assert!((uncertainty_mm - 0.005).abs() < 1e-15);
-        // One that makes no sense is none.
+        // An invalid uncertainty is ignored.
         let none = units(&context.replace("(5.)", "(-5.)")).unwrap().unwrap();
         assert_eq!(none.uncertainty_mm, None);
     }
