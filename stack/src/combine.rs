@@ -8,13 +8,13 @@ use crate::runs::{Change, Pixel, RunImage};
 /// An operation that combines two images pixel by pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Op {
-    /// White where either is.
+    /// White where either image is white.
     Union,
-    /// White where both are.
+    /// White where both images are white.
     Intersect,
-    /// White where the first is and the second is not.
+    /// White where only the first image is white.
     Difference,
-    /// White where one is and the other is not.
+    /// White where exactly one image is white.
     Xor,
 }
 
@@ -63,7 +63,7 @@ crate::named!(Op {
     Xor = "xor",
 });
 
-/// A pixel's value that an [`Op`] knows how to combine.
+/// A pixel's value that an [`Op`] can combine.
 pub trait Combine: Pixel {
     /// Returns the combination of two pixels.
     fn combined(op: Op, a: Self, b: Self) -> Self;
@@ -83,8 +83,8 @@ impl Combine for u8 {
     }
 }
 
-/// Replaces `out` by the row whose every pixel is what `pixel` makes of the
-/// pixels of `rows` there. `pixel` must leave black what is black in all rows.
+/// Replaces `out` by the row whose pixels are `pixel` of the pixels of `rows`. `pixel` of
+/// black pixels must be black.
 #[inline]
 pub fn combine_rows<C: Change, const N: usize>(
     rows: [&[C]; N],
@@ -102,8 +102,7 @@ pub fn combine_rows<C: Change, const N: usize>(
     });
 }
 
-/// Calls `each` at every column where some of the rows change, with the rows'
-/// pixels from there on.
+/// Calls `each` at every column where any row changes, with the rows' pixels from there on.
 #[inline]
 pub(crate) fn walk_rows<C: Change, const N: usize>(
     mut rows: [&[C]; N],
@@ -123,9 +122,8 @@ pub(crate) fn walk_rows<C: Change, const N: usize>(
 }
 
 impl<C: Change<Pixel: Combine>> RunImage<C> {
-    /// Returns the combination of this image and another of its size by
-    /// [`Op::is_white`] or [`Op::level`], or `None` if it has more than
-    /// [`MAX_RUNS`].
+    /// Combines the image with another of its size by [`Op::is_white`] or [`Op::level`]. Returns
+    /// `None` if the result has more than [`MAX_RUNS`].
     ///
     /// # Panics
     /// Panics if the sizes differ.
@@ -146,9 +144,8 @@ impl<C: Change<Pixel: Combine>> RunImage<C> {
 }
 
 impl Image {
-    /// Returns the combination of this image and another of its size: a mask of
-    /// two masks, else a gray mask. Returns `None` if it has more than
-    /// [`MAX_RUNS`].
+    /// Combines the image with another of its size: two masks to a mask, otherwise to a gray
+    /// mask. Returns `None` if the result has more than [`MAX_RUNS`].
     ///
     /// # Panics
     /// Panics if the sizes differ.

@@ -1,4 +1,4 @@
-//! What can be wrong with a stack.
+//! Defines the errors of reading and writing stacks.
 
 use std::io;
 
@@ -6,44 +6,44 @@ use thiserror::Error;
 
 use crate::g4::G4Error;
 
-/// Why a stack cannot be read or written.
+/// An error in reading or writing a stack.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StackError {
-    /// Nothing arrived at all.
+    /// The input is empty.
     #[error("the input is empty: no stack arrived")]
     Empty,
-    /// The first bytes are those of no TIFF and no PNG.
+    /// The input starts as neither a TIFF nor a PNG.
     #[error("this is not a TIFF stack or a PNG (it starts with bytes {start:02x?})")]
     NotTiff {
         /// The first bytes of the input.
         start: Vec<u8>,
     },
-    /// The input ends before its last page's end.
+    /// The input ends within a page.
     #[error("the stack is cut off: {}; run the stage that wrote it again", last_whole_text(*.last_whole))]
     CutOff {
-        /// The last layer that arrived whole.
+        /// The last complete layer.
         last_whole: Option<u32>,
     },
-    /// A page's directory or data contradicts itself, or passes a limit.
+    /// A page's directory or data is inconsistent or exceeds a limit.
     #[error("page {page}: {fault}")]
     Malformed {
         /// The page, from 0.
         page: u32,
-        /// What is wrong.
+        /// The fault.
         fault: PageFault,
     },
-    /// A page is valid but not of a kind that is read here.
+    /// A page is valid but uses an unsupported feature.
     #[error(
         "page {page}: {feature} is not read here; save it as a 1-bit or an 8-bit gray TIFF first, with any lossless compression"
     )]
     Unsupported {
         /// The page, from 0.
         page: u32,
-        /// The feature in question.
+        /// The feature.
         feature: UnsupportedFeature,
     },
-    /// A TIFF whose parts stand in an order that a stream cannot follow.
+    /// The parts of a TIFF are in an order that cannot be read from a stream.
     #[error(
         "page {page}: its parts do not follow each other, so it cannot be read from a pipe; give the file's name instead"
     )]
@@ -51,34 +51,34 @@ pub enum StackError {
         /// The page, from 0.
         page: u32,
     },
-    /// A strip that does not decode.
+    /// A strip does not decode.
     #[error("layer {layer}")]
     Strip {
         /// The layer's index.
         layer: u32,
-        /// What is wrong with its codes.
+        /// The fault in its codes.
         source: G4Error,
     },
-    /// A file of a folder that cannot be read.
+    /// A file of a folder cannot be read.
     #[error("{file}")]
     InFile {
         /// The file's name.
         file: String,
-        /// What is wrong with it.
+        /// The cause.
         source: Box<StackError>,
     },
-    /// Layers that do not go up.
+    /// The layer indices do not increase.
     #[error("layer {layer} stands behind layer {before}: a stack's layers go up")]
     Order {
         /// The layer that is out of order.
         layer: u32,
-        /// The one before it.
+        /// The layer before it in the file.
         before: u32,
     },
-    /// A folder without pages.
+    /// A folder has no pages.
     #[error("the folder holds no .tif or .png page")]
     NoPages,
-    /// A folder of pages of both kinds.
+    /// A folder has both TIFF and PNG pages.
     #[error(
         "the folder holds .tif and .png pages: keep those that are the stack, and move the others away"
     )]
@@ -86,10 +86,10 @@ pub enum StackError {
     /// A page is missing from a folder.
     #[error("the folder lacks a page: layer {layer} does not follow what was before it")]
     MissingPage {
-        /// The layer behind the gap.
+        /// The layer after the gap.
         layer: u32,
     },
-    /// A file of a folder that is a stack of its own.
+    /// A file of a folder has several pages.
     #[error("it has several pages: the files of a folder have one page each")]
     SeveralPages,
     /// The stack does not fit a classic TIFF.
@@ -100,10 +100,10 @@ pub enum StackError {
         /// The layer that does not fit.
         layer: u32,
     },
-    /// A stack must have at least one layer.
+    /// There is no layer to write.
     #[error("there is no layer to write")]
     NoLayers,
-    /// A folder of pages is to be written where something stands already.
+    /// The output folder is not empty.
     #[error(
         "a folder of pages is not written over what is there: remove it or choose another name"
     )]
@@ -113,7 +113,7 @@ pub enum StackError {
     Io(#[from] io::Error),
 }
 
-/// What is wrong with a page.
+/// A fault in a page.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PageFault {
@@ -123,7 +123,7 @@ pub enum PageFault {
     /// A TIFF field has no value.
     #[error("its tag {0} is empty")]
     EmptyTag(u16),
-    /// A TIFF field is not of a type that its tag may have.
+    /// A TIFF field has a type that its tag does not allow.
     #[error("its tag {tag} has type {kind}")]
     TagType {
         /// The field's tag.
@@ -131,7 +131,7 @@ pub enum PageFault {
         /// The number of its type.
         kind: u16,
     },
-    /// A TIFF field is larger than the reader's limits.
+    /// A TIFF field exceeds the reader's limit.
     #[error("its tag {tag} claims {bytes} bytes")]
     TagBytes {
         /// The field's tag.
@@ -139,32 +139,32 @@ pub enum PageFault {
         /// Its size.
         bytes: u64,
     },
-    /// A TIFF directory has more entries than the reader's limits.
+    /// A TIFF directory has more entries than the reader's limit.
     #[error("its directory claims {0} entries")]
     Entries(u64),
-    /// The links of a TIFF lead back to a page.
+    /// The links of a TIFF's directories form a loop.
     #[error("its directory was met before: the links form a loop")]
     Loop,
-    /// A width or height is zero or past the reader's limits, in pixels.
+    /// A width or height, in pixels, is zero or exceeds the reader's limit.
     #[error("it claims a side of {0} pixels")]
     Side(u64),
-    /// TIFF knows no such orientation.
+    /// The orientation is not one of TIFF's.
     #[error("there is no orientation {0}")]
     Orientation(u64),
-    /// An image is too wide to exchange its rows and columns, in pixels.
+    /// The image's width in pixels is too large to exchange rows and columns.
     #[error("it claims {0} columns, too many to turn it upright")]
     TooWideToTurn(u32),
-    /// There are not as many strips or tiles as the image's size makes.
+    /// The number of strips or tiles does not match the image's size.
     #[error("it has {found} {pieces} where its size makes {wanted}")]
     PieceCount {
         /// `strips` or `tiles`.
         pieces: &'static str,
-        /// How many the directory lists.
+        /// The number that the directory lists.
         found: usize,
-        /// How many there should be.
+        /// The number that the image's size requires.
         wanted: u64,
     },
-    /// The strips or tiles are larger than any coding makes them, in bytes.
+    /// The strips or tiles have more bytes than any coding of the image needs.
     #[error("its strips claim {0} bytes, more than its pixels can take")]
     PieceBytes(u64),
     /// Strips or tiles share bytes.
@@ -173,7 +173,7 @@ pub enum PageFault {
     /// A `strip` or `tile` ends before its last row.
     #[error("a {0} is shorter than its rows")]
     TooShort(&'static str),
-    /// A `strip` or `tile` is not what its compression makes.
+    /// A `strip` or `tile` does not decompress.
     #[error("a {0} does not decode: it is damaged")]
     Damaged(&'static str),
     /// The image has more runs than the reader's limits.
@@ -185,15 +185,15 @@ pub enum PageFault {
     /// A PNG has bytes that belong to no chunk.
     #[error("its PNG has bytes between its chunks")]
     PngGap,
-    /// A PNG is larger than the reader's limits, in bytes.
+    /// A PNG is larger than the reader's limit, in bytes.
     #[error("its PNG has more than {0} bytes")]
     PngBytes(u64),
-    /// A PNG's palette lacks an entry that a pixel names.
+    /// A PNG's palette lacks an entry that a pixel uses.
     #[error("its palette has no entry {0}")]
     PaletteEntry(u8),
 }
 
-/// A feature of TIFF or PNG that is not read.
+/// An unsupported feature of TIFF or PNG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum UnsupportedFeature {
@@ -203,35 +203,35 @@ pub enum UnsupportedFeature {
     /// A TIFF with a palette.
     #[error("an image with a palette")]
     Palette,
-    /// Another photometric interpretation of TIFF.
+    /// An unsupported photometric interpretation of TIFF.
     #[error("photometric interpretation {0}")]
     Photometric(u64),
-    /// Pixels of another size.
+    /// An unsupported number of samples or bits.
     #[error("an image of {samples} x {bits} bits")]
     PixelBits {
-        /// Samples a pixel.
+        /// Samples per pixel.
         samples: u64,
-        /// Bits a sample.
+        /// Bits per sample.
         bits: u64,
     },
-    /// Samples that are no unsigned numbers.
+    /// Samples that are not unsigned integers.
     #[error("sample format {0}")]
     SampleFormat(u64),
-    /// Group 3 data that may hold pixels without a code.
+    /// Group 3 data that may use the uncompressed mode.
     #[error("Group 3 with its uncompressed mode")]
     UncompressedMode,
     /// JPEG data.
     #[error("JPEG in a TIFF")]
     Jpeg,
-    /// Another compression of TIFF.
+    /// An unsupported compression of TIFF.
     #[error("TIFF compression {0}")]
     Compression(u64),
-    /// A predictor that these pixels are not read with.
+    /// A predictor that is unsupported for these pixels.
     #[error("predictor {predictor} of {bits}-bit pixels")]
     Predictor {
-        /// Its number in TIFF.
+        /// The predictor's number in TIFF.
         predictor: u64,
-        /// Bits a pixel.
+        /// Bits per pixel.
         bits: u8,
     },
     /// An interlaced PNG.
@@ -240,13 +240,13 @@ pub enum UnsupportedFeature {
     /// A PNG with an alpha channel or a transparent colour.
     #[error("a PNG with transparency")]
     Transparency,
-    /// A PNG with 16 bits a sample.
+    /// A PNG with 16 bits per sample.
     #[error("a PNG of 16 bits")]
     SixteenBits,
     /// A PNG in colour.
     #[error("a PNG in colour")]
     PngColour,
-    /// A PNG with a palette that is not gray.
+    /// A PNG whose palette has colours other than grays.
     #[error("a PNG with a palette of colours")]
     PngPalette,
 }

@@ -3,8 +3,7 @@
 use crate::layer::Image;
 use crate::runs::{Change, RunImage};
 
-/// The rectangle that an image is cropped or padded to. It may reach beyond the
-/// image, where it is black.
+/// The rectangle that an image is cropped or padded to. Pixels beyond the image are black.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// The image's column that becomes the first.
@@ -18,8 +17,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Returns the number of black rows above an image of `height`, the image's
-    /// rows that the frame shows, and the number of black rows below.
+    /// Returns the number of black rows above an image of `height`, the image's rows inside the
+    /// frame, and the number of black rows below.
     fn rows(&self, height: u32) -> (u32, std::ops::Range<u32>, u32) {
         let within = |row: i64| row.clamp(0, height.into()) as u32;
         let shown = within(self.top)..within(self.top.saturating_add(self.height.into()));
@@ -35,11 +34,11 @@ impl Frame {
     }
 }
 
-/// Appends a row to `out`, a row of an image of `into` columns, such that its
-/// first column stands at `left` there. What lies outside is cut off.
+/// Appends a row of `width` columns to `out`, a row of `into` columns, at column `left`.
+/// Pixels outside are cut off.
 ///
-/// `width` is that of the appended row. `out` must not change behind `left`; a
-/// change at `left` itself goes if both rows have the same value there.
+/// `out` must not change after `left`. A change at `left` is removed if both rows have the
+/// same value there.
 pub fn place_row<C: Change>(changes: &[C], width: u32, left: i64, into: u32, out: &mut Vec<C>) {
     let (start, end) = (left.clamp(0, into.into()), left.saturating_add(width.into()));
     let place = |change: C| left.saturating_add(change.column().into());
@@ -60,8 +59,7 @@ pub fn place_row<C: Change>(changes: &[C], width: u32, left: i64, into: u32, out
     }
 }
 
-/// Changes a row's value from a column on, which is that of its last change or
-/// behind it.
+/// Sets a row's value from a column on, which must not be before the row's last change.
 fn change_to<C: Change>(pixel: C::Pixel, column: i64, width: u32, row: &mut Vec<C>) {
     if column >= width.into() {
         return;

@@ -1,11 +1,10 @@
-//! 8-bit images as runs of equal level.
+//! Stores 8-bit images as runs of equal level.
 
 use crate::mask::Mask;
 use crate::runs::{Change, RunError, RunImage};
 
-/// An 8-bit image, kept as the places where each row changes its level: 0 is
-/// black, 255 full exposure. See [`RunImage`] for where pixels lie and what is
-/// guaranteed.
+/// An 8-bit image, stored as the columns where each row changes its level: 0 is black, 255
+/// full exposure. See [`RunImage`] for the coordinates and the guarantees.
 ///
 /// ```
 /// use lamp_stack::{GrayMask, LevelChange, gray_runs};
@@ -20,12 +19,12 @@ use crate::runs::{Change, RunError, RunImage};
 /// ```
 pub type GrayMask = RunImage<LevelChange>;
 
-/// A column from which on a row's pixels have another level.
+/// A change of level in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LevelChange {
     /// The first column of the new level.
     pub column: u32,
-    /// The new level: 0 black, 255 full exposure.
+    /// The new level: 0 is black, 255 full exposure.
     pub level: u8,
 }
 
@@ -67,9 +66,8 @@ impl GrayMask {
         self.push_row_checked(changes)
     }
 
-    /// Adds a row given as runs of `(length, level)` from the left, which may
-    /// be empty or repeat a level. If they end before the width, the rest is
-    /// black.
+    /// Adds a row given as runs `(length, level)` from the left, which may be empty or repeat a
+    /// level. Pixels after the last run are black.
     ///
     /// # Errors
     /// Returns an error if the runs are longer than the width.
@@ -94,7 +92,7 @@ impl GrayMask {
     }
 }
 
-/// Makes a mask gray, with the levels 0 and 255.
+/// Converts a mask to the levels 0 and 255.
 impl From<&Mask> for GrayMask {
     fn from(mask: &Mask) -> Self {
         let mut gray = Self::new(mask.width());
@@ -111,8 +109,8 @@ impl From<&Mask> for GrayMask {
     }
 }
 
-/// Returns the runs of a row that are not black, as the first column, the column
-/// after the last, and the level.
+/// Returns the nonblack runs of a row, as the first column, the column after the last, and
+/// the level.
 pub fn gray_runs(changes: &[LevelChange], width: u32) -> impl Iterator<Item = (u32, u32, u8)> {
     let ends = changes.iter().skip(1).map(|change| change.column).chain([width]);
     changes

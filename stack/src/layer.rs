@@ -1,4 +1,4 @@
-//! One layer of a stack: its image and what is known of it.
+//! Defines a layer of a stack: its image and the metadata of its page.
 
 use std::ops::Range;
 
@@ -10,13 +10,12 @@ use crate::length::{Dpi, Length};
 use crate::mask::{Mask, white_runs};
 use crate::ordered::MemorySize;
 
-/// What is exposed at one height: an image, and where and how it is exposed.
+/// The exposure at one height: an image and its metadata.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// What the page's JSON line says.
+    /// The content of the page's JSON line.
     pub info: PageInfo,
-    /// The image's resolution, where the page states one in inches or
-    /// centimetres.
+    /// The image's resolution, if the page states one in inches or centimetres.
     pub dpi: Option<Dpi>,
     /// The image.
     pub image: LayerImage,
@@ -32,12 +31,11 @@ impl MemorySize for Layer {
     }
 }
 
-/// A layer's image, which may remember the T.6 strip of the page that it was
-/// read from: an image that passes through a stage unchanged is not encoded
-/// again.
+/// A layer's image. An image that was read may keep its page's T.6 strip, so that a stage
+/// that does not change it need not encode it again.
 ///
-/// It dereferences to its [`Image`]. To change it, replace it by another image
-/// with `into`, which then has no strip.
+/// It dereferences to its [`Image`]. To change it, replace it with another image converted
+/// by `into`, which has no strip.
 ///
 /// ```
 /// use lamp_stack::{Image, Layer, Mask, PageInfo};
@@ -64,7 +62,7 @@ impl LayerImage {
         self.strip.as_deref()
     }
 
-    /// Returns the image alone.
+    /// Returns the image without its strip.
     pub fn into_image(self) -> Image {
         self.image
     }
@@ -93,9 +91,9 @@ impl<I: Into<Image>> From<I> for LayerImage {
 /// A layer's pixels: 1-bit or 8-bit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Image {
-    /// Every pixel is exposed or not.
+    /// A 1-bit image: every pixel is exposed or not.
     Mask(Mask),
-    /// Every pixel is exposed by a level.
+    /// An 8-bit image: every pixel has an exposure level.
     Gray(GrayMask),
 }
 
@@ -128,8 +126,7 @@ impl Image {
         }
     }
 
-    /// Returns the number of changes in all rows, with which the image's cost
-    /// grows.
+    /// Returns the number of changes in all rows, which determines the cost of processing.
     pub fn change_count(&self) -> usize {
         match self {
             Self::Mask(mask) => mask.change_count(),
@@ -137,8 +134,8 @@ impl Image {
         }
     }
 
-    /// Returns the runs of a row that are not black, as the first column, the
-    /// column after the last, and the level.
+    /// Returns the nonblack runs of a row, as the first column, the column after the last, and
+    /// the level.
     ///
     /// # Panics
     /// Panics if `row` is not below the height.
@@ -153,11 +150,10 @@ impl Image {
     }
 }
 
-/// What the JSON line of a page says: which layer it is, and whatever later
-/// stages need. Keys that are not known are kept.
+/// The content of a page's JSON line: the layer's index and the metadata that later stages
+/// need. Unknown keys are kept.
 ///
-/// Pages of other writers may lack all but the index, which is then the
-/// page's.
+/// Pages of other writers may have no line; the index is then the page's number.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PageInfo {
     /// The layer's index, 0 at the bottom.
@@ -172,55 +168,52 @@ pub struct PageInfo {
     /// The image's top left corner (x, y) in part coordinates, in millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin_mm: Option<[f64; 2]>,
-    /// How long the layer is exposed, in milliseconds.
+    /// The layer's exposure time in milliseconds.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
     pub exposure_ms: Option<f64>,
-    /// Whether every contour of the layer's section closes, where the slicer
-    /// knows. One that does not may still leave every row balanced.
+    /// True if every contour of the layer's section closes, false if not, `None` if unknown.
+    /// An open contour may still leave every row balanced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub closed: Option<bool>,
-    /// Rows at which contours break off, increasing: each is the first row
-    /// below such an end, which may be the one below the image. Only there does
-    /// a row begin to miss crossings, or cease to. Empty where `closed` is
-    /// not `false`.
+    /// The first row below each end of an open contour, increasing; it may be the row below the
+    /// image. Rows begin or cease to miss crossings only there. Empty unless `closed` is false.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub open_rows: Vec<u32>,
-    /// Rows whose crossings did not balance, increasing.
+    /// The rows whose crossings did not balance, increasing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stray_rows: Vec<u32>,
-    /// What holds for the whole stack; on page 0 only.
+    /// The metadata of the whole stack, on page 0 only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stack: Option<StackInfo>,
-    /// Whatever else the line says.
+    /// The unknown keys of the line.
     #[serde(flatten)]
     pub other: Map<String, Value>,
 }
 
-/// What page 0 says of the whole stack. It holds no date, host or path, so
-/// that equal input gives equal bytes.
+/// The metadata of a whole stack, on page 0. It has no date, host or path, so that equal
+/// input gives equal bytes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StackInfo {
     /// The part's name.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub part: String,
-    /// The commands that made every page, first to last, with the options
-    /// that matter to the images.
+    /// The commands that made the stack, first to last, with the options that affect the images.
     #[serde(default)]
     pub commands: Vec<String>,
-    /// The digest of the input, as `blake3:` and 64 hexadecimal digits.
+    /// The digest of the input: `blake3:` and 64 hexadecimal digits.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub digest: String,
-    /// How many layers the stack has.
+    /// The number of layers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layers: Option<u32>,
-    /// Whatever else is said.
+    /// The unknown keys.
     #[serde(flatten)]
     pub other: Map<String, Value>,
 }
 
 impl StackInfo {
-    /// What it says of a range of the stack's layers, where the first of all
-    /// is `first`. Layers are taken to follow each other.
+    /// Returns the metadata of a range of the stack's layers, given the stack's first layer.
+    /// The layers are assumed to be consecutive.
     pub fn of_range(self, first: u32, range: &Range<u32>) -> Self {
         let within = |layers: u32| {
             let end = first.saturating_add(layers).min(range.end);
@@ -231,12 +224,12 @@ impl StackInfo {
 }
 
 impl PageInfo {
-    /// The height of the layer's bottom, where it is known.
+    /// Returns the height of the layer's bottom, if known.
     pub fn z(&self) -> Option<Length> {
         self.z_um.map(Length::from_um)
     }
 
-    /// The layer as people name it: `layer 812 (z 81.20 mm)`.
+    /// Returns a name for messages, such as `layer 812 (z 81.20 mm)`.
     pub fn name(&self) -> String {
         match self.z() {
             Some(z) => format!("layer {} (z {:.2} mm)", self.index, z.mm()),
@@ -244,12 +237,12 @@ impl PageInfo {
         }
     }
 
-    /// Reads a page's description; `None` where it is not this JSON line.
+    /// Parses a page's description. Returns `None` if it is not such a JSON line.
     pub(crate) fn parse(description: &[u8]) -> Option<Self> {
         serde_json::from_slice(description).ok()
     }
 
-    /// The line as it stands in the file.
+    /// Returns the JSON line.
     pub(crate) fn to_line(&self) -> String {
         serde_json::to_string(self).expect("maps have string keys and numbers are finite")
     }

@@ -209,6 +209,7 @@ impl FromStr for Dpi {
             .parse()
             .ok()
             .and_then(Self::new)
+            // Accepts only what TIFF's rational tags store exactly.
             .filter(|dpi| {
                 let (num, den) = dpi.to_rational();
                 f64::from(num) / f64::from(den) == dpi.get()

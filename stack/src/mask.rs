@@ -1,8 +1,8 @@
-//! 1-bit images as runs.
+//! Stores 1-bit images as runs.
 
 use crate::runs::{RunError, RunImage};
 
-/// A 1-bit image, kept as the columns where each row changes colour.
+/// A 1-bit image, stored as the columns where each row changes colour.
 ///
 /// ```text
 ///   column  0 1 2 3 4 5 6 7
@@ -10,9 +10,9 @@ use crate::runs::{RunError, RunImage};
 ///   row 1   . . . . . . . .     none
 /// ```
 ///
-/// `#` is white: 1, cured. Every row starts black and toggles at each of its
-/// transitions; a row with an odd number of them ends white. See [`RunImage`]
-/// for where pixels lie and what is guaranteed.
+/// `#` is white: 1, cured. Every row starts black and toggles at each of its transitions; a
+/// row with an odd number of them ends white. See [`RunImage`] for the coordinates and the
+/// guarantees.
 ///
 /// ```
 /// use lamp_stack::Mask;
@@ -26,9 +26,8 @@ use crate::runs::{RunError, RunImage};
 pub type Mask = RunImage<u32>;
 
 impl Mask {
-    /// Creates a mask of `width` from its two arrays: `row_offsets` has one
-    /// entry more than there are rows, the first 0 and the last
-    /// `transitions.len()`.
+    /// Creates a mask from its two arrays. `row_offsets` has one entry more than there are rows,
+    /// the first 0 and the last `transitions.len()`.
     ///
     /// # Errors
     /// Returns an error if the arrays break the guarantees of [`RunImage`].
@@ -121,8 +120,8 @@ impl MaskBuilder {
     /// Adds a row below the others.
     ///
     /// # Errors
-    /// Returns an error if the transitions do not strictly increase below the
-    /// width, or are too many altogether.
+    /// Returns an error if the transitions do not strictly increase or reach the width, or if
+    /// the image has too many.
     pub fn push_row(&mut self, transitions: &[u32]) -> Result<(), RunError> {
         self.mask.push_row_checked(transitions)
     }

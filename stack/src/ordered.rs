@@ -1,12 +1,12 @@
-//! Work on many layers at once without changing their order.
+//! Maps layers on many threads, in order.
 
 use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
-/// What waits in a queue, and how much memory it takes there.
+/// A queued item whose memory size can be estimated.
 pub trait MemorySize {
-    /// About how many bytes it takes, or will take once it is decoded.
+    /// Returns the approximate number of bytes that the item takes, or will take when decoded.
     fn bytes(&self) -> usize;
 }
 
@@ -16,17 +16,16 @@ impl<T: MemorySize, U> MemorySize for (T, U) {
     }
 }
 
-/// Batches are at most so large, in items a thread: enough that handing them
-/// out costs little.
+/// The largest batch in items per thread: enough to make the cost of scheduling small.
 const MAX_A_THREAD: usize = 16;
-/// From so many bytes on, a batch has no more than an item a thread.
+/// The batch size in bytes from which a batch has at most one item per thread.
 const ENOUGH_BYTES: usize = 32 << 20;
 
-/// Maps the items of `input` through `work` on all threads of the current
-/// rayon pool, in order. After an error nothing more is taken from `input`.
+/// Maps the items of `input` through `work` on all threads of the current rayon pool, in
+/// order, and stops after an error.
 ///
-/// A batch of items is held at once, so memory does not grow with the length
-/// of `input`: up to sixteen a thread, but of large ones only one a thread.
+/// Items are taken in batches of up to sixteen per thread, or one per thread if they are
+/// large, so memory does not grow with the length of `input`.
 pub fn map_in_order<I, T, U, E>(
     input: I,
     work: impl Fn(T) -> Result<U, E> + Sync,

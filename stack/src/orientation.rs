@@ -32,18 +32,18 @@ use crate::runs::{Change, RunImage};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Orientation {
-    /// How many right angles, below four.
+    /// The number of right angles, 0 to 3.
     quarters: u8,
     mirrored: bool,
 }
 
-/// A text that names no [`Orientation`].
+/// An error in the text of an [`Orientation`].
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("`{0}` is no turn: write 0, 90, 180 or 270, and m behind it to mirror first")]
 pub struct OrientationError(String);
 
 impl Orientation {
-    /// All eight: the four rotations, then the same mirrored.
+    /// All eight orientations: the four rotations, then the same mirrored.
     pub const ALL: [Self; 8] = {
         let mut all = [Self { quarters: 0, mirrored: false }; 8];
         let mut k = 0;
@@ -54,14 +54,14 @@ impl Orientation {
         all
     };
 
-    /// Mirrors left to right if `mirrored`, then rotates by `quarters` right
-    /// angles anticlockwise.
+    /// Creates the orientation that mirrors left to right if `mirrored`, then rotates
+    /// anticlockwise by `quarters` right angles.
     pub fn new(quarters: u32, mirrored: bool) -> Self {
         Self { quarters: (quarters % 4) as u8, mirrored }
     }
 
-    /// Returns what sets an image upright whose rows are stored as TIFF's
-    /// orientation tag says (1 to 8); `None` for other values.
+    /// Returns the orientation that turns an image with this TIFF orientation tag (1 to 8)
+    /// upright, or `None` for other values.
     ///
     /// Source: TIFF 6.0, section 8, Orientation.
     pub(crate) fn of_tiff_tag(tag: u64) -> Option<Self> {
@@ -69,7 +69,7 @@ impl Orientation {
         ways.get(usize::try_from(tag).ok()?.checked_sub(1)?)?.parse().ok()
     }
 
-    /// The number of right angles of the rotation, anticlockwise: below four.
+    /// Returns the number of right angles, 0 to 3, of the anticlockwise rotation.
     pub fn quarters(self) -> u32 {
         self.quarters.into()
     }
@@ -91,15 +91,13 @@ impl Orientation {
         Self { quarters, ..self }
     }
 
-    /// The width and height of an image of this width and height once it is
-    /// oriented.
+    /// Returns the oriented width and height of an image of this size.
     pub fn size(self, width: u32, height: u32) -> (u32, u32) {
         if self.is_across() { (height, width) } else { (width, height) }
     }
 
-    /// Returns whether, after rows and columns are exchanged where the
-    /// orientation [`is_across`](Self::is_across), the columns and the rows are
-    /// to be reversed.
+    /// Returns whether to reverse the columns and the rows, after exchanging rows and columns if
+    /// the orientation [`is_across`](Self::is_across).
     fn reversed(self) -> (bool, bool) {
         let (columns, rows) = (self.quarters >= 2, matches!(self.quarters, 1 | 2));
         if self.mirrored { (!rows, columns) } else { (columns, rows) }
@@ -107,7 +105,7 @@ impl Orientation {
 }
 
 impl fmt::Display for Orientation {
-    /// Writes `0`, `90`, `180` or `270`, and `m` behind it if mirrored.
+    /// Formats as `0`, `90`, `180` or `270`, followed by `m` if mirrored.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}{}", u32::from(self.quarters) * 90, if self.mirrored { "m" } else { "" })
     }
@@ -116,7 +114,7 @@ impl fmt::Display for Orientation {
 impl FromStr for Orientation {
     type Err = OrientationError;
 
-    /// Parses what [`Display`](fmt::Display) writes.
+    /// Parses the format of [`Display`](fmt::Display).
     fn from_str(text: &str) -> Result<Self, OrientationError> {
         let known = Self::ALL.into_iter().find(|known| known.to_string() == text.trim());
         known.ok_or_else(|| OrientationError(text.to_owned()))
@@ -124,8 +122,8 @@ impl FromStr for Orientation {
 }
 
 impl<C: Change> RunImage<C> {
-    /// Returns the image in another orientation, or `None` if that has more
-    /// than [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
+    /// Returns the image in another orientation, or `None` if it would have more than
+    /// [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
     pub fn oriented(&self, orientation: Orientation) -> Option<Self> {
         let mut image = if orientation.is_across() { self.transposed()? } else { self.clone() };
         let (columns, rows) = orientation.reversed();
@@ -157,10 +155,10 @@ impl<C: Change> RunImage<C> {
             if last != C::Pixel::default() {
                 reversed.push(C::new(0, last));
             }
-            // A change at column 0 would come to lie at the width.
+            // A change at column 0 would move to the width, outside the row.
             let first = usize::from(row.first().is_some_and(|change| change.column() == 0));
             reversed.extend((first..row.len()).rev().map(|i| {
-                // From right to left, a change is back to the value before it.
+                // From right to left, a change restores the value before it.
                 C::new(width - row[i].column(), C::last_pixel(&row[..i]))
             }));
             image.push(&reversed);
@@ -168,8 +166,8 @@ impl<C: Change> RunImage<C> {
         image
     }
 
-    /// Returns the image with rows and columns exchanged, or `None` if that has
-    /// more than [`MAX_RUNS`]. Where two rows differ, each column has a change.
+    /// Returns the image with rows and columns exchanged, or `None` if it would have more than
+    /// [`MAX_RUNS`]. Each column gets a change wherever two adjacent rows differ.
     fn transposed(&self) -> Option<Self> {
         let black = C::Pixel::default();
         let (offsets, changes) = by_column(self.width(), C::new(0, black), |each| {
@@ -186,8 +184,8 @@ impl<C: Change> RunImage<C> {
 }
 
 impl Image {
-    /// Returns the image in another orientation, or `None` if that has more
-    /// than [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
+    /// Returns the image in another orientation, or `None` if it would have more than
+    /// [`MAX_RUNS`]. The cost grows with the edges along rows and columns.
     pub fn oriented(&self, orientation: Orientation) -> Option<Self> {
         Some(match self {
             Self::Mask(mask) => Self::Mask(mask.oriented(orientation)?),
@@ -196,8 +194,8 @@ impl Image {
     }
 }
 
-/// Calls `each` with every stretch of columns where two rows differ, and the
-/// second row's value there.
+/// Calls `each` with every range of columns where two rows differ, and the second row's
+/// value there.
 fn stretches_that_differ<C: Change>(
     above: &[C],
     row: &[C],
@@ -215,11 +213,10 @@ fn stretches_that_differ<C: Change>(
     end(width, [C::Pixel::default(); 2]);
 }
 
-/// Sorts the values that `visit` gives for stretches of columns by column.
-/// Returns where each column's values start (and one entry more), and the
-/// values, or `None` if these are more than [`MAX_RUNS`]. `visit` is called
-/// several times and must give the same each time: it is cheaper to compare
-/// rows again than to keep what was found.
+/// Sorts by column the values that `visit` reports for ranges of columns. Returns the start
+/// of each column's values (and a last entry, the end) and the values, or `None` if there
+/// are more than [`MAX_RUNS`]. `visit` is called several times and must report the same each
+/// time: comparing rows again is cheaper than storing the ranges.
 fn by_column<T: Copy>(
     width: u32,
     blank: T,
@@ -230,7 +227,7 @@ fn by_column<T: Copy>(
     if total > MAX_RUNS as u64 {
         return None;
     }
-    // By how many values each column has more than the one before it.
+    // First, the difference between the counts of each column and the one before it.
     let mut starts = vec![0u32; width as usize + 1];
     visit(&mut |stretch, _| {
         for (column, step) in [(stretch.start, 1), (stretch.end, u32::MAX)] {
@@ -251,7 +248,7 @@ fn by_column<T: Copy>(
             *next += 1;
         }
     });
-    // Each column's start has become its end, which is the next one's start.
+    // Each column's start has become its end, which is the start of the next column.
     starts.copy_within(..width as usize, 1);
     starts[0] = 0;
     Some((starts, values))

@@ -1,10 +1,10 @@
-//! PackBits, between runs of gray levels and bytes.
+//! Encodes gray images as PackBits and decodes PackBits to runs of bytes.
 //!
 //! Source: TIFF 6.0, section 9.
 
 use crate::gray::{GrayMask, LevelChange, gray_runs};
 
-/// Encodes a gray mask, each row on its own, as PackBits demands.
+/// Encodes a gray mask, each row separately, as TIFF requires.
 pub(crate) fn encode(image: &GrayMask) -> Vec<u8> {
     let mut out = Vec::new();
     for changes in image.rows() {
@@ -23,9 +23,8 @@ fn encode_row(out: &mut Vec<u8>, changes: &[LevelChange], width: u32) {
     put_run(out, width - column, 0);
 }
 
-/// Adds `length` bytes of `level`. Literals are never gathered: a run costs
-/// two bytes for each 128 pixels, and gray pixels that differ from both
-/// neighbours are few.
+/// Appends `length` bytes of `level`, always as repeats: these take two bytes per 128
+/// pixels, and gray pixels that differ from both neighbours are rare.
 fn put_run(out: &mut Vec<u8>, mut length: u32, level: u8) {
     while length > 0 {
         let part = length.min(128);
@@ -35,11 +34,11 @@ fn put_run(out: &mut Vec<u8>, mut length: u32, level: u8) {
     }
 }
 
-/// The runs `(length, byte)` of packed data. It ends where the data ends, be
-/// that within a packet or not.
+/// An iterator over the runs `(length, byte)` of packed data. It ends where the data ends,
+/// even within a packet.
 pub(crate) struct Runs<'a> {
     data: &'a [u8],
-    /// Bytes of the current literal still to come.
+    /// The number of unread bytes of the current literal.
     literal: usize,
 }
 
@@ -88,7 +87,7 @@ mod tests {
 
     #[test]
     fn the_example_of_the_specification_unpacks() {
-        // Its last packet, cut short here.
+        // The last packet of the specification's example, cut short.
         let packed = [0xFE, 0xAA, 2, 0x80, 0, 0x2A, 0xFD, 0xAA, 0x80, 3, 0x80, 0];
         let runs: Vec<_> = Runs::new(&packed).collect();
         let literal = [(1, 0x80), (1, 0), (1, 0x2A)];

@@ -1,34 +1,31 @@
-//! What 1-bit and gray images share: rows of runs in two flat arrays.
+//! Stores the rows of 1-bit and gray images as runs in two flat arrays.
 
 use std::fmt::Debug;
 
 use thiserror::Error;
 
-/// A pixel's value: `bool` in a mask, `u8` in a gray mask. The default is
-/// black.
+/// A pixel's value: `bool` in a mask, `u8` in a gray mask. The default is black.
 pub trait Pixel: Copy + Debug + Default + Eq {}
 
 impl Pixel for bool {}
 impl Pixel for u8 {}
 
-/// A place in a row where pixels change their value: a `u32` in a
-/// [`Mask`](crate::Mask), which stands for the column alone, or a
-/// [`LevelChange`](crate::LevelChange).
+/// A column where a row changes its value: a `u32` in a [`Mask`](crate::Mask), a
+/// [`LevelChange`](crate::LevelChange) in a gray mask.
 pub trait Change: Copy + Debug + Eq {
-    /// What changes.
+    /// The type of the pixel's value.
     type Pixel: Pixel;
 
-    /// Creates the change to `pixel` at a column. Between two values, the column
-    /// tells all.
+    /// Creates the change to `pixel` at a column. A mask needs only the column.
     fn new(column: u32, pixel: Self::Pixel) -> Self;
 
     /// Returns the first column of the new value.
     fn column(self) -> u32;
 
-    /// Returns the new value of pixels that were `before`.
+    /// Returns the new value, given the value before the change.
     fn after(self, before: Self::Pixel) -> Self::Pixel;
 
-    /// Returns the value behind the last of a row's changes.
+    /// Returns the value after the last of a row's changes.
     fn last_pixel(changes: &[Self]) -> Self::Pixel;
 }
 
@@ -56,25 +53,24 @@ impl Change for u32 {
     }
 }
 
-/// An image kept as the columns where each row changes: [`Mask`](crate::Mask)
-/// and [`GrayMask`](crate::GrayMask) are its two kinds.
+/// An image stored as the columns where each row changes: a [`Mask`](crate::Mask) or a
+/// [`GrayMask`](crate::GrayMask).
 ///
 /// Row 0 is at the largest y, column 0 at the smallest x; pixel `x` covers
 /// `[x, x + 1)`. Every row starts black.
 ///
 /// # Guarantees
-/// The columns of a row's changes strictly increase and are below the width,
-/// and every change is to another value. This is the only form an image has, so
-/// `==` compares images.
+/// The columns of a row's changes strictly increase and are below the width, and every
+/// change is to a different value. This form is unique, so `==` compares images.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunImage<C> {
     width: u32,
-    /// Where each row's changes start, and one entry more: the end.
+    /// The start of each row's changes, and a last entry: their end.
     row_offsets: Vec<u32>,
     changes: Vec<C>,
 }
 
-/// Arrays or rows that break the guarantees of a [`RunImage`].
+/// A violation of the guarantees of a [`RunImage`].
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RunError {
@@ -84,7 +80,7 @@ pub enum RunError {
         /// The row, from the top.
         row: usize,
     },
-    /// A change is to the value that pixels have already.
+    /// A change is to the same value.
     #[error("row {row}: nothing changes at column {column}")]
     NoChange {
         /// The row, from the top.
@@ -92,7 +88,7 @@ pub enum RunError {
         /// The column of the change.
         column: u32,
     },
-    /// A change is at or past the width.
+    /// A change is at or beyond the width.
     #[error("row {row}: column {column} is outside an image {width} pixels wide")]
     OutsideWidth {
         /// The row, from the top.
@@ -119,7 +115,7 @@ impl<C: Change> RunImage<C> {
         Self { width, row_offsets: vec![0], changes: Vec::new() }
     }
 
-    /// Creates an image from its two arrays, where these keep the guarantees.
+    /// Creates an image from its two arrays, or returns an error if they break the guarantees.
     pub(crate) fn from_arrays(
         width: u32,
         row_offsets: Vec<u32>,
@@ -166,8 +162,7 @@ impl<C: Change> RunImage<C> {
         self.row_offsets.windows(2).map(|ends| &self.changes[ends[0] as usize..ends[1] as usize])
     }
 
-    /// Returns the number of changes in all rows, with which the image's cost
-    /// grows.
+    /// Returns the number of changes in all rows, which determines the cost of processing.
     pub fn change_count(&self) -> usize {
         self.changes.len()
     }
@@ -178,7 +173,7 @@ impl<C: Change> RunImage<C> {
         self.changes.reserve(changes);
     }
 
-    /// Checks a row that comes from outside this crate and adds it.
+    /// Adds a row from outside this crate, after checking it.
     pub(crate) fn push_row_checked(&mut self, changes: &[C]) -> Result<(), RunError> {
         let row = self.row_offsets.len() - 1;
         self.check_row(row, changes)?;
@@ -189,8 +184,8 @@ impl<C: Change> RunImage<C> {
         Ok(())
     }
 
-    /// Adds the row that `make` appends to the image's changes, given the width
-    /// and the row's number; adds nothing if it fails.
+    /// Adds the row that `make` appends to the image's changes, given the width and the row's
+    /// number. Adds nothing if it fails.
     pub(crate) fn push_row_with(
         &mut self,
         make: impl FnOnce(u32, usize, &mut Vec<C>) -> Result<(), RunError>,
@@ -204,15 +199,15 @@ impl<C: Change> RunImage<C> {
         made
     }
 
-    /// Adds a row that this crate has made in canonical form.
+    /// Adds a row in canonical form, without checking it.
     pub(crate) fn push(&mut self, changes: &[C]) {
         debug_assert_eq!(self.check_row(self.row_offsets.len() - 1, changes), Ok(()));
         self.changes.extend_from_slice(changes);
         self.row_offsets.push(self.changes.len() as u32);
     }
 
-    /// Adds the row of the first `len` of `changes`, in canonical form, which are
-    /// at least three more: rows are short, and are copied faster in fours.
+    /// Adds the first `len` of `changes`, in canonical form, as a row. `changes` has at least
+    /// three more entries, because short rows are copied faster in groups of four.
     #[inline]
     pub(crate) fn push_padded(&mut self, changes: &[C], len: usize) {
         debug_assert_eq!(self.check_row(self.row_offsets.len() - 1, &changes[..len]), Ok(()));

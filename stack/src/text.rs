@@ -1,15 +1,15 @@
-//! Texts out of files that people write, as messages say them.
+//! Formats positions and excerpts of text files for messages.
 
 use std::ops::Range;
 
-/// The line at which some bytes of a text begin, from 1; the first where a parser
-/// does not say which bytes.
+/// Returns the line, from 1, at which a byte range begins, or 1 if there is no range.
 pub fn line_of(text: &str, bytes: Option<Range<usize>>) -> usize {
     let before = bytes.map_or(0, |bytes| bytes.start);
     1 + text.bytes().take(before).filter(|&byte| byte == b'\n').count()
 }
 
-/// Makes one line of a text from a file: it must not steer the terminal.
+/// Joins a file's text to one line without control characters, which could control the
+/// terminal.
 pub fn one_line(text: &str) -> String {
     let clean: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     clean.split_whitespace().collect::<Vec<_>>().join(" ")

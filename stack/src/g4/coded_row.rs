@@ -1,14 +1,13 @@
-//! A row that several transitions can be looked at, or written, at once.
+//! Stores a row so that several transitions can be read or written at once.
 
-/// How many vertical codes are taken together.
+/// The number of vertical codes decoded together.
 pub(super) const AT_ONCE: usize = 4;
-/// Those, and the place after them.
+/// The number of transitions read together: one more than the codes.
 pub(super) const LOOK: usize = AT_ONCE + 1;
-/// Transitions so far apart stay in order when each moves by three pixels.
+/// The distance at which transitions stay in order when each moves by up to three pixels.
 pub(super) const WIDE: u32 = 7;
 
-/// A row's transitions, and [`LOOK`] places behind the last: the width, and on
-/// from there in wide steps.
+/// A row's transitions, followed by [`LOOK`] places: the width, and more in wide steps.
 pub(super) struct CodedRow {
     pub(super) places: Vec<u32>,
     pub(super) len: usize,
@@ -21,13 +20,13 @@ impl CodedRow {
         row
     }
 
-    /// Transition `i`; the width behind the last.
+    /// Returns transition `i`, or the width after the last.
     #[inline]
     pub(super) fn at(&self, i: usize) -> u32 {
         self.places[i.min(self.len)]
     }
 
-    /// Makes room for the next transitions.
+    /// Reserves space for the next transitions.
     #[inline]
     pub(super) fn make_room(&mut self) {
         if self.places.len() < self.len + LOOK {
@@ -35,7 +34,7 @@ impl CodedRow {
         }
     }
 
-    /// Toggles at a column; toggling there again cancels.
+    /// Toggles at a column; toggling twice cancels.
     #[inline]
     pub(super) fn toggle(&mut self, column: u32, width: u32) {
         if self.len > 0 && self.places[self.len - 1] == column {
@@ -47,7 +46,7 @@ impl CodedRow {
         }
     }
 
-    /// Puts the width behind the last transition.
+    /// Appends the width after the last transition.
     #[inline]
     pub(super) fn end(&mut self, width: u32) {
         self.make_room();

@@ -1,14 +1,13 @@
-//! The code words of T.6 and of the run lengths it takes from T.4, and T.4's
-//! end of line.
+//! Defines the code words of T.6 and T.4.
 
-/// A code word: its bits, right-aligned, and how many there are.
+/// A code word: its bits, right-aligned, and their number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Code {
     pub(super) bits: u32,
     pub(super) len: u32,
 }
 
-/// Reads code words as the recommendations print them, white space between.
+/// Parses code words in the recommendations' notation, separated by white space.
 const fn codes<const N: usize>(digits: &str) -> [Code; N] {
     let digits = digits.as_bytes();
     let mut table = [Code { bits: 0, len: 0 }; N];
@@ -91,10 +90,10 @@ pub(super) const MAKE_UP_LONG: [Code; 13] = codes(
     ",
 );
 
-/// The longest run that one make-up code stands for.
+/// The longest run that one make-up code encodes.
 pub(super) const LONGEST_MAKE_UP: u32 = 2560;
 
-/// The make-up code of a run of `64 * units` pixels, `units` from 1 to 40.
+/// Returns the make-up code of a run of `64 * units` pixels, `units` from 1 to 40.
 pub(super) fn make_up(white: bool, units: u32) -> Code {
     match (units as usize, white) {
         (28.., _) => MAKE_UP_LONG[units as usize - 28],

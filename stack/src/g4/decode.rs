@@ -1,4 +1,4 @@
-//! T.6 codes to runs.
+//! Decodes T.6 codes to runs.
 
 use std::sync::LazyLock;
 
@@ -11,15 +11,14 @@ use super::{G4Error, G4Fault};
 use crate::limits::MAX_RUNS;
 use crate::mask::Mask;
 
-/// Decodes a T.6 (CCITT Group 4) strip of `height` rows, most significant
-/// bit first, into a mask. T.6's white is black (0).
+/// Decodes a T.6 (CCITT Group 4) strip of `height` rows, most significant bit first, into a
+/// mask. T.6's white is black (0).
 ///
-/// Bytes after the last row, with or without EOFB, are not looked at. Memory
-/// grows with the codes read, not with the size that is claimed.
+/// Bytes after the last row, with or without EOFB, are ignored. Memory grows with the codes
+/// read, not with the claimed size.
 ///
 /// # Errors
-/// Where the codes end early, are not T.6, or leave the row; the error names
-/// the row.
+/// Returns an error with the row if the codes end early, are not T.6, or leave the row.
 ///
 /// Source: ITU-T Recommendation T.6, section 2.2.
 pub fn decode(strip: &[u8], width: u32, height: u32) -> Result<Mask, G4Error> {
@@ -28,7 +27,7 @@ pub fn decode(strip: &[u8], width: u32, height: u32) -> Result<Mask, G4Error> {
     Ok(mask)
 }
 
-/// Decodes a strip below the rows that `mask` has.
+/// Decodes a strip and adds its rows below those of `mask`.
 pub(crate) fn decode_rows(
     strip: &[u8],
     width: u32,
@@ -60,8 +59,7 @@ pub(crate) fn decode_rows(
     Ok(())
 }
 
-/// Decodes one row against the row above it. Names are those of
-/// [`encode_row`](super::encode).
+/// Decodes one row against the row above it, with the names of [`encode_row`](super::encode).
 pub(super) fn decode_row(
     bits: &mut BitReader<'_>,
     above: &CodedRow,
@@ -71,7 +69,7 @@ pub(super) fn decode_row(
     row.len = 0;
     let (mut a0, mut started) = (0, false);
     let mut white = false;
-    // The index of b1; its parity is the colour's.
+    // The index of b1; its parity is that of the colour.
     let mut j = 0;
     while a0 < width || !started {
         if let Some(count) = take_verticals(bits, above, j, a0, row, width) {
@@ -115,9 +113,9 @@ pub(super) fn decode_row(
     Ok(())
 }
 
-/// Takes up to four vertical codes at once and writes their transitions behind
-/// the row, where these lie in order whatever the codes, because the runs
-/// above are wide. The last may be the row's end. Gives how many were taken.
+/// Decodes up to four vertical codes at once, if the runs above are wide enough to keep the
+/// transitions in order for any codes. Writes the transitions after the row's end and
+/// returns their number; the last may be the end of the row.
 #[inline]
 fn take_verticals(
     bits: &mut BitReader<'_>,
@@ -131,16 +129,16 @@ fn take_verticals(
         return None;
     }
     let b: &[u32; LOOK] = above.places.get(j..)?.first_chunk()?;
-    // The transition before b1 goes the other way: left of the next a0, it
-    // cannot be the b1 after this one.
+    // The transition before b1 has the opposite colour. If it is left of the next a0, it
+    // cannot be the next b1.
     let alone = j == 0 || b[0] - above.places[j - 1] > 3;
-    // Any difference that is too small leaves the sign bit.
+    // Any difference that is too small sets the sign bit.
     let mut narrow = b[0].wrapping_sub(a0).wrapping_sub(WIDE);
     for k in 1..LOOK {
         narrow |= b[k].wrapping_sub(b[k - 1]).wrapping_sub(WIDE);
     }
     let codes = bits.verticals[bits.peek(VERTICALS_BITS)];
-    // Behind the last transition stands the row's end, coded once.
+    // The row's end follows the last transition and is coded once.
     let count = usize::from(codes.count).min(above.len - j + 1);
     if !alone || narrow >> 31 != 0 || count == 0 {
         return None;
@@ -152,7 +150,7 @@ fn take_verticals(
     if moved[count - 1] > width {
         return None;
     }
-    // A vertical code ends with a 1, which no bit behind the strip is.
+    // Every vertical code ends with a 1, so none extends into the zeros after the strip.
     bits.skip(codes.end(count - 1));
     Some(count)
 }
@@ -164,19 +162,19 @@ enum Mode {
     Vertical(i32),
 }
 
-/// What a code word that starts at some bits stands for, and its length; a
-/// length of 0 marks bits that start no code.
+/// The value and length of the code word that some bits start with; the length is 0 if they
+/// start with none.
 #[derive(Clone, Copy)]
 struct Entry<T> {
     value: T,
     len: u8,
 }
 
-/// The longest code of a table, in bits: how many bits index it.
+/// The longest mode code in bits, and so the bits of the table's index.
 const MODE_BITS: u32 = 7;
 const RUN_BITS: u32 = 13;
 
-/// Enters `value` at every index that begins with `code`.
+/// Stores `value` at every index that begins with `code`.
 fn enter<T: Copy>(table: &mut [Entry<T>], index_bits: u32, code: Code, value: T) {
     let spare = index_bits - code.len;
     let first = (code.bits << spare) as usize;
@@ -193,17 +191,17 @@ static MODES: LazyLock<Vec<Entry<Mode>>> = LazyLock::new(|| {
     table
 });
 
-/// The vertical codes that some bits begin with, at most four.
+/// The vertical codes, at most four, that some bits begin with.
 #[derive(Clone, Copy, Default)]
 struct Verticals {
     shifts: [i8; AT_ONCE],
     count: u8,
-    /// How many bits the codes up to each take, in 4 bits each.
+    /// The end of each code in bits, packed in 4 bits each.
     ends: u16,
 }
 
 impl Verticals {
-    /// How many bits the codes up to `k` take.
+    /// Returns the end of code `k` in bits.
     #[inline]
     fn end(self, k: usize) -> u32 {
         u32::from(self.ends) >> (4 * k) & 15
@@ -237,7 +235,7 @@ static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {
     (0..1 << VERTICALS_BITS).map(begin).collect()
 });
 
-/// Run-length codes of both colours, 0 first.
+/// The run-length codes of both colours, 0 first.
 static RUNS: LazyLock<[Vec<Entry<u16>>; 2]> = LazyLock::new(|| {
     let table = |terminating: &[Code], make_up: &[Code]| {
         let mut table = vec![Entry { value: 0, len: 0 }; 1 << RUN_BITS];
@@ -250,12 +248,12 @@ static RUNS: LazyLock<[Vec<Entry<u16>>; 2]> = LazyLock::new(|| {
     [table(&TERMINATING_0, &MAKE_UP_0), table(&TERMINATING_1, &MAKE_UP_1)]
 });
 
-/// Takes code words off a strip.
+/// A reader of a strip's code words.
 pub(super) struct BitReader<'a> {
     rest: &'a [u8],
-    /// The bits at hand, left-aligned.
+    /// The buffered bits, left-aligned.
     pending: u64,
-    /// How many bits are at hand; negative once bits past the end were taken.
+    /// The number of buffered bits; negative after bits past the end were taken.
     count: i32,
     modes: &'static [Entry<Mode>],
     verticals: &'static [Verticals],
@@ -274,7 +272,7 @@ impl<'a> BitReader<'a> {
         }
     }
 
-    /// The next `n` bits (zeros past the end).
+    /// Returns the next `n` bits, zeros past the end, without taking them.
     #[inline]
     pub(super) fn peek(&mut self, n: u32) -> usize {
         if self.count < 32 {
@@ -288,7 +286,7 @@ impl<'a> BitReader<'a> {
         if let Some(word) = self.rest.first_chunk::<8>()
             && self.count >= 0
         {
-            // The bits behind the last whole byte come again next time.
+            // The bits after the last whole byte are loaded again next time.
             self.pending |= u64::from_be_bytes(*word) >> self.count;
             self.rest = &self.rest[(63 - self.count) as usize / 8..];
             self.count |= 56;
@@ -301,14 +299,14 @@ impl<'a> BitReader<'a> {
         }
     }
 
-    /// Takes bits that are at hand.
+    /// Takes bits that are buffered.
     #[inline]
     fn skip(&mut self, len: u32) {
         self.pending <<= len;
         self.count -= len as i32;
     }
 
-    /// Takes as many 1 bits as come next, at most `most`.
+    /// Takes the next 1 bits, at most `most`, and returns their number.
     fn take_ones(&mut self, most: u32) -> u32 {
         let mut taken = 0;
         loop {
@@ -339,8 +337,7 @@ impl<'a> BitReader<'a> {
         Ok(entry.value)
     }
 
-    /// A run of at most `room` pixels: any make-up codes and a terminating
-    /// code.
+    /// Reads a run of at most `room` pixels: any make-up codes and a terminating code.
     pub(super) fn run(&mut self, white: bool, room: u32) -> Result<u32, G4Fault> {
         let runs = self.runs;
         let table = &runs[usize::from(white)];
@@ -361,13 +358,13 @@ impl<'a> BitReader<'a> {
         }
     }
 
-    /// Goes on to the next byte, unless a byte has just ended.
+    /// Skips to the next byte boundary.
     pub(super) fn align(&mut self) -> Result<(), G4Fault> {
         self.take((self.count % 8) as u8)
     }
 
-    /// Why the next bits are no code: the strip or the page ended, or they
-    /// are not T.6.
+    /// Returns the fault of bits that are no code: the strip or the page ended, or they are not
+    /// T.6.
     fn no_code(&mut self) -> G4Fault {
         if self.peek(EOL.len) == EOL.bits as usize || (self.pending == 0 && self.rest.is_empty()) {
             G4Fault::EndsEarly

@@ -1,4 +1,4 @@
-//! Runs to T.6 codes.
+//! Encodes runs as T.6 codes.
 
 use std::sync::LazyLock;
 
@@ -7,10 +7,10 @@ use super::codes::{
 };
 use crate::mask::Mask;
 
-/// Encodes a mask as one T.6 (CCITT Group 4) strip, most significant bit
-/// first, ended by EOFB and padded to a byte. Black (0) is T.6's white.
+/// Encodes a mask as one T.6 (CCITT Group 4) strip, most significant bit first, ended by
+/// EOFB and padded to a byte. Black (0) is T.6's white.
 ///
-/// The codes are those that T.6's flow diagram gives; no pixel is looked at.
+/// The codes are those of T.6's flow diagram, computed from the runs alone.
 ///
 /// Source: ITU-T Recommendation T.6, sections 2.2.1 to 2.2.5.
 pub fn encode(mask: &Mask) -> Vec<u8> {
@@ -29,17 +29,16 @@ pub fn encode(mask: &Mask) -> Vec<u8> {
     bits.finish()
 }
 
-/// Encodes one row against the row above it, naming positions as T.6 does:
-/// a0 is where coding stands, a1 and a2 the next transitions of this row, b1
-/// the first transition of the reference row right of a0 towards the other
-/// colour, and b2 the one after it.
+/// Encodes one row against the row above it, with the names of T.6: a0 is the current
+/// position, a1 and a2 are the next transitions of this row, b1 is the first transition of
+/// the reference row right of a0 to the opposite colour, and b2 the one after it.
 fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) {
     let four_verticals = &*FOUR_VERTICALS;
     let at = |transitions: &[u32], i: usize| transitions.get(i).copied().unwrap_or(width);
     // The first a0 is an imaginary pixel left of the row: at 0, but not past
     // a transition at 0.
     let (mut a0, mut started) = (0, false);
-    // Indices of a1 and b1. They agree in parity: both change colour alike.
+    // The indices of a1 and b1. Their parities agree, as both change to the same colour.
     let (mut i, mut j) = (0, 0);
     while a0 < width || !started {
         if let Some(code) = four_near(reference, row, i, j, width, four_verticals) {
@@ -56,7 +55,7 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
             bits.put(VERTICAL[a1.wrapping_sub(b1).wrapping_add(3) as usize]);
             a0 = a1;
             i += 1;
-            // The other colour's next transition may stand before this one.
+            // The next transition of the other colour may be before this one.
             j = if j > 0 { j - 1 } else { j + 1 };
         } else {
             let a2 = at(row, i + 1);
@@ -73,9 +72,9 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
     }
 }
 
-/// If the next four transitions all lie within three pixels of the reference
-/// row's, and the reference runs between are wide enough (four pixels) that
-/// no pass mode and no other b1 is possible, their four codes.
+/// Returns the four codes of the next four transitions if each is within three pixels of the
+/// reference row's and the reference runs are wide enough (four pixels) to exclude pass mode
+/// and any other b1.
 #[inline]
 fn four_near(
     reference: &[u32],
@@ -87,9 +86,9 @@ fn four_near(
 ) -> Option<Code> {
     let a: &[u32; 4] = row.get(i..)?.first_chunk()?;
     let b: &[u32; 4] = reference.get(j..)?.first_chunk()?;
-    // The transition before b1 must lie left of the next a0, the one behind
-    // the last of b right of the fourth a1. A difference that is too small
-    // leaves the sign bit, a shift that is too large any bit above the third.
+    // The transition before b1 must be left of the next a0, the one after the last of b right
+    // of the fourth a1. A difference that is too small sets the sign bit, a shift that is too
+    // large sets a bit above the third.
     let behind = reference.get(j + 4).copied().unwrap_or(width);
     let before = if j == 0 { b[0].wrapping_sub(4) } else { reference[j - 1] };
     let mut narrow = b[0].wrapping_sub(before).wrapping_sub(4);
@@ -110,9 +109,9 @@ fn four_near(
     (code != 0).then_some(Code { bits: code & 0x07FF_FFFF, len: code >> 27 })
 }
 
-/// Four vertical codes in one word, indexed by four 3-bit values of
-/// `a1 - b1 + 3`, first lowest: the length in the top 5 bits, the bits below
-/// (27 are enough, since every code longer than 3 bits starts with zeros).
+/// Four vertical codes in one word, indexed by four 3-bit values of `a1 - b1 + 3`, the first
+/// lowest: the length in the top 5 bits, the codes' bits below. 27 bits are enough, because
+/// every code longer than 3 bits starts with zeros.
 static FOUR_VERTICALS: LazyLock<Vec<u32>> = LazyLock::new(|| {
     let join = |index: usize| {
         (0..4).try_fold(Code { bits: 0, len: 0 }, |joined, k| {
@@ -123,10 +122,10 @@ static FOUR_VERTICALS: LazyLock<Vec<u32>> = LazyLock::new(|| {
     (0..4096).map(|index| join(index).map_or(0, |code| code.len << 27 | code.bits)).collect()
 });
 
-/// Gathers bits, most significant first.
+/// A writer of bits, most significant first.
 struct BitWriter {
     out: Vec<u8>,
-    /// The bits not yet written, left-aligned; fewer than 32 between calls.
+    /// The buffered bits, left-aligned; fewer than 32 between calls.
     pending: u64,
     count: u32,
 }

@@ -1,4 +1,4 @@
-//! T.4 (Group 3) codes to runs.
+//! Decodes T.4 (Group 3) codes to runs.
 
 use super::coded_row::CodedRow;
 use super::codes::EOL;
@@ -6,27 +6,26 @@ use super::decode::{BitReader, decode_row};
 use super::{G4Error, G4Fault};
 use crate::mask::Mask;
 
-/// The kinds of Group 3 that TIFF knows.
+/// The kinds of Group 3 coding in TIFF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Group3 {
-    /// Runs alone; every row starts on a byte (TIFF compression 2).
+    /// Rows of run lengths, each starting on a byte boundary (TIFF compression 2).
     ModifiedHuffman,
-    /// Runs alone; an end of line before every row.
+    /// Rows of run lengths, each after an end of line.
     OneDimensional,
-    /// Behind each end of line, a bit says whether the row is coded as runs
-    /// or against the row above.
+    /// A bit after each end of line selects run lengths or coding against the row above.
     TwoDimensional,
 }
 
-/// Decodes a Group 3 strip of `height` rows below those that `mask` has. T.4's
-/// white is black (0).
+/// Decodes a Group 3 strip of `height` rows and adds them below those of `mask`. T.4's white
+/// is black (0).
 ///
-/// Zeros that fill up to an end of line are passed over. The first row's end
-/// of line may be missing, or those of all rows, where no bit stands behind
-/// them; any other row without one is damaged.
+/// Fill zeros before an end of line are skipped. In one-dimensional coding, the first row's
+/// end of line may be missing, or those of all rows; any other row without one is damaged.
 ///
 /// # Errors
-/// As for [`decode`](super::decode); no row is guessed.
+/// Returns an error in the same cases as [`decode`](super::decode); damaged rows are not
+/// concealed.
 ///
 /// Sources: ITU-T Recommendation T.4, section 4; TIFF 6.0, sections 10 and 11.
 pub(crate) fn decode_group3_rows(
@@ -58,20 +57,19 @@ pub(crate) fn decode_group3_rows(
 struct Group3Rows<'a> {
     bits: BitReader<'a>,
     kind: Group3,
-    /// Whether an end of line stood before the last row.
+    /// True if an end of line preceded the last row.
     ends_of_line: bool,
 }
 
 impl Group3Rows<'_> {
-    /// Goes to the codes of row `index`. Gives whether they refer to the row
-    /// above.
+    /// Moves to the codes of row `index` and returns whether they refer to the row above.
     fn start(&mut self, index: u32) -> Result<bool, G4Fault> {
         if self.kind == Group3::ModifiedHuffman {
             return self.bits.align().map(|()| false);
         }
         let found = self.end_of_line()?;
         let expected = self.ends_of_line || self.kind == Group3::TwoDimensional;
-        // What the first two rows have, all have.
+        // From the second row on, either all rows have an end of line or none has.
         if (expected && !found) || (index > 1 && found != self.ends_of_line) {
             return Err(G4Fault::NoEndOfLine);
         }
@@ -84,8 +82,8 @@ impl Group3Rows<'_> {
         Ok(tag == 0)
     }
 
-    /// Takes an end of line and the zeros before it, if it comes next: no
-    /// other code starts with as many zeros.
+    /// Takes an end of line with the fill zeros before it, if it comes next. No other code
+    /// starts with eleven zeros.
     fn end_of_line(&mut self) -> Result<bool, G4Fault> {
         if self.bits.peek(EOL.len - 1) != 0 {
             return Ok(false);
@@ -98,7 +96,7 @@ impl Group3Rows<'_> {
         Ok(true)
     }
 
-    /// A row coded as runs, black (T.4's white) first.
+    /// Decodes a row of run lengths, black (T.4's white) first.
     fn runs(&mut self, row: &mut CodedRow, width: u32) -> Result<(), G4Fault> {
         row.len = 0;
         let (mut column, mut white) = (0, false);

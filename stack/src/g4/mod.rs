@@ -1,8 +1,7 @@
-//! The CCITT Group 4 (T.6) codec, between runs and bits, and a decoder of its
-//! forerunner, Group 3 (T.4).
+//! Encodes and decodes CCITT Group 4 (T.6), and decodes Group 3 (T.4).
 //!
-//! Both are defined on the places where a row changes colour, which is what a
-//! [`Mask`](crate::Mask) holds: neither direction makes a bitmap.
+//! Both codes describe the columns where a row changes colour, which is what a
+//! [`Mask`](crate::Mask) stores, so no bitmap is needed.
 
 mod coded_row;
 mod codes;
@@ -17,34 +16,33 @@ pub(crate) use group3::{Group3, decode_group3_rows};
 
 use thiserror::Error;
 
-/// A strip that is neither T.6 nor T.4, and where.
+/// An error in decoding a T.6 or T.4 strip.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("row {row} {fault}")]
 pub struct G4Error {
     /// The row that could not be decoded, from the image's top.
     pub row: u32,
-    /// What is wrong with it.
+    /// The fault.
     pub fault: G4Fault,
 }
 
-/// What is wrong with a row of T.6 or T.4 codes.
+/// A fault in a row of T.6 or T.4 codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum G4Fault {
-    /// The strip, or its EOFB, comes before the row is full.
+    /// The strip ends, or its EOFB comes, before the row is complete.
     #[error("is missing: the codes end early")]
     EndsEarly,
-    /// Bits that are no code (uncompressed mode is not known here).
+    /// The bits are no code (uncompressed mode is not supported).
     #[error("has bits that are no T.6 or T.4 code")]
     NotACode,
-    /// A Group 3 row without an end of line before it, where others have one.
+    /// A Group 3 row lacks the end of line that other rows have.
     #[error("has no end of line before it")]
     NoEndOfLine,
-    /// The image has more runs than any layer: the strip was made to fill
-    /// memory.
+    /// The image has more runs than an image may have, as in a strip made to exhaust memory.
     #[error("makes more runs than an image may have")]
     TooManyRuns,
-    /// A run goes past the width or turns back.
+    /// A run exceeds the width or ends before it starts.
     #[error("has a run outside the image")]
     OutsideRow,
 }

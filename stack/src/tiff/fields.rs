@@ -1,4 +1,4 @@
-//! The values of a page's directory, and the page they describe.
+//! Interprets the values of a page's directory.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,7 @@ use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::orientation::Orientation;
 
-/// The tags that are looked at.
+/// The tags whose values are read.
 pub(super) const KNOWN: [u16; 21] = [
     IMAGE_WIDTH,
     IMAGE_LENGTH,
@@ -48,7 +48,7 @@ pub(super) struct Fields {
     pub(super) page: u32,
     pub(super) little_endian: bool,
     pub(super) limits: Limits,
-    /// By tag: the field's type and bytes.
+    /// The type and bytes of each field, by tag.
     pub(super) values: HashMap<u16, (u16, Vec<u8>)>,
 }
 
@@ -100,7 +100,7 @@ impl Fields {
             .unwrap_or(PageInfo { index: self.page, ..PageInfo::default() })
     }
 
-    /// The page without the data of its strips or tiles.
+    /// Returns the page without the data of its strips or tiles.
     pub(super) fn page(&self) -> Result<Page, StackError> {
         let gray = self.is_gray()?;
         let compression = self.compression(gray)?;
@@ -144,7 +144,7 @@ impl Fields {
             bits => return Err(self.unsupported(UnsupportedFeature::PixelBits { samples, bits })),
         };
         match self.number_or(SAMPLE_FORMAT, 1)? {
-            // Unsigned, or not stated.
+            // Unsigned or undefined (TIFF 6.0, section 19, SampleFormat).
             1 | 4 => Ok(gray),
             other => Err(self.unsupported(UnsupportedFeature::SampleFormat(other))),
         }
@@ -170,8 +170,8 @@ impl Fields {
         })
     }
 
-    /// Whether bytes are stored as what they differ by from the byte before.
-    /// The other compressions have no predictor, whatever the tag says.
+    /// Returns whether bytes are stored as differences from the byte before. The tag applies
+    /// only to LZW and Deflate.
     fn has_differences(&self, gray: bool, compression: Compression) -> Result<bool, StackError> {
         match self.number_or(PREDICTOR, 1)? {
             1 => Ok(false),
@@ -193,7 +193,7 @@ impl Fields {
         Ok(Layout::strips(width, height, rows.clamp(1, u64::from(height)) as u32))
     }
 
-    /// Where the strips or tiles stand, and how many bytes each takes.
+    /// Returns the offset and length in bytes of each strip or tile.
     pub(super) fn places(&self, layout: &Layout) -> Result<Vec<(u64, u64)>, StackError> {
         let (pieces, offsets, counts) = if layout.tiled {
             ("tiles", TILE_OFFSETS, TILE_BYTE_COUNTS)
@@ -218,7 +218,7 @@ pub(super) fn malformed(page: u32, fault: PageFault) -> StackError {
     StackError::Malformed { page, fault }
 }
 
-/// An unsigned number of up to 8 bytes.
+/// Returns an unsigned number of up to 8 bytes.
 pub(super) fn number(bytes: &[u8], little_endian: bool) -> u64 {
     let step = |number: u64, &byte: &u8| number << 8 | u64::from(byte);
     if little_endian { bytes.iter().rev().fold(0, step) } else { bytes.iter().fold(0, step) }

@@ -1,17 +1,16 @@
-//! The pieces that a page is stored in: strips, or tiles.
+//! Computes the layout of a page's strips or tiles.
 
 use std::ops::Range;
 
-/// How a page is cut into pieces, which stand row by row. A strip is as wide
-/// as the page.
+/// The division of a page into strips or tiles, in row order. A strip has the page's width.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     pub(super) tiled: bool,
-    /// A piece's width; tiles may stick out on the right.
+    /// A piece's width; tiles may extend beyond the page's right side.
     pub(super) width: u32,
-    /// A piece's rows; the last strip has fewer, and tiles stick out below.
+    /// A piece's rows; the last strip may have fewer, and tiles may extend below the page.
     rows: u32,
-    /// How many pieces lie side by side.
+    /// The number of pieces side by side.
     pub(super) across: usize,
     pub(super) page_height: u32,
 }
@@ -26,20 +25,19 @@ impl Layout {
         Self { tiled: true, width, rows, across, page_height }
     }
 
-    /// How many pieces the page has.
+    /// Returns the number of pieces.
     pub(super) fn count(&self) -> u64 {
         self.across as u64 * u64::from(self.page_height.div_ceil(self.rows))
     }
 
-    /// More bytes than the pieces take, however they are coded: a pixel never
-    /// takes two, and a row has its ends and fill bits. 4 GiB is the end, since
-    /// an endless stream must have one.
+    /// Returns an upper bound of the pieces' bytes in any coding: less than two per pixel, and
+    /// line ends and fill bits per row. At most 4 GiB, so that reading an endless stream ends.
     pub(super) fn most_bytes(&self) -> u64 {
         let rows = self.count().saturating_mul(self.rows.into());
         rows.saturating_mul(2 * u64::from(self.width) + 16).saturating_add(1 << 16).min(4 << 30)
     }
 
-    /// The rows of the page that each strip, or row of tiles, holds.
+    /// Returns the page's rows in each strip or row of tiles.
     pub(super) fn row_ranges(&self) -> impl Iterator<Item = Range<u32>> {
         let (rows, height) = (self.rows, self.page_height);
         (0..height.div_ceil(rows)).map(move |i| i * rows..height.min((i + 1).saturating_mul(rows)))

@@ -1,14 +1,14 @@
-//! The stack format: a multipage TIFF that is written and read in one pass.
+//! Reads and writes the stack format: a multipage TIFF that needs only one pass.
 //!
-//! Each page's directory stands before its data, and offsets only grow:
+//! Each page's directory precedes its data, and offsets only increase:
 //!
 //! ```text
 //! header | directory 0, texts, strip 0 | directory 1, texts, strip 1 | ...
 //! ```
 //!
-//! Everything starts on an 8-byte boundary. The last directory's link is
-//! zero; a stack without that zero was cut off. TIFFs of other writers are
-//! read, too: strips and tiles, in several compressions, turned upright.
+//! Each part starts on an 8-byte boundary. The last directory's link is zero; a stack
+//! without that zero was cut off. TIFFs of other writers are read too: strips and tiles, in
+//! several compressions and all orientations.
 //!
 //! Sources: TIFF 6.0; for BigTIFF, the AWare Systems description of the
 //! format that libtiff reads.

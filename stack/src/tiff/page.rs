@@ -1,4 +1,4 @@
-//! Pages to layers.
+//! Decodes pages to layers.
 
 use std::ops::Range;
 
@@ -18,12 +18,12 @@ use crate::tiff::layout::Layout;
 use crate::tiff::tiles::join_tiles;
 use crate::tiff::unpack::{PieceShape, UnpackError, unpack};
 
-/// How a page's image is compressed.
+/// The compression of a page's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compression {
-    /// Not at all.
+    /// No compression.
     Uncompressed,
-    /// CCITT modified Huffman: Group 3 without ends of lines.
+    /// CCITT modified Huffman: Group 3 without end-of-line codes.
     ModifiedHuffman,
     /// CCITT Group 3, one-dimensional.
     Group3,
@@ -35,13 +35,13 @@ pub enum Compression {
     Lzw,
     /// Deflate (zlib).
     Deflate,
-    /// Apple's run lengths.
+    /// Apple's PackBits run lengths.
     PackBits,
     /// The page is a PNG file.
     Png,
 }
 
-/// One page as it stands in the file, not yet decoded.
+/// A page that is not decoded yet.
 #[derive(Clone, Debug)]
 pub struct Page {
     pub(super) number: u32,
@@ -51,24 +51,24 @@ pub struct Page {
     pub(super) width: u32,
     pub(super) gray: bool,
     pub(super) white_is_zero: bool,
-    /// What sets the image upright.
+    /// The orientation that turns the image upright.
     pub(super) orientation: Orientation,
     pub(super) compression: Compression,
-    /// Whether gray levels are stored as differences to the left.
+    /// True if gray levels are stored as differences from the left neighbour.
     pub(super) differences: bool,
     pub(super) layout: Layout,
     /// The strips or tiles, row by row.
     pub(super) pieces: Vec<Vec<u8>>,
 }
 
-/// Room is made for so many transitions before the codes are read: a strip may
-/// hold fewer than its length promises.
+/// The maximum number of transitions to reserve memory for before decoding, because a strip
+/// may hold fewer than its length suggests.
 const MAX_RESERVED: usize = 1 << 20;
 
 impl MemorySize for Page {
     fn bytes(&self) -> usize {
-        // A code of one to four bits makes a transition of four bytes; what is
-        // packed may be anything.
+        // A code of one to four bits becomes a transition of four bytes; the other
+        // compressions have no fixed ratio.
         let growth = match self.compression {
             Compression::Lzw | Compression::Deflate | Compression::Png => 64,
             _ => 16,
@@ -78,7 +78,7 @@ impl MemorySize for Page {
 }
 
 impl Page {
-    /// A page that is a PNG file.
+    /// Creates a page from a PNG file.
     pub(super) fn of_png(number: u32, limits: Limits, header: Header, file: Vec<u8>) -> Self {
         let Header { width, height, gray, dpi, info } = header;
         Self {
@@ -97,17 +97,17 @@ impl Page {
         }
     }
 
-    /// What the page's JSON line says (only the page's number, if it has none).
+    /// Returns the content of the page's JSON line, or only the page's number if it has none.
     pub fn info(&self) -> &PageInfo {
         &self.info
     }
 
-    /// How the image is compressed.
+    /// Returns the compression of the image.
     pub fn compression(&self) -> Compression {
         self.compression
     }
 
-    /// How many bytes the strips or tiles take.
+    /// Returns the number of bytes of all strips or tiles.
     pub fn strip_bytes(&self) -> u64 {
         self.pieces.iter().map(|piece| piece.len() as u64).sum()
     }
@@ -115,8 +115,7 @@ impl Page {
     /// Decodes the page and turns it upright.
     ///
     /// # Errors
-    /// Where a strip or tile does not decode to the size that the directory
-    /// states.
+    /// Returns an error if a strip or tile does not decode to the size that the directory states.
     pub fn decode(mut self) -> Result<Layer, StackError> {
         let image = match self.gray {
             _ if self.compression == Compression::Png => {
@@ -139,7 +138,7 @@ impl Page {
     fn decode_mask(&self) -> Result<Mask, StackError> {
         let mut mask = Mask::without_rows(self.width);
         if self.compression == Compression::G4 {
-            // A row takes a bit at least, a transition about four.
+            // A row takes at least one bit, a transition about four.
             let bytes = self.strip_bytes() as usize;
             mask.reserve(
                 bytes.saturating_mul(8).min(self.layout.page_height as usize),
@@ -158,7 +157,7 @@ impl Page {
         Ok(gray)
     }
 
-    /// Adds the rows of every strip, or of the tiles side by side, to the image.
+    /// Adds the rows of every strip or row of tiles to the image.
     fn decode_pieces<C: Change>(
         &self,
         image: &mut RunImage<C>,
@@ -182,7 +181,7 @@ impl Page {
         Ok(())
     }
 
-    /// Whether a 1-bit page stands as we would write it.
+    /// Returns whether a 1-bit page has the layout that this crate writes.
     fn is_in_our_layout(&self) -> bool {
         let one_strip = self.pieces.len() == 1 && !self.layout.tiled;
         one_strip
@@ -190,13 +189,12 @@ impl Page {
             && self.orientation == Orientation::default()
     }
 
-    /// The strips, or the tiles side by side, and the rows of the page that
-    /// they hold.
+    /// Returns each strip or row of tiles with the page's rows that it holds.
     fn bands(&self) -> impl Iterator<Item = (&[Vec<u8>], Range<u32>)> {
         self.pieces.chunks(self.layout.across).zip(self.layout.row_ranges())
     }
 
-    /// Decodes those rows of the page that a 1-bit strip or tile holds.
+    /// Decodes the rows of a 1-bit strip or tile.
     fn mask_rows(
         &self,
         piece: &[u8],
@@ -235,8 +233,7 @@ impl Page {
         })
     }
 
-    /// Gives each row of a piece that no fax code makes, until `each` has
-    /// enough.
+    /// Calls `each` with every row of a piece that is not fax-coded, until it returns false.
     fn unpack(
         &self,
         piece: &[u8],
@@ -262,12 +259,12 @@ impl Page {
     }
 }
 
-/// The transitions of a row of bits, given as runs of bytes.
+/// Returns the transitions of a row of bits, given as runs of bytes.
 pub(crate) fn bit_transitions(row: &[(u32, u8)], width: u32) -> Vec<u32> {
     let mut transitions = Vec::new();
     let (mut column, mut before) = (0, 0u8);
     for &(length, byte) in row {
-        // Inside a run of 00 or FF nothing toggles.
+        // A run of 00 or FF toggles at most at its start.
         let visited = if matches!(byte, 0 | 0xFF) { 1 } else { length };
         for start in (column..).step_by(8).take(visited as usize) {
             let toggles = byte ^ (byte >> 1 | before << 7);

@@ -1,4 +1,4 @@
-//! A stream or file to pages.
+//! Reads pages from a stream or a file.
 
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
@@ -12,8 +12,8 @@ use crate::error::{PageFault, StackError};
 use crate::limits::Limits;
 use crate::png_page;
 
-/// Reads pages one after the other, from a stream (forward only) or from a
-/// file (any order). A PNG is a page of its own.
+/// Reads pages in order from a stream (forward only) or a file (parts in any order). A
+/// PNG file is a single page.
 #[derive(Debug)]
 pub struct PageReader {
     source: Source,
@@ -21,11 +21,11 @@ pub struct PageReader {
     png: bool,
     big: bool,
     little_endian: bool,
-    /// Where the next directory stands; 0 behind the last page.
+    /// The offset of the next directory; 0 after the last page.
     next: u64,
     number: u32,
     last_whole: Option<u32>,
-    /// Directories seen, so that a loop of links ends.
+    /// The offsets of the directories read, to detect a loop of links.
     seen: HashSet<u64>,
 }
 
@@ -33,7 +33,7 @@ impl PageReader {
     /// Reads from a stream, such as standard input.
     ///
     /// # Errors
-    /// Where the stream is empty or does not start as a TIFF or a PNG.
+    /// Returns an error if the stream is empty or does not start as a TIFF or a PNG.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
         let stream = BufReader::with_capacity(1 << 18, Box::new(stream) as Box<dyn Read + Send>);
         Self::new(Source::Stream { stream, position: 0 })
@@ -42,12 +42,12 @@ impl PageReader {
     /// Reads from a file.
     ///
     /// # Errors
-    /// Where the file is empty or does not start as a TIFF or a PNG.
+    /// Returns an error if the file is empty or does not start as a TIFF or a PNG.
     pub fn from_file(file: File) -> Result<Self, StackError> {
         Self::new(Source::File { file: BufReader::with_capacity(1 << 18, file), position: 0 })
     }
 
-    /// Returns the reader with these limits instead of the default ones.
+    /// Replaces the default limits of the reader.
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits: limits.within_images(), ..self }
     }
@@ -64,7 +64,7 @@ impl PageReader {
             [b'I', b'I', 43, 0, ..] => (true, true),
             [b'M', b'M', 0, 43, ..] => (false, true),
             _ if png => (false, false),
-            // The first bytes of a TIFF or a PNG, but not all that tell one.
+            // The signature of a TIFF or a PNG is cut off.
             [b'I']
             | [b'I', b'I']
             | [b'I', b'I', 42 | 43]
@@ -100,15 +100,14 @@ impl PageReader {
         })
     }
 
-    /// Counts pages from `first`, behind `last_whole`, for a folder's later
-    /// files.
+    /// Numbers the pages from `first`, after the layer `last_whole`, for a folder's later files.
     pub(crate) fn numbered(mut self, first: u32, last_whole: Option<u32>) -> Self {
         self.number = first;
         self.last_whole = last_whole;
         self
     }
 
-    /// Whether no page follows.
+    /// Returns whether no page follows.
     pub(crate) fn is_at_end(&self) -> bool {
         self.next == 0
     }
@@ -121,7 +120,7 @@ impl PageReader {
         Ok(page)
     }
 
-    /// The next page, and the link behind it.
+    /// Reads the next page and the link after it.
     fn read_tiff_page(&mut self) -> Result<(Page, u64), StackError> {
         if !self.seen.insert(self.next) {
             return Err(malformed(self.number, PageFault::Loop));
@@ -131,7 +130,7 @@ impl PageReader {
         Ok((self.read_pieces(&fields)?, next))
     }
 
-    /// `length` bytes at `offset`, all of them.
+    /// Reads exactly `length` bytes at `offset`.
     fn read(&mut self, offset: u64, length: u64) -> Result<Vec<u8>, StackError> {
         if !self.source.reaches(offset) {
             return Err(StackError::NotForward { page: self.number });
@@ -143,7 +142,7 @@ impl PageReader {
         Ok(bytes)
     }
 
-    /// The directory's entries, and the link to the next.
+    /// Reads the directory's entries and the link to the next directory.
     fn read_directory(&mut self) -> Result<(Vec<Entry>, u64), StackError> {
         let (count_size, entry_size, word) = if self.big { (8, 20, 8) } else { (2, 12, 4) };
         let count = number(&self.read(self.next, count_size)?, self.little_endian);
@@ -164,8 +163,8 @@ impl PageReader {
         Ok((entries, number(link, self.little_endian)))
     }
 
-    /// The values of the fields that matter, read in the order in which they
-    /// stand.
+    /// Reads the values of the known fields, in the order of their offsets, because a stream
+    /// cannot go back.
     fn read_values(&mut self, entries: &[Entry]) -> Result<Fields, StackError> {
         let mut fields = Fields {
             page: self.number,
@@ -175,7 +174,7 @@ impl PageReader {
         };
         let mut distant = Vec::new();
         let mut seen = HashSet::new();
-        // The first entry of a tag counts, as for libtiff.
+        // Of several entries of one tag, the first counts, as in libtiff.
         let first = |entry: &&Entry| KNOWN.contains(&entry.tag) && seen.insert(entry.tag);
         for entry in entries.iter().filter(first) {
             let length = entry.count.saturating_mul(type_size(entry.kind));
@@ -205,11 +204,12 @@ impl PageReader {
             return Err(malformed(self.number, PageFault::PieceBytes(bytes)));
         }
         page.pieces = vec![Vec::new(); places.len()];
+        // Offsets in increasing order can be read from a stream.
         places.sort_by_key(|(_, (offset, _))| *offset);
         let reversed = fields.number_or(FILL_ORDER, 1)? == 2;
         let mut end = 0;
         for (i, (offset, length)) in places {
-            // Strips that overlap would take more memory than the file has.
+            // Overlapping strips could take more memory than the file's size.
             if offset < end {
                 return Err(malformed(self.number, PageFault::Overlap));
             }
@@ -223,7 +223,7 @@ impl PageReader {
         Ok(page)
     }
 
-    /// The file's bytes up to its last chunk, as the page that they are.
+    /// Reads the file up to its last chunk, as one page.
     fn read_png(&mut self) -> Result<Page, StackError> {
         let mut file = png_page::SIGNATURE.to_vec();
         loop {
@@ -237,7 +237,7 @@ impl PageReader {
             if file.len() as u64 + length > most {
                 return Err(malformed(self.number, PageFault::PngBytes(most)));
             }
-            // The data, and its checksum.
+            // The data and its checksum.
             let body = self.read(file.len() as u64, length + 4)?;
             file.extend_from_slice(&body);
             if kind == b"IEND" {
@@ -253,7 +253,7 @@ impl PageReader {
 impl Iterator for PageReader {
     type Item = Result<Page, StackError>;
 
-    /// The next page; after an error, none.
+    /// Returns the next page, or `None` after an error.
     fn next(&mut self) -> Option<Self::Item> {
         if self.next == 0 {
             return None;
@@ -270,6 +270,6 @@ struct Entry {
     tag: u16,
     kind: u16,
     count: u64,
-    /// The value itself if it fits, else its offset.
+    /// The value itself if it fits, otherwise its offset.
     value: Vec<u8>,
 }

@@ -1,10 +1,10 @@
-//! Bytes by offset, from a stream or a file.
+//! Reads bytes at offsets of a stream or a file.
 
 use std::fmt;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 
-/// Where bytes come from.
+/// A source of bytes.
 pub(super) enum Source {
     Stream { stream: BufReader<Box<dyn Read + Send>>, position: u64 },
     File { file: BufReader<File>, position: u64 },
@@ -20,7 +20,7 @@ impl fmt::Debug for Source {
 }
 
 impl Source {
-    /// Whether bytes at `offset` can still be read: a stream goes forward only.
+    /// Returns whether bytes at `offset` can still be read: a stream only goes forward.
     pub(super) fn reaches(&self, offset: u64) -> bool {
         match self {
             Self::Stream { position, .. } => offset >= *position,
@@ -28,8 +28,8 @@ impl Source {
         }
     }
 
-    /// Up to `length` bytes at `offset`, fewer where the input ends. A length
-    /// that lies costs nothing: memory grows with the bytes that arrive.
+    /// Reads up to `length` bytes at `offset`, fewer at the end of the input. Memory grows with
+    /// the bytes read, so a false length costs nothing.
     pub(super) fn read_up_to(&mut self, offset: u64, length: u64) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let position = match self {
@@ -43,7 +43,7 @@ impl Source {
             Self::File { file, position } => {
                 if let Ok(gap) = i64::try_from(i128::from(offset) - i128::from(*position)) {
                     match file.seek_relative(gap) {
-                        // No file reaches so far.
+                        // The offset is larger than that of any file.
                         Err(error) if error.kind() == io::ErrorKind::InvalidInput => {}
                         sought => {
                             sought?;

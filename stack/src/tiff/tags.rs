@@ -1,4 +1,4 @@
-//! Tag and type numbers of TIFF 6.0 that a stack uses.
+//! Defines the numbers of the TIFF 6.0 tags and types that are read or written.
 
 pub(super) const NEW_SUBFILE_TYPE: u16 = 254;
 pub(super) const IMAGE_WIDTH: u16 = 256;
@@ -33,7 +33,7 @@ pub(super) const T4: u64 = 3;
 pub(super) const T6: u64 = 4;
 pub(super) const LZW: u64 = 5;
 pub(super) const DEFLATE: u64 = 8;
-/// Deflate's number before it had one.
+/// Deflate's number before 8 was assigned to it.
 pub(super) const OLD_DEFLATE: u64 = 32_946;
 pub(super) const PACK_BITS: u64 = 32_773;
 
@@ -56,7 +56,7 @@ pub(super) const LONG: u16 = 4;
 pub(super) const RATIONAL: u16 = 5;
 pub(super) const LONG8: u16 = 16;
 
-/// How many bytes a value of a field type takes; 0 for types not known.
+/// Returns the size in bytes of a value of a field type, or 0 for unknown types.
 pub(super) fn type_size(kind: u16) -> u64 {
     match kind {
         1 | ASCII | 6 | 7 => 1,

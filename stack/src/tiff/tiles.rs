@@ -1,9 +1,9 @@
-//! Joins tiles that lie side by side to rows of a page, on their runs.
+//! Joins adjacent tiles to the rows of a page, on their runs.
 
 use crate::frame::place_row;
 use crate::runs::{Change, RunImage};
 
-/// Adds the rows of tiles of equal size to a page, cut to its width.
+/// Adds the rows of adjacent tiles of equal size to a page, cut to its width.
 pub(super) fn join_tiles<C: Change>(tiles: &[RunImage<C>], page: &mut RunImage<C>) {
     let mut row = Vec::new();
     for index in 0..tiles[0].height() {

@@ -1,4 +1,4 @@
-//! Strips and tiles of bytes to rows of runs of bytes.
+//! Decompresses strips and tiles to rows of byte runs.
 
 use std::io::{self, Read};
 
@@ -8,28 +8,27 @@ use weezl::{BitOrder, LzwStatus, decode::Decoder};
 use super::page::Compression;
 use crate::packbits;
 
-/// Why bytes do not make rows.
+/// A reason to stop decompressing.
 #[derive(Debug)]
 pub(super) enum UnpackError {
-    /// They end before the last row does.
+    /// The data ends before the last row does.
     TooShort,
-    /// They are not what the compression makes.
+    /// The data is not valid for the compression.
     Damaged,
-    /// A row was said to be one too many.
+    /// The caller stopped because the image has too many runs.
     Enough,
 }
 
-/// The rows of a strip or tile in bytes.
+/// The size of a strip's or tile's rows in bytes.
 pub(super) struct PieceShape {
     pub(super) row_bytes: u32,
     pub(super) rows: u32,
-    /// Whether each byte is stored as what it differs by from the one before
-    /// in its row.
+    /// True if each byte is stored as its difference from the byte before in its row.
     pub(super) differences: bool,
 }
 
-/// Gives each row as runs of `(length, byte)`, until `each` has enough. No
-/// more than a row is held at once.
+/// Calls `each` with every row as runs `(length, byte)`, until it returns false. Only one
+/// row is held at a time.
 pub(super) fn unpack(
     compression: Compression,
     bytes: &[u8],
@@ -78,7 +77,7 @@ fn cut_bytes(
     let (mut row, mut runs) = (Vec::new(), Vec::new());
     for _ in 0..shape.rows {
         row.clear();
-        // Memory grows with the bytes that come, not with the width claimed.
+        // Memory grows with the bytes read, not with the claimed width.
         match bytes.by_ref().take(shape.row_bytes.into()).read_to_end(&mut row) {
             Ok(length) if length == shape.row_bytes as usize => {}
             Ok(_) => return Err(UnpackError::TooShort),
@@ -102,13 +101,13 @@ fn cut_bytes(
     Ok(())
 }
 
-/// The runs `(length, byte)` of a row of bytes.
+/// Replaces `runs` by the runs `(length, byte)` of a row of bytes.
 pub(crate) fn byte_runs(row: &[u8], runs: &mut Vec<(u32, u8)>) {
     runs.clear();
     runs.extend(row.chunk_by(|a, b| a == b).map(|run| (run.len() as u32, run[0])));
 }
 
-/// Adds a run to others, or to the last of them.
+/// Appends a run, or extends the last run if it has the same byte.
 fn push_run(row: &mut Vec<(u32, u8)>, length: u32, byte: u8) {
     match row.last_mut() {
         Some((before, same)) if *same == byte => *before += length,
@@ -116,7 +115,7 @@ fn push_run(row: &mut Vec<(u32, u8)>, length: u32, byte: u8) {
     }
 }
 
-/// Takes the bytes out of TIFF's LZW as they are asked for.
+/// A reader that decompresses TIFF's LZW on demand.
 struct LzwReader<'a> {
     decoder: Decoder,
     rest: &'a [u8],
@@ -139,7 +138,7 @@ impl Read for LzwReader<'_> {
                 Ok(LzwStatus::Done) => return Ok(0),
                 Ok(_) if done.consumed_in > 0 => stuck = false,
                 Ok(_) if stuck => return Ok(0),
-                // It may still hold bytes, and give them when asked again.
+                // The decoder may still hold bytes and return them when called again.
                 Ok(_) => stuck = true,
                 Err(error) => return Err(io::Error::new(io::ErrorKind::InvalidData, error)),
             }
@@ -159,7 +158,7 @@ mod tests {
             let black = vec![0; (row_bytes * rows) as usize];
             let mut strip =
                 Encoder::with_tiff_size_switch(BitOrder::Msb, 8).encode(&black).unwrap();
-            // Some writers leave the last code out.
+            // Some writers omit the last code.
             for cut in [0, 1] {
                 strip.truncate(strip.len() - cut);
                 let shape = PieceShape { row_bytes, rows, differences: false };

@@ -1,4 +1,4 @@
-//! Layers to pages, pages to a stream.
+//! Encodes layers as pages and writes pages to a stream.
 
 use std::io::Write;
 
@@ -13,13 +13,13 @@ use crate::error::StackError;
 use crate::layer::{Image, Layer};
 use crate::{g4, packbits};
 
-/// The two shapes of a TIFF.
+/// The variant of TIFF to write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
-    /// 64-bit offsets: any size.
+    /// BigTIFF, with 64-bit offsets: any size.
     #[default]
     Big,
-    /// 32-bit offsets: at most 4 GiB.
+    /// Classic TIFF, with 32-bit offsets: at most 4 GiB.
     Classic,
 }
 
@@ -31,7 +31,7 @@ impl Format {
         }
     }
 
-    /// An offset, count or link in the width of the format.
+    /// Appends an offset, count or link in the format's width.
     fn put_word(self, out: &mut Vec<u8>, word: u64) {
         match self {
             Self::Big => out.extend_from_slice(&word.to_le_bytes()),
@@ -47,8 +47,8 @@ impl Format {
     }
 }
 
-/// A layer as it will stand in a file, before its place is known. Encoding
-/// is the costly part of writing, and needs nothing of the other pages.
+/// An encoded layer whose offset in the file is not known yet. Encoding is the costly part
+/// of writing and does not depend on other pages.
 #[derive(Clone, Debug)]
 pub struct EncodedPage {
     index: u32,
@@ -61,8 +61,8 @@ pub struct EncodedPage {
 }
 
 impl EncodedPage {
-    /// Encodes a layer: a mask as G4, a gray mask as PackBits. A mask that is
-    /// as it was read keeps its codes.
+    /// Encodes a layer: a mask as G4, a gray mask as PackBits. An unchanged mask keeps the strip
+    /// that it was read from.
     pub fn new(layer: &Layer) -> Self {
         let (gray, strip) = match (&*layer.image, layer.image.strip()) {
             (Image::Mask(_), Some(strip)) => (false, strip.to_vec()),
@@ -80,10 +80,10 @@ impl EncodedPage {
         }
     }
 
-    /// The page's bytes where it starts at `start`: directory, texts, strip
-    /// and padding. The link is to the byte after it, or zero on the last.
+    /// Returns the bytes of the page at offset `start`: directory, texts, strip and padding. The
+    /// link is to the byte after them, or zero on the last page.
     fn bytes(&self, format: Format, start: u64, last: bool) -> Vec<u8> {
-        // Lengths do not depend on offsets: lay out once to learn them.
+        // The directory's length does not depend on offsets, so any offsets give it.
         let data = start + self.directory(format, start, 0, 0).len() as u64;
         let end = (data + self.strip.len() as u64).next_multiple_of(8);
         let mut bytes = self.directory(format, start, data, if last { 0 } else { end });
@@ -92,7 +92,7 @@ impl EncodedPage {
         bytes
     }
 
-    /// The directory and the texts behind it, padded to 8 bytes.
+    /// Returns the directory and the texts after it, padded to 8 bytes.
     fn directory(&self, format: Format, start: u64, data: u64, link: u64) -> Vec<u8> {
         let fields = self.fields(format, data);
         let word = format.word_size();
@@ -120,7 +120,7 @@ impl EncodedPage {
         out
     }
 
-    /// The fields as (tag, type, count, value), in the order of their tags.
+    /// Returns the fields as (tag, type, count, value), in the order of their tags.
     fn fields(&self, format: Format, data: u64) -> Vec<(u16, u16, u64, Vec<u8>)> {
         let short = |tag, value: u64| (tag, SHORT, 1, (value as u16).to_le_bytes().to_vec());
         let long = |tag, value: u32| (tag, LONG, 1, value.to_le_bytes().to_vec());
@@ -134,7 +134,7 @@ impl EncodedPage {
         };
         let description = [self.description.as_bytes(), &[0]].concat();
         let mut fields = vec![
-            // One page of many.
+            // A single page of a multipage image (TIFF 6.0, section 8, NewSubfileType).
             long(NEW_SUBFILE_TYPE, 2),
             long(IMAGE_WIDTH, self.width),
             long(IMAGE_LENGTH, self.height),
@@ -162,8 +162,8 @@ impl EncodedPage {
     }
 }
 
-/// Writes pages to a stream, forward only. It keeps one page back, because
-/// only the last page's link is zero.
+/// Writes pages to a stream, forward only. It holds one page back, because only the last
+/// page's link is zero.
 #[derive(Debug)]
 pub struct PageWriter<W> {
     out: W,
@@ -173,7 +173,7 @@ pub struct PageWriter<W> {
 }
 
 impl<W: Write> PageWriter<W> {
-    /// A stack of `format` to be written to `out`, which should be buffered.
+    /// Creates a writer of a stack to `out`, which should be buffered.
     pub fn new(out: W, format: Format) -> Self {
         Self { out, format, offset: 0, held: None }
     }
@@ -181,7 +181,7 @@ impl<W: Write> PageWriter<W> {
     /// Adds a page.
     ///
     /// # Errors
-    /// Where writing fails or a classic TIFF would pass 4 GiB.
+    /// Returns an error if writing fails or a classic TIFF would exceed 4 GiB.
     pub fn push(&mut self, page: EncodedPage) -> Result<(), StackError> {
         match self.held.replace(page) {
             Some(before) => self.write(&before, false),
@@ -189,10 +189,10 @@ impl<W: Write> PageWriter<W> {
         }
     }
 
-    /// Writes the last page and gives the stream back, flushed.
+    /// Writes the last page, flushes the stream and returns it.
     ///
     /// # Errors
-    /// As [`push`](Self::push); and where no page was pushed.
+    /// Returns an error in the same cases as [`push`](Self::push), or if no page was pushed.
     pub fn finish(mut self) -> Result<W, StackError> {
         let last = self.held.take().ok_or(StackError::NoLayers)?;
         self.write(&last, true)?;
@@ -200,11 +200,11 @@ impl<W: Write> PageWriter<W> {
         Ok(self.out)
     }
 
-    /// Writes the page kept back, with a link to a page that will not come:
-    /// what stands is whole, but the stack is cut off.
+    /// Writes the page held back, with a link to a page that does not follow: all pages are
+    /// complete, but readers see that the stack is cut off.
     ///
     /// # Errors
-    /// Where writing fails.
+    /// Returns an error if writing fails.
     pub fn cut_off(mut self) -> Result<(), StackError> {
         if let Some(last) = self.held.take() {
             self.write(&last, false)?;
