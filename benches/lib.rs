@@ -1,5 +1,5 @@
-//! What the benches share: breaking a part and slicing it beside the whole one,
-//! and scoring what a correction makes of that. See `README.md` for figures.
+//! Breaks parts, slices them beside the whole ones and scores corrections, for the benches. See
+//! `README.md` for figures.
 
 pub mod score;
 pub mod sliced;

@@ -1,13 +1,13 @@
-//! How near corrected layers come to the part they should show.
+//! Scores corrected layers against the clean part.
 
 use std::ops::{AddAssign, Range};
 
 use lamp_stack::{Mask, white_in_row};
 
-/// The classes of bands: the most rows of each. The last takes all wider ones.
+/// The maximum rows of each class of bands. The last class takes all wider ones.
 pub const MAX_ROWS: [usize; 4] = [2, 5, 15, usize::MAX];
 
-/// What a correction made of broken layers.
+/// The score of a correction of broken layers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Score {
     /// The broken bands, in the classes of [`MAX_ROWS`].
@@ -18,23 +18,23 @@ pub struct Score {
     pub stray_rows_left: u64,
 }
 
-/// Broken bands of one class. A band is as many neighbouring rows as there are
-/// that all differ from the clean ones.
+/// Broken bands of one class. A band is a maximal block of rows that all differ from the clean
+/// ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Bands {
-    /// How many bands.
+    /// The number of bands.
     pub count: u64,
-    /// Their wrong pixels before the correction.
+    /// The wrong pixels before the correction.
     pub injected: u64,
-    /// Their wrong pixels after it.
+    /// The wrong pixels after it.
     pub left: u64,
 }
 
 impl Bands {
-    /// Scores some rows of a layer as one band, however they differ.
+    /// Scores the given rows of a layer as one band.
     ///
     /// # Panics
-    /// If a mask lacks one of the rows.
+    /// Panics if a mask lacks one of the rows.
     pub fn of(clean: &Mask, broken: &Mask, fixed: &Mask, rows: Range<u32>) -> Self {
         let wrong = |mask: &Mask| {
             let wrong = |row| pixels_that_differ(clean.row(row), mask.row(row), clean.width());
@@ -45,11 +45,10 @@ impl Bands {
 }
 
 impl Score {
-    /// Scores one layer: `fixed` is what a correction made of `broken`, which
-    /// should have been `clean`.
+    /// Scores one layer: `fixed` is the correction of `broken`, and `clean` the truth.
     ///
     /// # Panics
-    /// If the masks differ in size.
+    /// Panics if the masks differ in size.
     pub fn of(clean: &Mask, broken: &Mask, fixed: &Mask) -> Self {
         let size = |mask: &Mask| (mask.width(), mask.height());
         assert!([broken, fixed].map(size) == [size(clean); 2], "the masks have one frame");
@@ -93,13 +92,13 @@ impl AddAssign for Bands {
     }
 }
 
-/// How many pixels of two rows differ in colour.
+/// Returns the number of pixels in which two rows differ.
 fn pixels_that_differ(a: &[u32], b: &[u32], width: u32) -> u64 {
     if a == b {
         return 0;
     }
-    // Each toggle of either row parts the two or joins them again: of their
-    // exclusive or, these are the transitions, except those of empty runs.
+    // Each toggle of either row is a transition of their exclusive or, except at
+    // empty runs.
     let mut toggles = [a, b].concat();
     toggles.sort_unstable();
     white_in_row(&toggles, width)
@@ -111,7 +110,7 @@ mod tests {
 
     use super::*;
 
-    /// `#` is white; all rows as wide as the first.
+    /// Parses rows of equal width, in which `#` is white.
     fn picture(rows: &[&str]) -> Mask {
         let mut mask = MaskBuilder::new(rows[0].len() as u32);
         for row in rows {
@@ -132,7 +131,7 @@ mod tests {
     fn wrong_pixels_are_told_apart_by_where_they_are() {
         let clean = picture(&["..##..", "..##..", "..##..", ".####.", "......"]);
         let broken = picture(&["..####", "..##..", "..##..", ".#####", "..#..."]);
-        // Row 0 is half mended, row 1 spoiled, row 3 still ends white.
+        // Row 0 is half corrected, row 1 damaged, row 3 still ends white.
         let fixed = picture(&["..###.", ".###..", "..##..", ".#####", "......"]);
         let score = Score::of(&clean, &broken, &fixed);
         let none = Bands::default();

@@ -1,4 +1,4 @@
-//! Parts as layers in memory, whole and broken in one frame.
+//! Slices parts in memory, whole and broken, in one frame.
 
 use lamp_fixtures::{Defect, Mesh, inject};
 use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
@@ -7,10 +7,10 @@ use lamp_stack::{Image, Layer, Mask};
 /// A part's layers, bottom first.
 pub type Layers = Vec<Layer>;
 
-/// Slices a mesh, and gives the frame of its layers, too.
+/// Slices a mesh, and returns its layers and their frame.
 ///
 /// # Errors
-/// As [`Slices`].
+/// Returns the errors of [`Slices`].
 pub fn slice(mesh: &Mesh, options: &SliceOptions) -> Result<(Layers, GridRule), SliceError> {
     let slices = Slices::new(Part::from_facets("part", mesh.facets.clone()), options)?;
     let grid = slices.grid();
@@ -18,13 +18,13 @@ pub fn slice(mesh: &Mesh, options: &SliceOptions) -> Result<(Layers, GridRule), 
     Ok((slices.collect::<Result<_, _>>()?, grid))
 }
 
-/// Breaks `count` facets of a mesh, and keeps its height: of the seeds `seed`,
-/// `seed + 2^32`, `seed + 2 * 2^32`, ... it takes the first that leaves the
-/// lowest and the highest z to the bit, so that the broken mesh is sliced at
-/// the same planes.
+/// Breaks `count` facets of a mesh without changing its height.
+///
+/// Uses the first of the seeds `seed`, `seed + 2^32`, `seed + 2 * 2^32`, ... that keeps the lowest
+/// and highest z to the bit, so that the broken mesh is sliced at the same planes.
 ///
 /// # Panics
-/// If the first hundred seeds all change the height.
+/// Panics if the first hundred seeds all change the height.
 pub fn broken(mesh: &Mesh, defect: Defect, count: usize, seed: u32) -> Mesh {
     let heights = |mesh: &Mesh| {
         let (low, high) = mesh.bounds_mm();
@@ -39,10 +39,10 @@ pub fn broken(mesh: &Mesh, defect: Defect, count: usize, seed: u32) -> Mesh {
     candidates.find(|broken| heights(broken) == heights(mesh)).expect("a seed keeps the height")
 }
 
-/// The mask of a slice.
+/// Returns the mask of a slice.
 ///
 /// # Panics
-/// If the layer is gray, which no slice is.
+/// Panics if the layer is gray, which no slice is.
 pub fn mask(layer: &Layer) -> &Mask {
     match &*layer.image {
         Image::Mask(mask) => mask,
@@ -85,7 +85,7 @@ mod tests {
                 rows[0] += pairs().filter(|(clean, stray)| clean == stray).count();
                 rows[1] += pairs().filter(|(clean, stray)| clean != stray).count();
             }
-            // Where no facet is broken, no row differs.
+            // Without broken facets, no row differs.
             assert!(rows[1] > 0 && rows[0] > 10 * rows[1], "{defect:?}: {rows:?}");
         }
     }
@@ -94,7 +94,7 @@ mod tests {
     fn a_seed_that_changes_the_height_is_passed_over() {
         let [o, x, y, z] = [[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0], [0.0, 0.0, 9.0]];
         let tetra = Mesh { facets: vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]] };
-        // Of four facets one is left, and a fourth of the seeds leave the foot.
+        // One of four facets remains, and a quarter of the seeds keep the foot.
         let left = |seed| {
             let mut mesh = tetra.clone();
             inject(&mut mesh, Defect::Drop, 3, u64::from(seed));

@@ -1,5 +1,5 @@
-//! Swept layers of round bodies against closed forms: lost and gained volumes within 0.1%
-//! of the layer's volume.
+//! Checks that volumes lost and gained by swept layers of round bodies agree with closed forms
+//! within 0.1% of the layer's volume.
 
 use std::f64::consts::PI;
 
@@ -17,8 +17,8 @@ fn part(mesh: &Mesh) -> LayeredPart {
     LayeredPart::new(facets, Length::from_um(5.0), Fill::EvenOdd).unwrap()
 }
 
-/// The volumes of a layer in cubic millimetres, of areas by height in millimetres:
-/// lost, gained, and the part's.
+/// Returns the volumes lost, gained and of the part in a layer, in cubic millimetres, from areas
+/// by height in millimetres.
 fn integrated(bottom: f64, top: f64, of: impl Fn(f64) -> [f64; 3]) -> [f64; 3] {
     const STEPS: u32 = 2000;
     let dz = (top - bottom) / f64::from(STEPS);
@@ -30,7 +30,7 @@ fn integrated(bottom: f64, top: f64, of: impl Fn(f64) -> [f64; 3]) -> [f64; 3] {
     sums
 }
 
-/// Sections that are discs about one axis: one holds the other.
+/// Returns the volumes for sections that are concentric discs: one contains the other.
 fn discs(bottom: f64, top: f64, radius: impl Fn(f64) -> f64) -> [f64; 3] {
     let area = |z: f64| PI * radius(z).powi(2);
     let at_top = area(top);
@@ -44,11 +44,10 @@ fn check(layer: &SweptLayer, [lost, gained, volume]: [f64; 3]) {
     assert!((layer.volume_mm3 - volume).abs() < allowed, "{layer:?}: {volume}");
 }
 
-/// Checks layers at many heights and of many thicknesses, with the tops of each
-/// height found at once.
+/// Checks layers of many thicknesses at many heights; all tops of a height are swept at once.
 fn check_all(part: &LayeredPart, height: f64, of: impl Fn(f64, f64) -> [f64; 3]) {
-    // The first layers begin at the pole or on the platform; thinner than a few
-    // facets there, they are those of the mesh and not of the sphere.
+    // The first layers begin at the pole or on the platform. If they are thinner than
+    // a few facets, they show the mesh and not the sphere.
     for place in 0..24 {
         let bottom = (f64::from(place) - 0.5).max(0.0) / 23.0 * height;
         let tops: Vec<f64> = [0.02, 0.03, 0.1, 0.11, 0.4, 1.0, 1.7, 3.0]
@@ -81,7 +80,7 @@ fn cones_both_ways() {
         let mesh = if low > high {
             cone(low, high, height, 100_000)
         } else {
-            // Turned over, so that facets still face outwards.
+            // Reverses facets so that they still face outwards.
             cone(high, low, height, 100_000).map(|[x, y, z]| [x, -y, height - z])
         };
         check_all(&part(&mesh), height, |bottom, top| {
@@ -90,7 +89,7 @@ fn cones_both_ways() {
     }
 }
 
-/// What two discs that are apart have in common.
+/// Returns the area that two discs at a distance have in common.
 fn lens(radius: f64, apart: f64) -> f64 {
     if apart >= 2.0 * radius {
         return 0.0;
@@ -114,15 +113,14 @@ fn inclined_cylinders() {
     });
 }
 
-/// Figure 45: the sections of an inclined cylinder have one area, so that the area
-/// sees nothing of the stairs.
+/// Figure 45: all sections of an inclined cylinder have the same area, which hides the stairs.
 #[test]
 fn the_area_is_blind_to_an_inclined_cylinder() {
     let part = part(&inclined_cylinder());
     let layer = part.layers(3000.0, &[4000.0]).each[0];
     assert!(AreaDeviation.measure(&layer) < 1e-3);
     assert!(VolumeDeviation.measure(&layer) > 0.2);
-    // Its walls lean by 45 degrees at the steepest.
+    // Its walls lean by at most 45 degrees.
     let cusp = CuspHeight.measure(&layer);
     assert!((cusp - 1000.0 * 0.5_f64.sqrt()).abs() < 1.0, "{cusp}");
     let [min, max, step] = [50.0, 1000.0, 10.0].map(Length::from_um);
@@ -137,7 +135,7 @@ fn the_area_is_blind_to_an_inclined_cylinder() {
     assert!(by_volume.len() > 100 && by_volume.iter().all(|layer| layer.deviation() <= 0.02));
 }
 
-/// Cones have one slope, and so one cusp height for each thickness.
+/// A cone has one slope, so one cusp height for each thickness.
 #[test]
 fn the_cusp_of_a_cone_follows_from_its_slope() {
     let part = part(&cone(5.0, 1.0, 4.0, 20_000));

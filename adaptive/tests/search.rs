@@ -1,4 +1,4 @@
-//! The search for heights: bounds kept, degenerate parts, budgets, flat faces.
+//! Checks the search for layer heights: bounds, degenerate parts, budgets, flat faces.
 
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart,
@@ -33,7 +33,7 @@ fn built_um(heights: &Heights) -> Vec<f64> {
     heights.layers.iter().map(|layer| (layer.thickness_um * 1e3).round() / 1e3).collect()
 }
 
-/// A box from one height to another.
+/// Builds a box from one height to another.
 fn plate(low: f64, high: f64) -> Mesh {
     cone(4.0, 4.0, high - low, 200).map(|[x, y, z]| [x, y, z + low])
 }
@@ -51,7 +51,7 @@ fn the_part_of_figure_48() {
     let between = |low: f64, high: f64| {
         layers.iter().filter(move |layer| layer.bottom_um >= low && layer.top_um() <= high)
     };
-    // The cylinder, the cone and the upper half of the sphere.
+    // The cylinder, the cone, the sphere's upper half.
     assert!(between(0.0, 17_780.0).all(|layer| (layer.thickness_um - 2540.0).abs() < 1e-6));
     let cone: Vec<f64> = between(19_050.0, 38_100.0).map(|layer| layer.thickness_um).collect();
     let (least, most) =
@@ -107,8 +107,7 @@ fn a_plate_is_a_layer_or_a_few() {
     assert_eq!(built_um(&heights), [25.0]);
 }
 
-/// Nothing is lost where there is nothing, and the next body begins with a layer
-/// that does not reach far below it.
+/// Empty layers lose no volume, and the first layer of the next body does not reach far below it.
 #[test]
 fn bodies_above_each_other_with_nothing_between() {
     let part = part(&joined(&[plate(0.0, 1.0), plate(1.4321, 2.0), plate(2.0005, 3.0)]));
@@ -150,7 +149,7 @@ fn budgets_are_kept_and_used() {
         assert!(count <= layers && count > 0.9 * layers, "{count} of {layers}");
         assert_eq!(search.heights(bound).unwrap(), heights);
     }
-    // 2 s a layer, and 10 ms a micrometre.
+    // 2 s per layer plus 10 ms per micrometre.
     let cost = |thickness: Length| 2000.0 + 10.0 * thickness.um();
     let (_, heights) = search.within_budget(cost, 1.2e6).unwrap();
     let spent: f64 =
@@ -173,7 +172,7 @@ fn threads_do_not_change_the_heights() {
     assert_eq!(with(1), with(3));
 }
 
-/// As the volume, without ruling anything out.
+/// The volume criterion without pruning.
 #[derive(Debug)]
 struct LookingAtAll;
 
@@ -196,14 +195,14 @@ fn what_is_ruled_out_would_not_have_been_found() {
         for bound in [0.001, 0.01, 0.05, 0.4] {
             let search = by_volume(&part, &thicknesses);
             let all = HeightSearch { criterion: &LookingAtAll, ..by_volume(&part, &thicknesses) };
-            // Volumes may differ in their last digits.
+            // Volumes may differ in the last digits.
             let [found, expected] = [search, all].map(|s| built_um(&s.heights(bound).unwrap()));
             assert!(found == expected, "{bound}: {} layers, {}", found.len(), expected.len());
         }
     }
 }
 
-/// Where exposures grow faster than layers, many thin ones may be the quickest.
+/// Many thin layers may be fastest if exposure grows faster than thickness.
 #[test]
 fn a_budget_of_time_is_kept_by_the_quickest_layers() {
     let part = part(&plate(0.0, 6.0));
@@ -220,7 +219,7 @@ fn a_budget_of_time_is_kept_by_the_quickest_layers() {
 fn a_bound_that_no_budget_keeps_is_infinite() {
     let part = part(&sphere(5.0, 5_000));
     let thicknesses = buildable(25.0, 100.0, 1.0);
-    // The first layer stands on a point: no share of nothing is finite.
+    // The first layer stands on a point, so its relative error is infinite.
     let search = HeightSearch { criterion: &AreaDeviation, ..by_volume(&part, &thicknesses) };
     let (bound, heights) = search.within_budget(|_| 1.0, 100.0).unwrap();
     assert!(bound.is_infinite());
@@ -245,7 +244,7 @@ fn layers_of_which_nothing_is_known_are_the_thinnest() {
     let thicknesses = buildable(25.0, 100.0, 1.0);
     let closed = by_volume(&whole, &thicknesses).heights(0.5).unwrap();
     assert!(closed.layers.iter().all(|layer| layer.rows_left_out == 0));
-    // Without the side to the right, no row balances.
+    // Without the right side, no row balances.
     mesh.facets.retain(|facet| facet.iter().map(|corner| corner[0]).sum::<f32>() < 0.0);
     let open = part(&mesh);
     let heights = by_volume(&open, &thicknesses).heights(0.5).unwrap();

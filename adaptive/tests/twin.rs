@@ -1,5 +1,5 @@
-//! Swept layers against a slow obvious twin: sections at very many heights, compared
-//! with the one at the top, row by row.
+//! Compares swept layers with brute force: sections at many heights, each compared with the top
+//! one row by row.
 
 use lamp_adaptive::{LayeredPart, SweptLayer};
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
@@ -44,7 +44,7 @@ impl Twin {
         let height = max[2] - min[2];
         for layer in layers {
             let [bottom, top] = layer.map(|share| min[2] + share * height);
-            // Among other tops, as the search asks.
+            // Among other tops, as in the search.
             let tops = [0.5, 0.75, 1.0, 1.2].map(|share| bottom + share * (top - bottom));
             let layer = part.layers(bottom, &tops).each[2];
             let top_section = self.section(top.min(max[2]), max[1], rows);
@@ -60,7 +60,7 @@ impl Twin {
                 }
             }
             let near = |found: f64, expected: f64| {
-                // A section has a flat face or not: an error of one of them.
+                // A flat face may count in one section more or less.
                 let face = 0.002 * volume + 2.0 * (lost + gained + volume) / f64::from(SECTIONS);
                 (found - expected).abs() < face
             };
@@ -83,7 +83,7 @@ fn common(a: &Inside, b: &Inside) -> f64 {
     a.iter().flat_map(|&p| b.iter().map(move |&q| overlap(p, q))).sum()
 }
 
-/// Layers thin and thick, through all heights.
+/// Checks thin and thick layers at all heights.
 const LAYERS: [[f64; 2]; 8] = [
     [0.0, 0.01],
     [0.1, 0.13],
@@ -107,7 +107,7 @@ fn parts_that_stand() {
     }
 }
 
-/// Every face leans, columns pass several of them, and holes lie across.
+/// All faces are inclined, columns pass several of them, and holes lie across.
 #[test]
 fn parts_that_lie_and_lean() {
     let placements = [
@@ -122,7 +122,7 @@ fn parts_that_lie_and_lean() {
     }
 }
 
-/// Two balls that overlap: one cuts the other out, or they unite.
+/// Two overlapping balls, cut out of each other or united.
 #[test]
 fn bodies_that_pass_through_each_other() {
     let balls = [sphere(4.0, 1_000), sphere(4.0, 1_000).map(|[x, y, z]| [x + 2.0, y, z + 3.0])];

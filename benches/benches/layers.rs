@@ -1,7 +1,8 @@
-//! Times the hot loops: slicing, encoding and decoding of blade-mould layers beside the
-//! `fax` crate (throughput in transitions); dithering of a page of 900 megapixels (in
-//! gray pixels); errors of layers of 25 to 100 um (in bottoms of layers); and
-//! compensation (in transitions).
+//! Times the hot loops.
+//!
+//! Throughput is in transitions for slicing, coding (beside the `fax` crate) and compensating
+//! layers of the blade mould; in gray pixels for dithering a page of 900 megapixels; in layer
+//! bottoms for the errors of layers of 25 to 100 um.
 
 use std::io::Cursor;
 
@@ -30,7 +31,7 @@ fn slices(facets: usize, gray: Option<DepthLevels>) -> impl Fn() -> Slices {
     }
 }
 
-/// Gray levels in proportion to depths up to a layer.
+/// Gray levels proportional to depths up to a layer's thickness.
 fn depth_levels() -> DepthLevels {
     DepthLevels::new(Length::from_um(100.0), |gray| Length::from_um(100.0 * gray))
 }
@@ -109,8 +110,7 @@ fn layers(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The page of a large machine, 34,500 x 26,000 pixels: white, with `runs`
-/// runs of gray in each row.
+/// Returns a white page of a large machine, 34,500 x 26,000 pixels, with `runs` gray runs per row.
 fn page(runs: u32, length: u32) -> GrayMask {
     let mut page = GrayMask::new(34_500);
     for row in 0..26_000 {
@@ -166,7 +166,7 @@ fn dither(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A layer's pixels, eight to a byte, as a program without runs would hold them.
+/// Returns a layer's pixels, eight to a byte, as a program without runs would hold them.
 fn bitmap(strip: &[u8], width: u32, height: u32) -> Vec<u8> {
     let stride = width.div_ceil(8) as usize;
     let mut bytes = Vec::with_capacity(stride * height as usize);
@@ -182,7 +182,7 @@ fn bitmap(strip: &[u8], width: u32, height: u32) -> Vec<u8> {
     bytes
 }
 
-/// Sets the bits from the first up to, but without, the second.
+/// Sets the bits from the first up to the second, exclusive.
 fn fill(bytes: &mut [u8], first: usize, end: usize) {
     if first == end {
         return;
@@ -198,7 +198,7 @@ fn fill(bytes: &mut [u8], first: usize, end: usize) {
     }
 }
 
-/// Cure-width compensation of whole layers, beside decoding them to bitmaps.
+/// Times cure-width compensation of whole layers, beside decoding them to bitmaps.
 fn compensation(criterion: &mut Criterion) {
     let masks = masks(slices(100_000, None)());
     let transitions: usize = masks.iter().map(Mask::change_count).sum();
@@ -235,7 +235,7 @@ fn compensation(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A stack of one page, in memory.
+/// Encodes a stack of one page in memory.
 fn tiff_file(mask: &Mask) -> Vec<u8> {
     let layer =
         Layer { info: PageInfo::default(), dpi: Dpi::new(1500.0), image: mask.clone().into() };

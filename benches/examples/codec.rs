@@ -1,7 +1,7 @@
-//! Seconds that our codec takes to decode, and to encode, every page of a
-//! stack in memory on one thread: each page the median of five. What
-//! `libtiff.c` is for libtiff. Every page must first decode alike through
-//! the `fax` crate.
+//! Times decoding and encoding every page of a stack, in seconds.
+//!
+//! In memory, on one thread, the median of five for each page. `libtiff.c` does the same with
+//! libtiff. The `fax` crate must decode every page to the same image.
 //!
 //! ```sh
 //! cargo run --release -p lamp-benches --example codec blade.tif
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The time of all pages, each the median of five.
+/// Returns the time of all pages, each the median of five.
 fn seconds<T: Copy>(pages: impl Iterator<Item = T>, work: impl Fn(T)) -> f64 {
     pages
         .map(|page| {

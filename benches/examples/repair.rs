@@ -1,8 +1,9 @@
-//! How well corrections mend the layers of broken parts: each part is broken
-//! by each defect and three seeds, and what each method makes of it is held
-//! against the whole part. One Markdown table a method; wrong pixels left are a
-//! share of those that the defects brought into bands so wide. The last table
-//! shows what the confidence is worth: the bands of up to 15 rows by it.
+//! Measures how well corrections restore the layers of broken parts.
+//!
+//! Each part is broken by each defect with three seeds; each method's result is compared with
+//! the whole part in a Markdown table. Remaining wrong pixels are given as a share of those
+//! that the defects caused in bands of that width. The last table lists bands of up to
+//! 15 rows by confidence.
 //!
 //! ```sh
 //! cargo run --release -p lamp-benches --example repair
@@ -27,7 +28,7 @@ const PARTS: [(Sample, usize); 5] = [
     (Sample::Sphere, 20_000),
 ];
 
-/// One facet of so many is broken.
+/// One facet in this number is broken.
 const FACETS_PER_DEFECT: usize = 1000;
 const GAPS_PIXELS: [f32; 5] = [0.1, 0.5, 1.0, 2.0, 5.0];
 const SEEDS: RangeInclusive<u32> = 1..=3;
@@ -46,7 +47,7 @@ const METHODS: [(&str, Method); 4] = [
     ("spline, default limits", |layers| fixed(layers, FixOptions::default())),
 ];
 
-/// No band is left, however wide or doubtful.
+/// Corrects every band, however wide or doubtful.
 const UNRESTRAINED: FixOptions = FixOptions {
     method: FixMethod::Spline,
     max_width: u32::MAX,
@@ -102,8 +103,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The defects, and the filling under which each shows: flipped facets change
-/// nothing under even-odd.
+/// The defects, each with the fill rule that shows it: flipped facets change nothing under
+/// even-odd.
 fn defects() -> Vec<(String, Defect, Fill)> {
     let pixel_mm = SliceOptions::default().dpi.pitch().mm() as f32;
     let gap = |pixels| {
@@ -118,7 +119,7 @@ fn defects() -> Vec<(String, Defect, Fill)> {
     GAPS_PIXELS.map(gap).into_iter().chain(others).collect()
 }
 
-/// What a method made of a part with a defect, over all seeds.
+/// A method's results for a part with a defect, over all seeds.
 #[derive(Clone, Copy, Default)]
 struct Outcome {
     score: Score,
@@ -145,7 +146,7 @@ impl Outcome {
         self.layers += other.layers;
     }
 
-    /// The cells of its line under [`HEADING`], after the names.
+    /// Returns the cells of its line under [`HEADING`], after the names.
     fn cells(&self) -> String {
         let Score { bands, harmed, stray_rows_left } = self.score;
         let count = |bands: Bands| format!(" {} |", bands.count);
@@ -155,7 +156,7 @@ impl Outcome {
     }
 }
 
-/// The cell of the wrong pixels left, as a share of those injected.
+/// Formats the remaining wrong pixels as a share of those injected.
 fn left(Bands { injected, left, .. }: Bands) -> String {
     match injected {
         0 => " |".to_owned(),
@@ -163,7 +164,7 @@ fn left(Bands { injected, left, .. }: Bands) -> String {
     }
 }
 
-/// The classes of confidence: what each is below.
+/// The upper bounds of the classes of confidence.
 const MAX_CONFIDENCE: [f64; 4] = [0.35, 0.7, 0.95, 1.01];
 
 /// Adds the bands of up to 15 rows to their classes of confidence.

@@ -1,4 +1,4 @@
-//! The built-in materials hold the numbers of their sources, and no others.
+//! Checks that the built-in materials hold exactly the numbers of their sources.
 
 use lamp_grayscale::material::{Material, ResinError};
 use lamp_grayscale::resin::{CureError, CureModel, Dose, ExposureTime, GrayLevel, WorkingCurve};
@@ -66,8 +66,7 @@ fn what_a_source_does_not_give_is_absent() {
 #[test]
 fn pegda_cures_films_of_180_um_and_more() {
     let pegda = material("pegda-mw700").resin().unwrap();
-    // 450 um, the part of 000 section 5.2.1: E_c (1 + 450/D_pL) where the
-    // solid is clear.
+    // The part of 000 section 5.2.1, 450 um: E_c (1 + 450/D_pL) in a clear solid.
     let time = pegda.exposure_time(Length::from_um(450.0), 1.0).unwrap();
     let seconds = 11.593 * (1.0 + 450.0 / 302.8253) / 0.2064;
     assert!((time.ms() / 1000.0 - seconds).abs() < 1e-2, "{time}");

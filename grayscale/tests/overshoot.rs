@@ -1,5 +1,5 @@
-//! What gray layers cure too deep and too shallow under slopes that face down,
-//! against white layers (002 figure 67, as simulation).
+//! Compares the cure errors of gray and white layers under slopes that face down (002 figure 67,
+//! simulated).
 
 use lamp_fixtures::{Mesh, sphere, tower};
 use lamp_grayscale::material::Material;
@@ -32,10 +32,9 @@ fn slices(mesh: &Mesh, overcure: f64, gray: bool) -> Slices {
         .unwrap()
 }
 
-/// What is cured outside the part, and what of the part is not, in mm³, in the
-/// rows wanted, by `fine` lines through a pixel along its row and across. A line
-/// beside the part has no face that looks down: what the
-/// rounding to pixels cures there is the same for both.
+/// Returns the volumes cured outside the part and missing inside it, in mm³, in the given rows,
+/// with `fine` lines per pixel along and across the row. Lines beside the part are left out: they
+/// meet no face that looks down, and rounding to pixels is the same for both.
 fn errors(
     mesh: &Mesh,
     layers: &[Layer],
@@ -89,8 +88,8 @@ fn errors(
     sums
 }
 
-/// The error of white and of gray layers under faces that look down: what is
-/// cured outside, and what gray layers miss and white ones do not.
+/// Returns the errors of white and gray layers under faces that look down: the volume cured
+/// outside, and the volume that only gray layers miss.
 fn downward_errors(mesh: &Mesh, overcure: f64, fine: u32, every: u32) -> [f64; 2] {
     let white = slices(mesh, overcure, false);
     let grid = *white.grid();
@@ -120,8 +119,8 @@ fn gray_layers_leave_a_small_share_of_the_error() {
     for (name, mesh, every) in
         [("wedge", wedge(), 5), ("sphere", sphere(6.0, 6_000), 61), ("tower", tower(6_000), 131)]
     {
-        // Through the pixels' centres, where depths are exact but for the 255
-        // levels; and all over the pixels, which have one depth each.
+        // Through the pixels' centres, where depths are exact except for the 255
+        // levels, and all over the pixels, which have one depth each.
         for (fine, share) in [(1, 0.01), (3, 0.2)] {
             for overcure in [1.0, 1.6] {
                 let [white, gray] = downward_errors(&mesh, overcure, fine, every);

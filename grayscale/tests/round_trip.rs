@@ -1,4 +1,4 @@
-//! A material survives being written and read; a spoilt file is refused in one
+//! Checks that materials survive writing and reading, and that damaged files are refused in one
 //! line.
 
 use lamp_grayscale::material::{
@@ -22,7 +22,7 @@ fn mj() -> impl Strategy<Value = Dose> + Clone {
     number().prop_map(Dose::from_mj_per_cm2)
 }
 
-/// Texts with what TOML must escape.
+/// Texts that TOML must escape.
 fn text() -> impl Strategy<Value = String> {
     "[ -~äµ²\n\"]{0,12}x"
 }
@@ -68,7 +68,7 @@ fn two_depth() -> impl Strategy<Value = TwoDepthNumbers> {
     )
 }
 
-/// Sizes that differ.
+/// Returns distinct sizes.
 fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
     let slope = number().prop_map(WidthSensitivity::from_um_per_mj_per_cm2);
     let numbers = (0.1..1.0f64, given(mj()), given(slope));
@@ -132,7 +132,7 @@ proptest! {
         let mut text: Vec<char> = Material::BUILTINS[which].toml.chars().collect();
         let at = at % text.len();
         text.splice(at..text.len().min(at + length), junk.chars());
-        // What is spoilt may be a comment.
+        // The damage may lie in a comment.
         if let Err(error) = Material::from_toml(&String::from_iter(text)) {
             prop_assert!(!error.to_string().contains(char::is_control), "{}", error);
         }

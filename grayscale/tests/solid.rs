@@ -1,4 +1,4 @@
-//! What dithering must leave alone.
+//! Checks the pixels that dithering must not change.
 
 use lamp_grayscale::{DitherError, DitherMethod, dither, dither_image};
 use lamp_stack::{GrayMask, Image, Layer, Mask, PageInfo};
@@ -51,7 +51,7 @@ fn masks_pass_unchanged_and_gray_pages_name_the_method() {
     assert_eq!(out[1].info.other["dither"], "floyd-steinberg");
 }
 
-/// A row of half gray makes up to a run a pixel: the page is refused, not tried.
+/// Half gray gives up to one run per pixel: such a page is refused before dithering.
 #[test]
 fn dots_that_no_reader_takes_are_refused() {
     let mut gray = GrayMask::new(1 << 26);

@@ -1,4 +1,4 @@
-//! B-rep parts against closed forms, pixel by pixel.
+//! Compares layers of B-rep parts with closed forms, pixel by pixel.
 
 use lamp_fixtures::{StepSample, StepUnit, step};
 use lamp_slicer::{
@@ -12,9 +12,9 @@ fn model(part: StepSample, chord_mm: f64) -> Part {
     Part::from_step("part", step(part, StepUnit::Inch).as_bytes(), &options).unwrap()
 }
 
-/// Counts the pixels of a part's layers that are not what the closed form says:
-/// how far outside their centres are, in millimetres. Nearer than a nanometre, to
-/// which pages round heights, they may be either.
+/// Counts the pixels that differ from the closed form, which gives the signed distance of
+/// a pixel's centre from the part in millimetres, positive outside. Within a nanometre, to
+/// which pages round heights, a pixel may be either.
 fn wrong_pixels(
     model: Part,
     options: &SliceOptions,
@@ -72,12 +72,12 @@ fn a_sphere_has_no_wrong_pixel() {
     }
 }
 
-/// Turned so that nothing lies along the rows.
+/// Rotates the part so that nothing lies along the rows.
 fn askew() -> Placement {
     Placement::default().rotated(Axis::X, 33.0).rotated(Axis::Z, 71.0).translated([1.0, 2.0, 0.3])
 }
 
-/// Where a point of the machine is on a part that is `askew`.
+/// Returns the part's point at a point of the machine, for a part that is `askew`.
 fn back([x, y, z]: [f64; 3]) -> [f64; 3] {
     let turned = Placement::default().rotated(Axis::Z, -71.0).rotated(Axis::X, -33.0);
     turned.at([x - 1.0, y - 2.0, z - 0.3])
@@ -98,7 +98,7 @@ fn a_torus_has_no_wrong_pixel() {
     }
 }
 
-/// Near its poles a sphere has facets as thin as needles.
+/// Facets near a sphere's poles are thin as needles.
 #[test]
 fn poles_have_no_wrong_pixel() {
     let about_x = |degrees: f64| Placement::default().rotated(Axis::X, degrees);
@@ -112,7 +112,7 @@ fn poles_have_no_wrong_pixel() {
     }
 }
 
-/// Nearly level, a torus has sections as crescents that turn four times.
+/// The sections of a nearly level torus are crescents with four extrema.
 #[test]
 fn crescents_have_no_wrong_pixel() {
     let [there, back] = [3.0, -3.0].map(|by| Placement::default().rotated(Axis::X, by));
@@ -123,8 +123,8 @@ fn crescents_have_no_wrong_pixel() {
     assert!(wrong == 0 && white > 10_000, "{wrong} of {white}");
 }
 
-/// Where a torus lies askew its sections have saddles: contours meet in a cross, and
-/// facets part them the wrong way at heights nearer than the chord.
+/// The sections of a torus that lies askew have saddles, where contours meet in a cross.
+/// Facets split them the wrong way at heights within the chord.
 #[test]
 fn contours_that_meet_have_no_wrong_pixel() {
     let tilt = Placement::default().rotated(Axis::X, 20.0);
@@ -144,7 +144,7 @@ fn contours_that_meet_have_no_wrong_pixel() {
     }
 }
 
-/// The fewer facets, the more their pixels are off; the surfaces stay exact.
+/// Fewer facets give more wrong pixels; the surfaces stay exact.
 #[test]
 fn facets_alone_have_wrong_pixels() {
     let options = SliceOptions { polish: false, ..options(1500.0, 3.0, Placement::default()) };
@@ -154,10 +154,10 @@ fn facets_alone_have_wrong_pixels() {
     assert!(wrong[0] > 5 * wrong[1] && wrong[1] > 5 * wrong[2] && wrong[2] > 0, "{wrong:?}");
 }
 
-/// A gray pixel is as deep as the sphere is below it, to a level.
+/// A gray pixel's level is the depth of the sphere below it, within one level.
 #[test]
 fn gray_levels_are_those_of_the_exact_depth() {
-    // A level for each micrometre.
+    // One level per micrometre.
     let levels = DepthLevels::new(Length::from_um(255.0), |part| Length::from_um(255.0 * part));
     let gray = Some(LayerLevels::from(levels));
     let options = SliceOptions { gray, ..options(600.0, 0.1, Placement::default()) };

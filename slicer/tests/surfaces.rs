@@ -1,4 +1,4 @@
-//! Crossings, boxes and extrema on exact surfaces against closed forms.
+//! Compares crossings, boxes and extrema on exact surfaces with closed forms.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ const NM: f64 = 1e-6;
 
 const AS_IT_IS: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
-/// Turned about all axes, so that nothing lies along the rows.
+/// Rotates the part about all axes, so that nothing lies along the rows.
 const ASKEW: [[f64; 4]; 3] =
     [[0.36, 0.48, -0.8, 3.0], [-0.8, 0.6, 0.0, -1.0], [0.48, 0.64, 0.6, 2.0]];
 
@@ -19,7 +19,7 @@ fn at(rows: &[[f64; 4]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * x + row[1] * y + row[2] * z + row[3])
 }
 
-/// A text as each kernel reads it.
+/// Reads a STEP text with each kernel.
 fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
     let own: Arc<dyn Kernel> = Arc::new(StepModel::read(text.as_bytes()).unwrap());
     let meshed = |kernel: Arc<dyn Kernel>| {
@@ -47,8 +47,8 @@ fn placed(part: StepSample, chord_mm: f64, rows: [[f64; 4]; 3]) -> PlacedSurface
 
 #[test]
 fn crossings_of_a_blade_give_its_sections_exactly() {
-    // The length of rows within the section, times their distance. Rows that touch
-    // the section but no facet are missing.
+    // The total length of the rows inside the section times their spacing. Rows that
+    // touch the section but no facet are missing.
     let surfaces = placed(StepSample::Blade, 0.02, AS_IT_IS);
     let (step_mm, z_mm) = (0.002, 17.0123);
     let length = |points: &[FacetPoint]| {
@@ -66,7 +66,7 @@ fn crossings_of_a_blade_give_its_sections_exactly() {
     assert!(before.abs() > 1e-3 && after.abs() < 1e-4, "{before} {after}");
 }
 
-/// All crossings of facets with a plane and with rows a step apart.
+/// Lists the crossings of facets with a plane and equally spaced rows.
 fn crossings(surfaces: &PlacedSurfaces, z_mm: f64, step_mm: f64) -> Vec<FacetPoint> {
     let mesh = surfaces.mesh();
     let mut list = Vec::new();
@@ -95,9 +95,8 @@ fn crossings(surfaces: &PlacedSurfaces, z_mm: f64, step_mm: f64) -> Vec<FacetPoi
     list
 }
 
-/// Polishes the crossings of a part with many planes. Returns how far those that moved
-/// are from where they should be, in millimetres, before and after, and which part of
-/// them was kept; for each kernel.
+/// Polishes the crossings of a part with many planes. Returns, for each kernel, the greatest
+/// errors of the moved crossings before and after, in millimetres, and the share that was kept.
 fn errors(
     part: StepSample,
     heights_mm: &[f64],
@@ -148,7 +147,7 @@ fn crossings_of_a_sphere_are_exact_to_a_nanometre() {
 
 #[test]
 fn crossings_of_a_torus_are_exact_to_a_nanometre() {
-    // Of up to four the one that is nearest.
+    // The nearest of up to four.
     let x_mm = |[x, y, z]: [f64; 3]| {
         let half = (64.0 - (z - 8.0).powi(2)).max(0.0).sqrt();
         let x_at = |radius: f64| (radius * radius - y * y).max(0.0).sqrt().copysign(x);
@@ -203,7 +202,7 @@ fn contours_of_a_sphere_turn_at_its_highest_and_lowest_rows() {
     for rows in [AS_IT_IS, ASKEW] {
         let surfaces = placed(StepSample::Sphere, 0.02, rows);
         let centre = at(&rows, [0.0, 0.0, 15.0]);
-        // The last one is higher than any facet.
+        // The last plane is above all facets.
         for z in [-14.999f64, -14.9, -3.3, 0.0, 7.7, 14.99, 14.9995] {
             let radius = (225.0 - z * z).sqrt();
             let found = surfaces.extrema(centre[2] + z);
@@ -211,7 +210,7 @@ fn contours_of_a_sphere_turn_at_its_highest_and_lowest_rows() {
             for (extremum, y) in [(low, -radius), (high, radius)] {
                 let [x_mm, y_mm, _] = extremum.at_mm;
                 assert!((x_mm - centre[0]).abs() < NM && (y_mm - centre[1] - y).abs() < NM);
-                // The contour lies on the side of the other extremum.
+                // The contour lies towards the other extremum.
                 let inwards = -1e-4 * y.signum();
                 for (by, is_met) in [(inwards, true), (-inwards, false)] {
                     let contact = extremum.contact(&surfaces, y_mm + by);

@@ -1,4 +1,4 @@
-//! TIFFs that other programs might write, made here byte by byte.
+//! Reads TIFFs as other programs might write them, built byte by byte.
 
 use std::io::{Cursor, Write};
 
@@ -8,8 +8,8 @@ use proptest::prelude::*;
 const SHORT: u16 = 3;
 const LONG: u16 = 4;
 
-/// A classic, little-endian TIFF of one page: its fields with their numbers,
-/// and its strips or tiles, which stand in `order` behind the directory.
+/// A classic, little-endian TIFF of one page: its fields by number, and its strips or tiles,
+/// stored in `order` after the directory.
 struct Tiff {
     fields: Vec<(u16, u32)>,
     pieces: Vec<Vec<u8>>,
@@ -17,7 +17,7 @@ struct Tiff {
 }
 
 impl Tiff {
-    /// A page of strips, black being zero.
+    /// Creates a page of strips in which zero is black.
     fn new(size: (u32, u32), bits: u32, compression: u32, pieces: Vec<Vec<u8>>) -> Self {
         let fields = vec![(256, size.0), (257, size.1), (258, bits), (259, compression), (262, 1)];
         let order = (0..pieces.len()).collect();
@@ -87,12 +87,12 @@ fn deflate(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
-/// The compressions of bytes, by TIFF's numbers.
+/// TIFF's numbers of the byte compressions.
 type Compress = fn(&[u8]) -> Vec<u8>;
 const COMPRESSIONS: [(u32, Compress); 4] =
     [(1, <[u8]>::to_vec), (5, lzw), (8, deflate), (32946, deflate)];
 
-/// Gray pixels as a page, and each piece's rows as bytes.
+/// Returns gray pixels as a page, and the bytes of each strip's or tile's rows.
 fn gray_of(rows: &[Vec<u8>]) -> Image {
     let mut gray = GrayMask::new(rows[0].len() as u32);
     for row in rows {
@@ -112,8 +112,7 @@ fn mask_of(rows: &[Vec<u8>], width: u32) -> Image {
     Image::Mask(mask.finish())
 }
 
-/// Cuts rows of bytes into tiles, row by row of tiles; those that stick out
-/// are filled up with `0xA5`.
+/// Cuts rows of bytes into tiles in reading order, padded with `0xA5` at the edges.
 fn tiles(rows: &[Vec<u8>], width: usize, height: usize) -> Vec<Vec<u8>> {
     let mut tiles = Vec::new();
     for top in (0..rows.len()).step_by(height) {
@@ -129,7 +128,7 @@ fn tiles(rows: &[Vec<u8>], width: usize, height: usize) -> Vec<Vec<u8>> {
     tiles
 }
 
-/// Each byte less the one before it in its row.
+/// Subtracts from each byte the one before it in its row.
 fn differences(piece: &[u8], width: usize) -> Vec<u8> {
     let row = |row: &[u8]| -> Vec<u8> {
         let before = [0].into_iter().chain(row.iter().copied());
@@ -138,7 +137,7 @@ fn differences(piece: &[u8], width: usize) -> Vec<u8> {
     piece.chunks(width).flat_map(row).collect()
 }
 
-/// Rows of bytes, most of them like their neighbours.
+/// Returns rows of bytes, most of which equal their neighbours.
 fn rows_of_bytes() -> impl Strategy<Value = Vec<Vec<u8>>> {
     (1usize..50, 1usize..40).prop_flat_map(|(width, height)| {
         let byte = prop_oneof![4 => Just(0u8), 2 => Just(0xFF), 1 => any::<u8>()];
@@ -281,8 +280,8 @@ fn what_is_not_read_is_named() {
 
 #[test]
 fn a_damaged_row_is_named_as_the_page_counts_it() {
-    // Black rows of eight pixels: modified Huffman's 10011 and zeros up to a
-    // byte. One of the last strip is no code.
+    // Black rows of eight pixels: modified Huffman's 10011, padded to a byte with
+    // zeros. One row of the last strip is no valid code.
     let strips = vec![vec![0x98, 0x98], vec![0x98, 0x00]];
     let page = Tiff::new((8, 4), 1, 2, strips).with(278, 2);
     let error = read(page.bytes()).unwrap_err();

@@ -1,5 +1,5 @@
-//! The stack format: what is written is read back, by us and by others, and
-//! what is cut off is noticed.
+//! Checks that stacks read back as written, here and by other programs, and that truncated ones
+//! are refused.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -96,7 +96,7 @@ fn a_cut_stream_names_the_last_whole_layer() {
     let layers = layers(4);
     for format in [Format::Big, Format::Classic] {
         let whole = write(&layers, format);
-        // Where each page ends: the same bytes with fewer pages, but for the
+        // The end of each page: fewer pages give the same bytes, except for the
         // last link.
         let ends: Vec<usize> = (1..4).map(|count| write(&layers[..count], format).len()).collect();
         for cut in 1..whole.len() {
@@ -104,7 +104,7 @@ fn a_cut_stream_names_the_last_whole_layer() {
                 Err(StackError::CutOff { last_whole }) => {
                     let pages = ends.iter().filter(|&&end| end <= cut).count();
                     let text = format!("cut at {cut} of {}", whole.len());
-                    // Padding does not count: the page may be whole before it.
+                    // Padding does not count: the page may be complete before it.
                     let known = last_whole.map_or(0, |layer| layer + 1) as usize;
                     assert!(
                         known == pages || ends[..].get(pages).is_some_and(|end| end - cut < 8),
@@ -227,7 +227,7 @@ fn a_folder_in_use_is_not_written_over() {
 #[test]
 fn lying_directories_cost_only_an_error() {
     let good = write(&layers(1), Format::Big);
-    // Every byte of the directory, set to every extreme.
+    // Each byte of the directory, set to each extreme.
     for at in 0..good.len().min(600) {
         for value in [0, 1, 0x7F, 0x80, 0xFF] {
             let mut bad = good.clone();
@@ -246,7 +246,7 @@ fn lying_directories_cost_only_an_error() {
     assert!(error.unwrap_err().to_string().contains("loop"));
 }
 
-/// Runs another program on a stack, where it is installed.
+/// Runs another program on a stack, if it is installed.
 fn run(program: &str, arguments: &[&str], stack: &Path) -> Option<String> {
     let output = Command::new(program).args(arguments).arg(stack).output().ok()?;
     let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();

@@ -1,4 +1,4 @@
-//! PNG files, and folders of them, as stacks.
+//! Reads PNG files, and folders of them, as stacks.
 
 use std::fs;
 use std::io::Cursor;
@@ -6,7 +6,7 @@ use std::io::Cursor;
 use lamp_stack::{Compression, Dpi, Image, Layer, MaskBuilder, PageInfo, Pages, StackError};
 use png::{BitDepth, ColorType, Encoder, PixelDimensions, Unit};
 
-/// A PNG of the rows of bytes given.
+/// Encodes rows of bytes as a PNG.
 fn png(
     width: u32,
     kind: (ColorType, BitDepth),
@@ -40,7 +40,7 @@ fn read(file: Vec<u8>) -> Result<Layer, StackError> {
     layer
 }
 
-/// Rows as text: `#` and `.`, or gray levels.
+/// Formats rows as text: `#` and `.`, or gray levels.
 fn picture(image: &Image) -> Vec<String> {
     match image {
         Image::Mask(mask) => (0..mask.height())

@@ -1,14 +1,13 @@
-//! Builds the binaries, and finds them.
+//! Builds and finds the binaries.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Returns the path of a binary of `lamp-cli`, built from the sources as they
-/// are now.
+/// Returns the path of a binary of `lamp-cli`, built from the current sources.
 ///
 /// # Panics
-/// Where the binaries do not build; the message is the compiler's.
+/// Panics with the compiler's message if the build fails.
 pub fn bin(name: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -25,7 +24,7 @@ pub fn workspace_root() -> &'static Path {
     root.expect("this package is a folder of the workspace")
 }
 
-/// Returns the folder that cargo builds in.
+/// Returns cargo's target folder.
 pub fn target_dir() -> PathBuf {
     folder_above(&profile_dir())
 }
@@ -40,11 +39,11 @@ fn folder_above(path: &Path) -> PathBuf {
     path.parent().expect("tests run in target/<profile>/deps").to_owned()
 }
 
-/// Builds the binaries with the profile of this test: cargo does so by itself
-/// only for tests of the package that has them.
+/// Builds the binaries with the profile of this test. Cargo does so itself only for
+/// tests of the package that contains them.
 ///
-/// The whole workspace is named, so that the features of shared crates are those
-/// of `cargo test --workspace`, which has built all but the binaries by then.
+/// Builds the whole workspace, so that shared crates keep the features of `cargo test
+/// --workspace` and are not built again.
 fn build() {
     let folder = profile_dir();
     let profile = match folder.file_name().and_then(|name| name.to_str()) {

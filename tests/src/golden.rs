@@ -9,10 +9,10 @@ use png::{BitDepth, ColorType, Compression, Decoder, Encoder};
 
 use crate::binaries::{target_dir, workspace_root};
 
-/// What rewrites the golden images after a change that is meant.
+/// The command that rewrites the golden images after an intended change.
 const BLESS_COMMAND: &str = "LAMP_BLESS=1 cargo test -p lamp-tests --test golden";
 
-/// A folder of golden images, `name.png` each, of 1 bit a pixel.
+/// A folder of golden images: 1-bit `name.png` files.
 #[derive(Clone, Debug)]
 pub struct Golden {
     images: PathBuf,
@@ -20,18 +20,18 @@ pub struct Golden {
     bless: bool,
 }
 
-/// What blessing did to a golden image.
+/// The effect of blessing on a golden image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// There was none of that name.
+    /// There was no image of that name.
     New,
-    /// It showed something else.
+    /// The image differed.
     Changed,
 }
 
 impl Golden {
-    /// The project's golden images, in `fixtures/golden`. With `LAMP_BLESS=1`
-    /// in the environment they are rewritten.
+    /// Opens the project's golden images, in `fixtures/golden`. `LAMP_BLESS=1` in the
+    /// environment rewrites them.
     pub fn of_the_project() -> Self {
         let bless = std::env::var("LAMP_BLESS").is_ok_and(|value| value == "1");
         Self::new(
@@ -41,15 +41,15 @@ impl Golden {
         )
     }
 
-    /// Golden images in a folder, and where to show what differs from them.
+    /// Opens the golden images in a folder; pictures of differences go to another.
     pub fn new(images: PathBuf, differences: PathBuf, bless: bool) -> Self {
         Self { images, differences, bless }
     }
 
-    /// Returns the names of the images that there are, sorted.
+    /// Returns the names of the images, sorted.
     ///
     /// # Panics
-    /// Where the folder cannot be read.
+    /// Panics if the folder cannot be read.
     pub fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(&self.images).expect("there are golden images");
         let paths = entries.map(|entry| entry.expect("it can be listed").path());
@@ -59,15 +59,14 @@ impl Golden {
         names
     }
 
-    /// Compares an image with the golden one of that name, or makes it the
-    /// golden one.
+    /// Compares an image with the golden one of that name, or replaces that one.
     ///
     /// # Errors
-    /// Where they are not the same: a text that says how much differs, where
-    /// a picture of that is, and how to bless the change.
+    /// Returns a text if they differ: by how much, the path of a picture of the
+    /// difference, and how to bless the change.
     ///
     /// # Panics
-    /// Where a file cannot be written.
+    /// Panics if a file cannot be written.
     pub fn check(&self, name: &str, actual: &Mask) -> Result<Option<Change>, String> {
         let path = self.images.join(format!("{name}.png"));
         let expected = read_mask(&path);
@@ -103,21 +102,21 @@ impl Golden {
     }
 }
 
-/// How a pixel of two images compares.
+/// The comparison of a pixel in two images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shade {
     /// White in both.
     White,
     /// Black in both.
     Black,
-    /// White where it was expected to be, now black.
+    /// White expected, black found.
     Gone,
-    /// White now, where black was expected.
+    /// Black expected, white found.
     New,
 }
 
 impl Shade {
-    /// Whether the two images differ here.
+    /// Returns whether the images differ here.
     pub fn differs(self) -> bool {
         matches!(self, Self::Gone | Self::New)
     }
@@ -132,8 +131,8 @@ impl Shade {
     }
 }
 
-/// Compares two images pixel by pixel, on the larger of their sizes: outside
-/// an image, all is black.
+/// Compares two images pixel by pixel, on the larger of their sizes. Outside an
+/// image all is black.
 pub fn difference(expected: &Mask, actual: &Mask) -> Vec<Vec<Shade>> {
     let width = expected.width().max(actual.width());
     let height = expected.height().max(actual.height());
@@ -178,7 +177,7 @@ fn write_png(path: &Path, size: [usize; 2], format: (ColorType, BitDepth), pixel
     out.flush().expect("the file can be written");
 }
 
-/// Reads a golden image; `None` where there is no such file.
+/// Reads a golden image; returns `None` if there is no such file.
 fn read_mask(path: &Path) -> Option<Mask> {
     let file = File::open(path).ok()?;
     let mut reader = Decoder::new(BufReader::new(file)).read_info().expect("a PNG");

@@ -1,12 +1,11 @@
-//! Makes images out of others, and finds where two differ.
+//! Derives images from others, and compares rows.
 
 use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo};
 
-/// Returns the mask whose rows are what `edit` makes of the rows, by their
-/// numbers.
+/// Returns a mask with `edit` applied to each row and its number.
 ///
 /// # Panics
-/// Where a row is none any more.
+/// Panics if an edited row is invalid.
 pub fn edited(mask: &Mask, edit: impl Fn(u32, &[u32]) -> Vec<u32>) -> Mask {
     let mut out = MaskBuilder::new(mask.width());
     for (row, transitions) in (0..).zip(mask.rows()) {
@@ -15,12 +14,11 @@ pub fn edited(mask: &Mask, edit: impl Fn(u32, &[u32]) -> Vec<u32>) -> Mask {
     out.finish()
 }
 
-/// Returns a gray image whose levels rise from the edges of the mask's runs
-/// inwards, over four pixels. Where a run reaches the image's last column,
-/// there is no edge.
+/// Returns a gray image whose levels rise over four pixels inwards from the edges of
+/// the mask's runs. The image's last column is no edge.
 ///
 /// # Panics
-/// Never: it is as wide as the mask.
+/// Never panics: the image is as wide as the mask.
 pub fn with_soft_edges(mask: &Mask) -> GrayMask {
     let mut gray = GrayMask::new(mask.width());
     for row in mask.rows() {
@@ -39,10 +37,10 @@ pub fn with_soft_edges(mask: &Mask) -> GrayMask {
     gray
 }
 
-/// Returns where a gray image is of at least so high a level.
+/// Returns the pixels of a gray image that have at least a level.
 ///
 /// # Panics
-/// Never: its columns are those of the gray image.
+/// Never panics: its columns are those of the gray image.
 pub fn at_least(gray: &GrayMask, level: u8) -> Mask {
     let mut mask = MaskBuilder::new(gray.width());
     for row in gray.rows() {
@@ -56,8 +54,7 @@ pub fn at_least(gray: &GrayMask, level: u8) -> Mask {
     mask.finish()
 }
 
-/// Returns the layers as a program that knows nothing of ours would write
-/// them: their images alone, numbered from 0.
+/// Returns the layers without metadata, numbered from 0, as other programs write them.
 pub fn stripped(layers: &[Layer]) -> Vec<Layer> {
     let bare = |(index, layer): (u32, &Layer)| Layer {
         info: PageInfo { index, ..PageInfo::default() },
@@ -67,7 +64,7 @@ pub fn stripped(layers: &[Layer]) -> Vec<Layer> {
     (0..).zip(layers).map(bare).collect()
 }
 
-/// Returns the columns where a row differs between two images of one size.
+/// Returns the columns in which a row differs between two images of one size.
 pub fn differing(a: &Image, b: &Image, row: u32) -> Vec<u32> {
     let level = |image: &Image, column: u32| match image {
         Image::Mask(mask) => 255 * u8::from(mask.is_white(column, row)),

@@ -1,9 +1,8 @@
-//! What the end-to-end tests share: the binaries, a folder to run them in,
-//! and the comparison of layers with golden images.
+//! Shared by the end-to-end tests: the binaries, a folder to run them in, and golden
+//! images.
 //!
-//! The tests run the real `lamp`, `slice`, `fix`, `dither` and `tile`; they
-//! are built first, so that they are never stale. A test reads as what people
-//! type:
+//! The tests run the real `lamp`, `slice`, `fix`, `dither` and `tile`, which are built
+//! first so that they are never stale. Tests contain command lines as users type them:
 //!
 //! ```
 //! use lamp_fixtures::Sample;
@@ -33,8 +32,8 @@ use std::path::PathBuf;
 
 use lamp_fixtures::{Mesh, sphere};
 
-/// Returns a ball of few facets, each of which many rows and planes meet;
-/// tilted, for no plane meets an edge that lies level.
+/// Returns a ball of few facets, each met by many rows and planes. It is tilted because
+/// no plane meets a level edge.
 pub fn tilted_ball() -> Mesh {
     let ([sin_x, cos_x], [sin_y, cos_y]) = ([0.6, 0.8], [0.28, 0.96]);
     sphere(6.0, 600).map(|[x, y, z]| {
@@ -43,17 +42,16 @@ pub fn tilted_ball() -> Mesh {
     })
 }
 
-/// Returns a folder of models or images from elsewhere, `stl` or `tiff`:
-/// `../shared/data` beside the workspace, where it exists.
+/// Returns a folder of other programs' models or images (`stl` or `tiff`) in
+/// `../shared/data` beside the workspace, if it exists.
 pub fn shared_data(kind: &str) -> Option<PathBuf> {
     let folder = workspace_root().parent()?.join("shared/data").join(kind);
     folder.is_dir().then_some(folder)
 }
 
-/// Says a line that shows even where the test passes, such as why something
-/// was skipped: the test harness only captures what `println!` and its like
-/// write.
+/// Prints a line even if the test passes, such as the reason for a skip. The test
+/// harness captures only the output of `println!` and its like.
 pub fn note(line: &str) {
-    // Nobody may be listening; that is no failure of the test.
+    // A closed stream is no failure of the test.
     let _ = writeln!(std::io::stderr().lock(), "note: {line}");
 }

@@ -1,5 +1,4 @@
-//! Runs other programs that read and write images. Those that are not installed are skipped with
-//! a note.
+//! Runs other programs that read and write images, and skips missing ones with a note.
 
 use std::fs::File;
 use std::path::Path;
@@ -10,11 +9,11 @@ use tiff::decoder::{Decoder, DecodingResult};
 
 use crate::{Scratch, note};
 
-/// Runs another program in the folder and returns what it printed; `None`
-/// where it is not installed.
+/// Runs another program in the folder and returns its output, or `None` if it is not
+/// installed.
 ///
 /// # Panics
-/// Where it fails or warns.
+/// Panics if it fails or warns.
 #[track_caller]
 pub fn ask(scratch: &Scratch, program: &str, arguments: &[&str]) -> Option<String> {
     let asked = Command::new(program).args(arguments).current_dir(scratch).output();
@@ -28,10 +27,10 @@ pub fn ask(scratch: &Scratch, program: &str, arguments: &[&str]) -> Option<Strin
     Some(said.into_owned())
 }
 
-/// Runs a script; `None` where there is no Python or it has no Pillow.
+/// Runs a Python script and returns its output, or `None` without Python and Pillow.
 ///
 /// # Panics
-/// Where it fails or warns.
+/// Panics if it fails or warns.
 #[track_caller]
 pub fn ask_python(scratch: &Scratch, script: &str) -> Option<String> {
     let has_pillow = Command::new("python3").args(["-c", "import PIL"]).output();
@@ -42,15 +41,14 @@ pub fn ask_python(scratch: &Scratch, script: &str) -> Option<String> {
     ask(scratch, "python3", &["-c", script])
 }
 
-/// Rows of bytes: of eight pixels each, the first in the highest bit, or of a
-/// gray pixel each.
+/// Rows of bytes, each of eight pixels, the first in the highest bit, or of one gray
+/// pixel.
 pub type Packed = Vec<Vec<u8>>;
 
-/// The pages of an uncompressed TIFF, read by a decoder that shares nothing
-/// with ours.
+/// Returns the pages of an uncompressed TIFF, read by an independent decoder.
 ///
 /// # Panics
-/// Where it cannot be read.
+/// Panics if it cannot be read.
 pub fn plain_pages(path: &Path) -> Vec<Packed> {
     let mut decoder = Decoder::new(File::open(path).unwrap()).unwrap();
     let mut pages = Vec::new();
@@ -67,7 +65,7 @@ pub fn plain_pages(path: &Path) -> Vec<Packed> {
     }
 }
 
-/// The pixels of an image; those that fill up a row's last byte are black.
+/// Returns the pixels of an image; padding in a row's last byte is black.
 pub fn packed(image: &Image) -> Packed {
     match image {
         Image::Mask(mask) => packed_mask(mask),
@@ -84,7 +82,7 @@ pub fn packed(image: &Image) -> Packed {
     }
 }
 
-/// The pixels of a 1-bit image; those that fill up a row's last byte are black.
+/// Returns the pixels of a 1-bit image; padding in a row's last byte is black.
 pub fn packed_mask(mask: &Mask) -> Packed {
     let byte = |row, first: u32| {
         (first..first + 8).fold(0, |byte, column| byte << 1 | u8::from(mask.is_white(column, row)))

@@ -1,4 +1,4 @@
-//! A folder to run the binaries in.
+//! Runs pipelines of the binaries in a temporary folder.
 
 use std::fs::{self, File};
 use std::io::{Read, Seek, Write};
@@ -20,16 +20,16 @@ pub struct Scratch {
     folder: TempDir,
 }
 
-/// What became of a pipeline.
+/// The result of a pipeline.
 #[derive(Clone, Debug)]
 pub struct Ran {
     /// The command line.
     pub line: String,
-    /// The exit status of each stage; `None` for one that a signal ended.
+    /// The exit status of each stage; `None` if a signal ended it.
     pub statuses: Vec<Option<i32>>,
-    /// What the last stage wrote, unless that went to a file.
+    /// The last stage's output, unless redirected to a file.
     pub stdout: Vec<u8>,
-    /// What all stages said, as a terminal shows it.
+    /// The standard error of all stages, as a terminal shows it.
     pub stderr: String,
 }
 
@@ -43,16 +43,16 @@ impl Scratch {
     /// Makes an empty folder.
     ///
     /// # Panics
-    /// Where the system has no room for one.
+    /// Panics if the system cannot create one.
     pub fn new() -> Self {
         Self { folder: tempfile::tempdir().expect("a temporary folder") }
     }
 
-    /// With a tower of 76 layers and a torus of 15 to lay out, as `tower.tif` and
-    /// `torus.tif`, 100 dpi and 1 mm.
+    /// Makes a folder with `tower.tif` of 76 layers and `torus.tif` of 15, at 100 dpi and
+    /// 1 mm.
     ///
     /// # Panics
-    /// Where they cannot be made.
+    /// Panics if they cannot be made.
     pub fn with_tower_and_torus() -> Self {
         let scratch = Self::new();
         scratch.part("tower.stl", Sample::Tower, 5_000);
@@ -64,7 +64,7 @@ impl Scratch {
         scratch
     }
 
-    /// Returns the path of something in the folder.
+    /// Returns the path of a name in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -105,7 +105,7 @@ impl Scratch {
         layers.unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// Returns what stands in the folder, hidden files too, sorted.
+    /// Returns the names in the folder, sorted, with hidden files.
     pub fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.folder.path()).expect("the folder is there");
         let name = |entry: std::io::Result<fs::DirEntry>| {
@@ -116,8 +116,7 @@ impl Scratch {
         names
     }
 
-    /// Returns a binary with its arguments, set to run in the folder with
-    /// nothing on its standard input.
+    /// Returns a command that runs a binary in the folder with empty standard input.
     pub fn command(&self, words: &str) -> Command {
         let mut words = words.split_whitespace();
         let mut command = Command::new(bin(words.next().expect("a command has a name")));
@@ -125,8 +124,8 @@ impl Scratch {
         command
     }
 
-    /// Runs a pipeline as a shell does, `a x | b | c > file`, each stage's
-    /// output being the pipe that the next one reads. There are no quotes.
+    /// Runs a pipeline `a x | b | c > file` as a shell does, with real pipes between the
+    /// stages. Quotes are not supported.
     pub fn run(&self, line: &str) -> Ran {
         self.run_on(line, &[])
     }
@@ -185,20 +184,20 @@ impl Scratch {
 }
 
 impl Ran {
-    /// Checks that every stage ended well.
+    /// Checks that every stage succeeded.
     ///
     /// # Panics
-    /// Where one did not, with what was said.
+    /// Panics with the messages if one did not.
     #[track_caller]
     pub fn succeeds(self) -> Self {
         assert!(self.statuses.iter().all(|&status| status == Some(0)), "{self:?}");
         self
     }
 
-    /// Checks that every stage ended well and none said a word.
+    /// Checks that every stage succeeded without messages.
     ///
     /// # Panics
-    /// Where that is not so.
+    /// Panics otherwise.
     #[track_caller]
     pub fn succeeds_quietly(self) -> Self {
         let ran = self.succeeds();
@@ -206,11 +205,10 @@ impl Ran {
         ran
     }
 
-    /// Checks that it was wrong usage: status 2, and what was said holds all of
-    /// `words`.
+    /// Checks for wrong usage: status 2, and messages that contain all `words`.
     ///
     /// # Panics
-    /// Where that is not so.
+    /// Panics otherwise.
     #[track_caller]
     pub fn is_wrong_usage(self, words: &[&str]) -> Self {
         assert_eq!(self.statuses, [Some(2)], "{self:?}");
@@ -220,11 +218,11 @@ impl Ran {
         self
     }
 
-    /// Checks that the last stage refused its input: status 1 and one line
-    /// that starts with the command's name and holds all of `words`.
+    /// Checks that the last stage refused its input: status 1 and one line that starts with
+    /// the command's name and contains all `words`.
     ///
     /// # Panics
-    /// Where that is not so.
+    /// Panics otherwise.
     #[track_caller]
     pub fn is_refused_with(self, words: &[&str]) -> Self {
         assert_eq!(self.statuses.last(), Some(&Some(1)), "{self:?}");
@@ -240,7 +238,7 @@ impl Ran {
 /// Returns the 1-bit image of a layer.
 ///
 /// # Panics
-/// If it is gray.
+/// Panics if it is gray.
 pub fn mask(layer: &Layer) -> &Mask {
     match &*layer.image {
         Image::Mask(mask) => mask,
@@ -253,29 +251,29 @@ pub fn masks(layers: &[Layer]) -> Vec<&Mask> {
     layers.iter().map(mask).collect()
 }
 
-/// Reads a stack from memory, as it comes through a pipe.
+/// Reads a stack from memory, as from a pipe.
 pub fn read_stack(bytes: Vec<u8>) -> Vec<Layer> {
     let pages = Pages::from_stream(std::io::Cursor::new(bytes)).expect("a stack");
     pages.layers().collect::<Result<_, _>>().expect("a whole stack")
 }
 
-/// Whether some row of the image ends white, as none of a whole part does.
+/// Returns whether a row of the image ends white, which none of a whole part does.
 pub fn ends_white(mask: &Mask) -> bool {
     mask.rows().any(|row| row.len() % 2 == 1)
 }
 
-/// The folder, where a path is wanted.
+/// Returns the folder.
 impl AsRef<Path> for Scratch {
     fn as_ref(&self) -> &Path {
         self.folder.path()
     }
 }
 
-/// Writes a stack of one gray layer: each row rises from black on its left to
-/// full exposure on its right.
+/// Writes a stack of one gray layer that rises from black on the left to full exposure
+/// on the right.
 ///
 /// # Panics
-/// Where the file cannot be written.
+/// Panics if the file cannot be written.
 pub fn write_gray_ramp(path: &Path, width: u32, height: u32) {
     let mut gray = GrayMask::new(width);
     let level = |column: u32| (1, (column * 255 / (width - 1)) as u8);

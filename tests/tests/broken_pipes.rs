@@ -7,8 +7,8 @@ use std::process::{ChildStdout, Command, Stdio};
 use lamp_fixtures::Sample;
 use lamp_tests::Scratch;
 
-/// Where the pages of a `BigTIFF` stack of one-strip pages end: a reader of
-/// its own, so that a mistake of the one under test would show.
+/// Returns the ends of the pages of a `BigTIFF` stack of one-strip pages. Independent of
+/// the reader under test, so that its mistakes show.
 fn page_ends(stack: &[u8]) -> Vec<usize> {
     let word = |at: usize| u64::from_le_bytes(stack[at..at + 8].try_into().unwrap()) as usize;
     let mut ends = Vec::new();
@@ -29,7 +29,7 @@ fn page_ends(stack: &[u8]) -> Vec<usize> {
     ends
 }
 
-/// Lengths to cut a stack at: in the header, and all around each page's end.
+/// Returns the lengths to cut a stack at: in the header and around each page's end.
 fn cuts(ends: &[usize]) -> Vec<usize> {
     let starts = [8, 12, 15, 16, 17, 24, 100];
     let around = |&end: &usize| [end - 1, end, end + 1, end + 40, end + 300];
@@ -87,8 +87,8 @@ fn a_slicer_killed_midway_fails_the_stages_after_it() {
         let mut next = scratch.command(&format!("{stage} -o out.tif"));
         let mut next = next.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let (mut from, mut to) = (slice.stdout.take().unwrap(), next.stdin.take().unwrap());
-        // Its stack is of megabytes, so a slicer that has given this much is
-        // stuck in a full pipe.
+        // The stack has megabytes, so a slicer that has written this much waits
+        // for a full pipe.
         std::io::copy(&mut from.by_ref().take(300_000), &mut to).unwrap();
         slice.kill().unwrap();
         assert!(!slice.wait().unwrap().success());
@@ -107,7 +107,7 @@ fn a_slicer_killed_midway_fails_the_stages_after_it() {
 fn an_interrupted_stage_leaves_nothing() {
     let scratch = Scratch::new();
     scratch.part("blade.stl", Sample::Blade, 24_000);
-    // Shells start background jobs with Ctrl-C ignored, which stays so.
+    // Shells start background jobs with Ctrl-C ignored, and children inherit that.
     let (signal, status) = ("-TERM", 143);
     for output in ["out.tif", "out/"] {
         // Some 12 000 layers, of which only the first few are ever made.
@@ -136,7 +136,7 @@ fn a_stage_that_waits_for_its_input_can_be_interrupted() {
     let mut fix = fix.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     // Waiting for the process would close it.
     let _input = fix.stdin.take();
-    // Only a process that has set itself up has a thread for signals.
+    // The signal thread exists once the process is set up.
     let tasks = format!("/proc/{}/task", fix.id());
     while std::fs::read_dir(&tasks).is_ok_and(|tasks| tasks.count() < 2) {
         std::thread::yield_now();
@@ -183,7 +183,7 @@ fn messages_that_nobody_reads_stop_nothing() {
     assert!(!scratch.bytes("fixed.tif").is_empty());
 }
 
-/// Runs a pipeline, reads a thousand bytes of it and goes away.
+/// Runs a pipeline, reads a thousand bytes of its output and closes the pipe.
 #[track_caller]
 fn reads_a_little(scratch: &Scratch, line: &str) {
     let mut said = Vec::new();
@@ -265,7 +265,7 @@ fn an_input_without_a_byte_is_said_to_be_empty() {
 fn a_folder_that_lost_pages_is_refused() {
     let scratch = Scratch::new();
     scratch.part("cube.stl", Sample::Cube, 64);
-    // Which of the ten pages are still there.
+    // The remaining ones of the ten pages.
     for left in [0..9, 0..1] {
         scratch.run("slice cube.stl --dpi 100 --thickness 2mm -o pages/").succeeds();
         for lost in (0..10).filter(|k| !left.contains(k)) {
@@ -285,7 +285,7 @@ fn a_broken_pipe_does_not_hide_a_broken_stack() {
     let stack = scratch.run("slice cube.stl --dpi 100 --thickness 1mm").succeeds().stdout;
     let mut fix = scratch.command("fix -o out.tif");
     let mut fix = fix.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // The strip of a page in the middle, turned to noise.
+    // Noise in place of a middle page's strip.
     let mut noisy = stack.clone();
     let end = page_ends(&stack)[4];
     noisy[end - 20..end].fill(0xA5);

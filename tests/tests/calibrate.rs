@@ -1,9 +1,9 @@
-//! `lamp calibrate`: made-up measurements give back the material that they were made from.
+//! Checks that `lamp calibrate` recovers the material behind made-up measurements.
 
 use lamp_fixtures::SplitMix;
 use lamp_tests::{Scratch, workspace_root};
 
-/// What a command prints.
+/// Returns the output of a command.
 fn said(scratch: &Scratch, line: &str) -> String {
     String::from_utf8(scratch.run(line).succeeds().stdout).unwrap()
 }
@@ -12,7 +12,7 @@ fn text(scratch: &Scratch, name: &str) -> String {
     String::from_utf8(scratch.bytes(name)).unwrap()
 }
 
-/// The value, the lower and the upper end in the `nth` printed line of that name.
+/// Returns the value, lower and upper end in the `nth` printed line of a name.
 fn estimate(said: &str, name: &str, nth: usize) -> [f64; 3] {
     let line = said.lines().filter(|line| line.starts_with(name)).nth(nth);
     let line = line.unwrap_or_else(|| panic!("no {name} in:\n{said}"));
@@ -51,7 +51,7 @@ fn a_working_curve_comes_back_from_its_films() {
     assert!(table.starts_with("21 points of 24 rows (3 uncured, 0 blank left out)\n"), "{table}");
     holds(estimate(&table, "Ec (mJ/cm2)", 0), 131.5);
     holds(estimate(&table, "Dp (um)", 0), 211.0);
-    // The file says the same, and where it is from.
+    // The file states the same values and their origin.
     let file = text(&scratch, "mine.toml");
     for words in [
         "name = \"mine\"",
@@ -65,7 +65,7 @@ fn a_working_curve_comes_back_from_its_films() {
     }
     let checked = said(&scratch, "lamp material check mine.toml");
     assert!(checked.contains("mine gives working-curve; at 1600 mW/cm2"), "{checked}");
-    // Plots and files are the same each time, and nothing else is left.
+    // Plots and files are the same each time, and no other file remains.
     let svg = scratch.bytes("films.svg");
     scratch.run(line).succeeds();
     assert_eq!((scratch.bytes("films.svg"), text(&scratch, "mine.toml")), (svg, file));
@@ -140,11 +140,11 @@ fn the_two_depth_model_comes_back_from_its_films() {
     holds(estimate(&table, "Ec (mJ/cm2)", 0), 4.0);
     holds(estimate(&table, "DpL (um)", 0), 80.0);
     holds(estimate(&table, "DpS (um)", 0), 150.0);
-    // What the material had else is still there.
+    // The material keeps its other entries.
     let file = text(&scratch, "mine.toml");
     assert!(file.contains("name = \"sl-5510\"") && file.contains("[working-curve.critical-dose]"));
     assert!(file.contains("calibrated from films.csv, 10 points"));
-    // Straight points tell no penetration depth of the solid.
+    // Points on a straight line give no penetration depth of the solid.
     let straight = (1..9).map(|i| format!("{},{}\n", 10 * i, 30 * i - 20)).collect::<String>();
     scratch.write("straight.csv", format!("dose_mj_per_cm2,depth_um\n{straight}").as_bytes());
     let ran = scratch.run("lamp calibrate depth straight.csv --model two-depth").succeeds();
@@ -154,8 +154,8 @@ fn the_two_depth_model_comes_back_from_its_films() {
     );
 }
 
-/// Squares that grow by lines of these sizes in pixels, `E_c^w` and `D_p^w`, measured
-/// to 2 um.
+/// Measurements, to 2 um, of squares of these sizes in pixels that grow by a line with the given
+/// `E_c^w` and `D_p^w`.
 fn squares(sizes: &[(f64, f64, f64)]) -> String {
     let mut noise = SplitMix(60);
     let mut csv = "feature_px,dose_mj_per_cm2,cured_um\n".to_owned();
@@ -193,7 +193,7 @@ fn cure_widths_come_back_from_their_squares() {
     assert!(file.contains("feature-size = \"423.333 um\""), "{file}");
     assert!(file.contains("638.51 um") && file.contains("calibrated from squares.csv, "));
     said(&scratch, "lamp material check mine.toml");
-    // A second series takes the place of the sizes that it has.
+    // A second series replaces the sizes that it contains.
     scratch.write("more.csv", squares(&[(100.0, 110.0, 0.12), (900.0, 90.0, 0.16)]).as_bytes());
     said(&scratch, "lamp calibrate width more.csv --material mine.toml -o mine.toml");
     let file = text(&scratch, "mine.toml");
@@ -211,7 +211,7 @@ fn without_a_cure_depth_there_is_no_broadening_depth() {
     assert!(!String::from_utf8(ran.stdout.clone()).unwrap().contains("Bd"));
     let line = "lamp calibrate width squares.csv --depth-material lamp-no-absorber -o mine.toml";
     assert!(said(&scratch, line).contains("Bd (um)"));
-    // The depth's material is looked at, not copied.
+    // The depth's material is referenced, not copied.
     assert!(!text(&scratch, "mine.toml").contains("working-curve"));
     // At another resolution a pixel is another length.
     let widths = (1..5).map(|i| format!("450,{},{}\n", 100 * i, 10 * i - 5)).collect::<String>();
@@ -220,7 +220,7 @@ fn without_a_cure_depth_there_is_no_broadening_depth() {
     let fine = said(&scratch, "lamp calibrate width widths.csv --dpi 2400 --quiet");
     assert!(fine.contains("450 px (4762.5 um): 4 points"), "{fine}");
     assert!(fine.contains("Ec^w (mJ/cm2)                   50.000"), "{fine}");
-    // A line that would begin left of no dose.
+    // A line that would begin at a negative dose.
     let early = widths.replace(",5\n", ",105\n").replace(",15\n", ",115\n");
     let early = early.replace(",25\n", ",125\n").replace(",35\n", ",135\n");
     scratch.write("early.csv", format!("{head}{early}").as_bytes());

@@ -1,4 +1,4 @@
-//! `lamp compensate`: moves edges, keeps and reports walls, makes up for shrinkage.
+//! Checks that `lamp compensate` moves edges, keeps and reports walls, and corrects shrinkage.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Dpi, GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo, StackInfo};
@@ -18,7 +18,7 @@ fn layer(index: u32, image: Image) -> Layer {
     Layer { info, dpi: Dpi::new(254.0), image: image.into() }
 }
 
-/// Blocks as columns and rows, each first and end.
+/// Builds blocks from ranges of columns and rows, each with an exclusive end.
 fn blocks(blocks: &[[u32; 4]]) -> Mask {
     let mut mask = MaskBuilder::new(64);
     for row in 0..40 {
@@ -54,7 +54,7 @@ fn edges_move_by_the_length_and_the_rest_becomes_gray() {
     assert_eq!(levels(&layers[0], 20), [(11, 128), (12, 255), (28, 128), (29, 0)]);
     let page = &layers[0].info.other["compensate"];
     assert_eq!(page["inwards_um"], serde_json::json!([150.0, 150.0]));
-    // Nothing to move: the page passes as it is.
+    // Without a move the page passes unchanged.
     assert_eq!(layers[1], layer(1, Image::Mask(blocks(&[]))));
     scratch.run("lamp compensate in.tif --uniform 2mil --one-bit -o out.tif").succeeds_quietly();
     assert_eq!(mask(&scratch.layers("out.tif")[0]), &blocks(&[[11, 29, 6, 34]]));

@@ -1,4 +1,4 @@
-//! `lamp convert`: writes the same layers in other forms, and back byte for byte.
+//! Checks that `lamp convert` writes the same layers in other forms, and back byte for byte.
 
 use std::fs;
 use std::io::Cursor;
@@ -7,8 +7,7 @@ use lamp_fixtures::Sample;
 use lamp_stack::Layer;
 use lamp_tests::{Scratch, mask};
 
-/// A build with all that pages say: stray rows that were corrected, and where
-/// the copies stand.
+/// Makes a build with all page metadata: corrected stray rows and the copies' places.
 fn with_build() -> Scratch {
     let scratch = Scratch::new();
     scratch.run("lamp sample tower --facets 5k --defect drop --count 20 -o t.stl -q").succeeds();
@@ -35,12 +34,12 @@ fn every_shape_goes_back_to_the_same_bytes() {
     assert!(scratch.run("lamp convert classics").succeeds_quietly().stdout == build);
     scratch.run("lamp convert build.tif --png -o pngs/").succeeds_quietly();
     assert!(scratch.run("lamp convert pngs").succeeds_quietly().stdout == build);
-    // A folder of TIFFs may be called what it likes.
+    // A folder of TIFFs may have any name.
     scratch.run("lamp convert build.tif -o odd.png/").succeeds_quietly();
     assert!(scratch.run("lamp convert odd.png").succeeds_quietly().stdout == build);
 }
 
-/// What a PNG says, and its image as bytes.
+/// Returns a PNG's metadata and its image as bytes.
 struct Read {
     bits: u8,
     line: String,
@@ -49,7 +48,7 @@ struct Read {
     rows: Vec<Vec<u8>>,
 }
 
-/// Reads a gray PNG by a decoder that is not ours.
+/// Reads a gray PNG with an independent decoder.
 fn read(png: Vec<u8>) -> Read {
     let mut reader = png::Decoder::new(Cursor::new(png)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
@@ -159,7 +158,7 @@ fn a_stack_that_is_cut_off_leaves_nothing_behind() {
     }
     scratch.run("lamp split cut.tif --every 10 -o x/").is_refused_with(&["split: cut.tif: ", "36"]);
     assert_eq!(scratch.names(), before);
-    // One layer of many is no stack of one.
+    // One layer of several is no stack of one.
     let ran = scratch.run("lamp convert build.tif -o x.png");
     ran.is_refused_with(&["build.tif: ", "one layer", "--layers", "--png"]);
     assert_eq!(scratch.names(), before);

@@ -76,12 +76,12 @@ fn flipped_facets_change_no_pixel_under_even_odd() {
     assert_eq!(ran.stderr, "");
     let (whole, flipped) = (scratch.layers("whole.tif"), scratch.layers("stray.tif"));
     assert!(masks(&whole) == masks(&flipped));
-    // It is another file, and that shows.
+    // The file differs, so its digest does.
     let digest = |layers: &[Layer]| layers[0].info.stack.clone().unwrap().digest;
     assert_ne!(digest(&whole), digest(&flipped));
 }
 
-/// Nothing but the file's digest shows that facets were flipped: nor how many.
+/// Only the file's digest shows that facets were flipped, and not how many.
 #[test]
 fn flipped_facets_change_no_byte_but_the_digest() {
     let scratch = Scratch::new();

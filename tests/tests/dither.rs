@@ -1,12 +1,11 @@
-//! `dither` on stacks of gray layers.
+//! Checks `dither` on stacks of gray layers.
 
 use lamp_stack::{Destination, Dpi, Format, GrayMask, Layer, PageInfo, StackError, write_stack};
 use lamp_tests::{Scratch, masks, read_stack};
 
 const METHODS: [&str; 4] = ["blue-noise", "ordered", "floyd-steinberg", "threshold"];
 
-/// White squares in a gray rim that rises from the left, on black, in layers
-/// from 40 on.
+/// Writes white squares on black, from layer 40 on, in a gray rim that rises from the left.
 fn with_gray_stack(dpi: f64) -> Scratch {
     let layer = |index| {
         let mut gray = GrayMask::new(300);
@@ -70,7 +69,7 @@ fn a_layer_has_the_same_dots_whatever_the_threads_and_the_range() {
         let all = read_stack(stack);
         let some = scratch.run(&format!("{line} --layers 45..48")).succeeds_quietly().stdout;
         assert!(masks(&read_stack(some)) == masks(&all[5..8]), "{method}");
-        // The layers are alike but for their dots.
+        // The layers are alike except for their dots.
         assert_eq!(all[5].image == all[6].image, method == "threshold");
     }
 }
@@ -87,7 +86,7 @@ fn pixels_too_wide_to_cure_evenly_are_told_of_once() {
         let ran = scratch.run("dither gray.tif -o dots.tif").succeeds();
         assert_eq!(ran.stderr.lines().count(), 1, "{ran:?}");
         assert!(words.iter().all(|word| ran.stderr.contains(word)), "{ran:?}");
-        // Nothing is said of dots that are there already, or are none.
+        // Existing dots, or none, give no message.
         scratch.run("dither dots.tif -o again.tif").succeeds_quietly();
         scratch.run("dither gray.tif --method threshold -o white.tif").succeeds_quietly();
         scratch.run("dither gray.tif --quiet -o dots.tif").succeeds_quietly();

@@ -1,11 +1,10 @@
-//! `lamp edit`: adds shapes, labels and other stacks, and records them on the pages.
+//! Checks that `lamp edit` adds shapes, labels and other stacks, and records them on the pages.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Image, Layer, Mask};
 use lamp_tests::{Scratch, mask, masks, workspace_root, write_gray_ramp};
 
-/// The 20 mm cube about zero, with its hole of 10 mm, at 254 dpi: a pixel is
-/// 100 um.
+/// Slices the 20 mm cube about zero, with its 10 mm hole, at 254 dpi: a pixel is 100 um.
 fn with_cube() -> Scratch {
     let scratch = Scratch::new();
     scratch.part("cube.stl", Sample::Cube, 2000);
@@ -13,7 +12,7 @@ fn with_cube() -> Scratch {
     scratch
 }
 
-/// Whether a layer is white at a place of the part, in millimetres.
+/// Returns whether a layer is white at a point of the part, in millimetres.
 fn white_at(layer: &Layer, [x, y]: [f64; 2]) -> bool {
     let [x0, y1] = layer.info.origin_mm.unwrap();
     mask(layer).is_white(((x - x0) * 10.0) as u32, ((y1 - y) * 10.0) as u32)
@@ -33,7 +32,7 @@ fn the_example_of_the_documentation_does_what_it_says() {
     scratch.run("lamp edit cube.tif edits.toml -o out.tif").succeeds_quietly();
     let (before, after) = (scratch.layers("cube.tif"), scratch.layers("out.tif"));
     assert_eq!(after.len(), before.len());
-    // Rotated by 90 degrees, what was at x, y is at -y, x.
+    // Rotation by 90 degrees takes x, y to -y, x.
     let white = |index: usize, [x, y]: [f64; 2]| white_at(&after[index], [-y, x]);
     for (index, place, is) in [
         (0, [-7.5, 7.0], false), // in the pocket
@@ -48,7 +47,7 @@ fn the_example_of_the_documentation_does_what_it_says() {
     ] {
         assert_eq!(white(index, place), is, "layer {index} at {place:?}");
     }
-    // The numbers are in the lowest layer, and nowhere above.
+    // The numbers are in the lowest layer only.
     let lost = |index: usize, y: [f64; 2]| {
         let rows = (0..20).map(|k| y[0] + (y[1] - y[0]) * f64::from(k) / 20.0);
         rows.flat_map(|y| (0..100).map(move |k| [f64::from(k) / 10.0 - 1.0, y]))
@@ -82,7 +81,7 @@ fn layers_that_no_edit_is_for_pass_byte_for_byte() {
     });
     let mut differ: Vec<_> = differ.collect();
     differ.sort();
-    // The first says what was done; the eleventh is edited.
+    // The first page records the edit; the eleventh is edited.
     let (before, after) = (scratch.layers("cube.tif"), scratch.layers("files/"));
     assert_eq!(differ.len(), 2, "{differ:?}");
     assert_eq!(bytes_of_pages(&before)[..10], bytes_of_pages(&after)[..10]);
@@ -106,7 +105,7 @@ fn two_stacks_are_combined() {
         bytes_of_pages(&scratch.layers("cube.tif"))
     );
     assert_eq!((white("none.tif"), white("nothing.tif")), (0, 0));
-    // Below 10 mm the right half is left, above nothing.
+    // Below 10 mm the right half remains, above nothing.
     assert_eq!(white("right.tif") * 4, white("cube.tif"));
     let page = &scratch.layers("whole.tif")[0].info;
     let commands = &page.stack.as_ref().unwrap().commands;
@@ -265,7 +264,7 @@ fn a_build_keeps_what_is_not_in_its_copies() {
         scratch.run(&line).succeeds_quietly();
     }
     scratch.run("tile cube.tif --copies 2 -o build.tif").succeeds_quietly();
-    // An edit of all heights leaves the layers of mesh alone.
+    // An edit of all heights does not change the layers of mesh.
     let rib =
         "[[edit]]\ncopies = true\nbox = { x = [\"-2mm\", \"2mm\"], y = [\"-1mm\", \"1mm\"] }\n";
     scratch.write("rib.toml", rib.as_bytes());
@@ -279,7 +278,7 @@ fn a_build_keeps_what_is_not_in_its_copies() {
     scratch
         .run("lamp edit cube.tif --union torus.tif -o x.tif")
         .is_refused_with(&["beside its image", "pad"]);
-    // Of a stack that says nothing, the build still says where the copies stand.
+    // Without metadata in the stack, the build still records the copies' places.
     let mut plain = scratch.layers("cube.tif");
     plain[0].info.stack = None;
     scratch.stack("plain.tif", plain);

@@ -1,11 +1,11 @@
-//! Errors: one sentence, a status that tells usage from input, and no file under its final name.
+//! Checks errors: one sentence, a status that tells usage from input, no file under its final name.
 
 use std::fs;
 
 use lamp_fixtures::Sample;
 use lamp_tests::{Ran, Scratch};
 
-/// A folder with a good part, a good stack and all sorts of bad files.
+/// Makes a folder with a good part, a good stack and many kinds of bad files.
 fn with_all_sorts() -> Scratch {
     let scratch = Scratch::new();
     scratch.part("cube.stl", Sample::Cube, 64);
@@ -25,12 +25,12 @@ fn with_all_sorts() -> Scratch {
     scratch
 }
 
-/// A binary STL whose header claims another number of facets.
+/// Returns a binary STL whose header claims a wrong number of facets.
 fn with_count(stl: &[u8], count: u32) -> Vec<u8> {
     [&stl[..80], &count.to_le_bytes(), &stl[84..]].concat()
 }
 
-/// A binary STL with a corner that is no number.
+/// Returns a binary STL with a corner that is not a number.
 fn with_nan(stl: &[u8], facet: usize) -> Vec<u8> {
     let mut stl = stl.to_vec();
     let corner = 84 + 50 * facet + 12;
@@ -38,7 +38,7 @@ fn with_nan(stl: &[u8], facet: usize) -> Vec<u8> {
     stl
 }
 
-/// Runs a command that must fail, and checks that it left the folder alone.
+/// Runs a command that must fail, and checks that the folder is unchanged.
 #[track_caller]
 fn fails(scratch: &Scratch, line: &str) -> Ran {
     let before = scratch.names();
@@ -256,7 +256,7 @@ fn an_output_that_cannot_be_written_is_named() {
     ] {
         is_bad_input(&scratch, line, &["folder", "remove it or choose another name"]);
     }
-    // A file cannot become a folder.
+    // A file cannot be replaced by a folder.
     is_bad_input(&scratch, "fix cube.tif -o cube.stl/", &["cube.stl"]);
     let kept: Vec<_> = fs::read_dir(scratch.path("folder")).unwrap().collect();
     assert_eq!(kept.len(), 1);

@@ -1,6 +1,6 @@
-//! Headers with false sizes give an error and take no memory.
+//! Checks that headers with false sizes give an error and take no memory.
 //!
-//! There is one test, because memory is counted for all threads of the process together.
+//! There is one test because memory is counted for the whole process.
 
 use std::error::Error;
 use std::fs;
@@ -17,11 +17,10 @@ use peak_alloc::PeakAlloc;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// What a refusal may take at its peak: a few buffers.
+/// The peak memory allowed for a refusal: a few buffers.
 const MAX_BYTES: usize = 2 << 20;
 
-/// Runs something that must refuse its input in one line with these words,
-/// within little memory.
+/// Checks that input is refused in one line with these words, within little memory.
 #[track_caller]
 fn is_cheaply_refused<T>(words: &str, read: impl FnOnce() -> Result<T, Box<dyn Error>>) {
     let before = MEMORY.current_usage();
@@ -37,7 +36,7 @@ fn layers(pages: Pages) -> Result<Vec<Layer>, Box<dyn Error>> {
     Ok(pages.layers().collect::<Result<_, _>>()?)
 }
 
-/// Checks a stack from a file and from a pipe.
+/// Checks a stack both from a file and from a pipe.
 #[track_caller]
 fn stack_is_refused(scratch: &Scratch, words: &str, bytes: Vec<u8>) {
     scratch.write("lie.tif", &bytes);
@@ -45,13 +44,12 @@ fn stack_is_refused(scratch: &Scratch, words: &str, bytes: Vec<u8>) {
     is_cheaply_refused(words, || layers(Pages::from_stream(Cursor::new(bytes))?));
 }
 
-/// A page of T.6, as wide and high as it says.
+/// Returns a T.6 page that claims a width and height.
 fn page(width: u32, height: u32, strip: &[u8]) -> Vec<u8> {
     classic_tiff(&[(256, width), (257, height), (259, 4), (262, 1)], strip)
 }
 
-/// A page of 8 x 8 pixels with one more field, of `count` values of a type,
-/// somewhere behind the page.
+/// Returns a page of 8 x 8 pixels with one more field of `count` values, stored after the page.
 fn page_with(tag: u16, kind: u16, count: u32) -> Vec<u8> {
     let fields = [(256, 8), (257, 8), (259, 4), (262, 1), (tag, 1000)];
     let mut bytes = classic_tiff(&fields, &[0xFF; 8]);
@@ -62,7 +60,7 @@ fn page_with(tag: u16, kind: u16, count: u32) -> Vec<u8> {
     bytes
 }
 
-/// A BigTIFF whose first directory claims `count` entries.
+/// Returns a BigTIFF whose first directory claims `count` entries.
 fn with_entries(count: u64) -> Vec<u8> {
     let header = b"II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0";
     [&header[..], &count.to_le_bytes(), &[0; 4000]].concat()
@@ -91,7 +89,7 @@ fn stacks_that_lie(scratch: &Scratch) {
         "1 strips where its size makes 67108864",
         classic_tiff(&fields, &black),
     );
-    // Strips without number, and texts without end.
+    // Too many strips, and endless texts.
     for (tag, kind) in [(273, 16), (279, 3), (270, 2), (282, 5)] {
         stack_is_refused(scratch, &format!("its tag {tag} claims"), page_with(tag, kind, u32::MAX));
         stack_is_refused(scratch, "cut off", page_with(tag, kind, 200_000));
@@ -154,7 +152,7 @@ fn parts_that_lie(scratch: &Scratch) {
 #[test]
 fn a_header_that_lies_costs_nothing_but_an_error() {
     let scratch = Scratch::new();
-    // The threads and tables that the first call makes are not its cost.
+    // Threads and tables made by the first call are not counted.
     drop(g4::decode(&[], 8, 8));
     rayon_threads_start();
     stacks_that_lie(&scratch);

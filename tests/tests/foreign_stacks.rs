@@ -1,5 +1,5 @@
-//! Stacks by other programs: every kind of TIFF and PNG that libtiff and Pillow write is read
-//! with the same pixels.
+//! Checks that every kind of TIFF and PNG that libtiff and Pillow write is read with the same
+//! pixels.
 
 use std::fs;
 
@@ -9,21 +9,21 @@ use lamp_stack::{
 };
 use lamp_tests::{Packed, Scratch, ask, ask_python, packed};
 
-/// Numbers that look random, the same each time.
+/// A generator of reproducible pseudo-random numbers.
 struct Dice(u64);
 
 impl Dice {
-    /// A number below `limit`.
+    /// Returns a number below `limit`.
     fn below(&mut self, limit: u32) -> u32 {
         self.0 = self.0.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
         ((self.0 >> 33) % u64::from(limit)) as u32
     }
 }
 
-/// Widths around those of bytes, words, tiles and the longest code.
+/// Widths near those of bytes, words, tiles and the longest code.
 const WIDTHS: [u32; 16] = [1, 7, 8, 9, 31, 32, 33, 63, 64, 65, 239, 240, 241, 2559, 2560, 2561];
 
-/// Rows that differ as much as rows can, then rows like those above them.
+/// Returns rows that differ as much as possible, then rows like those above them.
 fn mask(width: u32, dice: &mut Dice) -> Image {
     let alternating: Vec<u32> = (0..width).collect();
     let mut rows = vec![vec![], vec![0], alternating[1..].to_vec(), alternating, vec![width - 1]];
@@ -44,7 +44,7 @@ fn mask(width: u32, dice: &mut Dice) -> Image {
     Image::Mask(mask.finish())
 }
 
-/// Rows of long runs, ramps and noise.
+/// Returns rows of long runs, ramps and noise.
 fn gray(width: u32, dice: &mut Dice) -> Image {
     let mut gray = GrayMask::new(width);
     for row in 0..35 {
@@ -90,7 +90,7 @@ const LAYOUTS: [&str; 7] = [
     "-t -w 4096 -l 48 -f lsb2msb",
 ];
 
-/// Lets libtiff write the stack in all the ways given, and reads each.
+/// Writes the stack with libtiff in all the given ways, and reads each.
 fn libtiff_writes(compressions: &[&str], image: fn(u32, &mut Dice) -> Image) {
     let scratch = Scratch::new();
     let layers = stack(&scratch, "ours.tif", image);
@@ -121,8 +121,8 @@ fn gray_pages_that_libtiff_writes_are_read() {
     libtiff_writes(&["lzw", "lzw:2", "zip", "zip:2", "packbits", "none"], gray);
 }
 
-/// Runs a script that writes images and prints, for each, a file's name, its
-/// size, its mode and its bytes in hexadecimal; checks that we read the same.
+/// Runs a script that writes images and prints the name, size, mode and hexadecimal bytes of
+/// each; checks that LAMP reads the same.
 fn python_writes(scratch: &Scratch, script: &str) {
     let script = format!(
         "from PIL import Image, ImageSequence, ImageOps, TiffImagePlugin\n\

@@ -1,4 +1,4 @@
-//! `slice --gray` and `lamp cure`: gray layers, and what they cure.
+//! Checks the layers of `slice --gray`, and `lamp cure` on them.
 
 use std::io::Cursor;
 
@@ -132,7 +132,7 @@ fn exposures_that_are_none_are_refused() {
     }
 }
 
-/// The areas that `lamp cure` prints, by panel: overshoot and missing.
+/// Returns the areas that `lamp cure` prints for each panel: overshoot and missing.
 fn areas(text: &[u8]) -> Vec<[f64; 2]> {
     let text = std::str::from_utf8(text).unwrap();
     let rows = text.lines().filter(|line| line.starts_with("white ") || line.starts_with("gray "));
@@ -144,7 +144,7 @@ fn areas(text: &[u8]) -> Vec<[f64; 2]> {
     .collect()
 }
 
-/// A colour picture: its width, and its pixels row by row.
+/// Returns the width of a colour picture and its pixels row by row.
 fn rgb_pixels(png: &[u8]) -> (usize, Vec<[u8; 3]>) {
     let mut reader = png::Decoder::new(Cursor::new(png)).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
@@ -173,7 +173,7 @@ fn a_section_shows_what_gray_saves() {
         assert!(white[0] > 1.0 && gray[0] < 0.02 * white[0], "{white:?} {gray:?}");
         assert!((gray[1] - white[1]).abs() < 0.03 * white[0], "{white:?} {gray:?}");
         let (width, pixels) = rgb_pixels(&scratch.bytes("s.png"));
-        // Red on the left alone, blue on both sides.
+        // Red only on the left, blue on both sides.
         let count = |colour: [u8; 3], left: bool| {
             let of_half = |k: usize| (k % width < width / 2) == left;
             (0..).zip(&pixels).filter(|(k, pixel)| of_half(*k) && **pixel == colour).count()

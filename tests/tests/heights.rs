@@ -1,4 +1,4 @@
-//! `slice --adaptive` and `lamp heights`: layers of adaptive heights.
+//! Checks the adaptive layers of `slice --adaptive` and `lamp heights`.
 
 use lamp_fixtures::{Mesh, Sample, cone};
 use lamp_stack::{Image, Layer};
@@ -18,7 +18,7 @@ fn heights_of(layers: &[Layer]) -> Vec<[f64; 2]> {
     layers.iter().map(|l| [l.info.z_um.unwrap(), l.info.thickness_um.unwrap()]).collect()
 }
 
-/// The rows of a report, by column.
+/// Returns the rows of a report, by column.
 fn report(scratch: &Scratch, name: &str) -> Vec<Vec<f64>> {
     let text = String::from_utf8(scratch.bytes(name)).unwrap();
     let mut lines = text.lines();
@@ -89,7 +89,7 @@ fn every_stage_keeps_what_layers_say() {
         let ms = 137.4 / 1.6 * (plain.info.thickness_um.unwrap() / 215.2).exp();
         assert!((plain.info.exposure_ms.unwrap() - ms).abs() < 1e-3 * ms, "{ms}");
     }
-    // The command on the first page makes the stack again.
+    // The command recorded on the first page reproduces the stack.
     let command = &plain[0].info.stack.as_ref().unwrap().commands[0];
     let again = scratch.run(command).succeeds_quietly().stdout;
     assert!(again == scratch.bytes("plain.tif"));
@@ -108,15 +108,14 @@ fn threads_memory_and_the_order_of_facets_change_no_byte() {
         scratch.run(&format!("{slice} {options} -o b.tif")).succeeds_quietly();
         assert!(scratch.bytes("a.tif") == scratch.bytes("b.tif"), "{options}");
     }
-    // A range is the same layers.
+    // A range has the same layers.
     scratch.run(&format!("{slice} --layers 5..9 -o range.tif")).succeeds_quietly();
     let (all, range) = (scratch.layers("a.tif"), scratch.layers("range.tif"));
     assert_eq!(masks(&all)[5..9], masks(&range));
     assert_eq!(heights_of(&all)[5..9], heights_of(&range));
 }
 
-/// Each layer's gray levels and exposure are those of its own thickness, and cure
-/// no deeper than the part.
+/// Each layer's gray levels and exposure suit its own thickness and cure no deeper than the part.
 #[test]
 fn gray_layers_have_the_levels_of_their_thickness() {
     let scratch = with_tower();
@@ -135,7 +134,7 @@ fn gray_layers_have_the_levels_of_their_thickness() {
     assert!(outside("gray") < 0.05 * outside("white"), "{said}");
 }
 
-/// A plate of 1.03 mm with a narrower one on it.
+/// Builds a plate of 1.03 mm with a narrower one on it.
 fn steps() -> Mesh {
     let plate = |radius: f64, low: f64, high: f64| {
         cone(radius, radius, high - low, 400).map(|[x, y, z]| [x, y, z + low])

@@ -1,7 +1,6 @@
-//! The fuzz targets' entry points on their seeds, on damaged seeds and on
-//! files by other programs; and the checked-in seeds themselves.
+//! Runs the fuzz targets on seeds, damaged seeds and other programs' files, and checks the seeds.
 //!
-//! After a change that is meant,
+//! After an intended change,
 //! `LAMP_BLESS=1 cargo test -p lamp-tests --test hostile`
 //! rewrites the seeds in `fuzz/seeds`.
 
@@ -12,14 +11,14 @@ use lamp_fixtures::SplitMix;
 use lamp_tests::hostile::{self, Seed, classic_tiff, seeds};
 use lamp_tests::{note, read_stack, shared_data, workspace_root};
 
-/// How many damaged seeds each target reads.
+/// The number of damaged seeds for each target.
 const MUTATIONS: u64 = 3000;
 
 fn seeds_of(target: &str) -> Vec<Seed> {
     seeds().into_iter().filter(|seed| seed.target == target).collect()
 }
 
-/// Runs a target's entry point on its seeds, whole, cut and damaged.
+/// Runs a target on its seeds, whole, truncated and damaged.
 fn survives(target: &str, entry: fn(&[u8])) {
     let seeds = seeds_of(target);
     for Seed { bytes, .. } in &seeds {
@@ -37,13 +36,13 @@ fn survives(target: &str, entry: fn(&[u8])) {
     }
 }
 
-/// More with `LAMP_MUTATIONS` in the environment.
+/// Returns the number of damaged seeds, which `LAMP_MUTATIONS` in the environment raises.
 fn mutations() -> u64 {
     let asked = std::env::var("LAMP_MUTATIONS");
     asked.map_or(MUTATIONS, |number| number.parse().expect("LAMP_MUTATIONS is a number"))
 }
 
-/// Changes one place.
+/// Changes one place in the bytes.
 fn damage(bytes: &mut Vec<u8>, numbers: &mut SplitMix) {
     const EXTREMES: [u32; 8] = [0, 1, 0x7F, 0xFF, 0xFFFF, 1 << 26, 1 << 31, u32::MAX];
     let at = numbers.below(bytes.len() + 1);
@@ -99,7 +98,7 @@ fn files_by_other_programs_hold_no_surprise() {
     }
 }
 
-/// As for libtiff: a directory that names a text many times costs it once.
+/// A directory that names a text many times costs it once, as with libtiff.
 #[test]
 fn the_first_entry_of_a_tag_counts() {
     let fields = [(256, 8), (256, 9), (257, 2), (257, 1), (262, 1)];
@@ -116,7 +115,7 @@ fn the_seeds_are_what_the_fixtures_make() {
     let bless = std::env::var("LAMP_BLESS").is_ok_and(|value| value == "1");
     let root = folder_of_seeds();
     if bless {
-        // Seeds that nothing makes any more go away with the rest.
+        // Outdated seeds are removed with the rest.
         drop(fs::remove_dir_all(&root));
     }
     let mut names = Vec::new();

@@ -1,4 +1,4 @@
-//! `lamp info` and `lamp show` against the layers as the library reads them.
+//! Compares `lamp info` and `lamp show` with the layers as the library reads them.
 
 use std::io::Cursor;
 
@@ -13,7 +13,7 @@ fn with_cube() -> Scratch {
     scratch
 }
 
-/// The value of a line `key: value` of `lamp info`.
+/// Returns the value of a line `key: value` of `lamp info`.
 fn fact<'a>(text: &'a str, key: &str) -> &'a str {
     let line = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(':'));
     line.unwrap_or_else(|| panic!("no {key} in {text}")).trim()
@@ -31,8 +31,8 @@ fn info_says_what_the_stack_holds() {
     assert_eq!(fact(&text, "stack"), "cube.tif");
     assert_eq!(fact(&text, "part"), "cube");
     assert!(fact(&text, "made by").starts_with("slice cube.stl --dpi 100 --thickness 1mm "));
-    // 20 mm in layers of 1 mm, and 78.7 pixels a side: 79 or less are
-    // covered, with a margin of one, the width then a multiple of 32.
+    // 20 mm in layers of 1 mm, and 78.7 pixels per side: at most 79 are covered, plus
+    // a margin of one; the width is rounded up to a multiple of 32.
     assert_eq!(fact(&text, "layers"), "20 (0 to 19)");
     assert_eq!(fact(&text, "size"), "96 x 81 pixels");
     assert_eq!(fact(&text, "resolution"), "100 dpi (24.384 x 20.574 mm)");
@@ -75,7 +75,7 @@ fn info_counts_stray_rows() {
     assert_eq!(fact(&text, "stray rows"), "none known");
 }
 
-/// Rows of gray levels.
+/// Returns the rows of gray levels.
 type Picture = Vec<Vec<u8>>;
 
 fn read_png(bytes: Vec<u8>) -> Picture {
@@ -102,7 +102,7 @@ fn with_blade() -> (Scratch, Mask) {
     (scratch, image)
 }
 
-/// Some columns and rows of an image as gray levels; black outside.
+/// Returns a region of an image as gray levels, black outside the image.
 fn levels(image: &Mask, columns: std::ops::Range<u32>, rows: std::ops::Range<u32>) -> Picture {
     let level = |column, row| if image.is_white(column, row) { 255 } else { 0 };
     rows.map(|row| columns.clone().map(|column| level(column, row)).collect()).collect()
@@ -114,7 +114,7 @@ fn show_draws_the_layer_pixel_for_pixel() {
     let all = levels(&image, 0..image.width(), 0..image.height());
     assert!(show(&scratch, "") == all);
     assert!(show(&scratch, "--region 100,90,70,50") == levels(&image, 100..170, 90..140));
-    // A region is cut to the image.
+    // A region is clipped to the image.
     let (width, height) = (image.width(), image.height());
     let corner = levels(&image, 200..width, 200..height);
     assert!(show(&scratch, "--region 200,200,9999,9999") == corner);

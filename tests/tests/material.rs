@@ -1,4 +1,4 @@
-//! `lamp material`: what it prints and what it refuses.
+//! Checks the output and the errors of `lamp material`.
 
 use std::fs;
 
@@ -17,7 +17,7 @@ fn list_has_a_line_for_each_material() {
         text.lines().skip(1).map(|line| line.split_whitespace().collect()).collect();
     assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), NAMES);
     assert_eq!(rows[1][1..6], ["1600", "mW/cm2", "working-curve,", "gray,", "dimmed-lamp"]);
-    // Neither a light nor a model stands where the source has none.
+    // No light and no model is printed if the source has none.
     assert_eq!(rows[3][1..4], ["-", "working-curve,", "two-depth"]);
     assert_eq!(rows[4][1..4], ["14", "mW/cm2", "-"]);
 }

@@ -1,4 +1,4 @@
-//! `slice --report`: lists the edges and facets behind unbalanced rows, as in the part's file.
+//! Checks that `slice --report` lists the edges and facets behind unbalanced rows.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 const FINE: &str = "--dpi 600 --thickness 50um";
 
-/// Slices a part and reads the report on it.
+/// Slices a part and reads its report.
 fn report(scratch: &Scratch, parts: &str, options: &str) -> Value {
     let line = format!("slice {parts} {FINE} {options} -o part.tif --report gaps.json");
     let ran = scratch.run(&line).succeeds();
@@ -32,7 +32,7 @@ fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
     value[key].as_array().unwrap()
 }
 
-/// The facets that a report names: file, number and corners.
+/// Returns the facets that a report names: file, number and corners.
 fn named(report: &Value) -> BTreeSet<(u64, u64, String)> {
     let facets = list(report, "edges").iter().flat_map(|edge| list(edge, "facets"));
     let name = |facet: &Value| {
@@ -46,7 +46,7 @@ fn corners(facet: Result<Facet, serde_json::Error>) -> String {
     format!("{:?}", facet.expect("three corners"))
 }
 
-/// The facets of a mesh that have an edge of a given one.
+/// Returns the facets of a mesh that share an edge with a given one.
 fn at_edges_of(mesh: &Mesh, facet: &Facet, file: u64) -> BTreeSet<(u64, u64, String)> {
     let shared = |other: &Facet| facet.iter().filter(|corner| other.contains(corner)).count();
     let facets = (0..).zip(&mesh.facets).filter(|(_, other)| shared(other) >= 2);
@@ -230,7 +230,7 @@ fn a_report_needs_a_file_of_its_own() {
     assert!(ran.stderr.ends_with("; fix corrects them, and --report FILE.json lists the facets\n"));
 }
 
-/// A part whose facets belong to no whole, from elsewhere.
+/// A downloaded part whose facets form no closed surface.
 #[test]
 fn a_soup_is_reported_on() {
     let Some(soup) = shared_data("stl").map(|folder| folder.join("trimesh_soup.stl")) else {

@@ -1,12 +1,10 @@
-//! Other programs open the pipeline's stacks, and see the same pixels. Programs that are not
-//! installed are skipped with a note.
+//! Checks that other programs, if installed, read the same pixels from the pipeline's stacks.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Layer, Mask};
 use lamp_tests::{Scratch, ask, ask_python, masks, packed_mask, plain_pages};
 
-/// A build made by the real pipeline, as `build.tif` (`BigTIFF`) and as
-/// `classic.tif`.
+/// Makes a build by the real pipeline, as `build.tif` (`BigTIFF`) and `classic.tif`.
 fn with_build() -> (Scratch, Vec<Layer>) {
     let scratch = Scratch::new();
     scratch.part("blade.stl", Sample::Blade, 24_000);
@@ -21,7 +19,7 @@ fn with_build() -> (Scratch, Vec<Layer>) {
 
 const STACKS: [&str; 2] = ["build.tif", "classic.tif"];
 
-/// `width height white`, a line for each page.
+/// Returns `width height white`, one line for each page.
 fn sizes_and_areas(layers: &[Layer]) -> String {
     let line =
         |mask: &&Mask| format!("{} {} {}\n", mask.width(), mask.height(), mask.white_pixels());

@@ -1,10 +1,10 @@
-//! Whole pipelines of real processes: the same layers arrive by pipe, file and folder.
+//! Checks that pipelines of real processes give the same layers by pipe, file and folder.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Layer, PageInfo, StackInfo};
 use lamp_tests::{Scratch, masks, read_stack};
 
-/// Coarse, so that a part takes a blink.
+/// Coarse, so that slicing is fast.
 const COARSE: &str = "--dpi 100 --thickness 1mm";
 /// 400 x 400 pixels at 100 dpi: nine towers.
 const AREA: &str = "--area 4x4in";
@@ -58,7 +58,7 @@ fn a_pipe_makes_the_bytes_that_stages_make_through_files() {
     scratch.run("dither 2.tif -o 3.tif").succeeds();
     scratch.run(&format!("tile 3.tif {AREA} -o 4.tif")).succeeds();
     assert!(scratch.bytes("piped.tif") == scratch.bytes("4.tif"));
-    // Two stages had nothing to do, and kept every byte.
+    // Two stages had nothing to do and kept every byte.
     assert!(scratch.bytes("1.tif") == scratch.bytes("2.tif"));
     assert!(scratch.bytes("2.tif") == scratch.bytes("3.tif"));
     assert!(scratch.bytes("3.tif") != scratch.bytes("4.tif"));
@@ -138,7 +138,7 @@ fn a_classic_tiff_holds_the_same_layers() {
     let [big, classic] = ["big.tif", "classic.tif"].map(|name| scratch.bytes(name));
     assert_eq!((big[2], classic[2]), (43, 42));
     assert!(scratch.layers("big.tif") == scratch.layers("classic.tif"));
-    // The stages take one for the other, and turn one into the other.
+    // The stages accept both forms and convert between them.
     assert!(scratch.run("fix classic.tif").succeeds().stdout == big);
     assert!(scratch.run("fix big.tif --classic").succeeds().stdout == classic);
     assert!(scratch.run_on("dither --classic", &classic).succeeds().stdout == classic);
@@ -224,7 +224,7 @@ fn the_demo_is_what_the_four_binaries_make() {
         let mut reader = png::Decoder::new(std::io::Cursor::new(picture)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut pixels).unwrap();
-        // A picture of a layer, in black and white and with grays on edges.
+        // A picture of a layer, in black and white and with gray edges.
         assert!([0, 255].iter().all(|level| pixels.contains(level)), "{name}");
     }
     scratch

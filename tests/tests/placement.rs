@@ -1,4 +1,4 @@
-//! Parts that are scaled, mirrored, rotated and moved; several parts at once.
+//! Checks parts that are scaled, mirrored, rotated and moved, and several parts at once.
 
 use lamp_fixtures::{Mesh, Sample, sphere, torus};
 use lamp_stack::{Layer, StackInfo};
@@ -43,7 +43,7 @@ fn the_stack_remembers_where_the_part_was_put() {
     let command = |name| stack_info(&scratch.layers(name)).commands[0].clone();
     let full = placed.replace("--scale 2", "--scale 2,2,2");
     assert_eq!(command("placed.tif").replace(&format!(" {full}"), ""), command("plain.tif"));
-    // It is a command.
+    // The record is a command that runs.
     let again = scratch.run(&command("placed.tif")).succeeds().stdout;
     assert!(again == scratch.bytes("placed.tif"));
 }

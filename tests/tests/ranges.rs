@@ -1,4 +1,4 @@
-//! `lamp join` and `lamp split`: ranges of layers join to the whole stack, byte for byte.
+//! Checks that `lamp split` and `lamp join` reproduce the whole stack, byte for byte.
 
 use std::fs;
 
@@ -60,8 +60,7 @@ fn names(scratch: &Scratch, folder: &str) -> Vec<String> {
     names
 }
 
-/// Joins a folder's files in the order of their names, as `folder/*.tif` does
-/// in a shell.
+/// Joins a folder's files in order of name, as a shell's `folder/*.tif` does.
 fn joined(scratch: &Scratch, folder: &str) -> Vec<u8> {
     let files: Vec<_> =
         names(scratch, folder).iter().map(|name| format!("{folder}/{name}")).collect();
@@ -84,7 +83,7 @@ fn what_is_split_joins_to_the_same_bytes() {
     for folder in ["by30", "at", "one"] {
         assert!(joined(&scratch, folder) == all, "{folder}");
     }
-    // A range split again is still of the whole.
+    // A range that is split again still refers to the whole.
     scratch.run("lamp split all.tif --layers 10..50 --every 25 -o middle/").succeeds_quietly();
     let middle = scratch.run("lamp convert all.tif --layers 10..50").succeeds_quietly().stdout;
     assert!(joined(&scratch, "middle") == middle);
@@ -97,14 +96,14 @@ fn each_file_of_a_split_is_a_stack_in_itself() {
     scratch.run(&format!("slice t.stl {COARSE} -o all.tif")).succeeds();
     scratch.run("lamp split all.tif --at 20,21 -o parts/").succeeds_quietly();
     for (name, range) in [("00000-00019", "..20"), ("00020-00020", "20"), ("00021-00075", "21..")] {
-        // What slice makes of the range alone.
+        // The range as sliced alone.
         let line = format!("slice t.stl {COARSE} --layers {range}");
         let alone = scratch.run(&line).succeeds_quietly().stdout;
         assert!(scratch.bytes(&format!("parts/layers_{name}.tif")) == alone, "{range}");
     }
 }
 
-/// Writes gray layers that do not say what they are of.
+/// Writes gray layers without a record of their source.
 fn write_plain_stack(scratch: &Scratch, name: &str, indexes: &[u32]) {
     let layers = indexes.iter().map(|&index| {
         let mut gray = GrayMask::new(64);

@@ -1,5 +1,4 @@
-//! Models and images by other programs, in `../shared/data` beside the
-//! workspace, where it exists.
+//! Reads other programs' models and images in `../shared/data` beside the workspace, if present.
 
 use std::fs::{self, File};
 use std::io::{Read, Seek};
@@ -9,10 +8,10 @@ use std::time::{Duration, Instant};
 
 use lamp_tests::{Scratch, ask, masks, note, packed, plain_pages, shared_data};
 
-/// Far more than any of these takes: only a command that hangs gets here.
+/// Far more than any of these takes: only a command that hangs reaches it.
 const TOO_LONG: Duration = Duration::from_secs(60);
 
-/// The files of a kind, sorted; none where the folder does not exist.
+/// Returns the files of a kind, sorted; none if the folder does not exist.
 fn files(kind: &str, extensions: &[&str]) -> Vec<PathBuf> {
     let Some(folder) = shared_data(kind) else {
         note(&format!("there is no ../shared/data/{kind}: skipped"));
@@ -33,7 +32,7 @@ fn name(path: &Path) -> &str {
     path.file_name().unwrap().to_str().unwrap()
 }
 
-/// Runs a command on a file and returns its exit status and what it said.
+/// Runs a command on a file and returns its exit status and messages.
 fn run(scratch: &Scratch, words: &str, file: &Path) -> (Option<i32>, String) {
     let mut said = tempfile::tempfile().unwrap();
     let mut command = scratch.command(words);
@@ -81,7 +80,7 @@ fn every_part_slices_but_the_empty_ones() {
         let fixed = scratch.layers("fixed.tif");
         assert_eq!(fixed.len(), layers.len());
         for (layer, mask) in fixed.iter().zip(masks(&fixed)) {
-            // Rows of bands that were left are still listed.
+            // Rows of uncorrected bands are still listed.
             let mut ends_white =
                 (0..).zip(mask.rows()).filter(|(_, row)| !row.len().is_multiple_of(2));
             let listed = |(row, _): (u32, _)| layer.info.stray_rows.contains(&row);

@@ -1,4 +1,4 @@
-//! STEP parts: slicing, checking and converting them, and what is refused.
+//! Checks slicing, checking, converting and refusing STEP parts.
 
 use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
 use lamp_stack::Image;
@@ -16,7 +16,7 @@ fn broken(defect: StepDefect) -> Scratch {
     scratch
 }
 
-/// Standard error of a command that succeeds.
+/// Returns the standard error of a command that succeeds.
 fn said(scratch: &Scratch, line: &str) -> String {
     scratch.run(line).succeeds().stderr
 }
@@ -68,7 +68,7 @@ fn facets_of_a_file_are_those_of_the_stl_made_of_it() {
     scratch.run(&format!("slice part.stl {line} -o b.tif")).succeeds_quietly();
     scratch.run(&format!("slice part.step {line} --tolerance 20um --quiet -o c.tif")).succeeds();
     let [a, b, c] = ["a.tif", "b.tif", "c.tif"].map(|name| scratch.layers(name));
-    // Most planes of the torus meet facets at the same heights in both.
+    // Most planes of the torus meet facets at the same heights in both files.
     let same = masks(&a).iter().zip(masks(&b)).filter(|(a, b)| **a == *b).count();
     assert!(same + 2 > a.len(), "{same} of {}", a.len());
     let same = masks(&a).iter().zip(masks(&c)).filter(|(a, c)| **a == *c).count();
@@ -128,7 +128,7 @@ fn what_is_broken_is_refused_or_healed_and_said() {
     }
 }
 
-/// A block without its top: turned on its side, every layer has a gap.
+/// Writes a block without its top. On its side, every layer has a gap.
 #[test]
 fn layers_with_gaps_come_from_the_fallback() {
     let scratch = broken(StepDefect::Missing);
@@ -143,7 +143,7 @@ fn layers_with_gaps_come_from_the_fallback() {
     let differ = masks(&a).iter().zip(masks(&b)).filter(|(a, b)| **a != *b).count();
     assert_eq!(differ, 0, "{text}");
     assert!(a.iter().all(|layer| layer.info.closed == Some(true)));
-    // Upright no layer has one.
+    // Upright, no layer has a gap.
     let text = said(&scratch, "slice part.step --fallback whole.stl --dpi 600 -o up.tif");
     assert!(!text.contains("gaps"), "{text}");
     scratch.run("lamp sample sphere -o other.stl").succeeds();
@@ -155,7 +155,7 @@ fn layers_with_gaps_come_from_the_fallback() {
         .is_wrong_usage(&["--fallback needs a STEP part"]);
 }
 
-/// A face that closes around the part leaves no gap in a section, but no contour.
+/// Without a face that closes around the part, a section has no gap but lacks a contour.
 #[test]
 fn layers_without_a_contour_come_from_the_fallback() {
     let whole = step(StepSample::Tower, StepUnit::Millimetre);

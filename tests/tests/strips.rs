@@ -1,4 +1,4 @@
-//! `tile --strips` cuts a build into a scanning projector's swaths; `lamp join` joins them again.
+//! Checks that `tile --strips` cuts a build into swaths, and `lamp join` joins them again.
 
 use std::fs;
 
@@ -17,7 +17,7 @@ fn with_tower() -> Scratch {
 
 const TILE: &str = "tile tower.tif --area 60x60mm";
 
-/// The levels of an image, row by row.
+/// Returns the levels of an image, row by row.
 fn levels(image: &Image) -> Vec<Vec<u32>> {
     let gray = match image {
         Image::Mask(mask) => GrayMask::from(mask),
@@ -45,8 +45,7 @@ fn names(scratch: &Scratch, folder: &str) -> Vec<String> {
     names
 }
 
-/// Checks pixel by pixel that the strips of a folder add up to the build, and
-/// returns them.
+/// Checks pixel by pixel that a folder's strips add up to the build, and returns them.
 fn check_sum(scratch: &Scratch, folder: &str, build: &str) -> Vec<Vec<Layer>> {
     let build = scratch.layers(build);
     let index = index(scratch, folder);
@@ -131,7 +130,7 @@ fn the_machine_knows_its_strips_and_threads_change_no_byte() {
     scratch.write("mine.toml", machine.as_bytes());
     let line = "tile tower.tif --machine mine.toml";
     scratch.run(&format!("{line} --strips a/ --threads 1")).succeeds_quietly();
-    // The build goes on, too, if it is asked for.
+    // The build is also written if requested.
     let line = format!("{TILE} --strips b --mirrors 100 --overlap 20 --threads 3 -o -");
     let build = scratch.run(&line).succeeds_quietly().stdout;
     assert!(build == scratch.run(TILE).succeeds_quietly().stdout);
@@ -166,7 +165,7 @@ fn gray_layers_and_ranges_come_back() {
     };
     scratch.stack("gray.tif", (0..9).map(layer));
     let tile = "tile gray.tif --area 100x80mm";
-    // The base is black and white, the layers above it are not.
+    // Only the base is black and white.
     scratch
         .run(&format!("{tile} --strips s --mirrors 40 --overlap 11 -o build.tif"))
         .succeeds_quietly();
@@ -182,7 +181,7 @@ fn gray_layers_and_ranges_come_back() {
         scratch.run("lamp join r").succeeds_quietly().stdout
             == scratch.run(&range).succeeds_quietly().stdout
     );
-    // A strip alone is a stack: others join and split it.
+    // A strip is a stack that can be joined and split.
     scratch.run("lamp split s/strip_001.tif --every 4 -o parts/").succeeds_quietly();
     let files: Vec<_> =
         names(&scratch, "parts").iter().map(|name| format!("parts/{name}")).collect();
@@ -214,7 +213,7 @@ fn dithered_strips_give_seams_their_full_dose() {
     assert_eq!(white(&left, 0..128), 128.0 * 320.0);
     let seam = (white(&left, 128..192) + white(&right, 0..64)) / (64.0 * 320.0);
     assert!((seam - 1.0).abs() < 0.01, "the seam has {seam} of the dose");
-    // Rising from edge to edge, not by the half.
+    // A ramp from edge to edge, not a step of a half.
     let falls = [128..144, 176..192].map(|columns| white(&left, columns) / (16.0 * 320.0));
     assert!(falls[0] > 0.8 && falls[1] < 0.2, "{falls:?}");
 }

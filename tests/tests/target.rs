@@ -1,4 +1,4 @@
-//! `lamp target`: test images, checked pixel by pixel.
+//! Checks the test images of `lamp target` pixel by pixel.
 
 use lamp_stack::Image;
 use lamp_tests::{Scratch, mask};
@@ -50,7 +50,7 @@ fn the_table_to_fill_in_is_what_calibrate_reads() {
     scratch
         .run("lamp calibrate width targets/squares.csv")
         .is_refused_with(&["no row below the header holds a measurement"]);
-    // Each square grows by a tenth of a um for each mJ/cm² above 100.
+    // Each square grows by 0.1 um per mJ/cm² above 100.
     let filled = table.lines().map(|line| {
         let cells: Vec<f64> = line.split(',').filter_map(|cell| cell.parse().ok()).collect();
         let [pixels, dose] = cells[..] else { return format!("{line}\n") };
@@ -105,7 +105,7 @@ fn screens_are_checkerboards_of_the_study() {
         }
         assert_eq!((level(left - 1, gap), level(left + 720, gap)), (0, 0));
     }
-    // Dots of the gray tile, and the screens as they are.
+    // The gray tile as dots, and the screens unchanged.
     scratch.run("lamp target screens --gray 25% | dither > dots.tif").succeeds();
     let white = mask(&scratch.layers("dots.tif")[0]).white_pixels() as f64;
     assert!((white / (5.0 * 720.0 * 720.0) - 0.25).abs() < 0.001, "{white}");

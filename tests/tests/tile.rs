@@ -1,4 +1,4 @@
-//! `tile` with several stacks, extents, outlines, layout files and machines.
+//! Checks `tile` with several stacks, extents, outlines, layout files and machines.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use lamp_stack::{Dpi, Frame, GrayMask, Image, Layer, Mask, Op, Orientation, Page
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
 
-/// Where the copies of a part stand: left, top and turn.
+/// Returns the places of a part's copies: left, top and orientation.
 fn copies(about: &Value) -> Vec<(u32, u32, Orientation)> {
     let places = about["copies"].as_array().expect("a list").iter();
     let turn = |k: usize| about["turns"][k].as_str().unwrap_or("0").parse().expect("a turn");
@@ -20,7 +20,7 @@ fn about_parts(build: &[Layer]) -> Vec<Value> {
     tile["parts"].as_array().cloned().unwrap_or_else(|| vec![tile.clone()])
 }
 
-/// Checks that each copy of a build is the part, and all else black.
+/// Checks that each copy in a build equals the part, and that the rest is black.
 fn check(scratch: &Scratch, build: &str, stacks: &[&str]) -> usize {
     let build = scratch.layers(build);
     let parts: Vec<Vec<Layer>> = stacks.iter().map(|stack| scratch.layers(stack)).collect();
@@ -185,7 +185,7 @@ fn other_heights_are_refused_or_resampled() {
     scratch
         .run(&format!("tile tower.tif sharp.tif {area}"))
         .is_refused_with(&["sharp.tif has 200 dpi and tower.tif has 100 dpi"]);
-    // Planes lie at the tops of layers, so that every second fine layer is one of the coarse.
+    // Planes lie at the tops of layers, so every second fine layer is a coarse one.
     scratch.run(&format!("tile tower.tif torus.tif {area}")).succeeds_quietly();
     let plain = scratch.layers("build.tif");
     scratch.run(&format!("tile tower.tif fine.tif --resample {area}")).succeeds_quietly();
@@ -242,7 +242,7 @@ fn gray_layers_make_a_gray_build() {
         let cut = image.framed(Frame { left: left.into(), top: top.into(), width, height });
         assert!(cut.oriented(turn.inverse()).unwrap() == ramp);
     }
-    // Thresholds know no place, so that dots are the same before and after.
+    // A threshold does not depend on the place, so dots are the same before and after.
     let dots = "dither --method threshold";
     let after = scratch.run(&format!("tile gray.tif --mesh none --copies 2 | {dots} -o after.tif"));
     after.succeeds_quietly();

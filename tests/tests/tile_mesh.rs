@@ -1,4 +1,4 @@
-//! The mesh of `tile`: around the parts, never on them, and below them.
+//! Checks the mesh of `tile`: around and below the parts, never on them.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ const CLEARANCE: f64 = 1.0 * 100.0 / 25.4;
 /// The default number of layers of mesh alone.
 const BASE: usize = 5;
 
-/// The white runs of an image, as rows and columns.
+/// Returns the white runs of an image, as rows and columns.
 fn white_runs(mask: &Mask) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
     mask.rows().enumerate().flat_map(|(k, row)| {
         let runs = lamp_stack::white_runs(row, mask.width());
@@ -19,8 +19,7 @@ fn white_runs(mask: &Mask) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
     })
 }
 
-/// Pixel by pixel, what lies nearer to white pixels than leaves `gap` pixels
-/// between them.
+/// Returns, by brute force, the pixels with fewer than `gap` pixels between them and a white one.
 fn nearer_than(mask: &Mask, gap: f64) -> Vec<Vec<bool>> {
     let (width, height) = (mask.width() as usize, mask.height() as usize);
     let mut near = vec![vec![false; width]; height];
@@ -29,7 +28,7 @@ fn nearer_than(mask: &Mask, gap: f64) -> Vec<Vec<bool>> {
         let first = row.saturating_sub(reach);
         let lines = near[first..(row + reach + 1).min(height)].iter_mut();
         for (line, near) in (first..).zip(lines) {
-            // From centre to centre it is a pixel more.
+            // The distance between centres is one pixel more.
             let away = |across: usize| (across as f64).hypot(line.abs_diff(row) as f64);
             let across = (0..=reach).rev().find(|&across| away(across) < gap + 1.0);
             let Some(across) = across else { continue };
@@ -70,13 +69,13 @@ fn parts_are_untouched_and_moats_are_as_wide_as_stated() {
             assert_eq!(minus(parts, meshed).white_pixels(), 0, "{k}, layer {layer}");
             let [mesh, unbroken] = [meshed, unbroken].map(|build| minus(build, parts));
             assert_eq!(pixels_in(&mesh, &nearer_than(parts, CLEARANCE)), 0, "{k}, layer {layer}");
-            // Mesh is where it would be without parts, as far as no moat is there.
+            // Outside the moat, mesh is where it would be without parts.
             assert_eq!(minus(&unbroken, whole).white_pixels(), 0, "{k}, layer {layer}");
             assert_eq!(minus(&mesh, &unbroken).white_pixels(), 0, "{k}, layer {layer}");
             let lost = minus(whole, &unbroken);
             let within = pixels_in(&lost, &nearer_than(parts, CLEARANCE + 2.0));
             let enclosed = lost.white_pixels() - within as u64;
-            // The hole of a torus, from which no mesh would come free.
+            // Mesh in the hole of a torus could not be removed.
             assert_eq!(enclosed > 0, layer < 15, "{k}, layer {layer}: {enclosed}");
             let cut = minus(&unbroken, &mesh).white_pixels() as f64 / mesh.white_pixels() as f64;
             assert!((0.01..0.3).contains(&cut), "{k}, layer {layer}: {cut} is cut by break lines");
@@ -145,7 +144,7 @@ fn an_image_is_repeated_as_the_mesh() {
     let command = build[0].info.stack.as_ref().unwrap().commands.last().unwrap();
     assert!(command.contains("--mesh walls.tif"), "{command}");
     write_gray_ramp(&scratch.path("gray.tif"), 16, 16);
-    // Of gray, what is half as bright as white.
+    // Gray counts from half the brightness of white.
     scratch.run("tile torus.tif --mesh gray.tif --copies 1 -o build.tif").succeeds_quietly();
     let build = scratch.layers("build.tif");
     scratch.run("dither gray.tif --method threshold -q -o dots.tif").succeeds_quietly();
@@ -230,7 +229,7 @@ fn edits_of_copies_hit_the_parts() {
     }
 }
 
-/// A bore that lies across is free of mesh only if the moat follows the outline.
+/// A transverse bore is free of mesh only if the moat follows the outline.
 #[test]
 fn mesh_keeps_out_of_a_part_that_lies() {
     let scratch = Scratch::new();

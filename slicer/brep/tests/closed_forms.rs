@@ -1,4 +1,4 @@
-//! Parts of which everything is known, read back from STEP.
+//! Compares STEP parts with their closed forms: volumes, areas and positions.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ fn read(part: StepSample, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessella
     (model, mesh)
 }
 
-/// A text as each kernel reads it.
+/// Reads a STEP text with each kernel.
 fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
     let own: Arc<dyn Kernel> = Arc::new(StepModel::read(text.as_bytes()).unwrap());
     let meshed = |kernel: Arc<dyn Kernel>| {
@@ -32,7 +32,7 @@ fn by_occt(_: &str) -> Option<Arc<dyn Kernel>> {
     None
 }
 
-/// The bodies of a part, which must be right by each kernel and the same to the chord.
+/// Returns a part's bodies, after checking that all kernels agree within the chord.
 fn bodies(part: StepSample, unit: StepUnit, chord_mm: f64) -> Vec<BodyReport> {
     let reports = |(kernel, mesh): &(Arc<dyn Kernel>, Tessellation)| {
         let reports = check(&**kernel, mesh);
@@ -67,7 +67,7 @@ fn volumes_come_near_to_closed_forms_in_every_unit() {
                 let off = report.volume_mm3 / volume_mm3 - 1.0;
                 assert!(off < 0.0 && off > -0.5 * chord_mm, "{part:?} {chord_mm}: {off}");
                 let off = report.exact_volume_mm3 / volume_mm3 - 1.0;
-                // The edge of the cone's foot is a polygon for both of its faces.
+                // The edge at the cone's foot is a polygon for both faces.
                 let most = if part == StepSample::Cone { 0.05 * chord_mm } else { 1e-6 };
                 assert!(off.abs() < most, "{part:?} {chord_mm}: exact {off}");
             }
@@ -77,8 +77,8 @@ fn volumes_come_near_to_closed_forms_in_every_unit() {
 
 #[test]
 fn parts_of_a_torus_that_meets_itself_are_told_apart() {
-    // The profile x = R + a cos v turned around z = a sin v, between the points
-    // where x is 0, for the apple; the lemon is what is missing to the whole turn.
+    // The apple is the profile x = R + a cos v, z = a sin v revolved about z, between
+    // the points where x is 0; the lemon is the rest of the full turn.
     let (major, minor): (f64, f64) = (5.0, 8.0);
     let end = (-major / minor).acos();
     let (sin, cos) = end.sin_cos();
@@ -90,7 +90,7 @@ fn parts_of_a_torus_that_meets_itself_are_told_apart() {
     let lemon = apple - 2.0 * PI * PI * major * minor * minor;
     for (part, volume_mm3) in [(StepSample::Apple, apple), (StepSample::Lemon, lemon)] {
         for chord_mm in [0.1, 0.005] {
-            // OpenCASCADE makes both parts of it one body: see docs/occt.md.
+            // OpenCASCADE makes both parts one body: see docs/occt.md.
             let (model, mesh) = read(part, StepUnit::Inch, chord_mm);
             let [report] = &check(&model, &mesh)[..] else { panic!("one body") };
             assert!(report.faults.is_empty() && mesh.findings.is_empty(), "{part:?}: {report:?}");
@@ -123,7 +123,7 @@ fn a_lofted_blade_has_its_sections() {
         let report = &check(&model, &mesh)[0];
         assert!(report.faults.is_empty() && mesh.findings.is_empty(), "{report:?}");
         let off = (report.volume_mm3 / blade_volume_mm3() - 1.0).abs();
-        // Facets within the chord of a blade that is about 4 mm thick.
+        // Facets lie within the chord; the blade is about 4 mm thick.
         assert!(off < chord_mm / 4.0 && off < before / 3.0, "{chord_mm}: {off}");
         before = off;
         for part in 1..20 {
@@ -134,7 +134,7 @@ fn a_lofted_blade_has_its_sections() {
     }
 }
 
-/// The area between the crossings of facets with a plane.
+/// Returns the area of the facets' section with a plane.
 fn area_mm2(mesh: &Tessellation, z_mm: f64) -> f64 {
     let double = |facet: &Facet| {
         let corners = mesh.corners(facet);
@@ -168,7 +168,7 @@ fn a_tower_of_all_kinds_of_surfaces_is_closed() {
 fn an_assembly_has_its_parts_in_their_places() {
     let reports = bodies(StepSample::Pair, StepUnit::Inch, 0.01);
     assert_eq!(reports.len(), 2);
-    // The second stands on x = 50 mm, at the height of the first one's centre.
+    // The second body stands at x = 50 mm, at the height of the first one's centre.
     let expected = [[-15.0, -15.0, 0.0], [50.0, -15.0, 0.0]];
     for (report, least) in reports.iter().zip(expected) {
         for k in 0..3 {

@@ -1,16 +1,15 @@
-//! Files that are broken on purpose: whatever comes of them, it comes in time and
-//! without a panic.
+//! Checks that deliberately broken files are read or refused in time, without a panic.
 
 use std::time::{Duration, Instant};
 
 use lamp_brep::{BrepError, Kernel, StepError, StepModel, check};
 use lamp_fixtures::{SplitMix, StepDefect, StepSample, StepUnit, broken_step, step};
 
-/// Numbers that geometry does not like.
+/// Numbers that are hard for geometry.
 const NUMBERS: [&str; 10] =
     ["0.", "-1.", "1.E300", "1.E-300", "-0.", "1.E8", "99999999999", "0.5", "1.E-9", "1.E999"];
 
-/// Where numbers and references begin, and how long they are.
+/// Returns the positions and lengths of numbers and references.
 fn numbers(text: &str) -> Vec<(usize, usize)> {
     let bytes = text.as_bytes();
     let is_part = |b: u8| b.is_ascii_digit() || b"#.-Ee".contains(&b);
@@ -37,7 +36,7 @@ fn broken(text: &str, random: &mut SplitMix) -> String {
         let old = &text[start..start + length];
         let new = match (random.below(8), old.strip_prefix('#')) {
             (0, _) => String::new(),
-            // Most files should get past the reader.
+            // Unchanged references let most files pass the reader.
             (4.., Some(_)) => old.to_owned(),
             (1, _) => "$".to_owned(),
             (_, Some(_)) => format!("#{}", random.below(places.len() / 3 + 2)),
@@ -68,7 +67,7 @@ fn broken_files_are_refused_or_read_in_time() {
             let text = broken(&text, &mut random);
             let start = Instant::now();
             if let Some(path) = std::env::var_os("LAMP_KEEP") {
-                // The last one is what to look at after a crash.
+                // After a crash, the last file is the one to look at.
                 std::fs::write(path, &text).unwrap();
             }
             let heal_mm = if round % 2 == 0 { 0.0 } else { 0.01 };
@@ -87,12 +86,12 @@ fn broken_files_are_refused_or_read_in_time() {
     assert!(refused > 0 && passed > 0);
 }
 
-/// The longest that a file of a few megabytes may take to be refused.
+/// The time limit for refusing a file of a few megabytes.
 const SOON: Duration = Duration::from_secs(20);
-/// How many shapes a file has that goes deep.
+/// The number of nested shapes in a deep file.
 const DEEP: usize = 100_000;
 
-/// What is said of the sphere's file with more entities.
+/// Returns the error for the sphere's file with more entities.
 fn said_of(more: &str) -> Result<usize, BrepError> {
     let text = step(StepSample::Sphere, StepUnit::Millimetre);
     let text = text.replace("ENDSEC;\nEND-ISO", &format!("{more}ENDSEC;\nEND-ISO"));
@@ -102,14 +101,14 @@ fn said_of(more: &str) -> Result<usize, BrepError> {
     said
 }
 
-/// The entity of a type in the sphere's file, such as `#7`.
+/// Returns the name of the entity of a type in the sphere's file, such as `#7`.
 fn number_of(name: &str) -> String {
     let text = step(StepSample::Sphere, StepUnit::Millimetre);
     let line = text.lines().find(|line| line.contains(&format!("={name}("))).unwrap();
     line.split('=').next().unwrap().to_owned()
 }
 
-/// Shapes one after the other, from the sphere's on, each related to the next.
+/// Writes a chain of shapes that starts at the sphere's, each related to the next.
 fn chain(relation: impl Fn(&str, &str, usize) -> String) -> String {
     let mut before = number_of("ADVANCED_BREP_SHAPE_REPRESENTATION");
     let context = number_of("(GEOMETRIC_REPRESENTATION_CONTEXT");
@@ -137,7 +136,7 @@ fn assemblies_may_not_go_on_for_ever() {
     };
     let endless = said_of(&(moved.clone() + &chain(part_of)));
     assert!(matches!(endless, Err(BrepError::Step(StepError::Endless { .. }))), "{endless:?}");
-    // An assembly that is a part of itself stands nowhere.
+    // An assembly that contains itself has no place.
     let own = number_of("ADVANCED_BREP_SHAPE_REPRESENTATION");
     let nowhere = said_of(&(moved + &part_of(&own, &own, 900_001)));
     assert!(matches!(nowhere, Err(BrepError::Step(StepError::Empty))), "{nowhere:?}");
@@ -183,7 +182,7 @@ fn entities_that_hold_themselves_are_refused() {
             .lines()
             .map(|line| {
                 let end = line.starts_with("END-ISO");
-                // Whoever named the old one names the new one.
+                // References to the old entity now name the new one.
                 let line = line.replace(&format!("{old},"), &format!("{own},"));
                 let line = line.replace(&format!("{old})"), &format!("{own})"));
                 if end { format!("DATA;\n{entity}\nENDSEC;\n{line}") } else { line }

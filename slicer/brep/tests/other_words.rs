@@ -1,4 +1,4 @@
-//! The same part in other words: what STEP can say in several ways is read the same.
+//! Checks that equivalent STEP descriptions of a part are read alike.
 
 use std::f64::consts::PI;
 
@@ -8,8 +8,8 @@ use lamp_fixtures::{StepSample, StepUnit, step};
 /// The volume of a frustum of radii 15 and 7.5 mm, 30 mm high.
 const FRUSTUM_MM3: f64 = PI * 30.0 / 3.0 * (225.0 + 112.5 + 56.25);
 
-/// A part's file, in which every entity of a type is replaced: by what is made of
-/// its number and its attributes, with numbers of one's own from `next` on.
+/// Replaces every entity of a type in a part's file. The replacement is made from its number and
+/// attributes, with unused numbers from `next` on.
 fn reworded(
     part: StepSample,
     unit: StepUnit,
@@ -31,7 +31,7 @@ fn reworded(
     lines.join("\n")
 }
 
-/// The volumes by facets and by surfaces; what is found must be nothing.
+/// Returns the volumes by facets and by surfaces, after checking that there are no findings.
 fn volumes_mm3(text: &str, chord_mm: f64) -> [f64; 2] {
     let model = StepModel::read(text.as_bytes()).unwrap();
     let mesh = model.tessellate(chord_mm).unwrap();
@@ -57,7 +57,7 @@ fn trimmed_circles_may_go_backwards() {
                  {sense},.PARAMETER.);\n#{next}=CIRCLE({attributes});"
                 )
             });
-        // The edges follow the trimmed curve in the other direction then.
+        // The edges then run against the trimmed curve.
         let text: Vec<String> = text
             .lines()
             .map(|line| {
@@ -71,7 +71,7 @@ fn trimmed_circles_may_go_backwards() {
 
 #[test]
 fn circles_may_be_chains_of_arcs() {
-    // Half a turn forwards, the other half given backwards.
+    // Half a turn forwards, the other half backwards.
     let text = reworded(StepSample::Frustum, StepUnit::Metre, "CIRCLE", |id, attributes, k| {
         let arc = |k: usize, from: &str, to: &str, sense: &str| {
             format!(
@@ -148,7 +148,7 @@ fn surfaces_may_be_trimmed_or_bounded_or_offset() {
     }
 }
 
-/// A cylinder's attributes as an extruded circle with an offset.
+/// Rewrites a cylinder's attributes as an extruded circle with an offset.
 fn extruded(id: &str, attributes: &str, k: usize, by: f64) -> String {
     let [a, b, c] = [k + 1, k + 2, k + 3];
     format!(
@@ -186,7 +186,7 @@ fn what_is_not_read_is_refused_by_name() {
     assert!(error.ends_with("is a SURFACE_REPLICA, which is not supported"), "{error}");
 }
 
-/// The names of a file's bodies.
+/// Returns the names of a file's bodies.
 fn names(text: &str) -> Vec<String> {
     let model = StepModel::read(text.as_bytes()).unwrap();
     model.bodies().iter().map(|body| body.name.clone()).collect()
@@ -200,7 +200,7 @@ fn bodies_without_names_have_those_of_their_products() {
     let nameless = pair.replace("MANIFOLD_SOLID_BREP('part'", "MANIFOLD_SOLID_BREP(''");
     assert_eq!(names(&nameless), ["nut", "nut"]);
     assert_eq!(names(&nameless.replace("'nut'", "''")), ["7", "7"]);
-    // Without a product of its own, the shape has that of what it stands in.
+    // A shape without a product has that of the shape that contains it.
     let of_shape = |line: &&str| line.contains("=SHAPE_DEFINITION_REPRESENTATION(");
     let first = nameless.lines().find(of_shape).unwrap();
     assert_eq!(names(&nameless.replace(first, "")), ["pair", "pair"]);

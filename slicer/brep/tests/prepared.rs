@@ -1,4 +1,4 @@
-//! Files that are healed, or refused for the right reason and at the right place.
+//! Checks which broken files are healed, and the reason and place given for those refused.
 
 use lamp_brep::{BodyFault, Fault, Prepared, prepare, read_step};
 use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
@@ -14,7 +14,7 @@ fn broken(defect: StepDefect, chord_mm: f64) -> Prepared {
     prepared(&broken_step(defect), chord_mm)
 }
 
-/// The volume of the only body.
+/// Returns the volume of the only body.
 fn volume_mm3(prepared: &Prepared) -> f64 {
     let [report] = &prepared.reports[..] else { panic!("one body") };
     assert!(report.faults.is_empty(), "{:?} {:?}", report.faults, prepared.tries);
@@ -33,8 +33,7 @@ fn what_is_right_is_taken_as_it_is() {
 
 #[test]
 fn edges_that_faces_do_not_share_are_joined() {
-    // The usual tolerance, one that is tighter would do too; a looser one; one as
-    // long as the chord.
+    // The usual tolerance (a tighter one would do), a looser one, and the chord.
     for (gap_nm, heal_mm) in [(0, 0.001), (1000, 0.01), (20_000, 0.05)] {
         let prepared = broken(StepDefect::Apart { gap_nm }, 0.05);
         let volume_mm3 = volume_mm3(&prepared);
@@ -63,7 +62,7 @@ fn a_gap_wider_than_the_chord_stays_open() {
     assert!(prepared.mesh.findings.is_empty());
     // Longer chords do not help.
     assert_eq!(prepared.tries.last().unwrap().chord_mm, 0.32);
-    // With a chord as long as the gap it is healed, and that is said.
+    // A chord as long as the gap heals it, with a finding.
     let prepared = broken(StepDefect::Apart { gap_nm: 100_000 }, 0.2);
     assert!(prepared.is_good() && prepared.mesh.findings.len() == 6);
 }

@@ -1,5 +1,5 @@
-//! STEP files of other programs, where they are at hand: each is right or refused
-//! for a reason, within a time limit.
+//! Checks that STEP files of other programs, where present, are read right or refused with a
+//! reason, within a time limit.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
@@ -7,33 +7,29 @@ use std::time::{Duration, Instant};
 
 use lamp_brep::{Facet, Finding, ReadFn, Tessellation, prepare, read_step};
 
-/// Longer than any file takes, many times over.
+/// The time limit, many times what any file takes.
 const LIMIT: Duration = Duration::from_secs(300);
-/// Volumes agree within this part.
+/// The tolerated relative error of volumes.
 const SAME: f64 = 1e-3;
-/// The areas of sections agree within this part.
+/// The tolerated relative error of section areas.
 const SAME_AREA: f64 = 2e-3;
-/// A file whose volume at hand, 732.189 mm³, is OpenCASCADE's integral over the
-/// surfaces. That is bounded by curves in the parameters of its B-spline faces, which
-/// OpenCASCADE makes, up to 0.059 mm from the file's edges; the edges themselves lie
-/// within 0.03 µm of the surfaces. OpenCASCADE's facets follow the edges: this is
-/// their volume at a chord of 0.5 µm.
+/// A file and its volume by OpenCASCADE's facets at a chord of 0.5 µm. The reference, 732.189 mm³,
+/// is OpenCASCADE's integral over the surfaces, bounded by its own parameter curves, up to
+/// 0.059 mm from the file's edges. The edges lie within 0.03 µm of the surfaces.
 const LOOSE_VOLUME: (&str, f64) = ("axom_boxed_sphere.step", 733.601);
-/// A section whose area at hand, 64 791 mm², is that of OpenCASCADE's Boolean
-/// operation, which gives about as much at least 1 mm below and 0.1 mm above. Its
-/// facets at a chord of 0.02 mm have this area, and change steadily there; its
-/// classifier finds 20 000 random points of the plane to lie in
-/// 101 300 ± 1600 mm².
+/// A section and its area by OpenCASCADE's facets at a chord of 0.02 mm, which changes steadily
+/// around it. The reference, 64 791 mm², is from OpenCASCADE's Boolean operation; its classifier
+/// gives 101 300 ± 1600 mm² by 20 000 random points.
 const WRONG_SECTION: (&str, usize, f64) = ("nist_ctc_02_asme1_ap242.stp", 2, 103_560.4);
-/// Files that must be read right; the others may be refused.
+/// The share of files that must be read right; the rest may be refused.
 const LEAST_RIGHT: f64 = 0.95;
 
-/// The folder of files and figures beside the project.
+/// Returns the folder of files and reference figures beside the project.
 fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data")
 }
 
-/// What became of a file.
+/// The result of reading a file.
 enum Outcome {
     Read { volume_mm3: f64, areas_mm2: Vec<f64>, bodies: usize, facets: usize, said: String },
     Refused(String),
@@ -63,18 +59,18 @@ fn read(path: &Path, kernel: ReadFn, chord_mm: f64, heights_mm: &[f64]) -> Outco
     }
 }
 
-/// How many findings there are, and the first.
+/// Returns the number of findings, and the first.
 fn findings(list: &[Finding]) -> Option<String> {
     let first = list.first()?;
     Some(format!("{} findings, the first #{}: {}", list.len(), first.entity, first.fault))
 }
 
-/// The area of the facets' section with a plane.
+/// Returns the area of the facets' section with a plane.
 fn section_area(mesh: &Tessellation, z: f64) -> f64 {
     let double = |facet: &Facet| {
         let corners = mesh.corners(facet);
         let is_above = corners.map(|corner| corner[2] >= z);
-        // Where the contour crosses the facet's edges downwards and upwards.
+        // The points where the contour crosses the facet's edges downwards and upwards.
         let crossing = |from_above: bool| {
             let k = (0..3)
                 .find(|&k| is_above[k] == from_above && is_above[(k + 1) % 3] != from_above)?;
@@ -90,12 +86,12 @@ fn section_area(mesh: &Tessellation, z: f64) -> f64 {
     (mesh.facets.iter().map(double).sum::<f64>() / 2.0).abs()
 }
 
-/// Reads a file on a thread of its own; one that hangs is left behind.
+/// Reads a file on its own thread, which is abandoned if it hangs.
 fn within_limit(path: &Path, kernel: ReadFn, chord_mm: f64, heights_mm: Vec<f64>) -> Outcome {
     let (sender, receiver) = mpsc::channel();
     let path = path.to_owned();
     std::thread::spawn(move || {
-        // Nobody listens any more when time is up.
+        // The receiver is gone if time is up.
         let _ = sender.send(read(&path, kernel, chord_mm, &heights_mm));
     });
     match receiver.recv_timeout(LIMIT) {
@@ -116,7 +112,7 @@ fn every_file_is_right_or_refused_with_occt() {
     every_file(lamp_brep_occt::read, LEAST_RIGHT);
 }
 
-/// Reads every file of the folder, if it is there, and prints a table of them.
+/// Reads every file of the folder, if it exists, and prints a table.
 fn every_file(kernel: ReadFn, least_right: f64) {
     let Ok(figures) = std::fs::read(data().join("step_oracle.json")) else {
         println!("no files at hand");
