@@ -17,6 +17,7 @@ pub(super) fn facets(
     let mut sum = 0.0;
     for (face, range) in (0..).zip(ranges) {
         let grid = grid(kernel, face, range);
+        // NaN fails the comparison, as it should.
         let is_sound = |p: &Vec3| p.iter().all(|x| x.abs() < MAX_MM);
         if !grid.iter().all(is_sound) {
             return Err(BrepError::Size { entity: kernel.face(face).entity });
@@ -49,6 +50,7 @@ fn cells(grid: &[Vec3], axis: usize, line: usize, chord_mm: f64) -> f64 {
         |k: usize| grid[if axis == 0 { k * (STEPS + 1) + line } else { line * (STEPS + 1) + k }];
     let chords = |k: usize| {
         let (a, b, c) = (at(k - 1), at(k), at(k + 1));
+        // The sag of one step of a curve is an eighth of the second difference.
         let sag_mm = length([0, 1, 2].map(|k| a[k] - 2.0 * b[k] + c[k])) / 8.0;
         (sag_mm / chord_mm).sqrt()
     };

@@ -290,6 +290,7 @@ void set_up() {
 }
 
 LampOcctModel *read(const uint8_t *bytes, size_t count, double heal_mm, LampOcctError *error) {
+    // The settings of readers are global to the process.
     static std::mutex reading;
     const std::lock_guard<std::mutex> one_at_a_time(reading);
     static const bool is_set_up = (set_up(), true);

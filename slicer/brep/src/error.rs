@@ -1,20 +1,20 @@
-//! Errors of reading a model and making facets of it.
+//! Defines the errors of reading and tessellating a model.
 
 use crate::step::StepError;
 
-/// Why a B-rep model cannot be sliced.
+/// The reason why a B-rep model cannot be sliced.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BrepError {
-    /// The file is not what it should be.
+    /// The STEP file is invalid or not supported.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// The library that a kernel is built on cannot work with the file.
+    /// A kernel's library failed on the file.
     #[error("{library} says: {message}")]
     Library {
         /// The library's name.
         library: &'static str,
-        /// Its own words.
+        /// The library's message.
         message: String,
     },
     /// The chord is not a positive length.
@@ -23,25 +23,25 @@ pub enum BrepError {
         /// In millimetres.
         chord_mm: f64,
     },
-    /// A face has no size, or none that can be built.
+    /// A face has no size, or is too large to be built.
     #[error("#{entity} is larger than anything that can be built, or has no size")]
     Size {
-        /// The entity, or 0.
+        /// The entity's number, or 0 if unknown.
         entity: u64,
     },
-    /// The tolerance to mend with is not a positive length.
+    /// The healing tolerance is not a positive length.
     #[error("a tolerance of {heal_mm} mm is not a positive length")]
     Heal {
         /// In millimetres.
         heal_mm: f64,
     },
-    /// There would be more facets than can be numbered.
+    /// There would be too many facets.
     #[error("it takes more than {most} facets; give a longer chord")]
     TooMany {
-        /// The most that are made.
+        /// The greatest number of facets.
         most: usize,
     },
-    /// A panic: an error of the program, not of the file.
+    /// The kernel panicked: an error of the program, not of the file.
     #[error("{doing} failed within the program: {what}")]
     Panicked {
         /// The work that failed.

@@ -1,5 +1,4 @@
-//! Defines the trait of a B-rep kernel, and the facets and surface points that it
-//! returns.
+//! Defines the trait of a B-rep kernel, and the facets and surface points that it returns.
 
 use crate::error::BrepError;
 
@@ -20,8 +19,7 @@ pub struct Jet {
 ///
 /// Faces are numbered across all bodies. Each has a surface with the same number.
 pub trait Kernel: Send + Sync {
-    /// Returns the bodies in the file's order. A body that is placed twice appears
-    /// twice.
+    /// Returns the bodies in the file's order. A body that is placed twice appears twice.
     fn bodies(&self) -> &[Body];
 
     /// Returns a face by its number.

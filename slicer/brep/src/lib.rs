@@ -1,12 +1,11 @@
-//! Reads B-rep models (STEP) and makes closed facets of them that know their exact
-//! surfaces.
+//! Reads B-rep models (STEP) and tessellates them into closed facets on exact surfaces.
 //!
-//! A [`Kernel`] is a model that has been read: bodies, faces, and surfaces, which it
-//! evaluates. It makes facets that share the points of their edges, so that they close.
-//! [`check`] validates them: a body with faults must not be sliced.
+//! A [`Kernel`] holds a model and evaluates its surfaces. Its facets share the points of
+//! their edges, so they close. [`check`] validates them: a body with faults must not be
+//! sliced.
 //!
-//! [`StepModel`] is the kernel in pure Rust. [`prepare`] reads, heals and validates a
-//! file in as many ways as it takes.
+//! [`StepModel`] is the kernel in pure Rust. [`prepare`] reads and validates a file, and
+//! heals it if needed.
 //!
 //! The crate `lamp-brep-occt` has a kernel on OpenCASCADE.
 //!

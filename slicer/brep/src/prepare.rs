@@ -145,8 +145,7 @@ impl Search<'_> {
         self.tries.push(Attempt::of(&made, heal_mm, chord_mm));
         let Ok(made) = made else { return };
         let is_better = match &self.best {
-            // At a longer chord, fewer facets have fewer open edges without being
-            // better.
+            // At a longer chord, fewer facets have fewer open edges without being better.
             Ok(_) if chord_mm > self.chord_mm => made.is_good(),
             Ok((_, best)) => wrong(&made.reports) < wrong(&best.reports),
             Err(_) => true,

@@ -197,8 +197,7 @@ fn exact_volume(kernel: &dyn Kernel, facets: &[Facet], middle: Vec3) -> f64 {
 
 /// Returns a fault unless exactly two facets share each edge, in opposite directions.
 fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
-    // The number of uses of each edge, with ascending and with descending point
-    // indices.
+    // The number of uses of each edge, with ascending and with descending point indices.
     let mut edges: HashMap<[u32; 2], [u32; 2]> = HashMap::with_capacity(facets.len() * 3 / 2);
     for [a, b] in facets.iter().flat_map(sides) {
         edges.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;

@@ -34,7 +34,7 @@ impl<'a> Batch<'a> {
         Self { surfaces, tally, cutter, layers, points: Vec::new(), cells: Vec::new() }
     }
 
-    /// Adds a facet's crossings and returns how many there are.
+    /// Adds a facet's crossings and returns their number.
     pub(super) fn cut(
         &mut self,
         number: u32,

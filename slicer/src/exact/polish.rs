@@ -50,6 +50,7 @@ pub fn polish(surfaces: &PlacedSurfaces, axis: usize, points: &mut [FacetPoint])
     let known = if axis == 0 { [1, 2] } else { [0, 1] };
     let face = |point: &&mut FacetPoint| surfaces.facet(point.facet).face;
     let mut points: Vec<&mut FacetPoint> = points.iter_mut().collect();
+    // Grouped by face, since kernels evaluate many points of one face at once.
     if !points.is_sorted_by_key(face) {
         points.sort_by_key(face);
     }

@@ -54,6 +54,7 @@ impl PolynomialBasis {
         let mut pieces = Vec::with_capacity(count);
         let mut coefficients = Vec::with_capacity(count * (knots.degree() + 1).pow(2));
         for pair in breaks.windows(2) {
+            // Halved before adding, so that huge knots do not overflow.
             let (middle, half) = (pair[0] / 2.0 + pair[1] / 2.0, pair[1] / 2.0 - pair[0] / 2.0);
             let span = knots.span(pair[0]);
             pieces.push(KnotInterval { first: span - knots.degree(), middle, scale: 1.0 / half });

@@ -128,6 +128,7 @@ impl Surface {
             let (a, b, c) = (dot(jet.du, jet.du), dot(jet.du, jet.dv), dot(jet.dv, jet.dv));
             let (e, f) = (dot(d, jet.du), dot(d, jet.dv));
             let det = a * c - b * b;
+            // Relative to the squared lengths, so that the units of u and v do not matter.
             let step = if det > 1e-14 * a * c {
                 [(e * c - f * b) / det, (f * a - e * b) / det]
             } else {

@@ -32,6 +32,7 @@ impl<'a> EdgeCurve<'a> {
     /// Returns a point's place along the edge, from 0 to 1, or `None` if it is further
     /// away than the tolerance.
     pub(super) fn part(&self, p: Vec3) -> Option<f64> {
+        // A test of the box avoids most of the slow projections.
         let near = 2.0 * self.tolerance_mm;
         if (0..3).any(|k| p[k] < self.low[k] - near || p[k] > self.high[k] + near) {
             return None;
@@ -48,8 +49,7 @@ impl<'a> EdgeCurve<'a> {
         (distance(at, p) <= self.tolerance_mm).then_some(part)
     }
 
-    /// Returns [`part`](Self::part) for a point further than the tolerance from both
-    /// ends.
+    /// Returns [`part`](Self::part) for a point further than the tolerance from both ends.
     pub(super) fn inner_part(&self, p: Vec3) -> Option<f64> {
         let is_end = |t: f64| distance(self.curve.place(t), p) <= self.tolerance_mm;
         self.part(p).filter(|_| !self.range.into_iter().any(is_end))

@@ -163,6 +163,7 @@ impl Healing<'_> {
             });
             match twin {
                 Some((k, other, is_along, apart)) => {
+                    // An edge joins two faces at most, so a pair takes no third edge.
                     waiting.swap_remove(k);
                     becomes.insert(edge, (other, is_along));
                     let widest = self.widest_mm.remove(&edge).unwrap_or(0.0).max(apart);

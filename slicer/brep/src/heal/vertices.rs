@@ -6,10 +6,11 @@ use super::Healing;
 use crate::model::Loop;
 use crate::vector::{Vec3, add, distance, scale};
 
-/// Steps of a vertex to where its edges meet, and how short the last one is, in
-/// millimetres.
+/// The greatest number of steps of a vertex to the place where its edges meet.
 const MAX_STEPS: usize = 50;
+/// The length of the last step, in millimetres.
 const SETTLED_MM: f64 = 1e-9;
+
 impl Healing<'_> {
     /// Merges vertices that lie within the tolerance of each other.
     pub(super) fn join_vertices(&mut self) {
@@ -36,8 +37,8 @@ impl Healing<'_> {
         self.rename(&becomes);
     }
 
-    /// Moves vertices that were joined to where the curves of their edges meet, and
-    /// onto a pole of their surface that is near.
+    /// Moves merged vertices to the place where their edges' curves meet, or to a pole
+    /// of their surface within the tolerance.
     pub(super) fn settle(&mut self) {
         let mut around: HashMap<usize, Vec<usize>> = HashMap::new();
         for &edge in self.widest_mm.keys() {
@@ -48,6 +49,7 @@ impl Healing<'_> {
             let start = self.vertices[vertex];
             let mut place = start;
             for _ in 0..MAX_STEPS {
+                // Averaging the feet on all curves converges to their common point.
                 let feet = edges.iter().map(|edge| {
                     let curve = &self.edges[*edge].curve;
                     curve.place(curve.project(place))

@@ -61,6 +61,7 @@ fn size(entities: &Entities, unit: u64, step: usize) -> Result<f64, StepError> {
     let converted = entities.get(unit, "CONVERSION_BASED_UNIT")?;
     let measure = converted.reference(1)?;
     let records = entities.records(measure)?;
+    // A complex measure has several records; only one has value and unit (ISO 10303-41).
     let with_unit = records.iter().find(|record| record.values.len() >= 2);
     let item = Item { id: measure, record: with_unit.ok_or(bad.clone())? };
     if step == MAX_STEPS {

@@ -1,5 +1,4 @@
-//! Scales parameters to a plane of cells in which a surface bends about equally both
-//! ways.
+//! Scales parameters to a plane of cells in which a surface bends about equally both ways.
 
 use spade::Point2;
 
@@ -7,7 +6,8 @@ use super::Node;
 use crate::geometry::Surface;
 use crate::vector::{Vec3, along, distance, dot, length, middle, sub, unit};
 
-/// The greatest ratio of a cell's length to its width.
+/// The greatest ratio of a cell's length to its width. A cylinder is straight along its axis,
+/// and would otherwise get facets as long as it is.
 const LONGEST: f64 = 30.0;
 
 /// The map from parameters to the plane of the triangulation.
@@ -71,8 +71,7 @@ fn measure(surface: &Surface, low: [f64; 2], size: [f64; 2]) -> ([f64; 2], [f64;
                 let off = sub(three[1], middle(three[0], three[2]));
                 let way = unit(sub(three[2], three[0])).unwrap_or([0.0; 3]);
                 let sag = length(along(off, way, -dot(off, way)));
-                // Sag grows with the square of the step, and each sample spans two
-                // steps.
+                // Sag grows with the square of the step, and each sample spans two steps.
                 let whole = sag * (STEPS * STEPS) as f64 / 4.0;
                 bends[axis] = f64::max(bends[axis], whole);
             }

@@ -23,8 +23,7 @@ type Triangles = ConstrainedDelaunayTriangulation<Point2<f64>>;
 const MAX_ROUNDS: usize = 40;
 /// The greatest number of cells of a face: a sphere of 100 mm at a chord of 0.3 um.
 const MAX_CELLS: f64 = 1e6;
-/// The greatest number of corners that halving may add: per cell, and regardless of
-/// cells.
+/// The greatest number of corners that halving may add: per cell, and regardless of cells.
 const MORE: [usize; 2] = [4, 20_000];
 
 type Filled = (Vec<[Node; 3]>, Option<Fault>);
@@ -182,8 +181,7 @@ impl FaceTriangulation<'_> {
             let corners = face.vertices().map(|v| &self.corners[v.fix().index()]);
             let flat = face.vertices().map(|v| v.position());
             let places = corners.map(|corner| corner.place);
-            // A triangle with two corners at one pole has no area, so it makes no
-            // facet.
+            // A triangle with two corners at one pole has no area, so it makes no facet.
             let is_tip = (0..3).any(|k| {
                 corners[k].point.is_some() && corners[k].point == corners[(k + 1) % 3].point
             });

@@ -1,9 +1,8 @@
 //! Tessellates faces into facets that share the points of their edges.
 //!
 //! Each edge becomes a chain of points once, which all its faces share. A face is
-//! triangulated between its loops, in the parameters of its surface; inner points lie
-//! on the surface. Facets of neighbouring faces therefore always meet in the same
-//! points.
+//! triangulated between its loops, in the parameters of its surface; inner points lie on
+//! the surface. Facets of neighbouring faces therefore always meet in the same points.
 
 mod boundary;
 mod cells;
@@ -195,8 +194,7 @@ fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<PointRing> {
     rings.collect()
 }
 
-/// Returns a fault if the points of the edges lie further off the surface than facets
-/// may.
+/// Returns a fault if the points of the edges lie further off the surface than facets may.
 fn off(face: &Face, polygons: &[Vec<Node>], points: &FacePoints, chord_mm: f64) -> Option<Fault> {
     let apart =
         |node: &Node| crate::vector::distance(points.get(node.point), face.surface.point(node.uv));
