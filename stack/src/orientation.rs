@@ -298,7 +298,7 @@ mod tests {
         }
     }
 
-    /// Where a point of a turned image comes from, by the definition: x to the
+    /// Returns the source of a point of an oriented image by the definition, with x to the
     /// right and y up from the middle, in half pixels.
     fn source(orientation: Orientation, (mut x, mut y): (i64, i64)) -> (i64, i64) {
         for _ in 0..orientation.quarters() {
@@ -324,8 +324,8 @@ mod tests {
         }
     }
 
-    /// Where the pixel of an upright image stands in an image of `width` and
-    /// `height` that is stored with an orientation tag, as TIFF 6.0 words it.
+    /// Returns the place of an upright image's pixel in an image of `width` and `height` stored
+    /// with an orientation tag, following TIFF 6.0, section 8.
     fn stored_at(tag: u64, x: u32, y: u32, width: u32, height: u32) -> (u32, u32) {
         match tag {
             1 => (x, y),

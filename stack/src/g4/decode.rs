@@ -214,6 +214,7 @@ impl Verticals {
     }
 }
 
+// Four codes of three bits, VL1 or VR1, fit; longer ones are decoded fewer at a time.
 const VERTICALS_BITS: u32 = 12;
 
 static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {

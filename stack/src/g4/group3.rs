@@ -142,8 +142,8 @@ mod tests {
         bits
     }
 
-    /// The bits of a row against the one above it: what the two-dimensional
-    /// code of both rows has more than that of the one above.
+    /// Returns the two-dimensional code of a row: the T.6 code of both rows without the code of
+    /// the row above.
     fn coded_against(above: &[u32], row: &[u32], width: u32) -> String {
         let bits = |rows: &[&[u32]]| -> String {
             let strip = super::super::encode(&mask_of(width, rows.iter().copied()));
@@ -153,15 +153,14 @@ mod tests {
         bits(&[above, row])[bits(&[above]).len()..].to_owned()
     }
 
-    /// How a strip is coded apart from its kind.
+    /// The options of a strip's coding besides its kind.
     #[derive(Clone, Copy, Debug, Default)]
     struct Style {
-        /// Ends of lines end with a byte.
+        /// Fill bits make each end of line end on a byte boundary.
         fill: bool,
-        /// Every so many rows, one is coded as runs.
+        /// One row of every `k` is coded as run lengths.
         k: u32,
-        /// The end of a line stands behind it, so that the first row has none
-        /// before it.
+        /// The end of line follows each row, so that none precedes the first row.
         behind: bool,
     }
 
