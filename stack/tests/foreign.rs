@@ -2,7 +2,9 @@
 
 use std::io::{Cursor, Write};
 
-use lamp_stack::{GrayMask, Image, Layer, MaskBuilder, Pages, StackError};
+use lamp_stack::{
+    Destination, Format, GrayMask, Image, Layer, MaskBuilder, Pages, StackError, g4, write_stack,
+};
 use proptest::prelude::*;
 
 const SHORT: u16 = 3;
@@ -207,6 +209,22 @@ proptest! {
         if let Ok(layer) = read(bytes) {
             prop_assert!(layer.image.width() > 0 && layer.image.height() > 0);
         }
+    }
+}
+
+#[test]
+fn codes_are_passed_on_only_where_they_mean_the_image() {
+    let rows: Vec<Vec<u8>> = (0..40u8).map(|row| vec![row, row ^ 0x5A]).collect();
+    let Image::Mask(mask) = mask_of(&rows, 16) else { panic!("rows of bits are a mask") };
+    for (photometric, image) in [(0, mask.inverted()), (1, mask.clone())] {
+        let page = Tiff::new((16, 40), 1, 4, vec![g4::encode(&mask)]).with(262, photometric);
+        let layer = read(page.bytes()).unwrap();
+        assert_eq!(layer.image.clone().into_image(), Image::Mask(image));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("written.tif");
+        let layers = [Ok::<_, StackError>(layer.clone())].into_iter();
+        write_stack(layers, Destination::File(path.clone()), Format::Big).unwrap();
+        assert_eq!(Pages::open(&path).unwrap().layers().next().unwrap().unwrap(), layer);
     }
 }
 

@@ -186,6 +186,8 @@ impl Page {
         let one_strip = self.pieces.len() == 1 && !self.layout.tiled;
         one_strip
             && self.compression == Compression::G4
+            // Its codes would mean the image inverted.
+            && !self.white_is_zero
             && self.orientation == Orientation::default()
     }
 
