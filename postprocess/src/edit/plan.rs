@@ -140,9 +140,15 @@ impl EditPlan {
                 _ => true,
             };
             if holds {
-                let is_whole = matches!(step, PlannedEdit::Frame { frame, .. }
-                    if frame.is_whole(image.width(), image.height()));
-                if !is_whole {
+                // An image that stays as it is keeps the codes of its page.
+                let is_unchanged = match step {
+                    PlannedEdit::Frame { frame, .. } => {
+                        frame.is_whole(image.width(), image.height())
+                    }
+                    PlannedEdit::Turn { turn, .. } => *turn == Orientation::default(),
+                    _ => false,
+                };
+                if !is_unchanged {
                     image = step.of_image(&image, &info, other)?.ok_or_else(too_many)?.into();
                 }
                 step.follow(&mut info)?;

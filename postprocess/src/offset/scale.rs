@@ -1,6 +1,6 @@
 //! Images enlarged by what firing takes away.
 
-use lamp_stack::{GrayMask, Image, LevelChange};
+use lamp_stack::{Change, GrayMask, Image, MaskBuilder, RunImage};
 
 /// The enlargement along one side of an image.
 #[derive(Clone, Copy, Debug)]
@@ -32,24 +32,46 @@ impl AxisScale {
 /// Enlarges an image so that the fired part has the image's size. Each pixel takes the colour of
 /// the pixel that its centre lies in after firing.
 pub(super) fn scaled(image: &Image, columns: &AxisScale, rows: &AxisScale, width: u32) -> Image {
-    let before = image.to_gray();
-    let column = |column: u32| columns.first_past(column) as u32;
-    let end = column(before.width());
-    let mut out = GrayMask::new(width);
-    for (row, changes) in (0..).zip(before.rows()) {
-        let moved = |change: &LevelChange| LevelChange { column: column(change.column), ..*change };
-        let mut moved: Vec<_> = changes.iter().map(moved).collect();
-        // The last run ends where the image ended, also if the larger image is wider than that.
-        if moved.last().is_some_and(|change| change.level > 0) && end < width {
-            moved.push(LevelChange { column: end, level: 0 });
+    const APART: &str = "columns move apart";
+    match image {
+        Image::Mask(mask) => {
+            let mut out = MaskBuilder::new(width);
+            scale_rows(mask, columns, rows, width, |row| out.push_row(row).expect(APART));
+            Image::Mask(out.finish())
         }
-        for _ in rows.first_past(row)..rows.first_past(row + 1) {
-            out.push_row(&moved).expect("columns move apart");
+        Image::Gray(gray) => {
+            let mut out = GrayMask::new(width);
+            scale_rows(gray, columns, rows, width, |row| out.push_row(row).expect(APART));
+            Image::Gray(out)
         }
     }
-    match image {
-        Image::Mask(_) => Image::Mask(out.to_mask().expect("levels stay as they are")),
-        Image::Gray(_) => Image::Gray(out),
+}
+
+/// Gives the rows of an enlarged image.
+fn scale_rows<C: Change>(
+    before: &RunImage<C>,
+    columns: &AxisScale,
+    rows: &AxisScale,
+    width: u32,
+    mut push: impl FnMut(&[C]),
+) {
+    let column = |column: u32| columns.first_past(column) as u32;
+    let (end, black) = (column(before.width()), C::last_pixel(&[]));
+    let mut moved = Vec::new();
+    for (row, changes) in (0..).zip(before.rows()) {
+        let mut pixel = black;
+        moved.clear();
+        moved.extend(changes.iter().map(|change| {
+            pixel = change.after(pixel);
+            C::new(column(change.column()), pixel)
+        }));
+        // The last run ends where the image ended, also if the larger image is wider than that.
+        if pixel != black && end < width {
+            moved.push(C::new(end, black));
+        }
+        for _ in rows.first_past(row)..rows.first_past(row + 1) {
+            push(&moved);
+        }
     }
 }
 

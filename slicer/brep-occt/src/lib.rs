@@ -1,7 +1,7 @@
 //! STEP files read by OpenCASCADE, as a second kernel for B-rep models.
 //!
 //! Without the feature `occt` the crate is empty; with it, OpenCASCADE must be installed.
-//! [`OcctModel`] supports more surfaces and curves than `lamp_brep::StepModel`, and repairs
+//! `OcctModel` supports more surfaces and curves than `lamp_brep::StepModel`, and repairs
 //! more. OpenCASCADE can crash on a broken file: read untrusted files in a separate
 //! process.
 
