@@ -24,7 +24,7 @@
 //!     ..SliceOptions::default()
 //! };
 //! let areas_mm2: Vec<f64> = Slices::new(part, &options)?
-//!     .map(|layer| match layer?.image {
+//!     .map(|layer| match layer?.image.into_image() {
 //!         Image::Mask(mask) => Ok(mask.white_pixels() as f64 * 0.01),
 //!         Image::Gray(_) => unreachable!("slices are masks"),
 //!     })

@@ -288,7 +288,7 @@ fn strips_that_do_not_belong_together_are_named() {
     refused(&["strips.json", "no index of strips"]);
     let index = String::from_utf8(scratch.bytes("other/strips.json")).unwrap();
     with("strips.json", index.as_bytes());
-    refused(&["strip_000.tif", "of which strips.json does not tell"]);
+    refused(&["strip_000.tif", "which strips.json does not list"]);
     with("strips.json", index.replace("65", "99").as_bytes());
     refused(&["strip_000.tif", "18 layers that strips.json tells of are missing"]);
     with("strips.json", index.replace("65", "81").replace("[236, 236]", "[236, 235]").as_bytes());
