@@ -4,7 +4,7 @@
 //! The tests run the real `lamp`, `slice`, `fix`, `dither` and `tile`, which are built
 //! first so that they are never stale. Tests contain command lines as users type them:
 //!
-//! ```
+//! ```no_run
 //! use lamp_fixtures::Sample;
 //! use lamp_tests::Scratch;
 //!
