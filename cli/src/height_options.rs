@@ -161,7 +161,7 @@ impl HeightOptions {
         self.max.unwrap_or(Length::from_um(100.0))
     }
 
-    fn min(&self) -> Length {
+    pub(crate) fn min(&self) -> Length {
         self.min.unwrap_or(Length::from_um(25.0))
     }
 

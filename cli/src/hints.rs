@@ -165,12 +165,17 @@ fn strips(error: &StripsError) -> Option<String> {
 }
 
 fn machine_limit(error: &MachineLimit) -> Option<String> {
-    let option = match error {
-        MachineLimit::Dpi { .. } => "--dpi",
-        MachineLimit::Thickness { .. } => "--thickness",
+    let hint = match error {
+        MachineLimit::Area { .. } => "give a smaller --area",
+        MachineLimit::Footprint { .. } => "check --units, or turn or scale the part",
+        MachineLimit::Height { .. } => "check --units, or lay the part down with --rotate",
+        MachineLimit::Dpi { .. } => "slice with such a --dpi",
+        MachineLimit::Thickness { .. } => {
+            "slice with such a --thickness, or --min and --max with --adaptive"
+        }
         _ => return None,
     };
-    Some(format!("slice it with such a {option}, or give --area instead of --machine"))
+    Some(format!("{hint}, or take another --machine"))
 }
 
 fn data(error: &DataError) -> Option<String> {

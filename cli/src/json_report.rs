@@ -1,11 +1,24 @@
-//! Writes reports: JSON objects that people can read, too, with a list item on each line.
+//! Writes JSON: answers of commands (`--json`), and reports that people can read, too, with a
+//! list item on each line.
 
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use crate::exit::Exit;
-use crate::streams::write_file;
+use crate::streams::{print, write_file};
+
+/// Prints a command's answer as one line: an object with the name of its schema, then `fields`.
+/// docs/json.md describes each schema; keys may be added to one, but not change.
+pub(crate) fn print_answer(schema: &str, fields: &impl Serialize) -> Result<(), Exit> {
+    #[derive(Serialize)]
+    struct Answer<'a, T> {
+        schema: &'a str,
+        #[serde(flatten)]
+        fields: &'a T,
+    }
+    print(&(json(&Answer { schema, fields }) + "\n"))
+}
 
 /// A JSON object that is being written: first some fields, then lists.
 pub(crate) struct JsonReport(String);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
+use lamp_postprocess::machine::{Machine, MachineLimit};
 use lamp_slicer::{GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOptions, Slices};
 use lamp_stack::{Dpi, Layer, Length, Size};
 use serde::{Deserialize, Serialize};
@@ -205,6 +206,17 @@ impl SlicingOptions {
             say(&format!("{layers} layers keep the budget, with errors up to {}", found.bound()));
         }
         Ok(found.heights.layer_heights()?)
+    }
+
+    /// Checks that a machine builds in this resolution and these thicknesses.
+    pub(crate) fn check_machine(&self, machine: &Machine) -> Result<(), MachineLimit> {
+        machine.check_dpi(self.dpi, "the stack")?;
+        if self.adaptive {
+            machine.check_thickness(self.heights.min(), "the thinnest layer")?;
+            machine.check_thickness(self.heights.max(), "the thickest layer")
+        } else {
+            machine.check_thickness(self.thickness, "a layer")
+        }
     }
 
     /// Returns the files that the options name.

@@ -274,6 +274,10 @@ fn machines_have_areas_and_limits() {
         "1mm thick",
         "25um to 100um",
     ]);
+    for area in ["9x9in", "4.1x1in", "1x4.6in"] {
+        let line = format!("tile tower.tif --machine alpha --area {area} -o x.tif");
+        scratch.run(&line).is_wrong_usage(&["alpha builds on 101.6x114.3mm", "smaller --area"]);
+    }
     scratch
         .run("tile tower.tif --machine gamma -o x.tif")
         .is_refused_with(&["gamma", "alpha, beta"]);

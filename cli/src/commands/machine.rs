@@ -5,12 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use lamp_postprocess::machine::Machine;
 use lamp_stack::Catalogued;
+use serde_json::{Value, json};
 
-use crate::catalogue;
+use crate::catalogue::{entry, show};
 use crate::exit::Exit;
+use crate::json_report::{print_answer, to_nm};
 use crate::streams::print;
 
-/// List or show machines: build area, resolution and layer thickness
+/// List or show machines: build area, height, resolution and layer thickness
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -25,32 +27,73 @@ pub(crate) struct MachineArgs {
 #[derive(Subcommand)]
 enum Action {
     /// List the built-in machines
-    List,
+    List {
+        /// Print JSON, as docs/json.md describes it
+        #[arg(long)]
+        json: bool,
+    },
     /// Check a machine's file and print it as it was written, to read or to start a new one from
     Show {
         /// Which machine: a built-in machine's name, a file, or - for standard input
         #[arg(value_name = "MACHINE")]
         machine: PathBuf,
+
+        /// Print JSON, as docs/json.md describes it, instead of the file
+        #[arg(long)]
+        json: bool,
     },
 }
 
 pub(crate) fn run(args: &MachineArgs) -> Result<(), Exit> {
     match &args.action {
-        Action::List => print(&table()),
-        Action::Show { machine } => catalogue::show::<Machine>(machine),
+        Action::List { json: true } => answer(Machine::builtins()),
+        Action::List { json: false } => print(&table()),
+        Action::Show { machine, json: true } => answer([entry(machine)?]),
+        Action::Show { machine, json: false } => show::<Machine>(machine),
     }
+}
+
+fn answer(machines: impl IntoIterator<Item = Machine>) -> Result<(), Exit> {
+    let machines: Vec<Value> = machines.into_iter().map(|machine| fields(&machine)).collect();
+    print_answer("lamp-machine-1", &json!({ "machines": machines }))
+}
+
+/// A machine's fields; what is not known is null.
+fn fields(machine: &Machine) -> Value {
+    let Machine { name, description, area, height, dpi, thickness, strips } = machine;
+    json!({
+        "name": name,
+        "description": description,
+        "area_mm": [to_nm(area.value.width.mm()), to_nm(area.value.height.mm())],
+        "height_mm": height.as_ref().map(|height| to_nm(height.value.mm())),
+        "dpi": dpi.as_ref().map(|dpi| [dpi.least, dpi.most]),
+        "thickness_um": thickness.as_ref().map(|limits| [limits.least.um(), limits.most.um()]),
+        "mirrors": strips.as_ref().map(|strips| strips.mirrors),
+        "overlap": strips.as_ref().map(|strips| strips.overlap),
+        "sources": {
+            "area": area.source,
+            "height": height.as_ref().map(|height| &height.source),
+            "dpi": dpi.as_ref().map(|dpi| &dpi.source),
+            "thickness": thickness.as_ref().map(|limits| &limits.source),
+            "strips": strips.as_ref().map(|strips| &strips.source),
+        },
+    })
 }
 
 /// A line for each built-in machine.
 fn table() -> String {
-    let mut text = format!("{:<8}{:<18}{:<14}{:<16}description\n", "name", "area", "dpi", "layers");
+    let mut text = format!(
+        "{:<8}{:<18}{:<10}{:<14}{:<16}description\n",
+        "name", "area", "height", "dpi", "layers"
+    );
     for machine in Machine::builtins() {
-        let Machine { name, description, area, dpi, thickness, .. } = machine;
+        let Machine { name, description, area, height, dpi, thickness, .. } = machine;
         let area = area.value.to_string();
+        let height = height.map_or("unknown".to_owned(), |height| height.value.to_string());
         let dpi = dpi.map_or("any".to_owned(), |dpi| format!("{}-{}", dpi.least, dpi.most));
         let layers = thickness
             .map_or("any".to_owned(), |limits| format!("{}-{}", limits.least, limits.most));
-        text += &format!("{name:<8}{area:<18}{dpi:<14}{layers:<16}{description}\n");
+        text += &format!("{name:<8}{area:<18}{height:<10}{dpi:<14}{layers:<16}{description}\n");
     }
     text
 }

@@ -5,8 +5,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_slicer::{PixelGrid, Polished, StrayBand};
+use lamp_postprocess::machine::{Machine, MachineLimit};
+use lamp_slicer::{PixelGrid, Polished, Slices, StrayBand};
+use lamp_stack::{Length, Size};
 
+use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::fallback::Bridged;
 use crate::json_report::parse_report;
@@ -43,6 +46,11 @@ pub(crate) struct SliceArgs {
     #[command(flatten)]
     pub(crate) options: SlicingOptions,
 
+    /// Machine to build on: alpha, beta or a file (see lamp machine). A part, a resolution or a
+    /// layer thickness beyond its limits is refused before the work
+    #[arg(long, value_name = "M")]
+    machine: Option<PathBuf>,
+
     /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     layers: Option<Range<u32>>,
@@ -70,12 +78,17 @@ pub(crate) struct SliceArgs {
 }
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
-    let inputs = || args.parts.iter().chain(args.options.files()).chain(&args.fallback);
+    let inputs =
+        || args.parts.iter().chain(args.options.files()).chain(&args.fallback).chain(&args.machine);
     if let Some(report) = &args.report {
         check_beside(report, &args.output.output, inputs())?;
     }
     check_not_input(&args.output.output, inputs())?;
     let exposure = args.options.exposure()?;
+    let machine: Option<Machine> = args.machine.as_deref().map(entry).transpose()?;
+    if let Some(machine) = &machine {
+        args.options.check_machine(machine).map_err(Exit::wrong_options)?;
+    }
     let progress = progress("slice", common, &args.output);
     let say = |line: &str| progress.say(line);
     let reading =
@@ -94,6 +107,9 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         .options
         .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure, &say)
         .map_err(|error| at_part(error, &args.parts))?;
+    if let Some(machine) = &machine {
+        check_part(machine, &slices).map_err(|limit| Exit::from(limit).at(name.clone()))?;
+    }
     progress.expect(slices.layer_count() as u64);
     let mut bridged =
         Bridged::new(slices, args.fallback.as_deref(), &args.options, args.layers.clone())?;
@@ -128,6 +144,16 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     }
     say_stray_rows(&progress, counts, args.report.as_deref());
     Ok(())
+}
+
+/// Checks that a part lies within a machine's area and height.
+fn check_part(machine: &Machine, slices: &Slices) -> Result<(), MachineLimit> {
+    let [low, high] = slices.box_mm();
+    let side = |k: usize| Length::from_mm(high[k] - low[k]).to_whole_nm();
+    machine.check_footprint(Size { width: side(0), height: side(1) })?;
+    let thicknesses = slices.layer_heights();
+    let height = Length::from_um(thicknesses.thicknesses_um().sum()).to_whole_nm();
+    machine.check_height(height, "the part")
 }
 
 /// What polishing did, in a line.

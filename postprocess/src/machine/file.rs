@@ -16,6 +16,9 @@ pub enum MachineError {
     /// Limits that hold nothing, or no possible resolution.
     #[error("{0}: least and most must be above zero, and least not above most")]
     Range(&'static str),
+    /// A height that holds nothing.
+    #[error("height: it must be above zero")]
+    Height,
     /// Swaths without a pixel of their own.
     #[error("strips: a swath shares less than half its mirrors with the next")]
     Strips,
@@ -49,6 +52,9 @@ impl Catalogued for Machine {
         {
             return Err(MachineError::Range("thickness"));
         }
+        if self.height.as_ref().is_some_and(|height| height.value.um() <= 0.0) {
+            return Err(MachineError::Height);
+        }
         match &self.strips {
             Some(strips) if strips.overlap >= strips.mirrors.div_ceil(2) => {
                 Err(MachineError::Strips)
@@ -81,6 +87,10 @@ description = "A machine of mine"
 value = "100x80mm"
 source = "data sheet"
 
+[height]
+value = "80mm"
+source = "data sheet"
+
 [dpi]
 least = 600
 most = 600
@@ -102,7 +112,8 @@ source = "data sheet"
         for builtin in Machine::BUILTINS {
             let machine = Machine::from_toml(builtin.toml).unwrap();
             assert_eq!(machine.name, builtin.name);
-            assert_eq!(machine.strips, None);
+            // Their source gives neither.
+            assert_eq!((machine.strips, machine.height), (None, None));
         }
         let [alpha, beta] =
             ["alpha", "beta"].map(|name| Machine::builtin(name).unwrap().area.value);
@@ -121,8 +132,10 @@ source = "data sheet"
             ("least = 600", "least = 0", &["dpi: least and most"]),
             ("\"20um\"", "\"20\"", &["thickness.least", "unit"]),
             ("\"20um\"", "\"-20um\"", &["thickness: least and most"]),
+            ("\"80mm\"", "\"80\"", &["line 9", "height.value", "unit"]),
+            ("\"80mm\"", "\"0mm\"", &["height", "above zero"]),
             ("mirrors = 1024", "mirrors = 128", &["strips", "half its mirrors"]),
-            ("mirrors = 1024", "mirrors = -1", &["line 19", "strips.mirrors"]),
+            ("mirrors = 1024", "mirrors = -1", &["line 23", "strips.mirrors"]),
             ("\"mine\"", "\"My own\"", &["name", "`My own` is not a name"]),
             ("[area]", "[area", &["line 4", "a machine is a TOML file"]),
         ] {

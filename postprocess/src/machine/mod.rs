@@ -1,5 +1,5 @@
-//! Machines: how large a build may be, and in what pixels and layers, in TOML
-//! files.
+//! Machines: how large and how high a build may be, and in what pixels and layers, in
+//! TOML files.
 //!
 //! ```
 //! use lamp_postprocess::machine::Machine;
@@ -11,12 +11,13 @@
 //! ```
 
 mod file;
+mod limit;
 
-use lamp_stack::{Layer, Length, Size, nonempty_text};
+use lamp_stack::{Length, Size, nonempty_text};
 use serde::Deserialize;
-use thiserror::Error;
 
 pub use file::MachineError;
+pub use limit::MachineLimit;
 
 /// What is known of a machine. What a source does not give is absent, and then
 /// anything goes.
@@ -29,6 +30,8 @@ pub struct Machine {
     pub description: String,
     /// The build area.
     pub area: Area,
+    /// The height of a build.
+    pub height: Option<BuildHeight>,
     /// The resolutions that it builds in.
     pub dpi: Option<DpiRange>,
     /// The layers that it builds in.
@@ -44,6 +47,18 @@ pub struct Area {
     /// As `23x23in`.
     #[serde(deserialize_with = "file::size")]
     pub value: Size,
+    /// The section, table or data sheet.
+    #[serde(deserialize_with = "nonempty_text")]
+    pub source: String,
+}
+
+/// How high a build may be, and where that comes from.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BuildHeight {
+    /// From the platform to the top of the last layer, as `200mm`.
+    #[serde(deserialize_with = "file::length")]
+    pub value: Length,
     /// The section, table or data sheet.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
@@ -88,106 +103,4 @@ pub struct Strips {
     /// The section, table or data sheet.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
-}
-
-/// Why a machine does not build a layer.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum MachineLimit {
-    /// Another resolution.
-    #[error("{layer} has {dpi} dpi, and the machine {machine} builds in {least} to {most} dpi")]
-    Dpi {
-        /// The layer's name.
-        layer: String,
-        /// Its resolution.
-        dpi: f64,
-        /// The machine's name.
-        machine: String,
-        /// The coarsest that it builds in.
-        least: f64,
-        /// The finest that it builds in.
-        most: f64,
-    },
-    /// Another thickness.
-    #[error(
-        "{layer} is {thickness} thick, and the machine {machine} builds in layers of {least} to {most}"
-    )]
-    Thickness {
-        /// The layer's name.
-        layer: String,
-        /// Its thickness.
-        thickness: Length,
-        /// The machine's name.
-        machine: String,
-        /// The thinnest that it builds in.
-        least: Length,
-        /// The thickest that it builds in.
-        most: Length,
-    },
-}
-
-/// What thicknesses may miss a limit by, in micrometres: they are sums and
-/// differences of heights.
-const SLACK: f64 = 1e-3;
-
-impl Machine {
-    /// Checks that the machine builds in a layer's resolution and thickness,
-    /// as far as both are known.
-    ///
-    /// # Errors
-    /// Returns an error if it does not.
-    pub fn check(&self, layer: &Layer) -> Result<(), MachineLimit> {
-        if let (Some(DpiRange { least, most, .. }), Some(dpi)) = (&self.dpi, layer.dpi)
-            && !(*least..=*most).contains(&dpi.get())
-        {
-            return Err(MachineLimit::Dpi {
-                layer: layer.info.name(),
-                dpi: dpi.get(),
-                machine: self.name.clone(),
-                least: *least,
-                most: *most,
-            });
-        }
-        if let (Some(ThicknessRange { least, most, .. }), Some(um)) =
-            (&self.thickness, layer.info.thickness_um)
-            && !(least.um() - SLACK..=most.um() + SLACK).contains(&um)
-        {
-            return Err(MachineLimit::Thickness {
-                layer: layer.info.name(),
-                thickness: Length::from_um(um),
-                machine: self.name.clone(),
-                least: *least,
-                most: *most,
-            });
-        }
-        Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use lamp_stack::{Catalogued, Dpi, Mask, PageInfo};
-
-    use super::*;
-
-    fn layer(dpi: f64, thickness_um: f64) -> Layer {
-        let info = PageInfo { thickness_um: Some(thickness_um), ..PageInfo::default() };
-        Layer { info, dpi: Dpi::new(dpi), image: Mask::black(1, 1).into() }
-    }
-
-    #[test]
-    fn layers_beyond_the_limits_are_named() {
-        let beta = Machine::builtin("beta").unwrap();
-        for (dpi, thickness) in [(1500.0, 100.0), (2400.0, 25.0), (2000.0, 100.0 + 1e-9)] {
-            assert_eq!(beta.check(&layer(dpi, thickness)), Ok(()));
-        }
-        let coarse = beta.check(&layer(100.0, 100.0)).unwrap_err().to_string();
-        assert!(
-            coarse.starts_with("layer 0 has 100 dpi, and the machine beta builds in 1500 to 2400")
-        );
-        let thick = beta.check(&layer(1500.0, 1000.0)).unwrap_err().to_string();
-        assert!(thick.contains("1mm thick") && thick.contains("25um to 100um"), "{thick}");
-        let any = Machine { dpi: None, thickness: None, ..beta };
-        assert_eq!(any.check(&layer(1.0, 1e6)), Ok(()));
-    }
 }

@@ -9,11 +9,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
+use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
     HeightOptions, Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, StrayRows,
     TileOptions, Turns,
 };
-use lamp_stack::{Length, Size};
+use lamp_stack::{Layer, Length, Size};
 
 use crate::catalogue::{entry, read_text};
 use crate::exit::Exit;
@@ -56,8 +57,8 @@ pub(crate) struct TileArgs {
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     layers: Option<Range<u32>>,
 
-    /// Machine: alpha, beta or a file (see lamp machine); it must build in the stacks' resolution
-    /// and layer thickness
+    /// Machine: alpha, beta or a file (see lamp machine). A build beyond its area, height,
+    /// resolution or layer thickness is refused
     #[arg(long, value_name = "M")]
     machine: Option<PathBuf>,
 
@@ -141,7 +142,10 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
         Some(output) => progress("tile", common, output),
         None => Progress::new("tile", common.quiet, true),
     };
-    let machine = args.machine.as_deref().map(entry).transpose()?;
+    let machine: Option<Machine> = args.machine.as_deref().map(entry).transpose()?;
+    if let Some((machine, area)) = machine.as_ref().zip(args.area) {
+        machine.check_area(area).map_err(Exit::wrong_options)?;
+    }
     let strips = args.strips.writer(machine.as_ref(), args.classic)?;
     let file = args.layout.as_deref().map(read_layout).transpose()?;
     let mut stacks = InputStack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
@@ -149,7 +153,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     let parts: Vec<PartStack> =
         stacks.iter_mut().map(|stack| stack.part(needs_outlines)).collect::<Result<_, _>>()?;
     let plain = TileOptions::default();
-    let machine_area = machine.map(|machine| machine.area.value);
+    let machine_area = machine.as_ref().map(|machine| machine.area.value);
     let file_area = file.as_ref().and_then(LayoutFile::area);
     let area = args.area.or(machine_area).or(file_area).unwrap_or(plain.area);
     let layout = match &file {
@@ -176,6 +180,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
     let heights = HeightOptions { settle: args.settle, resample: args.resample };
     let build = layout.build(layers, heights, |stray| say_stray(&progress, stray));
+    let build = within_height(build, machine);
     strips::write(build, strips, output.as_ref(), &progress)?;
     args.tell(&placed)
 }
@@ -263,6 +268,25 @@ fn place(
 ) -> Result<Layout, Exit> {
     let path = path.unwrap_or(Path::new("-")).display();
     file.place(parts, area).map_err(|error| Exit::Failed(anyhow!(error)).at(path.to_string()))
+}
+
+/// Checks that a build is no higher than the machine's are.
+fn within_height(
+    build: impl Iterator<Item = Result<Layer, Exit>>,
+    machine: Option<Machine>,
+) -> impl Iterator<Item = Result<Layer, Exit>> {
+    let mut bottom_um = None;
+    build.map(move |layer| {
+        let layer = layer?;
+        if let Some(machine) = &machine
+            && let (Some(z_um), Some(thickness_um)) = (layer.info.z_um, layer.info.thickness_um)
+        {
+            let height_um = z_um + thickness_um - *bottom_um.get_or_insert(z_um);
+            let what = format!("the build up to {}", layer.info.name());
+            machine.check_height(Length::from_um(height_um).to_whole_nm(), &what)?;
+        }
+        Ok(layer)
+    })
 }
 
 /// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.

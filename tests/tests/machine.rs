@@ -1,0 +1,129 @@
+//! Checks that the limits of machines bind, and what `lamp machine` says of them.
+
+use lamp_fixtures::Sample;
+use lamp_tests::Scratch;
+use serde_json::{Value, json};
+
+const MINE: &str = r#"name = "mine"
+description = "A machine of mine"
+
+[area]
+value = "40x30mm"
+source = "measured"
+
+[height]
+value = "80mm"
+source = "data sheet"
+
+[dpi]
+least = 50
+most = 100
+source = "data sheet"
+
+[thickness]
+least = "0.5mm"
+most = "1mm"
+source = "data sheet"
+
+[strips]
+mirrors = 64
+overlap = 8
+source = "data sheet"
+"#;
+
+/// Returns a folder with `tower.stl`, 25.4 x 25.4 x 76 mm, and a machine that just builds it.
+fn tower_and_machine() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Sample::Tower, 5_000);
+    scratch.write("mine.toml", MINE.as_bytes());
+    scratch
+}
+
+const SLICE: &str = "slice tower.stl --machine mine.toml -q -o tower.tif";
+
+#[test]
+fn a_part_within_the_limits_is_sliced_as_without_a_machine() {
+    let scratch = tower_and_machine();
+    scratch.run(&format!("{SLICE} --dpi 100 --thickness 1mm")).succeeds_quietly();
+    scratch.run("slice tower.stl --dpi 100 --thickness 1mm -q -o plain.tif").succeeds_quietly();
+    assert!(scratch.bytes("tower.tif") == scratch.bytes("plain.tif"));
+}
+
+#[test]
+fn options_beyond_a_limit_are_wrong_usage() {
+    let scratch = tower_and_machine();
+    let limits = "mine builds in layers of 500um to 1mm";
+    for (options, words) in [
+        ("--dpi 120 --thickness 1mm", ["the stack has 120 dpi", "mine builds in 50 to 100 dpi"]),
+        ("--dpi 100 --thickness 0.4mm", ["a layer is 400um thick", limits]),
+        ("--dpi 100 --thickness 1.1mm", ["a layer is 1.1mm thick", limits]),
+        ("--dpi 100 --adaptive --max 1mm", ["the thinnest layer is 25um thick", limits]),
+        ("--dpi 100 --adaptive --min 0.5mm --max 2mm", ["the thickest layer is 2mm thick", limits]),
+    ] {
+        scratch.run(&format!("{SLICE} {options}")).is_wrong_usage(&words);
+        assert_eq!(scratch.names(), ["mine.toml", "tower.stl"]);
+    }
+}
+
+#[test]
+fn parts_beyond_a_limit_are_refused_before_they_are_sliced() {
+    let scratch = tower_and_machine();
+    let line = format!("{SLICE} --dpi 100 --thickness 1mm");
+    for (options, words) in [
+        ("--scale 1.3,1.3,1", ["tower.stl: the part takes 33", "mine builds on 40x30mm"]),
+        ("--scale 1.7,1,1", ["tower.stl: the part takes 43", "mine builds on 40x30mm"]),
+        ("--scale 1,1,1.1", ["tower.stl: the part is 84mm high", "mine builds 80mm high"]),
+        ("--units inch", ["the part takes", "check --units"]),
+    ] {
+        scratch.run(&format!("{line} {options}")).is_refused_with(&words);
+        assert_eq!(scratch.names(), ["mine.toml", "tower.stl"]);
+    }
+    // It fits when it is turned by 90 degrees.
+    scratch.run(&format!("{line} --scale 1,1.5,1")).succeeds_quietly();
+}
+
+#[test]
+fn a_build_that_is_too_high_is_refused_with_its_layer() {
+    let scratch = tower_and_machine();
+    scratch.run(&format!("{SLICE} --dpi 100 --thickness 1mm")).succeeds_quietly();
+    let tile = "tile tower.tif --machine mine.toml --copies 1 -o build.tif";
+    // 76 layers of 1 mm on five of mesh alone.
+    let words = ["the build up to layer 80", "is 81mm high", "mine builds 80mm high"];
+    scratch.run(tile).is_refused_with(&words);
+    assert!(!scratch.path("build.tif").exists());
+    scratch.run(&format!("{tile} --base-layers 4")).succeeds_quietly();
+}
+
+#[test]
+fn json_says_what_is_known_of_machines() {
+    let scratch = tower_and_machine();
+    let answer = |line: &str| -> Value {
+        serde_json::from_slice(&scratch.run(line).succeeds_quietly().stdout).unwrap()
+    };
+    assert_eq!(
+        answer("lamp machine show mine.toml --json"),
+        json!({"schema": "lamp-machine-1", "machines": [{
+            "name": "mine",
+            "description": "A machine of mine",
+            "area_mm": [40.0, 30.0],
+            "height_mm": 80.0,
+            "dpi": [50.0, 100.0],
+            "thickness_um": [500.0, 1000.0],
+            "mirrors": 64,
+            "overlap": 8,
+            "sources": {
+                "area": "measured",
+                "height": "data sheet",
+                "dpi": "data sheet",
+                "thickness": "data sheet",
+                "strips": "data sheet",
+            },
+        }]})
+    );
+    let list = answer("lamp machine list --json");
+    assert_eq!(list["schema"], "lamp-machine-1");
+    assert_eq!(list["machines"][0]["name"], "alpha");
+    assert_eq!(list["machines"][1]["area_mm"], json!([584.2, 584.2]));
+    assert_eq!(list["machines"][1]["height_mm"], Value::Null);
+    assert_eq!(list["machines"][1]["sources"]["strips"], Value::Null);
+}
