@@ -5,6 +5,7 @@ use std::io;
 use thiserror::Error;
 
 use crate::g4::G4Error;
+use crate::picture_page::PictureFormat;
 
 /// An error in reading or writing a stack.
 #[derive(Debug, Error)]
@@ -13,8 +14,8 @@ pub enum StackError {
     /// The input is empty.
     #[error("the input is empty: no stack arrived")]
     Empty,
-    /// The input starts as neither a TIFF nor a PNG.
-    #[error("this is not a TIFF stack or a PNG (it starts with bytes {start:02x?})")]
+    /// The input starts as neither a TIFF nor a picture that is read.
+    #[error("this is neither a TIFF stack nor a picture (it starts with bytes {start:02x?})")]
     NotTiff {
         /// The first bytes of the input.
         start: Vec<u8>,
@@ -76,13 +77,16 @@ pub enum StackError {
         before: u32,
     },
     /// A folder has no pages.
-    #[error("the folder holds no .tif or .png page")]
+    #[error("the folder holds no page: no .tif, no .png and no other picture")]
     NoPages,
-    /// A folder has both TIFF and PNG pages.
+    /// A folder has pages of two formats.
     #[error(
-        "the folder holds .tif and .png pages: keep those that are the stack, and move the others away"
+        "the folder holds {} and {} pages: keep those that are the stack, and move the others away", formats[0], formats[1]
     )]
-    MixedPages,
+    MixedPages {
+        /// The formats' names.
+        formats: [&'static str; 2],
+    },
     /// A page is missing from a folder.
     #[error("the folder lacks a page: layer {layer} does not follow what was before it")]
     MissingPage {
@@ -188,6 +192,22 @@ pub enum PageFault {
     /// A PNG is larger than the reader's limit, in bytes.
     #[error("its PNG has more than {0} bytes")]
     PngBytes(u64),
+    /// A picture cannot be decoded.
+    #[error("its {format} cannot be read: {problem}")]
+    Picture {
+        /// The picture's format.
+        format: PictureFormat,
+        /// The decoder's message.
+        problem: String,
+    },
+    /// A picture is larger than the reader's limit, in bytes.
+    #[error("its picture has more than {0} bytes")]
+    PictureFileBytes(u64),
+    /// A picture's pixels take more bytes than the reader's limit.
+    #[error(
+        "its pixels take {0} bytes, which is too much for a picture that is decoded whole: save it as a PNG or a TIFF"
+    )]
+    PictureBytes(u64),
     /// A PNG's palette lacks an entry that a pixel uses.
     #[error("its palette has no entry {0}")]
     PaletteEntry(u8),
@@ -237,18 +257,18 @@ pub enum UnsupportedFeature {
     /// An interlaced PNG.
     #[error("an interlaced PNG")]
     Interlaced,
-    /// A PNG with an alpha channel or a transparent colour.
-    #[error("a PNG with transparency")]
+    /// A picture with a pixel that is not opaque, or a PNG with a transparent colour.
+    #[error("a picture with transparency")]
     Transparency,
-    /// A PNG with 16 bits per sample.
-    #[error("a PNG of 16 bits")]
+    /// A picture with 16 bits per sample.
+    #[error("a picture of 16 bits")]
     SixteenBits,
-    /// A PNG in colour.
-    #[error("a PNG in colour")]
-    PngColour,
-    /// A PNG whose palette has colours other than grays.
-    #[error("a PNG with a palette of colours")]
-    PngPalette,
+    /// A picture with a pixel that is not gray.
+    #[error("a picture in colour")]
+    Colour,
+    /// A picture file with several images, such as an animation.
+    #[error("a picture file of several images")]
+    SeveralImages,
 }
 
 fn last_whole_text(last_whole: Option<u32>) -> String {

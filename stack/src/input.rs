@@ -8,6 +8,7 @@ use crate::error::StackError;
 use crate::layer::Layer;
 use crate::limits::Limits;
 use crate::ordered::map_in_order;
+use crate::picture_page::PictureFormat;
 use crate::tiff::{Page, PageReader};
 
 /// An iterator over the pages of a stack, bottom first.
@@ -29,12 +30,13 @@ enum Source {
 }
 
 impl Pages {
-    /// Opens a TIFF or PNG file, or a folder of single-page TIFF files or of PNG files. Files of
-    /// a folder are ordered by name, with numbers in names compared as numbers.
+    /// Opens a TIFF file, a picture file, or a folder of single-page TIFF files or of pictures
+    /// of one format. Files of a folder are ordered by name, with numbers in names compared as
+    /// numbers.
     ///
     /// # Errors
-    /// Returns an error if the input cannot be read or is of neither format, or if a folder
-    /// holds both.
+    /// Returns an error if the input cannot be read or is of no such format, or if a folder
+    /// holds pages of several.
     pub fn open(path: &Path) -> Result<Self, StackError> {
         let source = if path.is_dir() {
             let files = page_files(path)?;
@@ -48,10 +50,10 @@ impl Pages {
         Ok(Self::new(source))
     }
 
-    /// Reads an open TIFF or PNG file from its start.
+    /// Reads an open TIFF or picture file from its start.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read or is of neither format.
+    /// Returns an error if the file cannot be read or is of no such format.
     pub fn from_file(file: File) -> Result<Self, StackError> {
         Ok(Self::new(Source::One(PageReader::from_file(file)?)))
     }
@@ -59,7 +61,7 @@ impl Pages {
     /// Reads a stack from a stream, such as standard input.
     ///
     /// # Errors
-    /// Returns an error if the stream is empty or is of neither format.
+    /// Returns an error if the stream is empty or is neither a TIFF nor a picture.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
         Ok(Self::new(Source::One(PageReader::from_stream(stream)?)))
     }
@@ -156,24 +158,37 @@ fn one_page(
     if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
 }
 
-/// Lists the TIFF or PNG files of a folder, last name first.
+/// Lists the pages of a folder, last name first: its TIFFs or PNGs, or where there are none its
+/// other pictures.
 fn page_files(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
-    let (mut files, mut tiffs) = (Vec::new(), 0);
+    let mut files = Vec::new();
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        let tiff = matches!(extension.as_deref(), Some("tif" | "tiff"));
-        if tiff || extension.as_deref() == Some("png") {
-            tiffs += usize::from(tiff);
-            files.push(path);
-        }
+        files.extend(page_format(&path).map(|format| (format, path)));
     }
-    if tiffs > 0 && tiffs < files.len() {
-        return Err(StackError::MixedPages);
+    let is_usual = |format: &str| matches!(format, "TIFF" | "PNG");
+    if files.iter().any(|(format, _)| is_usual(format)) {
+        files.retain(|(format, _)| is_usual(format));
     }
+    if let Some(pair) = files.windows(2).find(|pair| pair[0].0 != pair[1].0) {
+        let mut formats = [pair[0].0, pair[1].0];
+        formats.sort_unstable();
+        return Err(StackError::MixedPages { formats });
+    }
+    let mut files: Vec<PathBuf> = files.into_iter().map(|(_, path)| path).collect();
     files.sort_by_cached_key(|path| name_key(&path.to_string_lossy()));
     files.reverse();
     Ok(files)
+}
+
+/// Returns the format of a folder's file by its name, if it is one of pages.
+fn page_format(file: &Path) -> Option<&'static str> {
+    let extension = file.extension()?.to_string_lossy().to_ascii_lowercase();
+    match extension.as_str() {
+        "tif" | "tiff" => Some("TIFF"),
+        "png" => Some("PNG"),
+        extension => PictureFormat::of_extension(extension).map(PictureFormat::name),
+    }
 }
 
 /// Splits a name into pairs of a text and the number after it, so that `page10` sorts after

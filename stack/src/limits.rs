@@ -40,8 +40,12 @@ pub struct Limits {
     /// strips. Numbers and JSON take up to a hundred times their bytes once
     /// they are read.
     pub field_bytes: u64,
-    /// The greatest size in bytes of a PNG file: an endless stream must end.
+    /// The greatest size in bytes of the file of a PNG or another picture: an endless stream
+    /// must end.
     pub png_bytes: u64,
+    /// The greatest size in bytes of the pixels of a picture other than a PNG: such pictures
+    /// are decoded whole.
+    pub picture_bytes: u64,
 }
 
 impl Default for Limits {
@@ -54,6 +58,7 @@ impl Default for Limits {
             directory_entries: 4096,
             field_bytes: 2 << 20,
             png_bytes: 1 << 30,
+            picture_bytes: 256 << 20,
         }
     }
 }

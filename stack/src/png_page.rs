@@ -4,12 +4,13 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, Info, Reader, Unit};
 
-use crate::error::{PageFault, StackError, UnsupportedFeature};
+use crate::error::{PageFault, UnsupportedFeature};
 use crate::gray::GrayMask;
 use crate::layer::{Image, PageInfo};
 use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::mask::Mask;
+use crate::picture_page::{PictureFault, check_runs, gray_level};
 use crate::tiff::{bit_transitions, byte_runs};
 
 /// The first bytes of every PNG.
@@ -30,23 +31,7 @@ pub(crate) struct Header {
     pub(crate) info: Option<PageInfo>,
 }
 
-/// A reason why a PNG cannot be read as a page.
-#[derive(Debug)]
-pub(crate) enum PngFault {
-    Unsupported(UnsupportedFeature),
-    Malformed(PageFault),
-}
-
-impl PngFault {
-    pub(crate) fn on(self, page: u32) -> StackError {
-        match self {
-            Self::Unsupported(feature) => StackError::Unsupported { page, feature },
-            Self::Malformed(fault) => StackError::Malformed { page, fault },
-        }
-    }
-}
-
-impl From<png::DecodingError> for PngFault {
+impl From<png::DecodingError> for PictureFault {
     fn from(error: png::DecodingError) -> Self {
         Self::Malformed(PageFault::Png(error))
     }
@@ -56,7 +41,7 @@ impl From<png::DecodingError> for PngFault {
 type PngRows<'a> = Reader<Cursor<&'a [u8]>>;
 
 /// Reads the chunks before the image data.
-pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PngFault> {
+pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PictureFault> {
     let (reader, samples) = open(file, limits)?;
     let info = reader.info();
     let mut line = description(info).and_then(|text| PageInfo::parse(text.as_bytes()));
@@ -70,7 +55,7 @@ pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PngFault> {
 }
 
 /// Decodes the image.
-pub(crate) fn decode(file: &[u8], limits: &Limits) -> Result<Image, PngFault> {
+pub(crate) fn decode(file: &[u8], limits: &Limits) -> Result<Image, PictureFault> {
     let (reader, samples) = open(file, limits)?;
     if samples.are_bits() {
         decode_mask(reader, &samples, limits.runs)
@@ -83,7 +68,7 @@ fn decode_mask(
     mut reader: PngRows<'_>,
     samples: &Samples,
     max_runs: usize,
-) -> Result<Image, PngFault> {
+) -> Result<Image, PictureFault> {
     let width = reader.info().width;
     let mut mask = Mask::without_rows(width);
     let mut runs = Vec::new();
@@ -92,25 +77,26 @@ fn decode_mask(
         mask.push(&bit_transitions(&runs, width));
         check_runs(mask.change_count(), max_runs)?;
     }
-    Ok(Image::Mask(if samples.levels[0] == 0 { mask } else { mask.inverted() }))
+    Ok(Image::Mask(if samples.levels[0] == Some(0) { mask } else { mask.inverted() }))
 }
 
 fn decode_gray(
     mut reader: PngRows<'_>,
     samples: &Samples,
     max_runs: usize,
-) -> Result<Image, PngFault> {
+) -> Result<Image, PictureFault> {
     let width = reader.info().width;
     let mut gray = GrayMask::new(width);
     let (mut row_samples, mut runs) = (Vec::new(), Vec::new());
     while let Some(row) = reader.next_row()? {
-        samples.unpack(row.data(), width, &mut row_samples);
+        samples.unpack(row.data(), width, &mut row_samples)?;
         byte_runs(&row_samples, &mut runs);
         for (_, sample) in &mut runs {
-            *sample = *samples
-                .levels
-                .get(usize::from(*sample))
-                .ok_or(PngFault::Malformed(PageFault::PaletteEntry(*sample)))?;
+            *sample = match samples.levels.get(usize::from(*sample)) {
+                Some(Some(level)) => *level,
+                Some(None) => return Err(PictureFault::Unsupported(UnsupportedFeature::Colour)),
+                None => return Err(PictureFault::Malformed(PageFault::PaletteEntry(*sample))),
+            };
         }
         gray.push_runs(runs.iter().copied()).expect("a row is as long as the width");
         check_runs(gray.change_count(), max_runs)?;
@@ -118,24 +104,20 @@ fn decode_gray(
     Ok(Image::Gray(gray))
 }
 
-fn check_runs(runs: usize, max: usize) -> Result<(), PngFault> {
-    if runs > max {
-        return Err(PngFault::Malformed(PageFault::TooManyRuns));
-    }
-    Ok(())
-}
-
-fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(PngRows<'a>, Samples), PngFault> {
+fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(PngRows<'a>, Samples), PictureFault> {
     let mut decoder = Decoder::new(Cursor::new(file));
     decoder.set_ignore_iccp_chunk(true);
     let reader = decoder.read_info()?;
     let info = reader.info();
     let side = info.width.max(info.height);
     if side > limits.side {
-        return Err(PngFault::Malformed(PageFault::Side(side.into())));
+        return Err(PictureFault::Malformed(PageFault::Side(side.into())));
     }
     if info.interlaced {
-        return Err(PngFault::Unsupported(UnsupportedFeature::Interlaced));
+        return Err(PictureFault::Unsupported(UnsupportedFeature::Interlaced));
+    }
+    if info.animation_control.is_some_and(|animation| animation.num_frames > 1) {
+        return Err(PictureFault::Unsupported(UnsupportedFeature::SeveralImages));
     }
     let samples = Samples::of(info)?;
     Ok((reader, samples))
@@ -143,61 +125,59 @@ fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(PngRows<'a>, Samples), P
 
 /// A PNG's encoding of gray levels.
 struct Samples {
+    /// Bits per sample, at most 8.
     bits: usize,
-    /// The level of each sample value.
-    levels: Vec<u8>,
+    /// Samples per pixel.
+    channels: usize,
+    /// The level of each sample value, or none for a palette's colour.
+    levels: Vec<Option<u8>>,
 }
 
 impl Samples {
-    fn of(info: &Info<'_>) -> Result<Self, PngFault> {
+    fn of(info: &Info<'_>) -> Result<Self, PictureFault> {
         if info.trns.is_some() {
-            return Err(PngFault::Unsupported(UnsupportedFeature::Transparency));
+            return Err(PictureFault::Unsupported(UnsupportedFeature::Transparency));
         }
         let bits = match info.bit_depth {
             BitDepth::Sixteen => {
-                return Err(PngFault::Unsupported(UnsupportedFeature::SixteenBits));
+                return Err(PictureFault::Unsupported(UnsupportedFeature::SixteenBits));
             }
             depth => depth as usize,
         };
+        let highest = (1u32 << bits) - 1;
         let levels = match info.color_type {
-            ColorType::Grayscale => {
-                let highest = (1 << bits) - 1;
-                (0..=highest).map(|sample: u32| (sample * 255 / highest) as u8).collect()
+            ColorType::Indexed => {
+                let palette = info.palette.as_deref().unwrap_or_default();
+                palette.chunks(3).map(|entry| gray_level(entry).ok()).collect()
             }
-            ColorType::Indexed => gray_palette(info.palette.as_deref().unwrap_or_default())?,
-            ColorType::GrayscaleAlpha => {
-                return Err(PngFault::Unsupported(UnsupportedFeature::Transparency));
-            }
-            ColorType::Rgb | ColorType::Rgba => {
-                return Err(PngFault::Unsupported(UnsupportedFeature::PngColour));
-            }
+            _ => (0..=highest).map(|sample| Some((sample * 255 / highest) as u8)).collect(),
         };
-        Ok(Self { bits, levels })
+        Ok(Self { bits, channels: info.color_type.samples(), levels })
     }
 
     /// Returns whether the image is 1-bit, black and white.
     fn are_bits(&self) -> bool {
-        self.bits == 1 && matches!(*self.levels, [0, 255] | [255, 0])
+        let is_black_and_white =
+            matches!(*self.levels, [Some(0), Some(255)] | [Some(255), Some(0)]);
+        self.bits == 1 && is_black_and_white
     }
 
-    /// Unpacks the samples of a row to a byte each.
-    fn unpack(&self, row: &[u8], width: u32, samples: &mut Vec<u8>) {
+    /// Unpacks the samples of a row to a byte for each pixel.
+    fn unpack(&self, row: &[u8], width: u32, samples: &mut Vec<u8>) -> Result<(), PictureFault> {
         samples.clear();
+        if self.channels > 1 {
+            for pixel in row.chunks_exact(self.channels) {
+                samples.push(gray_level(pixel)?);
+            }
+            return Ok(());
+        }
         let mask = 0xFF >> (8 - self.bits);
         for byte in row {
             samples.extend((0..8).step_by(self.bits).map(|b| byte >> (8 - self.bits - b) & mask));
         }
         samples.truncate(width as usize);
+        Ok(())
     }
-}
-
-/// Returns the levels of a palette of grays.
-fn gray_palette(palette: &[u8]) -> Result<Vec<u8>, PngFault> {
-    let level = |entry: &[u8]| match *entry {
-        [r, g, b] if r == g && g == b => Ok(r),
-        _ => Err(PngFault::Unsupported(UnsupportedFeature::PngPalette)),
-    };
-    palette.chunks(3).map(level).collect()
 }
 
 /// Returns the resolution: from the JSON line's key if it rounds to the same whole pixels

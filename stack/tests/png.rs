@@ -75,7 +75,7 @@ fn one_bit_pngs_are_masks() {
     let error = palette(&[0, 0, 0]).unwrap_err().to_string();
     assert!(error.contains("palette has no entry 1"), "{error}");
     let error = palette(&[0, 0, 0, 255, 0, 0]).unwrap_err().to_string();
-    assert!(error.contains("a palette of colours is not read"), "{error}");
+    assert!(error.contains("a picture in colour is not read"), "{error}");
 }
 
 #[test]
@@ -87,6 +87,18 @@ fn pngs_of_more_bits_are_gray() {
     ] {
         let file = png(4, (ColorType::Grayscale, depth), row, 1, |_| {});
         assert_eq!(picture(&read(file).unwrap().image), [expected], "{depth:?}");
+    }
+}
+
+#[test]
+fn pngs_of_colours_that_are_gray_are_gray() {
+    for (colour, row) in [
+        (ColorType::Rgb, &[0, 0, 0, 200, 200, 200, 7, 7, 7][..]),
+        (ColorType::Rgba, &[0, 0, 0, 255, 200, 200, 200, 255, 7, 7, 7, 255]),
+        (ColorType::GrayscaleAlpha, &[0, 255, 200, 255, 7, 255]),
+    ] {
+        let file = png(3, (colour, BitDepth::Eight), row, 1, |_| {});
+        assert_eq!(picture(&read(file).unwrap().image), ["1:200 2:7 "], "{colour:?}");
     }
 }
 
@@ -113,9 +125,11 @@ fn what_is_not_read_is_named() {
     let eight = |colour| (colour, BitDepth::Eight);
     let clear = |encoder: &mut Encoder<'_, &mut Vec<u8>>| encoder.set_trns(vec![0, 1]);
     for (file, words) in [
-        (png(1, eight(ColorType::Rgb), &[1, 1, 1], 1, |_| {}), "a PNG in colour"),
-        (png(1, eight(ColorType::Rgba), &[1, 1, 1, 1], 1, |_| {}), "a PNG in colour"),
+        (png(1, eight(ColorType::Rgb), &[1, 1, 3], 1, |_| {}), "a picture in colour"),
+        (png(1, eight(ColorType::Rgba), &[1, 3, 1, 255], 1, |_| {}), "a picture in colour"),
+        (png(1, eight(ColorType::Rgba), &[1, 1, 1, 254], 1, |_| {}), "transparency"),
         (png(1, eight(ColorType::GrayscaleAlpha), &[1, 1], 1, |_| {}), "transparency"),
+        (animated(), "a picture file of several images"),
         (png(1, BITS, &[0], 1, clear), "transparency"),
         (png(1, (ColorType::Grayscale, BitDepth::Sixteen), &[1, 1], 1, |_| {}), "16 bits"),
         (interlaced(), "an interlaced PNG"),
@@ -123,6 +137,19 @@ fn what_is_not_read_is_named() {
         let error = read(file).unwrap_err().to_string();
         assert!(error.contains(words) && error.contains("is not read here"), "{error}");
     }
+}
+
+fn animated() -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = Encoder::new(&mut file, 8, 1);
+    encoder.set_animated(2, 0).unwrap();
+    encoder.set_depth(BitDepth::One);
+    let mut writer = encoder.write_header().unwrap();
+    for frame in [0x0F, 0xF0] {
+        writer.write_image_data(&[frame]).unwrap();
+    }
+    writer.finish().unwrap();
+    file
 }
 
 fn interlaced() -> Vec<u8> {
@@ -182,7 +209,7 @@ fn a_folder_of_pngs_is_a_stack() {
 
     fs::write(folder.path().join("page.tif"), "").unwrap();
     let error = Pages::open(folder.path()).unwrap_err();
-    assert!(matches!(error, StackError::MixedPages), "{error}");
+    assert!(matches!(error, StackError::MixedPages { formats: ["PNG", "TIFF"] }), "{error}");
 }
 
 #[test]

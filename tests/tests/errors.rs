@@ -198,8 +198,8 @@ fn a_stack_that_cannot_be_read_is_named_with_what_is_wrong() {
     for (name, words) in [
         ("missing.tif", &["No such file"][..]),
         ("folder", &["holds no .tif"]),
-        ("cube.stl", &["not a TIFF stack"]),
-        ("text.stl", &["not a TIFF stack"]),
+        ("cube.stl", &["neither a TIFF stack nor a picture"]),
+        ("text.stl", &["neither a TIFF stack nor a picture"]),
         ("empty.stl", &["empty"]),
     ] {
         let place = format!("{name}: ");

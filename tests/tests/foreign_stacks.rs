@@ -1,8 +1,10 @@
-//! Checks that every kind of TIFF and PNG that libtiff and Pillow write is read with the same
-//! pixels.
+//! Checks that every kind of TIFF and picture that libtiff, Pillow and the image crate write is read
+//! with the same pixels.
 
 use std::fs;
 
+use image::RgbImage;
+use lamp_fixtures::Sample;
 use lamp_stack::{
     Destination, Dpi, Format, GrayMask, Image, Layer, MaskBuilder, PageInfo, StackError,
     write_stack,
@@ -240,9 +242,72 @@ fn stages_read_pngs_from_files_folders_and_pipes() {
     assert_eq!(scratch.bytes("piped.tif"), scratch.bytes("one.tif"));
 
     fs::copy(scratch.path("one.tif"), scratch.path("pngs/3.tif")).unwrap();
-    let words = ["dither: pngs: ", ".tif and .png", "move the others away"];
+    let words = ["dither: pngs: ", "PNG and TIFF pages", "move the others away"];
     scratch.run("dither pngs -o x.tif").is_refused_with(&words);
     scratch.run_on("lamp info", &png[..png.len() - 5]).is_refused_with(&["cut off"]);
+}
+
+/// Writes the layers of a sliced cube as a folder of pictures that end in `extension`.
+fn cube_as_pictures(scratch: &Scratch, extension: &str) {
+    fs::create_dir(scratch.path(extension)).unwrap();
+    for layer in scratch.layers("cube.tif") {
+        let mask = lamp_tests::mask(&layer);
+        let level = |column, row| [255 * u8::from(mask.is_white(column, row)); 3];
+        let picture = RgbImage::from_fn(mask.width(), mask.height(), |x, y| level(x, y).into());
+        let name = format!("{extension}/{}.{extension}", layer.info.index);
+        picture.save(scratch.path(&name)).unwrap();
+    }
+}
+
+#[test]
+fn stages_read_folders_of_pictures_and_meshes_their_templates() {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Sample::Cube, 64);
+    scratch.run("slice cube.stl --dpi 100 --thickness 5mm -o cube.tif").succeeds();
+    let images = |name: &str| -> Vec<Image> {
+        scratch.layers(name).into_iter().map(|layer| layer.image.into_image()).collect()
+    };
+    let tile = |mesh: &str| {
+        let line = format!("tile cube.tif --mesh {mesh} --area 60x60mm -o build.tif");
+        scratch.run(&line).succeeds();
+        images("build.tif")
+    };
+    scratch.run("lamp convert cube.tif --png -o png/").succeeds();
+    let meshed = tile("png/layer_00000.png");
+    for extension in ["bmp", "ppm", "jpg", "webp", "gif"] {
+        cube_as_pictures(&scratch, extension);
+        let line = format!("dither {extension} --method threshold -o {extension}.tif");
+        scratch.run(&line).succeeds_quietly();
+        assert!(images(&format!("{extension}.tif")) == images("cube.tif"), "{extension}");
+        assert!(tile(&format!("{extension}/0.{extension}")) == meshed, "{extension}");
+    }
+    let of_gif = scratch.run("lamp info gif").succeeds_quietly().stdout;
+    assert!(String::from_utf8(of_gif).unwrap().contains("bytes, GIF\n"));
+    fs::copy(scratch.path("jpg/0.jpg"), scratch.path("gif/8.jpg")).unwrap();
+    scratch.run("dither gif -o x.tif").is_refused_with(&["gif: ", "GIF and JPEG pages"]);
+    let red = RgbImage::from_pixel(9, 9, [200, 0, 0].into());
+    red.save(scratch.path("red.bmp")).unwrap();
+    let words = ["red.bmp: ", "a picture in colour is not read here"];
+    scratch.run("tile cube.tif --mesh red.bmp -o x.tif").is_refused_with(&words);
+}
+
+#[test]
+fn pictures_that_pillow_writes_are_read() {
+    let scratch = Scratch::new();
+    stack(&scratch, "masks.tif", mask);
+    stack(&scratch, "grays.tif", gray);
+    let script = r#"
+for k, (mask, gray) in enumerate(zip(pages("masks.tif"), pages("grays.tif"))):
+    for extension in "bmp", "pbm":
+        mask.save(f"mask_{k}.{extension}")
+        tell(f"mask_{k}.{extension}", mask)
+    for extension in "bmp", "pgm", "gif":
+        gray.save(f"gray_{k}.{extension}")
+        tell(f"gray_{k}.{extension}", gray)
+    gray.save(f"gray_{k}.webp", lossless=True)
+    tell(f"gray_{k}.webp", gray)
+"#;
+    python_writes(&scratch, script);
 }
 
 #[test]

@@ -182,5 +182,6 @@ fn compression_name(compression: Compression) -> &'static str {
         Compression::Deflate => "Deflate",
         Compression::PackBits => "PackBits",
         Compression::Png => "PNG",
+        Compression::Picture(format) => format.name(),
     }
 }

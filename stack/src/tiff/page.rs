@@ -11,6 +11,7 @@ use crate::limits::Limits;
 use crate::mask::Mask;
 use crate::ordered::MemorySize;
 use crate::orientation::Orientation;
+use crate::picture_page::{self, PictureFormat};
 use crate::png_page::{self, Header};
 use crate::runs::{Change, RunImage};
 use crate::tiff::fields::malformed;
@@ -39,6 +40,8 @@ pub enum Compression {
     PackBits,
     /// The page is a PNG file.
     Png,
+    /// The page is another picture file.
+    Picture(PictureFormat),
 }
 
 /// A page that is not decoded yet.
@@ -70,7 +73,10 @@ impl MemorySize for Page {
         // A code of one to four bits becomes a transition of four bytes; the other
         // compressions have no fixed ratio.
         let growth = match self.compression {
-            Compression::Lzw | Compression::Deflate | Compression::Png => 64,
+            Compression::Lzw
+            | Compression::Deflate
+            | Compression::Png
+            | Compression::Picture(_) => 64,
             _ => 16,
         };
         growth * self.strip_bytes() as usize + 4 * self.layout.page_height as usize
@@ -78,8 +84,14 @@ impl MemorySize for Page {
 }
 
 impl Page {
-    /// Creates a page from a PNG file.
-    pub(super) fn of_png(number: u32, limits: Limits, header: Header, file: Vec<u8>) -> Self {
+    /// Creates a page from the file of a PNG or another picture.
+    pub(super) fn of_picture(
+        number: u32,
+        limits: Limits,
+        compression: Compression,
+        header: Header,
+        file: Vec<u8>,
+    ) -> Self {
         let Header { width, height, gray, dpi, info } = header;
         Self {
             number,
@@ -90,7 +102,7 @@ impl Page {
             gray,
             white_is_zero: false,
             orientation: Orientation::default(),
-            compression: Compression::Png,
+            compression,
             differences: false,
             layout: Layout::strips(width, height, height),
             pieces: vec![file],
@@ -117,13 +129,15 @@ impl Page {
     /// # Errors
     /// Returns an error if a strip or tile does not decode to the size that the directory states.
     pub fn decode(mut self) -> Result<Layer, StackError> {
-        let image = match self.gray {
-            _ if self.compression == Compression::Png => {
-                png_page::decode(&self.pieces[0], &self.limits)
+        let image = match self.compression {
+            Compression::Png => png_page::decode(&self.pieces[0], &self.limits)
+                .map_err(|fault| fault.on(self.number))?,
+            Compression::Picture(format) => {
+                picture_page::decode(format, &self.pieces[0], &self.limits)
                     .map_err(|fault| fault.on(self.number))?
             }
-            true => Image::Gray(self.decode_gray()?),
-            false => Image::Mask(self.decode_mask()?),
+            _ if self.gray => Image::Gray(self.decode_gray()?),
+            _ => Image::Mask(self.decode_mask()?),
         };
         let image = if self.is_in_our_layout() {
             LayerImage::with_strip(image, self.pieces.remove(0))

@@ -5,20 +5,21 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 
 use super::fields::{Fields, KNOWN, malformed, number};
-use super::page::Page;
+use super::page::{Compression, Page};
 use super::source::Source;
 use super::tags::{FILL_ORDER, type_size};
 use crate::error::{PageFault, StackError};
 use crate::limits::Limits;
+use crate::picture_page::{self, PictureFormat};
 use crate::png_page;
 
 /// Reads pages in order from a stream (forward only) or a file (parts in any order). A
-/// PNG file is a single page.
+/// PNG or another picture file is a single page.
 #[derive(Debug)]
 pub struct PageReader {
     source: Source,
     limits: Limits,
-    png: bool,
+    kind: FileKind,
     big: bool,
     little_endian: bool,
     /// The offset of the next directory; 0 after the last page.
@@ -33,7 +34,7 @@ impl PageReader {
     /// Reads from a stream, such as standard input.
     ///
     /// # Errors
-    /// Returns an error if the stream is empty or does not start as a TIFF or a PNG.
+    /// Returns an error if the stream is empty or does not start as a TIFF or a picture.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
         let stream = BufReader::with_capacity(1 << 18, Box::new(stream) as Box<dyn Read + Send>);
         Self::new(Source::Stream { stream, position: 0 })
@@ -42,7 +43,7 @@ impl PageReader {
     /// Reads from a file.
     ///
     /// # Errors
-    /// Returns an error if the file is empty or does not start as a TIFF or a PNG.
+    /// Returns an error if the file is empty or does not start as a TIFF or a picture.
     pub fn from_file(file: File) -> Result<Self, StackError> {
         Self::new(Source::File { file: BufReader::with_capacity(1 << 18, file), position: 0 })
     }
@@ -57,13 +58,13 @@ impl PageReader {
         if start.is_empty() {
             return Err(StackError::Empty);
         }
-        let png = start == png_page::SIGNATURE;
+        let kind = FileKind::of_start(&start);
         let (little_endian, big) = match start.as_slice() {
             [b'I', b'I', 42, 0, ..] => (true, false),
             [b'M', b'M', 0, 42, ..] => (false, false),
             [b'I', b'I', 43, 0, ..] => (true, true),
             [b'M', b'M', 0, 43, ..] => (false, true),
-            _ if png => (false, false),
+            _ if kind != FileKind::Tiff => (false, false),
             // The signature of a TIFF or a PNG is cut off.
             [b'I']
             | [b'I', b'I']
@@ -78,19 +79,23 @@ impl PageReader {
             }
             _ => return Err(StackError::NotTiff { start }),
         };
-        if big {
-            start = source.read_up_to(8, 8)?;
+        let next = if kind == FileKind::Tiff {
+            if big {
+                start = source.read_up_to(8, 8)?;
+            } else {
+                start.drain(..4.min(start.len()));
+            }
+            if start.len() < if big { 8 } else { 4 } {
+                return Err(StackError::CutOff { last_whole: None });
+            }
+            number(&start, little_endian)
         } else {
-            start.drain(..4.min(start.len()));
-        }
-        if start.len() < if big { 8 } else { 4 } {
-            return Err(StackError::CutOff { last_whole: None });
-        }
-        let next = if png { 8 } else { number(&start, little_endian) };
+            start.len() as u64
+        };
         Ok(Self {
             source,
             limits: Limits::default(),
-            png,
+            kind,
             big,
             little_endian,
             next,
@@ -113,7 +118,14 @@ impl PageReader {
     }
 
     fn read_page(&mut self) -> Result<Page, StackError> {
-        let (page, next) = if self.png { (self.read_png()?, 0) } else { self.read_tiff_page()? };
+        let (page, next) = match &self.kind {
+            FileKind::Tiff => self.read_tiff_page()?,
+            FileKind::Png => (self.read_png()?, 0),
+            FileKind::Picture { format, start } => {
+                let (format, start) = (*format, start.clone());
+                (self.read_picture(format, start)?, 0)
+            }
+        };
         self.next = next;
         self.number += 1;
         self.last_whole = Some(page.info.index);
@@ -246,7 +258,48 @@ impl PageReader {
         }
         let header =
             png_page::header(&file, &self.limits).map_err(|fault| fault.on(self.number))?;
-        Ok(Page::of_png(self.number, self.limits, header, file))
+        Ok(Page::of_picture(self.number, self.limits, Compression::Png, header, file))
+    }
+
+    /// Reads the rest of the file as one page.
+    fn read_picture(
+        &mut self,
+        format: PictureFormat,
+        mut file: Vec<u8>,
+    ) -> Result<Page, StackError> {
+        let most = self.limits.png_bytes;
+        let rest = self.source.read_up_to(file.len() as u64, most)?;
+        file.extend_from_slice(&rest);
+        if file.len() as u64 > most {
+            return Err(malformed(self.number, PageFault::PictureFileBytes(most)));
+        }
+        let header = picture_page::header(format, &file, &self.limits)
+            .map_err(|fault| fault.on(self.number))?;
+        let compression = Compression::Picture(format);
+        Ok(Page::of_picture(self.number, self.limits, compression, header, file))
+    }
+}
+
+/// What the first bytes of a file say it is.
+#[derive(Debug, PartialEq)]
+enum FileKind {
+    /// A TIFF, or nothing that is read.
+    Tiff,
+    Png,
+    /// Another picture, with its first bytes, which a stream gives only once.
+    Picture {
+        format: PictureFormat,
+        start: Vec<u8>,
+    },
+}
+
+impl FileKind {
+    fn of_start(start: &[u8]) -> Self {
+        match PictureFormat::of_start(start) {
+            Some(format) => Self::Picture { format, start: start.to_owned() },
+            None if start == png_page::SIGNATURE => Self::Png,
+            None => Self::Tiff,
+        }
     }
 }
 
