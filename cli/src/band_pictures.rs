@@ -1,15 +1,15 @@
 //! Draws a picture of each band that `fix` corrected or left, for `--evidence`.
 
-use std::fs;
+use std::fs::File;
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use lamp_postprocess::{Band, BandOutcome, Fixed};
-use lamp_stack::{Image, write_rgb_png};
+use lamp_stack::{FolderBeside, Image, write_rgb_png};
 
 use crate::exit::Exit;
 use crate::picture::{Region, levels_of_region};
-use crate::streams::write_file;
+use crate::streams::new_folder;
 
 /// Rows above and below a band, and columns beside it, that are shown with it.
 const ROWS_AROUND: u32 = 16;
@@ -25,19 +25,15 @@ const GUTTER: [u8; 3] = [128; 3];
 
 /// A folder of pictures, one for each band.
 pub(crate) struct BandPictures {
-    folder: PathBuf,
-    failed: Option<Exit>,
+    folder: FolderBeside,
+    name: PathBuf,
+    failed: Option<io::Error>,
 }
 
 impl BandPictures {
-    /// Makes the folder, which must not hold anything yet.
-    pub(crate) fn new(folder: &Path) -> Result<Self, Exit> {
-        let name = || folder.display().to_string();
-        fs::create_dir_all(folder).with_context(name)?;
-        if fs::read_dir(folder).with_context(name)?.next().is_some() {
-            return Err(Exit::usage(format!("{}: the folder for pictures is not empty", name())));
-        }
-        Ok(Self { folder: folder.to_owned(), failed: None })
+    /// Prepares the folder, in place of one that an earlier run wrote if that is forced.
+    pub(crate) fn new(folder: &Path, force: bool) -> Result<Self, Exit> {
+        Ok(Self { folder: new_folder(folder, force)?, name: folder.to_owned(), failed: None })
     }
 
     /// Draws the bands of a layer. After a failure it draws no more.
@@ -49,12 +45,15 @@ impl BandPictures {
         }
     }
 
-    /// Returns the first failure to draw, if any.
+    /// Gives the folder its name, or returns the first failure to draw.
     pub(crate) fn finish(self) -> Result<(), Exit> {
-        self.failed.map_or(Ok(()), Err)
+        let Self { folder, name, failed } = self;
+        let whole = failed.map_or(Ok(folder), |error| Err(error.into()));
+        let whole = whole.and_then(FolderBeside::persist);
+        whole.map_err(|error| Exit::from(error).at(name.display().to_string()))
     }
 
-    fn draw(&self, fixed: &Fixed<'_>, band: &Band) -> Result<(), Exit> {
+    fn draw(&self, fixed: &Fixed<'_>, band: &Band) -> io::Result<()> {
         let region = region(&fixed.before.image, band);
         let panel = |image: &Image| -> Vec<Vec<u8>> { levels_of_region(image, &region).collect() };
         let before = panel(&fixed.before.image);
@@ -74,9 +73,8 @@ impl BandPictures {
             if corrected { "" } else { "_left" },
         );
         let (width, height) = (rows[0].len() as u32 / 3, rows.len() as u32);
-        write_file(&self.folder.join(name), |out| {
-            write_rgb_png(out, width, height, rows.into_iter())
-        })
+        let file = File::create_new(self.folder.path().join(name))?;
+        write_rgb_png(BufWriter::new(file), width, height, rows.into_iter())
     }
 }
 

@@ -3,6 +3,7 @@
 //! Libraries state facts and know no options; this is the one place that adds them.
 
 use std::error::Error;
+use std::io;
 
 use lamp_adaptive::HeightsError;
 use lamp_grayscale::calibrate::DataError;
@@ -13,7 +14,7 @@ use lamp_postprocess::{
     StripsError, TileError,
 };
 use lamp_slicer::SliceError;
-use lamp_stack::{CatalogueError, Length};
+use lamp_stack::{CatalogueError, Length, StackError};
 
 /// Returns what to try about an error, to stand after its message.
 pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
@@ -31,6 +32,8 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
         .or_else(|| error.downcast_ref().and_then(data))
+        .or_else(|| error.downcast_ref().and_then(stack))
+        .or_else(|| error.downcast_ref().and_then(input_output))
         .or_else(catalogued)
 }
 
@@ -183,6 +186,28 @@ fn data(error: &DataError) -> Option<String> {
         DataError::NoLight => Some("give --intensity, as 1.6W/cm2".to_owned()),
         _ => None,
     }
+}
+
+fn stack(error: &StackError) -> Option<String> {
+    let hint = match error {
+        StackError::Exists => "--force replaces a folder of an earlier run",
+        StackError::NotReplaceable { .. } => "choose another name, or remove the folder yourself",
+        // It is transparent, so that it is no cause of its own.
+        StackError::Io(error) => return input_output(error),
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn input_output(error: &io::Error) -> Option<String> {
+    let hint = match error.kind() {
+        io::ErrorKind::FileTooLarge => "raise the limit (ulimit -f), or write to another disk",
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "make room, or write to another disk"
+        }
+        _ => return None,
+    };
+    Some(hint.to_owned())
 }
 
 fn catalogue<F>(error: &CatalogueError<F>) -> Option<String> {

@@ -56,6 +56,10 @@ pub(crate) struct Output {
     /// Write a classic TIFF (at most 4 GiB) instead of a BigTIFF
     #[arg(long)]
     pub(crate) classic: bool,
+
+    /// Replace a folder that an earlier run wrote, once the new one is complete
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 /// Returns a parser of a library's named values, which `--help` lists.

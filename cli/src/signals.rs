@@ -3,13 +3,23 @@
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
 
+use anyhow::Context;
 use lamp_stack::remove_temporaries;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{
+    SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
+    SIGXFSZ,
+};
 use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 
+/// The signals that end a process which does not expect them.
+const ENDING: [i32; 10] =
+    [SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGUSR1, SIGUSR2];
+
 static CAUGHT: AtomicBool = AtomicBool::new(false);
+
+const WATCH: &str = "the thread that waits for signals";
 
 /// If a signal is ending the process, waits for that: what fails meanwhile,
 /// because its files are gone, is not to be told.
@@ -21,19 +31,21 @@ pub(crate) fn wait_if_ending() {
 
 /// Lets Ctrl-C, and the signals that end a batch, take temporary files away
 /// before the process ends, with status 128 + the signal's number, as shells
-/// have it. A signal that is ignored, as `nohup` arranges, stays so.
+/// have it. A signal that is ignored, as `nohup` arranges, stays so. A file
+/// that passes the limit of sizes is an error of writing it, and no signal.
 pub(crate) fn clean_up_on_signals() -> Result<(), Exit> {
     let ignored = ignored_signals();
-    let wanted = [SIGHUP, SIGINT, SIGTERM];
-    let wanted = wanted.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    let mut signals = Signals::new(wanted).map_err(|error| Exit::Failed(error.into()))?;
-    thread::spawn(move || {
-        if let Some(signal) = signals.forever().next() {
+    let wanted = ENDING.into_iter().chain([SIGXFSZ]);
+    let wanted = wanted.filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let mut signals = Signals::new(wanted).context(WATCH)?;
+    let watch = move || {
+        if let Some(signal) = signals.forever().find(|&signal| signal != SIGXFSZ) {
             CAUGHT.store(true, Relaxed);
             remove_temporaries();
             std::process::exit(128 + signal);
         }
-    });
+    };
+    thread::Builder::new().spawn(watch).context(WATCH)?;
     Ok(())
 }
 

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use lamp_stack::{
-    Destination, FileBeside, Format, Layer, Page, Pages, StackError, StackInfo, map_in_order,
-    write_stack,
+    Destination, FileBeside, FolderBeside, Format, Layer, Page, Pages, StackError, StackInfo,
+    map_in_order, write_stack,
 };
 
 use crate::exit::Exit;
@@ -186,7 +186,7 @@ pub(crate) fn write_layers(
     output: &Output,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    let to = destination(&output.output)?;
+    let to = destination(output)?;
     let counted = layers.inspect(|_| progress.layer_done());
     let written = write_stack(counted, to, format(output.classic));
     written_to(&output.output, written, progress)
@@ -211,7 +211,8 @@ pub(crate) fn written_to(
     })
 }
 
-fn destination(path: &Path) -> Result<Destination, Exit> {
+fn destination(output: &Output) -> Result<Destination, Exit> {
+    let path = output.output.as_path();
     if is_stream(path) {
         if io::stdout().is_terminal() {
             return Err(Exit::usage(
@@ -222,7 +223,7 @@ fn destination(path: &Path) -> Result<Destination, Exit> {
         return Ok(Destination::Stream(Box::new(io::stdout().lock())));
     }
     if is_folder(path) {
-        return Ok(Destination::Folder(folder_to_make(path)?.to_owned()));
+        return Ok(Destination::Folder(new_folder(path, output.force)?));
     }
     if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) {
         return Err(Exit::usage(format!(
@@ -241,12 +242,16 @@ pub(crate) fn is_folder(path: &Path) -> bool {
     path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.is_dir()
 }
 
-/// Returns the path if a folder can have that name.
-pub(crate) fn folder_to_make(path: &Path) -> Result<&Path, Exit> {
-    match path.file_name() {
-        Some(_) if !is_stream(path) => Ok(path),
-        _ => Err(Exit::usage(format!("{}: name the folder to write to", path.display()))),
+/// Returns a folder that gets its name when it is complete, in place of one that an earlier run
+/// wrote if that is forced.
+pub(crate) fn new_folder(path: &Path, force: bool) -> Result<FolderBeside, Exit> {
+    let name = || path.display().to_string();
+    if path.file_name().is_none() || is_stream(path) {
+        return Err(Exit::usage(format!("{}: name the folder to write to", name())));
     }
+    let folder =
+        if force { FolderBeside::replacing(path) } else { FolderBeside::over_nothing(path) };
+    folder.map_err(|error| Exit::Failed(error.into()).at(name()))
 }
 
 /// Checks, before the work, that a file can be written beside the stack: its folder exists, and it

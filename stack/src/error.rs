@@ -108,10 +108,14 @@ pub enum StackError {
     #[error("there is no layer to write")]
     NoLayers,
     /// The output folder is not empty.
-    #[error(
-        "a folder of pages is not written over what is there: remove it or choose another name"
-    )]
+    #[error("a folder is not written over what is there")]
     Exists,
+    /// The folder to be replaced holds what no command writes into folders.
+    #[error("only what an earlier run wrote is replaced, and this folder holds {name}")]
+    NotReplaceable {
+        /// The name of such a file or folder.
+        name: String,
+    },
     /// Reading or writing failed.
     #[error(transparent)]
     Io(#[from] io::Error),

@@ -34,6 +34,7 @@ mod gray;
 mod input;
 mod join;
 mod layer;
+mod leftovers;
 mod length;
 mod limits;
 mod mask;

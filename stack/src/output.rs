@@ -14,8 +14,8 @@ use crate::tiff::{EncodedPage, Format, PageWriter};
 pub enum Destination {
     /// One multipage file, written under a temporary name and renamed when complete.
     File(PathBuf),
-    /// A folder of single-page files, renamed likewise. It must be empty or not exist.
-    Folder(PathBuf),
+    /// A folder of single-page files.
+    Folder(FolderBeside),
     /// A stream, such as standard output.
     Stream(Box<dyn Write>),
 }
@@ -68,9 +68,7 @@ impl Sink {
                 let out = BufWriter::with_capacity(BUFFER_BYTES, temporary.file().try_clone()?);
                 Self::File { pages: PageWriter::new(out, format), temporary }
             }
-            Destination::Folder(path) => {
-                Self::Folder { temporary: FolderBeside::over_nothing(&path)?, format, empty: true }
-            }
+            Destination::Folder(temporary) => Self::Folder { temporary, format, empty: true },
         })
     }
 

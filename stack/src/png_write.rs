@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
 
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, Filter, PixelDimensions, Unit,
@@ -22,21 +21,19 @@ use crate::temporary::FolderBeside;
 /// The folder gets its name when it is complete.
 ///
 /// # Errors
-/// Returns the first error among the layers, or an error if the folder cannot be written. It
-/// must be empty or not exist.
+/// Returns the first error among the layers, or an error if the folder cannot be written.
 pub fn write_png_folder<E>(
     layers: impl Iterator<Item = Result<Layer, E>>,
-    folder: &Path,
+    folder: FolderBeside,
 ) -> Result<(), E>
 where
     E: From<StackError> + Send,
 {
-    let temporary = FolderBeside::over_nothing(folder)?;
     let pages = map_in_order(layers, |layer: Layer| Ok((layer.info.index, png_of_layer(&layer)?)));
     let mut empty = true;
     for page in pages {
         let (index, png) = page?;
-        let path = temporary.path().join(format!("layer_{index:05}.png"));
+        let path = folder.path().join(format!("layer_{index:05}.png"));
         let written = File::create_new(path).and_then(|mut file| file.write_all(&png));
         written.map_err(StackError::from)?;
         empty = false;
@@ -44,7 +41,7 @@ where
     if empty {
         return Err(StackError::NoLayers.into());
     }
-    Ok(temporary.persist().map_err(StackError::from)?)
+    Ok(folder.persist()?)
 }
 
 /// Encodes a layer as a PNG: 1-bit for a mask, 8-bit for a gray mask. A `tEXt` chunk with

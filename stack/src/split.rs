@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::BufWriter;
 use std::num::NonZeroU32;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use thiserror::Error;
 
@@ -64,17 +64,17 @@ impl SplitPoints {
 ///
 /// # Errors
 /// Returns the first error among the layers, or an error if layers are missing, a cut is at no
-/// layer, or the folder cannot be written. The folder must be empty or not exist.
+/// layer, or the folder cannot be written.
 pub fn write_split<E>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     cuts: &SplitPoints,
-    folder: &Path,
+    folder: FolderBeside,
     format: Format,
 ) -> Result<(), E>
 where
     E: From<StackError> + From<SplitError> + Send,
 {
-    let mut folder = Folder { temporary: FolderBeside::over_nothing(folder)?, format, open: None };
+    let mut folder = Folder { temporary: folder, format, open: None };
     let mut plan = Plan { cuts, stack: None, first: 0, last: None, file: 0..0 };
     let placed = layers.map(|layer| {
         let mut layer = layer?;
@@ -174,7 +174,7 @@ impl Folder {
             return Err(StackError::NoLayers);
         }
         self.close()?;
-        Ok(self.temporary.persist()?)
+        self.temporary.persist()
     }
 
     /// Returns the temporary path of the current file, whose last layer is not yet known.

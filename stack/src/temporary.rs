@@ -1,32 +1,51 @@
 //! Creates files and folders that get their name only when they are complete.
 
 use std::collections::BTreeSet;
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::thread;
+use std::time::Duration;
 
 use tempfile::{Builder, NamedTempFile, TempDir};
 
 use crate::error::StackError;
+use crate::leftovers::{END, RANDOM_LETTERS, claim, remove_leftovers, start_of_name};
+use crate::text::one_line;
 
-/// The temporary files and folders that exist now.
+/// The temporary files and folders of this process that exist now.
 static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// The prefix of temporary names: hidden, and short even if the final name is long.
-const PREFIX: &str = ".lamp-";
+/// How often a temporary file is made anew that another process removed at once.
+const ATTEMPTS: usize = 100;
 
 /// Removes the temporary files and folders of this process. Call it before exiting without
 /// running destructors.
+///
+/// Gives up after a second if another thread keeps them: that thread may be stopped. The next
+/// process that writes to their folders removes them.
 pub fn remove_temporaries() {
-    // The set is valid even if a thread panicked while it held the lock.
-    let mut live = LIVE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let locked = (0..100).find_map(|_| match LIVE.try_lock() {
+        Ok(live) => Some(live),
+        // The set is valid even if a thread panicked while it held the lock.
+        Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) => {
+            thread::sleep(Duration::from_millis(10));
+            None
+        }
+    });
+    let Some(mut live) = locked else { return };
+    // Nothing gets its final name while it is being removed: the lock is held.
     for path in std::mem::take(&mut *live) {
-        // The path may already be removed or renamed. A folder that another thread still
-        // fills may need several attempts.
+        // A folder that another thread still fills may need several attempts.
         let remove = || fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
         let _ = (0..100).find(|_| remove().is_ok() || !path.exists());
     }
+}
+
+fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    LIVE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Keeps a path in [`LIVE`] until it is dropped.
@@ -34,23 +53,35 @@ struct Registered(PathBuf);
 
 impl Registered {
     fn new(path: &Path) -> Self {
-        LIVE.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(path.to_owned());
+        live().insert(path.to_owned());
         Self(path.to_owned())
+    }
+
+    /// Gives the file or folder another name, unless [`remove_temporaries`] was faster.
+    fn rename<E: From<io::Error>>(&self, rename: impl FnOnce() -> Result<(), E>) -> Result<(), E> {
+        let live = live();
+        if !live.contains(&self.0) {
+            return Err(io::Error::from(io::ErrorKind::Interrupted).into());
+        }
+        rename()
     }
 }
 
 impl Drop for Registered {
     fn drop(&mut self) {
-        LIVE.lock().unwrap_or_else(std::sync::PoisonError::into_inner).remove(&self.0);
+        live().remove(&self.0);
     }
 }
 
 /// A temporary file in the folder of its final path, removed on drop unless [`persist`]ed.
 ///
+/// Its name tells the final one, and a lock that it is in use. What writers that were killed left
+/// in that folder is removed.
+///
 /// [`persist`]: Self::persist
 pub struct FileBeside {
     file: NamedTempFile,
-    _registered: Registered,
+    registered: Registered,
     path: PathBuf,
 }
 
@@ -60,18 +91,26 @@ impl FileBeside {
     /// # Errors
     /// Returns an error if no file can be created in that folder.
     pub fn new(path: &Path) -> io::Result<Self> {
-        let mut builder = Builder::new();
-        set_mode(&mut builder, 0o666);
-        let file = builder.prefix(PREFIX).suffix(".part").tempfile_in(folder_of(path)?)?;
-        if let Ok(before) = fs::metadata(path) {
-            file.as_file().set_permissions(before.permissions())?;
+        let folder = folder_of(path)?;
+        remove_leftovers(folder);
+        let start = start_of_name(path);
+        let builder = builder(&start, 0o666);
+        for _ in 0..ATTEMPTS {
+            let file = builder.tempfile_in(folder)?;
+            if !claim(file.as_file(), file.path()) {
+                continue;
+            }
+            if let Ok(before) = fs::metadata(path) {
+                file.as_file().set_permissions(before.permissions())?;
+            }
+            let registered = Registered::new(file.path());
+            return Ok(Self { file, registered, path: path.to_owned() });
         }
-        let registered = Registered::new(file.path());
-        Ok(Self { file, _registered: registered, path: path.to_owned() })
+        Err(cannot_claim())
     }
 
     /// Returns the file, for writing.
-    pub fn file(&mut self) -> &mut fs::File {
+    pub fn file(&mut self) -> &mut File {
         self.file.as_file_mut()
     }
 
@@ -80,37 +119,57 @@ impl FileBeside {
     /// # Errors
     /// Returns an error if renaming fails.
     pub fn persist(self) -> io::Result<()> {
-        self.file.persist(self.path).map_err(|error| error.error)?;
-        Ok(())
+        let Self { file, registered, path } = self;
+        registered.rename(|| file.persist(path).map(drop).map_err(|error| error.error))
     }
 }
 
 /// A temporary folder, otherwise like [`FileBeside`].
 pub struct FolderBeside {
     folder: TempDir,
-    _registered: Registered,
+    registered: Registered,
     path: PathBuf,
+    replaces: bool,
+    /// Holds the lock, where the system locks folders.
+    _handle: Option<File>,
 }
 
 impl FolderBeside {
-    fn new(path: &Path) -> io::Result<Self> {
-        let mut builder = Builder::new();
-        set_mode(&mut builder, 0o777);
-        let folder = builder.prefix(PREFIX).suffix(".part").tempdir_in(folder_of(path)?)?;
-        let registered = Registered::new(folder.path());
-        Ok(Self { folder, _registered: registered, path: path.to_owned() })
-    }
-
     /// Creates a folder that will become `path`, which must be an empty folder or not exist.
     ///
     /// # Errors
     /// Returns an error if `path` is anything else, or no folder can be created there.
     pub fn over_nothing(path: &Path) -> Result<Self, StackError> {
-        let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
-        if path.exists() && !is_empty() {
-            return Err(StackError::Exists);
+        Self::new(path, false)
+    }
+
+    /// Creates a folder that will become `path`, and then replaces a folder there. That may only
+    /// hold files with the names of pages, ranges of layers, strips, targets or pictures, as this
+    /// workspace writes them. It stays until the new one is complete.
+    ///
+    /// # Errors
+    /// Returns an error if `path` is anything else, or no folder can be created there.
+    pub fn replacing(path: &Path) -> Result<Self, StackError> {
+        Self::new(path, true)
+    }
+
+    fn new(path: &Path, replaces: bool) -> Result<Self, StackError> {
+        // A folder is replaced, not a link to it.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        check_replaceable(&path, replaces)?;
+        let parent = folder_of(&path)?;
+        remove_leftovers(parent);
+        let start = start_of_name(&path);
+        let builder = builder(&start, 0o777);
+        for _ in 0..ATTEMPTS {
+            let folder = builder.tempdir_in(parent)?;
+            let handle = File::open(folder.path()).ok();
+            if handle.as_ref().is_none_or(|handle| claim(handle, folder.path())) {
+                let registered = Registered::new(folder.path());
+                return Ok(Self { folder, registered, path, replaces, _handle: handle });
+            }
         }
-        Ok(Self::new(path)?)
+        Err(cannot_claim().into())
     }
 
     /// Returns the folder's temporary path.
@@ -118,16 +177,82 @@ impl FolderBeside {
         self.folder.path()
     }
 
-    /// Renames the folder to its final name.
+    /// Renames the folder to its final name, and removes the one that it replaces.
     ///
     /// # Errors
-    /// Returns an error if renaming fails.
-    pub fn persist(self) -> io::Result<()> {
-        fs::rename(self.folder.path(), &self.path)?;
-        // The folder has been renamed, so there is nothing to remove.
-        let _ = self.folder.keep();
+    /// Returns an error if there is something now that is not to be replaced, or renaming fails.
+    pub fn persist(self) -> Result<(), StackError> {
+        let (from, to) = (self.folder.path(), &self.path);
+        let mut replaced = false;
+        self.registered.rename(|| {
+            replaced = check_replaceable(to, self.replaces)? == Existing::Replaceable;
+            let renamed = if replaced { exchange(from, to) } else { fs::rename(from, to) };
+            renamed.map_err(StackError::from)
+        })?;
+        let from = self.folder.keep();
+        if replaced {
+            // What remains of it is removed as a dead writer's.
+            let _ = fs::remove_dir_all(from);
+        }
         Ok(())
     }
+}
+
+/// Exchanges two folders at once, so that a process that ends at any time leaves one of them.
+fn exchange(new: &Path, old: &Path) -> io::Result<()> {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        if renameat_with(CWD, new, CWD, old, RenameFlags::EXCHANGE).is_ok() {
+            return Ok(());
+        }
+    }
+    // Some file systems cannot. Then the old folder is aside for a moment, under a name that
+    // nothing removes.
+    let aside = new.with_extension("old");
+    fs::rename(old, &aside)?;
+    fs::rename(new, old).inspect_err(|_| drop(fs::rename(&aside, old)))?;
+    fs::rename(aside, new)
+}
+
+/// What stands where a folder will be.
+#[derive(PartialEq, Eq)]
+enum Existing {
+    /// Nothing, or an empty folder.
+    Nothing,
+    /// A folder that an earlier run wrote.
+    Replaceable,
+}
+
+fn check_replaceable(path: &Path, replaces: bool) -> Result<Existing, StackError> {
+    let entries = match fs::read_dir(path) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Existing::Nothing),
+        Err(_) => return Err(StackError::Exists),
+    };
+    let mut existing = Existing::Nothing;
+    for entry in entries {
+        if !replaces {
+            return Err(StackError::Exists);
+        }
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if !entry.file_type()?.is_file() || !is_name_in_folders(&name) {
+            return Err(StackError::NotReplaceable { name: one_line(&name) });
+        }
+        existing = Existing::Replaceable;
+    }
+    Ok(existing)
+}
+
+/// Returns whether commands give that name to files in the folders that they write.
+fn is_name_in_folders(name: &str) -> bool {
+    const STARTS: [&str; 4] = ["layer_", "layers_", "strip_", "squares_"];
+    let numbered = |start: &&str| {
+        name.strip_prefix(start).is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+    };
+    let is_image = name.ends_with(".tif") || name.ends_with(".png");
+    matches!(name, "strips.json" | "squares.csv") || is_image && STARTS.iter().any(numbered)
 }
 
 /// Returns the parent folder of `path`.
@@ -143,11 +268,18 @@ fn folder_of(path: &Path) -> io::Result<&Path> {
     Err(io::Error::new(io::ErrorKind::NotFound, message))
 }
 
-/// Sets the usual permissions of new files (subject to the umask) instead of the private
-/// ones of temporary files.
-fn set_mode(builder: &mut Builder<'_, '_>, mode: u32) {
+fn cannot_claim() -> io::Error {
+    io::Error::other("other programs remove its temporary files as soon as they are made")
+}
+
+/// Returns a builder of temporary names that start with `start`. They have the usual permissions
+/// of new files (subject to the umask) instead of the private ones of temporary files.
+fn builder(start: &str, mode: u32) -> Builder<'_, 'static> {
+    let mut builder = Builder::new();
+    builder.prefix(start).rand_bytes(RANDOM_LETTERS).suffix(END);
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
     #[cfg(not(unix))]
-    let _ = (builder, mode);
+    let _ = mode;
+    builder
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::Command;
 
 use lamp_stack::{
-    Destination, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Mask, PageInfo, PageReader,
-    PageWriter, Pages, StackError, StackInfo, write_stack,
+    Destination, Dpi, EncodedPage, FolderBeside, Format, GrayMask, Image, Layer, Mask, PageInfo,
+    PageReader, PageWriter, Pages, StackError, StackInfo, write_stack,
 };
 use tiff::decoder::{Decoder, DecodingResult};
 
@@ -154,7 +154,7 @@ fn a_file_and_a_folder_read_back() {
     for (name, folder_of_pages) in [("stack.tif", false), ("stack", true)] {
         let path = folder.path().join(name);
         let to = if folder_of_pages {
-            Destination::Folder(path.clone())
+            Destination::Folder(FolderBeside::over_nothing(&path).unwrap())
         } else {
             Destination::File(path.clone())
         };
@@ -203,13 +203,13 @@ fn a_folder_of_stacks_is_no_stack() {
 #[test]
 fn a_failure_leaves_nothing_under_the_final_name() {
     let folder = tempfile::tempdir().unwrap();
-    for to in [
-        Destination::File(folder.path().join("stack.tif")),
-        Destination::Folder(folder.path().join("stack")),
-    ] {
+    let path = folder.path().join("stack");
+    let file = || Destination::File(path.clone());
+    let pages = || Destination::Folder(FolderBeside::over_nothing(&path).unwrap());
+    for to in [&file as &dyn Fn() -> Destination, &pages] {
         let cut =
             layers(3).into_iter().map(Ok).chain([Err(StackError::CutOff { last_whole: Some(2) })]);
-        assert!(write_stack(cut, to, Format::Big).is_err());
+        assert!(write_stack(cut, to(), Format::Big).is_err());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }
@@ -218,10 +218,40 @@ fn a_failure_leaves_nothing_under_the_final_name() {
 fn a_folder_in_use_is_not_written_over() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("thesis.doc"), "mine").unwrap();
-    let to = Destination::Folder(folder.path().to_owned());
-    let written = write_stack::<StackError>(layers(1).into_iter().map(Ok), to, Format::Big);
-    assert!(matches!(written, Err(StackError::Exists)));
+    assert!(matches!(FolderBeside::over_nothing(folder.path()), Err(StackError::Exists)));
+    let replacing = FolderBeside::replacing(folder.path());
+    assert!(matches!(replacing, Err(StackError::NotReplaceable { name }) if name == "thesis.doc"));
     assert!(folder.path().join("thesis.doc").exists());
+}
+
+#[test]
+fn a_folder_is_replaced_when_the_new_one_is_complete() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pages");
+    let write = |count: u32, fails: bool| {
+        let failure = fails.then_some(Err(StackError::CutOff { last_whole: None }));
+        let layers = layers(count).into_iter().map(Ok).chain(failure);
+        let to = Destination::Folder(FolderBeside::replacing(&path).unwrap());
+        write_stack::<StackError>(layers, to, Format::Big)
+    };
+    let pages = || std::fs::read_dir(&path).unwrap().count();
+    write(3, false).unwrap();
+    assert!(write(2, true).is_err());
+    assert_eq!(pages(), 3);
+    write(2, false).unwrap();
+    assert_eq!(pages(), 2);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary folders remain");
+
+    // What came in the meantime is not replaced either.
+    let late = FolderBeside::replacing(&path).unwrap();
+    std::fs::write(path.join("notes.txt"), "mine").unwrap();
+    let late = write_stack::<StackError>(
+        layers(1).into_iter().map(Ok),
+        Destination::Folder(late),
+        Format::Big,
+    );
+    assert!(matches!(late, Err(StackError::NotReplaceable { name }) if name == "notes.txt"));
+    assert_eq!(pages(), 3);
 }
 
 #[test]

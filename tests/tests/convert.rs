@@ -173,5 +173,5 @@ fn a_png_replaces_the_file_that_was_there_and_a_folder_does_not() {
     fs::create_dir(scratch.path("pngs")).unwrap();
     scratch.run("lamp convert build.tif --png -o pngs").succeeds_quietly();
     let ran = scratch.run("lamp convert build.tif --png -o pngs");
-    ran.is_refused_with(&["convert: pngs: ", "remove it or choose another name"]);
+    ran.is_refused_with(&["convert: pngs: ", "--force replaces a folder"]);
 }

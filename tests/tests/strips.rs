@@ -243,7 +243,7 @@ fn what_cannot_be_cut_leaves_nothing() {
     let cut = scratch.bytes("tower.tif");
     scratch.write("tower.tif", &cut[..cut.len() / 2]);
     for (options, words) in [
-        ("--strips full --mirrors 100", &["full", "remove it or choose another name"][..]),
+        ("--strips full --mirrors 100", &["full", "--force replaces a folder"][..]),
         ("--strips no/s --mirrors 100", &["no/s", "there is no folder no"]),
         ("--strips s --mirrors 100", &["tower.tif", "cut off"]),
         ("--strips s --mirrors 100 -o build.tif", &["tower.tif", "cut off"]),

@@ -15,8 +15,8 @@ use crate::options::{Common, Input, Output};
 use crate::progress::say;
 use crate::step_options::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
 use crate::streams::{
-    check_beside, folder_to_make, input_name, is_folder, is_stream, progress, read_layers,
-    write_file, write_layers, written_to,
+    check_beside, input_name, is_folder, is_stream, new_folder, progress, read_layers, write_file,
+    write_layers, written_to,
 };
 
 /// Convert a stack to a file, a folder of pages or PNGs, or a STEP part to STL
@@ -75,7 +75,8 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
         OutputKind::Tiff => write_layers(layers, &args.output, &progress),
         OutputKind::Pngs => {
             let counted = layers.inspect(|_| progress.layer_done());
-            written_to(output, write_png_folder(counted, output), &progress)
+            let folder = new_folder(output, args.output.force)?;
+            written_to(output, write_png_folder(counted, folder), &progress)
         }
         OutputKind::Png => {
             let png = png_of_layer(&only_layer(layers, &input_name(&args.input.stack))?)?;
@@ -121,10 +122,10 @@ impl ConvertArgs {
     }
 
     fn shape(&self) -> Result<OutputKind, Exit> {
-        let Output { output, classic } = &self.output;
+        let Output { output, classic, .. } = &self.output;
         let named_png = output.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
         match (is_folder(output), self.png) {
-            (true, true) => folder_to_make(output).map(|_| OutputKind::Pngs),
+            (true, true) => Ok(OutputKind::Pngs),
             (false, _) if named_png && *classic => {
                 Err(Exit::usage("--classic is for TIFFs: leave it out, or name a .tif file"))
             }

@@ -166,7 +166,11 @@ fn write(
     stack: &Path,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    write_layers(layers, &Output { output: stack.to_owned(), classic: false }, progress)
+    write_layers(
+        layers,
+        &Output { output: stack.to_owned(), classic: false, force: false },
+        progress,
+    )
 }
 
 /// The layers of a stack that are pictured.

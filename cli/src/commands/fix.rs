@@ -88,7 +88,9 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("fix", common, &args.output);
     let options = args.options();
     let mut findings = FixReport::new(options);
-    let mut evidence = args.evidence.as_deref().map(BandPictures::new).transpose()?;
+    let evidence = args.evidence.as_deref();
+    let mut evidence =
+        evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
     let mut layer_count = 0;
     let layers = read_layers(&args.input, &progress)?.inspect(|_| layer_count += 1);
     let fixed = lamp_postprocess::fix(layers, options, |fixed| {

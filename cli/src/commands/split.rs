@@ -9,7 +9,7 @@ use lamp_stack::{SplitError, SplitPoints, write_split};
 use crate::exit::Exit;
 use crate::options::{Common, Input};
 use crate::progress::Progress;
-use crate::streams::{folder_to_make, format, input_name, read_layers, written_to};
+use crate::streams::{format, input_name, new_folder, read_layers, written_to};
 
 /// Split a stack into files, each with a range of layers
 ///
@@ -35,13 +35,17 @@ pub(crate) struct SplitArgs {
     #[arg(long, value_name = "LAYER,...", group = "cuts", value_delimiter = ',')]
     at: Vec<u32>,
 
-    /// Folder to write to; it must not exist, or be empty
+    /// Folder to write to; without --force it must not exist, or be empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 
     /// Write classic TIFFs (at most 4 GiB each) instead of BigTIFFs
     #[arg(long)]
     classic: bool,
+
+    /// Replace a folder that an earlier run wrote, once the new one is complete
+    #[arg(long)]
+    force: bool,
 }
 
 pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Exit> {
@@ -54,7 +58,7 @@ pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Exit> {
             ));
         }
     };
-    let folder = folder_to_make(&args.output)?;
+    let folder = new_folder(&args.output, args.force)?;
     let progress = Progress::new("split", common.quiet, true);
     let layers = read_layers(&args.input, &progress)?.inspect(|_| progress.layer_done());
     let written = write_split(layers, &cuts, folder, format(args.classic));

@@ -2,7 +2,6 @@
 
 use std::fs::{self, File};
 use std::io::BufWriter;
-use std::path::Path;
 
 use lamp_stack::{
     EncodedPage, FolderBeside, Format, Layer, MAX_SIDE, MemorySize, PageWriter, StackError,
@@ -36,14 +35,13 @@ struct OpenStrips {
 }
 
 impl StripWriter {
-    /// Prepares a folder of strips of `mirrors` columns, each of which shares `overlap` columns
+    /// Prepares strips of `mirrors` columns, each of which shares `overlap` columns
     /// with the next.
     ///
     /// # Errors
-    /// Returns an error if there are no such swaths, or the folder exists and is not empty, or
-    /// cannot be made.
+    /// Returns an error if there are no such swaths.
     pub fn new(
-        folder: &Path,
+        folder: FolderBeside,
         mirrors: u32,
         overlap: u32,
         format: Format,
@@ -52,7 +50,6 @@ impl StripWriter {
         if mirrors > MAX_SIDE {
             return Err(StripsError::Mirrors { mirrors, max: MAX_SIDE });
         }
-        let folder = FolderBeside::over_nothing(folder)?;
         Ok(Self { folder, format, mirrors, overlap, open: None })
     }
 
@@ -117,7 +114,7 @@ impl StripWriter {
             file.finish()?;
         }
         fs::write(self.folder.path().join(INDEX), index.to_json()).map_err(StackError::from)?;
-        Ok(self.folder.persist().map_err(StackError::from)?)
+        Ok(self.folder.persist()?)
     }
 }
 

@@ -139,11 +139,16 @@ fn pictures_go_to_an_empty_folder() {
     scratch.write("pictures/mine.txt", b"keep");
     let names = scratch.names();
     let ran = scratch.run("fix stray.tif --evidence pictures -o fixed.tif");
-    assert_eq!(ran.statuses, [Some(2)]);
-    assert!(ran.stderr.contains("pictures: the folder for pictures is not empty"), "{ran:?}");
+    ran.is_refused_with(&["pictures: a folder is not written over", "--force"]);
+    let ran = scratch.run("fix stray.tif --evidence pictures -o fixed.tif --force");
+    ran.is_refused_with(&["pictures: only what an earlier run wrote", "mine.txt"]);
     assert_eq!((scratch.names(), pictures(&scratch)), (names, vec!["mine.txt".to_owned()]));
 
     fs::remove_file(scratch.path("pictures/mine.txt")).unwrap();
     scratch.run("fix stray.tif --evidence pictures -o fixed.tif").succeeds();
     assert!(!pictures(&scratch).is_empty());
+    let drawn = pictures(&scratch);
+    fs::remove_file(scratch.path("pictures").join(&drawn[0])).unwrap();
+    scratch.run("fix stray.tif --evidence pictures -o fixed.tif --force").succeeds();
+    assert_eq!(pictures(&scratch), drawn);
 }

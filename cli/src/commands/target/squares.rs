@@ -3,21 +3,18 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::{ArgGroup, Args};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_grayscale::target::{TargetExposure, squares};
-use lamp_stack::{
-    Destination, Dpi, FolderBeside, Format, Layer, Length, PageInfo, StackInfo, write_stack,
-};
+use lamp_stack::{Destination, Dpi, Format, Layer, Length, PageInfo, StackInfo, write_stack};
 
 use super::{parse_gap, whole_pixels};
 use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::options::{Common, parse_light};
 use crate::progress::Progress;
-use crate::streams::{folder_to_make, write_file};
+use crate::streams::{new_folder, write_file, written_to};
 
 /// Write squares of several sizes, each at several doses, to calibrate the cure width
 ///
@@ -58,13 +55,16 @@ pub(super) struct SquaresArgs {
     #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_gap)]
     gap: Length,
 
-    /// Folder to write to; it must not exist, or be empty
+    /// Folder to write to; without --force it must not exist, or be empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+
+    /// Replace a folder that an earlier run wrote, once the new one is complete
+    #[arg(long)]
+    force: bool,
 }
 
 pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
-    let folder = folder_to_make(&args.output)?;
     let light = args.light()?;
     let gap = whole_pixels(args.gap, args.dpi);
     let mut sizes = args.sizes.clone();
@@ -78,8 +78,7 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
         .into_iter()
         .map(|size| Ok((size, squares(size, gap, doses)?)))
         .collect::<Result<_, Exit>>()?;
-    let to = FolderBeside::over_nothing(folder)
-        .map_err(|error| Exit::Failed(error.into()).at(folder.display().to_string()))?;
+    let to = new_folder(&args.output, args.force)?;
     let mut table = TABLE_HEAD.to_owned();
     let stacks = targets.len();
     for (size, exposures) in targets {
@@ -91,11 +90,11 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
         write_stack(args.layers(size, exposures, light), Destination::File(path), Format::Big)?;
     }
     write_file(&to.path().join("squares.csv"), |out| out.write_all(table.as_bytes()))?;
-    to.persist().with_context(|| folder.display().to_string())?;
     let progress = Progress::new("target", common.quiet, true);
+    written_to(&args.output, to.persist().map_err(Exit::from), &progress)?;
     progress.say(&format!(
         "{}: {} of {}, and squares.csv to fill in",
-        folder.display(),
+        args.output.display(),
         counted(stacks, "stack"),
         counted(doses.len(), "exposure")
     ));

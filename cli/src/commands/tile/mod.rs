@@ -132,6 +132,10 @@ pub(crate) struct TileArgs {
     /// Write classic TIFFs (at most 4 GiB) instead of BigTIFFs
     #[arg(long)]
     classic: bool,
+
+    /// Replace folders that an earlier run wrote, once the new ones are complete
+    #[arg(long)]
+    force: bool,
 }
 
 pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
@@ -146,7 +150,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     if let Some((machine, area)) = machine.as_ref().zip(args.area) {
         machine.check_area(area).map_err(Exit::wrong_options)?;
     }
-    let strips = args.strips.writer(machine.as_ref(), args.classic)?;
+    let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
     let file = args.layout.as_deref().map(read_layout).transpose()?;
     let mut stacks = InputStack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
     let needs_outlines = args.fit || args.pack == PackBy::Outlines || args.mesh.needs_outlines();
@@ -223,7 +227,7 @@ impl TileArgs {
     fn output(&self) -> Option<Output> {
         let unless_strips = || self.strips.folder().is_none().then(|| PathBuf::from("-"));
         let output = self.output.clone().or_else(unless_strips)?;
-        Some(Output { output, classic: self.classic })
+        Some(Output { output, classic: self.classic, force: self.force })
     }
 
     fn counts(&self) -> Vec<Option<u32>> {

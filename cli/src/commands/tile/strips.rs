@@ -10,7 +10,7 @@ use lamp_stack::Layer;
 use crate::exit::Exit;
 use crate::options::Output;
 use crate::progress::Progress;
-use crate::streams::{folder_to_make, format, write_layers};
+use crate::streams::{format, new_folder, write_layers};
 
 const HEADING: &str = "Strips of a projector that scans";
 
@@ -45,9 +45,9 @@ impl StripArgs {
         &self,
         machine: Option<&Machine>,
         classic: bool,
+        force: bool,
     ) -> Result<Option<StripOutput>, Exit> {
         let Some(folder) = &self.strips else { return Ok(None) };
-        let folder = folder_to_make(folder)?;
         let of_machine = machine.and_then(|machine| machine.strips.as_ref());
         let mirrors = self.mirrors.or(of_machine.map(|strips| strips.mirrors));
         let Some(mirrors) = mirrors else {
@@ -60,7 +60,8 @@ impl StripArgs {
         };
         let of_machine = of_machine.filter(|_| self.mirrors.is_none());
         let overlap = self.overlap.or(of_machine.map(|strips| strips.overlap)).unwrap_or(0);
-        match StripWriter::new(folder, mirrors, overlap, format(classic)) {
+        let new = new_folder(folder, force)?;
+        match StripWriter::new(new, mirrors, overlap, format(classic)) {
             Ok(writer) => Ok(Some(StripOutput { folder: folder.to_owned(), writer })),
             Err(error @ (StripsError::Swaths(_) | StripsError::Mirrors { .. })) => {
                 Err(Exit::wrong_options(error))
