@@ -62,7 +62,7 @@ pub enum LengthError {
     #[error("`{0}` is not a length: write a number and a unit, as 100um, 0.1mm, 4mil or 0.004in")]
     NotALength(String),
     /// The number has no unit, or an unknown one.
-    #[error("`{text}` has no unit that is known: add um, mm, mil or in")]
+    #[error("`{text}` has no unit that is known: add um, mm, cm, m, mil or in")]
     NoUnit {
         /// The given text.
         text: String,
@@ -89,6 +89,8 @@ fn split_unit(text: &str) -> Result<(f64, Option<f64>), LengthError> {
         "" => None,
         "um" | "µm" | "μm" => Some(1.0),
         "mm" => Some(1000.0),
+        "cm" => Some(10_000.0),
+        "m" => Some(1_000_000.0),
         "in" | "inch" | "\"" => Some(25_400.0),
         "mil" => Some(25.4),
         _ => return Err(LengthError::NoUnit { text: digits.to_owned() }),
@@ -99,7 +101,7 @@ fn split_unit(text: &str) -> Result<(f64, Option<f64>), LengthError> {
 impl FromStr for Length {
     type Err = LengthError;
 
-    /// Parses a number and its unit: `um`, `mm`, `in` (or `inch`) or `mil`.
+    /// Parses a number and its unit: `um`, `mm`, `cm`, `m`, `in` (or `inch`) or `mil`.
     ///
     /// # Errors
     /// Returns an error if the number is missing or the unit is missing or unknown.
@@ -239,6 +241,8 @@ mod tests {
             ("1 inch", 25_400.0),
             ("-2mm", -2000.0),
             ("1e-1mm", 100.0),
+            ("5cm", 50_000.0),
+            ("1.2m", 1_200_000.0),
         ] {
             let length: Length = text.parse().unwrap();
             assert!((length.um() - um).abs() < 1e-9, "{text}");
