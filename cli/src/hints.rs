@@ -41,7 +41,10 @@ fn slicing(error: &SliceError) -> Option<String> {
     let hint = match error {
         SliceError::EmptyFile | SliceError::Ascii { .. } => "export the part again",
         SliceError::Count { .. } => "export it again",
-        SliceError::NotAFile => "pipe it in and give - as the part",
+        SliceError::Folder => "name the part's file in it",
+        SliceError::Changed { .. } => "slice it again once nothing writes to it",
+        SliceError::Packed(_) => "pack it again",
+        SliceError::Inflated { .. } => "unpack it first",
         SliceError::OtherFormat(_) => "export the part as one",
         SliceError::NotFinite { .. } => "repair or export the part again",
         SliceError::TooFar { .. } => "check --units, --scale and --translate",

@@ -4,6 +4,10 @@ use std::io::{self, BufRead, Cursor, Read, Seek, SeekFrom};
 
 use crate::error::{AsciiFault, SliceError};
 use crate::facet::Facet;
+use crate::text_lines::{TextLines, without_mark};
+
+/// More bytes than any line of a facet has.
+const MAX_LINE_BYTES: usize = 4096;
 
 /// Returns true if a file that starts with these bytes is ASCII STL: text that begins
 /// with `solid` and goes on with a facet, or ends at once, or has a first line
@@ -17,50 +21,30 @@ pub(crate) fn looks_ascii(start: &[u8], is_whole: bool) -> bool {
         && (holds(b"facet") || holds(b"endsolid") || !is_whole)
 }
 
-/// Returns a text without the byte order mark that some editors put before it.
-fn without_mark(text: &[u8]) -> &[u8] {
-    text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text)
-}
-
 /// Reads the facets of all solids of an ASCII file.
-pub(crate) fn read(text: &[u8]) -> Result<Vec<Facet>, SliceError> {
+pub(crate) fn read(text: impl BufRead) -> Result<Vec<Facet>, SliceError> {
     let mut facets = Vec::new();
-    let text = without_mark(text);
-    // Lines of old Macintosh files end in a carriage return alone.
-    let end_of_line = if text.contains(&b'\n') { b'\n' } else { b'\r' };
-    let mut rest = text.trim_ascii();
-    while !rest.is_empty() {
-        let (solid, behind) = rest.split_at(end_of_solid(rest, end_of_line));
-        read_solid(solid, end_of_line, &mut facets)?;
-        rest = behind.trim_ascii_start();
+    let mut lines = TextLines::new(text, MAX_LINE_BYTES);
+    while lines.advance()? {
+        let is_solid = |line: &[u8]| line.len() >= 5 && line[..5].eq_ignore_ascii_case(b"solid");
+        if !is_solid(without_mark(lines.line())) {
+            return Err(SliceError::Ascii { facet: facets.len(), fault: AsciiFault::NoSolid });
+        }
+        read_solid(&mut lines, &mut facets)?;
     }
     Ok(facets)
 }
 
-/// Returns where the solid at the start of `text` ends: behind its `endsolid` line.
-fn end_of_solid(text: &[u8], end_of_line: u8) -> usize {
-    let mut end = 0;
-    for line in text.split_inclusive(|&byte| byte == end_of_line) {
-        end += line.len();
-        let word = line.trim_ascii_start();
-        if word.len() >= 8 && word[..8].eq_ignore_ascii_case(b"endsolid") {
-            break;
-        }
-    }
-    end
-}
-
-fn read_solid(text: &[u8], end_of_line: u8, facets: &mut Vec<Facet>) -> Result<(), SliceError> {
-    let failed = |facet, fault| SliceError::Ascii { facet, fault };
-    if text.len() < 5 || !text[..5].eq_ignore_ascii_case(b"solid") {
-        return Err(failed(facets.len(), AsciiFault::NoSolid));
-    }
-    let end_of_header = text.iter().position(|&byte| byte == end_of_line).unwrap_or(text.len());
-    let mut source = PlainText::new(&text[end_of_header..], end_of_line);
-    let triangles = stl_io::create_stl_reader(&mut source)
-        .map_err(|e| failed(facets.len(), AsciiFault::Line(e)))?;
+fn read_solid(
+    lines: &mut TextLines<impl BufRead>,
+    facets: &mut Vec<Facet>,
+) -> Result<(), SliceError> {
+    let failed = |facet, error| SliceError::Ascii { facet, fault: AsciiFault::Line(error) };
+    let mut source = PlainText::new(lines);
+    let triangles =
+        stl_io::create_stl_reader(&mut source).map_err(|error| failed(facets.len(), error))?;
     for triangle in triangles {
-        let triangle = triangle.map_err(|e| failed(facets.len(), AsciiFault::Line(e)))?;
+        let triangle = triangle.map_err(|error| failed(facets.len(), error))?;
         facets.push(triangle.vertices.map(|corner| corner.0));
     }
     Ok(())
@@ -68,23 +52,18 @@ fn read_solid(text: &[u8], end_of_line: u8, facets: &mut Vec<Facet>) -> Result<(
 
 /// A solid as stl_io reads it, line by line: in lower case, and without names, which
 /// may not be UTF-8, and normals, which may be no numbers. It would refuse both, though
-/// facets need neither. No line is long, however long the text's are.
-struct PlainText<'a> {
-    /// All but the first line.
-    body: &'a [u8],
-    /// The lines still to come.
-    rest: &'a [u8],
-    end_of_line: u8,
+/// facets need neither.
+struct PlainText<'a, R> {
+    /// The lines behind the solid's first.
+    lines: &'a mut TextLines<R>,
     line: Cursor<Vec<u8>>,
+    has_begun: bool,
+    has_ended: bool,
 }
 
-/// More words than any line has, and more bytes than any number.
-const MAX_WORDS: usize = 6;
-const MAX_WORD_BYTES: usize = 1000;
-
-impl<'a> PlainText<'a> {
-    fn new(body: &'a [u8], end_of_line: u8) -> Self {
-        Self { body, rest: body, end_of_line, line: Self::header() }
+impl<'a, R: BufRead> PlainText<'a, R> {
+    fn new(lines: &'a mut TextLines<R>) -> Self {
+        Self { lines, line: Self::header(), has_begun: false, has_ended: false }
     }
 
     /// Returns a first line, whatever the text's is.
@@ -93,56 +72,57 @@ impl<'a> PlainText<'a> {
     }
 
     /// Takes the next line off the text.
-    fn next_line(&mut self) {
-        let end = self.rest.iter().position(|&byte| byte == self.end_of_line);
-        let (line, rest) = self.rest.split_at(end.map_or(self.rest.len(), |end| end + 1));
-        self.rest = rest;
-        self.line = Cursor::new(plain(line));
+    fn next_line(&mut self) -> io::Result<()> {
+        self.has_begun = true;
+        if self.lines.advance()? {
+            let mut line = std::mem::take(&mut self.line).into_inner();
+            line.clear();
+            plain(self.lines.line(), &mut line);
+            self.has_ended = line == END;
+            self.line = Cursor::new(line);
+        } else {
+            self.has_ended = true;
+        }
+        Ok(())
     }
 }
 
-impl Read for PlainText<'_> {
+impl<R: BufRead> Read for PlainText<'_, R> {
     fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
-        while self.line.fill_buf()?.is_empty() && !self.rest.is_empty() {
-            self.next_line();
+        if self.line.fill_buf()?.is_empty() && !self.has_ended {
+            self.next_line()?;
         }
         self.line.read(to)
     }
 }
 
-impl Seek for PlainText<'_> {
-    /// Only to the start, as stl_io does once it knows the format.
+impl<R: BufRead> Seek for PlainText<'_, R> {
+    /// Only to the start, as stl_io does once it knows the format from the first line.
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        if to != SeekFrom::Start(0) {
+        if to != SeekFrom::Start(0) || self.has_begun {
             return Err(io::ErrorKind::Unsupported.into());
         }
-        self.rest = self.body;
         self.line = Self::header();
         Ok(0)
     }
 }
 
-/// Returns a line as stl_io reads it.
-fn plain(line: &[u8]) -> Vec<u8> {
-    let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    let words: Vec<&[u8]> = words.take(MAX_WORDS).collect();
-    let is = |i: usize, name: &str| {
-        words.get(i).is_some_and(|w| w.eq_ignore_ascii_case(name.as_bytes()))
-    };
-    if is(0, "endsolid") {
-        return b"endsolid\n".to_vec();
+/// The last line of a solid.
+const END: &[u8] = b"endsolid\n";
+
+/// Writes a line as stl_io reads it.
+fn plain(line: &[u8], plain: &mut Vec<u8>) {
+    let mut words = line.split(|&byte| byte == b' ');
+    let mut is = |name: &str| words.next().is_some_and(|w| w.eq_ignore_ascii_case(name.as_bytes()));
+    if line.len() >= 8 && line[..8].eq_ignore_ascii_case(b"endsolid") {
+        plain.extend_from_slice(END);
+    } else if is("facet") && is("normal") && words.count() == 3 {
+        plain.extend_from_slice(b"facet normal 0 0 0\n");
+    } else {
+        plain.extend_from_slice(line);
+        plain.make_ascii_lowercase();
+        plain.push(b'\n');
     }
-    if is(0, "facet") && is(1, "normal") && words.len() == 5 {
-        return b"facet normal 0 0 0\n".to_vec();
-    }
-    let mut plain = Vec::new();
-    for word in words {
-        plain.extend_from_slice(if word.len() > MAX_WORD_BYTES { b"..." } else { word });
-        plain.push(b' ');
-    }
-    plain.make_ascii_lowercase();
-    plain.push(b'\n');
-    plain
 }
 
 #[cfg(test)]

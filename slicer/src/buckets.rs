@@ -14,7 +14,7 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use crate::facet::Facet;
-use crate::part::map;
+use crate::part_file::for_each_record;
 use crate::placement::{PlacedFacet, PlacedPart, facet_heights};
 use crate::planes::Planes;
 use crate::table::FacetSource;
@@ -25,12 +25,18 @@ const RECORD_BYTES: usize = 36;
 /// All slabs together have at least this many buckets.
 const BUCKETS: usize = 128;
 
+/// Facets of a bucket that one transform places: their bytes in the file.
+#[derive(Clone, Debug)]
+struct Chunk {
+    bytes: Range<u64>,
+    transform: usize,
+}
+
 /// A part's facets by slab.
 #[derive(Debug)]
 pub(crate) struct Buckets {
     file: File,
-    /// The places of each bucket's chunks in the file.
-    chunks: Vec<Vec<Range<u64>>>,
+    chunks: Vec<Vec<Chunk>>,
     /// The number of buckets of each slab.
     per_slab: usize,
 }
@@ -58,24 +64,31 @@ impl Buckets {
         let writer = Mutex::new(BucketWriter { buckets, end: 0 });
         let blocks: Vec<usize> = (0..model.model.block_count()).collect();
         let piece = blocks.len().div_ceil(workers).max(1);
-        blocks.par_chunks(piece).try_for_each(|blocks| {
+        blocks.par_chunks(piece).try_for_each(|blocks| -> io::Result<()> {
             let mut gathered: Vec<_> =
                 (0..count).map(|_| Vec::with_capacity(chunk_bytes)).collect();
-            for &block in blocks {
-                let mut result = Ok(());
-                model.model.for_each_in_block(block, |facet| {
-                    order.for_each_bucket(&model.placed(facet), |bucket| {
-                        let records = &mut gathered[bucket];
-                        records.extend_from_slice(&record(facet));
-                        if records.len() + RECORD_BYTES > chunk_bytes && result.is_ok() {
-                            result = write(&writer, bucket, records);
-                        }
-                    });
-                })?;
-                result?;
+            let alike =
+                |a: &usize, b: &usize| model.transform_of_block(*a) == model.transform_of_block(*b);
+            for blocks in blocks.chunk_by(alike) {
+                let transform = model.transform_of_block(blocks[0]);
+                let write = |bucket, records: &mut _| write(&writer, bucket, records, transform);
+                for &block in blocks {
+                    let mut result = Ok(());
+                    model.model.for_each_in_block(block, |facet| {
+                        order.for_each_bucket(&model.placed(facet, transform), |bucket| {
+                            let records = &mut gathered[bucket];
+                            records.extend_from_slice(&record(facet));
+                            if records.len() + RECORD_BYTES > chunk_bytes && result.is_ok() {
+                                result = write(bucket, records);
+                            }
+                        });
+                    })?;
+                    result?;
+                }
+                let mut rest = gathered.iter_mut().enumerate();
+                rest.try_for_each(|(bucket, records)| write(bucket, records))?;
             }
-            let mut rest = gathered.iter_mut().enumerate();
-            rest.try_for_each(|(bucket, records)| write(&writer, bucket, records))
+            Ok(())
         })?;
         Ok(writer.into_inner().expect("no writer panics").buckets)
     }
@@ -144,13 +157,18 @@ struct BucketWriter {
     end: u64,
 }
 
-fn write(writer: &Mutex<BucketWriter>, bucket: usize, records: &mut Vec<u8>) -> io::Result<()> {
+fn write(
+    writer: &Mutex<BucketWriter>,
+    bucket: usize,
+    records: &mut Vec<u8>,
+    transform: usize,
+) -> io::Result<()> {
     if !records.is_empty() {
         let BucketWriter { buckets, end } = &mut *writer.lock().expect("no writer panics");
         buckets.file.write_all(records)?;
         let start = *end;
         *end += records.len() as u64;
-        buckets.chunks[bucket].push(start..*end);
+        buckets.chunks[bucket].push(Chunk { bytes: start..*end, transform });
         records.clear();
     }
     Ok(())
@@ -159,7 +177,7 @@ fn write(writer: &Mutex<BucketWriter>, bucket: usize, records: &mut Vec<u8>) -> 
 /// The facets of one slab.
 pub(crate) struct SlabFacets<'a> {
     file: &'a File,
-    chunks: Vec<Range<u64>>,
+    chunks: Vec<Chunk>,
     model: &'a PlacedPart,
 }
 
@@ -169,15 +187,13 @@ impl FacetSource for SlabFacets<'_> {
     }
 
     fn for_each_in(&self, piece: usize, mut each: impl FnMut(&PlacedFacet)) -> io::Result<()> {
-        let Range { start, end } = self.chunks[piece];
-        let bytes = map(self.file, start, (end - start) as usize)?;
-        for record in bytes.as_chunks::<RECORD_BYTES>().0 {
+        let Chunk { bytes, transform } = &self.chunks[piece];
+        for_each_record(self.file, bytes.clone(), |record: &[u8; RECORD_BYTES]| {
             let (numbers, _) = record.as_chunks::<4>();
             let number = |i: usize| f32::from_le_bytes(numbers[i]);
             let facet = std::array::from_fn(|c| std::array::from_fn(|axis| number(3 * c + axis)));
-            each(&self.model.placed(&facet));
-        }
-        Ok(())
+            each(&self.model.placed(&facet, *transform));
+        })
     }
 }
 

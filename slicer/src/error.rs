@@ -14,9 +14,19 @@ pub enum SliceError {
     /// The file holds nothing.
     #[error("the file is empty")]
     EmptyFile,
-    /// A folder or a device.
-    #[error("this is not a file that can be mapped")]
-    NotAFile,
+    /// A folder.
+    #[error("this is a folder, not a file")]
+    Folder,
+    /// A file that another program wrote to, or replaced, while it was read.
+    #[error(
+        "the file was changed while it was read, so that images would mix its versions: {change}"
+    )]
+    Changed {
+        /// The file, from 0, among those joined.
+        file: usize,
+        /// How it changed.
+        change: FileChange,
+    },
     /// Neither binary nor ASCII STL.
     #[error(
         "this is not an STL file: it has {size} bytes, and neither a binary header nor `solid` and `facet`"
@@ -26,8 +36,17 @@ pub enum SliceError {
         size: u64,
     },
     /// A file of a known format that is not read.
-    #[error("this is a {0} file, not an STL or STEP file")]
+    #[error("this is a {0} file, not an STL, STEP or OBJ file")]
     OtherFormat(&'static str),
+    /// A packed file that is damaged.
+    #[error("it cannot be unpacked: {0}")]
+    Packed(#[source] io::Error),
+    /// A packed file that holds far more than any mesh its size.
+    #[error("it unpacks to more than {most} bytes, which is far more than a packed mesh does")]
+    Inflated {
+        /// The most that is unpacked.
+        most: u64,
+    },
     /// A binary STL whose header does not agree with its size.
     #[error(
         "the header declares {declared} facets, which take {} bytes, but the file has {size}: {}",
@@ -47,6 +66,14 @@ pub enum SliceError {
         facet: usize,
         /// The fault there.
         fault: AsciiFault,
+    },
+    /// A line of an OBJ file that cannot be read.
+    #[error("line {line} of the OBJ file {fault}")]
+    Obj {
+        /// The line, from 1.
+        line: u64,
+        /// The fault there.
+        fault: ObjFault,
     },
     /// A coordinate that is no number.
     #[error("facet {facet} has a coordinate that is not a finite number")]
@@ -169,6 +196,47 @@ fn where_count_is_wrong(declared: u32, size: u64) -> String {
     } else {
         "bytes follow the last facet".to_owned()
     }
+}
+
+/// How a file changed while it was read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum FileChange {
+    /// It grew or shrank.
+    #[error("it had {before} bytes and has {now} now")]
+    Size {
+        /// Its bytes when it was opened.
+        before: u64,
+        /// Its bytes at the end.
+        now: u64,
+    },
+    /// It was written to.
+    #[error("it was written to")]
+    Content,
+    /// Its name stands for another file now.
+    #[error("another file has its name now")]
+    Replaced,
+}
+
+/// A fault of a line of an OBJ file.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ObjFault {
+    /// A vertex without three numbers, or a face with something else than numbers.
+    #[error("is no vertex of three numbers, and no face of numbers of vertices")]
+    Number,
+    /// A corner at a vertex that does not stand before it.
+    #[error("names a vertex that does not stand before it: there is no vertex {0}")]
+    NoVertex(i64),
+    /// A face that is none.
+    #[error("is a face with fewer than three corners")]
+    FewCorners,
+    /// A line that is longer than any face.
+    #[error("is longer than a megabyte")]
+    LongLine,
+    /// Curves and surfaces instead of faces.
+    #[error("is a free-form curve or surface, which is not read: only faces are")]
+    FreeForm,
 }
 
 /// A fault of an ASCII STL.

@@ -46,8 +46,10 @@ mod facet;
 mod facet_index;
 mod gray;
 mod grid;
+mod obj;
 mod open;
 mod part;
+mod part_file;
 mod placement;
 mod planes;
 pub mod scan;
@@ -56,12 +58,14 @@ mod slices;
 mod stl;
 mod survey;
 mod table;
+mod text_lines;
 mod trace;
+mod unpack;
 
 /// B-rep models: kernels, and reports of what they read.
 pub use lamp_brep as brep;
 
-pub use error::{AsciiFault, SliceError};
+pub use error::{AsciiFault, FileChange, ObjFault, SliceError};
 pub use exact::Polished;
 pub use facet::{Facet, Units};
 pub use facet_index::FacetIndex;

@@ -1,20 +1,24 @@
-//! Opens parts from files and streams, STL or STEP, as their content says.
+//! Opens parts from files and streams, in the format that their content says.
 
 use std::fs::File;
-use std::io::{Cursor, Read};
+use std::io::{BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use lamp_brep::{
-    BodyFault, BodyReport, BrepError, Prepared, ReadFn, START_BYTES, is_step, prepare,
-};
+use blake3::Hasher;
+use lamp_brep::{BodyFault, BodyReport, BrepError, Prepared, ReadFn, is_step, prepare};
 use lamp_stack::{Length, one_line};
 
 use crate::error::SliceError;
-use crate::part::Part;
+use crate::facet::Units;
+use crate::obj::{self, looks_obj};
+use crate::part::{Facets, Part, Piece};
+use crate::part_file::{PartFile, digest_text};
+use crate::stl;
+use crate::unpack::{is_gzip, unpack};
 
 /// The program that reads STEP files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,46 +67,61 @@ impl Default for OpenOptions {
     }
 }
 
+/// The bytes at a file's start that tell its format.
+const FORMAT_BYTES: u64 = 4096;
+
 impl Part {
-    /// Opens an STL or STEP file. Which one it is follows from its content.
+    /// Opens an STL, STEP or OBJ file, or one of these packed by gzip. Which one it
+    /// is follows from its content. A pipe is read to its end.
     ///
-    /// A binary STL must not change while the part is in use.
+    /// A binary STL must not change while the part is in use; [`check_unchanged`] tells.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read, is neither, contradicts itself or
-    /// holds no facets; or if bodies of a STEP file have faults.
+    /// Returns an error if the file cannot be read, is none of these, contradicts itself
+    /// or holds no facets; if bodies of a STEP file have faults; or if the file changed
+    /// while it was read.
+    ///
+    /// [`check_unchanged`]: Self::check_unchanged
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Self, SliceError> {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let mut file = File::open(path)?;
-        let mut start = Vec::new();
-        // `from_stl` refuses folders, which cannot be read.
-        let read = (&file).take(START_BYTES).read_to_end(&mut start);
-        if read.is_err() || !is_step(&start) {
-            return Self::from_stl(name, &file);
+        let file = File::open(path)?;
+        let metadata = file.metadata()?;
+        if metadata.is_dir() {
+            return Err(SliceError::Folder);
         }
-        file.read_to_end(&mut start)?;
-        Self::from_step(&name, start, options)
+        if !metadata.is_file() {
+            return Self::from_stream("pipe", file, options);
+        }
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        // The ending that says how the file is packed is no part of the name.
+        let name = name.strip_suffix(".stl").unwrap_or(&name);
+        Self::from_file(name, PartFile::new(file, path)?, options)
     }
 
-    /// Reads an STL or STEP file from a stream, such as standard input; an STL by way
-    /// of a temporary file.
+    /// Reads a part from a stream, such as standard input, by way of a temporary file.
     ///
     /// # Errors
     /// As [`open`](Self::open).
     pub fn from_stream(
         name: &str,
-        mut stream: impl Read,
+        stream: impl Read,
         options: &OpenOptions,
     ) -> Result<Self, SliceError> {
-        let mut start = Vec::new();
-        stream.by_ref().take(START_BYTES).read_to_end(&mut start)?;
-        if is_step(&start) {
-            stream.read_to_end(&mut start)?;
-            return Self::from_step(name, start, options);
-        }
-        let mut file = tempfile::tempfile()?;
-        std::io::copy(&mut Cursor::new(start).chain(stream), &mut file)?;
-        Self::from_stl(name.to_owned(), &file)
+        Self::from_file(name, PartFile::of_stream(stream)?, options)
+    }
+
+    fn from_file(name: &str, file: PartFile, options: &OpenOptions) -> Result<Self, SliceError> {
+        let digest = file.digest().to_owned();
+        let file = Arc::new(file);
+        let pieces = match pieces(&file, options) {
+            // Of a binary STL, nothing was read yet.
+            Ok(pieces) if pieces.iter().any(Piece::is_in_file) => pieces,
+            outcome => match file.change()? {
+                Some(change) => return Err(SliceError::Changed { file: 0, change }),
+                None => outcome?,
+            },
+        };
+        let part = Self::new(name, pieces, digest);
+        if part.facet_count() == 0 { Err(SliceError::NoFacets) } else { Ok(part) }
     }
 
     /// Reads the bytes of a STEP file.
@@ -117,8 +136,64 @@ impl Part {
         let bytes = bytes.into();
         let prepared = read_step(bytes.clone(), options)?;
         refuse_faults(&prepared, options.allow_gaps)?;
-        Ok(Self::from_surfaces(name, &bytes, prepared))
+        let digest = digest_text(Hasher::new().update(&bytes));
+        Ok(Self::new(name, vec![of_surfaces(prepared)], digest))
     }
+}
+
+/// Reads what a file holds.
+fn pieces(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Vec<Piece>, SliceError> {
+    let start = file.start(FORMAT_BYTES)?;
+    if start.is_empty() {
+        return Err(SliceError::EmptyFile);
+    }
+    if !is_gzip(&start) {
+        return unpacked_pieces(file, &start, options);
+    }
+    let file = Arc::new(unpack(file)?);
+    let start = file.start(FORMAT_BYTES)?;
+    unpacked_pieces(&file, &start, options)
+}
+
+fn unpacked_pieces(
+    file: &Arc<PartFile>,
+    start: &[u8],
+    options: &OpenOptions,
+) -> Result<Vec<Piece>, SliceError> {
+    if is_step(start) {
+        let mut bytes = Vec::new();
+        file.reader().read_to_end(&mut bytes)?;
+        let prepared = read_step(bytes.into(), options)?;
+        refuse_faults(&prepared, options.allow_gaps)?;
+        return Ok(vec![of_surfaces(prepared)]);
+    }
+    if let Some(format) = other_format(start) {
+        return Err(SliceError::OtherFormat(format));
+    }
+    if looks_obj(start) {
+        let facets = obj::read(BufReader::new(file.reader()))?;
+        return Ok(vec![Piece::new(Facets::Memory(Arc::new(facets)))]);
+    }
+    Ok(vec![Piece::new(stl::open(file, start)?)])
+}
+
+/// Returns the format of a file that was given by mistake, if it is known.
+fn other_format(start: &[u8]) -> Option<&'static str> {
+    const FORMATS: [(&[u8], &str); 7] = [
+        (b"II*\0", "TIFF"),
+        (b"II+\0", "TIFF"),
+        (b"MM\0*", "TIFF"),
+        (b"PK\x03\x04", "ZIP or 3MF"),
+        (b"\x1F\x8B", "doubly packed"),
+        (b"ply", "PLY"),
+        (b"\x89PNG", "PNG"),
+    ];
+    FORMATS.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, name)| *name)
+}
+
+fn of_surfaces(prepared: Prepared) -> Piece {
+    let units = Some(Units::Millimetres);
+    Piece { units, ..Piece::new(Facets::Surfaces(Arc::new(prepared))) }
 }
 
 /// Files nest entities as deep as they like.

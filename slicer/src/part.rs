@@ -1,47 +1,60 @@
 //! Parts as sources of facets, in files or in memory.
 
-use std::fs::File;
 use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
 use blake3::Hasher;
 use lamp_brep::Prepared;
-use memmap2::{Mmap, MmapOptions};
 
-use crate::ascii;
 use crate::error::SliceError;
-use crate::facet::Facet;
+use crate::facet::{Facet, Units};
+use crate::part_file::{PartFile, digest_text};
+use crate::placement::Placement;
+use crate::stl::{FACET_BYTES, HEADER_BYTES, parse};
 
-/// Header and count of a binary STL.
-const HEADER_BYTES: u64 = 84;
-/// A facet of a binary STL: normal, three corners, attributes.
-const FACET_BYTES: usize = 50;
 /// The facets of a block, in which they are read: 200 kB of a binary file.
 const BLOCK_FACETS: usize = 4096;
 /// Facets of surfaces are fewer and cost more, and all threads should have some.
 const BLOCK_SURFACE_FACETS: usize = 128;
 
 /// A part: its name and its facets, from one file or several. A binary STL
-/// stays in its file, of which only a few blocks are mapped at a time. Clones
+/// stays in its file, of which only a few blocks are read at a time. Clones
 /// share the facets.
 #[derive(Clone, Debug)]
 pub struct Part {
     name: String,
-    /// The files' facets. No block has facets of two files.
-    files: Vec<FileFacets>,
+    /// No block has facets of two pieces.
+    pieces: Vec<Piece>,
+    /// The number of blocks up to the end of each piece.
+    block_ends: Vec<usize>,
     digest: String,
 }
 
+/// The facets of a file that stand alike: all, or those of one of its items.
 #[derive(Clone, Debug)]
-enum FileFacets {
-    Binary { file: Arc<File>, count: usize },
+pub(crate) struct Piece {
+    pub(crate) facets: Facets,
+    /// The file, from 0, among those joined.
+    pub(crate) file: usize,
+    /// The number in the file of its first facet.
+    pub(crate) first_facet: usize,
+    /// The unit that the file states, if it does.
+    pub(crate) units: Option<Units>,
+    /// How it stands among the other pieces.
+    pub(crate) placement: Placement,
+}
+
+/// Facets in file units.
+#[derive(Clone, Debug)]
+pub(crate) enum Facets {
+    Binary { file: Arc<PartFile>, count: usize },
     Memory(Arc<Vec<Facet>>),
     Surfaces(Arc<Prepared>),
 }
 
-impl FileFacets {
-    fn count(&self) -> usize {
+impl Facets {
+    pub(crate) fn count(&self) -> usize {
         match self {
             Self::Binary { count, .. } => *count,
             Self::Memory(facets) => facets.len(),
@@ -50,48 +63,97 @@ impl FileFacets {
     }
 
     fn blocks(&self) -> usize {
-        self.count().div_ceil(self.block_facets())
+        self.count().div_ceil(self.per_block())
     }
 
-    fn block_facets(&self) -> usize {
+    fn per_block(&self) -> usize {
         match self {
             Self::Surfaces(_) => BLOCK_SURFACE_FACETS,
             _ => BLOCK_FACETS,
         }
     }
+
+    /// Calls `each` with every facet of a range.
+    fn for_each(&self, range: Range<usize>, mut each: impl FnMut(&Facet)) -> io::Result<()> {
+        match self {
+            Self::Memory(facets) => facets[range].iter().for_each(each),
+            Self::Surfaces(prepared) => {
+                let mesh = &prepared.mesh;
+                let facets = &mesh.facets[range];
+                facets.iter().for_each(|facet| each(&rounded(mesh.corners(facet))));
+            }
+            Self::Binary { file, .. } => {
+                let at = |facet: usize| HEADER_BYTES + (facet * FACET_BYTES) as u64;
+                let bytes = at(range.start)..at(range.end);
+                file.for_each_record(bytes, |record| each(&parse(record)))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Piece {
+    pub(crate) fn new(facets: Facets) -> Self {
+        let placement = Placement::default();
+        Self { facets, file: 0, first_facet: 0, units: None, placement }
+    }
+
+    /// Returns true if the facets are read again from their file whenever they are needed.
+    pub(crate) fn is_in_file(&self) -> bool {
+        matches!(self.facets, Facets::Binary { .. })
+    }
+
+    /// Returns the exact surfaces below the facets, if there are some.
+    pub(crate) fn surfaces(&self) -> Option<&Prepared> {
+        match &self.facets {
+            Facets::Surfaces(prepared) => Some(prepared),
+            _ => None,
+        }
+    }
+
+    /// Calls `each` with every facet of a range, counter-clockwise seen from outside
+    /// once it is in its place.
+    fn for_each(&self, range: Range<usize>, mut each: impl FnMut(&Facet)) -> io::Result<()> {
+        if self.placement.is_mirror() {
+            self.facets.for_each(range, |&[a, b, c]| each(&[a, c, b]))
+        } else {
+            self.facets.for_each(range, each)
+        }
+    }
 }
 
 impl Part {
+    /// Creates a part of some pieces of a file with this digest.
+    pub(crate) fn new(name: &str, pieces: Vec<Piece>, digest: String) -> Self {
+        let mut blocks = 0;
+        let end = |piece: &Piece| {
+            blocks += piece.facets.blocks();
+            blocks
+        };
+        let block_ends = pieces.iter().map(end).collect();
+        Self { name: name.to_owned(), pieces, block_ends, digest }
+    }
+
     /// Creates a part of facets in memory.
     pub fn from_facets(name: &str, facets: Vec<Facet>) -> Self {
         let mut hasher = Hasher::new();
         for corner in facets.iter().flatten().flatten() {
             hasher.update(&corner.to_le_bytes());
         }
-        let files = vec![FileFacets::Memory(Arc::new(facets))];
-        Self { name: name.to_owned(), files, digest: digest_text(&hasher) }
-    }
-
-    /// Creates a part of exact surfaces, in millimetres, from the bytes of its file.
-    pub(crate) fn from_surfaces(name: &str, bytes: &[u8], prepared: Prepared) -> Self {
-        let files = vec![FileFacets::Surfaces(Arc::new(prepared))];
-        Self { name: name.to_owned(), files, digest: digest_text(Hasher::new().update(bytes)) }
+        let piece = Piece::new(Facets::Memory(Arc::new(facets)));
+        Self::new(name, vec![piece], digest_text(&hasher))
     }
 
     /// Returns what was read of each STEP file.
     pub fn prepared(&self) -> impl Iterator<Item = &Prepared> {
-        self.surfaces().flatten()
+        self.pieces.iter().filter_map(Piece::surfaces)
     }
 
-    /// Returns the surfaces of each file that has some.
-    pub(crate) fn surfaces(&self) -> impl Iterator<Item = Option<&Prepared>> {
-        self.files.iter().map(|file| match file {
-            FileFacets::Surfaces(prepared) => Some(&**prepared),
-            _ => None,
-        })
+    pub(crate) fn pieces(&self) -> &[Piece] {
+        &self.pieces
     }
 
-    /// Joins parts that stand in the same coordinates into one. Its name joins theirs
+    /// Joins parts into one, each where its own placement puts it. Its name joins theirs
     /// with `+`; its digest is that of theirs, one after another. A single part stays
     /// as it is.
     pub fn joined(models: Vec<Self>) -> Self {
@@ -107,35 +169,23 @@ impl Part {
                 digest_text(&hasher)
             }
         };
-        Self { name, files: models.into_iter().flat_map(|model| model.files).collect(), digest }
+        let mut pieces = Vec::new();
+        for model in models {
+            let files = pieces.last().map_or(0, |last: &Piece| last.file + 1);
+            let of_model = model.pieces.into_iter();
+            pieces.extend(of_model.map(|piece| Piece { file: files + piece.file, ..piece }));
+        }
+        Self::new(&name, pieces, digest)
     }
 
-    /// Opens an STL file, binary or ASCII. Which one it is follows from its size and
-    /// content: many binary files begin with `solid`, too.
-    pub(crate) fn from_stl(name: String, file: &File) -> Result<Self, SliceError> {
-        let metadata = file.metadata()?;
-        if !metadata.is_file() {
-            return Err(SliceError::NotAFile);
+    /// Places the part among others, after its file's units were taken into account.
+    /// What slicing scales, turns and moves afterwards is all of them together.
+    #[must_use]
+    pub fn placed(mut self, placement: &Placement) -> Self {
+        for piece in &mut self.pieces {
+            piece.placement = piece.placement.then(placement);
         }
-        let size = metadata.len();
-        if size == 0 {
-            return Err(SliceError::EmptyFile);
-        }
-        let start = map(file, 0, size.min(1024) as usize)?;
-        let declared = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
-        let facets = match declared {
-            Some(count) if HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size => {
-                FileFacets::Binary { file: Arc::new(file.try_clone()?), count: count as usize }
-            }
-            _ if ascii::looks_ascii(&start, start.len() as u64 == size) => {
-                FileFacets::Memory(Arc::new(ascii::read(&map(file, 0, size as usize)?)?))
-            }
-            declared => return Err(why_not_stl(&start, declared, size)),
-        };
-        if facets.count() == 0 {
-            return Err(SliceError::NoFacets);
-        }
-        Ok(Self { name, files: vec![facets], digest: digest_of(file, size)? })
+        self
     }
 
     /// Returns the part's name: the file's, without folder and extension.
@@ -145,7 +195,7 @@ impl Part {
 
     /// Returns the number of facets.
     pub fn facet_count(&self) -> usize {
-        self.files.iter().map(FileFacets::count).sum()
+        self.pieces.iter().map(|piece| piece.facets.count()).sum()
     }
 
     /// Returns the digest of the file, `blake3:` and 64 hexadecimal digits. Without a
@@ -154,117 +204,59 @@ impl Part {
         &self.digest
     }
 
+    /// Checks that no file was written to or replaced since it was opened. Whoever reads
+    /// a part does so after the last look at its facets.
+    ///
+    /// # Errors
+    /// Returns an error if one was, or cannot be read.
+    pub fn check_unchanged(&self) -> Result<(), SliceError> {
+        for piece in &self.pieces {
+            if let Facets::Binary { file, .. } = &piece.facets
+                && let Some(change) = file.change()?
+            {
+                return Err(SliceError::Changed { file: piece.file, change });
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the reason for an error: a file that changed, if reading it failed.
+    pub(crate) fn reason(&self, error: SliceError) -> SliceError {
+        self.check_unchanged().err().unwrap_or(error)
+    }
+
     pub(crate) fn block_count(&self) -> usize {
-        self.files.iter().map(FileFacets::blocks).sum()
+        self.block_ends.last().copied().unwrap_or(0)
     }
 
-    /// Returns the file of a block, and the block's facets among the file's.
-    pub(crate) fn place_of(&self, mut block: usize) -> (usize, Range<usize>) {
-        let mut file = 0;
-        while block >= self.files[file].blocks() {
-            block -= self.files[file].blocks();
-            file += 1;
-        }
-        let length = self.files[file].block_facets();
-        let start = block * length;
-        (file, start..self.files[file].count().min(start + length))
+    /// Returns the piece of a block, and the block's facets among the piece's.
+    pub(crate) fn place_of(&self, block: usize) -> (usize, Range<usize>) {
+        let piece = self.block_ends.partition_point(|&end| end <= block);
+        let facets = &self.pieces[piece].facets;
+        let in_piece = block + facets.blocks() - self.block_ends[piece];
+        let start = in_piece * facets.per_block();
+        (piece, start..facets.count().min(start + facets.per_block()))
     }
 
-    /// Returns a facet of a file.
-    pub(crate) fn facet(&self, file: usize, facet: usize) -> io::Result<Facet> {
-        match &self.files[file] {
-            FileFacets::Memory(facets) => Ok(facets[facet]),
-            FileFacets::Surfaces(prepared) => {
-                let mesh = &prepared.mesh;
-                Ok(rounded(mesh.corners(&mesh.facets[facet])))
-            }
-            FileFacets::Binary { file, .. } => {
-                let offset = HEADER_BYTES + (facet * FACET_BYTES) as u64;
-                let bytes = map(file, offset, FACET_BYTES)?;
-                Ok(parse(&bytes.as_chunks().0[0]))
-            }
-        }
+    /// Returns a facet of a piece.
+    pub(crate) fn facet(&self, piece: usize, facet: usize) -> io::Result<Facet> {
+        let mut found = Facet::default();
+        self.pieces[piece].for_each(facet..facet + 1, |facet| found = *facet)?;
+        Ok(found)
     }
 
     /// Calls `each` with every facet of a block.
     pub(crate) fn for_each_in_block(
         &self,
         block: usize,
-        mut each: impl FnMut(&Facet),
+        each: impl FnMut(&Facet),
     ) -> io::Result<()> {
-        let (file, Range { start, end }) = self.place_of(block);
-        match &self.files[file] {
-            FileFacets::Memory(facets) => facets[start..end].iter().for_each(each),
-            FileFacets::Surfaces(prepared) => {
-                let mesh = &prepared.mesh;
-                let facets = &mesh.facets[start..end];
-                facets.iter().for_each(|facet| each(&rounded(mesh.corners(facet))));
-            }
-            FileFacets::Binary { file, .. } => {
-                let offset = HEADER_BYTES + (start * FACET_BYTES) as u64;
-                let bytes = map(file, offset, (end - start) * FACET_BYTES)?;
-                let (records, _) = bytes.as_chunks::<FACET_BYTES>();
-                records.iter().for_each(|record| each(&parse(record)));
-            }
-        }
-        Ok(())
+        let (piece, facets) = self.place_of(block);
+        self.pieces[piece].for_each(facets, each)
     }
-}
-
-fn why_not_stl(start: &[u8], declared: Option<u32>, size: u64) -> SliceError {
-    match (other_format(start), declared) {
-        (Some(format), _) => SliceError::OtherFormat(format),
-        (None, Some(declared)) => SliceError::Count { declared, size },
-        (None, None) => SliceError::NotStl { size },
-    }
-}
-
-/// Returns the format of a file that was given by mistake, if it is known.
-fn other_format(start: &[u8]) -> Option<&'static str> {
-    const FORMATS: [(&[u8], &str); 6] = [
-        (b"II*\0", "TIFF"),
-        (b"II+\0", "TIFF"),
-        (b"MM\0*", "TIFF"),
-        (b"PK\x03\x04", "ZIP or 3MF"),
-        (b"ply", "PLY"),
-        (b"\x89PNG", "PNG"),
-    ];
-    FORMATS.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, name)| *name)
 }
 
 /// Rounds corners to 32 bits, as STL has them.
 fn rounded(corners: [[f64; 3]; 3]) -> Facet {
     corners.map(|corner| corner.map(|c| c as f32))
-}
-
-/// Returns the corners of a binary facet.
-#[inline]
-fn parse(record: &[u8; FACET_BYTES]) -> Facet {
-    let number = |at: usize| {
-        f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
-    };
-    let corner = |at| [number(at), number(at + 4), number(at + 8)];
-    [corner(12), corner(24), corner(36)]
-}
-
-/// Maps a range of a file into memory.
-#[expect(unsafe_code, reason = "mapping a file is unsafe, since others may change it")]
-pub(crate) fn map(file: &File, offset: u64, length: usize) -> io::Result<Mmap> {
-    // SAFETY: the map is private and read only. Its bytes are undefined only
-    // if another process changes the file meanwhile, which `Part::open`
-    // forbids (temporary files have no name); any bytes are valid numbers here.
-    unsafe { MmapOptions::new().offset(offset).len(length).map(file) }
-}
-
-fn digest_of(file: &File, size: u64) -> io::Result<String> {
-    const WINDOW: u64 = 1 << 20;
-    let mut hasher = Hasher::new();
-    for offset in (0..size).step_by(WINDOW as usize) {
-        hasher.update(&map(file, offset, WINDOW.min(size - offset) as usize)?);
-    }
-    Ok(digest_text(&hasher))
-}
-
-fn digest_text(hasher: &Hasher) -> String {
-    format!("blake3:{}", hasher.finalize().to_hex())
 }

@@ -9,7 +9,7 @@ use lamp_brep::Prepared;
 
 use crate::exact::PlacedSurfaces;
 use crate::facet::{Facet, Units};
-use crate::part::Part;
+use crate::part::{Part, Piece};
 
 /// An axis of part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +84,26 @@ impl Placement {
         self
     }
 
+    /// Returns both placements as one: this one, and then another.
+    #[must_use]
+    pub fn then(&self, next: &Self) -> Self {
+        let rows = next.rows.map(|[x, y, z, shift]| {
+            let mut row: [f64; 4] = std::array::from_fn(|k| {
+                x * self.rows[0][k] + y * self.rows[1][k] + z * self.rows[2][k]
+            });
+            row[3] += shift;
+            row
+        });
+        Self { rows }
+    }
+
+    /// Returns true if it makes right hands left ones.
+    pub(crate) fn is_mirror(&self) -> bool {
+        let [a, b, c] = self.rows;
+        let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+        a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1) < 0.0
+    }
+
     /// Returns a point in its place, in millimetres.
     pub fn at(&self, point_mm: [f64; 3]) -> [f64; 3] {
         self.rows.map(|row| affine(&row, point_mm))
@@ -114,31 +134,30 @@ pub fn facet_heights(facet: &PlacedFacet) -> (f64, f64) {
 #[derive(Debug)]
 pub(crate) struct PlacedPart {
     pub(crate) model: Part,
-    transform: Transform,
-    /// Each file's surfaces in place, if it has some.
-    surfaces: Vec<Option<PlacedSurfaces>>,
+    /// Those of the pieces, each once.
+    transforms: Vec<Transform>,
+    pieces: Vec<PlacedPiece>,
+}
+
+/// A piece of a part in its place.
+#[derive(Debug)]
+struct PlacedPiece {
+    /// Its number among the transforms.
+    transform: usize,
+    /// Its surfaces in place, if it has some.
+    surfaces: Option<PlacedSurfaces>,
 }
 
 /// The transform from file units to the place.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Transform {
     /// Scales the axes. Most parts stay where they are, and need no more.
     Scale([f64; 3]),
     Affine([[f64; 4]; 3]),
 }
 
-impl PlacedPart {
-    pub(crate) fn new(model: Part, placement: &Placement, units: Units) -> Self {
-        let place = |prepared: Option<&Prepared>| {
-            let rows = placement.rows.map(|[x, y, z, shift]| {
-                let unit = units.mm();
-                [x * unit, y * unit, z * unit, shift]
-            });
-            prepared.map(|Prepared { kernel, mesh, .. }| {
-                PlacedSurfaces::new(kernel.clone(), mesh.clone(), rows)
-            })
-        };
-        let surfaces = model.surfaces().map(place).collect();
+impl Transform {
+    fn new(placement: &Placement, units: Units) -> Self {
         let mut rows = placement.rows;
         // Straight to micrometres: z in file units times them is exact.
         for (row, (unit, per_mm)) in
@@ -147,31 +166,55 @@ impl PlacedPart {
             let [x, y, z, shift] = *row;
             *row = [x * unit, y * unit, z * unit, shift * per_mm];
         }
-        let scale = std::array::from_fn(|axis| rows[axis][axis]);
         let is_scale = (0..12).all(|k| k % 4 == k / 4 || rows[k / 4][k % 4] == 0.0);
-        Self {
-            model,
-            transform: if is_scale { Transform::Scale(scale) } else { Transform::Affine(rows) },
-            surfaces,
+        match is_scale {
+            true => Self::Scale(std::array::from_fn(|axis| rows[axis][axis])),
+            false => Self::Affine(rows),
         }
+    }
+}
+
+impl PlacedPart {
+    /// Places a part. Files that state no unit are in `units`.
+    pub(crate) fn new(model: Part, placement: &Placement, units: Units) -> Self {
+        let mut transforms = Vec::new();
+        let mut place = |piece: &Piece| {
+            let units = piece.units.unwrap_or(units);
+            let placement = piece.placement.then(placement);
+            let transform = Transform::new(&placement, units);
+            // Pieces that stand alike follow each other.
+            if transforms.last() != Some(&transform) {
+                transforms.push(transform);
+            }
+            let rows = placement.rows.map(|[x, y, z, shift]| {
+                let unit = units.mm();
+                [x * unit, y * unit, z * unit, shift]
+            });
+            let surfaces = piece.surfaces().map(|Prepared { kernel, mesh, .. }| {
+                PlacedSurfaces::new(kernel.clone(), mesh.clone(), rows)
+            });
+            PlacedPiece { transform: transforms.len() - 1, surfaces }
+        };
+        let pieces = model.pieces().iter().map(&mut place).collect();
+        Self { model, transforms, pieces }
     }
 
     /// Drops the surfaces, so that only facets are left.
     pub(crate) fn on_facets(mut self) -> Self {
-        self.surfaces.fill_with(|| None);
+        self.pieces.iter_mut().for_each(|piece| piece.surfaces = None);
         self
     }
 
     /// Returns all surfaces.
     pub(crate) fn surfaces(&self) -> impl Iterator<Item = &PlacedSurfaces> {
-        self.surfaces.iter().flatten()
+        self.pieces.iter().filter_map(|piece| piece.surfaces.as_ref())
     }
 
-    /// Returns the surfaces of a block's file, if it has some, and the number there of the
-    /// block's first facet.
+    /// Returns the surfaces of a block's piece, if it has some, and the number there of
+    /// the block's first facet.
     pub(crate) fn surfaces_of_block(&self, block: usize) -> Option<(&PlacedSurfaces, u32)> {
-        let (file, facets) = self.model.place_of(block);
-        Some((self.surfaces[file].as_ref()?, facets.start as u32))
+        let (piece, facets) = self.model.place_of(block);
+        Some((self.pieces[piece].surfaces.as_ref()?, facets.start as u32))
     }
 
     /// Calls `each` with every facet of a block.
@@ -181,7 +224,7 @@ impl PlacedPart {
         mut each: impl FnMut(&PlacedFacet),
     ) -> io::Result<()> {
         // Two loops, so that neither asks at every facet which one it is.
-        match self.transform {
+        match self.transforms[self.transform_of_block(block)] {
             Transform::Scale(scale) => self.model.for_each_in_block(block, |facet| {
                 each(&placed(facet, |corner| scaled(&scale, corner)));
             }),
@@ -191,10 +234,15 @@ impl PlacedPart {
         }
     }
 
-    /// Places a facet.
+    /// Returns the number of the transform that places the facets of a block.
+    pub(crate) fn transform_of_block(&self, block: usize) -> usize {
+        self.pieces[self.model.place_of(block).0].transform
+    }
+
+    /// Places a facet by one of the transforms.
     #[inline]
-    pub(crate) fn placed(&self, facet: &Facet) -> PlacedFacet {
-        match &self.transform {
+    pub(crate) fn placed(&self, facet: &Facet, transform: usize) -> PlacedFacet {
+        match &self.transforms[transform] {
             Transform::Scale(scale) => placed(facet, |corner| scaled(scale, corner)),
             Transform::Affine(rows) => placed(facet, |corner| rows.map(|row| affine(&row, corner))),
         }

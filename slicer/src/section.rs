@@ -42,6 +42,13 @@ pub type Inside = Vec<[f64; 2]>;
 /// Returns an error if the part is empty, not finite or 1000 km away, or there are too
 /// many rows.
 pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
+    let part = model.clone();
+    let rows = rows(model, options).map_err(|error| part.reason(error))?;
+    part.check_unchanged()?;
+    Ok(rows)
+}
+
+fn rows(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
     let model = PlacedPart::new(model, &options.placement, options.units);
     let survey = Survey::of(&model)?;
     survey.check_distance()?;
@@ -62,7 +69,7 @@ pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, Sli
         Ok(crossings)
     });
     let mut crossings = found.collect::<Result<Vec<_>, SliceError>>()?.concat();
-    crossings.par_sort_by(|a, b| a.partial_cmp(b).expect("coordinates are finite"));
+    crossings.par_sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     let mut rows = vec![Inside::new(); options.rows as usize];
     for row in crossings.chunk_by(|a, b| a.0 == b.0) {
         rows[row[0].0 as usize] = inside(row, options.fill);

@@ -134,6 +134,8 @@ pub struct Slices {
     /// The layers of the table that are still to be made into images.
     pending: Range<usize>,
     ready: VecDeque<Layer>,
+    /// Whether the files were compared with what they were, after all layers.
+    is_checked: bool,
 }
 
 impl Slices {
@@ -144,6 +146,11 @@ impl Slices {
     /// layers would be too large or too many, or if the sections of gray layers are not
     /// at their tops.
     pub fn new(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
+        let part = model.clone();
+        Self::prepared(model, options).map_err(|error| part.reason(error))
+    }
+
+    fn prepared(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
         if options.gray.is_some() && options.plane != PlaneRule::Top {
             return Err(SliceError::GrayPlane);
         }
@@ -193,6 +200,7 @@ impl Slices {
             polished: Polished::default(),
             open_rows: OpenRows::new(),
             ready: VecDeque::new(),
+            is_checked: false,
         })
     }
 
@@ -304,7 +312,9 @@ impl Slices {
             cutter: Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill },
             memory: 2 * size_of::<Crossing>() * self.max_crossings,
         };
-        Ok(tracer.trace(&bands)?)
+        let trace = tracer.trace(&bands);
+        self.model.model.check_unchanged()?;
+        Ok(trace?)
     }
 
     /// Makes the next layers of the table into images.
@@ -381,11 +391,14 @@ impl Iterator for Slices {
         if self.ready.is_empty() {
             if self.pending.is_empty() {
                 if self.pending.end == self.wanted.end {
-                    return None;
+                    let is_checked = std::mem::replace(&mut self.is_checked, true);
+                    let change = || self.model.model.check_unchanged().err();
+                    return if is_checked { None } else { change().map(Err) };
                 }
                 if let Err(error) = self.fill_slab() {
                     self.pending = self.wanted.end..self.wanted.end;
-                    return Some(Err(error));
+                    self.is_checked = true;
+                    return Some(Err(self.model.model.reason(error)));
                 }
             }
             self.finish_batch();

@@ -1,11 +1,50 @@
-//! Writes parts as binary STL.
+//! Reads STL files, and writes parts as binary ones.
 
-use std::io::{self, Write};
+use std::io::{self, BufReader, Write};
+use std::sync::Arc;
 
 use stl_io::{Normal, Triangle, Vertex};
 
+use crate::ascii;
+use crate::error::SliceError;
 use crate::facet::Facet;
-use crate::part::Part;
+use crate::part::{Facets, Part};
+use crate::part_file::PartFile;
+
+/// Header and count of a binary STL.
+pub(crate) const HEADER_BYTES: u64 = 84;
+/// A facet of a binary STL: normal, three corners, attributes.
+pub(crate) const FACET_BYTES: usize = 50;
+
+/// Opens an STL file that starts with these bytes, binary or ASCII. Which one it is
+/// follows from its size and content: many binary files begin with `solid`, too.
+///
+/// # Errors
+/// Returns an error if it is neither, contradicts itself or cannot be read.
+pub(crate) fn open(file: &Arc<PartFile>, start: &[u8]) -> Result<Facets, SliceError> {
+    let size = file.size();
+    let declared = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
+    match declared {
+        Some(count) if HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size => {
+            Ok(Facets::Binary { file: file.clone(), count: count as usize })
+        }
+        _ if ascii::looks_ascii(start, start.len() as u64 == size) => {
+            Ok(Facets::Memory(Arc::new(ascii::read(BufReader::new(file.reader()))?)))
+        }
+        Some(declared) => Err(SliceError::Count { declared, size }),
+        None => Err(SliceError::NotStl { size }),
+    }
+}
+
+/// Returns the corners of a binary facet.
+#[inline]
+pub(crate) fn parse(record: &[u8; FACET_BYTES]) -> Facet {
+    let number = |at: usize| {
+        f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
+    };
+    let corner = |at| [number(at), number(at + 4), number(at + 8)];
+    [corner(12), corner(24), corner(36)]
+}
 
 impl Part {
     /// Writes the facets as binary STL, in the file's units: those of exact surfaces

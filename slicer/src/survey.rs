@@ -79,8 +79,9 @@ fn facet_box([a, b, c]: &PlacedFacet) -> ([f64; 3], [f64; 3]) {
 /// Returns the error that names a block's first facet with a coordinate that is not
 /// finite.
 fn not_finite(model: &PlacedPart, block: usize) -> io::Result<SliceError> {
-    let (file, facets) = model.model.place_of(block);
-    let mut facet = facets.start;
+    let (piece, facets) = model.model.place_of(block);
+    let piece = &model.model.pieces()[piece];
+    let mut facet = piece.first_facet + facets.start;
     let mut found = None;
     model.for_each_in_block(block, |corners| {
         if found.is_none() && !corners.iter().flatten().all(|c| c.is_finite()) {
@@ -88,7 +89,7 @@ fn not_finite(model: &PlacedPart, block: usize) -> io::Result<SliceError> {
         }
         facet += 1;
     })?;
-    Ok(SliceError::NotFinite { file, facet: found.unwrap_or(facet) })
+    Ok(SliceError::NotFinite { file: piece.file, facet: found.unwrap_or(facet) })
 }
 
 impl Survey {

@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use crate::cut::{Cutter, SegmentEnd};
 use crate::facet::Facet;
+use crate::part::Piece;
 use crate::placement::PlacedPart;
 use crate::survey::Survey;
 use crate::table::Fill;
@@ -98,13 +99,13 @@ struct Sighting {
     layer: u32,
     row: u32,
     point: [u64; 2],
-    file: u32,
+    piece: u32,
     facet: u32,
     edge: [u8; 2],
     starts: bool,
 }
 
-/// The bits of an edge's corners, the lesser first, which identify it.
+/// The bits of an edge's corners, the lesser first, which identify it in its file.
 type EdgeName = [[u32; 3]; 2];
 
 /// Looks at a mesh a second time.
@@ -151,7 +152,7 @@ impl Tracer<'_> {
         let too_many =
             || layers.len() > 1 && found.load(Relaxed) * 2 * size_of::<Sighting>() > self.memory;
         let of_block = |block| -> io::Result<Vec<Sighting>> {
-            let (file, mut facets) = self.model.model.place_of(block);
+            let (piece, mut facets) = self.model.model.place_of(block);
             let mut sightings = Vec::new();
             self.model.for_each_in_block(block, |placed| {
                 let facet = facets.next().unwrap_or_default();
@@ -169,7 +170,7 @@ impl Tracer<'_> {
                                 layer: layer as u32,
                                 row,
                                 point: end.at.map(f64::to_bits),
-                                file: file as u32,
+                                piece: piece as u32,
                                 facet: facet as u32,
                                 edge: end.edge,
                                 starts,
@@ -202,7 +203,7 @@ impl Tracer<'_> {
         bands: Vec<StrayBand>,
         mut sightings: &[Sighting],
         trace: &mut Trace,
-        known: &mut BTreeMap<EdgeName, usize>,
+        known: &mut BTreeMap<(usize, EdgeName), usize>,
     ) -> io::Result<()> {
         for band in bands {
             let of_band = |s: &Sighting| (s.layer, s.row) <= (band.layer, band.rows.end);
@@ -239,12 +240,14 @@ impl Tracer<'_> {
         &self,
         group: &[Sighting],
         edges: &mut Vec<FaultyEdge>,
-        known: &mut BTreeMap<EdgeName, usize>,
+        known: &mut BTreeMap<(usize, EdgeName), usize>,
     ) -> io::Result<Vec<usize>> {
         let mut by_edge: BTreeMap<EdgeName, (Vec<Sighting>, FaultyEdge)> = BTreeMap::new();
         for &sighting in group {
-            let (file, facet) = (sighting.file as usize, sighting.facet as usize);
-            let corners = self.model.model.facet(file, facet)?;
+            let (piece, facet) = (sighting.piece as usize, sighting.facet as usize);
+            let corners = self.model.model.facet(piece, facet)?;
+            let Piece { file, first_facet, .. } = self.model.model.pieces()[piece];
+            let facet = first_facet + facet;
             let [from, to] = sighting.edge.map(usize::from);
             // Numbers along the facet: 0 1, 1 2, 2 0.
             let [from, to] = if (from + 1) % 3 == to { [from, to] } else { [to, from] };
@@ -258,8 +261,8 @@ impl Tracer<'_> {
             edge.facets.push(EdgeFacet { file, facet, corners, forwards });
         }
         by_edge.retain(|_, (sightings, _)| self.is_open(sightings));
-        let mut place = |(name, (_, edge))| {
-            *known.entry(name).or_insert_with(|| {
+        let mut place = |(name, (_, edge)): (EdgeName, (_, FaultyEdge))| {
+            *known.entry((edge.facets[0].file, name)).or_insert_with(|| {
                 edges.push(edge);
                 edges.len() - 1
             })

@@ -32,7 +32,7 @@ impl<T: Copy + Default> Grouped<T> {
         items().for_each(|(key, _)| counts.add(key));
         let mut groups = counts.into_groups();
         items().for_each(|(key, item)| {
-            groups.put(key, item);
+            groups.put(key, item).expect("as many items as before");
         });
         groups.finish()
     }
@@ -106,14 +106,15 @@ impl KeyCounts {
 pub struct UnfinishedGroups<T>(Grouped<T>);
 
 impl<T> UnfinishedGroups<T> {
-    /// Puts an item into its group, and returns its place among all items.
+    /// Puts an item into its group, and returns its place among all items; none if more
+    /// items come than were counted.
     #[inline]
-    pub fn put(&mut self, key: usize, item: T) -> u32 {
+    pub fn put(&mut self, key: usize, item: T) -> Option<u32> {
         let Grouped { starts, items } = &mut self.0;
         let place = starts[key + 1];
-        items[place as usize] = item;
+        *items.get_mut(place as usize)? = item;
         starts[key + 1] += 1;
-        place
+        Some(place)
     }
 
     /// Returns the groups, once as many items were put in as were counted.

@@ -1,0 +1,234 @@
+//! Reads files of parts in pieces, and tells whether they stayed as they were.
+//!
+//! A part's file is read several times: to survey it, and slab by slab. Each reading
+//! copies bytes; a file that another program cuts short is an error then, where a
+//! mapped one would end the process. That all readings saw one version of the file
+//! is checked once the last is done, by what the system notes of every change.
+
+use std::fs::{File, Metadata};
+use std::io::{self, Read};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use blake3::Hasher;
+
+use crate::error::FileChange;
+
+/// The bytes that are read at once: few enough to stay in a processor's cache.
+const READ_BYTES: usize = 1 << 15;
+
+/// File systems note times in steps, of two seconds at most (FAT).
+const CLOCK_STEP: Duration = Duration::from_secs(2);
+
+/// An open file of a part, and its state when it was opened.
+#[derive(Debug)]
+pub(crate) struct PartFile {
+    file: File,
+    /// Its path and state; none for a temporary file, which nobody else can open.
+    shared: Option<(PathBuf, FileState)>,
+    size: u64,
+    digest: String,
+}
+
+impl PartFile {
+    /// Takes an open file, and reads it once for its digest.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be read.
+    pub(crate) fn new(file: File, path: &Path) -> io::Result<Self> {
+        let state = FileState::of(&file.metadata()?);
+        let size = state.size;
+        let shared = Some((path.to_owned(), state));
+        let mut this = Self { file, shared, size, digest: String::new() };
+        this.digest = this.digest_now()?;
+        Ok(this)
+    }
+
+    /// Keeps a stream in a temporary file that has no name.
+    ///
+    /// # Errors
+    /// Returns an error if the stream fails, or the disk has no room for it.
+    pub(crate) fn of_stream(mut stream: impl Read) -> io::Result<Self> {
+        let mut file = tempfile::tempfile()?;
+        let size = io::copy(&mut stream, &mut file)?;
+        let mut this = Self { file, shared: None, size, digest: String::new() };
+        this.digest = this.digest_now()?;
+        Ok(this)
+    }
+
+    /// Takes a temporary file with this one's content in another form. Its digest is
+    /// this one's.
+    pub(crate) fn in_other_form(&self, file: File, size: u64) -> Self {
+        Self { file, shared: None, size, digest: self.digest.clone() }
+    }
+
+    /// Returns the first bytes, at most `count`.
+    pub(crate) fn start(&self, count: u64) -> io::Result<Vec<u8>> {
+        let mut start = Vec::new();
+        self.reader().take(count).read_to_end(&mut start)?;
+        Ok(start)
+    }
+
+    /// Returns the size in bytes.
+    pub(crate) fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// Returns the digest of all bytes.
+    pub(crate) fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    /// Returns a reader of all bytes, from the first.
+    pub(crate) fn reader(&self) -> FileReader<'_> {
+        FileReader { file: &self.file, at: 0 }
+    }
+
+    /// Calls `each` with every record of `N` bytes in a range of the file.
+    pub(crate) fn for_each_record<const N: usize>(
+        &self,
+        range: Range<u64>,
+        each: impl FnMut(&[u8; N]),
+    ) -> io::Result<()> {
+        for_each_record(&self.file, range, each)
+    }
+
+    /// Returns how the file changed since it was opened, if it did.
+    ///
+    /// Its size, the time of the last write and what its name stands for tell, as far as
+    /// clocks do. Where only the time of the last change to its entry differs, or the
+    /// file was so new when it was opened that a write since may bear the same times,
+    /// its digest decides.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be read.
+    pub(crate) fn change(&self) -> io::Result<Option<FileChange>> {
+        let Some((path, before)) = &self.shared else { return Ok(None) };
+        let now = FileState::of(&self.file.metadata()?);
+        if now.size != before.size {
+            return Ok(Some(FileChange::Size { before: before.size, now: now.size }));
+        }
+        // A name that is gone leaves the file as it is.
+        let named = path.metadata().ok().map(|metadata| FileState::of(&metadata).identity);
+        if named.is_some_and(|identity| identity != before.identity) {
+            return Ok(Some(FileChange::Replaced));
+        }
+        let is_same = now.written == before.written && {
+            let is_sure = now.changed == before.changed && !before.is_fresh;
+            is_sure || self.digest_now()? == self.digest
+        };
+        Ok((!is_same).then_some(FileChange::Content))
+    }
+
+    fn digest_now(&self) -> io::Result<String> {
+        let mut hasher = Hasher::new();
+        io::copy(&mut self.reader().take(self.size), &mut hasher)?;
+        Ok(digest_text(&hasher))
+    }
+}
+
+/// What a system notes of a file.
+#[derive(Debug)]
+struct FileState {
+    size: u64,
+    /// The time of the last write.
+    written: Option<SystemTime>,
+    /// The time of the last change of content, name, owner or times, which no program
+    /// can set; zero where there is none.
+    changed: (i64, i64),
+    /// Device and number, which no two files share; zero where there are none.
+    identity: (u64, u64),
+    /// Whether it changed so recently that the next write may bear the same times.
+    is_fresh: bool,
+}
+
+impl FileState {
+    fn of(metadata: &Metadata) -> Self {
+        let written = metadata.modified().ok();
+        // A time to come is another machine's.
+        let age = |time: SystemTime| time.elapsed().unwrap_or_default();
+        let (changed, identity) = entry(metadata);
+        let entry_time = u64::try_from(changed.0)
+            .map_or(SystemTime::UNIX_EPOCH, |s| SystemTime::UNIX_EPOCH + Duration::from_secs(s));
+        let is_fresh = written.is_none_or(|time| age(time) <= CLOCK_STEP)
+            || age(entry_time) <= CLOCK_STEP + Duration::from_secs(1);
+        Self { size: metadata.len(), written, changed, identity, is_fresh }
+    }
+}
+
+/// Returns the time of the last change of a file's entry, and the file's identity.
+#[cfg(unix)]
+fn entry(metadata: &Metadata) -> ((i64, i64), (u64, u64)) {
+    use std::os::unix::fs::MetadataExt;
+    ((metadata.ctime(), metadata.ctime_nsec()), (metadata.dev(), metadata.ino()))
+}
+
+#[cfg(not(unix))]
+fn entry(_: &Metadata) -> ((i64, i64), (u64, u64)) {
+    ((0, 0), (0, 0))
+}
+
+/// Reads a file from its start, whatever place others read at.
+#[derive(Debug)]
+pub(crate) struct FileReader<'a> {
+    file: &'a File,
+    at: u64,
+}
+
+impl Read for FileReader<'_> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let read = read_at(self.file, to, self.at)?;
+        self.at += read as u64;
+        Ok(read)
+    }
+}
+
+/// Calls `each` with every record of `N` bytes in a range of a file.
+pub(crate) fn for_each_record<const N: usize>(
+    file: &File,
+    range: Range<u64>,
+    mut each: impl FnMut(&[u8; N]),
+) -> io::Result<()> {
+    let mut buffer = [0; READ_BYTES];
+    let at_once = (READ_BYTES / N * N) as u64;
+    let mut at = range.start;
+    while at < range.end {
+        let length = at_once.min(range.end - at);
+        let bytes = &mut buffer[..length as usize];
+        read_exact_at(file, bytes, at)?;
+        bytes.as_chunks().0.iter().for_each(&mut each);
+        at += length;
+    }
+    Ok(())
+}
+
+fn read_exact_at(file: &File, mut to: &mut [u8], mut at: u64) -> io::Result<()> {
+    while !to.is_empty() {
+        match read_at(file, to, at) {
+            Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(read) => {
+                to = &mut to[read..];
+                at += read as u64;
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+#[cfg(unix)]
+fn read_at(file: &File, to: &mut [u8], at: u64) -> io::Result<usize> {
+    std::os::unix::fs::FileExt::read_at(file, to, at)
+}
+
+#[cfg(windows)]
+fn read_at(file: &File, to: &mut [u8], at: u64) -> io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_read(file, to, at)
+}
+
+/// Returns a digest as stacks state it.
+pub(crate) fn digest_text(hasher: &Hasher) -> String {
+    format!("blake3:{}", hasher.finalize().to_hex())
+}

@@ -1,0 +1,40 @@
+//! Unpacks files that gzip packed.
+
+use std::io::{self, BufReader, Read};
+
+use flate2::bufread::MultiGzDecoder;
+
+use crate::error::SliceError;
+use crate::part_file::PartFile;
+
+/// Meshes shrink by up to 20 when they are packed; bytes that shrink more than this hold
+/// something else, and would fill the disk.
+const MOST_SHRINKAGE: u64 = 200;
+/// This much is unpacked in any case.
+const ALWAYS_BYTES: u64 = 64 << 20;
+
+/// Returns true if a file that starts with these bytes was packed by gzip.
+pub(crate) fn is_gzip(start: &[u8]) -> bool {
+    start.starts_with(b"\x1F\x8B")
+}
+
+/// Returns the most bytes that are unpacked from this many.
+pub(crate) fn most_unpacked(packed: u64) -> u64 {
+    ALWAYS_BYTES.saturating_add(packed.saturating_mul(MOST_SHRINKAGE))
+}
+
+/// Unpacks a file into a temporary one.
+///
+/// # Errors
+/// Returns an error if it is damaged, holds more than a mesh explains, or the disk has
+/// no room for it.
+pub(crate) fn unpack(file: &PartFile) -> Result<PartFile, SliceError> {
+    let most = most_unpacked(file.size());
+    let mut bytes = MultiGzDecoder::new(BufReader::new(file.reader())).take(most + 1);
+    let mut unpacked = tempfile::tempfile()?;
+    let size = io::copy(&mut bytes, &mut unpacked).map_err(SliceError::Packed)?;
+    if size > most {
+        return Err(SliceError::Inflated { most });
+    }
+    Ok(file.in_other_form(unpacked, size))
+}
