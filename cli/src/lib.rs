@@ -30,6 +30,7 @@ mod signals;
 mod slicing_options;
 mod step_options;
 mod streams;
+mod thumbnails;
 
 use std::process::ExitCode;
 

@@ -1,7 +1,9 @@
 //! Options that several commands share, and parsers of their values.
 
+use std::num::NonZeroU32;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -100,6 +102,32 @@ pub(crate) fn parse_layers(text: &str) -> Result<Range<u32>, String> {
     Ok(start..end)
 }
 
+/// Some layers of a range: its first and every so many after it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct EveryNth {
+    pub(crate) range: Range<u32>,
+    pub(crate) step: NonZeroU32,
+}
+
+impl EveryNth {
+    /// Returns whether a layer is one of them.
+    pub(crate) fn holds(&self, layer: u32) -> bool {
+        self.range.contains(&layer) && (layer - self.range.start).is_multiple_of(self.step.get())
+    }
+}
+
+impl FromStr for EveryNth {
+    type Err = String;
+
+    /// Parses a range of layers with an optional step: `0..1270/40`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (range, step) = text.split_once('/').unwrap_or((text, "1"));
+        let wrong =
+            |_| format!("`{text}` is not a range with a step: write A..B/N for every Nth layer");
+        Ok(Self { range: parse_layers(range)?, step: step.parse().map_err(wrong)? })
+    }
+}
+
 /// Parses a length that is not below zero.
 pub(crate) fn parse_distance(text: &str) -> Result<Length, String> {
     let length: Length = text.parse().map_err(|error: LengthError| error.to_string())?;
@@ -178,6 +206,18 @@ pub(crate) fn ranges(rows: &[u32]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_nth_layer_of_a_range() {
+        let some: EveryNth = "10..30/8".parse().unwrap();
+        let held = |layers: &EveryNth| (0..40).filter(|&k| layers.holds(k)).collect::<Vec<_>>();
+        assert_eq!(held(&some), [10, 18, 26]);
+        assert_eq!(held(&"..3".parse().unwrap()), [0, 1, 2]);
+        assert_eq!(held(&"35../3".parse().unwrap()), [35, 38]);
+        for wrong in ["", "1..9/0", "1..9/-1", "1..9/", "/4", "9..1/2"] {
+            assert!(wrong.parse::<EveryNth>().is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn rows_that_touch_are_one_range() {

@@ -68,14 +68,23 @@ pub(crate) enum PictureScale {
     Down(u32),
 }
 
+/// The most that a picture enlarges or reduces.
+const MAX_FACTOR: u32 = 1000;
+
 impl PictureScale {
-    /// The longer side of a region's picture, in pixels.
-    pub(crate) fn side(self, region: &Region) -> u64 {
-        let side = region.columns.len().max(region.rows.len()) as u64;
-        match self {
+    /// The width and height of a region's picture, in pixels.
+    pub(crate) fn size(self, region: &Region) -> [u64; 2] {
+        [region.columns.len() as u64, region.rows.len() as u64].map(|side| match self {
             Self::Up(up) => side * u64::from(up),
             Self::Down(down) => side.div_ceil(down.into()),
-        }
+        })
+    }
+
+    /// Returns the scale, at most 1, at which a region's picture is at most `side` pixels wide
+    /// and high, as far as scales go.
+    pub(crate) fn fitting(region: &Region, side: u32) -> Self {
+        let longer = region.columns.len().max(region.rows.len()) as u32;
+        Self::Down(longer.div_ceil(side).clamp(1, MAX_FACTOR))
     }
 }
 
@@ -89,7 +98,7 @@ impl FromStr for PictureScale {
             _ => (Self::Up as fn(u32) -> Self, text),
         };
         match factor.trim().parse() {
-            Ok(factor @ 1..=1000) => Ok(scale(factor)),
+            Ok(factor @ 1..=MAX_FACTOR) => Ok(scale(factor)),
             _ => Err(format!("`{text}` is not a scale: write 4 to enlarge, 1/8 to reduce")),
         }
     }
@@ -122,6 +131,20 @@ impl<'a> Picture<'a> {
             std::iter::repeat_n(wide, up as usize)
         });
         Self { width: width * up, height: height * up, rows: Box::new(rows) }
+    }
+
+    /// A picture of rows of `width` levels.
+    pub(crate) fn from_rows(
+        width: u32,
+        height: u32,
+        rows: impl Iterator<Item = Vec<u8>> + 'a,
+    ) -> Self {
+        Self { width, height, rows: Box::new(rows) }
+    }
+
+    /// Returns the rows of levels.
+    pub(crate) fn into_rows(self) -> impl Iterator<Item = Vec<u8>> {
+        self.rows
     }
 
     /// Pictures of one height side by side, with a gray gutter between.
@@ -244,6 +267,17 @@ mod tests {
         for wrong in ["", "0", "1/0", "2/3", "-1", "0.5", "1/5000"] {
             assert!(wrong.parse::<PictureScale>().is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_picture_is_reduced_to_fit() {
+        let fitting = |width: u32, height, side| {
+            PictureScale::fitting(&Region { columns: 5..5 + width, rows: 0..height }, side)
+        };
+        assert_eq!(fitting(400, 10, 400), PictureScale::Down(1));
+        assert_eq!(fitting(401, 10, 400), PictureScale::Down(2));
+        assert_eq!(fitting(10, 1201, 400), PictureScale::Down(4));
+        assert_eq!(fitting(1 << 26, 1, 1), PictureScale::Down(1000));
     }
 
     #[test]

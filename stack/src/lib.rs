@@ -73,7 +73,9 @@ pub use ordered::{MemorySize, map_in_order};
 pub use orientation::{Orientation, OrientationError};
 pub use output::{Destination, write_stack};
 pub use picture_page::PictureFormat;
-pub use png_write::{png_of_layer, write_gray_png, write_png_folder, write_rgb_png};
+pub use png_write::{
+    png_of_layer, write_gray_animation, write_gray_png, write_png_folder, write_rgb_png,
+};
 pub use runs::{Change, Pixel, RunError, RunImage};
 pub use split::{SplitError, SplitPoints, write_split};
 pub use temporary::{FileBeside, FolderBeside, remove_temporaries};

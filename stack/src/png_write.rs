@@ -109,16 +109,51 @@ pub fn write_rgb_png(
     write_picture(out, [width, height], ColorType::Rgb, rows)
 }
 
+/// Writes pictures of 8-bit levels as an animated PNG that repeats without end.
+///
+/// Programs that know no animations show the first picture.
+///
+/// # Errors
+/// Returns an error if writing fails, if there is no picture or if one has not the size
+/// `[width, height]`.
+pub fn write_gray_animation(
+    out: impl Write,
+    [width, height]: [u32; 2],
+    per_second: u16,
+    pictures: impl ExactSizeIterator<Item = Vec<u8>>,
+) -> io::Result<()> {
+    noting_failures(out, |out| {
+        let mut encoder = Encoder::new(out, width, height);
+        encoder.set_animated(pictures.len() as u32, 0)?;
+        encoder.set_frame_delay(1, per_second)?;
+        let mut writer = encoder.write_header()?;
+        for picture in pictures {
+            writer.write_image_data(&picture)?;
+        }
+        writer.finish()
+    })
+}
+
 fn write_picture(
     out: impl Write,
     [width, height]: [u32; 2],
     color: ColorType,
     rows: impl Iterator<Item = Vec<u8>>,
 ) -> io::Result<()> {
+    noting_failures(out, |out| {
+        let mut encoder = Encoder::new(out, width, height);
+        encoder.set_color(color);
+        write_rows(encoder, rows)
+    })
+}
+
+/// Encodes a PNG, and returns the failure of its writer as it is.
+fn noting_failures<W: Write>(
+    out: W,
+    encode: impl FnOnce(&mut Noting<W>) -> Result<(), EncodingError>,
+) -> io::Result<()> {
     let mut out = Noting { out, failed: None };
-    let mut encoder = Encoder::new(&mut out, width, height);
-    encoder.set_color(color);
-    let written = write_rows(encoder, rows);
+    let written = encode(&mut out);
     written.map_err(io::Error::from).and_then(|()| out.flush()).map_err(|error| match out.failed {
         Some(kind) => io::Error::new(kind, error.to_string()),
         None => error,

@@ -154,6 +154,90 @@ fn show_reduces_squares_to_their_mean() {
 }
 
 #[test]
+fn show_finds_a_layer_by_its_height() {
+    let scratch = with_cube();
+    let shown =
+        |which: &str| scratch.run(&format!("lamp show cube.tif {which}")).succeeds_quietly().stdout;
+    for (z, layer) in [("0mm", 0), ("12mm", 12), ("12.999mm", 12), ("13mm", 13), ("20mm", 19)] {
+        let by_height = shown(&format!("--z {z}"));
+        assert!(by_height == shown(&format!("--layer {layer}")), "{z}");
+    }
+    for z in ["-1um", "20.001mm"] {
+        let line = format!("lamp show cube.tif --z {z}");
+        scratch.run(&line).is_refused_with(&["cube.tif: no layer is at z", "0.000 to 20.000 mm"]);
+    }
+    lamp_tests::write_gray_ramp(&scratch.path("ramp.tif"), 8, 1);
+    let words = ["ramp.tif: layer 0 states no height", "--layer"];
+    scratch.run("lamp show ramp.tif --z 0mm").is_refused_with(&words);
+}
+
+#[test]
+fn show_puts_layers_on_a_sheet() {
+    let (scratch, image) = with_blade();
+    let sheet = scratch.run("lamp show blade.tif --layers 5..127/40").succeeds_quietly().stdout;
+    let sheet = read_png(sheet);
+    // Layers 5, 45, 85 and 125: two on two, with gutters of 12 pixels and captions of 24.
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    assert_eq!((sheet[0].len(), sheet.len()), (12 + 2 * (width + 12), 12 + 2 * (height + 36)));
+    let cell = |column: usize, row: usize| -> Picture {
+        let top = 12 + row * (height + 36);
+        let left = 12 + column * (width + 12);
+        sheet[top..top + height].iter().map(|row| row[left..left + width].to_vec()).collect()
+    };
+    for (k, layer) in [5, 45, 85, 125].into_iter().enumerate() {
+        let line = format!("lamp show blade.tif --layer {layer}");
+        let alone = read_png(scratch.run(&line).succeeds_quietly().stdout);
+        assert!(cell(k % 2, k / 2) == alone, "layer {layer}");
+    }
+    // A caption has letters, from the left edge of the picture on.
+    let caption = &sheet[12 + height..12 + height + 24];
+    let white = |row: &Vec<u8>| row[12..].contains(&255);
+    assert!(caption.iter().any(white));
+
+    scratch.run("lamp show blade.tif --layers 200..").is_refused_with(&["no layer is in that"]);
+    let large = "lamp show blade.tif --layers ..20 --scale 100";
+    scratch.run(large).is_wrong_usage(&["choose fewer layers", "--layers 0..1270/40"]);
+    let both = "lamp show blade.tif --layer 3 --layers 4..6";
+    scratch.run(both).is_wrong_usage(&["cannot be used with"]);
+    scratch.run("lamp show blade.tif").is_wrong_usage(&["--layer <K>|--z"]);
+}
+
+#[test]
+fn show_reads_no_further_than_it_shows() {
+    let scratch = with_cube();
+    let whole = scratch.bytes("cube.tif");
+    let cut = &whole[..whole.len() - 9];
+    scratch.run_on("lamp show --layers 3..19", cut).succeeds_quietly();
+    scratch.run_on("lamp show --layers 3..", cut).is_refused_with(&["last whole layer is 18"]);
+}
+
+#[test]
+fn show_animates_layers() {
+    let (scratch, image) = with_blade();
+    let line = "lamp show blade.tif --layers 5../40 --animate --fps 25 -o blade.png";
+    scratch.run(line).succeeds_quietly();
+    let file = scratch.bytes("blade.png");
+    let mut reader = png::Decoder::new(Cursor::new(file)).read_info().unwrap();
+    let animation = *reader.info().animation_control().unwrap();
+    assert_eq!((animation.num_frames, animation.num_plays), (4, 0));
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    for layer in [5, 45, 85, 125] {
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        let frame = reader.info().frame_control().unwrap();
+        assert_eq!((frame.delay_num, frame.delay_den), (1, 25));
+        let rows: Picture = pixels.chunks(width).map(<[u8]>::to_vec).collect();
+        assert_eq!(rows.len(), height + 24);
+        let line = format!("lamp show blade.tif --layer {layer}");
+        let alone = read_png(scratch.run(&line).succeeds_quietly().stdout);
+        assert!(rows[..height] == alone, "layer {layer}");
+    }
+    scratch.run("lamp info blade.png").is_refused_with(&["a picture file of several images"]);
+    let alone = "lamp show blade.tif --layer 5 --animate";
+    scratch.run(alone).is_wrong_usage(&["--animate", "cannot be used with", "--layer"]);
+}
+
+#[test]
 fn show_draws_gray_levels() {
     let scratch = Scratch::new();
     lamp_tests::write_gray_ramp(&scratch.path("ramp.tif"), 256, 3);

@@ -1,44 +1,75 @@
-//! `lamp show`: draws a layer.
+//! `lamp show`: draws layers.
 
-use std::io::{self, BufWriter, IsTerminal};
-use std::path::PathBuf;
+use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::anyhow;
 use clap::Args;
-use lamp_stack::Layer;
+use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order};
 
 use crate::exit::Exit;
+use crate::options::EveryNth;
 use crate::picture::{Picture, PictureScale, Region};
 use crate::streams::{failed_at, input_name, is_stream, open_pages, write_file};
+use crate::thumbnails::{Thumbnail, contact_sheet, write_animation};
 
-/// Show a layer as a PNG picture, whole or in part
+/// Show a layer as a PNG picture, or many on one sheet or as an animation
 ///
-/// The stack is read only up to the layer, so one that is cut off after it works, too.
+/// The stack is read only up to the last layer shown, so one that is cut off after it works, too.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp show build.tif --layer 600 --scale 1/8 -o layer.png
-  lamp show build.tif --layer 600 --region 2000,1500,200,100 --scale 4 -o detail.png")]
+  lamp show build.tif --z 12mm --region 2000,1500,200,100 --scale 4 -o detail.png
+  lamp show build.tif --layers 0..1270/40 -o sheet.png
+  lamp show build.tif --layers 0..1270/10 --animate -o build.png")]
 pub(crate) struct ShowArgs {
-    /// The stack: a TIFF or PNG file, a folder of pages, or - for standard input
+    /// The stack: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
     stack: PathBuf,
 
-    /// Index of the layer
-    #[arg(long, value_name = "K")]
-    layer: u32,
+    #[command(flatten)]
+    shown: Shown,
 
     /// Show only this part of the image: left column, top row, width and height in pixels
     #[arg(long, value_name = "X,Y,W,H")]
     region: Option<Region>,
 
-    /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 the mean of 8 x 8
-    #[arg(long, value_name = "N|1/N", default_value = "1")]
-    scale: PictureScale,
+    /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 the mean of 8 x 8 [default: 1; of
+    /// several layers, what makes each at most 400 pixels wide and high]
+    #[arg(long, value_name = "N|1/N")]
+    scale: Option<PictureScale>,
+
+    /// Show the layers one after the other, as an animated PNG
+    #[arg(long, conflicts_with_all = ["layer", "z"])]
+    animate: bool,
+
+    /// Layers per second of an animation
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "animate")]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=100))]
+    fps: u16,
 
     /// Where to write the PNG: a file, or - for standard output
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     output: PathBuf,
+}
+
+/// The layers to show.
+#[derive(Args)]
+#[group(required = true, multiple = false)]
+struct Shown {
+    /// Index of the layer
+    #[arg(long, value_name = "K")]
+    layer: Option<u32>,
+
+    /// Show the layer at this height, as 12mm; where two layers meet, the upper one
+    #[arg(long, value_name = "HEIGHT", allow_hyphen_values = true)]
+    z: Option<Length>,
+
+    /// Show all layers from A to B - 1 on one sheet, or every Nth of them
+    #[arg(long, value_name = "A..B[/N]")]
+    layers: Option<EveryNth>,
 }
 
 pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
@@ -47,42 +78,153 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
             "a picture is not for terminals: name a file with -o, or pipe it on",
         ));
     }
-    let Layer { image, .. } = find_layer(args)?;
-    let whole = Region::of(&image);
-    let region = args.region.as_ref().unwrap_or(&whole).on(&image).ok_or_else(|| {
+    match &args.shown.layers {
+        Some(layers) => show_many(args, layers),
+        None => show_one(args),
+    }
+}
+
+fn show_one(args: &ShowArgs) -> Result<(), Exit> {
+    let Layer { image, .. } = match (args.shown.layer, args.shown.z) {
+        (Some(index), _) => layer_numbered(&args.stack, index)?,
+        (None, z) => layer_at(&args.stack, z.expect("one of the options is required"))?,
+    };
+    let region = region_on(args, &image)?;
+    let scale = args.scale.unwrap_or(PictureScale::Up(1));
+    check_size(scale.size(&region))?;
+    let picture = Picture::new(&image, region, scale);
+    write(args, |out| picture.write_png(out))
+}
+
+fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
+    let name = input_name(&args.stack);
+    let failed = |error| failed_at(name.clone(), error);
+    let mut pages = open_pages(&args.stack)?;
+    let mut next = 0;
+    let pages = std::iter::from_fn(|| {
+        if next >= layers.range.end {
+            return None;
+        }
+        let page = pages.next()?;
+        next = page.as_ref().map_or(u32::MAX, |page| page.info().index.saturating_add(1));
+        Some(page.map_err(failed))
+    });
+    let shown =
+        pages.filter(|page| page.as_ref().map_or(true, |page| layers.holds(page.info().index)));
+    let pixels = AtomicU64::new(0);
+    let thumbnails = map_in_order(shown, |page: Page| {
+        let layer = page.decode().map_err(failed)?;
+        let region = region_on(args, &layer.image)?;
+        let scale = args.scale.unwrap_or_else(|| PictureScale::fitting(&region, THUMBNAIL_SIDE));
+        let [width, height] = scale.size(&region);
+        if pixels.fetch_add(width * height, Ordering::Relaxed) + width * height > MAX_PIXELS {
+            return Err(Exit::usage(format!(
+                "the pictures of the layers would have more than {MAX_PIXELS} pixels: choose fewer layers, as every 40th with --layers 0..1270/40, or a smaller --scale"
+            )));
+        }
+        Ok(Thumbnail::new(&layer, region, scale)?)
+    });
+    let thumbnails = thumbnails.collect::<Result<Vec<_>, Exit>>()?;
+    if thumbnails.is_empty() {
+        return Err(Exit::Failed(anyhow!("{name}: no layer is in that range")));
+    }
+    if args.animate {
+        return write(args, |out| write_animation(&thumbnails, args.fps, out));
+    }
+    let sheet = contact_sheet(thumbnails);
+    check_size([sheet.width, sheet.height].map(u64::from))?;
+    write(args, |out| sheet.write_png(out))
+}
+
+/// The longer side of a layer's picture among others, in pixels.
+const THUMBNAIL_SIDE: u32 = 400;
+/// The most pixels of all pictures that are shown together, a byte each.
+const MAX_PIXELS: u64 = 1 << 28;
+/// Pictures wider or higher than this cannot be looked at.
+const MAX_PICTURE_SIDE: u64 = 200_000;
+
+fn check_size([width, height]: [u64; 2]) -> Result<(), Exit> {
+    if width.max(height) <= MAX_PICTURE_SIDE {
+        return Ok(());
+    }
+    Err(Exit::usage(format!(
+        "the picture would be more than {MAX_PICTURE_SIDE} pixels wide or high: choose a --region or a smaller --scale"
+    )))
+}
+
+/// Returns the region to show of an image.
+fn region_on(args: &ShowArgs, image: &Image) -> Result<Region, Exit> {
+    let whole = Region::of(image);
+    args.region.as_ref().unwrap_or(&whole).on(image).ok_or_else(|| {
         let (width, height) = (image.width(), image.height());
         Exit::usage(format!(
             "the region lies outside the image, which is {width} x {height} pixels"
         ))
-    })?;
-    if args.scale.side(&region) > MAX_PICTURE_SIDE {
-        return Err(Exit::usage(format!(
-            "the picture would be more than {MAX_PICTURE_SIDE} pixels wide or high: choose a --region or a smaller --scale"
-        )));
-    }
-    let picture = Picture::new(&image, region, args.scale);
+    })
+}
+
+fn write(
+    args: &ShowArgs,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Exit> {
     if is_stream(&args.output) {
-        let written = picture.write_png(BufWriter::new(io::stdout().lock()));
+        let written = write(&mut BufWriter::new(io::stdout().lock()));
         written.map_err(|error| Exit::output(error, "standard output"))
     } else {
-        write_file(&args.output, |out| picture.write_png(out))
+        write_file(&args.output, write)
     }
 }
 
-/// Pictures wider or higher than this cannot be looked at.
-const MAX_PICTURE_SIDE: u64 = 200_000;
-
-fn find_layer(args: &ShowArgs) -> Result<Layer, Exit> {
-    let name = input_name(&args.stack);
+/// Returns the layer of an index.
+fn layer_numbered(stack: &Path, index: u32) -> Result<Layer, Exit> {
+    let name = input_name(stack);
     let failed = |error| failed_at(name.clone(), error);
     let mut last = None;
-    for page in open_pages(&args.stack)? {
+    for page in open_pages(stack)? {
         let page = page.map_err(failed)?;
-        if page.info().index == args.layer {
+        if page.info().index == index {
             return page.decode().map_err(failed);
         }
         last = Some(page.info().index);
     }
     let last = last.map_or_else(String::new, |last| format!("; the last is {last}"));
-    Err(Exit::Failed(anyhow!("{name}: there is no layer {}{last}", args.layer)))
+    Err(Exit::Failed(anyhow!("{name}: there is no layer {index}{last}")))
+}
+
+/// Returns the layer at a height.
+fn layer_at(stack: &Path, z: Length) -> Result<Layer, Exit> {
+    let name = input_name(stack);
+    let failed = |error| failed_at(name.clone(), error);
+    let (mut lowest, mut last) = (None, None);
+    for page in open_pages(stack)? {
+        let page = page.map_err(failed)?;
+        let Some([bottom, top]) = heights(page.info()) else {
+            let layer = page.info().name();
+            return Err(Exit::Failed(anyhow!(
+                "{name}: {layer} states no height: choose a layer with --layer"
+            )));
+        };
+        if (bottom..top).contains(&z) {
+            return page.decode().map_err(failed);
+        }
+        lowest.get_or_insert(bottom);
+        last = Some((page, top));
+    }
+    match (lowest, last) {
+        // The top of the stack belongs to its last layer.
+        (_, Some((page, top))) if z == top => page.decode().map_err(failed),
+        (Some(bottom), Some((_, top))) => {
+            let [z, bottom, top] = [z, bottom, top].map(Length::mm);
+            Err(Exit::Failed(anyhow!(
+                "{name}: no layer is at z {z} mm: the layers are from {bottom:.3} to {top:.3} mm"
+            )))
+        }
+        _ => Err(failed(StackError::NoLayers)),
+    }
+}
+
+/// Returns the heights of a layer's bottom and top, if its page states them.
+fn heights(info: &PageInfo) -> Option<[Length; 2]> {
+    let bottom = info.z_um?;
+    Some([bottom, bottom + info.thickness_um?].map(Length::from_um))
 }

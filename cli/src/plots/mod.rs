@@ -1,6 +1,7 @@
 //! Plots curves and measured points as SVG or PNG.
 
 mod axis_scale;
+mod caption;
 mod layout;
 
 use std::io;
@@ -15,6 +16,7 @@ use plotters::style::{FontStyle, register_font};
 
 use axis_scale::AxisScale;
 
+pub(crate) use caption::{CAPTION_HEIGHT, caption};
 pub(crate) use layout::layout_picture;
 
 use crate::exit::Exit;
