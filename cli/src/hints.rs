@@ -193,6 +193,11 @@ fn data(error: &DataError) -> Option<String> {
 
 fn stack(error: &StackError) -> Option<String> {
     let hint = match error {
+        StackError::Check { .. }
+        | StackError::EndedEarly { .. }
+        | StackError::MissingPages { .. } => {
+            "make the stack again, or take it as it is with lamp convert --ignore-checks"
+        }
         StackError::Exists => "--force replaces a folder of an earlier run",
         StackError::NotReplaceable { .. } => "choose another name, or remove the folder yourself",
         // It is transparent, so that it is no cause of its own.

@@ -28,6 +28,7 @@ mod progress;
 mod recorded;
 mod signals;
 mod slicing_options;
+mod stack_facts;
 mod step_options;
 mod streams;
 mod thumbnails;

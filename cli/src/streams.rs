@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use lamp_stack::{
-    Destination, FileBeside, FolderBeside, Format, Layer, Page, Pages, StackError, StackInfo,
-    map_in_order, write_stack,
+    Destination, FileBeside, FolderBeside, Format, Layer, Page, PageInfo, Pages, StackError,
+    StackInfo, map_in_order, write_stack,
 };
 
 use crate::exit::Exit;
@@ -99,14 +99,23 @@ pub(crate) fn read_layers(
     input: &Input,
     progress: &Progress,
 ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
+    Ok(layers_of_input(open_pages(&input.stack)?, input, progress))
+}
+
+/// Reads the wanted layers of the input, which is open.
+pub(crate) fn layers_of_input(
+    pages: Pages,
+    input: &Input,
+    progress: &Progress,
+) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
     let progress = progress.clone();
     let name = input_name(&input.stack);
-    let pages = read_pages(input)?.inspect(move |page| {
+    let pages = pages_of(pages, name.clone(), input.layers.clone()).inspect(move |page| {
         if let Ok((_, Some(StackInfo { layers: Some(layers), .. }))) = page {
             progress.expect((*layers).into());
         }
     });
-    Ok(decoded(pages, name))
+    decoded(pages, name)
 }
 
 /// Reads the wanted layers of a stack that is open, decoded, in order.
@@ -142,19 +151,22 @@ pub(crate) fn read_beside(
     Ok(map_in_order(pages, move |page: Page| page.decode().map_err(&failed)))
 }
 
-/// Reads the pages of the wanted layers. The stack's own metadata goes with the first of them.
-pub(crate) fn read_pages(
-    input: &Input,
-) -> Result<impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>> + use<>, Exit> {
-    let pages = open_pages(&input.stack)?;
-    Ok(pages_of(pages, input_name(&input.stack), input.layers.clone()))
-}
-
 fn pages_of(
-    mut pages: Pages,
+    pages: Pages,
     name: String,
     layers: Option<Range<u32>>,
 ) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>> {
+    in_range(pages, Page::info, name, layers)
+}
+
+/// Takes the pages of the wanted layers, decoded or not, given how to get their `info`. The
+/// stack's own metadata goes with the first of them.
+pub(crate) fn in_range<P>(
+    mut pages: impl Iterator<Item = Result<P, StackError>>,
+    info: fn(&P) -> &PageInfo,
+    name: String,
+    layers: Option<Range<u32>>,
+) -> impl Iterator<Item = Result<(P, Option<StackInfo>), Exit>> {
     let mut stack: Option<StackInfo> = None;
     let mut found = false;
     std::iter::from_fn(move || {
@@ -166,9 +178,9 @@ fn pages_of(
                     return Some(Err(failed_at(name.clone(), error)));
                 }
             };
-            let of_page = page.info().stack.clone();
+            let of_page = info(&page).stack.clone();
             let Some(layers) = &layers else { return Some(Ok((page, of_page))) };
-            let index = page.info().index;
+            let index = info(&page).index;
             stack = of_page.map(|of_page| of_page.of_range(index, layers)).or(stack.take());
             if layers.contains(&index) {
                 found = true;
@@ -190,6 +202,15 @@ pub(crate) fn write_layers(
     let counted = layers.inspect(|_| progress.layer_done());
     let written = write_stack(counted, to, format(output.classic));
     written_to(&output.output, written, progress)
+}
+
+/// Passes layers on. At their end `finding` may stop the work: then no file is written, and a
+/// stream ends as one that is cut off and says why.
+pub(crate) fn unless_found(
+    layers: impl Iterator<Item = Result<Layer, Exit>>,
+    finding: impl FnOnce() -> Option<Exit>,
+) -> impl Iterator<Item = Result<Layer, Exit>> {
+    layers.chain(std::iter::once_with(finding).flatten().map(Err))
 }
 
 /// Returns the format of TIFFs to write.

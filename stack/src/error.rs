@@ -4,6 +4,7 @@ use std::io;
 
 use thiserror::Error;
 
+use crate::check::CheckFault;
 use crate::g4::G4Error;
 use crate::picture_page::PictureFormat;
 
@@ -59,6 +60,34 @@ pub enum StackError {
         layer: u32,
         /// The fault in its codes.
         source: G4Error,
+    },
+    /// A page is not as it was written.
+    #[error("layer {layer}: {fault}")]
+    Check {
+        /// The layer's index.
+        layer: u32,
+        /// What differs.
+        fault: CheckFault,
+    },
+    /// The stack ends, but its last page was not the last when it was written.
+    #[error("the stack ends with layer {last}, but was written with more layers")]
+    EndedEarly {
+        /// The last layer.
+        last: u32,
+    },
+    /// The stack has fewer pages than its first page states.
+    #[error("the stack has {found} layers, but its first page states {stated}: pages are missing")]
+    MissingPages {
+        /// The number of pages.
+        found: u32,
+        /// The number that the first page states.
+        stated: u32,
+    },
+    /// The stage that wrote the stream gave up and said why.
+    #[error("the stage before gave up: {reason}")]
+    GivenUp {
+        /// The sentence of that stage.
+        reason: String,
     },
     /// A file of a folder cannot be read.
     #[error("{file}")]

@@ -4,12 +4,13 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use crate::check::ChainReader;
 use crate::error::StackError;
 use crate::layer::Layer;
 use crate::limits::Limits;
 use crate::ordered::map_in_order;
 use crate::picture_page::PictureFormat;
-use crate::tiff::{Page, PageReader};
+use crate::tiff::{Page, PageHeader, PageReader};
 
 /// An iterator over the pages of a stack, bottom first.
 #[derive(Debug)]
@@ -17,16 +18,21 @@ pub struct Pages {
     source: Source,
     limits: Limits,
     count: u32,
+    /// The number of pages that the first page states.
+    stated: Option<u32>,
     last_whole: Option<u32>,
+    /// `None` if checks are ignored.
+    chain: Option<ChainReader>,
+    images: bool,
+    ended: bool,
 }
 
 #[derive(Debug)]
 enum Source {
     /// A file or a stream.
     One(PageReader),
-    /// A folder: the unread files, last first, and the number of pages that the first page
-    /// states, if any.
-    Folder { files: Vec<PathBuf>, expected: u32 },
+    /// A folder: the unread files, last first.
+    Folder(Vec<PathBuf>),
 }
 
 impl Pages {
@@ -43,7 +49,7 @@ impl Pages {
             if files.is_empty() {
                 return Err(StackError::NoPages);
             }
-            Source::Folder { files, expected: 0 }
+            Source::Folder(files)
         } else {
             Source::One(PageReader::from_file(File::open(path)?)?)
         };
@@ -67,14 +73,23 @@ impl Pages {
     }
 
     fn new(source: Source) -> Self {
-        Self { source, limits: Limits::default(), count: 0, last_whole: None }
+        Self {
+            source,
+            limits: Limits::default(),
+            count: 0,
+            stated: None,
+            last_whole: None,
+            chain: Some(ChainReader::default()),
+            images: true,
+            ended: false,
+        }
     }
 
     /// Replaces the default limits of the reader.
     pub fn with_limits(self, limits: Limits) -> Self {
         let source = match self.source {
             Source::One(reader) => Source::One(reader.with_limits(limits)),
-            folder @ Source::Folder { .. } => folder,
+            folder @ Source::Folder(_) => folder,
         };
         Self { source, limits, ..self }
     }
@@ -84,34 +99,55 @@ impl Pages {
         map_in_order(self, Page::decode)
     }
 
+    /// Ignores the checks of pages: images and texts that another program has changed are taken
+    /// as they are.
+    pub fn without_checks(self) -> Self {
+        Self { chain: None, ..self }
+    }
+
+    /// Returns what the pages say without their images, in order. Data is passed over.
+    pub fn headers(mut self) -> impl Iterator<Item = Result<PageHeader, StackError>> {
+        self.images = false;
+        self.source = match self.source {
+            Source::One(reader) => Source::One(reader.without_images()),
+            folder @ Source::Folder(_) => folder,
+        };
+        self.map(|page| page.map(|page| page.header()))
+    }
+
     fn next_page(&mut self) -> Option<Result<Page, StackError>> {
         match &mut self.source {
             Source::One(reader) => reader.next(),
-            Source::Folder { files, expected } => match files.pop() {
-                None if self.count < *expected => {
-                    *expected = 0;
-                    Some(Err(StackError::CutOff { last_whole: self.last_whole }))
-                }
-                None => None,
-                Some(file) => Some(
-                    one_page(&file, self.limits, self.count, self.last_whole).map_err(|source| {
-                        let file =
-                            file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                        StackError::InFile { file, source: Box::new(source) }
-                    }),
-                ),
-            },
+            Source::Folder(files) => {
+                let file = files.pop()?;
+                let page = self.page_of_file(&file);
+                Some(page.map_err(|source| {
+                    let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                    StackError::InFile { file, source: Box::new(source) }
+                }))
+            }
         }
+    }
+
+    /// Reads the single page of a folder's file.
+    fn page_of_file(&self, file: &Path) -> Result<Page, StackError> {
+        let reader = PageReader::from_file(File::open(file)?)?;
+        let mut reader = reader.with_limits(self.limits).numbered(self.count, self.last_whole);
+        if !self.images {
+            reader = reader.without_images();
+        }
+        let page = reader.next().unwrap_or(Err(StackError::Empty))?;
+        if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
     }
 
     /// Checks that a page follows the page before it.
     fn check(&mut self, page: &Page) -> Result<(), StackError> {
         let info = page.info();
         let layer = info.index;
-        if let Source::Folder { expected, .. } = &mut self.source {
-            if self.count == 0 {
-                *expected = info.stack.as_ref().and_then(|stack| stack.layers).unwrap_or(0);
-            }
+        if self.count == 0 {
+            self.stated = info.stack.as_ref().and_then(|stack| stack.layers);
+        }
+        if matches!(self.source, Source::Folder(_)) {
             // The first page of ours states the stack.
             let follows = match self.last_whole {
                 Some(last) => last.checked_add(1) == Some(layer),
@@ -123,6 +159,25 @@ impl Pages {
         }
         match self.last_whole {
             Some(before) if layer <= before => Err(StackError::Order { layer, before }),
+            before => match &mut self.chain {
+                Some(chain) => {
+                    page.follow(chain, before).map_err(|fault| StackError::Check { layer, fault })
+                }
+                None => Ok(()),
+            },
+        }
+    }
+
+    /// Checks that no page is missing behind the last.
+    fn check_end(&self) -> Result<(), StackError> {
+        let (Some(last), Some(chain)) = (self.last_whole, &self.chain) else { return Ok(()) };
+        if chain.is_open() {
+            return Err(StackError::EndedEarly { last });
+        }
+        match self.stated {
+            Some(stated) if self.count < stated => {
+                Err(StackError::MissingPages { found: self.count, stated })
+            }
             _ => Ok(()),
         }
     }
@@ -133,34 +188,33 @@ impl Iterator for Pages {
 
     /// Returns the next page, or `None` after an error.
     fn next(&mut self) -> Option<Self::Item> {
-        let page = self.next_page()?.and_then(|page| self.check(&page).map(|()| page));
-        match &page {
+        if self.ended {
+            return None;
+        }
+        let page = match self.next_page() {
+            Some(page) => page.and_then(|page| self.check(&page).map(|()| page)),
+            None => {
+                self.ended = true;
+                return self.check_end().err().map(Err);
+            }
+        };
+        match page {
             Ok(page) => {
                 self.count += 1;
                 self.last_whole = Some(page.info().index);
+                Some(Ok(if self.chain.is_some() { page } else { page.without_check() }))
             }
-            Err(_) => self.source = Source::Folder { files: Vec::new(), expected: 0 },
+            Err(error) => {
+                self.ended = true;
+                Some(Err(error))
+            }
         }
-        Some(page)
     }
-}
-
-/// Reads the single page of a folder's file.
-fn one_page(
-    file: &Path,
-    limits: Limits,
-    number: u32,
-    last_whole: Option<u32>,
-) -> Result<Page, StackError> {
-    let reader = PageReader::from_file(File::open(file)?)?;
-    let mut reader = reader.with_limits(limits).numbered(number, last_whole);
-    let page = reader.next().unwrap_or(Err(StackError::Empty))?;
-    if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
 }
 
 /// Lists the pages of a folder, last name first: its TIFFs or PNGs, or where there are none its
 /// other pictures.
-fn page_files(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
+pub(crate) fn page_files(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();

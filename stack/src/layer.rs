@@ -5,6 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use crate::check::ImageCheck;
 use crate::gray::{GrayMask, gray_runs};
 use crate::length::{Dpi, Length};
 use crate::mask::{Mask, white_runs};
@@ -31,11 +32,11 @@ impl MemorySize for Layer {
     }
 }
 
-/// A layer's image. An image that was read may keep its page's T.6 strip, so that a stage
-/// that does not change it need not encode it again.
+/// A layer's image. An image that was read may keep its page's T.6 strip and its check, so that
+/// a stage that does not change it need not make them again.
 ///
 /// It dereferences to its [`Image`]. To change it, replace it with another image converted
-/// by `into`, which has no strip.
+/// by `into`, which has neither.
 ///
 /// ```
 /// use lamp_stack::{Image, Layer, Mask, PageInfo};
@@ -51,18 +52,25 @@ impl MemorySize for Layer {
 pub struct LayerImage {
     image: Image,
     strip: Option<Box<[u8]>>,
+    check: Option<ImageCheck>,
 }
 
 impl LayerImage {
-    pub(crate) fn with_strip(image: Image, strip: Vec<u8>) -> Self {
-        Self { image, strip: Some(strip.into()) }
+    /// Creates an image as it was read.
+    pub(crate) fn of_page(image: Image, strip: Option<Vec<u8>>, check: Option<ImageCheck>) -> Self {
+        Self { image, strip: strip.map(Into::into), check }
     }
 
     pub(crate) fn strip(&self) -> Option<&[u8]> {
         self.strip.as_deref()
     }
 
-    /// Returns the image without its strip.
+    /// Returns the check that the image was read with, or computes it.
+    pub(crate) fn check(&self) -> ImageCheck {
+        self.check.unwrap_or_else(|| ImageCheck::of(&self.image))
+    }
+
+    /// Returns the image without its strip and check.
     pub fn into_image(self) -> Image {
         self.image
     }
@@ -84,7 +92,7 @@ impl PartialEq for LayerImage {
 
 impl<I: Into<Image>> From<I> for LayerImage {
     fn from(image: I) -> Self {
-        Self { image: image.into(), strip: None }
+        Self { image: image.into(), strip: None, check: None }
     }
 }
 
@@ -237,12 +245,7 @@ impl PageInfo {
         }
     }
 
-    /// Parses a page's description. Returns `None` if it is not such a JSON line.
-    pub(crate) fn parse(description: &[u8]) -> Option<Self> {
-        serde_json::from_slice(description).ok()
-    }
-
-    /// Returns the JSON line.
+    /// Returns the JSON line without the page's check.
     pub(crate) fn to_line(&self) -> String {
         serde_json::to_string(self).expect("maps have string keys and numbers are finite")
     }
@@ -250,7 +253,7 @@ impl PageInfo {
 
 /// Writes a whole number without `.0`.
 #[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
-fn short_number<S: Serializer>(number: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
+pub(crate) fn short_number<S: Serializer>(number: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
     match *number {
         None => to.serialize_none(),
         Some(n) if n.fract() == 0.0 && n.abs() < 1e15 => to.serialize_i64(n as i64),
@@ -261,11 +264,16 @@ fn short_number<S: Serializer>(number: &Option<f64>, to: S) -> Result<S::Ok, S::
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check::Line;
+
+    fn parse(line: &str) -> Option<PageInfo> {
+        Line::parse(line.as_bytes()).map(|line| line.info)
+    }
 
     #[test]
     fn the_line_of_the_format_reads_and_writes_back() {
         let line = r#"{"layer":812,"z_um":81200,"thickness_um":100,"origin_mm":[-1.016934,77.216934],"exposure_ms":136.7,"closed":false,"stray_rows":[1034,1035],"who":{"knows":[1,null]}}"#;
-        let info = PageInfo::parse(line.as_bytes()).unwrap();
+        let info = parse(line).unwrap();
         assert_eq!(info.index, 812);
         assert_eq!(info.z(), Some(Length::from_mm(81.2)));
         assert_eq!((info.closed, &info.stray_rows[..]), (Some(false), &[1034, 1035][..]));
@@ -291,13 +299,13 @@ mod tests {
     #[test]
     fn numbers_of_all_digits_pass_through_unchanged() {
         let line = r#"{"layer":1,"z_um":31.245270191439438,"who":121.48791951161945}"#;
-        assert_eq!(PageInfo::parse(line.as_bytes()).unwrap().to_line(), line);
+        assert_eq!(parse(line).unwrap().to_line(), line);
     }
 
     #[test]
     fn other_descriptions_are_not_taken_for_ours() {
         for text in ["", "a scan", "{}", r#"{"layer":-1}"#, "[1]", "\u{0}"] {
-            assert_eq!(PageInfo::parse(text.as_bytes()), None, "{text}");
+            assert_eq!(parse(text), None, "{text}");
         }
     }
 }

@@ -24,10 +24,13 @@
 //! ```
 
 mod catalogue;
+mod check;
 mod combine;
 mod counting_sort;
 mod depth_levels;
+mod digest;
 mod error;
+mod find;
 mod frame;
 pub mod g4;
 mod gray;
@@ -54,12 +57,17 @@ mod testing;
 mod text;
 mod threshold;
 mod tiff;
+mod totals;
+mod verify;
 
 pub use catalogue::{Builtin, CatalogueError, Catalogued, nonempty_text};
+pub use check::CheckFault;
 pub use combine::{Combine, Op, combine_rows};
 pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use depth_levels::DepthLevels;
+pub use digest::{digest_of, digest_of_digests};
 pub use error::{PageFault, StackError, UnsupportedFeature};
+pub use find::stacks_in;
 pub use frame::{Frame, place_row};
 pub use gray::{GrayMask, LevelChange, gray_runs};
 pub use input::Pages;
@@ -80,4 +88,6 @@ pub use runs::{Change, Pixel, RunError, RunImage};
 pub use split::{SplitError, SplitPoints, write_split};
 pub use temporary::{FileBeside, FolderBeside, remove_temporaries};
 pub use text::{line_of, one_line};
-pub use tiff::{Compression, EncodedPage, Format, Page, PageReader, PageWriter};
+pub use tiff::{Compression, EncodedPage, Format, Page, PageHeader, PageReader, PageWriter};
+pub use totals::{NumberRange, StackTotals};
+pub use verify::{LayerFault, VerifyError, verify};

@@ -1,14 +1,16 @@
 //! Writes stacks to a file, a folder of pages or a stream.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
+use crate::check::Chain;
 use crate::error::StackError;
 use crate::layer::Layer;
 use crate::ordered::map_in_order;
 use crate::temporary::{FileBeside, FolderBeside};
-use crate::tiff::{EncodedPage, Format, PageWriter};
+use crate::tiff::{EncodedPage, Format, PageWriter, file_of_page};
 
 /// The place that a stack is written to.
 pub enum Destination {
@@ -24,14 +26,15 @@ pub enum Destination {
 ///
 /// # Errors
 /// Returns the first error among the layers, or an error if writing fails. No file then
-/// appears under the final name; a stream lacks its last page link, so that its reader notices.
+/// appears under the final name; a stream ends without its last page, and says why, so that its
+/// reader fails with that sentence.
 pub fn write_stack<E>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     to: Destination,
     format: Format,
 ) -> Result<(), E>
 where
-    E: From<StackError> + Send,
+    E: From<StackError> + Display + Send,
 {
     let mut sink = Sink::new(to, format)?;
     let pages =
@@ -40,7 +43,7 @@ where
         match page {
             Ok((index, page)) => sink.push(index, page)?,
             Err(error) => {
-                sink.abandon();
+                sink.abandon(&error);
                 return Err(error);
             }
         }
@@ -50,7 +53,7 @@ where
 
 enum Sink {
     File { pages: PageWriter<BufWriter<File>>, temporary: FileBeside },
-    Folder { temporary: FolderBeside, format: Format, empty: bool },
+    Folder(PageFolder),
     Stream(PageWriter<BufWriter<Box<dyn Write>>>),
 }
 
@@ -68,7 +71,9 @@ impl Sink {
                 let out = BufWriter::with_capacity(BUFFER_BYTES, temporary.file().try_clone()?);
                 Self::File { pages: PageWriter::new(out, format), temporary }
             }
-            Destination::Folder(temporary) => Self::Folder { temporary, format, empty: true },
+            Destination::Folder(temporary) => {
+                Self::Folder(PageFolder { temporary, format, chain: Chain::default(), held: None })
+            }
         })
     }
 
@@ -76,23 +81,15 @@ impl Sink {
         match self {
             Self::Stream(pages) => pages.push(page),
             Self::File { pages, .. } => pages.push(page),
-            Self::Folder { temporary, format, empty, .. } => {
-                let name = format!("layer_{index:05}.tif");
-                let file = File::create_new(temporary.path().join(name))?;
-                let mut pages = PageWriter::new(BufWriter::new(file), *format);
-                pages.push(page)?;
-                pages.finish()?;
-                *empty = false;
-                Ok(())
-            }
+            Self::Folder(folder) => folder.push(index, page),
         }
     }
 
-    /// Flushes all complete layers to a stream; removes files.
-    fn abandon(self) {
+    /// Flushes all complete layers and the reason to a stream; removes files.
+    fn abandon(self, reason: &impl Display) {
         if let Self::Stream(pages) = self {
             // Only the original error is reported.
-            let _ = pages.cut_off();
+            let _ = pages.give_up(&reason.to_string());
         }
     }
 
@@ -103,9 +100,37 @@ impl Sink {
                 pages.finish()?;
                 temporary.persist()?;
             }
-            Self::Folder { empty: true, .. } => return Err(StackError::NoLayers),
-            Self::Folder { temporary, .. } => temporary.persist()?,
+            Self::Folder(folder) => folder.finish()?,
         }
         Ok(())
+    }
+}
+
+/// A folder of single-page files. One page is held back, because the last one says so.
+struct PageFolder {
+    temporary: FolderBeside,
+    format: Format,
+    chain: Chain,
+    held: Option<(u32, EncodedPage)>,
+}
+
+impl PageFolder {
+    fn push(&mut self, index: u32, page: EncodedPage) -> Result<(), StackError> {
+        match self.held.replace((index, page)) {
+            Some((index, before)) => self.write(index, &before, false),
+            None => Ok(()),
+        }
+    }
+
+    fn write(&mut self, index: u32, page: &EncodedPage, last: bool) -> Result<(), StackError> {
+        let path = self.temporary.path().join(format!("layer_{index:05}.tif"));
+        let bytes = file_of_page(page, self.format, &mut self.chain, last);
+        Ok(File::create_new(path)?.write_all(&bytes)?)
+    }
+
+    fn finish(mut self) -> Result<(), StackError> {
+        let (index, page) = self.held.take().ok_or(StackError::NoLayers)?;
+        self.write(index, &page, true)?;
+        self.temporary.persist()
     }
 }

@@ -125,7 +125,7 @@ pub(crate) fn header(
 ) -> Result<Header, PictureFault> {
     let mut file = Cursor::new(file);
     let (width, height) = decoder(format, &mut file, limits)?.dimensions();
-    Ok(Header { width, height, gray: true, dpi: None, info: None })
+    Ok(Header { width, height, gray: true, dpi: None, line: None })
 }
 
 /// Decodes a picture: to a mask if its file has one bit a pixel, black or white, otherwise to a

@@ -4,6 +4,7 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, Info, Reader, Unit};
 
+use crate::check::Line;
 use crate::error::{PageFault, UnsupportedFeature};
 use crate::gray::GrayMask;
 use crate::layer::{Image, PageInfo};
@@ -28,7 +29,7 @@ pub(crate) struct Header {
     pub(crate) height: u32,
     pub(crate) gray: bool,
     pub(crate) dpi: Option<Dpi>,
-    pub(crate) info: Option<PageInfo>,
+    pub(crate) line: Option<Line>,
 }
 
 impl From<png::DecodingError> for PictureFault {
@@ -44,13 +45,13 @@ type PngRows<'a> = Reader<Cursor<&'a [u8]>>;
 pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PictureFault> {
     let (reader, samples) = open(file, limits)?;
     let info = reader.info();
-    let mut line = description(info).and_then(|text| PageInfo::parse(text.as_bytes()));
+    let mut line = description(info).and_then(|text| Line::parse(text.as_bytes()));
     Ok(Header {
         width: info.width,
         height: info.height,
         gray: !samples.are_bits(),
-        dpi: dpi(info, line.as_mut()),
-        info: line,
+        dpi: dpi(info, line.as_mut().map(|line| &mut line.info)),
+        line,
     })
 }
 

@@ -1,6 +1,5 @@
 //! Writes layers and pictures as PNG files.
 
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Write};
 
@@ -8,6 +7,7 @@ use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, Filter, PixelDimensions, Unit,
 };
 
+use crate::check::{Chain, OpenLine};
 use crate::error::StackError;
 use crate::gray::gray_runs;
 use crate::layer::{Image, Layer};
@@ -29,18 +29,20 @@ pub fn write_png_folder<E>(
 where
     E: From<StackError> + Send,
 {
-    let pages = map_in_order(layers, |layer: Layer| Ok((layer.info.index, png_of_layer(&layer)?)));
-    let mut empty = true;
-    for page in pages {
-        let (index, png) = page?;
-        let path = folder.path().join(format!("layer_{index:05}.png"));
-        let written = File::create_new(path).and_then(|mut file| file.write_all(&png));
-        written.map_err(StackError::from)?;
-        empty = false;
+    let mut chain = Chain::default();
+    let mut write = |page: &PngPage, is_last| {
+        let path = folder.path().join(format!("layer_{:05}.png", page.index));
+        File::create_new(path)?.write_all(&page.file(&mut chain, is_last))
+    };
+    // One page is held back, because the last one says so.
+    let mut held: Option<PngPage> = None;
+    for page in map_in_order(layers, |layer: Layer| Ok(PngPage::new(&layer)?)) {
+        if let Some(before) = held.replace(page?) {
+            write(&before, false).map_err(StackError::from)?;
+        }
     }
-    if empty {
-        return Err(StackError::NoLayers.into());
-    }
+    let last = held.ok_or(StackError::NoLayers)?;
+    write(&last, true).map_err(StackError::from)?;
     Ok(folder.persist()?)
 }
 
@@ -53,33 +55,64 @@ where
 /// # Errors
 /// Returns an error if the image has no pixels.
 pub fn png_of_layer(layer: &Layer) -> Result<Vec<u8>, StackError> {
+    Ok(PngPage::new(layer)?.file(&mut Chain::default(), true))
+}
+
+/// A layer encoded as a PNG without its line, which depends on the pages before it.
+struct PngPage {
+    index: u32,
+    png: Vec<u8>,
+    line: OpenLine,
+}
+
+/// The end of a PNG's first chunk, the header: the signature has 8 bytes, the chunk 25.
+const HEADER_END: usize = 33;
+
+impl PngPage {
+    fn new(layer: &Layer) -> Result<Self, StackError> {
+        Ok(Self {
+            index: layer.info.index,
+            png: png_of_image(&layer.image, layer.dpi)?,
+            line: line(layer),
+        })
+    }
+
+    /// Returns the PNG with its line in a chunk after the header.
+    fn file(&self, chain: &mut Chain, is_last: bool) -> Vec<u8> {
+        let line = chain.close(&self.line, is_last);
+        let body = [b"tEXt", DESCRIPTION.as_bytes(), &[0], line.as_bytes()].concat();
+        let length = (body.len() - 4) as u32;
+        let crc = crc32fast::hash(&body);
+        let (header, rest) = self.png.split_at(HEADER_END);
+        [header, &length.to_be_bytes(), &body, &crc.to_be_bytes(), rest].concat()
+    }
+}
+
+fn png_of_image(image: &Image, dpi: Option<Dpi>) -> io::Result<Vec<u8>> {
     let mut png = Vec::new();
-    let mut encoder = Encoder::new(&mut png, layer.image.width(), layer.image.height());
+    let mut encoder = Encoder::new(&mut png, image.width(), image.height());
     // Most rows equal the row above. Better compression saves a third of the bytes but takes
     // twenty times as long.
     encoder.set_compression(Compression::Fast);
     encoder.set_color(ColorType::Grayscale);
     encoder.set_filter(Filter::Up);
-    encoder.set_pixel_dims(layer.dpi.map(pixel_dims));
-    let written = encoder.add_text_chunk(DESCRIPTION.to_owned(), line(layer));
-    written
-        .and_then(|()| match &*layer.image {
-            Image::Mask(mask) => {
-                encoder.set_depth(BitDepth::One);
-                write_rows(encoder, mask.rows().map(|row| bits(row, mask.width())))
-            }
-            Image::Gray(gray) => {
-                let levels = gray.rows().map(|row| {
-                    let mut levels = vec![0; gray.width() as usize];
-                    for (start, end, level) in gray_runs(row, gray.width()) {
-                        levels[start as usize..end as usize].fill(level);
-                    }
-                    levels
-                });
-                write_rows(encoder, levels)
-            }
-        })
-        .map_err(io::Error::from)?;
+    encoder.set_pixel_dims(dpi.map(pixel_dims));
+    match image {
+        Image::Mask(mask) => {
+            encoder.set_depth(BitDepth::One);
+            write_rows(encoder, mask.rows().map(|row| bits(row, mask.width())))?;
+        }
+        Image::Gray(gray) => {
+            let levels = gray.rows().map(|row| {
+                let mut levels = vec![0; gray.width() as usize];
+                for (start, end, level) in gray_runs(row, gray.width()) {
+                    levels[start as usize..end as usize].fill(level);
+                }
+                levels
+            });
+            write_rows(encoder, levels)?;
+        }
+    }
     Ok(png)
 }
 
@@ -199,22 +232,12 @@ fn pixel_dims(dpi: Dpi) -> PixelDimensions {
 }
 
 /// Returns the page's JSON line in ASCII, because readers of `tEXt` disagree on other bytes.
-fn line(layer: &Layer) -> String {
+fn line(layer: &Layer) -> OpenLine {
     let mut info = layer.info.clone();
     if let Some(dpi) = layer.dpi.filter(|&dpi| Dpi::from_per_metre(dpi.per_metre()) != Some(dpi)) {
         info.other.insert(EXACT_DPI.to_owned(), dpi.get().into());
     }
-    let mut line = String::new();
-    for c in info.to_line().chars() {
-        if c.is_ascii() {
-            line.push(c);
-        } else {
-            for unit in c.encode_utf16(&mut [0; 2]) {
-                write!(line, "\\u{unit:04x}").expect("memory takes all");
-            }
-        }
-    }
-    line
+    OpenLine::new(&info, layer.dpi, layer.image.check()).into_ascii()
 }
 
 /// A writer that keeps the I/O error, which the encoder's own errors do not contain.
@@ -238,6 +261,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::check::Line;
     use crate::{Limits, Mask, PageInfo, StackInfo, png_page};
 
     proptest! {
@@ -264,18 +288,22 @@ mod tests {
 
     #[test]
     fn the_line_has_the_resolution_only_where_it_would_be_lost() {
-        let whole = layer(1500.0, "cube");
-        assert_eq!(line(&whole), whole.info.to_line());
-        let odd = line(&layer(72.25, "cube"));
-        assert_eq!(odd, line(&layer(72.0, "cube")).replace("}}", "},\"dpi\":72.25}"));
+        let stated =
+            |dpi| line_of_file(&layer(dpi, "cube")).split_once("\"check\"").unwrap().0.to_owned();
+        assert!(!stated(1500.0).contains("dpi"));
+        assert_eq!(stated(72.25), stated(72.0) + "\"dpi\":72.25,");
+    }
+
+    fn line_of_file(layer: &Layer) -> String {
+        Chain::default().close(&line(layer), true)
     }
 
     #[test]
     fn the_line_is_ascii_and_reads_back() {
         let layer = layer(1500.0, "Лопатка 葉 🔥 é");
-        let line = line(&layer);
+        let line = line_of_file(&layer);
         assert!(line.is_ascii());
-        assert_eq!(PageInfo::parse(line.as_bytes()), Some(layer.info));
+        assert_eq!(Line::parse(line.as_bytes()).unwrap().info, layer.info);
     }
 
     #[test]
@@ -290,7 +318,7 @@ mod tests {
                 assert_eq!(header.dpi, layer.dpi);
                 // A page that needs the key overwrites it.
                 if own.is_none() || dpi.fract() == 0.0 || dpi == 203.2 {
-                    assert_eq!(header.info, Some(layer.info), "{dpi} {own:?}");
+                    assert_eq!(header.line.unwrap().info, layer.info, "{dpi} {own:?}");
                 }
             }
         }

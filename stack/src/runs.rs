@@ -162,6 +162,11 @@ impl<C: Change> RunImage<C> {
         self.row_offsets.windows(2).map(|ends| &self.changes[ends[0] as usize..ends[1] as usize])
     }
 
+    /// Returns the number of changes up to each row's end, and the changes of all rows.
+    pub(crate) fn row_ends_and_changes(&self) -> (&[u32], &[C]) {
+        (&self.row_offsets[1..], &self.changes)
+    }
+
     /// Returns the number of changes in all rows, which determines the cost of processing.
     pub fn change_count(&self) -> usize {
         self.changes.len()

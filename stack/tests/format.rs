@@ -78,17 +78,30 @@ fn a_stream_reads_back() {
 
 #[test]
 fn every_part_stands_on_eight_bytes_and_offsets_grow() {
-    let bytes = write(&layers(3), Format::Big);
-    assert_eq!(bytes.len() % 8, 0);
-    let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
-    let mut directory = number(8);
-    for last in [false, false, true] {
-        assert_eq!(directory % 8, 0);
-        let link = directory + 8 + 20 * number(directory);
-        assert_eq!(number(link) == 0, last);
-        assert!(last || number(link) > link);
-        directory = number(link);
+    for format in [Format::Big, Format::Classic] {
+        let bytes = write(&layers(3), format);
+        assert_eq!(bytes.len() % 8, 0);
+        let directories = directories(&bytes, format);
+        assert_eq!(directories.len(), 3);
+        assert!(directories.is_sorted_by(|a, b| a < b));
+        assert!(directories.iter().all(|directory| directory % 8 == 0));
     }
+}
+
+/// Follows the links from directory to directory.
+fn directories(bytes: &[u8], format: Format) -> Vec<usize> {
+    let number = |at: usize, size: usize| {
+        bytes[at..at + size].iter().rev().fold(0, |number, &byte| number << 8 | usize::from(byte))
+    };
+    let (first, count_size, entry_size, word) = match format {
+        Format::Big => (8, 8, 20, 8),
+        Format::Classic => (4, 2, 12, 4),
+    };
+    let next = |directory: &usize| {
+        let link = directory + count_size + entry_size * number(*directory, count_size);
+        Some(number(link, word)).filter(|&next| next > 0)
+    };
+    std::iter::successors(Some(number(first, word)), next).collect()
 }
 
 #[test]
@@ -96,9 +109,8 @@ fn a_cut_stream_names_the_last_whole_layer() {
     let layers = layers(4);
     for format in [Format::Big, Format::Classic] {
         let whole = write(&layers, format);
-        // The end of each page: fewer pages give the same bytes, except for the
-        // last link.
-        let ends: Vec<usize> = (1..4).map(|count| write(&layers[..count], format).len()).collect();
+        // Each page ends where the next begins.
+        let ends = &directories(&whole, format)[1..];
         for cut in 1..whole.len() {
             match read(whole[..cut].to_vec()) {
                 Err(StackError::CutOff { last_whole }) => {
@@ -107,7 +119,7 @@ fn a_cut_stream_names_the_last_whole_layer() {
                     // Padding does not count: the page may be complete before it.
                     let known = last_whole.map_or(0, |layer| layer + 1) as usize;
                     assert!(
-                        known == pages || ends[..].get(pages).is_some_and(|end| end - cut < 8),
+                        known == pages || ends.get(pages).is_some_and(|end| end - cut < 8),
                         "{text}"
                     );
                 }
@@ -170,7 +182,7 @@ fn a_file_and_a_folder_read_back() {
         Pages::open(&folder.path().join("stack")).unwrap().layers().last().unwrap()
     };
     let last = without("layer_00011.tif");
-    assert!(matches!(last, Err(StackError::CutOff { last_whole: Some(10) })));
+    assert!(matches!(last, Err(StackError::EndedEarly { last: 10 })));
     let middle = without("layer_00004.tif");
     assert!(matches!(middle, Err(StackError::MissingPage { layer: 5 })));
     let first = without("layer_00000.tif");

@@ -5,6 +5,7 @@ use std::io::Cursor;
 use lamp_fixtures::Sample;
 use lamp_stack::Mask;
 use lamp_tests::{Scratch, mask, masks};
+use serde_json::json;
 
 fn with_cube() -> Scratch {
     let scratch = Scratch::new();
@@ -38,12 +39,61 @@ fn info_says_what_the_stack_holds() {
     assert_eq!(fact(&text, "resolution"), "100 dpi (24.384 x 20.574 mm)");
     assert_eq!(fact(&text, "z"), "0.000 to 20.000 mm");
     let transitions: usize = masks(&layers).iter().map(|mask| mask.rows().flatten().count()).sum();
-    assert_eq!(fact(&text, "runs"), format!("{transitions} transitions"));
+    let white: u64 = masks(&layers).iter().map(|mask| mask.white_pixels()).sum();
+    let volume = white as f64 * 0.254 * 0.254;
+    let exposed = format!("{white} pixels in all layers, {volume:.3} mm3");
+    assert_eq!(fact(&text, "exposed"), exposed);
+    assert!(!text.contains("runs:"));
+    let with_runs = info(&scratch, "lamp info cube.tif --runs");
+    assert_eq!(fact(&with_runs, "runs"), format!("{transitions} transitions"));
+    let proven = "texts, order and number of layers are as written; lamp verify checks the images";
+    assert_eq!(fact(&text, "checks"), proven);
     assert!(fact(&text, "data").ends_with(" bytes, CCITT Group 4"));
     assert_eq!(fact(&text, "stray rows"), "none known");
     let digest = &layers[0].info.stack.as_ref().unwrap().digest;
     assert_eq!(fact(&text, "input"), digest);
     assert!(digest.starts_with("blake3:") && digest.len() == "blake3:".len() + 64, "{digest}");
+}
+
+#[test]
+fn info_answers_scripts_in_json() {
+    let scratch = with_cube();
+    let answer =
+        |line: &str| -> serde_json::Value { serde_json::from_str(&info(&scratch, line)).unwrap() };
+    let layers = scratch.layers("cube.tif");
+    let stack = layers[0].info.stack.as_ref().unwrap();
+    let white: u64 = masks(&layers).iter().map(|mask| mask.white_pixels()).sum();
+    let found = answer("lamp info cube.tif --json");
+    for (key, expected) in [
+        ("schema", json!("lamp-info-1")),
+        ("part", json!("cube")),
+        ("commands", json!(stack.commands)),
+        ("digest", json!(stack.digest)),
+        ("layers", json!(20)),
+        ("first_layer", json!(0)),
+        ("last_layer", json!(19)),
+        ("gray_layers", json!(0)),
+        ("width_px", json!(96)),
+        ("height_px", json!(81)),
+        ("one_size", json!(true)),
+        ("dpi", json!(100.0)),
+        ("bottom_mm", json!(0.0)),
+        ("top_mm", json!(20.0)),
+        ("thickness_um", json!([1000.0, 1000.0])),
+        ("exposure_ms", json!(null)),
+        ("exposure_s", json!(null)),
+        ("exposed_px", json!(white)),
+        ("stray_rows", json!(0)),
+        ("compressions", json!(["CCITT Group 4"])),
+        ("checks", json!(true)),
+        ("transitions", json!(null)),
+    ] {
+        assert_eq!(found[key], expected, "{key}");
+    }
+    let volume = found["volume_mm3"].as_f64().unwrap();
+    assert!((volume - white as f64 * 0.254 * 0.254).abs() < 1e-3, "{volume}");
+    let transitions: usize = masks(&layers).iter().map(|mask| mask.change_count()).sum();
+    assert_eq!(answer("lamp info cube.tif --json --runs")["transitions"], json!(transitions));
 }
 
 #[test]

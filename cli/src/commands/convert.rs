@@ -15,8 +15,8 @@ use crate::options::{Common, Input, Output};
 use crate::progress::say;
 use crate::step_options::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
 use crate::streams::{
-    check_beside, input_name, is_folder, is_stream, new_folder, progress, read_layers, write_file,
-    write_layers, written_to,
+    check_beside, input_name, is_folder, is_stream, layers_of_input, new_folder, open_pages,
+    progress, write_file, write_layers, written_to,
 };
 
 /// Convert a stack to a file, a folder of pages or PNGs, or a STEP part to STL
@@ -52,6 +52,10 @@ pub(crate) struct ConvertArgs {
     /// Write a folder of PNGs instead of TIFFs; a single layer may be a file that ends in .png
     #[arg(long, conflicts_with = "classic")]
     png: bool,
+
+    /// Take pages that another program has changed as they are, and make new checks
+    #[arg(long)]
+    ignore_checks: bool,
 }
 
 pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
@@ -70,7 +74,11 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     let output = args.output.output.as_path();
     let progress = progress("convert", common, &args.output);
     let shape = args.shape()?;
-    let layers = read_layers(&args.input, &progress)?;
+    let mut pages = open_pages(path)?;
+    if args.ignore_checks {
+        pages = pages.without_checks();
+    }
+    let layers = layers_of_input(pages, &args.input, &progress);
     match shape {
         OutputKind::Tiff => write_layers(layers, &args.output, &progress),
         OutputKind::Pngs => {

@@ -1,5 +1,6 @@
 //! `lamp fix`: corrects stray rows, and reports them.
 
+use std::cell::Cell;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -11,7 +12,7 @@ use crate::exit::Exit;
 use crate::fix_report::{FixReport, whereabouts};
 use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output, one_of_described};
-use crate::streams::{check_beside, progress, read_layers, write_layers};
+use crate::streams::{check_beside, progress, read_layers, unless_found, write_layers};
 
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
 ///
@@ -62,7 +63,8 @@ pub(crate) struct FixArgs {
     #[arg(long, value_name = "DIR")]
     evidence: Option<PathBuf>,
 
-    /// Exit with status 3 if a band was left as it is
+    /// Give up with status 3 if a band was left as it is: no stack is written, and the next stage
+    /// of a pipe fails, too
     #[arg(long)]
     strict: bool,
 
@@ -91,6 +93,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     let evidence = args.evidence.as_deref();
     let mut evidence =
         evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
+    let left = Cell::new(0);
     let mut layer_count = 0;
     let layers = read_layers(&args.input, &progress)?.inspect(|_| layer_count += 1);
     let fixed = lamp_postprocess::fix(layers, options, |fixed| {
@@ -101,22 +104,26 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
             evidence.add(fixed);
         }
         findings.add(fixed);
+        left.set(findings.left());
     });
-    write_layers(fixed, &args.output, &progress)?;
+    let finding = || match left.get() {
+        left if left > 0 && args.strict => Some(Exit::Findings(left_in_all(left))),
+        _ => None,
+    };
+    let written = write_layers(unless_found(fixed, finding), &args.output, &progress);
+    if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
+        return written;
+    }
     if let Some(evidence) = evidence {
         evidence.finish()?;
     }
     if let Some(path) = &args.report {
         findings.write(layer_count, path)?;
     }
-    match findings.left() {
-        0 => Ok(()),
-        left if args.strict => Err(Exit::Findings(left_in_all(left))),
-        left => {
-            progress.say(&left_in_all(left));
-            Ok(())
-        }
+    if left.get() > 0 && !args.strict {
+        progress.say(&left_in_all(left.get()));
     }
+    written
 }
 
 fn left_in_all(bands: usize) -> String {

@@ -1,153 +1,146 @@
 //! `lamp info`: describes a stack.
 
+use std::ops::Range;
+
 use clap::Args;
-use lamp_stack::{Compression, Image, Layer, Page, StackInfo, map_in_order};
+use lamp_stack::{
+    NumberRange, Page, PageHeader, PageInfo, Pages, StackInfo, StackTotals, map_in_order,
+};
+use serde::Serialize;
 
 use crate::exit::Exit;
+use crate::json_report::print_answer;
 use crate::options::Input;
-use crate::streams::{failed_at, input_name, print, read_pages};
+use crate::stack_facts::{StackFacts, compression_name};
+use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 
-/// Describe a stack: pages, size, resolution, heights, runs, bytes
+/// Describe a stack: pages, size, resolution, heights, area, exposure, checks
+///
+/// Only directories and texts are read, which takes a moment for any file. Area and volume are
+/// those that the pages state. lamp verify also decodes the images.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp info build.tif
-  slice blade.stl | lamp info")]
+  lamp info build.tif --json | jq .exposure_s
+  slice blade.stl | lamp info --runs")]
 pub(crate) struct InfoArgs {
     #[command(flatten)]
     input: Input,
+
+    /// Also decode the images, and count their transitions
+    #[arg(long)]
+    runs: bool,
+
+    /// Print a JSON object (docs/json.md)
+    #[arg(long)]
+    json: bool,
 }
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
     let name = input_name(&args.input.stack);
-    let decoded = map_in_order(read_pages(&args.input)?, |(page, stack): (Page, _)| {
-        let (bytes, compression) = (page.strip_bytes(), page.compression());
-        let mut layer = page.decode().map_err(|error| failed_at(name.clone(), error))?;
-        layer.info.stack = stack;
-        Ok((layer, bytes, compression))
-    });
-    let mut totals: Option<StackTotals> = None;
-    for page in decoded {
-        let (layer, bytes, compression) = page?;
-        totals.get_or_insert_with(|| StackTotals::new(&layer)).add(&layer, bytes, compression);
+    let pages = open_pages(&args.input.stack)?;
+    let facts = if args.runs {
+        runs_of(pages, &name, args.input.layers.clone())?
+    } else {
+        let headers =
+            in_range(pages.headers(), header_info, name.clone(), args.input.layers.clone());
+        Facts::sum(headers.map(|page| Ok((with_stack(page?), None))))?
+    };
+    let Some(facts) = facts else { return Ok(()) };
+    if args.json {
+        return print_answer("lamp-info-1", &facts.json());
     }
-    totals.map_or(Ok(()), |totals| print(&totals.text(&name)))
+    print(&facts.text(&name))
 }
 
-/// Sums over the layers.
-struct StackTotals {
-    first: Layer,
-    last: Layer,
-    /// Those of the pages, in the order of their first use.
-    compressions: Vec<Compression>,
-    pages: u64,
-    gray_pages: u64,
-    changes: u64,
-    bytes: u64,
-    stray_rows: u64,
-    stray_layers: u64,
-    one_size: bool,
-    thickness_um: NumberRange,
-    exposure_ms: NumberRange,
+fn header_info(header: &PageHeader) -> &PageInfo {
+    &header.info
 }
 
-/// The range and sum of the numbers that pages state.
-#[derive(Default)]
-struct NumberRange {
-    ends: Option<[f64; 2]>,
-    sum: f64,
+/// Gives the first page in a range the metadata of the stack.
+fn with_stack((mut header, stack): (PageHeader, Option<StackInfo>)) -> PageHeader {
+    header.info.stack = stack;
+    header
 }
 
-impl NumberRange {
-    fn add(&mut self, number: Option<f64>) {
-        let Some(number) = number else { return };
-        let [least, greatest] = self.ends.unwrap_or([number; 2]);
-        self.ends = Some([least.min(number), greatest.max(number)]);
-        self.sum += number;
-    }
-
-    fn text(&self, unit: &str) -> Option<String> {
-        let [least, greatest] = self.ends?;
-        let one = least == greatest;
-        Some(if one { format!("{least} {unit}") } else { format!("{least} to {greatest} {unit}") })
-    }
+/// Sums up the pages and the transitions of their images.
+fn runs_of(pages: Pages, name: &str, layers: Option<Range<u32>>) -> Result<Option<Facts>, Exit> {
+    let place = name.to_owned();
+    let pages = in_range(pages, Page::info, name.to_owned(), layers);
+    Facts::sum(map_in_order(pages, move |(page, stack): (Page, _)| {
+        let header = with_stack((page.header(), stack));
+        let layer = page.decode().map_err(|error| failed_at(place.clone(), error))?;
+        Ok((header, Some(layer.image.change_count() as u64)))
+    }))
 }
 
-impl StackTotals {
-    fn new(first: &Layer) -> Self {
-        Self {
-            first: first.clone(),
-            last: first.clone(),
-            compressions: Vec::new(),
-            pages: 0,
-            gray_pages: 0,
-            changes: 0,
-            bytes: 0,
-            stray_rows: 0,
-            stray_layers: 0,
-            one_size: true,
-            thickness_um: NumberRange::default(),
-            exposure_ms: NumberRange::default(),
+/// The facts of a stack.
+struct Facts {
+    totals: StackTotals,
+    /// The number of transitions, if they were counted.
+    runs: Option<u64>,
+}
+
+impl Facts {
+    fn sum(
+        pages: impl Iterator<Item = Result<(PageHeader, Option<u64>), Exit>>,
+    ) -> Result<Option<Self>, Exit> {
+        let mut facts: Option<Self> = None;
+        for page in pages {
+            let (header, runs) = page?;
+            match &mut facts {
+                None => facts = Some(Self { totals: StackTotals::of(&header), runs }),
+                Some(facts) => {
+                    facts.totals.add(&header);
+                    facts.runs = facts.runs.zip(runs).map(|(sum, runs)| sum + runs);
+                }
+            }
         }
+        Ok(facts)
     }
 
-    fn add(&mut self, layer: &Layer, bytes: u64, compression: Compression) {
-        self.pages += 1;
-        self.gray_pages += u64::from(matches!(*layer.image, Image::Gray(_)));
-        if !self.compressions.contains(&compression) {
-            self.compressions.push(compression);
+    fn json(&self) -> impl Serialize {
+        #[derive(Serialize)]
+        struct Info<'a> {
+            #[serde(flatten)]
+            stack: StackFacts<'a>,
+            transitions: Option<u64>,
         }
-        self.changes += layer.image.change_count() as u64;
-        self.bytes += bytes;
-        self.stray_rows += layer.info.stray_rows.len() as u64;
-        self.stray_layers += u64::from(!layer.info.stray_rows.is_empty());
-        let (first, image) = (&self.first.image, &layer.image);
-        self.one_size &= first.width() == image.width() && first.height() == image.height();
-        self.thickness_um.add(layer.info.thickness_um);
-        self.exposure_ms.add(layer.info.exposure_ms);
-        self.last.info = layer.info.clone();
+        Info { stack: StackFacts::new(&self.totals), transitions: self.runs }
     }
 
     fn text(&self, name: &str) -> String {
-        let Layer { info, dpi, image } = &self.first;
+        let totals = &self.totals;
+        let info = &totals.first.info;
         let mut lines = vec![("stack", name.to_owned())];
         if let Some(stack) = &info.stack {
             lines.extend(stack_lines(stack));
         }
-        let (first, last) = (info.index, self.last.info.index);
-        let gray = match self.gray_pages {
-            0 => String::new(),
-            pages => format!(", {pages} of them gray"),
-        };
-        lines.push(("layers", format!("{} ({first} to {last}){gray}", self.pages)));
-        let others = if self.one_size { "" } else { " on the first page; others differ" };
-        lines.push(("size", format!("{} x {} pixels{others}", image.width(), image.height())));
-        match dpi {
-            Some(dpi) => {
-                let mm = |pixels: u32| f64::from(pixels) * dpi.pitch().mm();
-                let (width, height) = (mm(image.width()), mm(image.height()));
-                lines.push(("resolution", format!("{dpi} dpi ({width:.3} x {height:.3} mm)")));
-            }
-            None => lines.push(("resolution", "not stated".to_owned())),
-        }
-        if let (Some(bottom), Some(top)) = (info.z(), self.top_mm()) {
+        lines.push(("layers", self.layers_text()));
+        let [width, height] = totals.first.size;
+        let others = if totals.one_size { "" } else { " on the first page; others differ" };
+        lines.push(("size", format!("{width} x {height} pixels{others}")));
+        lines.push(("resolution", resolution_text(&totals.first)));
+        if let (Some(bottom), Some(top)) = (info.z(), totals.top_mm()) {
             lines.push(("z", format!("{:.3} to {top:.3} mm", bottom.mm())));
         }
-        lines.extend(self.thickness_um.text("um").map(|text| ("thickness", text)));
-        if let Some(text) = self.exposure_ms.text("ms") {
-            let seconds = self.exposure_ms.sum / 1000.0;
+        lines.extend(totals.thickness_um.map(|range| ("thickness", range_text(range, "um"))));
+        if let Some(exposure) = totals.exposure_ms {
+            let (text, seconds) = (range_text(exposure, "ms"), exposure.sum / 1000.0);
             lines.push(("exposure", format!("{text}, {seconds:.1} s in all")));
         }
-        lines.push(("runs", format!("{} transitions", self.changes)));
-        let names: Vec<_> = self.compressions.iter().map(|each| compression_name(*each)).collect();
-        lines.push(("data", format!("{} bytes, {}", self.bytes, names.join(" and "))));
-        lines.push((
-            "stray rows",
-            match self.stray_rows {
-                0 => "none known".to_owned(),
-                rows => format!("{rows} in {} layers", self.stray_layers),
-            },
-        ));
+        lines.extend(self.area_text().map(|text| ("exposed", text)));
+        lines.extend(self.runs.map(|runs| ("runs", format!("{runs} transitions"))));
+        let names: Vec<_> =
+            totals.compressions.iter().map(|each| compression_name(*each)).collect();
+        lines.push(("data", format!("{} bytes, {}", totals.data_bytes, names.join(" and "))));
+        let stray = match totals.stray_rows {
+            0 => "none known".to_owned(),
+            rows => format!("{rows} in {} layers", totals.stray_layers),
+        };
+        lines.push(("stray rows", stray));
+        lines.push(("checks", self.checks_text().to_owned()));
         // Names come from files: they must not steer the terminal.
         let plain = |text: String| text.replace(char::is_control, "?");
         lines
@@ -157,9 +150,31 @@ impl StackTotals {
             .collect()
     }
 
-    fn top_mm(&self) -> Option<f64> {
-        let info = &self.last.info;
-        Some((info.z_um? + info.thickness_um?) / 1000.0)
+    fn layers_text(&self) -> String {
+        let totals = &self.totals;
+        let gray = match totals.gray_pages {
+            0 => String::new(),
+            pages => format!(", {pages} of them gray"),
+        };
+        let (first, last) = (totals.first.info.index, totals.last.index);
+        format!("{} ({first} to {last}){gray}", totals.pages)
+    }
+
+    /// `1.2 megapixels in all, 340.512 mm3`.
+    fn area_text(&self) -> Option<String> {
+        let pixels = self.totals.exposed_px?;
+        let volume = self.totals.volume_mm3.map(|volume| format!(", {volume:.3} mm3"));
+        Some(format!("{pixels} pixels in all layers{}", volume.unwrap_or_default()))
+    }
+
+    fn checks_text(&self) -> &'static str {
+        match (self.totals.has_checks(), self.runs) {
+            (false, _) => "none: images and the number of layers cannot be proven",
+            (true, None) => {
+                "texts, order and number of layers are as written; lamp verify checks the images"
+            }
+            (true, Some(_)) => "images, texts, order and number of layers are as written",
+        }
     }
 }
 
@@ -171,17 +186,13 @@ fn stack_lines(stack: &StackInfo) -> Vec<(&'static str, String)> {
     lines
 }
 
-fn compression_name(compression: Compression) -> &'static str {
-    match compression {
-        Compression::Uncompressed => "uncompressed",
-        Compression::ModifiedHuffman => "CCITT modified Huffman",
-        Compression::Group3 => "CCITT Group 3",
-        Compression::Group3TwoDimensional => "CCITT Group 3, two-dimensional",
-        Compression::G4 => "CCITT Group 4",
-        Compression::Lzw => "LZW",
-        Compression::Deflate => "Deflate",
-        Compression::PackBits => "PackBits",
-        Compression::Png => "PNG",
-        Compression::Picture(format) => format.name(),
-    }
+fn resolution_text(page: &PageHeader) -> String {
+    let Some(dpi) = page.dpi else { return "not stated".to_owned() };
+    let [width, height] = page.size.map(|pixels| f64::from(pixels) * dpi.pitch().mm());
+    format!("{dpi} dpi ({width:.3} x {height:.3} mm)")
+}
+
+fn range_text(NumberRange { least, greatest, .. }: NumberRange, unit: &str) -> String {
+    let one = least == greatest;
+    if one { format!("{least} {unit}") } else { format!("{least} to {greatest} {unit}") }
 }

@@ -20,6 +20,7 @@ pub(crate) mod slice;
 mod split;
 mod target;
 mod tile;
+mod verify;
 
 use clap::{ArgMatches, FromArgMatches, Subcommand};
 
@@ -37,6 +38,7 @@ pub(crate) enum Command {
     Sample(sample::SampleArgs),
     Demo(demo::DemoArgs),
     Info(info::InfoArgs),
+    Verify(verify::VerifyArgs),
     Show(show::ShowArgs),
     Convert(convert::ConvertArgs),
     Join(join::JoinArgs),
@@ -73,6 +75,7 @@ impl Command {
             Self::Sample(args) => sample::run(args, common),
             Self::Demo(args) => demo::run(args, common),
             Self::Info(args) => info::run(args),
+            Self::Verify(args) => verify::run(args, common),
             Self::Show(args) => show::run(args),
             Self::Convert(args) => convert::run(args, common),
             Self::Join(args) => join::run(args, common),

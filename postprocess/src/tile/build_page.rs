@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use lamp_stack::{Layer, Orientation, PageInfo, StackInfo};
+use lamp_stack::{Layer, Orientation, PageInfo, StackInfo, digest_of_digests};
 use serde_json::{Map, Value, json};
 
 use super::lockstep::LayerSet;
@@ -127,7 +127,7 @@ impl Layout {
         StackInfo {
             part: texts(|stack| &stack.part).collect::<Vec<_>>().join("+"),
             commands: vec![self.command.clone()],
-            digest: digest_of(texts(|stack| &stack.digest)),
+            digest: digest_of_digests(texts(|stack| &stack.digest)),
             layers: self.layer_count(),
             other: other.into_iter().collect(),
         }
@@ -220,18 +220,6 @@ fn unique_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
         unique.extend(candidates.find(|name| !unique.contains(name)));
     }
     unique
-}
-
-/// Returns the digest of several inputs, which is that of their digests in order.
-fn digest_of<'a>(digests: impl Iterator<Item = &'a str>) -> String {
-    let mut hasher = blake3::Hasher::new();
-    for digest in digests {
-        if digest.is_empty() {
-            return String::new();
-        }
-        hasher.update(digest.as_bytes());
-    }
-    format!("blake3:{}", hasher.finalize().to_hex())
 }
 
 impl LayerSet {

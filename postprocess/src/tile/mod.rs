@@ -129,6 +129,31 @@ pub fn tile<E: From<TileError> + Send>(
     build.flatten()
 }
 
+/// Passes on layers that come with the parts that are not black in them. After the last comes an
+/// error if a part was black in all of them.
+fn unless_black<E: From<TileError>>(
+    mut layers: impl Iterator<Item = Result<(Layer, Vec<usize>), E>>,
+    names: Vec<String>,
+) -> impl Iterator<Item = Result<Layer, E>> {
+    let mut black: Vec<Option<String>> = names.into_iter().map(Some).collect();
+    let mut ended = false;
+    std::iter::from_fn(move || match layers.next() {
+        Some(Ok((layer, exposed))) => {
+            exposed.into_iter().for_each(|part| black[part] = None);
+            Some(Ok(layer))
+        }
+        Some(Err(error)) => {
+            ended = true;
+            Some(Err(error))
+        }
+        None if std::mem::replace(&mut ended, true) => None,
+        None => {
+            let name = black.iter_mut().find_map(Option::take)?;
+            Some(Err(TileError::Black { name }.into()))
+        }
+    })
+}
+
 impl TileOptions {
     fn layout(&self, first: &Layer) -> Result<Layout, TileError> {
         let part = PartStack::of_image("the stack", first)?;
@@ -141,7 +166,8 @@ impl Layout {
     /// the parts. `stray` is called with the rows that a part's page calls stray.
     ///
     /// Layers come with an error if a stack cannot be read, or differs from what was
-    /// placed, or does not match the other stacks' heights.
+    /// placed, or does not match the other stacks' heights. After the last layer comes an error
+    /// if a part was black in all its layers.
     ///
     /// # Panics
     /// Panics if there are not as many stacks as parts.
@@ -157,6 +183,7 @@ impl Layout {
     {
         assert_eq!(stacks.len(), self.parts.len(), "a stack for each part");
         self.resampled = heights.resample && stacks.len() > 1;
+        let names = self.parts.iter().map(|part| part.name().to_owned()).collect();
         let mesh = self.mesh.clone();
         let mesh_bytes = mesh.as_ref().map_or(0, BuildMesh::bytes);
         let named = stacks.into_iter().zip(&self.parts).enumerate();
@@ -169,14 +196,20 @@ impl Layout {
                 dpi: Some(self.dpi),
                 image: self.image(&step)?.into(),
             };
-            Ok((layer, self.stray_rows(&step)))
+            Ok((layer, self.stray_rows(&step), self.exposed_parts(&step)))
         });
         let layers = layers.map(move |made| {
-            let (layer, rows) = made?;
+            let (layer, rows, exposed) = made?;
             rows.iter().for_each(&mut stray);
-            Ok(layer)
+            Ok((layer, exposed))
         });
-        on_base(layers, mesh)
+        on_base(unless_black(layers, names), mesh)
+    }
+
+    /// Returns the parts that are not black at one height.
+    fn exposed_parts(&self, step: &LayerSet) -> Vec<usize> {
+        let exposed = self.layers_of(step).filter(|(_, _, layer)| layer.image.change_count() > 0);
+        exposed.map(|(part, _, _)| part).collect()
     }
 
     /// Returns the build's image: the parts, and the mesh around them.

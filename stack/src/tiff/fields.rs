@@ -12,8 +12,8 @@ use super::tags::{
     T4_OPTIONS, T6, TILE_BYTE_COUNTS, TILE_LENGTH, TILE_OFFSETS, TILE_WIDTH, TWO_DIMENSIONAL,
     UNCOMPRESSED, UNCOMPRESSED_MODE, WHITE_IS_ZERO, X_RESOLUTION, type_size,
 };
+use crate::check::Line;
 use crate::error::{PageFault, StackError, UnsupportedFeature};
-use crate::layer::PageInfo;
 use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::orientation::Orientation;
@@ -93,11 +93,14 @@ impl Fields {
         }
     }
 
-    fn info(&self) -> PageInfo {
-        self.values
-            .get(&IMAGE_DESCRIPTION)
-            .and_then(|(_, text)| PageInfo::parse(text.split(|&byte| byte == 0).next()?))
-            .unwrap_or(PageInfo { index: self.page, ..PageInfo::default() })
+    /// Returns the text of the page's description, if it has one.
+    pub(super) fn description(&self) -> Option<&[u8]> {
+        let (_, text) = self.values.get(&IMAGE_DESCRIPTION)?;
+        text.split(|&byte| byte == 0).next()
+    }
+
+    fn line(&self) -> Line {
+        self.description().and_then(Line::parse).unwrap_or_else(|| Line::without(self.page))
     }
 
     /// Returns the page without the data of its strips or tiles.
@@ -120,10 +123,12 @@ impl Fields {
         if orientation.is_across() && width > self.limits.rows_from_columns {
             return Err(malformed(self.page, PageFault::TooWideToTurn(width)));
         }
+        let Line { info, check } = self.line();
         Ok(Page {
             number: self.page,
             limits: self.limits,
-            info: self.info(),
+            info,
+            check,
             dpi: self.dpi(),
             width,
             gray,
@@ -133,6 +138,7 @@ impl Fields {
             differences: self.has_differences(gray, compression)?,
             layout: self.layout(width, height)?,
             pieces: Vec::new(),
+            data_bytes: 0,
         })
     }
 

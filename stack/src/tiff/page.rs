@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::check::{ChainReader, CheckFault, Line, LineCheck, image_crc};
 use crate::error::{PageFault, StackError};
 use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
@@ -50,6 +51,7 @@ pub struct Page {
     pub(super) number: u32,
     pub(super) limits: Limits,
     pub(super) info: PageInfo,
+    pub(super) check: Option<LineCheck>,
     pub(super) dpi: Option<Dpi>,
     pub(super) width: u32,
     pub(super) gray: bool,
@@ -62,6 +64,29 @@ pub struct Page {
     pub(super) layout: Layout,
     /// The strips or tiles, row by row.
     pub(super) pieces: Vec<Vec<u8>>,
+    /// The number of bytes of all strips or tiles.
+    pub(super) data_bytes: u64,
+}
+
+/// What a page says of its layer, without the image.
+#[derive(Clone, Debug)]
+pub struct PageHeader {
+    /// The content of the page's JSON line, or only the page's number if it has none.
+    pub info: PageInfo,
+    /// The resolution, if the page states one in inches or centimetres.
+    pub dpi: Option<Dpi>,
+    /// The width and height in pixels of the upright image.
+    pub size: [u32; 2],
+    /// Whether the image is gray, not a mask.
+    pub gray: bool,
+    /// The compression of the image.
+    pub compression: Compression,
+    /// The number of bytes of all strips or tiles.
+    pub data_bytes: u64,
+    /// The number of pixels that are not black, if the page has a check.
+    pub exposed_px: Option<u64>,
+    /// The number of pages up to it, if its check says that it is the last.
+    pub pages: Option<u32>,
 }
 
 /// The maximum number of transitions to reserve memory for before decoding, because a strip
@@ -92,11 +117,13 @@ impl Page {
         header: Header,
         file: Vec<u8>,
     ) -> Self {
-        let Header { width, height, gray, dpi, info } = header;
+        let Header { width, height, gray, dpi, line } = header;
+        let Line { info, check } = line.unwrap_or_else(|| Line::without(number));
         Self {
             number,
             limits,
-            info: info.unwrap_or(PageInfo { index: number, ..PageInfo::default() }),
+            info,
+            check,
             dpi,
             width,
             gray,
@@ -105,6 +132,7 @@ impl Page {
             compression,
             differences: false,
             layout: Layout::strips(width, height, height),
+            data_bytes: file.len() as u64,
             pieces: vec![file],
         }
     }
@@ -121,13 +149,44 @@ impl Page {
 
     /// Returns the number of bytes of all strips or tiles.
     pub fn strip_bytes(&self) -> u64 {
-        self.pieces.iter().map(|piece| piece.len() as u64).sum()
+        self.data_bytes
     }
 
-    /// Decodes the page and turns it upright.
+    /// Checks that the page follows those that `chain` has seen, the last of them layer `before`.
+    pub(crate) fn follow(
+        &self,
+        chain: &mut ChainReader,
+        before: Option<u32>,
+    ) -> Result<(), CheckFault> {
+        chain.follow(self.check.as_ref(), self.dpi, before)
+    }
+
+    /// Returns what the page says, without its image.
+    pub fn header(&self) -> PageHeader {
+        let (width, height) = (self.width, self.layout.page_height);
+        let check = self.check.as_ref().and_then(|check| check.page.as_ref());
+        PageHeader {
+            info: self.info.clone(),
+            dpi: self.dpi,
+            size: if self.orientation.is_across() { [height, width] } else { [width, height] },
+            gray: self.gray,
+            compression: self.compression,
+            data_bytes: self.data_bytes,
+            exposed_px: check.map(|check| check.image.exposed_px),
+            pages: check.and_then(|check| check.pages),
+        }
+    }
+
+    /// Forgets the page's check, so that any image is taken.
+    pub(crate) fn without_check(self) -> Self {
+        Self { check: None, ..self }
+    }
+
+    /// Decodes the page, turns it upright and checks the image.
     ///
     /// # Errors
-    /// Returns an error if a strip or tile does not decode to the size that the directory states.
+    /// Returns an error if a strip or tile does not decode to the size that the directory states,
+    /// or if the image is not the one that the page's check was made of.
     pub fn decode(mut self) -> Result<Layer, StackError> {
         let image = match self.compression {
             Compression::Png => png_page::decode(&self.pieces[0], &self.limits)
@@ -139,13 +198,17 @@ impl Page {
             _ if self.gray => Image::Gray(self.decode_gray()?),
             _ => Image::Mask(self.decode_mask()?),
         };
-        let image = if self.is_in_our_layout() {
-            LayerImage::with_strip(image, self.pieces.remove(0))
-        } else if self.orientation == Orientation::default() {
-            image.into()
+        let image = if self.orientation == Orientation::default() {
+            image
         } else {
-            image.oriented(self.orientation).ok_or_else(|| self.too_many_runs())?.into()
+            image.oriented(self.orientation).ok_or_else(|| self.too_many_runs())?
         };
+        let check = self.check.as_ref().and_then(|line| line.page.as_ref()).map(|page| page.image);
+        if check.is_some_and(|check| check.crc != image_crc(&image)) {
+            return Err(StackError::Check { layer: self.info.index, fault: CheckFault::Image });
+        }
+        let strip = self.is_in_our_layout().then(|| self.pieces.remove(0));
+        let image = LayerImage::of_page(image, strip, check);
         Ok(Layer { info: self.info, dpi: self.dpi, image })
     }
 

@@ -8,10 +8,12 @@ use super::fields::{Fields, KNOWN, malformed, number};
 use super::page::{Compression, Page};
 use super::source::Source;
 use super::tags::{FILL_ORDER, type_size};
+use super::write::Notice;
 use crate::error::{PageFault, StackError};
 use crate::limits::Limits;
 use crate::picture_page::{self, PictureFormat};
 use crate::png_page;
+use crate::text::one_line;
 
 /// Reads pages in order from a stream (forward only) or a file (parts in any order). A
 /// PNG or another picture file is a single page.
@@ -20,6 +22,8 @@ pub struct PageReader {
     source: Source,
     limits: Limits,
     kind: FileKind,
+    /// Whether the data of images is read, too.
+    images: bool,
     big: bool,
     little_endian: bool,
     /// The offset of the next directory; 0 after the last page.
@@ -96,6 +100,7 @@ impl PageReader {
             source,
             limits: Limits::default(),
             kind,
+            images: true,
             big,
             little_endian,
             next,
@@ -103,6 +108,11 @@ impl PageReader {
             last_whole: None,
             seen: HashSet::new(),
         })
+    }
+
+    /// Passes over the data of images: the pages cannot be decoded.
+    pub(crate) fn without_images(self) -> Self {
+        Self { images: false, ..self }
     }
 
     /// Numbers the pages from `first`, after the layer `last_whole`, for a folder's later files.
@@ -139,6 +149,9 @@ impl PageReader {
         }
         let (entries, next) = self.read_directory()?;
         let fields = self.read_values(&entries)?;
+        if let Some(reason) = fields.description().and_then(given_up) {
+            return Err(StackError::GivenUp { reason });
+        }
         Ok((self.read_pieces(&fields)?, next))
     }
 
@@ -215,6 +228,10 @@ impl PageReader {
         if bytes > page.layout.most_bytes() {
             return Err(malformed(self.number, PageFault::PieceBytes(bytes)));
         }
+        page.data_bytes = bytes;
+        if !self.images {
+            return self.skip_pieces(&places).map(|()| page);
+        }
         page.pieces = vec![Vec::new(); places.len()];
         // Offsets in increasing order can be read from a stream.
         places.sort_by_key(|(_, (offset, _))| *offset);
@@ -233,6 +250,19 @@ impl PageReader {
             page.pieces[i] = piece;
         }
         Ok(page)
+    }
+
+    /// Passes over strips or tiles, in the order of their offsets. They must be there.
+    fn skip_pieces(&mut self, places: &[(usize, (u64, u64))]) -> Result<(), StackError> {
+        for &(_, (offset, length)) in places {
+            if !self.source.reaches(offset) {
+                return Err(StackError::NotForward { page: self.number });
+            }
+            if !self.source.skip(offset, length)? {
+                return Err(StackError::CutOff { last_whole: self.last_whole });
+            }
+        }
+        Ok(())
     }
 
     /// Reads the file up to its last chunk, as one page.
@@ -317,6 +347,12 @@ impl Iterator for PageReader {
         }
         Some(page)
     }
+}
+
+/// Returns the reason in the text of a page that a stage writes when it gives up.
+fn given_up(text: &[u8]) -> Option<String> {
+    let Notice { gave_up } = serde_json::from_slice(text).ok()?;
+    Some(one_line(&gave_up))
 }
 
 struct Entry {

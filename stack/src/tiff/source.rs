@@ -28,6 +28,20 @@ impl Source {
         }
     }
 
+    /// Passes over `length` bytes at `offset`. Returns whether the input has them.
+    pub(super) fn skip(&mut self, offset: u64, length: u64) -> io::Result<bool> {
+        let end = offset.saturating_add(length);
+        match self {
+            Self::Stream { stream, position } => {
+                let gap = end - *position;
+                let skipped = io::copy(&mut stream.by_ref().take(gap), &mut io::sink())?;
+                *position += skipped;
+                Ok(skipped == gap)
+            }
+            Self::File { file, .. } => Ok(file.get_ref().metadata()?.len() >= end),
+        }
+    }
+
     /// Reads up to `length` bytes at `offset`, fewer at the end of the input. Memory grows with
     /// the bytes read, so a false length costs nothing.
     pub(super) fn read_up_to(&mut self, offset: u64, length: u64) -> io::Result<Vec<u8>> {

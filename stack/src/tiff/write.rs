@@ -2,6 +2,8 @@
 
 use std::io::Write;
 
+use serde::{Deserialize, Serialize};
+
 use super::tags::{
     ASCII, BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, FILL_ORDER, IMAGE_DESCRIPTION,
     IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, NEW_SUBFILE_TYPE, ORIENTATION, PACK_BITS, PER_INCH,
@@ -9,6 +11,7 @@ use super::tags::{
     SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS, STRIP_OFFSETS, T6, T6_OPTIONS, X_RESOLUTION,
     Y_RESOLUTION,
 };
+use crate::check::{Chain, OpenLine};
 use crate::error::StackError;
 use crate::layer::{Image, Layer};
 use crate::{g4, packbits};
@@ -47,7 +50,7 @@ impl Format {
     }
 }
 
-/// An encoded layer whose offset in the file is not known yet. Encoding is the costly part
+/// An encoded layer whose place in the file is not known yet. Encoding is the costly part
 /// of writing and does not depend on other pages.
 #[derive(Clone, Debug)]
 pub struct EncodedPage {
@@ -56,13 +59,13 @@ pub struct EncodedPage {
     height: u32,
     gray: bool,
     resolution: (u32, u32),
-    description: String,
+    line: OpenLine,
     strip: Vec<u8>,
 }
 
 impl EncodedPage {
     /// Encodes a layer: a mask as G4, a gray mask as PackBits. An unchanged mask keeps the strip
-    /// that it was read from.
+    /// that it was read from, any unchanged image its check.
     pub fn new(layer: &Layer) -> Self {
         let (gray, strip) = match (&*layer.image, layer.image.strip()) {
             (Image::Mask(_), Some(strip)) => (false, strip.to_vec()),
@@ -75,53 +78,27 @@ impl EncodedPage {
             height: layer.image.height(),
             gray,
             resolution: layer.dpi.map_or((0, 1), crate::Dpi::to_rational),
-            description: layer.info.to_line(),
+            line: OpenLine::new(&layer.info, layer.dpi, layer.image.check()),
             strip,
         }
     }
 
     /// Returns the bytes of the page at offset `start`: directory, texts, strip and padding. The
-    /// link is to the byte after them, or zero on the last page.
-    fn bytes(&self, format: Format, start: u64, last: bool) -> Vec<u8> {
+    /// link is to the byte after them, or zero if the page ends the file.
+    fn bytes(&self, description: &str, format: Format, start: u64, ends_file: bool) -> Vec<u8> {
         // The directory's length does not depend on offsets, so any offsets give it.
-        let data = start + self.directory(format, start, 0, 0).len() as u64;
+        let directory =
+            |data, link| format.directory(self.fields(description, format, data), start, link);
+        let data = start + directory(0, 0).len() as u64;
         let end = (data + self.strip.len() as u64).next_multiple_of(8);
-        let mut bytes = self.directory(format, start, data, if last { 0 } else { end });
+        let mut bytes = directory(data, if ends_file { 0 } else { end });
         bytes.extend_from_slice(&self.strip);
         bytes.resize((end - start) as usize, 0);
         bytes
     }
 
-    /// Returns the directory and the texts after it, padded to 8 bytes.
-    fn directory(&self, format: Format, start: u64, data: u64, link: u64) -> Vec<u8> {
-        let fields = self.fields(format, data);
-        let word = format.word_size();
-        let count_size = if format == Format::Big { 8 } else { 2 };
-        let size = count_size + fields.len() * (4 + 2 * word) + word;
-        let mut out = (fields.len() as u64).to_le_bytes()[..count_size].to_vec();
-        let mut texts: Vec<u8> = Vec::new();
-        let texts_start = (start + size as u64).next_multiple_of(8);
-        for (tag, kind, count, mut value) in fields {
-            out.extend_from_slice(&tag.to_le_bytes());
-            out.extend_from_slice(&kind.to_le_bytes());
-            format.put_word(&mut out, count);
-            if value.len() <= word {
-                value.resize(word, 0);
-                out.extend_from_slice(&value);
-            } else {
-                format.put_word(&mut out, texts_start + texts.len() as u64);
-                value.resize(value.len().next_multiple_of(8), 0);
-                texts.extend_from_slice(&value);
-            }
-        }
-        format.put_word(&mut out, link);
-        out.resize((texts_start - start) as usize, 0);
-        out.extend_from_slice(&texts);
-        out
-    }
-
-    /// Returns the fields as (tag, type, count, value), in the order of their tags.
-    fn fields(&self, format: Format, data: u64) -> Vec<(u16, u16, u64, Vec<u8>)> {
+    /// Returns the fields of the directory, in the order of their tags.
+    fn fields(&self, description: &str, format: Format, data: u64) -> Vec<Field> {
         let short = |tag, value: u64| (tag, SHORT, 1, (value as u16).to_le_bytes().to_vec());
         let long = |tag, value: u32| (tag, LONG, 1, value.to_le_bytes().to_vec());
         let word = |tag, value: u64| match format {
@@ -132,7 +109,6 @@ impl EncodedPage {
             let (num, den) = self.resolution;
             (tag, RATIONAL, 1, [num.to_le_bytes(), den.to_le_bytes()].concat())
         };
-        let description = [self.description.as_bytes(), &[0]].concat();
         let mut fields = vec![
             // A single page of a multipage image (TIFF 6.0, section 8, NewSubfileType).
             long(NEW_SUBFILE_TYPE, 2),
@@ -142,7 +118,7 @@ impl EncodedPage {
             short(COMPRESSION, if self.gray { PACK_BITS } else { T6 }),
             short(PHOTOMETRIC, BLACK_IS_ZERO),
             short(FILL_ORDER, 1),
-            (IMAGE_DESCRIPTION, ASCII, description.len() as u64, description),
+            text_field(description),
             word(STRIP_OFFSETS, data),
             short(ORIENTATION, 1),
             short(SAMPLES_PER_PIXEL, 1),
@@ -162,6 +138,50 @@ impl EncodedPage {
     }
 }
 
+/// A field of a directory: its tag, type, number of values, and values.
+type Field = (u16, u16, u64, Vec<u8>);
+
+fn text_field(text: &str) -> Field {
+    let text = [text.as_bytes(), &[0]].concat();
+    (IMAGE_DESCRIPTION, ASCII, text.len() as u64, text)
+}
+
+impl Format {
+    /// Returns a directory at offset `start` and the texts after it, padded to 8 bytes.
+    fn directory(self, fields: Vec<Field>, start: u64, link: u64) -> Vec<u8> {
+        let word = self.word_size();
+        let count_size = if self == Self::Big { 8 } else { 2 };
+        let size = count_size + fields.len() * (4 + 2 * word) + word;
+        let mut out = (fields.len() as u64).to_le_bytes()[..count_size].to_vec();
+        let mut texts: Vec<u8> = Vec::new();
+        let texts_start = (start + size as u64).next_multiple_of(8);
+        for (tag, kind, count, mut value) in fields {
+            out.extend_from_slice(&tag.to_le_bytes());
+            out.extend_from_slice(&kind.to_le_bytes());
+            self.put_word(&mut out, count);
+            if value.len() <= word {
+                value.resize(word, 0);
+                out.extend_from_slice(&value);
+            } else {
+                self.put_word(&mut out, texts_start + texts.len() as u64);
+                value.resize(value.len().next_multiple_of(8), 0);
+                texts.extend_from_slice(&value);
+            }
+        }
+        self.put_word(&mut out, link);
+        out.resize((texts_start - start) as usize, 0);
+        out.extend_from_slice(&texts);
+        out
+    }
+}
+
+/// The text of the page that a stage writes when it gives up: it has no image.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Notice {
+    pub(super) gave_up: String,
+}
+
 /// Writes pages to a stream, forward only. It holds one page back, because only the last
 /// page's link is zero.
 #[derive(Debug)]
@@ -169,13 +189,14 @@ pub struct PageWriter<W> {
     out: W,
     format: Format,
     offset: u64,
+    chain: Chain,
     held: Option<EncodedPage>,
 }
 
 impl<W: Write> PageWriter<W> {
     /// Creates a writer of a stack to `out`, which should be buffered.
     pub fn new(out: W, format: Format) -> Self {
-        Self { out, format, offset: 0, held: None }
+        Self { out, format, offset: 0, chain: Chain::default(), held: None }
     }
 
     /// Adds a page.
@@ -200,24 +221,36 @@ impl<W: Write> PageWriter<W> {
         Ok(self.out)
     }
 
-    /// Writes the page held back, with a link to a page that does not follow: all pages are
-    /// complete, but readers see that the stack is cut off.
+    /// Writes the page held back and a page that says why no other follows, with a link to
+    /// nothing: all layers so far are complete, but readers see that the stack is cut off.
     ///
     /// # Errors
     /// Returns an error if writing fails.
-    pub fn cut_off(mut self) -> Result<(), StackError> {
+    pub fn give_up(mut self, reason: &str) -> Result<(), StackError> {
         if let Some(last) = self.held.take() {
             self.write(&last, false)?;
         }
+        self.start()?;
+        let notice = Notice { gave_up: reason.to_owned() };
+        let text = serde_json::to_string(&notice).expect("a text is valid JSON");
+        let directory = |link| self.format.directory(vec![text_field(&text)], self.offset, link);
+        let end = self.offset + directory(0).len() as u64;
+        self.out.write_all(&directory(end))?;
         Ok(self.out.flush()?)
     }
 
-    fn write(&mut self, page: &EncodedPage, last: bool) -> Result<(), StackError> {
+    fn start(&mut self) -> Result<(), StackError> {
         if self.offset == 0 {
             self.out.write_all(self.format.header())?;
             self.offset = self.format.header().len() as u64;
         }
-        let bytes = page.bytes(self.format, self.offset, last);
+        Ok(())
+    }
+
+    fn write(&mut self, page: &EncodedPage, last: bool) -> Result<(), StackError> {
+        self.start()?;
+        let description = self.chain.close(&page.line, last);
+        let bytes = page.bytes(&description, self.format, self.offset, last);
         self.offset += bytes.len() as u64;
         if self.format == Format::Classic && self.offset > u64::from(u32::MAX) {
             return Err(StackError::PastClassic { layer: page.index });
@@ -225,4 +258,17 @@ impl<W: Write> PageWriter<W> {
         self.out.write_all(&bytes)?;
         Ok(())
     }
+}
+
+/// Returns the bytes of a file of the page alone, and the index of its layer. The page is one
+/// of several that `chain` runs through.
+pub(crate) fn file_of_page(
+    page: &EncodedPage,
+    format: Format,
+    chain: &mut Chain,
+    is_last: bool,
+) -> Vec<u8> {
+    let header = format.header();
+    let description = chain.close(&page.line, is_last);
+    [header, &page.bytes(&description, format, header.len() as u64, true)].concat()
 }

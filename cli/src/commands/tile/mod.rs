@@ -4,6 +4,7 @@ mod mesh;
 mod stacks;
 mod strips;
 
+use std::cell::Cell;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -22,7 +23,7 @@ use crate::json_report::parse_report;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers, ranges};
 use crate::plots;
 use crate::progress::Progress;
-use crate::streams::{check_beside, check_not_input, progress, write_file};
+use crate::streams::{check_beside, check_not_input, progress, unless_found, write_file};
 
 use mesh::MeshArgs;
 use stacks::{InputStack, StackArg};
@@ -118,6 +119,10 @@ pub(crate) struct TileArgs {
     #[arg(long)]
     resample: bool,
 
+    /// Give up with status 3 if a part's pages list stray rows: no build is written
+    #[arg(long)]
+    strict: bool,
+
     #[command(flatten)]
     mesh: MeshArgs,
 
@@ -183,9 +188,17 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
         .inspect(|&layers| progress.expect(u64::from(layers) + u64::from(base_layers)));
     let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
     let heights = HeightOptions { settle: args.settle, resample: args.resample };
-    let build = layout.build(layers, heights, |stray| say_stray(&progress, stray));
+    let stray_rows = Cell::new(0);
+    let build = layout.build(layers, heights, |stray| {
+        stray_rows.set(stray_rows.get() + stray.rows.len());
+        say_stray(&progress, stray);
+    });
+    let finding = || match stray_rows.get() {
+        rows if rows > 0 && args.strict => Some(Exit::Findings(stray_in_all(rows))),
+        _ => None,
+    };
     let build = within_height(build, machine);
-    strips::write(build, strips, output.as_ref(), &progress)?;
+    strips::write(unless_found(build, finding), strips, output.as_ref(), &progress)?;
     args.tell(&placed)
 }
 
@@ -291,6 +304,12 @@ fn within_height(
         }
         Ok(layer)
     })
+}
+
+fn stray_in_all(rows: usize) -> String {
+    let (rows, have) =
+        if rows == 1 { ("1 row".to_owned(), "is") } else { (format!("{rows} rows"), "are") };
+    format!("{rows} of the parts {have} stray: run fix before tile, or repair the CAD model")
 }
 
 /// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.

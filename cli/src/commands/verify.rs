@@ -1,0 +1,174 @@
+//! `lamp verify`: proves that stacks are whole.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_stack::{StackTotals, VerifyError, digest_of, stacks_in, verify};
+use serde::Serialize;
+
+use crate::exit::Exit;
+use crate::json_report::print_answer;
+use crate::options::Common;
+use crate::stack_facts::StackFacts;
+use crate::streams::{input_name, is_stream, open_pages, print};
+
+/// Prove that stacks are whole: every page, image, text and height
+///
+/// Each stack is read to its end and gets one line. Pages decode to the images that were written,
+/// in the order that they were written in, up to the last; each layer starts where the one before
+/// ends; all images have one size and resolution. A stack of an older version or of another program
+/// has no checks: its line says what cannot be known.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp verify build.tif
+  lamp verify night/ --json > night.json
+  lamp verify blade.tif --against blade.stl
+  slice blade.stl | fix | lamp verify
+
+Exit status: 0 if no fault was found, 1 otherwise.")]
+pub(crate) struct VerifyArgs {
+    /// Stacks: TIFF or PNG files, folders of pages, folders of stacks, or - for standard input
+    #[arg(value_name = "STACK", default_value = "-")]
+    stacks: Vec<PathBuf>,
+
+    /// The part that each stack must be made from; repeat it for several parts, in their order
+    #[arg(long, value_name = "PART")]
+    against: Vec<PathBuf>,
+
+    /// Print a JSON object (docs/json.md)
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: &VerifyArgs, common: &Common) -> Result<(), Exit> {
+    let digests = args.against.iter().map(|part| digest_of_part(part)).collect::<Result<_, _>>()?;
+    let digests: Vec<String> = digests;
+    let mut verdicts = Vec::new();
+    for path in stacks_at(&args.stacks)? {
+        let verdict = Verdict::of(&path, &digests);
+        if !args.json && (!common.quiet || verdict.result.is_err()) {
+            print(&format!("{}\n", verdict.line()))?;
+        }
+        verdicts.push(verdict);
+    }
+    let faulty = verdicts.iter().filter(|verdict| verdict.result.is_err()).count();
+    if args.json {
+        print_answer("lamp-verify-1", &answer(&verdicts, faulty == 0))?;
+    }
+    match (faulty, verdicts.len()) {
+        (0, _) => Ok(()),
+        (_, 1) => Err(Exit::Failed(anyhow!("the stack is not whole"))),
+        (faulty, all) => Err(Exit::Failed(anyhow!("{faulty} of {all} stacks are not whole"))),
+    }
+}
+
+fn digest_of_part(part: &Path) -> Result<String, Exit> {
+    let digest = || digest_of(File::open(part)?);
+    Ok(digest().with_context(|| part.display().to_string())?)
+}
+
+/// Returns the stacks at the paths. Where there is none, a path stands for itself.
+fn stacks_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Exit> {
+    let mut stacks = Vec::new();
+    for path in paths {
+        let found = if is_stream(path) { Ok(vec![path.clone()]) } else { stacks_in(path) };
+        let found = found.with_context(|| input_name(path))?;
+        if found.is_empty() {
+            return Err(Exit::Failed(anyhow!("{}: there is no stack in it", input_name(path))));
+        }
+        stacks.extend(found);
+    }
+    Ok(stacks)
+}
+
+/// What was found about a stack.
+struct Verdict {
+    name: String,
+    /// The facts of a stack without fault, or the fault.
+    result: Result<StackTotals, String>,
+    /// Whether it was compared with parts.
+    compared: bool,
+}
+
+impl Verdict {
+    fn of(path: &Path, digests: &[String]) -> Self {
+        let name = input_name(path);
+        let result = Self::checked(path, digests).map_err(|error| {
+            let message = error.to_string();
+            let place = format!("{name}: ");
+            message.strip_prefix(&place).map(str::to_owned).unwrap_or(message)
+        });
+        Self { name, result, compared: !digests.is_empty() }
+    }
+
+    fn checked(path: &Path, digests: &[String]) -> Result<StackTotals, Exit> {
+        let totals = verify(open_pages(path)?).map_err(|error| match error {
+            VerifyError::Stack(error) => anyhow::Error::new(error),
+            error => anyhow::Error::new(error),
+        })?;
+        if !digests.is_empty() {
+            let stack = totals.first.info.stack.as_ref().filter(|stack| !stack.digest.is_empty());
+            let stack = stack.ok_or_else(|| anyhow!("it does not say what it was made from"))?;
+            if !stack.is_made_of(digests) {
+                let made_of = &stack.digest;
+                return Err(anyhow!("it was made from another part ({made_of})").into());
+            }
+        }
+        Ok(totals)
+    }
+
+    fn line(&self) -> String {
+        let name = &self.name;
+        let totals = match &self.result {
+            Ok(totals) => totals,
+            Err(fault) => return format!("{name}: {fault}"),
+        };
+        let layers = totals.pages;
+        let z = totals.first.info.z().zip(totals.top_mm());
+        let z = z.map(|(bottom, top)| format!(", z {:.3} to {top:.3} mm", bottom.mm()));
+        let compared = if self.compared { ", made from the given part" } else { "" };
+        let facts = format!("{layers} layers{}{compared}", z.unwrap_or_default());
+        if totals.has_checks() {
+            format!("{name}: whole, {facts}")
+        } else {
+            format!(
+                "{name}: no fault in {facts}, but it has no checks: {} would not show",
+                unproven(totals)
+            )
+        }
+    }
+}
+
+/// What cannot be known of a stack without checks.
+fn unproven(totals: &StackTotals) -> &'static str {
+    match totals.first.info.stack.as_ref().and_then(|stack| stack.layers) {
+        Some(_) => "a changed image or text",
+        None => "a changed image or text, or layers missing at the top,",
+    }
+}
+
+fn answer(verdicts: &[Verdict], whole: bool) -> impl Serialize {
+    #[derive(Serialize)]
+    struct Answer<'a> {
+        whole: bool,
+        stacks: Vec<Stack<'a>>,
+    }
+    #[derive(Serialize)]
+    struct Stack<'a> {
+        stack: &'a str,
+        whole: bool,
+        fault: Option<&'a str>,
+        #[serde(flatten)]
+        facts: Option<StackFacts<'a>>,
+    }
+    let stacks = verdicts.iter().map(|verdict| Stack {
+        stack: &verdict.name,
+        whole: verdict.result.is_ok(),
+        fault: verdict.result.as_ref().err().map(String::as_str),
+        facts: verdict.result.as_ref().ok().map(StackFacts::new),
+    });
+    Answer { whole, stacks: stacks.collect() }
+}

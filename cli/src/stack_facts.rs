@@ -1,0 +1,84 @@
+//! The facts of a stack as `info` and `verify` give them to scripts.
+
+use lamp_stack::{Compression, Dpi, NumberRange, StackInfo, StackTotals};
+use serde::Serialize;
+
+use crate::json_report::to_nm;
+
+/// What the pages of a stack say.
+#[derive(Serialize)]
+pub(crate) struct StackFacts<'a> {
+    part: Option<&'a str>,
+    commands: &'a [String],
+    digest: Option<&'a str>,
+    layers: u64,
+    first_layer: u32,
+    last_layer: u32,
+    gray_layers: u64,
+    width_px: u32,
+    height_px: u32,
+    one_size: bool,
+    dpi: Option<f64>,
+    bottom_mm: Option<f64>,
+    top_mm: Option<f64>,
+    thickness_um: Option<[f64; 2]>,
+    exposure_ms: Option<[f64; 2]>,
+    exposure_s: Option<f64>,
+    exposed_px: Option<u64>,
+    volume_mm3: Option<f64>,
+    stray_rows: u64,
+    stray_layers: u64,
+    data_bytes: u64,
+    compressions: Vec<&'static str>,
+    checks: bool,
+}
+
+impl<'a> StackFacts<'a> {
+    pub(crate) fn new(totals: &'a StackTotals) -> Self {
+        let (first, last) = (&totals.first, &totals.last);
+        let stack = first.info.stack.as_ref();
+        let text = |text: &'a String| (!text.is_empty()).then_some(text.as_str());
+        let ends = |range: NumberRange| [range.least, range.greatest];
+        Self {
+            part: stack.and_then(|stack| text(&stack.part)),
+            commands: stack.map_or(&[], |stack: &StackInfo| &stack.commands),
+            digest: stack.and_then(|stack| text(&stack.digest)),
+            layers: totals.pages,
+            first_layer: first.info.index,
+            last_layer: last.index,
+            gray_layers: totals.gray_pages,
+            width_px: first.size[0],
+            height_px: first.size[1],
+            one_size: totals.one_size,
+            dpi: first.dpi.map(Dpi::get),
+            bottom_mm: first.info.z().map(|z| to_nm(z.mm())),
+            top_mm: totals.top_mm().map(to_nm),
+            thickness_um: totals.thickness_um.map(ends),
+            exposure_ms: totals.exposure_ms.map(ends),
+            exposure_s: totals.exposure_ms.map(|exposure| to_nm(exposure.sum / 1000.0)),
+            exposed_px: totals.exposed_px,
+            volume_mm3: totals.volume_mm3.map(to_nm),
+            stray_rows: totals.stray_rows,
+            stray_layers: totals.stray_layers,
+            data_bytes: totals.data_bytes,
+            compressions: totals.compressions.iter().map(|each| compression_name(*each)).collect(),
+            checks: totals.has_checks(),
+        }
+    }
+}
+
+/// Returns a compression's usual name.
+pub(crate) fn compression_name(compression: Compression) -> &'static str {
+    match compression {
+        Compression::Uncompressed => "uncompressed",
+        Compression::ModifiedHuffman => "CCITT modified Huffman",
+        Compression::Group3 => "CCITT Group 3",
+        Compression::Group3TwoDimensional => "CCITT Group 3, two-dimensional",
+        Compression::G4 => "CCITT Group 4",
+        Compression::Lzw => "LZW",
+        Compression::Deflate => "Deflate",
+        Compression::PackBits => "PackBits",
+        Compression::Png => "PNG",
+        Compression::Picture(format) => format.name(),
+    }
+}

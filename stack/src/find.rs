@@ -1,0 +1,50 @@
+//! Finds the stacks in a folder.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::input::{Pages, page_files};
+
+/// Returns the stacks at a path, by name: the path itself if it is a file or a folder of pages,
+/// otherwise every stack in the folder and in the folders below it. Hidden files are left out.
+///
+/// A file that is a whole stack of its own is no page of the folder's stack.
+///
+/// # Errors
+/// Returns an error if a folder cannot be read.
+pub fn stacks_in(path: &Path) -> io::Result<Vec<PathBuf>> {
+    if !path.is_dir() || is_stack(path) {
+        return Ok(vec![path.to_owned()]);
+    }
+    let mut entries = fs::read_dir(path)?.collect::<Result<Vec<_>, _>>()?;
+    entries.retain(|entry| !entry.file_name().as_encoded_bytes().starts_with(b"."));
+    entries.sort_by_key(fs::DirEntry::file_name);
+    let mut stacks = Vec::new();
+    for entry in entries {
+        let path = entry.path();
+        if entry.file_type()?.is_dir() {
+            stacks.extend(stacks_in(&path)?);
+        } else if is_stack_name(&path) {
+            stacks.push(path);
+        }
+    }
+    Ok(stacks)
+}
+
+/// Returns whether a file has the extension of a stack.
+fn is_stack_name(path: &Path) -> bool {
+    let extension = path.extension().map(|end| end.to_string_lossy().to_ascii_lowercase());
+    matches!(extension.as_deref(), Some("tif" | "tiff" | "png"))
+}
+
+/// Returns whether a folder's files are the pages of one stack.
+fn is_stack(folder: &Path) -> bool {
+    let Ok(files) = page_files(folder) else { return false };
+    // The first file is the last of the list.
+    let Some(first) = files.last() else { return false };
+    let Ok(pages) = Pages::open(first) else { return true };
+    let mut headers = pages.headers();
+    let alone = headers.next().and_then(Result::ok).is_some_and(|page| page.pages == Some(1));
+    headers.next().is_none_or(|second| second.is_err()) && (files.len() == 1 || !alone)
+}

@@ -1,0 +1,199 @@
+//! Stacks whose pages are changed, missing or moved: every reader notices.
+
+use std::io::Cursor;
+
+use lamp_stack::{
+    CheckFault, Dpi, EncodedPage, Format, GrayMask, Image, Layer, LevelChange, Mask, PageInfo,
+    PageWriter, Pages, StackError, StackInfo,
+};
+
+fn mask_layer(index: u32) -> Layer {
+    let columns = vec![1 + index, 6, 9, 2, 3, 5 + index];
+    let mask = Mask::new(24, vec![0, 3, 3, 6], columns).unwrap();
+    layer(index, Image::Mask(mask))
+}
+
+fn gray_layer(index: u32) -> Layer {
+    let mut gray = GrayMask::new(24);
+    let level = 40 + index as u8;
+    gray.push_row(&[LevelChange { column: 3, level }, LevelChange { column: 7, level: 0 }])
+        .unwrap();
+    gray.push_runs([(5, 0), (9, 255), (10, level)]).unwrap();
+    layer(index, Image::Gray(gray))
+}
+
+fn layer(index: u32, image: Image) -> Layer {
+    let stack = (index == 0).then(|| StackInfo {
+        part: "cube".to_owned(),
+        layers: Some(4),
+        ..StackInfo::default()
+    });
+    let info = PageInfo {
+        index,
+        z_um: Some(f64::from(index) * 50.0),
+        thickness_um: Some(50.0),
+        exposure_ms: Some(120.0),
+        stack,
+        ..PageInfo::default()
+    };
+    Layer { info, dpi: Dpi::new(1500.0), image: image.into() }
+}
+
+fn layers(kind: fn(u32) -> Layer) -> Vec<Layer> {
+    (0..4).map(kind).collect()
+}
+
+fn write(layers: &[Layer], format: Format) -> Vec<u8> {
+    let mut pages = PageWriter::new(Vec::new(), format);
+    layers.iter().for_each(|layer| pages.push(EncodedPage::new(layer)).unwrap());
+    pages.finish().unwrap()
+}
+
+fn read(bytes: &[u8]) -> Result<Vec<Layer>, StackError> {
+    Pages::from_stream(Cursor::new(bytes.to_vec()))?.layers().collect()
+}
+
+fn fault(bytes: &[u8]) -> (u32, CheckFault) {
+    match read(bytes) {
+        Err(StackError::Check { layer, fault }) => (layer, fault),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Removes the checks, as if an older version had written the stack.
+fn without_checks(bytes: &[u8]) -> Vec<u8> {
+    let mut old = bytes.to_vec();
+    let key = b",\"check\":";
+    while let Some(at) = old.windows(key.len()).position(|window| window == key) {
+        let end = at + old[at..].iter().position(|&byte| byte == 0).unwrap();
+        old[at..end].fill(b' ');
+        old[at] = b'}';
+    }
+    old
+}
+
+#[test]
+fn any_changed_byte_is_an_error_or_changes_nothing() {
+    for format in [Format::Big, Format::Classic] {
+        for kind in [mask_layer, gray_layer] {
+            let layers = layers(kind);
+            let whole = write(&layers, format);
+            let mut errors = 0;
+            for at in 0..whole.len() {
+                for bits in [0x01, 0x04, 0x20, 0x80, 0xFF] {
+                    let mut changed = whole.clone();
+                    changed[at] ^= bits;
+                    match read(&changed) {
+                        Ok(read) => assert_eq!(read, layers, "byte {at} xor {bits:#x}"),
+                        Err(_) => errors += 1,
+                    }
+                }
+            }
+            assert!(errors > whole.len(), "{errors} errors in {} bytes", whole.len());
+        }
+    }
+}
+
+#[test]
+fn a_wrong_image_is_named() {
+    let layers = layers(gray_layer);
+    let mut changed = write(&layers, Format::Big);
+    // The level of layer 2, as a run of PackBits has it.
+    let at = changed.iter().rposition(|&byte| byte == 42).unwrap();
+    changed[at] = 45;
+    assert_eq!(fault(&changed), (2, CheckFault::Image));
+    let read: Vec<_> = Pages::from_stream(Cursor::new(changed)).unwrap().without_checks().collect();
+    assert!(read.into_iter().all(|page| page.unwrap().decode().is_ok()));
+}
+
+/// Writes the page of each layer whose number is listed, as it stands in the whole stack.
+fn reordered(order: &[usize]) -> Result<Vec<Layer>, StackError> {
+    let layers = layers(mask_layer);
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole");
+    let folder_of_pages = lamp_stack::FolderBeside::over_nothing(&whole).unwrap();
+    let to = lamp_stack::Destination::Folder(folder_of_pages);
+    lamp_stack::write_stack::<StackError>(layers.into_iter().map(Ok), to, Format::Big).unwrap();
+    let other = folder.path().join("other");
+    std::fs::create_dir(&other).unwrap();
+    for (place, layer) in order.iter().enumerate() {
+        let from = whole.join(format!("layer_{layer:05}.tif"));
+        std::fs::copy(from, other.join(format!("{place}.tif"))).unwrap();
+    }
+    Pages::open(&other)?.layers().collect()
+}
+
+#[test]
+fn missing_and_moved_pages_are_errors() {
+    assert_eq!(reordered(&[0, 1, 2, 3]).unwrap(), layers(mask_layer));
+    for order in [&[0, 1, 3][..], &[1, 2, 3], &[0, 2, 1, 3], &[0, 1, 2], &[0], &[0, 1, 2, 3, 3]] {
+        assert!(reordered(order).is_err(), "{order:?}");
+    }
+}
+
+#[test]
+fn a_chain_that_was_ended_by_hand_is_an_error() {
+    for format in [Format::Big, Format::Classic] {
+        let whole = write(&layers(mask_layer), format);
+        let (first, count_size, entry, word) =
+            if format == Format::Big { (16, 8, 20, 8) } else { (8, 2, 12, 4) };
+        let link = first + count_size + entry * usize::from(whole[first]);
+        let mut ended = whole.clone();
+        ended[link..link + word].fill(0);
+        assert!(matches!(read(&ended), Err(StackError::EndedEarly { last: 0 })));
+        // Without checks, the number of layers on page 0 tells.
+        let missing = read(&without_checks(&ended));
+        assert!(matches!(missing, Err(StackError::MissingPages { found: 1, stated: 4 })));
+    }
+}
+
+#[test]
+fn a_stack_without_checks_reads_and_gets_them() {
+    let layers = layers(mask_layer);
+    let whole = write(&layers, Format::Big);
+    let old = without_checks(&whole);
+    assert_ne!(old, whole);
+    assert_eq!(read(&old).unwrap(), layers);
+    assert_eq!(write(&read(&old).unwrap(), Format::Big), whole);
+}
+
+#[test]
+fn headers_say_what_pages_do_without_images() {
+    for kind in [mask_layer, gray_layer] {
+        let layers = layers(kind);
+        let whole = write(&layers, Format::Big);
+        let headers = |bytes: &[u8]| {
+            let pages = Pages::from_stream(Cursor::new(bytes.to_vec())).unwrap();
+            pages.headers().collect::<Result<Vec<_>, _>>()
+        };
+        let read = headers(&whole).unwrap();
+        assert_eq!(read.len(), layers.len());
+        for (header, layer) in read.iter().zip(&layers) {
+            let image = &layer.image;
+            let exposed = (0..image.height()).flat_map(|row| image.runs(row));
+            let exposed: u32 = exposed.map(|(start, end, _)| end - start).sum();
+            assert_eq!((&header.info, header.dpi), (&layer.info, layer.dpi));
+            assert_eq!(header.size, [image.width(), image.height()]);
+            assert_eq!(header.exposed_px, Some(exposed.into()));
+        }
+        let cut = headers(&whole[..whole.len() - 12]);
+        assert!(matches!(cut, Err(StackError::CutOff { last_whole: Some(2) })));
+    }
+}
+
+#[test]
+fn a_stage_that_gives_up_says_why_to_the_next() {
+    let layers = layers(mask_layer);
+    for count in 0..3 {
+        for format in [Format::Big, Format::Classic] {
+            let mut stream = Vec::new();
+            let mut pages = PageWriter::new(&mut stream, format);
+            layers[..count].iter().for_each(|layer| pages.push(EncodedPage::new(layer)).unwrap());
+            pages.give_up("3 rows\u{1b} need a person").unwrap();
+            let mut read = Pages::from_stream(Cursor::new(stream)).unwrap().layers();
+            assert!(layers[..count].iter().all(|layer| read.next().unwrap().unwrap() == *layer));
+            let message = read.next().unwrap().unwrap_err().to_string();
+            assert_eq!(message, "the stage before gave up: 3 rows need a person");
+        }
+    }
+}
