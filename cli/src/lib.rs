@@ -3,6 +3,7 @@
 //! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` are the
 //! same code under the names of the pipeline.
 
+mod arguments;
 mod band_pictures;
 mod catalogue;
 mod commands;
@@ -19,6 +20,7 @@ mod mesh_report;
 #[cfg(feature = "occt")]
 mod occt_process;
 mod options;
+mod options_file;
 mod part_options;
 mod picture;
 mod pixel_location;
@@ -64,7 +66,11 @@ slice, fix, dither and tile are short for lamp slice, lamp fix, lamp dither and 
 
 /// Runs `lamp` with the process's arguments.
 pub fn run_lamp() -> ExitCode {
-    let matches = Lamp::command().get_matches();
+    let lamp = Lamp::command();
+    let matches = match arguments::matches(&lamp, lamp.clone()) {
+        Ok(matches) => matches,
+        Err(error) => return finish("lamp", Err(error)),
+    };
     let parsed = Lamp::from_arg_matches(&matches);
     let Lamp { command, common } = parsed.unwrap_or_else(|error| error.exit());
     finish(matches.subcommand_name().unwrap_or_default(), run(&command, &common))
@@ -76,14 +82,29 @@ pub fn run_lamp() -> ExitCode {
 /// If `lamp` has no command of that name.
 pub fn run_stage(name: &str) -> ExitCode {
     let lamp = Lamp::command();
-    let stage = lamp.find_subcommand(name).expect("a stage is a command of lamp").clone();
-    // The stage's own arguments, with lamp's general ones.
-    let general = lamp.get_arguments().filter(|arg| arg.is_global_set()).cloned();
-    let stage = stage.args(general).version(env!("CARGO_PKG_VERSION")).max_term_width(100);
-    let matches = stage.get_matches();
+    let matches = match arguments::matches(&lamp, stage(&lamp, name)) {
+        Ok(matches) => matches,
+        Err(error) => return finish(name, Err(error)),
+    };
     let common = Common::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let command = Command::of_stage(name, &matches).unwrap_or_else(|error| error.exit());
     finish(name, run(&command, &common))
+}
+
+/// Returns a stage as a program: its own arguments, with lamp's general ones.
+fn stage(lamp: &clap::Command, name: &str) -> clap::Command {
+    let stage = lamp.find_subcommand(name).expect("a stage is a command of lamp").clone();
+    let general = lamp.get_arguments().filter(|arg| arg.is_global_set()).cloned();
+    stage.args(general).version(env!("CARGO_PKG_VERSION")).max_term_width(100)
+}
+
+/// Returns all programs, for their documentation.
+fn programs() -> Vec<clap::Command> {
+    let lamp = Lamp::command();
+    let stages = ["slice", "fix", "dither", "tile"].map(|name| stage(&lamp, name));
+    let mut programs: Vec<_> = std::iter::once(lamp).chain(stages).collect();
+    programs.iter_mut().for_each(clap::Command::build);
+    programs
 }
 
 fn run(command: &Command, common: &Common) -> Result<ExitCode, Exit> {

@@ -23,9 +23,19 @@ pub(crate) struct Common {
     #[arg(long, value_name = "N", global = true, help_heading = "General options")]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
     threads: Option<u16>,
+
+    /// Take options from a TOML file, as thickness = "50um" or gray = true, where the command line
+    /// does not give them
+    #[arg(long, value_name = "FILE.toml", global = true, help_heading = "General options")]
+    options: Option<PathBuf>,
 }
 
 impl Common {
+    /// Returns the options file.
+    pub(crate) fn file(&self) -> Option<&PathBuf> {
+        self.options.as_ref()
+    }
+
     /// Sets up the threads. To be called once.
     pub(crate) fn apply(&self) -> Result<(), Exit> {
         // Zero lets the pool choose.

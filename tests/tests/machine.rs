@@ -111,6 +111,7 @@ fn json_says_what_is_known_of_machines() {
             "thickness_um": [500.0, 1000.0],
             "mirrors": 64,
             "overlap": 8,
+            "defaults": {"dpi": null, "thickness_um": null, "margin": null},
             "sources": {
                 "area": "measured",
                 "height": "data sheet",

@@ -4,11 +4,13 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_slicer::brep::{Body, BodyReport, Prepared};
+use lamp_slicer::brep::{Attempt, Body, BodyReport, Prepared};
 use lamp_slicer::{SliceError, body_name, read_step};
-use lamp_stack::Dpi;
+use lamp_stack::{Dpi, one_line};
+use serde_json::{Map, Value, json};
 
 use crate::exit::Exit;
+use crate::json_report::print_answer;
 use crate::step_options::{BrepOptions, bytes_of, length, notes};
 use crate::streams::{input_name, print};
 
@@ -37,6 +39,10 @@ pub(crate) struct BrepArgs {
     /// Exit with status 3 if a body would not be sliced
     #[arg(long)]
     strict: bool,
+
+    /// Print JSON, as docs/json.md describes it
+    #[arg(long)]
+    json: bool,
 }
 
 pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
@@ -44,13 +50,45 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
     let options = args.brep.reader.for_opening(args.brep.tolerance(args.dpi));
     let read = || read_step(bytes_of(&args.part)?, &options);
     let prepared = read().map_err(|error: SliceError| Exit::from(error).at(name.clone()))?;
-    print(&text(&name, &prepared))?;
+    match args.json {
+        true => print_answer("lamp-brep-1", &answer(&name, &prepared))?,
+        false => print(&text(&name, &prepared))?,
+    }
     let refused = prepared.reports.iter().filter(|report| !report.faults.is_empty()).count();
     if args.strict && refused > 0 {
         let bodies = if refused == 1 { "body" } else { "bodies" };
         return Err(Exit::Findings(format!("{name}: {refused} {bodies} would not be sliced")));
     }
     Ok(())
+}
+
+fn answer(name: &str, prepared: &Prepared) -> Value {
+    let attempt = |attempt: &Attempt| json!({"chord_mm": attempt.chord_mm, "heal_mm": attempt.heal_mm, "why": attempt.why});
+    let bodies = prepared.kernel.bodies().iter().zip(&prepared.reports);
+    json!({
+        "part": name,
+        "unit": prepared.kernel.unit(),
+        "facets": prepared.mesh.facets.len(),
+        "chord_mm": prepared.chord_mm,
+        "heal_mm": prepared.heal_mm,
+        "notes": notes(prepared),
+        "tries": prepared.tries.iter().map(attempt).collect::<Vec<_>>(),
+        "bodies": bodies.map(|(body, report)| fields(body, report, prepared)).collect::<Vec<_>>(),
+    })
+}
+
+fn fields(body: &Body, report: &BodyReport, prepared: &Prepared) -> Value {
+    let faces = kinds(body, prepared).into_iter();
+    json!({
+        "name": one_line(&report.name),
+        "faces": faces.map(|(kind, count)| (kind.to_owned(), count.into())).collect::<Map<_, _>>(),
+        "facets": report.facets,
+        "box_mm": report.box_mm,
+        "volume_mm3": report.exact_volume_mm3,
+        "facet_volume_mm3": report.volume_mm3,
+        "facet_area_mm2": report.area_mm2,
+        "faults": report.faults.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
 }
 
 fn text(name: &str, prepared: &Prepared) -> String {
@@ -101,8 +139,15 @@ fn body_text(number: usize, body: &Body, report: &BodyReport, prepared: &Prepare
     )
 }
 
-/// Lists the number of faces of each kind, the most frequent first.
+/// Lists the number of faces of each kind.
 fn faces(body: &Body, prepared: &Prepared) -> String {
+    let kinds = kinds(body, prepared).into_iter();
+    let kinds: Vec<_> = kinds.map(|(kind, count)| format!("{count} {kind}")).collect();
+    format!("{} ({})", body.faces.len(), kinds.join(", "))
+}
+
+/// Returns the number of faces of each kind, the most frequent first.
+fn kinds<'a>(body: &Body, prepared: &'a Prepared) -> Vec<(&'a str, usize)> {
     let mut kinds: Vec<(&str, usize)> = Vec::new();
     for face in body.faces.clone() {
         let kind = prepared.kernel.face(face).kind;
@@ -112,6 +157,5 @@ fn faces(body: &Body, prepared: &Prepared) -> String {
         }
     }
     kinds.sort_by_key(|&(kind, count)| (std::cmp::Reverse(count), kind));
-    let kinds: Vec<_> = kinds.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
-    format!("{} ({})", body.faces.len(), kinds.join(", "))
+    kinds
 }

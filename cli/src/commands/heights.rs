@@ -7,11 +7,15 @@ use clap::Args;
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, Heights, LayeredPart, SweptLayer, uniform_heights,
 };
+use lamp_grayscale::resin::ExposureTime;
 use lamp_stack::{Dpi, Length};
+use serde::Serialize;
+use serde_json::json;
 
 use crate::exit::Exit;
 use crate::exposure::{Exposure, ExposureOptions};
-use crate::height_options::{FoundHeights, HeightOptions, significant, time_text};
+use crate::height_options::{FoundHeights, HeightOptions, Measure, significant, time_text};
+use crate::json_report::print_answer;
 use crate::options::{Common, parse_thickness};
 use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
 use crate::plots::{self, Plot, PlotAxis, Series, drawn};
@@ -47,6 +51,10 @@ pub(crate) struct HeightsArgs {
     /// Uniform thicknesses to compare with; the first is plotted [default: the thickest layer]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, value_delimiter = ',')]
     uniform: Vec<Length>,
+
+    /// Print JSON, as docs/json.md describes it
+    #[arg(long)]
+    json: bool,
 
     /// Resolution of the images, which sets the distance between the rows that are measured
     #[arg(long, value_name = "DPI", default_value = "1500")]
@@ -88,8 +96,24 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
         let bytes = drawn(&plots(&name_of_all(&args.parts), &all[..2]), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
     }
-    let overhead = args.heights.overhead();
-    print(&summary(&found, &all, exposure.as_ref(), overhead))
+    let choices: Vec<_> = all
+        .iter()
+        .map(|(name, heights)| {
+            Choice::new(name, heights, &found, exposure.as_ref(), args.heights.overhead())
+        })
+        .collect();
+    if !args.json {
+        return print(&summary(&choices, found.measure));
+    }
+    let layers = found.heights.layers.iter().map(|layer| LayerRow::new(layer, exposure.as_ref()));
+    let answer = json!({
+        "part": name_of_all(&args.parts),
+        "criterion": found.measure.name(),
+        "bound": found.bound,
+        "choices": choices,
+        "layers": layers.collect::<Vec<_>>(),
+    });
+    print_answer("lamp-heights-1", &answer)
 }
 
 impl HeightsArgs {
@@ -121,6 +145,37 @@ impl HeightsArgs {
     }
 }
 
+/// What is known of a layer, under the names of the table's columns.
+#[derive(Serialize)]
+struct LayerRow {
+    z_um: f64,
+    thickness_um: f64,
+    volume_mm3: f64,
+    lost_mm3: f64,
+    gained_mm3: f64,
+    deviation_percent: f64,
+    cusp_um: f64,
+    area_percent: f64,
+    exposure_ms: Option<f64>,
+}
+
+impl LayerRow {
+    fn new(layer: &SweptLayer, exposure: Option<&Exposure>) -> Self {
+        let time = exposure.and_then(|e| e.time(Length::from_um(layer.thickness_um)).ok());
+        Self {
+            z_um: Length::from_um(layer.bottom_um).to_whole_nm().um(),
+            thickness_um: Length::from_um(layer.thickness_um).to_whole_nm().um(),
+            volume_mm3: layer.volume_mm3,
+            lost_mm3: layer.lost_mm3,
+            gained_mm3: layer.gained_mm3,
+            deviation_percent: 100.0 * layer.deviation(),
+            cusp_um: CuspHeight.measure(layer),
+            area_percent: 100.0 * AreaDeviation.measure(layer),
+            exposure_ms: time.map(ExposureTime::ms),
+        }
+    }
+}
+
 fn write_table(
     heights: &Heights,
     exposure: Option<&Exposure>,
@@ -132,32 +187,68 @@ fn write_table(
          area_percent,exposure_ms"
     )?;
     for (index, layer) in heights.layers.iter().enumerate() {
-        let time = exposure.and_then(|e| e.time(Length::from_um(layer.thickness_um)).ok());
+        let row = LayerRow::new(layer, exposure);
         writeln!(
             out,
             "{index},{},{},{:.6},{:.6},{:.6},{:.4},{:.3},{:.4},{}",
-            Length::from_um(layer.bottom_um).to_whole_nm().um(),
-            Length::from_um(layer.thickness_um).to_whole_nm().um(),
-            layer.volume_mm3,
-            layer.lost_mm3,
-            layer.gained_mm3,
-            100.0 * layer.deviation(),
-            CuspHeight.measure(layer),
-            100.0 * AreaDeviation.measure(layer),
-            time.map_or(String::new(), |time| time.ms().to_string()),
+            row.z_um,
+            row.thickness_um,
+            row.volume_mm3,
+            row.lost_mm3,
+            row.gained_mm3,
+            row.deviation_percent,
+            row.cusp_um,
+            row.area_percent,
+            row.exposure_ms.map_or(String::new(), |ms| ms.to_string()),
         )?;
     }
     Ok(())
 }
 
-/// A line for each choice of layers: how many there are, how far they are off by
-/// volume, how far the worst is by the criterion, and how many are past the bound.
-fn summary(
-    found: &FoundHeights,
-    all: &[(String, Heights)],
-    exposure: Option<&Exposure>,
-    overhead: f64,
-) -> String {
+/// A choice of layers: how many there are, how far they are off by volume, how far the worst is by
+/// the criterion, and how many are past the bound.
+#[derive(Serialize)]
+struct Choice {
+    name: String,
+    layers: usize,
+    lost_mm3: f64,
+    gained_mm3: f64,
+    /// Not finite if the part has no volume.
+    deviation_percent: f64,
+    worst: f64,
+    past_bound: usize,
+    /// With what each layer takes besides its exposure.
+    time_s: Option<f64>,
+}
+
+impl Choice {
+    fn new(
+        name: &str,
+        heights: &Heights,
+        found: &FoundHeights,
+        exposure: Option<&Exposure>,
+        overhead_s: f64,
+    ) -> Self {
+        let layers = &heights.layers;
+        let [lost_mm3, gained_mm3, volume_mm3] = heights.volumes_mm3();
+        let measures = layers.iter().map(|layer| found.measure.criterion().measure(layer));
+        let ms: Option<f64> =
+            layers.iter().map(|layer| LayerRow::new(layer, exposure).exposure_ms).sum();
+        Self {
+            name: name.to_owned(),
+            layers: layers.len(),
+            lost_mm3,
+            gained_mm3,
+            deviation_percent: 100.0 * (lost_mm3 + gained_mm3) / volume_mm3,
+            worst: measures.fold(0.0, f64::max),
+            past_bound: found.past(heights),
+            time_s: ms.map(|ms| ms / 1000.0 + overhead_s * layers.len() as f64),
+        }
+    }
+}
+
+/// A line for each choice of layers.
+fn summary(choices: &[Choice], measure: Measure) -> String {
     let mut text = format!(
         "{:<20}{:>8}{:>13}{:>14}{:>12}{:>13}{:>12}{:>10}\n",
         "",
@@ -169,25 +260,16 @@ fn summary(
         "past bound",
         "time"
     );
-    for (name, heights) in all {
-        let [lost, gained, volume] = heights.volumes_mm3();
-        let measures = heights.layers.iter().map(|layer| found.measure.criterion().measure(layer));
-        let worst = measures.fold(0.0, f64::max);
-        let time = |layer: &SweptLayer| {
-            Some(exposure?.time(Length::from_um(layer.thickness_um)).ok()?.ms())
-        };
-        let ms: Option<f64> = heights.layers.iter().map(time).sum();
-        let time = ms.map(|ms| ms / 1000.0 + overhead * heights.layers.len() as f64);
-        let percent = if volume > 0.0 { 100.0 * (lost + gained) / volume } else { f64::NAN };
+    for choice in choices {
+        let Choice { name, layers, deviation_percent: percent, worst, .. } = choice;
         text += &format!(
-            "{name:<20}{:>8}{:>13}{:>14}{:>12}{:>13}{:>12}{:>10}\n",
-            heights.layers.len(),
-            significant(lost),
-            significant(gained),
-            if percent.is_finite() { significant(percent) + "%" } else { "-".to_owned() },
-            if worst.is_finite() { found.measure.text(worst) } else { "-".to_owned() },
-            found.past(heights),
-            time.map_or("-".to_owned(), time_text),
+            "{name:<20}{layers:>8}{:>13}{:>14}{:>12}{:>13}{:>12}{:>10}\n",
+            significant(choice.lost_mm3),
+            significant(choice.gained_mm3),
+            if percent.is_finite() { significant(*percent) + "%" } else { "-".to_owned() },
+            if worst.is_finite() { measure.text(*worst) } else { "-".to_owned() },
+            choice.past_bound,
+            choice.time_s.map_or("-".to_owned(), time_text),
         );
     }
     text

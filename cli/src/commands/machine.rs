@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use lamp_postprocess::machine::Machine;
-use lamp_stack::Catalogued;
+use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
 use crate::catalogue::{entry, show};
@@ -60,7 +60,7 @@ fn answer(machines: impl IntoIterator<Item = Machine>) -> Result<(), Exit> {
 
 /// A machine's fields; what is not known is null.
 fn fields(machine: &Machine) -> Value {
-    let Machine { name, description, area, height, dpi, thickness, strips } = machine;
+    let Machine { name, description, area, height, dpi, thickness, strips, defaults } = machine;
     json!({
         "name": name,
         "description": description,
@@ -70,6 +70,11 @@ fn fields(machine: &Machine) -> Value {
         "thickness_um": thickness.as_ref().map(|limits| [limits.least.um(), limits.most.um()]),
         "mirrors": strips.as_ref().map(|strips| strips.mirrors),
         "overlap": strips.as_ref().map(|strips| strips.overlap),
+        "defaults": {
+            "dpi": defaults.dpi,
+            "thickness_um": defaults.thickness.map(Length::um),
+            "margin": defaults.margin,
+        },
         "sources": {
             "area": area.source,
             "height": height.as_ref().map(|height| &height.source),

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::DepthRange;
+use lamp_grayscale::resin::{DepthRange, ExposureTime, Resin};
 use lamp_stack::{Catalogued, Length};
+use serde_json::{Value, json};
 
 use crate::catalogue;
 use crate::exit::Exit;
+use crate::json_report::print_answer;
 use crate::streams::{input_name, print};
 
 /// List, show or check materials: how deep light cures a resin
@@ -26,26 +28,70 @@ pub(crate) struct MaterialArgs {
 #[derive(Subcommand)]
 enum Action {
     /// List the built-in materials
-    List,
+    List {
+        /// Print JSON, as docs/json.md describes it
+        #[arg(long)]
+        json: bool,
+    },
     /// Check a material's file and print it as it was written, to read or to start a new one from
     Show {
         /// Material: a built-in material's name, a file, or - for standard input
         #[arg(value_name = "MATERIAL")]
         material: PathBuf,
+
+        /// Print JSON, as docs/json.md describes it, instead of the file
+        #[arg(long)]
+        json: bool,
     },
     /// Check a material file and report what it allows
     Check {
         /// The file, or - for standard input
         file: PathBuf,
+
+        /// Print JSON, as docs/json.md describes it
+        #[arg(long)]
+        json: bool,
     },
 }
 
 pub(crate) fn run(args: &MaterialArgs) -> Result<(), Exit> {
     match &args.action {
-        Action::List => print(&table()),
-        Action::Show { material } => catalogue::show::<Material>(material),
-        Action::Check { file } => check(file),
+        Action::List { json: true } => answer(Material::builtins()),
+        Action::List { json: false } => print(&table()),
+        Action::Show { material, json: true } => answer([catalogue::entry(material)?]),
+        Action::Show { material, json: false } => catalogue::show::<Material>(material),
+        Action::Check { file, json } => check(file, *json),
     }
+}
+
+fn answer(materials: impl IntoIterator<Item = Material>) -> Result<(), Exit> {
+    let materials: Vec<Value> = materials.into_iter().map(|material| fields(&material)).collect();
+    print_answer("lamp-material-1", &json!({ "materials": materials }))
+}
+
+/// What is known of a material, and what follows from it.
+fn fields(material: &Material) -> Value {
+    let resin = material.resin();
+    let example = resin.as_ref().ok().map(example);
+    let why = match (&resin, &example) {
+        (Err(why), _) => Some(why.to_string()),
+        (_, Some((_, Err(why)))) => Some(why.clone()),
+        _ => None,
+    };
+    let depths = resin.as_ref().ok().map(|resin| resin.model().depths());
+    let time = example.as_ref().and_then(|(_, time)| time.as_ref().ok());
+    json!({
+        "name": material.name,
+        "description": material.description,
+        "light_mw_per_cm2": material.intensity.as_ref().map(|light| light.value.mw_per_cm2()),
+        "models": models(material),
+        "cure_width_um": material.cure_width.iter().map(|it| it.feature_size.um()).collect::<Vec<_>>(),
+        "depths_um": depths.map(|depths| [Some(depths.from.um()), depths.to.map(Length::um)]),
+        "layer_um": example.as_ref().map(|(layer, _)| layer.um()),
+        "exposure_ms": time.map(|time| time.ms()),
+        "why_not": why,
+        "given": material,
+    })
 }
 
 /// A line for each built-in material.
@@ -54,7 +100,7 @@ fn table() -> String {
     for material in Material::builtins() {
         let light = material.intensity.as_ref().map(|light| light.value.to_string());
         let light = light.unwrap_or_else(|| "-".to_owned());
-        let mut models = models(&material).join(", ");
+        let mut models = models_and_widths(&material);
         if models.is_empty() {
             models.push('-');
         }
@@ -64,16 +110,20 @@ fn table() -> String {
     text
 }
 
-/// The cure models of a material, by their tables, and its cure widths.
-fn models(material: &Material) -> Vec<String> {
+/// The cure models of a material, by their tables.
+fn models(material: &Material) -> Vec<&'static str> {
     let all = [
         ("working-curve", material.working_curve.is_some()),
         ("gray", material.gray.is_some() || material.gray_light.is_some()),
         ("dimmed-lamp", material.dimmed_lamp.is_some()),
         ("two-depth", material.two_depth.is_some()),
     ];
-    let given = all.into_iter().filter(|&(_, given)| given).map(|(name, _)| name.to_owned());
-    given.chain(widths(material)).collect()
+    all.into_iter().filter(|&(_, given)| given).map(|(name, _)| name).collect()
+}
+
+fn models_and_widths(material: &Material) -> String {
+    let models = models(material).into_iter().map(str::to_owned);
+    models.chain(widths(material)).collect::<Vec<_>>().join(", ")
 }
 
 /// The sizes of the squares whose cure widths a material has.
@@ -87,8 +137,11 @@ fn widths(material: &Material) -> Option<String> {
     })
 }
 
-fn check(path: &Path) -> Result<(), Exit> {
+fn check(path: &Path, json: bool) -> Result<(), Exit> {
     let (material, _) = catalogue::read_file(path)?;
+    if json {
+        return answer([material]);
+    }
     print(&format!("{}: {}\n", input_name(path), allows(&material)))
 }
 
@@ -102,17 +155,23 @@ fn allows(material: &Material) -> String {
         }
     };
     let depths = resin.model().depths();
-    // A layer of the seed's machine (002 table 1), or as thin as can be told.
-    let layer = if depths.from.um() > 100.0 { depths.from } else { Length::from_um(100.0) };
-    let models = models(material).join(", ");
+    let models = models_and_widths(material);
     let holds =
         if depths == DepthRange::ALL { String::new() } else { format!(" (depths of {depths})") };
-    match resin.exposure_time(layer, 1.0) {
-        Ok(time) => format!(
+    match example(&resin) {
+        (layer, Ok(time)) => format!(
             "{} gives {models}{holds}; at {}, full white cures {layer} in {time:.1}",
             material.name,
             resin.light()
         ),
-        Err(why) => format!("{} gives {models}{holds}, but {why}", material.name),
+        (_, Err(why)) => format!("{} gives {models}{holds}, but {why}", material.name),
     }
+}
+
+/// Returns a layer and the time in which full white cures it, or why it does not: a layer of the
+/// seed's machine (002 table 1), or as thin as can be told.
+fn example(resin: &Resin) -> (Length, Result<ExposureTime, String>) {
+    let least = resin.model().depths().from;
+    let layer = if least.um() > 100.0 { least } else { Length::from_um(100.0) };
+    (layer, resin.exposure_time(layer, 1.0).map_err(|why| why.to_string()))
 }

@@ -3,6 +3,7 @@
 mod brep;
 mod calibrate;
 mod compensate;
+mod completions;
 mod convert;
 mod cure;
 mod demo;
@@ -13,6 +14,7 @@ mod heights;
 mod info;
 mod join;
 mod machine;
+mod man;
 mod material;
 mod sample;
 mod show;
@@ -50,6 +52,8 @@ pub(crate) enum Command {
     Target(target::TargetArgs),
     Heights(heights::HeightsArgs),
     Brep(brep::BrepArgs),
+    Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
 }
 
 impl Command {
@@ -87,6 +91,8 @@ impl Command {
             Self::Target(args) => target::run(args, common),
             Self::Heights(args) => heights::run(args, common),
             Self::Brep(args) => brep::run(args),
+            Self::Completions(args) => completions::run(args),
+            Self::Man(args) => man::run(args),
         }
     }
 }

@@ -7,10 +7,10 @@ use lamp_stack::{Builtin, Catalogued, Dpi, Length, Size};
 use serde::de::{self, Deserialize, Deserializer};
 use thiserror::Error;
 
-use super::Machine;
+use super::{Machine, MachineLimit};
 
 /// Why a machine's numbers contradict each other.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MachineError {
     /// Limits that hold nothing, or no possible resolution.
@@ -19,6 +19,12 @@ pub enum MachineError {
     /// A height that holds nothing.
     #[error("height: it must be above zero")]
     Height,
+    /// A default that is no resolution or no thickness.
+    #[error("defaults: {0}: it must be above zero")]
+    NoDefault(&'static str),
+    /// A default beyond the machine's own limits.
+    #[error("defaults: {0}")]
+    Default(#[from] MachineLimit),
     /// Swaths without a pixel of their own.
     #[error("strips: a swath shares less than half its mirrors with the next")]
     Strips,
@@ -55,6 +61,7 @@ impl Catalogued for Machine {
         if self.height.as_ref().is_some_and(|height| height.value.um() <= 0.0) {
             return Err(MachineError::Height);
         }
+        self.check_defaults()?;
         match &self.strips {
             Some(strips) if strips.overlap >= strips.mirrors.div_ceil(2) => {
                 Err(MachineError::Strips)
@@ -64,12 +71,32 @@ impl Catalogued for Machine {
     }
 }
 
+impl Machine {
+    fn check_defaults(&self) -> Result<(), MachineError> {
+        if let Some(dpi) = self.defaults.dpi {
+            let dpi = Dpi::new(dpi).ok_or(MachineError::NoDefault("dpi"))?;
+            self.check_dpi(dpi, "a stack")?;
+        }
+        if let Some(thickness) = self.defaults.thickness {
+            if thickness.um() <= 0.0 {
+                return Err(MachineError::NoDefault("thickness"));
+            }
+            self.check_thickness(thickness, "a layer")?;
+        }
+        Ok(())
+    }
+}
+
 pub(super) fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Size, D::Error> {
     parsed(from)
 }
 
 pub(super) fn length<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
     parsed(from)
+}
+
+pub(super) fn some_length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Length>, D::Error> {
+    length(from).map(Some)
 }
 
 fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
@@ -105,6 +132,10 @@ source = "data sheet"
 mirrors = 1024
 overlap = 64
 source = "data sheet"
+
+[defaults]
+dpi = 600
+thickness = "50um"
 "#;
 
     #[test]
@@ -137,6 +168,11 @@ source = "data sheet"
             ("mirrors = 1024", "mirrors = 128", &["strips", "half its mirrors"]),
             ("mirrors = 1024", "mirrors = -1", &["line 23", "strips.mirrors"]),
             ("\"mine\"", "\"My own\"", &["name", "`My own` is not a name"]),
+            ("dpi = 600", "dpi = 900", &["defaults: a stack has 900 dpi", "600 to 600"]),
+            ("dpi = 600", "dpi = 0", &["defaults: dpi", "above zero"]),
+            ("\"50um\"", "\"1mm\"", &["defaults: a layer is 1mm thick", "20um to 200um"]),
+            ("\"50um\"", "\"0um\"", &["defaults: thickness", "above zero"]),
+            ("\"50um\"", "\"50\"", &["line 29", "defaults.thickness", "unit"]),
             ("[area]", "[area", &["line 4", "a machine is a TOML file"]),
         ] {
             assert!(WHOLE.contains(from), "{from}");

@@ -38,6 +38,9 @@ pub struct Machine {
     pub thickness: Option<ThicknessRange>,
     /// The swaths that a scanning projector exposes.
     pub strips: Option<Strips>,
+    /// How it is usually sliced for.
+    #[serde(default)]
+    pub defaults: Defaults,
 }
 
 /// A build area, and where it comes from.
@@ -90,6 +93,19 @@ pub struct ThicknessRange {
     /// The section, table or data sheet.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
+}
+
+/// Options of slicing for a machine, unless others are given.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Defaults {
+    /// The resolution.
+    pub dpi: Option<f64>,
+    /// The thickness of layers.
+    #[serde(deserialize_with = "file::some_length")]
+    pub thickness: Option<Length>,
+    /// Black pixels around the part's box.
+    pub margin: Option<u32>,
 }
 
 /// The swaths that a scanning projector exposes.

@@ -1,0 +1,153 @@
+//! Parses arguments: those of the command line, then what an options file and a machine's file
+//! give where the command line is silent.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::exit;
+
+use clap::error::ErrorKind;
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Command, FromArgMatches};
+use lamp_postprocess::machine::{Defaults, Machine};
+
+use crate::catalogue::{entry, read_text};
+use crate::exit::Exit;
+use crate::options::Common;
+use crate::options_file::{Setting, option_of, settings_of};
+use crate::streams::{input_name, is_stream};
+
+/// An options file has a line for each option.
+const MAX_OPTIONS_BYTES: u64 = 1 << 20;
+
+/// Parses a program's arguments. `lamp` has all commands, and `program` is it or one of its stages.
+/// Ends the process where clap does: with a wrong command line, or with help that was asked for.
+pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Exit> {
+    let mut lamp = lamp.clone();
+    lamp.build();
+    let mut arguments =
+        Arguments { lamp, program, words: std::env::args_os().collect(), from: Vec::new() };
+    let given = arguments.parsed_so_far();
+    let (path, of_command) = arguments.command(&given);
+    let common = Common::from_arg_matches(of_command).expect("every command has these options");
+    if let Some(file) = common.file() {
+        let read = || read_text(file, MAX_OPTIONS_BYTES, "an options file");
+        let named = |error: anyhow::Error| Exit::Usage(error).at(input_name(file));
+        let text = read().map_err(named)?;
+        let settings = settings_of(&arguments.lamp, &path, &text)
+            .map_err(|problem| named(anyhow::Error::msg(problem)))?;
+        arguments.fill_in(&path, of_command, &settings, file);
+    }
+    let given = arguments.parsed_so_far();
+    let (path, of_command) = arguments.command(&given);
+    if path == ["slice"]
+        && let Some(file) = of_command.get_one::<PathBuf>("machine")
+    {
+        let settings = settings_of_machine(file)?;
+        arguments.fill_in(&path, of_command, &settings, file);
+    }
+    Ok(arguments.parsed())
+}
+
+/// The words of a command line.
+struct Arguments {
+    /// All commands.
+    lamp: Command,
+    program: Command,
+    words: Vec<OsString>,
+    /// The files that some of the words are from.
+    from: Vec<String>,
+}
+
+impl Arguments {
+    /// Parses the words, though some that are required may be missing.
+    fn parsed_so_far(&self) -> ArgMatches {
+        let parse = |program: Command| program.try_get_matches_from(&self.words);
+        parse(self.program.clone())
+            .or_else(|error| match error.kind() {
+                ErrorKind::MissingRequiredArgument => {
+                    parse(self.program.clone().ignore_errors(true))
+                }
+                _ => Err(error),
+            })
+            .unwrap_or_else(|error| self.end(&error))
+    }
+
+    fn parsed(self) -> ArgMatches {
+        let parsed = self.program.clone().try_get_matches_from(&self.words);
+        parsed.unwrap_or_else(|error| self.end(&error))
+    }
+
+    /// Ends the process as clap does, and names the files that had a say.
+    fn end(&self, error: &clap::Error) -> ! {
+        // There is nobody left to tell if it cannot be printed.
+        let _ = error.print();
+        if error.use_stderr() && !self.from.is_empty() {
+            eprintln!("\nWith the options of {}.", self.from.join(" and "));
+        }
+        exit(error.exit_code())
+    }
+
+    /// Returns the command that runs, as words, and its matches.
+    fn command<'a>(&self, matches: &'a ArgMatches) -> (Vec<String>, &'a ArgMatches) {
+        let (mut path, mut matches) = (Vec::new(), matches);
+        if self.program.get_name() != self.lamp.get_name() {
+            path.push(self.program.get_name().to_owned());
+        }
+        while let Some((name, of_command)) = matches.subcommand() {
+            path.push(name.to_owned());
+            matches = of_command;
+        }
+        (path, matches)
+    }
+
+    /// Adds settings of a file, but none that is given already or contradicts what is.
+    fn fill_in(
+        &mut self,
+        path: &[String],
+        matches: &ArgMatches,
+        settings: &[Setting],
+        file: &Path,
+    ) {
+        let command =
+            path.iter().try_fold(&self.lamp, |command, name| command.find_subcommand(name));
+        let command = command.expect("a command that was parsed is one of lamp's");
+        let is_given = |option: &&Arg| {
+            matches.value_source(option.get_id().as_str()) == Some(ValueSource::CommandLine)
+        };
+        let given: Vec<&Arg> = command.get_arguments().filter(is_given).collect();
+        let is_free = |option: &Arg| {
+            let excludes = |a, b: &Arg| {
+                command.get_arg_conflicts_with(a).iter().any(|other| other.get_id() == b.get_id())
+            };
+            !given.iter().any(|other| {
+                other.get_id() == option.get_id()
+                    || excludes(other, option)
+                    || excludes(option, other)
+            })
+        };
+        let free = settings.iter().filter(|it| option_of(command, &it.key).is_some_and(is_free));
+        let words: Vec<OsString> = free.flat_map(|setting| setting.words.clone()).collect();
+        // What stands behind `--` is no option.
+        let end = self.words.iter().position(|word| word == "--").unwrap_or(self.words.len());
+        self.words.splice(end..end, words);
+        self.from.push(input_name(file));
+    }
+}
+
+/// Returns the defaults that a machine's file gives to `slice`.
+fn settings_of_machine(file: &Path) -> Result<Vec<Setting>, Exit> {
+    if is_stream(file) {
+        return Err(Exit::usage("standard input is for the part: name the machine's file"));
+    }
+    let machine: Machine = entry(file)?;
+    let Defaults { dpi, thickness, margin } = machine.defaults;
+    let settings = [
+        ("dpi", dpi.map(|dpi| dpi.to_string())),
+        ("thickness", thickness.map(|thickness| thickness.to_string())),
+        ("margin", margin.map(|margin| margin.to_string())),
+    ];
+    let setting = |(key, value): (&str, Option<String>)| {
+        Some(Setting { key: key.to_owned(), words: vec![format!("--{key}={}", value?).into()] })
+    };
+    Ok(settings.into_iter().filter_map(setting).collect())
+}

@@ -1,0 +1,68 @@
+//! Checks completions, manual pages, versions and the help of all commands.
+
+use std::process::Command;
+
+use lamp_tests::Scratch;
+
+const PROGRAMS: [&str; 5] = ["lamp", "slice", "fix", "dither", "tile"];
+
+fn said(line: &str) -> String {
+    String::from_utf8(Scratch::new().run(line).succeeds_quietly().stdout).unwrap()
+}
+
+#[test]
+fn every_program_has_a_version() {
+    for program in PROGRAMS {
+        let version = format!("{program} {}\n", env!("CARGO_PKG_VERSION"));
+        assert_eq!(said(&format!("{program} --version")), version);
+        assert_eq!(said(&format!("{program} -V")), version);
+    }
+}
+
+#[test]
+fn shells_complete_every_program() {
+    for (shell, each) in [
+        ("bash", ["complete -F _", " -o "]),
+        ("zsh", ["#compdef ", "--threads"]),
+        ("fish", ["complete -c ", " -l threads"]),
+        ("elvish", ["edit:completion:arg-completer[", "--threads"]),
+        ("powershell", ["Register-ArgumentCompleter -Native -CommandName '", "--threads"]),
+    ] {
+        let script = said(&format!("lamp completions {shell}"));
+        for word in each {
+            assert!(script.matches(word).count() >= PROGRAMS.len(), "{shell}: {word}");
+        }
+        assert!(script.matches("using namespace System.Management.Automation\n").count() <= 1);
+    }
+}
+
+/// Asks bash itself, where it is installed.
+#[test]
+fn bash_completes_options() {
+    let scratch = Scratch::new();
+    scratch.run("lamp completions bash > lamp.bash").succeeds_quietly();
+    let complete = "source ./lamp.bash; COMP_WORDS=(slice --thi); COMP_CWORD=1; \
+                    _slice slice --thi slice; echo \"${COMPREPLY[@]}\"";
+    let bash = Command::new("bash").args(["-c", complete]).current_dir(&scratch).output();
+    if let Ok(answer) = bash {
+        assert_eq!(String::from_utf8_lossy(&answer.stdout), "--thickness\n", "{answer:?}");
+    }
+}
+
+#[test]
+fn man_writes_a_page_for_each_command() {
+    let scratch = Scratch::new();
+    scratch.run("lamp man man1/").succeeds_quietly();
+    for page in ["lamp.1", "lamp-slice.1", "lamp-target-squares.1", "slice.1", "tile.1"] {
+        assert!(scratch.path("man1").join(page).is_file(), "{page}");
+    }
+    let page = String::from_utf8(scratch.bytes("man1/lamp-slice.1")).unwrap();
+    for text in [".TH lamp-slice 1", "\\-\\-thickness", ".SH EXAMPLES\n.nf\nslice blade.stl"] {
+        assert!(page.contains(text), "no {text} in {page}");
+    }
+    // A second time, it replaces them by the same.
+    scratch.run("lamp man man1").succeeds_quietly();
+    assert_eq!(String::from_utf8(scratch.bytes("man1/lamp-slice.1")).unwrap(), page);
+    scratch.write("file", b"");
+    scratch.run("lamp man file").is_refused_with(&["file"]);
+}

@@ -1,0 +1,167 @@
+//! Checks the keys and values that docs/json.md gives for `--json`.
+
+use lamp_fixtures::{Sample, StepDefect, StepSample, StepUnit, broken_step, step};
+use lamp_tests::Scratch;
+use serde_json::{Value, json};
+
+/// Returns the one object that a command prints, in one line.
+fn answer(scratch: &Scratch, line: &str) -> Value {
+    let text = String::from_utf8(scratch.run(line).succeeds().stdout).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    serde_json::from_str(&text).unwrap()
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+fn is_near(value: &Value, expected: f64) -> bool {
+    value.as_f64().is_some_and(|number| (number - expected).abs() < 1e-6 * expected.abs())
+}
+
+const MATERIAL: &str = r#"name = "mine"
+description = "A resin of mine"
+
+[intensity]
+value = "2 W/cm2"
+source = "radiometer"
+
+[working-curve.critical-dose]
+value = "100 mJ/cm2"
+source = "notebook"
+
+[working-curve.penetration-depth]
+value = "200 um"
+source = "notebook"
+
+[[cure-width]]
+feature-size = "0.5 mm"
+critical-dose = { value = "150 mJ/cm2", source = "notebook" }
+sensitivity = { value = "0.2 um/(mJ/cm2)", source = "notebook" }
+"#;
+
+#[test]
+fn materials() {
+    let scratch = Scratch::new();
+    scratch.write("mine.toml", MATERIAL.as_bytes());
+    let shown = answer(&scratch, "lamp material show mine.toml --json");
+    assert_eq!(shown["schema"], "lamp-material-1");
+    let mine = &shown["materials"][0];
+    // White takes E_c exp(100/200) mJ/cm2 at 2000 mW/cm2.
+    let ms = 100.0 * 0.5_f64.exp() / 2.0;
+    assert!(is_near(&mine["exposure_ms"], ms), "{mine}");
+    let mut rest = mine.clone();
+    rest["exposure_ms"] = Value::Null;
+    rest["given"] = Value::Null;
+    assert_eq!(
+        rest,
+        json!({
+            "name": "mine",
+            "description": "A resin of mine",
+            "light_mw_per_cm2": 2000.0,
+            "models": ["working-curve"],
+            "cure_width_um": [500.0],
+            "depths_um": [0.0, null],
+            "layer_um": 100.0,
+            "exposure_ms": null,
+            "why_not": null,
+            "given": null,
+        })
+    );
+    let dose = &mine["given"]["working-curve"]["critical-dose"];
+    assert_eq!(*dose, json!({"value": "100 mJ/cm2", "source": "notebook"}));
+    assert_eq!(answer(&scratch, "lamp material check mine.toml --json"), shown);
+
+    let list = answer(&scratch, "lamp material list --json");
+    let names: Vec<_> =
+        list["materials"].as_array().unwrap().iter().map(|it| &it["name"]).collect();
+    assert_eq!(names.len(), 5);
+    let dark = &list["materials"][0];
+    assert_eq!(dark["name"], "lamp-no-absorber");
+    assert_eq!((&dark["light_mw_per_cm2"], &dark["depths_um"]), (&Value::Null, &Value::Null));
+    assert!(dark["why_not"].as_str().unwrap().contains("how bright full white is"), "{dark}");
+}
+
+#[test]
+fn heights() {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Sample::Tower, 2_000);
+    scratch.write("times.csv", b"thickness_um,exposure_ms\n1000,200\n2000,800\n");
+    let line = "lamp heights tower.stl --min 1mm --max 2mm --step 0.5mm --exposure-table times.csv \
+                --layer-overhead 10s --uniform 2mm --report heights.csv --json";
+    let answer = answer(&scratch, line);
+    assert_eq!(keys(&answer), ["schema", "part", "criterion", "bound", "choices", "layers"]);
+    assert_eq!(answer["schema"], "lamp-heights-1");
+    assert_eq!((&answer["part"], &answer["criterion"]), (&json!("tower.stl"), &json!("volume")));
+    assert_eq!(answer["bound"], 0.02);
+
+    // The layers are the rows of the report, to its digits.
+    let layers = answer["layers"].as_array().unwrap();
+    let report = String::from_utf8(scratch.bytes("heights.csv")).unwrap();
+    let mut rows = report.lines().map(|line| line.split(',').skip(1).collect::<Vec<_>>());
+    let columns = rows.next().unwrap();
+    for (layer, row) in layers.iter().zip(rows) {
+        assert_eq!(keys(layer), columns);
+        for (key, cell) in columns.iter().zip(row) {
+            let (said, written) = (layer[key].as_f64().unwrap(), cell.parse::<f64>().unwrap());
+            assert!((said - written).abs() <= 6e-4, "{key}: {said} {written}");
+        }
+    }
+
+    let [found, uniform] = &answer["choices"].as_array().unwrap()[..] else { panic!("two") };
+    let names = ["name", "layers", "lost_mm3", "gained_mm3", "deviation_percent", "worst"];
+    assert_eq!(keys(found), [&names[..], &["past_bound", "time_s"]].concat());
+    assert_eq!((&found["name"], &found["layers"]), (&json!("volume 2.00%"), &json!(layers.len())));
+    let sum = |key: &str| layers.iter().map(|layer| layer[key].as_f64().unwrap()).sum::<f64>();
+    assert!(is_near(&found["gained_mm3"], sum("gained_mm3")), "{found}");
+    let seconds = sum("exposure_ms") / 1000.0 + 10.0 * layers.len() as f64;
+    assert!(is_near(&found["time_s"], seconds), "{found}");
+    assert_eq!((&uniform["name"], &uniform["layers"]), (&json!("uniform 2mm"), &json!(38)));
+    assert!(uniform["past_bound"].as_u64().unwrap() > 0, "{uniform}");
+}
+
+#[test]
+fn bodies() {
+    let scratch = Scratch::new();
+    scratch.write("block.step", step(StepSample::Block, StepUnit::Inch).as_bytes());
+    let answer_of_block = answer(&scratch, "lamp brep block.step --tolerance 1um --json");
+    let [body] = &answer_of_block["bodies"].as_array().unwrap()[..] else { panic!("one body") };
+    for (key, mm) in
+        [("volume_mm3", 6000.0), ("facet_volume_mm3", 6000.0), ("facet_area_mm2", 2200.0)]
+    {
+        assert!(is_near(&body[key], mm), "{key}: {body}");
+    }
+    assert_eq!(body["faces"], json!({"plane": 6}));
+    assert_eq!((&body["facets"], &body["faults"]), (&json!(12), &json!([])));
+    let side =
+        |k: usize| body["box_mm"][1][k].as_f64().unwrap() - body["box_mm"][0][k].as_f64().unwrap();
+    for (k, mm) in [30.0, 20.0, 10.0].into_iter().enumerate() {
+        assert!((side(k) - mm).abs() < 1e-6, "{body}");
+    }
+    let of_body = ["name", "faces", "facets", "box_mm", "volume_mm3", "facet_volume_mm3"];
+    assert_eq!(keys(body), [&of_body[..], &["facet_area_mm2", "faults"]].concat());
+    let mut rest = answer_of_block.clone();
+    rest["bodies"] = Value::Null;
+    assert_eq!(
+        rest,
+        json!({
+            "schema": "lamp-brep-1",
+            "part": "block.step",
+            "unit": "inch",
+            "facets": 12,
+            "chord_mm": 0.001,
+            "heal_mm": 0.0,
+            "notes": [],
+            "tries": [],
+            "bodies": null,
+        })
+    );
+
+    scratch.write("gap.step", broken_step(StepDefect::Missing).as_bytes());
+    let ran = scratch.run("lamp brep gap.step --strict --json");
+    assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
+    let gap: Value = serde_json::from_slice(&ran.stdout).unwrap();
+    let fault = gap["bodies"][0]["faults"][0].as_str().unwrap();
+    assert!(fault.contains("edges of facets are open"), "{gap}");
+    assert_eq!(keys(&gap["tries"][0]), ["chord_mm", "heal_mm", "why"]);
+}
