@@ -16,11 +16,13 @@ mod fix_report;
 mod height_options;
 mod hints;
 mod json_report;
+mod memory;
 mod mesh_report;
 #[cfg(feature = "occt")]
 mod occt_process;
 mod options;
 mod options_file;
+mod out_of_memory;
 mod part_options;
 mod picture;
 mod pixel_location;
@@ -42,6 +44,7 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 use commands::Command;
 use exit::Exit;
 use options::Common;
+use out_of_memory::note_command;
 use progress::say;
 use signals::{clean_up_on_signals, wait_if_ending};
 
@@ -73,7 +76,8 @@ pub fn run_lamp() -> ExitCode {
     };
     let parsed = Lamp::from_arg_matches(&matches);
     let Lamp { command, common } = parsed.unwrap_or_else(|error| error.exit());
-    finish(matches.subcommand_name().unwrap_or_default(), run(&command, &common))
+    let name = matches.subcommand_name().unwrap_or_default();
+    finish(name, run(name, &command, &common))
 }
 
 /// Runs one of the pipeline's stages with the process's arguments.
@@ -88,7 +92,7 @@ pub fn run_stage(name: &str) -> ExitCode {
     };
     let common = Common::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let command = Command::of_stage(name, &matches).unwrap_or_else(|error| error.exit());
-    finish(name, run(&command, &common))
+    finish(name, run(name, &command, &common))
 }
 
 /// Returns a stage as a program: its own arguments, with lamp's general ones.
@@ -107,7 +111,8 @@ fn programs() -> Vec<clap::Command> {
     programs
 }
 
-fn run(command: &Command, common: &Common) -> Result<ExitCode, Exit> {
+fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit> {
+    note_command(name);
     keep_freed_memory();
     clean_up_on_signals()?;
     #[cfg(feature = "occt")]

@@ -4,13 +4,16 @@ use std::num::NonZeroU32;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::thread;
 
+use anyhow::{Context, anyhow};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::{Length, LengthError, Named};
 
 use crate::exit::Exit;
+use crate::memory::{in_words, within_limits};
 
 /// Options of every command.
 #[derive(Args, Clone, Debug)]
@@ -30,6 +33,9 @@ pub(crate) struct Common {
     options: Option<PathBuf>,
 }
 
+/// The memory that a thread takes to start with: its stack, and room to work in.
+const THREAD_BYTES: u64 = 8 << 20;
+
 impl Common {
     /// Returns the options file.
     pub(crate) fn file(&self) -> Option<&PathBuf> {
@@ -38,10 +44,26 @@ impl Common {
 
     /// Sets up the threads. To be called once.
     pub(crate) fn apply(&self) -> Result<(), Exit> {
-        // Zero lets the pool choose.
-        let threads = self.threads.unwrap_or(0);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-        pool.map_err(|error| Exit::Failed(anyhow::Error::new(error)))
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads()?).build_global();
+        Ok(pool.context("the threads to work with")?)
+    }
+
+    /// Returns the number of threads, for which there is room within limits of memory; zero lets
+    /// the pool choose.
+    fn threads(&self) -> Result<usize, Exit> {
+        let asked = self.threads.map_or(0, usize::from);
+        let Some(left) = within_limits() else { return Ok(asked) };
+        let most = (left / THREAD_BYTES) as usize;
+        if most == 0 || asked > most {
+            return Err(Exit::Failed(anyhow!(
+                "the limit of memory leaves {}, which is too little for {} threads: raise it \
+                 (ulimit -v), or give fewer --threads",
+                in_words(left),
+                asked.max(1),
+            )));
+        }
+        let usual = || thread::available_parallelism().map_or(1, usize::from).min(most);
+        Ok(if asked == 0 { usual() } else { asked })
     }
 }
 

@@ -17,16 +17,21 @@ use crate::exit::Exit;
 const ENDING: [i32; 10] =
     [SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGUSR1, SIGUSR2];
 
-static CAUGHT: AtomicBool = AtomicBool::new(false);
+static ENDS: AtomicBool = AtomicBool::new(false);
 
 const WATCH: &str = "the thread that waits for signals";
 
-/// If a signal is ending the process, waits for that: what fails meanwhile,
+/// If a signal or a lack of memory is ending the process, waits for that: what fails meanwhile,
 /// because its files are gone, is not to be told.
 pub(crate) fn wait_if_ending() {
-    while CAUGHT.load(Relaxed) {
+    while ENDS.load(Relaxed) {
         thread::park();
     }
+}
+
+/// Keeps what fails from now on from being told, since the process is about to end.
+pub(crate) fn say_no_more() {
+    ENDS.store(true, Relaxed);
 }
 
 /// Lets Ctrl-C, and the signals that end a batch, take temporary files away
@@ -40,7 +45,7 @@ pub(crate) fn clean_up_on_signals() -> Result<(), Exit> {
     let mut signals = Signals::new(wanted).context(WATCH)?;
     let watch = move || {
         if let Some(signal) = signals.forever().find(|&signal| signal != SIGXFSZ) {
-            CAUGHT.store(true, Relaxed);
+            say_no_more();
             remove_temporaries();
             std::process::exit(128 + signal);
         }

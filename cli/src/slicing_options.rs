@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_postprocess::machine::{Machine, MachineLimit};
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::exit::Exit;
 use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
 use crate::height_options::{self, HeightOptions};
+use crate::memory::{available, in_words};
 use crate::options::{one_of, parse_thickness};
 use crate::part_options::PartOptions;
 use crate::placement::Numbers;
@@ -176,6 +178,7 @@ impl SlicingOptions {
             exposure.time(self.thickness)?;
         }
         let slices = Slices::new(model, &options)?;
+        check_memory(&slices)?;
         let command = self.command(part, exposure.as_ref());
         let name_command = move |layer: &mut Layer| {
             // All thicknesses were tried above.
@@ -252,16 +255,21 @@ impl SlicingOptions {
 /// Returns the share of the allowed memory for the table of crossings: its lists double as they
 /// grow, and the rest is for images in progress. More than 64 MiB would not make it faster.
 fn table_memory(allowed: Option<u64>) -> u64 {
-    let allowed = allowed.unwrap_or_else(|| machine_memory() / 4);
+    let there_is = available();
+    let allowed = allowed.unwrap_or(there_is / 4).min(there_is);
     (allowed / 4).min(64 << 20)
 }
 
-/// Returns the machine's memory in bytes, or 4 GiB if it is unknown.
-fn machine_memory() -> u64 {
-    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let total = text.lines().find_map(|line| line.strip_prefix("MemTotal:"));
-    let kib = total.and_then(|rest| rest.trim().trim_end_matches(" kB").parse::<u64>().ok());
-    kib.map_or(4 << 30, |kib| kib * 1024)
+/// Checks that there is memory for the largest layer alone.
+fn check_memory(slices: &Slices) -> Result<(), Exit> {
+    let (least, there_is) = (slices.least_memory(), available());
+    if least <= there_is {
+        return Ok(());
+    }
+    let [least, there_is] = [least, there_is].map(in_words);
+    Err(Exit::Failed(anyhow!(
+        "a layer takes some {least} of memory, and there are {there_is}: check --units and --dpi"
+    )))
 }
 
 /// Parses `X,Y` in millimetres.

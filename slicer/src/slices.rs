@@ -124,6 +124,8 @@ pub struct Slices {
     gray: Option<LayerLevels>,
     wanted: Range<usize>,
     max_crossings: usize,
+    /// The crossings of the largest layer, by an estimate.
+    largest: f64,
     /// Slabs of layers that fit the memory, by an estimate.
     slabs: Vec<Range<usize>>,
     buckets: Option<Buckets>,
@@ -175,6 +177,7 @@ impl Slices {
                 *crossings *= 1.0 + spans_per_crossing(reach_um / planes.thickness_um(layer));
             }
         }
+        let largest = expected[wanted.clone()].iter().copied().fold(0.0, f64::max);
         let slabs = slabs(&wanted, &expected, max_crossings);
         let heights: Vec<_> =
             slabs.iter().map(|slab| heights_of(slab, &planes, reach_um)).collect();
@@ -191,6 +194,7 @@ impl Slices {
             fill: options.fill,
             gray: options.gray.clone(),
             max_crossings,
+            largest,
             pending: wanted.start..wanted.start,
             wanted,
             planes,
@@ -212,6 +216,13 @@ impl Slices {
     /// Returns the number of layers.
     pub fn layer_count(&self) -> usize {
         self.wanted.len()
+    }
+
+    /// Returns the bytes that the table takes at least, which is for the largest layer alone, by
+    /// an estimate.
+    pub fn least_memory(&self) -> u64 {
+        let rows = f64::from(self.grid.height);
+        ((2.0 * self.largest + rows) * size_of::<Crossing>() as f64) as u64
     }
 
     /// Returns what polishing did to the crossings of B-rep parts so far, if there are

@@ -58,7 +58,7 @@ impl Registered {
     }
 
     /// Gives the file or folder another name, unless [`remove_temporaries`] was faster.
-    fn rename<E: From<io::Error>>(&self, rename: impl FnOnce() -> Result<(), E>) -> Result<(), E> {
+    fn rename<T, E: From<io::Error>>(&self, rename: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
         let live = live();
         if !live.contains(&self.0) {
             return Err(io::Error::from(io::ErrorKind::Interrupted).into());
@@ -183,18 +183,29 @@ impl FolderBeside {
     /// Returns an error if there is something now that is not to be replaced, or renaming fails.
     pub fn persist(self) -> Result<(), StackError> {
         let (from, to) = (self.folder.path(), &self.path);
-        let mut replaced = false;
-        self.registered.rename(|| {
-            replaced = check_replaceable(to, self.replaces)? == Existing::Replaceable;
-            let renamed = if replaced { exchange(from, to) } else { fs::rename(from, to) };
-            renamed.map_err(StackError::from)
-        })?;
+        let replaced = self.registered.rename(|| put_in_place(from, to, self.replaces))?;
         let from = self.folder.keep();
         if replaced {
             // What remains of it is removed as a dead writer's.
             let _ = fs::remove_dir_all(from);
         }
         Ok(())
+    }
+}
+
+/// Gives a folder its final name. Returns whether it has replaced one, which now has its own.
+fn put_in_place(from: &Path, to: &Path, replaces: bool) -> Result<bool, StackError> {
+    use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty};
+    loop {
+        if check_replaceable(to, replaces)? == Existing::Replaceable {
+            exchange(from, to)?;
+            return Ok(true);
+        }
+        match fs::rename(from, to) {
+            // Another process was faster.
+            Err(error) if matches!(error.kind(), AlreadyExists | DirectoryNotEmpty) => {}
+            renamed => return Ok(renamed.map(|()| false)?),
+        }
     }
 }
 

@@ -56,7 +56,7 @@ pub(crate) struct SliceArgs {
     layers: Option<Range<u32>>,
 
     /// Memory for the table of crossings, at least 16MB; with less, fewer layers are cut at a time
-    /// [default: a quarter of the machine's, as far as it helps]. Facets in no order of height are
+    /// [default: a quarter of what there is, as far as it helps]. Facets in no order of height are
     /// first sorted in a temporary file, 36 bytes per facet. --adaptive also holds the mesh in
     /// memory, 45 bytes per facet
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]

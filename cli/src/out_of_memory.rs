@@ -1,0 +1,102 @@
+//! Ends a command that gets no more memory: one sentence, status 1 and no temporary files.
+//!
+//! Rust aborts a process whose allocation failed, and runs no destructors. Only the allocator
+//! itself can do better before that.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::fs::File;
+use std::io::{self, Cursor, Write};
+use std::os::fd::AsFd;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::thread;
+use std::time::Duration;
+
+use lamp_stack::remove_temporaries;
+use signal_hook::low_level::exit;
+
+use crate::signals::say_no_more;
+
+/// The command's name, for the message.
+static COMMAND: OnceLock<String> = OnceLock::new();
+
+/// Notes the name of the command that runs.
+pub(crate) fn note_command(name: &str) {
+    COMMAND.get_or_init(|| name.to_owned());
+}
+
+/// The system's allocator, except that the process ends where that gives nothing.
+struct GivesOrEnds;
+
+#[global_allocator]
+static ALLOCATOR: GivesOrEnds = GivesOrEnds;
+
+// SAFETY: The system's allocator does all the work; `given` returns what it gave or not at all.
+#[expect(unsafe_code, reason = "only the allocator learns of a failure before the process aborts")]
+unsafe impl GlobalAlloc for GivesOrEnds {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: The caller keeps the same contract.
+        given(unsafe { System.alloc(layout) }, layout.size())
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: The caller keeps the same contract.
+        given(unsafe { System.alloc_zeroed(layout) }, layout.size())
+    }
+
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
+        // SAFETY: The caller keeps the same contract.
+        given(unsafe { System.realloc(memory, layout, bytes) }, bytes)
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: The caller keeps the same contract.
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
+
+#[inline]
+fn given(memory: *mut u8, bytes: usize) -> *mut u8 {
+    if memory.is_null() {
+        end(bytes);
+    }
+    memory
+}
+
+/// Ends the process, in the first thread that gets here. Takes no memory itself.
+#[cold]
+fn end(bytes: usize) -> ! {
+    /// A thread is known by the address of a variable of its own; zero is none.
+    static ENDS_IT: AtomicUsize = AtomicUsize::new(0);
+    thread_local! { static OWN: u8 = const { 0 } }
+    let thread = OWN.with(|own| std::ptr::from_ref(own).addr());
+    match ENDS_IT.compare_exchange(0, thread, Relaxed, Relaxed) {
+        Ok(_) => {}
+        // There is not even enough to remove folders. The next command removes them.
+        Err(ends_it) if ends_it == thread => exit(1),
+        Err(_) => loop {
+            thread::sleep(Duration::MAX);
+        },
+    }
+    say_no_more();
+    tell(bytes);
+    remove_temporaries();
+    exit(1)
+}
+
+/// Prints the message past standard error's lock, which a thread may hold that waits in [`end`].
+fn tell(bytes: usize) {
+    let mut line = [0; 256];
+    let mut cursor = Cursor::new(&mut line[..]);
+    let command = COMMAND.get().map_or("lamp", String::as_str);
+    let written = writeln!(
+        cursor,
+        "{command}: out of memory, {bytes} bytes more were not to be had: raise the limit \
+         (ulimit -v), end other programs, or give fewer --threads"
+    );
+    let end = cursor.position() as usize;
+    if let (Ok(()), Ok(stderr)) = (written, io::stderr().as_fd().try_clone_to_owned()) {
+        // Nobody is left to tell.
+        let _ = File::from(stderr).write_all(&line[..end]);
+    }
+}
