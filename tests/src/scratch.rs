@@ -161,7 +161,9 @@ impl Scratch {
         Ran { line: line.to_owned(), statuses, stdout, stderr }
     }
 
-    fn start(&self, stages: &str, file: Option<&str>, said: &File) -> Vec<Child> {
+    /// Starts a pipeline, the last stage of which writes to `file` if there is one, and all of
+    /// which say their messages into `said`.
+    pub fn start(&self, stages: &str, file: Option<&str>, said: &File) -> Vec<Child> {
         let stages: Vec<&str> = stages.split('|').collect();
         let mut children: Vec<Child> = Vec::new();
         for (i, words) in stages.iter().enumerate() {

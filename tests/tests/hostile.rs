@@ -8,7 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use lamp_fixtures::SplitMix;
-use lamp_tests::hostile::{self, Seed, classic_tiff, seeds};
+use lamp_tests::hostile::{self, Seed, classic_tiff, damage, seeds};
 use lamp_tests::{note, read_stack, shared_data, workspace_root};
 
 /// The number of damaged seeds for each target.
@@ -40,29 +40,6 @@ fn survives(target: &str, entry: fn(&[u8])) {
 fn mutations() -> u64 {
     let asked = std::env::var("LAMP_MUTATIONS");
     asked.map_or(MUTATIONS, |number| number.parse().expect("LAMP_MUTATIONS is a number"))
-}
-
-/// Changes one place in the bytes.
-fn damage(bytes: &mut Vec<u8>, numbers: &mut SplitMix) {
-    const EXTREMES: [u32; 8] = [0, 1, 0x7F, 0xFF, 0xFFFF, 1 << 26, 1 << 31, u32::MAX];
-    let at = numbers.below(bytes.len() + 1);
-    let rest = bytes.len() - at;
-    let some = numbers.below(rest.min(60) + 1);
-    match numbers.below(6) {
-        0 if rest > 0 => bytes[at] ^= 1 << numbers.below(8),
-        1 if rest > 0 => bytes[at] = numbers.below(256) as u8,
-        2 if rest >= 4 => {
-            let extreme = EXTREMES[numbers.below(EXTREMES.len())].to_le_bytes();
-            bytes[at..at + 4].copy_from_slice(&extreme);
-        }
-        3 => drop(bytes.drain(at..at + some)),
-        4 => {
-            let copy = bytes[at..at + some].to_vec();
-            let to = numbers.below(bytes.len() + 1);
-            bytes.splice(to..to, copy);
-        }
-        _ => bytes.truncate(at),
-    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! Each panics where a reader panics or an answer contradicts another; what
 //! is refused must be refused in one line.
 
+mod damage;
 mod seeds;
 
 use std::error::Error;
@@ -18,6 +19,7 @@ use lamp_stack::{
 };
 use tempfile::NamedTempFile;
 
+pub use damage::damage;
 pub use seeds::{Seed, classic_tiff, seeds};
 
 /// Parts are sliced only where their images are at most this high: the cost of
