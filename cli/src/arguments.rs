@@ -14,7 +14,9 @@ use crate::catalogue::{entry, read_text};
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::options_file::{Setting, option_of, settings_of};
+use crate::progress::say;
 use crate::streams::{input_name, is_stream};
+use crate::usage::show;
 
 /// An options file has a line for each option.
 const MAX_OPTIONS_BYTES: u64 = 1 << 20;
@@ -79,10 +81,10 @@ impl Arguments {
 
     /// Ends the process as clap does, and names the files that had a say.
     fn end(&self, error: &clap::Error) -> ! {
-        // There is nobody left to tell if it cannot be printed.
-        let _ = error.print();
+        show(error);
         if error.use_stderr() && !self.from.is_empty() {
-            eprintln!("\nWith the options of {}.", self.from.join(" and "));
+            say("");
+            say(&format!("With the options of {}.", self.from.join(" and ")));
         }
         exit(error.exit_code())
     }

@@ -16,7 +16,10 @@ pub(crate) struct FixReport {
     options: FixOptions,
     bands: Vec<BandLine>,
     corrected: usize,
+    corrected_layers: usize,
     pixels: u64,
+    /// The place of the first band that was left.
+    first_left: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -57,23 +60,60 @@ struct BandLine {
 
 impl FixReport {
     pub(crate) fn new(options: FixOptions) -> Self {
-        Self { options, bands: Vec::new(), corrected: 0, pixels: 0 }
+        Self {
+            options,
+            bands: Vec::new(),
+            corrected: 0,
+            corrected_layers: 0,
+            pixels: 0,
+            first_left: None,
+        }
     }
 
     /// Adds the bands of a layer.
     pub(crate) fn add(&mut self, fixed: &Fixed<'_>) {
+        let is_corrected = |band: &Band| band.outcome == BandOutcome::Corrected;
+        self.corrected_layers += usize::from(fixed.bands.iter().any(is_corrected));
         for band in fixed.bands {
-            if band.outcome == BandOutcome::Corrected {
+            if is_corrected(band) {
                 self.corrected += 1;
                 self.pixels += band.pixels;
+            } else if self.first_left.is_none() {
+                let place = whereabouts(fixed.before, band);
+                self.first_left = Some(format!("{} near {place}", fixed.before.info.name()));
             }
             self.bands.push(self.line(fixed.before, band));
         }
     }
 
     /// Returns how many bands were left as they are.
-    pub(crate) fn left(&self) -> usize {
+    fn left(&self) -> usize {
         self.bands.len() - self.corrected
+    }
+
+    /// Returns a line that sums up what was corrected, if anything was.
+    pub(crate) fn text_of_corrected(&self) -> Option<String> {
+        let layers = match self.corrected_layers {
+            1 => "1 layer".to_owned(),
+            layers => format!("{layers} layers"),
+        };
+        (self.corrected > 0).then(|| {
+            let (bands, were) = bands_were(self.corrected);
+            format!(
+                "{bands} of stray rows in {layers} {were} corrected, {} pixels changed",
+                self.pixels
+            )
+        })
+    }
+
+    /// Returns a line that sums up what was left, if anything was.
+    pub(crate) fn text_of_left(&self) -> Option<String> {
+        let first = self.first_left.as_ref()?;
+        let (bands, were) = bands_were(self.left());
+        Some(format!(
+            "{bands} of stray rows {were} left, the first in {first}: repair the CAD model, or \
+             change the limits; --verbose and --report list all"
+        ))
     }
 
     /// Writes the report.
@@ -116,6 +156,14 @@ impl FixReport {
                 BandOutcome::Doubtful => "left: doubtful",
             },
         }
+    }
+}
+
+/// `1 band` and `was`, or `3 bands` and `were`.
+fn bands_were(bands: usize) -> (String, &'static str) {
+    match bands {
+        1 => ("1 band".to_owned(), "was"),
+        bands => (format!("{bands} bands"), "were"),
     }
 }
 

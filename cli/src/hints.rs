@@ -198,6 +198,7 @@ fn stack(error: &StackError) -> Option<String> {
         | StackError::MissingPages { .. } => {
             "make the stack again, or take it as it is with lamp convert --ignore-checks"
         }
+        StackError::NotTiff { .. } => "if it is a part, slice it first",
         StackError::Exists => "--force replaces a folder of an earlier run",
         StackError::NotReplaceable { .. } => "choose another name, or remove the folder yourself",
         // It is transparent, so that it is no cause of its own.

@@ -36,6 +36,7 @@ mod stack_facts;
 mod step_options;
 mod streams;
 mod thumbnails;
+mod usage;
 
 use std::process::ExitCode;
 
@@ -47,6 +48,7 @@ use options::Common;
 use out_of_memory::note_command;
 use progress::say;
 use signals::{clean_up_on_signals, wait_if_ending};
+use usage::refuse;
 
 /// Turn CAD parts into layer images for projection photopolymerization.
 #[derive(Parser)]
@@ -75,7 +77,7 @@ pub fn run_lamp() -> ExitCode {
         Err(error) => return finish("lamp", Err(error)),
     };
     let parsed = Lamp::from_arg_matches(&matches);
-    let Lamp { command, common } = parsed.unwrap_or_else(|error| error.exit());
+    let Lamp { command, common } = parsed.unwrap_or_else(|error| refuse(&error));
     let name = matches.subcommand_name().unwrap_or_default();
     finish(name, run(name, &command, &common))
 }
@@ -90,8 +92,8 @@ pub fn run_stage(name: &str) -> ExitCode {
         Ok(matches) => matches,
         Err(error) => return finish(name, Err(error)),
     };
-    let common = Common::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let command = Command::of_stage(name, &matches).unwrap_or_else(|error| error.exit());
+    let common = Common::from_arg_matches(&matches).unwrap_or_else(|error| refuse(&error));
+    let command = Command::of_stage(name, &matches).unwrap_or_else(|error| refuse(&error));
     finish(name, run(name, &command, &common))
 }
 

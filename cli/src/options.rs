@@ -22,6 +22,10 @@ pub(crate) struct Common {
     #[arg(short, long, global = true, help_heading = "General options")]
     pub(crate) quiet: bool,
 
+    /// Print more of what was done
+    #[arg(short, long, global = true, help_heading = "General options", conflicts_with = "quiet")]
+    pub(crate) verbose: bool,
+
     /// Use N threads [default: one per processor]
     #[arg(long, value_name = "N", global = true, help_heading = "General options")]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]

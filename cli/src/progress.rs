@@ -1,14 +1,18 @@
 //! Progress and messages on standard error.
 
+use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::options::Common;
 
 /// Prints messages and a progress bar.
 #[derive(Clone)]
 pub(crate) struct Progress {
     command: &'static str,
     quiet: bool,
+    verbose: bool,
     watched: bool,
     bar: ProgressBar,
 }
@@ -16,12 +20,13 @@ pub(crate) struct Progress {
 impl Progress {
     /// Returns progress with a bar if standard error is a terminal. Of the stages of a pipeline
     /// only the last shows one (`is_last`), because they share the terminal.
-    pub(crate) fn new(command: &'static str, quiet: bool, is_last: bool) -> Self {
+    pub(crate) fn new(command: &'static str, common: &Common, is_last: bool) -> Self {
+        let &Common { quiet, verbose, .. } = common;
         let watched = !quiet && is_last && io::stderr().is_terminal();
         let bar = ProgressBar::hidden();
         bar.set_style(style("{prefix} {human_pos} layers {per_sec}"));
         bar.set_prefix(command);
-        Self { command, quiet, watched, bar }
+        Self { command, quiet, verbose, watched, bar }
     }
 
     /// Sets the number of layers to expect.
@@ -38,11 +43,23 @@ impl Progress {
         self.bar.inc(1);
     }
 
+    /// Prints a line of what is told only to who asks for it with `--verbose`.
+    pub(crate) fn detail(&self, line: &str) {
+        if self.verbose {
+            self.warn(line);
+        }
+    }
+
     /// Prints a line, unless quiet.
     pub(crate) fn say(&self, line: &str) {
         if !self.quiet {
-            self.bar.suspend(|| say(&format!("{}: {line}", self.command)));
+            self.warn(line);
         }
+    }
+
+    /// Prints a line, also if quiet.
+    pub(crate) fn warn(&self, line: &str) {
+        self.bar.suspend(|| say(&format!("{}: {line}", self.command)));
     }
 
     /// Removes the bar.
@@ -53,9 +70,32 @@ impl Progress {
 
 /// Prints a line to standard error. A closed standard error does not stop the work.
 pub(crate) fn say(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", printable(line));
+}
+
+/// Escapes what could steer a terminal, as names of files may.
+pub(crate) fn printable(text: &str) -> Cow<'_, str> {
+    // The characters that turn the direction of writing hide what a name is.
+    let steers =
+        |c: char| c.is_control() || matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
+    if !text.contains(steers) {
+        return Cow::Borrowed(text);
+    }
+    let escaped = |c: char| if steers(c) { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(escaped).collect())
 }
 
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).expect("the templates are fixed")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_steers_a_terminal_is_escaped() {
+        assert_eq!(printable("blade.stl: größe 3"), "blade.stl: größe 3");
+        assert_eq!(printable("a\u{1b}[31mb\nc\u{202E}"), r"a\u{1b}[31mb\nc\u{202e}");
+    }
 }

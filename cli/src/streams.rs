@@ -5,11 +5,12 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use anyhow::{Context, anyhow};
 use lamp_stack::{
-    Destination, FileBeside, FolderBeside, Format, Layer, Page, PageInfo, Pages, StackError,
-    StackInfo, map_in_order, write_stack,
+    Destination, FileBeside, FolderBeside, Format, Layer, Page, PageInfo, Pages, PictureFormat,
+    StackError, StackInfo, map_in_order, write_stack,
 };
 
 use crate::exit::Exit;
@@ -21,9 +22,32 @@ pub(crate) fn is_stream(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Returns the name of an input for messages.
+/// The part on standard input, of which a process has one.
+static PIPED_PART: OnceLock<String> = OnceLock::new();
+
+/// Returns the part of the stack on standard input, as soon as its first page has told it.
+pub(crate) fn piped_part() -> Option<&'static str> {
+    PIPED_PART.get().map(String::as_str)
+}
+
+/// Returns the name of an input for messages: of standard input with its part, if that is known.
 pub(crate) fn input_name(path: &Path) -> String {
-    if is_stream(path) { "standard input".to_owned() } else { path.display().to_string() }
+    match piped_part() {
+        _ if !is_stream(path) => path.display().to_string(),
+        Some(part) => format!("{part} (standard input)"),
+        None => "standard input".to_owned(),
+    }
+}
+
+/// Learns the part of a stack from the metadata on its first page.
+fn learn_part(path: &Path, stack: Option<&StackInfo>) {
+    // A part that was itself on standard input is called so.
+    if let Some(StackInfo { part, .. }) = stack
+        && is_stream(path)
+        && !["", "stdin"].contains(&&**part)
+    {
+        PIPED_PART.get_or_init(|| part.clone());
+    }
 }
 
 /// Prints the result of a command to standard output.
@@ -73,7 +97,7 @@ pub(crate) fn failed_at(place: impl Display + Send + Sync + 'static, error: Stac
 /// Returns the progress of a command that writes to `output`.
 pub(crate) fn progress(command: &'static str, common: &Common, output: &Output) -> Progress {
     let last = !is_stream(&output.output) || io::stdout().is_terminal() || stdout_is_file();
-    Progress::new(command, common.quiet, last)
+    Progress::new(command, common, last)
 }
 
 /// Returns whether standard output goes to a file, so that no stage follows.
@@ -109,30 +133,30 @@ pub(crate) fn layers_of_input(
     progress: &Progress,
 ) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
     let progress = progress.clone();
-    let name = input_name(&input.stack);
-    let pages = pages_of(pages, name.clone(), input.layers.clone()).inspect(move |page| {
+    let path = input.stack.clone();
+    let pages = pages_of(pages, path.clone(), input.layers.clone()).inspect(move |page| {
         if let Ok((_, Some(StackInfo { layers: Some(layers), .. }))) = page {
             progress.expect((*layers).into());
         }
     });
-    decoded(pages, name)
+    decoded(pages, path)
 }
 
 /// Reads the wanted layers of a stack that is open, decoded, in order.
 pub(crate) fn layers_of(
     pages: Pages,
-    name: &str,
+    path: &Path,
     layers: Option<Range<u32>>,
 ) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
-    decoded(pages_of(pages, name.to_owned(), layers), name.to_owned())
+    decoded(pages_of(pages, path.to_owned(), layers), path.to_owned())
 }
 
 fn decoded(
     pages: impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>>,
-    name: String,
+    path: PathBuf,
 ) -> impl Iterator<Item = Result<Layer, Exit>> {
     map_in_order(pages, move |(page, stack): (Page, _)| {
-        let mut layer = page.decode().map_err(|error| failed_at(name.clone(), error))?;
+        let mut layer = page.decode().map_err(|error| failed_at(input_name(&path), error))?;
         layer.info.stack = stack;
         Ok(layer)
     })
@@ -153,10 +177,10 @@ pub(crate) fn read_beside(
 
 fn pages_of(
     pages: Pages,
-    name: String,
+    path: PathBuf,
     layers: Option<Range<u32>>,
 ) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>> {
-    in_range(pages, Page::info, name, layers)
+    in_range(pages, Page::info, path, layers)
 }
 
 /// Takes the pages of the wanted layers, decoded or not, given how to get their `info`. The
@@ -164,23 +188,25 @@ fn pages_of(
 pub(crate) fn in_range<P>(
     mut pages: impl Iterator<Item = Result<P, StackError>>,
     info: fn(&P) -> &PageInfo,
-    name: String,
+    path: PathBuf,
     layers: Option<Range<u32>>,
 ) -> impl Iterator<Item = Result<(P, Option<StackInfo>), Exit>> {
     let mut stack: Option<StackInfo> = None;
-    let mut found = false;
+    let (mut found, mut ends) = (false, None);
     std::iter::from_fn(move || {
         for page in pages.by_ref() {
             let page = match page {
                 Ok(page) => page,
                 Err(error) => {
                     found = true;
-                    return Some(Err(failed_at(name.clone(), error)));
+                    return Some(Err(failed_at(input_name(&path), error)));
                 }
             };
             let of_page = info(&page).stack.clone();
+            learn_part(&path, of_page.as_ref());
             let Some(layers) = &layers else { return Some(Ok((page, of_page))) };
             let index = info(&page).index;
+            ends = Some((ends.map_or(index, |(first, _)| first), index));
             stack = of_page.map(|of_page| of_page.of_range(index, layers)).or(stack.take());
             if layers.contains(&index) {
                 found = true;
@@ -188,7 +214,12 @@ pub(crate) fn in_range<P>(
             }
         }
         let none_found = layers.is_some() && !std::mem::replace(&mut found, true);
-        none_found.then(|| Err(Exit::Failed(anyhow!("{name}: no layer is in that range"))))
+        none_found.then(|| {
+            let name = input_name(&path);
+            let has = ends.map(|(first, last)| format!(": it has layers {first} to {last}"));
+            let has = has.unwrap_or_default();
+            Err(Exit::Failed(anyhow!("{name}: no layer is in that range{has}")))
+        })
     })
 }
 
@@ -246,16 +277,38 @@ fn destination(output: &Output) -> Result<Destination, Exit> {
     if is_folder(path) {
         return Ok(Destination::Folder(new_folder(path, output.force)?));
     }
-    if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) {
+    let extension = extension(path);
+    if extension == "png" {
         return Err(Exit::usage(format!(
             "{}: a stack is a TIFF; lamp convert turns it into PNGs",
             path.display()
         )));
     }
+    if PictureFormat::of_extension(&extension).is_some() {
+        let path = path.display();
+        return Err(Exit::usage(format!("{path}: a stack is a TIFF: end its name in .tif")));
+    }
     Ok(match open_device(path)? {
         Some(device) => Destination::Stream(Box::new(device)),
         None => Destination::File(behind_links(path)),
     })
+}
+
+/// Refuses to write a PNG under the name of another kind of picture.
+pub(crate) fn check_png_name(path: &Path) -> Result<(), Exit> {
+    let extension = extension(path);
+    let is_other = matches!(&*extension, "tif" | "tiff" | "svg")
+        || PictureFormat::of_extension(&extension).is_some();
+    if is_other {
+        let path = path.display();
+        return Err(Exit::usage(format!("{path}: the picture is a PNG: end its name in .png")));
+    }
+    Ok(())
+}
+
+/// Returns what a file's name ends in, in small letters.
+fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 
 /// Returns whether an output names a folder.

@@ -143,7 +143,7 @@ pub enum SliceError {
         top: Length,
     },
     /// The layers asked for do not exist.
-    #[error("layers {start}..{end} were asked for, but the part has layers 0..{count}")]
+    #[error("{} asked for, but the part has layers 0 to {}", asked(*start, *end), count.saturating_sub(1))]
     NoSuchLayers {
         /// The first layer asked for.
         start: u32,
@@ -255,4 +255,14 @@ pub enum AsciiFault {
 fn start_of(error: &io::Error) -> String {
     const MAX_CHARACTERS: usize = 150;
     error.to_string().chars().take(MAX_CHARACTERS).collect()
+}
+
+/// Says which layers were asked for.
+fn asked(start: u32, end: u32) -> String {
+    match end {
+        _ if end <= start => format!("layers {start}..{end} were"),
+        _ if end == start + 1 => format!("layer {start} was"),
+        u32::MAX => format!("layers {start} and above were"),
+        _ => format!("layers {start} to {} were", end - 1),
+    }
 }

@@ -16,7 +16,7 @@ pub enum StackError {
     #[error("the input is empty: no stack arrived")]
     Empty,
     /// The input starts as neither a TIFF nor a picture that is read.
-    #[error("this is neither a TIFF stack nor a picture (it starts with bytes {start:02x?})")]
+    #[error("this is neither a TIFF stack nor a picture (it starts with \"{}\")", start.escape_ascii())]
     NotTiff {
         /// The first bytes of the input.
         start: Vec<u8>,

@@ -58,7 +58,7 @@ impl PictureFormat {
     }
 
     /// Returns the format of files with this extension, in small letters.
-    pub(crate) fn of_extension(extension: &str) -> Option<Self> {
+    pub fn of_extension(extension: &str) -> Option<Self> {
         match extension {
             "bmp" => Some(Self::Bmp),
             "gif" => Some(Self::Gif),

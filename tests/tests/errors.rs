@@ -114,6 +114,20 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("lamp convert cube.tif --png --classic -o x/", &["--classic"]),
         ("lamp convert cube.tif --classic -o x.png", &["--classic is for TIFFs"]),
         ("fix cube.tif -o x.png", &["x.png: a stack is a TIFF", "lamp convert"]),
+        ("lamp convert cube.tif --layers 3 -o x.jpg", &["a stack is a TIFF: end its name in .tif"]),
+        ("lamp show cube.tif --layer 3 -o x.jpg", &["a PNG: end its name in .png"]),
+        (
+            "lamp show cube.tif --layer five -o x.png",
+            &["'five'", "'--layer <K>'", "a whole number"],
+        ),
+        ("lamp show cube.tif --layers 1..9/0 -o x.png", &["A..B/N", "every Nth layer"]),
+        (
+            "fix cube.tif --max-width=-3 -o x.tif",
+            &["'-3'", "'--max-width <ROWS>'", "of at least 0"],
+        ),
+        ("fix cube.tif -q -v -o x.tif", &["--quiet", "--verbose"]),
+        ("tile cube.tif --mesh hex -o x.tif", &["--mesh hex", "hexagon, square, none"]),
+        ("tile cube.tif --wall 0um -o x.tif", &["'--wall <LENGTH>'", "above zero"]),
         ("lamp convert cube.tif --png -o /", &["name the folder"]),
         ("lamp join -o x.tif", &["<STACK>"]),
         ("lamp join cube.tif - -o x.tif", &["standard input", "name files"]),
@@ -161,7 +175,10 @@ fn of_several_parts_the_bad_one_is_named() {
         ("cube.stl missing.stl", &["slice: missing.stl: ", "No such file"][..]),
         ("cube.stl cube.stl nan.stl", &["slice: nan.stl: facet 5 ", "not a finite number"]),
         ("none.stl cube.stl", &["slice: none.stl: ", "no facets"]),
-        ("cube.stl cube.stl cube.stl --layers 200..", &["slice: cube.stl and 2 more: ", "0..200"]),
+        (
+            "cube.stl cube.stl cube.stl --layers 200..",
+            &["slice: cube.stl and 2 more: ", "0 to 199"],
+        ),
     ] {
         is_bad_input(&scratch, &format!("slice {parts} -o x.tif"), words);
     }
@@ -171,7 +188,7 @@ fn of_several_parts_the_bad_one_is_named() {
 fn a_part_that_does_not_fit_the_options_is_refused() {
     let scratch = with_all_sorts();
     for (options, words) in [
-        ("--layers 200..", &["200", "0..200"][..]),
+        ("--layers 200..", &["layers 200 and above were asked for", "layers 0 to 199"][..]),
         ("--origin 0,0 --size 5x5mm", &["sticks out of the frame", "-10.000 to 10.000"]),
         ("--units inch --dpi 100000 --margin 99999999", &["pixels", "--units", "--dpi"]),
         ("--thickness 0.00001um", &["layers", "--thickness"]),
@@ -197,15 +214,19 @@ fn a_stack_that_cannot_be_read_is_named_with_what_is_wrong() {
     ];
     for (name, words) in [
         ("missing.tif", &["No such file"][..]),
-        ("folder", &["holds no .tif"]),
-        ("cube.stl", &["neither a TIFF stack nor a picture"]),
+        ("folder", &["holds no page: no .tif, no .png"]),
+        ("cube.stl", &["neither a TIFF stack nor a picture", "slice it first"]),
         ("text.stl", &["neither a TIFF stack nor a picture"]),
         ("empty.stl", &["empty"]),
     ] {
         let place = format!("{name}: ");
         let words = [&[place.as_str()], words].concat();
         for stage in stages {
-            let output = if stage == "lamp info" { "" } else { "-o x.tif" };
+            let output = match stage {
+                "lamp info" => "",
+                "lamp show --layer 0" => "-o x.png",
+                _ => "-o x.tif",
+            };
             is_bad_input(&scratch, &format!("{stage} {name} {output}"), &words);
         }
     }
@@ -228,6 +249,26 @@ fn a_stack_that_does_not_fit_the_options_is_refused() {
         let words = [&["cube.tif: "], words].concat();
         is_bad_input(&scratch, line, &words);
     }
+}
+
+/// A name that would colour a terminal and forge a second line.
+#[test]
+fn names_of_files_cannot_steer_the_terminal() {
+    let scratch = with_all_sorts();
+    let name = "\u{1b}[31mred\nfix: all is well.tif";
+    let escaped = r"\u{1b}[31mred\nfix: all is well.tif";
+    for (command, options) in [("fix", &[][..]), ("lamp", &["info"]), ("slice", &["--dpi"])] {
+        let ran = scratch.command(command).args(options).arg(name).output().unwrap();
+        let said = String::from_utf8(ran.stderr).unwrap();
+        assert!(!ran.status.success() && !said.contains('\u{1b}'), "{said:?}");
+        assert!(!said.lines().any(|line| line.starts_with("fix: all is well")), "{said:?}");
+        let is_usage = ran.status.code() == Some(2);
+        assert!(is_usage || said.contains(escaped), "{said:?}");
+    }
+    scratch.write(name, &scratch.bytes("cube.tif"));
+    let ran = scratch.command("lamp").args(["info", name]).output().unwrap();
+    let said = String::from_utf8(ran.stdout).unwrap();
+    assert!(ran.status.success() && !said.contains('\u{1b}'), "{said:?}");
 }
 
 #[test]
@@ -254,7 +295,7 @@ fn an_output_that_cannot_be_written_is_named() {
         "lamp convert cube.tif --png -o folder",
         "lamp split cube.tif --every 5 -o folder",
     ] {
-        is_bad_input(&scratch, line, &["folder", "remove it or choose another name"]);
+        is_bad_input(&scratch, line, &["folder", "--force replaces a folder"]);
     }
     // A file cannot be replaced by a folder.
     is_bad_input(&scratch, "fix cube.tif -o cube.stl/", &["cube.stl"]);

@@ -25,7 +25,9 @@ fn said(scratch: &Scratch, line: &str) -> String {
 #[test]
 fn a_tower_in_inches_has_its_discs() {
     let scratch = with(StepSample::Tower);
-    let text = said(&scratch, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
+    let slice = "slice part.step --dpi 600 --thickness 1mm -o part.tif";
+    assert_eq!(said(&scratch, slice), "");
+    let text = said(&scratch, &format!("{slice} --verbose"));
     assert!(text.contains("crossings were moved from facets to exact surfaces"), "{text}");
     let layers = scratch.layers("part.tif");
     assert_eq!(layers.len(), 76);

@@ -89,7 +89,15 @@ fn standard_input_fits_as_a_file_does() {
     );
     scratch.run("tile --fit").is_refused_with(&["standard input", "empty"]);
     let cut = scratch.run_on("tile --fit", &stack[..stack.len() / 2]);
-    cut.is_refused_with(&["standard input", "cut off"]);
+    cut.is_refused_with(&["torus (standard input): ", "cut off"]);
+    for options in ["--copies 99", "--copies 99 --fit"] {
+        let many = scratch.run_on(&format!("tile {options}"), &stack);
+        many.is_refused_with(&["tile: torus: 99 copies were asked for"]);
+    }
+    scratch.write("layout.json", br#"{"copies": [{"part": "torus"}]}"#);
+    let wrong = scratch.run_on("tile --layout layout.json", &stack);
+    assert_eq!(wrong.stderr.matches("missing field").count(), 1, "{wrong:?}");
+    wrong.is_refused_with(&["layout.json: this is not a layout"]);
 }
 
 #[test]

@@ -78,7 +78,6 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     }
     check_not_input(&args.output.output, &args.material)?;
     let progress = progress("compensate", common, &args.output);
-    let name = input_name(&args.input.stack);
     let options = CompensateOptions {
         min_feature: args.min_feature,
         one_bit: args.one_bit,
@@ -95,11 +94,12 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     let done = lamp_postprocess::compensate(layers, options, widths, |done| walls.add(done));
     write_layers(done, &args.output, &progress).map_err(|error| match error {
         Exit::Failed(error) if error.is::<CompensateError>() || error.is::<NoDose>() => {
-            Exit::Failed(error).at(name.clone())
+            Exit::Failed(error).at(input_name(&args.input.stack))
         }
         error => error,
     })?;
     let moves = args.uniform.is_some() || args.material.is_some();
+    let name = input_name(&args.input.stack);
     let again = done_before.lines(&name, moves, args.shrinkage.is_some());
     for line in again.into_iter().chain(walls.lines()) {
         progress.say(&line);

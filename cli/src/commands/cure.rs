@@ -19,7 +19,7 @@ use crate::part_options::{Reading, name_of_all};
 use crate::picture::PictureScale;
 use crate::progress::Progress;
 use crate::slicing_options::SlicingOptions;
-use crate::streams::{check_beside, input_name, print, read_layers, write_file};
+use crate::streams::{check_beside, check_png_name, input_name, print, read_layers, write_file};
 
 /// Draw a vertical section of what a stack cures, compared with the part
 ///
@@ -66,13 +66,14 @@ pub(crate) struct CureArgs {
 }
 
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
+    check_png_name(&args.output)?;
     let inputs = args.part.iter().chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     let material: Material = entry(&args.material)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let name = input_name(&args.input.stack);
-    let failed = |error: anyhow::Error| Exit::Failed(error).at(name.clone());
-    let progress = Progress::new("cure", common.quiet, true);
+    let failed = |error: anyhow::Error| Exit::Failed(error).at(input_name(&args.input.stack));
+    let progress = Progress::new("cure", common, true);
     let (mut exposures, mut stack) = (None, None);
     for layer in read_layers(&args.input, &progress)? {
         let layer = layer?;

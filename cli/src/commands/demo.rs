@@ -62,7 +62,7 @@ pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Exit> {
         ["blade.stl", "build.tif", "layers.png", "alpha.tif", "alpha.png"]
             .map(|name| args.folder.join(name));
     write_file(&stl, |out| mesh.write_stl(part.name(), out))?;
-    let progress = Progress::new("demo", common.quiet, true);
+    let progress = Progress::new("demo", common, true);
     let started = Instant::now();
     let size = run_pipeline(&stl, &stack, &progress)?;
     let seconds = started.elapsed().as_secs_f64();

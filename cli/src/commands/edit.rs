@@ -114,7 +114,6 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
     let (edits, files) = args.edits()?;
     check_not_input(&args.output.output, files.iter().chain(&args.edits))?;
     let progress = progress("edit", common, &args.output);
-    let name = input_name(&args.input.stack);
     let may_reach_beyond = args.input.layers.is_some();
     let other = |file: &PathBuf| {
         let layers = Box::new(read_beside(file)?);
@@ -127,7 +126,9 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
         done.iter().for_each(|&edit| counts[edit] += 1);
     });
     write_layers(edited, &args.output, &progress).map_err(|error| match error {
-        Exit::Failed(error) if error.is::<EditError>() => Exit::Failed(error).at(name),
+        Exit::Failed(error) if error.is::<EditError>() => {
+            Exit::Failed(error).at(input_name(&args.input.stack))
+        }
         error => error,
     })?;
     for (number, _) in (1..).zip(counts).filter(|(_, count)| *count == 0) {

@@ -1,6 +1,6 @@
 //! `lamp fix`: corrects stray rows, and reports them.
 
-use std::cell::Cell;
+use std::cell::RefCell;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -21,8 +21,8 @@ use crate::streams::{check_beside, progress, read_layers, unless_found, write_la
 /// stray if it lacks crossings that the rows above and below have, or has a run that they lack.
 /// Missing crossings are added; existing ones stay unless they contradict the contours around them.
 /// A band of rows that is too wide, or whose correction is too uncertain, is left and reported.
-/// Changes are reported for each layer and recorded on its page; all other layers pass byte for
-/// byte. Gray layers are corrected by their outlines.
+/// Changes are recorded on their pages, and summed up in two lines; --verbose and --report list them
+/// all. All other layers pass byte for byte. Gray layers are corrected by their outlines.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -89,50 +89,40 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     }
     let progress = progress("fix", common, &args.output);
     let options = args.options();
-    let mut findings = FixReport::new(options);
+    let findings = RefCell::new(FixReport::new(options));
     let evidence = args.evidence.as_deref();
     let mut evidence =
         evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
-    let left = Cell::new(0);
     let mut layer_count = 0;
     let layers = read_layers(&args.input, &progress)?.inspect(|_| layer_count += 1);
     let fixed = lamp_postprocess::fix(layers, options, |fixed| {
         for line in describe(fixed, &options) {
-            progress.say(&line);
+            progress.detail(&line);
         }
         if let Some(evidence) = &mut evidence {
             evidence.add(fixed);
         }
-        findings.add(fixed);
-        left.set(findings.left());
+        findings.borrow_mut().add(fixed);
     });
-    let finding = || match left.get() {
-        left if left > 0 && args.strict => Some(Exit::Findings(left_in_all(left))),
-        _ => None,
-    };
+    let finding = || findings.borrow().text_of_left().filter(|_| args.strict).map(Exit::Findings);
     let written = write_layers(unless_found(fixed, finding), &args.output, &progress);
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }
+    let findings = findings.borrow();
     if let Some(evidence) = evidence {
         evidence.finish()?;
     }
     if let Some(path) = &args.report {
         findings.write(layer_count, path)?;
     }
-    if left.get() > 0 && !args.strict {
-        progress.say(&left_in_all(left.get()));
+    if let Some(line) = findings.text_of_corrected() {
+        progress.say(&line);
+    }
+    if let Some(line) = findings.text_of_left().filter(|_| !args.strict) {
+        progress.warn(&line);
     }
     written
-}
-
-fn left_in_all(bands: usize) -> String {
-    let (bands, were) =
-        if bands == 1 { ("1 band".to_owned(), "was") } else { (format!("{bands} bands"), "were") };
-    format!(
-        "{bands} of stray rows {were} left: repair the CAD model, or check the report and \
-         pictures and change the limits"
-    )
 }
 
 /// What was found in a layer: a line for all that was corrected, and one for

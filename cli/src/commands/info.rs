@@ -1,7 +1,5 @@
 //! `lamp info`: describes a stack.
 
-use std::ops::Range;
-
 use clap::Args;
 use lamp_stack::{
     NumberRange, Page, PageHeader, PageInfo, Pages, StackInfo, StackTotals, map_in_order,
@@ -41,10 +39,14 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
     let name = input_name(&args.input.stack);
     let pages = open_pages(&args.input.stack)?;
     let facts = if args.runs {
-        runs_of(pages, &name, args.input.layers.clone())?
+        runs_of(pages, &args.input)?
     } else {
-        let headers =
-            in_range(pages.headers(), header_info, name.clone(), args.input.layers.clone());
+        let headers = in_range(
+            pages.headers(),
+            header_info,
+            args.input.stack.clone(),
+            args.input.layers.clone(),
+        );
         Facts::sum(headers.map(|page| Ok((with_stack(page?), None))))?
     };
     let Some(facts) = facts else { return Ok(()) };
@@ -65,12 +67,12 @@ fn with_stack((mut header, stack): (PageHeader, Option<StackInfo>)) -> PageHeade
 }
 
 /// Sums up the pages and the transitions of their images.
-fn runs_of(pages: Pages, name: &str, layers: Option<Range<u32>>) -> Result<Option<Facts>, Exit> {
-    let place = name.to_owned();
-    let pages = in_range(pages, Page::info, name.to_owned(), layers);
+fn runs_of(pages: Pages, input: &Input) -> Result<Option<Facts>, Exit> {
+    let path = input.stack.clone();
+    let pages = in_range(pages, Page::info, path.clone(), input.layers.clone());
     Facts::sum(map_in_order(pages, move |(page, stack): (Page, _)| {
         let header = with_stack((page.header(), stack));
-        let layer = page.decode().map_err(|error| failed_at(place.clone(), error))?;
+        let layer = page.decode().map_err(|error| failed_at(input_name(&path), error))?;
         Ok((header, Some(layer.image.change_count() as u64)))
     }))
 }

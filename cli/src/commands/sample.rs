@@ -120,6 +120,6 @@ fn is_step_name(path: &Path) -> bool {
 }
 
 fn say_size(args: &SampleArgs, common: &Common, mesh: &Mesh) {
-    let progress = Progress::new("sample", common.quiet, true);
+    let progress = Progress::new("sample", common, true);
     progress.say(&format!("{}: {} facets", args.output.display(), mesh.facets.len()));
 }

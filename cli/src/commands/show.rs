@@ -11,7 +11,7 @@ use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order}
 use crate::exit::Exit;
 use crate::options::EveryNth;
 use crate::picture::{Picture, PictureScale, Region};
-use crate::streams::{failed_at, input_name, is_stream, open_pages, write_file};
+use crate::streams::{check_png_name, failed_at, input_name, is_stream, open_pages, write_file};
 use crate::thumbnails::{Thumbnail, contact_sheet, write_animation};
 
 /// Show a layer as a PNG picture, or many on one sheet or as an animation
@@ -78,6 +78,7 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
             "a picture is not for terminals: name a file with -o, or pipe it on",
         ));
     }
+    check_png_name(&args.output)?;
     match &args.shown.layers {
         Some(layers) => show_many(args, layers),
         None => show_one(args),

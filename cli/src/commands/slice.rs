@@ -137,7 +137,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         subject.write(&trace, rows, path)?;
     }
     if let Some(polished) = slices.polished().filter(|it| it.moved + it.kept > 0) {
-        progress.say(&polish_text(polished));
+        progress.detail(&polish_text(polished));
     }
     if let Some(text) = bridged.text() {
         progress.say(&text);

@@ -59,7 +59,7 @@ pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Exit> {
         }
     };
     let folder = new_folder(&args.output, args.force)?;
-    let progress = Progress::new("split", common.quiet, true);
+    let progress = Progress::new("split", common, true);
     let layers = read_layers(&args.input, &progress)?.inspect(|_| progress.layer_done());
     let written = write_split(layers, &cuts, folder, format(args.classic));
     written_to(&args.output, written, &progress).map_err(|error| match error {

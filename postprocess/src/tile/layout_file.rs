@@ -15,7 +15,7 @@
 //! not. `turn` is 0, 90, 180 or 270 degrees anticlockwise; `"mirror": true` mirrors the
 //! image left to right before it is turned.
 
-use lamp_stack::{Frame, Length, Orientation, Size};
+use lamp_stack::{Frame, Length, Orientation, Size, one_line};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -65,9 +65,12 @@ fn is_zero(turn: &u32) -> bool {
 pub enum LayoutError {
     /// The text is no JSON, or has other keys.
     #[error(
-        "this is not a layout: {0}; write {{\"copies\": [{{\"part\": \"blade.tif\", \"x_mm\": 1, \"y_mm\": 1, \"turn\": 90}}]}}"
+        "this is not a layout: {problem}; write {{\"copies\": [{{\"part\": \"blade.tif\", \"x_mm\": 1, \"y_mm\": 1, \"turn\": 90}}]}}"
     )]
-    Json(#[from] serde_json::Error),
+    Json {
+        /// The parser's message, with the line and column.
+        problem: String,
+    },
     /// A number is no distance on a build area.
     #[error("{place}: {value} is no length on a build area")]
     Number {
@@ -117,7 +120,8 @@ impl LayoutFile {
     /// # Errors
     /// Returns an error if the text is none, or a value cannot stand on a build area.
     pub fn from_json(text: &str) -> Result<Self, LayoutError> {
-        let file: Self = serde_json::from_str(text)?;
+        let file: Self = serde_json::from_str(text)
+            .map_err(|error| LayoutError::Json { problem: one_line(&error.to_string()) })?;
         for (axis, value) in ["[0]", "[1]"].into_iter().zip(file.area_mm.into_iter().flatten()) {
             let is_side = value > 0.0 && value < MAX_MM;
             check_number(is_side, value, || format!("area_mm{axis}"))?;

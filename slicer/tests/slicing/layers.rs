@@ -178,10 +178,16 @@ fn refusal(options: &SliceOptions) -> SliceError {
 
 #[test]
 fn layers_that_do_not_exist_are_refused() {
-    for (start, end) in [(10, 11), (4, 4), (7, 3), (u32::MAX, u32::MAX)] {
+    for (start, end, asked) in [
+        (10, 11, "layer 10 was"),
+        (10, 13, "layers 10 to 12 were"),
+        (10, u32::MAX, "layers 10 and above were"),
+        (4, 4, "layers 4..4 were"),
+        (7, 3, "layers 7..3 were"),
+    ] {
         let error = refusal(&SliceOptions { layers: Some(start..end), ..options(254.0, 100.0) });
         assert!(matches!(error, SliceError::NoSuchLayers { count: 10, .. }), "{error}");
-        let says = format!("layers {start}..{end} were asked for, but the part has layers 0..10");
+        let says = format!("{asked} asked for, but the part has layers 0 to 9");
         assert_eq!(error.to_string(), says);
     }
 }

@@ -18,7 +18,7 @@ const TOWER: &str = "--dpi 150 --thickness 500um";
 #[test]
 fn fix_says_what_it_changed_and_leaves_no_row_that_ends_white() {
     let scratch = broken_tower();
-    let ran = scratch.run("fix stray.tif -o fixed.tif").succeeds();
+    let ran = scratch.run("fix stray.tif --verbose -o fixed.tif").succeeds();
     let (stray, fixed) = (scratch.layers("stray.tif"), scratch.layers("fixed.tif"));
     assert_eq!(stray.len(), fixed.len());
     assert!(masks(&stray).iter().any(|mask| ends_white(mask)));
@@ -38,6 +38,8 @@ fn fix_says_what_it_changed_and_leaves_no_row_that_ends_white() {
             on_page.as_array().unwrap().iter().map(|band| band["pixels"].as_u64().unwrap());
         assert_eq!(pixels.sum::<u64>(), changed);
     }
+    let sum = lines.next().expect("a line that sums up");
+    assert!(sum.contains(" bands of stray rows in "), "{sum}");
     assert_eq!(lines.next(), None);
 }
 

@@ -5,21 +5,46 @@ use lamp_fixtures::Facet;
 use crate::{COARSE, bands, broken_ball, is_corrected, number, report};
 
 #[test]
-fn bands_that_are_left_end_with_status_3_and_the_same_stack() {
+fn bands_that_are_left_end_with_status_3_and_no_stack() {
     let (scratch, _) = broken_ball(5, 1, COARSE);
-    let lax = scratch.run("fix stray.tif --max-width 4 -o lax.tif").succeeds();
-    let (report, strict) = report(&scratch, "--max-width 4 --strict");
+    let lax = scratch.run("fix stray.tif --max-width 4 -v -o lax.tif").succeeds();
+    let (report, strict) = report(&scratch, "--max-width 4 --strict -v");
     assert_eq!(strict.statuses, [Some(3)]);
-    assert!(scratch.bytes("lax.tif") == scratch.bytes("fixed.tif"));
+    assert!(!scratch.path("fixed.tif").exists());
     let left = bands(&report).iter().filter(|band| !is_corrected(band)).count();
     for ran in [lax, strict] {
         let last = ran.stderr.lines().last().unwrap();
         assert!(last.contains(&format!("{left} bands of stray rows were left")), "{last}");
         assert_eq!(ran.stderr.matches("; repair the CAD model near ").count(), left);
     }
-    let ran = scratch.run("fix stray.tif --max-width 4 --strict --quiet -o quiet.tif");
-    assert_eq!(ran.statuses, [Some(3)]);
-    assert!(scratch.bytes("lax.tif") == scratch.bytes("quiet.tif"));
+}
+
+#[test]
+fn two_lines_sum_up_and_quiet_keeps_what_strict_would_stop_for() {
+    let (scratch, _) = broken_ball(5, 1, COARSE);
+    let (report, ran) = report(&scratch, "--max-width 4");
+    let ran = ran.succeeds();
+    let (corrected, left): (Vec<_>, Vec<_>) =
+        bands(&report).iter().partition(|band| is_corrected(band));
+    assert!(corrected.len() > 1 && left.len() > 1);
+    let [of_corrected, of_left] = ran.stderr.lines().collect::<Vec<_>>()[..] else {
+        panic!("two lines: {ran:?}")
+    };
+    let start = format!("fix: {} bands of stray rows in ", corrected.len());
+    let changed = number(&report["pixels_changed"]);
+    let end = format!(" were corrected, {changed} pixels changed");
+    assert!(of_corrected.starts_with(&start) && of_corrected.ends_with(&end), "{of_corrected}");
+    let (count, first) = (left.len(), number(&left[0]["layer"]));
+    let start =
+        format!("fix: {count} bands of stray rows were left, the first in layer {first} (z ");
+    assert!(of_left.starts_with(&start) && of_left.contains(" near x "), "{of_left}");
+
+    let quiet = scratch.run("fix stray.tif --max-width 4 --quiet -o quiet.tif").succeeds();
+    assert_eq!(quiet.stderr.trim_end(), of_left);
+    assert!(scratch.bytes("quiet.tif") == scratch.bytes("fixed.tif"));
+    let strict = scratch.run("fix stray.tif --max-width 4 --strict --quiet -o strict.tif");
+    assert_eq!(strict.statuses, [Some(3)]);
+    assert_eq!(strict.stderr, quiet.stderr);
 }
 
 #[test]
@@ -62,7 +87,7 @@ fn a_band_that_is_left_names_the_place_of_the_missing_facet() {
     {
         let slicing = format!("--dpi 600 --thickness 50um --translate {dx},{dy},0");
         let (scratch, facets) = broken_ball(1, seed, &slicing);
-        let (report, ran) = report(&scratch, "--strict");
+        let (report, ran) = report(&scratch, "--strict --verbose");
         let left: Vec<_> = bands(&report).iter().filter(|band| !is_corrected(band)).collect();
         assert_eq!(ran.statuses, [Some(if left.is_empty() { 0 } else { 3 })]);
         let stray = scratch.layers("stray.tif");

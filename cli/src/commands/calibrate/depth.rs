@@ -66,7 +66,7 @@ pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Exit> {
         DepthModel::Gray => fit_gray(points).map(DepthFit::Gray),
     };
     let fit = fit.map_err(|error| at_place(error.into()))?;
-    say_what_was_changed(&fit, &Progress::new("calibrate", common.quiet, true));
+    say_what_was_changed(&fit, &Progress::new("calibrate", common, true));
     let mut text = EstimateTable::new(&measured, "uncured");
     fit.write(&mut text);
     let title = format!("Cure depth: {}", files.source_name());

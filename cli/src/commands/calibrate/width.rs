@@ -54,7 +54,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     let measured = width_points(&table, files.light(base.as_ref()), args.dpi);
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;
-    let progress = Progress::new("calibrate", common.quiet, true);
+    let progress = Progress::new("calibrate", common, true);
     if depths.is_none() {
         progress.say(
             "there is no broadening depth, as no cure depth is known: name a material with \

@@ -90,7 +90,7 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
         write_stack(args.layers(size, exposures, light), Destination::File(path), Format::Big)?;
     }
     write_file(&to.path().join("squares.csv"), |out| out.write_all(table.as_bytes()))?;
-    let progress = Progress::new("target", common.quiet, true);
+    let progress = Progress::new("target", common, true);
     written_to(&args.output, to.persist().map_err(Exit::from), &progress)?;
     progress.say(&format!(
         "{}: {} of {}, and squares.csv to fill in",

@@ -9,7 +9,7 @@ use lamp_stack::{Image, Length, StackError};
 
 use crate::exit::Exit;
 use crate::options::{one_of, parse_distance, parse_thickness};
-use crate::streams::{failed_at, input_name, layers_of, open_pages};
+use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages};
 
 const HEADING: &str = "Mesh around the parts";
 
@@ -121,7 +121,13 @@ impl MeshArgs {
 /// white.
 fn template(path: &Path) -> Result<MeshPattern, Exit> {
     let place = input_name(path);
-    let first = layers_of(open_pages(path)?, &place, None).next();
+    if !is_stream(path) && !path.exists() {
+        return Err(Exit::usage(format!(
+            "--mesh {place}: there is no such image: write hexagon, square, none, or the name of \
+             an image file"
+        )));
+    }
+    let first = layers_of(open_pages(path)?, path, None).next();
     let layer = first.unwrap_or_else(|| Err(failed_at(place.clone(), StackError::NoLayers)))?;
     let image = match layer.image.into_image() {
         Image::Mask(image) => image,

@@ -149,7 +149,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     let output = args.output();
     let progress = match &output {
         Some(output) => progress("tile", common, output),
-        None => Progress::new("tile", common.quiet, true),
+        None => Progress::new("tile", common, true),
     };
     let machine: Option<Machine> = args.machine.as_deref().map(entry).transpose()?;
     if let Some((machine, area)) = machine.as_ref().zip(args.area) {

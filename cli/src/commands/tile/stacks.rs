@@ -11,7 +11,9 @@ use lamp_postprocess::machine::Machine;
 use lamp_stack::{Layer, Pages, StackError};
 
 use crate::exit::Exit;
-use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages, spool_stdin};
+use crate::streams::{
+    failed_at, input_name, is_stream, layers_of, open_pages, piped_part, spool_stdin,
+};
 
 /// A stack and the number of its copies: `blade.tif:120`.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,21 +99,32 @@ impl InputStack {
                 self.spool = Some(spool_stdin()?);
             }
             let mut count = None;
-            let layers = self.read()?.inspect(|layer| {
+            let mut layers = self.read()?.inspect(|layer| {
                 if let Ok(layer) = layer {
                     count = count.or(count_of(layer));
                 }
             });
+            let first = layers.next();
+            self.take_name_of_pipe();
+            let layers = first.into_iter().chain(layers);
             let part = PartStack::of_outline::<Exit>(&self.name, layers)?.ok_or(no_layers);
             self.layer_count = count;
             return part;
         }
         let mut layers = self.read()?;
         let first = layers.next().unwrap_or(Err(no_layers))?;
+        self.take_name_of_pipe();
         let part = PartStack::of_image(&self.name, &first)?;
         self.layer_count = count_of(&first);
         self.layers = Some(Box::new(std::iter::once(Ok(first)).chain(layers)));
         Ok(part)
+    }
+
+    /// Calls standard input by its part, as the first page does.
+    fn take_name_of_pipe(&mut self) {
+        if let Some(part) = piped_part().filter(|_| is_stream(&self.path)) {
+            self.name = part.to_owned();
+        }
     }
 
     /// Its layers.
@@ -135,7 +148,7 @@ impl InputStack {
             }
             None => open_pages(&self.path)?,
         };
-        let layers = layers_of(pages, &self.name, self.range.clone());
+        let layers = layers_of(pages, &self.path, self.range.clone());
         let Some(machine) = self.machine.clone() else { return Ok(Box::new(layers)) };
         let name = self.name.clone();
         Ok(Box::new(layers.map(move |layer| {

@@ -1,0 +1,81 @@
+//! Shows errors of usage, in words that people know.
+
+use std::env;
+use std::error::Error as _;
+use std::num::ParseIntError;
+
+use clap::error::{ContextKind, ErrorKind};
+
+use crate::progress::{printable, say};
+
+/// Shows an error of usage, or the help that was asked for, and ends the process.
+pub(crate) fn refuse(error: &clap::Error) -> ! {
+    show(error);
+    std::process::exit(error.exit_code())
+}
+
+/// Shows an error of usage, or the help that was asked for.
+pub(crate) fn show(error: &clap::Error) {
+    let known = with_known_words(error);
+    let error = known.as_ref().unwrap_or(error);
+    let steers_terminal = |arg: std::ffi::OsString| {
+        let arg = arg.to_string_lossy();
+        printable(&arg) != arg
+    };
+    if error.use_stderr() && env::args_os().any(steers_terminal) {
+        // One line, since a line break may be the argument's.
+        say(error.render().to_string().trim_end().trim_end_matches(MORE).trim_end());
+    } else {
+        // There is nobody left to tell if it cannot be printed.
+        let _ = error.print();
+    }
+}
+
+const MORE: &str = "For more information, try '--help'.";
+
+/// Says what to write instead of something that is not a whole number.
+fn with_known_words(error: &clap::Error) -> Option<clap::Error> {
+    let source = error.source()?;
+    let problem = source.to_string();
+    let option = error.get(ContextKind::InvalidArg)?;
+    let value = error.get(ContextKind::InvalidValue)?.to_string();
+    // What people see should not tell how many bits a number has.
+    let least = problem.strip_suffix(&format!("..={}", u32::MAX));
+    let todo = match least.and_then(|text| text.rsplit(' ').next()) {
+        Some(_) if value.parse().is_ok_and(|value: i128| value > 0) => {
+            "that is too large".to_owned()
+        }
+        Some(least) => format!("write a whole number of at least {least}"),
+        None if source.is::<ParseIntError>() => "write a whole number".to_owned(),
+        None => return None,
+    };
+    let message = format!("invalid value '{value}' for '{option}': {todo}\n\n{MORE}\n");
+    Some(clap::Error::raw(ErrorKind::ValueValidation, message))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Arg, Command, value_parser};
+
+    use super::*;
+
+    #[test]
+    fn wrong_numbers_are_told_without_the_machine_s_words() {
+        let said = |value: &str| {
+            let option = Arg::new("copies").long("copies");
+            let command =
+                Command::new("tile").arg(option.value_parser(value_parser!(u32).range(1..)));
+            let error = command.try_get_matches_from(["tile", &format!("--copies={value}")]);
+            with_known_words(&error.unwrap_err()).expect("a number is wrong").to_string()
+        };
+        for (value, words) in [
+            ("0", "'--copies <copies>': write a whole number of at least 1\n"),
+            ("-3", "write a whole number of at least 1\n"),
+            ("99999999999", "invalid value '99999999999' for"),
+            ("99999999999", ": that is too large\n"),
+            ("two", "'two' for '--copies <copies>': write a whole number\n"),
+        ] {
+            assert!(said(value).contains(words), "{}", said(value));
+        }
+    }
+}
