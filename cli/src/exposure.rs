@@ -24,8 +24,9 @@ const MAX_TABLE_BYTES: u64 = 1 << 20;
 #[derive(Args, Clone, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct ExposureOptions {
-    /// Resin: a built-in material's name (see lamp material list) or a file. Pages then state their
-    /// exposure time
+    /// Resin: a built-in material's name (see lamp material list) or a file
+    ///
+    /// Pages then state their exposure time
     #[arg(long, value_name = "NAME|FILE", help_heading = EXPOSURE)]
     material: Option<PathBuf>,
 

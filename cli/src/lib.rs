@@ -14,6 +14,7 @@ mod exposure;
 mod fallback;
 mod fix_report;
 mod height_options;
+mod help;
 mod hints;
 mod json_report;
 mod memory;
@@ -44,6 +45,7 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 
 use commands::Command;
 use exit::Exit;
+use help::{formed, version};
 use options::Common;
 use out_of_memory::note_command;
 use progress::say;
@@ -71,7 +73,7 @@ slice, fix, dither and tile are short for lamp slice, lamp fix, lamp dither and 
 
 /// Runs `lamp` with the process's arguments.
 pub fn run_lamp() -> ExitCode {
-    let lamp = Lamp::command();
+    let lamp = formed(Lamp::command());
     let matches = match arguments::matches(&lamp, lamp.clone()) {
         Ok(matches) => matches,
         Err(error) => return finish("lamp", Err(error)),
@@ -87,7 +89,7 @@ pub fn run_lamp() -> ExitCode {
 /// # Panics
 /// If `lamp` has no command of that name.
 pub fn run_stage(name: &str) -> ExitCode {
-    let lamp = Lamp::command();
+    let lamp = formed(Lamp::command());
     let matches = match arguments::matches(&lamp, stage(&lamp, name)) {
         Ok(matches) => matches,
         Err(error) => return finish(name, Err(error)),
@@ -101,12 +103,18 @@ pub fn run_stage(name: &str) -> ExitCode {
 fn stage(lamp: &clap::Command, name: &str) -> clap::Command {
     let stage = lamp.find_subcommand(name).expect("a stage is a command of lamp").clone();
     let general = lamp.get_arguments().filter(|arg| arg.is_global_set()).cloned();
-    stage.args(general).version(env!("CARGO_PKG_VERSION")).max_term_width(100)
+    stage
+        .args(general)
+        .version(env!("CARGO_PKG_VERSION"))
+        .disable_version_flag(true)
+        .arg(version())
+        .disable_help_flag(true)
+        .max_term_width(100)
 }
 
 /// Returns all programs, for their documentation.
 fn programs() -> Vec<clap::Command> {
-    let lamp = Lamp::command();
+    let lamp = formed(Lamp::command());
     let stages = ["slice", "fix", "dither", "tile"].map(|name| stage(&lamp, name));
     let mut programs: Vec<_> = std::iter::once(lamp).chain(stages).collect();
     programs.iter_mut().for_each(clap::Command::build);
@@ -152,6 +160,6 @@ mod tests {
 
     #[test]
     fn the_arguments_are_consistent() {
-        Lamp::command().debug_assert();
+        programs().into_iter().for_each(clap::Command::debug_assert);
     }
 }

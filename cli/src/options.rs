@@ -15,11 +15,14 @@ use lamp_stack::{Length, LengthError, Named};
 use crate::exit::Exit;
 use crate::memory::{in_words, within_limits};
 
+/// The heading of options that every command has.
+pub(crate) const GENERAL: &str = "General options";
+
 /// Options of every command.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Common {
     /// Print errors only
-    #[arg(short, long, global = true, help_heading = "General options")]
+    #[arg(short, long, global = true, help_heading = GENERAL)]
     pub(crate) quiet: bool,
 
     /// Print more of what was done
@@ -27,13 +30,15 @@ pub(crate) struct Common {
     pub(crate) verbose: bool,
 
     /// Use N threads [default: one per processor]
-    #[arg(long, value_name = "N", global = true, help_heading = "General options")]
+    #[arg(long, value_name = "N", global = true, help_heading = GENERAL, hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
     threads: Option<u16>,
 
-    /// Take options from a TOML file, as thickness = "50um" or gray = true, where the command line
-    /// does not give them
-    #[arg(long, value_name = "FILE.toml", global = true, help_heading = "General options")]
+    /// Take further options from a TOML file
+    ///
+    /// Keys are the long options, as thickness = "50um" or gray = true; a table, as [slice], is for
+    /// that command alone. The command line wins
+    #[arg(long, value_name = "FILE.toml", global = true, help_heading = GENERAL)]
     options: Option<PathBuf>,
 }
 
@@ -86,8 +91,9 @@ pub(crate) struct Input {
 /// The stack that a stage writes.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Output {
-    /// Where to write the stack: a file, a folder of pages (a name that ends in /, or an empty
-    /// folder), or - for standard output
+    /// Where to write the stack: a file, a folder of pages, or - for standard output
+    ///
+    /// A folder's name ends in /, or is that of an empty folder
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     pub(crate) output: PathBuf,
 

@@ -28,9 +28,10 @@ pub(crate) struct PlacementOptions {
     #[serde(with = "list")]
     mirror: Vec<Axis>,
 
-    /// Rotate the part about an axis through the origin, in degrees, counter-clockwise seen from
-    /// the axis's tip. Several rotations apply in order, as in x:90,z:-12.5. Quarter turns are
-    /// exact
+    /// Rotate the part by degrees, as in x:90,z:-12.5
+    ///
+    /// It turns about an axis through the origin, counter-clockwise seen from the axis's tip.
+    /// Several rotations apply in order. Quarter turns are exact
     #[arg(long, value_name = "AXIS:DEGREES", value_delimiter = ',', help_heading = HEADING)]
     #[serde(with = "list")]
     rotate: Vec<Rotation>,

@@ -68,7 +68,9 @@ pub(crate) struct SlicingOptions {
     #[serde(with = "optional")]
     size: Option<Size>,
 
-    /// Make each layer as thick as the part's slopes allow, within the limits below
+    /// Make each layer as thick as the part's slopes allow
+    ///
+    /// The options below set the limits and the largest error
     #[arg(long, help_heading = height_options::HEADING)]
     adaptive: bool,
 
@@ -80,8 +82,10 @@ pub(crate) struct SlicingOptions {
     #[serde(flatten)]
     exposure: ExposureOptions,
 
-    /// Write gray layers: each pixel just bright enough to cure down to where the part ends below
-    /// it, or white if that is deeper than white cures
+    /// Write gray layers, which cure just down to where the part ends
+    ///
+    /// Each pixel is just bright enough to cure down to where the part ends below it, or white if
+    /// that is deeper than white cures
     #[arg(long, requires = "material", conflicts_with = "exposure_table")]
     #[arg(help_heading = EXPOSURE)]
     gray: bool,

@@ -66,3 +66,40 @@ fn man_writes_a_page_for_each_command() {
     scratch.write("file", b"");
     scratch.run("lamp man file").is_refused_with(&["file"]);
 }
+
+/// Returns a command's help at a width of 80 columns.
+fn help(line: &str) -> String {
+    let output = Scratch::new().command(line).env("COLUMNS", "80").output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn the_help_of_lamp_fits_a_screen() {
+    for line in ["lamp --help", "lamp -h", "lamp help"] {
+        let text = help(line);
+        assert!(text.lines().count() <= 24 && text.lines().all(|line| line.len() <= 80), "{text}");
+    }
+}
+
+#[test]
+fn short_help_has_what_people_use_and_long_help_all() {
+    for name in ["slice", "lamp slice"] {
+        let [short, long] = ["-h", "--help"].map(|option| help(&format!("{name} {option}")));
+        for option in ["--dpi", "--thickness", "--output", "--machine", "--options"] {
+            assert!(short.contains(option) && long.contains(option), "{option}: {short}");
+        }
+        for option in ["--row-pitch", "--tolerance", "--memory", "--threads"] {
+            assert!(!short.contains(&format!("  {option}")), "{option}: {short}");
+            assert!(long.contains(&format!("  {option}")), "{option}: {long}");
+        }
+        assert!(short.lines().count() <= 48, "{short}");
+        for heading in ["Images:", "Part:", "Adaptive layer heights:", "General options:"] {
+            assert!(long.contains(&format!("\n{heading}\n")), "{heading}: {long}");
+        }
+        // Examples come first.
+        for text in [short, long] {
+            assert!(text.find("\nExamples:\n").unwrap() < text.find("\nArguments:\n").unwrap());
+        }
+    }
+}

@@ -37,8 +37,9 @@ pub(crate) fn run(args: &ManArgs) -> Result<(), Exit> {
 
 /// Writes the page of a command, and of those below it.
 fn write_pages(command: &Command, folder: &Path) -> Result<(), Exit> {
-    let examples = command.get_after_help().map(ToString::to_string);
-    let man = Man::new(command.clone().after_help(Resettable::Reset));
+    let examples = command.get_after_long_help().map(ToString::to_string);
+    let plain = command.clone().after_help(Resettable::Reset).after_long_help(Resettable::Reset);
+    let man = Man::new(plain);
     write_file(&folder.join(man.get_filename()), |out| {
         man.render(out)?;
         write_examples(&examples.unwrap_or_default(), out)

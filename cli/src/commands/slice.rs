@@ -46,8 +46,10 @@ pub(crate) struct SliceArgs {
     #[command(flatten)]
     pub(crate) options: SlicingOptions,
 
-    /// Machine to build on: alpha, beta or a file (see lamp machine). A part, a resolution or a
-    /// layer thickness beyond its limits is refused before the work
+    /// Machine to build on: alpha, beta or a file (see lamp machine)
+    ///
+    /// A part, a resolution or a layer thickness beyond its limits is refused before the work. Its
+    /// defaults hold where no other resolution, thickness or margin is given
     #[arg(long, value_name = "M")]
     machine: Option<PathBuf>,
 

@@ -1,0 +1,140 @@
+//! The form of the help: examples first, the usual options by `-h`, all of them by `--help`.
+
+use clap::{Arg, ArgAction, Command};
+
+use crate::options::GENERAL;
+
+/// The help of `lamp`, for a screen of 24 lines and 80 columns.
+const LAMP: &str = "\
+Turn CAD parts into layer images for projection photopolymerization.
+
+Usage: lamp COMMAND [OPTIONS]
+
+From part to build:        slice blade.stl | fix | dither | tile > build.tif
+  slice       cut a part into layers         fix         correct stray rows
+  dither      turn gray levels into dots     tile        lay out copies
+  compensate  narrow by what light adds      edit        change a design
+Stacks:
+  info        describe a stack               verify      check that it is whole
+  show        draw layers                    convert     write in another form
+  join        join ranges of layers          split       split into ranges
+Parts:
+  brep        check a STEP part              heights     find layer thicknesses
+  sample      write a sample part            demo        do the main job on it
+Resins and machines:
+  material    list and check resins          machine     list and check machines
+  calibrate   make a material                target      make images to measure
+  cure        draw what a stack cures
+This program:
+  completions let shells complete commands   man         write manual pages
+
+lamp COMMAND -h lists the usual options of a command, --help all of them.
+";
+
+/// Examples stand between usage and options.
+const FORM: &str = "{about-with-newline}\n{usage-heading} {usage}{after-help}\n\n{all-args}";
+
+/// The examples that `-h` shows.
+const FEW: usize = 3;
+
+/// The options that `-h` shows, of the commands that have many.
+const USUAL: [(&str, &[&str]); 3] = [
+    (
+        "slice",
+        &[
+            "dpi",
+            "thickness",
+            "units",
+            "rotate",
+            "adaptive",
+            "material",
+            "gray",
+            "machine",
+            "output",
+        ],
+    ),
+    ("tile", &["machine", "area", "copies", "gap", "fit", "pack", "layout", "mesh", "output"]),
+    ("heights", &["report", "plot", "uniform", "min", "max", "deviation", "cusp", "material"]),
+];
+
+/// The headings of options of `slice` that have none of their own.
+const SLICE_HEADINGS: [(&str, &[&str]); 3] = [
+    ("Images", &["dpi", "thickness", "plane", "margin", "origin", "size", "machine", "layers"]),
+    ("Part", &["units", "fill"]),
+    ("Output and memory", &["memory", "report", "output", "force", "classic"]),
+];
+
+/// Gives `lamp`, and the commands below it, this form.
+pub(crate) fn formed(lamp: Command) -> Command {
+    let help = Arg::new("help")
+        .short('h')
+        .long("help")
+        .action(ArgAction::Help)
+        .global(true)
+        .help("Print the usual options (-h) or all (--help)")
+        .help_heading(GENERAL);
+    // The manual page still has the examples.
+    let lamp = few_examples(lamp).override_help(LAMP);
+    lamp.disable_help_flag(true).arg(help).mut_subcommands(of_command)
+}
+
+fn of_command(command: Command) -> Command {
+    let name = command.get_name().to_owned();
+    let usual = USUAL.iter().find(|(of, _)| *of == name).map(|(_, usual)| *usual);
+    let headings = if name == "slice" { &SLICE_HEADINGS[..] } else { &[] };
+    let command = command.help_template(FORM).mut_args(|option| {
+        let is_in = |ids: &[&str]| ids.contains(&option.get_id().as_str());
+        let is_hidden = !option.is_positional() && usual.is_some_and(|usual| !is_in(usual));
+        let heading = headings.iter().find(|(_, ids)| is_in(ids)).map(|(heading, _)| *heading);
+        let option = if is_hidden { option.hide_short_help(true) } else { option };
+        if heading.is_some() { option.help_heading(heading) } else { option }
+    });
+    few_examples(command).mut_subcommands(of_command)
+}
+
+/// Leaves all examples to the long help.
+fn few_examples(command: Command) -> Command {
+    let Some(all) = command.get_after_help().map(ToString::to_string) else { return command };
+    let few: Vec<_> = all.lines().take(1 + FEW).collect();
+    command.after_help(few.join("\n")).after_long_help(all)
+}
+
+/// Returns the argument of a version, among the general options.
+pub(crate) fn version() -> Arg {
+    Arg::new("version")
+        .short('V')
+        .long("version")
+        .action(ArgAction::Version)
+        .help("Print version")
+        .help_heading(GENERAL)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::Lamp;
+
+    #[test]
+    fn the_help_of_lamp_fits_a_screen_and_names_all_commands() {
+        assert!(LAMP.lines().count() <= 23, "a line is for the prompt");
+        assert!(LAMP.lines().all(|line| line.len() <= 80));
+        let words: Vec<_> = LAMP.split_whitespace().collect();
+        for command in Lamp::command().get_subcommands() {
+            assert!(words.contains(&command.get_name()), "{}", command.get_name());
+        }
+    }
+
+    #[test]
+    fn every_option_that_is_named_is_there() {
+        let lamp = Lamp::command();
+        let listed = SLICE_HEADINGS.iter().map(|(_, ids)| ("slice", *ids));
+        for (command, ids) in listed.chain(USUAL) {
+            let command = lamp.find_subcommand(command).expect("it is a command");
+            for id in ids {
+                assert!(command.get_arguments().any(|option| option.get_id() == *id), "{id}");
+            }
+        }
+    }
+}
