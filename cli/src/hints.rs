@@ -45,7 +45,14 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::Changed { .. } => "slice it again once nothing writes to it",
         SliceError::Packed(_) => "pack it again",
         SliceError::Inflated { .. } => "unpack it first",
-        SliceError::OtherFormat(_) => "export the part as one",
+        SliceError::OtherFormat(_) => "export the part as one of these",
+        SliceError::WildVertex { .. } => {
+            "repair or export the part again, or give --trust-extent if it is like that"
+        }
+        SliceError::TooManyRows { .. } => {
+            "check --units, --dpi and --thickness, or give --trust-extent if the part is so large"
+        }
+        SliceError::ThreeMf(_) | SliceError::Obj { .. } => "export the part again",
         SliceError::NotFinite { .. } => "repair or export the part again",
         SliceError::TooFar { .. } => "check --units, --scale and --translate",
         SliceError::TooLarge { .. } => "check --units and --dpi",

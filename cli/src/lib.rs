@@ -24,6 +24,8 @@ mod occt_process;
 mod options;
 mod options_file;
 mod out_of_memory;
+mod part_arg;
+mod part_doubts;
 mod part_options;
 mod picture;
 mod pixel_location;

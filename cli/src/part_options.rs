@@ -1,7 +1,7 @@
 //! The solid to slice: its files, units, placement and fill rule.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use lamp_slicer::brep::Prepared;
@@ -11,16 +11,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::exit::Exit;
 use crate::options::one_of;
+use crate::part_arg::{PartArg, PartPlacement};
+use crate::part_doubts::PartSize;
 use crate::placement::PlacementOptions;
 use crate::recorded::text;
 use crate::step_options::{BrepOptions, boxes_overlap, notes};
-use crate::streams::{input_name, is_stream};
+use crate::streams::is_stream;
 
 /// Options that decide the solid to slice.
 #[derive(Args, Clone, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct PartOptions {
-    /// Unit of an STL's coordinates; a STEP file states its own
+    /// Unit of coordinates in STL and OBJ files; STEP and 3MF files state their own
     #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
     #[serde(with = "text")]
     pub(crate) units: Units,
@@ -35,6 +37,11 @@ pub(crate) struct PartOptions {
     #[serde(flatten)]
     placement: PlacementOptions,
 
+    /// Take the part as large as it seems, also if single vertices lie far outside the rest, or
+    /// there are more rows than any machine exposes
+    #[arg(long)]
+    trust_extent: bool,
+
     #[command(flatten)]
     #[serde(flatten)]
     pub(crate) brep: BrepOptions,
@@ -45,63 +52,86 @@ impl PartOptions {
         self.placement.placement()
     }
 
+    /// Returns the size of a part in its place.
+    pub(crate) fn size(&self, model: &Part, box_mm: [[f64; 3]; 2]) -> PartSize {
+        PartSize::new(box_mm, (!model.states_unit()).then_some(self.units))
+    }
+
+    /// Returns a doubt about parts that overlap: `found` are the numbers of two whose boxes
+    /// do, or of one of which two items do.
+    pub(crate) fn overlap_doubt(
+        &self,
+        model: &Part,
+        parts: &[PartArg],
+        found: Option<[usize; 2]>,
+    ) -> Option<String> {
+        let what = match found {
+            _ if self.fill != Fill::EvenOdd => return None,
+            Some([a, b]) if a == b => format!("items of {}", parts[a].name()),
+            Some([a, b]) => format!("{} and {}", parts[a].name(), parts[b].name()),
+            None if model.prepared().any(boxes_overlap) => "bodies".to_owned(),
+            None => return None,
+        };
+        Some(format!(
+            "the bounding boxes of {what} overlap: what lies in both cancels out, or unites with \
+             --fill nonzero"
+        ))
+    }
+
     /// Returns an index of the part's facets by height.
     pub(crate) fn body(&self, model: Part) -> Result<FacetIndex, SliceError> {
         FacetIndex::new(model, &self.placement(), self.units)
     }
 
     /// Opens all files of a part.
-    pub(crate) fn open(&self, paths: &[PathBuf], reading: &Reading<'_>) -> Result<Part, Exit> {
-        if paths.iter().filter(|path| is_stream(path)).count() > 1 {
+    pub(crate) fn open(&self, parts: &[PartArg], reading: &Reading<'_>) -> Result<Part, Exit> {
+        if parts.iter().filter(|part| is_stream(&part.path)).count() > 1 {
             return Err(Exit::usage("standard input can be read only once: give - for one part"));
         }
-        let open = |path: &PathBuf| {
-            self.open_one(path, reading).map_err(|error| error.at(input_name(path)))
+        let open = |part: &PartArg| {
+            let model =
+                self.open_one(&part.path, reading).map_err(|error| error.at(part.name()))?;
+            let placement = part.placement.map(PartPlacement::placement);
+            Ok(model.placed(&placement.unwrap_or_default()))
         };
-        Ok(Part::joined(paths.iter().map(open).collect::<Result<_, _>>()?))
+        Ok(Part::joined(parts.iter().map(open).collect::<Result<_, Exit>>()?))
     }
 
     fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Part, Exit> {
         let tolerance = self.brep.tolerance(reading.dpi);
         let options = OpenOptions {
             allow_gaps: reading.may_be_open,
+            trust_extent: self.trust_extent,
             ..self.brep.reader.for_opening(tolerance)
         };
         let model = match is_stream(path) {
             true => Part::from_stream("stdin", io::stdin().lock(), &options)?,
             false => Part::open(path, &options)?,
         };
+        if self.units != Units::default() && model.states_unit() {
+            let why = "a STEP or 3MF file states its own unit: leave out --units";
+            return Err(Exit::usage(why));
+        }
+        match model.left_out() {
+            0 => {}
+            1 => (reading.say)("1 item is left out: it is no solid"),
+            count => (reading.say)(&format!("{count} items are left out: they are no solids")),
+        }
         for prepared in model.prepared() {
-            self.check_step(prepared, tolerance, reading)?;
+            self.check_step(prepared, tolerance, reading);
         }
         Ok(model)
     }
 
-    /// Refuses units for a STEP file, and passes notes about it on.
-    fn check_step(
-        &self,
-        prepared: &Prepared,
-        tolerance: Length,
-        reading: &Reading<'_>,
-    ) -> Result<(), Exit> {
-        if self.units == Units::Inches {
-            let why = "a STEP file states its own unit: leave out --units";
-            return Err(Exit::usage(why));
-        }
+    /// Passes notes about a STEP file on.
+    fn check_step(&self, prepared: &Prepared, tolerance: Length, reading: &Reading<'_>) {
         if tolerance.um() > reading.dpi.pitch().um() {
             (reading.say)(&format!(
                 "--tolerance {tolerance} is more than a pixel: pixels may be wrong where faces \
                  meet or run along rows"
             ));
         }
-        if self.fill == Fill::EvenOdd && boxes_overlap(prepared) {
-            (reading.say)(
-                "the bounding boxes of bodies overlap: where the bodies overlap, too, they \
-                 cancel out, or unite with --fill nonzero",
-            );
-        }
         notes(prepared).iter().for_each(|note| (reading.say)(note));
-        Ok(())
     }
 }
 
@@ -116,18 +146,22 @@ pub(crate) struct Reading<'a> {
 }
 
 /// Puts the name of the faulty facet's file, or of all files, before a message.
-pub(crate) fn at_part(error: Exit, paths: &[PathBuf]) -> Exit {
+pub(crate) fn at_part(error: Exit, parts: &[PartArg]) -> Exit {
     let place = match error.cause() {
-        Some(&SliceError::NotFinite { file, .. }) => input_name(&paths[file]),
-        _ => name_of_all(paths),
+        Some(
+            &(SliceError::NotFinite { file, .. }
+            | SliceError::WildVertex { file, .. }
+            | SliceError::Changed { file, .. }),
+        ) => parts[file].name(),
+        _ => name_of_all(parts),
     };
     error.at(place)
 }
 
 /// Returns one name for all files of a part, for messages.
-pub(crate) fn name_of_all(paths: &[PathBuf]) -> String {
-    match paths {
-        [path] => input_name(path),
-        paths => format!("{} and {} more", input_name(&paths[0]), paths.len() - 1),
+pub(crate) fn name_of_all(parts: &[PartArg]) -> String {
+    match parts {
+        [part] => part.name(),
+        parts => format!("{} and {} more", parts[0].name(), parts.len() - 1),
     }
 }

@@ -142,6 +142,13 @@ impl SlicingOptions {
         from_words(rest.find(" --").map_or("", |start| &rest[start..]))
     }
 
+    /// Returns the names of the files in a command that a stack records, with their
+    /// placements.
+    pub(crate) fn parts_of_command(command: &str) -> &str {
+        let rest = command.strip_prefix("slice ").unwrap_or_default();
+        rest.split_once(" --").map_or(rest, |(parts, _)| parts)
+    }
+
     /// The command as the stack records it.
     fn command(&self, part: &str, exposure: Option<&Exposure>) -> String {
         let mut options = self.clone();
@@ -224,6 +231,11 @@ impl SlicingOptions {
         } else {
             machine.check_thickness(self.thickness, "a layer")
         }
+    }
+
+    /// Returns the thickness of all layers, if they have the same.
+    pub(crate) fn uniform_thickness(&self) -> Option<Length> {
+        (!self.adaptive).then_some(self.thickness)
     }
 
     /// Returns the files that the options name.

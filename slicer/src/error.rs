@@ -7,6 +7,8 @@ use lamp_brep::{BodyFault, BrepError, Finding};
 use lamp_stack::Length;
 use thiserror::Error;
 
+use crate::three_mf::ThreeMfError;
+
 /// Why a part cannot be sliced.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -36,7 +38,7 @@ pub enum SliceError {
         size: u64,
     },
     /// A file of a known format that is not read.
-    #[error("this is a {0} file, not an STL, STEP or OBJ file")]
+    #[error("this is a {0} file, not an STL, STEP, 3MF or OBJ file")]
     OtherFormat(&'static str),
     /// A packed file that is damaged.
     #[error("it cannot be unpacked: {0}")]
@@ -75,6 +77,9 @@ pub enum SliceError {
         /// The fault there.
         fault: ObjFault,
     },
+    /// A 3MF file that cannot be read.
+    #[error(transparent)]
+    ThreeMf(#[from] ThreeMfError),
     /// A coordinate that is no number.
     #[error("facet {facet} has a coordinate that is not a finite number")]
     NotFinite {
@@ -82,6 +87,31 @@ pub enum SliceError {
         file: usize,
         /// The facet in the file, from 0.
         facet: usize,
+    },
+    /// A corner far outside the rest of the part.
+    #[error(
+        "facet {facet} has a corner at {}, far outside the rest: only {reaching} of {facets} facets reach there",
+        corner.map(|c| c.to_string()).join(", ")
+    )]
+    WildVertex {
+        /// The file, from 0, among those joined.
+        file: usize,
+        /// The first facet out there, in the file, from 0.
+        facet: usize,
+        /// Its corner, in the file's coordinates and units.
+        corner: [f32; 3],
+        /// How many facets reach so far.
+        reaching: usize,
+        /// How many facets the part has.
+        facets: usize,
+    },
+    /// More rows than any machine exposes, which take hours even if they are black.
+    #[error("{layers} layers of {rows} rows are more than any machine exposes")]
+    TooManyRows {
+        /// The number of layers.
+        layers: usize,
+        /// The rows of each.
+        rows: u32,
     },
     /// A part more than 1000 km away, where coordinates are no longer exact.
     #[error(

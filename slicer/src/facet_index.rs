@@ -33,6 +33,7 @@ pub struct FacetIndex {
     from_below: Grouped<u32>,
     min: [f64; 3],
     max: [f64; 3],
+    overlap: Option<[usize; 2]>,
 }
 
 /// Even ranges of height.
@@ -86,7 +87,7 @@ impl FacetIndex {
 
     fn of(model: PlacedPart) -> Result<Self, SliceError> {
         let survey = Survey::of(&model)?;
-        survey.check_distance()?;
+        survey.check_extent(&model)?;
         let bins = HeightBins::new(&survey);
         let (mut facets, mut from_below) = (KeyCounts::new(bins.count), KeyCounts::new(bins.count));
         let blocks = 0..model.model.block_count();
@@ -111,7 +112,14 @@ impl FacetIndex {
         }
         model.model.check_unchanged()?;
         let (facets, from_below) = (facets.finish(), from_below.finish());
-        Ok(Self { model, bins, facets, from_below, min: survey.min, max: survey.max })
+        let overlap = survey.overlap(&model);
+        Ok(Self { model, bins, facets, from_below, min: survey.min, max: survey.max, overlap })
+    }
+
+    /// Returns the numbers of the first two files whose boxes overlap, or of one file of
+    /// which two items do.
+    pub fn overlap(&self) -> Option<[usize; 2]> {
+        self.overlap
     }
 
     /// Returns the least x and y in millimetres, and z in micrometres.

@@ -59,8 +59,10 @@ mod stl;
 mod survey;
 mod table;
 mod text_lines;
+mod three_mf;
 mod trace;
 mod unpack;
+mod wild;
 
 /// B-rep models: kernels, and reports of what they read.
 pub use lamp_brep as brep;
@@ -78,4 +80,5 @@ pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};
 pub use slices::{GridRule, SliceOptions, Slices};
 pub use table::Fill;
+pub use three_mf::{ModelFault, ThreeMfError};
 pub use trace::{EdgeFacet, FaultyEdge, OpenEnd, StrayBand, Trace, TracedBand};

@@ -21,10 +21,11 @@ pub(crate) fn looks_obj(start: &[u8]) -> bool {
     let mut has_lines = false;
     while let Ok(true) = lines.advance() {
         has_lines = true;
-        let first = lines.words().next().unwrap_or_default();
+        let mut words = lines.words();
+        let first = words.next().unwrap_or_default();
         if !first.starts_with(b"#") {
             let is_known = FIRST_WORDS.iter().any(|word| word.as_bytes() == first);
-            return is_known && start.iter().all(is_text);
+            return is_known && words.next().is_some() && start.iter().all(is_text);
         }
     }
     has_lines && start.iter().all(is_text)
@@ -163,7 +164,7 @@ f 2 3 4
 
     #[test]
     fn other_text_is_no_obj() {
-        for text in ["", "solid part\nfacet", "v\0", "value 1 2 3", "{\"v\": 1}"] {
+        for text in ["", "s", "solid part\nfacet", "v\0", "value 1 2 3", "{\"v\": 1}"] {
             assert!(!looks_obj(text.as_bytes()), "{text}");
         }
     }

@@ -18,6 +18,7 @@ use crate::obj::{self, looks_obj};
 use crate::part::{Facets, Part, Piece};
 use crate::part_file::{PartFile, digest_text};
 use crate::stl;
+use crate::three_mf::{self, Contents, looks_packaged};
 use crate::unpack::{is_gzip, unpack};
 
 /// The program that reads STEP files.
@@ -41,7 +42,7 @@ impl KernelName {
     }
 }
 
-/// Options for reading STEP files. STL files take none.
+/// Options for reading files, most of them for STEP.
 #[derive(Clone, Debug)]
 pub struct OpenOptions {
     /// The program that reads them.
@@ -53,6 +54,10 @@ pub struct OpenOptions {
     /// Whether bodies may have gaps, because something else stands in for the layers
     /// that have them.
     pub allow_gaps: bool,
+    /// Whether files of any format are taken as large as they are, also if single
+    /// vertices lie far outside the rest, or images have more rows than any machine
+    /// exposes.
+    pub trust_extent: bool,
 }
 
 impl Default for OpenOptions {
@@ -63,6 +68,7 @@ impl Default for OpenOptions {
             tolerance: Length::from_um(5.0),
             timeout: Duration::from_secs(300),
             allow_gaps: false,
+            trust_extent: false,
         }
     }
 }
@@ -71,7 +77,7 @@ impl Default for OpenOptions {
 const FORMAT_BYTES: u64 = 4096;
 
 impl Part {
-    /// Opens an STL, STEP or OBJ file, or one of these packed by gzip. Which one it
+    /// Opens an STL, STEP, 3MF or OBJ file, or one of these packed by gzip. Which one it
     /// is follows from its content. A pipe is read to its end.
     ///
     /// A binary STL must not change while the part is in use; [`check_unchanged`] tells.
@@ -112,15 +118,16 @@ impl Part {
     fn from_file(name: &str, file: PartFile, options: &OpenOptions) -> Result<Self, SliceError> {
         let digest = file.digest().to_owned();
         let file = Arc::new(file);
-        let pieces = match pieces(&file, options) {
+        let contents = match contents(&file, options) {
             // Of a binary STL, nothing was read yet.
-            Ok(pieces) if pieces.iter().any(Piece::is_in_file) => pieces,
+            Ok(contents) if contents.pieces.iter().any(Piece::is_in_file) => contents,
             outcome => match file.change()? {
                 Some(change) => return Err(SliceError::Changed { file: 0, change }),
                 None => outcome?,
             },
         };
-        let part = Self::new(name, pieces, digest);
+        let part = Self::new(name, contents.pieces, digest);
+        let part = part.with(contents.left_out, options.trust_extent);
         if part.facet_count() == 0 { Err(SliceError::NoFacets) } else { Ok(part) }
     }
 
@@ -137,53 +144,57 @@ impl Part {
         let prepared = read_step(bytes.clone(), options)?;
         refuse_faults(&prepared, options.allow_gaps)?;
         let digest = digest_text(Hasher::new().update(&bytes));
-        Ok(Self::new(name, vec![of_surfaces(prepared)], digest))
+        let part = Self::new(name, vec![of_surfaces(prepared)], digest);
+        Ok(part.with(0, options.trust_extent))
     }
 }
 
 /// Reads what a file holds.
-fn pieces(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Vec<Piece>, SliceError> {
+fn contents(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Contents, SliceError> {
     let start = file.start(FORMAT_BYTES)?;
     if start.is_empty() {
         return Err(SliceError::EmptyFile);
     }
     if !is_gzip(&start) {
-        return unpacked_pieces(file, &start, options);
+        return unpacked(file, &start, options);
     }
     let file = Arc::new(unpack(file)?);
     let start = file.start(FORMAT_BYTES)?;
-    unpacked_pieces(&file, &start, options)
+    unpacked(&file, &start, options)
 }
 
-fn unpacked_pieces(
+fn unpacked(
     file: &Arc<PartFile>,
     start: &[u8],
     options: &OpenOptions,
-) -> Result<Vec<Piece>, SliceError> {
+) -> Result<Contents, SliceError> {
+    let of_one = |piece| Contents { pieces: vec![piece], left_out: 0 };
     if is_step(start) {
         let mut bytes = Vec::new();
         file.reader().read_to_end(&mut bytes)?;
         let prepared = read_step(bytes.into(), options)?;
         refuse_faults(&prepared, options.allow_gaps)?;
-        return Ok(vec![of_surfaces(prepared)]);
+        return Ok(of_one(of_surfaces(prepared)));
+    }
+    if looks_packaged(start) {
+        return Ok(three_mf::read(file)?);
     }
     if let Some(format) = other_format(start) {
         return Err(SliceError::OtherFormat(format));
     }
     if looks_obj(start) {
         let facets = obj::read(BufReader::new(file.reader()))?;
-        return Ok(vec![Piece::new(Facets::Memory(Arc::new(facets)))]);
+        return Ok(of_one(Piece::new(Facets::Memory(Arc::new(facets)))));
     }
-    Ok(vec![Piece::new(stl::open(file, start)?)])
+    Ok(of_one(Piece::new(stl::open(file, start)?)))
 }
 
 /// Returns the format of a file that was given by mistake, if it is known.
 fn other_format(start: &[u8]) -> Option<&'static str> {
-    const FORMATS: [(&[u8], &str); 7] = [
+    const FORMATS: [(&[u8], &str); 6] = [
         (b"II*\0", "TIFF"),
         (b"II+\0", "TIFF"),
         (b"MM\0*", "TIFF"),
-        (b"PK\x03\x04", "ZIP or 3MF"),
         (b"\x1F\x8B", "doubly packed"),
         (b"ply", "PLY"),
         (b"\x89PNG", "PNG"),

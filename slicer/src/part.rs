@@ -29,6 +29,8 @@ pub struct Part {
     /// The number of blocks up to the end of each piece.
     block_ends: Vec<usize>,
     digest: String,
+    left_out: usize,
+    trusts_extent: bool,
 }
 
 /// The facets of a file that stand alike: all, or those of one of its items.
@@ -131,7 +133,13 @@ impl Part {
             blocks
         };
         let block_ends = pieces.iter().map(end).collect();
-        Self { name: name.to_owned(), pieces, block_ends, digest }
+        let name = name.to_owned();
+        Self { name, pieces, block_ends, digest, left_out: 0, trusts_extent: false }
+    }
+
+    /// Notes how many items are no solids, and whether the part is as large as it seems.
+    pub(crate) fn with(self, left_out: usize, trusts_extent: bool) -> Self {
+        Self { left_out, trusts_extent, ..self }
     }
 
     /// Creates a part of facets in memory.
@@ -169,13 +177,15 @@ impl Part {
                 digest_text(&hasher)
             }
         };
+        let left_out = models.iter().map(|model| model.left_out).sum();
+        let trusts_extent = models.iter().any(|model| model.trusts_extent);
         let mut pieces = Vec::new();
         for model in models {
             let files = pieces.last().map_or(0, |last: &Piece| last.file + 1);
             let of_model = model.pieces.into_iter();
             pieces.extend(of_model.map(|piece| Piece { file: files + piece.file, ..piece }));
         }
-        Self::new(&name, pieces, digest)
+        Self::new(&name, pieces, digest).with(left_out, trusts_extent)
     }
 
     /// Places the part among others, after its file's units were taken into account.
@@ -202,6 +212,22 @@ impl Part {
     /// file it is that of the coordinates, and with several that of their digests.
     pub fn digest(&self) -> &str {
         &self.digest
+    }
+
+    /// Returns true if the files state the unit of their coordinates.
+    pub fn states_unit(&self) -> bool {
+        self.pieces.iter().all(|piece| piece.units.is_some())
+    }
+
+    /// Returns how many items of 3MF files were left out because they are no solids, but
+    /// supports, surfaces or others.
+    pub fn left_out(&self) -> usize {
+        self.left_out
+    }
+
+    /// Returns true if the part is to be taken as large as it seems.
+    pub(crate) fn trusts_extent(&self) -> bool {
+        self.trusts_extent
     }
 
     /// Checks that no file was written to or replaced since it was opened. Whoever reads

@@ -6,7 +6,7 @@
 //! is checked once the last is done, by what the system notes of every change.
 
 use std::fs::{File, Metadata};
-use std::io::{self, Read};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -82,7 +82,7 @@ impl PartFile {
 
     /// Returns a reader of all bytes, from the first.
     pub(crate) fn reader(&self) -> FileReader<'_> {
-        FileReader { file: &self.file, at: 0 }
+        FileReader { file: &self.file, size: self.size, at: 0 }
     }
 
     /// Calls `each` with every record of `N` bytes in a range of the file.
@@ -173,6 +173,7 @@ fn entry(_: &Metadata) -> ((i64, i64), (u64, u64)) {
 #[derive(Debug)]
 pub(crate) struct FileReader<'a> {
     file: &'a File,
+    size: u64,
     at: u64,
 }
 
@@ -181,6 +182,18 @@ impl Read for FileReader<'_> {
         let read = read_at(self.file, to, self.at)?;
         self.at += read as u64;
         Ok(read)
+    }
+}
+
+impl Seek for FileReader<'_> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let at = match to {
+            SeekFrom::Start(at) => Some(at),
+            SeekFrom::End(by) => self.size.checked_add_signed(by),
+            SeekFrom::Current(by) => self.at.checked_add_signed(by),
+        };
+        self.at = at.ok_or(io::ErrorKind::InvalidInput)?;
+        Ok(self.at)
     }
 }
 

@@ -97,6 +97,12 @@ impl Placement {
         Self { rows }
     }
 
+    /// Creates the placement that takes a point (x, y, z) to the sums of these
+    /// coefficients times x, y, z and 1 mm.
+    pub(crate) fn of_rows(rows: [[f64; 4]; 3]) -> Self {
+        Self { rows }
+    }
+
     /// Returns true if it makes right hands left ones.
     pub(crate) fn is_mirror(&self) -> bool {
         let [a, b, c] = self.rows;
@@ -237,6 +243,11 @@ impl PlacedPart {
     /// Returns the number of the transform that places the facets of a block.
     pub(crate) fn transform_of_block(&self, block: usize) -> usize {
         self.pieces[self.model.place_of(block).0].transform
+    }
+
+    /// Places a facet of a piece.
+    pub(crate) fn placed_in_piece(&self, facet: &Facet, piece: usize) -> PlacedFacet {
+        self.placed(facet, self.pieces[piece].transform)
     }
 
     /// Places a facet by one of the transforms.

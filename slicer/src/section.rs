@@ -51,7 +51,7 @@ pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, Sli
 fn rows(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
     let model = PlacedPart::new(model, &options.placement, options.units);
     let survey = Survey::of(&model)?;
-    survey.check_distance()?;
+    survey.check_extent(&model)?;
     let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
     let planes = Planes::one(options.z);
     let cutter = Cutter { grid: &grid, planes: &planes, fill: options.fill };

@@ -107,6 +107,10 @@ impl Default for SliceOptions {
     }
 }
 
+/// Ten times the rows of 12 000 layers on an area of 23 x 23 inches at 2400 dpi: even
+/// black rows take time.
+const MAX_ROWS: u64 = 1 << 32;
+
 /// The layers of a part, bottom first.
 ///
 /// One look at all facets finds the part's box. Then z is processed in slabs of as
@@ -144,9 +148,9 @@ impl Slices {
     /// Prepares to slice a part.
     ///
     /// # Errors
-    /// Returns an error if the part is empty, not finite or 1000 km away, if images or
-    /// layers would be too large or too many, or if the sections of gray layers are not
-    /// at their tops.
+    /// Returns an error if the part is empty, not finite or 1000 km away, or has vertices
+    /// far outside the rest; if images or layers would be too large or too many; if the
+    /// sections of gray layers are not at their tops; or if a file changed.
     pub fn new(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
         let part = model.clone();
         Self::prepared(model, options).map_err(|error| part.reason(error))
@@ -158,7 +162,7 @@ impl Slices {
         }
         let model = PlacedPart::new(model, &options.placement, options.units);
         let survey = Survey::of(&model)?;
-        survey.check_distance()?;
+        survey.check_extent(&model)?;
         let model = if options.polish { model } else { model.on_facets() };
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;
@@ -168,6 +172,9 @@ impl Slices {
             None => Planes::uniform(bottom_um, top_um, options.thickness, options.plane)?,
         };
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
+        if wanted.len() as u64 * u64::from(grid.height) > MAX_ROWS && !model.model.trusts_extent() {
+            return Err(SliceError::TooManyRows { layers: wanted.len(), rows: grid.height });
+        }
         // A list that grows holds up to twice what it needs.
         let max_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
         let reach_um = options.gray.as_ref().map_or(0.0, LayerLevels::reach_um);
@@ -268,6 +275,12 @@ impl Slices {
     /// millimetres.
     pub fn box_mm(&self) -> [[f64; 3]; 2] {
         [self.survey.min, self.survey.max].map(|[x, y, z_um]| [x, y, z_um / 1000.0])
+    }
+
+    /// Returns the numbers of the first two files whose boxes overlap, or of one file of
+    /// which two items do.
+    pub fn overlap(&self) -> Option<[usize; 2]> {
+        self.survey.overlap(&self.model)
     }
 
     /// Fills the table with the next slab, as the iterator does when it needs to.

@@ -11,9 +11,13 @@ use crate::error::SliceError;
 use crate::exact::PlacedSurfaces;
 use crate::placement::{PlacedFacet, PlacedPart};
 use crate::planes::Planes;
+use crate::wild;
 
 /// Coordinates are exact to a nanometre as far as this.
 const MAX_DISTANCE_MM: f64 = 1e9;
+
+/// Boxes that overlap by no more only touch: a micrometre, far more than rounding.
+const TOUCHING: [f64; 3] = [0.001, 0.001, 1.0];
 
 /// A part's box and blocks: x and y in millimetres, z in micrometres.
 #[derive(Debug)]
@@ -126,11 +130,46 @@ impl Survey {
         Ok(Self { min, max, blocks: good })
     }
 
-    /// Checks that the part is near enough for coordinates to be exact to a nanometre.
+    /// Checks that the part is near enough for coordinates to be exact to a nanometre,
+    /// and that no vertex lies far outside the rest, unless the part is to be trusted.
     ///
     /// # Errors
-    /// Returns an error if it is not.
-    pub(crate) fn check_distance(&self) -> Result<(), SliceError> {
+    /// Returns an error if that is not so.
+    pub(crate) fn check_extent(&self, part: &PlacedPart) -> Result<(), SliceError> {
+        if !part.model.trusts_extent() {
+            wild::check(part, self)?;
+        }
+        self.check_distance()
+    }
+
+    /// Returns the files of the first two pieces of a part whose boxes overlap.
+    pub(crate) fn overlap(&self, part: &PlacedPart) -> Option<[usize; 2]> {
+        let pieces = part.model.pieces();
+        let mut boxes = vec![([f64::MAX; 3], [f64::MIN; 3]); pieces.len()];
+        for (block, survey) in self.blocks.iter().enumerate() {
+            let (low, high) = &mut boxes[part.model.place_of(block).0];
+            for axis in 0..3 {
+                low[axis] = low[axis].min(survey.min[axis]);
+                high[axis] = high[axis].max(survey.max[axis]);
+            }
+        }
+        let boxes = &boxes;
+        let mut order: Vec<usize> = (0..boxes.len()).collect();
+        order.sort_by(|&a, &b| boxes[a].0[0].total_cmp(&boxes[b].0[0]));
+        let overlap = |a: usize, b: usize| {
+            let (a, b) = (boxes[a], boxes[b]);
+            let depth = |axis: usize| a.1[axis].min(b.1[axis]) - a.0[axis].max(b.0[axis]);
+            (0..3).all(|axis| depth(axis) > TOUCHING[axis])
+        };
+        let pairs = order.iter().enumerate().flat_map(|(place, &a)| {
+            let may_meet = move |b: &&usize| boxes[**b].0[0] < boxes[a].1[0];
+            order[place + 1..].iter().take_while(may_meet).map(move |&b| (a.min(b), a.max(b)))
+        });
+        let (a, b) = pairs.filter(|&(a, b)| overlap(a, b)).min()?;
+        Some([pieces[a].file, pieces[b].file])
+    }
+
+    fn check_distance(&self) -> Result<(), SliceError> {
         let [x, y, z] = [0, 1, 2].map(|axis| self.max[axis].max(-self.min[axis]));
         let mm = x.max(y).max(z / 1000.0);
         let distance = Length::from_mm(mm);

@@ -9,7 +9,7 @@ use crate::part_file::PartFile;
 
 /// Meshes shrink by up to 20 when they are packed; bytes that shrink more than this hold
 /// something else, and would fill the disk.
-const MOST_SHRINKAGE: u64 = 200;
+const MOST_SHRINKAGE: u64 = 100;
 /// This much is unpacked in any case.
 const ALWAYS_BYTES: u64 = 64 << 20;
 

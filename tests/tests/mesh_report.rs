@@ -177,7 +177,7 @@ fn facets_are_numbered_in_their_own_file() {
     let mut text = Vec::new();
     broken.write_ascii_stl("ball", &mut text).unwrap();
     scratch.write("ball.stl", &text);
-    let report = report(&scratch, "ring.stl ball.stl", "");
+    let report = report(&scratch, "ring.stl ball.stl", "--fill nonzero");
     assert_eq!(report["files"], json!(["ring.stl", "ball.stl"]));
     assert_eq!(named(&report), at_edges_of(&broken, &hole, 1));
 }

@@ -60,14 +60,15 @@ fn several_parts_are_sliced_as_one() {
         let sliced = |parts: &str| format!("slice {parts} {COARSE} --fill {fill} -o out.tif");
         scratch.run(&sliced("both.stl")).succeeds_quietly();
         let expected = scratch.layers("out.tif");
-        scratch.run(&sliced("a.stl b.stl")).succeeds_quietly();
+        let ran = scratch.run(&sliced("a.stl b.stl")).succeeds();
+        assert_eq!(ran.stderr.contains("boxes of a.stl and b.stl overlap"), fill == "even-odd");
         let layers = scratch.layers("out.tif");
         assert!(masks(&layers) == masks(&expected));
         let StackInfo { part, commands, digest, .. } = stack_info(&layers);
         assert_eq!(part, "a+b");
         assert!(commands[0].starts_with("slice a.stl b.stl --dpi 100 "), "{commands:?}");
         assert_ne!(digest, &stack_info(&expected).digest);
-        scratch.run_on(&sliced("a.stl -"), &scratch.bytes("b.stl")).succeeds_quietly();
+        scratch.run_on(&sliced("a.stl -"), &scratch.bytes("b.stl")).succeeds();
         assert!(masks(&scratch.layers("out.tif")) == masks(&expected));
         assert_eq!(&stack_info(&scratch.layers("out.tif")).digest, digest);
     }

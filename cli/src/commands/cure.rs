@@ -15,6 +15,7 @@ use crate::cured_section::{
 };
 use crate::exit::Exit;
 use crate::options::{Common, Input};
+use crate::part_arg::{PartArg, paths};
 use crate::part_options::{Reading, name_of_all};
 use crate::picture::PictureScale;
 use crate::progress::Progress;
@@ -48,9 +49,9 @@ pub(crate) struct CureArgs {
     section: SectionPlane,
 
     /// Part that the stack was sliced from, for its outline; it is placed as the stack records.
-    /// Give several files in the order in which slice got them
-    #[arg(long, value_name = "FILE")]
-    part: Vec<PathBuf>,
+    /// Give several files in the order in which slice got them, each with its own placement
+    #[arg(long, value_name = "FILE", value_parser = PartArg::parser())]
+    part: Vec<PartArg>,
 
     /// Draw only this stretch of the section, for example 10mm..14mm
     #[arg(long, value_name = "A..B", value_parser = parse_along, allow_hyphen_values = true)]
@@ -67,7 +68,7 @@ pub(crate) struct CureArgs {
 
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     check_png_name(&args.output)?;
-    let inputs = args.part.iter().chain([&args.input.stack, &args.material]);
+    let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     let material: Material = entry(&args.material)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
@@ -107,16 +108,17 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
 
 /// The part's outline, placed as the stack says.
 fn outline(
-    parts: &[PathBuf],
+    parts: &[PartArg],
     course: &SectionLine,
     stack: Option<&StackInfo>,
     name: &str,
 ) -> Result<Vec<SolidHeights>, Exit> {
     let sliced = stack.and_then(|stack| {
-        let options = SlicingOptions::of_command(stack.commands.first()?)?;
-        Some((options, &stack.digest))
+        let command = stack.commands.first()?;
+        let recorded = SlicingOptions::parts_of_command(command);
+        Some((SlicingOptions::of_command(command)?, recorded, &stack.digest))
     });
-    let (options, digest) = sliced.with_context(|| {
+    let (options, recorded, digest) = sliced.with_context(|| {
         format!("{name} does not record how its part was sliced: leave out --part")
     })?;
     let reading = Reading { dpi: options.dpi, may_be_open: false, say: &|_| () };
@@ -125,6 +127,15 @@ fn outline(
     if model.digest() != digest {
         return Err(Exit::Failed(anyhow!(
             "{name} was not sliced from {part}, or the part has changed"
+        )));
+    }
+    // Names of files may have changed since, but not where the parts stand.
+    let given: Vec<_> = parts.iter().map(PartArg::recorded).collect();
+    if (recorded.contains('@') || parts.iter().any(|part| part.placement.is_some()))
+        && given.join(" ") != recorded
+    {
+        return Err(Exit::Failed(anyhow!(
+            "{name} was sliced from {recorded}: give --part with the same placements"
         )));
     }
     course.outline(model, &options).map_err(|error| Exit::from(error).at(part))

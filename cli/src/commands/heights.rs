@@ -17,6 +17,7 @@ use crate::exposure::{Exposure, ExposureOptions};
 use crate::height_options::{FoundHeights, HeightOptions, Measure, significant, time_text};
 use crate::json_report::print_answer;
 use crate::options::{Common, parse_thickness};
+use crate::part_arg::{PartArg, paths};
 use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
 use crate::plots::{self, Plot, PlotAxis, Series, drawn};
 use crate::progress::say;
@@ -35,9 +36,9 @@ Examples:
   lamp heights blade.stl --cusp 10um --report heights.csv
   lamp heights blade.stl --time-budget 10h --layer-overhead 20s --material lamp-suspension")]
 pub(crate) struct HeightsArgs {
-    /// The part: STL or STEP files, or - for standard input, as for `slice`
-    #[arg(value_name = "PART", required = true)]
-    parts: Vec<PathBuf>,
+    /// The part: files, or - for standard input, as for `slice`
+    #[arg(value_name = "PART", required = true, value_parser = PartArg::parser())]
+    parts: Vec<PartArg>,
 
     /// Write a table of the layers: height, thickness, volume lost and gained, and the error by
     /// every criterion
@@ -81,7 +82,12 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     };
     let model =
         args.solid.open(&args.parts, &Reading { dpi: args.dpi, may_be_open: false, say: &say })?;
-    let body = args.solid.body(model).map_err(|error| at_part(error.into(), &args.parts))?;
+    let body = args.solid.body(model.clone());
+    let body = body.map_err(|error| at_part(error.into(), &args.parts))?;
+    let box_mm = [body.min(), body.max()].map(|[x, y, z_um]| [x, y, z_um / 1000.0]);
+    let size = args.solid.size(&model, box_mm);
+    let overlap = args.solid.overlap_doubt(&model, &args.parts, body.overlap());
+    size.doubt(args.dpi, None).iter().chain(&overlap).for_each(|doubt| say(doubt));
     let part = args.heights.part(body, args.dpi, args.solid.fill)?;
     let found = args.heights.find(&part, exposure.as_ref());
     let found = found.map_err(|error| at_part(error, &args.parts))?;
@@ -122,7 +128,7 @@ impl HeightsArgs {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
         }
-        let inputs = || self.parts.iter().chain(self.exposure.files());
+        let inputs = || paths(&self.parts).chain(self.exposure.files());
         for file in self.report.iter().chain(&self.plot) {
             check_beside(file, Path::new("-"), inputs())?;
         }

@@ -1,13 +1,14 @@
 //! `lamp slice`: slices a part into a stack.
 
-use std::borrow::Cow;
+use std::cell::Cell;
+use std::iter;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::machine::{Machine, MachineLimit};
 use lamp_slicer::{PixelGrid, Polished, Slices, StrayBand};
-use lamp_stack::{Length, Size};
+use lamp_stack::{Image, Length, Size};
 
 use crate::catalogue::entry;
 use crate::exit::Exit;
@@ -15,8 +16,9 @@ use crate::fallback::Bridged;
 use crate::json_report::parse_report;
 use crate::mesh_report::{Counts, MeshReport, RowPositions};
 use crate::options::{Common, Output, parse_layers, parse_memory};
+use crate::part_arg::{PartArg, paths};
 use crate::part_options::{Reading, at_part, name_of_all};
-use crate::progress::Progress;
+use crate::progress::{Progress, say};
 use crate::slicing_options::SlicingOptions;
 use crate::step_options::{HEADING, length};
 use crate::streams::{check_beside, check_not_input, progress, write_layers};
@@ -38,10 +40,11 @@ Examples:
   slice blade.stl --gray --material lamp-suspension | fix | dither > blade.tif
   slice broken.stl -o broken.tif --report gaps.json")]
 pub(crate) struct SliceArgs {
-    /// The part: STL (binary or ASCII) or STEP files, or - for standard input. Several files share
-    /// one coordinate system; where they overlap they cancel out, or unite with --fill nonzero
-    #[arg(value_name = "PART", required = true)]
-    parts: Vec<PathBuf>,
+    /// The part: STL (binary or ASCII), STEP, 3MF or OBJ files, also packed by gzip, or - for
+    /// standard input. Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns one
+    /// about z and moves it first. Where parts overlap they cancel out, or unite with --fill nonzero
+    #[arg(value_name = "PART", required = true, value_parser = PartArg::parser())]
+    parts: Vec<PartArg>,
 
     #[command(flatten)]
     pub(crate) options: SlicingOptions,
@@ -60,7 +63,7 @@ pub(crate) struct SliceArgs {
     /// Memory for the table of crossings, at least 16MB; with less, fewer layers are cut at a time
     /// [default: a quarter of what there is, as far as it helps]. Facets in no order of height are
     /// first sorted in a temporary file, 36 bytes per facet. --adaptive also holds the mesh in
-    /// memory, 45 bytes per facet
+    /// memory, 49 bytes per facet
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
@@ -75,13 +78,19 @@ pub(crate) struct SliceArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
+    /// Stop with status 3 for what is hardly meant so: a part below a few pixels or layers, or
+    /// larger than any machine, parts that overlap, or a stack without a white pixel
+    #[arg(long)]
+    strict: bool,
+
     #[command(flatten)]
     output: Output,
 }
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
-    let inputs =
-        || args.parts.iter().chain(args.options.files()).chain(&args.fallback).chain(&args.machine);
+    let inputs = || {
+        paths(&args.parts).chain(args.options.files()).chain(&args.fallback).chain(&args.machine)
+    };
     if let Some(report) = &args.report {
         check_beside(report, &args.output.output, inputs())?;
     }
@@ -92,32 +101,42 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         args.options.check_machine(machine).map_err(Exit::wrong_options)?;
     }
     let progress = progress("slice", common, &args.output);
-    let say = |line: &str| progress.say(line);
+    let note = |line: &str| progress.say(line);
     let reading =
-        Reading { dpi: args.options.dpi, may_be_open: args.fallback.is_some(), say: &say };
+        Reading { dpi: args.options.dpi, may_be_open: args.fallback.is_some(), say: &note };
     let model = args.options.solid.open(&args.parts, &reading)?;
     if args.fallback.is_some() && model.prepared().next().is_none() {
         return Err(Exit::usage("--fallback needs a STEP part"));
     }
     let name = name_of_all(&args.parts);
-    let files: Vec<_> = args
-        .parts
-        .iter()
-        .map(|part| part.file_name().unwrap_or_default().to_string_lossy())
-        .collect();
+    let recorded: Vec<_> = args.parts.iter().map(PartArg::recorded).collect();
+    let part = model.clone();
     let (slices, name_command) = args
         .options
-        .slices(model, &files.join(" "), args.layers.clone(), args.memory, exposure, &say)
+        .slices(model, &recorded.join(" "), args.layers.clone(), args.memory, exposure, &note)
         .map_err(|error| at_part(error, &args.parts))?;
     if let Some(machine) = &machine {
         check_part(machine, &slices).map_err(|limit| Exit::from(limit).at(name.clone()))?;
     }
+    let solid = &args.options.solid;
+    let size = solid.size(&part, slices.box_mm());
+    let doubts = [
+        size.doubt(args.options.dpi, args.options.uniform_thickness()),
+        solid.overlap_doubt(&part, &args.parts, slices.overlap()),
+    ];
+    let doubts: Vec<String> = doubts.into_iter().flatten().collect();
+    if args.strict && !doubts.is_empty() {
+        return Err(Exit::Findings(doubts.join("; ")).at(name));
+    }
+    doubts.iter().for_each(|doubt| warn(doubt));
     progress.expect(slices.layer_count() as u64);
     let mut bridged =
         Bridged::new(slices, args.fallback.as_deref(), &args.options, args.layers.clone())?;
     let (mut counts, mut bands) = (Counts::default(), Vec::new());
+    let is_blank = Cell::new(true);
     let layers = bridged.by_ref().map(|layer| {
-        let mut layer = layer.map_err(|error| Exit::from(error).at(name.clone()))?;
+        let mut layer = layer.map_err(|error| at_part(error.into(), &args.parts))?;
+        is_blank.set(is_blank.get() && has_no_white(&layer.image));
         name_command(&mut layer);
         counts.add(&layer.info);
         if args.report.is_some() {
@@ -125,15 +144,14 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         }
         Ok(layer)
     });
+    let refused = || (args.strict && is_blank.get()).then(|| Err(Exit::Findings(BLANK.to_owned())));
+    let layers = layers.chain(iter::once_with(refused).flatten());
     write_layers(layers, &args.output, &progress)?;
     let slices = &bridged.slices;
     if let Some(path) = &args.report {
-        let trace = slices.trace(&bands).map_err(|error| Exit::from(error).at(name))?;
-        let subject = MeshReport {
-            files: files.into_iter().map(Cow::into_owned).collect(),
-            fill: args.options.solid.fill.name(),
-            counts,
-        };
+        let trace = slices.trace(&bands).map_err(|error| at_part(error.into(), &args.parts))?;
+        let files = args.parts.iter().map(PartArg::file).collect();
+        let subject = MeshReport { files, fill: solid.fill.name(), counts };
         let PixelGrid { origin_mm, dpi, .. } = *slices.grid();
         let rows = RowPositions { top_mm: origin_mm[1], dpi };
         subject.write(&trace, rows, path)?;
@@ -145,7 +163,25 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         progress.say(&text);
     }
     say_stray_rows(&progress, counts, args.report.as_deref());
+    if is_blank.get() {
+        warn(BLANK);
+    }
     Ok(())
+}
+
+/// What a stack without white calls for.
+const BLANK: &str = "no layer has a white pixel: check the part, its unit and --layers";
+
+/// Says what `--strict` stops for, however quiet the command is to be.
+fn warn(doubt: &str) {
+    say(&format!("slice: {doubt}"));
+}
+
+fn has_no_white(image: &Image) -> bool {
+    match image {
+        Image::Mask(mask) => mask.rows().all(<[u32]>::is_empty),
+        Image::Gray(gray) => gray.rows().flatten().all(|change| change.level == 0),
+    }
 }
 
 /// Checks that a part lies within a machine's area and height.

@@ -6,6 +6,7 @@ mod closed_forms;
 mod common;
 mod even_rows;
 mod fill;
+mod formats;
 mod gray;
 mod layers;
 mod placement;
