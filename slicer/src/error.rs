@@ -79,7 +79,7 @@ pub enum SliceError {
     },
     /// A 3MF file that cannot be read.
     #[error(transparent)]
-    ThreeMf(#[from] ThreeMfError),
+    ThreeMf(#[from] Box<ThreeMfError>),
     /// A coordinate that is no number.
     #[error("facet {facet} has a coordinate that is not a finite number")]
     NotFinite {

@@ -177,7 +177,7 @@ fn unpacked(
         return Ok(of_one(of_surfaces(prepared)));
     }
     if looks_packaged(start) {
-        return Ok(three_mf::read(file)?);
+        return Ok(three_mf::read(file).map_err(Box::new)?);
     }
     if let Some(format) = other_format(start) {
         return Err(SliceError::OtherFormat(format));

@@ -190,10 +190,10 @@ mod tests {
     use crate::part::Part;
     use crate::placement::{Axis, Placement};
 
-    fn found(facets: Vec<Facet>) -> Option<(usize, [f32; 3])> {
+    fn found(facets: &[Facet]) -> Option<(usize, [f32; 3])> {
         let tilted = Placement::default().rotated(Axis::X, 40.0).translated([9.0, 0.0, 1e4]);
         let [here, there] = [Placement::default(), tilted].map(|placement| {
-            let part = Part::from_facets("part", facets.clone());
+            let part = Part::from_facets("part", facets.to_vec());
             let part = PlacedPart::new(part, &placement, Units::Millimetres);
             match check(&part, &Survey::of(&part).unwrap()) {
                 Ok(()) => None,
@@ -218,13 +218,13 @@ mod tests {
             for far in [[0.0, 0.0, 1e5], [-3e6, 10.0, 0.0], [2e4, 2e4, 2e4]] {
                 let mut alone = mesh.facets.clone();
                 alone[100][0] = far;
-                assert_eq!(found(alone), Some((100, far)));
-                let (facet, at) = found(moved(&mesh, corner, far)).unwrap();
+                assert_eq!(found(&alone), Some((100, far)));
+                let (facet, at) = found(&moved(&mesh, corner, far)).unwrap();
                 assert!(facet <= 100 && at == far);
             }
             let mut whole = mesh.facets.clone();
             whole[100] = [[1e5, 0.0, 0.0], [1e5, 1.0, 0.0], [1e5, 0.0, 1.0]];
-            assert_eq!(found(whole), Some((100, [1e5, 0.0, 0.0])));
+            assert_eq!(found(&whole), Some((100, [1e5, 0.0, 0.0])));
         }
     }
 
@@ -252,8 +252,8 @@ mod tests {
         let none = [0.0; 3];
         // Needles, plates and rods of few facets.
         for by in [[1.0, 1.0, 1e4], [1e4, 1e4, 1.0], [1e-3, 1.0, 1.0], [5e3, 1.0, 1.0]] {
-            assert_eq!(found(block(by)), None, "{by:?}");
-            assert_eq!(found(scaled(&sphere(1.0, 100), by, none)), None, "{by:?}");
+            assert_eq!(found(&block(by)), None, "{by:?}");
+            assert_eq!(found(&scaled(&sphere(1.0, 100), by, none)), None, "{by:?}");
         }
         // Parts far apart, and a large one with a fine detail, or at the end of a long bar.
         for other in [
@@ -261,9 +261,9 @@ mod tests {
             block([300.0, 300.0, 5.0]),
             block([0.5, 0.5, 900.0]),
         ] {
-            assert_eq!(found([ball.facets.clone(), other].concat()), None);
+            assert_eq!(found(&[ball.facets.clone(), other].concat()), None);
         }
-        assert_eq!(found(octahedron.facets), None);
+        assert_eq!(found(&octahedron.facets), None);
         // Cones are half tip.
         let tip: Vec<Facet> = (0..500)
             .map(|k| {
@@ -274,10 +274,10 @@ mod tests {
                 [at(k), at(k + 1), [0.0, 0.0, 900.0]]
             })
             .collect();
-        assert_eq!(found(tip), None);
+        assert_eq!(found(&tip), None);
         for sample in Sample::ALL {
             let mesh = build(sample, 60_000).unwrap();
-            assert_eq!(found(mesh.facets.clone()), None, "{sample:?}");
+            assert_eq!(found(&mesh.facets), None, "{sample:?}");
         }
     }
 }

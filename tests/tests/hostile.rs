@@ -48,6 +48,16 @@ fn no_stl_makes_the_slicer_panic_or_contradict_itself() {
 }
 
 #[test]
+fn no_obj_makes_the_slicer_panic_or_contradict_itself() {
+    survives("obj", hostile::obj);
+}
+
+#[test]
+fn no_3mf_makes_the_slicer_panic_or_contradict_itself() {
+    survives("three_mf", hostile::three_mf);
+}
+
+#[test]
 fn no_step_makes_the_slicer_panic_or_leave_a_row_open() {
     survives("step", hostile::step);
 }

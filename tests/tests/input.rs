@@ -113,7 +113,8 @@ fn a_wrong_unit_is_told() {
         // Silence is for what nobody needs to look at.
         let ran = scratch.run(&format!("{line} -q")).succeeds();
         assert!(ran.stderr.contains(words), "{ran:?}");
-        let ran = scratch.run(&format!("slice part.stl {COARSE} --strict -o strict.tif"));
+        let ran =
+            scratch.run(&format!("slice part.stl {COARSE} --layers 0..2 --strict -o strict.tif"));
         assert!(ran.statuses == [Some(3)] && ran.stderr.contains(words), "{ran:?}");
         assert!(!scratch.path("strict.tif").exists());
         let line = format!("slice part.stl {COARSE} --units {unit} --strict -o out.tif");

@@ -29,13 +29,36 @@ const MAX_ROWS: u32 = 1000;
 /// run costs one for every 2560 pixels.
 const MAX_CODES: u64 = 1 << 20;
 
-/// Reads bytes as STL and slices a few layers of what they hold, by both rules
-/// of filling. The images are in canonical form, their rows end white exactly
-/// where they are said to be stray, and the size of the slabs does not matter.
+/// Reads bytes as STL, as [`part`] says.
 ///
 /// # Panics
 /// Where that is not so.
 pub fn stl(bytes: &[u8]) {
+    part(bytes);
+}
+
+/// Reads bytes as OBJ, and as what gzip packed, as [`part`] says.
+///
+/// # Panics
+/// Where that is not so.
+pub fn obj(bytes: &[u8]) {
+    part(bytes);
+}
+
+/// Reads bytes as a 3MF package, and as the model of one, as [`part`] says.
+///
+/// # Panics
+/// Where that is not so.
+pub fn three_mf(bytes: &[u8]) {
+    part(bytes);
+    // Hardly any damaged package is unpacked.
+    part(&lamp_fixtures::three_mf(&String::from_utf8_lossy(bytes), &[]));
+}
+
+/// Reads bytes as a part in any format and slices a few layers of what they hold, by
+/// both rules of filling. The images are in canonical form, their rows end white exactly
+/// where they are said to be stray, and the size of the slabs does not matter.
+fn part(bytes: &[u8]) {
     let file = file_of(bytes);
     for fill in [Fill::EvenOdd, Fill::NonZero] {
         let [tight, roomy] = [1, 64 << 20].map(|memory| sliced(file.path(), fill, memory));

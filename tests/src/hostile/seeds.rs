@@ -1,9 +1,13 @@
 //! The seed corpus of the fuzz targets: small inputs of every kind, good ones
 //! and ones that lie, made by the fixtures.
 
+use std::io::Write;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use lamp_fixtures::{
     Defect, Mesh, Sample, StepDefect, StepSample, StepUnit, broken_step, build, inject, sphere,
-    step, torus,
+    step, three_mf, three_mf_model, torus,
 };
 use lamp_slicer::{Part, SliceOptions, Slices};
 use lamp_stack::{
@@ -31,6 +35,8 @@ pub fn seeds() -> Vec<Seed> {
     stl()
         .into_iter()
         .map(of("stl"))
+        .chain(objs().into_iter().map(of("obj")))
+        .chain(three_mfs().into_iter().map(of("three_mf")))
         .chain(steps().into_iter().map(of("step")))
         .chain(tiff().into_iter().map(of("tiff")))
         .chain(g4_codes().into_iter().map(of("g4")))
@@ -81,6 +87,55 @@ fn stl() -> Named {
         ("two_solids_ascii.stl", two),
         ("cut_ascii.stl", text(&ball)[..700].to_vec()),
         ("none_ascii.stl", text(&Mesh::default())),
+    ]
+}
+
+fn objs() -> Named {
+    let ball = sphere(3.0, 24);
+    let obj = ball.obj();
+    let polygons = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 2 2 5\nvt 0 0\nvn 0 0 1\n\
+                    f 4 3 2 1\nf 1/1/1 2/1/1 5/1/1\nf 2//1 3//1 5//1\nf -3 -2 -1\nf -2/-1 -5 -1\n";
+    vec![
+        ("ball.obj", obj.clone().into_bytes()),
+        ("polygons.obj", polygons.into()),
+        ("cut.obj", obj.as_bytes()[..obj.len() / 2].to_vec()),
+        ("no_vertex.obj", obj.replace("f 1 ", "f 99999999999999999999 ").into_bytes()),
+        ("backwards.obj", obj.replace("f 1 ", "f -9223372036854775808 ").into_bytes()),
+        ("packed.gz", gzip(obj.as_bytes())),
+        ("packed_stl.gz", gzip(&binary(&ball))),
+        ("packed_twice.gz", gzip(&gzip(obj.as_bytes()))),
+        ("blanks.gz", gzip(&vec![b' '; 1 << 20])),
+    ]
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packed = GzEncoder::new(Vec::new(), Compression::default());
+    packed.write_all(bytes).expect("memory takes all");
+    packed.finish().expect("memory takes all")
+}
+
+fn three_mfs() -> Named {
+    let ball = sphere(3.0, 24).three_mf_object(1);
+    let item = "<item objectid=\"1\" transform=\"0 1 0 -1 0 0 0 0 1 10 0 0\"/>\n";
+    let model = three_mf_model("millimeter", &ball, item);
+    let nested = |inner: u32, outer: u32, times: usize| {
+        let component = format!("<component objectid=\"{inner}\"/>").repeat(times);
+        format!("<object id=\"{outer}\"><components>{component}</components></object>\n")
+    };
+    let many: String = (2..12).map(|id| nested(id - 1, id, 10)).collect();
+    let laughs = three_mf_model("inch", &(ball.clone() + &many), "<item objectid=\"11\"/>\n");
+    let itself = three_mf_model("micron", &nested(1, 1, 1), item);
+    let other = "<object id=\"1\"><components><component p:path=\"/3D/a.model\" objectid=\"1\"/>\
+                 </components></object>\n";
+    let referring = three_mf_model("foot", other, item);
+    vec![
+        ("ball.3mf", three_mf(&model, &[])),
+        ("two_models.3mf", three_mf(&referring, &[("3D/a.model", &model)])),
+        ("blanks.3mf", three_mf(&" ".repeat(1 << 20), &[])),
+        ("cut.model", model.as_bytes()[..model.len() / 2].to_vec()),
+        ("ball.model", model.into_bytes()),
+        ("laughs.model", laughs.into_bytes()),
+        ("itself.model", itself.into_bytes()),
     ]
 }
 
