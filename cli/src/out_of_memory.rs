@@ -91,7 +91,7 @@ fn tell(bytes: usize) {
     let command = COMMAND.get().map_or("lamp", String::as_str);
     let written = writeln!(
         cursor,
-        "{command}: out of memory, {bytes} bytes more were not to be had: raise the limit \
+        "{command}: out of memory ({bytes} bytes more were asked for): raise the limit \
          (ulimit -v), end other programs, or give fewer --threads"
     );
     let end = cursor.position() as usize;

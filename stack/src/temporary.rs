@@ -209,17 +209,26 @@ fn put_in_place(from: &Path, to: &Path, replaces: bool) -> Result<bool, StackErr
     }
 }
 
-/// Exchanges two folders at once, so that a process that ends at any time leaves one of them.
+/// Exchanges two folders.
 fn exchange(new: &Path, old: &Path) -> io::Result<()> {
-    #[cfg(target_os = "linux")]
-    {
-        use rustix::fs::{CWD, RenameFlags, renameat_with};
-        if renameat_with(CWD, new, CWD, old, RenameFlags::EXCHANGE).is_ok() {
-            return Ok(());
-        }
-    }
-    // Some file systems cannot. Then the old folder is aside for a moment, under a name that
-    // nothing removes.
+    exchange_at_once(new, old).or_else(|_| exchange_in_steps(new, old))
+}
+
+/// Exchanges two folders so that a process that ends at any time leaves one of them in place. Some
+/// file systems cannot.
+#[cfg(target_os = "linux")]
+fn exchange_at_once(new: &Path, old: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    Ok(renameat_with(CWD, new, CWD, old, RenameFlags::EXCHANGE)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn exchange_at_once(_: &Path, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
+/// Exchanges two folders. The old one is aside for a moment, under a name that nothing removes.
+fn exchange_in_steps(new: &Path, old: &Path) -> io::Result<()> {
     let aside = new.with_extension("old");
     fs::rename(old, &aside)?;
     fs::rename(new, old).inspect_err(|_| drop(fs::rename(&aside, old)))?;
@@ -293,4 +302,52 @@ fn builder(start: &str, mode: u32) -> Builder<'_, 'static> {
     #[cfg(not(unix))]
     let _ = mode;
     builder
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_are_exchanged_at_once_or_in_steps() {
+        for exchange in [exchange, exchange_in_steps] {
+            let folder = tempfile::tempdir().unwrap();
+            let [new, old] = [".a.lamp-aaaaaa.part", "a"].map(|name| folder.path().join(name));
+            for (path, page) in [(&new, "new"), (&old, "old")] {
+                fs::create_dir(path).unwrap();
+                fs::write(path.join(page), "").unwrap();
+            }
+            exchange(&new, &old).unwrap();
+            assert!(old.join("new").exists() && new.join("old").exists());
+            // What cannot be exchanged stays where it is.
+            assert!(exchange(&folder.path().join("none"), &old).is_err());
+            assert!(old.join("new").exists());
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+        }
+    }
+
+    #[test]
+    fn only_folders_of_numbered_images_are_replaced() {
+        for ours in ["layer_00812.tif", "layer_00812.png", "layers_00500-00999.tif"] {
+            assert!(is_name_in_folders(ours), "{ours}");
+        }
+        for ours in ["layer_00007_rows_00001-00002_left.png", "strip_000.tif", "strips.json"] {
+            assert!(is_name_in_folders(ours), "{ours}");
+        }
+        assert!(["squares_00025px.tif", "squares.csv"].iter().all(|name| is_name_in_folders(name)));
+        for other in ["thesis.doc", "layer.png", "layer_a.png", "img_0001.png", "layer_1.stl", ""] {
+            assert!(!is_name_in_folders(other), "{other}");
+        }
+    }
+
+    #[test]
+    fn what_was_removed_gets_no_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("build.tif");
+        let file = FileBeside::new(&path).unwrap();
+        // As a signal does, but for this one alone: other tests run in this process.
+        live().remove(file.file.path());
+        assert_eq!(file.persist().unwrap_err().kind(), io::ErrorKind::Interrupted);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
 }

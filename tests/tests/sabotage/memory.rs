@@ -11,7 +11,7 @@ fn too_little_memory_is_one_sentence_and_no_file() {
     for job in JOBS.iter().filter(|job| !job.line.contains('|')) {
         let wanted = workplace.wanted(job);
         // Mebibytes, in steps that are small where it matters.
-        let limits = trials(8).min(400);
+        let limits = trials(8).min(100);
         for step in 0..limits {
             let mebibytes = 24 + 376 * step * step / (limits * limits);
             let line = format!("{} --threads 4", job.line);

@@ -23,7 +23,7 @@ struct Kind {
     seeds: fn(&Scratch) -> Vec<Vec<u8>>,
 }
 
-const KINDS: [Kind; 9] = [
+const KINDS: [Kind; 11] = [
     Kind {
         name: "STL",
         ending: "stl",
@@ -35,6 +35,12 @@ const KINDS: [Kind; 9] = [
         ending: "step",
         line: "slice mutant.step --dpi 60 --thickness 500um -q -o out.tif",
         seeds: |_| of_fuzzing("step"),
+    },
+    Kind {
+        name: "OBJ",
+        ending: "obj",
+        line: "slice mutant.obj --dpi 60 --thickness 500um -q -o out.tif",
+        seeds: |_| vec![OBJ.as_bytes().to_vec()],
     },
     Kind {
         name: "stacks",
@@ -57,6 +63,12 @@ const KINDS: [Kind; 9] = [
         seeds: |scratch| vec![said(scratch, "lamp material show lamp-suspension")],
     },
     Kind {
+        name: "options",
+        ending: "toml",
+        line: "slice base.stl --options mutant.toml --layers ..3 -q -o out.tif",
+        seeds: |_| vec![OPTIONS.as_bytes().to_vec()],
+    },
+    Kind {
         name: "edits",
         ending: "toml",
         line: "lamp edit base.tif mutant.toml -q -o out.tif",
@@ -65,7 +77,7 @@ const KINDS: [Kind; 9] = [
     Kind {
         name: "layouts",
         ending: "json",
-        line: "tile base.tif --layout mutant.json -q -o out.tif",
+        line: "tile base.tif --layers ..2 --mesh none --layout mutant.json -q -o out.tif",
         seeds: |scratch| {
             scratch
                 .run("tile base.tif -q --area 30x30mm --layout-out layout.json -o tiled.tif")
@@ -82,13 +94,33 @@ const KINDS: [Kind; 9] = [
     Kind {
         name: "pictures",
         ending: "png",
-        line: "tile base.tif --area 30x30mm --mesh mutant.png -q -o out.tif",
+        line: "tile base.tif --layers ..2 --area 30x30mm --mesh mutant.png -q -o out.tif",
         seeds: |scratch| {
             scratch.run("lamp show base.tif --layer 3 --scale 1/8 -o layer.png").succeeds();
             vec![scratch.bytes("layer.png")]
         },
     },
 ];
+
+/// A tetrahedron, with what else stands in such files.
+const OBJ: &str = "\
+# exported\nmtllib part.mtl\no part\nv 0 0 0\nv 9.5 0 0\nv 0 9.5 0\nv 0 0 9.5 1.0\nvn 0 0 1\nusemtl gray\n\
+f 1 3 2\nf 1/1/1 2/1/1 4/1/1\nf 1//1 4//1 3//1\nf -3 -2 -1\n";
+
+/// Options of several types.
+const OPTIONS: &str = r#"
+dpi = 60
+threads = 2
+
+[slice]
+thickness = "500um"
+plane = "middle"
+fill = "nonzero"
+rotate = ["x:90", "z:-12.5"]
+scale = "1,2,0.5"
+margin = 3
+memory = "64MB"
+"#;
 
 /// Each kind of edit once.
 const EDITS: &str = r#"
@@ -136,6 +168,8 @@ fn said(scratch: &Scratch, line: &str) -> Vec<u8> {
 const LONGEST: Duration = Duration::from_secs(10);
 /// No input may take more memory: this many KiB of address space, which is more than what is used.
 const MOST_MEMORY: &str = "-v 1048576";
+/// What a command says that needs more.
+const TAKES_MORE: [&str; 2] = ["out of memory", "of memory, and there are"];
 
 /// What became of the inputs of a kind.
 #[derive(Default)]
@@ -156,7 +190,7 @@ impl Tally {
         if ended.time > LONGEST {
             self.hangs.push(fault());
         }
-        if ended.stderr.contains("memory") {
+        if TAKES_MORE.iter().any(|words| ended.stderr.contains(words)) {
             self.peaks.push(fault());
         }
         match ended.status {

@@ -28,6 +28,16 @@ fn what_dead_writers_left_goes_and_all_else_stays() {
     assert_eq!(temporaries(&scratch), others);
 }
 
+#[test]
+fn the_longest_names_there_are_can_be_written() {
+    let Workplace { scratch, .. } = Workplace::new();
+    let (file, folder) = (format!("{}.tif", "l".repeat(251)), "ö".repeat(127));
+    scratch.run(&format!("fix stray.tif -q -o {file}")).succeeds();
+    scratch.run(&format!("fix stray.tif -q -o {folder}/")).succeeds();
+    let names = scratch.names();
+    assert!(names.contains(&file) && names.contains(&folder), "{names:?}");
+}
+
 /// Returns all of a stack but its end, so that a stage begins its output and waits.
 fn begun(stack: &[u8]) -> &[u8] {
     &stack[..stack.len() - 1000]
