@@ -79,7 +79,7 @@ impl Common {
 /// The stack that a stage reads.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Input {
-    /// The stack to read: a TIFF or PNG file, a folder of pages, or - for standard input
+    /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
     pub(crate) stack: PathBuf,
 

@@ -30,7 +30,7 @@ Examples:
 
 Exit status: 0 if no fault was found, 1 otherwise.")]
 pub(crate) struct VerifyArgs {
-    /// Stacks: TIFF or PNG files, folders of pages, folders of stacks, or - for standard input
+    /// Stacks: TIFF or picture files, folders of pages, folders of stacks, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
     stacks: Vec<PathBuf>,
 

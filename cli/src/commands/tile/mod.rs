@@ -49,7 +49,7 @@ Examples:
   tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif
   tile blade.tif --machine beta --strips strips/ --mirrors 1920 --overlap 64")]
 pub(crate) struct TileArgs {
-    /// Stacks to read, each with its number of copies: TIFF or PNG files, folders of pages, or -
+    /// Stacks to read, each with its number of copies: TIFF or picture files, folders of pages, or -
     /// for standard input [default count: as many as fit of one stack, one each of several]
     #[arg(value_name = "STACK[:COPIES]", default_value = "-", value_parser = StackArg::parse)]
     stacks: Vec<StackArg>,
