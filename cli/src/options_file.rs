@@ -184,6 +184,19 @@ mod tests {
     use super::*;
     use crate::Lamp;
 
+    const NIGHT: &str = "\
+dpi = 600
+quiet = true
+[slice]
+dpi = 72.5
+gray = true
+mirror = [\"x\", \"y\"]
+[target.squares]
+quiet = false
+[tile]
+fit = true
+";
+
     /// The words that a file gives to a command.
     fn words(command: &str, text: &str) -> Result<String, String> {
         let mut lamp = Lamp::command();
@@ -196,8 +209,7 @@ mod tests {
 
     #[test]
     fn a_table_is_for_its_command_and_wins() {
-        let text = "dpi = 600\nquiet = true\n[slice]\ndpi = 72.5\ngray = true\n\
-                    mirror = [\"x\", \"y\"]\n[target.squares]\nquiet = false\n[tile]\nfit = true";
+        let text = NIGHT;
         assert_eq!(
             words("slice", text).unwrap(),
             "--quiet --dpi=72.5 --gray --mirror=x --mirror=y"
@@ -229,5 +241,22 @@ mod tests {
             let said = words("slice", text).unwrap_err();
             assert!(said.starts_with(problem) && !said.contains('\n'), "{text}: {said}");
         }
+    }
+
+    #[test]
+    fn damaged_files_are_read_or_refused_in_one_line() {
+        let mut lamp = Lamp::command();
+        lamp.build();
+        let mut refused = 0;
+        for at in 0..NIGHT.len() {
+            for with in ["", "=", "[", "\"", "0", "\u{e9}"] {
+                let text = format!("{}{with}{}", &NIGHT[..at], &NIGHT[at + 1..]);
+                if let Err(said) = settings_of(&lamp, &["slice".to_owned()], &text) {
+                    assert!(said.starts_with("line ") && !said.contains('\n'), "{said}");
+                    refused += 1;
+                }
+            }
+        }
+        assert!(refused > 3 * NIGHT.len(), "{refused}");
     }
 }

@@ -70,6 +70,15 @@ fn the_command_line_wins() {
 }
 
 #[test]
+fn a_file_gives_what_a_command_requires() {
+    let scratch = with_tower("[split]\nevery = 30\noutput = \"parts/\"\n");
+    scratch.run("slice tower.stl --dpi 50 --thickness 1mm -q -o tower.tif").succeeds_quietly();
+    scratch.run("lamp split tower.tif").is_wrong_usage(&["required", "--output"]);
+    scratch.run("lamp split tower.tif --options night.toml").succeeds();
+    assert!(scratch.path("parts").is_dir());
+}
+
+#[test]
 fn wrong_files_are_wrong_usage() {
     let scratch = with_tower("");
     for (text, words) in [

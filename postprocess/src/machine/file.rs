@@ -19,9 +19,12 @@ pub enum MachineError {
     /// A height that holds nothing.
     #[error("height: it must be above zero")]
     Height,
-    /// A default that is no resolution or no thickness.
-    #[error("defaults: {0}: it must be above zero")]
-    NoDefault(&'static str),
+    /// A default that is no resolution.
+    #[error("defaults: dpi: it must be between 1 and 100000")]
+    NoResolution,
+    /// A default that is no thickness.
+    #[error("defaults: thickness: it must be above zero")]
+    NoThickness,
     /// A default beyond the machine's own limits.
     #[error("defaults: {0}")]
     Default(#[from] MachineLimit),
@@ -74,12 +77,12 @@ impl Catalogued for Machine {
 impl Machine {
     fn check_defaults(&self) -> Result<(), MachineError> {
         if let Some(dpi) = self.defaults.dpi {
-            let dpi = Dpi::new(dpi).ok_or(MachineError::NoDefault("dpi"))?;
+            let dpi = Dpi::new(dpi).ok_or(MachineError::NoResolution)?;
             self.check_dpi(dpi, "a stack")?;
         }
         if let Some(thickness) = self.defaults.thickness {
             if thickness.um() <= 0.0 {
-                return Err(MachineError::NoDefault("thickness"));
+                return Err(MachineError::NoThickness);
             }
             self.check_thickness(thickness, "a layer")?;
         }
@@ -169,7 +172,7 @@ thickness = "50um"
             ("mirrors = 1024", "mirrors = -1", &["line 23", "strips.mirrors"]),
             ("\"mine\"", "\"My own\"", &["name", "`My own` is not a name"]),
             ("dpi = 600", "dpi = 900", &["defaults: a stack has 900 dpi", "600 to 600"]),
-            ("dpi = 600", "dpi = 0", &["defaults: dpi", "above zero"]),
+            ("dpi = 600", "dpi = 0", &["defaults: dpi", "between 1 and"]),
             ("\"50um\"", "\"1mm\"", &["defaults: a layer is 1mm thick", "20um to 200um"]),
             ("\"50um\"", "\"0um\"", &["defaults: thickness", "above zero"]),
             ("\"50um\"", "\"50\"", &["line 29", "defaults.thickness", "unit"]),
