@@ -9,7 +9,6 @@ const LAMP: &str = "\
 Turn CAD parts into layer images for projection photopolymerization.
 
 Usage: lamp COMMAND [OPTIONS]
-
 From part to build:        slice blade.stl | fix | dither | tile > build.tif
   slice       cut a part into layers         fix         correct stray rows
   dither      turn gray levels into dots     tile        lay out copies
@@ -29,6 +28,7 @@ This program:
   completions let shells complete commands   man         write manual pages
 
 lamp COMMAND -h lists the usual options of a command, --help all of them.
+All commands have -q, --quiet; --threads N; --options FILE.toml; -h, --help.
 ";
 
 /// Examples stand between usage and options.
@@ -60,8 +60,8 @@ const USUAL: [(&str, &[&str]); 3] = [
 /// The headings of options of `slice` that have none of their own.
 const SLICE_HEADINGS: [(&str, &[&str]); 3] = [
     ("Images", &["dpi", "thickness", "plane", "margin", "origin", "size", "machine", "layers"]),
-    ("Part", &["units", "fill"]),
-    ("Output and memory", &["memory", "report", "output", "force", "classic"]),
+    ("Part", &["units", "fill", "trust_extent"]),
+    ("Output and memory", &["memory", "report", "strict", "output", "force", "classic"]),
 ];
 
 /// Gives `lamp`, and the commands below it, this form.

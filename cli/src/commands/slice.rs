@@ -40,9 +40,10 @@ Examples:
   slice blade.stl --gray --material lamp-suspension | fix | dither > blade.tif
   slice broken.stl -o broken.tif --report gaps.json")]
 pub(crate) struct SliceArgs {
-    /// The part: STL (binary or ASCII), STEP, 3MF or OBJ files, also packed by gzip, or - for
-    /// standard input. Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns one
-    /// about z and moves it first. Where parts overlap they cancel out, or unite with --fill nonzero
+    /// The part: STL, STEP, 3MF or OBJ files, also packed by gzip, or - for standard input
+    ///
+    /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns one about z and moves it
+    /// first. Where parts overlap they cancel out, or unite with --fill nonzero
     #[arg(value_name = "PART", required = true, value_parser = PartArg::parser())]
     parts: Vec<PartArg>,
 
