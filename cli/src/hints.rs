@@ -52,6 +52,7 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::TooManyRows { .. } => {
             "check --units, --dpi and --thickness, or give --trust-extent if the part is so large"
         }
+        SliceError::TooManyCrossings { .. } => "check it for facets that repeat, and --dpi",
         SliceError::ThreeMf(_) | SliceError::Obj { .. } => "export the part again",
         SliceError::NotFinite { .. } => "repair or export the part again",
         SliceError::TooFar { .. } => "check --units, --scale and --translate",

@@ -113,6 +113,16 @@ pub enum SliceError {
         /// The rows of each.
         rows: u32,
     },
+    /// Contours that cross the rows of a layer more often than those of any part.
+    #[error(
+        "about {crossings:.0} crossings of rows and contours in layer {layer} are more than any part has"
+    )]
+    TooManyCrossings {
+        /// The first such layer.
+        layer: usize,
+        /// How many crossings are expected there.
+        crossings: f64,
+    },
     /// A part more than 1000 km away, where coordinates are no longer exact.
     #[error(
         "the part reaches {:.3e} mm from the origin, where coordinates are no longer exact",

@@ -111,6 +111,10 @@ impl Default for SliceOptions {
 /// black rows take time.
 const MAX_ROWS: u64 = 1 << 32;
 
+/// A layer of 23 x 23 inches at 2400 dpi has them if contours cross each of its rows 600
+/// times. They take a quarter of a gigabyte.
+const MAX_CROSSINGS: f64 = (1 << 25) as f64;
+
 /// The layers of a part, bottom first.
 ///
 /// One look at all facets finds the part's box. Then z is processed in slabs of as
@@ -179,6 +183,10 @@ impl Slices {
         let max_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
         let reach_um = options.gray.as_ref().map_or(0.0, LayerLevels::reach_um);
         let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
+        if let Some(layer) = wanted.clone().find(|&layer| expected[layer] > MAX_CROSSINGS) {
+            let crossings = expected[layer];
+            return Err(SliceError::TooManyCrossings { layer, crossings });
+        }
         if options.gray.is_some() {
             for (layer, crossings) in expected.iter_mut().enumerate() {
                 *crossings *= 1.0 + spans_per_crossing(reach_um / planes.thickness_um(layer));

@@ -248,6 +248,17 @@ fn bombs_are_refused() {
     );
 }
 
+/// A small package may hold one facet a million times.
+#[test]
+fn crossings_without_end_are_refused_before_they_take_memory() {
+    let facet = [[0.0; 3], [0.0, 10.0, 10.0], [9.0, 0.0, 10.0]];
+    let part = |count| Part::from_facets("part", vec![facet; count]);
+    let fine = options(25_400.0, 500.0);
+    assert!(Slices::new(part(1_000), &fine).is_ok());
+    let error = Slices::new(part(100_000), &fine).unwrap_err().to_string();
+    assert!(error.contains("crossings of rows and contours in layer 0"), "{error}");
+}
+
 #[test]
 fn a_damaged_package_says_so() {
     let packed = gzip(&stl(&sphere(3.0, 500)));
