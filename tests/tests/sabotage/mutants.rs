@@ -23,24 +23,32 @@ struct Kind {
     seeds: fn(&Scratch) -> Vec<Vec<u8>>,
 }
 
-const KINDS: [Kind; 11] = [
+/// Of parts some layers are cut: a part that says that it is a kilometre high has millions, and takes
+/// its time for them, which is no hang.
+const KINDS: [Kind; 12] = [
     Kind {
         name: "STL",
         ending: "stl",
-        line: "slice mutant.stl --dpi 60 --thickness 500um -q -o out.tif",
+        line: "slice mutant.stl --dpi 60 --thickness 500um --layers ..40 -q -o out.tif",
         seeds: |_| of_fuzzing("stl"),
     },
     Kind {
         name: "STEP",
         ending: "step",
-        line: "slice mutant.step --dpi 60 --thickness 500um -q -o out.tif",
+        line: "slice mutant.step --dpi 60 --thickness 500um --layers ..40 -q -o out.tif",
         seeds: |_| of_fuzzing("step"),
     },
     Kind {
         name: "OBJ",
         ending: "obj",
-        line: "slice mutant.obj --dpi 60 --thickness 500um -q -o out.tif",
-        seeds: |_| vec![OBJ.as_bytes().to_vec()],
+        line: "slice mutant.obj --dpi 60 --thickness 500um --layers ..40 -q -o out.tif",
+        seeds: |_| of_fuzzing("obj"),
+    },
+    Kind {
+        name: "3MF",
+        ending: "3mf",
+        line: "slice mutant.3mf --dpi 60 --thickness 500um --layers ..40 -q -o out.tif",
+        seeds: |_| of_fuzzing("three_mf"),
     },
     Kind {
         name: "stacks",
@@ -101,11 +109,6 @@ const KINDS: [Kind; 11] = [
         },
     },
 ];
-
-/// A tetrahedron, with what else stands in such files.
-const OBJ: &str = "\
-# exported\nmtllib part.mtl\no part\nv 0 0 0\nv 9.5 0 0\nv 0 9.5 0\nv 0 0 9.5 1.0\nvn 0 0 1\nusemtl gray\n\
-f 1 3 2\nf 1/1/1 2/1/1 4/1/1\nf 1//1 4//1 3//1\nf -3 -2 -1\n";
 
 /// Options of several types.
 const OPTIONS: &str = r#"
