@@ -1,14 +1,14 @@
-//! Checks that pages carry: of their image, and of all pages up to them.
+//! Checks that pages carry: of their image and their text, and on the last page of all pages.
 //!
 //! A page's JSON line ends with the key `check`:
 //!
 //! ```json
-//! "check":{"image":"9f86d081","exposed_px":20133,"dpi":1500,"chain":"5d41402a"}
+//! "check":{"image":"9f86d081","exposed_px":20133,"dpi":1500,"text":"5d41402a"}
 //! ```
 //!
-//! `image` is the CRC-32 of the image's runs, whatever their coding. `chain` is the CRC-32 of the
-//! texts of all pages so far, each up to its own `chain`; so a page that is missing, moved or has
-//! another text breaks the chain at the next page. The last page has `pages`, too: their number.
+//! `image` is the CRC-32 of the image's runs, whatever their coding; `text` that of the line up to
+//! its own `text`. The last page also has `pages`, their number, and `chain`, the CRC-32 of the
+//! `text` of all pages before it: it tells of pages that are missing, moved or from another stack.
 
 use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
@@ -26,9 +26,19 @@ pub(crate) struct PageCheck {
     /// The resolution in dpi, if the page states one.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
     pub(crate) dpi: Option<f64>,
-    /// On the last page: the number of pages.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) pages: Option<u32>,
+    /// On the last page: what all pages must come to.
+    #[serde(flatten)]
+    pub(crate) end: Option<EndCheck>,
+}
+
+/// What the last page says of the pages before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct EndCheck {
+    /// The number of pages, with the last.
+    pub(crate) pages: u32,
+    /// The CRC-32 of their texts' checks, without the last.
+    #[serde(with = "hexadecimal")]
+    chain: u32,
 }
 
 /// What is computed from an image when it is written.
@@ -69,11 +79,14 @@ pub enum CheckFault {
     /// The image is not the one that the page's check was made of.
     #[error("its image is not the one that was written")]
     Image,
-    /// The check of the texts up to the page differs.
-    #[error("{}", chain_text(*before))]
+    /// The page's text is not the one that its check was made of.
+    #[error("its text is not the one that was written")]
+    Text,
+    /// The pages before the last are not those that its check was made of.
+    #[error("the pages before it are not those that were written: {}", chain_text(*gap))]
     Chain {
-        /// The layer of the page before, if there is one.
-        before: Option<u32>,
+        /// The last layer before and the first after the first gap, if there is one.
+        gap: Option<[u32; 2]>,
     },
     /// The page's resolution differs from that in its check.
     #[error("its resolution is {}, but it was written with {}", dpi_text(*found), dpi_text(*written))]
@@ -102,15 +115,12 @@ pub enum CheckFault {
     },
 }
 
-fn chain_text(before: Option<u32>) -> String {
-    match before {
-        Some(before) => format!(
-            "it does not follow layer {before} as it was written: a page is missing or moved, \
-             or a page's text has changed"
-        ),
-        None => "it is not the first page as it was written: pages before it are missing, or its \
-                 text has changed"
-            .to_owned(),
+fn chain_text(gap: Option<[u32; 2]>) -> String {
+    match gap {
+        Some([before, after]) => {
+            format!("there is nothing between layer {before} and layer {after}")
+        }
+        None => "one is missing, or comes from another stack".to_owned(),
     }
 }
 
@@ -172,18 +182,18 @@ fn add_numbers<T: Copy, const N: usize>(
     }
 }
 
-/// The text between the part of a line that its chain covers and the chain.
-const BEFORE_CHAIN: &str = ",\"chain\":\"";
-const AFTER_CHAIN: &str = "\"}}";
+/// What stands between the part of a line that `text` covers and the check, and after it.
+const BEFORE_TEXT: &str = ",\"text\":\"";
+const AFTER_TEXT: &str = "\"}}";
 
-/// A page's line before the number of pages and the chain, which depend on its place.
+/// A page's line before the checks that depend on its place.
 #[derive(Clone, Debug)]
 pub(crate) struct OpenLine(String);
 
 impl OpenLine {
     pub(crate) fn new(info: &PageInfo, dpi: Option<Dpi>, image: ImageCheck) -> Self {
         let mut line = info.to_line();
-        let check = PageCheck { image, dpi: dpi.map(Dpi::get), pages: None };
+        let check = PageCheck { image, dpi: dpi.map(Dpi::get), end: None };
         let check = serde_json::to_string(&check).expect("a check is numbers and texts");
         // Both objects stay open: without their last braces.
         line.pop();
@@ -208,31 +218,35 @@ impl OpenLine {
     }
 }
 
-/// The check of the texts of all pages so far, for a writer.
+/// The checks of all texts so far.
 #[derive(Debug, Default)]
 pub(crate) struct Chain {
-    crc: u32,
+    texts: Hasher,
     pages: u32,
 }
 
 impl Chain {
     /// Completes the line of the next page.
     pub(crate) fn close(&mut self, line: &OpenLine, is_last: bool) -> String {
-        self.pages += 1;
         let mut line = line.0.clone();
         if is_last {
-            line.push_str(&format!(",\"pages\":{}", self.pages));
+            let EndCheck { pages, chain } = self.end();
+            line.push_str(&format!(",\"pages\":{pages},\"chain\":\"{chain:08x}\""));
         }
-        self.crc = continued(self.crc, line.as_bytes());
-        line + BEFORE_CHAIN + &format!("{:08x}", self.crc) + AFTER_CHAIN
+        let crc = crc32fast::hash(line.as_bytes());
+        self.add(crc);
+        format!("{line}{BEFORE_TEXT}{crc:08x}{AFTER_TEXT}")
     }
-}
 
-/// Returns the CRC-32 of the texts before, followed by `text`.
-fn continued(crc: u32, text: &[u8]) -> u32 {
-    let mut hasher = Hasher::new_with_initial(crc);
-    hasher.update(text);
-    hasher.finalize()
+    /// Returns what the next page must say if it is the last.
+    fn end(&self) -> EndCheck {
+        EndCheck { pages: self.pages.saturating_add(1), chain: self.texts.clone().finalize() }
+    }
+
+    fn add(&mut self, text: u32) {
+        self.pages = self.pages.saturating_add(1);
+        self.texts.update(format!("{text:08x}").as_bytes());
+    }
 }
 
 /// A page's line as it was read: its content, and its check if it has one.
@@ -268,19 +282,27 @@ impl Line {
 }
 
 impl LineCheck {
-    /// Returns the text that the chain covers, and the chain.
+    /// Returns the check and that of its text, if the text is what it was.
+    fn intact(&self) -> Option<(&PageCheck, u32)> {
+        let (text, crc) = self.covered()?;
+        Some((self.page.as_ref()?, crc)).filter(|_| crc32fast::hash(text) == crc)
+    }
+
+    /// Returns the part of the line that its check covers, and that check.
     fn covered(&self) -> Option<(&[u8], u32)> {
-        let line = self.text.strip_suffix(AFTER_CHAIN.as_bytes())?;
+        let line = self.text.strip_suffix(AFTER_TEXT.as_bytes())?;
         let (line, crc) = line.split_at_checked(line.len().checked_sub(8)?)?;
-        Some((line.strip_suffix(BEFORE_CHAIN.as_bytes())?, parse_crc(crc)?))
+        Some((line.strip_suffix(BEFORE_TEXT.as_bytes())?, parse_crc(crc)?))
     }
 }
 
-/// The check of the texts of all pages so far, for a reader.
+/// Checks the texts of pages, in order.
 #[derive(Debug, Default)]
 pub(crate) struct ChainReader {
     chain: Chain,
     state: ChainState,
+    /// The layers around the first gap.
+    gap: Option<[u32; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -294,44 +316,39 @@ enum ChainState {
 }
 
 impl ChainReader {
-    /// Checks the next page. `before` is the layer of the page before it.
+    /// Checks the next page, of a layer. `before` is the layer of the page before it.
     pub(crate) fn follow(
         &mut self,
         check: Option<&LineCheck>,
         dpi: Option<Dpi>,
+        layer: u32,
         before: Option<u32>,
     ) -> Result<(), CheckFault> {
-        self.chain.pages = self.chain.pages.saturating_add(1);
-        let Some(check) = check else {
-            return match self.state {
-                ChainState::Checked { .. } => Err(CheckFault::Without),
-                _ => {
-                    self.state = ChainState::Unchecked;
-                    Ok(())
-                }
-            };
+        let is_gap = |before: &u32| before.checked_add(1) != Some(layer);
+        self.gap = self.gap.or(before.filter(is_gap).map(|before| [before, layer]));
+        let (page, crc) = match (check, self.state) {
+            (None, ChainState::Checked { .. }) => return Err(CheckFault::Without),
+            (None, _) => {
+                self.state = ChainState::Unchecked;
+                return Ok(());
+            }
+            (Some(_), ChainState::Unchecked) => return Err(CheckFault::AfterUnchecked),
+            (Some(_), ChainState::Checked { ended: true }) => return Err(CheckFault::AfterLast),
+            (Some(check), _) => check.intact().ok_or(CheckFault::Text)?,
         };
-        match self.state {
-            ChainState::Unchecked => return Err(CheckFault::AfterUnchecked),
-            ChainState::Checked { ended: true } => return Err(CheckFault::AfterLast),
-            _ => {}
-        }
-        let (text, crc) = check.covered().ok_or(CheckFault::Chain { before })?;
-        self.chain.crc = continued(self.chain.crc, text);
-        let page = check.page.as_ref().filter(|_| self.chain.crc == crc);
-        let page = page.ok_or(CheckFault::Chain { before })?;
         let found = dpi.map(Dpi::get);
         if !is_same_dpi(found, page.dpi) {
             return Err(CheckFault::Resolution { found, written: page.dpi });
         }
-        match page.pages {
-            Some(written) if written != self.chain.pages => {
-                Err(CheckFault::Pages { found: self.chain.pages, written })
+        self.state = ChainState::Checked { ended: page.end.is_some() };
+        let end = self.chain.end();
+        self.chain.add(crc);
+        match page.end {
+            Some(written) if written.pages != end.pages && self.gap.is_none() => {
+                Err(CheckFault::Pages { found: end.pages, written: written.pages })
             }
-            pages => {
-                self.state = ChainState::Checked { ended: pages.is_some() };
-                Ok(())
-            }
+            Some(written) if written != end => Err(CheckFault::Chain { gap: self.gap }),
+            _ => Ok(()),
         }
     }
 

@@ -158,7 +158,7 @@ impl Page {
         chain: &mut ChainReader,
         before: Option<u32>,
     ) -> Result<(), CheckFault> {
-        chain.follow(self.check.as_ref(), self.dpi, before)
+        chain.follow(self.check.as_ref(), self.dpi, self.info.index, before)
     }
 
     /// Returns what the page says, without its image.
@@ -173,7 +173,7 @@ impl Page {
             compression: self.compression,
             data_bytes: self.data_bytes,
             exposed_px: check.map(|check| check.image.exposed_px),
-            pages: check.and_then(|check| check.pages),
+            pages: check.and_then(|check| check.end).map(|end| end.pages),
         }
     }
 
