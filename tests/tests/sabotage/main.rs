@@ -11,6 +11,7 @@ mod kills;
 mod limits;
 mod memory;
 mod mutants;
+mod stacks;
 mod writers;
 
 /// Returns how often to try something: `few` times, or as often as `LAMP_SABOTAGE` says.
