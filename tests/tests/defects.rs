@@ -83,18 +83,15 @@ fn flipped_facets_change_no_pixel_under_even_odd() {
 
 /// Only the file's digest shows that facets were flipped, and not how many.
 #[test]
-fn flipped_facets_change_no_byte_but_the_digest() {
+fn flipped_facets_change_nothing_but_the_digest() {
     let scratch = Scratch::new();
     scratch.run("lamp sample tower --facets 20k -o broken.stl").succeeds();
     let sliced = || {
         scratch.run(&format!("slice broken.stl {COARSE} -o part.tif")).succeeds_quietly();
-        let layers = scratch.layers("part.tif");
+        let mut layers = scratch.layers("part.tif");
         assert!(layers.iter().all(|layer| layer.info.closed == Some(true)));
-        let digest = layers[0].info.stack.clone().unwrap().digest.into_bytes();
-        let mut bytes = scratch.bytes("part.tif");
-        let at = bytes.windows(digest.len()).position(|text| text == digest).unwrap();
-        bytes[at..at + digest.len()].fill(b'0');
-        (digest, bytes)
+        let digest = layers[0].info.stack.as_mut().unwrap();
+        (std::mem::take(&mut digest.digest), layers)
     };
     let (whole_digest, whole) = sliced();
     for (count, seed) in [(1, 1), (700, 2), (19_000, 3), (1_000_000, 4)] {
