@@ -8,15 +8,14 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use blake3::Hasher;
 use lamp_brep::{BodyFault, BodyReport, BrepError, Prepared, ReadFn, is_step, prepare};
-use lamp_stack::{Length, one_line};
+use lamp_stack::{Length, digest_of, one_line};
 
 use crate::error::SliceError;
 use crate::facet::Units;
 use crate::obj::{self, looks_obj};
 use crate::part::{Facets, Part, Piece};
-use crate::part_file::{PartFile, digest_text};
+use crate::part_file::PartFile;
 use crate::stl;
 use crate::three_mf::{self, Contents, looks_packaged};
 use crate::unpack::{is_gzip, unpack};
@@ -143,7 +142,7 @@ impl Part {
         let bytes = bytes.into();
         let prepared = read_step(bytes.clone(), options)?;
         refuse_faults(&prepared, options.allow_gaps)?;
-        let digest = digest_text(Hasher::new().update(&bytes));
+        let digest = digest_of(&bytes[..])?;
         let part = Self::new(name, vec![of_surfaces(prepared)], digest);
         Ok(part.with(0, options.trust_extent))
     }

@@ -4,12 +4,12 @@ use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
-use blake3::Hasher;
 use lamp_brep::Prepared;
+use lamp_stack::{digest_of, digest_of_digests};
 
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
-use crate::part_file::{PartFile, digest_text};
+use crate::part_file::PartFile;
 use crate::placement::Placement;
 use crate::stl::{FACET_BYTES, HEADER_BYTES, parse};
 
@@ -144,12 +144,10 @@ impl Part {
 
     /// Creates a part of facets in memory.
     pub fn from_facets(name: &str, facets: Vec<Facet>) -> Self {
-        let mut hasher = Hasher::new();
-        for corner in facets.iter().flatten().flatten() {
-            hasher.update(&corner.to_le_bytes());
-        }
-        let piece = Piece::new(Facets::Memory(Arc::new(facets)));
-        Self::new(name, vec![piece], digest_text(&hasher))
+        let numbers = facets.iter().flatten().flatten();
+        let bytes: Vec<u8> = numbers.flat_map(|number| number.to_le_bytes()).collect();
+        let digest = digest_of(&bytes[..]).expect("memory can be read");
+        Self::new(name, vec![Piece::new(Facets::Memory(Arc::new(facets)))], digest)
     }
 
     /// Returns what was read of each STEP file.
@@ -167,16 +165,7 @@ impl Part {
     pub fn joined(models: Vec<Self>) -> Self {
         let names: Vec<&str> = models.iter().map(Self::name).collect();
         let name = names.join("+");
-        let digest = match &models[..] {
-            [alone] => alone.digest.clone(),
-            models => {
-                let mut hasher = Hasher::new();
-                for model in models {
-                    hasher.update(model.digest.as_bytes());
-                }
-                digest_text(&hasher)
-            }
-        };
+        let digest = digest_of_digests(models.iter().map(Self::digest));
         let left_out = models.iter().map(|model| model.left_out).sum();
         let trusts_extent = models.iter().any(|model| model.trusts_extent);
         let mut pieces = Vec::new();

@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use blake3::Hasher;
+use lamp_stack::digest_of;
 
 use crate::error::FileChange;
 
@@ -122,9 +122,7 @@ impl PartFile {
     }
 
     fn digest_now(&self) -> io::Result<String> {
-        let mut hasher = Hasher::new();
-        io::copy(&mut self.reader().take(self.size), &mut hasher)?;
-        Ok(digest_text(&hasher))
+        digest_of(self.reader().take(self.size))
     }
 }
 
@@ -239,9 +237,4 @@ fn read_at(file: &File, to: &mut [u8], at: u64) -> io::Result<usize> {
 #[cfg(windows)]
 fn read_at(file: &File, to: &mut [u8], at: u64) -> io::Result<usize> {
     std::os::windows::fs::FileExt::seek_read(file, to, at)
-}
-
-/// Returns a digest as stacks state it.
-pub(crate) fn digest_text(hasher: &Hasher) -> String {
-    format!("blake3:{}", hasher.finalize().to_hex())
 }

@@ -107,9 +107,12 @@ impl Default for SliceOptions {
     }
 }
 
-/// Ten times the rows of 12 000 layers on an area of 23 x 23 inches at 2400 dpi: even
-/// black rows take time.
-const MAX_ROWS: u64 = 1 << 32;
+/// Four times the rows of 5000 layers on an area of 23 x 23 inches at 2400 dpi: even black
+/// rows take time.
+const MAX_ROWS: u64 = 1 << 30;
+
+/// Twice the layers of 10 um in a cube of 23 inches: even black layers take time.
+const MAX_LAYERS: usize = 1 << 17;
 
 /// A layer of 23 x 23 inches at 2400 dpi has them if contours cross each of its rows 600
 /// times. They take a quarter of a gigabyte.
@@ -176,7 +179,9 @@ impl Slices {
             None => Planes::uniform(bottom_um, top_um, options.thickness, options.plane)?,
         };
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
-        if wanted.len() as u64 * u64::from(grid.height) > MAX_ROWS && !model.model.trusts_extent() {
+        let is_usual =
+            wanted.len() <= MAX_LAYERS && wanted.len() as u64 * u64::from(grid.height) <= MAX_ROWS;
+        if !is_usual && !model.model.trusts_extent() {
             return Err(SliceError::TooManyRows { layers: wanted.len(), rows: grid.height });
         }
         // A list that grows holds up to twice what it needs.
