@@ -67,9 +67,9 @@ pub(crate) struct CureArgs {
 }
 
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
-    check_png_name(&args.output)?;
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
+    check_png_name(&args.output)?;
     let material: Material = entry(&args.material)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let name = input_name(&args.input.stack);
