@@ -222,12 +222,19 @@ fn stray_rows_are_told_once_however_many_copies() {
         Layer { info, dpi: Dpi::new(25.4), image: image.into() }
     };
     scratch.stack("p.tif", [stray(0, &[]), stray(1, &[1, 2, 3])]);
-    let ran = scratch.run("tile p.tif:200 --area 100x100mm --mesh none -o build.tif").succeeds();
-    assert_eq!(ran.stderr, "tile: p.tif: layer 1 (z 0.10 mm) has 3 stray rows: 1-3\n");
+    let said = |options: &str| {
+        let line = format!("tile p.tif:200 --area 100x100mm --mesh none {options} -o build.tif");
+        scratch.run(&line).succeeds().stderr
+    };
+    let all = "tile: p.tif: 3 stray rows in 1 layer, the first in layer 1 (z 0.10 mm): run fix \
+               before tile, or repair the CAD model\n";
+    assert_eq!(said("-q"), all);
+    let listed = "tile: p.tif: layer 1 (z 0.10 mm) has 3 stray rows: 1-3\n";
+    assert_eq!(said("-v"), listed.to_owned() + all);
+    assert_eq!(said(""), all);
     let build = scratch.layers("build.tif");
     assert!(build[0].info.stray_rows.is_empty());
     assert_eq!(build[1].info.stray_rows.len(), 3 * 10);
-    scratch.run("tile p.tif:200 --area 100x100mm --mesh none -q -o build.tif").succeeds_quietly();
 }
 
 #[test]

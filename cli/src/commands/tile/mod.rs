@@ -4,7 +4,7 @@ mod mesh;
 mod stacks;
 mod strips;
 
-use std::cell::Cell;
+use std::cell::RefCell;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -188,17 +188,18 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
         .inspect(|&layers| progress.expect(u64::from(layers) + u64::from(base_layers)));
     let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
     let heights = HeightOptions { settle: args.settle, resample: args.resample };
-    let stray_rows = Cell::new(0);
+    let stray_rows = RefCell::new(StrayTotals::default());
     let build = layout.build(layers, heights, |stray| {
-        stray_rows.set(stray_rows.get() + stray.rows.len());
-        say_stray(&progress, stray);
+        stray_rows.borrow_mut().add(stray);
+        progress.detail(&describe_stray(stray));
     });
-    let finding = || match stray_rows.get() {
-        rows if rows > 0 && args.strict => Some(Exit::Findings(stray_in_all(rows))),
-        _ => None,
-    };
+    let stray_text = || stray_rows.borrow().text();
+    let finding = || stray_text().filter(|_| args.strict).map(Exit::Findings);
     let build = within_height(build, machine);
     strips::write(unless_found(build, finding), strips, output.as_ref(), &progress)?;
+    if let Some(text) = stray_text() {
+        progress.warn(&text);
+    }
     args.tell(&placed)
 }
 
@@ -306,14 +307,40 @@ fn within_height(
     })
 }
 
-fn stray_in_all(rows: usize) -> String {
-    let (rows, have) =
-        if rows == 1 { ("1 row".to_owned(), "is") } else { (format!("{rows} rows"), "are") };
-    format!("{rows} of the parts {have} stray: run fix before tile, or repair the CAD model")
+/// The stray rows that the parts' pages list.
+#[derive(Default)]
+struct StrayTotals {
+    rows: usize,
+    layers: usize,
+    /// The part and the layer of the first.
+    first: Option<(String, String)>,
+}
+
+impl StrayTotals {
+    fn add(&mut self, StrayRows { part, layer, rows }: &StrayRows) {
+        self.rows += rows.len();
+        self.layers += 1;
+        self.first.get_or_insert_with(|| (part.clone(), layer.clone()));
+    }
+
+    /// `blade.tif: 14 stray rows in 3 layers, the first in layer 12 (z 1.20 mm): ...`.
+    fn text(&self) -> Option<String> {
+        let (part, layer) = self.first.as_ref()?;
+        let counted = |count, one: &str, more| match count {
+            1 => format!("1 {one}"),
+            count => format!("{count} {more}"),
+        };
+        let rows = counted(self.rows, "stray row", "stray rows");
+        let layers = counted(self.layers, "layer", "layers");
+        Some(format!(
+            "{part}: {rows} in {layers}, the first in {layer}: run fix before tile, or repair the \
+             CAD model"
+        ))
+    }
 }
 
 /// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
-fn say_stray(progress: &Progress, StrayRows { part, layer, rows }: &StrayRows) {
+fn describe_stray(StrayRows { part, layer, rows }: &StrayRows) -> String {
     let word = if rows.len() == 1 { "row" } else { "rows" };
-    progress.say(&format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows)));
+    format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows))
 }
