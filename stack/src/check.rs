@@ -83,10 +83,17 @@ pub enum CheckFault {
     #[error("its text is not the one that was written")]
     Text,
     /// The pages before the last are not those that its check was made of.
-    #[error("the pages before it are not those that were written: {}", chain_text(*gap))]
+    #[error(
+        "the pages before it are not those that were written: {}",
+        chain_text(*gap, *found, *written)
+    )]
     Chain {
         /// The last layer before and the first after the first gap, if there is one.
         gap: Option<[u32; 2]>,
+        /// The number of pages up to it.
+        found: u32,
+        /// The number of pages that it states.
+        written: u32,
     },
     /// The page's resolution differs from that in its check.
     #[error("its resolution is {}, but it was written with {}", dpi_text(*found), dpi_text(*written))]
@@ -105,22 +112,15 @@ pub enum CheckFault {
     /// The page follows the stack's last page.
     #[error("it stands behind the stack's last page")]
     AfterLast,
-    /// The last page states another number of pages.
-    #[error("it is page {found} and the last of {written}")]
-    Pages {
-        /// The number of pages up to it.
-        found: u32,
-        /// The number that it states.
-        written: u32,
-    },
 }
 
-fn chain_text(gap: Option<[u32; 2]>) -> String {
+fn chain_text(gap: Option<[u32; 2]>, found: u32, written: u32) -> String {
     match gap {
         Some([before, after]) => {
             format!("there is nothing between layer {before} and layer {after}")
         }
-        None => "one is missing, or comes from another stack".to_owned(),
+        None if found != written => format!("with it there are {found} instead of {written}"),
+        None => "one comes from another stack".to_owned(),
     }
 }
 
@@ -344,10 +344,10 @@ impl ChainReader {
         let end = self.chain.end();
         self.chain.add(crc);
         match page.end {
-            Some(written) if written.pages != end.pages && self.gap.is_none() => {
-                Err(CheckFault::Pages { found: end.pages, written: written.pages })
+            Some(written) if written != end => {
+                let (found, written) = (end.pages, written.pages);
+                Err(CheckFault::Chain { gap: self.gap, found, written })
             }
-            Some(written) if written != end => Err(CheckFault::Chain { gap: self.gap }),
             _ => Ok(()),
         }
     }

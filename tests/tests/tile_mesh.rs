@@ -152,9 +152,11 @@ fn an_image_is_repeated_as_the_mesh() {
     for (row, column) in (0..16).flat_map(|row| (0..16).map(move |column| (row, column))) {
         assert_eq!(base.is_white(column, row), mask(&dots[0]).is_white(column, row));
     }
-    scratch
-        .run("tile torus.tif --mesh hexagons -o x.tif")
-        .is_refused_with(&["hexagons", "No such file"]);
+    scratch.run("tile torus.tif --mesh hexagons -o x.tif").is_wrong_usage(&[
+        "hexagons",
+        "there is no such image",
+        "hexagon, square, none",
+    ]);
     for (options, words) in [
         ("--cell 2mm --wall 2mm", "wall"),
         ("--mesh square --cell 100um", "cell"),
