@@ -52,11 +52,12 @@ use options::Common;
 use out_of_memory::note_command;
 use progress::say;
 use signals::{clean_up_on_signals, wait_if_ending};
+use streams::give_up;
 use usage::refuse;
 
 /// Turn CAD parts into layer images for projection photopolymerization.
 #[derive(Parser)]
-#[command(name = "lamp", version, max_term_width = 100, after_help = EXAMPLES)]
+#[command(name = "lamp", version, propagate_version = true, max_term_width = 100, after_help = EXAMPLES)]
 struct Lamp {
     #[command(subcommand)]
     command: Command,
@@ -149,6 +150,7 @@ fn finish(name: &str, result: Result<ExitCode, Exit>) -> ExitCode {
     match result {
         Err(error) if !error.is_reader_gone() => {
             say(&format!("{name}: {error}"));
+            give_up(&error);
             ExitCode::from(error.status())
         }
         Err(_) => ExitCode::SUCCESS,

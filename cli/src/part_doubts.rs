@@ -8,6 +8,8 @@ use lamp_stack::{Dpi, Length};
 const FEW: f64 = 3.0;
 /// Sizes of parts, in millimetres: the largest build area known is 23 inches wide.
 const USUAL_MM: std::ops::Range<f64> = 10.0..600.0;
+/// Smaller than any casting.
+const SMALL_MM: f64 = 1.0;
 /// Larger than any machine.
 const LARGE_MM: f64 = 1000.0;
 
@@ -34,6 +36,8 @@ impl PartSize {
         let unit = self.likely_unit();
         if x.max(y).max(z) > LARGE_MM {
             Some(format!("{}, larger than any machine builds: {unit}", size()))
+        } else if x.max(y).max(z) < SMALL_MM && unit.contains("give --units") {
+            Some(format!("{}, smaller than any casting: {unit}", size()))
         } else if pixels(x.min(y)) < FEW {
             let [columns, rows] = [x, y].map(|mm| short(pixels(mm)));
             Some(format!("{}, only {columns} x {rows} pixels: {unit}", size()))
@@ -64,7 +68,7 @@ impl PartSize {
             Some(unit) if !USUAL_MM.contains(&largest) => {
                 format!("if its file is in {}, give --units {unit}", plural(*unit))
             }
-            _ => "check --units and --scale".to_owned(),
+            _ => "check --units, --scale and --thickness".to_owned(),
         }
     }
 }
@@ -105,12 +109,12 @@ mod tests {
             (
                 [0.076, 0.076, 0.127],
                 Units::Millimetres,
-                "0.076 x 0.076 x 0.127 mm, only 1 layer: if its file is in metres, give --units m",
+                "0.076 x 0.076 x 0.127 mm, smaller than any casting: if its file is in metres, give --units m",
             ),
             (
                 [0.0076, 0.0076, 0.1],
                 Units::Millimetres,
-                "only 0.449 x 0.449 pixels: if its file is in metres, give --units m",
+                "smaller than any casting: if its file is in metres, give --units m",
             ),
             (
                 [1.0, 1.5, 0.1],
@@ -138,7 +142,7 @@ mod tests {
 
     #[test]
     fn usual_parts_raise_no_doubt() {
-        for mm in [[0.1, 0.1, 0.3], [76.2, 76.2, 127.0], [584.2, 584.2, 300.0]] {
+        for mm in [[1.0, 1.0, 1.0], [76.2, 76.2, 127.0], [584.2, 584.2, 300.0]] {
             assert_eq!(doubt(mm, Some(Units::Millimetres)), None);
         }
     }

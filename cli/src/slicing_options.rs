@@ -222,6 +222,11 @@ impl SlicingOptions {
         Ok(found.heights.layer_heights()?)
     }
 
+    /// Returns the size of the frame that the images are given, if it is fixed.
+    pub(crate) fn frame(&self) -> Option<Size> {
+        self.size
+    }
+
     /// Checks that a machine builds in this resolution and these thicknesses.
     pub(crate) fn check_machine(&self, machine: &Machine) -> Result<(), MachineLimit> {
         machine.check_dpi(self.dpi, "the stack")?;

@@ -6,11 +6,12 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, anyhow};
 use lamp_stack::{
-    Destination, FileBeside, FolderBeside, Format, Layer, Page, PageInfo, Pages, PictureFormat,
-    StackError, StackInfo, map_in_order, write_stack,
+    Destination, FileBeside, FolderBeside, Format, Layer, Page, PageInfo, PageWriter, Pages,
+    PictureFormat, StackError, StackInfo, map_in_order, write_stack,
 };
 
 use crate::exit::Exit;
@@ -94,8 +95,20 @@ pub(crate) fn failed_at(place: impl Display + Send + Sync + 'static, error: Stac
     Exit::Failed(anyhow::Error::new(error).context(place))
 }
 
+/// Whether the next stage waits for a stack that this command has not begun.
+static IS_AWAITED: AtomicBool = AtomicBool::new(false);
+
+/// Tells the next stage why no stack comes, if it waits for one.
+pub(crate) fn give_up(error: &Exit) {
+    if IS_AWAITED.swap(false, Ordering::Relaxed) {
+        // Only the original error is reported.
+        let _ = PageWriter::new(io::stdout().lock(), Format::Big).give_up(&error.to_string());
+    }
+}
+
 /// Returns the progress of a command that writes to `output`.
 pub(crate) fn progress(command: &'static str, common: &Common, output: &Output) -> Progress {
+    IS_AWAITED.store(is_stream(&output.output) && !io::stdout().is_terminal(), Ordering::Relaxed);
     let last = !is_stream(&output.output) || io::stdout().is_terminal() || stdout_is_file();
     Progress::new(command, common, last)
 }
@@ -272,6 +285,7 @@ fn destination(output: &Output) -> Result<Destination, Exit> {
             ));
         }
         widen_pipe(&io::stdout());
+        IS_AWAITED.store(false, Ordering::Relaxed);
         return Ok(Destination::Stream(Box::new(io::stdout().lock())));
     }
     if is_folder(path) {

@@ -41,7 +41,7 @@ pub enum SliceError {
     #[error("this is a {0} file, not an STL, STEP, 3MF or OBJ file")]
     OtherFormat(&'static str),
     /// A packed file that is damaged.
-    #[error("it cannot be unpacked: {0}")]
+    #[error("it cannot be unpacked")]
     Packed(#[source] io::Error),
     /// A packed file that holds far more than any mesh its size.
     #[error("it unpacks to more than {most} bytes, which is far more than a packed mesh does")]

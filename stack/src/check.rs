@@ -79,6 +79,9 @@ pub enum CheckFault {
     /// The image is not the one that the page's check was made of.
     #[error("its image is not the one that was written")]
     Image,
+    /// The directory differs from what we write, so that other programs may read another image.
+    #[error("its directory is not the one that was written")]
+    Directory,
     /// The page's text is not the one that its check was made of.
     #[error("its text is not the one that was written")]
     Text,
@@ -272,28 +275,36 @@ impl Line {
 
     /// Parses a page's description. Returns `None` if it is not such a line.
     pub(crate) fn parse(description: &[u8]) -> Option<Self> {
-        let mut info: PageInfo = serde_json::from_slice(description).ok()?;
-        let check = info.other.shift_remove("check").map(|check| LineCheck {
-            page: serde_json::from_str(&check.to_string()).ok(),
-            text: description.to_vec(),
+        let checked = |page| LineCheck { page, text: description.to_vec() };
+        let line = serde_json::from_slice(description).ok().map(|mut info: PageInfo| {
+            let check = info.other.shift_remove("check");
+            let check = check.map(|check| checked(serde_json::from_value(check).ok()));
+            Self { info, check }
         });
-        Some(Self { info, check })
+        match line {
+            Some(Self { check: Some(_), .. }) => line,
+            // It ends as ours do, so it was one of ours, and is damaged.
+            _ if covered(description).is_some() => {
+                Some(Self { info: PageInfo::default(), check: Some(checked(None)) })
+            }
+            line => line,
+        }
     }
 }
 
 impl LineCheck {
     /// Returns the check and that of its text, if the text is what it was.
     fn intact(&self) -> Option<(&PageCheck, u32)> {
-        let (text, crc) = self.covered()?;
+        let (text, crc) = covered(&self.text)?;
         Some((self.page.as_ref()?, crc)).filter(|_| crc32fast::hash(text) == crc)
     }
+}
 
-    /// Returns the part of the line that its check covers, and that check.
-    fn covered(&self) -> Option<(&[u8], u32)> {
-        let line = self.text.strip_suffix(AFTER_TEXT.as_bytes())?;
-        let (line, crc) = line.split_at_checked(line.len().checked_sub(8)?)?;
-        Some((line.strip_suffix(BEFORE_TEXT.as_bytes())?, parse_crc(crc)?))
-    }
+/// Returns the part of a line that its check covers, and that check.
+fn covered(line: &[u8]) -> Option<(&[u8], u32)> {
+    let line = line.strip_suffix(AFTER_TEXT.as_bytes())?;
+    let (line, crc) = line.split_at_checked(line.len().checked_sub(8)?)?;
+    Some((line.strip_suffix(BEFORE_TEXT.as_bytes())?, parse_crc(crc)?))
 }
 
 /// Checks the texts of pages, in order.

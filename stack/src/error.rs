@@ -8,6 +8,9 @@ use crate::check::CheckFault;
 use crate::g4::G4Error;
 use crate::picture_page::PictureFormat;
 
+/// What stands before the reason of a stage that gave up.
+pub(crate) const GAVE_UP: &str = "the stage before gave up: ";
+
 /// An error in reading or writing a stack.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -84,7 +87,7 @@ pub enum StackError {
         stated: u32,
     },
     /// The stage that wrote the stream gave up and said why.
-    #[error("the stage before gave up: {reason}")]
+    #[error("{GAVE_UP}{reason}")]
     GivenUp {
         /// The sentence of that stage.
         reason: String,

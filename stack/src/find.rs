@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::error::StackError;
 use crate::input::{Pages, page_files};
 
 /// Returns the stacks at a path, by name: the path itself if it is a file or a folder of pages,
@@ -23,7 +24,7 @@ pub fn stacks_in(path: &Path) -> io::Result<Vec<PathBuf>> {
     let mut stacks = Vec::new();
     for entry in entries {
         let path = entry.path();
-        if entry.file_type()?.is_dir() {
+        if path.is_dir() {
             stacks.extend(stacks_in(&path)?);
         } else if is_stack_name(&path) {
             stacks.push(path);
@@ -38,13 +39,24 @@ fn is_stack_name(path: &Path) -> bool {
     matches!(extension.as_deref(), Some("tif" | "tiff" | "png"))
 }
 
-/// Returns whether a folder's files are the pages of one stack.
+/// Returns whether a folder's files are the pages of one stack. The first file that tells decides.
 fn is_stack(folder: &Path) -> bool {
-    let Ok(files) = page_files(folder) else { return false };
+    let Ok(mut files) = page_files(folder) else { return false };
     // The first file is the last of the list.
-    let Some(first) = files.last() else { return false };
-    let Ok(pages) = Pages::open(first) else { return true };
-    let mut headers = pages.headers();
-    let alone = headers.next().and_then(Result::ok).is_some_and(|page| page.pages == Some(1));
-    headers.next().is_none_or(|second| second.is_err()) && (files.len() == 1 || !alone)
+    files.reverse();
+    !files.is_empty() && files.iter().find_map(|file| is_page(file, files.len())).unwrap_or(true)
+}
+
+/// Returns whether a file of several is a page and not a stack of its own, if it tells.
+fn is_page(file: &Path, files: usize) -> Option<bool> {
+    let mut headers = Pages::open(file).ok()?.headers();
+    let first = headers.next()?.ok()?;
+    match headers.next() {
+        // A page of ours that says that others follow.
+        Some(Err(StackError::EndedEarly { .. } | StackError::MissingPages { .. })) => Some(true),
+        // Several pages, or a stack that was cut off.
+        Some(_) => Some(false),
+        None if files == 1 => Some(true),
+        None => first.pages.map(|pages| pages > 1),
+    }
 }

@@ -6,7 +6,7 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use crate::check::Chain;
-use crate::error::StackError;
+use crate::error::{GAVE_UP, StackError};
 use crate::layer::Layer;
 use crate::ordered::map_in_order;
 use crate::temporary::{FileBeside, FolderBeside};
@@ -89,7 +89,9 @@ impl Sink {
     fn abandon(self, reason: &impl Display) {
         if let Self::Stream(pages) = self {
             // Only the original error is reported.
-            let _ = pages.give_up(&reason.to_string());
+            let reason = reason.to_string();
+            let first = reason.rsplit(GAVE_UP).next().unwrap_or(&reason);
+            let _ = pages.give_up(first);
         }
     }
 

@@ -95,6 +95,40 @@ fn any_changed_byte_is_an_error_or_changes_nothing() {
 }
 
 #[test]
+fn a_text_that_was_ours_is_not_taken_for_another_program_s() {
+    let stack = StackInfo { layers: Some(1), ..StackInfo::default() };
+    let info = PageInfo { stack: Some(stack), index: 7, ..mask_layer(7).info };
+    let alone = [Layer { info, ..mask_layer(7) }];
+    let whole = write(&alone, Format::Big);
+    assert_eq!(read(&whole).unwrap(), alone);
+    let start = whole.windows(9).position(|text| text == b"{\"layer\":").unwrap();
+    let key = whole.windows(8).position(|text| text == b"\"check\":").unwrap();
+    for at in [start, start + 3, key + 2] {
+        let mut changed = whole.clone();
+        changed[at] ^= 1;
+        assert_eq!(fault(&changed).1, CheckFault::Text, "byte {at}");
+    }
+}
+
+#[test]
+fn a_directory_that_other_programs_would_read_otherwise_is_an_error() {
+    let whole = write(&layers(mask_layer), Format::Big);
+    // The fields of the first page: tag, type, number of values, value.
+    let field = |tag: u16| {
+        let place = |entry: &[u8]| entry[..2] == tag.to_le_bytes();
+        24 + 20 * whole[24..].chunks(20).position(place).unwrap()
+    };
+    for (tag, value) in [(284u16, 2u8), (284, 0), (293, 2)] {
+        let mut changed = whole.clone();
+        changed[field(tag) + 12] = value;
+        assert_eq!(fault(&changed), (0, CheckFault::Directory), "tag {tag}");
+    }
+    let mut changed = whole.clone();
+    changed[field(283) + 12] ^= 1;
+    assert_eq!(fault(&changed), (0, CheckFault::Directory), "another resolution along columns");
+}
+
+#[test]
 fn a_wrong_image_is_named() {
     let layers = layers(gray_layer);
     let mut changed = write(&layers, Format::Big);

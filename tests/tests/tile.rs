@@ -227,7 +227,7 @@ fn stray_rows_are_told_once_however_many_copies() {
         scratch.run(&line).succeeds().stderr
     };
     let all = "tile: p.tif: 3 stray rows in 1 layer, the first in layer 1 (z 0.10 mm): run fix \
-               before tile, or repair the CAD model\n";
+               before tile, and repair the CAD model where fix cannot\n";
     assert_eq!(said("-q"), all);
     let listed = "tile: p.tif: layer 1 (z 0.10 mm) has 3 stray rows: 1-3\n";
     assert_eq!(said("-v"), listed.to_owned() + all);

@@ -78,7 +78,14 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     if args.ignore_checks {
         pages = pages.without_checks();
     }
-    let layers = layers_of_input(pages, &args.input, &progress);
+    let layers = layers_of_input(pages, &args.input, &progress).map(|layer| {
+        let mut layer = layer?;
+        if let Some(stack) = layer.info.stack.as_mut().filter(|_| args.ignore_checks) {
+            // What is missing would be missed again.
+            stack.layers = None;
+        }
+        Ok(layer)
+    });
     match shape {
         OutputKind::Tiff => write_layers(layers, &args.output, &progress),
         OutputKind::Pngs => {

@@ -23,7 +23,7 @@ use crate::slicing_options::SlicingOptions;
 use crate::step_options::{HEADING, length};
 use crate::streams::{check_beside, check_not_input, progress, write_layers};
 
-/// Slice an STL or STEP part into a stack of layer images
+/// Slice a part into a stack of layer images
 ///
 /// A pixel is white (cured) exactly when its centre is inside the part's section at the layer's
 /// plane. Gaps in the mesh leave rows whose crossings do not balance; they are listed on their
@@ -117,7 +117,8 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         .slices(model, &recorded.join(" "), args.layers.clone(), args.memory, exposure, &note)
         .map_err(|error| at_part(error, &args.parts))?;
     if let Some(machine) = &machine {
-        check_part(machine, &slices).map_err(|limit| Exit::from(limit).at(name.clone()))?;
+        check_part(machine, &slices, args.options.frame())
+            .map_err(|limit| Exit::from(limit).at(name.clone()))?;
     }
     let solid = &args.options.solid;
     let size = solid.size(&part, slices.box_mm());
@@ -185,11 +186,15 @@ fn has_no_white(image: &Image) -> bool {
     }
 }
 
-/// Checks that a part lies within a machine's area and height.
-fn check_part(machine: &Machine, slices: &Slices) -> Result<(), MachineLimit> {
+/// Checks that a part, and the frame that it is put into if one is given, lies within a machine's
+/// area and height.
+fn check_part(machine: &Machine, slices: &Slices, frame: Option<Size>) -> Result<(), MachineLimit> {
     let [low, high] = slices.box_mm();
     let side = |k: usize| Length::from_mm(high[k] - low[k]).to_whole_nm();
     machine.check_footprint(Size { width: side(0), height: side(1) })?;
+    if let Some(frame) = frame {
+        machine.check_footprint(frame)?;
+    }
     let thicknesses = slices.layer_heights();
     let height = Length::from_um(thicknesses.thicknesses_um().sum()).to_whole_nm();
     machine.check_height(height, "the part")

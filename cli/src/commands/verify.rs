@@ -1,16 +1,19 @@
 //! `lamp verify`: proves that stacks are whole.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
+use lamp_postprocess::{is_strips, join_strips};
 use lamp_stack::{StackTotals, VerifyError, digest_of, stacks_in, verify};
 use serde::Serialize;
 
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::options::Common;
+use crate::progress::printable;
 use crate::stack_facts::StackFacts;
 use crate::streams::{input_name, is_stream, open_pages, print};
 
@@ -47,10 +50,13 @@ pub(crate) fn run(args: &VerifyArgs, common: &Common) -> Result<(), Exit> {
     let digests = args.against.iter().map(|part| digest_of_part(part)).collect::<Result<_, _>>()?;
     let digests: Vec<String> = digests;
     let mut verdicts = Vec::new();
-    for path in stacks_at(&args.stacks)? {
-        let verdict = Verdict::of(&path, &digests);
+    let stacks = stacks_at(&args.stacks)?;
+    let folders: BTreeSet<&Path> = stacks.iter().filter_map(|path| path.parent()).collect();
+    let strips = folders.into_iter().filter(|folder| is_strips(folder));
+    let of_stacks = stacks.iter().map(|path| Verdict::of(path, &digests));
+    for verdict in of_stacks.chain(strips.map(Verdict::of_strips)) {
         if !args.json && (!common.quiet || verdict.result.is_err()) {
-            print(&format!("{}\n", verdict.line()))?;
+            print(&format!("{}\n", printable(&verdict.line())))?;
         }
         verdicts.push(verdict);
     }
@@ -60,8 +66,10 @@ pub(crate) fn run(args: &VerifyArgs, common: &Common) -> Result<(), Exit> {
     }
     match (faulty, verdicts.len()) {
         (0, _) => Ok(()),
-        (_, 1) => Err(Exit::Failed(anyhow!("the stack is not whole"))),
-        (faulty, all) => Err(Exit::Failed(anyhow!("{faulty} of {all} stacks are not whole"))),
+        (1, all) => Err(Exit::Failed(anyhow!("1 of {all} stacks is not proven whole"))),
+        (faulty, all) => {
+            Err(Exit::Failed(anyhow!("{faulty} of {all} stacks are not proven whole")))
+        }
     }
 }
 
@@ -87,8 +95,8 @@ fn stacks_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Exit> {
 /// What was found about a stack.
 struct Verdict {
     name: String,
-    /// The facts of a stack without fault, or the fault.
-    result: Result<StackTotals, String>,
+    /// The facts of a stack without fault (a folder of strips has none of its own), or the fault.
+    result: Result<Option<StackTotals>, String>,
     /// Whether it was compared with parts.
     compared: bool,
 }
@@ -96,12 +104,21 @@ struct Verdict {
 impl Verdict {
     fn of(path: &Path, digests: &[String]) -> Self {
         let name = input_name(path);
-        let result = Self::checked(path, digests).map_err(|error| {
+        let result = Self::checked(path, digests).map(Some).map_err(|error| {
             let message = error.to_string();
             let place = format!("{name}: ");
             message.strip_prefix(&place).map(str::to_owned).unwrap_or(message)
         });
         Self { name, result, compared: !digests.is_empty() }
+    }
+
+    /// Checks that the strips in a folder are those of one build.
+    fn of_strips(folder: &Path) -> Self {
+        let name = input_name(folder);
+        let joined =
+            join_strips(folder).and_then(|mut layers| layers.try_for_each(|layer| layer.map(drop)));
+        let result = joined.map(|()| None).map_err(|error| Exit::from(error).to_string());
+        Self { name, result, compared: false }
     }
 
     fn checked(path: &Path, digests: &[String]) -> Result<StackTotals, Exit> {
@@ -113,8 +130,8 @@ impl Verdict {
             let stack = totals.first.info.stack.as_ref().filter(|stack| !stack.digest.is_empty());
             let stack = stack.ok_or_else(|| anyhow!("it does not say what it was made from"))?;
             if !stack.is_made_of(digests) {
-                let made_of = &stack.digest;
-                return Err(anyhow!("it was made from another part ({made_of})").into());
+                let (made_of, given) = (&stack.digest, digests.join(" and "));
+                return Err(anyhow!("it was made from {made_of}, not from {given}").into());
             }
         }
         Ok(totals)
@@ -123,14 +140,16 @@ impl Verdict {
     fn line(&self) -> String {
         let name = &self.name;
         let totals = match &self.result {
-            Ok(totals) => totals,
+            Ok(Some(totals)) => totals,
+            Ok(None) => return format!("{name}: whole, the strips make one build"),
             Err(fault) => return format!("{name}: {fault}"),
         };
         let layers = totals.pages;
         let z = totals.first.info.z().zip(totals.top_mm());
         let z = z.map(|(bottom, top)| format!(", z {:.3} to {top:.3} mm", bottom.mm()));
         let compared = if self.compared { ", made from the given part" } else { "" };
-        let facts = format!("{layers} layers{}{compared}", z.unwrap_or_default());
+        let word = if layers == 1 { "layer" } else { "layers" };
+        let facts = format!("{layers} {word}{}{compared}", z.unwrap_or_default());
         if totals.has_checks() {
             format!("{name}: whole, {facts}")
         } else {
@@ -168,7 +187,7 @@ fn answer(verdicts: &[Verdict], whole: bool) -> impl Serialize {
         stack: &verdict.name,
         whole: verdict.result.is_ok(),
         fault: verdict.result.as_ref().err().map(String::as_str),
-        facts: verdict.result.as_ref().ok().map(StackFacts::new),
+        facts: verdict.result.as_ref().ok().and_then(Option::as_ref).map(StackFacts::new),
     });
     Answer { whole, stacks: stacks.collect() }
 }

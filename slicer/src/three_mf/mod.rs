@@ -37,7 +37,7 @@ const USUAL_MODEL: &str = "3D/3dmodel.model";
 #[non_exhaustive]
 pub enum ThreeMfError {
     /// The package is damaged, or packed in another way than 3MF allows.
-    #[error("its ZIP package cannot be read: {0}")]
+    #[error("its ZIP package cannot be read")]
     Package(#[from] ZipError),
     /// A ZIP package of another kind.
     #[error("it is a ZIP package without a 3D model: it has no {0}")]
@@ -63,6 +63,17 @@ pub enum ThreeMfError {
     /// An object that holds itself, or very many objects.
     #[error("its objects hold themselves, or more than {MAX_VISITS} objects in all")]
     Endless,
+    /// No item that is built.
+    #[error(
+        "none of its items is built: {left_out} are left out, being no solids or not to be printed"
+    )]
+    NothingToBuild {
+        /// The number of items that are left out.
+        left_out: usize,
+    },
+    /// Items that stand for far more facets than a package of its size explains.
+    #[error("its items stand for more than {0} facets, far more than a package of its size does")]
+    Copies(u64),
     /// A package that holds far more than any mesh its size.
     #[error("its model unpacks to more than {0} bytes, which is far more than a packed mesh does")]
     Inflated(u64),
@@ -124,7 +135,7 @@ pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
     let path = package.model_path()?;
     let mut models = Models { package, models: BTreeMap::new(), facets: 0 };
     let items = models.get(&path)?.items.clone();
-    let mut found = Found { pieces: Vec::new(), visits: 0 };
+    let mut found = Found { pieces: Vec::new(), visits: 0, facets: 0 };
     let mut left_out = 0;
     for item in items.iter().filter(|item| item.is_built) {
         let path = item.model.as_ref().unwrap_or(&path).clone();
@@ -134,12 +145,17 @@ pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
             left_out += 1;
         }
     }
+    if found.pieces.is_empty() && left_out > 0 {
+        return Err(ThreeMfError::NothingToBuild { left_out });
+    }
     Ok(Contents { pieces: found.pieces, left_out })
 }
 
 struct Found {
     pieces: Vec<Piece>,
     visits: usize,
+    /// The facets of all pieces.
+    facets: u64,
 }
 
 /// The models of a package, each read when it is first asked for.
@@ -189,9 +205,13 @@ impl Models<'_> {
             return Err(ThreeMfError::Endless);
         }
         let placement = reference.placement.then(&outer);
-        let units = self.get(path)?.units;
+        let (units, most) = (self.get(path)?.units, self.package.most);
         let components = match &self.object(path, reference.object)?.shape {
             Shape::Mesh { facets, first } => {
+                found.facets += facets.len() as u64;
+                if found.facets > most {
+                    return Err(ThreeMfError::Copies(most));
+                }
                 let facets = Facets::Memory(facets.clone());
                 let units = Some(units);
                 let piece = Piece { first_facet: *first, units, placement, ..Piece::new(facets) };

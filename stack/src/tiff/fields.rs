@@ -7,19 +7,20 @@ use super::page::{Compression, Page};
 use super::tags::{
     BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, DEFLATE, FILL_ORDER, IMAGE_DESCRIPTION,
     IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, LZW, MODIFIED_HUFFMAN, OLD_DEFLATE, ORIENTATION,
-    PACK_BITS, PER_CENTIMETRE, PER_INCH, PHOTOMETRIC, PREDICTOR, RATIONAL, RESOLUTION_UNIT,
-    ROWS_PER_STRIP, SAMPLE_FORMAT, SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS, STRIP_OFFSETS, T4,
-    T4_OPTIONS, T6, TILE_BYTE_COUNTS, TILE_LENGTH, TILE_OFFSETS, TILE_WIDTH, TWO_DIMENSIONAL,
-    UNCOMPRESSED, UNCOMPRESSED_MODE, WHITE_IS_ZERO, X_RESOLUTION, type_size,
+    PACK_BITS, PER_CENTIMETRE, PER_INCH, PHOTOMETRIC, PLANAR_CONFIGURATION, PREDICTOR, RATIONAL,
+    RESOLUTION_UNIT, ROWS_PER_STRIP, SAMPLE_FORMAT, SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS,
+    STRIP_OFFSETS, T4, T4_OPTIONS, T6, T6_OPTIONS, TILE_BYTE_COUNTS, TILE_LENGTH, TILE_OFFSETS,
+    TILE_WIDTH, TWO_DIMENSIONAL, UNCOMPRESSED, UNCOMPRESSED_MODE, WHITE_IS_ZERO, X_RESOLUTION,
+    Y_RESOLUTION, type_size,
 };
-use crate::check::Line;
+use crate::check::{CheckFault, Line};
 use crate::error::{PageFault, StackError, UnsupportedFeature};
 use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::orientation::Orientation;
 
 /// The tags whose values are read.
-pub(super) const KNOWN: [u16; 21] = [
+pub(super) const KNOWN: [u16; 24] = [
     IMAGE_WIDTH,
     IMAGE_LENGTH,
     BITS_PER_SAMPLE,
@@ -33,8 +34,11 @@ pub(super) const KNOWN: [u16; 21] = [
     ROWS_PER_STRIP,
     STRIP_BYTE_COUNTS,
     X_RESOLUTION,
+    Y_RESOLUTION,
+    PLANAR_CONFIGURATION,
     RESOLUTION_UNIT,
     T4_OPTIONS,
+    T6_OPTIONS,
     PREDICTOR,
     TILE_WIDTH,
     TILE_LENGTH,
@@ -124,6 +128,10 @@ impl Fields {
             return Err(malformed(self.page, PageFault::TooWideToTurn(width)));
         }
         let Line { info, check } = self.line();
+        if check.is_some() && !self.is_as_we_write() {
+            let (layer, fault) = (info.index, CheckFault::Directory);
+            return Err(StackError::Check { layer, fault });
+        }
         Ok(Page {
             number: self.page,
             limits: self.limits,
@@ -140,6 +148,14 @@ impl Fields {
             pieces: Vec::new(),
             data_bytes: 0,
         })
+    }
+
+    /// Returns whether fields that we do not need, but other programs do, are as we write them.
+    fn is_as_we_write(&self) -> bool {
+        let resolution = |tag| self.values.get(&tag);
+        resolution(X_RESOLUTION) == resolution(Y_RESOLUTION)
+            && matches!(self.number_or(PLANAR_CONFIGURATION, 1), Ok(1))
+            && matches!(self.number_or(T6_OPTIONS, 0), Ok(0))
     }
 
     fn is_gray(&self) -> Result<bool, StackError> {

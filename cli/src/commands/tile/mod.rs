@@ -333,8 +333,8 @@ impl StrayTotals {
         let rows = counted(self.rows, "stray row", "stray rows");
         let layers = counted(self.layers, "layer", "layers");
         Some(format!(
-            "{part}: {rows} in {layers}, the first in {layer}: run fix before tile, or repair the \
-             CAD model"
+            "{part}: {rows} in {layers}, the first in {layer}: run fix before tile, and repair the \
+             CAD model where fix cannot"
         ))
     }
 }
