@@ -37,7 +37,9 @@ mod offset;
 mod strips;
 mod tile;
 
-pub use edit::{EditError, EditProblem, Edits, ImageBounds, LayerProblem, OtherLayers, edit};
+pub use edit::{
+    EditError, EditProblem, Edits, ImageBounds, LayerProblem, OtherLayers, OtherPicture, edit,
+};
 pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
 pub use offset::{
     CompensateError, CompensateOptions, CompensateProblem, Compensated, Loss, Shrinkage, ThinWall,

@@ -242,6 +242,93 @@ fn what_is_wrong_is_said_with_the_edit_and_the_key() {
     assert!(said.contains("edit 1 applies to no layer"), "{said}");
 }
 
+/// A PBM of a plus sign, in which 1 is black, and a BMP of the same in 256 levels of gray.
+fn plus_signs() -> (Vec<u8>, Vec<u8>) {
+    let is_white = |column: u32, row: u32| column == 1 || row == 1;
+    let bits = (0..9).map(|k| if is_white(k % 3, k / 3) { '0' } else { '1' });
+    let pbm = format!("P1\n3 3\n{}\n", bits.collect::<String>()).into_bytes();
+    let mut bmp = b"BM".to_vec();
+    let words = |bmp: &mut Vec<u8>, words: &[u32]| {
+        words.iter().for_each(|word| bmp.extend(word.to_le_bytes()));
+    };
+    words(&mut bmp, &[54 + 1024 + 12, 0, 54 + 1024]);
+    words(&mut bmp, &[40, 3, 3, 1 | 8 << 16, 0, 12, 0, 0, 256, 0]);
+    words(&mut bmp, &(0..256).map(|level| level * 0x01_01_01).collect::<Vec<_>>());
+    for row in 0..3 {
+        bmp.extend((0..3).map(|column| if is_white(column, row) { 128 } else { 127 }));
+        bmp.push(0);
+    }
+    (pbm, bmp)
+}
+
+#[test]
+fn a_picture_is_stamped_and_recorded_without_its_folder() {
+    let scratch = with_cube();
+    let (pbm, bmp) = plus_signs();
+    std::fs::create_dir(scratch.path("art")).unwrap();
+    scratch.write("art/plus.pbm", &pbm);
+    scratch.write("art/plus.bmp", &bmp);
+    let list = |file: &str, more: &str| {
+        format!(
+            "[[edit]]\nop = \"subtract\"\nz = [\"0mm\", \"1mm\"]\n\
+             picture = {{ file = \"{file}\", at = [\"7mm\", \"5mm\"]{more} }}\n"
+        )
+    };
+    let before = scratch.layers("cube.tif");
+    for (file, bytes) in [("plus.pbm", &pbm), ("plus.bmp", &bmp)] {
+        let wide = list(file, ", width = \"2.4mm\", align = \"center\"");
+        scratch.write("art/stamp.toml", wide.as_bytes());
+        scratch.run("lamp edit cube.tif art/stamp.toml -o out.tif").succeeds_quietly();
+        let after = scratch.layers("out.tif");
+        // Pixels of 0.8 mm, x 5.8 to 8.2 and y 5 to 7.4.
+        for (place, is) in [
+            ([6.2, 5.4], true),
+            ([7.0, 5.1], false),
+            ([5.9, 6.2], false),
+            ([7.7, 6.7], true),
+            ([7.7, 6.5], false),
+            ([7.3, 7.3], false),
+            ([7.3, 7.5], true),
+        ] {
+            assert_eq!(white_at(&after[1], place), is, "{file} at {place:?}");
+        }
+        let white = |layers: &[Layer], k: usize| mask(&layers[k]).white_pixels();
+        assert_eq!(white(&after, 0) + 5 * 64, white(&before, 0));
+        assert_eq!(white(&after, 2), white(&before, 2));
+        let command = after[0].info.stack.as_ref().unwrap().commands.last().unwrap().clone();
+        let digest = lamp_stack::digest_of(&bytes[..]).unwrap();
+        let told = format!(r#""file":{{"name":"{file}","digest":"{digest}"}}"#);
+        assert!(command.contains(&told) && !command.contains("art"), "{command}");
+    }
+    // By default a pixel is a pixel.
+    scratch.write("art/stamp.toml", list("plus.bmp", "").as_bytes());
+    scratch.run("lamp edit cube.tif art/stamp.toml -o out.tif").succeeds_quietly();
+    let after = scratch.layers("out.tif");
+    assert_eq!(mask(&after[0]).white_pixels() + 5, mask(&before[0]).white_pixels());
+    // Gray pages are stamped, too; their corner is at zero.
+    write_gray_ramp(&scratch.path("ramp.tif"), 256, 100);
+    let gray = list("plus.bmp", "").replace("z = [\"0mm\", \"1mm\"]", "layers = [0, 1]");
+    scratch.write("art/stamp.toml", gray.replace("7mm\", \"5mm", "1in\", \"0in").as_bytes());
+    scratch.run("lamp edit ramp.tif art/stamp.toml -o out.tif").succeeds_quietly();
+    let Image::Gray(stamped) = &*scratch.layers("out.tif")[0].image else { panic!("gray") };
+    let level = |column: u32, row: u32| stamped.level(column, row);
+    assert_eq!([100, 101, 102].map(|column| level(column, 97)), [100, 0, 102]);
+    assert_eq!([100, 101, 102].map(|column| level(column, 98)), [0, 0, 0]);
+    for (file, more, words) in [
+        ("none.bmp", "", &["none.bmp", "No such file"][..]),
+        ("stamp.toml", "", &["stamp.toml"]),
+        ("../cube.tif", "", &["edit 1", "cube.tif has several pages"]),
+        ("plus.bmp", ", width = \"0mm\"", &["edit 1, picture.width", "above zero"]),
+        ("plus.bmp", ", width = \"9mm\"", &["edit 1: plus.bmp reaches outside", "x -10."]),
+    ] {
+        scratch.write("art/stamp.toml", list(file, more).as_bytes());
+        scratch.run("lamp edit cube.tif art/stamp.toml -o bad.tif").is_refused_with(words);
+    }
+    scratch.write("art/stamp.toml", list("plus.bmp", "").as_bytes());
+    let ran = scratch.run("lamp edit cube.tif art/stamp.toml -o art/plus.bmp");
+    assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+}
+
 #[test]
 fn wrong_usage_is_status_2() {
     let scratch = with_cube();

@@ -1,17 +1,20 @@
 //! `lamp edit`: changes a stack at image level.
 
+use std::fs::File;
+use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::{ArgGroup, Args};
-use lamp_postprocess::{EditError, Edits, OtherLayers};
-use lamp_stack::Op;
+use lamp_postprocess::{EditError, Edits, OtherLayers, OtherPicture};
+use lamp_stack::{Limits, Op, Pages, digest_of};
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::streams::{
-    check_not_input, input_name, is_stream, progress, read_beside, read_layers, write_layers,
+    check_not_input, failed_at, input_name, is_stream, layers_of, progress, read_beside,
+    read_layers, write_layers,
 };
 
 /// A list of edits is text of a few kilobytes.
@@ -19,10 +22,10 @@ const MAX_LIST_BYTES: u64 = 1 << 20;
 
 /// Change a design at image level, without slicing it again
 ///
-/// Adds or subtracts boxes, cylinders, lines, labels and other stacks in a range of heights; crops,
-/// pads, mirrors and rotates all layers. Lengths and positions are in part coordinates. Edits are
-/// listed in a TOML file and applied in order; docs/edit.md describes every key. Layers that no
-/// edit applies to pass byte for byte.
+/// Adds or subtracts boxes, cylinders, lines, labels, pictures and other stacks in a range of
+/// heights; crops, pads, mirrors and rotates all layers. Lengths and positions are in part
+/// coordinates. Edits are listed in a TOML file and applied in order; docs/edit.md describes every
+/// key. Layers that no edit applies to pass byte for byte.
 #[derive(Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["edits", "union", "intersect", "difference", "xor"]))]
 #[command(override_usage = "\
@@ -67,9 +70,15 @@ pub(crate) struct EditArgs {
     output: Output,
 }
 
+/// The edits, and the files that they name.
+struct EditFiles {
+    edits: Edits,
+    stacks: Vec<PathBuf>,
+    pictures: Vec<PathBuf>,
+}
+
 impl EditArgs {
-    /// The edits, and the files of the stacks that they name.
-    fn edits(&self) -> Result<(Edits, Vec<PathBuf>), Exit> {
+    fn edits(&self) -> Result<EditFiles, Exit> {
         let ways = [
             (Op::Union, &self.union),
             (Op::Intersect, &self.intersect),
@@ -78,7 +87,8 @@ impl EditArgs {
         ];
         if let Some((op, file)) = ways.into_iter().find_map(|(op, file)| Some((op, file.clone()?)))
         {
-            return Ok((Edits::combine(op, file.clone()), vec![file]));
+            let edits = Edits::combine(op, file.clone());
+            return Ok(EditFiles { edits, stacks: vec![file], pictures: vec![] });
         }
         let list = self.edits.as_deref().expect("one of the group is given");
         let edits = || -> anyhow::Result<Edits> {
@@ -87,8 +97,9 @@ impl EditArgs {
         let edits = edits().with_context(|| input_name(list))?;
         // Files stand beside the list that names them.
         let folder = list.parent().unwrap_or(Path::new(""));
-        let files = edits.stacks().map(|file| folder.join(file)).collect();
-        Ok((edits, files))
+        let stacks = edits.stacks().map(|file| folder.join(file)).collect();
+        let pictures = edits.pictures().map(|file| folder.join(file)).collect();
+        Ok(EditFiles { edits, stacks, pictures })
     }
 
     fn check_streams(&self) -> Result<(), Exit> {
@@ -111,18 +122,20 @@ impl EditArgs {
 
 pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
     args.check_streams()?;
-    let (edits, files) = args.edits()?;
-    check_not_input(&args.output.output, files.iter().chain(&args.edits))?;
+    let EditFiles { edits, stacks, pictures } = args.edits()?;
+    let files = stacks.iter().chain(&pictures).chain(&args.edits);
+    check_not_input(&args.output.output, files)?;
     let progress = progress("edit", common, &args.output);
     let may_reach_beyond = args.input.layers.is_some();
     let other = |file: &PathBuf| {
         let layers = Box::new(read_beside(file)?);
         Ok(OtherLayers { name: input_name(file), layers, may_reach_beyond })
     };
-    let others = files.iter().map(other).collect::<Result<_, Exit>>()?;
+    let others = stacks.iter().map(other).collect::<Result<_, Exit>>()?;
+    let pictures = pictures.iter().map(|file| open_picture(file)).collect::<Result<_, Exit>>()?;
     let layers = read_layers(&args.input, &progress)?;
     let mut counts = vec![0; edits.count()];
-    let edited = lamp_postprocess::edit(layers, edits, others, |_, done| {
+    let edited = lamp_postprocess::edit(layers, edits, others, pictures, |_, done| {
         done.iter().for_each(|&edit| counts[edit] += 1);
     });
     write_layers(edited, &args.output, &progress).map_err(|error| match error {
@@ -135,4 +148,22 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
         progress.say(&format!("edit {number} applies to no layer: check its z or layers"));
     }
     Ok(())
+}
+
+/// Opens a picture. A copy in a temporary file is read, so that the digest is of what is stamped.
+fn open_picture(path: &Path) -> Result<OtherPicture<Exit>, Exit> {
+    let name = path.display().to_string();
+    let max = Limits::default().png_bytes;
+    let copied = || -> anyhow::Result<(File, String)> {
+        let mut copy = tempfile::tempfile()?;
+        let bytes = io::copy(&mut File::open(path)?.take(max + 1), &mut copy)?;
+        ensure!(bytes <= max, "more than {} MiB is not a picture", max >> 20);
+        copy.rewind()?;
+        let digest = digest_of(&copy)?;
+        copy.rewind()?;
+        Ok((copy, digest))
+    };
+    let (copy, digest) = copied().with_context(|| name.clone())?;
+    let pages = Pages::from_file(copy).map_err(|error| failed_at(name.clone(), error))?;
+    Ok(OtherPicture { name, digest, pages: Box::new(layers_of(pages, path, None)) })
 }

@@ -62,7 +62,9 @@ pub enum EditError {
 #[non_exhaustive]
 pub enum EditProblem {
     /// It has none or several of the keys that say what to do.
-    #[error("write one of box, cylinder, line, label, stack, crop, pad, mirror and rotate")]
+    #[error(
+        "write one of box, cylinder, line, label, picture, stack, crop, pad, mirror and rotate"
+    )]
     NotOneAction,
     /// An edit of whole images chooses layers or an operation.
     #[error("it holds for all layers: take op, z and layers out")]
@@ -71,7 +73,7 @@ pub enum EditProblem {
     #[error("z and layers say the same: write one of them")]
     TwoRanges,
     /// Copies are chosen for something that is not drawn.
-    #[error("copies are for boxes, cylinders, lines and labels: take it out")]
+    #[error("copies are for boxes, cylinders, lines, labels and pictures: take it out")]
     CopiesWithoutShape,
     /// All but the shapes in the copies would go.
     #[error("intersect would take away all of the build but the shapes in these copies")]
@@ -113,6 +115,20 @@ pub enum EditProblem {
         text: String,
         /// The image, or that of the part whose copy has the label.
         image: ImageBounds,
+    },
+    /// A picture is not all on the image.
+    #[error("{picture} reaches outside the image, which is {image}: move it, or pad first")]
+    PictureOutside {
+        /// The name of the picture's file.
+        picture: String,
+        /// The image, or that of the part whose copies have the picture.
+        image: ImageBounds,
+    },
+    /// A file of a picture has more than one.
+    #[error("{picture} has several pages, and a picture is one")]
+    SeveralPages {
+        /// The picture's file.
+        picture: String,
     },
     /// The other stack is empty.
     #[error("{stack} has no layers")]

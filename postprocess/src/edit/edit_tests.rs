@@ -51,7 +51,7 @@ fn edited(
         layers: Box::new(layers.into_iter().map(Ok)) as Box<dyn Iterator<Item = _>>,
         may_reach_beyond: false,
     });
-    edit(layers.into_iter().map(Ok), edits, others.collect(), |_, _| {}).collect()
+    edit(layers.into_iter().map(Ok), edits, others.collect(), vec![], |_, _| {}).collect()
 }
 
 fn mask(layer: &Layer) -> &Mask {
@@ -59,6 +59,15 @@ fn mask(layer: &Layer) -> &Mask {
         Image::Mask(mask) => mask,
         Image::Gray(_) => panic!("a mask was edited"),
     }
+}
+
+/// Edits a stack with a list that names one file of a picture, with these pages.
+fn stamped(layers: Vec<Layer>, list: &str, pages: Vec<Layer>) -> Result<Vec<Layer>, EditError> {
+    let pages = Box::new(pages.into_iter().map(Ok));
+    let (name, digest) = ("art/logo.png".to_owned(), "blake3:00".to_owned());
+    let pictures = vec![OtherPicture { name, digest, pages }];
+    let edits = Edits::from_toml(list)?;
+    edit(layers.into_iter().map(Ok), edits, vec![], pictures, |_, _| {}).collect()
 }
 
 /// Quarters of a millimetre, so that many edges lie on centres.
@@ -139,6 +148,77 @@ proptest! {
                 let expected = within && off.sqrt() < diameter / 2.0;
                 prop_assert_eq!(mask(after).is_white(column, row), expected, "{} {} {}", column, row, index);
             }
+        }
+    }
+
+    #[test]
+    fn a_pixel_is_in_a_picture_when_its_centre_is_in_a_white_pixel_of_it(
+        (before, gray) in (arbitrary_mask(), any::<bool>()),
+        levels in (1usize..6).prop_flat_map(|width| {
+            let level = prop::sample::select(&[0u8, 127, 128, 255][..]);
+            prop::collection::vec(prop::collection::vec(level, width), 1..6)
+        }),
+        places in prop::collection::vec((12i32..60, -8i32..28), 1..3),
+        (quarters, align, turn) in (prop::option::of(1i32..30), 0usize..3, 0usize..8),
+        op in op(),
+    ) {
+        // No edge of a pixel of the picture lies on a centre.
+        let places: Vec<[f64; 2]> = places.into_iter()
+            .map(|(x, y)| [f64::from(x) / 4.0 + 0.013, f64::from(y) / 4.0 + 0.017]).collect();
+        let (columns, rows) = (levels[0].len() as f64, levels.len() as f64);
+        let width = quarters.map(|quarters| f64::from(quarters) / 4.0);
+        let turn = lamp_stack::Orientation::ALL[turn];
+        let at: Vec<_> = places.iter().map(|&place| lengths(place)).collect();
+        let list = format!(
+            "[[edit]]\nop = \"{op}\"\n[edit.picture]\nfile = \"logo.png\"\nat = [{}]\n\
+             align = \"{}\"\nturn = \"{turn}\"\n{}",
+            at.join(", "), ["left", "center", "right"][align],
+            width.map_or(String::new(), |width| format!("width = \"{width}mm\"\n")),
+        );
+        // Undoes the turn about each place, and looks for the pixel of the picture.
+        let side = width.map_or(1.0, |width| width / columns);
+        let found = |(column, row): (i32, i32)| -> Vec<u8> {
+            let centre = [3.5 + f64::from(column), 6.5 - f64::from(row)];
+            let of_place = |place: &[f64; 2]| {
+                let [mut x, mut y] = [centre[0] - place[0], centre[1] - place[1]];
+                for _ in 0..turn.quarters() {
+                    [x, y] = [y, -x];
+                }
+                x = if turn.is_mirrored() { -x } else { x } + align as f64 / 2.0 * columns * side;
+                let [column, row] = [x / side, rows - y / side].map(|at| at.floor() as i32);
+                let row = levels.get(usize::try_from(row).ok()?)?;
+                row.get(usize::try_from(column).ok()?).copied()
+            };
+            places.iter().filter_map(of_place).collect()
+        };
+        let is_in = |pixel| found(pixel).iter().any(|level| *level >= 128);
+        let mut picture = GrayMask::new(levels[0].len() as u32);
+        for row in &levels {
+            picture.push_runs(row.iter().map(|level| (1, *level))).unwrap();
+        }
+        let mut page = layer(0, Image::Gray(picture.clone()));
+        if !gray {
+            page.image = Image::Mask(picture.at_least(128)).into();
+        }
+        let result = stamped(vec![layer(0, Image::Mask(before.clone()))], &list, vec![page]);
+        // Around the image, too, as no pixel may be cut off.
+        let around = || (-40..60i32).flat_map(|row| (-40..60i32).map(move |column| (column, row)));
+        let is_on_image = |&(column, row): &(i32, i32)| {
+            (0..WIDTH as i32).contains(&column) && (0..HEIGHT as i32).contains(&row)
+        };
+        if around().any(|pixel| !is_on_image(&pixel) && !found(pixel).is_empty()) {
+            prop_assert!(result.unwrap_err().to_string().contains("logo.png reaches outside"));
+            return Ok(());
+        }
+        if !around().any(is_in) {
+            prop_assert!(result.unwrap_err().to_string().contains("no pixel"));
+            return Ok(());
+        }
+        let after = result.unwrap();
+        for (column, row) in around().filter(is_on_image) {
+            let [x, y] = [column, row].map(|at| at as u32);
+            let expected = op.is_white(before.is_white(x, y), is_in((column, row)));
+            prop_assert_eq!(mask(&after[0]).is_white(x, y), expected, "{} {}", x, y);
         }
     }
 
@@ -264,6 +344,63 @@ fn each_copy_of_a_build_has_the_next_number() {
     }
     assert!(white > 20, "{white}");
     assert_eq!(mask(&after[0]).white_pixels(), white);
+}
+
+/// A picture of two rows: white, black, white, black; and white.
+fn logo() -> Layer {
+    layer(0, Image::Mask(Mask::new(4, vec![0, 4, 5], vec![0, 1, 2, 3, 0]).unwrap()))
+}
+
+fn black() -> Vec<Layer> {
+    vec![layer(0, Image::Mask(Mask::black(WIDTH, HEIGHT)))]
+}
+
+#[test]
+fn a_picture_may_fill_the_image_but_not_reach_beside_it() {
+    let list = |keys: &str| format!("[[edit]]\n[edit.picture]\nfile = \"../logo.png\"\n{keys}\n");
+    let rows = |keys: &str| {
+        let after = stamped(black(), &list(keys), vec![logo()]).unwrap();
+        (0..HEIGHT).map(|row| mask(&after[0]).row(row).to_vec()).collect::<Vec<_>>()
+    };
+    let whole = rows("at = [\"3mm\", \"1mm\"]\nwidth = \"12mm\"");
+    assert_eq!(whole[0], [0, 3, 6, 9]);
+    assert_eq!((&whole[2], &whole[3], &whole[5]), (&whole[0], &vec![0], &vec![0]));
+    assert!(whole[6].is_empty());
+    let small = rows("at = [[\"3.5mm\", \"-0.5mm\"]]\nwidth = \"4mm\"");
+    assert_eq!((&small[5][..], &small[6][..]), (&[0, 1, 2, 3][..], &[0, 4][..]));
+    let error = |keys: &str, pages| stamped(black(), &list(keys), pages).unwrap_err().to_string();
+    for at in ["2mm", "12mm"] {
+        let error = error(&format!("at = [\"{at}\", \"0mm\"]"), vec![logo()]);
+        assert!(error.starts_with("edit 1: logo.png reaches outside the image, which is x 3.000"));
+    }
+    let at = "at = [\"5mm\", \"0mm\"]";
+    assert_eq!(
+        error(at, vec![logo(), logo()]),
+        "edit 1: art/logo.png has several pages, and a picture is one"
+    );
+    assert_eq!(error(at, vec![]), "edit 1: art/logo.png has no layers");
+    let after = stamped(black(), &list(at), vec![logo()]).unwrap();
+    let commands = &after[0].info.stack.as_ref().unwrap().commands;
+    let told = r#"edit [{"picture":{"at":["5mm","0mm"],"file":{"name":"logo.png","digest":"blake3:00"}}}]"#;
+    assert_eq!(commands, &[told.to_owned()]);
+}
+
+#[test]
+fn each_copy_of_a_build_has_the_picture() {
+    let list = "[[edit]]\ncopies = true\n\
+                picture = { file = \"logo.png\", at = [\"5mm\", \"0mm\"], width = \"8mm\" }\n";
+    let mut build = vec![layer(0, Image::Mask(Mask::black(60, 40)))];
+    let tile = json!({ "part_pixels": [12, 9], "part_origin_mm": [3.0, 7.0],
+                       "copies": [[1, 2], [20, 30]], "turns": ["0", "180"] });
+    build[0].info.stack.as_mut().unwrap().other.insert("tile".to_owned(), tile);
+    let after = stamped(build, list, vec![logo()]).unwrap();
+    let part = stamped(black(), &list.replace("copies = true", ""), vec![logo()]).unwrap();
+    for (left, top, turn) in [(1, 2, "0"), (20, 30, "180")] {
+        let frame = lamp_stack::Frame { left, top, width: WIDTH, height: HEIGHT };
+        let expected = mask(&part[0]).oriented(turn.parse().unwrap()).unwrap();
+        assert_eq!(mask(&after[0]).framed(frame), expected);
+    }
+    assert_eq!(mask(&after[0]).white_pixels(), 2 * (2 * 2 * 2 + 8 * 2));
 }
 
 #[test]

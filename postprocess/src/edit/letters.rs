@@ -56,7 +56,7 @@ fn glyph(face: &Face<'_>, letter: char) -> Option<GlyphId> {
 }
 
 /// Turns a point about the origin, with y up.
-fn turned([x, y]: Point, turn: Orientation) -> Point {
+pub(super) fn turned([x, y]: Point, turn: Orientation) -> Point {
     let start = if turn.is_mirrored() { [-x, y] } else { [x, y] };
     (0..turn.quarters()).fold(start, |[x, y], _| [-y, x])
 }

@@ -83,6 +83,11 @@ impl Edits {
     pub fn stacks(&self) -> impl Iterator<Item = &PathBuf> {
         self.list.iter().filter_map(|edit| Some(&edit.stack.as_ref()?.file))
     }
+
+    /// Returns the files of the pictures that the edits name, in order.
+    pub fn pictures(&self) -> impl Iterator<Item = &PathBuf> {
+        self.list.iter().filter_map(|edit| Some(&edit.picture.as_ref()?.file))
+    }
 }
 
 impl Edit {
@@ -97,11 +102,12 @@ impl Edit {
             self.cylinder.is_some(),
             self.line.is_some(),
             self.label.is_some(),
+            self.picture.is_some(),
         ];
         let of_all =
             [self.crop.is_some(), self.pad.is_some(), self.mirror.is_some(), self.rotate.is_some()];
-        let count = |of: [bool; 4]| of.into_iter().filter(|is| *is).count();
-        let (shapes, of_all) = (count(shapes), count(of_all));
+        let count = |of: &[bool]| of.iter().filter(|is| **is).count();
+        let (shapes, of_all) = (count(&shapes), count(&of_all));
         if shapes + of_all + usize::from(self.stack.is_some()) != 1 {
             return Some(EditProblem::NotOneAction);
         }
@@ -185,6 +191,14 @@ mod tests {
             (
                 "cylinder = { at = [\"0mm\", \"0mm\"], diameter = \"1mm\", along = \"x\" }",
                 &["edit 2", "between"],
+            ),
+            (
+                "picture = { file = \"a.bmp\", at = [\"0mm\", \"0mm\"], width = \"0mm\" }",
+                &["edit 2, picture.width", "above zero"],
+            ),
+            (
+                "picture = { file = \"a.bmp\", at = [\"0mm\"] }",
+                &["edit 2, picture.at", "[x, y], or a list of places"],
             ),
             (
                 "label = { text = \"a\", at = [[\"0mm\", \"0mm\"]], height = \"1mm\", turn = \"45\" }",

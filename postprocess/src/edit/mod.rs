@@ -16,6 +16,7 @@ mod letters;
 mod list;
 mod other_stacks;
 mod page_changes;
+mod pictures;
 mod plan;
 mod schema;
 mod shape;
@@ -29,13 +30,14 @@ pub use image_bounds::ImageBounds;
 pub use list::Edits;
 pub use other_stacks::OtherLayers;
 pub(crate) use page_changes::frame_page;
+pub use pictures::OtherPicture;
 
 use other_stacks::AlignedStack;
 use plan::EditPlan;
 
 /// Makes a list of edits in every layer of a stack. `others` are the stacks that the
-/// edits name, in order. `done` is called with each layer and the indices of the edits
-/// that were made in it.
+/// edits name, in order, and `pictures` the pictures. `done` is called with each layer
+/// and the indices of the edits that were made in it.
 ///
 /// Shapes and stacks lie in the part's coordinates. A pixel is in a shape if its centre
 /// is, a layer in a range of heights if its middle is.
@@ -54,7 +56,7 @@ use plan::EditPlan;
 /// "#;
 ///
 /// let layers = std::iter::once(Ok::<_, EditError>(layer));
-/// let mut edited = edit(layers, Edits::from_toml(list)?, vec![], |_, _| {});
+/// let mut edited = edit(layers, Edits::from_toml(list)?, vec![], vec![], |_, _| {});
 /// let Image::Mask(mask) = edited.next().unwrap()?.image.into_image() else { unreachable!() };
 /// assert_eq!((mask.row(2), mask.row(3)), (&[0][..], &[0, 2, 5][..]));
 /// # Ok::<(), EditError>(())
@@ -66,11 +68,12 @@ use plan::EditPlan;
 /// added over all heights has layers above the last.
 ///
 /// # Panics
-/// Panics if there are fewer `others` than the edits name.
+/// Panics if there are fewer `others` or `pictures` than the edits name.
 pub fn edit<E: From<EditError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     edits: Edits,
     others: Vec<OtherLayers<E>>,
+    mut pictures: Vec<OtherPicture<E>>,
     mut done: impl FnMut(&Layer, &[usize]),
 ) -> impl Iterator<Item = Result<Layer, E>> {
     let mut beside = AlignedStacks::new(&edits, others);
@@ -84,7 +87,7 @@ pub fn edit<E: From<EditError> + Send>(
         };
         let planned = match &plan {
             Some(plan) => Ok(Arc::clone(plan)),
-            None => EditPlan::new(&edits, &layer, &mut beside.others)
+            None => EditPlan::new(&edits, &layer, &mut beside.others, &mut pictures)
                 .map(|new| Arc::clone(plan.insert(Arc::new(new)))),
         };
         Some(planned.and_then(|plan| Ok(ToEdit { others: beside.at(&layer.info)?, layer, plan })))

@@ -14,6 +14,7 @@ use super::image_bounds::ImageBounds;
 use super::list::Edits;
 use super::other_stacks::{AlignedStack, middle};
 use super::page_changes::{frame_page, turn_page};
+use super::pictures::OtherPicture;
 use super::schema::{Edit, LengthRange, Mirror};
 use super::shape::EditShape;
 
@@ -81,16 +82,18 @@ impl LayerSelection {
 
 impl EditPlan {
     /// Plans edits of a stack from its first layer. `others` are the stacks that they
-    /// name.
+    /// name, and `pictures` the pictures.
     pub(super) fn new<E: From<EditError>>(
         edits: &Edits,
         first: &Layer,
         others: &mut [AlignedStack<E>],
+        pictures: &mut [OtherPicture<E>],
     ) -> Result<Self, E> {
         let mut plan =
             Self { place: ImageBounds::of(first), steps: Vec::new(), command: String::new() };
         let (mut place, mut info) = (plan.place, first.info.clone());
-        let (mut others, mut told) = (others.iter_mut(), edits.told.clone());
+        let (mut others, mut pictures) = (others.iter_mut(), pictures.iter_mut());
+        let mut told = edits.told.clone();
         for (number, (edit, told)) in (1..).zip(edits.list.iter().zip(&mut told)) {
             let step = match &edit.stack {
                 Some(stack) => {
@@ -102,7 +105,16 @@ impl EditPlan {
                         .map_err(|problem| problem.of_edit(number))?;
                     PlannedEdit::Other { reach: LayerSelection::of(edit), op: edit.op(), frame }
                 }
-                None => PlannedEdit::of(edit, number, &place, &info)?,
+                None => {
+                    let mut picture = None;
+                    if let Some(keys) = &edit.picture {
+                        let file = pictures.next().expect("there is a file for each picture");
+                        told["picture"]["file"] =
+                            json!({ "name": keys.name(), "digest": file.digest });
+                        picture = Some(file.read(number)?);
+                    }
+                    PlannedEdit::of(edit, number, &place, &info, picture.as_ref())?
+                }
             };
             step.follow(&mut info)?;
             if let PlannedEdit::Frame { place: after, .. }
@@ -164,12 +176,13 @@ impl EditPlan {
 
 impl PlannedEdit {
     /// Plans an edit that names no other stack, for images at `place` and the first page
-    /// `info`.
+    /// `info`, with the picture that it names.
     fn of(
         edit: &Edit,
         number: usize,
         place: &ImageBounds,
         info: &PageInfo,
+        picture: Option<&Mask>,
     ) -> Result<Self, EditError> {
         let turned = |turn| Self::Turn { turn, height: place.height, place: place.turned(turn) };
         let framed = |frame: Frame| {
@@ -191,7 +204,7 @@ impl PlannedEdit {
             return framed(cropped(crop, number, place)?);
         }
         let copies = BuildCopy::all(&edit.copies, info, place)?;
-        let shape = EditShape::of(edit, number, place, copies)?;
+        let shape = EditShape::of(edit, number, place, copies, picture)?;
         let reach = match LayerSelection::of(edit) {
             // Copies begin above the base layers.
             LayerSelection::All if !edit.copies.is_none() => {

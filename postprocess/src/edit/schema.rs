@@ -1,5 +1,6 @@
 //! The TOML tables of a list of edits, and their values.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use lamp_stack::{Length, LengthError, Op, Orientation};
@@ -27,6 +28,7 @@ pub(super) struct Edit {
     pub(super) cylinder: Option<Cylinder>,
     pub(super) line: Option<StraightLine>,
     pub(super) label: Option<Label>,
+    pub(super) picture: Option<Picture>,
     pub(super) stack: Option<OtherStack>,
     pub(super) crop: Option<Rectangle>,
     pub(super) pad: Option<Pad>,
@@ -125,6 +127,30 @@ pub(super) struct Label {
     pub(super) step: i32,
 }
 
+/// A picture whose white pixels are the shape.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Picture {
+    pub(super) file: PathBuf,
+    /// The places of the lower edge's left end, middle or right end, by `align`.
+    #[serde(deserialize_with = "places")]
+    pub(super) at: Vec<[Length; 2]>,
+    /// Without one, a pixel of the picture is one of the stack.
+    #[serde(default, deserialize_with = "some_size")]
+    pub(super) width: Option<Length>,
+    #[serde(default)]
+    pub(super) align: Align,
+    #[serde(default, deserialize_with = "turn")]
+    pub(super) turn: Orientation,
+}
+
+impl Picture {
+    /// Returns the file's name without its folder.
+    pub(super) fn name(&self) -> Cow<'_, str> {
+        self.file.file_name().unwrap_or_default().to_string_lossy()
+    }
+}
+
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OtherStack {
@@ -190,7 +216,16 @@ fn some_span<'de, D: Deserializer<'de>>(from: D) -> Result<Option<LengthRange>, 
 }
 
 fn places<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<[Length; 2]>, D::Error> {
-    let texts = Vec::<[String; 2]>::deserialize(from)?;
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "write a place [x, y], or a list of places")]
+    enum Places {
+        One([String; 2]),
+        Several(Vec<[String; 2]>),
+    }
+    let texts = match Places::deserialize(from)? {
+        Places::One(place) => vec![place],
+        Places::Several(places) => places,
+    };
     texts.iter().map(|[x, y]| Ok([length(x)?, length(y)?])).collect()
 }
 
@@ -206,6 +241,10 @@ fn distance<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
 fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
     let length = distance(from)?;
     if length.um() == 0.0 { Err(D::Error::custom("it must be above zero")) } else { Ok(length) }
+}
+
+fn some_size<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Length>, D::Error> {
+    size(from).map(Some)
 }
 
 fn turn<'de, D: Deserializer<'de>>(from: D) -> Result<Orientation, D::Error> {

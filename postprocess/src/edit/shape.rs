@@ -10,6 +10,7 @@ use super::fill::{Point, disc, polygons};
 use super::image_bounds::{ImageBounds, PixelMap};
 use super::letters::{numbered, outlines};
 use super::other_stacks::middle;
+use super::pictures::stamped;
 use super::schema::{Cylinder, CylinderAxis, Edit, Label, Rectangle, StraightLine};
 
 /// The error of letters' curves, in pixels.
@@ -24,16 +25,17 @@ pub(super) enum EditShape {
 }
 
 impl EditShape {
-    /// Creates an edit's shape in each of `copies`.
+    /// Creates an edit's shape in each of `copies`, with the `picture` that it names.
     ///
     /// # Errors
     /// Returns an error if a letter has no outline, a line no length, or the shape no
-    /// pixel.
+    /// pixel, or if a label or picture reaches outside the image.
     pub(super) fn of(
         edit: &Edit,
         number: usize,
         place: &ImageBounds,
         copies: Vec<BuildCopy>,
+        picture: Option<&Mask>,
     ) -> Result<Self, EditError> {
         let wrong = |problem: EditProblem| problem.of_edit(number);
         let grids: Vec<PixelMap> =
@@ -52,6 +54,10 @@ impl EditShape {
                 .collect::<Result<_, _>>()
                 .map_err(wrong)?;
             composed(&copies, place, |k, part| polygons(&lines[k], part.width, part.height))
+        } else if let Some((keys, picture)) = edit.picture.as_ref().zip(picture) {
+            let part = copies.first().map_or(place, |copy| &copy.part);
+            let stamp = stamped(keys, picture, part, part.grid()?).map_err(wrong)?;
+            composed(&copies, place, |_, _| stamp.clone())
         } else {
             if edit.line.is_some_and(|line| line.from == line.to) {
                 return Err(wrong(EditProblem::PointLine));
