@@ -29,7 +29,7 @@ const MAX_ROWS: u32 = 1000;
 /// run costs one for every 2560 pixels.
 const MAX_CODES: u64 = 1 << 20;
 
-/// Reads bytes as STL, as [`part`] says.
+/// Reads bytes as STL, as `part` says.
 ///
 /// # Panics
 /// Where that is not so.
@@ -37,7 +37,7 @@ pub fn stl(bytes: &[u8]) {
     part(bytes);
 }
 
-/// Reads bytes as OBJ, and as what gzip packed, as [`part`] says.
+/// Reads bytes as OBJ, and as what gzip packed, as `part` says.
 ///
 /// # Panics
 /// Where that is not so.
@@ -45,7 +45,7 @@ pub fn obj(bytes: &[u8]) {
     part(bytes);
 }
 
-/// Reads bytes as a 3MF package, and as the model of one, as [`part`] says.
+/// Reads bytes as a 3MF package, and as the model of one, as `part` says.
 ///
 /// # Panics
 /// Where that is not so.
