@@ -9,7 +9,7 @@ const FEW: f64 = 3.0;
 /// Sizes of parts, in millimetres: the largest build area known is 23 inches wide.
 const USUAL_MM: std::ops::Range<f64> = 10.0..600.0;
 /// Smaller than any casting.
-const SMALL_MM: f64 = 1.0;
+const SMALL_MM: f64 = 0.5;
 /// Larger than any machine.
 const LARGE_MM: f64 = 1000.0;
 
@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn usual_parts_raise_no_doubt() {
-        for mm in [[1.0, 1.0, 1.0], [76.2, 76.2, 127.0], [584.2, 584.2, 300.0]] {
+        for mm in [[0.3, 0.3, 0.6], [76.2, 76.2, 127.0], [584.2, 584.2, 300.0]] {
             assert_eq!(doubt(mm, Some(Units::Millimetres)), None);
         }
     }

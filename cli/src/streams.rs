@@ -98,9 +98,9 @@ pub(crate) fn failed_at(place: impl Display + Send + Sync + 'static, error: Stac
 /// Whether the next stage waits for a stack that this command has not begun.
 static IS_AWAITED: AtomicBool = AtomicBool::new(false);
 
-/// Tells the next stage why no stack comes, if it waits for one.
+/// Tells the next stage why no stack comes, if it waits for one. Wrong usage writes nothing.
 pub(crate) fn give_up(error: &Exit) {
-    if IS_AWAITED.swap(false, Ordering::Relaxed) {
+    if !matches!(error, Exit::Usage(_)) && IS_AWAITED.swap(false, Ordering::Relaxed) {
         // Only the original error is reported.
         let _ = PageWriter::new(io::stdout().lock(), Format::Big).give_up(&error.to_string());
     }

@@ -97,8 +97,8 @@ fn any_changed_byte_is_an_error_or_changes_nothing() {
 #[test]
 fn a_text_that_was_ours_is_not_taken_for_another_program_s() {
     let stack = StackInfo { layers: Some(1), ..StackInfo::default() };
-    let info = PageInfo { stack: Some(stack), index: 7, ..mask_layer(7).info };
-    let alone = [Layer { info, ..mask_layer(7) }];
+    let info = PageInfo { stack: Some(stack), ..mask_layer(3).info };
+    let alone = [Layer { info, ..mask_layer(3) }];
     let whole = write(&alone, Format::Big);
     assert_eq!(read(&whole).unwrap(), alone);
     let start = whole.windows(9).position(|text| text == b"{\"layer\":").unwrap();

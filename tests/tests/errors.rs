@@ -1,8 +1,10 @@
 //! Checks errors: one sentence, a status that tells usage from input, no file under its final name.
 
 use std::fs;
+use std::io::Cursor;
 
 use lamp_fixtures::Sample;
+use lamp_stack::Pages;
 use lamp_tests::{Ran, Scratch};
 
 /// Makes a folder with a good part, a good stack and many kinds of bad files.
@@ -164,7 +166,11 @@ fn a_part_that_cannot_be_sliced_is_named_with_what_is_wrong() {
         let words = [&[place.as_str()], words].concat();
         is_bad_input(&scratch, &format!("slice {name} -o x.tif"), &words);
         is_bad_input(&scratch, &format!("slice {name} -o x/"), &words);
-        is_bad_input(&scratch, &format!("slice {name}"), &words);
+        // The next stage is told, too.
+        let ran = scratch.run(&format!("slice {name}")).is_refused_with(&words);
+        let told = Pages::from_stream(Cursor::new(ran.stdout)).unwrap().next().unwrap();
+        let told = told.unwrap_err().to_string();
+        assert!(words.iter().all(|word| told.contains(word)), "{told}");
     }
 }
 
