@@ -1,6 +1,6 @@
 //! Interprets the values of a page's directory.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use super::layout::Layout;
 use super::page::{Compression, Page};
@@ -53,7 +53,7 @@ pub(super) struct Fields {
     pub(super) little_endian: bool,
     pub(super) limits: Limits,
     /// The type and bytes of each field, by tag.
-    pub(super) values: HashMap<u16, (u16, Vec<u8>)>,
+    pub(super) values: BTreeMap<u16, (u16, Vec<u8>)>,
 }
 
 impl Fields {
