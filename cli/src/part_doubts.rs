@@ -33,24 +33,33 @@ impl PartSize {
         let size = || format!("the part is {} x {} x {} mm", short(x), short(y), short(z));
         let pixels = |mm: f64| Length::from_mm(mm).pixels(dpi);
         let layers = thickness.map_or(FEW, |thickness| (1000.0 * z / thickness.um()).round());
-        let unit = self.likely_unit();
+        let advice = self.advice();
         if x.max(y).max(z) > LARGE_MM {
-            Some(format!("{}, larger than any machine builds: {unit}", size()))
-        } else if x.max(y).max(z) < SMALL_MM && unit.contains("give --units") {
-            Some(format!("{}, smaller than any casting: {unit}", size()))
+            Some(format!("{}, larger than any machine builds: {advice}", size()))
+        } else if x.max(y).max(z) < SMALL_MM && self.likely_unit().is_some() {
+            Some(format!("{}, smaller than any casting: {advice}", size()))
         } else if pixels(x.min(y)) < FEW {
             let [columns, rows] = [x, y].map(|mm| short(pixels(mm)));
-            Some(format!("{}, only {columns} x {rows} pixels: {unit}", size()))
+            Some(format!("{}, only {columns} x {rows} pixels: {advice}", size()))
         } else if layers < FEW {
             let layers = if layers > 1.0 { "2 layers" } else { "1 layer" };
-            Some(format!("{}, only {layers}: {unit}", size()))
+            Some(format!("{}, only {layers}: {advice}", size()))
         } else {
             None
         }
     }
 
-    /// Returns what to do about the size: give the unit that makes it usual, if one does.
-    fn likely_unit(&self) -> String {
+    /// Returns what to do about the size.
+    fn advice(&self) -> String {
+        match (self.units, self.likely_unit()) {
+            (None, _) => "check the unit that its file states, and --scale".to_owned(),
+            (_, Some(unit)) => format!("if its file is in {}, give --units {unit}", plural(unit)),
+            (_, None) => "check --units, --scale and --thickness".to_owned(),
+        }
+    }
+
+    /// Returns the unit that would make an unusual size usual, if there is one.
+    fn likely_unit(&self) -> Option<Units> {
         // Nearly all files are in millimetres or inches.
         const LIKELY: [Units; 5] = [
             Units::Millimetres,
@@ -59,17 +68,10 @@ impl PartSize {
             Units::Metres,
             Units::Micrometres,
         ];
-        let Some(units) = self.units else {
-            return "check the unit that its file states, and --scale".to_owned();
-        };
+        let units = self.units?;
         let largest = self.mm.into_iter().fold(0.0, f64::max);
         let in_unit = |unit: &Units| USUAL_MM.contains(&(largest * unit.mm() / units.mm()));
-        match LIKELY.iter().find(|unit| **unit != units && in_unit(unit)) {
-            Some(unit) if !USUAL_MM.contains(&largest) => {
-                format!("if its file is in {}, give --units {unit}", plural(*unit))
-            }
-            _ => "check --units, --scale and --thickness".to_owned(),
-        }
+        LIKELY.into_iter().find(in_unit).filter(|_| !USUAL_MM.contains(&largest))
     }
 }
 

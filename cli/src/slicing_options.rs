@@ -222,14 +222,11 @@ impl SlicingOptions {
         Ok(found.heights.layer_heights()?)
     }
 
-    /// Returns the size of the frame that the images are given, if it is fixed.
-    pub(crate) fn frame(&self) -> Option<Size> {
-        self.size
-    }
-
-    /// Checks that a machine builds in this resolution and these thicknesses.
+    /// Checks that a machine builds in this resolution, these thicknesses and this size, as far as
+    /// it is given.
     pub(crate) fn check_machine(&self, machine: &Machine) -> Result<(), MachineLimit> {
         machine.check_dpi(self.dpi, "the stack")?;
+        self.size.map_or(Ok(()), |size| machine.check_footprint(size, "the image"))?;
         if self.adaptive {
             machine.check_thickness(self.heights.min(), "the thinnest layer")?;
             machine.check_thickness(self.heights.max(), "the thickest layer")

@@ -51,6 +51,18 @@ fn learn_part(path: &Path, stack: Option<&StackInfo>) {
     }
 }
 
+/// Passes the pages of a stack on, and learns its part from them.
+pub(crate) fn learning_part<'a>(
+    pages: Pages,
+    path: &'a Path,
+) -> impl Iterator<Item = Result<Page, StackError>> + 'a {
+    pages.inspect(|page| {
+        if let Ok(page) = page {
+            learn_part(path, page.info().stack.as_ref());
+        }
+    })
+}
+
 /// Prints the result of a command to standard output.
 pub(crate) fn print(text: &str) -> Result<(), Exit> {
     let written = io::stdout().lock().write_all(text.as_bytes());

@@ -1,5 +1,6 @@
 //! Finds the stacks in a folder.
 
+use std::collections::HashSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,22 +16,36 @@ use crate::input::{Pages, page_files};
 /// # Errors
 /// Returns an error if a folder cannot be read.
 pub fn stacks_in(path: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut stacks = Vec::new();
+    add_stacks(path, &mut HashSet::new(), &mut stacks)?;
+    Ok(stacks)
+}
+
+/// Adds the stacks at a path, but not those of a folder that links have led to before.
+fn add_stacks(
+    path: &Path,
+    seen: &mut HashSet<PathBuf>,
+    stacks: &mut Vec<PathBuf>,
+) -> io::Result<()> {
     if !path.is_dir() || is_stack(path) {
-        return Ok(vec![path.to_owned()]);
+        stacks.push(path.to_owned());
+        return Ok(());
+    }
+    if !seen.insert(path.canonicalize()?) {
+        return Ok(());
     }
     let mut entries = fs::read_dir(path)?.collect::<Result<Vec<_>, _>>()?;
     entries.retain(|entry| !entry.file_name().as_encoded_bytes().starts_with(b"."));
     entries.sort_by_key(fs::DirEntry::file_name);
-    let mut stacks = Vec::new();
     for entry in entries {
         let path = entry.path();
         if path.is_dir() {
-            stacks.extend(stacks_in(&path)?);
+            add_stacks(&path, seen, stacks)?;
         } else if is_stack_name(&path) {
             stacks.push(path);
         }
     }
-    Ok(stacks)
+    Ok(())
 }
 
 /// Returns whether a file has the extension of a stack.

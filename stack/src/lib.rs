@@ -46,6 +46,7 @@ mod ordered;
 mod orientation;
 mod output;
 mod packbits;
+mod page_folder;
 mod picture_page;
 mod png_page;
 mod png_write;

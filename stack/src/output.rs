@@ -5,12 +5,12 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use crate::check::Chain;
-use crate::error::{GAVE_UP, StackError};
+use crate::error::StackError;
 use crate::layer::Layer;
 use crate::ordered::map_in_order;
+use crate::page_folder::PageFolder;
 use crate::temporary::{FileBeside, FolderBeside};
-use crate::tiff::{EncodedPage, Format, PageWriter, file_of_page};
+use crate::tiff::{EncodedPage, Format, PageWriter};
 
 /// The place that a stack is written to.
 pub enum Destination {
@@ -37,11 +37,9 @@ where
     E: From<StackError> + Display + Send,
 {
     let mut sink = Sink::new(to, format)?;
-    let pages =
-        map_in_order(layers, |layer: Layer| Ok((layer.info.index, EncodedPage::new(&layer))));
-    for page in pages {
+    for page in map_in_order(layers, |layer: Layer| Ok(EncodedPage::new(&layer))) {
         match page {
-            Ok((index, page)) => sink.push(index, page)?,
+            Ok(page) => sink.push(page)?,
             Err(error) => {
                 sink.abandon(&error);
                 return Err(error);
@@ -53,7 +51,7 @@ where
 
 enum Sink {
     File { pages: PageWriter<BufWriter<File>>, temporary: FileBeside },
-    Folder(PageFolder),
+    Folder { pages: PageFolder<(EncodedPage, Format)>, format: Format },
     Stream(PageWriter<BufWriter<Box<dyn Write>>>),
 }
 
@@ -71,17 +69,15 @@ impl Sink {
                 let out = BufWriter::with_capacity(BUFFER_BYTES, temporary.file().try_clone()?);
                 Self::File { pages: PageWriter::new(out, format), temporary }
             }
-            Destination::Folder(temporary) => {
-                Self::Folder(PageFolder { temporary, format, chain: Chain::default(), held: None })
-            }
+            Destination::Folder(folder) => Self::Folder { pages: PageFolder::new(folder), format },
         })
     }
 
-    fn push(&mut self, index: u32, page: EncodedPage) -> Result<(), StackError> {
+    fn push(&mut self, page: EncodedPage) -> Result<(), StackError> {
         match self {
             Self::Stream(pages) => pages.push(page),
             Self::File { pages, .. } => pages.push(page),
-            Self::Folder(folder) => folder.push(index, page),
+            Self::Folder { pages, format } => pages.push((page, *format)),
         }
     }
 
@@ -89,9 +85,7 @@ impl Sink {
     fn abandon(self, reason: &impl Display) {
         if let Self::Stream(pages) = self {
             // Only the original error is reported.
-            let reason = reason.to_string();
-            let first = reason.rsplit(GAVE_UP).next().unwrap_or(&reason);
-            let _ = pages.give_up(first);
+            let _ = pages.give_up(&reason.to_string());
         }
     }
 
@@ -102,37 +96,8 @@ impl Sink {
                 pages.finish()?;
                 temporary.persist()?;
             }
-            Self::Folder(folder) => folder.finish()?,
+            Self::Folder { pages, .. } => pages.finish()?,
         }
         Ok(())
-    }
-}
-
-/// A folder of single-page files. One page is held back, because the last one says so.
-struct PageFolder {
-    temporary: FolderBeside,
-    format: Format,
-    chain: Chain,
-    held: Option<(u32, EncodedPage)>,
-}
-
-impl PageFolder {
-    fn push(&mut self, index: u32, page: EncodedPage) -> Result<(), StackError> {
-        match self.held.replace((index, page)) {
-            Some((index, before)) => self.write(index, &before, false),
-            None => Ok(()),
-        }
-    }
-
-    fn write(&mut self, index: u32, page: &EncodedPage, last: bool) -> Result<(), StackError> {
-        let path = self.temporary.path().join(format!("layer_{index:05}.tif"));
-        let bytes = file_of_page(page, self.format, &mut self.chain, last);
-        Ok(File::create_new(path)?.write_all(&bytes)?)
-    }
-
-    fn finish(mut self) -> Result<(), StackError> {
-        let (index, page) = self.held.take().ok_or(StackError::NoLayers)?;
-        self.write(index, &page, true)?;
-        self.temporary.persist()
     }
 }

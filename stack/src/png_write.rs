@@ -1,6 +1,5 @@
 //! Writes layers and pictures as PNG files.
 
-use std::fs::File;
 use std::io::{self, Write};
 
 use png::{
@@ -14,6 +13,7 @@ use crate::layer::{Image, Layer};
 use crate::length::Dpi;
 use crate::mask::white_runs;
 use crate::ordered::map_in_order;
+use crate::page_folder::{PageFile, PageFolder};
 use crate::png_page::{DESCRIPTION, EXACT_DPI};
 use crate::temporary::FolderBeside;
 
@@ -29,21 +29,11 @@ pub fn write_png_folder<E>(
 where
     E: From<StackError> + Send,
 {
-    let mut chain = Chain::default();
-    let mut write = |page: &PngPage, is_last| {
-        let path = folder.path().join(format!("layer_{:05}.png", page.index));
-        File::create_new(path)?.write_all(&page.file(&mut chain, is_last))
-    };
-    // One page is held back, because the last one says so.
-    let mut held: Option<PngPage> = None;
+    let mut pages = PageFolder::new(folder);
     for page in map_in_order(layers, |layer: Layer| Ok(PngPage::new(&layer)?)) {
-        if let Some(before) = held.replace(page?) {
-            write(&before, false).map_err(StackError::from)?;
-        }
+        pages.push(page?)?;
     }
-    let last = held.ok_or(StackError::NoLayers)?;
-    write(&last, true).map_err(StackError::from)?;
-    Ok(folder.persist()?)
+    Ok(pages.finish()?)
 }
 
 /// Encodes a layer as a PNG: 1-bit for a mask, 8-bit for a gray mask. A `tEXt` chunk with
@@ -55,7 +45,7 @@ where
 /// # Errors
 /// Returns an error if the image has no pixels.
 pub fn png_of_layer(layer: &Layer) -> Result<Vec<u8>, StackError> {
-    Ok(PngPage::new(layer)?.file(&mut Chain::default(), true))
+    Ok(PngPage::new(layer)?.bytes(&mut Chain::default(), true))
 }
 
 /// A layer encoded as a PNG without its line, which depends on the pages before it.
@@ -76,9 +66,15 @@ impl PngPage {
             line: line(layer),
         })
     }
+}
+
+impl PageFile for PngPage {
+    fn name(&self) -> String {
+        format!("layer_{:05}.png", self.index)
+    }
 
     /// Returns the PNG with its line in a chunk after the header.
-    fn file(&self, chain: &mut Chain, is_last: bool) -> Vec<u8> {
+    fn bytes(&self, chain: &mut Chain, is_last: bool) -> Vec<u8> {
         let line = chain.close(&self.line, is_last);
         let body = [b"tEXt", DESCRIPTION.as_bytes(), &[0], line.as_bytes()].concat();
         let length = (body.len() - 4) as u32;

@@ -3,7 +3,6 @@
 use thiserror::Error;
 
 use crate::error::StackError;
-use crate::input::Pages;
 use crate::layer::PageInfo;
 use crate::length::{Dpi, Length};
 use crate::ordered::map_in_order;
@@ -77,13 +76,15 @@ pub enum LayerFault {
     },
 }
 
-/// Reads a stack to its end, and returns its facts if nothing is wrong: every page decodes, images, texts, order and number of pages are
-/// those that were written (as far as pages carry checks), heights follow each other without a gap,
-/// and all images have one size and resolution.
+/// Reads a stack to its end, and returns its facts if nothing is wrong: every page decodes; images,
+/// texts, order and number of pages are those that were written (as far as pages carry checks);
+/// heights follow each other without a gap; and all images have one size and resolution.
 ///
 /// # Errors
 /// Returns the first fault.
-pub fn verify(pages: Pages) -> Result<StackTotals, VerifyError> {
+pub fn verify(
+    pages: impl Iterator<Item = Result<Page, StackError>>,
+) -> Result<StackTotals, VerifyError> {
     let pages = pages.map(|page| page.map_err(VerifyError::from));
     let headers = map_in_order(pages, |page: Page| {
         let header = page.header();

@@ -101,7 +101,7 @@ fn info_reads_pipes_folders_and_ranges() {
     let scratch = with_cube();
     let of_file = info(&scratch, "lamp info cube.tif");
     let of_pipe = info(&scratch, "slice cube.stl --dpi 100 --thickness 1mm | lamp info");
-    assert_eq!(of_pipe, of_file.replace("cube.tif", "standard input"));
+    assert_eq!(of_pipe, of_file.replace("cube.tif", "cube (standard input)"));
     scratch.run("fix cube.tif -o pages/").succeeds();
     let of_folder = info(&scratch, "lamp info pages");
     assert_eq!(of_folder, of_file.replace("cube.tif", "pages"));

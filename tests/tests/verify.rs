@@ -35,7 +35,7 @@ fn a_whole_stack_is_said_to_be_whole() {
     let whole = "whole, 20 layers, z 0.000 to 20.000 mm";
     assert_eq!(verified(&scratch, "lamp verify cube.tif"), format!("cube.tif: {whole}\n"));
     let from_pipe = verified(&scratch, "slice cube.stl --dpi 100 --thickness 1mm | lamp verify");
-    assert!(from_pipe.ends_with(&format!(": {whole}\n")), "{from_pipe}");
+    assert_eq!(from_pipe, format!("cube (standard input): {whole}\n"));
 }
 
 #[test]

@@ -36,7 +36,6 @@ pub(crate) struct InfoArgs {
 }
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
-    let name = input_name(&args.input.stack);
     let pages = open_pages(&args.input.stack)?;
     let facts = if args.runs {
         runs_of(pages, &args.input)?
@@ -53,7 +52,8 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
     if args.json {
         return print_answer("lamp-info-1", &facts.json());
     }
-    print(&facts.text(&name))
+    // The first page has told the part of standard input.
+    print(&facts.text(&input_name(&args.input.stack)))
 }
 
 fn header_info(header: &PageHeader) -> &PageInfo {

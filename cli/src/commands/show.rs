@@ -11,7 +11,9 @@ use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order}
 use crate::exit::Exit;
 use crate::options::EveryNth;
 use crate::picture::{Picture, PictureScale, Region};
-use crate::streams::{check_png_name, failed_at, input_name, is_stream, open_pages, write_file};
+use crate::streams::{
+    check_png_name, failed_at, input_name, is_stream, learning_part, open_pages, write_file,
+};
 use crate::thumbnails::{Thumbnail, contact_sheet, write_animation};
 
 /// Show a layer as a PNG picture, or many on one sheet or as an animation
@@ -98,9 +100,8 @@ fn show_one(args: &ShowArgs) -> Result<(), Exit> {
 }
 
 fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
-    let name = input_name(&args.stack);
-    let failed = |error| failed_at(name.clone(), error);
-    let mut pages = open_pages(&args.stack)?;
+    let failed = |error| failed_at(input_name(&args.stack), error);
+    let mut pages = learning_part(open_pages(&args.stack)?, &args.stack);
     let mut next = 0;
     let pages = std::iter::from_fn(|| {
         if next >= layers.range.end {
@@ -127,6 +128,7 @@ fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
     });
     let thumbnails = thumbnails.collect::<Result<Vec<_>, Exit>>()?;
     if thumbnails.is_empty() {
+        let name = input_name(&args.stack);
         return Err(Exit::Failed(anyhow!("{name}: no layer is in that range")));
     }
     if args.animate {
@@ -178,29 +180,28 @@ fn write(
 
 /// Returns the layer of an index.
 fn layer_numbered(stack: &Path, index: u32) -> Result<Layer, Exit> {
-    let name = input_name(stack);
-    let failed = |error| failed_at(name.clone(), error);
+    let failed = |error| failed_at(input_name(stack), error);
     let mut last = None;
-    for page in open_pages(stack)? {
+    for page in learning_part(open_pages(stack)?, stack) {
         let page = page.map_err(failed)?;
         if page.info().index == index {
             return page.decode().map_err(failed);
         }
         last = Some(page.info().index);
     }
+    let name = input_name(stack);
     let last = last.map_or_else(String::new, |last| format!("; the last is {last}"));
     Err(Exit::Failed(anyhow!("{name}: there is no layer {index}{last}")))
 }
 
 /// Returns the layer at a height.
 fn layer_at(stack: &Path, z: Length) -> Result<Layer, Exit> {
-    let name = input_name(stack);
-    let failed = |error| failed_at(name.clone(), error);
+    let failed = |error| failed_at(input_name(stack), error);
     let (mut lowest, mut last) = (None, None);
-    for page in open_pages(stack)? {
+    for page in learning_part(open_pages(stack)?, stack) {
         let page = page.map_err(failed)?;
         let Some([bottom, top]) = heights(page.info()) else {
-            let layer = page.info().name();
+            let (name, layer) = (input_name(stack), page.info().name());
             return Err(Exit::Failed(anyhow!(
                 "{name}: {layer} states no height: choose a layer with --layer"
             )));
@@ -215,6 +216,7 @@ fn layer_at(stack: &Path, z: Length) -> Result<Layer, Exit> {
         // The top of the stack belongs to its last layer.
         (_, Some((page, top))) if z == top => page.decode().map_err(failed),
         (Some(bottom), Some((_, top))) => {
+            let name = input_name(stack);
             let [z, bottom, top] = [z, bottom, top].map(Length::mm);
             Err(Exit::Failed(anyhow!(
                 "{name}: no layer is at z {z} mm: the layers are from {bottom:.3} to {top:.3} mm"

@@ -1,14 +1,13 @@
 //! `lamp slice`: slices a part into a stack.
 
 use std::cell::Cell;
-use std::iter;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::machine::{Machine, MachineLimit};
 use lamp_slicer::{PixelGrid, Polished, Slices, StrayBand};
-use lamp_stack::{Image, Length, Size};
+use lamp_stack::{Length, Size};
 
 use crate::catalogue::entry;
 use crate::exit::Exit;
@@ -18,10 +17,10 @@ use crate::mesh_report::{Counts, MeshReport, RowPositions};
 use crate::options::{Common, Output, parse_layers, parse_memory};
 use crate::part_arg::{PartArg, paths};
 use crate::part_options::{Reading, at_part, name_of_all};
-use crate::progress::{Progress, say};
+use crate::progress::Progress;
 use crate::slicing_options::SlicingOptions;
 use crate::step_options::{HEADING, length};
-use crate::streams::{check_beside, check_not_input, progress, write_layers};
+use crate::streams::{check_beside, check_not_input, progress, unless_found, write_layers};
 
 /// Slice a part into a stack of layer images
 ///
@@ -117,8 +116,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         .slices(model, &recorded.join(" "), args.layers.clone(), args.memory, exposure, &note)
         .map_err(|error| at_part(error, &args.parts))?;
     if let Some(machine) = &machine {
-        check_part(machine, &slices, args.options.frame())
-            .map_err(|limit| Exit::from(limit).at(name.clone()))?;
+        check_part(machine, &slices).map_err(|limit| Exit::from(limit).at(name.clone()))?;
     }
     let solid = &args.options.solid;
     let size = solid.size(&part, slices.box_mm());
@@ -130,7 +128,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     if args.strict && !doubts.is_empty() {
         return Err(Exit::Findings(doubts.join("; ")).at(name));
     }
-    doubts.iter().for_each(|doubt| warn(doubt));
+    doubts.iter().for_each(|doubt| progress.warn(doubt));
     progress.expect(slices.layer_count() as u64);
     let mut bridged =
         Bridged::new(slices, args.fallback.as_deref(), &args.options, args.layers.clone())?;
@@ -138,7 +136,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     let is_blank = Cell::new(true);
     let layers = bridged.by_ref().map(|layer| {
         let mut layer = layer.map_err(|error| at_part(error.into(), &args.parts))?;
-        is_blank.set(is_blank.get() && has_no_white(&layer.image));
+        is_blank.set(is_blank.get() && layer.image.change_count() == 0);
         name_command(&mut layer);
         counts.add(&layer.info);
         if args.report.is_some() {
@@ -146,9 +144,8 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         }
         Ok(layer)
     });
-    let refused = || (args.strict && is_blank.get()).then(|| Err(Exit::Findings(BLANK.to_owned())));
-    let layers = layers.chain(iter::once_with(refused).flatten());
-    write_layers(layers, &args.output, &progress)?;
+    let finding = || (args.strict && is_blank.get()).then(|| Exit::Findings(BLANK.to_owned()));
+    write_layers(unless_found(layers, finding), &args.output, &progress)?;
     let slices = &bridged.slices;
     if let Some(path) = &args.report {
         let trace = slices.trace(&bands).map_err(|error| at_part(error.into(), &args.parts))?;
@@ -166,7 +163,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     }
     say_stray_rows(&progress, counts, args.report.as_deref());
     if is_blank.get() {
-        warn(BLANK);
+        progress.warn(BLANK);
     }
     Ok(())
 }
@@ -174,27 +171,11 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
 /// What a stack without white calls for.
 const BLANK: &str = "no layer has a white pixel: check the part, its unit and --layers";
 
-/// Says what `--strict` stops for, however quiet the command is to be.
-fn warn(doubt: &str) {
-    say(&format!("slice: {doubt}"));
-}
-
-fn has_no_white(image: &Image) -> bool {
-    match image {
-        Image::Mask(mask) => mask.rows().all(<[u32]>::is_empty),
-        Image::Gray(gray) => gray.rows().flatten().all(|change| change.level == 0),
-    }
-}
-
-/// Checks that a part, and the frame that it is put into if one is given, lies within a machine's
-/// area and height.
-fn check_part(machine: &Machine, slices: &Slices, frame: Option<Size>) -> Result<(), MachineLimit> {
+/// Checks that a part lies within a machine's area and height.
+fn check_part(machine: &Machine, slices: &Slices) -> Result<(), MachineLimit> {
     let [low, high] = slices.box_mm();
     let side = |k: usize| Length::from_mm(high[k] - low[k]).to_whole_nm();
-    machine.check_footprint(Size { width: side(0), height: side(1) })?;
-    if let Some(frame) = frame {
-        machine.check_footprint(frame)?;
-    }
+    machine.check_footprint(Size { width: side(0), height: side(1) }, "the part")?;
     let thicknesses = slices.layer_heights();
     let height = Length::from_um(thicknesses.thicknesses_um().sum()).to_whole_nm();
     machine.check_height(height, "the part")

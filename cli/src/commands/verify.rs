@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use lamp_postprocess::{is_strips, join_strips};
 use lamp_stack::{StackTotals, VerifyError, digest_of, stacks_in, verify};
@@ -15,7 +15,7 @@ use crate::json_report::print_answer;
 use crate::options::Common;
 use crate::progress::printable;
 use crate::stack_facts::StackFacts;
-use crate::streams::{input_name, is_stream, open_pages, print};
+use crate::streams::{input_name, is_stream, learning_part, open_pages, print};
 
 /// Prove that stacks are whole: every page, image, text and height
 ///
@@ -47,8 +47,8 @@ pub(crate) struct VerifyArgs {
 }
 
 pub(crate) fn run(args: &VerifyArgs, common: &Common) -> Result<(), Exit> {
-    let digests = args.against.iter().map(|part| digest_of_part(part)).collect::<Result<_, _>>()?;
-    let digests: Vec<String> = digests;
+    let digests = args.against.iter().map(|part| digest_of_part(part));
+    let digests = digests.collect::<Result<Vec<_>, _>>()?;
     let mut verdicts = Vec::new();
     let stacks = stacks_at(&args.stacks)?;
     let folders: BTreeSet<&Path> = stacks.iter().filter_map(|path| path.parent()).collect();
@@ -95,7 +95,8 @@ fn stacks_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Exit> {
 /// What was found about a stack.
 struct Verdict {
     name: String,
-    /// The facts of a stack without fault (a folder of strips has none of its own), or the fault.
+    /// The facts of a stack without fault (a folder of strips has none of its own), or a sentence
+    /// that names the stack and the fault.
     result: Result<Option<StackTotals>, String>,
     /// Whether it was compared with parts.
     compared: bool,
@@ -103,13 +104,9 @@ struct Verdict {
 
 impl Verdict {
     fn of(path: &Path, digests: &[String]) -> Self {
-        let name = input_name(path);
-        let result = Self::checked(path, digests).map(Some).map_err(|error| {
-            let message = error.to_string();
-            let place = format!("{name}: ");
-            message.strip_prefix(&place).map(str::to_owned).unwrap_or(message)
-        });
-        Self { name, result, compared: !digests.is_empty() }
+        let result = Self::checked(path, digests).map(Some).map_err(|error| error.to_string());
+        // The first page has told the part of standard input.
+        Self { name: input_name(path), result, compared: !digests.is_empty() }
     }
 
     /// Checks that the strips in a folder are those of one build.
@@ -117,23 +114,18 @@ impl Verdict {
         let name = input_name(folder);
         let joined =
             join_strips(folder).and_then(|mut layers| layers.try_for_each(|layer| layer.map(drop)));
-        let result = joined.map(|()| None).map_err(|error| Exit::from(error).to_string());
-        Self { name, result, compared: false }
+        let named = |error| Exit::from(error).at(name.clone()).to_string();
+        Self { result: joined.map(|()| None).map_err(named), name, compared: false }
     }
 
     fn checked(path: &Path, digests: &[String]) -> Result<StackTotals, Exit> {
-        let totals = verify(open_pages(path)?).map_err(|error| match error {
-            VerifyError::Stack(error) => anyhow::Error::new(error),
-            error => anyhow::Error::new(error),
-        })?;
-        if !digests.is_empty() {
-            let stack = totals.first.info.stack.as_ref().filter(|stack| !stack.digest.is_empty());
-            let stack = stack.ok_or_else(|| anyhow!("it does not say what it was made from"))?;
-            if !stack.is_made_of(digests) {
-                let (made_of, given) = (&stack.digest, digests.join(" and "));
-                return Err(anyhow!("it was made from {made_of}, not from {given}").into());
-            }
-        }
+        let at = |error: anyhow::Error| Exit::Failed(error).at(input_name(path));
+        let totals =
+            verify(learning_part(open_pages(path)?, path)).map_err(|error| match error {
+                VerifyError::Stack(error) => at(error.into()),
+                error => at(error.into()),
+            })?;
+        compare(&totals, digests).map_err(at)?;
         Ok(totals)
     }
 
@@ -142,7 +134,7 @@ impl Verdict {
         let totals = match &self.result {
             Ok(Some(totals)) => totals,
             Ok(None) => return format!("{name}: whole, the strips make one build"),
-            Err(fault) => return format!("{name}: {fault}"),
+            Err(fault) => return fault.clone(),
         };
         let layers = totals.pages;
         let z = totals.first.info.z().zip(totals.top_mm());
@@ -159,6 +151,20 @@ impl Verdict {
             )
         }
     }
+}
+
+/// Checks that a stack was made from the parts of these digests, if there are any.
+fn compare(totals: &StackTotals, digests: &[String]) -> anyhow::Result<()> {
+    if digests.is_empty() {
+        return Ok(());
+    }
+    let stack = totals.first.info.stack.as_ref().filter(|stack| !stack.digest.is_empty());
+    let stack = stack.context("it does not say what it was made from")?;
+    if !stack.is_made_of(digests) {
+        let (made_of, given) = (&stack.digest, digests.join(" and "));
+        bail!("it was made from {made_of}, not from {given}");
+    }
+    Ok(())
 }
 
 /// What cannot be known of a stack without checks.

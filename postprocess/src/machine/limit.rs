@@ -19,10 +19,12 @@ pub enum MachineLimit {
         /// Its area.
         most: Size,
     },
-    /// A part that does not lie within the area, turned by 90 degrees or not.
-    #[error("the part takes {footprint}, and the machine {machine} builds on {most}")]
+    /// A part or an image that does not lie within the area, turned by 90 degrees or not.
+    #[error("{what} takes {footprint}, and the machine {machine} builds on {most}")]
     Footprint {
-        /// What the part takes along x and y.
+        /// What is too large.
+        what: String,
+        /// What it takes along x and y.
         footprint: Size,
         /// The machine's name.
         machine: String,
@@ -139,18 +141,19 @@ impl Machine {
         Err(MachineLimit::Area { area, machine: self.name.clone(), most })
     }
 
-    /// Checks that a part lies within the area, as it is or turned by 90 degrees.
+    /// Checks that a footprint lies within the area, as it is or turned by 90 degrees. `what` has
+    /// it: `the part`.
     ///
     /// # Errors
     /// Returns an error if it does not.
-    pub fn check_footprint(&self, footprint: Size) -> Result<(), MachineLimit> {
+    pub fn check_footprint(&self, footprint: Size, what: &str) -> Result<(), MachineLimit> {
         let Size { width, height } = footprint;
         let turned = Size { width: height, height: width };
         if self.check_area(footprint).or(self.check_area(turned)).is_ok() {
             return Ok(());
         }
-        let (machine, most) = (self.name.clone(), self.area.value);
-        Err(MachineLimit::Footprint { footprint, machine, most })
+        let (what, machine, most) = (what.to_owned(), self.name.clone(), self.area.value);
+        Err(MachineLimit::Footprint { what, footprint, machine, most })
     }
 
     /// Checks that a build may be as high. `what` reaches up to there: `layer 12`.
@@ -210,9 +213,9 @@ mod tests {
             "the area is 228.6x228.6mm, and the machine alpha builds on 101.6x114.3mm"
         );
         assert!(alpha.check_area(size("4.5x4in")).is_err());
-        assert_eq!(alpha.check_footprint(size("4.5x4in")), Ok(()));
+        assert_eq!(alpha.check_footprint(size("4.5x4in"), "the part"), Ok(()));
         for footprint in ["4.1x4.5in", "4.5x4.1in", "115x1mm", "1x115mm"] {
-            assert!(alpha.check_footprint(size(footprint)).is_err(), "{footprint}");
+            assert!(alpha.check_footprint(size(footprint), "the part").is_err(), "{footprint}");
         }
     }
 

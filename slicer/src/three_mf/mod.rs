@@ -64,12 +64,10 @@ pub enum ThreeMfError {
     #[error("its objects hold themselves, or more than {MAX_VISITS} objects in all")]
     Endless,
     /// No item that is built.
-    #[error(
-        "none of its items is built: {left_out} are left out, being no solids or not to be printed"
-    )]
+    #[error("of its {items} items none is both a solid and to be printed")]
     NothingToBuild {
-        /// The number of items that are left out.
-        left_out: usize,
+        /// The number of items.
+        items: usize,
     },
     /// Items that stand for far more facets than a package of its size explains.
     #[error("its items stand for more than {0} facets, far more than a package of its size does")]
@@ -145,8 +143,8 @@ pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
             left_out += 1;
         }
     }
-    if found.pieces.is_empty() && left_out > 0 {
-        return Err(ThreeMfError::NothingToBuild { left_out });
+    if found.pieces.is_empty() && !items.is_empty() {
+        return Err(ThreeMfError::NothingToBuild { items: items.len() });
     }
     Ok(Contents { pieces: found.pieces, left_out })
 }

@@ -27,5 +27,4 @@ pub(crate) use page::bit_transitions;
 pub use page::{Compression, Page, PageHeader};
 pub use read::PageReader;
 pub(crate) use unpack::byte_runs;
-pub(crate) use write::file_of_page;
 pub use write::{EncodedPage, Format, PageWriter};

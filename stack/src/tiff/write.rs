@@ -12,8 +12,9 @@ use super::tags::{
     Y_RESOLUTION,
 };
 use crate::check::{Chain, OpenLine};
-use crate::error::StackError;
+use crate::error::{GAVE_UP, StackError};
 use crate::layer::{Image, Layer};
+use crate::page_folder::PageFile;
 use crate::{g4, packbits};
 
 /// The variant of TIFF to write.
@@ -231,7 +232,9 @@ impl<W: Write> PageWriter<W> {
             self.write(&last, false)?;
         }
         self.start()?;
-        let notice = Notice { gave_up: reason.to_owned() };
+        // Through several stages, the first reason goes on alone.
+        let first = reason.rsplit(GAVE_UP).next().unwrap_or(reason);
+        let notice = Notice { gave_up: first.to_owned() };
         let text = serde_json::to_string(&notice).expect("a text is valid JSON");
         let directory = |link| self.format.directory(vec![text_field(&text)], self.offset, link);
         let end = self.offset + directory(0).len() as u64;
@@ -260,15 +263,16 @@ impl<W: Write> PageWriter<W> {
     }
 }
 
-/// Returns the bytes of a file of the page alone, and the index of its layer. The page is one
-/// of several that `chain` runs through.
-pub(crate) fn file_of_page(
-    page: &EncodedPage,
-    format: Format,
-    chain: &mut Chain,
-    is_last: bool,
-) -> Vec<u8> {
-    let header = format.header();
-    let description = chain.close(&page.line, is_last);
-    [header, &page.bytes(&description, format, header.len() as u64, true)].concat()
+/// A page as a file of its own, in a format.
+impl PageFile for (EncodedPage, Format) {
+    fn name(&self) -> String {
+        format!("layer_{:05}.tif", self.0.index)
+    }
+
+    fn bytes(&self, chain: &mut Chain, is_last: bool) -> Vec<u8> {
+        let (page, format) = self;
+        let header = format.header();
+        let description = chain.close(&page.line, is_last);
+        [header, &page.bytes(&description, *format, header.len() as u64, true)].concat()
+    }
 }
