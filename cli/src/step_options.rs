@@ -116,7 +116,9 @@ pub(crate) fn boxes_overlap(prepared: &Prepared) -> bool {
 
 /// Returns notes about how a file was read, for people.
 pub(crate) fn notes(prepared: &Prepared) -> Vec<String> {
-    let mut notes = findings(&prepared.mesh.findings);
+    let mut notes: Vec<String> =
+        prepared.kernel.notices().iter().map(ToString::to_string).collect();
+    notes.extend(findings(&prepared.mesh.findings));
     if prepared.heal_mm > 0.0 {
         notes.push(format!("edges within {} of each other were joined", length(prepared.heal_mm)));
     }

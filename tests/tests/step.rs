@@ -105,6 +105,21 @@ fn a_report_names_what_a_file_holds() {
 }
 
 #[test]
+fn what_a_file_holds_beside_its_solids_is_said() {
+    let scratch = Scratch::new();
+    let text = step(StepSample::Pair, StepUnit::Millimetre);
+    // Both spheres stand in one place.
+    scratch.write("part.step", text.replace("'',#33,#29)", "'',#33,#26)").as_bytes());
+    let words = "#14, a solid that is placed twice in one place, is sliced once";
+    let report = scratch.run("lamp brep part.step").succeeds().stdout;
+    let report = String::from_utf8(report).unwrap();
+    assert!(report.contains(&format!("found:      {words}\n")), "{report}");
+    assert!(report.contains("bodies:     1"), "{report}");
+    let report = said(&scratch, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
+    assert!(report.contains(words), "{report}");
+}
+
+#[test]
 fn what_is_broken_is_refused_or_healed_and_said() {
     for (defect, words) in [
         (StepDefect::Missing, "edges of facets are open"),

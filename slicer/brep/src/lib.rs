@@ -47,7 +47,9 @@ mod validate;
 pub mod vector;
 
 pub use error::BrepError;
-pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellation};
+pub use kernel::{
+    Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Matter, Notice, Tessellation,
+};
 pub use prepare::{Attempt, OpenedModel, Prepared, ReadFn, prepare};
 pub use step::{START_BYTES, StepError, StepModel, check_syntax, is_step, read_step};
 pub use tessellate::MAX_FACETS;

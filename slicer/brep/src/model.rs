@@ -1,7 +1,7 @@
 //! Holds a model in memory: placed bodies, faces, edges and vertices, in millimetres.
 
 use crate::geometry::{Curve, Surface};
-use crate::kernel::Body;
+use crate::kernel::{Body, Notice};
 use crate::vector::Vec3;
 
 /// All bodies of a file.
@@ -11,6 +11,8 @@ pub(crate) struct BrepModel {
     pub(crate) faces: Vec<Face>,
     pub(crate) edges: Vec<BrepEdge>,
     pub(crate) vertices: Vec<Vec3>,
+    /// What the file holds besides.
+    pub(crate) notices: Vec<Notice>,
     /// The name of the file's length unit.
     pub(crate) unit: String,
     /// The uncertainty of lengths that the file states, in millimetres.

@@ -54,7 +54,8 @@ pub fn unit(a: Vec3) -> Option<Vec3> {
     (length > 1e-12 && length.is_finite()).then(|| scale(a, 1.0 / length))
 }
 
-/// A right-handed coordinate system: an origin and three directions of length 1.
+/// A coordinate system: an origin and three directions of length 1 at right angles. It is
+/// left-handed in mirrored parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axes {
     pub(crate) origin: Vec3,
@@ -65,7 +66,7 @@ impl Axes {
     pub(crate) const WORLD: Self =
         Self { origin: [0.0; 3], directions: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
 
-    /// Returns axes with this z axis, and `x` projected to be at a right angle to it.
+    /// Returns right-handed axes with this z axis, and `x` projected to be at a right angle to it.
     /// Without a usable `x`, the first world axis that is not parallel to z is used
     /// (ISO 10303-42, `first_proj_axis`).
     pub(crate) fn new(origin: Vec3, z: Vec3, x: Option<Vec3>) -> Option<Self> {
@@ -74,6 +75,12 @@ impl Axes {
         let default = if z[0].abs() < 1.0 - 1e-9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let x = x.and_then(unit).and_then(across).or_else(|| across(default))?;
         Some(Self { origin, directions: [x, cross(z, x), z] })
+    }
+
+    /// Returns whether the axes are left-handed.
+    pub(crate) fn is_mirrored(&self) -> bool {
+        let [x, y, z] = self.directions;
+        dot(cross(x, y), z) < 0.0
     }
 
     /// Converts a point from these axes to the world's.

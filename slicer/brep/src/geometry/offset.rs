@@ -2,7 +2,7 @@
 
 use super::surface::{Surface, TorusPart};
 use crate::kernel::Jet;
-use crate::vector::{Vec3, along, cross, scale, sub, unit};
+use crate::vector::{Axes, Vec3, along, cross, scale, sub, unit};
 
 /// The step for differences of the normal, as a part of the domain. Its error only slows
 /// the search for points.
@@ -14,20 +14,32 @@ impl Surface {
         if !by_mm.is_finite() {
             return None;
         }
+        // In left-handed axes, du × dv points against z and inwards.
+        let turned = |axes: &Axes| if axes.is_mirrored() { -by_mm } else { by_mm };
+        let outwards_mm = match &self {
+            Self::Plane(axes)
+            | Self::Cylinder { axes, .. }
+            | Self::Sphere { axes, .. }
+            | Self::Torus { axes, .. }
+            | Self::Cone { axes, .. } => turned(axes),
+            _ => by_mm,
+        };
         let moved = match self {
             Self::Plane(mut axes) => {
-                axes.origin = along(axes.origin, axes.directions[2], by_mm);
+                axes.origin = along(axes.origin, axes.directions[2], outwards_mm);
                 Self::Plane(axes)
             }
-            Self::Cylinder { axes, radius } => Self::Cylinder { axes, radius: radius + by_mm },
-            Self::Sphere { axes, radius } => Self::Sphere { axes, radius: radius + by_mm },
+            Self::Cylinder { axes, radius } => {
+                Self::Cylinder { axes, radius: radius + outwards_mm }
+            }
+            Self::Sphere { axes, radius } => Self::Sphere { axes, radius: radius + outwards_mm },
             Self::Torus { axes, major, minor, part: TorusPart::Whole }
-                if minor + by_mm <= major =>
+                if minor + outwards_mm <= major =>
             {
-                Self::Torus { axes, major, minor: minor + by_mm, part: TorusPart::Whole }
+                Self::Torus { axes, major, minor: minor + outwards_mm, part: TorusPart::Whole }
             }
             Self::Cone { axes, radius, slope } => {
-                let radius = radius + by_mm * (1.0 + slope * slope).sqrt();
+                let radius = radius + outwards_mm * (1.0 + slope * slope).sqrt();
                 Self::Cone { axes, radius, slope }
             }
             basis => Self::Offset { basis: Box::new(basis), by_mm },

@@ -100,6 +100,17 @@ impl Entities {
         }
     }
 
+    /// Returns the error of an instance whose type is not supported.
+    pub(crate) fn unsupported(&self, id: u64) -> StepError {
+        let names = |records: &[Record]| {
+            records.iter().map(|record| record.name.as_str()).collect::<Vec<_>>().join(" ")
+        };
+        match self.records(id) {
+            Ok(records) => StepError::Unsupported { id, name: names(records) },
+            Err(missing) => missing,
+        }
+    }
+
     /// Returns all records of a type, in the file's order.
     pub(crate) fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = Item<'a>> {
         self.ids.iter().filter_map(move |&id| self.find(id, name))
@@ -140,6 +151,11 @@ impl<'a> Item<'a> {
     /// Returns a reference, or `None` if it is omitted.
     pub(crate) fn optional(&self, k: usize) -> Option<u64> {
         self.record.values.get(k).and_then(Value::reference)
+    }
+
+    /// Returns a number, or `None` if it is omitted.
+    pub(crate) fn optional_number(&self, k: usize) -> Option<f64> {
+        self.record.values.get(k).and_then(Value::number)
     }
 
     pub(crate) fn number(&self, k: usize) -> Result<f64, StepError> {

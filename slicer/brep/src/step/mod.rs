@@ -1,12 +1,15 @@
 //! Reads STEP files (ISO 10303-21; application protocols AP203, AP214 and AP242).
 
 mod assembly;
+mod contents;
 mod entities;
+mod place;
 mod product;
 mod read_curve;
 mod read_placement;
 mod read_spline;
 mod read_surface;
+mod shapes;
 mod token;
 mod topology;
 mod units;
@@ -15,7 +18,7 @@ use std::sync::Arc;
 
 use crate::error::BrepError;
 use crate::heal::heal;
-use crate::kernel::{Body, FaceInfo, Finding, Jet, Kernel, Tessellation};
+use crate::kernel::{Body, FaceInfo, Finding, Jet, Kernel, Matter, Notice, Tessellation};
 use crate::model::BrepModel;
 use crate::prepare::OpenedModel;
 use crate::tessellate;
@@ -86,9 +89,23 @@ pub enum StepError {
         /// The number of the representation.
         id: u64,
     },
-    /// There is no solid or shell.
-    #[error("it holds no solid")]
+    /// There is no solid and no face.
+    #[error("it holds no solid and no face")]
     Empty,
+    /// There is only something else.
+    #[error("it holds nothing that can be sliced: #{id} is {matter}")]
+    Other {
+        /// The first such entity's number.
+        id: u64,
+        /// What it is.
+        matter: Matter,
+    },
+    /// There is only a mesh of finite elements.
+    #[error("it holds nothing that can be sliced: #{id} is a finite element")]
+    Elements {
+        /// The first element's number.
+        id: u64,
+    },
     /// An assembly contains itself, or has too many parts.
     #[error("its assembly holds itself, or more than {most} parts")]
     Endless {
@@ -182,6 +199,10 @@ impl Kernel for StepModel {
 
     fn uncertainty_mm(&self) -> Option<f64> {
         self.model.uncertainty_mm
+    }
+
+    fn notices(&self) -> &[Notice] {
+        &self.model.notices
     }
 
     fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError> {

@@ -2,6 +2,7 @@
 
 use super::StepError;
 use super::entities::{Entities, Item};
+use super::place::Place;
 use super::units::Units;
 use crate::vector::{Axes, Vec3, dot, scale, unit};
 
@@ -15,7 +16,42 @@ pub(crate) struct GeometryReader<'a> {
 /// The greatest depth of references between curves and surfaces; more counts as a cycle.
 pub(super) const MAX_NESTED: usize = 8;
 
-impl GeometryReader<'_> {
+impl<'a> GeometryReader<'a> {
+    /// Returns a reader in a representation's own coordinates.
+    pub(super) fn unplaced(entities: &'a Entities, units: &'a Units) -> Self {
+        Self { entities, units, place: Axes::WORLD }
+    }
+
+    /// Reads where a placement or an operator puts things.
+    pub(super) fn place(&self, id: u64) -> Result<Place, StepError> {
+        if let Some(operator) = self.entities.find(id, "CARTESIAN_TRANSFORMATION_OPERATOR_3D") {
+            return self.operator(operator);
+        }
+        if self.entities.find(id, "AXIS2_PLACEMENT_3D").is_none() {
+            return Err(self.entities.unsupported(id));
+        }
+        Ok(Place { axes: self.axes(id)?, scale: 1.0 })
+    }
+
+    /// Reads a `CARTESIAN_TRANSFORMATION_OPERATOR_3D`, which may mirror and scale
+    /// (ISO 10303-42, `base_axis`).
+    fn operator(&self, item: Item) -> Result<Place, StepError> {
+        let bad = || StepError::Numbers { id: item.id, what: "transformation" };
+        // Names and descriptions come first; some programs write one, others three.
+        let first = item.record.values.len().checked_sub(5).ok_or_else(bad)?;
+        let direction = |k: usize| self.optional_direction(item.optional(first + k));
+        let z = direction(4)?.unwrap_or([0.0, 0.0, 1.0]);
+        let origin = self.point(item.reference(first + 2)?)?;
+        let mut axes = Axes::new(origin, z, direction(0)?).ok_or_else(bad)?;
+        let [_, y, _] = axes.directions;
+        if dot(direction(1)?.unwrap_or(y), y) < 0.0 {
+            axes.directions[1] = scale(y, -1.0);
+        }
+        let scale = item.optional_number(first + 3).unwrap_or(1.0);
+        let is_sound = (1e-6..=1e6).contains(&scale);
+        is_sound.then_some(Place { axes, scale }).ok_or_else(bad)
+    }
+
     /// Returns the position of a vertex or a cartesian point.
     pub(crate) fn point(&self, id: u64) -> Result<Vec3, StepError> {
         let id = match self.entities.find(id, "VERTEX_POINT") {
@@ -54,7 +90,15 @@ impl GeometryReader<'_> {
         let [first, second, _] = self.place.directions;
         let default = if dot(z, first).abs() < 1.0 - 1e-9 { first } else { second };
         let axes = Axes::new(self.point(item.reference(1)?)?, z, x.or(Some(default)));
-        axes.ok_or(StepError::Numbers { id, what: "axes" })
+        axes.map(|axes| self.handed(axes)).ok_or(StepError::Numbers { id, what: "axes" })
+    }
+
+    /// Returns axes that were made right-handed, mirrored if this reader's place is.
+    pub(super) fn handed(&self, mut axes: Axes) -> Axes {
+        if self.place.is_mirrored() {
+            axes.directions[1] = scale(axes.directions[1], -1.0);
+        }
+        axes
     }
 
     pub(super) fn length(&self, item: Item, k: usize) -> Result<f64, StepError> {

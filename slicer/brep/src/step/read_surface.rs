@@ -56,7 +56,9 @@ impl GeometryReader<'_> {
             }
             "OFFSET_SURFACE" if depth < MAX_NESTED => {
                 let basis = self.surface_within(item.reference(1)?, depth + 1)?;
-                let by_mm = item.number(2)? * self.units.mm;
+                // A mirror turns normals over.
+                let along = if self.place.is_mirrored() { -1.0 } else { 1.0 };
+                let by_mm = along * item.number(2)? * self.units.mm;
                 let bad = StepError::Numbers { id, what: "offset surface" };
                 basis.offset(by_mm).ok_or(bad)?
             }
@@ -69,6 +71,7 @@ impl GeometryReader<'_> {
         let z = self.optional_direction(axis.optional(2))?.unwrap_or(self.place.directions[2]);
         let axes = Axes::new(self.point(axis.reference(1)?)?, z, None);
         let axes = axes.ok_or(StepError::Numbers { id: item.id, what: "axis" })?;
+        let axes = self.handed(axes);
         // The curve is read in the coordinates of the axes.
         let place = axes.inverse().then(&self.place);
         let seen = GeometryReader { entities: self.entities, units: self.units, place };

@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 
 use super::StepError;
-use super::assembly::{PlacedSolid, placed};
+use super::assembly::placed;
+use super::contents::PlacedBody;
 use super::entities::{Entities, Item};
 use super::read_placement::GeometryReader;
+use super::units::Units;
 use crate::geometry::Curve;
 use crate::kernel::Body;
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
@@ -13,26 +15,25 @@ use crate::vector::{sub, unit};
 
 /// Reads all bodies of a file.
 pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
-    let mut model = BrepModel::default();
-    for placed in placed(entities)? {
+    let placed = placed(entities)?;
+    let mut model = BrepModel { notices: placed.notices, ..BrepModel::default() };
+    for body in placed.bodies {
         if model.unit.is_empty() {
-            model.unit.clone_from(&placed.units.name);
-            model.uncertainty_mm = placed.units.uncertainty_mm;
+            model.unit.clone_from(&body.units.name);
+            model.uncertainty_mm = body.units.uncertainty_mm;
         }
         let first = model.faces.len() as u32;
-        let mut reader = SolidReader::new(entities, &placed, &mut model);
-        reader.solid(placed.solid)?;
+        let units = body.units.scaled(body.place.scale);
+        let mut reader = BodyReader::new(entities, &body, &units, &mut model);
+        body.items.iter().try_for_each(|&item| reader.item(item))?;
         let faces = first..model.faces.len() as u32;
-        let own = entities.simple(placed.solid)?.text(0);
-        // Many programs name only the product.
-        let name = if own.trim().is_empty() { placed.product } else { own.to_owned() };
-        model.bodies.push(Body { name, faces });
+        model.bodies.push(Body { name: body.name, faces });
     }
     Ok(model)
 }
 
-/// Reads one solid.
-struct SolidReader<'a> {
+/// Reads one body.
+struct BodyReader<'a> {
     entities: &'a Entities,
     geometry: GeometryReader<'a>,
     model: &'a mut BrepModel,
@@ -43,31 +44,36 @@ struct SolidReader<'a> {
     sides: HashMap<[usize; 2], usize>,
 }
 
-impl<'a> SolidReader<'a> {
-    fn new(entities: &'a Entities, placed: &'a PlacedSolid, model: &'a mut BrepModel) -> Self {
-        let geometry = GeometryReader { entities, units: &placed.units, place: placed.place };
+impl<'a> BodyReader<'a> {
+    fn new(
+        entities: &'a Entities,
+        body: &PlacedBody,
+        units: &'a Units,
+        model: &'a mut BrepModel,
+    ) -> Self {
+        let geometry = GeometryReader { entities, units, place: body.place.axes };
         let (vertices, edges, sides) = (HashMap::new(), HashMap::new(), HashMap::new());
         Self { entities, geometry, model, vertices, edges, sides }
     }
 
-    fn solid(&mut self, id: u64) -> Result<(), StepError> {
+    /// Reads a solid, a shell or a face.
+    fn item(&mut self, id: u64) -> Result<(), StepError> {
         let item = self.entities.simple(id)?;
         match item.name() {
-            "SHELL_BASED_SURFACE_MODEL" => {
-                item.references(1)?.into_iter().try_for_each(|shell| self.shell(shell, true))
-            }
+            "MANIFOLD_SOLID_BREP" | "FACETED_BREP" => self.shell(item.reference(1)?, true),
             "BREP_WITH_VOIDS" => {
                 self.shell(item.reference(1)?, true)?;
                 item.references(2)?.into_iter().try_for_each(|shell| self.shell(shell, true))
             }
-            _ => self.shell(item.reference(1)?, true),
+            name if name.ends_with("FACE") || name == "FACE_SURFACE" => self.face(id, true),
+            _ => self.shell(id, true),
         }
     }
 
     fn shell(&mut self, id: u64, outwards: bool) -> Result<(), StepError> {
         let item = self.entities.simple(id)?;
         match item.name() {
-            "CLOSED_SHELL" | "OPEN_SHELL" => {
+            "CLOSED_SHELL" | "OPEN_SHELL" | "CONNECTED_FACE_SET" => {
                 let mut faces = item.references(1)?.into_iter();
                 faces.try_for_each(|face| self.face(face, outwards))
             }
@@ -94,7 +100,9 @@ impl<'a> SolidReader<'a> {
                 let loops =
                     bounds.into_iter().map(|bound| self.bound(bound)).collect::<Result<_, _>>()?;
                 let surface = self.geometry.surface(item.reference(2)?)?;
-                let outwards = along_normal == outwards;
+                // A mirror turns normals over, but not the sense of loops in parameters.
+                let is_mirrored = self.geometry.place.is_mirrored();
+                let outwards = (along_normal == outwards) != is_mirrored;
                 self.model.faces.push(Face { entity: id, surface, along_normal, outwards, loops });
                 Ok(())
             }

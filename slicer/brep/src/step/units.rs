@@ -20,6 +20,12 @@ pub(crate) struct Units {
 const MAX_STEPS: usize = 8;
 
 impl Units {
+    /// Returns the units of shapes that are scaled.
+    pub(crate) fn scaled(&self, by: f64) -> Self {
+        let uncertainty_mm = self.uncertainty_mm.map(|mm| by * mm);
+        Self { mm: by * self.mm, uncertainty_mm, ..self.clone() }
+    }
+
     /// Reads the units of a context, or returns `None` if it has no unit of length.
     pub(crate) fn of_context(entities: &Entities, context: u64) -> Result<Option<Self>, StepError> {
         let Some(assigned) = entities.find(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT") else {
