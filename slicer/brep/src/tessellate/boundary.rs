@@ -1,17 +1,20 @@
 //! Turns a face's loops into closed polygons in the parameters of its surface.
 //!
-//! A loop may go around a closed surface. The polygon is then cut open along a line to
-//! the loop on the other side, or to the pole there. Both sides of the cut have the
-//! same points.
+//! A loop may go around a closed surface. It is then joined to the loop on the other side,
+//! or to the pole there.
 
-use super::unwrap::{Unwrapped, between, near, unwrap};
+use super::join::Joining;
+use super::unwrap::{Unwrapped, between, unwrap};
 use super::{FacePoints, Node, PointRing};
 use crate::geometry::{Pole, Surface};
 use crate::kernel::Fault;
 use crate::model::Face;
 
-/// Returns the polygons of a face. A point is on the face if an odd number of them
-/// contain it.
+/// The number of nodes that stand for a pole.
+const POLE_PARTS: usize = 16;
+
+/// Returns the polygons of a face, the outer one last. A point is on the face if an odd
+/// number of them contain it.
 pub(super) fn polygons(
     face: &Face,
     rings: &[PointRing],
@@ -30,11 +33,17 @@ pub(super) fn polygons(
     }
     let mut work = FaceOutline { face, poles: &poles, tips, points, chord_mm };
     let (around, mut closed): (Vec<_>, Vec<_>) =
-        loops.into_iter().partition(|loop_| loop_.turns != [0, 0]);
+        loops.into_iter().partition(|around| around.turns != [0, 0]);
     let outer = match around.as_slice() {
         [] => work.outer(&mut closed)?,
-        [one] => work.up_to_pole(one)?,
-        [one, other] => work.band(one, other)?,
+        [one] => {
+            let (pole, is_left) = work.pole_beside(one)?;
+            work.joined([one.clone(), pole], is_left, &mut closed)?
+        }
+        [one, other] => {
+            let is_left = work.is_left(one, other)?;
+            work.joined([one.clone(), other.clone()], is_left, &mut closed)?
+        }
         _ => return Err(Fault::Unbounded),
     };
     let mut polygons: Vec<Vec<Node>> =
@@ -55,7 +64,7 @@ impl FaceOutline<'_, '_> {
     /// Removes the outer loop from the loops that do not go around the surface. If
     /// there is none, makes it from the surface's whole domain.
     fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
-        let areas: Vec<f64> = closed.iter().map(|loop_| area(&loop_.nodes)).collect();
+        let areas: Vec<f64> = closed.iter().map(|hole| area(&hole.nodes)).collect();
         let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
         let sense = if self.face.along_normal { 1.0 } else { -1.0 };
         match largest {
@@ -73,180 +82,182 @@ impl FaceOutline<'_, '_> {
         })
     }
 
-    /// Returns the boundary of a closed surface's whole domain, cut open away from its
-    /// holes.
-    fn whole(&mut self, holes: &[Unwrapped]) -> Result<Vec<Node>, Fault> {
-        let surface = &self.face.surface;
-        let [Some(u), Some(v)] = surface.domain() else { return Err(Fault::Unbounded) };
+    /// Returns the polygon of a closed surface with holes alone.
+    fn whole(&mut self, holes: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
         if !self.is_closed() {
             return Err(Fault::Unbounded);
         }
-        let periods = surface.periods();
-        let mut low = [u[0], v[0]];
-        let mut high = [u[1], v[1]];
-        for axis in 0..2 {
-            if let (Some(period), Some(hole)) = (periods[axis], holes.first()) {
-                let ends = hole.nodes.iter().map(|node| node.uv[axis]);
-                let (least, most) =
-                    ends.fold((f64::MAX, f64::MIN), |(a, b), t| (a.min(t), b.max(t)));
-                low[axis] = (least + most - period) / 2.0;
-                high[axis] = low[axis] + period;
+        let is_left = self.face.along_normal;
+        let rings = match self.poles {
+            [] => self.seam(holes)?,
+            poles => {
+                let mut ends: Vec<Pole> = poles.to_vec();
+                ends.sort_by(|a, b| a.at.total_cmp(&b.at));
+                let [first, last] = ends[..] else { return Err(Fault::Unbounded) };
+                // The face lies on the left of the least v and of the greatest u.
+                let turn = if (first.axis == 1) == is_left { 1 } else { -1 };
+                [self.ring_at(first, turn), self.ring_at(last, -turn)]
             }
-        }
-        let corners = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]];
-        let tips: Vec<u32> = self.poles.iter().map(|pole| self.points.push(pole.point)).collect();
-        let tip_at = |uv: [f64; 2]| {
-            let is_here = |pole: &Pole| (uv[pole.axis] - pole.at).abs() < 1e-9;
-            self.poles.iter().position(is_here).map(|k| tips[k])
         };
-        // The four corners are one point unless they are poles.
-        let shared = self.points.push(surface.point(corners[0]));
-        let corner = corners.map(|uv| Node { uv, point: tip_at(uv).unwrap_or(shared) });
-        let bottom = self.side(corner[0], corner[1], tip_at([f64::NAN, low[1]]));
-        let right = self.side(corner[1], corner[2], tip_at([high[0], f64::NAN]));
-        let top = match tip_at([f64::NAN, high[1]]) {
-            Some(tip) => self.side(corner[2], corner[3], Some(tip)),
-            None => opposite(&bottom, corner[2], 1),
-        };
-        let left = match tip_at([low[0], f64::NAN]) {
-            Some(tip) => self.side(corner[3], corner[0], Some(tip)),
-            None => opposite(&right, corner[3], 0),
-        };
-        let mut polygon = [bottom, right, top, left].concat();
-        if !self.face.along_normal {
-            polygon.reverse();
-        }
-        Ok(polygon)
+        self.joined(rings, is_left, holes)
     }
 
-    /// Returns the nodes of a straight side from `from` to `to`, without the last. All
-    /// of them are the point `tip` if there is one.
-    fn side(&mut self, from: Node, to: Node, tip: Option<u32>) -> Vec<Node> {
+    /// Returns both sides of a line around a torus that meets no hole.
+    fn seam(&mut self, holes: &[Unwrapped]) -> Result<[Unwrapped; 2], Fault> {
         let surface = &self.face.surface;
-        let inner = match tip {
-            Some(_) => (1..16).map(|k| mix(from.uv, to.uv, f64::from(k) / 16.0)).collect(),
-            None => between(surface, from.uv, to.uv, self.chord_mm),
+        let [Some(u), Some(v)] = surface.domain() else { return Err(Fault::Unbounded) };
+        let domain = [u, v];
+        let free = |axis: usize| {
+            let [low, high] = domain[axis];
+            let spans: Vec<[f64; 2]> = holes.iter().map(|hole| span(hole, axis)).collect();
+            gap(&spans, low, high - low).map(|at| (axis, at))
         };
-        let mut side = vec![from];
-        for uv in inner {
-            let point = tip.unwrap_or_else(|| self.points.push(surface.point(uv)));
-            side.push(Node { uv, point });
-        }
-        side
+        // The line is constant in `axis` and goes along the other.
+        let (axis, at) = free(1).or_else(|| free(0)).ok_or(Fault::Unbounded)?;
+        let along = 1 - axis;
+        let [low, high] = domain[along];
+        let place = |t: f64| {
+            let mut uv = [at; 2];
+            uv[along] = t;
+            uv
+        };
+        let inner = between(surface, place(low), place(high), self.chord_mm);
+        let points = &mut *self.points;
+        let nodes: Vec<Node> = [place(low)]
+            .into_iter()
+            .chain(inner)
+            .map(|uv| Node { uv, point: points.push(surface.point(uv)) })
+            .collect();
+        // The face lies on the left of a line along u, above it, or on the right of one
+        // along v.
+        let turn = if (along == 0) == self.face.along_normal { 1 } else { -1 };
+        let mut back = nodes.clone();
+        let period = domain[axis][1] - domain[axis][0];
+        back.iter_mut().for_each(|node| node.uv[axis] += period);
+        let ring = |mut nodes: Vec<Node>, turn: i32| {
+            if turn < 0 {
+                nodes.reverse();
+            }
+            let mut turns = [0; 2];
+            turns[along] = turn;
+            Unwrapped { nodes, turns }
+        };
+        Ok([ring(nodes, turn), ring(back, -turn)])
     }
 
-    /// Returns a polygon from a loop that goes around the surface to the pole on the
-    /// loop's left.
-    fn up_to_pole(&mut self, around: &Unwrapped) -> Result<Vec<Node>, Fault> {
-        let axis = self.axis(around)?;
-        let across = 1 - axis;
-        let ring = opened(around, axis, &self.face.surface);
-        let [first, last] = [ring[0], ring[ring.len() - 1]];
-        // The left of a loop along u is towards greater v; the left of one along v is
-        // towards smaller u.
-        let left = around.turns[axis] * if axis == 0 { 1 } else { -1 };
-        let left = f64::from(if self.face.along_normal { left } else { -left });
-        let is_there =
-            |pole: &&Pole| pole.axis == across && (pole.at - first.uv[across]) * left > 0.0;
-        let pole = *self.poles.iter().find(is_there).ok_or(Fault::Unbounded)?;
+    /// Returns a pole as a loop around the surface.
+    fn ring_at(&mut self, pole: Pole, turn: i32) -> Unwrapped {
         let at_pole =
             |point: &&u32| crate::vector::distance(self.points.get(**point), pole.point) < 1e-4;
         let tip = self.tips.iter().find(at_pole).copied();
         let tip = tip.unwrap_or_else(|| self.points.push(pole.point));
-        let on_pole = |node: Node| {
-            let mut uv = node.uv;
-            uv[across] = pole.at;
+        let along = 1 - pole.axis;
+        let [low, high] = self.face.surface.domain()[along].unwrap_or([0.0, 1.0]);
+        let node = |k: usize| {
+            let part = k as f64 / POLE_PARTS as f64;
+            let mut uv = [pole.at; 2];
+            uv[along] = low + (high - low) * if turn > 0 { part } else { 1.0 - part };
             Node { uv, point: tip }
         };
-        let (there, back) = (on_pole(last), on_pole(first));
-        let mut polygon = ring;
-        let up = self.side(last, there, None);
-        polygon.extend(&up[1..]);
-        polygon.extend(self.side(there, back, Some(tip)));
-        polygon.push(back);
-        let moved = first.uv[axis] - last.uv[axis];
-        polygon.extend(up[1..].iter().rev().map(|node| shifted(*node, axis, moved)));
-        Ok(polygon)
+        let mut turns = [0; 2];
+        turns[along] = turn;
+        Unwrapped { nodes: (0..POLE_PARTS).map(node).collect(), turns }
     }
 
-    /// Returns the polygon between two loops that go around the surface in opposite
-    /// directions.
-    fn band(&mut self, one: &Unwrapped, other: &Unwrapped) -> Result<Vec<Node>, Fault> {
-        let axis = self.axis(one)?;
+    /// Returns the pole to which a face with one loop around the surface reaches, and
+    /// whether the face lies on the left of the loop.
+    fn pole_beside(&mut self, around: &Unwrapped) -> Result<(Unwrapped, bool), Fault> {
+        let axis = axis(around)?;
+        let across = 1 - axis;
+        let middle = mean(around, across);
+        // The left of a loop along u is towards greater v; the left of one along v is
+        // towards smaller u.
+        let left = f64::from(around.turns[axis] * if axis == 0 { 1 } else { -1 });
+        let is_on_left = |pole: &Pole| (pole.at - middle) * left > 0.0;
+        let mut poles = self.poles.iter().copied().filter(|pole| pole.axis == across);
+        let is_wanted = |pole: &Pole| is_on_left(pole) == self.face.along_normal;
+        let pole = match [poles.next(), poles.next()] {
+            [Some(only), None] => only,
+            // Both sides are finite, so the sense of the loop decides.
+            [Some(a), Some(b)] if is_wanted(&a) != is_wanted(&b) => {
+                if is_wanted(&a) { a } else { b }
+            }
+            _ => return Err(Fault::Unbounded),
+        };
+        let is_left = is_on_left(&pole);
+        Ok((self.ring_at(pole, -around.turns[axis]), is_left))
+    }
+
+    /// Returns whether a face between two loops around the surface lies on their left.
+    fn is_left(&self, one: &Unwrapped, other: &Unwrapped) -> Result<bool, Fault> {
+        let axis = axis(one)?;
         if other.turns.map(|turn| -turn) != one.turns {
             return Err(Fault::Unbounded);
         }
-        let ring = opened(one, axis, &self.face.surface);
-        let [first, last] = [ring[0], ring[ring.len() - 1]];
-        let period = self.face.surface.periods()[axis];
-        // The other loop starts at its point nearest to the end of this one, for a
-        // short cut.
-        let apart =
-            |node: &Node| (near(node.uv[axis], last.uv[axis], period) - last.uv[axis]).abs();
-        let nearest = (0..other.nodes.len())
-            .min_by(|&a, &b| apart(&other.nodes[a]).total_cmp(&apart(&other.nodes[b])));
-        let turned = rotated(other, nearest.unwrap_or(0), axis, &self.face.surface);
-        let start = turned.nodes[0].uv;
-        let mut back = opened(&turned, axis, &self.face.surface);
-        let mut by = [0.0; 2];
-        for k in 0..2 {
-            let period = self.face.surface.periods()[k];
-            by[k] = near(start[k], last.uv[k], period) - start[k];
+        let across = 1 - axis;
+        if self.face.surface.periods()[across].is_some() {
+            // On a torus both sides are finite, so the sense of the loops decides.
+            return Ok(self.face.along_normal);
         }
-        back.iter_mut().for_each(|node| (0..2).for_each(|k| node.uv[k] += by[k]));
-        let cut = self.side(last, back[0], None);
-        let moved = first.uv[axis] - last.uv[axis];
-        let mut polygon = ring;
-        polygon.extend(&cut[1..]);
-        polygon.extend(back);
-        polygon.extend(cut[1..].iter().rev().map(|node| shifted(*node, axis, moved)));
-        Ok(polygon)
+        let is_above = mean(other, across) > mean(one, across);
+        Ok(is_above == ((one.turns[axis] > 0) == (axis == 0)))
     }
 
-    /// Returns the parameter, 0 for u or 1 for v, around which a loop goes once.
-    fn axis(&self, around: &Unwrapped) -> Result<usize, Fault> {
-        match around.turns {
-            [1 | -1, 0] => Ok(0),
-            [0, 1 | -1] => Ok(1),
-            _ => Err(Fault::Unbounded),
-        }
+    /// Joins two loops around the surface, and takes those holes from the list that lie
+    /// on the way.
+    fn joined(
+        &mut self,
+        rings: [Unwrapped; 2],
+        is_left: bool,
+        holes: &mut Vec<Unwrapped>,
+    ) -> Result<Vec<Node>, Fault> {
+        let loops = rings.into_iter().chain(std::mem::take(holes)).collect();
+        let joining = Joining::new(&self.face.surface, is_left, loops);
+        let (outer, free) = joining.polygon(self.points, self.chord_mm)?;
+        *holes = free;
+        Ok(outer)
     }
 }
 
-fn mix(a: [f64; 2], b: [f64; 2], part: f64) -> [f64; 2] {
-    [0, 1].map(|k| a[k] + (b[k] - a[k]) * part)
+/// Returns the parameter, 0 for u or 1 for v, around which a loop goes once.
+fn axis(around: &Unwrapped) -> Result<usize, Fault> {
+    match around.turns {
+        [1 | -1, 0] => Ok(0),
+        [0, 1 | -1] => Ok(1),
+        _ => Err(Fault::Unbounded),
+    }
 }
 
-fn shifted(mut node: Node, axis: usize, by: f64) -> Node {
-    node.uv[axis] += by;
-    node
+fn mean(around: &Unwrapped, axis: usize) -> f64 {
+    around.nodes.iter().map(|node| node.uv[axis]).sum::<f64>() / around.nodes.len() as f64
 }
 
-/// Returns the opposite side of a whole domain, backwards from its corner `start`, with
-/// the same points.
-fn opposite(side: &[Node], start: Node, axis: usize) -> Vec<Node> {
-    let inner = side[1..].iter().rev().map(|node| {
-        let mut node = *node;
-        node.uv[axis] = start.uv[axis];
-        node
-    });
-    [start].into_iter().chain(inner).collect()
+/// Returns the least and the greatest value of a parameter of a loop.
+fn span(around: &Unwrapped, axis: usize) -> [f64; 2] {
+    let ends = around.nodes.iter().map(|node| node.uv[axis]);
+    ends.fold([f64::MAX, f64::MIN], |[a, b], t| [a.min(t), b.max(t)])
 }
 
-/// Returns the loop's nodes, and the first once more, one period further.
-fn opened(around: &Unwrapped, axis: usize, surface: &Surface) -> Vec<Node> {
-    let period = surface.periods()[axis].unwrap_or(0.0);
-    let mut nodes = around.nodes.clone();
-    nodes.push(shifted(nodes[0], axis, period * f64::from(around.turns[axis])));
-    nodes
-}
-
-/// Returns the loop, starting at node `start`.
-fn rotated(around: &Unwrapped, start: usize, axis: usize, surface: &Surface) -> Unwrapped {
-    let by = surface.periods()[axis].unwrap_or(0.0) * f64::from(around.turns[axis]);
-    let (before, after) = around.nodes.split_at(start);
-    let before = before.iter().map(|node| shifted(*node, axis, by));
-    Unwrapped { nodes: after.iter().copied().chain(before).collect(), turns: around.turns }
+/// Returns the middle of the longest part of a period that no span covers.
+fn gap(spans: &[[f64; 2]], low: f64, period: f64) -> Option<f64> {
+    let mut parts: Vec<[f64; 2]> = spans
+        .iter()
+        .map(|[a, b]| {
+            let start = low + (a - low).rem_euclid(period);
+            [start, start + (b - a)]
+        })
+        .collect();
+    parts.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let Some(first) = parts.first().copied() else { return Some(low) };
+    let mut end = parts.iter().map(|part| part[1] - period).fold(f64::MIN, f64::max);
+    let mut longest = (0.0, low);
+    for [a, b] in parts.into_iter().chain([first.map(|t| t + period)]) {
+        if a - end > longest.0 {
+            longest = (a - end, (a + end) / 2.0);
+        }
+        end = end.max(b);
+    }
+    (longest.0 > 1e-6 * period).then_some(longest.1)
 }
 
 /// Returns whether the outer polygon is counter-clockwise. One made from a whole domain

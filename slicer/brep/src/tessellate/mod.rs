@@ -7,6 +7,7 @@
 mod boundary;
 mod cells;
 mod fill;
+mod join;
 mod unwrap;
 
 use rayon::prelude::*;
