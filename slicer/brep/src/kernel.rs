@@ -225,6 +225,12 @@ pub enum Fault {
         /// The distance, in millimetres.
         off_mm: f64,
     },
+    /// An edge lay off the surface, and was moved to where its surfaces meet.
+    #[error("an edge lay {off_mm:.6} mm off its surface; it was moved onto its surfaces")]
+    Rebuilt {
+        /// The distance, in millimetres.
+        off_mm: f64,
+    },
     /// Its loops go clockwise although they should not. The face was turned over to fit
     /// the loops.
     #[error("its sense is against its loops; the loops were followed")]
@@ -261,7 +267,10 @@ impl Fault {
     /// Returns the distance of a fault, in millimetres, or 0 for faults without one.
     pub fn off_mm(&self) -> f64 {
         match self {
-            Self::Off { off_mm } | Self::Joined { off_mm, .. } | Self::Coarse { off_mm } => *off_mm,
+            Self::Off { off_mm }
+            | Self::Rebuilt { off_mm }
+            | Self::Joined { off_mm, .. }
+            | Self::Coarse { off_mm } => *off_mm,
             _ => 0.0,
         }
     }

@@ -51,6 +51,17 @@ impl Surface {
     /// At a pole the undetermined parameter is arbitrary. Periodic parameters may lie in
     /// any period.
     pub(crate) fn project(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
+        self.project_near(p, hint, SAME_MM)
+    }
+
+    /// Returns the same for a point that may lie off the surface: what is found near
+    /// `hint` is taken if it is as near as `off_mm`.
+    pub(crate) fn project_near(
+        &self,
+        p: Vec3,
+        hint: Option<[f64; 2]>,
+        off_mm: f64,
+    ) -> [f64; 2] {
         let azimuth = |q: Vec3| q[1].atan2(q[0]);
         match self {
             Self::Plane(axes) => {
@@ -80,14 +91,14 @@ impl Surface {
                 }
                 [azimuth(q), q[2].atan2(out - major)]
             }
-            _ => self.search(p, hint),
+            _ => self.search(p, hint, off_mm),
         }
     }
 
-    fn search(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
+    fn search(&self, p: Vec3, hint: Option<[f64; 2]>, off_mm: f64) -> [f64; 2] {
         let near = hint.map(|hint| self.nearer(p, hint));
         if let Some((apart, uv)) = near
-            && apart < SAME_MM
+            && apart < off_mm
         {
             return uv;
         }

@@ -11,11 +11,12 @@ use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 use super::cells::{Borders, CellScale};
+use super::ears::{Corner, doubled, ears, refine};
 use super::{FacePoints, Node};
 use crate::geometry::Surface;
 use crate::kernel::Fault;
 use crate::model::Face;
-use crate::vector::{Vec3, cross, distance, dot, middle, sub, unit};
+use crate::vector::{Vec3, cross, distance, dot, length, middle, sub, unit};
 
 type Triangles = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
@@ -49,10 +50,96 @@ pub(super) fn fill(
         corners: Vec::new(),
         borders: HashMap::new(),
     };
-    work.add_borders(polygons)?;
+    if let Err(Fault::Crossing) = work.add_borders(polygons) {
+        return crossed(&work, polygons, points).map(|triangles| (triangles, None));
+    }
     work.add_grid(polygons)?;
     let coarse = work.refine(points)?;
     Ok((work.triangles(points), coarse))
+}
+
+/// Triangulates a face whose polygons cross by less than its edges are off, or than the
+/// chord.
+fn crossed(
+    work: &FaceTriangulation,
+    polygons: &[Vec<Node>],
+    points: &mut FacePoints,
+) -> Result<Vec<[Node; 3]>, Fault> {
+    let (surface, chord_mm) = (work.surface, work.chord_mm);
+    let mut nodes: Vec<Node> = Vec::new();
+    let mut rings = Vec::new();
+    for polygon in polygons {
+        let corner = |(k, node): (usize, &Node)| Corner {
+            at: work.scale.place(node.uv),
+            number: nodes.len() + k,
+        };
+        rings.push(polygon.iter().enumerate().map(corner).collect::<Vec<_>>());
+        nodes.extend(polygon);
+    }
+    let Some(mut outer) = rings.pop() else { return Err(Fault::Unbounded) };
+    let is_clockwise = ring_area(&outer) < 0.0;
+    if is_clockwise {
+        outer.reverse();
+    }
+    for hole in rings.iter_mut().filter(|hole| ring_area(hole) > 0.0) {
+        hole.reverse();
+    }
+    let off = |node: &Node| distance(points.get(node.point), surface.point(node.uv));
+    let off_mm = nodes.iter().map(off).fold(chord_mm, f64::max);
+    let mut triangles = ears(outer, rings);
+    let (turned, around) = (turned_mm2(&triangles, &nodes, &work.scale, points), length_mm(polygons, points));
+    if turned > off_mm * around {
+        return Err(Fault::Crossing);
+    }
+    let nodes = std::cell::RefCell::new(nodes);
+    let half = |a: usize, b: usize| {
+        let nodes = nodes.borrow();
+        [0, 1].map(|k| (nodes[a].uv[k] + nodes[b].uv[k]) / 2.0)
+    };
+    let is_long = |a: usize, b: usize| {
+        let ends = [a, b].map(|k| surface.point(nodes.borrow()[k].uv));
+        distance(surface.point(half(a, b)), middle(ends[0], ends[1])) > chord_mm
+    };
+    refine(&mut triangles, is_long, |a, b| {
+        let uv = half(a, b);
+        let node = Node { uv, point: points.push(surface.point(uv)) };
+        nodes.borrow_mut().push(node);
+        nodes.borrow().len() - 1
+    });
+    let nodes = nodes.into_inner();
+    Ok(triangles.into_iter().map(|triangle| triangle.map(|k| nodes[k])).collect())
+}
+
+fn ring_area(ring: &[Corner]) -> f64 {
+    let first = ring[0].at;
+    ring.windows(2).map(|pair| doubled(first, pair[0].at, pair[1].at)).sum()
+}
+
+/// Returns the area of the triangles that lie upside down.
+fn turned_mm2(
+    triangles: &[[usize; 3]],
+    nodes: &[Node],
+    scale: &CellScale,
+    points: &FacePoints,
+) -> f64 {
+    let is_turned = |triangle: &&[usize; 3]| {
+        let [a, b, c] = triangle.map(|k| scale.place(nodes[k].uv));
+        doubled(a, b, c) < 0.0
+    };
+    let area = |triangle: &[usize; 3]| {
+        let [a, b, c] = triangle.map(|k| points.get(nodes[k].point));
+        length(cross(sub(b, a), sub(c, a))) / 2.0
+    };
+    triangles.iter().filter(is_turned).map(area).sum()
+}
+
+fn length_mm(polygons: &[Vec<Node>], points: &FacePoints) -> f64 {
+    let of_polygon = |polygon: &Vec<Node>| -> f64 {
+        let next = polygon.iter().cycle().skip(1);
+        let place = |node: &Node| points.get(node.point);
+        polygon.iter().zip(next).map(|(a, b)| distance(place(a), place(b))).sum()
+    };
+    polygons.iter().map(of_polygon).sum()
 }
 
 struct FaceTriangulation<'a> {

@@ -6,9 +6,13 @@
 
 mod boundary;
 mod cells;
+mod ears;
 mod fill;
 mod join;
+mod rebuild;
 mod unwrap;
+
+use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
@@ -74,12 +78,25 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
         }
     }
     let shared = points.len();
-    let patches: Vec<FacePatch> = (0u32..)
-        .zip(&model.faces)
-        .collect::<Vec<_>>()
-        .into_par_iter()
-        .map(|(number, face)| patch(number, face, &chains, &points, chord_mm))
-        .collect();
+    let made = |numbers: Vec<usize>, points: &[Vec3]| -> Vec<FacePatch> {
+        let numbers = numbers.into_par_iter();
+        numbers
+            .map(|face| patch(face as u32, &model.faces[face], &chains, points, chord_mm))
+            .collect()
+    };
+    let mut patches = made((0..model.faces.len()).collect(), &points);
+    let is_off = |patch: &FacePatch| patch.faults.iter().any(|fault| matches!(fault, Fault::Off { .. }));
+    let off: BTreeSet<usize> = (0..patches.len()).filter(|&face| is_off(&patches[face])).collect();
+    let moved = rebuild::rebuild(model, &chains, &off, chord_mm, &mut points);
+    let again: Vec<usize> = moved.into_iter().collect();
+    for (face, mut patch) in again.iter().zip(made(again.clone(), &points)) {
+        let before = std::mem::take(&mut patches[*face].faults);
+        if !is_off(&patch) {
+            let off = before.into_iter().find(|fault| matches!(fault, Fault::Off { .. }));
+            patch.faults.extend(off.map(|fault| Fault::Rebuilt { off_mm: fault.off_mm() }));
+        }
+        patches[*face] = patch;
+    }
     let (mut facets, mut tips) = (Vec::new(), Vec::new());
     let mut findings = Vec::new();
     for (face, patch) in (0u32..).zip(patches) {

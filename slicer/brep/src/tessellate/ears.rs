@@ -1,0 +1,215 @@
+//! Triangulates faces whose loops cross themselves within the tolerance.
+//!
+//! Where edges lie off their surface, or two run within the tolerance of each other, loops
+//! cross in the surface's parameters. Cutting off ears needs no loops free of crossings:
+//! every side of a loop becomes a side of exactly one triangle, so that the face still
+//! closes with its neighbours. Triangles at a crossing lie upside down; their area tells
+//! whether the loops cross by more than the tolerance.
+
+use std::collections::HashMap;
+
+use spade::Point2;
+
+/// A polygon's corner: its place in the plane of cells, and its number.
+#[derive(Clone, Copy)]
+pub(super) struct Corner {
+    pub(super) at: Point2<f64>,
+    pub(super) number: usize,
+}
+
+/// Returns triangles between an outer polygon, counter-clockwise, and holes, clockwise.
+pub(super) fn ears(outer: Vec<Corner>, mut holes: Vec<Vec<Corner>>) -> Vec<[usize; 3]> {
+    let mut ring = outer;
+    // From right to left, so that a hole is joined to what lies on its right.
+    let right = |hole: &[Corner]| hole.iter().map(|corner| corner.at.x).fold(f64::MIN, f64::max);
+    holes.sort_by(|a, b| right(b).total_cmp(&right(a)));
+    for hole in holes {
+        join(&mut ring, &hole);
+    }
+    cut(ring)
+}
+
+/// Joins a hole to a ring by a line there and back, the shortest that crosses neither.
+fn join(ring: &mut Vec<Corner>, hole: &[Corner]) {
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::with_capacity(ring.len() * hole.len());
+    for (i, a) in ring.iter().enumerate() {
+        for (k, b) in hole.iter().enumerate() {
+            pairs.push(((a.at.x - b.at.x).hypot(a.at.y - b.at.y), i, k));
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_free = |&&(_, i, k): &&(f64, usize, usize)| {
+        let line = [ring[i].at, hole[k].at];
+        !is_crossed(line, ring) && !is_crossed(line, hole)
+    };
+    let found = pairs.iter().take(MOST_LINES).find(is_free).or(pairs.first());
+    let Some(&(_, i, k)) = found else { return };
+    let around = (0..=hole.len()).map(|n| hole[(k + n) % hole.len()]);
+    let way: Vec<Corner> = around.chain([ring[i]]).collect();
+    ring.splice(i + 1..i + 1, way);
+}
+
+/// The greatest number of lines that are tried to join a hole.
+const MOST_LINES: usize = 1000;
+
+fn is_crossed([a, b]: [Point2<f64>; 2], ring: &[Corner]) -> bool {
+    let next = ring.iter().cycle().skip(1);
+    ring.iter().zip(next).any(|(c, d)| {
+        let (c, d) = (c.at, d.at);
+        doubled(a, b, c) * doubled(a, b, d) < 0.0 && doubled(c, d, a) * doubled(c, d, b) < 0.0
+    })
+}
+
+/// Cuts ears off until a triangle is left: corners that bulge out and whose triangle holds
+/// no other corner; where there is none, the flattest.
+fn cut(mut ring: Vec<Corner>) -> Vec<[usize; 3]> {
+    let mut triangles = Vec::with_capacity(ring.len());
+    let mut at = 0;
+    let mut misses = 0;
+    while ring.len() > 2 {
+        let count = ring.len();
+        at %= count;
+        let is_stuck = misses > count;
+        if is_stuck {
+            let flattest = |k: &usize| {
+                let [a, b, c] = around(&ring, *k);
+                doubled(a.at, b.at, c.at).abs()
+            };
+            let all = 0..count;
+            at = all.min_by(|a, b| flattest(a).total_cmp(&flattest(b))).unwrap_or(0);
+        }
+        if is_stuck || is_ear(&ring, at) {
+            triangles.push(around(&ring, at).map(|corner| corner.number));
+            ring.remove(at);
+            misses = 0;
+            // Skipping a corner keeps the triangles from becoming a fan of slivers.
+        } else {
+            misses += 1;
+        }
+        at += 1;
+    }
+    triangles
+}
+
+fn around(ring: &[Corner], k: usize) -> [Corner; 3] {
+    let count = ring.len();
+    [ring[(k + count - 1) % count], ring[k], ring[(k + 1) % count]]
+}
+
+fn is_ear(ring: &[Corner], k: usize) -> bool {
+    let [a, b, c] = around(ring, k);
+    if doubled(a.at, b.at, c.at) <= 0.0 {
+        return false;
+    }
+    let is_other = |corner: &&Corner| {
+        [a, b, c].iter().all(|own| own.number != corner.number && own.at != corner.at)
+    };
+    let is_within = |p: Point2<f64>| {
+        doubled(a.at, b.at, p) >= 0.0 && doubled(b.at, c.at, p) >= 0.0 && doubled(c.at, a.at, p) >= 0.0
+    };
+    !ring.iter().filter(is_other).any(|corner| is_within(corner.at))
+}
+
+/// Returns twice the signed area of a triangle.
+pub(super) fn doubled(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>) -> f64 {
+    (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
+}
+
+/// Halves the sides that two triangles share and that are too long, and both triangles with
+/// them, until none is. `is_long` says so of two corners; `halve` makes the one between.
+pub(super) fn refine(
+    triangles: &mut Vec<[usize; 3]>,
+    mut is_long: impl FnMut(usize, usize) -> bool,
+    mut halve: impl FnMut(usize, usize) -> usize,
+) {
+    for _ in 0..MAX_ROUNDS {
+        let mut uses: HashMap<[usize; 2], usize> = HashMap::new();
+        for [a, b] in triangles.iter().flat_map(|&triangle| sides(triangle)) {
+            *uses.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+        let mut middles: Vec<([usize; 2], usize)> = Vec::new();
+        let mut long: Vec<[usize; 2]> =
+            uses.into_iter().filter(|(_, uses)| *uses == 2).map(|(side, _)| side).collect();
+        long.sort_unstable();
+        for [a, b] in long {
+            if is_long(a, b) {
+                middles.push(([a, b], halve(a, b)));
+            }
+        }
+        if middles.is_empty() {
+            return;
+        }
+        let middles: HashMap<[usize; 2], usize> = middles.into_iter().collect();
+        let parts = triangles.iter().flat_map(|&triangle| halved(triangle, &middles));
+        *triangles = parts.collect();
+    }
+}
+
+/// The greatest number of rounds of halving.
+const MAX_ROUNDS: usize = 12;
+
+fn sides([a, b, c]: [usize; 3]) -> [[usize; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+/// Returns the parts of a triangle after its sides got middles.
+fn halved(triangle: [usize; 3], middles: &HashMap<[usize; 2], usize>) -> Vec<[usize; 3]> {
+    let middle = |[a, b]: [usize; 2]| middles.get(&[a.min(b), a.max(b)]).copied();
+    // Starts where the first side has a middle, if any, and the last has none, if any.
+    let [a, b, c] = triangle;
+    let turns = [[a, b, c], [b, c, a], [c, a, b]];
+    let turned = turns.into_iter().find(|&turn| {
+        let [first, _, last] = sides(turn).map(middle);
+        first.is_some() && last.is_none()
+    });
+    let [a, b, c] = turned.unwrap_or(triangle);
+    match sides([a, b, c]).map(middle) {
+        [Some(p), Some(q), Some(r)] => vec![[a, p, r], [p, b, q], [r, q, c], [p, q, r]],
+        [Some(p), Some(q), None] => vec![[p, b, q], [a, p, q], [a, q, c]],
+        [Some(p), None, None] => vec![[a, p, c], [p, b, c]],
+        _ => vec![triangle],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ring(places: &[[f64; 2]], first: usize) -> Vec<Corner> {
+        let corner = |(k, &[x, y]): (usize, &[f64; 2])| Corner { at: Point2::new(x, y), number: first + k };
+        places.iter().enumerate().map(corner).collect()
+    }
+
+    /// Returns the sides that are not shared by two triangles, as directed, in order.
+    fn border(triangles: &[[usize; 3]]) -> Vec<[usize; 2]> {
+        let all: Vec<[usize; 2]> = triangles.iter().flat_map(|&triangle| sides(triangle)).collect();
+        let mut free: Vec<[usize; 2]> =
+            all.iter().copied().filter(|&[a, b]| !all.contains(&[b, a])).collect();
+        free.sort_unstable();
+        free
+    }
+
+    #[test]
+    fn a_ring_and_its_hole_keep_all_their_sides() {
+        let outer = ring(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]], 0);
+        let hole = ring(&[[1.0, 1.0], [1.0, 3.0], [3.0, 3.0], [3.0, 1.0]], 4);
+        let triangles = ears(outer, vec![hole]);
+        assert_eq!(triangles.len(), 8);
+        let sides = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4]];
+        assert_eq!(border(&triangles), sides);
+    }
+
+    #[test]
+    fn a_crossed_ring_keeps_all_its_sides() {
+        // The last corner lies a little beyond the first side.
+        let crossed = ring(&[[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [2.0, -0.001], [0.0, 2.0]], 0);
+        let mut triangles = ears(crossed, Vec::new());
+        assert_eq!(triangles.len(), 3);
+        let sides = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 0]];
+        assert_eq!(border(&triangles), sides);
+        let mut count = 5;
+        refine(&mut triangles, |_, b| b < 5, |_, _| { count += 1; count - 1 });
+        assert!(triangles.len() > 3);
+        assert_eq!(border(&triangles), sides);
+    }
+}
