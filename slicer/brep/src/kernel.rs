@@ -153,6 +153,14 @@ pub struct Facet {
     pub face: u32,
 }
 
+impl Facet {
+    /// Turns the facet over.
+    pub(crate) fn turn_over(&mut self) {
+        self.corners.swap(1, 2);
+        self.uv.swap(1, 2);
+    }
+}
+
 /// The facets of all bodies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tessellation {
@@ -246,6 +254,9 @@ pub enum Fault {
     /// It points inwards where its neighbours point outwards.
     #[error("it is inside out beside its neighbours; it was turned over")]
     Inverted,
+    /// The shell that begins with it points the wrong way: out of a void, or into the body.
+    #[error("its shell points the wrong way; it was turned over")]
+    Shell,
     /// All faces of its body point inwards.
     #[error("its body is inside out; all of it was turned over")]
     InsideOut,

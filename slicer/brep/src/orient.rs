@@ -38,10 +38,7 @@ fn turn(kernel: &dyn Kernel, mesh: &mut Tessellation, body: &Body, turned: &[boo
     let is_turned = |facet: &&mut Facet| {
         body.faces.contains(&facet.face) && turned[(facet.face - body.faces.start) as usize]
     };
-    for facet in mesh.facets.iter_mut().chain(&mut mesh.tips).filter(is_turned) {
-        facet.corners.swap(1, 2);
-        facet.uv.swap(1, 2);
-    }
+    mesh.facets.iter_mut().chain(&mut mesh.tips).filter(is_turned).for_each(Facet::turn_over);
     let finding = |face: u32, fault| Finding { face, entity: kernel.face(face).entity, fault };
     if turned.iter().all(|&turned| turned) {
         mesh.findings.push(finding(body.faces.start, Fault::InsideOut));

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use crate::error::BrepError;
 use crate::kernel::{Kernel, Tessellation};
+use crate::nest::turn_shells;
 use crate::orient::turn_over;
 use crate::validate::{BodyFault, BodyReport, apart, check};
 
@@ -161,7 +162,8 @@ fn facets(kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) -> Result<Prepar
     let (mesh, reports) = caught("making facets", || {
         let mut mesh = kernel.tessellate(chord_mm)?;
         let mut reports = check(kernel.as_ref(), &mesh);
-        if turn_over(kernel.as_ref(), &mut mesh, &reports) {
+        let is_turned = turn_over(kernel.as_ref(), &mut mesh, &reports);
+        if turn_shells(kernel.as_ref(), &mut mesh, &reports) || is_turned {
             reports = check(kernel.as_ref(), &mesh);
         }
         Ok((Arc::new(mesh), reports))

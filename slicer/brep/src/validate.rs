@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::kernel::{Facet, Jet, Kernel, Tessellation};
+use crate::kernel::{Facet, Fault, Jet, Kernel, Tessellation};
+use crate::nest::crossed;
 use crate::vector::{Vec3, cross, dot, length, scale, sub};
 
 /// The greatest relative difference of a body's two volumes.
@@ -46,6 +47,19 @@ pub enum BodyFault {
         facets_mm3: f64,
         /// The volume of the surfaces, in cubic millimetres.
         surfaces_mm3: f64,
+    },
+    /// Its faces enclose something twice, or turn inside out: the side of a face is wrong, or the
+    /// body crosses itself.
+    #[error(
+        "the body crosses itself at #{entity} near ({:.3}, {:.3}, {:.3}) mm, \
+         or the side of a face cannot be told",
+        at_mm[0], at_mm[1], at_mm[2]
+    )]
+    Crossed {
+        /// The entity of a face there.
+        entity: u64,
+        /// A place on that face, in millimetres.
+        at_mm: [f64; 3],
     },
     /// Its faces point inwards.
     #[error("it is inside out: its volume is {volume_mm3:.6} mm³")]
@@ -123,6 +137,9 @@ fn faults(
         faults.push(fault);
     } else if report.volume_mm3 <= 0.0 {
         faults.push(BodyFault::InsideOut { volume_mm3: report.volume_mm3 });
+    }
+    if faults.is_empty() {
+        faults.extend(crossed(kernel, mesh, facets));
     }
     faults
 }
@@ -223,6 +240,16 @@ pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
+/// Returns how far edges of a face lie off its surface, if further than facets may.
+fn off_edges_mm(mesh: &Tessellation, face: u32) -> f64 {
+    let findings = mesh.findings.iter().filter(|finding| finding.face == face);
+    let off = findings.filter_map(|finding| match finding.fault {
+        Fault::Off { off_mm } => Some(off_mm),
+        _ => None,
+    });
+    off.fold(0.0, f64::max)
+}
+
 fn outside(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
     let of_face = facets.chunk_by(|a, b| a.face == b.face);
     let off = |facets: &[Facet]| {
@@ -232,7 +259,7 @@ fn outside(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option
         let over = (0..3).map(|k| (least[k] - low[k]).max(high[k] - most[k]));
         let off_mm = over.fold(0.0, f64::max);
         // Points of edges may lie off the surface by as much as facets.
-        let is_off = off_mm > mesh.chord_mm;
+        let is_off = off_mm > mesh.chord_mm.max(off_edges_mm(mesh, facets[0].face));
         is_off.then_some(BodyFault::Outside { entity: info.entity, off_mm })
     };
     of_face.into_iter().find_map(off)

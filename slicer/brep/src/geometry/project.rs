@@ -56,12 +56,7 @@ impl Surface {
 
     /// Returns the same for a point that may lie off the surface: what is found near
     /// `hint` is taken if it is as near as `off_mm`.
-    pub(crate) fn project_near(
-        &self,
-        p: Vec3,
-        hint: Option<[f64; 2]>,
-        off_mm: f64,
-    ) -> [f64; 2] {
+    pub(crate) fn project_near(&self, p: Vec3, hint: Option<[f64; 2]>, off_mm: f64) -> [f64; 2] {
         let azimuth = |q: Vec3| q[1].atan2(q[0]);
         match self {
             Self::Plane(axes) => {

@@ -180,7 +180,11 @@ impl FaceOutline<'_, '_> {
             [Some(only), None] => only,
             // Both sides are finite, so the sense of the loop decides.
             [Some(a), Some(b)] if is_wanted(&a) != is_wanted(&b) => {
-                if is_wanted(&a) { a } else { b }
+                if is_wanted(&a) {
+                    a
+                } else {
+                    b
+                }
             }
             _ => return Err(Fault::Unbounded),
         };

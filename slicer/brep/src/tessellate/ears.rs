@@ -105,7 +105,9 @@ fn is_ear(ring: &[Corner], k: usize) -> bool {
         [a, b, c].iter().all(|own| own.number != corner.number && own.at != corner.at)
     };
     let is_within = |p: Point2<f64>| {
-        doubled(a.at, b.at, p) >= 0.0 && doubled(b.at, c.at, p) >= 0.0 && doubled(c.at, a.at, p) >= 0.0
+        doubled(a.at, b.at, p) >= 0.0
+            && doubled(b.at, c.at, p) >= 0.0
+            && doubled(c.at, a.at, p) >= 0.0
     };
     !ring.iter().filter(is_other).any(|corner| is_within(corner.at))
 }
@@ -176,7 +178,8 @@ mod tests {
     use super::*;
 
     fn ring(places: &[[f64; 2]], first: usize) -> Vec<Corner> {
-        let corner = |(k, &[x, y]): (usize, &[f64; 2])| Corner { at: Point2::new(x, y), number: first + k };
+        let corner =
+            |(k, &[x, y]): (usize, &[f64; 2])| Corner { at: Point2::new(x, y), number: first + k };
         places.iter().enumerate().map(corner).collect()
     }
 
@@ -208,7 +211,14 @@ mod tests {
         let sides = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 0]];
         assert_eq!(border(&triangles), sides);
         let mut count = 5;
-        refine(&mut triangles, |_, b| b < 5, |_, _| { count += 1; count - 1 });
+        refine(
+            &mut triangles,
+            |_, b| b < 5,
+            |_, _| {
+                count += 1;
+                count - 1
+            },
+        );
         assert!(triangles.len() > 3);
         assert_eq!(border(&triangles), sides);
     }

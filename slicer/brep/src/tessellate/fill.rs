@@ -87,7 +87,8 @@ fn crossed(
     let off = |node: &Node| distance(points.get(node.point), surface.point(node.uv));
     let off_mm = nodes.iter().map(off).fold(chord_mm, f64::max);
     let mut triangles = ears(outer, rings);
-    let (turned, around) = (turned_mm2(&triangles, &nodes, &work.scale, points), length_mm(polygons, points));
+    let (turned, around) =
+        (turned_mm2(&triangles, &nodes, &work.scale, points), length_mm(polygons, points));
     if turned > off_mm * around {
         return Err(Fault::Crossing);
     }

@@ -77,27 +77,23 @@ impl<'a> Joining<'a> {
     fn cut(&self, a: usize, b: usize) -> Option<([(usize, usize); 2], [f64; 2])> {
         let (from, to) = (&self.loops[a].nodes, &self.loops[b].nodes);
         let long = self.lengths();
+        let is_free = |end: &(usize, usize)| self.cut_at(*end).is_none();
         let mut tries = Vec::new();
-        for i in spread(from.len()) {
-            for k in spread(to.len()) {
+        // With one cut a node, the walk knows its way.
+        for i in spread(from.len()).filter(|&i| is_free(&(a, i))) {
+            for k in spread(to.len()).filter(|&k| is_free(&(b, k))) {
                 for shift in self.shifts(from[i].uv, to[k].uv) {
                     let way = minus(plus(to[k].uv, shift), from[i].uv);
-                    tries.push(((way[0] * long[0]).hypot(way[1] * long[1]), i, k, shift));
+                    if self.is_inwards(a, i, way) && self.is_inwards(b, k, way.map(|x| -x)) {
+                        tries.push(((way[0] * long[0]).hypot(way[1] * long[1]), i, k, shift));
+                    }
                 }
             }
         }
         tries.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let found = tries.into_iter().take(TRIES).find(|&(_, i, k, shift)| {
-            let ends = [from[i].uv, plus(to[k].uv, shift)];
-            // With one cut a node, the walk knows its way.
-            if [(a, i), (b, k)].into_iter().any(|end| self.cut_at(end).is_some()) {
-                return false;
-            }
-            let way = minus(ends[1], ends[0]);
-            self.is_inwards(a, i, way)
-                && self.is_inwards(b, k, way.map(|x| -x))
-                && !self.is_crossed(ends)
-        });
+        let mut tries = tries.into_iter().take(TRIES);
+        let found =
+            tries.find(|&(_, i, k, shift)| !self.is_crossed([from[i].uv, plus(to[k].uv, shift)]));
         found.map(|(_, i, k, shift)| ([(a, i), (b, k)], shift))
     }
 
@@ -185,7 +181,11 @@ impl<'a> Joining<'a> {
     }
 
     /// Returns the copies of a side, moved by periods, whose boxes meet that of a line.
-    fn copies(&self, line: [[f64; 2]; 2], side: [[f64; 2]; 2]) -> impl Iterator<Item = [[f64; 2]; 2]> {
+    fn copies(
+        &self,
+        line: [[f64; 2]; 2],
+        side: [[f64; 2]; 2],
+    ) -> impl Iterator<Item = [[f64; 2]; 2]> {
         let periods = self.surface.periods();
         let moves = [0, 1].map(|k| match periods[k] {
             Some(period) => {
@@ -198,9 +198,8 @@ impl<'a> Joining<'a> {
             None => vec![0.0],
         });
         let [us, vs] = moves;
-        us.into_iter().flat_map(move |u| {
-            vs.clone().into_iter().map(move |v| side.map(|uv| plus(uv, [u, v])))
-        })
+        us.into_iter()
+            .flat_map(move |u| vs.clone().into_iter().map(move |v| side.map(|uv| plus(uv, [u, v]))))
     }
 
     /// Walks along loops and cuts with the face on the same hand.

@@ -85,7 +85,8 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
             .collect()
     };
     let mut patches = made((0..model.faces.len()).collect(), &points);
-    let is_off = |patch: &FacePatch| patch.faults.iter().any(|fault| matches!(fault, Fault::Off { .. }));
+    let is_off =
+        |patch: &FacePatch| patch.faults.iter().any(|fault| matches!(fault, Fault::Off { .. }));
     let off: BTreeSet<usize> = (0..patches.len()).filter(|&face| is_off(&patches[face])).collect();
     let moved = rebuild::rebuild(model, &chains, &off, chord_mm, &mut points);
     let again: Vec<usize> = moved.into_iter().collect();

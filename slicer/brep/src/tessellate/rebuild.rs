@@ -81,7 +81,8 @@ fn settled(
             let jet = surface.at(uv);
             let to = sub(jet.point, place);
             off = off.max(length(to));
-            let normal = unit(to).filter(|_| length(to) > 1e-9).or_else(|| unit(cross(jet.du, jet.dv)));
+            let normal =
+                unit(to).filter(|_| length(to) > 1e-9).or_else(|| unit(cross(jet.du, jet.dv)));
             let Some(normal) = normal else { continue };
             for (k, row) in sums.iter_mut().enumerate() {
                 *row = add(*row, scale(normal, normal[k]));

@@ -1,0 +1,180 @@
+//! Tells which shells of a body are voids, and whether its faces enclose it.
+
+use std::collections::HashMap;
+
+use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
+use crate::rays::{Hit, RayPoint, SHARES, hits, seen_mm2};
+use crate::validate::{BodyFault, BodyReport, volume};
+
+/// How far faces may reach into each other, as a multiple of the chord.
+const LOOSE: f64 = 8.0;
+
+/// Turns over shells whose faces point into the body: an outermost one must point outwards, one
+/// inside it into its void, and so on. Returns whether any was turned over.
+pub(crate) fn turn_shells(
+    kernel: &dyn Kernel,
+    mesh: &mut Tessellation,
+    reports: &[BodyReport],
+) -> bool {
+    let mut is_turned = false;
+    let is_open = |fault: &BodyFault| matches!(fault, BodyFault::Open { .. });
+    for (body, report) in kernel.bodies().iter().zip(reports) {
+        if report.faults.iter().any(is_open) {
+            continue;
+        }
+        let facets = mesh.of_faces(&body.faces);
+        let shells = shells(facets);
+        let Some(count) = shells.iter().max().map(|last| last + 1).filter(|count| *count > 1)
+        else {
+            continue;
+        };
+        let turned = turned(mesh, facets, &shells, count);
+        if !turned.contains(&true) {
+            continue;
+        }
+        is_turned = true;
+        turn(kernel, mesh, body, &shells, &turned);
+    }
+    is_turned
+}
+
+/// Returns for each shell whether it points the wrong way.
+fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize) -> Vec<bool> {
+    let mut volumes = vec![0.0; count];
+    let mut rays: Vec<RayPoint> = Vec::with_capacity(count);
+    let mut widest = vec![(0.0, 0); count];
+    let about = facets.first().map_or([0.0; 3], |facet| mesh.corners(facet)[0]);
+    for (number, facet) in facets.iter().enumerate() {
+        let shell = shells[number];
+        volumes[shell] += volume(mesh, std::slice::from_ref(facet), about);
+        let seen = seen_mm2(mesh, facet).abs();
+        if seen > widest[shell].0 {
+            widest[shell] = (seen, number);
+        }
+    }
+    rays.extend(widest.iter().map(|(_, facet)| RayPoint { facet: *facet, shares: SHARES[0] }));
+    let is_wrong = |(shell, hits): (usize, Vec<Hit>)| {
+        let own = hits.iter().position(|hit| hit.facet == rays[shell].facet).unwrap_or(0);
+        let others = hits[..own].iter().filter(|hit| shells[hit.facet] != shell);
+        let is_void = others.count() % 2 == 1;
+        is_void == (volumes[shell] > 0.0)
+    };
+    hits(mesh, facets, &rays).into_iter().enumerate().map(is_wrong).collect()
+}
+
+/// Numbers the shell of each facet: facets that share a point.
+fn shells(facets: &[Facet]) -> Vec<usize> {
+    let mut parents: HashMap<u32, u32> = HashMap::new();
+    fn root(parents: &mut HashMap<u32, u32>, mut point: u32) -> u32 {
+        loop {
+            let parent = *parents.entry(point).or_insert(point);
+            if parent == point {
+                return point;
+            }
+            let above = *parents.entry(parent).or_insert(parent);
+            parents.insert(point, above);
+            point = above;
+        }
+    }
+    for facet in facets {
+        let [a, b, c] = facet.corners.map(|corner| root(&mut parents, corner));
+        parents.insert(b, a);
+        let c = if c == b { a } else { c };
+        parents.insert(c, a);
+    }
+    let mut numbers: HashMap<u32, usize> = HashMap::new();
+    let of_facet = |facet: &Facet| {
+        let root = root(&mut parents, facet.corners[0]);
+        let next = numbers.len();
+        *numbers.entry(root).or_insert(next)
+    };
+    facets.iter().map(of_facet).collect()
+}
+
+fn turn(
+    kernel: &dyn Kernel,
+    mesh: &mut Tessellation,
+    body: &Body,
+    shells: &[usize],
+    turned: &[bool],
+) {
+    let start = mesh.facets.partition_point(|facet| facet.face < body.faces.start);
+    let mut faces = Vec::new();
+    for (facet, shell) in mesh.facets[start..].iter_mut().zip(shells) {
+        if turned[*shell] {
+            facet.turn_over();
+            faces.push((facet.face, *shell));
+        }
+    }
+    faces.dedup_by_key(|(face, _)| *face);
+    let is_in =
+        |facet: &&mut Facet| faces.binary_search_by_key(&facet.face, |(face, _)| *face).is_ok();
+    mesh.tips.iter_mut().filter(is_in).for_each(Facet::turn_over);
+    faces.sort_by_key(|(_, shell)| *shell);
+    faces.dedup_by_key(|(_, shell)| *shell);
+    let finding = |(face, _): (u32, usize)| Finding {
+        face,
+        entity: kernel.face(face).entity,
+        fault: Fault::Shell,
+    };
+    mesh.findings.extend(faces.into_iter().map(finding));
+}
+
+/// Returns a fault if a ray through one of the faces does not enter and leave the body in
+/// turns.
+pub(crate) fn crossed(
+    kernel: &dyn Kernel,
+    mesh: &Tessellation,
+    facets: &[Facet],
+) -> Option<BodyFault> {
+    let off = |finding: &Finding| finding.fault.off_mm();
+    let loose_mm = LOOSE * mesh.findings.iter().map(off).fold(mesh.chord_mm, f64::max);
+    let mut left: Vec<usize> = widest(mesh, facets);
+    for shares in SHARES {
+        let rays: Vec<RayPoint> = left.iter().map(|&facet| RayPoint { facet, shares }).collect();
+        let hits = hits(mesh, facets, &rays);
+        let mut again = Vec::new();
+        for (facet, hits) in left.into_iter().zip(hits) {
+            // A ray that meets an edge misses a facet or meets one twice.
+            if hits.iter().map(wound).sum::<i32>() != 0 {
+                again.push(facet);
+            } else if let Some(hit) = wrong(&hits, loose_mm) {
+                let at = &facets[hit.facet];
+                let at_mm = mesh.corners(at)[0];
+                return Some(BodyFault::Crossed { entity: kernel.face(at.face).entity, at_mm });
+            }
+        }
+        left = again;
+    }
+    None
+}
+
+/// Returns the facet of each face that the rays see best.
+fn widest(mesh: &Tessellation, facets: &[Facet]) -> Vec<usize> {
+    let mut widest = Vec::new();
+    let mut start = 0;
+    for of_face in facets.chunk_by(|a, b| a.face == b.face) {
+        let seen = |k: &usize| seen_mm2(mesh, &of_face[*k]).abs();
+        let best = (0..of_face.len()).max_by(|a, b| seen(a).total_cmp(&seen(b)));
+        widest.extend(best.map(|k| start + k));
+        start += of_face.len();
+    }
+    widest
+}
+
+/// Returns how often a ray is deeper in the body after a hit.
+fn wound(hit: &Hit) -> i32 {
+    if hit.cosine < 0.0 { 1 } else { -1 }
+}
+
+/// Returns the hit after which a ray is in the body twice, or less than not at all, for
+/// more than a length.
+fn wrong(hits: &[Hit], loose_mm: f64) -> Option<Hit> {
+    let mut inside = 0;
+    hits.windows(2).find_map(|pair| {
+        inside += wound(&pair[0]);
+        let flat = pair[0].cosine.abs().min(pair[1].cosine.abs());
+        let apart = (pair[1].depth_mm - pair[0].depth_mm) * flat;
+        (!(0..=1).contains(&inside) && apart > loose_mm).then_some(pair[0])
+    })
+}
