@@ -15,11 +15,17 @@ const ENDS: usize = 48;
 /// The greatest number of cuts that are tried between two loops.
 const TRIES: usize = 500;
 
-/// A cut from a node to another, by loop and place in it.
-struct Cut {
+/// A straight line from a node to another, each given by its loop and its place in it.
+#[derive(Clone, Copy)]
+struct Line {
     ends: [(usize, usize); 2],
     /// The periods to add to the second end to be beside the first.
     shift: [f64; 2],
+}
+
+/// A cut along a line.
+struct Cut {
+    line: Line,
     /// The nodes strictly between the ends, as seen from the first.
     inner: Vec<Node>,
 }
@@ -51,13 +57,14 @@ impl<'a> Joining<'a> {
     ) -> Result<(Vec<Node>, Vec<Unwrapped>), Fault> {
         let mut cut = self.cut(0, 1);
         while !self.is_joined[1] {
-            let (ends, shift) = cut.or_else(|| self.nearest()).ok_or(Fault::Unbounded)?;
+            let line = cut.or_else(|| self.nearest()).ok_or(Fault::Unbounded)?;
+            let Line { ends, shift } = line;
             let [a, b] = ends.map(|(number, k)| self.loops[number].nodes[k].uv);
             let inner = between(self.surface, a, plus(b, shift), chord_mm).into_iter();
             let inner =
                 inner.map(|uv| Node { uv, point: points.push(self.surface.point(uv)) }).collect();
             self.is_joined[ends[1].0] = true;
-            self.cuts.push(Cut { ends, shift, inner });
+            self.cuts.push(Cut { line, inner });
             cut = if self.is_joined[1] { None } else { self.cut(ends[1].0, 1) };
         }
         let outer = self.walk()?;
@@ -66,7 +73,7 @@ impl<'a> Joining<'a> {
     }
 
     /// Returns the first cut found from a joined loop to a free one.
-    fn nearest(&self) -> Option<([(usize, usize); 2], [f64; 2])> {
+    fn nearest(&self) -> Option<Line> {
         let count = self.loops.len();
         let pairs = (0..count).flat_map(|a| (1..count).rev().map(move |b| (a, b)));
         let mut pairs = pairs.filter(|&(a, b)| self.is_joined[a] && !self.is_joined[b]);
@@ -74,7 +81,7 @@ impl<'a> Joining<'a> {
     }
 
     /// Returns the shortest cut tried between two loops that crosses no loop.
-    fn cut(&self, a: usize, b: usize) -> Option<([(usize, usize); 2], [f64; 2])> {
+    fn cut(&self, a: usize, b: usize) -> Option<Line> {
         let (from, to) = (&self.loops[a].nodes, &self.loops[b].nodes);
         let long = self.lengths();
         let is_free = |end: &(usize, usize)| self.cut_at(*end).is_none();
@@ -94,7 +101,7 @@ impl<'a> Joining<'a> {
         let mut tries = tries.into_iter().take(TRIES);
         let found =
             tries.find(|&(_, i, k, shift)| !self.is_crossed([from[i].uv, plus(to[k].uv, shift)]));
-        found.map(|(_, i, k, shift)| ([(a, i), (b, k)], shift))
+        found.map(|(_, i, k, shift)| Line { ends: [(a, i), (b, k)], shift })
     }
 
     /// Returns the lengths in space of a step along each parameter.
@@ -175,8 +182,8 @@ impl<'a> Joining<'a> {
         });
         by_loop
             || self.cuts.iter().any(|cut| {
-                let [a, b] = cut.ends.map(|(number, k)| self.loops[number].nodes[k].uv);
-                is_met([a, plus(b, cut.shift)])
+                let [a, b] = cut.line.ends.map(|(number, k)| self.loops[number].nodes[k].uv);
+                is_met([a, plus(b, cut.line.shift)])
             })
     }
 
@@ -215,13 +222,12 @@ impl<'a> Joining<'a> {
         for _ in 0..most {
             polygon.push(moved(nodes(at.0)[at.1], shift));
             if let Some((cut, is_first)) = self.cut_at(at) {
-                let there = cut.ends[usize::from(is_first)];
-                let inner = cut.inner.iter().map(|node| moved(*node, shift));
+                let there = cut.line.ends[usize::from(is_first)];
                 if is_first {
-                    polygon.extend(inner);
-                    shift = plus(shift, cut.shift);
+                    polygon.extend(cut.inner.iter().map(|node| moved(*node, shift)));
+                    shift = plus(shift, cut.line.shift);
                 } else {
-                    shift = minus(shift, cut.shift);
+                    shift = minus(shift, cut.line.shift);
                     polygon.extend(cut.inner.iter().rev().map(|node| moved(*node, shift)));
                 }
                 at = there;
@@ -239,8 +245,8 @@ impl<'a> Joining<'a> {
 
     /// Returns the cut at a node, and whether the node is its first end.
     fn cut_at(&self, end: (usize, usize)) -> Option<(&Cut, bool)> {
-        let cut = self.cuts.iter().find(|cut| cut.ends.contains(&end))?;
-        Some((cut, cut.ends[0] == end))
+        let cut = self.cuts.iter().find(|cut| cut.line.ends.contains(&end))?;
+        Some((cut, cut.line.ends[0] == end))
     }
 }
 
