@@ -158,6 +158,25 @@ fn shapes_that_are_the_same_are_read_once() {
 }
 
 #[test]
+fn chains_of_chains_of_chains_are_refused() {
+    let text = step(StepSample::Frustum, StepUnit::Millimetre);
+    let circle = text.lines().find(|line| line.contains("=CIRCLE(")).unwrap();
+    let mut bomb = circle.replace("CIRCLE", "COMPOSITE_CURVE('',(#9001),.F.);\n#9000=CIRCLE");
+    for k in [9001, 9003, 9005] {
+        // A thousand pieces, each of which is a chain of a thousand.
+        let pieces = vec![format!("#{}", k + 2); 1000].join(",");
+        let chain = k + 1;
+        bomb += &format!("\n#{k}=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#{chain});");
+        bomb += &format!("\n#{chain}=COMPOSITE_CURVE('',({pieces}),.F.);");
+    }
+    bomb += "\n#9007=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#9000);";
+    let start = Instant::now();
+    let error = StepModel::read(text.replace(circle, &bomb).as_bytes()).unwrap_err();
+    assert!(matches!(error, BrepError::Step(StepError::TooMuch { .. })), "{error}");
+    assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
+}
+
+#[test]
 fn entities_that_hold_themselves_are_refused() {
     let surface = number_of("SPHERICAL_SURFACE");
     let face = number_of("ADVANCED_FACE");

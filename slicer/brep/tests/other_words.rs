@@ -172,6 +172,134 @@ fn a_closed_shell_is_a_body_without_a_solid() {
     is_frustum(&text);
 }
 
+/// Writes an operator `#{k}` that moves, mirrors and doubles, with the numbers after it.
+fn operator(k: usize) -> String {
+    let [origin, x, y] = [k + 1, k + 2, k + 3];
+    format!(
+        "#{k}=CARTESIAN_TRANSFORMATION_OPERATOR_3D('',#{x},#{y},#{origin},2.,$);\n\
+         #{origin}=CARTESIAN_POINT('',(1.,0.,0.));\n#{x}=DIRECTION('',(0.,1.,0.));\n\
+         #{y}=DIRECTION('',(1.,0.,0.));\n"
+    )
+}
+
+#[test]
+fn curves_and_surfaces_may_be_copies() {
+    // A circle of half the radius, half as high and behind a mirror, which turns it over.
+    let text =
+        reworded(StepSample::Frustum, StepUnit::Millimetre, "CIRCLE", |id, attributes, k| {
+            let radius: f64 = attributes.rsplit(',').next().unwrap().parse().unwrap();
+            // The foot is at 0, the top at 30 mm.
+            let z = if radius > 10.0 { 0.0 } else { 15.0 };
+            let [axes, at, x] = [k + 10, k + 11, k + 12];
+            let down = k + 13;
+            format!(
+                "{id}=CURVE_REPLICA('',#{},#{k});\n{}#{}=CIRCLE('',#{axes},{:?});\n\
+             #{axes}=AXIS2_PLACEMENT_3D('',#{at},#{down},#{x});\n\
+             #{at}=CARTESIAN_POINT('',(0.,-0.5,{z:?}));\n#{x}=DIRECTION('',(1.,0.,0.));\n\
+             #{down}=DIRECTION('',(0.,0.,-1.));",
+                k + 9,
+                operator(k),
+                k + 9,
+                radius / 2.0
+            )
+        });
+    is_frustum(&text);
+    let text = reworded(
+        StepSample::Tower,
+        StepUnit::Millimetre,
+        "CYLINDRICAL_SURFACE",
+        |id, attributes, k| {
+            let radius: f64 = attributes.rsplit(',').next().unwrap().parse().unwrap();
+            let [axes, at, down] = [k + 10, k + 11, k + 12];
+            format!(
+                "{id}=SURFACE_REPLICA('',#{},#{k});\n{}#{}=OFFSET_SURFACE('',#{},0.5,.F.);\n\
+                 #{}=CYLINDRICAL_SURFACE('',#{axes},{:?});\n\
+                 #{axes}=AXIS2_PLACEMENT_3D('',#{at},#{down},$);\n\
+                 #{at}=CARTESIAN_POINT('',(0.,-0.5,0.));\n#{down}=DIRECTION('',(0.,0.,-1.));",
+                k + 9,
+                operator(k),
+                k + 9,
+                k + 8,
+                k + 8,
+                radius / 2.0 - 0.5
+            )
+        },
+    );
+    // A mirrored surface's normal, du × dv, points the other way.
+    let turned = text.lines().map(|line| {
+        let of_copy = line.contains("ADVANCED_FACE") && {
+            let surface = line.rsplit(',').nth(1).unwrap();
+            text.contains(&format!("{surface}=SURFACE_REPLICA"))
+        };
+        if of_copy { line.replace(".T.)", ".F.)") } else { line.to_owned() }
+    });
+    let plain = volumes_mm3(&step(StepSample::Tower, StepUnit::Millimetre), 0.02);
+    let copied = volumes_mm3(&turned.collect::<Vec<_>>().join("\n"), 0.02);
+    for (copied, plain) in copied.into_iter().zip(plain) {
+        assert!((copied / plain - 1.0).abs() < 1e-4, "{copied} {plain}");
+    }
+}
+
+#[test]
+fn lines_and_circles_may_be_offsets_of_others() {
+    let text = reworded(StepSample::Frustum, StepUnit::Inch, "CIRCLE", |id, attributes, k| {
+        let (rest, radius) = attributes.rsplit_once(',').unwrap();
+        let radius: f64 = radius.parse().unwrap();
+        // Outwards, against the product of z and the tangent.
+        format!(
+            "{id}=OFFSET_CURVE_3D('',#{k},-0.1,.F.,#{});\n#{k}=CIRCLE({rest},{:?});\n\
+             #{}=DIRECTION('',(0.,0.,1.));",
+            k + 1,
+            radius - 0.1,
+            k + 1
+        )
+    });
+    is_frustum(&text);
+    let plain = volumes_mm3(&step(StepSample::Block, StepUnit::Millimetre), 0.1);
+    let text = reworded(StepSample::Block, StepUnit::Millimetre, "LINE", |id, attributes, k| {
+        // Out along an oblique direction, and back.
+        let [inner, up] = [k + 1, k + 2];
+        format!(
+            "{id}=OFFSET_CURVE_3D('',#{inner},-2.,.F.,#{up});\n\
+             #{inner}=OFFSET_CURVE_3D('',#{k},2.,.F.,#{up});\n#{k}=LINE({attributes});\n\
+             #{up}=DIRECTION('',(0.3,0.5,0.7));"
+        )
+    });
+    assert_eq!(volumes_mm3(&text, 0.1), plain);
+    let too_far = text.replace("2.,.F.,", "1.E999,.F.,");
+    let error = StepModel::read(too_far.as_bytes()).unwrap_err().to_string();
+    assert!(error.ends_with("give no offset curve"), "{error}");
+}
+
+#[test]
+fn chains_may_hold_chains_and_edges_may_be_parts() {
+    let text = reworded(StepSample::Frustum, StepUnit::Metre, "CIRCLE", |id, attributes, k| {
+        let chain = |k: usize, of: usize, sense: &str| {
+            format!(
+                "#{k}=COMPOSITE_CURVE('',(#{0}),.F.);\n\
+                 #{0}=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,{sense},#{of});\n",
+                k + 1
+            )
+        };
+        format!(
+            "{id}=CURVE_REPLICA('',#{0},#{1});\n{2}{3}#{k}=CIRCLE({attributes});\n\
+             #{1}=CARTESIAN_TRANSFORMATION_OPERATOR_3D('',$,$,#{4},$,$);\n\
+             #{4}=CARTESIAN_POINT('',(0.,0.,0.));",
+            k + 10,
+            k + 1,
+            chain(k + 10, k + 20, ".F."),
+            chain(k + 20, k, ".F."),
+            k + 2,
+        )
+    });
+    is_frustum(&text);
+    let text = reworded(StepSample::Frustum, StepUnit::Inch, "EDGE_CURVE", |id, attributes, k| {
+        let ends: Vec<&str> = attributes.split(',').collect();
+        format!("{id}=SUBEDGE('',{},{},#{k});\n#{k}=EDGE_CURVE({attributes});", ends[1], ends[2])
+    });
+    is_frustum(&text);
+}
+
 #[test]
 fn what_is_not_read_is_refused_by_name() {
     let text = reworded(StepSample::Frustum, StepUnit::Inch, "CIRCLE", |id, _, _| {
@@ -180,10 +308,10 @@ fn what_is_not_read_is_refused_by_name() {
     let error = StepModel::read(text.as_bytes()).unwrap_err().to_string();
     assert!(error.starts_with('#') && error.ends_with("is a PCURVE, which is not supported"));
     let text = reworded(StepSample::Frustum, StepUnit::Inch, "CONICAL_SURFACE", |id, _, _| {
-        format!("{id}=SURFACE_REPLICA('',#1,#1);")
+        format!("{id}=RECTANGULAR_COMPOSITE_SURFACE('',((#1)));")
     });
     let error = StepModel::read(text.as_bytes()).unwrap_err().to_string();
-    assert!(error.ends_with("is a SURFACE_REPLICA, which is not supported"), "{error}");
+    assert!(error.ends_with("is a RECTANGULAR_COMPOSITE_SURFACE, which is not supported"));
 }
 
 /// Returns the names of a file's bodies.

@@ -1,5 +1,6 @@
 //! Parses the entities of a STEP file (ISO 10303-21).
 
+use std::cell::Cell;
 use std::collections::HashMap;
 
 use super::StepError;
@@ -36,7 +37,23 @@ pub(crate) struct Entities {
     map: HashMap<u64, Vec<Record>>,
     /// The numbers, in the file's order.
     ids: Vec<u64>,
+    /// The number of points, edges and faces read so far.
+    spent: Cell<usize>,
 }
+
+/// The greatest number of points, edges and faces of all bodies. Few entities may be read
+/// many times.
+const MAX_SPENT: usize = 10_000_000;
+/// Types with subtypes that come together, from the most general one on. A complex
+/// instance of one of them is read as a simple one.
+const COMBINED: [&str; 6] = [
+    "REPRESENTATION_ITEM",
+    "MANIFOLD_SOLID_BREP",
+    "BREP_WITH_VOIDS",
+    "PCURVE",
+    "SURFACE_CURVE",
+    "COMPOSITE_CURVE",
+];
 
 impl Entities {
     /// Reads a whole file.
@@ -59,7 +76,7 @@ impl Entities {
                 Token::Word(word) if word.starts_with("END-ISO-10303-21") => break,
                 Token::Reference(id) if in_data => {
                     reader.expect(b'=')?;
-                    let records = reader.instance()?;
+                    let records = flat(reader.instance()?);
                     if entities.map.insert(id, records).is_some() {
                         return Err(StepError::Twice { id });
                     }
@@ -73,6 +90,13 @@ impl Entities {
             }
         }
         Ok(entities)
+    }
+
+    /// Counts points, edges or faces that are read.
+    pub(crate) fn spend(&self, count: usize) -> Result<(), StepError> {
+        self.spent.set(self.spent.get().saturating_add(count));
+        let is_within = self.spent.get() <= MAX_SPENT;
+        is_within.then_some(()).ok_or(StepError::TooMuch { most: MAX_SPENT })
     }
 
     /// Returns all records of an instance.
@@ -225,6 +249,19 @@ impl Value {
     }
 }
 
+/// Joins the records of a complex instance whose type adds attributes to its supertypes'.
+fn flat(records: Vec<Record>) -> Vec<Record> {
+    let of = |name: &&str| records.iter().find(|record| record.name == **name);
+    let parts: Vec<&Record> = COMBINED.iter().filter_map(of).collect();
+    match parts[..] {
+        [Record { .. }, .., Record { name, .. }] => {
+            let values = parts.iter().flat_map(|part| part.values.iter().cloned()).collect();
+            vec![Record { name: name.clone(), values }]
+        }
+        _ => records,
+    }
+}
+
 struct EntityReader<'a> {
     tokens: Tokens<'a>,
 }
@@ -313,6 +350,23 @@ mod tests {
         assert!(matches!(b.number(2), Err(StepError::Attribute { id: 2, attribute: 3 })));
         assert!(matches!(b.number(3), Err(StepError::Attribute { id: 2, attribute: 4 })));
         assert!(matches!(entities.simple(3), Err(StepError::Missing { id: 3 })));
+    }
+
+    #[test]
+    fn complex_instances_of_combined_types_are_simple_ones() {
+        let data = "#1=(BOUNDED_CURVE()CURVE()REPRESENTATION_ITEM('a')SURFACE_CURVE(#2,(),.X.));\
+                    #3=(BREP_WITH_VOIDS((#5))FACETED_BREP()MANIFOLD_SOLID_BREP(#4)\
+                    REPRESENTATION_ITEM('b'));#6=(BOUNDED_CURVE()REPRESENTATION_ITEM('c'));";
+        let entities = read(&(data.to_owned() + END)).unwrap();
+        let curve = entities.simple(1).unwrap();
+        assert_eq!(
+            (curve.name(), curve.text(0), curve.optional(1)),
+            ("SURFACE_CURVE", "a", Some(2))
+        );
+        let solid = entities.simple(3).unwrap();
+        assert_eq!((solid.name(), solid.optional(1)), ("BREP_WITH_VOIDS", Some(4)));
+        assert_eq!(solid.references(2).unwrap(), [5]);
+        assert_eq!(entities.records(6).unwrap().len(), 2);
     }
 
     #[test]

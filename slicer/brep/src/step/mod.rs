@@ -106,6 +106,12 @@ pub enum StepError {
         /// The first element's number.
         id: u64,
     },
+    /// Bodies share curves or surfaces that are too large.
+    #[error("its bodies have more than {most} points, edges and faces in all")]
+    TooMuch {
+        /// The greatest number.
+        most: usize,
+    },
     /// An assembly contains itself, or has too many parts.
     #[error("its assembly holds itself, or more than {most} parts")]
     Endless {

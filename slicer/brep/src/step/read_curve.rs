@@ -5,11 +5,7 @@ use super::entities::{Item, Value};
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::{Chain, Curve, Link, edge_range};
-use crate::vector::unit;
-
-/// The greatest depth at which a chain's pieces count as nested. No piece may be a chain:
-/// one that contains itself would never end.
-const DEEPEST_PIECE: usize = MAX_NESTED - 2;
+use crate::vector::{along, cross, dot, unit};
 
 impl GeometryReader<'_> {
     /// Reads the curve of an edge.
@@ -57,13 +53,29 @@ impl GeometryReader<'_> {
                 let curve = self.curve_within(item.reference(1)?, depth + 1)?;
                 Ok(if item.truth(4)? { curve } else { curve.reversed() })
             }
-            "COMPOSITE_CURVE" if depth < DEEPEST_PIECE => self.composite(item),
+            "COMPOSITE_CURVE"
+            | "COMPOSITE_CURVE_ON_SURFACE"
+            | "BOUNDARY_CURVE"
+            | "OUTER_BOUNDARY_CURVE"
+                if depth < MAX_NESTED =>
+            {
+                self.composite(item, depth)
+            }
+            "CURVE_REPLICA" if depth < MAX_NESTED => {
+                let parent = item.reference(1)?;
+                self.copied(item.reference(2)?, |copy| copy.curve_within(parent, depth + 1))
+            }
+            "OFFSET_CURVE_3D" if depth < MAX_NESTED => {
+                let basis = self.curve_within(item.reference(1)?, depth + 1)?;
+                self.offset(&basis, item)?.ok_or_else(unsupported)
+            }
             _ => Err(unsupported()),
         }
     }
 
     fn polyline(&self, item: Item) -> Result<Curve, StepError> {
         let points = item.references(1)?;
+        self.entities.spend(points.len())?;
         let points: Vec<Weighted> = points
             .iter()
             .map(|&id| Ok(weighted(self.point(id)?, 1.0)))
@@ -75,11 +87,40 @@ impl GeometryReader<'_> {
         Ok(Curve::Spline(SplineCurve { knots, points }))
     }
 
+    /// Moves a line or a circle sideways, along the product of a direction and its own; returns
+    /// `None` if the result is neither (ISO 10303-42, `offset_curve_3d`).
+    fn offset(&self, basis: &Curve, item: Item) -> Result<Option<Curve>, StepError> {
+        let by_mm = item.number(2)? * self.units.mm;
+        let up = self.direction(item.reference(4)?)?;
+        let bad = || StepError::Numbers { id: item.id, what: "offset curve" };
+        let up = unit(up).filter(|_| by_mm.is_finite()).ok_or_else(bad)?;
+        Ok(match *basis {
+            Curve::Line { point, direction } => {
+                let sideways = unit(cross(up, direction)).ok_or_else(bad)?;
+                let by_mm = if self.place.is_mirrored() { -by_mm } else { by_mm };
+                Some(Curve::Line { point: along(point, sideways, by_mm), direction })
+            }
+            Curve::Ellipse { axes, radii: [a, b] } if a == b => {
+                // The product points inwards where the circle goes round the direction.
+                let rise = dot(up, axes.directions[2]);
+                let radius = a - by_mm * rise.signum();
+                let is_flat = rise.abs() > 1.0 - 1e-9;
+                let circle = Curve::Ellipse { axes, radii: [radius; 2] };
+                if radius <= 0.0 {
+                    return Err(bad());
+                }
+                is_flat.then_some(circle)
+            }
+            _ => None,
+        })
+    }
+
     /// Reads bounded curves joined end to end.
-    fn composite(&self, item: Item) -> Result<Curve, StepError> {
+    fn composite(&self, item: Item, depth: usize) -> Result<Curve, StepError> {
         let link = |id: u64| {
+            self.entities.spend(1)?;
             let segment = self.entities.get(id, "COMPOSITE_CURVE_SEGMENT")?;
-            let mut link = self.bounded(segment.reference(2)?, DEEPEST_PIECE)?;
+            let mut link = self.bounded(segment.reference(2)?, depth + 1)?;
             if !segment.truth(1)? {
                 link.range.reverse();
             }

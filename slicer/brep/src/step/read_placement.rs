@@ -52,6 +52,18 @@ impl<'a> GeometryReader<'a> {
         is_sound.then_some(Place { axes, scale }).ok_or_else(bad)
     }
 
+    /// Reads what an operator copies, with a reader of the copy.
+    pub(super) fn copied<T>(
+        &self,
+        operator: u64,
+        read: impl FnOnce(&GeometryReader) -> Result<T, StepError>,
+    ) -> Result<T, StepError> {
+        let own = GeometryReader::unplaced(self.entities, self.units);
+        let place = Place { axes: self.place, scale: 1.0 }.then(&own.place(operator)?);
+        let units = self.units.scaled(place.scale);
+        read(&GeometryReader { entities: self.entities, units: &units, place: place.axes })
+    }
+
     /// Returns the position of a vertex or a cartesian point.
     pub(crate) fn point(&self, id: u64) -> Result<Vec3, StepError> {
         let id = match self.entities.find(id, "VERTEX_POINT") {

@@ -32,6 +32,7 @@ impl GeometryReader<'_> {
         if ids.len() != weights.len() || !weights.iter().all(is_weight) {
             return Err(StepError::Numbers { id: of, what: "spline" });
         }
+        self.entities.spend(ids.len())?;
         ids.iter().zip(weights).map(|(&id, &w)| Ok(weighted(self.point(id)?, w))).collect()
     }
 

@@ -62,6 +62,10 @@ impl GeometryReader<'_> {
                 let bad = StepError::Numbers { id, what: "offset surface" };
                 basis.offset(by_mm).ok_or(bad)?
             }
+            "SURFACE_REPLICA" if depth < MAX_NESTED => {
+                let parent = item.reference(1)?;
+                self.copied(item.reference(2)?, |copy| copy.surface_within(parent, depth + 1))?
+            }
             name => return Err(StepError::Unsupported { id, name: name.to_owned() }),
         })
     }

@@ -6,7 +6,7 @@ use super::StepError;
 use super::assembly::placed;
 use super::contents::PlacedBody;
 use super::entities::{Entities, Item};
-use super::read_placement::GeometryReader;
+use super::read_placement::{GeometryReader, MAX_NESTED};
 use super::units::Units;
 use crate::geometry::Curve;
 use crate::kernel::Body;
@@ -92,6 +92,7 @@ impl<'a> BodyReader<'a> {
     }
 
     fn face(&mut self, id: u64, outwards: bool) -> Result<(), StepError> {
+        self.entities.spend(1)?;
         let item = self.entities.simple(id)?;
         match item.name() {
             "ADVANCED_FACE" | "FACE_SURFACE" => {
@@ -157,13 +158,28 @@ impl<'a> BodyReader<'a> {
         if let Some(&edge) = self.edges.get(&id) {
             return Ok(edge);
         }
-        let item = self.entities.get(id, "EDGE_CURVE")?;
+        self.entities.spend(1)?;
+        let item = self.entities.simple(id)?;
         let ends = [self.vertex(item.reference(1)?)?, self.vertex(item.reference(2)?)?];
-        let (curve, forward) = (self.geometry.curve(item.reference(3)?)?, item.truth(4)?);
+        let whole = self.whole_edge(item)?;
+        let (curve, forward) = (self.geometry.curve(whole.reference(3)?)?, whole.truth(4)?);
         let edge = self.model.edges.len();
         self.model.edges.push(BrepEdge { curve, ends, forward });
         self.edges.insert(id, edge);
         Ok(edge)
+    }
+
+    /// Returns the edge of which an edge is a part, or itself.
+    fn whole_edge(&self, item: Item<'a>) -> Result<Item<'a>, StepError> {
+        let mut whole = item;
+        for _ in 0..MAX_NESTED {
+            match whole.name() {
+                "EDGE_CURVE" => return Ok(whole),
+                "SUBEDGE" => whole = self.entities.simple(whole.reference(3)?)?,
+                _ => break,
+            }
+        }
+        Err(self.entities.unsupported(item.id))
     }
 
     /// Returns the edges of a polygon; polygons with the same vertices share them.
