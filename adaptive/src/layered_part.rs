@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use lamp_slicer::scan::RowFacet;
-use lamp_slicer::{FacetIndex, Fill, PlacedFacet, facet_heights};
+use lamp_slicer::{FacetIndex, Fill, FillRule, PlacedFacet, facet_heights};
 use lamp_stack::{Grouped, Length};
 use rayon::prelude::*;
 
@@ -48,7 +48,7 @@ impl Rows {
 pub struct LayeredPart {
     facets: FacetIndex,
     rows: Rows,
-    fill: Fill,
+    rule: FillRule,
 }
 
 impl LayeredPart {
@@ -65,7 +65,8 @@ impl LayeredPart {
             return Err(HeightsError::TooManyRows { pitch });
         }
         let rows = Rows { top_mm: facets.max()[1], pitch_mm: pitch.mm(), count: count as u32 };
-        Ok(Self { facets, rows, fill })
+        let rule = facets.fill_rule(fill);
+        Ok(Self { facets, rows, rule })
     }
 
     /// Returns the heights of the lowest and the highest point, in micrometres.
@@ -135,20 +136,21 @@ impl LayeredPart {
     }
 
     /// Returns the changes from the bottom to each plane above it, summed over all rows.
-    fn rise(&self, facets: &[PlacedFacet], z_um: [f64; 2], planes: &[f64]) -> Rise {
+    fn rise(&self, facets: &[(PlacedFacet, u32)], z_um: [f64; 2], planes: &[f64]) -> Rise {
         let stripe_rows = self.rows.count.div_ceil(STRIPES);
-        let mut stripes: Vec<Vec<RowFacet>> = (0..STRIPES).map(|_| Vec::new()).collect();
-        for facet in facets.iter().filter_map(|facet| self.rows.of_facet(facet)) {
+        let mut stripes: Vec<Vec<(RowFacet, u32)>> = (0..STRIPES).map(|_| Vec::new()).collect();
+        for (facet, body) in facets {
+            let Some(facet) = self.rows.of_facet(facet) else { continue };
             let Range { start: first, end } = facet.rows();
             for stripe in first / stripe_rows..=(end - 1) / stripe_rows {
-                stripes[stripe as usize].push(facet);
+                stripes[stripe as usize].push((facet, self.rule.name_of(*body)));
             }
         }
-        let of_stripe = |(stripe, facets): (usize, Vec<RowFacet>)| {
+        let of_stripe = |(stripe, facets): (usize, Vec<(RowFacet, u32)>)| {
             let first = stripe as u32 * stripe_rows;
             let mut cuts = RowCuts::default();
-            for facet in &facets {
-                cuts.add_facet(facet, [first, first + stripe_rows], z_um);
+            for (facet, body) in &facets {
+                cuts.add_facet(facet, *body, [first, first + stripe_rows], z_um);
             }
             self.sweep(&cuts, first, stripe_rows, planes)
         };
@@ -166,7 +168,7 @@ impl LayeredPart {
 
     fn sweep(&self, cuts: &RowCuts, first: u32, rows: u32, planes: &[f64]) -> Rise {
         let mut profile = Profile::new(planes);
-        let mut sweep = Sweep::new(self.fill);
+        let mut sweep = Sweep::new(&self.rule);
         let rows = rows as usize;
         let toggle = |toggle: &Toggle| ((toggle.row - first) as usize, *toggle);
         let slope = |slope: &Slope| ((slope.row - first) as usize, *slope);
@@ -209,9 +211,9 @@ fn normal(facet: &PlacedFacet) -> [f64; 3] {
 
 /// Returns the greatest |N_z| of the facets above a bottom and below each of several
 /// tops.
-fn steepest(facets: &[PlacedFacet], bottom_um: f64, tops_um: &[f64]) -> Vec<f64> {
+fn steepest(facets: &[(PlacedFacet, u32)], bottom_um: f64, tops_um: &[f64]) -> Vec<f64> {
     let mut steepest = vec![0.0; tops_um.len()];
-    for facet in facets {
+    for (facet, _) in facets {
         let (low, high) = facet_heights(facet);
         let normal = normal(facet);
         let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();

@@ -1,5 +1,6 @@
 //! Lines of facets along rows, clipped to a layer's heights.
 
+use lamp_slicer::Turn;
 use lamp_slicer::scan::RowFacet;
 
 use crate::sweep::{Slope, Toggle};
@@ -12,18 +13,19 @@ pub(crate) struct RowCuts {
 }
 
 impl RowCuts {
-    /// Adds what some rows see of a facet between two heights (micrometres).
-    pub(crate) fn add_facet(&mut self, facet: &RowFacet, rows: [u32; 2], z: [f64; 2]) {
+    /// Adds what some rows see of a body's facet between two heights (micrometres).
+    pub(crate) fn add_facet(&mut self, facet: &RowFacet, body: u32, rows: [u32; 2], z: [f64; 2]) {
         let seen = facet.rows_between(z);
         let seen = seen.start.max(rows[0])..seen.end.min(rows[1]);
         facet.for_each_row(seen, |row, [long, short]| {
-            self.add(row, long, short, facet.is_flipped(), z);
+            self.add(row, [long, short], facet.is_flipped(), body, z);
         });
     }
 
-    /// Adds a facet's line in a row, between its long and one of its short edges.
+    /// Adds a facet's line in a row, between points of its long and one of its short edges.
     #[inline]
-    fn add(&mut self, row: u32, long: [f64; 2], short: [f64; 2], is_flipped: bool, z: [f64; 2]) {
+    fn add(&mut self, row: u32, ends: [[f64; 2]; 2], is_flipped: bool, body: u32, z: [f64; 2]) {
+        let [long, short] = ends;
         let [bottom, top] = z;
         let (mut low, mut high) = if long[1] <= short[1] { (long, short) } else { (short, long) };
         // A corner on the layer's bottom counts as below it.
@@ -38,8 +40,8 @@ impl RowCuts {
         let at = |z: f64| [from[0] + per_um * (z - from[1]), z];
         if from[1] <= bottom {
             low = at(bottom);
-            let winding = if start[1] > end[1] { 1 } else { -1 };
-            self.toggles.push(Toggle { row, x: low[0], winding });
+            let turn = Turn::new(body, if start[1] > end[1] { 1 } else { -1 });
+            self.toggles.push(Toggle { row, x: low[0], turn });
         }
         if to[1] > top {
             high = at(top);
@@ -47,9 +49,9 @@ impl RowCuts {
         // An upright line has no columns above it: what it parts, its toggle says.
         if low[0] != high[0] {
             let (left, right) = if low[0] < high[0] { (low, high) } else { (high, low) };
-            let winding = if start[0] < end[0] { 1 } else { -1 };
+            let turn = Turn::new(body, if start[0] < end[0] { 1 } else { -1 });
             let heights = [left[1] - bottom, right[1] - bottom];
-            self.slopes.push(Slope { row, x: [left[0], right[0]], heights, winding });
+            self.slopes.push(Slope { row, x: [left[0], right[0]], heights, turn });
         }
     }
 }

@@ -5,7 +5,7 @@
 //! begins and ends in turn, and the layer's top decides which of these stretches
 //! the layer lacks or has too much. Nothing is sampled along x or z.
 
-use lamp_slicer::Fill;
+use lamp_slicer::{FillRule, Position, Turn};
 
 use crate::profile::{Profile, SurfaceLine};
 
@@ -14,8 +14,8 @@ use crate::profile::{Profile, SurfaceLine};
 pub(crate) struct Toggle {
     pub(crate) row: u32,
     pub(crate) x: f64,
-    /// +1 if the part is on the right, -1 if it is on the left.
-    pub(crate) winding: i8,
+    /// Up if the part is on the right, down if it is on the left.
+    pub(crate) turn: Turn,
 }
 
 /// A facet's line along a row: its two ends, the left one first, with their heights
@@ -25,8 +25,8 @@ pub(crate) struct Slope {
     pub(crate) row: u32,
     pub(crate) x: [f64; 2],
     pub(crate) heights: [f64; 2],
-    /// +1 if the part is above, -1 if it is below.
-    pub(crate) winding: i8,
+    /// Up if the part is above, down if it is below.
+    pub(crate) turn: Turn,
 }
 
 impl Slope {
@@ -42,8 +42,8 @@ impl Slope {
 
 /// Adds rows to a profile. Lists keep their memory from row to row.
 #[derive(Debug)]
-pub(crate) struct Sweep {
-    fill: Fill,
+pub(crate) struct Sweep<'a> {
+    rule: &'a FillRule,
     ends: Vec<f64>,
     open: Vec<Slope>,
 }
@@ -51,9 +51,9 @@ pub(crate) struct Sweep {
 /// How often columns are split where surfaces pass through each other, at most.
 const MAX_SPLITS: u32 = 12;
 
-impl Sweep {
-    pub(crate) fn new(fill: Fill) -> Self {
-        Self { fill, ends: Vec::new(), open: Vec::new() }
+impl<'a> Sweep<'a> {
+    pub(crate) fn new(rule: &'a FillRule) -> Self {
+        Self { rule, ends: Vec::new(), open: Vec::new() }
     }
 
     /// Adds a row, whose toggles and slopes are sorted from the left. Returns false
@@ -67,8 +67,9 @@ impl Sweep {
         if toggles.is_empty() && slopes.is_empty() {
             return true;
         }
-        let balance = toggles.iter().map(|toggle| i32::from(toggle.winding)).sum();
-        if self.fill.is_inside(balance) {
+        let mut position = Position::outside(self.rule);
+        toggles.iter().for_each(|toggle| position.cross(toggle.turn));
+        if !position.is_balanced() {
             return false;
         }
         self.ends.clear();
@@ -76,14 +77,15 @@ impl Sweep {
         self.ends.extend(slopes.iter().flat_map(|slope| slope.x));
         self.ends.sort_unstable_by(f64::total_cmp);
         self.open.clear();
-        let (mut toggles, mut slopes, mut winding) = (toggles.iter(), slopes.iter(), 0);
+        let (mut toggles, mut slopes) = (toggles.iter(), slopes.iter());
+        let mut position = Position::outside(self.rule);
         for k in 1..self.ends.len() {
             let columns = [self.ends[k - 1], self.ends[k]];
             if columns[0] == columns[1] {
                 continue;
             }
             while let Some(toggle) = next_until(&mut toggles, |toggle| toggle.x <= columns[0]) {
-                winding += i32::from(toggle.winding);
+                position.cross(toggle.turn);
             }
             self.open.retain(|slope| slope.x[1] > columns[0]);
             while let Some(slope) = next_until(&mut slopes, |slope| slope.x[0] <= columns[0]) {
@@ -91,13 +93,13 @@ impl Sweep {
                     self.open.push(*slope);
                 }
             }
-            if self.fill.is_inside(winding) {
+            if position.is_inside() {
                 profile.bottom_width += columns[1] - columns[0];
             }
             match self.open.len() {
                 0 => {}
-                1 => self.pass(columns, winding, profile),
-                _ => self.split(columns, winding, MAX_SPLITS, profile),
+                1 => self.pass(columns, &position, profile),
+                _ => self.split(columns, &position, MAX_SPLITS, profile),
             }
         }
         true
@@ -105,7 +107,13 @@ impl Sweep {
 
     /// Adds columns over several lines; those on either side of a place where two
     /// lines cross separately.
-    fn split(&mut self, columns: [f64; 2], winding: i32, splits: u32, profile: &mut Profile<'_>) {
+    fn split(
+        &mut self,
+        columns: [f64; 2],
+        position: &Position<'_>,
+        splits: u32,
+        profile: &mut Profile<'_>,
+    ) {
         let [a, b] = columns;
         let middle = 0.5 * (a + b);
         self.open.sort_unstable_by(|p, q| p.height(middle).total_cmp(&q.height(middle)));
@@ -117,24 +125,25 @@ impl Sweep {
         });
         match crossing {
             Some(x) if splits > 0 => {
-                self.split([a, x], winding, splits - 1, profile);
-                self.split([x, b], winding, splits - 1, profile);
+                self.split([a, x], position, splits - 1, profile);
+                self.split([x, b], position, splits - 1, profile);
             }
-            _ => self.pass(columns, winding, profile),
+            _ => self.pass(columns, position, profile),
         }
     }
 
     /// Adds columns over lines that are sorted from below.
-    fn pass(&self, columns: [f64; 2], mut winding: i32, profile: &mut Profile<'_>) {
+    fn pass(&self, columns: [f64; 2], position: &Position<'_>, profile: &mut Profile<'_>) {
         let width = columns[1] - columns[0];
-        let mut inside = self.fill.is_inside(winding);
+        let mut position = position.clone();
+        let mut inside = position.is_inside();
         // The height inside each of the two columns, as if they ended outside.
         let mut within = [0.0; 2];
         // The height, up to the line before, that is not as it is just above it.
         let mut unlike = [0.0; 2];
         for slope in &self.open {
-            winding += i32::from(slope.winding);
-            if self.fill.is_inside(winding) == inside {
+            position.cross(slope.turn);
+            if position.is_inside() == inside {
                 continue;
             }
             let heights = columns.map(|x| slope.height(x));
@@ -163,20 +172,22 @@ fn next_until<'a, T>(
 
 #[cfg(test)]
 mod tests {
+    use lamp_slicer::Fill;
+
     use super::*;
     use crate::profile::ProfileChange;
 
-    fn toggle(x: f64, winding: i8) -> Toggle {
-        Toggle { row: 0, x, winding }
+    fn toggle(x: f64, winding: i32) -> Toggle {
+        Toggle { row: 0, x, turn: Turn::new(0, winding) }
     }
 
-    fn slope(x: [f64; 2], heights: [f64; 2], winding: i8) -> Slope {
-        Slope { row: 0, x, heights, winding }
+    fn slope(x: [f64; 2], heights: [f64; 2], winding: i32) -> Slope {
+        Slope { row: 0, x, heights, turn: Turn::new(0, winding) }
     }
 
     fn changes(fill: Fill, toggles: &[Toggle], slopes: &[Slope]) -> Vec<ProfileChange> {
         let mut profile = Profile::new(&[10.0, 20.0, 40.0]);
-        Sweep::new(fill).add(toggles, slopes, &mut profile);
+        Sweep::new(&fill.into()).add(toggles, slopes, &mut profile);
         profile.changes()
     }
 

@@ -5,6 +5,7 @@
 
 mod arguments;
 mod band_pictures;
+mod body_overlaps;
 mod catalogue;
 mod commands;
 mod compensate_report;

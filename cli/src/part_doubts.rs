@@ -87,7 +87,7 @@ fn plural(unit: Units) -> &'static str {
 }
 
 /// Formats a number with three digits, for people.
-fn short(number: f64) -> String {
+pub(crate) fn short(number: f64) -> String {
     let digits = (2.0 - number.abs().max(1e-9).log10().floor()).max(0.0);
     let text = format!("{number:.*}", digits as usize);
     match text.contains('.') {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::Args;
 use lamp_slicer::brep::Prepared;
-use lamp_slicer::{FacetIndex, Fill, OpenOptions, Part, Placement, SliceError, Units};
+use lamp_slicer::{Bodies, FacetIndex, Fill, OpenOptions, Part, Placement, SliceError, Units};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ use crate::part_arg::{PartArg, PartPlacement};
 use crate::part_doubts::PartSize;
 use crate::placement::PlacementOptions;
 use crate::recorded::text;
-use crate::step_options::{BrepOptions, boxes_overlap, notes};
+use crate::step_options::{BrepOptions, notes};
 use crate::streams::is_stream;
 
 /// Options that decide the solid to slice.
@@ -28,10 +28,16 @@ pub(crate) struct PartOptions {
     pub(crate) units: Units,
 
     /// Rule for what is inside: between odd and even crossings, or wherever contours wind around
-    /// (for bodies that overlap)
+    /// (for shells and files that overlap)
     #[arg(long, value_parser = one_of::<Fill>(), default_value_t)]
     #[serde(with = "text")]
     pub(crate) fill: Fill,
+
+    /// How the bodies of a STEP file, or the items of a 3MF, join where they overlap: as one part,
+    /// or as even-odd fill joins files, which cut each other out
+    #[arg(long, value_parser = one_of::<Bodies>(), default_value_t)]
+    #[serde(with = "text")]
+    pub(crate) bodies: Bodies,
 
     #[command(flatten)]
     #[serde(flatten)]
@@ -57,24 +63,16 @@ impl PartOptions {
         PartSize::new(box_mm, (!model.states_unit()).then_some(self.units))
     }
 
-    /// Returns a doubt about parts that overlap: `found` are the numbers of two whose boxes
-    /// do, or of one of which two items do.
+    /// Returns a doubt about files that overlap: `found` are the numbers of two whose boxes do.
     pub(crate) fn overlap_doubt(
         &self,
-        model: &Part,
         parts: &[PartArg],
         found: Option<[usize; 2]>,
     ) -> Option<String> {
-        let what = match found {
-            _ if self.fill != Fill::EvenOdd => return None,
-            Some([a, b]) if a == b => format!("items of {}", parts[a].name()),
-            Some([a, b]) => format!("{} and {}", parts[a].name(), parts[b].name()),
-            None if model.prepared().any(boxes_overlap) => "bodies".to_owned(),
-            None => return None,
-        };
+        let [a, b] = found.filter(|_| self.fill == Fill::EvenOdd)?.map(|file| parts[file].name());
         Some(format!(
-            "the bounding boxes of {what} overlap: what lies in both cancels out, or unites with \
-             --fill nonzero"
+            "the bounding boxes of {a} and {b} overlap: what lies in both cancels out, or unites \
+             with --fill nonzero"
         ))
     }
 
@@ -85,6 +83,9 @@ impl PartOptions {
 
     /// Opens all files of a part.
     pub(crate) fn open(&self, parts: &[PartArg], reading: &Reading<'_>) -> Result<Part, Exit> {
+        if self.bodies == Bodies::Xor && self.fill == Fill::NonZero {
+            return Err(Exit::usage("--fill nonzero unites all bodies: leave out --bodies xor"));
+        }
         if parts.iter().filter(|part| is_stream(&part.path)).count() > 1 {
             return Err(Exit::usage("standard input can be read only once: give - for one part"));
         }
@@ -94,7 +95,8 @@ impl PartOptions {
             let placement = part.placement.map(PartPlacement::placement);
             Ok(model.placed(&placement.unwrap_or_default()))
         };
-        Ok(Part::joined(parts.iter().map(open).collect::<Result<_, Exit>>()?))
+        let part = Part::joined(parts.iter().map(open).collect::<Result<_, Exit>>()?);
+        Ok(part.with_bodies(self.bodies))
     }
 
     fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Part, Exit> {

@@ -7,7 +7,9 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_postprocess::machine::{Machine, MachineLimit};
-use lamp_slicer::{GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOptions, Slices};
+use lamp_slicer::{
+    Bodies, GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOptions, Slices,
+};
 use lamp_stack::{Dpi, Layer, Length, Size};
 use serde::{Deserialize, Serialize};
 
@@ -157,6 +159,7 @@ impl SlicingOptions {
         let words = to_words(&options, |key| match key {
             "thickness" => !self.adaptive,
             "kernel" => !kernel,
+            "bodies" => self.solid.bodies != Bodies::default(),
             "overcure" => options.exposure.has_material(),
             "margin" => self.origin.is_none(),
             _ => true,
@@ -311,6 +314,7 @@ mod tests {
              --overcure 1.5 --origin -1,77.2 --size 80x80.5mm",
             "--dpi 300 --thickness 1.5mm --plane middle --units mm --fill even-odd \
              --exposure-table my_times.csv --margin 0",
+            "--dpi 300 --thickness 1mm --plane top --units mm --fill even-odd --bodies xor --margin 1",
         ] {
             let command = format!("slice my part.stl {words}");
             let options = SlicingOptions::of_command(&command).unwrap();

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use lamp_slicer::brep::{BodyReport, Finding, Prepared};
+use lamp_slicer::brep::{Finding, Prepared};
 use lamp_slicer::{KernelName, OpenOptions, SliceError};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
@@ -100,18 +100,6 @@ fn parse_seconds(text: &str) -> Result<Duration, String> {
     seconds
         .filter(|seconds| !seconds.is_zero())
         .ok_or_else(|| format!("`{text}` is not a time: write seconds, as 60"))
-}
-
-/// Returns whether boxes of bodies overlap by more than the facets' tolerance.
-pub(crate) fn boxes_overlap(prepared: &Prepared) -> bool {
-    let overlap = |a: &BodyReport, b: &BodyReport| {
-        let [low, high] = [0, 1].map(|end| [a.box_mm[end], b.box_mm[end]]);
-        (0..3).all(|k| {
-            f64::min(high[0][k], high[1][k]) - f64::max(low[0][k], low[1][k]) > prepared.chord_mm
-        })
-    };
-    let reports = &prepared.reports;
-    (1..reports.len()).any(|k| reports[..k].iter().any(|other| overlap(other, &reports[k])))
 }
 
 /// Returns notes about how a file was read, for people.

@@ -25,11 +25,11 @@ const RECORD_BYTES: usize = 36;
 /// All slabs together have at least this many buckets.
 const BUCKETS: usize = 128;
 
-/// Facets of a bucket that one transform places: their bytes in the file.
+/// Facets of a bucket that are of one piece: their bytes in the file.
 #[derive(Clone, Debug)]
 struct Chunk {
     bytes: Range<u64>,
-    transform: usize,
+    piece: usize,
 }
 
 /// A part's facets by slab.
@@ -63,19 +63,18 @@ impl Buckets {
         let buckets = Self { file, chunks: vec![Vec::new(); count], per_slab: order.per_slab };
         let writer = Mutex::new(BucketWriter { buckets, end: 0 });
         let blocks: Vec<usize> = (0..model.model.block_count()).collect();
-        let piece = blocks.len().div_ceil(workers).max(1);
-        blocks.par_chunks(piece).try_for_each(|blocks| -> io::Result<()> {
+        let per_worker = blocks.len().div_ceil(workers).max(1);
+        blocks.par_chunks(per_worker).try_for_each(|blocks| -> io::Result<()> {
             let mut gathered: Vec<_> =
                 (0..count).map(|_| Vec::with_capacity(chunk_bytes)).collect();
-            let alike =
-                |a: &usize, b: &usize| model.transform_of_block(*a) == model.transform_of_block(*b);
-            for blocks in blocks.chunk_by(alike) {
-                let transform = model.transform_of_block(blocks[0]);
-                let write = |bucket, records: &mut _| write(&writer, bucket, records, transform);
+            let piece = |block: usize| model.model.place_of(block).0;
+            for blocks in blocks.chunk_by(|&a, &b| piece(a) == piece(b)) {
+                let piece = piece(blocks[0]);
+                let write = |bucket, records: &mut _| write(&writer, bucket, records, piece);
                 for &block in blocks {
                     let mut result = Ok(());
                     model.model.for_each_in_block(block, |facet| {
-                        order.for_each_bucket(&model.placed(facet, transform), |bucket| {
+                        order.for_each_bucket(&model.placed_in_piece(facet, piece), |bucket| {
                             let records = &mut gathered[bucket];
                             records.extend_from_slice(&record(facet));
                             if records.len() + RECORD_BYTES > chunk_bytes && result.is_ok() {
@@ -161,14 +160,14 @@ fn write(
     writer: &Mutex<BucketWriter>,
     bucket: usize,
     records: &mut Vec<u8>,
-    transform: usize,
+    piece: usize,
 ) -> io::Result<()> {
     if !records.is_empty() {
         let BucketWriter { buckets, end } = &mut *writer.lock().expect("no writer panics");
         buckets.file.write_all(records)?;
         let start = *end;
         *end += records.len() as u64;
-        buckets.chunks[bucket].push(Chunk { bytes: start..*end, transform });
+        buckets.chunks[bucket].push(Chunk { bytes: start..*end, piece });
         records.clear();
     }
     Ok(())
@@ -187,13 +186,17 @@ impl FacetSource for SlabFacets<'_> {
     }
 
     fn for_each_in(&self, piece: usize, mut each: impl FnMut(&PlacedFacet)) -> io::Result<()> {
-        let Chunk { bytes, transform } = &self.chunks[piece];
+        let Chunk { bytes, piece } = &self.chunks[piece];
         for_each_record(self.file, bytes.clone(), |record: &[u8; RECORD_BYTES]| {
             let (numbers, _) = record.as_chunks::<4>();
             let number = |i: usize| f32::from_le_bytes(numbers[i]);
             let facet = std::array::from_fn(|c| std::array::from_fn(|axis| number(3 * c + axis)));
-            each(&self.model.placed(&facet, *transform));
+            each(&self.model.placed_in_piece(&facet, *piece));
         })
+    }
+
+    fn body(&self, piece: usize) -> u32 {
+        self.chunks[piece].piece as u32
     }
 }
 

@@ -15,10 +15,11 @@ use crate::table::Fill;
 pub(crate) struct EndSum(u64);
 
 impl EndSum {
-    /// Adds the ends of a segment from `a` to `b`, or from `b` to `a` if `is_reversed`.
+    /// Adds the ends of a segment from the first to the second, or back if `is_reversed`.
+    /// Ends with another salt are other points.
     #[inline]
-    pub(crate) fn add(&mut self, a: [f64; 2], b: [f64; 2], is_reversed: bool, fill: Fill) {
-        let (a, b) = (hash(a), hash(b));
+    pub(crate) fn add(&mut self, ends: [[f64; 2]; 2], is_reversed: bool, fill: Fill, salt: u64) {
+        let [a, b] = ends.map(|end| hash(end, salt));
         self.0 = match fill {
             Fill::EvenOdd => self.0 ^ a ^ b,
             Fill::NonZero => {
@@ -53,10 +54,11 @@ impl RowSums {
         Self((0..=last).map(|_| AtomicU64::new(0)).collect())
     }
 
-    /// Adds an end of a segment that starts or stops there.
+    /// Adds an end of a segment that starts or stops there. Ends with another salt are other
+    /// points.
     #[inline]
-    pub(crate) fn add(&self, row: u32, point: [f64; 2], starts: bool, fill: Fill) {
-        let (sum, hash) = (&self.0[row as usize], hash(point));
+    pub(crate) fn add(&self, row: u32, point: [f64; 2], starts: bool, fill: Fill, salt: u64) {
+        let (sum, hash) = (&self.0[row as usize], hash(point, salt));
         match fill {
             Fill::EvenOdd => sum.fetch_xor(hash, Relaxed),
             Fill::NonZero if starts => sum.fetch_add(hash, Relaxed),
@@ -71,15 +73,15 @@ impl RowSums {
     }
 }
 
-/// Returns a hash of a point: the two halves of the product of its coordinates' bits,
+/// Returns a hash of a point and a salt: the two halves of the product of its coordinates' bits,
 /// combined. Sums of a few hashes do not cancel because of how points lie, such as at
 /// the corners of a rectangle.
 #[inline]
-fn hash(point: [f64; 2]) -> u64 {
+fn hash(point: [f64; 2], salt: u64) -> u64 {
     // Whole numbers end in zeros. These bits, of pi, do not.
     const PI: [u64; 2] = [0x243f_6a88_85a3_08d3, 0xa409_3822_299f_31d1];
     let [x, y] = point.map(f64::to_bits);
-    let product = u128::from(x ^ PI[0]) * u128::from(y ^ PI[1]);
+    let product = u128::from(x ^ PI[0] ^ salt) * u128::from(y ^ PI[1]);
     product as u64 ^ (product >> 64) as u64
 }
 
@@ -89,7 +91,7 @@ mod tests {
 
     fn sum(segments: &[[[f64; 2]; 2]], fill: Fill) -> EndSum {
         let mut sum = EndSum::default();
-        segments.iter().for_each(|&[start, end]| sum.add(start, end, false, fill));
+        segments.iter().for_each(|&ends| sum.add(ends, false, fill, 0));
         sum
     }
 
@@ -114,6 +116,19 @@ mod tests {
     }
 
     #[test]
+    fn contours_of_two_bodies_do_not_close_each_other() {
+        let [side, ..] = square(7.3);
+        for fill in [Fill::EvenOdd, Fill::NonZero] {
+            for (salt, is_closed) in [(0, true), (1, false)] {
+                let mut sum = EndSum::default();
+                sum.add(side, false, fill, 0);
+                sum.add(side, true, fill, salt);
+                assert_eq!(sum.is_closed(), is_closed);
+            }
+        }
+    }
+
+    #[test]
     fn only_the_nonzero_rule_sees_a_segment_turned_round() {
         let mut segments = square(7.3);
         segments[1].reverse();
@@ -128,8 +143,9 @@ mod tests {
     fn the_shares_of_workers_add_up() {
         for fill in [Fill::EvenOdd, Fill::NonZero] {
             let (mut there, mut back) = (EndSum::default(), EndSum::default());
-            there.add([0.5, 1.0], [3.0, 0.0], true, fill);
-            back.add([0.5, 1.0], [3.0, 0.0], false, fill);
+            let ends = [[0.5, 1.0], [3.0, 0.0]];
+            there.add(ends, true, fill, 0);
+            back.add(ends, false, fill, 0);
             assert!(!there.is_closed() && !back.is_closed());
             assert!(there.joined(back, fill).is_closed());
             assert_eq!(there.joined(there, fill).is_closed(), fill == Fill::EvenOdd);
@@ -144,11 +160,11 @@ mod tests {
             for (row, point, starts) in
                 [(3, a, true), (3, b, true), (3, a, false), (8, c, false), (8, c, true)]
             {
-                sums.add(row, point, starts, fill);
+                sums.add(row, point, starts, fill, 0);
             }
             assert_eq!(sums.open_rows(), [3]);
-            sums.add(3, b, false, fill);
-            sums.add(8, c, true, fill);
+            sums.add(3, b, false, fill, 0);
+            sums.add(8, c, true, fill, 0);
             assert_eq!(sums.open_rows(), [8]);
         }
     }
@@ -158,7 +174,7 @@ mod tests {
     #[test]
     fn points_of_a_grid_have_hashes_without_pattern() {
         let points = (0..100).flat_map(|x| (0..100).map(move |y| [f64::from(x), f64::from(y)]));
-        let mut hashes: Vec<_> = points.map(hash).collect();
+        let mut hashes: Vec<_> = points.map(|point| hash(point, 0)).collect();
         let at = |x: usize, y: usize| hashes[100 * x + y];
         for (x, y) in (1..100).flat_map(|x| (1..100).map(move |y| (x, y))) {
             let [a, b, c, d] = [at(0, 0), at(x, 0), at(0, y), at(x, y)];

@@ -14,15 +14,16 @@
 //! is cut has two such edges, too. An overflow would move a point to a row's end,
 //! but the same way for both facets.
 
+use std::iter;
 use std::ops::Range;
 
+use crate::bodies::{FillRule, Turn};
 use crate::closure::EndSum;
 use crate::gray::{DepthSpan, Sheet};
 use crate::grid::PixelGrid;
 use crate::placement::{PlacedFacet, facet_heights};
 use crate::planes::Planes;
 use crate::scan::{SortedFacet, Z, ceil_clamped};
-use crate::table::Fill;
 
 /// A crossing of a row in 64 bits: the row, the first column whose centre is past the
 /// crossing, and in the lowest bit the direction of the contour. Sorted, crossings
@@ -77,20 +78,70 @@ impl RowCrossing {
     }
 }
 
+/// A crossing in its row and the body that it is of, to sort by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct BodyCrossing {
+    place: RowCrossing,
+    body: u32,
+}
+
+impl BodyCrossing {
+    #[inline]
+    pub(crate) fn new(body: u32, place: RowCrossing) -> Self {
+        Self { place, body }
+    }
+}
+
+/// What a row's images are made of.
+pub(crate) trait InRow: Copy + Default + Ord {
+    /// Returns the first column past it.
+    fn column(self) -> u32;
+
+    /// Returns the step of the winding number.
+    fn turn(self) -> Turn;
+}
+
+impl InRow for RowCrossing {
+    #[inline]
+    fn column(self) -> u32 {
+        self.column()
+    }
+
+    #[inline]
+    fn turn(self) -> Turn {
+        Turn::new(0, self.winding())
+    }
+}
+
+impl InRow for BodyCrossing {
+    #[inline]
+    fn column(self) -> u32 {
+        self.place.column()
+    }
+
+    #[inline]
+    fn turn(self) -> Turn {
+        Turn::new(self.body, self.place.winding())
+    }
+}
+
 /// Cuts facets into segments, and these into crossings.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cutter<'a> {
     pub(crate) grid: &'a PixelGrid,
     pub(crate) planes: &'a Planes,
-    pub(crate) fill: Fill,
+    pub(crate) rule: &'a FillRule,
 }
 
 /// The share of a layer that one worker finds.
 #[derive(Debug, Default)]
 pub(crate) struct LayerShare {
-    pub(crate) crossings: Vec<Crossing>,
-    /// Crossings of B-rep facets near which no point of the surface was found.
-    pub(crate) kept: Vec<Crossing>,
+    crossings: Vec<Crossing>,
+    /// From which crossing on they are of which body; those before are of body 0.
+    bodies: Vec<(u32, u32)>,
+    /// Crossings of B-rep facets near which no point of the surface was found, and their
+    /// bodies.
+    pub(crate) kept: Vec<(u32, Crossing)>,
     pub(crate) ends: EndSum,
     /// Facets below the section, for gray layers.
     pub(crate) spans: Vec<DepthSpan>,
@@ -100,9 +151,33 @@ impl LayerShare {
     /// Empties the lists, which keep their memory.
     pub(crate) fn clear(&mut self) {
         self.crossings.clear();
+        self.bodies.clear();
         self.kept.clear();
         self.spans.clear();
         self.ends = EndSum::default();
+    }
+
+    /// Returns the crossings, to which those of a body are to be added.
+    #[inline]
+    pub(crate) fn of_body(&mut self, body: u32) -> &mut Vec<Crossing> {
+        if self.bodies.last().map_or(0, |&(_, last)| last) != body {
+            self.bodies.push((self.crossings.len() as u32, body));
+        }
+        &mut self.crossings
+    }
+
+    /// Returns all crossings.
+    pub(crate) fn crossings(&self) -> &[Crossing] {
+        &self.crossings
+    }
+
+    /// Returns the crossings by body; a body may come several times.
+    pub(crate) fn by_body(&self) -> impl Iterator<Item = (u32, &[Crossing])> {
+        let starts = iter::once((0, 0)).chain(self.bodies.iter().copied());
+        let ends = self.bodies.iter().map(|&(start, _)| start);
+        let ends = ends.chain(iter::once(self.crossings.len() as u32));
+        let part = |(start, end)| &self.crossings[start as usize..end as usize];
+        starts.zip(ends).map(move |((start, body), end)| (body, part((start, end))))
     }
 }
 
@@ -124,30 +199,33 @@ pub(crate) struct SegmentEnd {
 }
 
 impl Cutter<'_> {
-    /// Adds the facet's crossings in `layers` to the shares of those layers, and returns
-    /// their number.
+    /// Adds the crossings of a body's facet in `layers` to the shares of those layers, and
+    /// returns their number.
     #[inline]
     pub(crate) fn cut(
         &self,
         facet: &PlacedFacet,
+        body: u32,
         layers: &Range<usize>,
         shares: &mut [LayerShare],
     ) -> usize {
         let mut count = 0;
+        let (fill, salt) = (self.rule.fill(), self.rule.salt(body));
         self.for_each_segment(facet, layers, |layer, segment| {
             let share = &mut shares[layer - layers.start];
             let [a, b] = segment.ends.map(|end| end.at);
-            share.ends.add(a, b, segment.is_reversed, self.fill);
-            count += self.cross_rows(a, b, segment.is_reversed, &mut share.crossings);
+            share.ends.add([a, b], segment.is_reversed, fill, salt);
+            count += self.cross_rows(a, b, segment.is_reversed, share.of_body(body));
         });
         count
     }
 
-    /// Adds the depths at which the rows of `layers` meet the facet below their sections,
+    /// Adds the depths at which the rows of `layers` meet a body's facet below their sections,
     /// within `reach_um`. Returns the number of crossings that take as much memory.
     pub(crate) fn look_down(
         &self,
         facet: &PlacedFacet,
+        body: u32,
         reach_um: f64,
         layers: &Range<usize>,
         shares: &mut [LayerShare],
@@ -158,7 +236,7 @@ impl Cutter<'_> {
         if met.is_empty() {
             return 0;
         }
-        let Some(sheet) = Sheet::new(self, facet) else { return 0 };
+        let Some(sheet) = Sheet::new(self, facet, body) else { return 0 };
         let mut count = 0;
         sheet.for_each_span(self, met, reach_um, |layer, span| {
             shares[layer - layers.start].spans.push(span);

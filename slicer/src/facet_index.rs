@@ -4,11 +4,13 @@ use std::ops::Range;
 
 use lamp_stack::{Grouped, KeyCounts};
 
+use crate::bodies::FillRule;
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
 use crate::part::Part;
 use crate::placement::{PlacedFacet, PlacedPart, Placement, facet_heights};
 use crate::survey::Survey;
+use crate::table::Fill;
 
 /// A part in its place, whose facets between two heights are found without looking at
 /// the others. It takes about 49 bytes a facet.
@@ -27,7 +29,7 @@ use crate::survey::Survey;
 pub struct FacetIndex {
     model: PlacedPart,
     bins: HeightBins,
-    /// By the bin in which they begin, with the transforms that place them.
+    /// By the bin in which they begin, with their pieces.
     facets: Grouped<(Facet, u32)>,
     /// By bin, the facets of lower bins that reach into it, as positions in `facets`.
     from_below: Grouped<u32>,
@@ -100,11 +102,11 @@ impl FacetIndex {
         }
         let (mut facets, mut from_below) = (facets.into_groups(), from_below.into_groups());
         for block in blocks {
-            let transform = model.transform_of_block(block);
+            let (piece, _) = model.model.place_of(block);
             model.model.for_each_in_block(block, |facet| {
-                let met = bins.of_facet(&model.placed(facet, transform));
+                let met = bins.of_facet(&model.placed_in_piece(facet, piece));
                 // There is room for all, unless the file changed.
-                let Some(place) = facets.put(met.start, (*facet, transform as u32)) else { return };
+                let Some(place) = facets.put(met.start, (*facet, piece as u32)) else { return };
                 for bin in met.start + 1..met.end {
                     from_below.put(bin, place);
                 }
@@ -116,8 +118,12 @@ impl FacetIndex {
         Ok(Self { model, bins, facets, from_below, min: survey.min, max: survey.max, overlap })
     }
 
-    /// Returns the numbers of the first two files whose boxes overlap, or of one file of
-    /// which two items do.
+    /// Returns the rule that tells inside from outside, given that for crossings.
+    pub fn fill_rule(&self, fill: Fill) -> FillRule {
+        self.model.model.fill_rule(fill)
+    }
+
+    /// Returns the numbers of the first two files whose boxes overlap.
     pub fn overlap(&self) -> Option<[usize; 2]> {
         self.overlap
     }
@@ -132,15 +138,15 @@ impl FacetIndex {
         self.max
     }
 
-    /// Returns the facets that reach above one height and do not begin above the other,
-    /// in an arbitrary but fixed order. Heights are in micrometres.
-    pub fn between(&self, low_um: f64, high_um: f64) -> Vec<PlacedFacet> {
+    /// Returns the facets that reach above one height and do not begin above the other, and
+    /// their bodies, in an arbitrary but fixed order. Heights are in micrometres.
+    pub fn between(&self, low_um: f64, high_um: f64) -> Vec<(PlacedFacet, u32)> {
         let (first, last) = (self.bins.of(low_um), self.bins.of(high_um));
         let facets = self.facets.items();
         let from_below = self.from_below.group(first).iter().map(|&facet| &facets[facet as usize]);
         let own = &facets[self.facets.range(first..last + 1)];
-        let placed = from_below.chain(own).map(|facet| self.placed(facet));
-        let is_met = |facet: &PlacedFacet| {
+        let placed = from_below.chain(own).map(|facet| (self.placed(facet), facet.1));
+        let is_met = |(facet, _): &(PlacedFacet, u32)| {
             let (low, high) = facet_heights(facet);
             low <= high_um && high > low_um
         };
@@ -152,8 +158,8 @@ impl FacetIndex {
         self.facets.items().iter().for_each(|facet| each(&self.placed(facet)));
     }
 
-    fn placed(&self, (facet, transform): &(Facet, u32)) -> PlacedFacet {
-        self.model.placed(facet, *transform as usize)
+    fn placed(&self, (facet, piece): &(Facet, u32)) -> PlacedFacet {
+        self.model.placed_in_piece(facet, *piece as usize)
     }
 }
 
@@ -184,7 +190,8 @@ mod tests {
                         let (a, b) = facet_heights(facet);
                         a <= high && b > low
                     });
-                    let mut found = body.between(low, high);
+                    let found = body.between(low, high).into_iter();
+                    let mut found: Vec<_> = found.map(|(facet, _)| facet).collect();
                     for list in [&mut expected, &mut found] {
                         list.sort_by(|a, b| a.partial_cmp(b).unwrap());
                     }

@@ -37,6 +37,7 @@
 //! ```
 
 mod ascii;
+mod bodies;
 mod buckets;
 mod closure;
 mod cut;
@@ -67,6 +68,7 @@ mod wild;
 /// B-rep models: kernels, and reports of what they read.
 pub use lamp_brep as brep;
 
+pub use bodies::{Bodies, BodyOverlap, FillRule, Position, Turn};
 pub use error::{AsciiFault, FileChange, ObjFault, SliceError};
 pub use exact::Polished;
 pub use facet::{Facet, Units};

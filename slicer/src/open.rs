@@ -12,7 +12,6 @@ use lamp_brep::{BodyFault, BodyReport, BrepError, Prepared, ReadFn, is_step, pre
 use lamp_stack::{Length, digest_of, one_line};
 
 use crate::error::SliceError;
-use crate::facet::Units;
 use crate::obj::{self, looks_obj};
 use crate::part::{Facets, Part, Piece};
 use crate::part_file::PartFile;
@@ -143,7 +142,7 @@ impl Part {
         let prepared = read_step(bytes.clone(), options)?;
         refuse_faults(&prepared, options.allow_gaps)?;
         let digest = digest_of(&bytes[..])?;
-        let part = Self::new(name, vec![of_surfaces(prepared)], digest);
+        let part = Self::new(name, Piece::of_bodies(prepared), digest);
         Ok(part.with(0, options.trust_extent))
     }
 }
@@ -167,13 +166,13 @@ fn unpacked(
     start: &[u8],
     options: &OpenOptions,
 ) -> Result<Contents, SliceError> {
-    let of_one = |piece| Contents { pieces: vec![piece], left_out: 0 };
+    let of_one = |facets| Contents { pieces: vec![Piece::new(facets)], left_out: 0 };
     if is_step(start) {
         let mut bytes = Vec::new();
         file.reader().read_to_end(&mut bytes)?;
         let prepared = read_step(bytes.into(), options)?;
         refuse_faults(&prepared, options.allow_gaps)?;
-        return Ok(of_one(of_surfaces(prepared)));
+        return Ok(Contents { pieces: Piece::of_bodies(prepared), left_out: 0 });
     }
     if looks_packaged(start) {
         return Ok(three_mf::read(file).map_err(Box::new)?);
@@ -183,9 +182,9 @@ fn unpacked(
     }
     if looks_obj(start) {
         let facets = obj::read(BufReader::new(file.reader()))?;
-        return Ok(of_one(Piece::new(Facets::Memory(Arc::new(facets)))));
+        return Ok(of_one(Facets::Memory(Arc::new(facets))));
     }
-    Ok(of_one(Piece::new(stl::open(file, start)?)))
+    Ok(of_one(stl::open(file, start)?))
 }
 
 /// Returns the format of a file that was given by mistake, if it is known.
@@ -199,11 +198,6 @@ fn other_format(start: &[u8]) -> Option<&'static str> {
         (b"\x89PNG", "PNG"),
     ];
     FORMATS.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, name)| *name)
-}
-
-fn of_surfaces(prepared: Prepared) -> Piece {
-    let units = Some(Units::Millimetres);
-    Piece { units, ..Piece::new(Facets::Surfaces(Arc::new(prepared))) }
 }
 
 /// Files nest entities as deep as they like.

@@ -7,33 +7,36 @@ use std::sync::Arc;
 use lamp_brep::Prepared;
 use lamp_stack::{digest_of, digest_of_digests};
 
+use crate::bodies::{Bodies, FillRule};
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
 use crate::part_file::PartFile;
 use crate::placement::Placement;
 use crate::stl::{FACET_BYTES, HEADER_BYTES, parse};
+use crate::table::Fill;
 
 /// The facets of a block, in which they are read: 200 kB of a binary file.
 const BLOCK_FACETS: usize = 4096;
 /// Facets of surfaces are fewer and cost more, and all threads should have some.
 const BLOCK_SURFACE_FACETS: usize = 128;
 
-/// A part: its name and its facets, from one file or several. A binary STL
+/// A part: its name and its facets, from one file or several of one body or many. A binary STL
 /// stays in its file, of which only a few blocks are read at a time. Clones
 /// share the facets.
 #[derive(Clone, Debug)]
 pub struct Part {
     name: String,
-    /// No block has facets of two pieces.
+    /// The bodies. No block has facets of two pieces.
     pieces: Vec<Piece>,
     /// The number of blocks up to the end of each piece.
     block_ends: Vec<usize>,
     digest: String,
+    bodies: Bodies,
     left_out: usize,
     trusts_extent: bool,
 }
 
-/// The facets of a file that stand alike: all, or those of one of its items.
+/// The facets of a file that stand alike: all, or those of one of its items or bodies.
 #[derive(Clone, Debug)]
 pub(crate) struct Piece {
     pub(crate) facets: Facets,
@@ -50,9 +53,16 @@ pub(crate) struct Piece {
 /// Facets in file units.
 #[derive(Clone, Debug)]
 pub(crate) enum Facets {
-    Binary { file: Arc<PartFile>, count: usize },
+    Binary {
+        file: Arc<PartFile>,
+        count: usize,
+    },
     Memory(Arc<Vec<Facet>>),
-    Surfaces(Arc<Prepared>),
+    /// Those of a body.
+    Surfaces {
+        prepared: Arc<Prepared>,
+        facets: Range<usize>,
+    },
 }
 
 impl Facets {
@@ -60,7 +70,7 @@ impl Facets {
         match self {
             Self::Binary { count, .. } => *count,
             Self::Memory(facets) => facets.len(),
-            Self::Surfaces(prepared) => prepared.mesh.facets.len(),
+            Self::Surfaces { facets, .. } => facets.len(),
         }
     }
 
@@ -70,7 +80,7 @@ impl Facets {
 
     fn per_block(&self) -> usize {
         match self {
-            Self::Surfaces(_) => BLOCK_SURFACE_FACETS,
+            Self::Surfaces { .. } => BLOCK_SURFACE_FACETS,
             _ => BLOCK_FACETS,
         }
     }
@@ -79,9 +89,9 @@ impl Facets {
     fn for_each(&self, range: Range<usize>, mut each: impl FnMut(&Facet)) -> io::Result<()> {
         match self {
             Self::Memory(facets) => facets[range].iter().for_each(each),
-            Self::Surfaces(prepared) => {
+            Self::Surfaces { prepared, facets } => {
                 let mesh = &prepared.mesh;
-                let facets = &mesh.facets[range];
+                let facets = &mesh.facets[facets.clone()][range];
                 facets.iter().for_each(|facet| each(&rounded(mesh.corners(facet))));
             }
             Self::Binary { file, .. } => {
@@ -105,10 +115,24 @@ impl Piece {
         matches!(self.facets, Facets::Binary { .. })
     }
 
-    /// Returns the exact surfaces below the facets, if there are some.
-    pub(crate) fn surfaces(&self) -> Option<&Prepared> {
+    /// Creates the pieces of a STEP file: its bodies.
+    pub(crate) fn of_bodies(prepared: Prepared) -> Vec<Self> {
+        let prepared = Arc::new(prepared);
+        let piece = |facets: Range<usize>| Self {
+            first_facet: facets.start,
+            units: Some(Units::Millimetres),
+            ..Self::new(Facets::Surfaces { prepared: prepared.clone(), facets })
+        };
+        let before = |face| prepared.mesh.facets.partition_point(|facet| facet.face < face);
+        let bodies = prepared.kernel.bodies().iter();
+        bodies.map(|body| piece(before(body.faces.start)..before(body.faces.end))).collect()
+    }
+
+    /// Returns the exact surfaces below the facets, if there are some. Bodies of one file
+    /// share them.
+    pub(crate) fn surfaces(&self) -> Option<&Arc<Prepared>> {
         match &self.facets {
-            Facets::Surfaces(prepared) => Some(prepared),
+            Facets::Surfaces { prepared, .. } => Some(prepared),
             _ => None,
         }
     }
@@ -134,7 +158,8 @@ impl Part {
         };
         let block_ends = pieces.iter().map(end).collect();
         let name = name.to_owned();
-        Self { name, pieces, block_ends, digest, left_out: 0, trusts_extent: false }
+        let bodies = Bodies::default();
+        Self { name, pieces, block_ends, digest, bodies, left_out: 0, trusts_extent: false }
     }
 
     /// Notes how many items are no solids, and whether the part is as large as it seems.
@@ -152,7 +177,33 @@ impl Part {
 
     /// Returns what was read of each STEP file.
     pub fn prepared(&self) -> impl Iterator<Item = &Prepared> {
-        self.pieces.iter().filter_map(Piece::surfaces)
+        let of_files = self.pieces.chunk_by(|a, b| a.file == b.file);
+        of_files.filter_map(|pieces| pieces[0].surfaces().map(Arc::as_ref))
+    }
+
+    /// Returns what was read of a file, from 0 among those joined, if it is a STEP file.
+    pub fn prepared_of(&self, file: usize) -> Option<&Prepared> {
+        let piece = self.pieces.iter().find(|piece| piece.file == file)?;
+        piece.surfaces().map(Arc::as_ref)
+    }
+
+    /// Sets how the bodies of each file join; they unite by default.
+    #[must_use]
+    pub fn with_bodies(self, bodies: Bodies) -> Self {
+        Self { bodies, ..self }
+    }
+
+    /// Returns the rule that tells inside from outside of all files together.
+    pub(crate) fn fill_rule(&self, fill: Fill) -> FillRule {
+        let files: Vec<usize> = self.pieces.iter().map(|piece| piece.file).collect();
+        FillRule::new(fill, self.bodies, &files)
+    }
+
+    /// Returns the file of a body, and its number there, from 0.
+    pub(crate) fn body_in_file(&self, body: u32) -> (usize, usize) {
+        let file = self.pieces[body as usize].file;
+        let first = self.pieces.partition_point(|piece| piece.file < file);
+        (file, body as usize - first)
     }
 
     pub(crate) fn pieces(&self) -> &[Piece] {
@@ -168,13 +219,14 @@ impl Part {
         let digest = digest_of_digests(models.iter().map(Self::digest));
         let left_out = models.iter().map(|model| model.left_out).sum();
         let trusts_extent = models.iter().any(|model| model.trusts_extent);
+        let bodies = models.first().map_or_else(Bodies::default, |model| model.bodies);
         let mut pieces = Vec::new();
         for model in models {
             let files = pieces.last().map_or(0, |last: &Piece| last.file + 1);
             let of_model = model.pieces.into_iter();
             pieces.extend(of_model.map(|piece| Piece { file: files + piece.file, ..piece }));
         }
-        Self::new(&name, pieces, digest).with(left_out, trusts_extent)
+        Self::new(&name, pieces, digest).with(left_out, trusts_extent).with_bodies(bodies)
     }
 
     /// Places the part among others, after its file's units were taken into account.

@@ -103,6 +103,12 @@ impl Placement {
         Self { rows }
     }
 
+    /// Returns the coefficients for points in a unit.
+    fn rows_of(&self, units: Units) -> [[f64; 4]; 3] {
+        let unit = units.mm();
+        self.rows.map(|[x, y, z, shift]| [x * unit, y * unit, z * unit, shift])
+    }
+
     /// Returns true if it makes right hands left ones.
     pub(crate) fn is_mirror(&self) -> bool {
         let [a, b, c] = self.rows;
@@ -142,6 +148,8 @@ pub(crate) struct PlacedPart {
     pub(crate) model: Part,
     /// Those of the pieces, each once.
     transforms: Vec<Transform>,
+    /// The exact surfaces of each file that has some.
+    surfaces: Vec<PlacedSurfaces>,
     pieces: Vec<PlacedPiece>,
 }
 
@@ -150,8 +158,8 @@ pub(crate) struct PlacedPart {
 struct PlacedPiece {
     /// Its number among the transforms.
     transform: usize,
-    /// Its surfaces in place, if it has some.
-    surfaces: Option<PlacedSurfaces>,
+    /// The number of its file's surfaces, if it has some.
+    surfaces: Option<usize>,
 }
 
 /// The transform from file units to the place.
@@ -183,8 +191,9 @@ impl Transform {
 impl PlacedPart {
     /// Places a part. Files that state no unit are in `units`.
     pub(crate) fn new(model: Part, placement: &Placement, units: Units) -> Self {
-        let mut transforms = Vec::new();
-        let mut place = |piece: &Piece| {
+        let (mut transforms, mut surfaces) = (Vec::new(), Vec::new());
+        let mut file_before = None;
+        let mut place = |(body, piece): (u32, &Piece)| {
             let units = piece.units.unwrap_or(units);
             let placement = piece.placement.then(placement);
             let transform = Transform::new(&placement, units);
@@ -192,35 +201,39 @@ impl PlacedPart {
             if transforms.last() != Some(&transform) {
                 transforms.push(transform);
             }
-            let rows = placement.rows.map(|[x, y, z, shift]| {
-                let unit = units.mm();
-                [x * unit, y * unit, z * unit, shift]
-            });
-            let surfaces = piece.surfaces().map(|Prepared { kernel, mesh, .. }| {
-                PlacedSurfaces::new(kernel.clone(), mesh.clone(), rows)
-            });
+            let is_of_next_file = file_before.replace(piece.file) != Some(piece.file);
+            if let Some(prepared) = piece.surfaces().filter(|_| is_of_next_file) {
+                let Prepared { kernel, mesh, .. } = &**prepared;
+                let rows = placement.rows_of(units);
+                let placed = PlacedSurfaces::new(kernel.clone(), mesh.clone(), rows);
+                surfaces.push(placed.numbered_from(body));
+            }
+            let surfaces = piece.surfaces().map(|_| surfaces.len() - 1);
             PlacedPiece { transform: transforms.len() - 1, surfaces }
         };
-        let pieces = model.pieces().iter().map(&mut place).collect();
-        Self { model, transforms, pieces }
+        let pieces = (0..).zip(model.pieces()).map(&mut place).collect();
+        Self { model, transforms, surfaces, pieces }
     }
 
     /// Drops the surfaces, so that only facets are left.
     pub(crate) fn on_facets(mut self) -> Self {
         self.pieces.iter_mut().for_each(|piece| piece.surfaces = None);
+        self.surfaces.clear();
         self
     }
 
-    /// Returns all surfaces.
-    pub(crate) fn surfaces(&self) -> impl Iterator<Item = &PlacedSurfaces> {
-        self.pieces.iter().filter_map(|piece| piece.surfaces.as_ref())
+    /// Returns the surfaces of all files.
+    pub(crate) fn surfaces(&self) -> &[PlacedSurfaces] {
+        &self.surfaces
     }
 
     /// Returns the surfaces of a block's piece, if it has some, and the number there of
     /// the block's first facet.
     pub(crate) fn surfaces_of_block(&self, block: usize) -> Option<(&PlacedSurfaces, u32)> {
         let (piece, facets) = self.model.place_of(block);
-        Some((self.pieces[piece].surfaces.as_ref()?, facets.start as u32))
+        let surfaces = &self.surfaces[self.pieces[piece].surfaces?];
+        let first = self.model.pieces()[piece].first_facet + facets.start;
+        Some((surfaces, first as u32))
     }
 
     /// Calls `each` with every facet of a block.
@@ -230,7 +243,8 @@ impl PlacedPart {
         mut each: impl FnMut(&PlacedFacet),
     ) -> io::Result<()> {
         // Two loops, so that neither asks at every facet which one it is.
-        match self.transforms[self.transform_of_block(block)] {
+        let (piece, _) = self.model.place_of(block);
+        match self.transforms[self.pieces[piece].transform] {
             Transform::Scale(scale) => self.model.for_each_in_block(block, |facet| {
                 each(&placed(facet, |corner| scaled(&scale, corner)));
             }),
@@ -240,20 +254,10 @@ impl PlacedPart {
         }
     }
 
-    /// Returns the number of the transform that places the facets of a block.
-    pub(crate) fn transform_of_block(&self, block: usize) -> usize {
-        self.pieces[self.model.place_of(block).0].transform
-    }
-
     /// Places a facet of a piece.
-    pub(crate) fn placed_in_piece(&self, facet: &Facet, piece: usize) -> PlacedFacet {
-        self.placed(facet, self.pieces[piece].transform)
-    }
-
-    /// Places a facet by one of the transforms.
     #[inline]
-    pub(crate) fn placed(&self, facet: &Facet, transform: usize) -> PlacedFacet {
-        match &self.transforms[transform] {
+    pub(crate) fn placed_in_piece(&self, facet: &Facet, piece: usize) -> PlacedFacet {
+        match &self.transforms[self.pieces[piece].transform] {
             Transform::Scale(scale) => placed(facet, |corner| scaled(scale, corner)),
             Transform::Affine(rows) => placed(facet, |corner| rows.map(|row| affine(&row, corner))),
         }

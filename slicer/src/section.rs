@@ -3,6 +3,7 @@
 use lamp_stack::{Dpi, Length};
 use rayon::prelude::*;
 
+use crate::bodies::{Position, Turn};
 use crate::cut::Cutter;
 use crate::error::SliceError;
 use crate::facet::Units;
@@ -54,15 +55,18 @@ fn rows(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError
     survey.check_extent(&model)?;
     let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
     let planes = Planes::one(options.z);
-    let cutter = Cutter { grid: &grid, planes: &planes, fill: options.fill };
+    let rule = model.model.fill_rule(options.fill);
+    let cutter = Cutter { grid: &grid, planes: &planes, rule: &rule };
     let z_um = planes.z_um(0);
     let found = survey.blocks_between(z_um, z_um).into_par_iter().map(|block| {
         let mut crossings = Vec::new();
+        let body = rule.name_of(model.model.place_of(block).0 as u32);
         model.for_each_in_block(block, |facet| {
             cutter.for_each_segment(facet, &(0..1), |_, segment| {
                 let [a, b] = segment.ends.map(|end| end.at);
                 cutter.for_each_crossing(a, b, segment.is_reversed, |row, column, rising| {
-                    crossings.push((row, grid.to_mm(column, 0.0)[0], if rising { 1 } else { -1 }));
+                    let turn = Turn::new(body, if rising { 1 } else { -1 });
+                    crossings.push((row, grid.to_mm(column, 0.0)[0], turn));
                 });
             });
         })?;
@@ -71,18 +75,20 @@ fn rows(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError
     let mut crossings = found.collect::<Result<Vec<_>, SliceError>>()?.concat();
     crossings.par_sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     let mut rows = vec![Inside::new(); options.rows as usize];
+    let mut position = Position::outside(&rule);
     for row in crossings.chunk_by(|a, b| a.0 == b.0) {
-        rows[row[0].0 as usize] = inside(row, options.fill);
+        rows[row[0].0 as usize] = inside(row, &mut position);
     }
     Ok(rows)
 }
 
 /// Returns the stretches between the crossings of a row.
-fn inside(crossings: &[(u32, f64, i32)], fill: Fill) -> Inside {
-    let (mut inside, mut entered, mut winding) = (Inside::new(), None, 0);
+fn inside(crossings: &[(u32, f64, Turn)], position: &mut Position<'_>) -> Inside {
+    let (mut inside, mut entered) = (Inside::new(), None);
+    position.leave_all();
     for &(_, x, turn) in crossings {
-        winding += turn;
-        let is_inside = fill.is_inside(winding);
+        position.cross(turn);
+        let is_inside = position.is_inside();
         match entered {
             None if is_inside => entered = Some(x),
             Some(from) if !is_inside => {

@@ -7,6 +7,7 @@ use std::ops::Range;
 use lamp_stack::{Dpi, Layer, Length, LevelChange, PageInfo, StackInfo};
 use rayon::prelude::*;
 
+use crate::bodies::{BodyOverlap, FillRule, SharedCounts, SharedVolumes};
 use crate::buckets::Buckets;
 use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
@@ -131,7 +132,7 @@ pub struct Slices {
     survey: Survey,
     grid: PixelGrid,
     planes: Planes,
-    fill: Fill,
+    rule: FillRule,
     gray: Option<LayerLevels>,
     wanted: Range<usize>,
     max_crossings: usize,
@@ -144,6 +145,7 @@ pub struct Slices {
     /// What polishing did to the crossings of slabs before.
     polished: Polished,
     open_rows: OpenRows,
+    shared: SharedVolumes,
     /// The layers of the table that are still to be made into images.
     pending: Range<usize>,
     ready: VecDeque<Layer>,
@@ -171,6 +173,7 @@ impl Slices {
         let survey = Survey::of(&model)?;
         survey.check_extent(&model)?;
         let model = if options.polish { model } else { model.on_facets() };
+        let rule = model.model.fill_rule(options.fill);
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;
         let (bottom_um, top_um) = (survey.min[2], survey.max[2]);
@@ -203,7 +206,7 @@ impl Slices {
             slabs.iter().map(|slab| heights_of(slab, &planes, reach_um)).collect();
         // If no temporary file can be written, slabs read all blocks that they meet.
         // B-rep facets are in memory; and buckets would lose their numbers.
-        let wants_sorting = model.surfaces().next().is_none() && survey.wants_sorting(&heights);
+        let wants_sorting = model.surfaces().is_empty() && survey.wants_sorting(&heights);
         let buckets = wants_sorting
             .then(|| Buckets::sort(&model, &planes, reach_um, &slabs, options.memory as usize).ok())
             .flatten();
@@ -211,7 +214,7 @@ impl Slices {
             model,
             survey,
             grid,
-            fill: options.fill,
+            rule,
             gray: options.gray.clone(),
             max_crossings,
             largest,
@@ -223,6 +226,7 @@ impl Slices {
             table: Table::default(),
             polished: Polished::default(),
             open_rows: OpenRows::new(),
+            shared: SharedVolumes::default(),
             ready: VecDeque::new(),
             is_checked: false,
         })
@@ -248,7 +252,8 @@ impl Slices {
     /// Returns what polishing did to the crossings of B-rep parts so far, if there are
     /// any.
     pub fn polished(&self) -> Option<Polished> {
-        self.model.surfaces().next().map(|_| self.polished.joined(self.table.polished()))
+        let is_exact = !self.model.surfaces().is_empty();
+        is_exact.then(|| self.polished.joined(self.table.polished()))
     }
 
     /// Cuts a layer once more, with its plane moved up, but not past its neighbours' or
@@ -264,14 +269,14 @@ impl Slices {
             return Err(SliceError::NoSuchLayers { start, end, count: count as u32 });
         }
         let planes = self.planes.moved(index, up.um(), [self.survey.min[2], self.survey.max[2]]);
-        let cutter = Cutter { grid: &self.grid, planes: &planes, fill: self.fill };
+        let cutter = Cutter { grid: &self.grid, planes: &planes, rule: &self.rule };
         let reach_um = self.gray.as_ref().map(LayerLevels::reach_um);
         let layers = index..index + 1;
         let below = reach_um.unwrap_or(0.0);
         let facets = MetBlocks::of(&self.model, &self.survey, &layers, &planes, below);
         let mut table = Table::default();
         let open = fill(&mut table, &facets, cutter, reach_um, layers, usize::MAX)?;
-        Ok(self.image_of(index, &table, cutter, &open.unwrap_or_default()))
+        Ok(self.image_of(index, &table, cutter, &open.unwrap_or_default()).0)
     }
 
     /// Returns the heights of the layers.
@@ -290,10 +295,26 @@ impl Slices {
         [self.survey.min, self.survey.max].map(|[x, y, z_um]| [x, y, z_um / 1000.0])
     }
 
-    /// Returns the numbers of the first two files whose boxes overlap, or of one file of
-    /// which two items do.
+    /// Returns the numbers of the first two files whose boxes overlap.
     pub fn overlap(&self) -> Option<[usize; 2]> {
         self.survey.overlap(&self.model)
+    }
+
+    /// Returns true if bodies of a file unite, each even-odd by itself.
+    pub fn unites_bodies(&self) -> bool {
+        self.rule.unites()
+    }
+
+    /// Returns what bodies of the same file share in the layers made so far, the largest
+    /// volumes first. Bodies that only touch share nothing: what less than 0.01 % of
+    /// the smaller body, or no two layers in a row, have in common does not count. Under
+    /// [`Fill::NonZero`] nothing is counted.
+    pub fn body_overlaps(&self) -> Vec<BodyOverlap> {
+        let of_pair = |(bodies, volume_mm3): ([u32; 2], f64)| {
+            let [(file, a), (_, b)] = bodies.map(|body| self.model.model.body_in_file(body));
+            BodyOverlap { file, bodies: [a, b], volume_mm3 }
+        };
+        self.shared.overlaps().into_iter().map(of_pair).collect()
     }
 
     /// Fills the table with the next slab, as the iterator does when it needs to.
@@ -303,7 +324,7 @@ impl Slices {
         let start = self.pending.end;
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;
-        let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
+        let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
         let gray = self.gray.as_ref().map(LayerLevels::reach_um);
         let reach_um = gray.unwrap_or(0.0);
         self.polished = self.polished.joined(self.table.polished());
@@ -346,7 +367,7 @@ impl Slices {
         let tracer = Tracer {
             model: &self.model,
             survey: &self.survey,
-            cutter: Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill },
+            cutter: Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule },
             memory: 2 * size_of::<Crossing>() * self.max_crossings,
         };
         let trace = tracer.trace(&bands);
@@ -360,29 +381,36 @@ impl Slices {
         let end = self.pending.start + layers;
         let batch = self.pending.start..end;
         self.pending.start = end;
-        let cutter = Cutter { grid: &self.grid, planes: &self.planes, fill: self.fill };
+        let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
         let layer = |layer| self.image_of(layer, &self.table, cutter, &self.open_rows);
-        self.ready = batch.into_par_iter().map(layer).collect();
+        let made: Vec<_> = batch.clone().into_par_iter().map(layer).collect();
+        for (index, (layer, shared)) in batch.zip(made) {
+            self.add_shared(index, &shared);
+            self.ready.push_back(layer);
+        }
     }
 
-    /// Makes a layer of a table into an image.
+    /// Adds the pixels that bodies share in a layer.
+    fn add_shared(&mut self, layer: usize, shared: &[([u32; 2], u64)]) {
+        let pitch_mm = self.grid.dpi.pitch().mm();
+        let pixel_mm3 = pitch_mm * pitch_mm * self.planes.thickness_um(layer) / 1000.0;
+        self.shared.add(layer, shared, pixel_mm3);
+    }
+
+    /// Makes a layer of a table into an image, and counts the pixels that bodies share.
     fn image_of(
         &self,
         layer: usize,
         table: &Table,
         cutter: Cutter<'_>,
         open_rows: &OpenRows,
-    ) -> Layer {
-        let surfaces: Vec<_> = self.model.surfaces().collect();
-        let CutLayer { image, stray_rows, closed } =
-            table.layer(layer, cutter, &surfaces, self.gray.as_ref());
+    ) -> (Layer, SharedCounts) {
+        let CutLayer { image, stray_rows, closed, shared } =
+            table.layer(layer, cutter, self.model.surfaces(), self.gray.as_ref());
         let open_rows = open_rows.get(&layer).cloned().unwrap_or_default();
         let closed = Some(closed);
-        Layer {
-            info: PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) },
-            dpi: Some(self.grid.dpi),
-            image: image.into(),
-        }
+        let info = PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) };
+        (Layer { info, dpi: Some(self.grid.dpi), image: image.into() }, shared)
     }
 
     /// Returns the number of layers to make into images at once: enough for all threads,
@@ -458,7 +486,7 @@ fn fill(
         return Ok(None);
     }
     // A row takes as much memory as a crossing.
-    let open = table.open_layers(cutter.fill);
+    let open = table.open_layers(cutter.rule.fill());
     let at_once = (max_crossings / cutter.grid.height as usize).max(1);
     let mut rows = OpenRows::new();
     for layers in open.chunks(at_once) {
@@ -499,6 +527,10 @@ impl FacetSource for MetBlocks<'_> {
 
     fn surfaces(&self, piece: usize) -> Option<(&PlacedSurfaces, u32)> {
         self.model.surfaces_of_block(self.blocks[piece])
+    }
+
+    fn body(&self, piece: usize) -> u32 {
+        self.model.model.place_of(self.blocks[piece]).0 as u32
     }
 }
 

@@ -114,7 +114,7 @@ impl Survey {
         }
         let whole = good.iter().copied().reduce(BlockSurvey::joined).ok_or(SliceError::NoFacets)?;
         let (mut min, mut max) = (whole.min, whole.max);
-        for [low, high] in model.surfaces().filter_map(PlacedSurfaces::box_mm) {
+        for [low, high] in model.surfaces().iter().filter_map(PlacedSurfaces::box_mm) {
             for (axis, unit) in [1.0, 1.0, 1000.0].into_iter().enumerate() {
                 let (low, high) = (low[axis] * unit, high[axis] * unit);
                 // Not for rounding's sake: a flat end stays where its facets are.
@@ -142,12 +142,13 @@ impl Survey {
         self.check_distance()
     }
 
-    /// Returns the files of the first two pieces of a part whose boxes overlap.
+    /// Returns the first two files of a part whose boxes overlap.
     pub(crate) fn overlap(&self, part: &PlacedPart) -> Option<[usize; 2]> {
         let pieces = part.model.pieces();
-        let mut boxes = vec![([f64::MAX; 3], [f64::MIN; 3]); pieces.len()];
+        let files = pieces.last().map_or(0, |last| last.file + 1);
+        let mut boxes = vec![([f64::MAX; 3], [f64::MIN; 3]); files];
         for (block, survey) in self.blocks.iter().enumerate() {
-            let (low, high) = &mut boxes[part.model.place_of(block).0];
+            let (low, high) = &mut boxes[pieces[part.model.place_of(block).0].file];
             for axis in 0..3 {
                 low[axis] = low[axis].min(survey.min[axis]);
                 high[axis] = high[axis].max(survey.max[axis]);
@@ -166,7 +167,7 @@ impl Survey {
             order[place + 1..].iter().take_while(may_meet).map(move |&b| (a.min(b), a.max(b)))
         });
         let (a, b) = pairs.filter(|&(a, b)| overlap(a, b)).min()?;
-        Some([pieces[a].file, pieces[b].file])
+        Some([a, b])
     }
 
     fn check_distance(&self) -> Result<(), SliceError> {

@@ -11,10 +11,12 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use lamp_stack::{Grouped, Image, Mask};
 use rayon::prelude::*;
 
+use crate::bodies::{Position, SharedCounts, SharedPixels};
 use crate::closure::{EndSum, RowSums};
-use crate::cut::{Crossing, Cutter, LayerShare, RowCrossing};
+use crate::cut::{BodyCrossing, Crossing, Cutter, InRow, LayerShare, RowCrossing};
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
 use crate::gray::{DepthSpan, LayerLevels, Shader};
+use crate::grid::PixelGrid;
 use crate::placement::PlacedFacet;
 
 /// The rule that tells inside from outside.
@@ -60,6 +62,9 @@ pub(crate) trait FacetSource: Sync {
     fn surfaces(&self, _piece: usize) -> Option<(&PlacedSurfaces, u32)> {
         None
     }
+
+    /// The body that a piece's facets are of.
+    fn body(&self, piece: usize) -> u32;
 }
 
 /// The crossings of a slab of layers.
@@ -79,6 +84,8 @@ pub(crate) struct CutLayer {
     pub(crate) stray_rows: Vec<u32>,
     /// Whether every contour closes.
     pub(crate) closed: bool,
+    /// The pixels that bodies of one file share, by pairs.
+    pub(crate) shared: SharedCounts,
 }
 
 /// A limit to the crossings that all workers make together.
@@ -130,9 +137,11 @@ impl Table {
                 if piece >= facets.pieces() {
                     return Ok(());
                 }
+                let body = cutter.rule.name_of(facets.body(piece));
                 if let Some((surfaces, first)) = facets.surfaces(piece) {
+                    let layers = layers.clone();
                     let mut cut =
-                        ExactCut::new(surfaces, first, tally, cutter, layers.clone(), reach_um);
+                        ExactCut::new(surfaces, first, body, tally, cutter, layers, reach_um);
                     facets.for_each_in(piece, |facet| {
                         if !budget.is_spent() {
                             unclaimed += cut.cut(facet, shares);
@@ -144,9 +153,9 @@ impl Table {
                 }
                 facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
-                        unclaimed += cutter.cut(facet, &layers, shares);
+                        unclaimed += cutter.cut(facet, body, &layers, shares);
                         if let Some(reach_um) = reach_um {
-                            unclaimed += cutter.look_down(facet, reach_um, &layers, shares);
+                            unclaimed += cutter.look_down(facet, body, reach_um, &layers, shares);
                         }
                         budget.claim(&mut unclaimed);
                     }
@@ -191,19 +200,24 @@ impl Table {
     }
 
     /// Returns the crossings of a layer that are kept on facets, or added near extrema of
-    /// contours.
+    /// contours, with their bodies.
     fn more(
         &self,
         layer: usize,
         cutter: Cutter<'_>,
-        surfaces: &[&PlacedSurfaces],
-        crossings: impl Iterator<Item = Crossing>,
-    ) -> Vec<Crossing> {
+        surfaces: &[PlacedSurfaces],
+    ) -> Vec<(u32, Crossing)> {
         if surfaces.is_empty() {
             return Vec::new();
         }
-        let kept = self.shares(layer).flat_map(|share| &share.kept).copied().collect();
-        settle(surfaces, &self.tally, layer, cutter, crossings, kept)
+        let kept = self.shares(layer).flat_map(|share| &share.kept).copied();
+        settle(surfaces, &self.tally, layer, cutter, self.by_body(layer), kept)
+    }
+
+    /// Returns a layer's crossings from facets, with their bodies.
+    fn by_body(&self, layer: usize) -> impl Iterator<Item = (u32, Crossing)> {
+        let parts = self.shares(layer).flat_map(LayerShare::by_body);
+        parts.flat_map(|(body, crossings)| crossings.iter().map(move |&crossing| (body, crossing)))
     }
 
     /// Makes a layer of the slab.
@@ -211,49 +225,85 @@ impl Table {
         &self,
         layer: usize,
         cutter: Cutter<'_>,
-        surfaces: &[&PlacedSurfaces],
+        surfaces: &[PlacedSurfaces],
         gray: Option<&LayerLevels>,
     ) -> CutLayer {
-        let Cutter { grid, planes, fill } = cutter;
-        let (width, height) = (grid.width, grid.height);
+        let Cutter { grid, planes, rule } = cutter;
         let spans = self.spans(layer);
-        let mut shader = gray
-            .map(|levels| Shader::new(levels.of_layer(layer), fill, planes, layer, &spans, width));
-        let of_facets = || self.shares(layer).flat_map(|share| &share.crossings).copied();
-        let more = self.more(layer, cutter, surfaces, of_facets());
-        let crossings = || {
-            let all = of_facets().chain(more.iter().copied());
-            all.map(|crossing| (crossing.row(), crossing.in_row()))
+        let shader = gray.map(|levels| {
+            Shader::new(levels.of_layer(layer), rule, planes, layer, &spans, grid.width)
+        });
+        let more = self.more(layer, cutter, surfaces);
+        let rows = ImageRows::new(grid, shader);
+        let mut shared = SharedPixels::new(rule);
+        let (image, stray_rows) = if rule.has_bodies() {
+            let mut position = Position::outside(rule);
+            let crossings = || {
+                let all = self.by_body(layer).chain(more.iter().copied());
+                all.map(|(body, it)| (it.row(), BodyCrossing::new(body, it.in_row())))
+            };
+            rows.filled(crossings, |places, transitions| {
+                by_body(places, transitions, &mut position, &mut shared)
+            })
+        } else {
+            let of_facets = || self.shares(layer).flat_map(LayerShare::crossings);
+            let crossings = || {
+                let all = of_facets().copied().chain(more.iter().map(|&(_, crossing)| crossing));
+                all.map(|crossing| (crossing.row(), crossing.in_row()))
+            };
+            rows.filled(
+                crossings,
+                match rule.fill() {
+                    Fill::EvenOdd => even_odd,
+                    Fill::NonZero => non_zero,
+                },
+            )
         };
-        let mut by_row = Grouped::new(height as usize, crossings);
-        let mut row_offsets = Vec::with_capacity(height as usize + 1);
+        let closed = self.is_closed(layer, rule.fill());
+        CutLayer { image, stray_rows, closed, shared: shared.counts() }
+    }
+}
+
+/// The rows of a layer's image, to be filled from the top.
+struct ImageRows<'a> {
+    width: u32,
+    height: u32,
+    shader: Option<Shader<'a>>,
+}
+
+impl<'a> ImageRows<'a> {
+    fn new(grid: &PixelGrid, shader: Option<Shader<'a>>) -> Self {
+        Self { width: grid.width, height: grid.height, shader }
+    }
+
+    /// Fills all rows with what `fill` makes of their sorted crossings. Returns the image,
+    /// and the rows for which `fill` returns false since they do not balance.
+    fn filled<C: InRow, I: Iterator<Item = (usize, C)>>(
+        mut self,
+        crossings: impl Fn() -> I,
+        mut fill: impl FnMut(&[C], &mut Vec<u32>) -> bool,
+    ) -> (Image, Vec<u32>) {
+        let mut by_row = Grouped::new(self.height as usize, crossings);
+        let mut row_offsets = Vec::with_capacity(self.height as usize + 1);
         row_offsets.push(0);
         let mut transitions = Vec::with_capacity(by_row.items().len());
         let mut stray_rows = Vec::new();
-        for row in 0..height {
+        for row in 0..self.height {
             let places = by_row.group_mut(row as usize);
             if !places.is_empty() {
                 sort(places);
-                let balanced = match fill {
-                    Fill::EvenOdd => even_odd(places, &mut transitions),
-                    Fill::NonZero => non_zero(places, &mut transitions),
-                };
-                if !balanced {
+                if !fill(places, &mut transitions) {
                     stray_rows.push(row);
                 }
             }
             row_offsets.push(transitions.len() as u32);
-            if let Some(shader) = &mut shader {
+            if let Some(shader) = &mut self.shader {
                 shader.push_row(row, places);
             }
         }
-        let mask = Mask::new(width, row_offsets, transitions);
+        let mask = Mask::new(self.width, row_offsets, transitions);
         let mask = mask.expect("sorted places without pairs increase strictly");
-        CutLayer {
-            image: shader.map_or(Image::Mask(mask), Shader::finish),
-            stray_rows,
-            closed: self.is_closed(layer, fill),
-        }
+        (self.shader.map_or(Image::Mask(mask), Shader::finish), stray_rows)
     }
 }
 
@@ -275,12 +325,13 @@ pub(crate) fn open_rows(
         sums_of[layer - span.start] = Some(sums);
     }
     (0..facets.pieces()).into_par_iter().try_for_each(|piece| {
+        let (fill, salt) = (cutter.rule.fill(), cutter.rule.salt(facets.body(piece)));
         facets.for_each_in(piece, |facet| {
             cutter.for_each_segment(facet, &span, |layer, segment| {
                 let Some(sums) = sums_of[layer - span.start] else { return };
                 let [a, b] = segment.ends.map(|end| end.at);
-                sums.add(cutter.first_row(a), a, !segment.is_reversed, cutter.fill);
-                sums.add(cutter.first_row(b), b, segment.is_reversed, cutter.fill);
+                sums.add(cutter.first_row(a), a, !segment.is_reversed, fill, salt);
+                sums.add(cutter.first_row(b), b, segment.is_reversed, fill, salt);
             });
         })
     })?;
@@ -289,7 +340,7 @@ pub(crate) fn open_rows(
 
 /// Sorts the crossings of a row: few by insertion, without a call.
 #[inline]
-fn sort(places: &mut [RowCrossing]) {
+fn sort<C: InRow>(places: &mut [C]) {
     if places.len() > 16 {
         return places.sort_unstable();
     }
@@ -331,4 +382,27 @@ fn non_zero(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bool {
         }
     }
     winding == 0
+}
+
+/// Adds a row's transitions, wherever the position leaves or enters the part. Returns true
+/// if the row balances. Counts the pixels that bodies share.
+fn by_body(
+    places: &[BodyCrossing],
+    transitions: &mut Vec<u32>,
+    position: &mut Position<'_>,
+    shared: &mut SharedPixels<'_>,
+) -> bool {
+    position.leave_all();
+    shared.start_row();
+    for group in places.chunk_by(|a, b| a.column() == b.column()) {
+        let (before, column) = (position.is_inside(), group[0].column());
+        for place in group {
+            position.cross(place.turn());
+            shared.cross(place.turn().body(), column);
+        }
+        if position.is_inside() != before {
+            transitions.push(column);
+        }
+    }
+    position.is_balanced()
 }

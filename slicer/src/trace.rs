@@ -99,6 +99,8 @@ struct Sighting {
     layer: u32,
     row: u32,
     point: [u64; 2],
+    /// Differs between bodies whose contours close by themselves.
+    salt: u64,
     piece: u32,
     facet: u32,
     edge: [u8; 2],
@@ -107,6 +109,9 @@ struct Sighting {
 
 /// The bits of an edge's corners, the lesser first, which identify it in its file.
 type EdgeName = [[u32; 3]; 2];
+
+/// The positions of edges that were found, by file, salt of the body, and name.
+type KnownEdges = BTreeMap<(usize, u64, EdgeName), usize>;
 
 /// Looks at a mesh a second time.
 pub(crate) struct Tracer<'a> {
@@ -122,7 +127,7 @@ impl Tracer<'_> {
     pub(crate) fn trace(&self, bands: &[StrayBand]) -> io::Result<Trace> {
         let layers: Vec<_> = bands.chunk_by(|a, b| a.layer == b.layer).collect();
         let mut trace = Trace::default();
-        let mut known = BTreeMap::new();
+        let mut known = KnownEdges::new();
         let (mut done, mut count) = (0, layers.len());
         while done < layers.len() {
             let some = &layers[done..layers.len().min(done + count)];
@@ -154,6 +159,7 @@ impl Tracer<'_> {
         let of_block = |block| -> io::Result<Vec<Sighting>> {
             let (piece, mut facets) = self.model.model.place_of(block);
             let mut sightings = Vec::new();
+            let salt = self.cutter.rule.salt(piece as u32);
             self.model.for_each_in_block(block, |placed| {
                 let facet = facets.next().unwrap_or_default();
                 if too_many() {
@@ -170,6 +176,7 @@ impl Tracer<'_> {
                                 layer: layer as u32,
                                 row,
                                 point: end.at.map(f64::to_bits),
+                                salt,
                                 piece: piece as u32,
                                 facet: facet as u32,
                                 edge: end.edge,
@@ -203,14 +210,14 @@ impl Tracer<'_> {
         bands: Vec<StrayBand>,
         mut sightings: &[Sighting],
         trace: &mut Trace,
-        known: &mut BTreeMap<(usize, EdgeName), usize>,
+        known: &mut KnownEdges,
     ) -> io::Result<()> {
         for band in bands {
             let of_band = |s: &Sighting| (s.layer, s.row) <= (band.layer, band.rows.end);
             let (near, rest) = sightings.split_at(sightings.partition_point(of_band));
             sightings = rest;
             let mut ends = Vec::new();
-            for group in near.chunk_by(|a, b| a.point == b.point) {
+            for group in near.chunk_by(|a, b| (a.point, a.salt) == (b.point, b.salt)) {
                 if self.is_open(group) {
                     let [x, y] = group[0].point.map(f64::from_bits);
                     let edges = self.edges(group, &mut trace.edges, known)?;
@@ -229,7 +236,7 @@ impl Tracer<'_> {
 
     /// Returns true if the segments that meet at a point, or on an edge, leave it open.
     fn is_open(&self, sightings: &[Sighting]) -> bool {
-        match self.cutter.fill {
+        match self.cutter.rule.fill() {
             Fill::EvenOdd => !sightings.len().is_multiple_of(2),
             Fill::NonZero => 2 * sightings.iter().filter(|s| s.starts).count() != sightings.len(),
         }
@@ -240,8 +247,9 @@ impl Tracer<'_> {
         &self,
         group: &[Sighting],
         edges: &mut Vec<FaultyEdge>,
-        known: &mut BTreeMap<(usize, EdgeName), usize>,
+        known: &mut KnownEdges,
     ) -> io::Result<Vec<usize>> {
+        let salt = group[0].salt;
         let mut by_edge: BTreeMap<EdgeName, (Vec<Sighting>, FaultyEdge)> = BTreeMap::new();
         for &sighting in group {
             let (piece, facet) = (sighting.piece as usize, sighting.facet as usize);
@@ -262,7 +270,7 @@ impl Tracer<'_> {
         }
         by_edge.retain(|_, (sightings, _)| self.is_open(sightings));
         let mut place = |(name, (_, edge)): (EdgeName, (_, FaultyEdge))| {
-            *known.entry((edge.facets[0].file, name)).or_insert_with(|| {
+            *known.entry((edge.facets[0].file, salt, name)).or_insert_with(|| {
                 edges.push(edge);
                 edges.len() - 1
             })

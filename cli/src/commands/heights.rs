@@ -86,7 +86,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let body = body.map_err(|error| at_part(error.into(), &args.parts))?;
     let box_mm = [body.min(), body.max()].map(|[x, y, z_um]| [x, y, z_um / 1000.0]);
     let size = args.solid.size(&model, box_mm);
-    let overlap = args.solid.overlap_doubt(&model, &args.parts, body.overlap());
+    let overlap = args.solid.overlap_doubt(&args.parts, body.overlap());
     size.doubt(args.dpi, None).iter().chain(&overlap).for_each(|doubt| say(doubt));
     let part = args.heights.part(body, args.dpi, args.solid.fill)?;
     let found = args.heights.find(&part, exposure.as_ref());

@@ -1,14 +1,16 @@
 //! `lamp slice`: slices a part into a stack.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
+use std::iter;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::machine::{Machine, MachineLimit};
-use lamp_slicer::{PixelGrid, Polished, Slices, StrayBand};
+use lamp_slicer::{Bodies, PixelGrid, Polished, Slices, StrayBand};
 use lamp_stack::{Length, Size};
 
+use crate::body_overlaps::overlap_text;
 use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::fallback::Bridged;
@@ -122,7 +124,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     let size = solid.size(&part, slices.box_mm());
     let doubts = [
         size.doubt(args.options.dpi, args.options.uniform_thickness()),
-        solid.overlap_doubt(&part, &args.parts, slices.overlap()),
+        solid.overlap_doubt(&args.parts, slices.overlap()),
     ];
     let doubts: Vec<String> = doubts.into_iter().flatten().collect();
     if args.strict && !doubts.is_empty() {
@@ -130,11 +132,12 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     }
     doubts.iter().for_each(|doubt| progress.warn(doubt));
     progress.expect(slices.layer_count() as u64);
-    let mut bridged =
+    let bridged =
         Bridged::new(slices, args.fallback.as_deref(), &args.options, args.layers.clone())?;
+    let bridged = RefCell::new(bridged);
     let (mut counts, mut bands) = (Counts::default(), Vec::new());
     let is_blank = Cell::new(true);
-    let layers = bridged.by_ref().map(|layer| {
+    let layers = iter::from_fn(|| bridged.borrow_mut().next()).map(|layer| {
         let mut layer = layer.map_err(|error| at_part(error.into(), &args.parts))?;
         is_blank.set(is_blank.get() && layer.image.change_count() == 0);
         name_command(&mut layer);
@@ -144,8 +147,19 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
         }
         Ok(layer)
     });
-    let finding = || (args.strict && is_blank.get()).then(|| Exit::Findings(BLANK.to_owned()));
+    let overlap = || {
+        let overlaps = bridged.borrow().slices.body_overlaps();
+        overlap_text(&overlaps, &part, &args.parts, solid.bodies)
+    };
+    let finding = || {
+        let overlap = overlap().filter(|_| solid.bodies == Bodies::Xor);
+        let found = overlap.into_iter().chain(is_blank.get().then(|| BLANK.to_owned()));
+        let found: Vec<String> = found.collect();
+        (args.strict && !found.is_empty()).then(|| Exit::Findings(found.join("; ")))
+    };
     write_layers(unless_found(layers, finding), &args.output, &progress)?;
+    let overlap = overlap();
+    let bridged = bridged.into_inner();
     let slices = &bridged.slices;
     if let Some(path) = &args.report {
         let trace = slices.trace(&bands).map_err(|error| at_part(error.into(), &args.parts))?;
@@ -160,6 +174,11 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     }
     if let Some(text) = bridged.text() {
         progress.say(&text);
+    }
+    match overlap {
+        Some(text) if solid.bodies == Bodies::Xor => progress.warn(&text),
+        Some(text) => progress.say(&text),
+        None => {}
     }
     say_stray_rows(&progress, counts, args.report.as_deref());
     if is_blank.get() {

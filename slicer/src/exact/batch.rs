@@ -13,9 +13,10 @@ use crate::placement::PlacedFacet;
 /// The number of crossings polished at once: enough to amortise each call; 0.5 MB.
 const BATCH: usize = 4096;
 
-/// Crossings with curved facets, before they go into the table.
+/// Crossings with a body's curved facets, before they go into the table.
 pub(super) struct Batch<'a> {
     surfaces: &'a PlacedSurfaces,
+    body: u32,
     tally: &'a Tally,
     cutter: Cutter<'a>,
     layers: Range<usize>,
@@ -27,11 +28,12 @@ pub(super) struct Batch<'a> {
 impl<'a> Batch<'a> {
     pub(super) fn new(
         surfaces: &'a PlacedSurfaces,
+        body: u32,
         tally: &'a Tally,
         cutter: Cutter<'a>,
         layers: Range<usize>,
     ) -> Self {
-        Self { surfaces, tally, cutter, layers, points: Vec::new(), cells: Vec::new() }
+        Self { surfaces, body, tally, cutter, layers, points: Vec::new(), cells: Vec::new() }
     }
 
     /// Adds a facet's crossings and returns their number.
@@ -46,10 +48,11 @@ impl<'a> Batch<'a> {
         let flat = surfaces.is_flat(number).then(|| FlatFace::new(surfaces, number));
         let mut chart = None;
         let mut count = 0;
+        let (fill, salt) = (cutter.rule.fill(), cutter.rule.salt(self.body));
         cutter.for_each_segment(facet, &self.layers.clone(), |layer, segment| {
             let [a, b] = segment.ends.map(|end| end.at);
             let share = &mut shares[layer - self.layers.start];
-            share.ends.add(a, b, segment.is_reversed, cutter.fill);
+            share.ends.add([a, b], segment.is_reversed, fill, salt);
             let z_mm = cutter.planes.z_um(layer) / 1000.0;
             cutter.for_each_crossing(a, b, segment.is_reversed, |row, column, rising| {
                 count += 1;
@@ -57,7 +60,8 @@ impl<'a> Batch<'a> {
                 if let Some(flat) = &flat {
                     let x_mm = flat.x_mm(x_mm, y_mm, z_mm);
                     let [column, _] = cutter.grid.to_pixels(x_mm, y_mm);
-                    share.crossings.push(Crossing::at(cutter.grid, row, column, rising));
+                    let crossing = Crossing::at(cutter.grid, row, column, rising);
+                    share.of_body(self.body).push(crossing);
                     return;
                 }
                 let chart = chart.get_or_insert_with(|| surfaces.chart(number));
@@ -82,8 +86,11 @@ impl<'a> Batch<'a> {
         for (point, (layer, row, _)) in self.points.drain(..).zip(self.cells.drain(..)) {
             let [column, _] = grid.to_pixels(point.at_mm[0], point.at_mm[1]);
             let share = &mut shares[layer - self.layers.start];
-            let list = if point.is_exact { &mut share.crossings } else { &mut share.kept };
-            list.push(Crossing::at(grid, row, column, point.enters));
+            let crossing = Crossing::at(grid, row, column, point.enters);
+            match point.is_exact {
+                true => share.of_body(self.body).push(crossing),
+                false => share.kept.push((self.body, crossing)),
+            }
         }
     }
 }

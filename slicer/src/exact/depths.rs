@@ -11,9 +11,10 @@ use crate::placement::PlacedFacet;
 /// The number of pixels evaluated at once: enough to amortise each call; 0.3 MB.
 const BATCH: usize = 4096;
 
-/// Pixels over curved facets. Their exact heights go into the table as spans of one column.
+/// Pixels over a body's curved facets. Their exact heights go into the table as spans of one column.
 pub(super) struct Depths<'a> {
     surfaces: &'a PlacedSurfaces,
+    body: u32,
     cutter: Cutter<'a>,
     layers: Range<usize>,
     reach_um: f64,
@@ -25,11 +26,12 @@ pub(super) struct Depths<'a> {
 impl<'a> Depths<'a> {
     pub(super) fn new(
         surfaces: &'a PlacedSurfaces,
+        body: u32,
         cutter: Cutter<'a>,
         layers: Range<usize>,
         reach_um: f64,
     ) -> Self {
-        Self { surfaces, cutter, layers, reach_um, points: Vec::new(), pixels: Vec::new() }
+        Self { surfaces, body, cutter, layers, reach_um, points: Vec::new(), pixels: Vec::new() }
     }
 
     /// Adds the pixels where rows pass a facet below the sections, down to the exposure
@@ -42,9 +44,9 @@ impl<'a> Depths<'a> {
     ) -> usize {
         let (cutter, surfaces) = (self.cutter, self.surfaces);
         if surfaces.is_flat(number) {
-            return cutter.look_down(facet, self.reach_um, &self.layers, shares);
+            return cutter.look_down(facet, self.body, self.reach_um, &self.layers, shares);
         }
-        let Some(sheet) = Sheet::new(&cutter, facet) else { return 0 };
+        let Some(sheet) = Sheet::new(&cutter, facet, self.body) else { return 0 };
         let planes = cutter.planes;
         let low_um = planes.z_um(self.layers.start) - self.reach_um;
         let high_um = planes.z_um(self.layers.end - 1);

@@ -78,7 +78,7 @@ impl CriticalPoints {
             level.filter_map(|candidate| Saddle::on(surfaces, candidate.facet)).collect();
         let mut saddles: Vec<Saddle> = Vec::new();
         for saddle in found {
-            if !saddles.iter().any(|other| saddle.is_same(other)) {
+            if !saddles.iter().any(|other| saddle.is_same(other, surfaces)) {
                 saddles.push(saddle);
             }
         }
@@ -107,7 +107,7 @@ impl PlacedSurfaces {
         for extremum in extrema {
             let is_near = |other: &&Extremum| extremum.at_mm[1] - other.at_mm[1] < SAME_MM;
             let mut near = kept.iter().rev().take_while(is_near);
-            if !near.any(|other| extremum.is_same(other)) {
+            if !near.any(|other| extremum.is_same(other, self)) {
                 kept.push(extremum);
             }
         }
@@ -194,9 +194,16 @@ impl Extremum {
         }))
     }
 
-    /// Returns whether another facet's extremum is the same point.
-    fn is_same(&self, other: &Self) -> bool {
-        distance(self.at_mm, other.at_mm) < SAME_MM && self.is_above == other.is_above
+    /// Returns the number of its body.
+    pub(super) fn body(&self, surfaces: &PlacedSurfaces) -> u32 {
+        surfaces.body_of(self.facet)
+    }
+
+    /// Returns whether another facet's extremum is the same point of the same body.
+    fn is_same(&self, other: &Self, surfaces: &PlacedSurfaces) -> bool {
+        distance(self.at_mm, other.at_mm) < SAME_MM
+            && self.is_above == other.is_above
+            && self.body(surfaces) == other.body(surfaces)
     }
 }
 

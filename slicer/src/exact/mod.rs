@@ -43,18 +43,19 @@ pub(crate) struct ExactCut<'a> {
 }
 
 impl<'a> ExactCut<'a> {
-    /// Starts at a facet. Gray layers look `reach_um` below the sections.
+    /// Starts at a facet of a body. Gray layers look `reach_um` below the sections.
     pub(crate) fn new(
         surfaces: &'a PlacedSurfaces,
         first: u32,
+        body: u32,
         tally: &'a Tally,
         cutter: Cutter<'a>,
         layers: Range<usize>,
         reach_um: Option<f64>,
     ) -> Self {
         let depths =
-            reach_um.map(|reach_um| Depths::new(surfaces, cutter, layers.clone(), reach_um));
-        Self { next: first, crossings: Batch::new(surfaces, tally, cutter, layers), depths }
+            reach_um.map(|reach_um| Depths::new(surfaces, body, cutter, layers.clone(), reach_um));
+        Self { next: first, crossings: Batch::new(surfaces, body, tally, cutter, layers), depths }
     }
 
     /// Adds the next facet. Returns the number of crossings that would take as much memory.

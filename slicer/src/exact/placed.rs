@@ -18,6 +18,8 @@ pub struct PlacedSurfaces {
     /// axis.
     rows: [[f64; 4]; 3],
     tolerance_mm: f64,
+    /// The number of its first body among all bodies of the part.
+    first_body: u32,
     /// Whether each face is flat.
     is_flat: Vec<bool>,
     facets_by_point: OnceLock<Grouped<u32>>,
@@ -39,7 +41,28 @@ impl PlacedSurfaces {
         let faces = kernel.bodies().iter().map(|body| body.faces.end).max().unwrap_or(0);
         let is_flat = (0..faces).map(|face| kernel.face(face).kind == "plane").collect();
         let (facets_by_point, critical_points) = (OnceLock::new(), OnceLock::new());
-        Self { kernel, mesh, rows, tolerance_mm, is_flat, facets_by_point, critical_points }
+        Self {
+            kernel,
+            mesh,
+            rows,
+            tolerance_mm,
+            first_body: 0,
+            is_flat,
+            facets_by_point,
+            critical_points,
+        }
+    }
+
+    /// Numbers the bodies from another number than 0 on.
+    pub(crate) fn numbered_from(self, first_body: u32) -> Self {
+        Self { first_body, ..self }
+    }
+
+    /// Returns the number of a facet's body.
+    pub(crate) fn body_of(&self, facet: u32) -> u32 {
+        let face = self.facet(facet).face;
+        let before = self.kernel.bodies().partition_point(|body| body.faces.end <= face);
+        self.first_body + before as u32
     }
 
     /// Returns the greatest distance of facets from their surfaces, in millimetres.

@@ -49,9 +49,16 @@ impl Saddle {
         (is_saddle && a.is_finite()).then_some(saddle)
     }
 
-    /// Returns whether another facet's saddle is the same point.
-    pub(super) fn is_same(&self, other: &Self) -> bool {
-        distance(self.at_mm, other.at_mm) < SAME_MM && self.is_above == other.is_above
+    /// Returns the number of its body.
+    pub(super) fn body(&self, surfaces: &PlacedSurfaces) -> u32 {
+        surfaces.body_of(self.facet)
+    }
+
+    /// Returns whether another facet's saddle is the same point of the same body.
+    pub(super) fn is_same(&self, other: &Self, surfaces: &PlacedSurfaces) -> bool {
+        distance(self.at_mm, other.at_mm) < SAME_MM
+            && self.is_above == other.is_above
+            && self.body(surfaces) == other.body(surfaces)
     }
 
     /// Returns the extents along y and x in which facets may pair a section's contours the

@@ -29,40 +29,45 @@ struct UnsettledRow {
     sides: Vec<Crossing>,
 }
 
+/// The rows to settle, by body and number.
+type UnsettledRows = HashMap<(u32, u32), UnsettledRow>;
+
 /// Returns the crossings to add to a layer's crossings on surfaces.
 ///
 /// These are the crossings `kept` on facets, except pairs near extrema and saddles that the
 /// surfaces do not have; the surfaces' pairs there that facets miss; and the reverses of
-/// surplus crossings on surfaces.
+/// surplus crossings on surfaces. All come and go with their bodies: each is settled by
+/// itself.
 pub(crate) fn settle(
-    surfaces: &[&PlacedSurfaces],
+    surfaces: &[PlacedSurfaces],
     tally: &Tally,
     layer: usize,
     cutter: Cutter<'_>,
-    crossings: impl Iterator<Item = Crossing>,
-    kept: Vec<Crossing>,
-) -> Vec<Crossing> {
+    crossings: impl Iterator<Item = (u32, Crossing)>,
+    kept: impl Iterator<Item = (u32, Crossing)>,
+) -> Vec<(u32, Crossing)> {
     let z_mm = cutter.planes.z_um(layer) / 1000.0;
-    let mut rows: HashMap<u32, UnsettledRow> = HashMap::new();
+    let mut rows = UnsettledRows::new();
     let mut all_near = Vec::new();
     for surfaces in surfaces {
         let extrema = surfaces.extrema(z_mm).into_iter();
-        let extrema = extrema.map(|extremum| Near::extremum(extremum, cutter));
+        let extrema = extrema.map(|extremum| Near::extremum(extremum, surfaces, cutter));
         let saddles = surfaces.critical_points().saddles.iter();
         let saddles = saddles.filter_map(|saddle| Near::saddle(saddle, surfaces, z_mm, cutter));
         for near in extrema.chain(saddles) {
-            rows.extend(near.rows.clone().map(|row| (row, UnsettledRow::default())));
-            all_near.push((*surfaces, near));
+            let body = near.body;
+            rows.extend(near.rows.clone().map(|row| ((body, row), UnsettledRow::default())));
+            all_near.push((surfaces, near));
         }
     }
-    for crossing in kept {
-        rows.entry(crossing.row() as u32).or_default().kept.push(crossing);
+    for (body, crossing) in kept {
+        rows.entry((body, crossing.row() as u32)).or_default().kept.push(crossing);
     }
     if rows.is_empty() {
         return Vec::new();
     }
-    for crossing in crossings {
-        if let Some(row) = rows.get_mut(&(crossing.row() as u32)) {
+    for (body, crossing) in crossings {
+        if let Some(row) = rows.get_mut(&(body, crossing.row() as u32)) {
             row.found.push(crossing);
             row.exact.push(crossing);
         }
@@ -74,7 +79,10 @@ pub(crate) fn settle(
     }
     rows.values_mut().for_each(|row| row.add_sides(tally));
     // A map has no order, but the table sorts.
-    rows.into_values().flat_map(UnsettledRow::changes).collect()
+    let changes = |((body, _), row): ((u32, u32), UnsettledRow)| {
+        row.changes().map(move |crossing| (body, crossing))
+    };
+    rows.into_iter().flat_map(changes).collect()
 }
 
 /// The greatest length of a fold along its row, in millimetres.
@@ -94,7 +102,7 @@ impl UnsettledRow {
     /// leaves the surface's crossing. Otherwise even-odd filling would cancel the two and
     /// leave the kept one, which is off by the fold.
     ///
-    /// Contours of two bodies that touch within a column, beside a kept crossing of a third
+    /// Two contours of a body that touch within a column, beside a kept crossing of a third
     /// contour, look the same. Then the third moves by at most the fold.
     fn unfold(&mut self, tally: &Tally, max_columns: u32) {
         let kept = std::mem::take(&mut self.kept);
@@ -153,6 +161,7 @@ impl UnsettledRow {
 /// few rows.
 struct Near {
     point: CriticalPoint,
+    body: u32,
     /// The columns where facets may have crossings in place of the contour's.
     columns: RangeInclusive<i64>,
     rows: Range<u32>,
@@ -164,18 +173,26 @@ enum CriticalPoint {
 }
 
 impl Near {
-    fn new(point: CriticalPoint, at: [f64; 3], reach_mm: [f64; 2], cutter: Cutter<'_>) -> Self {
+    fn new(
+        point: CriticalPoint,
+        body: u32,
+        at: [f64; 3],
+        reach_mm: [f64; 2],
+        cutter: Cutter<'_>,
+    ) -> Self {
         let grid = cutter.grid;
         let [column, row] = grid.to_pixels(at[0], at[1]);
         let [reach, width] = reach_mm.map(|mm| mm / grid.dpi.pitch().mm() + 1.0);
         let clamped = |row: f64| row.ceil().clamp(0.0, f64::from(grid.height)) as u32;
         let columns = (column - width).floor() as i64..=(column + width).ceil() as i64;
-        Self { point, columns, rows: clamped(row - reach)..clamped(row + reach) }
+        let body = cutter.rule.name_of(body);
+        Self { point, body, columns, rows: clamped(row - reach)..clamped(row + reach) }
     }
 
-    fn extremum(extremum: Extremum, cutter: Cutter<'_>) -> Self {
+    fn extremum(extremum: Extremum, surfaces: &PlacedSurfaces, cutter: Cutter<'_>) -> Self {
         let reach_mm = [extremum.reach_mm, extremum.width_mm()];
-        Self::new(CriticalPoint::Extremum(extremum), extremum.at_mm, reach_mm, cutter)
+        let (at_mm, body) = (extremum.at_mm, extremum.body(surfaces));
+        Self::new(CriticalPoint::Extremum(extremum), body, at_mm, reach_mm, cutter)
     }
 
     /// Returns the surroundings of a saddle, or `None` if it is too far from the section.
@@ -186,7 +203,8 @@ impl Near {
         cutter: Cutter<'_>,
     ) -> Option<Self> {
         let reach_mm = saddle.reach_mm(surfaces, z_mm)?;
-        Some(Self::new(CriticalPoint::Saddle(*saddle), saddle.at_mm, reach_mm, cutter))
+        let (at_mm, body) = (saddle.at_mm, saddle.body(surfaces));
+        Some(Self::new(CriticalPoint::Saddle(*saddle), body, at_mm, reach_mm, cutter))
     }
 
     fn settle(
@@ -195,10 +213,11 @@ impl Near {
         tally: &Tally,
         z_mm: f64,
         cutter: Cutter<'_>,
-        rows: &mut HashMap<u32, UnsettledRow>,
+        rows: &mut UnsettledRows,
     ) {
         for number in self.rows.clone() {
-            let row = rows.get_mut(&number).expect("the map has all rows near the point");
+            let row =
+                rows.get_mut(&(self.body, number)).expect("the map has all rows near the point");
             let [_, y_mm] = cutter.grid.to_mm(0.0, f64::from(number));
             let contact = match &self.point {
                 CriticalPoint::Extremum(extremum) => extremum.contact(surfaces, y_mm),

@@ -2,21 +2,23 @@
 
 use lamp_stack::{DepthLevels, GrayMask, Image, Length, LevelChange, MaskBuilder};
 
-use crate::cut::RowCrossing;
+use crate::bodies::{FillRule, Position};
+use crate::cut::InRow;
 use crate::gray::DepthSpan;
 use crate::planes::Planes;
-use crate::table::Fill;
 
 /// Makes a layer's rows gray, from the top.
 pub(crate) struct Shader<'a> {
     levels: &'a DepthLevels,
-    fill: Fill,
+    rule: &'a FillRule,
     /// The depth of the layer's plane below its top.
     plane_depth_um: f64,
     /// The spans of the rows to come, by row.
     spans: &'a [DepthSpan],
     /// The spans over a column, in the order of their starts.
     open: Vec<&'a DepthSpan>,
+    /// What a pixel's line is in on its way down.
+    below: Position<'a>,
     met: Vec<(f64, &'a DepthSpan)>,
     changes: Vec<LevelChange>,
     image: GrayMask,
@@ -26,7 +28,7 @@ impl<'a> Shader<'a> {
     /// Starts a layer, given the sorted spans below its section.
     pub(crate) fn new(
         levels: &'a DepthLevels,
-        fill: Fill,
+        rule: &'a FillRule,
         planes: &Planes,
         layer: usize,
         spans: &'a [DepthSpan],
@@ -34,7 +36,8 @@ impl<'a> Shader<'a> {
     ) -> Self {
         Self {
             levels,
-            fill,
+            rule,
+            below: Position::outside(rule),
             plane_depth_um: planes.top_um(layer) - planes.z_um(layer),
             spans,
             open: Vec::new(),
@@ -45,26 +48,32 @@ impl<'a> Shader<'a> {
     }
 
     /// Adds the next row, given its sorted crossings with the section's contours.
-    pub(crate) fn push_row(&mut self, row: u32, places: &[RowCrossing]) {
+    pub(crate) fn push_row(&mut self, row: u32, places: &[impl InRow]) {
         let count = self.spans.iter().take_while(|span| span.row <= row).count();
         let (mut spans, rest) = self.spans.split_at(count);
         self.spans = rest;
         self.changes.clear();
         self.open.clear();
-        let mut winding = 0;
+        let mut position = Position::outside(self.rule);
         for (k, place) in places.iter().enumerate() {
-            winding += place.winding();
+            position.cross(place.turn());
             let end = places.get(k + 1).map_or(self.image.width(), |next| next.column());
             if place.column() < end {
-                self.shade(place.column(), end, winding, &mut spans);
+                self.shade(place.column(), end, &position, &mut spans);
             }
         }
         self.image.push_row(&self.changes).expect("changes come from the left");
     }
 
     /// Adds columns between two crossings of the row.
-    fn shade(&mut self, start: u32, end: u32, winding: i32, spans: &mut &'a [DepthSpan]) {
-        if !self.fill.is_inside(winding) {
+    fn shade(
+        &mut self,
+        start: u32,
+        end: u32,
+        position: &Position<'a>,
+        spans: &mut &'a [DepthSpan],
+    ) {
+        if !position.is_inside() {
             return self.push(start, 0);
         }
         let mut column = start;
@@ -75,48 +84,55 @@ impl<'a> Shader<'a> {
             self.open.retain(|span| span.end > column);
             let ends = self.open.iter().map(|span| span.end);
             let next = ends.chain(spans.first().map(|span| span.start)).fold(end, u32::min);
-            self.shade_evenly(column, next, winding);
+            self.shade_evenly(column, next, position);
             column = next;
         }
     }
 
     /// Adds columns over the same facets.
-    fn shade_evenly(&mut self, start: u32, end: u32, winding: i32) {
+    fn shade_evenly(&mut self, start: u32, end: u32, position: &Position<'a>) {
         if self.open.is_empty() {
             return self.push(start, 255);
         }
         let end = if self.open.iter().all(|span| span.is_level()) { start + 1 } else { end };
         for column in start..end {
-            let exit = self.exit_um(column, winding).map(Length::from_um);
+            let exit = self.exit_um(column, position).map(Length::from_um);
             let level = exit.map_or(255, |depth| self.levels.level(depth));
             self.push(column, level);
         }
     }
 
     /// Returns the depth at which the line down from a white pixel first leaves the part.
-    fn exit_um(&mut self, column: u32, winding: i32) -> Option<f64> {
+    fn exit_um(&mut self, column: u32, section: &Position<'a>) -> Option<f64> {
         self.met.clear();
         self.met.extend(self.open.iter().map(|&span| (span.depth_um(column), span)));
         self.met.sort_by(|a, b| a.partial_cmp(b).expect("depths are numbers"));
         let touching =
             |a: &(f64, &DepthSpan), b: &(f64, &DepthSpan)| b.0 - a.0 <= a.1.tie_um() + b.1.tie_um();
-        let mut left = winding;
+        self.below.move_to(section);
         for group in self.met.chunk_by(touching) {
             let (depth, first) = group[0];
-            let lost = group.iter().map(|(_, span)| span.winding()).sum::<i32>();
-            let below = depth > self.plane_depth_um + first.tie_um();
-            // The section accounts for facets within rounding of the plane that lead
-            // into the part.
-            if !below && lost * winding.signum() <= 0 {
-                continue;
+            let is_below = depth > self.plane_depth_um + first.tie_um();
+            for (k, (_, span)) in group.iter().enumerate() {
+                let is_alike = |(_, other): &&(f64, &DepthSpan)| {
+                    self.rule.counts_alike(span.body(), other.body())
+                };
+                // All spans that count alike at once, at the first of them.
+                if group[..k].iter().any(|other| is_alike(&other)) {
+                    continue;
+                }
+                let alike = group[k..].iter().filter(is_alike);
+                let lost = alike.map(|(_, span)| span.winding()).sum::<i32>();
+                // The section accounts for facets within rounding of the plane that lead
+                // into what it is in, and out of what it is not in.
+                let there = section.winding_about(span.body());
+                let inwards = if there == 0 { -1 } else { there.signum() };
+                if is_below || lost * inwards > 0 {
+                    self.below.cross_often(span.body(), -lost);
+                }
             }
-            left -= lost;
-            let leaves = match self.fill {
-                Fill::EvenOdd => lost % 2 != 0,
-                Fill::NonZero => left == 0,
-            };
-            if leaves {
-                return Some(if below { depth } else { 0.0 });
+            if !self.below.is_inside() {
+                return Some(if is_below { depth } else { 0.0 });
             }
         }
         None

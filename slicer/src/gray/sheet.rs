@@ -31,6 +31,7 @@ pub(crate) struct DepthSpan {
     /// The distance by which rounding may put it on the other side of the plane. Below
     /// zero if going down enters the part.
     signed_tie_um: f32,
+    body: u32,
 }
 
 impl DepthSpan {
@@ -50,6 +51,12 @@ impl DepthSpan {
     #[inline]
     pub(crate) fn winding(&self) -> i32 {
         if self.signed_tie_um < 0.0 { -1 } else { 1 }
+    }
+
+    /// Returns the body that it bounds.
+    #[inline]
+    pub(crate) fn body(&self) -> u32 {
+        self.body
     }
 
     /// Returns the distance from other facets within which it touches them.
@@ -93,11 +100,12 @@ pub(crate) struct Sheet {
     /// The ratio of a distance down to it to the distance across.
     steepness: f64,
     winding: i32,
+    body: u32,
 }
 
 impl Sheet {
-    /// Looks at a facet from above. Returns `None` if no vertical line meets it.
-    pub(crate) fn new(cutter: &Cutter<'_>, facet: &PlacedFacet) -> Option<Self> {
+    /// Looks at a body's facet from above. Returns `None` if no vertical line meets it.
+    pub(crate) fn new(cutter: &Cutter<'_>, facet: &PlacedFacet, body: u32) -> Option<Self> {
         let corners = facet.map(|[x, y, z_um]| {
             let [column, row] = cutter.grid.to_pixels(x, y);
             [column, row, z_um]
@@ -119,6 +127,7 @@ impl Sheet {
             tie_um: TOUCHING_UM + ASIDE_PIXELS * um_per_pixel.min(1e6),
             // Rows count downwards: facets that face down turn clockwise in y.
             winding: if area > 0.0 { 1 } else { -1 },
+            body,
         })
     }
 
@@ -159,6 +168,7 @@ impl Sheet {
             depth_um: depth_um as f32,
             um_per_column: 0.0,
             signed_tie_um: (f64::from(self.winding) * self.tie_um) as f32,
+            body: self.body,
         }
     }
 

@@ -6,11 +6,13 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use lamp_fixtures::{Mesh, StepSample, StepUnit, sphere, step, three_mf, three_mf_model, torus};
 use lamp_slicer::{
-    Axis, Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, Units,
+    Axis, Bodies, Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, Units,
 };
 use lamp_stack::Layer;
 
-use crate::common::{cube, joined, model, options, slice, try_layers, without_stack};
+use crate::common::{
+    block, cube, joined, model, options, slice, try_layers, white_pixels, without_stack,
+};
 
 fn open(bytes: &[u8]) -> Result<Part, SliceError> {
     Part::from_stream("part", bytes, &OpenOptions::default())
@@ -107,7 +109,11 @@ fn items_and_components_stand_where_their_transforms_put_them() {
     let component = Placement::default().rotated(Axis::Z, 90.0).translated([10.0, 0.0, 0.0]);
     let placed = |placement: &Placement| model(&mesh.map(|corner| placement.at(corner)));
     let expected = Part::joined(vec![placed(&component.then(&item)), placed(&item)]);
-    assert!(layers(part, &coarse()) == layers(expected, &coarse()));
+    // Files cut each other out where they overlap.
+    let xor = part.clone().with_bodies(Bodies::Xor);
+    assert!(layers(xor, &coarse()) == layers(expected.clone(), &coarse()));
+    let nonzero = SliceOptions { fill: Fill::NonZero, ..coarse() };
+    assert!(layers(part, &coarse()) == layers(expected, &nonzero));
 }
 
 /// Under the non-zero rule a mirrored body that faces inwards would cut the others out.
@@ -171,19 +177,43 @@ fn parts_have_places_of_their_own() {
 }
 
 #[test]
-fn overlaps_are_found_between_files_and_between_items() {
+fn overlaps_are_found_between_files() {
     let ball = sphere(3.0, 500);
     let at = |x: f64| model(&ball).placed(&Placement::default().translated([x, 0.0, 0.0]));
     let overlap = |part: Part| Slices::new(part, &coarse()).unwrap().overlap();
     assert_eq!(overlap(Part::joined(vec![at(0.0), at(20.0), at(25.9)])), Some([1, 2]));
     assert_eq!(overlap(Part::joined(vec![at(0.0), at(6.0), at(-6.0)])), None);
-    for (shift, expected) in [(5.0, Some([0, 0])), (6.0, None)] {
-        let items = format!(
-            "<item objectid=\"1\"/>\n<item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 {shift} 0 0\"/>\n"
-        );
-        let part = open(&package(&ball.three_mf_object(1), &items)).unwrap();
-        assert_eq!(overlap(part), expected);
-    }
+    assert_eq!(overlap(two_items(&ball, 5.0)), None);
+}
+
+/// A package of a mesh, and the same mesh further along x.
+fn two_items(mesh: &Mesh, shift_mm: f64) -> Part {
+    let items = format!(
+        "<item objectid=\"1\"/>\n<item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 {shift_mm} 0 0\"/>\n"
+    );
+    open(&package(&mesh.three_mf_object(1), &items)).unwrap()
+}
+
+fn white_of(slices: &mut Slices) -> u64 {
+    slices.map(|layer| white_pixels(&[layer.unwrap()])).sum()
+}
+
+#[test]
+fn items_unite_and_what_they_share_is_counted() {
+    let bar = block([0.0; 3], [2.0, 1.0, 1.0]);
+    let slices = |part: Part| Slices::new(part, &options(254.0, 100.0)).unwrap();
+    let white = |bodies: Bodies| {
+        let mut slices = slices(two_items(&bar, 1.5).with_bodies(bodies));
+        let white = white_of(&mut slices);
+        let [overlap] = slices.body_overlaps()[..] else { panic!("they overlap") };
+        assert_eq!((overlap.file, overlap.bodies), (0, [0, 1]));
+        assert!((overlap.volume_mm3 - 0.5).abs() < 1e-9, "{overlap:?}");
+        white
+    };
+    assert_eq!(white(Bodies::Unite), 35 * 10 * 10);
+    assert_eq!(white(Bodies::Xor), 30 * 10 * 10);
+    let mut touching = slices(two_items(&bar, 2.0));
+    assert_eq!((white_of(&mut touching), touching.body_overlaps()), (40 * 10 * 10, Vec::new()));
 }
 
 #[test]
