@@ -324,6 +324,6 @@ impl Part {
 }
 
 /// Rounds corners to 32 bits, as STL has them.
-fn rounded(corners: [[f64; 3]; 3]) -> Facet {
+pub(crate) fn rounded(corners: [[f64; 3]; 3]) -> Facet {
     corners.map(|corner| corner.map(|c| c as f32))
 }

@@ -164,14 +164,14 @@ struct PlacedPiece {
 
 /// The transform from file units to the place.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Transform {
+pub(crate) enum Transform {
     /// Scales the axes. Most parts stay where they are, and need no more.
     Scale([f64; 3]),
     Affine([[f64; 4]; 3]),
 }
 
 impl Transform {
-    fn new(placement: &Placement, units: Units) -> Self {
+    pub(crate) fn new(placement: &Placement, units: Units) -> Self {
         let mut rows = placement.rows;
         // Straight to micrometres: z in file units times them is exact.
         for (row, (unit, per_mm)) in
@@ -184,6 +184,15 @@ impl Transform {
         match is_scale {
             true => Self::Scale(std::array::from_fn(|axis| rows[axis][axis])),
             false => Self::Affine(rows),
+        }
+    }
+
+    /// Places a facet.
+    #[inline]
+    pub(crate) fn placed(&self, facet: &Facet) -> PlacedFacet {
+        match self {
+            Self::Scale(scale) => placed(facet, |corner| scaled(scale, corner)),
+            Self::Affine(rows) => placed(facet, |corner| rows.map(|row| affine(&row, corner))),
         }
     }
 }
@@ -257,10 +266,7 @@ impl PlacedPart {
     /// Places a facet of a piece.
     #[inline]
     pub(crate) fn placed_in_piece(&self, facet: &Facet, piece: usize) -> PlacedFacet {
-        match &self.transforms[self.pieces[piece].transform] {
-            Transform::Scale(scale) => placed(facet, |corner| scaled(scale, corner)),
-            Transform::Affine(rows) => placed(facet, |corner| rows.map(|row| affine(&row, corner))),
-        }
+        self.transforms[self.pieces[piece].transform].placed(facet)
     }
 }
 

@@ -104,7 +104,7 @@ impl<const ALONG: usize> SortedFacet<ALONG> {
 
 /// A side of a facet, from its lesser end along the axis to its greater.
 #[derive(Clone, Copy)]
-struct FacetEdge<const ALONG: usize> {
+pub(crate) struct FacetEdge<const ALONG: usize> {
     from: [f64; 3],
     to: [f64; 3],
     slopes: [f64; 2],
@@ -114,15 +114,16 @@ impl<const ALONG: usize> FacetEdge<ALONG> {
     /// The other two axes.
     const ACROSS: [usize; 2] = if ALONG == Z { [0, Y] } else { [0, Z] };
 
+    /// Joins two corners, the lesser one first.
     #[inline]
-    fn new(from: [f64; 3], to: [f64; 3]) -> Self {
+    pub(crate) fn new(from: [f64; 3], to: [f64; 3]) -> Self {
         let length = to[ALONG] - from[ALONG];
         Self { from, to, slopes: Self::ACROSS.map(|axis| (to[axis] - from[axis]) / length) }
     }
 
     /// Returns the edge's point on a line, without the coordinate along the axis.
     #[inline]
-    fn at(&self, value: f64) -> [f64; 2] {
+    pub(crate) fn at(&self, value: f64) -> [f64; 2] {
         let [a, b] = Self::ACROSS;
         // No rounding where a plane meets the corner itself. Rows never do: those
         // of an edge end before the first that its lower end is past.

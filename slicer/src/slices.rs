@@ -173,6 +173,7 @@ impl Slices {
         let survey = Survey::of(&model)?;
         survey.check_extent(&model)?;
         let model = if options.polish { model } else { model.on_facets() };
+        model.surfaces().iter().for_each(PlacedSurfaces::examine);
         let rule = model.model.fill_rule(options.fill);
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;

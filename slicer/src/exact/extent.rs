@@ -39,8 +39,8 @@ impl PlacedSurfaces {
     /// Returns the least and the greatest corner of the surfaces' box, in millimetres, or
     /// `None` if there are no facets.
     ///
-    /// It equals the facets' box where surfaces end at a corner or an edge. Round surfaces
-    /// bulge beyond it.
+    /// It equals the facets' box where surfaces end at a corner. Round surfaces and edges bulge
+    /// beyond it.
     pub fn box_mm(&self) -> Option<[[f64; 3]; 2]> {
         if self.mesh().facets.is_empty() {
             return None;
@@ -68,8 +68,11 @@ impl PlacedSurfaces {
         near.truncate(MAX_FACETS);
         let levels = near.into_iter().filter_map(|facet| self.level_point(facet, direction));
         let most = of_facets + 2.0 * self.tolerance_mm();
-        levels
-            .map(|level| direction.along(level.jet.point))
+        let edges = self.curved_edges().all.iter();
+        let turns = edges.filter_map(|edge| edge.turns[direction.axis]);
+        let points = levels.map(|level| level.jet.point).chain(turns.map(|turn| turn.at_mm));
+        points
+            .map(|point| direction.along(point))
             .filter(|end| *end <= most)
             .fold(of_facets, f64::max)
     }

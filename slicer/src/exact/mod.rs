@@ -9,14 +9,17 @@
 
 mod batch;
 mod depths;
+mod edges;
 mod extent;
 mod extrema;
+mod lens;
 mod locate;
 mod placed;
 mod polish;
 mod saddle;
 mod settle;
 mod solve;
+mod switch;
 mod tally;
 
 use std::ops::Range;

@@ -7,8 +7,12 @@ use lamp_brep::vector::{Vec3, cross, dot, length, scale, sub, unit};
 use lamp_brep::{Facet, Jet, Kernel, Tessellation};
 use lamp_stack::Grouped;
 
+use super::edges::CurvedEdges;
 use super::extrema::CriticalPoints;
 use super::locate::facets_by_point;
+use crate::facet::Units;
+use crate::part::rounded;
+use crate::placement::{PlacedFacet, Placement, Transform};
 
 /// A model's surfaces and facets, scaled, rotated and moved into place.
 pub struct PlacedSurfaces {
@@ -24,6 +28,7 @@ pub struct PlacedSurfaces {
     is_flat: Vec<bool>,
     facets_by_point: OnceLock<Grouped<u32>>,
     critical_points: OnceLock<CriticalPoints>,
+    curved_edges: OnceLock<CurvedEdges>,
 }
 
 impl fmt::Debug for PlacedSurfaces {
@@ -40,7 +45,6 @@ impl PlacedSurfaces {
         let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
         let faces = kernel.bodies().iter().map(|body| body.faces.end).max().unwrap_or(0);
         let is_flat = (0..faces).map(|face| kernel.face(face).kind == "plane").collect();
-        let (facets_by_point, critical_points) = (OnceLock::new(), OnceLock::new());
         Self {
             kernel,
             mesh,
@@ -48,8 +52,9 @@ impl PlacedSurfaces {
             tolerance_mm,
             first_body: 0,
             is_flat,
-            facets_by_point,
-            critical_points,
+            facets_by_point: OnceLock::new(),
+            critical_points: OnceLock::new(),
+            curved_edges: OnceLock::new(),
         }
     }
 
@@ -89,6 +94,12 @@ impl PlacedSurfaces {
         self.mesh.corners(self.facet(number)).map(|corner| self.at(corner))
     }
 
+    /// Returns a facet in place as the slicer cuts it, with its corners rounded.
+    pub(super) fn placed_facet(&self, number: u32) -> PlacedFacet {
+        let transform = Transform::new(&Placement::of_rows(self.rows), Units::Millimetres);
+        transform.placed(&rounded(self.mesh.corners(self.facet(number))))
+    }
+
     fn at(&self, point: Vec3) -> Vec3 {
         let moved = self.turned(point);
         [0, 1, 2].map(|k| moved[k] + self.rows[k][3])
@@ -96,6 +107,13 @@ impl PlacedSurfaces {
 
     fn turned(&self, direction: Vec3) -> Vec3 {
         self.rows.map(|[x, y, z, _]| x * direction[0] + y * direction[1] + z * direction[2])
+    }
+
+    /// Examines all facets, which the first layer would do otherwise: its thread would wait for
+    /// others, and might meanwhile take up a layer that waits for the same.
+    pub(crate) fn examine(&self) {
+        self.critical_points();
+        self.curved_edges();
     }
 
     /// Returns the facets around each point. The first call examines every facet.
@@ -107,6 +125,11 @@ impl PlacedSurfaces {
     /// facet.
     pub(super) fn critical_points(&self) -> &CriticalPoints {
         self.critical_points.get_or_init(|| CriticalPoints::find(self))
+    }
+
+    /// Returns the curved edges between facets. The first call examines every facet.
+    pub(super) fn curved_edges(&self) -> &CurvedEdges {
+        self.curved_edges.get_or_init(|| CurvedEdges::find(self))
     }
 
     /// Evaluates a face's surface in place at many parameters at once.

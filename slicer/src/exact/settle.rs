@@ -9,10 +9,12 @@ use std::collections::HashMap;
 use std::ops::{Range, RangeInclusive};
 
 use super::extrema::Extremum;
+use super::lens::Line;
 use super::locate::RowContact;
 use super::placed::PlacedSurfaces;
 use super::polish::FacetPoint;
 use super::saddle::Saddle;
+use super::switch::{RowLists, Switch};
 use super::tally::Tally;
 use crate::cut::{Crossing, Cutter};
 
@@ -21,12 +23,10 @@ use crate::cut::{Crossing, Cutter};
 struct UnsettledRow {
     /// The crossings on surfaces, as polishing found them.
     found: Vec<Crossing>,
-    /// The crossings on surfaces, as repaired.
-    exact: Vec<Crossing>,
-    /// The crossings kept on facets.
-    kept: Vec<Crossing>,
-    /// Crossings located on only one side of an extremum or a saddle.
-    sides: Vec<Crossing>,
+    /// The row's crossings, as repaired.
+    lists: RowLists,
+    /// Changes next to curved edges that are still to be made.
+    switches: Vec<Switch>,
 }
 
 /// The rows to settle, by body and number.
@@ -50,18 +50,27 @@ pub(crate) fn settle(
     let mut rows = UnsettledRows::new();
     let mut all_near = Vec::new();
     for surfaces in surfaces {
+        let plane = Line::at_height(cutter.grid, cutter.planes.z_um(layer));
+        for edge in &surfaces.curved_edges().all {
+            for point in plane.lens(surfaces, edge) {
+                let body = surfaces.body_of(edge.facets[0]);
+                let switch = Switch::new(surfaces, edge.facets, &point, cutter);
+                rows.entry((body, point.cell)).or_default().switches.push(switch);
+            }
+        }
         let extrema = surfaces.extrema(z_mm).into_iter();
         let extrema = extrema.map(|extremum| Near::extremum(extremum, surfaces, cutter));
         let saddles = surfaces.critical_points().saddles.iter();
         let saddles = saddles.filter_map(|saddle| Near::saddle(saddle, surfaces, z_mm, cutter));
         for near in extrema.chain(saddles) {
-            let body = near.body;
-            rows.extend(near.rows.clone().map(|row| ((body, row), UnsettledRow::default())));
+            for row in near.rows.clone() {
+                rows.entry((near.body, row)).or_default();
+            }
             all_near.push((surfaces, near));
         }
     }
     for (body, crossing) in kept {
-        rows.entry((body, crossing.row() as u32)).or_default().kept.push(crossing);
+        rows.entry((body, crossing.row() as u32)).or_default().lists.kept.push(crossing);
     }
     if rows.is_empty() {
         return Vec::new();
@@ -69,15 +78,21 @@ pub(crate) fn settle(
     for (body, crossing) in crossings {
         if let Some(row) = rows.get_mut(&(body, crossing.row() as u32)) {
             row.found.push(crossing);
-            row.exact.push(crossing);
+            row.lists.exact.push(crossing);
         }
     }
     let max_columns = (MAX_FOLD_MM / cutter.grid.dpi.pitch().mm()) as u32;
-    rows.values_mut().for_each(|row| row.unfold(tally, max_columns));
+    for row in rows.values_mut() {
+        row.unfold(tally, max_columns);
+        row.switch(tally);
+    }
     for (surfaces, near) in all_near {
         near.settle(surfaces, tally, z_mm, cutter, &mut rows);
     }
-    rows.values_mut().for_each(|row| row.add_sides(tally));
+    for row in rows.values_mut() {
+        row.switch(tally);
+        row.add_sides(tally);
+    }
     // A map has no order, but the table sorts.
     let changes = |((body, _), row): ((u32, u32), UnsettledRow)| {
         row.changes().map(move |crossing| (body, crossing))
@@ -105,9 +120,9 @@ impl UnsettledRow {
     /// Two contours of a body that touch within a column, beside a kept crossing of a third
     /// contour, look the same. Then the third moves by at most the fold.
     fn unfold(&mut self, tally: &Tally, max_columns: u32) {
-        let kept = std::mem::take(&mut self.kept);
+        let kept = std::mem::take(&mut self.lists.kept);
         for crossing in kept {
-            let there = &self.exact;
+            let there = &self.lists.exact;
             let away = |k: &usize| there[*k].in_row().column().abs_diff(crossing.in_row().column());
             let is_double = |k: &usize| {
                 let same = there.iter().filter(|other| is_same(there[*k], **other)).count();
@@ -116,12 +131,22 @@ impl UnsettledRow {
             let near = (0..there.len()).filter(|k| away(k) <= max_columns);
             match near.filter(is_double).min_by_key(away) {
                 Some(double) => {
-                    self.exact.swap_remove(double);
+                    self.lists.exact.swap_remove(double);
                     tally.mend(2, 1);
                 }
-                None => self.kept.push(crossing),
+                None => self.lists.kept.push(crossing),
             }
         }
+    }
+
+    /// Changes the faces of crossings next to curved edges, where both are known.
+    fn switch(&mut self, tally: &Tally) {
+        if self.switches.is_empty() {
+            return;
+        }
+        let before = self.lists.kept.len();
+        let made = self.lists.switch(&mut self.switches);
+        tally.mend(2 * made, before - self.lists.kept.len());
     }
 
     /// Adds the outer sides of two extrema between which the contour turns back, so that
@@ -132,13 +157,13 @@ impl UnsettledRow {
     /// may stand for one of them, the pairing is ambiguous and the row stays without them.
     fn add_sides(&mut self, tally: &Tally) {
         let mut sides: Vec<Crossing> = Vec::new();
-        for side in std::mem::take(&mut self.sides) {
-            if !self.exact.iter().chain(&sides).any(|other| is_same(side, *other)) {
+        for side in std::mem::take(&mut self.lists.sides) {
+            if !self.lists.exact.iter().chain(&sides).any(|other| is_same(side, *other)) {
                 sides.push(side);
             }
         }
-        if sides.len() == 2 && winding(&sides) == 0 && self.kept.is_empty() {
-            self.exact.extend(sides);
+        if sides.len() == 2 && winding(&sides) == 0 && self.lists.kept.is_empty() {
+            self.lists.exact.extend(sides);
             tally.mend(2, 0);
         }
     }
@@ -148,12 +173,12 @@ impl UnsettledRow {
     fn changes(mut self) -> impl Iterator<Item = Crossing> {
         let mut cancelled = Vec::new();
         for crossing in self.found {
-            match self.exact.iter().position(|other| *other == crossing) {
-                Some(at) => drop(self.exact.swap_remove(at)),
+            match self.lists.exact.iter().position(|other| *other == crossing) {
+                Some(at) => drop(self.lists.exact.swap_remove(at)),
                 None => cancelled.push(crossing.reversed()),
             }
         }
-        self.kept.into_iter().chain(self.exact).chain(cancelled)
+        self.lists.kept.into_iter().chain(self.lists.exact).chain(cancelled)
     }
 }
 
@@ -229,7 +254,7 @@ impl Near {
             };
             match contact {
                 RowContact::Pair(pair) => self.set_pair(tally, pair.map(crossing), row),
-                RowContact::OneSide(point) => row.sides.push(crossing(point)),
+                RowContact::OneSide(point) => self.set_side(tally, crossing(point), row),
                 RowContact::Nothing => self.remove_kept(tally, row),
                 RowContact::Unknown => {}
             }
@@ -244,16 +269,30 @@ impl Near {
             let at = column(crossing);
             self.columns.contains(&at) || pair.iter().any(|one| (column(one) - at).abs() <= width)
         };
-        row.kept.iter().filter(is_near).copied().collect()
+        row.lists.kept.iter().filter(is_near).copied().collect()
     }
 
     /// Removes a row's crossings on facets where the surface has none.
     fn remove_kept(&self, tally: &Tally, row: &mut UnsettledRow) {
         let kept = self.kept(row, &[]);
         if winding(&kept) == 0 {
-            row.kept.retain(|crossing| !kept.contains(crossing));
+            row.lists.kept.retain(|crossing| !kept.contains(crossing));
             tally.mend(kept.len(), kept.len());
         }
+    }
+
+    /// Moves the crossing kept on a facet near the point to the surface's only one there, or
+    /// notes that one if there is no such crossing.
+    fn set_side(&self, tally: &Tally, side: Crossing, row: &mut UnsettledRow) {
+        let kept = self.kept(row, &[side]);
+        let is_there = row.lists.exact.iter().any(|other| is_same(side, *other));
+        if is_there || kept.len() != 1 || winding(&kept) != side.in_row().winding() {
+            row.lists.sides.push(side);
+            return;
+        }
+        row.lists.kept.retain(|crossing| *crossing != kept[0]);
+        row.lists.exact.push(side);
+        tally.mend(1, 1);
     }
 
     /// Gives a row the surface's pair of crossings near the point, each once.
@@ -261,7 +300,7 @@ impl Near {
         let kept = self.kept(row, &pair);
         let is_one = |other: &Crossing| pair.iter().any(|crossing| is_same(*crossing, *other));
         let there: Vec<Crossing> =
-            row.exact.iter().filter(|other| is_one(other)).copied().collect();
+            row.lists.exact.iter().filter(|other| is_one(other)).copied().collect();
         let has_both = pair
             .iter()
             .all(|crossing| there.iter().filter(|other| is_same(*crossing, **other)).count() == 1);
@@ -269,9 +308,9 @@ impl Near {
         if is_settled || winding(&kept) + winding(&there) != 0 {
             return;
         }
-        row.kept.retain(|crossing| !kept.contains(crossing));
-        row.exact.retain(|other| !is_one(other));
-        row.exact.extend(pair);
+        row.lists.kept.retain(|crossing| !kept.contains(crossing));
+        row.lists.exact.retain(|other| !is_one(other));
+        row.lists.exact.extend(pair);
         tally.mend(kept.len() + there.len().abs_diff(2), kept.len());
     }
 }
@@ -282,7 +321,7 @@ fn winding(crossings: &[Crossing]) -> i32 {
 
 /// Returns whether two crossings are the same one found twice: rounding may put it in
 /// either of two columns.
-fn is_same(a: Crossing, b: Crossing) -> bool {
+pub(super) fn is_same(a: Crossing, b: Crossing) -> bool {
     let [a, b] = [a.in_row(), b.in_row()];
     a.winding() == b.winding() && a.column().abs_diff(b.column()) <= 1
 }
