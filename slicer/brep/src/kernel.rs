@@ -41,6 +41,18 @@ pub trait Kernel: Send + Sync {
         &[]
     }
 
+    /// Returns the number of edges that bound one face alone, so that no facets can close
+    /// there; 0 if the kernel does not know.
+    fn free_edges(&self) -> usize {
+        0
+    }
+
+    /// Returns the longest side of the box of the vertices, in millimetres; 0 if the kernel
+    /// does not know.
+    fn longest_mm(&self) -> f64 {
+        0.0
+    }
+
     /// Tessellates the faces into facets at most `chord_mm` from their surfaces, joined
     /// along their edges.
     ///

@@ -1,8 +1,8 @@
 //! Holds a model in memory: placed bodies, faces, edges and vertices, in millimetres.
 
-use crate::geometry::{Curve, Surface};
+use crate::geometry::{Curve, Surface, edge_range};
 use crate::kernel::{Body, Notice};
-use crate::vector::Vec3;
+use crate::vector::{Vec3, distance};
 
 /// All bodies of a file.
 #[derive(Debug, Default)]
@@ -18,6 +18,31 @@ pub(crate) struct BrepModel {
     /// The uncertainty of lengths that the file states, in millimetres.
     pub(crate) uncertainty_mm: Option<f64>,
 }
+
+impl BrepModel {
+    /// Returns the edges that bound one face alone, in ascending order, but for those that
+    /// are a single point.
+    pub(crate) fn free_edges(&self) -> Vec<usize> {
+        let mut uses = vec![0u32; self.edges.len()];
+        for around in self.faces.iter().flat_map(|face| &face.loops) {
+            if let Loop::Edges(edges) = around {
+                edges.iter().for_each(|(edge, _)| uses[*edge] += 1);
+            }
+        }
+        let is_free = |edge: &usize| uses[*edge] == 1 && !self.is_point(&self.edges[*edge]);
+        (0..uses.len()).filter(is_free).collect()
+    }
+
+    fn is_point(&self, edge: &BrepEdge) -> bool {
+        let [start, end] = edge.ends.map(|vertex| self.vertices[vertex]);
+        let [from, to] = edge_range(&edge.curve, start, end, edge.forward);
+        let middle = edge.curve.place((from + to) / 2.0);
+        distance(start, end) < POINT_MM && distance(start, middle) < POINT_MM
+    }
+}
+
+/// The length below which an edge is a single point, in millimetres.
+const POINT_MM: f64 = 1e-6;
 
 /// A piece of a surface.
 #[derive(Debug)]

@@ -55,8 +55,12 @@ pub struct Attempt {
 const USUAL_MM: f64 = 1e-3;
 /// Healing tolerances, as multiples of the file's own.
 const HEALS: [f64; 3] = [1.0, 0.1, 10.0];
-/// Healing tolerances, as multiples of the chord. The last is the upper limit of all.
+/// Healing tolerances, as multiples of the chord.
 const LOOSEST: [f64; 2] = [0.1, 1.0];
+/// The upper limit of healing, in millimetres, and as a part of the model's longest side. A
+/// longer chord is a limit, too.
+const MOST_MM: f64 = 0.1;
+const MOST_PART: f64 = 1e-3;
 /// Longer chords, as multiples of the requested one.
 const CHORDS: [f64; 2] = [4.0, 16.0];
 
@@ -77,14 +81,14 @@ pub fn prepare(bytes: &[u8], read: ReadFn, chord_mm: f64) -> Result<Prepared, Br
     }
     let opened = caught("reading the file", || read(bytes, 0.0))?;
     let own_mm = opened.kernel.uncertainty_mm().unwrap_or(USUAL_MM);
-    let first = facets(opened.kernel, 0.0, chord_mm);
-    let first_try = Attempt::of(&first, 0.0, chord_mm);
-    let mut search =
-        Search { bytes, read, chord_mm, tries: vec![first_try], best: first.map(|made| (0, made)) };
+    let mut search = Search::new(bytes, read, chord_mm);
+    search.begin(opened.kernel);
+    let most_mm = f64::max(chord_mm, MOST_MM.min(MOST_PART * search.longest_mm));
     let heals = HEALS.map(|by| by * own_mm).into_iter().chain(LOOSEST.map(|by| by * chord_mm));
-    for heal_mm in heals.filter(|heal_mm| *heal_mm <= chord_mm) {
+    for heal_mm in heals.chain([most_mm]).filter(|heal_mm| *heal_mm <= most_mm) {
         search.healed(heal_mm, chord_mm)?;
     }
+    search.settle_open();
     for by in CHORDS {
         search.longer(by * chord_mm)?;
     }
@@ -103,11 +107,68 @@ struct Search<'a> {
     tries: Vec<Attempt>,
     /// The best attempt and its index, or the first one's error if none gave facets.
     best: Result<(usize, Prepared), BrepError>,
+    /// Of the models without facets because edges bound one face alone, that with the fewest
+    /// such edges: its index among the attempts, the number of edges, and the model.
+    open: Option<(usize, usize, Arc<dyn Kernel>)>,
+    /// The longest side of the box of the model's vertices, in millimetres.
+    longest_mm: f64,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(bytes: &'a [u8], read: ReadFn, chord_mm: f64) -> Self {
+        let none = Err(BrepError::Chord { chord_mm });
+        Self { bytes, read, chord_mm, tries: Vec::new(), best: none, open: None, longest_mm: 0.0 }
+    }
+
+    /// Tries the file as it is.
+    fn begin(&mut self, kernel: Arc<dyn Kernel>) {
+        self.longest_mm = kernel.longest_mm();
+        if self.is_open(&kernel, 0.0) {
+            return;
+        }
+        let first = facets(kernel, 0.0, self.chord_mm);
+        self.tries.push(Attempt::of(&first, 0.0, self.chord_mm));
+        self.best = first.map(|made| (0, made));
+    }
+
+    /// Returns whether edges bound one face alone, so that facets would be in vain, and
+    /// keeps the model with the fewest.
+    fn is_open(&mut self, kernel: &Arc<dyn Kernel>, heal_mm: f64) -> bool {
+        let edges = kernel.free_edges();
+        if edges == 0 {
+            return false;
+        }
+        let why = format!("{edges} edges bound one face alone");
+        if self.open.as_ref().is_none_or(|(_, least, _)| edges < *least) {
+            self.open = Some((self.tries.len(), edges, kernel.clone()));
+        }
+        self.tries.push(Attempt { heal_mm, chord_mm: self.chord_mm, why });
+        true
+    }
+
+    /// Makes facets of the model with the fewest free edges, if no other has any, to tell
+    /// where it is open.
+    fn settle_open(&mut self) {
+        if self.best.is_err()
+            && let Some((index, _, kernel)) = self.open.take()
+        {
+            let heal_mm = self.tries[index].heal_mm;
+            // It will not be sliced unless gaps are accepted, so a longer chord will do.
+            let chord_mm = CHORDS[0] * self.chord_mm;
+            let made = facets(kernel, heal_mm, chord_mm);
+            self.tries[index] = Attempt::of(&made, heal_mm, chord_mm);
+            self.best = made.map(|made| (index, made));
+        }
+    }
+
     fn is_done(&self) -> bool {
         self.best.as_ref().is_ok_and(|(_, best)| best.is_good())
+    }
+
+    /// Returns whether the best model has edges that bound one face alone: a longer chord
+    /// closes none.
+    fn has_free_edges(&self) -> bool {
+        self.best.as_ref().is_ok_and(|(_, best)| best.kernel.free_edges() > 0)
     }
 
     fn open(&self, heal_mm: f64) -> Result<OpenedModel, BrepError> {
@@ -117,7 +178,7 @@ impl Search<'_> {
     fn healed(&mut self, heal_mm: f64, chord_mm: f64) -> Result<(), BrepError> {
         if !self.is_done() {
             let opened = self.open(heal_mm)?;
-            if opened.is_changed {
+            if opened.is_changed && !self.is_open(&opened.kernel, heal_mm) {
                 self.take(opened.kernel, heal_mm, chord_mm);
             }
         }
@@ -126,7 +187,7 @@ impl Search<'_> {
 
     /// Tries a longer chord with the best healing tolerance.
     fn longer(&mut self, chord_mm: f64) -> Result<(), BrepError> {
-        if !self.is_done() {
+        if !self.is_done() && !self.has_free_edges() {
             let heal_mm = self.best.as_ref().map_or(0.0, |(_, best)| best.heal_mm);
             let kernel = self.open(heal_mm)?.kernel;
             self.take(kernel, heal_mm, chord_mm);

@@ -85,9 +85,9 @@ impl Surface {
             du: axes.direction(du),
             dv: axes.direction(dv),
         };
-        let (sin, cos) = u.sin_cos();
         // A profile of radius r and height z, rotated about the axis.
         let turned = |axes: &Axes, [r, z]: [f64; 2], [dr, dz]: [f64; 2]| {
+            let (sin, cos) = u.sin_cos();
             jet(axes, [r * cos, r * sin, z], [-r * sin, r * cos, 0.0], [dr * cos, dr * sin, dz])
         };
         match self {
@@ -110,6 +110,7 @@ impl Surface {
             }
             Self::Revolution { axes, curve } => {
                 let [p, d] = curve.at(inside(v, curve.domain(), curve.period()));
+                let (sin, cos) = u.sin_cos();
                 let turn = |p: Vec3| [p[0] * cos - p[1] * sin, p[0] * sin + p[1] * cos, p[2]];
                 let [x, y, _] = turn(p);
                 jet(axes, turn(p), [-y, x, 0.0], turn(d))

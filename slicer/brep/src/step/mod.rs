@@ -211,6 +211,19 @@ impl Kernel for StepModel {
         &self.model.notices
     }
 
+    fn free_edges(&self) -> usize {
+        self.model.free_edges().len()
+    }
+
+    fn longest_mm(&self) -> f64 {
+        let places = || self.model.vertices.iter();
+        let side = |k: usize| {
+            let ends = places().fold([f64::MAX, f64::MIN], |[a, b], p| [a.min(p[k]), b.max(p[k])]);
+            ends[1] - ends[0]
+        };
+        (0..3).map(side).fold(0.0, f64::max)
+    }
+
     fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError> {
         let mut mesh = tessellate::model(&self.model, chord_mm)?;
         mesh.findings.extend_from_slice(&self.healed);

@@ -8,7 +8,7 @@ use crate::vector::{Vec3, along, distance, dot, length, middle, sub, unit};
 
 /// The greatest ratio of a cell's length to its width. A cylinder is straight along its axis,
 /// and would otherwise get facets as long as it is.
-const LONGEST: f64 = 30.0;
+const LONGEST: f64 = 1000.0;
 
 /// The map from parameters to the plane of the triangulation.
 pub(super) struct CellScale {
