@@ -47,6 +47,7 @@ mod step;
 mod tessellate;
 mod validate;
 pub mod vector;
+mod volume;
 
 pub use error::BrepError;
 pub use kernel::{

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
 use crate::rays::{Hit, RayPoint, SHARES, hits, seen_mm2};
-use crate::validate::{BodyFault, BodyReport, volume};
+use crate::validate::{BodyFault, BodyReport};
+use crate::volume::facet_volume;
 
 /// How far faces may reach into each other, as a multiple of the chord.
 const LOOSE: f64 = 8.0;
@@ -46,7 +47,7 @@ fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize)
     let about = facets.first().map_or([0.0; 3], |facet| mesh.corners(facet)[0]);
     for (number, facet) in facets.iter().enumerate() {
         let shell = shells[number];
-        volumes[shell] += volume(mesh, std::slice::from_ref(facet), about);
+        volumes[shell] += facet_volume(mesh, std::slice::from_ref(facet), about);
         let seen = seen_mm2(mesh, facet).abs();
         if seen > widest[shell].0 {
             widest[shell] = (seen, number);

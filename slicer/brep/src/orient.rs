@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
-use crate::validate::{BodyReport, bounds, doubled, sides, volume};
+use crate::validate::{BodyReport, bounds, doubled, sides};
 use crate::vector::{length, middle};
+use crate::volume::facet_volume;
 
 /// Of two groups of faces that contradict each other, the smaller is inside out if its
 /// area is less than this part of the other's.
@@ -72,7 +73,7 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     let [low, high] = bounds(mesh, facets);
     let about = middle(low, high);
     let signed = |facet: &Facet| {
-        let volume = volume(mesh, std::slice::from_ref(facet), about);
+        let volume = facet_volume(mesh, std::slice::from_ref(facet), about);
         if turned[index(facet)] { -volume } else { volume }
     };
     if facets.iter().map(signed).sum::<f64>() < 0.0 {

@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
-use crate::kernel::{Facet, Fault, Jet, Kernel, Tessellation};
+use crate::kernel::{Facet, Fault, Kernel, Tessellation};
 use crate::nest::crossed;
-use crate::vector::{Vec3, cross, dot, length, scale, sub};
+use crate::vector::{Vec3, cross, length, scale, sub};
+use crate::volume::{facet_volume, surface_volume};
 
 /// The greatest relative difference of a body's two volumes.
 const VOLUMES_APART: f64 = 1e-3;
@@ -78,8 +79,7 @@ pub struct BodyReport {
     pub facets: usize,
     /// The volume of the facets, in cubic millimetres.
     pub volume_mm3: f64,
-    /// The volume of the surfaces, integrated over the facets' parameters, in cubic
-    /// millimetres.
+    /// The volume of the surfaces, in cubic millimetres.
     pub exact_volume_mm3: f64,
     /// The area of the facets, in square millimetres.
     pub area_mm2: f64,
@@ -100,9 +100,8 @@ pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
         let mut report = BodyReport {
             name: body.name.clone(),
             facets: facets.len(),
-            volume_mm3: volume(mesh, facets, middle),
-            exact_volume_mm3: exact_volume(kernel, facets, middle)
-                + exact_volume(kernel, mesh.tips_of_faces(&body.faces), middle),
+            volume_mm3: facet_volume(mesh, facets, middle),
+            exact_volume_mm3: surface_volume(kernel, mesh, body, middle),
             area_mm2: facets.iter().map(|facet| length(doubled(mesh, facet)) / 2.0).sum(),
             box_mm,
             faults: Vec::new(),
@@ -159,57 +158,6 @@ pub(crate) fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
 pub(crate) fn doubled(mesh: &Tessellation, facet: &Facet) -> Vec3 {
     let [a, b, c] = mesh.corners(facet);
     cross(sub(b, a), sub(c, a))
-}
-
-pub(crate) fn volume(mesh: &Tessellation, facets: &[Facet], middle: Vec3) -> f64 {
-    let six = |facet: &Facet| {
-        let [a, b, c] = mesh.corners(facet).map(|corner| sub(corner, middle));
-        dot(a, cross(b, c))
-    };
-    facets.iter().map(six).sum::<f64>() / 6.0
-}
-
-/// Quadrature points of a triangle, and their weights (Strang and Fix, six points,
-/// exact to the fourth degree).
-const GAUSS: [([f64; 2], f64); 6] = {
-    const A: f64 = 0.445_948_490_915_965;
-    const B: f64 = 0.091_576_213_509_771;
-    const W: f64 = 0.223_381_589_678_011;
-    const V: f64 = 0.109_951_743_655_322;
-    [
-        ([A, A], W),
-        ([A, 1.0 - 2.0 * A], W),
-        ([1.0 - 2.0 * A, A], W),
-        ([B, B], V),
-        ([B, 1.0 - 2.0 * B], V),
-        ([1.0 - 2.0 * B, B], V),
-    ]
-};
-
-/// Returns the volume within the surfaces: by Gauss's theorem, a third of the flux of
-/// the position vector.
-fn exact_volume(kernel: &dyn Kernel, facets: &[Facet], middle: Vec3) -> f64 {
-    let mut sum = 0.0;
-    for of_face in facets.chunk_by(|a, b| a.face == b.face) {
-        let mut at = Vec::with_capacity(GAUSS.len() * of_face.len());
-        for facet in of_face {
-            let [p, q, r] = facet.uv;
-            let place =
-                |[s, t]: [f64; 2]| [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]));
-            at.extend(GAUSS.map(|(part, _)| place(part)));
-        }
-        let mut jets = vec![Jet::default(); at.len()];
-        kernel.evaluate(of_face[0].face, &at, &mut jets);
-        for (facet, jets) in of_face.iter().zip(jets.chunks(GAUSS.len())) {
-            let [p, q, r] = facet.uv;
-            let double = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-            let flux = |jet: &Jet| dot(sub(jet.point, middle), cross(jet.du, jet.dv));
-            let mean: f64 =
-                jets.iter().zip(GAUSS).map(|(jet, (_, weight))| weight * flux(jet)).sum();
-            sum += mean * double / 2.0;
-        }
-    }
-    sum / 3.0
 }
 
 /// Returns a fault unless facets follow each edge as often in one direction as in the other.
