@@ -303,10 +303,10 @@ fn chains_may_hold_chains_and_edges_may_be_parts() {
 #[test]
 fn what_is_not_read_is_refused_by_name() {
     let text = reworded(StepSample::Frustum, StepUnit::Inch, "CIRCLE", |id, _, _| {
-        format!("{id}=PCURVE('',#1,#1);")
+        format!("{id}=CLOTHOID('',#1,1.);")
     });
     let error = StepModel::read(text.as_bytes()).unwrap_err().to_string();
-    assert!(error.starts_with('#') && error.ends_with("is a PCURVE, which is not supported"));
+    assert!(error.starts_with('#') && error.ends_with("is a CLOTHOID, which is not supported"));
     let text = reworded(StepSample::Frustum, StepUnit::Inch, "CONICAL_SURFACE", |id, _, _| {
         format!("{id}=RECTANGULAR_COMPOSITE_SURFACE('',((#1)));")
     });

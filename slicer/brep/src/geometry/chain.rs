@@ -20,6 +20,27 @@ pub(crate) struct Link {
 /// The greatest gap between pieces, in millimetres: programs round points by less.
 const JOINED_MM: f64 = 1e-3;
 
+/// Turns pieces over that only so meet the one before, and returns them if they close:
+/// some programs confuse the senses of pieces.
+pub(crate) fn closed(mut links: Vec<Link>) -> Option<Vec<Link>> {
+    let end = |link: &Link, k: usize| link.curve.place(link.range[k]);
+    let meet = |a: Vec3, b: Vec3| distance(a, b) <= JOINED_MM;
+    if let [first, second, ..] = &mut links[..] {
+        let touches = |p: Vec3| meet(p, end(second, 0)) || meet(p, end(second, 1));
+        if !touches(end(first, 1)) {
+            first.range.reverse();
+        }
+    }
+    for k in 1..links.len() {
+        if !meet(end(&links[k - 1], 1), end(&links[k], 0)) {
+            links[k].range.reverse();
+        }
+    }
+    let next = links.iter().cycle().skip(1);
+    let is_closed = links.iter().zip(next).all(|(a, b)| meet(end(a, 1), end(b, 0)));
+    (!links.is_empty() && is_closed).then_some(links)
+}
+
 impl Chain {
     /// Returns a chain, or `None` if a piece does not start where the one before ends.
     pub(crate) fn new(links: Vec<Link>) -> Option<Self> {
@@ -115,6 +136,19 @@ mod tests {
         assert!(distance(line[0], [0.0; 3]) < 1e-14);
         assert!(line.iter().any(|p| distance(*p, [2.0, 0.0, 0.0]) < 1e-14));
         assert!(distance(line[line.len() - 1], [0.0, 2.0, 0.0]) < 1e-14);
+    }
+
+    #[test]
+    fn pieces_of_a_closed_chain_are_turned_over_where_they_meet_so() {
+        let right = half();
+        for turned in [vec![0], vec![1], vec![0, 1]] {
+            let mut links = right.clone();
+            turned.iter().for_each(|&k: &usize| links[k].range.reverse());
+            let links = closed(links).unwrap();
+            assert!(Chain::new(links).is_some(), "{turned:?}");
+        }
+        assert_eq!(closed(right[..1].to_vec()), None);
+        assert_eq!(closed(Vec::new()), None);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::chain::Chain;
 use super::spline::SplineCurve;
+use super::surface_curve::SurfaceCurve;
 use crate::vector::{Axes, Vec3, along, distance, dot, scale, sub};
 
 /// A curve in space, in millimetres, with the parameter of ISO 10303-42.
@@ -28,6 +29,7 @@ pub(crate) enum Curve {
     },
     Spline(SplineCurve),
     Chain(Chain),
+    OnSurface(Box<SurfaceCurve>),
 }
 
 /// The greatest number of steps of the search for the nearest point.
@@ -54,6 +56,7 @@ impl Curve {
             ),
             Self::Spline(spline) => spline.at(t),
             Self::Chain(chain) => chain.at(t),
+            Self::OnSurface(curve) => curve.at(t),
         }
     }
 
@@ -70,6 +73,7 @@ impl Curve {
             Self::Parabola { axes, focal } => Self::Parabola { axes: axes.turned(), focal },
             Self::Spline(spline) => Self::Spline(spline.reversed()),
             Self::Chain(chain) => Self::Chain(chain.reversed()),
+            Self::OnSurface(curve) => Self::OnSurface(Box::new(curve.reversed())),
         }
     }
 
@@ -79,6 +83,7 @@ impl Curve {
             Self::Ellipse { .. } => Some([0.0, TAU]),
             Self::Spline(spline) => Some(spline.knots.domain()),
             Self::Chain(chain) => Some(chain.domain()),
+            Self::OnSurface(_) => Some(SurfaceCurve::DOMAIN),
             _ => None,
         }
     }
@@ -88,6 +93,7 @@ impl Curve {
         match self {
             Self::Spline(spline) => Some(spline.knots.breaks()),
             Self::Chain(chain) => Some(chain.breaks()),
+            Self::OnSurface(curve) => Some(curve.breaks()),
             _ => None,
         }
     }
@@ -135,7 +141,7 @@ impl Curve {
             }
             Self::Parabola { axes, focal } => self.nearer(p, axes.local(p)[1] / (2.0 * focal)),
             Self::Chain(chain) => chain.project(p),
-            Self::Spline(_) => {
+            Self::Spline(_) | Self::OnSurface(_) => {
                 let far = |t: &f64| distance(self.at(*t)[0], p);
                 let nearer = |a: &f64, b: &f64| far(a).total_cmp(&far(b));
                 let samples = self.samples();
@@ -155,11 +161,8 @@ impl Curve {
 
     /// Searches for the foot of `p` from a start; returns the start if that diverges.
     fn nearer(&self, p: Vec3, start: f64) -> f64 {
-        let clamp = |t: f64| match self {
-            Self::Spline(spline) => {
-                let [low, high] = spline.knots.domain();
-                t.clamp(low, high)
-            }
+        let clamp = |t: f64| match (self, self.domain()) {
+            (Self::Spline(_) | Self::OnSurface(_), Some([low, high])) => t.clamp(low, high),
             _ => t,
         };
         let (mut t, mut best) = (start, (distance(self.at(start)[0], p), start));
@@ -214,7 +217,9 @@ impl Curve {
     /// Returns the point at `t`, also past the seam of a closed spline.
     pub(crate) fn place(&self, t: f64) -> Vec3 {
         match (self, self.domain()) {
-            (Self::Spline(_) | Self::Chain(_), Some([start, end])) if t < start || t > end => {
+            (Self::Spline(_) | Self::Chain(_) | Self::OnSurface(_), Some([start, end]))
+                if t < start || t > end =>
+            {
                 self.at(start + (t - start).rem_euclid(end - start))[0]
             }
             _ => self.at(t)[0],

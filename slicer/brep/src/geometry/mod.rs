@@ -9,7 +9,9 @@ pub(crate) mod spline;
 pub(crate) mod spline_surface;
 mod strips;
 pub(crate) mod surface;
+pub(crate) mod surface_curve;
 
-pub(crate) use chain::{Chain, Link};
+pub(crate) use chain::{Chain, Link, closed};
 pub(crate) use curve::{Curve, edge_range};
 pub(crate) use surface::{Pole, Surface, TorusPart};
+pub(crate) use surface_curve::SurfaceCurve;

@@ -59,6 +59,7 @@ impl Kind {
             {
                 Self::Tessellated
             }
+            Self::Wires if bounded_surfaces(entities, item).next().is_some() => Self::Surfaces,
             kind => kind,
         }
     }
@@ -285,6 +286,16 @@ fn documents(entities: &Entities) -> impl Iterator<Item = (u64, String)> {
 /// Returns the shells and faces of surfaces.
 fn shells(entities: &Entities, item: u64) -> Result<Vec<u64>, StepError> {
     let models = ["SHELL_BASED_SURFACE_MODEL", "FACE_BASED_SURFACE_MODEL"];
-    let model = models.iter().find_map(|name| entities.find(item, name));
-    model.map_or(Ok(vec![item]), |model| model.references(1))
+    if let Some(model) = models.iter().find_map(|name| entities.find(item, name)) {
+        return model.references(1);
+    }
+    let of_set: Vec<u64> = bounded_surfaces(entities, item).collect();
+    Ok(if of_set.is_empty() { vec![item] } else { of_set })
+}
+
+/// Returns the surfaces of a set that have bounds.
+fn bounded_surfaces(entities: &Entities, set: u64) -> impl Iterator<Item = u64> {
+    let set = entities.find(set, "GEOMETRIC_SET");
+    let elements = set.and_then(|set| set.references(1).ok()).unwrap_or_default().into_iter();
+    elements.filter(|id| entities.find(*id, "CURVE_BOUNDED_SURFACE").is_some())
 }

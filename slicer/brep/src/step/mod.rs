@@ -3,9 +3,11 @@
 mod assembly;
 mod contents;
 mod entities;
+mod free_face;
 mod place;
 mod product;
 mod read_curve;
+mod read_pcurve;
 mod read_placement;
 mod read_spline;
 mod read_surface;

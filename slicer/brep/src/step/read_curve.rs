@@ -5,12 +5,20 @@ use super::entities::{Item, Value};
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::{Chain, Curve, Link, edge_range};
-use crate::vector::{along, cross, dot, unit};
+use crate::vector::{Vec3, along, cross, distance, dot, unit};
 
 impl GeometryReader<'_> {
     /// Reads the curve of an edge.
     pub(crate) fn curve(&self, id: u64) -> Result<Curve, StepError> {
         self.curve_within(id, 0)
+    }
+
+    /// Reads the curve of an edge from its first to its last point, along the curve.
+    pub(super) fn curve_between(&self, id: u64, ends: [Vec3; 2]) -> Result<Curve, StepError> {
+        match self.entities.find(id, "PCURVE") {
+            Some(item) => self.pcurve(item, Some(ends), 0),
+            None => self.curve(id),
+        }
     }
 
     fn curve_within(&self, id: u64, depth: usize) -> Result<Curve, StepError> {
@@ -61,6 +69,7 @@ impl GeometryReader<'_> {
             {
                 self.composite(item, depth)
             }
+            "PCURVE" if depth < MAX_NESTED && !self.is_flat => self.pcurve(item, None, depth),
             "CURVE_REPLICA" if depth < MAX_NESTED => {
                 let parent = item.reference(1)?;
                 self.copied(item.reference(2)?, |copy| copy.curve_within(parent, depth + 1))
@@ -117,8 +126,15 @@ impl GeometryReader<'_> {
 
     /// Reads bounded curves joined end to end.
     fn composite(&self, item: Item, depth: usize) -> Result<Curve, StepError> {
+        let bad = StepError::Numbers { id: item.id, what: "chain of curves" };
+        Chain::new(self.links(item, depth)?).map(Curve::Chain).ok_or(bad)
+    }
+
+    /// Reads the pieces of a chain of curves.
+    pub(super) fn links(&self, item: Item, depth: usize) -> Result<Vec<Link>, StepError> {
         let link = |id: u64| {
-            self.entities.spend(1)?;
+            // A piece takes as much as several points.
+            self.entities.spend(10)?;
             let segment = self.entities.get(id, "COMPOSITE_CURVE_SEGMENT")?;
             let mut link = self.bounded(segment.reference(2)?, depth + 1)?;
             if !segment.truth(1)? {
@@ -126,15 +142,19 @@ impl GeometryReader<'_> {
             }
             Ok(link)
         };
-        let links = item.references(1)?.into_iter().map(link).collect::<Result<_, StepError>>()?;
-        let bad = StepError::Numbers { id: item.id, what: "chain of curves" };
-        Chain::new(links).map(Curve::Chain).ok_or(bad)
+        item.references(1)?.into_iter().map(link).collect()
     }
 
     /// Reads a bounded curve.
-    fn bounded(&self, id: u64, depth: usize) -> Result<Link, StepError> {
+    pub(super) fn bounded(&self, id: u64, depth: usize) -> Result<Link, StepError> {
         if let Some(trimmed) = self.entities.find(id, "TRIMMED_CURVE") {
             return self.trimmed(trimmed, depth);
+        }
+        let on_surfaces = ["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE"];
+        if let Some(item) = on_surfaces.iter().find_map(|name| self.entities.find(id, name))
+            && depth < MAX_NESTED
+        {
+            return self.bounded(item.reference(1)?, depth + 1);
         }
         let curve = self.curve_within(id, depth)?;
         let range = curve.domain().ok_or(StepError::Numbers { id, what: "bounded curve" })?;
@@ -170,7 +190,7 @@ impl GeometryReader<'_> {
     }
 
     /// Returns a curve's parameter for a parameter of the file.
-    fn parameter(&self, id: u64, curve: &Curve) -> Result<f64, StepError> {
+    pub(super) fn parameter(&self, id: u64, curve: &Curve) -> Result<f64, StepError> {
         match curve {
             Curve::Line { .. } => {
                 let line = self.entities.get(id, "LINE")?;
@@ -180,4 +200,12 @@ impl GeometryReader<'_> {
             _ => Ok(1.0),
         }
     }
+}
+
+/// Returns whether a piece of a curve is a point, as at a pole.
+pub(super) fn is_short(link: &Link) -> bool {
+    const POINT_MM: f64 = 1e-6;
+    let Link { curve, range: [from, to] } = link;
+    let place = |k: u32| curve.place(from + (to - from) * f64::from(k) / 4.0);
+    (1..=4).all(|k| distance(place(0), place(k)) < POINT_MM)
 }

@@ -11,6 +11,8 @@ pub(crate) struct GeometryReader<'a> {
     pub(crate) entities: &'a Entities,
     pub(crate) units: &'a Units,
     pub(crate) place: Axes,
+    /// Whether points have two coordinates: the parameters of a surface.
+    pub(crate) is_flat: bool,
 }
 
 /// The greatest depth of references between curves and surfaces; more counts as a cycle.
@@ -19,7 +21,7 @@ pub(super) const MAX_NESTED: usize = 8;
 impl<'a> GeometryReader<'a> {
     /// Returns a reader in a representation's own coordinates.
     pub(super) fn unplaced(entities: &'a Entities, units: &'a Units) -> Self {
-        Self { entities, units, place: Axes::WORLD }
+        Self { entities, units, place: Axes::WORLD, is_flat: false }
     }
 
     /// Reads where a placement or an operator puts things.
@@ -61,7 +63,12 @@ impl<'a> GeometryReader<'a> {
         let own = GeometryReader::unplaced(self.entities, self.units);
         let place = Place { axes: self.place, scale: 1.0 }.then(&own.place(operator)?);
         let units = self.units.scaled(place.scale);
-        read(&GeometryReader { entities: self.entities, units: &units, place: place.axes })
+        read(&GeometryReader {
+            entities: self.entities,
+            units: &units,
+            place: place.axes,
+            is_flat: self.is_flat,
+        })
     }
 
     /// Returns the position of a vertex or a cartesian point.
@@ -70,29 +77,36 @@ impl<'a> GeometryReader<'a> {
             Some(vertex) => vertex.reference(1)?,
             None => id,
         };
-        let point = self.entities.get(id, "CARTESIAN_POINT")?.numbers(1)?;
-        let &[x, y, z] = point.as_slice() else {
-            return Err(StepError::Attribute { id, attribute: 2 });
-        };
-        let point = self.place.point(scale([x, y, z], self.units.mm));
+        let point = self.coordinates(self.entities.get(id, "CARTESIAN_POINT")?)?;
+        let point = self.place.point(scale(point, self.units.mm));
         let is_near = point.iter().all(|x| x.abs() < 1e9);
         is_near.then_some(point).ok_or(StepError::Numbers { id, what: "point" })
     }
 
     pub(super) fn direction(&self, id: u64) -> Result<Vec3, StepError> {
-        let ratios = self.entities.get(id, "DIRECTION")?.numbers(1)?;
-        let &[x, y, z] = ratios.as_slice() else {
-            return Err(StepError::Attribute { id, attribute: 2 });
-        };
-        Ok(self.place.direction([x, y, z]))
+        Ok(self.place.direction(self.coordinates(self.entities.get(id, "DIRECTION")?)?))
+    }
+
+    fn coordinates(&self, item: Item) -> Result<Vec3, StepError> {
+        match (item.numbers(1)?.as_slice(), self.is_flat) {
+            (&[x, y, z], false) => Ok([x, y, z]),
+            (&[x, y], true) => Ok([x, y, 0.0]),
+            _ => Err(StepError::Attribute { id: item.id, attribute: 2 }),
+        }
     }
 
     pub(super) fn optional_direction(&self, id: Option<u64>) -> Result<Option<Vec3>, StepError> {
         id.map(|id| self.direction(id)).transpose()
     }
 
-    /// Reads an `AXIS2_PLACEMENT_3D`, with defaults for omitted axes.
+    /// Reads an `AXIS2_PLACEMENT_3D`, or one in a plane, with defaults for omitted axes.
     pub(crate) fn axes(&self, id: u64) -> Result<Axes, StepError> {
+        if let (true, Some(item)) = (self.is_flat, self.entities.find(id, "AXIS2_PLACEMENT_2D")) {
+            let (x, [_, _, z]) =
+                (self.optional_direction(item.optional(2))?, Axes::WORLD.directions);
+            let axes = Axes::new(self.point(item.reference(1)?)?, z, x);
+            return axes.ok_or(StepError::Numbers { id, what: "axes" });
+        }
         let item = self.entities.get(id, "AXIS2_PLACEMENT_3D")?;
         let z = self.optional_direction(item.optional(2))?;
         let x = self.optional_direction(item.optional(3))?;

@@ -12,7 +12,7 @@ impl GeometryReader<'_> {
         self.surface_within(id, 0)
     }
 
-    fn surface_within(&self, id: u64, depth: usize) -> Result<Surface, StepError> {
+    pub(super) fn surface_within(&self, id: u64, depth: usize) -> Result<Surface, StepError> {
         if let Some(spline) = self.spline_surface(id)? {
             return Ok(Surface::Spline(Box::new(spline)));
         }
@@ -78,7 +78,7 @@ impl GeometryReader<'_> {
         let axes = self.handed(axes);
         // The curve is read in the coordinates of the axes.
         let place = axes.inverse().then(&self.place);
-        let seen = GeometryReader { entities: self.entities, units: self.units, place };
+        let seen = GeometryReader { place, ..*self };
         Ok(Surface::Revolution { axes, curve: seen.curve(item.reference(1)?)? })
     }
 }

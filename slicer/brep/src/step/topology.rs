@@ -33,10 +33,10 @@ pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
 }
 
 /// Reads one body.
-struct BodyReader<'a> {
-    entities: &'a Entities,
-    geometry: GeometryReader<'a>,
-    model: &'a mut BrepModel,
+pub(super) struct BodyReader<'a> {
+    pub(super) entities: &'a Entities,
+    pub(super) geometry: GeometryReader<'a>,
+    pub(super) model: &'a mut BrepModel,
     /// The indices of vertices and edges in the model, by entity.
     vertices: HashMap<u64, usize>,
     edges: HashMap<u64, usize>,
@@ -51,12 +51,12 @@ impl<'a> BodyReader<'a> {
         units: &'a Units,
         model: &'a mut BrepModel,
     ) -> Self {
-        let geometry = GeometryReader { entities, units, place: body.place.axes };
+        let geometry = GeometryReader { entities, units, place: body.place.axes, is_flat: false };
         let (vertices, edges, sides) = (HashMap::new(), HashMap::new(), HashMap::new());
         Self { entities, geometry, model, vertices, edges, sides }
     }
 
-    /// Reads a solid, a shell or a face.
+    /// Reads a solid, a shell, a face or a surface.
     fn item(&mut self, id: u64) -> Result<(), StepError> {
         let item = self.entities.simple(id)?;
         match item.name() {
@@ -65,6 +65,7 @@ impl<'a> BodyReader<'a> {
                 self.shell(item.reference(1)?, true)?;
                 item.references(2)?.into_iter().try_for_each(|shell| self.shell(shell, true))
             }
+            "CURVE_BOUNDED_SURFACE" => self.bounded_surface(item),
             name if name.ends_with("FACE") || name == "FACE_SURFACE" => self.face(id, true),
             _ => self.shell(id, true),
         }
@@ -162,7 +163,12 @@ impl<'a> BodyReader<'a> {
         let item = self.entities.simple(id)?;
         let ends = [self.vertex(item.reference(1)?)?, self.vertex(item.reference(2)?)?];
         let whole = self.whole_edge(item)?;
-        let (curve, forward) = (self.geometry.curve(whole.reference(3)?)?, whole.truth(4)?);
+        let forward = whole.truth(4)?;
+        let mut points = ends.map(|vertex| self.model.vertices[vertex]);
+        if !forward {
+            points.reverse();
+        }
+        let curve = self.geometry.curve_between(whole.reference(3)?, points)?;
         let edge = self.model.edges.len();
         self.model.edges.push(BrepEdge { curve, ends, forward });
         self.edges.insert(id, edge);
