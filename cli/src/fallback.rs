@@ -99,7 +99,7 @@ impl Fallback {
         // An STL does not say which facets are of which body.
         let fill = if slices.unites_bodies() { Fill::NonZero } else { options.solid.fill };
         let brep = &options.solid.brep;
-        let opening = brep.reader.for_opening(brep.tolerance(options.dpi));
+        let opening = brep.reader.for_opening(brep.tolerance(options.dpi))?;
         let options = SliceOptions {
             heights: Some(slices.layer_heights()),
             gray: slices.levels().cloned(),

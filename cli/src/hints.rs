@@ -65,6 +65,9 @@ fn slicing(error: &SliceError) -> Option<String> {
                 "lamp brep tells more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
             ));
         }
+        SliceError::KernelsDisagree { .. } => {
+            "lamp brep --both tells more; --kernel lamp or occt slices what one of them reads"
+        }
         SliceError::Timeout { tolerance, .. } => {
             return Some(format!(
                 "give it more with --timeout, or let facets lie more than {tolerance} from the surfaces"

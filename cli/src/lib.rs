@@ -34,6 +34,7 @@ mod placement;
 mod plots;
 mod progress;
 mod recorded;
+mod second_opinion;
 mod signals;
 mod slicing_options;
 mod stack_facts;

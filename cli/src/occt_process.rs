@@ -11,6 +11,18 @@ use crate::exit::Exit;
 /// Set in the environment of the process that does the work.
 const MARK: &str = "LAMP_SUPERVISED";
 
+/// Returns whether a command line asks for OpenCASCADE.
+fn asks(words: &[OsString]) -> bool {
+    let is_it = |kernel: &str| ["occt", "both"].contains(&kernel);
+    let is_kernel =
+        |pair: &[OsString]| pair[0] == "--kernel" && pair[1].to_str().is_some_and(is_it);
+    let is_joined = |word: &OsString| {
+        let kernel = word.to_str().and_then(|word| word.strip_prefix("--kernel="));
+        kernel.is_some_and(is_it)
+    };
+    words.windows(2).any(is_kernel) || words.iter().any(|word| word == "--both" || is_joined(word))
+}
+
 /// Runs this command once more, as a child that ends with this process, and returns
 /// its status; nothing where this is the child, or OpenCASCADE is not asked for. A
 /// child that crashes is a failure as any other: it has not written anything.
@@ -22,8 +34,7 @@ pub(crate) fn supervised() -> Result<Option<ExitCode>, Exit> {
         return Ok(None);
     }
     let words: Vec<OsString> = env::args_os().collect();
-    let asks = |pair: &[OsString]| pair[0] == "--kernel" && pair[1] == "occt";
-    if !words.windows(2).any(asks) && !words.iter().any(|word| word == "--kernel=occt") {
+    if !asks(&words) {
         return Ok(None);
     }
     let program = env::current_exe().context("this program's own file")?;

@@ -104,7 +104,7 @@ impl PartOptions {
         let options = OpenOptions {
             allow_gaps: reading.may_be_open,
             trust_extent: self.trust_extent,
-            ..self.brep.reader.for_opening(tolerance)
+            ..self.brep.reader.for_opening(tolerance)?
         };
         let model = match is_stream(path) {
             true => Part::from_stream("stdin", io::stdin().lock(), &options)?,

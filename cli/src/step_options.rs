@@ -13,6 +13,7 @@ use lamp_slicer::{KernelName, OpenOptions, SliceError};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
+use crate::exit::Exit;
 use crate::options::parse_distance;
 use crate::recorded::optional;
 use crate::streams::is_stream;
@@ -38,7 +39,8 @@ pub(crate) struct BrepOptions {
 #[derive(Args, Clone, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct ReaderOptions {
-    /// Kernel that reads STEP parts: LAMP's own, or OpenCASCADE (in builds with --features occt)
+    /// Kernel that reads STEP parts: LAMP's own, OpenCASCADE, or LAMP's own if OpenCASCADE agrees
+    /// with it (the last two in builds with --features occt)
     #[arg(long, value_enum, default_value_t, help_heading = HEADING)]
     kernel: KernelArg,
 
@@ -54,8 +56,8 @@ pub(crate) struct ReaderOptions {
 enum KernelArg {
     #[default]
     Lamp,
-    #[cfg(feature = "occt")]
     Occt,
+    Both,
 }
 
 impl Default for ReaderOptions {
@@ -72,20 +74,40 @@ impl BrepOptions {
 }
 
 impl ReaderOptions {
-    /// Returns whether files are read in the default way.
+    /// Returns whether images are those of the default kernel.
     pub(crate) fn is_usual(&self) -> bool {
-        self.kernel == KernelArg::default()
+        self.kernel != KernelArg::Occt
+    }
+
+    /// Returns whether both kernels are asked.
+    pub(crate) fn asks_both(&self) -> bool {
+        self.kernel == KernelArg::Both
     }
 
     /// Returns the options of the library, for facets within a tolerance of surfaces.
-    pub(crate) fn for_opening(&self, tolerance: Length) -> OpenOptions {
+    ///
+    /// # Errors
+    /// Returns an error if OpenCASCADE is asked for, and this build is without it.
+    pub(crate) fn for_opening(&self, tolerance: Length) -> Result<OpenOptions, Exit> {
         let kernel = match self.kernel {
             KernelArg::Lamp => KernelName::Lamp,
             #[cfg(feature = "occt")]
             KernelArg::Occt => KernelName::Occt,
+            #[cfg(feature = "occt")]
+            KernelArg::Both => KernelName::Both,
+            #[cfg(not(feature = "occt"))]
+            KernelArg::Occt | KernelArg::Both => return Err(without_occt("--kernel")),
         };
-        OpenOptions { kernel, tolerance, timeout: self.timeout, ..OpenOptions::default() }
+        Ok(OpenOptions { kernel, tolerance, timeout: self.timeout, ..OpenOptions::default() })
     }
+}
+
+/// Returns the refusal of an option that needs OpenCASCADE.
+#[cfg(not(feature = "occt"))]
+pub(crate) fn without_occt(option: &str) -> Exit {
+    Exit::usage(format!(
+        "this build is without OpenCASCADE: leave out {option}, or build with --features occt"
+    ))
 }
 
 pub(crate) fn parse_tolerance(text: &str) -> Result<Length, String> {

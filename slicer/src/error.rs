@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use lamp_brep::{BodyFault, BrepError, Finding};
+use lamp_brep::{BodyFault, BrepError, Difference, Finding};
 use lamp_stack::Length;
 use thiserror::Error;
 
@@ -214,6 +214,19 @@ pub enum SliceError {
         /// The first finding about a face, which may be the reason.
         finding: Option<Finding>,
         /// How many more faults there are.
+        more: usize,
+    },
+    /// Another kernel reads a STEP file otherwise.
+    #[error(
+        "the kernels disagree about {body}: {difference}{}",
+        if *more > 0 { format!(", and {more} differences more") } else { String::new() }
+    )]
+    KernelsDisagree {
+        /// The first body that differs.
+        body: String,
+        /// Its first difference.
+        difference: Difference,
+        /// How many more differences there are.
         more: usize,
     },
     /// Reading a STEP file took too long.

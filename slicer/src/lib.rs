@@ -75,6 +75,8 @@ pub use facet::{Facet, Units};
 pub use facet_index::FacetIndex;
 pub use gray::LayerLevels;
 pub use grid::PixelGrid;
+#[cfg(feature = "occt")]
+pub use open::second_opinion;
 pub use open::{KernelName, OpenOptions, body_name, read_step};
 pub use part::Part;
 pub use placement::{Axis, PlacedFacet, Placement, facet_heights};

@@ -8,7 +8,9 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use lamp_brep::{BodyFault, BodyReport, BrepError, Prepared, ReadFn, is_step, prepare};
+#[cfg(feature = "occt")]
+use lamp_brep::Comparison;
+use lamp_brep::{BodyFault, BrepError, Prepared, ReadFn, is_step, prepare};
 use lamp_stack::{Length, digest_of, one_line};
 
 use crate::error::SliceError;
@@ -28,12 +30,17 @@ pub enum KernelName {
     /// OpenCASCADE.
     #[cfg(feature = "occt")]
     Occt,
+    /// LAMP itself, if OpenCASCADE agrees.
+    #[cfg(feature = "occt")]
+    Both,
 }
 
 impl KernelName {
     fn read(self) -> ReadFn {
         match self {
             Self::Lamp => lamp_brep::read_step,
+            #[cfg(feature = "occt")]
+            Self::Both => lamp_brep::read_step,
             #[cfg(feature = "occt")]
             Self::Occt => lamp_brep_occt::read,
         }
@@ -139,8 +146,7 @@ impl Part {
         options: &OpenOptions,
     ) -> Result<Self, SliceError> {
         let bytes = bytes.into();
-        let prepared = read_step(bytes.clone(), options)?;
-        refuse_faults(&prepared, options.allow_gaps)?;
+        let prepared = read_good(&bytes, options)?;
         let digest = digest_of(&bytes[..])?;
         let part = Self::new(name, Piece::of_bodies(prepared), digest);
         Ok(part.with(0, options.trust_extent))
@@ -170,8 +176,7 @@ fn unpacked(
     if is_step(start) {
         let mut bytes = Vec::new();
         file.reader().read_to_end(&mut bytes)?;
-        let prepared = read_step(bytes.into(), options)?;
-        refuse_faults(&prepared, options.allow_gaps)?;
+        let prepared = read_good(&bytes.into(), options)?;
         return Ok(Contents { pieces: Piece::of_bodies(prepared), left_out: 0 });
     }
     if looks_packaged(start) {
@@ -224,6 +229,42 @@ pub fn read_step(bytes: Arc<[u8]>, options: &OpenOptions) -> Result<Prepared, Sl
     }
 }
 
+/// Reads the bytes of a STEP file to be sliced.
+fn read_good(bytes: &Arc<[u8]>, options: &OpenOptions) -> Result<Prepared, SliceError> {
+    let prepared = read_step(bytes.clone(), options)?;
+    refuse_faults(&prepared, options.allow_gaps)?;
+    #[cfg(feature = "occt")]
+    if options.kernel == KernelName::Both {
+        refuse_differences(&second_opinion(&prepared, bytes.clone(), options)?)?;
+    }
+    Ok(prepared)
+}
+
+/// Reads the bytes of a STEP file with OpenCASCADE, too, and compares what both kernels
+/// read.
+///
+/// # Errors
+/// Returns an error if OpenCASCADE cannot read them in time.
+#[cfg(feature = "occt")]
+pub fn second_opinion(
+    ours: &Prepared,
+    bytes: Arc<[u8]>,
+    options: &OpenOptions,
+) -> Result<Comparison, SliceError> {
+    let options = OpenOptions { kernel: KernelName::Occt, ..options.clone() };
+    let theirs = read_step(bytes, &options)?;
+    Ok(Comparison::of([ours, &theirs], ["LAMP", "OpenCASCADE"]))
+}
+
+#[cfg(feature = "occt")]
+fn refuse_differences(comparison: &Comparison) -> Result<(), SliceError> {
+    let mut differences = comparison.differences().into_iter();
+    let Some((body, difference)) = differences.next() else { return Ok(()) };
+    let body = body_name(body.index + 1, &body.name);
+    let more = differences.count();
+    Err(SliceError::KernelsDisagree { body, difference, more })
+}
+
 fn refuse_faults(prepared: &Prepared, allow_gaps: bool) -> Result<(), SliceError> {
     let is_allowed = |fault: &BodyFault| allow_gaps && matches!(fault, BodyFault::Open { .. });
     let bodies = (1..).zip(&prepared.reports);
@@ -233,7 +274,7 @@ fn refuse_faults(prepared: &Prepared, allow_gaps: bool) -> Result<(), SliceError
     });
     let Some((number, report, fault)) = faults.next() else { return Ok(()) };
     Err(SliceError::Faulty {
-        body: body_name(number, report),
+        body: body_name(number, &report.name),
         fault: fault.clone(),
         finding: prepared.mesh.findings.first().cloned(),
         more: faults.count(),
@@ -241,8 +282,8 @@ fn refuse_faults(prepared: &Prepared, allow_gaps: bool) -> Result<(), SliceError
 }
 
 /// Returns a body's name for messages: its number, from 1, and its name in the file.
-pub fn body_name(number: usize, report: &BodyReport) -> String {
-    match report.name.trim() {
+pub fn body_name(number: usize, name: &str) -> String {
+    match name.trim() {
         "" => format!("body {number}"),
         name => format!("body {number} ({})", one_line(name)),
     }

@@ -222,6 +222,55 @@ fn a_sample_is_the_fixture() {
     assert_eq!(scratch.bytes("torus.step"), expected.as_bytes());
 }
 
+#[cfg(not(feature = "occt"))]
+#[test]
+fn what_needs_opencascade_is_refused_without_it() {
+    let scratch = with(StepSample::Sphere);
+    for line in ["lamp brep part.step --both", "slice part.step --kernel both -o a.tif"] {
+        scratch.run(line).is_wrong_usage(&["this build is without OpenCASCADE"]);
+    }
+    assert_eq!(scratch.names(), ["part.step"]);
+}
+
+#[cfg(feature = "occt")]
+#[test]
+fn a_second_opinion_agrees_on_good_parts() {
+    for part in [StepSample::Pair, StepSample::Blade, StepSample::Frustum, StepSample::Tower] {
+        let scratch = with(part);
+        let text =
+            String::from_utf8(scratch.run("lamp brep part.step --both").succeeds().stdout).unwrap();
+        assert!(text.contains("second:     OpenCASCADE agrees: volumes within 0.0"), "{text}");
+        let line = "slice part.step --dpi 300 --thickness 2mm --quiet";
+        scratch.run(&format!("{line} -o one.tif")).succeeds();
+        scratch.run(&format!("{line} --kernel both -o both.tif")).succeeds();
+        assert!(scratch.bytes("one.tif") == scratch.bytes("both.tif"), "{part:?}");
+    }
+}
+
+/// OpenCASCADE reads a torus that meets itself with both of its parts.
+#[cfg(feature = "occt")]
+#[test]
+fn kernels_that_disagree_stop_the_slicer() {
+    let scratch = with(StepSample::Apple);
+    let ran = scratch.run("lamp brep part.step --both --json");
+    assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
+    assert!(ran.stderr.contains("LAMP and OpenCASCADE read it differently"), "{ran:?}");
+    let answer: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap();
+    let second = &answer["second"];
+    assert!(!second["differences"].as_array().unwrap().is_empty(), "{second}");
+    let volume = &second["pairs"][0]["measures"][6];
+    let [one, two, allowed] =
+        ["first", "second", "allowed"].map(|key| volume[key].as_f64().unwrap());
+    assert!(volume["what"] == "volume_mm3" && (one - two).abs() > allowed, "{volume}");
+    let text = String::from_utf8(scratch.run("lamp brep part.step --both").stdout).unwrap();
+    assert!(text.contains("differs:    body 1") && text.contains("its volume is"), "{text}");
+    scratch
+        .run("slice part.step --kernel both -o part.tif")
+        .is_refused_with(&["the kernels disagree about body 1", "lamp brep --both tells more"]);
+    assert_eq!(scratch.names(), ["part.step"]);
+    scratch.run("slice part.step --dpi 100 -o part.tif").succeeds();
+}
+
 #[cfg(feature = "occt")]
 #[test]
 fn kernels_agree_pixel_by_pixel() {

@@ -4,13 +4,14 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_slicer::brep::{Attempt, Body, BodyReport, Prepared};
+use lamp_slicer::brep::{Attempt, Body, BodyReport, Comparison, Prepared};
 use lamp_slicer::{SliceError, body_name, read_step};
 use lamp_stack::{Dpi, one_line};
 use serde_json::{Map, Value, json};
 
 use crate::exit::Exit;
 use crate::json_report::print_answer;
+use crate::second_opinion;
 use crate::step_options::{BrepOptions, bytes_of, length, notes};
 use crate::streams::{input_name, print};
 
@@ -23,7 +24,8 @@ use crate::streams::{input_name, print};
 #[command(after_help = "\
 Examples:
   lamp brep blade.step
-  lamp brep blade.step --tolerance 1um --strict")]
+  lamp brep blade.step --tolerance 1um --strict
+  lamp brep blade.step --both")]
 pub(crate) struct BrepArgs {
     /// The part: a STEP file, or - for standard input
     #[arg(value_name = "PART")]
@@ -36,6 +38,11 @@ pub(crate) struct BrepArgs {
     #[command(flatten)]
     brep: BrepOptions,
 
+    /// Read the part with OpenCASCADE, too, and compare boxes, volumes and five sections of each
+    /// body; exit with status 3 if they differ by more than the tolerance explains
+    #[arg(long, conflicts_with = "kernel")]
+    both: bool,
+
     /// Exit with status 3 if a body would not be sliced
     #[arg(long)]
     strict: bool,
@@ -47,12 +54,22 @@ pub(crate) struct BrepArgs {
 
 pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
     let name = input_name(&args.part);
-    let options = args.brep.reader.for_opening(args.brep.tolerance(args.dpi));
-    let read = || read_step(bytes_of(&args.part)?, &options);
-    let prepared = read().map_err(|error: SliceError| Exit::from(error).at(name.clone()))?;
+    let failed = |error: SliceError| Exit::from(error).at(name.clone());
+    let options = args.brep.reader.for_opening(args.brep.tolerance(args.dpi))?;
+    let bytes = bytes_of(&args.part).map_err(failed)?;
+    let prepared = read_step(bytes.clone(), &options).map_err(failed)?;
+    let second = match args.both || args.brep.reader.asks_both() {
+        true => Some(second_opinion::asked(&prepared, bytes, &options)),
+        false => None,
+    };
+    let second = second.transpose().map_err(|error| error.at(name.clone()))?;
     match args.json {
-        true => print_answer("lamp-brep-1", &answer(&name, &prepared))?,
-        false => print(&text(&name, &prepared))?,
+        true => print_answer("lamp-brep-1", &answer(&name, &prepared, second.as_ref()))?,
+        false => print(&text(&name, &prepared, second.as_ref()))?,
+    }
+    if second.is_some_and(|second| !second.differences().is_empty()) {
+        let why = format!("{name}: LAMP and OpenCASCADE read it differently");
+        return Err(Exit::Findings(why));
     }
     let refused = prepared.reports.iter().filter(|report| !report.faults.is_empty()).count();
     if args.strict && refused > 0 {
@@ -62,7 +79,7 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
     Ok(())
 }
 
-fn answer(name: &str, prepared: &Prepared) -> Value {
+fn answer(name: &str, prepared: &Prepared, second: Option<&Comparison>) -> Value {
     let attempt = |attempt: &Attempt| json!({"chord_mm": attempt.chord_mm, "heal_mm": attempt.heal_mm, "why": attempt.why});
     let bodies = prepared.kernel.bodies().iter().zip(&prepared.reports);
     json!({
@@ -74,6 +91,7 @@ fn answer(name: &str, prepared: &Prepared) -> Value {
         "notes": notes(prepared),
         "tries": prepared.tries.iter().map(attempt).collect::<Vec<_>>(),
         "bodies": bodies.map(|(body, report)| fields(body, report, prepared)).collect::<Vec<_>>(),
+        "second": second.map(second_opinion::fields),
     })
 }
 
@@ -91,7 +109,7 @@ fn fields(body: &Body, report: &BodyReport, prepared: &Prepared) -> Value {
     })
 }
 
-fn text(name: &str, prepared: &Prepared) -> String {
+fn text(name: &str, prepared: &Prepared, second: Option<&Comparison>) -> String {
     let facets = prepared.mesh.facets.len();
     let mut text = format!(
         "part:       {name}\nunit:       {}\nfacets:     {facets}, up to {} from the surfaces\n\
@@ -110,6 +128,7 @@ fn text(name: &str, prepared: &Prepared) -> String {
         writeln!(text, "tried:      facets up to {chord} away{healed}: {}", attempt.why)
             .expect("a string takes all");
     }
+    text += &second.map(second_opinion::text).unwrap_or_default();
     let bodies = (1..).zip(prepared.kernel.bodies().iter().zip(&prepared.reports));
     for (number, (body, report)) in bodies {
         text += &body_text(number, body, report, prepared);
@@ -128,7 +147,7 @@ fn body_text(number: usize, body: &Body, report: &BodyReport, prepared: &Prepare
     format!(
         "{}\n  faces:    {}\n  box:      x {}, y {}, z {} mm\n\
          \x20 volume:   {:.6} mm3 (by facets {:.6})\n  area:     {:.6} mm2, as the box by facets\n{sliced}",
-        body_name(number, report),
+        body_name(number, &report.name),
         faces(body, prepared),
         side(0),
         side(1),

@@ -126,7 +126,7 @@ impl ConvertArgs {
         }
         check_beside(stl, Path::new("-"), [path])?;
         let name = input_name(path);
-        let options = self.reader.for_opening(self.chord);
+        let options = self.reader.for_opening(self.chord)?;
         let model = bytes_of(path).and_then(|bytes| Part::from_step(&name, bytes, &options));
         let model = model.map_err(|error| Exit::from(error).at(name))?;
         if !common.quiet {

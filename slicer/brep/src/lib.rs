@@ -34,6 +34,7 @@
 
 #![forbid(unsafe_code)]
 
+mod compare;
 mod error;
 mod geometry;
 mod heal;
@@ -49,6 +50,7 @@ mod validate;
 pub mod vector;
 mod volume;
 
+pub use compare::{BodyPair, Comparison, Difference, Measure, Measured, NamedBody};
 pub use error::BrepError;
 pub use kernel::{
     Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Matter, Notice, Tessellation,

@@ -8,7 +8,7 @@ use crate::vector::{Vec3, cross, length, scale, sub};
 use crate::volume::{facet_volume, surface_volume};
 
 /// The greatest relative difference of a body's two volumes.
-const VOLUMES_APART: f64 = 1e-3;
+pub(crate) const VOLUMES_APART: f64 = 1e-3;
 
 /// The reason why a body cannot be sliced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

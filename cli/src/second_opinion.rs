@@ -1,0 +1,84 @@
+//! Asks OpenCASCADE about a STEP part that LAMP's kernel has read, and says where they differ.
+
+use std::sync::Arc;
+
+use lamp_slicer::brep::{BodyPair, Comparison, Measure, Measured, Prepared};
+use lamp_slicer::{OpenOptions, body_name};
+use serde_json::{Value, json};
+
+use crate::exit::Exit;
+
+/// Compares what OpenCASCADE reads of a part's bytes with what LAMP's kernel did.
+///
+/// # Errors
+/// Returns an error if OpenCASCADE cannot read it, or this build is without it.
+#[cfg(feature = "occt")]
+pub(crate) fn asked(
+    ours: &Prepared,
+    bytes: Arc<[u8]>,
+    options: &OpenOptions,
+) -> Result<Comparison, Exit> {
+    Ok(lamp_slicer::second_opinion(ours, bytes, options)?)
+}
+
+#[cfg(not(feature = "occt"))]
+pub(crate) fn asked(_: &Prepared, _: Arc<[u8]>, _: &OpenOptions) -> Result<Comparison, Exit> {
+    Err(crate::step_options::without_occt("--both"))
+}
+
+/// Returns a comparison as JSON.
+pub(crate) fn fields(second: &Comparison) -> Value {
+    let pair = |pair: &BodyPair| {
+        let [ours, theirs] = pair.bodies.each_ref().map(|body| body.index);
+        json!({
+            "body": ours,
+            "other_body": theirs,
+            "measures": pair.measures.iter().map(measured_fields).collect::<Vec<_>>(),
+        })
+    };
+    let indices = |k: usize| second.only[k].iter().map(|body| body.index).collect::<Vec<_>>();
+    json!({
+        "kernel": second.kernels[1],
+        "differences": difference_lines(second),
+        "pairs": second.pairs.iter().map(pair).collect::<Vec<_>>(),
+        "only_in_first": indices(0),
+        "only_in_second": indices(1),
+    })
+}
+
+fn measured_fields(measured: &Measured) -> Value {
+    let (what, z_mm) = match measured.what {
+        Measure::Least(axis) => (format!("least_{}_mm", AXES[axis]), None),
+        Measure::Greatest(axis) => (format!("greatest_{}_mm", AXES[axis]), None),
+        Measure::Volume => ("volume_mm3".to_owned(), None),
+        Measure::Section { z_mm } => ("section_mm2".to_owned(), Some(z_mm)),
+    };
+    let [first, second] = measured.values;
+    let allowed = measured.allowed;
+    json!({"what": what, "z_mm": z_mm, "first": first, "second": second, "allowed": allowed})
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Returns a line for each difference.
+fn difference_lines(second: &Comparison) -> Vec<String> {
+    let differences = second.differences().into_iter();
+    differences
+        .map(|(body, what)| format!("{}: {what}", body_name(body.index + 1, &body.name)))
+        .collect()
+}
+
+/// Returns lines for people.
+pub(crate) fn text(second: &Comparison) -> String {
+    let differences = difference_lines(second);
+    if differences.is_empty() {
+        let percent = |is_kind: fn(&Measure) -> bool| 100.0 * second.most_apart(is_kind);
+        return format!(
+            "second:     {} agrees: volumes within {:.4} %, sections within {:.4} %\n",
+            second.kernels[1],
+            percent(|what| matches!(what, Measure::Volume)),
+            percent(|what| matches!(what, Measure::Section { .. })),
+        );
+    }
+    differences.iter().map(|line| format!("differs:    {line}\n")).collect()
+}
