@@ -24,8 +24,11 @@ pub(super) fn joined(
     chord_mm: f64,
 ) -> Result<Tessellation, BrepError> {
     let mut patches = patches(mesh);
-    let refine = |patch: &mut Patch| (patch.face, patch.refine(kernel, chord_mm));
-    let off: Vec<(u32, f64)> = patches.par_iter_mut().map(refine).collect();
+    let refine = |patch: &mut Patch| {
+        let edges_mm = patch.edges_off_mm(kernel);
+        (patch.face, edges_mm, patch.refine(kernel, chord_mm))
+    };
+    let off: Vec<(u32, f64, f64)> = patches.par_iter_mut().map(refine).collect();
     let count: usize = patches.iter().map(|patch| patch.triangles.len()).sum();
     if count > MAX_FACETS {
         return Err(BrepError::TooMany { most: MAX_FACETS });
@@ -44,9 +47,12 @@ pub(super) fn joined(
         }
     }
     let faults = mesh.faults().iter().map(|bad| (bad.face, fault(bad.status)));
-    let is_far = |(_, off_mm): &(u32, f64)| *off_mm > FAR * chord_mm;
-    let coarse = off.into_iter().filter(is_far);
-    let faults = faults.chain(coarse.map(|(face, off_mm)| (face, Fault::Coarse { off_mm })));
+    let of_face = |(face, edges_mm, facets_mm): (u32, f64, f64)| {
+        let edges = (edges_mm > chord_mm).then_some(Fault::Off { off_mm: edges_mm });
+        let facets = (facets_mm > FAR * chord_mm).then_some(Fault::Coarse { off_mm: facets_mm });
+        [edges, facets].into_iter().flatten().map(move |fault| (face, fault))
+    };
+    let faults = faults.chain(off.into_iter().flat_map(of_face));
     let finding = |(face, fault)| Finding { face, entity: kernel.face(face).entity, fault };
     joined.findings = faults.map(finding).collect();
     joined.findings.sort_by_key(|finding| finding.face);

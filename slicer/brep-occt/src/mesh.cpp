@@ -39,6 +39,9 @@ constexpr uint32_t NONE = std::numeric_limits<uint32_t>::max();
 constexpr uint32_t FAULTS = IMeshData_OpenWire | IMeshData_SelfIntersectingWire |
                             IMeshData_Failure | IMeshData_UnorientedWire;
 
+// The deflection within faces, in chords.
+constexpr double INTERIOR = 8;
+
 // The faults of faces, by face without its location.
 using Statuses = std::unordered_map<const TopoDS_TShape *, uint32_t>;
 
@@ -48,6 +51,8 @@ Statuses make_facets(const TopoDS_Shape &shape, double chord_mm, bool parallel) 
     IMeshTools_Parameters parameters;
     parameters.Deflection = chord_mm;
     parameters.Angle = 0.5;
+    // Facets are halved later where that is needed; OpenCASCADE takes minutes for some faces.
+    parameters.DeflectionInterior = INTERIOR * chord_mm;
     parameters.InParallel = parallel;
     parameters.Relative = false;
     const Handle(IMeshTools_Context) context = new BRepMesh_Context();

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use crate::calls::Node;
-use lamp_brep::vector::{Vec3, cross, dot, sub, unit};
+use lamp_brep::vector::{Vec3, cross, dot, length, sub, unit};
 use lamp_brep::{Jet, Kernel};
 
 /// Each round halves an edge once: after the last, edges are a thousandth as long.
@@ -86,6 +86,15 @@ impl Patch {
         let jets = self.evaluated(kernel, &at);
         let pairs = self.triangles.iter().zip(&jets);
         pairs.filter_map(|(triangle, jet)| self.off(triangle, jet.point)).fold(0.0, f64::max)
+    }
+
+    /// Returns the greatest distance of the nodes on edges from the surface.
+    pub(super) fn edges_off_mm(&self, kernel: &dyn Kernel) -> f64 {
+        let nodes = &self.nodes[..self.count];
+        let at: Vec<[f64; 2]> = nodes.iter().map(|node| node.uv).collect();
+        let jets = self.evaluated(kernel, &at);
+        let pairs = nodes.iter().zip(&jets);
+        pairs.map(|(node, jet)| length(sub(node.point, jet.point))).fold(0.0, f64::max)
     }
 
     fn evaluated(&self, kernel: &dyn Kernel, at: &[[f64; 2]]) -> Vec<Jet> {
