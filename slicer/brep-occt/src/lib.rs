@@ -111,6 +111,8 @@ fn info(face: &calls::Face) -> FaceInfo {
     FaceInfo {
         kind: KINDS.get(face.kind as usize).copied().unwrap_or("other"),
         entity: face.entity,
+        // OpenCASCADE has told the sides.
+        is_closed: false,
         control_box_mm: (face.has_box != 0).then_some(face.box_mm),
     }
 }

@@ -148,6 +148,9 @@ pub struct FaceInfo {
     pub kind: &'static str,
     /// The entity's number in the file, such as 12 for `#12`; 0 if unknown.
     pub entity: u64,
+    /// Whether its surface is closed both ways, so that the direction of its loops alone
+    /// tells which side of them is the face.
+    pub is_closed: bool,
     /// The least and the greatest corner of the surface's control points, in
     /// millimetres, if it has any. They enclose the surface.
     pub control_box_mm: Option<[[f64; 3]; 2]>,
@@ -255,6 +258,9 @@ pub enum Fault {
     /// the loops.
     #[error("its sense is against its loops; the loops were followed")]
     Sense,
+    /// A loop ran along an edge in the same direction as its neighbour's.
+    #[error("a loop ran against its neighbours; it was reversed")]
+    Contrary,
     /// Some of its edges were joined with those of its neighbours.
     #[error("{joints} of its edges were joined, up to {off_mm:.6} mm apart")]
     Joined {

@@ -39,6 +39,7 @@ mod error;
 mod geometry;
 mod heal;
 mod kernel;
+mod loops;
 mod model;
 mod nest;
 mod orient;

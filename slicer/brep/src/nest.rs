@@ -130,7 +130,7 @@ pub(crate) fn crossed(
 ) -> Option<BodyFault> {
     let off = |finding: &Finding| finding.fault.off_mm();
     let loose_mm = LOOSE * mesh.findings.iter().map(off).fold(mesh.chord_mm, f64::max);
-    let mut left: Vec<usize> = widest(mesh, facets);
+    let mut left = samples(mesh, facets);
     for shares in SHARES {
         let rays: Vec<RayPoint> = left.iter().map(|&facet| RayPoint { facet, shares }).collect();
         let hits = hits(mesh, facets, &rays);
@@ -150,18 +150,26 @@ pub(crate) fn crossed(
     None
 }
 
-/// Returns the facet of each face that the rays see best.
-fn widest(mesh: &Tessellation, facets: &[Facet]) -> Vec<usize> {
-    let mut widest = Vec::new();
+/// Returns for each face the facet that the rays see best, and others spread over it.
+fn samples(mesh: &Tessellation, facets: &[Facet]) -> Vec<usize> {
+    let mut samples = Vec::new();
     let mut start = 0;
     for of_face in facets.chunk_by(|a, b| a.face == b.face) {
         let seen = |k: &usize| seen_mm2(mesh, &of_face[*k]).abs();
         let best = (0..of_face.len()).max_by(|a, b| seen(a).total_cmp(&seen(b)));
-        widest.extend(best.map(|k| start + k));
+        let least = best.map_or(0.0, |best| LEAST_SEEN * seen(&best));
+        let spread = (0..of_face.len()).step_by(of_face.len().div_ceil(SAMPLES));
+        let others = spread.filter(|k| Some(*k) != best && seen(k) > least);
+        samples.extend(best.into_iter().chain(others).map(|k| start + k));
         start += of_face.len();
     }
-    widest
+    samples
 }
+
+/// The number of facets of a face that rays go through.
+const SAMPLES: usize = 8;
+/// The least area of a facet as rays see it, as a part of the greatest one's.
+const LEAST_SEEN: f64 = 0.05;
 
 /// Returns how often a ray is deeper in the body after a hit.
 fn wound(hit: &Hit) -> i32 {

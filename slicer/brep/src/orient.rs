@@ -11,28 +11,48 @@ use crate::volume::facet_volume;
 /// area is less than this part of the other's.
 const CLEARLY_SMALLER: f64 = 0.8;
 
+/// What [`turn_over`] did.
+#[derive(Debug, Default)]
+pub(crate) struct Turned {
+    /// Whether any face was turned over.
+    pub(crate) is_changed: bool,
+    /// The faces that contradict their neighbours and cannot be turned over: their number and
+    /// that of their body.
+    pub(crate) undecided: Vec<(u32, usize)>,
+}
+
 /// Turns over faces that follow a shared edge in the same direction as a neighbour, and
-/// bodies that are inside out. Returns whether any changed.
+/// bodies that are inside out.
 ///
 /// Of contradicting groups, the one with less area is turned. If their areas are
-/// similar, the sign of the body's volume decides. Changes are added to the findings.
+/// similar, the sign of the body's volume decides. Changes are added to the findings. A face
+/// on a surface that is closed both ways stays: if its loop runs the wrong way, it is not
+/// inside out, but on the wrong side of the loop.
 pub(crate) fn turn_over(
     kernel: &dyn Kernel,
     mesh: &mut Tessellation,
     reports: &[BodyReport],
-) -> bool {
-    let mut is_turned = false;
-    for (body, report) in kernel.bodies().iter().zip(reports) {
+) -> Turned {
+    let mut all = Turned::default();
+    for (number, (body, report)) in kernel.bodies().iter().zip(reports).enumerate() {
         if report.faults.is_empty() || report.facets == 0 {
             continue;
         }
-        let turned = inverted(mesh, body);
+        let mut turned = inverted(mesh, body);
+        if !turned.iter().all(|&turned| turned) {
+            for (face, turned) in body.faces.clone().zip(&mut turned) {
+                if *turned && kernel.face(face).is_closed {
+                    *turned = false;
+                    all.undecided.push((face, number));
+                }
+            }
+        }
         if turned.contains(&true) {
-            is_turned = true;
+            all.is_changed = true;
             turn(kernel, mesh, body, &turned);
         }
     }
-    is_turned
+    all
 }
 
 fn turn(kernel: &dyn Kernel, mesh: &mut Tessellation, body: &Body, turned: &[bool]) {

@@ -223,9 +223,12 @@ fn facets(kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) -> Result<Prepar
     let (mesh, reports) = caught("making facets", || {
         let mut mesh = kernel.tessellate(chord_mm)?;
         let mut reports = check(kernel.as_ref(), &mesh);
-        let is_turned = turn_over(kernel.as_ref(), &mut mesh, &reports);
-        if turn_shells(kernel.as_ref(), &mut mesh, &reports) || is_turned {
+        let turned = turn_over(kernel.as_ref(), &mut mesh, &reports);
+        if turn_shells(kernel.as_ref(), &mut mesh, &reports) || turned.is_changed {
             reports = check(kernel.as_ref(), &mesh);
+        }
+        for (face, body) in turned.undecided {
+            reports[body].faults.push(BodyFault::Side { entity: kernel.face(face).entity });
         }
         Ok((Arc::new(mesh), reports))
     })?;

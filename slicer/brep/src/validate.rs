@@ -62,6 +62,15 @@ pub enum BodyFault {
         /// A place on that face, in millimetres.
         at_mm: [f64; 3],
     },
+    /// A face on a closed surface contradicts its neighbours.
+    #[error(
+        "the side of #{entity} cannot be told: its loop runs against its neighbours, \
+         and its surface is closed"
+    )]
+    Side {
+        /// The entity of the face.
+        entity: u64,
+    },
     /// Its faces point inwards.
     #[error("it is inside out: its volume is {volume_mm3:.6} mm³")]
     InsideOut {

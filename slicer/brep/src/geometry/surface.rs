@@ -207,6 +207,14 @@ impl Surface {
         }
     }
 
+    /// Returns whether the surface is closed both ways, and so bounds a body by itself.
+    pub(crate) fn is_closed(&self) -> bool {
+        let (periods, poles) = (self.periods(), self.poles());
+        (0..2).all(|axis| {
+            periods[axis].is_some() || poles.iter().filter(|pole| pole.axis == axis).count() == 2
+        })
+    }
+
     /// Returns the box of the control points, if there are any. It encloses the surface.
     pub(crate) fn control_box(&self) -> Option<[Vec3; 2]> {
         let Self::Spline(spline) = self else { return None };

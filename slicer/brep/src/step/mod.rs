@@ -21,6 +21,7 @@ use std::sync::Arc;
 use crate::error::BrepError;
 use crate::heal::heal;
 use crate::kernel::{Body, FaceInfo, Finding, Jet, Kernel, Matter, Notice, Tessellation};
+use crate::loops::reverse_contrary;
 use crate::model::BrepModel;
 use crate::prepare::OpenedModel;
 use crate::tessellate;
@@ -153,6 +154,8 @@ pub struct StepModel {
     model: BrepModel,
     /// A finding for each face with joined edges.
     healed: Vec<Finding>,
+    /// A finding for each face with reversed loops.
+    reversed: Vec<Finding>,
 }
 
 impl StepModel {
@@ -172,7 +175,8 @@ impl StepModel {
     pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
         let mut model = topology::model(&entities::Entities::read(bytes)?)?;
         let healed = if heal_mm > 0.0 { heal(&mut model, heal_mm) } else { Vec::new() };
-        Ok(Self { model, healed })
+        let reversed = reverse_contrary(&mut model);
+        Ok(Self { model, healed, reversed })
     }
 
     /// Returns the model, which tests damage.
@@ -197,6 +201,7 @@ impl Kernel for StepModel {
         FaceInfo {
             kind: face.surface.kind(),
             entity: face.entity,
+            is_closed: face.surface.is_closed(),
             control_box_mm: face.surface.control_box(),
         }
     }
@@ -229,6 +234,7 @@ impl Kernel for StepModel {
     fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError> {
         let mut mesh = tessellate::model(&self.model, chord_mm)?;
         mesh.findings.extend_from_slice(&self.healed);
+        mesh.findings.extend_from_slice(&self.reversed);
         Ok(mesh)
     }
 

@@ -68,23 +68,16 @@ impl FaceOutline<'_, '_> {
         let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
         let sense = if self.face.along_normal { 1.0 } else { -1.0 };
         match largest {
-            Some(k) if areas[k] * sense > 0.0 || !self.is_closed() => Ok(closed.remove(k).nodes),
+            Some(k) if areas[k] * sense > 0.0 || !self.face.surface.is_closed() => {
+                Ok(closed.remove(k).nodes)
+            }
             _ => self.whole(closed),
         }
     }
 
-    /// Returns whether the surface is closed both ways, and so bounds a body by itself.
-    fn is_closed(&self) -> bool {
-        let periods = self.face.surface.periods();
-        (0..2).all(|axis| {
-            periods[axis].is_some()
-                || self.poles.iter().filter(|pole| pole.axis == axis).count() == 2
-        })
-    }
-
     /// Returns the polygon of a closed surface with holes alone.
     fn whole(&mut self, holes: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
-        if !self.is_closed() {
+        if !self.face.surface.is_closed() {
             return Err(Fault::Unbounded);
         }
         let is_left = self.face.along_normal;
