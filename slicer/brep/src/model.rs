@@ -55,6 +55,8 @@ pub(crate) struct Face {
     /// Whether the surface's normal points out of the body.
     pub(crate) outwards: bool,
     pub(crate) loops: Vec<Loop>,
+    /// The index of the loop that is marked as the outer one, if one alone is.
+    pub(crate) outer: Option<usize>,
 }
 
 /// A piece of a face's boundary.

@@ -99,13 +99,21 @@ impl<'a> BodyReader<'a> {
             "ADVANCED_FACE" | "FACE_SURFACE" => {
                 let along_normal = item.truth(3)?;
                 let bounds = item.references(1)?;
+                let outer = self.outer(&bounds);
                 let loops =
                     bounds.into_iter().map(|bound| self.bound(bound)).collect::<Result<_, _>>()?;
                 let surface = self.geometry.surface(item.reference(2)?)?;
                 // A mirror turns normals over, but not the sense of loops in parameters.
                 let is_mirrored = self.geometry.place.is_mirrored();
                 let outwards = (along_normal == outwards) != is_mirrored;
-                self.model.faces.push(Face { entity: id, surface, along_normal, outwards, loops });
+                self.model.faces.push(Face {
+                    entity: id,
+                    surface,
+                    along_normal,
+                    outwards,
+                    loops,
+                    outer,
+                });
                 Ok(())
             }
             "ORIENTED_FACE" if !self.is_oriented(item.reference(2)?) => {
@@ -113,6 +121,13 @@ impl<'a> BodyReader<'a> {
             }
             name => Err(StepError::Unsupported { id, name: name.to_owned() }),
         }
+    }
+
+    /// Returns the place of the bound that is marked as the outer one, if one alone is.
+    fn outer(&self, bounds: &[u64]) -> Option<usize> {
+        let is_outer = |id: &u64| self.entities.find(*id, "FACE_OUTER_BOUND").is_some();
+        let mut marked = (0..bounds.len()).filter(|&k| is_outer(&bounds[k]));
+        marked.next().filter(|_| marked.next().is_none())
     }
 
     fn bound(&mut self, id: u64) -> Result<Loop, StepError> {

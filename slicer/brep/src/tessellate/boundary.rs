@@ -24,11 +24,14 @@ pub(super) fn polygons(
     let poles = face.surface.poles();
     let mut tips = Vec::new();
     let mut loops = Vec::new();
-    for ring in rings {
+    for (number, ring) in rings.iter().enumerate() {
         match ring {
             PointRing::Point(point) => tips.push(*point),
             PointRing::Points(None) => return Err(Fault::Broken),
-            PointRing::Points(Some(ring)) => loops.push(unwrap(face, &poles, ring, points)),
+            PointRing::Points(Some(ring)) => {
+                let unwrapped = unwrap(face, &poles, ring, points);
+                loops.push(Unwrapped { is_outer: face.outer == Some(number), ..unwrapped });
+            }
         }
     }
     let mut work = FaceOutline { face, poles: &poles, tips, points, chord_mm };
@@ -68,11 +71,20 @@ impl FaceOutline<'_, '_> {
         let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
         let sense = if self.face.along_normal { 1.0 } else { -1.0 };
         match largest {
-            Some(k) if areas[k] * sense > 0.0 || !self.face.surface.is_closed() => {
+            // A hole cannot be the outer loop, whatever its sense; but a loop that encloses
+            // nothing bounds none of it.
+            Some(k) if areas[k] * sense > 0.0 || closed[k].is_outer && self.is_wide(areas[k]) => {
                 Ok(closed.remove(k).nodes)
             }
+            Some(k) if !self.face.surface.is_closed() => Ok(closed.remove(k).nodes),
             _ => self.whole(closed),
         }
+    }
+
+    /// Returns whether twice an area is more than nothing beside the surface's domain.
+    fn is_wide(&self, doubled: f64) -> bool {
+        let sides = self.face.surface.domain().map(|side| side.map_or(1.0, |[a, b]| b - a));
+        doubled.abs() > 1e-3 * sides[0] * sides[1]
     }
 
     /// Returns the polygon of a closed surface with holes alone.
@@ -133,7 +145,7 @@ impl FaceOutline<'_, '_> {
             }
             let mut turns = [0; 2];
             turns[along] = turn;
-            Unwrapped { nodes, turns }
+            Unwrapped { nodes, turns, is_outer: false }
         };
         Ok([ring(nodes, turn), ring(back, -turn)])
     }
@@ -154,7 +166,7 @@ impl FaceOutline<'_, '_> {
         };
         let mut turns = [0; 2];
         turns[along] = turn;
-        Unwrapped { nodes: (0..POLE_PARTS).map(node).collect(), turns }
+        Unwrapped { nodes: (0..POLE_PARTS).map(node).collect(), turns, is_outer: false }
     }
 
     /// Returns the pole to which a face with one loop around the surface reaches, and

@@ -12,6 +12,8 @@ pub(super) struct Unwrapped {
     /// The number of turns along u and along v around a closed surface, from start to
     /// start.
     pub(super) turns: [i32; 2],
+    /// Whether the file marks it as the face's outer loop.
+    pub(super) is_outer: bool,
 }
 
 /// The distance within which a point counts as at a pole, in millimetres.
@@ -58,7 +60,7 @@ pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &FacePoi
         }
     }
     nodes.pop();
-    Unwrapped { nodes, turns }
+    Unwrapped { nodes, turns, is_outer: false }
 }
 
 /// Returns a parameter, moved by periods to be nearest to another.
