@@ -16,7 +16,8 @@ impl BodyReader<'_> {
             bounds.into_iter().map(|bound| self.chained(bound)).collect::<Result<_, _>>()?;
         let surface = self.geometry.surface(item.reference(1)?)?;
         let outwards = !self.geometry.place.is_mirrored();
-        let face = Face { entity: item.id, surface, along_normal: true, outwards, loops };
+        let face =
+            Face { entity: item.id, surface, along_normal: true, outwards, loops, outer: None };
         self.model.faces.push(face);
         Ok(())
     }
