@@ -14,6 +14,7 @@ use lamp_postprocess::{
     StripsError, TileError,
 };
 use lamp_slicer::SliceError;
+use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_stack::{CatalogueError, Length, StackError};
 
 /// Returns what to try about an error, to stand after its message.
@@ -68,11 +69,26 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::KernelsDisagree { .. } => {
             "lamp brep --both tells more; --kernel lamp or occt slices what one of them reads"
         }
+        SliceError::Brep(BrepError::Step(error)) => return of_step(error),
         SliceError::Timeout { tolerance, .. } => {
             return Some(format!(
                 "give it more with --timeout, or let facets lie more than {tolerance} from the surfaces"
             ));
         }
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn of_step(error: &StepError) -> Option<String> {
+    let hint = match error {
+        StepError::Other { matter: Matter::Elsewhere { .. }, .. } => {
+            "slice those files, or export the assembly as one"
+        }
+        StepError::Empty | StepError::Other { .. } | StepError::Elements { .. } => {
+            "export the part as solids"
+        }
+        StepError::Unsupported { .. } => OTHER_KERNEL,
         _ => return None,
     };
     Some(hint.to_owned())

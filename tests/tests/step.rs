@@ -117,6 +117,13 @@ fn what_a_file_holds_beside_its_solids_is_said() {
     assert!(report.contains("bodies:     1"), "{report}");
     let report = said(&scratch, "slice part.step --dpi 600 --thickness 1mm -o part.tif");
     assert!(report.contains(words), "{report}");
+    let others = "ISO-10303-21;DATA;#1=DOCUMENT_FILE('nut.stp','','',#2,'',$);\
+                  #2=DOCUMENT_TYPE('geometry');ENDSEC;END-ISO-10303-21;";
+    scratch.write("others.step", others.as_bytes());
+    scratch.run("lamp brep others.step").is_refused_with(&[
+        "#1 is a part in another file, `nut.stp`",
+        "slice those files, or export the assembly as one",
+    ]);
 }
 
 #[test]

@@ -214,3 +214,71 @@ fn edges_may_be_given_by_parameters_alone() {
         assert!((volume_mm3 / FRUSTUM_MM3 - 1.0).abs() < 1e-3, "{volume_mm3}");
     }
 }
+
+/// Writes a file in millimetres and degrees with a set of surfaces as its only shape.
+fn set_of(surfaces: &[&str], entities: &str) -> String {
+    format!(
+        "ISO-10303-21;DATA;\n#1=(LENGTH_UNIT()SI_UNIT(.MILLI.,.METRE.));\n\
+         #2=(CONVERSION_BASED_UNIT('DEGREE',#3)PLANE_ANGLE_UNIT());\n\
+         #3=PLANE_ANGLE_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE(0.017453292519943295),#4);\n\
+         #4=(PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+         #5=(GLOBAL_UNIT_ASSIGNED_CONTEXT((#1,#2)));\n#6=SHAPE_REPRESENTATION('',(#7),#5);\n\
+         #7=GEOMETRIC_SET('',({}));\n#8=CARTESIAN_POINT('',(1.,2.,3.));\n\
+         #9=AXIS2_PLACEMENT_3D('',#8,$,$);\n{entities}\nENDSEC;\nEND-ISO-10303-21;",
+        surfaces.join(",")
+    )
+}
+
+#[test]
+fn surfaces_may_end_with_their_parameters() {
+    let trim = |id: &str, of: &str, range: &str| {
+        format!("{id}=RECTANGULAR_TRIMMED_SURFACE('',{of},{range},.T.,.T.);\n")
+    };
+    let sphere = "#10=SPHERICAL_SURFACE('',#9,10.);\n";
+    let torus = "#10=TOROIDAL_SURFACE('',#9,10.,3.);\n";
+    let (ball, ring) = (4000.0 / 3.0 * PI, 2.0 * PI * PI * 10.0 * 9.0);
+    let halves = trim("#11", "#10", "0.,360.,-90.,20.") + &trim("#12", "#10", "0.,360.,20.,90.");
+    // The second one goes across the seam.
+    let lunes = trim("#11", "#10", "40.,140.,-90.,90.") + &trim("#12", "#10", "140.,40.,-90.,90.");
+    let quarters = trim("#11", "#10", "0.,360.,30.,200.") + &trim("#12", "#10", "0.,360.,200.,30.");
+    let both: &[&str] = &["#11", "#12"];
+    for (surfaces, entities, volume_mm3) in [
+        (&both[..1], trim("#11", "#10", "0.,360.,-90.,90.") + sphere, ball),
+        (both, halves + sphere, ball),
+        (both, lunes + sphere, ball),
+        (&both[..1], trim("#11", "#10", "0.,360.,0.,360.") + torus, ring),
+        (both, quarters + torus, ring),
+    ] {
+        let prepared = prepared(&set_of(surfaces, &entities));
+        assert!(prepared.is_good(), "{prepared:?} {entities}");
+        let off = prepared.reports[0].exact_volume_mm3 / volume_mm3 - 1.0;
+        assert!(off.abs() < 1e-3, "{off} {entities}");
+    }
+}
+
+#[test]
+fn splines_of_a_set_are_whole() {
+    // The six sides of a box, as surfaces of the first degree.
+    let corner = |k: usize| [k & 1, k >> 1 & 1, k >> 2].map(|side| 10.0 * side as f64);
+    let points: String = (0..8)
+        .map(|k| format!("#{}=CARTESIAN_POINT('',{:?});\n", 20 + k, corner(k)))
+        .collect::<String>()
+        .replace('[', "(")
+        .replace(']', ")");
+    let side = |[a, b, c, d]: [usize; 4], id: usize| {
+        format!(
+            "#{id}=BEZIER_SURFACE('',1,1,((#{},#{}),(#{},#{})),.UNSPECIFIED.,.F.,.F.,.F.);\n",
+            20 + a,
+            20 + b,
+            20 + c,
+            20 + d
+        )
+    };
+    let sides =
+        [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 3, 6, 7], [0, 2, 4, 6], [1, 3, 5, 7]];
+    let entities: String = (30..).zip(sides).map(|(id, corners)| side(corners, id)).collect();
+    let text = set_of(&["#30", "#31", "#32", "#33", "#34", "#35"], &(points + &entities));
+    let prepared = prepared(&text);
+    assert!(prepared.is_good(), "{prepared:?}");
+    assert!((prepared.reports[0].volume_mm3 - 1000.0).abs() < 1e-6, "{prepared:?}");
+}

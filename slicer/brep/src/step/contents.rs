@@ -6,6 +6,7 @@ use std::mem::discriminant;
 
 use super::StepError;
 use super::entities::Entities;
+use super::free_face::is_whole_surface;
 use super::place::Place;
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use super::shapes::Shape;
@@ -297,5 +298,7 @@ fn shells(entities: &Entities, item: u64) -> Result<Vec<u64>, StepError> {
 fn bounded_surfaces(entities: &Entities, set: u64) -> impl Iterator<Item = u64> {
     let set = entities.find(set, "GEOMETRIC_SET");
     let elements = set.and_then(|set| set.references(1).ok()).unwrap_or_default().into_iter();
-    elements.filter(|id| entities.find(*id, "CURVE_BOUNDED_SURFACE").is_some())
+    elements.filter(|id| {
+        entities.find(*id, "CURVE_BOUNDED_SURFACE").is_some() || is_whole_surface(entities, *id)
+    })
 }

@@ -66,6 +66,28 @@ impl GeometryReader<'_> {
         })
     }
 
+    /// Returns the least and the greatest parameters of a `RECTANGULAR_TRIMMED_SURFACE`.
+    pub(super) fn trims(&self, item: Item, surface: &Surface) -> Result<[[f64; 2]; 2], StepError> {
+        let scale = self.parameters(item.reference(1)?, 0)?;
+        let bad = || StepError::Numbers { id: item.id, what: "trimmed surface" };
+        let range = |axis: usize| {
+            let ends = [item.number(2 + 2 * axis)?, item.number(3 + 2 * axis)?];
+            let [mut from, mut to] = ends.map(|end| end * scale[axis]);
+            if !item.truth(6 + axis)? {
+                (from, to) = (to, from);
+            }
+            match surface.periods()[axis] {
+                // It may be trimmed across the seam.
+                Some(period) if to <= from => to += period,
+                None if to < from => (from, to) = (to, from),
+                _ => {}
+            }
+            let is_sound = from < to && to - from < 1e9;
+            is_sound.then_some([from, to]).ok_or_else(bad)
+        };
+        Ok([range(0)?, range(1)?])
+    }
+
     /// Returns the parameter of a swept curve for one of the file.
     fn profile(&self, id: u64) -> Result<f64, StepError> {
         // The parameters of these begin where they do.

@@ -6,6 +6,7 @@ use super::StepError;
 use super::assembly::placed;
 use super::contents::PlacedBody;
 use super::entities::{Entities, Item};
+use super::free_face::is_whole_surface;
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use super::units::Units;
 use crate::geometry::Curve;
@@ -58,6 +59,9 @@ impl<'a> BodyReader<'a> {
 
     /// Reads a solid, a shell, a face or a surface.
     fn item(&mut self, id: u64) -> Result<(), StepError> {
+        if is_whole_surface(self.entities, id) {
+            return self.whole_surface(id);
+        }
         let item = self.entities.simple(id)?;
         match item.name() {
             "MANIFOLD_SOLID_BREP" | "FACETED_BREP" => self.shell(item.reference(1)?, true),
