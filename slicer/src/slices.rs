@@ -197,6 +197,8 @@ impl Slices {
             return Err(SliceError::TooManyCrossings { layer, crossings });
         }
         if options.gray.is_some() {
+            let cutter = Cutter { grid: &grid, planes: &planes, rule: &rule };
+            model.surfaces().iter().for_each(|surfaces| surfaces.examine_rims(cutter));
             for (layer, crossings) in expected.iter_mut().enumerate() {
                 *crossings *= 1.0 + spans_per_crossing(reach_um / planes.thickness_um(layer));
             }

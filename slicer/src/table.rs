@@ -191,10 +191,19 @@ impl Table {
         spans.map(|span| (span.end - span.start) as usize).sum()
     }
 
-    /// Returns the facets' spans below a layer's section, row by row.
-    fn spans(&self, layer: usize) -> Vec<DepthSpan> {
-        let mut spans: Vec<_> =
-            self.shares(layer).flat_map(|share| &share.spans).copied().collect();
+    /// Returns the spans below a layer's section, row by row: those of facets, and those of
+    /// surfaces that facets miss.
+    fn spans(
+        &self,
+        layer: usize,
+        cutter: Cutter<'_>,
+        surfaces: &[PlacedSurfaces],
+        reach_um: f64,
+    ) -> Vec<DepthSpan> {
+        let of_facets = self.shares(layer).flat_map(|share| &share.spans).copied();
+        let rims = surfaces.iter().map(|surfaces| surfaces.rims(cutter));
+        let of_rims = rims.flat_map(|rims| rims.spans(cutter.planes, layer, reach_um));
+        let mut spans: Vec<_> = of_facets.chain(of_rims).collect();
         spans.sort_unstable_by_key(DepthSpan::place);
         spans
     }
@@ -229,7 +238,9 @@ impl Table {
         gray: Option<&LayerLevels>,
     ) -> CutLayer {
         let Cutter { grid, planes, rule } = cutter;
-        let spans = self.spans(layer);
+        let reach_um = gray.map(LayerLevels::reach_um);
+        let spans = reach_um.map(|reach_um| self.spans(layer, cutter, surfaces, reach_um));
+        let spans = spans.unwrap_or_default();
         let shader = gray.map(|levels| {
             Shader::new(levels.of_layer(layer), rule, planes, layer, &spans, grid.width)
         });

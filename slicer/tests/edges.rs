@@ -5,7 +5,7 @@ mod referee;
 
 use lamp_fixtures::StepSample;
 use lamp_slicer::{Axis, Placement};
-use referee::{askew, back, model, options, wrong_pixels};
+use referee::{askew, back, model, options, wrong_levels, wrong_pixels};
 
 type Outside = fn([f64; 3]) -> f64;
 
@@ -86,4 +86,13 @@ fn a_hole_across_a_cylinder_has_no_wrong_pixel_at_2400_dpi() {
     let tilted = options(2400.0, 5.3, askew());
     let (wrong, white) = wrong_pixels(part(), &tilted, |point| off_drilled(back(point)));
     assert!(wrong == 0 && white > 1_000_000, "askew: {wrong} of {white}");
+}
+
+#[test]
+fn parts_are_gray_out_to_their_rims() {
+    for (part, outside) in PARTS {
+        let (options, chord_mm) = (options(600.0, 4.3, askew()), 0.25 * 25.4 / 600.0);
+        let (wrong, gray) = wrong_levels(part, chord_mm, &options, |point| outside(back(point)));
+        assert!(wrong == 0 && gray > 1000, "{part:?}: {wrong} of {gray}");
+    }
 }

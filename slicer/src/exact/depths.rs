@@ -73,7 +73,11 @@ impl<'a> Depths<'a> {
     pub(super) fn finish(&mut self, shares: &mut [LayerShare]) {
         polish(self.surfaces, 2, &mut self.points);
         let planes = self.cutter.planes;
+        let rims = self.surfaces.rims(self.cutter);
         for (point, pixel) in self.points.drain(..).zip(self.pixels.drain(..)) {
+            if !point.is_exact && rims.is_settled([pixel.row, pixel.start], point.at_mm[2]) {
+                continue;
+            }
             let z_um = 1000.0 * point.at_mm[2];
             let met = planes.between(z_um - pixel.tie_um(), z_um + self.reach_um);
             for layer in met.start.max(self.layers.start)..met.end.min(self.layers.end) {

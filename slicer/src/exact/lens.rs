@@ -65,6 +65,14 @@ impl<'a> Line<'a, Z> {
     }
 }
 
+impl<'a> Line<'a, Y> {
+    /// Returns the plane across y through a row's centres.
+    pub(super) fn at_row(grid: &'a PixelGrid, row: u32) -> Self {
+        let row = f64::from(row);
+        Self { grid, level: row, level_mm: grid.to_mm(0.0, row)[1] }
+    }
+}
+
 impl<const ALONG: usize> Line<'_, ALONG> {
     /// The axis along which cells follow each other.
     const ACROSS: usize = if ALONG == Z { Y } else { 0 };

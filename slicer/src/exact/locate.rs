@@ -89,11 +89,11 @@ impl PlacedSurfaces {
         }
     }
 
-    /// Returns a facet of another face: this one, or one of those around it.
-    fn facet_of_other(&self, face: u32, facet: u32) -> Option<u32> {
+    /// Returns a facet for which a rule holds: this one, or one of those around it.
+    fn facet_around(&self, facet: u32, is_wanted: impl Fn(u32) -> bool) -> Option<u32> {
         let corners = self.facet(facet).corners.into_iter();
         let around = corners.flat_map(|corner| self.facets_by_point().group(corner as usize));
-        [facet].into_iter().chain(around.copied()).find(|&other| self.facet(other).face != face)
+        [facet].into_iter().chain(around.copied()).find(|&facet| is_wanted(facet))
     }
 
     /// Finds a row's crossing of a contour, and the facet below.
@@ -105,12 +105,14 @@ impl PlacedSurfaces {
             let (uv, jet) = solve(self, face, [1, 2], &[wanted])[0]?;
             let facet = self.facet_below(point.facet, jet.point)?;
             let is_there = self.curved_edges().holds(self, face, facet, jet.point);
-            if is_there.unwrap_or(self.facet(facet).face == face) {
+            let is_on_face = |facet: u32| self.facet(facet).face == face;
+            if is_there.unwrap_or(is_on_face(facet)) {
+                let facet = self.facet_around(facet, is_on_face)?;
                 let at_mm = [jet.point[0], point.at_mm[1], point.at_mm[2]];
                 let enters = self.normal(facet, &jet)?[0] < 0.0;
                 return Some(FacetPoint { facet, uv, at_mm, enters, is_exact: true });
             }
-            let facet = self.facet_of_other(face, facet)?;
+            let facet = self.facet_around(facet, |facet| !is_on_face(facet))?;
             (point.facet, point.uv) = (facet, self.chart(facet).uv_at(jet.point));
         }
         None

@@ -16,6 +16,7 @@ mod lens;
 mod locate;
 mod placed;
 mod polish;
+mod rims;
 mod saddle;
 mod settle;
 mod solve;

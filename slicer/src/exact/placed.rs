@@ -10,6 +10,8 @@ use lamp_stack::Grouped;
 use super::edges::CurvedEdges;
 use super::extrema::CriticalPoints;
 use super::locate::facets_by_point;
+use super::rims::Rims;
+use crate::cut::Cutter;
 use crate::facet::Units;
 use crate::part::rounded;
 use crate::placement::{PlacedFacet, Placement, Transform};
@@ -29,6 +31,7 @@ pub struct PlacedSurfaces {
     facets_by_point: OnceLock<Grouped<u32>>,
     critical_points: OnceLock<CriticalPoints>,
     curved_edges: OnceLock<CurvedEdges>,
+    rims: OnceLock<Rims>,
 }
 
 impl fmt::Debug for PlacedSurfaces {
@@ -55,6 +58,7 @@ impl PlacedSurfaces {
             facets_by_point: OnceLock::new(),
             critical_points: OnceLock::new(),
             curved_edges: OnceLock::new(),
+            rims: OnceLock::new(),
         }
     }
 
@@ -116,6 +120,11 @@ impl PlacedSurfaces {
         self.curved_edges();
     }
 
+    /// Examines all rows of gray images, for the same reason.
+    pub(crate) fn examine_rims(&self, cutter: Cutter<'_>) {
+        self.rims(cutter);
+    }
+
     /// Returns the facets around each point. The first call examines every facet.
     pub(super) fn facets_by_point(&self) -> &Grouped<u32> {
         self.facets_by_point.get_or_init(|| facets_by_point(&self.mesh))
@@ -130,6 +139,18 @@ impl PlacedSurfaces {
     /// Returns the curved edges between facets. The first call examines every facet.
     pub(super) fn curved_edges(&self) -> &CurvedEdges {
         self.curved_edges.get_or_init(|| CurvedEdges::find(self))
+    }
+
+    /// Returns how vertical lines through an image's pixels meet surfaces other than facets.
+    /// The first call examines every row; all must be for the same image.
+    pub(crate) fn rims(&self, cutter: Cutter<'_>) -> &Rims {
+        self.rims.get_or_init(|| Rims::find(self, cutter))
+    }
+
+    /// Returns the surfaces turned so that z lies along the rows, x across, and y points up.
+    pub(super) fn turned_up(&self) -> Self {
+        let [x, y, z] = self.rows;
+        Self::new(self.kernel.clone(), self.mesh.clone(), [z, x, y])
     }
 
     /// Evaluates a face's surface in place at many parameters at once.

@@ -35,6 +35,19 @@ pub(crate) struct DepthSpan {
 }
 
 impl DepthSpan {
+    /// Returns a span of one pixel, with the winding that the way down loses there.
+    pub(crate) fn of_pixel(row: u32, column: u32, winding: i32, tie_um: f64, body: u32) -> Self {
+        Self {
+            row,
+            start: column,
+            end: column + 1,
+            depth_um: 0.0,
+            um_per_column: 0.0,
+            signed_tie_um: (f64::from(winding) * tie_um) as f32,
+            body,
+        }
+    }
+
     /// Returns the row and first column in one, to sort by.
     #[inline]
     pub(crate) fn place(&self) -> u64 {
@@ -190,6 +203,24 @@ impl Sheet {
                 }
             }
         });
+    }
+
+    /// Returns the height at which the vertical line through a pixel meets it.
+    pub(crate) fn height_um(&self, [row, column]: [u32; 2], width: u32) -> Option<f64> {
+        let mut height_um = None;
+        if self.facet.rows().contains(&row) {
+            self.facet.for_each_row(row..row + 1, |_, ends| {
+                let stretch = self.stretch(ends, width);
+                let stretch = stretch.filter(|stretch| stretch.columns.contains(&column));
+                height_um = stretch.map(|stretch| stretch.height(column));
+            });
+        }
+        height_um
+    }
+
+    /// Returns the winding that the way down through it loses.
+    pub(crate) fn winding(&self) -> i32 {
+        self.winding
     }
 
     /// Returns how much higher or lower a surface at a distance from it may be.
