@@ -30,7 +30,12 @@ pub(super) fn polygons(
             PointRing::Points(None) => return Err(Fault::Broken),
             PointRing::Points(Some(ring)) => {
                 let unwrapped = unwrap(face, &poles, ring, points);
-                loops.push(Unwrapped { is_outer: face.outer == Some(number), ..unwrapped });
+                if unwrapped.nodes.is_empty() {
+                    // All of it lies at a pole.
+                    tips.extend(ring.first());
+                } else {
+                    loops.push(Unwrapped { is_outer: face.outer == Some(number), ..unwrapped });
+                }
             }
         }
     }
