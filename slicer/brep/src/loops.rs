@@ -12,15 +12,17 @@ use crate::model::{BrepModel, Loop};
 /// A loop, by its face and its place in it.
 type LoopPlace = (usize, usize);
 
-/// Reverses loops that follow edges in the same direction as the most of their neighbours,
-/// and returns a finding for each face changed. Where as many loops run one way as the other,
-/// all stay.
+/// Reverses loops on closed surfaces that follow edges in the same direction as their
+/// neighbours, and returns a finding for each face changed. Of loops that run against each
+/// other, the fewer are wrong; where both are as many, all stay.
 pub(crate) fn reverse_contrary(model: &mut BrepModel) -> Vec<Finding> {
     let mut findings = Vec::new();
     for body in model.bodies.clone() {
         let faces = body.faces.start as usize..body.faces.end as usize;
         let mut contrary: Vec<LoopPlace> =
             pieces(&neighbours(model, faces)).iter().flat_map(|piece| minority(piece)).collect();
+        // Elsewhere a loop bounds one region alone, and the face is turned over instead.
+        contrary.retain(|&(face, _)| model.faces[face].surface.is_closed());
         contrary.sort_unstable();
         for &(face, number) in &contrary {
             if let Loop::Edges(edges) = &mut model.faces[face].loops[number] {

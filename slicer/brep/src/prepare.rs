@@ -10,7 +10,7 @@ use crate::error::BrepError;
 use crate::kernel::{Kernel, Tessellation};
 use crate::nest::turn_shells;
 use crate::orient::turn_over;
-use crate::validate::{BodyFault, BodyReport, apart, check};
+use crate::validate::{BodyFault, BodyReport, check};
 
 /// Reads a file's bytes and joins edges within a distance in millimetres; 0 leaves the
 /// model unchanged.
@@ -57,21 +57,23 @@ const USUAL_MM: f64 = 1e-3;
 const HEALS: [f64; 3] = [1.0, 0.1, 10.0];
 /// Healing tolerances, as multiples of the chord.
 const LOOSEST: [f64; 2] = [0.1, 1.0];
-/// The upper limit of healing, in millimetres, and as a part of the model's longest side. A
-/// longer chord is a limit, too.
+/// The upper limit of healing, in millimetres, and as a part of the model's longest side,
+/// unless the chord is longer.
 const MOST_MM: f64 = 0.1;
 const MOST_PART: f64 = 1e-3;
-/// Longer chords, as multiples of the requested one.
-const CHORDS: [f64; 2] = [4.0, 16.0];
+/// The chord for bodies that stay open, as a multiple of the requested one: they are sliced
+/// only if gaps are accepted.
+const OPEN_CHORD: f64 = 4.0;
 
 /// Reads a file's bytes, tessellates its bodies and checks them.
 ///
 /// A file with faults is healed with its own tolerance, then with a tighter and with
-/// looser ones, at most the chord; then it is tessellated with chords 4 and 16 times as
-/// long. Faces that are inside out are turned over and reported as findings. Returns
-/// the first attempt without faults. If there is none, returns the attempt at the
-/// requested chord with the fewest faults; it must not be sliced. Panics of the kernel
-/// are caught. There is no time limit.
+/// looser ones, at most 0.1 mm or a thousandth of the model, or the chord if that is more.
+/// Models with edges that bound one face alone get no facets. Faces and shells that are
+/// inside out are turned over and reported as findings. Returns the first attempt without
+/// faults. If there is none, returns the one with the fewest; it must not be sliced. If
+/// all have edges of one face alone, that with the fewest such edges gets facets with a
+/// chord 4 times as long. Panics of the kernel are caught. There is no time limit.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, or no attempt gives facets.
@@ -86,12 +88,9 @@ pub fn prepare(bytes: &[u8], read: ReadFn, chord_mm: f64) -> Result<Prepared, Br
     let most_mm = f64::max(chord_mm, MOST_MM.min(MOST_PART * search.longest_mm));
     let heals = HEALS.map(|by| by * own_mm).into_iter().chain(LOOSEST.map(|by| by * chord_mm));
     for heal_mm in heals.chain([most_mm]).filter(|heal_mm| *heal_mm <= most_mm) {
-        search.healed(heal_mm, chord_mm)?;
+        search.healed(heal_mm)?;
     }
     search.settle_open();
-    for by in CHORDS {
-        search.longer(by * chord_mm)?;
-    }
     let (best, prepared) = search.best?;
     search.tries.remove(best);
     Ok(Prepared { tries: search.tries, ..prepared })
@@ -153,8 +152,7 @@ impl<'a> Search<'a> {
             && let Some((index, _, kernel)) = self.open.take()
         {
             let heal_mm = self.tries[index].heal_mm;
-            // It will not be sliced unless gaps are accepted, so a longer chord will do.
-            let chord_mm = CHORDS[0] * self.chord_mm;
+            let chord_mm = OPEN_CHORD * self.chord_mm;
             let made = facets(kernel, heal_mm, chord_mm);
             self.tries[index] = Attempt::of(&made, heal_mm, chord_mm);
             self.best = made.map(|made| (index, made));
@@ -165,50 +163,26 @@ impl<'a> Search<'a> {
         self.best.as_ref().is_ok_and(|(_, best)| best.is_good())
     }
 
-    /// Returns whether the best model has edges that bound one face alone: a longer chord
-    /// closes none.
-    fn has_free_edges(&self) -> bool {
-        self.best.as_ref().is_ok_and(|(_, best)| best.kernel.free_edges() > 0)
-    }
-
     fn open(&self, heal_mm: f64) -> Result<OpenedModel, BrepError> {
         caught("reading the file", || (self.read)(self.bytes, heal_mm))
     }
 
-    fn healed(&mut self, heal_mm: f64, chord_mm: f64) -> Result<(), BrepError> {
+    fn healed(&mut self, heal_mm: f64) -> Result<(), BrepError> {
         if !self.is_done() {
             let opened = self.open(heal_mm)?;
             if opened.is_changed && !self.is_open(&opened.kernel, heal_mm) {
-                self.take(opened.kernel, heal_mm, chord_mm);
+                self.take(opened.kernel, heal_mm);
             }
-        }
-        Ok(())
-    }
-
-    /// Tries a longer chord with the best healing tolerance.
-    fn longer(&mut self, chord_mm: f64) -> Result<(), BrepError> {
-        if !self.is_done() && !self.has_free_edges() {
-            let heal_mm = self.best.as_ref().map_or(0.0, |(_, best)| best.heal_mm);
-            let kernel = self.open(heal_mm)?.kernel;
-            self.take(kernel, heal_mm, chord_mm);
         }
         Ok(())
     }
 
     /// Tessellates a model, and keeps it if it has fewer faults than the best one.
-    fn take(&mut self, kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) {
-        let mut made = facets(kernel, heal_mm, chord_mm);
-        if let Ok(made) = &mut made {
-            // A longer chord must not loosen the check of volumes.
-            for report in made.reports.iter_mut().filter(|report| report.faults.is_empty()) {
-                report.faults.extend(apart(report, self.chord_mm));
-            }
-        }
-        self.tries.push(Attempt::of(&made, heal_mm, chord_mm));
+    fn take(&mut self, kernel: Arc<dyn Kernel>, heal_mm: f64) {
+        let made = facets(kernel, heal_mm, self.chord_mm);
+        self.tries.push(Attempt::of(&made, heal_mm, self.chord_mm));
         let Ok(made) = made else { return };
         let is_better = match &self.best {
-            // At a longer chord, fewer facets have fewer open edges without being better.
-            Ok(_) if chord_mm > self.chord_mm => made.is_good(),
             Ok((_, best)) => wrong(&made.reports) < wrong(&best.reports),
             Err(_) => true,
         };

@@ -10,6 +10,10 @@ use crate::volume::{facet_volume, surface_volume};
 /// The greatest relative difference of a body's two volumes.
 pub(crate) const VOLUMES_APART: f64 = 1e-3;
 
+/// The least volume of a body of some area, as a part of what such a cube would have: less is
+/// the error of its numbers.
+const LEAST_VOLUME: f64 = 1e-9;
+
 /// The reason why a body cannot be sliced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -71,6 +75,9 @@ pub enum BodyFault {
         /// The entity of the face.
         entity: u64,
     },
+    /// Its faces lie on each other.
+    #[error("its faces lie on each other and enclose nothing")]
+    Flat,
     /// Its faces point inwards.
     #[error("it is inside out: its volume is {volume_mm3:.6} mm³")]
     InsideOut {
@@ -122,7 +129,7 @@ pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
 }
 
 /// Returns a fault if a body's two volumes differ by more than the chord allows.
-pub(crate) fn apart(report: &BodyReport, chord_mm: f64) -> Option<BodyFault> {
+fn apart(report: &BodyReport, chord_mm: f64) -> Option<BodyFault> {
     let (facets_mm3, surfaces_mm3) = (report.volume_mm3, report.exact_volume_mm3);
     let most = f64::max(VOLUMES_APART * facets_mm3.abs(), chord_mm * report.area_mm2);
     // `NaN` must fail the comparison.
@@ -143,7 +150,9 @@ fn faults(
     faults.extend(outside(kernel, mesh, facets));
     if let Some(fault) = apart(report, mesh.chord_mm) {
         faults.push(fault);
-    } else if report.volume_mm3 <= 0.0 {
+    } else if report.volume_mm3.abs() < LEAST_VOLUME * report.area_mm2.powf(1.5) {
+        faults.push(BodyFault::Flat);
+    } else if report.volume_mm3 < 0.0 {
         faults.push(BodyFault::InsideOut { volume_mm3: report.volume_mm3 });
     }
     if faults.is_empty() {
