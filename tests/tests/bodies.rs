@@ -2,7 +2,9 @@
 //! other, in images of every kind.
 
 use lamp_fixtures::StepBody::{Ball, Block, Hollow};
-use lamp_fixtures::{StepBody, sphere, step_bodies, three_mf, three_mf_model};
+use lamp_fixtures::{
+    StepBody, StepSample, StepUnit, sphere, step, step_bodies, three_mf, three_mf_model,
+};
 use lamp_stack::Layer;
 use lamp_tests::{Scratch, differing, mask, masks};
 
@@ -251,4 +253,20 @@ fn items_of_a_3mf_unite() {
     let unite = slice(&scratch, "part.3mf");
     assert_eq!(masks(&unite), masks(&slice(&scratch, "part.3mf --fill nonzero")));
     assert_ne!(masks(&unite), masks(&slice(&scratch, "part.3mf --bodies xor")));
+}
+
+/// Each of several files is polished as it would be alone.
+#[test]
+fn files_side_by_side_are_each_as_exact_as_alone() {
+    let scratch = Scratch::new();
+    scratch.write("part.step", step(StepSample::Tower, StepUnit::Millimetre).as_bytes());
+    let line = "--dpi 254 --thickness 1mm --rotate x:50 --quiet --force";
+    let white = |files: &str, fill: &str| -> Vec<u64> {
+        scratch.run(&format!("slice {files} {line} {fill} -o out.tif")).succeeds();
+        masks(&scratch.layers("out.tif")).iter().map(|mask| mask.white_pixels()).collect()
+    };
+    let doubled: Vec<u64> = white("part.step", "").iter().map(|pixels| 2 * pixels).collect();
+    for fill in ["", "--fill nonzero"] {
+        assert_eq!(white("part.step part.step@100,0", fill), doubled, "{fill}");
+    }
 }

@@ -82,7 +82,7 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
 fn answer(name: &str, prepared: &Prepared, second: Option<&Comparison>) -> Value {
     let attempt = |attempt: &Attempt| json!({"chord_mm": attempt.chord_mm, "heal_mm": attempt.heal_mm, "why": attempt.why});
     let bodies = prepared.kernel.bodies().iter().zip(&prepared.reports);
-    json!({
+    let mut answer = json!({
         "part": name,
         "unit": prepared.kernel.unit(),
         "facets": prepared.mesh.facets.len(),
@@ -91,8 +91,11 @@ fn answer(name: &str, prepared: &Prepared, second: Option<&Comparison>) -> Value
         "notes": notes(prepared),
         "tries": prepared.tries.iter().map(attempt).collect::<Vec<_>>(),
         "bodies": bodies.map(|(body, report)| fields(body, report, prepared)).collect::<Vec<_>>(),
-        "second": second.map(second_opinion::fields),
-    })
+    });
+    if let Some(second) = second {
+        answer["second"] = second_opinion::fields(second);
+    }
+    answer
 }
 
 fn fields(body: &Body, report: &BodyReport, prepared: &Prepared) -> Value {

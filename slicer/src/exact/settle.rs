@@ -53,7 +53,7 @@ pub(crate) fn settle(
         let plane = Line::at_height(cutter.grid, cutter.planes.z_um(layer));
         for edge in &surfaces.curved_edges().all {
             for point in plane.lens(surfaces, edge) {
-                let body = surfaces.body_of(edge.facets[0]);
+                let body = cutter.rule.name_of(surfaces.body_of(edge.facets[0]));
                 let switch = Switch::new(surfaces, edge.facets, &point, cutter);
                 rows.entry((body, point.cell)).or_default().switches.push(switch);
             }
