@@ -97,7 +97,7 @@ fn a_report_names_what_a_file_holds() {
     for words in ["unit:       inch", "bodies:     2", "1 (1 sphere)", "yes, it is closed"] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    let scratch = broken(StepDefect::Missing);
+    let scratch = broken(StepDefect::Crossing);
     let text = String::from_utf8(scratch.run("lamp brep part.step").succeeds().stdout).unwrap();
     assert!(text.contains("sliced:   no: ") && text.contains("tried:"), "{text}");
     let ran = scratch.run("lamp brep part.step --strict");
