@@ -39,9 +39,10 @@ const FILES: [&str; 10] = [
     "sg1_c5_214.stp",
 ];
 
-/// Faces of these files on a sphere or a torus. Where only the sense is turned over, their text is
-/// free of contradictions: it describes the part with a whole ball or ring added.
-const ON_CLOSED_SURFACES: [(&str, u64); 5] = [
+/// Faces on a sphere or a torus, by file. Where only the sense of one is turned over, the text is
+/// free of contradictions: it describes what the rest of the ball or ring bounds.
+const ON_CLOSED_SURFACES: [(&str, u64); 6] = [
+    ("Bend", 28),
     ("nist_mbe_pmi_11.stp", 20),
     ("nist_mbe_pmi_11.stp", 21),
     ("nist_mbe_pmi_11.stp", 24),

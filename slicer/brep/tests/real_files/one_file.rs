@@ -1,4 +1,4 @@
-//! Reads one file, in a process of its own, and prints what it finds as a line of JSON.
+//! Reads one file, in a process of its own, and prints what it finds as lines of JSON.
 
 use std::path::Path;
 use std::time::Instant;
@@ -38,31 +38,36 @@ pub(crate) struct Part {
 }
 
 impl Answer {
-    /// Parses what a process printed, and blames it if that is nothing.
+    /// Parses the last line that a process printed, and blames it if there is none.
     pub(crate) fn parse(text: &[u8], seconds: f64) -> Self {
         let ended = |_| Self {
             seconds,
             peak_mb: None,
             read: Err("the process was ended or ended itself".to_owned()),
         };
-        serde_json::from_slice(text).unwrap_or_else(ended)
+        let last = text.trim_ascii_end().rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
+        serde_json::from_slice(last).unwrap_or_else(ended)
     }
 }
 
-/// Reads a file and prints an [`Answer`].
+/// Reads a file and prints an [`Answer`], and a better one if shorter chords than the default are
+/// needed to compare and time is left.
 pub(crate) fn answer(kernel: ReadFn, path: &Path, size_mm: &str, heights_mm: &str) {
     let bytes = std::fs::read(path).expect("the file");
     let heights: Vec<f64> = heights_mm.split(',').filter_map(|z| z.parse().ok()).collect();
+    let say = |answer: &Answer| println!("{}", serde_json::to_string(answer).expect("plain data"));
     let start = Instant::now();
-    let mut read = part(&bytes, kernel, CHORD_MM, &heights);
+    let read = part(&bytes, kernel, CHORD_MM, &heights);
     let (seconds, peak_mb) = (start.elapsed().as_secs_f64(), peak_mb());
+    let first = Answer { seconds, peak_mb, read };
+    say(&first);
     let fine_mm = size_mm.parse::<f64>().expect("a size") / CHORDS;
-    if fine_mm > 0.0 && fine_mm < CHORD_MM && read.is_ok() {
+    if fine_mm > 0.0 && fine_mm < CHORD_MM && first.read.is_ok() {
         // What is good at the default tolerance stays so, however rough its edges are.
-        read = part(&bytes, kernel, fine_mm, &heights).or(read);
+        if let Ok(part) = part(&bytes, kernel, fine_mm, &heights) {
+            say(&Answer { read: Ok(part), ..first });
+        }
     }
-    let answer = Answer { seconds, peak_mb, read };
-    println!("{}", serde_json::to_string(&answer).expect("plain data"));
 }
 
 /// Returns the most memory that this process ever held, where Linux says it.
