@@ -163,5 +163,8 @@ fn bodies() {
     let gap: Value = serde_json::from_slice(&ran.stdout).unwrap();
     let fault = gap["bodies"][0]["faults"][0].as_str().unwrap();
     assert!(fault.contains("edges of facets are open"), "{gap}");
-    assert_eq!(keys(&gap["tries"][0]), ["chord_mm", "heal_mm", "why"]);
+
+    scratch.write("healed.step", broken_step(StepDefect::Apart { gap_nm: 1000 }).as_bytes());
+    let healed = answer(&scratch, "lamp brep healed.step --json");
+    assert_eq!(keys(&healed["tries"][0]), ["chord_mm", "heal_mm", "why"]);
 }

@@ -97,9 +97,12 @@ fn a_report_names_what_a_file_holds() {
     for words in ["unit:       inch", "bodies:     2", "1 (1 sphere)", "yes, it is closed"] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    let scratch = broken(StepDefect::Crossing);
+    let scratch = broken(StepDefect::Apart { gap_nm: 1000 });
     let text = String::from_utf8(scratch.run("lamp brep part.step").succeeds().stdout).unwrap();
-    assert!(text.contains("sliced:   no: ") && text.contains("tried:"), "{text}");
+    assert!(text.contains("sliced:   yes") && text.contains("tried:"), "{text}");
+    let scratch = broken(StepDefect::Missing);
+    let text = String::from_utf8(scratch.run("lamp brep part.step").succeeds().stdout).unwrap();
+    assert!(text.contains("sliced:   no: "), "{text}");
     let ran = scratch.run("lamp brep part.step --strict");
     assert_eq!(ran.statuses, [Some(3)], "{}", ran.stderr);
 }
