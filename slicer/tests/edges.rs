@@ -4,8 +4,8 @@
 mod referee;
 
 use lamp_fixtures::StepSample;
-use lamp_slicer::{Axis, Placement};
-use referee::{askew, back, model, options, wrong_levels, wrong_pixels};
+use lamp_slicer::{Axis, KernelName, Placement};
+use referee::{askew, back, model, model_by, options, wrong_levels, wrong_pixels};
 
 type Outside = fn([f64; 3]) -> f64;
 
@@ -37,16 +37,23 @@ const PARTS: [(StepSample, Outside); 4] = [
     (StepSample::Bend, off_bend),
 ];
 
-/// Counts the wrong pixels of all parts in a place.
+#[cfg(feature = "occt")]
+const KERNELS: &[KernelName] = &[KernelName::Lamp, KernelName::Occt];
+#[cfg(not(feature = "occt"))]
+const KERNELS: &[KernelName] = &[KernelName::Lamp];
+
+/// Counts the wrong pixels of all parts in a place, read by each kernel.
 fn check(dpi: f64, thickness_mm: f64, placement: Placement, back: impl Fn([f64; 3]) -> [f64; 3]) {
     let mut all = Vec::new();
-    for (part, outside) in PARTS {
-        for chord_mm in [0.25 * 25.4 / dpi, 0.02] {
-            let options = options(dpi, thickness_mm, placement);
-            let (wrong, white) =
-                wrong_pixels(model(part, chord_mm), &options, |point| outside(back(point)));
-            assert!(white > 10_000, "{part:?}: {white}");
-            all.push((part, chord_mm, wrong));
+    let options = options(dpi, thickness_mm, placement);
+    for &kernel in KERNELS {
+        for (part, outside) in PARTS {
+            for chord_mm in [0.25 * 25.4 / dpi, 0.02] {
+                let model = model_by(kernel, part, chord_mm);
+                let (wrong, white) = wrong_pixels(model, &options, |point| outside(back(point)));
+                assert!(white > 10_000, "{part:?}: {white}");
+                all.push((kernel, part, chord_mm, wrong));
+            }
         }
     }
     assert!(all.iter().all(|(.., wrong)| *wrong == 0), "{dpi} dpi: {all:?}");

@@ -2,12 +2,18 @@
 //! gray.
 
 use lamp_fixtures::{StepSample, StepUnit, step};
-use lamp_slicer::{Axis, LayerLevels, OpenOptions, Part, Placement, SliceOptions, Slices};
+use lamp_slicer::{
+    Axis, KernelName, LayerLevels, OpenOptions, Part, Placement, SliceOptions, Slices,
+};
 use lamp_stack::{DepthLevels, Dpi, Image, Length};
 
 pub(crate) fn model(part: StepSample, chord_mm: f64) -> Part {
+    model_by(KernelName::default(), part, chord_mm)
+}
+
+pub(crate) fn model_by(kernel: KernelName, part: StepSample, chord_mm: f64) -> Part {
     let tolerance = Length::from_mm(chord_mm);
-    let options = OpenOptions { tolerance, ..OpenOptions::default() };
+    let options = OpenOptions { kernel, tolerance, ..OpenOptions::default() };
     Part::from_step("part", step(part, StepUnit::Inch).as_bytes(), &options).unwrap()
 }
 
