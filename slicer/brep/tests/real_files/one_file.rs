@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 /// The argument that asks for one file.
 pub(crate) const TASK: &str = "one-file";
+/// Said of a file whose process gave no answer.
+pub(crate) const ENDED: &str = "the process was ended or ended itself";
 /// The default tolerance at 1500 dpi: a quarter of a pixel.
 const CHORD_MM: f64 = 25.4 / 1500.0 / 4.0;
 /// The chord for volumes and sections is the part's size divided by this, or the default.
@@ -40,11 +42,7 @@ pub(crate) struct Part {
 impl Answer {
     /// Parses the last line that a process printed, and blames it if there is none.
     pub(crate) fn parse(text: &[u8], seconds: f64) -> Self {
-        let ended = |_| Self {
-            seconds,
-            peak_mb: None,
-            read: Err("the process was ended or ended itself".to_owned()),
-        };
+        let ended = |_| Self { seconds, peak_mb: None, read: Err(ENDED.to_owned()) };
         let last = text.trim_ascii_end().rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
         serde_json::from_slice(last).unwrap_or_else(ended)
     }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::figures::Figures;
-use crate::one_file::{Answer, Part};
+use crate::one_file::{Answer, ENDED, Part};
 
 /// The tolerated relative error of volumes, and of boxes by the part's size.
 const SAME: f64 = 1e-3;
@@ -69,7 +69,11 @@ impl Verdict {
 
     /// Returns whether the part is the reference's, or is refused where that has no body.
     pub(crate) fn is_right(&self) -> bool {
-        self.errors.as_ref().map_or(!self.has_body, Errors::is_none)
+        match (&self.errors, &self.answer.read) {
+            (Some(errors), _) => errors.is_none(),
+            (None, Err(why)) => !self.has_body && why != ENDED,
+            (None, Ok(_)) => false,
+        }
     }
 
     /// Returns whether another part than the reference's would be sliced.
