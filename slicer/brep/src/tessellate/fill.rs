@@ -245,8 +245,9 @@ impl FaceTriangulation<'_> {
         let mut worst = 0.0;
         let cells = (self.scale.count[0] * self.scale.count[1]) as usize;
         let most = self.corners.len() + MORE[0] * cells + MORE[1];
+        let mut near = HashSet::new();
         for _ in 0..MAX_ROUNDS {
-            let (list, off) = self.too_far();
+            let (list, off) = self.too_far(&mut near);
             worst = off;
             if list.is_empty() || self.corners.len() > most {
                 break;
@@ -259,13 +260,19 @@ impl FaceTriangulation<'_> {
     }
 
     /// Returns the places that need more corners, and the greatest distance between the
-    /// surface and the triangles.
-    fn too_far(&self) -> (Vec<Point2<f64>>, f64) {
+    /// surface and the triangles. `near` holds the corners of triangles found near the
+    /// surface, which need no second look.
+    fn too_far(&self, near: &mut HashSet<[u32; 3]>) -> (Vec<Point2<f64>>, f64) {
         let mut list = Vec::new();
         let mut seen = HashSet::new();
         let mut worst: f64 = 0.0;
         for face in self.inside() {
             let face = self.mesh.face(face);
+            let mut numbers = face.vertices().map(|v| v.fix().index() as u32);
+            numbers.sort_unstable();
+            if near.contains(&numbers) {
+                continue;
+            }
             let corners = face.vertices().map(|v| &self.corners[v.fix().index()]);
             let flat = face.vertices().map(|v| v.position());
             let places = corners.map(|corner| corner.place);
@@ -304,9 +311,14 @@ impl FaceTriangulation<'_> {
             let third = |k: fn(&Point2<f64>) -> f64| flat.iter().map(k).sum::<f64>() / 3.0;
             let centre = Point2::new(third(|p| p.x), third(|p| p.y));
             let apart = off(centre, places[0], places[1]);
-            if !is_split && apart > self.chord_mm && size(flat) > 1e-6 {
+            if is_split {
+                continue;
+            }
+            if apart > self.chord_mm && size(flat) > 1e-6 {
                 worst = worst.max(apart);
                 list.push(centre);
+            } else {
+                near.insert(numbers);
             }
         }
         (list, worst)
