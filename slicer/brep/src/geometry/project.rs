@@ -6,6 +6,9 @@ use super::curve::Curve;
 use super::surface::{SAME_MM, Surface, TorusPart};
 use crate::vector::{Vec3, distance, dot, length, sub};
 
+/// The number of starts from which the nearest point is searched.
+const MOST_SEEDS: usize = 6;
+
 impl Surface {
     /// Returns the parameters from which to search for the point nearest to `p`.
     fn seeds(&self, p: Vec3) -> Vec<[f64; 2]> {
@@ -99,8 +102,12 @@ impl Surface {
         }
         let mut seeds: Vec<_> =
             self.seeds(p).into_iter().map(|uv| (distance(self.point(uv), p), uv)).collect();
+        if seeds.len() > MOST_SEEDS {
+            seeds.select_nth_unstable_by(MOST_SEEDS, |a, b| a.0.total_cmp(&b.0));
+            seeds.truncate(MOST_SEEDS);
+        }
         seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let found = seeds.into_iter().take(6).map(|(_, uv)| self.nearer(p, uv));
+        let found = seeds.into_iter().map(|(_, uv)| self.nearer(p, uv));
         // In near ties the hint wins.
         let better = |a: (f64, [f64; 2]), b: (f64, [f64; 2])| if b.0 < a.0 * 0.99 { b } else { a };
         near.into_iter().chain(found).reduce(better).map_or([0.0; 2], |(_, uv)| uv)

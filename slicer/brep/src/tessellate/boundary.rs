@@ -29,7 +29,7 @@ pub(super) fn polygons(
             PointRing::Point(point) => tips.push(*point),
             PointRing::Points(None) => return Err(Fault::Broken),
             PointRing::Points(Some(ring)) => {
-                let unwrapped = unwrap(face, &poles, ring, points);
+                let unwrapped = unwrap(face, &poles, ring, points, chord_mm);
                 if unwrapped.nodes.is_empty() {
                     // All of it lies at a pole.
                     tips.extend(ring.first());

@@ -22,7 +22,13 @@ const AT_POLE_MM: f64 = 1e-5;
 const POLE_PARTS: f64 = 16.0;
 
 /// Finds a loop's parameters, each as near to the one before as periods allow.
-pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &FacePoints) -> Unwrapped {
+pub(super) fn unwrap(
+    face: &Face,
+    poles: &[Pole],
+    ring: &[u32],
+    points: &FacePoints,
+    chord_mm: f64,
+) -> Unwrapped {
     let surface = &face.surface;
     let periods = surface.periods();
     let pole_at = |point: u32| {
@@ -40,7 +46,7 @@ pub(super) fn unwrap(face: &Face, poles: &[Pole], ring: &[u32], points: &FacePoi
             continue;
         }
         let before = nodes.last().map(|node| node.uv);
-        let mut uv = surface.project(points.get(point), before);
+        let mut uv = surface.project_near(points.get(point), before, chord_mm);
         if let Some(before) = before {
             for axis in 0..2 {
                 uv[axis] = near(uv[axis], before[axis], periods[axis]);
