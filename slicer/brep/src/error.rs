@@ -35,6 +35,19 @@ pub enum BrepError {
         /// In millimetres.
         heal_mm: f64,
     },
+    /// The surfaces bend too much for facets within the chord.
+    #[error(
+        "its faces take about {cells:.0} cells of facets, #{entity} alone {of_face:.0}; \
+         give a longer chord"
+    )]
+    Fine {
+        /// The number of cells.
+        cells: f64,
+        /// The entity of the face with the most of them.
+        entity: u64,
+        /// The number of its cells.
+        of_face: f64,
+    },
     /// There would be too many facets.
     #[error("it takes more than {most} facets; give a longer chord")]
     TooMany {

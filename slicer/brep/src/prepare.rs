@@ -64,6 +64,8 @@ const MOST_PART: f64 = 1e-3;
 /// The chord for bodies that stay open, as a multiple of the requested one: they are sliced
 /// only if gaps are accepted.
 const OPEN_CHORD: f64 = 4.0;
+/// The least of such chords, as a part of the model's longest side.
+const OPEN_PART: f64 = 1e-4;
 
 /// Reads a file's bytes, tessellates its bodies and checks them.
 ///
@@ -152,8 +154,12 @@ impl<'a> Search<'a> {
             && let Some((index, _, kernel)) = self.open.take()
         {
             let heal_mm = self.tries[index].heal_mm;
-            let chord_mm = OPEN_CHORD * self.chord_mm;
-            let made = facets(kernel, heal_mm, chord_mm);
+            let mut chord_mm = f64::max(OPEN_CHORD * self.chord_mm, OPEN_PART * self.longest_mm);
+            let mut made = facets(kernel.clone(), heal_mm, chord_mm);
+            while matches!(made, Err(BrepError::Fine { .. })) {
+                chord_mm *= OPEN_CHORD;
+                made = facets(kernel.clone(), heal_mm, chord_mm);
+            }
             self.tries[index] = Attempt::of(&made, heal_mm, chord_mm);
             self.best = made.map(|made| (index, made));
         }

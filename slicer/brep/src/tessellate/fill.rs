@@ -33,10 +33,10 @@ type Filled = (Vec<[Node; 3]>, Option<Fault>);
 pub(super) fn fill(
     face: &Face,
     polygons: &[Vec<Node>],
+    scale: CellScale,
     points: &mut FacePoints,
     chord_mm: f64,
 ) -> Result<Filled, Fault> {
-    let scale = CellScale::new(&face.surface, polygons, chord_mm);
     let cells = scale.count[0] * scale.count[1];
     // `NaN` counts as too many.
     if !matches!(cells.partial_cmp(&MAX_CELLS), Some(Ordering::Less)) {

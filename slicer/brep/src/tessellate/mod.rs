@@ -16,6 +16,7 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
+use self::cells::CellScale;
 use crate::error::BrepError;
 use crate::geometry::edge_range;
 use crate::kernel::{Facet, Fault, Finding, Tessellation};
@@ -35,8 +36,11 @@ struct Node {
 const CLEAR: f64 = 4.0;
 /// The greatest number of facets, which take about 5 GB of memory.
 pub const MAX_FACETS: usize = 50_000_000;
+/// The greatest number of cells of all faces, with about three facets each. They take some
+/// 300 MB of memory.
+const MAX_CELLS: f64 = 1e6;
 /// The greatest number of points on edges.
-const MAX_POINTS: usize = 20_000_000;
+const MAX_POINTS: usize = 5_000_000;
 
 /// The points of a face: those of its edges, which are shared, and its own.
 struct FacePoints<'a> {
@@ -53,6 +57,28 @@ impl FacePoints<'_> {
     fn push(&mut self, point: Vec3) -> u32 {
         self.own.push(point);
         (self.shared.len() + self.own.len() - 1) as u32
+    }
+}
+
+/// The polygons of one face.
+struct Outline {
+    own: Vec<Vec3>,
+    /// The polygons, the outer one last, and their scale.
+    inner: Result<(Vec<Vec<Node>>, CellScale), Fault>,
+    faults: Vec<Fault>,
+}
+
+impl Outline {
+    /// Returns how far edges lie off the surface, if further than facets may.
+    fn off_mm(&self) -> Option<f64> {
+        self.faults.iter().find_map(|fault| match fault {
+            Fault::Off { off_mm } => Some(*off_mm),
+            _ => None,
+        })
+    }
+
+    fn cells(&self) -> f64 {
+        self.inner.as_ref().map_or(0.0, |(_, scale)| scale.count[0] * scale.count[1])
     }
 }
 
@@ -78,26 +104,20 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
         }
     }
     let shared = points.len();
-    let made = |numbers: Vec<usize>, points: &[Vec3]| -> Vec<FacePatch> {
-        let numbers = numbers.into_par_iter();
-        numbers
-            .map(|face| patch(face as u32, &model.faces[face], &chains, points, chord_mm))
-            .collect()
-    };
-    let mut patches = made((0..model.faces.len()).collect(), &points);
-    let is_off =
-        |patch: &FacePatch| patch.faults.iter().any(|fault| matches!(fault, Fault::Off { .. }));
-    let off: BTreeSet<usize> = (0..patches.len()).filter(|&face| is_off(&patches[face])).collect();
-    let moved = rebuild::rebuild(model, &chains, &off, chord_mm, &mut points);
-    let again: Vec<usize> = moved.into_iter().collect();
-    for (face, mut patch) in again.iter().zip(made(again.clone(), &points)) {
-        let before = std::mem::take(&mut patches[*face].faults);
-        if !is_off(&patch) {
-            let off = before.into_iter().find(|fault| matches!(fault, Fault::Off { .. }));
-            patch.faults.extend(off.map(|fault| Fault::Rebuilt { off_mm: fault.off_mm() }));
-        }
-        patches[*face] = patch;
+    let outlines = outlines(model, &chains, chord_mm, &mut points);
+    let cells: Vec<f64> = outlines.iter().map(Outline::cells).collect();
+    let all: f64 = cells.iter().sum();
+    let largest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
+    if let Some(largest) = largest.filter(|_| all > MAX_CELLS) {
+        let entity = model.faces[largest].entity;
+        return Err(BrepError::Fine { cells: all, entity, of_face: cells[largest] });
     }
+    let patches: Vec<FacePatch> = (0u32..)
+        .zip(outlines)
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .map(|(face, outline)| patch(face, &model.faces[face as usize], outline, &points, chord_mm))
+        .collect();
     let (mut facets, mut tips) = (Vec::new(), Vec::new());
     let mut findings = Vec::new();
     for (face, patch) in (0u32..).zip(patches) {
@@ -140,20 +160,49 @@ fn chain(edge: &BrepEdge, model: &BrepModel, chord_mm: f64, points: &mut Vec<Vec
     [start as u32].into_iter().chain(inner).chain([end as u32]).collect()
 }
 
-fn patch(
-    number: u32,
-    face: &Face,
+/// Finds the polygons of all faces, after moving edges onto their surfaces.
+fn outlines(
+    model: &BrepModel,
     chains: &[Vec<u32>],
-    shared: &[Vec3],
     chord_mm: f64,
-) -> FacePatch {
+    points: &mut [Vec3],
+) -> Vec<Outline> {
+    let made = |numbers: &[usize], points: &[Vec3]| -> Vec<Outline> {
+        let numbers = numbers.par_iter();
+        numbers.map(|&face| outline(&model.faces[face], chains, points, chord_mm)).collect()
+    };
+    let mut outlines = made(&(0..model.faces.len()).collect::<Vec<_>>(), points);
+    let is_off = |face: &usize| outlines[*face].off_mm().is_some();
+    let off: BTreeSet<usize> = (0..outlines.len()).filter(is_off).collect();
+    let again: Vec<usize> =
+        rebuild::rebuild(model, chains, &off, chord_mm, points).into_iter().collect();
+    for (&face, mut outline) in again.iter().zip(made(&again, points)) {
+        if let (None, Some(off_mm)) = (outline.off_mm(), outlines[face].off_mm()) {
+            outline.faults.push(Fault::Rebuilt { off_mm });
+        }
+        outlines[face] = outline;
+    }
+    outlines
+}
+
+fn outline(face: &Face, chains: &[Vec<u32>], shared: &[Vec3], chord_mm: f64) -> Outline {
     let mut points = FacePoints { shared, own: Vec::new() };
     let mut faults = Vec::new();
-    let mut outwards = face.outwards;
-    let mut fill = || {
-        let polygons = boundary::polygons(face, &rings(face, chains), &mut points, chord_mm)?;
+    let polygons = boundary::polygons(face, &rings(face, chains), &mut points, chord_mm);
+    let inner = polygons.map(|polygons| {
         faults.extend(off(face, &polygons, &points, chord_mm));
-        let (corners, coarse) = fill::fill(face, &polygons, &mut points, chord_mm)?;
+        let scale = CellScale::new(&face.surface, &polygons, chord_mm);
+        (polygons, scale)
+    });
+    Outline { own: points.own, inner, faults }
+}
+
+fn patch(number: u32, face: &Face, outline: Outline, shared: &[Vec3], chord_mm: f64) -> FacePatch {
+    let Outline { own, inner, mut faults } = outline;
+    let mut points = FacePoints { shared, own };
+    let mut outwards = face.outwards;
+    let filled = inner.and_then(|(polygons, scale)| {
+        let (corners, coarse) = fill::fill(face, &polygons, scale, &mut points, chord_mm)?;
         if boundary::is_counter_clockwise(&polygons) != face.along_normal {
             // Neighbours share the loops, not the sense flag, so the loops decide.
             outwards = !outwards;
@@ -161,8 +210,7 @@ fn patch(
         }
         faults.extend(coarse);
         Ok(corners)
-    };
-    let filled = fill();
+    });
     let corners = filled.unwrap_or_else(|fault| {
         faults.push(fault);
         Vec::new()
