@@ -135,7 +135,7 @@ pub(crate) fn notes(prepared: &Prepared) -> Vec<String> {
     let wanted_mm = prepared.tries.first().map_or(prepared.chord_mm, |first| first.chord_mm);
     if prepared.chord_mm > wanted_mm {
         notes.push(format!(
-            "its facets lie up to {} from the surfaces, because finer ones were faulty",
+            "its facets lie up to {} from the surfaces, because it is open",
             length(prepared.chord_mm)
         ));
     }

@@ -110,7 +110,7 @@ impl<'a> Tokens<'a> {
             text.push('\'');
             text += &self.until(b'\'', start)?;
         }
-        Ok(text)
+        Ok(decoded(&text).unwrap_or(text))
     }
 
     fn number_from<N: std::str::FromStr>(&mut self, start: usize) -> Result<N, StepError> {
@@ -121,9 +121,63 @@ impl<'a> Tokens<'a> {
     }
 }
 
+/// Returns a text whose letters beyond ASCII are written as they are, or `None` if a directive
+/// is not one of ISO 10303-21 (6.4.3).
+fn decoded(text: &str) -> Option<String> {
+    let mut rest = text;
+    let mut out = String::new();
+    while let Some((before, after)) = rest.split_once('\\') {
+        out += before;
+        if let Some(after) = after.strip_prefix('\\') {
+            out.push('\\');
+            rest = after;
+        } else if let Some(after) = after.strip_prefix("S\\") {
+            // The second half of ISO 8859-1.
+            let letter = after.chars().next()?;
+            out.push(char::from(u8::try_from(letter).ok()?.checked_add(128)?));
+            rest = &after[letter.len_utf8()..];
+        } else if let Some(after) = after.strip_prefix("X\\") {
+            out.push(char::from(u8::from_str_radix(after.get(..2)?, 16).ok()?));
+            rest = &after[2..];
+        } else {
+            let digits = if after.starts_with("X2\\") { 4 } else { 8 };
+            let after = after.strip_prefix("X2\\").or_else(|| after.strip_prefix("X4\\"))?;
+            let (codes, after) = after.split_once("\\X0\\")?;
+            let codes: Option<Vec<u32>> = codes
+                .as_bytes()
+                .chunks(digits)
+                .map(|code| u32::from_str_radix(std::str::from_utf8(code).ok()?, 16).ok())
+                .collect();
+            if digits == 4 {
+                let units: Vec<u16> = codes?.into_iter().map(|code| code as u16).collect();
+                out += &String::from_utf16(&units).ok()?;
+            } else {
+                out.extend(codes?.into_iter().map(char::from_u32).collect::<Option<Vec<_>>>()?);
+            }
+            rest = after;
+        }
+    }
+    out += rest;
+    Some(out)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn letters_beyond_ascii_are_decoded() {
+        for (text, letters) in [
+            (r"T\X2\011B\X0\leso1", Some("Těleso1")),
+            (r"\X\D8 5\S\5m", Some("Ø 5µm")),
+            (r"\X4\0001F600\X0\ \X2\D83DDE00\X0\", Some("\u{1F600} \u{1F600}")),
+            (r"C:\\a", Some(r"C:\a")),
+            (r"C:\a", None),
+            (r"\X2\011", None),
+        ] {
+            assert_eq!(decoded(text).as_deref(), letters, "{text}");
+        }
+    }
 
     fn all(text: &str) -> Result<Vec<Token>, StepError> {
         let mut tokens = Tokens::new(text.as_bytes());
