@@ -72,7 +72,8 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::Brep(BrepError::Step(error)) => return of_step(error),
         SliceError::Timeout { tolerance, .. } => {
             return Some(format!(
-                "give it more with --timeout, or let facets lie more than {tolerance} from the surfaces"
+                "give it more with --timeout, or let facets lie more than {} from the surfaces",
+                crate::step_options::length(tolerance.mm())
             ));
         }
         _ => return None,

@@ -162,6 +162,7 @@ fn findings(findings: &[Finding]) -> Vec<String> {
     let line = |(worst, count): (&Finding, usize)| {
         let more = match count {
             1 => String::new(),
+            count if worst.fault.off_mm() == 0.0 => format!(", as are {} others", count - 1),
             2 => ", the worse of two such faces".to_owned(),
             count => format!(", the worst of {count} such faces"),
         };

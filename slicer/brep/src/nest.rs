@@ -7,8 +7,10 @@ use crate::rays::{Hit, RayPoint, SHARES, hits, seen_mm2};
 use crate::validate::{BodyFault, BodyReport};
 use crate::volume::facet_volume;
 
-/// How far faces may reach into each other, as a multiple of the chord.
+/// How far faces may reach into each other, as a multiple of the chord, and of the distance of
+/// edges from their surfaces.
 const LOOSE: f64 = 8.0;
+const LOOSE_EDGES: f64 = 2.0;
 
 /// Turns over shells whose faces point into the body: an outermost one must point outwards, one
 /// inside it into its void, and so on. Returns whether any was turned over.
@@ -128,8 +130,7 @@ pub(crate) fn crossed(
     mesh: &Tessellation,
     facets: &[Facet],
 ) -> Option<BodyFault> {
-    let off = |finding: &Finding| finding.fault.off_mm();
-    let loose_mm = LOOSE * mesh.findings.iter().map(off).fold(mesh.chord_mm, f64::max);
+    let loose_mm = LOOSE * mesh.chord_mm + LOOSE_EDGES * off_mm(mesh, facets);
     let mut left = samples(mesh, facets);
     for shares in SHARES {
         let rays: Vec<RayPoint> = left.iter().map(|&facet| RayPoint { facet, shares }).collect();
@@ -148,6 +149,13 @@ pub(crate) fn crossed(
         left = again;
     }
     None
+}
+
+/// Returns how far edges or facets of a body lie off their surfaces, if further than they may.
+fn off_mm(mesh: &Tessellation, facets: &[Facet]) -> f64 {
+    let (Some(first), Some(last)) = (facets.first(), facets.last()) else { return 0.0 };
+    let of_body = mesh.findings.iter().filter(|it| (first.face..=last.face).contains(&it.face));
+    of_body.map(|finding| finding.fault.off_mm()).fold(0.0, f64::max)
 }
 
 /// Returns for each face the facet that the rays see best, and others spread over it.

@@ -1,5 +1,5 @@
-//! Prepares a STEP file for slicing: reads, tessellates and validates it, and retries
-//! with healing or longer chords.
+//! Prepares a STEP file for slicing: reads, tessellates and validates it, and retries with
+//! healing.
 
 use std::any::Any;
 use std::fmt;
@@ -11,6 +11,7 @@ use crate::kernel::{Kernel, Tessellation};
 use crate::nest::turn_shells;
 use crate::orient::turn_over;
 use crate::validate::{BodyFault, BodyReport, check};
+use crate::vector::sub;
 
 /// Reads a file's bytes and joins edges within a distance in millimetres; 0 leaves the
 /// model unchanged.
@@ -87,6 +88,7 @@ pub fn prepare(bytes: &[u8], read: ReadFn, chord_mm: f64) -> Result<Prepared, Br
     let own_mm = opened.kernel.uncertainty_mm().unwrap_or(USUAL_MM);
     let mut search = Search::new(bytes, read, chord_mm);
     search.begin(opened.kernel);
+    search.measure();
     let most_mm = f64::max(chord_mm, MOST_MM.min(MOST_PART * search.longest_mm));
     let heals = HEALS.map(|by| by * own_mm).into_iter().chain(LOOSEST.map(|by| by * chord_mm));
     for heal_mm in heals.chain([most_mm]).filter(|heal_mm| *heal_mm <= most_mm) {
@@ -130,6 +132,15 @@ impl<'a> Search<'a> {
         let first = facets(kernel, 0.0, self.chord_mm);
         self.tries.push(Attempt::of(&first, 0.0, self.chord_mm));
         self.best = first.map(|made| (0, made));
+    }
+
+    /// Takes the size of the facets if the kernel does not know that of the model.
+    fn measure(&mut self) {
+        if let (0.0, Ok((_, best))) = (self.longest_mm, &self.best) {
+            let boxes = best.reports.iter().map(|report| report.box_mm);
+            let sides = boxes.flat_map(|[low, high]| sub(high, low));
+            self.longest_mm = sides.filter(|side| side.is_finite()).fold(0.0, f64::max);
+        }
     }
 
     /// Returns whether edges bound one face alone, so that facets would be in vain, and

@@ -75,6 +75,18 @@ pub enum BodyFault {
         /// The entity of the face.
         entity: u64,
     },
+    /// An edge or facets lie too far off a surface.
+    #[error(
+        "{what} of #{entity} lie {off_mm:.3} mm off its surface, more than a thousandth of the body"
+    )]
+    Off {
+        /// The entity of the face.
+        entity: u64,
+        /// What lies off: `edges` or `facets`.
+        what: &'static str,
+        /// The distance, in millimetres.
+        off_mm: f64,
+    },
     /// Its faces lie on each other.
     #[error("its faces lie on each other and enclose nothing")]
     Flat,
@@ -147,6 +159,7 @@ fn faults(
         return vec![BodyFault::Empty];
     }
     let mut faults: Vec<BodyFault> = open(kernel, mesh, facets).into_iter().collect();
+    faults.extend(off(mesh, facets, report));
     faults.extend(outside(kernel, mesh, facets));
     if let Some(fault) = apart(report, mesh.chord_mm) {
         faults.push(fault);
@@ -205,6 +218,25 @@ pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
     let [a, b, c] = facet.corners;
     [[a, b], [b, c], [c, a]]
 }
+
+/// Returns a fault if an edge or facets lie off their surface by more than numbers of another
+/// part would explain: nothing else tells that the edge is another surface's.
+fn off(mesh: &Tessellation, facets: &[Facet], report: &BodyReport) -> Option<BodyFault> {
+    let sides = sub(report.box_mm[1], report.box_mm[0]);
+    let most_mm = f64::max(4.0 * mesh.chord_mm, MOST_OFF * sides.into_iter().fold(0.0, f64::max));
+    let faces = facets.first()?.face..=facets.last()?.face;
+    let of_body = mesh.findings.iter().filter(|finding| faces.contains(&finding.face));
+    let off = of_body.filter_map(|finding| match finding.fault {
+        Fault::Off { off_mm } | Fault::Rebuilt { off_mm } => Some((finding, "edges", off_mm)),
+        Fault::Coarse { off_mm } => Some((finding, "facets", off_mm)),
+        _ => None,
+    });
+    let worst = off.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|(.., off_mm)| *off_mm > most_mm);
+    worst.map(|(finding, what, off_mm)| BodyFault::Off { entity: finding.entity, what, off_mm })
+}
+
+/// How far edges and facets may lie off their surface, as a part of the body's longest side.
+const MOST_OFF: f64 = 1e-3;
 
 /// Returns how far edges of a face lie off its surface, if further than facets may.
 fn off_edges_mm(mesh: &Tessellation, face: u32) -> f64 {

@@ -310,6 +310,14 @@ fn edges_off_their_surfaces_are_moved_onto_them() {
 }
 
 #[test]
+fn edges_far_off_their_surfaces_are_refused() {
+    let text = step(StepSample::Frustum, StepUnit::Millimetre).replace(",15.0);", ",16.0);");
+    let (faults, ..) = prepared(&text);
+    let is_off = |fault: &BodyFault| matches!(fault, BodyFault::Off { what: "edges", .. });
+    assert!(faults.iter().any(is_off), "{faults:?}");
+}
+
+#[test]
 fn volumes_of_surfaces_hardly_need_facets() {
     let exact = [
         (StepSample::Sphere, 4.0 / 3.0 * PI * 15f64.powi(3)),

@@ -48,10 +48,10 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(entities: &Entities, item: u64) -> Self {
-        let Ok(records) = entities.records(item) else { return Self::Other };
+    fn of(entities: &Entities, item: u64) -> Result<Self, StepError> {
+        let records = entities.records(item)?;
         let mut kinds = records.iter().map(|record| Self::of_name(&record.name));
-        match kinds.find(|kind| *kind != Self::Other).unwrap_or(Self::Other) {
+        Ok(match kinds.find(|kind| *kind != Self::Other).unwrap_or(Self::Other) {
             // One that repeats an exact solid, which it names, is not missed.
             Self::OtherSolid
                 if entities
@@ -62,7 +62,7 @@ impl Kind {
             }
             Self::Wires if bounded_surfaces(entities, item).next().is_some() => Self::Surfaces,
             kind => kind,
-        }
+        })
     }
 
     fn of_name(name: &str) -> Self {
@@ -76,6 +76,11 @@ impl Kind {
             | "RIGHT_ANGULAR_WEDGE"
             | "RIGHT_CIRCULAR_CONE"
             | "RIGHT_CIRCULAR_CYLINDER"
+            | "RECTANGULAR_PYRAMID"
+            | "TETRAHEDRON"
+            | "CONVEX_HEXAHEDRON"
+            | "ECCENTRIC_CONE"
+            | "CYCLIDE_SEGMENT_SOLID"
             | "BOOLEAN_RESULT" => Self::OtherSolid,
             "SHELL_BASED_SURFACE_MODEL"
             | "FACE_BASED_SURFACE_MODEL"
@@ -192,7 +197,7 @@ impl Contents {
     ) -> Result<(), StepError> {
         let mut open = Vec::new();
         for &item in &within.shape.items {
-            let kind = Kind::of(entities, item);
+            let kind = Kind::of(entities, item)?;
             if kind == Kind::Other || !self.is_new(item, kind, within) {
                 continue;
             }
@@ -261,7 +266,7 @@ fn replicated(
     let (mut solid, mut place) = (item, within.place);
     for _ in 0..MAX_NESTED {
         let Some(replica) = entities.find(solid, "SOLID_REPLICA") else {
-            return match Kind::of(entities, solid) {
+            return match Kind::of(entities, solid)? {
                 Kind::Solid => within.solid(entities, solid, place),
                 _ => Err(entities.unsupported(solid)),
             };

@@ -33,7 +33,8 @@ impl CellScale {
         // Sag grows with the square of a cell's size, hence the root.
         let wanted = bends.map(|bend| (bend / chord_mm).sqrt().max(1.0));
         let cell = [0, 1].map(|k| lengths[k].max(1e-9) / wanted[k]);
-        let most = LONGEST * cell[0].min(cell[1]);
+        // A face without extent along one parameter has no bend there either.
+        let most = LONGEST * cell[0].min(cell[1]).max(chord_mm);
         let count = [0, 1].map(|k| lengths[k].max(1e-9) / cell[k].min(most));
         Self { low, cells: [0, 1].map(|k| count[k] / size[k]), count }
     }

@@ -31,9 +31,11 @@ pub(super) fn ears(outer: Vec<Corner>, mut holes: Vec<Vec<Corner>>) -> Vec<[usiz
 
 /// Joins a hole to a ring by a line there and back, the shortest that crosses neither.
 fn join(ring: &mut Vec<Corner>, hole: &[Corner]) {
-    let mut pairs: Vec<(f64, usize, usize)> = Vec::with_capacity(ring.len() * hole.len());
-    for (i, a) in ring.iter().enumerate() {
-        for (k, b) in hole.iter().enumerate() {
+    let some = |list: &[Corner]| (0..list.len()).step_by(list.len().div_ceil(MOST_ENDS));
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+    for i in some(ring) {
+        for k in some(hole) {
+            let (a, b) = (ring[i], hole[k]);
             pairs.push(((a.at.x - b.at.x).hypot(a.at.y - b.at.y), i, k));
         }
     }
@@ -49,6 +51,8 @@ fn join(ring: &mut Vec<Corner>, hole: &[Corner]) {
     ring.splice(i + 1..i + 1, way);
 }
 
+/// The greatest number of corners of a ring from which lines are tried.
+const MOST_ENDS: usize = 500;
 /// The greatest number of lines that are tried to join a hole.
 const MOST_LINES: usize = 1000;
 

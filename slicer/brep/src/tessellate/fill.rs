@@ -20,6 +20,8 @@ use crate::vector::{Vec3, cross, distance, dot, length, middle, sub, unit};
 
 type Triangles = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
+/// The greatest number of corners of a face whose loops cross.
+const MOST_CROSSED: usize = 5_000;
 /// The greatest number of rounds of halving.
 const MAX_ROUNDS: usize = 40;
 /// The greatest number of cells of a face: a sphere of 100 mm at a chord of 0.3 um.
@@ -75,6 +77,10 @@ fn crossed(
         };
         rings.push(polygon.iter().enumerate().map(corner).collect::<Vec<_>>());
         nodes.extend(polygon);
+    }
+    // Cutting ears takes time with the square of their number.
+    if nodes.len() > MOST_CROSSED {
+        return Err(Fault::Crossing);
     }
     let Some(mut outer) = rings.pop() else { return Err(Fault::Unbounded) };
     let is_clockwise = ring_area(&outer) < 0.0;

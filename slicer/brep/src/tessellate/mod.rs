@@ -36,8 +36,7 @@ struct Node {
 const CLEAR: f64 = 4.0;
 /// The greatest number of facets, which take about 5 GB of memory.
 pub const MAX_FACETS: usize = 50_000_000;
-/// The greatest number of cells of all faces, with about three facets each. They take some
-/// 300 MB of memory.
+/// The greatest number of cells of all faces, with one to three facets each.
 const MAX_CELLS: f64 = 1e6;
 /// The greatest number of points on edges.
 const MAX_POINTS: usize = 5_000_000;
@@ -100,7 +99,7 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
     for edge in &model.edges {
         chains.push(chain(edge, model, chord_mm, &mut points));
         if points.len() > MAX_POINTS {
-            return Err(BrepError::TooMany { most: MAX_FACETS });
+            return Err(BrepError::TooMany { most: MAX_POINTS });
         }
     }
     let shared = points.len();

@@ -33,6 +33,8 @@ pub(crate) struct Figures {
     pub(crate) name: String,
     pub(crate) path: PathBuf,
     pub(crate) bodies: u64,
+    /// Whether the reference finds a solid in the file; a refusal is right where it does not.
+    pub(crate) has_solid: bool,
     /// The least and the greatest corner, if there is a body.
     pub(crate) box_mm: Option<[[f64; 3]; 2]>,
     /// The volume, if there is a body.
@@ -61,10 +63,12 @@ impl Figures {
             sides[side] = place;
         }
         let corners: Option<[f64; 6]> = sides.try_into().ok();
+        let solids = of_file["solids"].as_u64().unwrap_or(0);
         Self {
             name: name.to_owned(),
             path: folder.join(name),
-            bodies: if sewn.is_some() { 1 } else { of_file["solids"].as_u64().unwrap_or(0) },
+            bodies: if sewn.is_some() { 1 } else { solids },
+            has_solid: solids > 0,
             box_mm: corners.map(|[a, b, c, d, e, f]| [[a, b, c], [d, e, f]]),
             volume_mm3,
             heights_mm: list("section_z_mm"),

@@ -23,7 +23,7 @@ pub(crate) struct Verdict {
     /// `None` if the part was refused.
     errors: Option<Errors>,
     /// Whether the reference has a body.
-    has_body: bool,
+    has_solid: bool,
 }
 
 /// The errors of a part.
@@ -63,15 +63,14 @@ impl Errors {
 impl Verdict {
     pub(crate) fn new(figures: &Figures, answer: Answer) -> Self {
         let errors = answer.read.as_ref().ok().map(|part| Errors::new(part, figures));
-        let has_body = figures.volume_mm3.is_some();
-        Self { name: figures.name.clone(), answer, errors, has_body }
+        Self { name: figures.name.clone(), answer, errors, has_solid: figures.has_solid }
     }
 
-    /// Returns whether the part is the reference's, or is refused where that has no body.
+    /// Returns whether the part is the reference's, or is refused where that has no solid.
     pub(crate) fn is_right(&self) -> bool {
         match (&self.errors, &self.answer.read) {
             (Some(errors), _) => errors.is_none(),
-            (None, Err(why)) => !self.has_body && why != ENDED,
+            (None, Err(why)) => !self.has_solid && why != ENDED,
             (None, Ok(_)) => false,
         }
     }
