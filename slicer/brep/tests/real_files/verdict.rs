@@ -22,7 +22,7 @@ pub(crate) struct Verdict {
     answer: Answer,
     /// `None` if the part was refused.
     errors: Option<Errors>,
-    /// Whether the reference has a body.
+    /// Whether the reference finds a solid.
     has_solid: bool,
 }
 
