@@ -76,7 +76,7 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     let index = |facet: &Facet| (facet.face - body.faces.start) as usize;
     let mut areas = vec![0.0; count];
     facets.iter().for_each(|facet| areas[index(facet)] += length(doubled(mesh, facet)));
-    let pieces = pieces(&neighbours(facets, count, index));
+    let pieces = pieces(&neighbours(uses(facets, index).values(), count));
     let mut turned = vec![false; count];
     for piece in &pieces {
         let area = |side: bool| -> f64 {
@@ -102,26 +102,34 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     turned
 }
 
-/// Returns the neighbours of each face, and whether they contradict it by following a
-/// shared edge in the same direction.
-fn neighbours(
+/// Returns for each edge of facets the faces that follow it, and which way they do.
+fn uses(
     facets: &[Facet],
-    count: usize,
     index: impl Fn(&Facet) -> usize,
-) -> Vec<Vec<(usize, bool)>> {
-    let mut edges: HashMap<[u32; 2], Vec<(usize, bool)>> = HashMap::new();
+) -> HashMap<[u32; 2], Vec<(usize, bool)>> {
+    let mut uses: HashMap<[u32; 2], Vec<(usize, bool)>> = HashMap::new();
     for facet in facets {
         for [a, b] in sides(facet) {
-            edges.entry([a.min(b), a.max(b)]).or_default().push((index(facet), a > b));
+            uses.entry([a.min(b), a.max(b)]).or_default().push((index(facet), a > b));
         }
     }
+    uses
+}
+
+/// Returns the neighbours of each of `count` faces or loops, and whether they contradict it by
+/// following a shared edge in the same direction. `uses` tells for each edge who follows it,
+/// and which way.
+pub(crate) fn neighbours<'a>(
+    uses: impl Iterator<Item = &'a Vec<(usize, bool)>>,
+    count: usize,
+) -> Vec<Vec<(usize, bool)>> {
     let mut list = vec![Vec::new(); count];
-    for uses in edges.values() {
-        if let &[(a, down), (b, other)] = uses.as_slice()
+    for uses in uses {
+        if let &[(a, way), (b, other)] = uses.as_slice()
             && a != b
         {
-            list[a].push((b, down == other));
-            list[b].push((a, down == other));
+            list[a].push((b, way == other));
+            list[b].push((a, way == other));
         }
     }
     for list in &mut list {
@@ -131,9 +139,9 @@ fn neighbours(
     list
 }
 
-/// Returns the connected groups of faces, each face with its side: faces on different
-/// sides contradict each other. A face without neighbours is a group of its own.
-fn pieces(neighbours: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
+/// Returns the connected groups of faces or loops, each with its side: those on different sides
+/// contradict each other. One without neighbours is a group of its own.
+pub(crate) fn pieces(neighbours: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
     let mut pieces = Vec::new();
     let mut seen = vec![false; neighbours.len()];
     for first in 0..neighbours.len() {

@@ -12,7 +12,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 use super::cells::{Borders, CellScale};
 use super::ears::{Corner, doubled, ears, refine};
-use super::{FacePoints, Node};
+use super::{FacePoints, MAX_CELLS, Node};
 use crate::geometry::Surface;
 use crate::kernel::Fault;
 use crate::model::Face;
@@ -24,8 +24,6 @@ type Triangles = ConstrainedDelaunayTriangulation<Point2<f64>>;
 const MOST_CROSSED: usize = 5_000;
 /// The greatest number of rounds of halving.
 const MAX_ROUNDS: usize = 40;
-/// The greatest number of cells of a face: a sphere of 100 mm at a chord of 0.3 um.
-const MAX_CELLS: f64 = 1e6;
 /// The greatest number of corners that halving may add: per cell, and regardless of cells.
 const MORE: [usize; 2] = [4, 20_000];
 
