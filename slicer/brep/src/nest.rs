@@ -44,7 +44,6 @@ pub(crate) fn turn_shells(
 /// Returns for each shell whether it points the wrong way.
 fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize) -> Vec<bool> {
     let mut volumes = vec![0.0; count];
-    let mut rays: Vec<RayPoint> = Vec::with_capacity(count);
     let mut widest = vec![(0.0, 0); count];
     let about = facets.first().map_or([0.0; 3], |facet| mesh.corners(facet)[0]);
     for (number, facet) in facets.iter().enumerate() {
@@ -55,7 +54,8 @@ fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize)
             widest[shell] = (seen, number);
         }
     }
-    rays.extend(widest.iter().map(|(_, facet)| RayPoint { facet: *facet, shares: SHARES[0] }));
+    let best = widest.iter().map(|(_, facet)| RayPoint { facet: *facet, shares: SHARES[0] });
+    let rays: Vec<RayPoint> = best.collect();
     let is_wrong = |(shell, hits): (usize, Vec<Hit>)| {
         let own = hits.iter().position(|hit| hit.facet == rays[shell].facet).unwrap_or(0);
         let others = hits[..own].iter().filter(|hit| shells[hit.facet] != shell);
