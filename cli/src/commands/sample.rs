@@ -101,7 +101,7 @@ impl SampleArgs {
             Sample::Torus => StepSample::Torus,
             Sample::Cone => StepSample::Cone,
             Sample::Tower => StepSample::Tower,
-            Sample::Blade | Sample::Cube => {
+            _ => {
                 let why = format!("{} is available as STL only: name a .stl file", part.name());
                 return Err(Exit::usage(why));
             }
