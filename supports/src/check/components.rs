@@ -1,0 +1,294 @@
+//! The connected components of a layer, white and black, on runs.
+//!
+//! A row of n transitions has n + 1 segments, black and white in turns; the first is empty if the
+//! row starts white. Segments of one colour that touch in neighbouring rows are joined
+//! (union-find), so the cost follows the transitions.
+
+use std::ops::Range;
+
+use lamp_stack::Mask;
+
+/// The label of an empty segment.
+const NONE: u32 = u32::MAX;
+
+/// The components of an image, 4-connected, in the order of their first pixels.
+#[derive(Debug)]
+pub(super) struct Components {
+    /// The component of each segment, row by row.
+    labels: Vec<u32>,
+    /// The first segment of each row, and the end.
+    row_starts: Vec<u32>,
+    pub(super) all: Vec<Component>,
+}
+
+/// Pixels of one colour that touch at their sides.
+#[derive(Clone, Debug)]
+pub(super) struct Component {
+    pub(super) is_white: bool,
+    /// The column and row of the first pixel, by rows.
+    pub(super) first: [u32; 2],
+    pub(super) area: u64,
+    /// Twice the sum over its pixels of the columns of their centres.
+    twice_x: u64,
+    /// The sum over its pixels of their rows.
+    sum_y: u64,
+    pub(super) columns: Range<u32>,
+    pub(super) rows: Range<u32>,
+}
+
+impl Component {
+    fn new(is_white: bool, row: u32, columns: &Range<u32>) -> Self {
+        Self {
+            is_white,
+            first: [columns.start, row],
+            area: 0,
+            twice_x: 0,
+            sum_y: 0,
+            columns: columns.clone(),
+            rows: row..row + 1,
+        }
+    }
+
+    #[inline]
+    fn add(&mut self, row: u32, columns: &Range<u32>) {
+        let len = u64::from(columns.end - columns.start);
+        self.area += len;
+        self.twice_x += len * u64::from(columns.start + columns.end);
+        self.sum_y += len * u64::from(row);
+        self.columns.start = self.columns.start.min(columns.start);
+        self.columns.end = self.columns.end.max(columns.end);
+        self.rows.end = row + 1;
+    }
+
+    /// Returns the sums over its pixels of the columns and rows of their centres.
+    pub(super) fn moments(&self) -> [f64; 2] {
+        [self.twice_x as f64 / 2.0, self.sum_y as f64 + self.area as f64 / 2.0]
+    }
+
+    /// Returns the mean of its pixels' centres, as column and row.
+    pub(super) fn centroid(&self) -> [f64; 2] {
+        self.moments().map(|moment| moment / self.area as f64)
+    }
+}
+
+impl Components {
+    pub(super) fn of(mask: &Mask) -> Self {
+        let segments = mask.change_count() + mask.height() as usize;
+        let mut sets = Sets { parents: Vec::new() };
+        let mut labels = vec![NONE; segments];
+        let mut row_starts = Vec::with_capacity(mask.height() as usize + 1);
+        let (mut start, mut above_start) = (0, 0);
+        let mut above: &[u32] = &[];
+        for (number, row) in mask.rows().enumerate() {
+            row_starts.push(start as u32);
+            let end = start + row.len() + 1;
+            let (before, of_row) = labels[..end].split_at_mut(start);
+            if number > 0 {
+                sets.join_rows(above, &before[above_start..], row, of_row, mask.width());
+            }
+            sets.label_rest(row, of_row);
+            (above, above_start, start) = (row, start, end);
+        }
+        row_starts.push(start as u32);
+        let all = gather(mask, &mut labels, sets);
+        Self { labels, row_starts, all }
+    }
+
+    /// Returns the components of a row's segments.
+    pub(super) fn of_row(&self, row: u32) -> &[u32] {
+        let row = row as usize;
+        &self.labels[self.row_starts[row] as usize..self.row_starts[row + 1] as usize]
+    }
+
+    /// Returns the rows and columns of a component's runs, from the top.
+    pub(super) fn runs<'a>(
+        &'a self,
+        mask: &'a Mask,
+        component: u32,
+    ) -> impl Iterator<Item = (u32, Range<u32>)> + 'a {
+        let Component { rows, columns, .. } = &self.all[component as usize];
+        rows.clone().flat_map(move |row| {
+            let transitions = mask.row(row);
+            let first = transitions.partition_point(|&t| t <= columns.start);
+            let of_row = self.of_row(row);
+            (first..of_row.len())
+                .map(move |k| (segment(transitions, mask.width(), k), of_row[k]))
+                .take_while(move |(segment, _)| segment.start < columns.end)
+                .filter(move |(_, label)| *label == component)
+                .map(move |(segment, _)| (row, segment))
+        })
+    }
+
+    /// Returns whether a component holds a full square of pixels.
+    pub(super) fn holds_square(&self, mask: &Mask, component: u32, side: u32) -> bool {
+        let Component { area, rows, columns, .. } = &self.all[component as usize];
+        let room = rows.len().min(columns.len()) as u64;
+        room >= u64::from(side)
+            && *area >= u64::from(side).pow(2)
+            && holds_square(self.runs(mask, component), side)
+    }
+
+    /// Returns the component that holds a pixel.
+    pub(super) fn at(&self, mask: &Mask, column: u32, row: u32) -> u32 {
+        self.of_row(row)[mask.row(row).partition_point(|&t| t <= column)]
+    }
+}
+
+/// Returns whether runs, by row and column, hold a full square of pixels.
+pub(super) fn holds_square(runs: impl Iterator<Item = (u32, Range<u32>)>, side: u32) -> bool {
+    // What the last rows have in common, for one row, two rows and so on.
+    let mut common: Vec<Vec<Range<u32>>> = vec![Vec::new(); side as usize];
+    let mut of_row: Vec<Range<u32>> = Vec::new();
+    let mut last_row = None;
+    let mut runs = runs.peekable();
+    while let Some((row, columns)) = runs.next() {
+        if columns.end - columns.start >= side {
+            of_row.push(columns);
+        }
+        if runs.peek().is_some_and(|(next, _)| *next == row) {
+            continue;
+        }
+        if last_row.is_none_or(|last| last + 1 != row) {
+            common.iter_mut().for_each(Vec::clear);
+        }
+        for rows in (1..side as usize).rev() {
+            let [upper, here] = common.get_disjoint_mut([rows - 1, rows]).expect("they differ");
+            intersect(upper, &of_row, side, here);
+        }
+        std::mem::swap(&mut common[0], &mut of_row);
+        of_row.clear();
+        if !common[side as usize - 1].is_empty() {
+            return true;
+        }
+        last_row = Some(row);
+    }
+    false
+}
+
+/// Writes what two lists of ranges have in common, without what is shorter than `least`.
+fn intersect(a: &[Range<u32>], b: &[Range<u32>], least: u32, out: &mut Vec<Range<u32>>) {
+    out.clear();
+    let (mut i, mut j) = (0, 0);
+    while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
+        let both = x.start.max(y.start)..x.end.min(y.end);
+        if both.end >= both.start.saturating_add(least) {
+            out.push(both);
+        }
+        if x.end <= y.end { i += 1 } else { j += 1 }
+    }
+}
+
+/// Returns the columns of a row's segment.
+#[inline]
+fn segment(row: &[u32], width: u32, k: usize) -> Range<u32> {
+    let start = k.checked_sub(1).map_or(0, |before| row[before]);
+    start..row.get(k).copied().unwrap_or(width)
+}
+
+/// Calls `met` with the numbers of the segments of two rows that overlap, and the columns that
+/// both have. Segments of one colour have both even or both odd numbers.
+#[inline]
+pub(super) fn for_each_overlap(
+    a: &[u32],
+    b: &[u32],
+    width: u32,
+    mut met: impl FnMut(usize, usize, Range<u32>),
+) {
+    let mut start = 0;
+    // Rows that start white have an empty first segment.
+    let (mut i, mut j) = (usize::from(a.first() == Some(&0)), usize::from(b.first() == Some(&0)));
+    while start < width {
+        let ends = [a.get(i), b.get(j)].map(|end| end.copied().unwrap_or(width));
+        let end = ends[0].min(ends[1]);
+        met(i, j, start..end);
+        i += usize::from(ends[0] == end);
+        j += usize::from(ends[1] == end);
+        start = end;
+    }
+}
+
+/// Labels as sets: each points to a lower one of its set, the lowest to itself.
+struct Sets {
+    parents: Vec<u32>,
+}
+
+impl Sets {
+    fn root(&mut self, mut label: u32) -> u32 {
+        while self.parents[label as usize] != label {
+            let next = self.parents[self.parents[label as usize] as usize];
+            self.parents[label as usize] = next;
+            label = next;
+        }
+        label
+    }
+
+    /// Labels the segments of a row that touch some of their colour in the row above.
+    fn join_rows(
+        &mut self,
+        above: &[u32],
+        labels_above: &[u32],
+        row: &[u32],
+        labels: &mut [u32],
+        width: u32,
+    ) {
+        if above == row {
+            labels.copy_from_slice(labels_above);
+            return;
+        }
+        for_each_overlap(above, row, width, |i, j, _| {
+            if (i ^ j) & 1 == 1 {
+                return;
+            }
+            let (upper, lower) = (labels_above[i], labels[j]);
+            if lower == NONE {
+                labels[j] = upper;
+            } else if lower != upper {
+                let [a, b] = [upper, lower].map(|label| self.root(label));
+                self.parents[a.max(b) as usize] = a.min(b);
+                labels[j] = a.min(b);
+            }
+        });
+    }
+
+    /// Gives new labels to the segments of a row that have none.
+    fn label_rest(&mut self, row: &[u32], labels: &mut [u32]) {
+        let starts_white = usize::from(row.first() == Some(&0));
+        for label in labels[starts_white..].iter_mut().filter(|label| **label == NONE) {
+            *label = self.parents.len() as u32;
+            self.parents.push(*label);
+        }
+    }
+}
+
+/// Numbers the sets of labels, and gathers what is known of each.
+fn gather(mask: &Mask, labels: &mut [u32], sets: Sets) -> Vec<Component> {
+    let Sets { mut parents } = sets;
+    let mut count = 0;
+    for label in 0..parents.len() {
+        // Labels point at lower ones, which have their numbers by now.
+        parents[label] = match parents[label] as usize {
+            parent if parent == label => count,
+            parent => parents[parent],
+        };
+        count += u32::from(parents[label] == count);
+    }
+    let mut all: Vec<Component> = Vec::with_capacity(count as usize);
+    let mut labels = labels.iter_mut();
+    for (row, transitions) in (0..).zip(mask.rows()) {
+        let mut start = 0;
+        let ends = transitions.iter().copied().chain([mask.width()]);
+        for (k, (end, label)) in ends.zip(labels.by_ref()).enumerate() {
+            let columns = start..end;
+            start = end;
+            if *label == NONE {
+                continue;
+            }
+            *label = parents[*label as usize];
+            if *label as usize == all.len() {
+                all.push(Component::new(k % 2 == 1, row, &columns));
+            }
+            all[*label as usize].add(row, &columns);
+        }
+    }
+    all
+}

@@ -1,0 +1,284 @@
+//! What a check finds.
+
+use std::cmp::Reverse;
+use std::ops::Range;
+
+use lamp_stack::{Dpi, PageInfo};
+
+/// A rectangle of pixels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// The columns, from the left.
+    pub columns: Range<u32>,
+    /// The rows, from the top.
+    pub rows: Range<u32>,
+}
+
+impl Region {
+    /// Grows the region to hold another one, too.
+    pub(super) fn unite(&mut self, other: &Self) {
+        let both = |a: &Range<u32>, b: &Range<u32>| a.start.min(b.start)..a.end.max(b.end);
+        self.columns = both(&self.columns, &other.columns);
+        self.rows = both(&self.rows, &other.rows);
+    }
+
+    /// Returns whether the region, grown by `by` pixels on each side, meets another one.
+    pub(super) fn is_near(&self, other: &Self, by: u32) -> bool {
+        let near = |a: &Range<u32>, b: &Range<u32>| {
+            a.start < b.end.saturating_add(by) && b.start < a.end.saturating_add(by)
+        };
+        near(&self.columns, &other.columns) && near(&self.rows, &other.rows)
+    }
+}
+
+/// White that rests on nothing when it is built (002 section 4.2.2).
+///
+/// Layers are counted from the first one of the stack, which stands on the platform.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Island {
+    /// Its number: islands are counted as they begin, in a layer by their first pixels.
+    pub number: u64,
+    /// The layer where it begins.
+    pub layer: u32,
+    /// Its first pixel by rows, column and row, in that layer.
+    pub first: [u32; 2],
+    /// Its pixels in that layer.
+    pub area: u64,
+    /// The mean of their centres, as column and row: the centre of the first pixel is at (0.5, 0.5).
+    pub centroid: [f64; 2],
+    /// The rectangle around them.
+    pub region: Region,
+    /// The pixels of the layers until it joins. Where two islands join, the elder goes on.
+    pub floating_pixels: u64,
+    /// The sum of floating pixels times the thickness of their layers, in micrometres.
+    pub floating_pixels_um: f64,
+    /// The most pixels that float in one layer.
+    pub largest_area: u64,
+    /// The first layer that has them.
+    pub largest_layer: u32,
+    /// What becomes of it.
+    pub end: End,
+}
+
+/// What becomes of an island.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// It never joins.
+    Loose,
+    /// It joins what stands on the platform.
+    JoinsPart {
+        /// The first layer that joins them.
+        layer: u32,
+    },
+    /// It joins an elder island.
+    JoinsIsland {
+        /// The first layer that joins them.
+        layer: u32,
+        /// The elder's number.
+        number: u64,
+    },
+}
+
+/// White that rests on little.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeakJoint {
+    /// The layer.
+    pub layer: u32,
+    /// The pixels of the component.
+    pub area: u64,
+    /// Those above white.
+    pub support: u64,
+    /// The mean of the component's pixels, as column and row.
+    pub centroid: [f64; 2],
+    /// The rectangle around it.
+    pub region: Region,
+}
+
+/// White that reaches far beyond the white below, in layers that follow each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Overhang {
+    /// The first and the last layer.
+    pub layers: [u32; 2],
+    /// The pixels that lie too far from white below.
+    pub area: u64,
+    /// The largest distance to white below, squared, in pixels.
+    pub reach_squared: u64,
+    /// The first layer that reaches so far.
+    pub reach_layer: u32,
+    /// The pixel of that layer that does, as column and row.
+    pub farthest: [u32; 2],
+    /// The rectangle around all.
+    pub region: Region,
+}
+
+impl Overhang {
+    /// Returns the largest distance to white below, in pixels.
+    pub fn reach_pixels(&self) -> f64 {
+        (self.reach_squared as f64).sqrt()
+    }
+}
+
+/// How a pocket is closed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PocketKind {
+    /// Nothing leads out: what it holds stays in.
+    Trap,
+    /// It opens at the top only.
+    Cup,
+    /// The platform closes it.
+    Sealed,
+    /// It has ways out, all too narrow.
+    Narrow,
+}
+
+/// Black without a way to the image's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pocket {
+    /// How it is closed.
+    pub kind: PocketKind,
+    /// The first and the last layer.
+    pub layers: [u32; 2],
+    /// Its pixels, in all layers.
+    pub pixels: u64,
+    /// The sum of its pixels times the thickness of their layers, in micrometres.
+    pub pixels_um: f64,
+    /// Its first pixel by rows, column and row, in its first layer.
+    pub first: [u32; 2],
+    /// The rectangle around it.
+    pub region: Region,
+}
+
+/// A body whose centre of gravity leaves its base as it is built (002 section 4.1.1).
+#[derive(Clone, Debug, PartialEq)]
+pub struct OffBalance {
+    /// The first layer after which it is off.
+    pub layer: u32,
+    /// The layer after which it is farthest off.
+    pub worst_layer: u32,
+    /// How far it is then from the convex hull of the body's first layer, in pixels.
+    pub off_pixels: f64,
+    /// The centre of gravity then, as column and row.
+    pub centre: [f64; 2],
+    /// The rectangle around the body's first layer.
+    pub base: Region,
+}
+
+/// What the page of a layer says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerFacts {
+    /// The index on the page.
+    pub index: u32,
+    /// The height of the layer's bottom in micrometres.
+    pub z_um: Option<f64>,
+    /// The layer's thickness in micrometres.
+    pub thickness_um: Option<f64>,
+    /// The number of stray rows.
+    pub stray_rows: u32,
+    /// Whether the layer has white.
+    pub has_white: bool,
+    /// Whether it has white at the image's border.
+    pub white_at_border: bool,
+}
+
+/// A list that ends where memory would grow without bound.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Listed<T> {
+    /// What is listed.
+    pub list: Vec<T>,
+    /// How many more there are.
+    pub left_out: u64,
+}
+
+impl<T> Default for Listed<T> {
+    fn default() -> Self {
+        Self { list: Vec::new(), left_out: 0 }
+    }
+}
+
+impl<T> Listed<T> {
+    const MOST: usize = 100_000;
+
+    pub(super) fn push(&mut self, item: T) {
+        if self.list.len() < Self::MOST {
+            self.list.push(item);
+        } else {
+            self.left_out += 1;
+        }
+    }
+
+    /// Returns how many there are.
+    pub fn count(&self) -> u64 {
+        self.list.len() as u64 + self.left_out
+    }
+}
+
+/// What a check finds in a stack. The lists begin with the worst.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Findings {
+    /// The layers, from the first.
+    pub layers: Vec<LayerFacts>,
+    /// The resolution, if the pages state one.
+    pub dpi: Option<Dpi>,
+    /// The top left corner of the images in part coordinates, in millimetres, if stated.
+    pub origin_mm: Option<[f64; 2]>,
+    /// The images' width and height in pixels.
+    pub size: [u32; 2],
+    /// Islands, by what floats.
+    pub islands: Listed<Island>,
+    /// Islands that never hold a square of the size of a speck, as they begin.
+    pub specks: Listed<Island>,
+    /// Weak joints, the weakest first.
+    pub weak_joints: Listed<WeakJoint>,
+    /// Overhangs by reach, if the limit is known.
+    pub overhangs: Listed<Overhang>,
+    /// Pockets by kind and size.
+    pub pockets: Listed<Pocket>,
+    /// Bodies that are off balance, the farthest first.
+    pub off_balance: Listed<OffBalance>,
+}
+
+impl LayerFacts {
+    pub(super) fn new(info: &PageInfo) -> Self {
+        Self {
+            index: info.index,
+            z_um: info.z_um,
+            thickness_um: info.thickness_um,
+            stray_rows: info.stray_rows.len() as u32,
+            has_white: false,
+            white_at_border: false,
+        }
+    }
+}
+
+impl Findings {
+    /// Puts the worst of each kind first; equals stay in the order of the layers.
+    pub(super) fn sort(&mut self) {
+        self.islands.list.sort_by_key(|island| (Reverse(island.floating_pixels), island.number));
+        self.specks.list.sort_by_key(|island| island.number);
+        let share = |joint: &WeakJoint| joint.support as f64 / joint.area as f64;
+        self.weak_joints
+            .list
+            .sort_by(|a, b| share(a).total_cmp(&share(b)).then(a.layer.cmp(&b.layer)));
+        self.overhangs
+            .list
+            .sort_by_key(|overhang| (Reverse(overhang.reach_squared), overhang.layers));
+        self.pockets
+            .list
+            .sort_by_key(|pocket| (pocket.kind, Reverse(pocket.pixels), pocket.born()));
+        self.off_balance.list.sort_by(|a, b| {
+            b.off_pixels.total_cmp(&a.off_pixels).then(a.worst_layer.cmp(&b.worst_layer))
+        });
+    }
+
+    /// Returns the runs of layers, as the first and the last, that hold.
+    pub fn runs_of_layers(&self, holds: impl Fn(&LayerFacts) -> bool) -> Vec<[u32; 2]> {
+        let mut runs: Vec<[u32; 2]> = Vec::new();
+        for (layer, _) in (0..).zip(&self.layers).filter(|(_, facts)| holds(facts)) {
+            match runs.last_mut() {
+                Some([_, last]) if *last + 1 == layer => *last = layer,
+                _ => runs.push([layer; 2]),
+            }
+        }
+        runs
+    }
+}

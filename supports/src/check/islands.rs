@@ -1,0 +1,160 @@
+//! White bodies as they grow: which stand on the platform, which float, and where they join.
+
+use super::balance::Base;
+use super::components::Component;
+use super::contact::{Contact, Labelled};
+use super::findings::{End, Island, Listed, OffBalance, Region};
+use super::live::{Group, Live, Next};
+
+/// The white bodies of the layers so far.
+pub(super) struct Growth {
+    live: Live<Body>,
+    begun: u64,
+    speck: u32,
+    pub(super) islands: Listed<Island>,
+    pub(super) specks: Listed<Island>,
+    pub(super) off_balance: Listed<OffBalance>,
+}
+
+/// White that is joined so far.
+enum Body {
+    /// It stands on the platform.
+    Standing(Base),
+    Floating(Floating),
+}
+
+struct Floating {
+    /// What is known of it so far.
+    island: Island,
+    holds_square: bool,
+}
+
+impl Growth {
+    pub(super) fn new(speck: u32) -> Self {
+        Self {
+            live: Live::new(true),
+            begun: 0,
+            speck,
+            islands: Listed::default(),
+            specks: Listed::default(),
+            off_balance: Listed::default(),
+        }
+    }
+
+    /// Adds a layer, given its number from the first and how it rests on the one below.
+    pub(super) fn add(
+        &mut self,
+        layer: &Labelled,
+        contact: Option<&Contact>,
+        number: u32,
+        thickness_um: f64,
+    ) {
+        let joints = contact.map_or(&[][..], |contact| &contact.joints);
+        let Next { groups, ended } = self.live.add(layer, joints);
+        ended.into_iter().for_each(|body| self.end(body));
+        for Group { bodies, components } in groups {
+            let mut body = match (bodies.is_empty(), contact) {
+                (true, None) => Body::Standing(Base::of(layer, &components)),
+                (true, Some(_)) => {
+                    self.begin(&layer.components.all[components[0] as usize], number)
+                }
+                (false, _) => self.unite(bodies, number),
+            };
+            match &mut body {
+                Body::Standing(base) => base.grow(layer, &components, number, thickness_um),
+                Body::Floating(island) => {
+                    island.grow(layer, &components, number, thickness_um, self.speck);
+                }
+            }
+            self.live.put(body);
+        }
+    }
+
+    /// Ends all bodies.
+    pub(super) fn finish(&mut self) {
+        let live = std::mem::replace(&mut self.live, Live::new(true));
+        live.finish().into_iter().for_each(|body| self.end(body));
+    }
+
+    fn begin(&mut self, component: &Component, layer: u32) -> Body {
+        self.begun += 1;
+        let island = Island {
+            number: self.begun,
+            layer,
+            first: component.first,
+            area: component.area,
+            centroid: component.centroid(),
+            region: component.region(),
+            floating_pixels: 0,
+            floating_pixels_um: 0.0,
+            largest_area: 0,
+            largest_layer: layer,
+            end: End::Loose,
+        };
+        Body::Floating(Floating { island, holds_square: false })
+    }
+
+    /// Makes one body of several: one that stands, or else the eldest island.
+    fn unite(&mut self, bodies: Vec<Body>, layer: u32) -> Body {
+        let (mut base, mut floating) = (None::<Base>, Vec::new());
+        for body in bodies {
+            match (body, &mut base) {
+                (Body::Standing(other), Some(base)) => base.unite(other),
+                (Body::Standing(first), none) => *none = Some(first),
+                (Body::Floating(island), _) => floating.push(island),
+            }
+        }
+        if let Some(base) = base {
+            let end = End::JoinsPart { layer };
+            floating.into_iter().for_each(|island| self.list(island, end));
+            return Body::Standing(base);
+        }
+        floating.sort_by_key(|floating| floating.island.number);
+        let mut floating = floating.into_iter();
+        let elder = floating.next().expect("a group has a body");
+        let end = End::JoinsIsland { layer, number: elder.island.number };
+        floating.for_each(|island| self.list(island, end));
+        Body::Floating(elder)
+    }
+
+    fn end(&mut self, body: Body) {
+        match body {
+            Body::Standing(base) => {
+                base.off().into_iter().for_each(|off| self.off_balance.push(off));
+            }
+            Body::Floating(island) => self.list(island, End::Loose),
+        }
+    }
+
+    fn list(&mut self, floating: Floating, end: End) {
+        let island = Island { end, ..floating.island };
+        let list = if floating.holds_square { &mut self.islands } else { &mut self.specks };
+        list.push(island);
+    }
+}
+
+impl Floating {
+    fn grow(
+        &mut self,
+        layer: &Labelled,
+        components: &[u32],
+        number: u32,
+        thickness_um: f64,
+        speck: u32,
+    ) {
+        let area: u64 = components.iter().map(|&c| layer.components.all[c as usize].area).sum();
+        let island = &mut self.island;
+        island.floating_pixels += area;
+        island.floating_pixels_um += area as f64 * thickness_um;
+        if area > island.largest_area {
+            (island.largest_area, island.largest_layer) = (area, number);
+        }
+        self.holds_square = self.holds_square || layer.hold_square(components, speck);
+    }
+}
+
+impl Component {
+    pub(super) fn region(&self) -> Region {
+        Region { columns: self.columns.clone(), rows: self.rows.clone() }
+    }
+}

@@ -1,0 +1,297 @@
+//! Finds what would be lost, trapped or bent as a stack is built, in one pass over its layers.
+//!
+//! Layers are labelled and compared with the layer below many at once; bodies are then joined
+//! layer by layer. Only the last layer is kept, and bodies that it has no part of are done.
+//!
+//! Source: 002 sections 4.1.1, 4.2 and 4.3 (algorithm 16, on images).
+
+mod balance;
+mod components;
+mod contact;
+mod findings;
+mod islands;
+mod live;
+mod overhang;
+mod overhangs;
+mod pockets;
+
+use std::num::{NonZeroU8, NonZeroU32};
+use std::ops::Range;
+
+use lamp_stack::{Dpi, Image, Layer, Length, Mask, MemorySize};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use components::Components;
+use contact::{Contact, Labelled};
+pub use findings::{
+    End, Findings, Island, LayerFacts, Listed, OffBalance, Overhang, Pocket, PocketKind, Region,
+    WeakJoint,
+};
+use islands::Growth;
+use overhangs::Overhangs;
+use pockets::Hollows;
+
+/// What counts as a finding.
+#[derive(Clone, Debug)]
+pub struct CheckOptions {
+    /// The level from which a gray pixel is white.
+    pub threshold: NonZeroU8,
+    /// The side in pixels of the square that a finding must hold, so that rounding to pixels is
+    /// none.
+    pub speck: NonZeroU32,
+    /// The share of a component's area that must rest on white.
+    pub least_support: f64,
+    /// How far white may reach beyond the white below; if `None`, as far as the layer is thick
+    /// (45°).
+    pub max_overhang: Option<Length>,
+}
+
+impl Default for CheckOptions {
+    fn default() -> Self {
+        Self {
+            threshold: NonZeroU8::MIN,
+            speck: NonZeroU32::new(3).expect("it is not zero"),
+            least_support: 0.25,
+            max_overhang: None,
+        }
+    }
+}
+
+/// A reason that a stack cannot be checked.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CheckError {
+    /// There are no layers.
+    #[error("there are no layers to check")]
+    NoLayers,
+    /// The layers cannot be compared pixel by pixel.
+    #[error(
+        "{layer} is {} x {} pixels, and the first layer {} x {}: layers are compared pixel by pixel",
+        size[0], size[1], first[0], first[1]
+    )]
+    Sizes {
+        /// The layer's name.
+        layer: String,
+        /// Its width and height.
+        size: [u32; 2],
+        /// Those of the first layer.
+        first: [u32; 2],
+    },
+    /// The images stand in different places.
+    #[error("{layer} has another origin than the first layer: layers are compared pixel by pixel")]
+    Origins {
+        /// The layer's name.
+        layer: String,
+    },
+}
+
+/// Checks a stack, given its layers from the first and how to decode one.
+///
+/// The first layer stands on the platform. Pixels touch at sides, in a layer and from layer to
+/// layer. Memory holds the last layer and those in work: two if they are large.
+///
+/// # Errors
+/// Returns the first error of the layers, or one if layers cannot be compared.
+pub fn check<T, E>(
+    layers: impl Iterator<Item = Result<T, E>>,
+    decode: impl Fn(T) -> Result<Layer, E> + Sync,
+    options: &CheckOptions,
+) -> Result<Findings, E>
+where
+    T: MemorySize + Send,
+    E: From<CheckError> + Send,
+{
+    let mut layers = layers.fuse();
+    let mut checker: Option<Checker> = None;
+    let mut last: Option<Checked> = None;
+    loop {
+        let batch = take_batch(&mut layers);
+        if batch.is_empty() {
+            return Ok(checker.ok_or(CheckError::NoLayers)?.finish());
+        }
+        let labelled = batch.into_par_iter().map(|item| {
+            let layer = decode(item?)?;
+            Ok(Checked::new(layer, options))
+        });
+        let batch: Vec<Checked> = labelled.collect::<Result<_, E>>()?;
+        let checker = checker.get_or_insert_with(|| Checker::new(&batch[0], options));
+        for layer in &batch {
+            checker.compare(layer)?;
+        }
+        let below = last.iter().chain(&batch[..batch.len() - 1]).map(Some);
+        let below: Vec<_> = last.is_none().then_some(None).into_iter().chain(below).collect();
+        let contacts = batch.par_iter().zip(below).map(|(layer, below)| {
+            let limit = checker.limit(&layer.facts);
+            let speck = options.speck.get();
+            below.map(|below| Contact::new(&below.labelled, &layer.labelled, limit, speck))
+        });
+        let contacts: Vec<_> = contacts.collect();
+        for (layer, contact) in batch.iter().zip(&contacts) {
+            checker.add(layer, contact.as_ref());
+        }
+        last = batch.into_iter().next_back();
+    }
+}
+
+/// Returns the runs of the component of white that holds a pixel, as rows and columns from the
+/// top; none if the pixel is black.
+pub fn white_component(mask: &Mask, column: u32, row: u32) -> Vec<(u32, Range<u32>)> {
+    if !mask.is_white(column, row) {
+        return Vec::new();
+    }
+    let components = Components::of(mask);
+    let component = components.at(mask, column, row);
+    components.runs(mask, component).collect()
+}
+
+/// The most layers that are in work at once, and the bytes from which there are two at most.
+const MOST_LAYERS: usize = 64;
+const LARGE_BYTES: usize = 32 << 20;
+
+fn take_batch<T: MemorySize, E>(
+    layers: &mut impl Iterator<Item = Result<T, E>>,
+) -> Vec<Result<T, E>> {
+    let threads = rayon::current_num_threads();
+    let (mut batch, mut bytes) = (Vec::new(), 0);
+    let few = |bytes: usize| if bytes < LARGE_BYTES { MOST_LAYERS.min(16 * threads) } else { 2 };
+    while batch.len() < few(bytes).min(16 * threads) {
+        let Some(layer) = layers.next() else { break };
+        bytes += layer.as_ref().map_or(LARGE_BYTES, MemorySize::bytes);
+        batch.push(layer);
+    }
+    batch
+}
+
+/// A layer, labelled.
+struct Checked {
+    facts: LayerFacts,
+    /// What names it in messages.
+    name: String,
+    dpi: Option<Dpi>,
+    origin_mm: Option<[f64; 2]>,
+    labelled: Labelled,
+}
+
+impl Checked {
+    fn new(layer: Layer, options: &CheckOptions) -> Self {
+        let Layer { info, dpi, image } = layer;
+        let mask = match image.into_image() {
+            Image::Mask(mask) => mask,
+            Image::Gray(gray) => gray.at_least(options.threshold.get()),
+        };
+        let labelled = Labelled::new(mask);
+        let mut facts = LayerFacts::new(&info);
+        facts.has_white = labelled.of_colour(true).next().is_some();
+        facts.white_at_border = labelled.of_colour(true).any(|white| labelled.reaches_frame(white));
+        Self { facts, name: info.name(), dpi, origin_mm: info.origin_mm, labelled }
+    }
+
+    fn size(&self) -> [u32; 2] {
+        [self.labelled.mask.width(), self.labelled.mask.height()]
+    }
+}
+
+/// What is found so far.
+struct Checker {
+    options: CheckOptions,
+    layers: Vec<LayerFacts>,
+    dpi: Option<Dpi>,
+    origin_mm: Option<[f64; 2]>,
+    size: [u32; 2],
+    growth: Growth,
+    hollows: Hollows,
+    overhangs: Overhangs,
+    weak_joints: Listed<WeakJoint>,
+}
+
+impl Checker {
+    fn new(first: &Checked, options: &CheckOptions) -> Self {
+        let speck = options.speck.get();
+        Self {
+            options: options.clone(),
+            layers: Vec::new(),
+            dpi: first.dpi,
+            origin_mm: first.origin_mm,
+            size: first.size(),
+            growth: Growth::new(speck),
+            hollows: Hollows::new(speck),
+            overhangs: Overhangs::default(),
+            weak_joints: Listed::default(),
+        }
+    }
+
+    /// Checks that a layer can be compared with the first.
+    fn compare(&self, layer: &Checked) -> Result<(), CheckError> {
+        let name = || layer.name.clone();
+        if layer.size() != self.size {
+            return Err(CheckError::Sizes { layer: name(), size: layer.size(), first: self.size });
+        }
+        match (layer.origin_mm, self.origin_mm) {
+            (Some(origin), Some(first)) if origin != first => {
+                Err(CheckError::Origins { layer: name() })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns how far white may reach beyond the white below, in pixels.
+    fn limit(&self, layer: &LayerFacts) -> Option<f64> {
+        let of_layer = || layer.thickness_um.map(Length::from_um);
+        Some(self.options.max_overhang.or_else(of_layer)?.pixels(self.dpi?))
+    }
+
+    fn add(&mut self, layer: &Checked, contact: Option<&Contact>) {
+        let number = self.layers.len() as u32;
+        // Without thicknesses, all layers weigh the same.
+        let thickness_um = layer.facts.thickness_um.unwrap_or(1.0);
+        self.growth.add(&layer.labelled, contact, number, thickness_um);
+        self.hollows.add(&layer.labelled, contact, number, thickness_um);
+        if let Some(contact) = contact {
+            self.add_weak_joints(&layer.labelled, contact, number);
+            let near = self.limit(&layer.facts).map_or(0, |limit| limit.ceil().min(1e9) as u32 + 1);
+            self.overhangs.add(&contact.patches, number, near);
+        }
+        self.layers.push(layer.facts);
+    }
+
+    fn add_weak_joints(&mut self, layer: &Labelled, contact: &Contact, number: u32) {
+        for joints in contact.joints.chunk_by(|a, b| a.component == b.component) {
+            let component = &layer.components.all[joints[0].component as usize];
+            let support = joints.iter().map(|joint| joint.pixels).sum::<u64>();
+            let is_weak = (support as f64) < self.options.least_support * component.area as f64;
+            if component.is_white
+                && is_weak
+                && layer.hold_square(&[joints[0].component], self.options.speck.get())
+            {
+                self.weak_joints.push(WeakJoint {
+                    layer: number,
+                    area: component.area,
+                    support,
+                    centroid: component.centroid(),
+                    region: component.region(),
+                });
+            }
+        }
+    }
+
+    fn finish(mut self) -> Findings {
+        self.growth.finish();
+        self.hollows.finish();
+        self.overhangs.finish();
+        let mut findings = Findings {
+            layers: self.layers,
+            dpi: self.dpi,
+            origin_mm: self.origin_mm,
+            size: self.size,
+            islands: self.growth.islands,
+            specks: self.growth.specks,
+            weak_joints: self.weak_joints,
+            overhangs: self.overhangs.ended,
+            pockets: self.hollows.pockets,
+            off_balance: self.growth.off_balance,
+        };
+        findings.sort();
+        findings
+    }
+}

@@ -1,0 +1,226 @@
+//! White that lies far from the white below.
+
+use std::ops::Range;
+
+use lamp_stack::{Mask, white_runs};
+
+use super::components::holds_square;
+
+/// White pixels of a row that may lie too far from the white below.
+#[derive(Clone, Debug)]
+pub(super) struct Unheld {
+    pub(super) row: u32,
+    pub(super) columns: Range<u32>,
+    pub(super) component: u32,
+}
+
+/// Pixels that touch at their sides and are too far from the white below.
+#[derive(Clone, Debug)]
+pub(super) struct OverhangPatch {
+    pub(super) columns: Range<u32>,
+    pub(super) rows: Range<u32>,
+    pub(super) area: u64,
+    /// The largest distance to white below, squared, in pixels.
+    pub(super) reach_squared: u64,
+    /// The pixel that is so far: column and row.
+    pub(super) farthest: [u32; 2],
+    pub(super) is_speck: bool,
+}
+
+/// Whether a distance, squared and in pixels, is within a limit. The margin takes up the rounding
+/// of a limit of whole pixels.
+fn is_within(squared: u64, limit: f64) -> bool {
+    squared as f64 <= limit * limit * (1.0 + 1e-9)
+}
+
+/// Returns the patches that lie farther than `limit` pixels from the white of `below`, by rows.
+/// The runs are sorted by row and column, and what white of their own row reaches is left out.
+pub(super) fn patches(below: &Mask, runs: &[Unheld], limit: f64, speck: u32) -> Vec<OverhangPatch> {
+    let mut far: Vec<(u32, Range<u32>)> = Vec::new();
+    let (mut left, mut next) = (Vec::new(), Vec::new());
+    for Unheld { row, columns, .. } in runs {
+        left.clear();
+        left.push(columns.clone());
+        for (distance, reach) in reaches(limit) {
+            for near in [row.checked_sub(distance), row.checked_add(distance)] {
+                let near = near.filter(|near| *near < below.height() && !left.is_empty());
+                let Some(near) = near else { continue };
+                next.clear();
+                left.iter()
+                    .for_each(|run| without(run, below.row(near), below.width(), reach, &mut next));
+                std::mem::swap(&mut left, &mut next);
+            }
+        }
+        far.extend(left.drain(..).map(|columns| (*row, columns)));
+    }
+    let groups = touching(&far);
+    groups.into_iter().map(|runs| patch(below, &runs, speck)).collect()
+}
+
+/// Returns how far white of a row reaches sideways, for each distance in rows.
+fn reaches(limit: f64) -> impl Iterator<Item = (u32, u32)> {
+    (0u32..).map_while(move |rows| {
+        let squared = u64::from(rows).pow(2);
+        is_within(squared, limit).then(|| {
+            let mut reach = (limit * limit - squared as f64).max(0.0).sqrt() as u64;
+            while is_within(squared + (reach + 1).pow(2), limit) {
+                reach += 1;
+            }
+            (rows, reach.min(u64::from(u32::MAX)) as u32)
+        })
+    })
+}
+
+/// Adds what is left of a run without the white of a row, grown by `reach` on both sides.
+fn without(run: &Range<u32>, row: &[u32], width: u32, reach: u32, out: &mut Vec<Range<u32>>) {
+    let mut start = run.start;
+    // The first white run that ends, grown, after the start.
+    let first = row.partition_point(|&t| t.saturating_add(reach) <= start) & !1;
+    for (from, to) in white_runs(&row[first..], width) {
+        let (from, to) = (from.saturating_sub(reach), to.saturating_add(reach));
+        if from >= run.end {
+            break;
+        }
+        if from > start {
+            out.push(start..from);
+        }
+        start = start.max(to);
+        if start >= run.end {
+            return;
+        }
+    }
+    out.push(start..run.end);
+}
+
+/// Gathers runs, sorted by row and column, that touch at their sides.
+fn touching(runs: &[(u32, Range<u32>)]) -> Vec<Vec<(u32, Range<u32>)>> {
+    let mut parents: Vec<usize> = (0..runs.len()).collect();
+    let (mut above, mut row) = (0..0, 0..0);
+    for (k, (number, columns)) in runs.iter().enumerate() {
+        if k == 0 || runs[k - 1].0 != *number {
+            let follows = k > 0 && runs[k - 1].0 + 1 == *number;
+            above = if follows { row } else { 0..0 };
+            row = k..k;
+        }
+        row.end = k + 1;
+        while above.start < above.end && runs[above.start].1.end <= columns.start {
+            above.start += 1;
+        }
+        for upper in above.clone().take_while(|&upper| runs[upper].1.start < columns.end) {
+            let [a, b] = [root(&mut parents, upper), root(&mut parents, k)];
+            parents[a.max(b)] = a.min(b);
+        }
+    }
+    let mut groups: Vec<Vec<(u32, Range<u32>)>> = Vec::new();
+    let mut group_of = vec![0; runs.len()];
+    for (k, run) in runs.iter().enumerate() {
+        let root = root(&mut parents, k);
+        if root == k {
+            group_of[k] = groups.len();
+            groups.push(Vec::new());
+        }
+        groups[group_of[root]].push(run.clone());
+    }
+    groups
+}
+
+fn root(parents: &mut [usize], mut item: usize) -> usize {
+    while parents[item] != item {
+        parents[item] = parents[parents[item]];
+        item = parents[item];
+    }
+    item
+}
+
+/// Measures a patch.
+fn patch(below: &Mask, runs: &[(u32, Range<u32>)], speck: u32) -> OverhangPatch {
+    let columns = runs.iter().map(|(_, columns)| columns);
+    let start = columns.clone().map(|columns| columns.start).min().unwrap_or_default();
+    let end = columns.clone().map(|columns| columns.end).max().unwrap_or_default();
+    let mut farthest = Farthest { below, squared: 0, at: [runs[0].1.start, runs[0].0] };
+    farthest.search(runs);
+    OverhangPatch {
+        columns: start..end,
+        rows: runs[0].0..runs[runs.len() - 1].0 + 1,
+        area: columns.map(|columns| u64::from(columns.end - columns.start)).sum(),
+        reach_squared: farthest.squared,
+        farthest: farthest.at,
+        is_speck: !holds_square(runs.iter().cloned(), speck),
+    }
+}
+
+/// The pixel found so far that is farthest from white.
+struct Farthest<'a> {
+    below: &'a Mask,
+    squared: u64,
+    at: [u32; 2],
+}
+
+impl Farthest<'_> {
+    fn search(&mut self, runs: &[(u32, Range<u32>)]) {
+        // The middles first: a good start leaves little to search.
+        for (row, columns) in runs {
+            self.measure(columns.start + (columns.end - columns.start) / 2, *row);
+        }
+        for (row, columns) in runs {
+            let ends = [columns.start, columns.end - 1];
+            let squared = ends.map(|column| self.measure(column, *row));
+            self.between(*row, ends, squared);
+        }
+    }
+
+    /// Searches between two columns of a row whose distances are known. A step of a pixel
+    /// changes the distance by a pixel at most.
+    fn between(&mut self, row: u32, ends: [u32; 2], squared: [u64; 2]) {
+        let [start, end] = ends;
+        let [a, b] = squared.map(|squared| (squared as f64).sqrt());
+        let most = (a + b + f64::from(end - start)) / 2.0;
+        if end - start < 2 || most < ((self.squared + 1) as f64).sqrt() - 1e-6 {
+            return;
+        }
+        let middle = start + (end - start) / 2;
+        let at_middle = self.measure(middle, row);
+        self.between(row, [start, middle], [squared[0], at_middle]);
+        self.between(row, [middle, end], [at_middle, squared[1]]);
+    }
+
+    /// Returns the squared distance of a pixel to the nearest white, and remembers the first of
+    /// the largest.
+    fn measure(&mut self, column: u32, row: u32) -> u64 {
+        let squared = nearest(self.below, column, row);
+        if squared > self.squared {
+            (self.squared, self.at) = (squared, [column, row]);
+        }
+        squared
+    }
+}
+
+/// Returns the squared distance in pixels from a pixel's centre to the nearest white one's.
+fn nearest(mask: &Mask, column: u32, row: u32) -> u64 {
+    let mut nearest = u64::MAX;
+    for distance in 0..mask.height() {
+        let squared = u64::from(distance).pow(2);
+        if squared >= nearest {
+            break;
+        }
+        for near in [row.checked_sub(distance), row.checked_add(distance)] {
+            let near = near.filter(|near| *near < mask.height());
+            if let Some(aside) = near.and_then(|near| aside(mask, column, near)) {
+                nearest = nearest.min(squared + u64::from(aside).pow(2));
+            }
+        }
+    }
+    nearest
+}
+
+/// Returns the distance in a row from a column to the nearest white one.
+fn aside(mask: &Mask, column: u32, row: u32) -> Option<u32> {
+    let transitions = mask.row(row);
+    let passed = transitions.partition_point(|&t| t <= column);
+    if passed % 2 == 1 {
+        return Some(0);
+    }
+    let left = passed.checked_sub(1).map(|end| column - (transitions[end] - 1));
+    let right = transitions.get(passed).map(|start| start - column);
+    left.into_iter().chain(right).min()
+}

@@ -1,0 +1,94 @@
+//! Gathers the patches of layers that follow each other.
+
+use super::findings::{Listed, Overhang, Region};
+use super::overhang::OverhangPatch;
+
+/// The overhangs of the layers so far.
+#[derive(Default)]
+pub(super) struct Overhangs {
+    /// The last layer's patches, and which of `open` each belongs to.
+    last: Vec<(Region, usize)>,
+    open: Vec<Overhang>,
+    pub(super) ended: Listed<Overhang>,
+}
+
+impl Overhangs {
+    /// Adds a layer's patches. Those whose boxes come within `near` pixels of one of the last
+    /// layer go on with it.
+    pub(super) fn add(&mut self, patches: &[OverhangPatch], number: u32, near: u32) {
+        let before = self.open.len();
+        let mut all = std::mem::take(&mut self.open);
+        let mut of_patch = Vec::new();
+        let mut parents: Vec<usize> = (0..before).collect();
+        for patch in patches.iter().filter(|patch| !patch.is_speck) {
+            let overhang = Overhang::of(patch, number);
+            let own = all.len();
+            parents.push(own);
+            for (region, group) in &self.last {
+                if region.is_near(&overhang.region, near) {
+                    let [a, b] = [root(&parents, *group), root(&parents, own)];
+                    parents[a.max(b)] = a.min(b);
+                }
+            }
+            of_patch.push((overhang.region.clone(), own));
+            all.push(overhang);
+        }
+        let continued: Vec<usize> = of_patch.iter().map(|(_, own)| root(&parents, *own)).collect();
+        let mut kept: Vec<usize> = continued.clone();
+        kept.sort_unstable();
+        kept.dedup();
+        let mut merged: Vec<Option<Overhang>> = vec![None; all.len()];
+        for (k, overhang) in all.into_iter().enumerate() {
+            match &mut merged[root(&parents, k)] {
+                Some(first) => first.unite(&overhang),
+                none => *none = Some(overhang),
+            }
+        }
+        self.open = kept.iter().filter_map(|&k| merged[k].take()).collect();
+        merged.into_iter().flatten().for_each(|overhang| self.ended.push(overhang));
+        let place = |root: &usize| kept.binary_search(root).expect("it is kept");
+        self.last = of_patch
+            .into_iter()
+            .zip(&continued)
+            .map(|((region, _), root)| (region, place(root)))
+            .collect();
+    }
+
+    /// Ends all overhangs.
+    pub(super) fn finish(&mut self) {
+        std::mem::take(&mut self.open).into_iter().for_each(|overhang| self.ended.push(overhang));
+    }
+}
+
+fn root(parents: &[usize], mut item: usize) -> usize {
+    while parents[item] != item {
+        item = parents[item];
+    }
+    item
+}
+
+impl Overhang {
+    fn of(patch: &OverhangPatch, layer: u32) -> Self {
+        Self {
+            layers: [layer; 2],
+            area: patch.area,
+            reach_squared: patch.reach_squared,
+            reach_layer: layer,
+            farthest: patch.farthest,
+            region: Region { columns: patch.columns.clone(), rows: patch.rows.clone() },
+        }
+    }
+
+    fn unite(&mut self, other: &Self) {
+        self.layers = [self.layers[0].min(other.layers[0]), self.layers[1].max(other.layers[1])];
+        self.area += other.area;
+        self.region.unite(&other.region);
+        let reach = |overhang: &Self| {
+            (std::cmp::Reverse(overhang.reach_squared), overhang.reach_layer, overhang.farthest)
+        };
+        if reach(other) < reach(self) {
+            self.reach_squared = other.reach_squared;
+            (self.reach_layer, self.farthest) = (other.reach_layer, other.farthest);
+        }
+    }
+}

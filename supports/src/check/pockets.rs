@@ -1,0 +1,126 @@
+//! Black bodies: those without a way to the image's frame are pockets.
+//!
+//! Bodies are joined over all layers before they are judged, so that a way out may lead up and
+//! down as often as it likes.
+
+use super::components::Component;
+use super::contact::{Contact, Labelled};
+use super::findings::{Listed, Pocket, PocketKind};
+use super::live::{Group, Live, Next};
+
+/// The black bodies of the layers so far.
+pub(super) struct Hollows {
+    live: Live<Hollow>,
+    speck: u32,
+    pub(super) pockets: Listed<Pocket>,
+}
+
+/// Black that is joined so far.
+struct Hollow {
+    /// What it is if nothing more joins; the kind is decided at the end.
+    pocket: Pocket,
+    is_open: bool,
+    is_on_platform: bool,
+    holds_square: bool,
+}
+
+impl Hollows {
+    pub(super) fn new(speck: u32) -> Self {
+        Self { live: Live::new(false), speck, pockets: Listed::default() }
+    }
+
+    /// Adds a layer, given its number from the first and how it lies on the one below.
+    pub(super) fn add(
+        &mut self,
+        layer: &Labelled,
+        contact: Option<&Contact>,
+        number: u32,
+        thickness_um: f64,
+    ) {
+        let joints = contact.map_or(&[][..], |contact| &contact.joints);
+        let Next { groups, ended } = self.live.add(layer, joints);
+        ended.into_iter().for_each(|hollow| self.end(hollow, false));
+        for Group { bodies, components } in groups {
+            let mut hollow = bodies.into_iter().reduce(Hollow::united).unwrap_or_else(|| {
+                Hollow::begin(&layer.components.all[components[0] as usize], number)
+            });
+            hollow.grow(layer, &components, number, thickness_um, self.speck);
+            self.live.put(hollow);
+        }
+    }
+
+    /// Ends all bodies at the top.
+    pub(super) fn finish(&mut self) {
+        let live = std::mem::replace(&mut self.live, Live::new(false));
+        live.finish().into_iter().for_each(|hollow| self.end(hollow, true));
+    }
+
+    fn end(&mut self, hollow: Hollow, is_at_top: bool) {
+        if hollow.is_open || !hollow.holds_square {
+            return;
+        }
+        let kind = match (is_at_top, hollow.is_on_platform) {
+            (true, _) => PocketKind::Cup,
+            (false, true) => PocketKind::Sealed,
+            (false, false) => PocketKind::Trap,
+        };
+        self.pockets.push(Pocket { kind, ..hollow.pocket });
+    }
+}
+
+impl Hollow {
+    fn begin(component: &Component, number: u32) -> Self {
+        let pocket = Pocket {
+            kind: PocketKind::Trap,
+            layers: [number; 2],
+            pixels: 0,
+            pixels_um: 0.0,
+            first: component.first,
+            region: component.region(),
+        };
+        Self { pocket, is_open: false, is_on_platform: number == 0, holds_square: false }
+    }
+
+    fn united(self, other: Self) -> Self {
+        let (mut elder, younger) = match (self.pocket.born(), other.pocket.born()) {
+            (a, b) if a <= b => (self.pocket, other.pocket),
+            _ => (other.pocket, self.pocket),
+        };
+        elder.pixels += younger.pixels;
+        elder.pixels_um += younger.pixels_um;
+        elder.region.unite(&younger.region);
+        Self {
+            pocket: elder,
+            is_open: self.is_open || other.is_open,
+            is_on_platform: self.is_on_platform || other.is_on_platform,
+            holds_square: self.holds_square || other.holds_square,
+        }
+    }
+
+    fn grow(
+        &mut self,
+        layer: &Labelled,
+        components: &[u32],
+        number: u32,
+        thickness_um: f64,
+        speck: u32,
+    ) {
+        self.pocket.layers[1] = number;
+        for &component in components {
+            let component = &layer.components.all[component as usize];
+            self.is_open = self.is_open || layer.reaches_frame(component);
+            self.pocket.pixels += component.area;
+            self.pocket.pixels_um += component.area as f64 * thickness_um;
+            self.pocket.region.unite(&component.region());
+        }
+        self.holds_square =
+            self.is_open || self.holds_square || layer.hold_square(components, speck);
+    }
+}
+
+impl Pocket {
+    /// Returns where it begins: layer, row and column.
+    pub(super) fn born(&self) -> [u32; 3] {
+        [self.layers[0], self.first[1], self.first[0]]
+    }
+}

@@ -1,0 +1,30 @@
+//! What of a stack would be swept away, trapped or bent as it is built.
+//!
+//! [`check`] finds islands (white that rests on nothing), weak joints, overhangs, pockets and
+//! bodies off balance, on runs and in one pass.
+//!
+//! ```
+//! use lamp_stack::{Dpi, Layer, Mask, PageInfo};
+//! use lamp_supports::{CheckError, CheckOptions, End, check};
+//!
+//! // A post, and a block beside it that begins in layer 1 and joins the post in layer 2.
+//! let layer = |transitions: &[u32]| {
+//!     let rows = vec![0, 0, transitions.len() as u32, 2 * transitions.len() as u32, 3 * transitions.len() as u32];
+//!     let mask = Mask::new(16, rows, transitions.repeat(3)).unwrap();
+//!     Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image: mask.into() }
+//! };
+//! let layers = [layer(&[1, 5]), layer(&[1, 5, 9, 12]), layer(&[1, 12])];
+//! let layers = layers.into_iter().map(Ok::<_, CheckError>);
+//! let found = check(layers, Ok, &CheckOptions::default())?;
+//! let [island] = &found.islands.list[..] else { panic!() };
+//! assert_eq!((island.layer, island.area, island.centroid), (1, 9, [10.5, 2.5]));
+//! assert_eq!(island.end, End::JoinsPart { layer: 2 });
+//! # Ok::<(), CheckError>(())
+//! ```
+
+mod check;
+
+pub use check::{
+    CheckError, CheckOptions, End, Findings, Island, LayerFacts, Listed, OffBalance, Overhang,
+    Pocket, PocketKind, Region, WeakJoint, check, white_component,
+};
