@@ -52,6 +52,7 @@ mod png_page;
 mod png_write;
 mod runs;
 mod split;
+mod strut;
 mod temporary;
 #[cfg(test)]
 mod testing;
@@ -87,6 +88,7 @@ pub use png_write::{
 };
 pub use runs::{Change, Pixel, RunError, RunImage};
 pub use split::{SplitError, SplitPoints, write_split};
+pub use strut::Strut;
 pub use temporary::{FileBeside, FolderBeside, remove_temporaries};
 pub use text::{line_of, one_line};
 pub use tiff::{Compression, EncodedPage, Format, Page, PageHeader, PageReader, PageWriter};

@@ -63,7 +63,7 @@ pub enum EditError {
 pub enum EditProblem {
     /// It has none or several of the keys that say what to do.
     #[error(
-        "write one of box, cylinder, line, label, picture, stack, crop, pad, mirror and rotate"
+        "write one of box, cylinder, line, strut, label, picture, stack, crop, pad, mirror and rotate"
     )]
     NotOneAction,
     /// An edit of whole images chooses layers or an operation.
@@ -73,7 +73,7 @@ pub enum EditProblem {
     #[error("z and layers say the same: write one of them")]
     TwoRanges,
     /// Copies are chosen for something that is not drawn.
-    #[error("copies are for boxes, cylinders, lines, labels and pictures: take it out")]
+    #[error("copies are for boxes, cylinders, lines, struts, labels and pictures: take it out")]
     CopiesWithoutShape,
     /// All but the shapes in the copies would go.
     #[error("intersect would take away all of the build but the shapes in these copies")]
@@ -84,9 +84,9 @@ pub enum EditProblem {
     /// The angle is no multiple of 90 degrees.
     #[error("images rotate by 90, 180 or 270 degrees")]
     Angle,
-    /// The line has no length.
-    #[error("the line ends where it begins")]
-    PointLine,
+    /// The line or strut has no length.
+    #[error("it ends where it begins")]
+    NoLength,
     /// The shape has more runs than an image can hold.
     #[error("it has more runs than an image can hold")]
     TooManyRuns,
@@ -180,9 +180,9 @@ pub enum EditProblem {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LayerProblem {
-    /// A lying cylinder meets a layer of unknown height.
-    #[error("it does not say at what height it is, so no cylinder can lie in it")]
-    NoHeightForCylinder,
+    /// A strut or a lying cylinder meets a layer of unknown height.
+    #[error("it does not say at what height it is, so no strut or lying cylinder can cross it")]
+    NoHeightForSolid,
     /// Layers are chosen by height, but this one does not say its own.
     #[error("it does not say at what height it is: write layers = [first, end] instead of z")]
     NoHeightForRange,

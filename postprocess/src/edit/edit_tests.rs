@@ -152,6 +152,38 @@ proptest! {
     }
 
     #[test]
+    fn a_pixel_is_in_a_strut_when_its_centre_is(
+        masks in prop::collection::vec(arbitrary_mask(), 4),
+        (from, to) in ([4i32..60, -16..36, -8..24], [4i32..60, -16..36, -8..24]),
+        (diameter, op) in (1i32..24, op()),
+    ) {
+        // No end plane and no side passes through a centre.
+        let place = |end: [i32; 3], off: f64| end.map(|q| f64::from(q) / 4.0 + off);
+        let (from, to, radius) = (place(from, 0.0137), place(to, 0.0271), f64::from(diameter) / 8.0);
+        let list = format!(
+            "[[edit]]\nop = \"{op}\"\nstrut = {{ from = {}, to = {}, diameter = \"{}mm\" }}\n",
+            lengths(from), lengths(to), 2.0 * radius
+        );
+        let before: Vec<_> = (0..).zip(masks).map(|(k, mask)| layer(k, Image::Mask(mask))).collect();
+        let along: [f64; 3] = std::array::from_fn(|k| to[k] - from[k]);
+        let square: f64 = along.iter().map(|part| part * part).sum();
+        let is_in = |point: [f64; 3]| {
+            let part = (0..3).map(|k| (point[k] - from[k]) * along[k]).sum::<f64>() / square;
+            let away = (0..3).map(|k| (point[k] - from[k] - part * along[k]).powi(2)).sum::<f64>();
+            (0.0..1.0).contains(&part) && away.sqrt() < radius
+        };
+        for (index, (before, after)) in
+            (0..).zip(before.iter().zip(edited(before.clone(), &list, vec![]).unwrap()))
+        {
+            for (column, row) in (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |column| (column, row))) {
+                let expected =
+                    op.is_white(mask(before).is_white(column, row), is_in(middle(column, row, index)));
+                prop_assert_eq!(mask(&after).is_white(column, row), expected, "{} {} {}", column, row, index);
+            }
+        }
+    }
+
+    #[test]
     fn a_pixel_is_in_a_picture_when_its_centre_is_in_a_white_pixel_of_it(
         (before, gray) in (arbitrary_mask(), any::<bool>()),
         levels in (1usize..6).prop_flat_map(|width| {
@@ -318,6 +350,28 @@ fn gray_layers_are_edited_too() {
 }
 
 #[test]
+fn a_solid_is_for_the_layers_that_it_reaches() {
+    let of = |list: &str| {
+        let (edits, mut done) = (Edits::from_toml(list).unwrap(), Vec::new());
+        let layers = bars(5).into_iter().map(Ok::<_, EditError>);
+        let edited = edit(layers, edits, vec![], vec![], |layer, edits| {
+            done.extend(edits.iter().map(|_| layer.info.index));
+        });
+        edited.for_each(|layer| drop(layer.unwrap()));
+        done
+    };
+    let strut = "strut = { from = [\"5mm\", \"5mm\", \"3mm\"], to = [\"5mm\", \"5mm\", \"1mm\"], diameter = \"1mm\" }";
+    assert_eq!(of(&format!("[[edit]]\n{strut}\n")), [1, 2]);
+    assert_eq!(of(&format!("[[edit]]\n{strut}\nlayers = [2, 9]\n")), [2]);
+    assert_eq!(of(&format!("[[edit]]\nop = \"intersect\"\n{strut}\n")), [0, 1, 2, 3, 4]);
+    let lying = "cylinder = { at = [\"5mm\", \"2mm\"], diameter = \"2mm\", along = \"x\", between = [\"4mm\", \"9mm\"] }";
+    assert_eq!(of(&format!("[[edit]]\n{lying}\n")), [1, 2]);
+    let point = strut.replace("3mm", "1mm");
+    let error = edited(bars(1), &format!("[[edit]]\n{point}\n"), vec![]).unwrap_err();
+    assert_eq!(error.to_string(), "edit 1: it ends where it begins");
+}
+
+#[test]
 fn each_copy_of_a_build_has_the_next_number() {
     let list = "[[edit]]\ncopies = true\n\
                 label = { text = \"{n}\", start = 7, step = -1, at = [[\"4mm\", \"-1mm\"]], height = \"7mm\" }\n";
@@ -417,6 +471,7 @@ fn what_would_be_lost_or_cannot_be_is_refused() {
     foreign[0].info.z_um = None;
     for list in [
         moved,
+        "[[edit]]\nstrut = { from = [\"5mm\", \"1mm\", \"0mm\"], to = [\"5mm\", \"1mm\", \"2mm\"], diameter = \"1mm\" }\n",
         "[[edit]]\ncylinder = { at = [\"5mm\", \"1mm\"], diameter = \"1mm\", along = \"x\", between = [\"4mm\", \"9mm\"] }\n",
     ] {
         assert!(

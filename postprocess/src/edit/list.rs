@@ -101,6 +101,7 @@ impl Edit {
             self.block.is_some(),
             self.cylinder.is_some(),
             self.line.is_some(),
+            self.strut.is_some(),
             self.label.is_some(),
             self.picture.is_some(),
         ];
@@ -185,6 +186,10 @@ mod tests {
             (
                 "line = { from = [\"0mm\", \"0mm\"], to = [\"1mm\", \"0mm\"], width = \"0mm\" }",
                 &["edit 2, line.width", "above zero"],
+            ),
+            (
+                "strut = { from = [\"0mm\", \"0mm\"], to = [\"1mm\", \"0mm\", \"0mm\"], diameter = \"1mm\" }",
+                &["edit 2, strut.from", "2 lengths where 3"],
             ),
             ("pad = { left = \"-1mm\" }", &["edit 2, pad.left", "below zero"]),
             ("pad = { left = \"1e9mm\" }", &["edit 2, pad.left", "10 m"]),

@@ -20,6 +20,7 @@ mod pictures;
 mod plan;
 mod schema;
 mod shape;
+mod solid;
 
 use std::sync::Arc;
 

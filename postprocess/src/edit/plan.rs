@@ -145,13 +145,7 @@ impl EditPlan {
                 if matches!(step, PlannedEdit::Other { .. }) { others.next() } else { None };
             let other = other.and_then(Option::as_deref);
             let too_many = || LayerProblem::TooManyRuns { edit: k + 1 }.of_layer(&info);
-            let holds = match step {
-                PlannedEdit::Shape { reach, .. } | PlannedEdit::Other { reach, .. } => {
-                    reach.holds(&info)?
-                }
-                _ => true,
-            };
-            if holds {
+            if step.is_for(&info)? {
                 // An image that stays as it is keeps the codes of its page.
                 let is_unchanged = match step {
                     PlannedEdit::Frame { frame, .. } => {
@@ -213,6 +207,21 @@ impl PlannedEdit {
             reach => reach,
         };
         Ok(Self::Shape { reach, op: edit.op(), shape })
+    }
+
+    /// Returns true if it may change a layer.
+    ///
+    /// # Errors
+    /// Returns an error if that depends on the layer's height, which is unknown.
+    fn is_for(&self, info: &PageInfo) -> Result<bool, EditError> {
+        match self {
+            // An intersection blackens what its shape does not reach.
+            Self::Shape { reach, op: Op::Intersect, .. } | Self::Other { reach, .. } => {
+                reach.holds(info)
+            }
+            Self::Shape { reach, shape, .. } => Ok(reach.holds(info)? && shape.reaches(info)?),
+            Self::Frame { .. } | Self::Turn { .. } => Ok(true),
+        }
     }
 
     /// Returns the edited image, or `None` if it has more runs than an image can hold.

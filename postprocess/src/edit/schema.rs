@@ -27,6 +27,7 @@ pub(super) struct Edit {
     pub(super) block: Option<Rectangle>,
     pub(super) cylinder: Option<Cylinder>,
     pub(super) line: Option<StraightLine>,
+    pub(super) strut: Option<StrutEnds>,
     pub(super) label: Option<Label>,
     pub(super) picture: Option<Picture>,
     pub(super) stack: Option<OtherStack>,
@@ -93,6 +94,18 @@ pub(super) enum CylinderAxis {
     Y,
     #[default]
     Z,
+}
+
+/// A straight round rod between two points.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StrutEnds {
+    #[serde(deserialize_with = "lengths")]
+    pub(super) from: [Length; 3],
+    #[serde(deserialize_with = "lengths")]
+    pub(super) to: [Length; 3],
+    #[serde(deserialize_with = "size")]
+    pub(super) diameter: Length,
 }
 
 /// A straight line with square ends.

@@ -11,7 +11,8 @@ use super::image_bounds::{ImageBounds, PixelMap};
 use super::letters::{numbered, outlines};
 use super::other_stacks::middle;
 use super::pictures::stamped;
-use super::schema::{Cylinder, CylinderAxis, Edit, Label, Rectangle, StraightLine};
+use super::schema::{Cylinder, Edit, Label, StraightLine};
+use super::solid::{Solid, rectangle};
 
 /// The error of letters' curves, in pixels.
 const TOLERANCE: f64 = 1.0 / 64.0;
@@ -20,15 +21,15 @@ const TOLERANCE: f64 = 1.0 / 64.0;
 pub(super) enum EditShape {
     /// The same pixels in each layer.
     Upright(Mask),
-    /// A cylinder along x or y.
-    Lying { cylinder: Cylinder, copies: Vec<BuildCopy>, place: ImageBounds },
+    /// Others in each layer.
+    Solid { solid: Solid, copies: Vec<BuildCopy>, place: ImageBounds },
 }
 
 impl EditShape {
     /// Creates an edit's shape in each of `copies`, with the `picture` that it names.
     ///
     /// # Errors
-    /// Returns an error if a letter has no outline, a line no length, or the shape no
+    /// Returns an error if a letter has no outline, a line or strut no length, or the shape no
     /// pixel, or if a label or picture reaches outside the image.
     pub(super) fn of(
         edit: &Edit,
@@ -40,10 +41,10 @@ impl EditShape {
         let wrong = |problem: EditProblem| problem.of_edit(number);
         let grids: Vec<PixelMap> =
             copies.iter().map(|copy| copy.part.grid()).collect::<Result<_, _>>()?;
+        if let Some(solid) = Solid::of(edit).map_err(wrong)? {
+            return Ok(Self::Solid { solid, copies, place: *place });
+        }
         let mask = if let Some(cylinder) = edit.cylinder {
-            if cylinder.along != CylinderAxis::Z {
-                return Ok(Self::Lying { cylinder, copies, place: *place });
-            }
             composed(&copies, place, |k, part| round(cylinder, grids[k], part))
         } else if let Some(label) = &edit.label {
             let lines: Vec<_> = copies
@@ -60,7 +61,7 @@ impl EditShape {
             composed(&copies, place, |_, _| stamp.clone())
         } else {
             if edit.line.is_some_and(|line| line.from == line.to) {
-                return Err(wrong(EditProblem::PointLine));
+                return Err(wrong(EditProblem::NoLength));
             }
             let block = edit.block.map(|block| move |grid| rectangle(block, grid));
             let line = edit.line.map(|line| move |grid| stroke(line, grid));
@@ -82,48 +83,40 @@ impl EditShape {
         Ok(Self::Upright(mask))
     }
 
+    /// Returns true if the shape may have pixels in a layer.
+    ///
+    /// # Errors
+    /// Returns an error if that depends on the layer's height, which is unknown.
+    pub(super) fn reaches(&self, info: &PageInfo) -> Result<bool, EditError> {
+        match self {
+            Self::Upright(_) => Ok(true),
+            Self::Solid { solid, .. } => Ok(solid.reaches(height(info)?)),
+        }
+    }
+
     /// Returns the shape's pixels in a layer, or `None` if they have more runs than an
     /// image can hold.
     ///
     /// # Errors
     /// Returns an error if the shape depends on the layer's height and that is unknown.
     pub(super) fn at(&self, info: &PageInfo) -> Result<Option<Cow<'_, Mask>>, EditError> {
-        let (cylinder, copies, place) = match self {
+        let (solid, copies, place) = match self {
             Self::Upright(mask) => return Ok(Some(Cow::Borrowed(mask))),
-            Self::Lying { cylinder, copies, place } => (*cylinder, copies, place),
+            Self::Solid { solid, copies, place } => (solid, copies, place),
         };
-        let middle =
-            middle(info).ok_or_else(|| LayerProblem::NoHeightForCylinder.of_layer(info))?;
-        let block = section(cylinder, middle);
-        let part = |_, part: &ImageBounds| {
-            let corners = rectangle(block, part.grid().expect("it was found for each"));
-            polygons(&[corners], part.width, part.height)
-        };
-        Ok(composed(copies, place, part).map(Cow::Owned))
+        let height = height(info)?;
+        Ok(composed(copies, place, |_, part| solid.mask(height, part)).map(Cow::Owned))
     }
 }
 
-/// Returns the section of a lying cylinder at a height.
-fn section(cylinder: Cylinder, height: Length) -> Rectangle {
-    let [across, z] = cylinder.at.map(Length::um);
-    let [radius, off] = [cylinder.diameter.um() / 2.0, height.um() - z];
-    let half = (radius * radius - off * off).max(0.0).sqrt();
-    let across = [across - half, across + half].map(Length::from_um);
-    let between = cylinder.between.expect("one that lies has ends");
-    match cylinder.along {
-        CylinderAxis::X => Rectangle { x: between, y: across },
-        _ => Rectangle { x: across, y: between },
-    }
+/// Returns the height at which a layer shows solids.
+fn height(info: &PageInfo) -> Result<Length, EditError> {
+    middle(info).ok_or_else(|| LayerProblem::NoHeightForSolid.of_layer(info))
 }
 
 fn round(cylinder: Cylinder, grid: PixelMap, part: &ImageBounds) -> Mask {
     let centre = grid.to_pixels(cylinder.at.map(Length::mm));
     disc(centre, grid.length(cylinder.diameter) / 2.0, part.width, part.height)
-}
-
-fn rectangle(Rectangle { x, y }: Rectangle, grid: PixelMap) -> Vec<Point> {
-    let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
-    corners.into_iter().map(|corner| grid.to_pixels(corner.map(Length::mm))).collect()
 }
 
 fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec<Point> {
