@@ -135,6 +135,12 @@ pub enum SliceError {
     /// There is nothing to slice.
     #[error("the file holds no facets: there is nothing to slice")]
     NoFacets,
+    /// More facets than a corner table has numbers for.
+    #[error("{facets} facets are more than a corner table holds, which are 1431655764")]
+    TooManyFacets {
+        /// How many facets the part has.
+        facets: usize,
+    },
     /// An image would have too many pixels on a side.
     #[error(
         "an image would be {width} x {height} pixels, more than {} on a side",

@@ -10,6 +10,7 @@
 //! - [`Slices::trace`] finds the faulty edges behind stray rows.
 //! - [`section`](fn@section) cuts one section without rounding to pixels, and
 //!   [`FacetIndex`] finds facets by height.
+//! - [`topology`] tells which facets are neighbours and shells.
 //!
 //! ```
 //! use lamp_slicer::{Part, SliceOptions, Slices};
@@ -61,6 +62,7 @@ mod survey;
 mod table;
 mod text_lines;
 mod three_mf;
+pub mod topology;
 mod trace;
 mod unpack;
 mod wild;

@@ -1,0 +1,37 @@
+//! What a mesh hangs together by: vertices, edges, neighbours, shells.
+//!
+//! A [`CornerTable`] finds all that a soup of facets leaves out: which corners are one vertex, and
+//! which facets meet at an edge (002 section 2.3.2.1). A corner is a number: facet t has the
+//! corners 3t, 3t + 1 and 3t + 2, and everything is read from flat arrays by it.
+//!
+//! ```
+//! use lamp_slicer::topology::{CornerTable, Shells, facet_of, next, previous};
+//! use lamp_slicer::{Part, Placement, Units};
+//!
+//! let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
+//! let part = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
+//! let table = CornerTable::of_part(&part, &Placement::default(), Units::Millimetres)?;
+//! assert_eq!((table.facet_count(), table.points().len(), table.edge_count()), (4, 4, 6));
+//!
+//! // Across the edge opposite to corner 0 lies the facet that has no corner at the origin.
+//! let across = table.opposite(0).unwrap();
+//! assert_eq!(facet_of(across), 3);
+//! // Its other two corners are the two ends of that edge.
+//! let mut ends = [next(across), previous(across)].map(|corner| table.point(corner));
+//! ends.sort_by(|a, b| a.partial_cmp(b).unwrap());
+//! assert_eq!(ends, [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]);
+//!
+//! assert_eq!(Shells::new(&table).count(), 1);
+//! # Ok::<(), lamp_slicer::SliceError>(())
+//! ```
+
+mod around_edge;
+mod corner_table;
+mod edges;
+mod read;
+mod shells;
+#[cfg(test)]
+mod testing;
+
+pub use corner_table::{CornerTable, facet_of, next, previous};
+pub use shells::Shells;

@@ -1,0 +1,136 @@
+//! Reads a part into a corner table, and gives equal corners one vertex.
+
+use std::hash::{BuildHasher, RandomState};
+
+use hashbrown::HashTable;
+
+use crate::error::SliceError;
+use crate::facet::Units;
+use crate::part::Part;
+use crate::placement::{PlacedPart, Placement};
+use crate::topology::CornerTable;
+use crate::topology::corner_table::NONE;
+
+impl CornerTable {
+    /// Reads a part in its place. Corners are one vertex if their coordinates have the same bits
+    /// (0 and -0 are the same) and they are of one body. Vertices are numbered as they come.
+    ///
+    /// Facets are numbered through all bodies, so that with one file of one body they have the
+    /// numbers that errors give them.
+    ///
+    /// # Errors
+    /// Returns an error if there are no facets, or more than 1431655764, or they cannot be read.
+    pub fn of_part(part: &Part, placement: &Placement, units: Units) -> Result<Self, SliceError> {
+        let facets = part.facet_count();
+        if facets == 0 {
+            return Err(SliceError::NoFacets);
+        }
+        if facets >= NONE as usize / 3 {
+            return Err(SliceError::TooManyFacets { facets });
+        }
+        let table = Self::read(&PlacedPart::new(part.clone(), placement, units).on_facets());
+        let table = table.map_err(|error| part.reason(error))?;
+        part.check_unchanged()?;
+        Ok(table)
+    }
+
+    fn read(part: &PlacedPart) -> Result<Self, SliceError> {
+        let mut welder = Welder::default();
+        let mut vertices = Vec::with_capacity(3 * part.model.facet_count());
+        let mut body_ends = vec![0; part.model.pieces().len()];
+        let mut body = 0;
+        for block in 0..part.model.block_count() {
+            let (piece, _) = part.model.place_of(block);
+            if piece != body {
+                body = piece;
+                welder.forget();
+            }
+            part.for_each_in_block(block, |facet| {
+                let vertex = |&[x, y, z_um]: &[f64; 3]| welder.vertex([x, y, z_um / 1000.0]);
+                vertices.extend(facet.iter().map(vertex));
+            })?;
+            body_ends[piece] = (vertices.len() / 3) as u32;
+        }
+        // Bodies without facets have no blocks.
+        for body in 1..body_ends.len() {
+            body_ends[body] = body_ends[body].max(body_ends[body - 1]);
+        }
+        let mut points = welder.points;
+        points.shrink_to_fit();
+        Ok(Self::of_bodies(points, vertices, body_ends))
+    }
+}
+
+/// Gives equal points one number.
+#[derive(Default)]
+struct Welder {
+    points: Vec<[f64; 3]>,
+    /// The numbers of those that are not forgotten. Its order never shows.
+    known: HashTable<u32>,
+    hasher: RandomState,
+}
+
+impl Welder {
+    fn vertex(&mut self, point: [f64; 3]) -> u32 {
+        // Makes 0 of -0.
+        let point = point.map(|c| c + 0.0);
+        let bits = |point: &[f64; 3]| point.map(f64::to_bits);
+        let Self { points, known, hasher } = self;
+        let is_same = |&known: &u32| bits(&points[known as usize]) == bits(&point);
+        let hash_of = |&known: &u32| hasher.hash_one(bits(&points[known as usize]));
+        let entry = known.entry(hasher.hash_one(bits(&point)), is_same, hash_of);
+        let next = points.len() as u32;
+        let vertex = *entry.or_insert(next).get();
+        if vertex == next {
+            points.push(point);
+        }
+        vertex
+    }
+
+    /// Makes all points to come other vertices than those before.
+    fn forget(&mut self) {
+        self.known = HashTable::new();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::topology::testing::{block, table_of};
+
+    #[test]
+    fn zero_has_no_sign() {
+        let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
+        let minus = [-0.0, 0.0, -0.0];
+        let table = table_of(&[[minus, y, x], [o, x, z], [minus, z, y], [x, y, z]]);
+        assert_eq!((table.points().len(), table.edge_count()), (4, 6));
+    }
+
+    #[test]
+    fn points_are_those_of_the_file_to_the_bit() {
+        let facets = lamp_fixtures::sphere(5.0, 2_000).facets;
+        let table = table_of(&facets);
+        for (facet, corners) in (0..).zip(&facets) {
+            assert_eq!(table.facet(facet), corners.map(|corner| corner.map(f64::from)));
+        }
+    }
+
+    #[test]
+    fn bodies_share_no_vertex() {
+        let lower = Part::from_facets("lower", block([0.0; 3], [1.0; 3]));
+        let upper = Part::from_facets("upper", block([0.0, 0.0, 1.0], [1.0, 1.0, 2.0]));
+        let part = Part::joined(vec![lower, upper]);
+        let placement = Placement::default().scaled([2.0; 3]);
+        let table = CornerTable::of_part(&part, &placement, Units::Millimetres).unwrap();
+        assert_eq!(table.bodies().collect::<Vec<_>>(), [0..12, 12..24]);
+        assert_eq!((table.points().len(), table.crowded().len()), (16, 0));
+        assert_eq!(table.points()[15][2], 4.0);
+    }
+
+    #[test]
+    fn a_part_without_facets_has_no_table() {
+        let part = Part::from_facets("none", Vec::new());
+        let table = CornerTable::of_part(&part, &Placement::default(), Units::Millimetres);
+        assert!(matches!(table, Err(SliceError::NoFacets)));
+    }
+}
