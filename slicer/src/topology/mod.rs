@@ -28,10 +28,12 @@
 mod around_edge;
 mod corner_table;
 mod edges;
+mod minima;
 mod read;
 mod shells;
 #[cfg(test)]
 mod testing;
 
 pub use corner_table::{CornerTable, facet_of, next, previous};
+pub use minima::{Minimum, MinimumKind, Relief, minima};
 pub use shells::Shells;
