@@ -41,7 +41,7 @@ pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Ex
     }
     let given = arguments.parsed_so_far();
     let (path, of_command) = arguments.command(&given);
-    if path == ["slice"]
+    if [["slice"], ["check"]].iter().any(|command| path == *command)
         && let Some(file) = of_command.get_one::<PathBuf>("machine")
     {
         let settings = settings_of_machine(file)?;

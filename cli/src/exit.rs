@@ -9,6 +9,7 @@ use lamp_postprocess::machine::MachineLimit;
 use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, TileError};
 use lamp_slicer::SliceError;
 use lamp_stack::{JoinError, SplitError, StackError};
+use lamp_supports::CheckError;
 
 use crate::hints::hint;
 
@@ -105,6 +106,7 @@ macro_rules! failures {
 
 failures!(
     SliceError,
+    CheckError,
     DitherError,
     EditError,
     TileError,

@@ -7,25 +7,25 @@ use crate::options::GENERAL;
 /// The help of `lamp`, for a screen of 24 lines and 80 columns.
 const LAMP: &str = "\
 Turn CAD parts into layer images for projection photopolymerization.
-
 Usage: lamp COMMAND [OPTIONS]
 From part to build:        slice blade.stl | fix | dither | tile > build.tif
   slice       cut a part into layers         fix         correct stray rows
   dither      turn gray levels into dots     tile        lay out copies
   compensate  narrow by what light adds      edit        change a design
 Stacks:
-  info        describe a stack               verify      check that it is whole
+  check       find islands and pockets       support     hold islands
+  info        describe a stack               verify      prove that it is whole
   show        draw layers                    convert     write in another form
   join        join ranges of layers          split       split into ranges
 Parts:
+  mesh        check and repair a mesh        orient      find how to build it
   brep        check a STEP part              heights     find layer thicknesses
   sample      write a sample part            demo        do the main job on it
 Resins and machines:
   material    list and check resins          machine     list and check machines
   calibrate   make a material                target      make images to measure
-  cure        draw what a stack cures
-This program:
-  completions let shells complete commands   man         write manual pages
+  cure        draw what a stack cures        man         write manual pages
+  completions let shells complete commands
 
 lamp COMMAND -h lists the usual options of a command, --help all of them.
 All commands have -q, --quiet; --threads N; --options FILE.toml; -h, --help.
@@ -38,7 +38,7 @@ const FORM: &str = "{about-with-newline}\n{usage-heading} {usage}{after-help}\n\
 const FEW: usize = 3;
 
 /// The options that `-h` shows, of the commands that have many.
-const USUAL: [(&str, &[&str]); 3] = [
+const USUAL: [(&str, &[&str]); 4] = [
     (
         "slice",
         &[
@@ -54,6 +54,20 @@ const USUAL: [(&str, &[&str]); 3] = [
         ],
     ),
     ("tile", &["machine", "area", "copies", "gap", "fit", "pack", "layout", "mesh", "output"]),
+    (
+        "check",
+        &[
+            "only",
+            "speck",
+            "max_overhang",
+            "report",
+            "evidence",
+            "strict",
+            "dpi",
+            "thickness",
+            "rotate",
+        ],
+    ),
     ("heights", &["report", "plot", "uniform", "min", "max", "deviation", "cusp", "material"]),
 ];
 

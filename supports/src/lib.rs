@@ -26,5 +26,5 @@ mod check;
 
 pub use check::{
     CheckError, CheckOptions, End, Findings, Island, LayerFacts, Listed, OffBalance, Overhang,
-    Pocket, PocketKind, Region, WeakJoint, check, white_component,
+    Pocket, PocketKind, Region, WeakJoint, check, component_at,
 };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use lamp_postprocess::machine::Machine;
+use lamp_postprocess::machine::{Machine, Recoating};
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
@@ -60,7 +60,8 @@ fn answer(machines: impl IntoIterator<Item = Machine>) -> Result<(), Exit> {
 
 /// A machine's fields; what is not known is null.
 fn fields(machine: &Machine) -> Value {
-    let Machine { name, description, area, height, dpi, thickness, strips, defaults } = machine;
+    let Machine { name, description, area, height, dpi, thickness, strips, recoating, defaults } =
+        machine;
     json!({
         "name": name,
         "description": description,
@@ -70,6 +71,7 @@ fn fields(machine: &Machine) -> Value {
         "thickness_um": thickness.as_ref().map(|limits| [limits.least.um(), limits.most.um()]),
         "mirrors": strips.as_ref().map(|strips| strips.mirrors),
         "overlap": strips.as_ref().map(|strips| strips.overlap),
+        "recoating_pa": recoating.as_ref().map(Recoating::shear_pa),
         "defaults": {
             "dpi": defaults.dpi,
             "thickness_um": defaults.thickness.map(Length::um),
@@ -81,6 +83,7 @@ fn fields(machine: &Machine) -> Value {
             "dpi": dpi.as_ref().map(|dpi| &dpi.source),
             "thickness": thickness.as_ref().map(|limits| &limits.source),
             "strips": strips.as_ref().map(|strips| &strips.source),
+            "recoating": recoating.as_ref().map(|recoating| &recoating.source),
         },
     })
 }

@@ -2,6 +2,7 @@
 
 mod brep;
 mod calibrate;
+mod check;
 mod compensate;
 mod completions;
 mod convert;
@@ -41,6 +42,7 @@ pub(crate) enum Command {
     Demo(demo::DemoArgs),
     Info(info::InfoArgs),
     Verify(verify::VerifyArgs),
+    Check(check::CheckArgs),
     Show(show::ShowArgs),
     Convert(convert::ConvertArgs),
     Join(join::JoinArgs),
@@ -80,6 +82,7 @@ impl Command {
             Self::Demo(args) => demo::run(args, common),
             Self::Info(args) => info::run(args),
             Self::Verify(args) => verify::run(args, common),
+            Self::Check(args) => check::run(args, common),
             Self::Show(args) => show::run(args),
             Self::Convert(args) => convert::run(args, common),
             Self::Join(args) => join::run(args, common),

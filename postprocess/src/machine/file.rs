@@ -28,6 +28,9 @@ pub enum MachineError {
     /// A default beyond the machine's own limits.
     #[error("defaults: {0}")]
     Default(#[from] MachineLimit),
+    /// A blade that stands still, or spreads nothing.
+    #[error("recoating: travel, seconds, gap and viscosities must be above zero, the least first")]
+    Recoating,
     /// Swaths without a pixel of their own.
     #[error("strips: a swath shares less than half its mirrors with the next")]
     Strips,
@@ -63,6 +66,14 @@ impl Catalogued for Machine {
         }
         if self.height.as_ref().is_some_and(|height| height.value.um() <= 0.0) {
             return Err(MachineError::Height);
+        }
+        if let Some(recoating) = &self.recoating {
+            let [least, most] = recoating.viscosity_cp;
+            let above_zero = [recoating.travel.um(), recoating.gap.um(), recoating.seconds, least];
+            let possible = |number: f64| number > 0.0 && number.is_finite();
+            if !(above_zero.into_iter().all(possible) && least <= most && most.is_finite()) {
+                return Err(MachineError::Recoating);
+            }
         }
         self.check_defaults()?;
         match &self.strips {
@@ -131,6 +142,13 @@ least = "20um"
 most = "0.2mm"
 source = "data sheet"
 
+[recoating]
+viscosity_cp = [300, 350.5]
+travel = "30cm"
+seconds = 7
+gap = "0.1mm"
+source = "data sheet"
+
 [strips]
 mirrors = 1024
 overlap = 64
@@ -156,6 +174,14 @@ thickness = "50um"
     }
 
     #[test]
+    fn the_blade_shears_as_in_002_section_4_2_2() {
+        for builtin in Machine::builtins() {
+            let shear_pa = builtin.recoating.unwrap().shear_pa();
+            assert_eq!(shear_pa.map(f64::round), [87.0, 98.0], "{}", builtin.name);
+        }
+    }
+
+    #[test]
     fn errors_name_the_key_and_what_to_do() {
         assert_eq!(Machine::from_toml(WHOLE).unwrap().strips.unwrap().mirrors, 1024);
         for (from, to, words) in [
@@ -169,13 +195,16 @@ thickness = "50um"
             ("\"80mm\"", "\"80\"", &["line 9", "height.value", "unit"]),
             ("\"80mm\"", "\"0mm\"", &["height", "above zero"]),
             ("mirrors = 1024", "mirrors = 128", &["strips", "half its mirrors"]),
-            ("mirrors = 1024", "mirrors = -1", &["line 23", "strips.mirrors"]),
+            ("mirrors = 1024", "mirrors = -1", &["line 30", "strips.mirrors"]),
+            ("seconds = 7", "seconds = 0", &["recoating", "above zero"]),
+            ("[300, 350.5]", "[400, 350.5]", &["recoating", "the least first"]),
+            ("\"0.1mm\"", "\"0.1\"", &["line 26", "recoating.gap", "unit"]),
             ("\"mine\"", "\"My own\"", &["name", "`My own` is not a name"]),
             ("dpi = 600", "dpi = 900", &["defaults: a stack has 900 dpi", "600 to 600"]),
             ("dpi = 600", "dpi = 0", &["defaults: dpi", "between 1 and"]),
             ("\"50um\"", "\"1mm\"", &["defaults: a layer is 1mm thick", "20um to 200um"]),
             ("\"50um\"", "\"0um\"", &["defaults: thickness", "above zero"]),
-            ("\"50um\"", "\"50\"", &["line 29", "defaults.thickness", "unit"]),
+            ("\"50um\"", "\"50\"", &["line 36", "defaults.thickness", "unit"]),
             ("[area]", "[area", &["line 4", "a machine is a TOML file"]),
         ] {
             assert!(WHOLE.contains(from), "{from}");

@@ -38,6 +38,8 @@ pub struct Machine {
     pub thickness: Option<ThicknessRange>,
     /// The swaths that a scanning projector exposes.
     pub strips: Option<Strips>,
+    /// How a blade spreads the next layer.
+    pub recoating: Option<Recoating>,
     /// How it is usually sliced for.
     #[serde(default)]
     pub defaults: Defaults,
@@ -119,4 +121,33 @@ pub struct Strips {
     /// The section, table or data sheet.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
+}
+
+/// How a blade spreads a layer of suspension.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recoating {
+    /// The least and the greatest viscosity of the suspension, in centipoise.
+    pub viscosity_cp: [f64; 2],
+    /// How far the blade goes, as `26cm`.
+    #[serde(deserialize_with = "file::length")]
+    pub travel: Length,
+    /// How long that takes.
+    pub seconds: f64,
+    /// How high the blade is above what it covers, as `200um`.
+    #[serde(deserialize_with = "file::length")]
+    pub gap: Length,
+    /// The section, table or data sheet.
+    #[serde(deserialize_with = "nonempty_text")]
+    pub source: String,
+}
+
+impl Recoating {
+    /// Returns the shear stress on what the blade passes, in pascals, for the least and the
+    /// greatest viscosity: viscosity times speed divided by the gap, as for a Newtonian liquid
+    /// whose speed falls evenly across the gap (002 section 4.2.2).
+    pub fn shear_pa(&self) -> [f64; 2] {
+        let per_second = self.travel.mm() / self.seconds / self.gap.mm();
+        self.viscosity_cp.map(|centipoise| centipoise / 1000.0 * per_second)
+    }
 }

@@ -84,6 +84,8 @@ pub enum End {
 pub struct WeakJoint {
     /// The layer.
     pub layer: u32,
+    /// The component's first pixel by rows, column and row.
+    pub first: [u32; 2],
     /// The pixels of the component.
     pub area: u64,
     /// Those above white.

@@ -134,10 +134,10 @@ where
     }
 }
 
-/// Returns the runs of the component of white that holds a pixel, as rows and columns from the
-/// top; none if the pixel is black.
-pub fn white_component(mask: &Mask, column: u32, row: u32) -> Vec<(u32, Range<u32>)> {
-    if !mask.is_white(column, row) {
+/// Returns the runs of the component that holds a pixel, white or black, as rows and columns from
+/// the top; none if the pixel is outside the image.
+pub fn component_at(mask: &Mask, column: u32, row: u32) -> Vec<(u32, Range<u32>)> {
+    if column >= mask.width() || row >= mask.height() {
         return Vec::new();
     }
     let components = Components::of(mask);
@@ -266,6 +266,7 @@ impl Checker {
             {
                 self.weak_joints.push(WeakJoint {
                     layer: number,
+                    first: component.first,
                     area: component.area,
                     support,
                     centroid: component.centroid(),

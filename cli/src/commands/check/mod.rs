@@ -1,0 +1,342 @@
+//! `lamp check`: finds what would float away, be trapped or bend as a stack is built.
+
+mod lines;
+mod pictures;
+mod report;
+mod units;
+
+use std::fs::File;
+use std::io::Seek;
+use std::num::{NonZeroU8, NonZeroU32};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lamp_postprocess::machine::Machine;
+use lamp_stack::{Layer, Length, Page, Pages, StackError};
+use lamp_supports::{CheckError, CheckOptions, Findings};
+
+use crate::catalogue::entry;
+use crate::exit::Exit;
+use crate::json_report::parse_report;
+use crate::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
+use crate::part_arg::PartArg;
+use crate::part_options::{Reading, at_part};
+use crate::progress::{Progress, printable};
+use crate::slicing_options::SlicingOptions;
+use crate::streams::{
+    check_beside, failed_at, in_range, input_name, is_stream, open_pages, print, spool_stdin,
+};
+
+use lines::FindingLine;
+use pictures::write_pictures;
+use report::write_report;
+
+/// Find what would be swept away, trapped or bent as a stack is built
+///
+/// An island is white that rests on nothing: the recoating blade sweeps it away. Each gets a line,
+/// as do weak joints, pockets that hold resin, overhangs, bodies off balance, white at the border
+/// and empty layers; the worst come first. A part is sliced on the way, by the options of `slice`;
+/// its mesh then says where islands must be, too. What rounding to pixels makes, and islands that
+/// never hold a square of --speck pixels, is only in the report.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp check build.tif
+  lamp check blade.stl --rotate x:180 --evidence pictures/
+  slice blade.stl | fix | lamp check --strict
+  lamp check night/*.tif --only islands,pockets --report check.json
+
+Exit status: 0 if the work is done, whatever was found; 3 with --strict if something was.")]
+pub(crate) struct CheckArgs {
+    /// Stacks (TIFF or picture files, folders of pages, - for standard input) or parts, each
+    /// checked on its own
+    #[arg(value_name = "STACK|PART", default_value = "-")]
+    inputs: Vec<PathBuf>,
+
+    /// What to tell
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    #[arg(value_parser = one_of_described::<Kind>(&[
+        "White that rests on nothing",
+        "White that rests on little",
+        "Black without a way out",
+        "White far from the white below",
+        "Centres of gravity off their base",
+        "Stray rows, white at the border, empty layers",
+    ]))]
+    only: Vec<Kind>,
+
+    /// Side of the square that a finding must hold, in pixels
+    #[arg(long, value_name = "PIXELS", default_value = "3")]
+    speck: NonZeroU32,
+
+    /// Share of white that must rest on white
+    #[arg(long, value_name = "SHARE", default_value = "25%", value_parser = parse_percent)]
+    least_support: f64,
+
+    /// How far white may reach beyond the white below [default: as far as a layer is thick: 45
+    /// degrees]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
+    max_overhang: Option<Length>,
+
+    /// Level from which a gray pixel is white
+    #[arg(long, value_name = "LEVEL", default_value = "1")]
+    threshold: NonZeroU8,
+
+    /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
+    ///
+    /// Its defaults hold where no other resolution, thickness or margin is given
+    #[arg(long, value_name = "M", default_value = "alpha")]
+    machine: PathBuf,
+
+    /// Write all findings as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    report: Option<PathBuf>,
+
+    /// Write pictures of the worst findings into a new folder: what is found in red, other white
+    /// without white below in yellow, the layer below in gray
+    #[arg(long, value_name = "DIR")]
+    evidence: Option<PathBuf>,
+
+    /// Replace a folder of pictures that an earlier run wrote
+    #[arg(long)]
+    force: bool,
+
+    /// End with status 3 if there are findings
+    #[arg(long)]
+    strict: bool,
+
+    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended. The first of them
+    /// stands on the platform
+    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    layers: Option<Range<u32>>,
+
+    /// Memory for the table of crossings of a part
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
+
+    #[command(flatten)]
+    slicing: SlicingOptions,
+}
+
+/// A kind of findings, as people name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Islands,
+    Joints,
+    Pockets,
+    Overhangs,
+    Balance,
+    Layers,
+}
+
+lamp_stack::named!(Kind {
+    Islands = "islands",
+    Joints = "joints",
+    Pockets = "pockets",
+    Overhangs = "overhangs",
+    Balance = "balance",
+    Layers = "layers",
+});
+
+pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
+    for beside in [&args.report, &args.evidence].into_iter().flatten() {
+        check_beside(beside, Path::new("-"), &args.inputs)?;
+    }
+    if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
+        return Err(Exit::usage("standard input can be read only once: give - once"));
+    }
+    let machine: Machine = entry(&args.machine)?;
+    let mut checked = Vec::new();
+    for path in &args.inputs {
+        let mut input = Input::open(path)?;
+        let findings = args.check(&mut input, common)?;
+        let lines = lines::of(&findings, args, machine.recoating.as_ref());
+        let name = input_name(path);
+        print(&printed(&name, &findings, &lines, common.verbose))?;
+        checked.push(CheckedInput { name, input, findings, lines });
+    }
+    if let Some(path) = &args.report {
+        write_report(&checked, machine.recoating.as_ref(), path)?;
+    }
+    if let Some(folder) = &args.evidence {
+        write_pictures(&mut checked, args, common, folder)?;
+    }
+    let found: usize = checked.iter().map(CheckedInput::found).sum();
+    if args.strict && found > 0 {
+        return Err(Exit::Findings(match found {
+            1 => "1 finding".to_owned(),
+            found => format!("{found} findings"),
+        }));
+    }
+    Ok(())
+}
+
+impl CheckArgs {
+    fn options(&self) -> CheckOptions {
+        CheckOptions {
+            threshold: self.threshold,
+            speck: self.speck,
+            least_support: self.least_support,
+            max_overhang: self.max_overhang,
+        }
+    }
+
+    /// Checks a stack, or the layers of a part.
+    fn check(&self, input: &mut Input, common: &Common) -> Result<Findings, Exit> {
+        let progress = Progress::new("check", common, true);
+        let options = self.options();
+        let found = match input {
+            Input::Stack(stack) => {
+                let name = input_name(&stack.path);
+                let pages = stack.pages(self.evidence.is_some())?;
+                let pages = in_range(pages, Page::info, stack.path.clone(), self.layers.clone());
+                let decode = |(page, _): (Page, _)| {
+                    let layer = page.decode().map_err(|error| failed_at(name.clone(), error));
+                    progress.layer_done();
+                    layer
+                };
+                lamp_supports::check(pages, decode, &options).map_err(|error| match error.cause() {
+                    Some(CheckError::Sizes { .. } | CheckError::Origins { .. }) => {
+                        error.at(name.clone())
+                    }
+                    _ => error,
+                })
+            }
+            Input::Part(part) => {
+                let layers = self.slices(part, &progress)?;
+                let decode = |layer| {
+                    progress.layer_done();
+                    Ok(layer)
+                };
+                lamp_supports::check(layers, decode, &options)
+            }
+        };
+        progress.done();
+        found
+    }
+
+    /// Slices a part.
+    fn slices(
+        &self,
+        part: &PartArg,
+        progress: &Progress,
+    ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
+        let say = |line: &str| progress.say(line);
+        let reading = Reading { dpi: self.slicing.dpi, may_be_open: false, say: &say };
+        let parts = [part.clone()];
+        let exposure = self.slicing.exposure()?;
+        let model = self.slicing.solid.open(&parts, &reading)?;
+        let layers = self.layers.clone();
+        let slices = self.slicing.slices(model, &part.name(), layers, self.memory, exposure, &say);
+        let (slices, _) = slices.map_err(|error| at_part(error, &parts))?;
+        progress.expect(slices.layer_count() as u64);
+        Ok(slices.map(move |layer| layer.map_err(|error| at_part(error.into(), &parts))))
+    }
+
+    /// Returns whether findings of a kind are told.
+    fn tells(&self, kind: Kind) -> bool {
+        self.only.is_empty() || self.only.contains(&kind)
+    }
+}
+
+/// What is checked.
+enum Input {
+    Stack(StackInput),
+    Part(PartArg),
+}
+
+/// A stack that can be read again.
+struct StackInput {
+    path: PathBuf,
+    /// Standard input, kept.
+    spooled: Option<File>,
+}
+
+impl Input {
+    /// Tells a stack from a part by how it begins.
+    fn open(path: &Path) -> Result<Self, Exit> {
+        let is_part =
+            !is_stream(path) && matches!(Pages::open(path), Err(StackError::NotTiff { .. }));
+        Ok(match is_part {
+            true => Self::Part(PartArg { path: path.to_owned(), placement: None }),
+            false => Self::Stack(StackInput { path: path.to_owned(), spooled: None }),
+        })
+    }
+}
+
+impl StackInput {
+    /// Opens the pages; standard input is kept if it will be read `again`.
+    fn pages(&mut self, again: bool) -> Result<Pages, Exit> {
+        if !is_stream(&self.path) || (!again && self.spooled.is_none()) {
+            return open_pages(&self.path);
+        }
+        let reopened = |file: &File| -> Result<Pages, StackError> {
+            let mut file = file.try_clone()?;
+            file.rewind()?;
+            Pages::from_file(file)
+        };
+        let file = self.spooled.take().map_or_else(spool_stdin, Ok)?;
+        let pages = reopened(&file).map_err(|error| failed_at(input_name(&self.path), error));
+        self.spooled = Some(file);
+        pages
+    }
+}
+
+/// An input and what was found in it.
+struct CheckedInput {
+    name: String,
+    input: Input,
+    findings: Findings,
+    lines: Vec<FindingLine>,
+}
+
+impl CheckedInput {
+    /// Returns the number of findings that count.
+    fn found(&self) -> usize {
+        self.lines.iter().filter(|line| !line.is_note).count()
+    }
+}
+
+/// The most lines of a kind that are printed, unless all are asked for.
+const MOST_LINES: usize = 20;
+
+/// Returns the lines to print for an input.
+fn printed(name: &str, findings: &Findings, lines: &[FindingLine], all: bool) -> String {
+    let layers = findings.layers.len();
+    let specks = match findings.specks.count() {
+        0 => String::new(),
+        1 => ", 1 speck".to_owned(),
+        specks => format!(", {specks} specks"),
+    };
+    let found = match lines.iter().filter(|line| !line.is_note).count() {
+        0 => "no findings".to_owned(),
+        1 => "1 finding".to_owned(),
+        found => format!("{found} findings"),
+    };
+    let mut text = format!("{}: {layers} layers, {found}{specks}\n", printable(name));
+    for of_word in lines.chunk_by(|a, b| a.word == b.word) {
+        let shown = if all { of_word.len() } else { of_word.len().min(MOST_LINES) };
+        for line in &of_word[..shown] {
+            text += &format!("  {}: {}\n", line.word, line.text);
+        }
+        if shown < of_word.len() {
+            let left = of_word.len() - shown;
+            text +=
+                &format!("  {}: {left} more (--verbose or --report lists them)\n", of_word[0].word);
+        }
+    }
+    text
+}
+
+/// Parses a share: `25%` or `0.25`.
+fn parse_percent(text: &str) -> Result<f64, String> {
+    let (number, unit) = match text.strip_suffix('%') {
+        Some(percent) => (percent, 100.0),
+        None => (text, 1.0),
+    };
+    match number.trim().parse::<f64>() {
+        Ok(number) if (0.0..=unit).contains(&number) => Ok(number / unit),
+        _ => Err(format!("`{text}` is not a share: write 25% or 0.25")),
+    }
+}

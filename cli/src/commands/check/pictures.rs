@@ -1,0 +1,207 @@
+//! Pictures of the worst findings, for `--evidence`.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::ops::Range;
+use std::path::Path;
+
+use lamp_stack::{Image, Layer, Mask, Page, write_rgb_png};
+use lamp_supports::{Region, component_at};
+
+use super::lines::{FindingLine, Shown};
+use super::{CheckArgs, CheckedInput, Input};
+use crate::exit::Exit;
+use crate::options::Common;
+use crate::progress::Progress;
+use crate::streams::{failed_at, in_range, input_name, new_folder};
+
+/// The most pictures of an input.
+const MOST_PICTURES: usize = 24;
+/// The least that is shown around a finding, in pixels, and the share of its size.
+const LEAST_AROUND: u32 = 16;
+const SHARE_AROUND: u32 = 4;
+/// The size that pictures come near to, in pixels, and the most that they enlarge.
+const SIDE: u32 = 480;
+const MOST_ENLARGED: u32 = 8;
+
+/// What a pixel shows. Of several pixels that share a picture's, the last named wins.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Shade {
+    Black,
+    /// White in the layer below only.
+    Below,
+    White,
+    /// White without white below.
+    Unheld,
+    Found,
+}
+
+impl Shade {
+    fn colour(self) -> [u8; 3] {
+        match self {
+            Self::Black => [0; 3],
+            Self::Below => [90; 3],
+            Self::White => [255; 3],
+            Self::Unheld => [255, 200, 0],
+            Self::Found => [230, 30, 30],
+        }
+    }
+}
+
+/// Draws the worst findings of each input, the worst of each kind first.
+pub(super) fn write_pictures(
+    checked: &mut [CheckedInput],
+    args: &CheckArgs,
+    common: &Common,
+    folder: &Path,
+) -> Result<(), Exit> {
+    let name = folder.display().to_string();
+    let folder = new_folder(folder, args.force)?;
+    let several = checked.len() > 1;
+    for (number, CheckedInput { input, lines, .. }) in checked.iter_mut().enumerate() {
+        let prefix = if several { format!("{:02}_", number + 1) } else { String::new() };
+        let drawings = drawings(lines);
+        args.for_each_layer(
+            input,
+            common,
+            |position, below, layer| {
+                for (name, shown) in drawings.get(&position).into_iter().flatten() {
+                    let path = folder.path().join(format!("{prefix}{name}"));
+                    draw(&path, below, layer, shown)
+                        .map_err(|error| failed_at(name.clone(), error.into()))?;
+                }
+                Ok(())
+            },
+            |position| drawings.contains_key(&position),
+        )?;
+    }
+    folder.persist().map_err(|error| failed_at(name, error))
+}
+
+/// Returns the names of pictures and what they show, by layer.
+fn drawings(lines: &[FindingLine]) -> BTreeMap<u32, Vec<(String, &Shown)>> {
+    let mut drawings: BTreeMap<u32, Vec<_>> = BTreeMap::new();
+    let shown = lines.iter().filter_map(|line| Some((line, line.shown.as_ref()?)));
+    for (rank, (line, shown)) in shown.take(MOST_PICTURES).enumerate() {
+        let (rank, word) = (rank + 1, line.word.replace(' ', "_"));
+        let layer = line.json["reach_layer"].as_u64().or(line.json["layer"].as_u64());
+        let name = format!("{rank:02}_{word}_layer_{:05}.png", layer.unwrap_or_default());
+        drawings.entry(shown.layer).or_default().push((name, shown));
+    }
+    drawings
+}
+
+impl CheckArgs {
+    /// Reads an input again, and calls `each` with the wanted layers and the layers below them.
+    fn for_each_layer(
+        &self,
+        input: &mut Input,
+        common: &Common,
+        mut each: impl FnMut(u32, Option<&Mask>, &Mask) -> Result<(), Exit>,
+        is_wanted: impl Fn(u32) -> bool,
+    ) -> Result<(), Exit> {
+        let mut below: Option<Mask> = None;
+        let mut take = |position: u32, layer: Option<Layer>| {
+            let mask = layer.map(|layer| match layer.image.into_image() {
+                Image::Mask(mask) => mask,
+                Image::Gray(gray) => gray.at_least(self.threshold.get()),
+            });
+            if let Some(mask) = mask.as_ref().filter(|_| is_wanted(position)) {
+                each(position, below.as_ref(), mask)?;
+            }
+            below = mask;
+            Ok::<_, Exit>(())
+        };
+        let is_read = |position| is_wanted(position) || is_wanted(position + 1);
+        match input {
+            Input::Stack(stack) => {
+                let name = input_name(&stack.path);
+                let pages = stack.pages(true)?;
+                let pages = in_range(pages, Page::info, stack.path.clone(), self.layers.clone());
+                for (position, page) in (0..).zip(pages) {
+                    let (page, _) = page?;
+                    let layer = is_read(position).then(|| page.decode()).transpose();
+                    take(position, layer.map_err(|error| failed_at(name.clone(), error))?)?;
+                }
+                Ok(())
+            }
+            Input::Part(part) => {
+                let progress = Progress::new("check", common, false);
+                for (position, layer) in (0..).zip(self.slices(part, &progress)?) {
+                    take(position, Some(layer?))?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+fn draw(path: &Path, below: Option<&Mask>, layer: &Mask, shown: &Shown) -> io::Result<()> {
+    let Region { columns, rows } = around(&shown.region, layer);
+    let found = shown.pixel.map_or_else(Vec::new, |[column, row]| component_at(layer, column, row));
+    let longer = (columns.end - columns.start).max(rows.end - rows.start);
+    let (down, up) = (longer.div_ceil(SIDE), (SIDE / longer).clamp(1, MOST_ENLARGED));
+    let size = [&columns, &rows].map(|range| (range.end - range.start).div_ceil(down) * up);
+    let shades = rows.step_by(down as usize).flat_map(|first| {
+        let mut shades = vec![Shade::Black; columns.len().div_ceil(down as usize)];
+        for row in first..(first + down).min(layer.height()) {
+            let mut paint = |runs: &mut dyn Iterator<Item = Range<u32>>, shade: Shade| {
+                for run in runs {
+                    let run = run.start.max(columns.start)..run.end.min(columns.end);
+                    if run.is_empty() {
+                        continue;
+                    }
+                    let first = (run.start - columns.start) / down;
+                    let end = (run.end - columns.start).div_ceil(down);
+                    for place in &mut shades[first as usize..end as usize] {
+                        *place = shade.max(*place);
+                    }
+                }
+            };
+            let white = |mask: &Mask| -> Vec<Range<u32>> {
+                let runs = lamp_stack::white_runs(mask.row(row), mask.width());
+                runs.map(|(start, end)| start..end).collect()
+            };
+            let (here, under) = (white(layer), below.map_or_else(Vec::new, white));
+            paint(&mut under.iter().cloned(), Shade::Below);
+            paint(&mut here.iter().cloned(), Shade::White);
+            paint(&mut without(&here, &under).into_iter(), Shade::Unheld);
+            let of_row = found.partition_point(|(other, _)| *other < row);
+            let of_row = found[of_row..].iter().take_while(|(other, _)| *other == row);
+            paint(&mut of_row.map(|(_, run)| run.clone()), Shade::Found);
+        }
+        let wide = shades.iter().flat_map(|shade| shade.colour().repeat(up as usize));
+        let wide: Vec<u8> = wide.collect();
+        std::iter::repeat_n(wide, up as usize)
+    });
+    let file = File::create_new(path)?;
+    write_rgb_png(BufWriter::new(file), size[0], size[1], shades)
+}
+
+/// Returns a finding's region with what is around it.
+fn around(region: &Region, mask: &Mask) -> Region {
+    let grow = |range: &Range<u32>, end: u32| {
+        let by = LEAST_AROUND.max((range.end - range.start) / SHARE_AROUND);
+        range.start.saturating_sub(by)..range.end.saturating_add(by).min(end)
+    };
+    Region { columns: grow(&region.columns, mask.width()), rows: grow(&region.rows, mask.height()) }
+}
+
+/// Returns what is in some runs and not in others, both in order.
+fn without(runs: &[Range<u32>], others: &[Range<u32>]) -> Vec<Range<u32>> {
+    let mut left = Vec::new();
+    for run in runs {
+        let mut start = run.start;
+        for other in others.iter().filter(|other| other.end > run.start && other.start < run.end) {
+            if other.start > start {
+                left.push(start..other.start);
+            }
+            start = start.max(other.end);
+        }
+        if start < run.end {
+            left.push(start..run.end);
+        }
+    }
+    left
+}
