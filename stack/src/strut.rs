@@ -41,14 +41,6 @@ impl Strut {
         self.reach_mm(2).map(Length::from_mm)
     }
 
-    /// Returns the distance along the axis from the first end to below or above a point, in
-    /// millimetres, and how far the point is from there.
-    pub fn place_mm(&self, point_mm: [f64; 3]) -> (f64, [f64; 3]) {
-        let from: [f64; 3] = std::array::from_fn(|k| point_mm[k] - self.from_mm[k]);
-        let along = dot(from, self.direction);
-        (along, std::array::from_fn(|k| from[k] - along * self.direction[k]))
-    }
-
     /// Returns the pixels whose centres are in its section at a height: at most one run a
     /// row, as the row, the first column and the column after the last, from the top. The
     /// image's top left corner is at `origin_mm`, and it has `size` columns and rows.

@@ -23,8 +23,12 @@
 //! ```
 
 mod check;
+mod support;
 
 pub use check::{
     CheckError, CheckOptions, End, Findings, Island, LayerFacts, Listed, OffBalance, Overhang,
     Pocket, PocketKind, Region, WeakJoint, check, component_at,
+};
+pub use support::{
+    HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportOptions, Surface, plan_supports,
 };

@@ -1,0 +1,42 @@
+//! Directions over a cone.
+
+/// Returns unit vectors that lie evenly over a cone about straight down, by a spiral of the golden
+/// angle. The first points straight down, the last ones are tilted by `max_tilt` degrees.
+pub(super) fn directions(count: u32, max_tilt: f64) -> Vec<[f64; 3]> {
+    // On a sphere, bands of equal height have equal areas.
+    let height = 1.0 - max_tilt.to_radians().cos();
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let direction = |k: u32| {
+        let share = f64::from(k) / f64::from(count.saturating_sub(1).max(1));
+        let down = 1.0 - height * share;
+        let across = (1.0 - down * down).max(0.0).sqrt();
+        let (sin, cos) = (golden * f64::from(k)).sin_cos();
+        [across * cos, across * sin, -down]
+    };
+    (0..count).map(direction).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_fill_the_cone_evenly() {
+        let all = directions(400, 45.0);
+        assert_eq!(all[0].map(f64::abs), [0.0, 0.0, 1.0]);
+        let tilt = |d: &[f64; 3]| (-d[2]).acos().to_degrees();
+        assert!(all.iter().all(|d| tilt(d) < 45.0 + 1e-9));
+        assert!((tilt(&all[399]) - 45.0).abs() < 1e-9);
+        // Any direction of the cone has one nearby: 400 over its area are 3.9° apart on a square grid.
+        for k in 0..2_000u32 {
+            let (tilt, turn) = (45.0 * f64::from(k % 40) / 39.0, f64::from(k / 40) * 7.2);
+            let (sin, cos) = tilt.to_radians().sin_cos();
+            let (y, x) = turn.to_radians().sin_cos();
+            let at = [sin * x, sin * y, -cos];
+            let nearest = all.iter().map(|d| (0..3).map(|k| d[k] * at[k]).sum::<f64>());
+            let degrees = nearest.fold(-1.0, f64::max).acos().to_degrees();
+            assert!(degrees < 4.0, "{tilt} {turn}: {degrees}");
+        }
+        assert_eq!(directions(1, 30.0).len(), 1);
+    }
+}

@@ -1,0 +1,98 @@
+//! Divides wide islands into pieces that one support holds each.
+
+use std::ops::Range;
+
+/// White pixels as runs: rows, from the top, and columns.
+pub(super) type Runs = Vec<(u32, Range<u32>)>;
+
+/// A piece of an island.
+#[derive(Debug, PartialEq)]
+pub(super) struct Piece {
+    pub(super) area: u64,
+    /// The point to hold, as column and row: the centroid, or else the centre of the pixel that is
+    /// nearest to it. The first pixel's centre is at (0.5, 0.5).
+    pub(super) middle: [f64; 2],
+}
+
+/// Divides an island by an even grid over its box into pieces up to `hold` pixels wide and high.
+/// Pieces of fewer than `least` pixels are left out, unless there is no other.
+pub(super) fn divided(runs: &Runs, hold: f64, least: f64) -> Vec<Piece> {
+    let rows = bounds(runs.iter().map(|(row, _)| *row..row + 1));
+    let columns = bounds(runs.iter().map(|(_, run)| run.clone()));
+    let (across, down) = (cells(&columns, hold), cells(&rows, hold));
+    let within = |cell: (&Range<u32>, &Range<u32>)| -> Runs {
+        let in_rows = runs.iter().filter(|(row, _)| cell.0.contains(row));
+        let clipped =
+            in_rows.map(|(row, run)| (*row, run.start.max(cell.1.start)..run.end.min(cell.1.end)));
+        clipped.filter(|(_, run)| !run.is_empty()).collect()
+    };
+    let grid = down.iter().flat_map(|rows| across.iter().map(move |columns| (rows, columns)));
+    let pieces: Vec<Piece> =
+        grid.map(within).filter(|runs| !runs.is_empty()).map(|runs| piece(&runs)).collect();
+    if pieces.iter().any(|piece| piece.area as f64 >= least) {
+        pieces.into_iter().filter(|piece| piece.area as f64 >= least).collect()
+    } else {
+        vec![piece(runs)]
+    }
+}
+
+fn bounds(ranges: impl Iterator<Item = Range<u32>>) -> Range<u32> {
+    ranges.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or_default()
+}
+
+/// Divides a range evenly into parts up to `hold` long.
+fn cells(range: &Range<u32>, hold: f64) -> Vec<Range<u32>> {
+    let length = u64::from(range.end - range.start);
+    let count = (length as f64 / hold).ceil().clamp(1.0, length.max(1) as f64) as u64;
+    let at = |k: u64| range.start + (length * k / count) as u32;
+    (0..count).map(|k| at(k)..at(k + 1)).collect()
+}
+
+fn piece(runs: &Runs) -> Piece {
+    let area: u64 = runs.iter().map(|(_, run)| u64::from(run.end - run.start)).sum();
+    let count = |run: &Range<u32>| f64::from(run.end - run.start);
+    let columns = |run: &Range<u32>| count(run) * f64::midpoint(run.start.into(), run.end.into());
+    let x = runs.iter().map(|(_, run)| columns(run)).sum::<f64>() / area as f64;
+    let y = runs.iter().map(|(row, run)| (f64::from(*row) + 0.5) * count(run));
+    let y = y.sum::<f64>() / area as f64;
+    let pixel = [x, y].map(|place| place as u32);
+    if runs.iter().any(|(row, run)| *row == pixel[1] && run.contains(&pixel[0])) {
+        return Piece { area, middle: [x, y] };
+    }
+    let nearest = runs.iter().map(|(row, run)| {
+        let column = pixel[0].clamp(run.start, run.end - 1);
+        let middle = [column, *row].map(|place| f64::from(place) + 0.5);
+        ((middle[0] - x).powi(2) + (middle[1] - y).powi(2), middle)
+    });
+    let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a piece has pixels");
+    Piece { area, middle: nearest.1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_is_held_at_its_nearest_pixel() {
+        let ring: Runs = vec![(3, 4..9), (4, 4..5), (4, 8..9), (5, 4..9)];
+        assert_eq!(divided(&ring, 9.0, 1.0), [Piece { area: 12, middle: [6.5, 3.5] }]);
+    }
+
+    #[test]
+    fn wide_islands_are_divided_evenly() {
+        // An L: a bar of 12 x 2 pixels, and one of 2 x 7 below its left end.
+        let mut runs: Runs = (0..2).map(|row| (row, 10..22)).collect();
+        runs.extend((2..9).map(|row| (row, 10..12)));
+        let pieces = divided(&runs, 5.0, 1.0);
+        let places: Vec<_> = pieces.iter().map(|piece| (piece.area, piece.middle)).collect();
+        assert_eq!(
+            places,
+            [(12, [35.0 / 3.0, 5.0 / 3.0]), (8, [16.0, 1.0]), (8, [20.0, 1.0]), (10, [11.0, 6.5])]
+        );
+        assert_eq!(pieces.iter().map(|piece| piece.area).sum::<u64>(), 38);
+        assert_eq!(divided(&runs, 5.0, 9.0).len(), 2);
+        assert_eq!(divided(&runs, 5.0, 99.0), [piece(&runs)]);
+        assert_eq!(divided(&runs, 1e9, 1.0).len(), 1);
+        assert_eq!(divided(&runs, 1e-9, 1.0).len(), 38);
+    }
+}

@@ -1,0 +1,201 @@
+//! Tries a strut in the images, layer by layer, as it is drawn.
+
+use std::ops::Range;
+
+use lamp_slicer::brep::vector::{Vec3, dot, sub};
+use lamp_stack::{Length, Strut};
+
+use super::Rejection;
+use super::divide::Runs;
+use super::surface::Contact;
+use super::window::{Raster, Window};
+use crate::check::LayerFacts;
+
+/// The surroundings of an island.
+pub(super) struct Surroundings<'a> {
+    pub(super) raster: Raster,
+    /// All layers of the stack, whose heights are known.
+    pub(super) layers: &'a [LayerFacts],
+    /// The images below the island.
+    pub(super) window: &'a Window,
+    /// The island's first layer, and its pixels there.
+    pub(super) layer: u32,
+    pub(super) island: &'a Runs,
+}
+
+/// Returns the bottom and the thickness of a layer in millimetres, if its page states them.
+pub(super) fn span_mm(layer: &LayerFacts) -> Option<[f64; 2]> {
+    Some([layer.z_um? / 1000.0, layer.thickness_um? / 1000.0])
+}
+
+impl Surroundings<'_> {
+    /// Checks that a strut of this radius from the island to a contact holds the island, if it
+    /// is drawn into the images, touches nothing on the way and stays in the part below.
+    pub(super) fn try_strut(
+        &self,
+        strut: &Strut,
+        contact: &Contact,
+        radius_mm: f64,
+    ) -> Result<(), Rejection> {
+        let [low, high] = strut.heights();
+        let mut below = Vec::new();
+        let mut holds = false;
+        for number in self.window.first..self.layers.len() as u32 {
+            let [bottom, thickness] = self.span_mm(number);
+            let middle = Length::from_mm(bottom + thickness / 2.0);
+            if middle > high {
+                break;
+            }
+            if middle < low {
+                continue;
+            }
+            let section = self.raster.section(strut, middle);
+            if number < self.layer {
+                self.check_solid(number, middle, &section, contact, radius_mm)?;
+                let held = |(row, run): &(u32, _)| overlaps(&section, *row, run).next().is_some();
+                holds = number + 1 == self.layer && self.island.iter().any(held);
+            }
+            self.check_rest(number, &section, &below)?;
+            below = section;
+        }
+        if holds { Ok(()) } else { Err(Rejection::Unsteady) }
+    }
+
+    fn span_mm(&self, number: u32) -> [f64; 2] {
+        span_mm(&self.layers[number as usize]).expect("heights were found for all layers")
+    }
+
+    /// Checks that a section is white only beyond the contact, and black only before it.
+    fn check_solid(
+        &self,
+        number: u32,
+        middle: Length,
+        section: &Runs,
+        contact: &Contact,
+        radius_mm: f64,
+    ) -> Result<(), Rejection> {
+        let [_, thickness] = self.span_mm(number);
+        let pitch = self.raster.dpi.pitch().mm();
+        // Images are off the surface by up to a pixel and a layer, and the surface off the
+        // contact's plane.
+        let slack = radius_mm / 4.0 + pitch + thickness * contact.normal[2].abs();
+        let outside = |column: u32, row: u32| {
+            let [x, y] = self.raster.place_mm([column, row].map(|place| f64::from(place) + 0.5));
+            dot(sub([x, y, middle.mm()], contact.at_mm), contact.normal)
+        };
+        let ends =
+            |row: u32, run: &Range<u32>| [outside(run.start, row), outside(run.end - 1, row)];
+        for (row, run) in section {
+            let white: Vec<_> = self.window.white_in(number, *row, run).collect();
+            if white.iter().any(|run| ends(*row, run).iter().any(|&far| far > slack)) {
+                return Err(Rejection::Blocked);
+            }
+            let starts = std::iter::once(run.start).chain(white.iter().map(|run| run.end));
+            let stops = white.iter().map(|run| run.start).chain(std::iter::once(run.end));
+            let mut black = starts.zip(stops).map(|(start, end)| start..end);
+            if black.any(|run| !run.is_empty() && ends(*row, &run).iter().any(|&far| far < -slack))
+            {
+                return Err(Rejection::Through);
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that at least half of a section rests on white or is white already, and some of
+    /// each of its components. `below` is the strut's section one layer below.
+    fn check_rest(&self, number: u32, section: &Runs, below: &Runs) -> Result<(), Rejection> {
+        // The first layer stands on the platform.
+        if number == 0 {
+            return Ok(());
+        }
+        let (mut all, mut resting, mut of_component) = (0, 0, 0);
+        for (k, (row, run)) in section.iter().enumerate() {
+            let is_joined = k > 0 && {
+                let (above, other) = &section[k - 1];
+                above + 1 == *row && other.start < run.end && run.start < other.end
+            };
+            if k > 0 && !is_joined && of_component == 0 {
+                return Err(Rejection::Unsteady);
+            }
+            let mut held: Vec<_> = self.window.white_in(number - 1, *row, run).collect();
+            held.extend(self.window.white_in(number, *row, run));
+            held.extend(overlaps(below, *row, run));
+            let held = covered(held);
+            of_component = if is_joined { of_component + held } else { held };
+            resting += held;
+            all += run.end - run.start;
+        }
+        let is_steady = section.is_empty() || (of_component > 0 && 2 * resting >= all);
+        if is_steady { Ok(()) } else { Err(Rejection::Unsteady) }
+    }
+}
+
+/// Returns what a run of a row shares with others, which have at most one run a row.
+fn overlaps(others: &Runs, row: u32, run: &Range<u32>) -> impl Iterator<Item = Range<u32>> {
+    let found = others.binary_search_by_key(&row, |(row, _)| *row).ok();
+    let shared = found.map(|k| others[k].1.start.max(run.start)..others[k].1.end.min(run.end));
+    shared.filter(|run| !run.is_empty()).into_iter()
+}
+
+/// Returns how many columns lie in any of the ranges.
+fn covered(mut ranges: Vec<Range<u32>>) -> u32 {
+    ranges.sort_unstable_by_key(|range| range.start);
+    let (mut end, mut count) = (0, 0);
+    for range in ranges {
+        count += range.end.saturating_sub(range.start.max(end));
+        end = end.max(range.end);
+    }
+    count
+}
+
+/// Returns the least distance between two segments.
+///
+/// Source: C. Ericson, *Real-Time Collision Detection*, 2005, section 5.1.9.
+pub(super) fn distance_mm([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f64 {
+    let (u, v, w) = (sub(b, a), sub(d, c), sub(a, c));
+    let (uu, uv, vv, uw, vw) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));
+    let crossed = uu * vv - uv * uv;
+    let s = if crossed > 0.0 { ((uv * vw - vv * uw) / crossed).clamp(0.0, 1.0) } else { 0.0 };
+    let t = (uv * s + vw) / vv;
+    // The end of one that is nearest to the other's line may lie beyond it.
+    let s = if (0.0..=1.0).contains(&t) {
+        s
+    } else {
+        ((uv * t.clamp(0.0, 1.0) - uw) / uu).clamp(0.0, 1.0)
+    };
+    let t = t.clamp(0.0, 1.0);
+    let apart = |k: usize| w[k] + s * u[k] - t * v[k];
+    (0..3).map(|k| apart(k).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn columns_count_once() {
+        assert_eq!(covered(vec![5..9, 1..3, 2..4, 8..9, 3..3]), 7);
+        assert_eq!(covered(vec![]), 0);
+    }
+
+    proptest! {
+        #[test]
+        fn segments_are_as_near_as_their_nearest_points(
+            ends in prop::array::uniform4(prop::array::uniform3(-5i32..5)),
+        ) {
+            let [a, b, c, d] = ends.map(|end| end.map(f64::from));
+            prop_assume!(a != b && c != d);
+            let at = |p: Vec3, q: Vec3, s: f64| -> Vec3 { std::array::from_fn(|k| p[k] + s * (q[k] - p[k])) };
+            let steps = || (0..=40).map(|k| f64::from(k) / 40.0);
+            let pairs = steps().flat_map(|s| steps().map(move |t| (s, t)));
+            let sampled = pairs.map(|(s, t)| {
+                let apart = sub(at(a, b, s), at(c, d, t));
+                dot(apart, apart).sqrt()
+            });
+            let (least, found) = (sampled.fold(f64::INFINITY, f64::min), distance_mm([a, b], [c, d]));
+            prop_assert!(found < least + 1e-9 && found > least - 0.5, "{found} {least}");
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! Plans the supports of all islands of a stack in one pass over its layers.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use lamp_slicer::brep::vector::{Vec3, along, dot};
+use lamp_stack::{Image, Layer, Length, Mask};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::cone::directions;
+use super::divide::{Piece, divided};
+use super::fit::{Surroundings, distance_mm, span_mm};
+use super::surface::{Contact, NearSurface, Surface};
+use super::window::{Raster, Window};
+use super::{HeldPlace, IslandPlan, Rejection, Support, SupportOptions};
+use crate::check::{Findings, Island, Region, white_component};
+
+/// A reason that no supports can be planned for a stack.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum SupportError {
+    /// The pages do not say how large pixels are.
+    #[error("the stack has no resolution, so it cannot be compared with the part")]
+    NoResolution,
+    /// The pages do not say where the images lie in the part.
+    #[error("the stack does not say where its images lie in the part")]
+    NoOrigin,
+    /// A page does not say the layer's height and thickness.
+    #[error("layer {index} does not say at what height it is and how thick")]
+    NoHeight {
+        /// The layer's index.
+        index: u32,
+    },
+    /// The layers are not those that were checked.
+    #[error("the stack has fewer layers than when it was checked")]
+    MissingLayers,
+}
+
+/// Plans supports of the islands that a check has found, given the stack's layers once more and
+/// the surface of its part. Islands are in the order of the layers they begin in; specks get none.
+///
+/// # Errors
+/// Returns the first error of the layers, or one if the pages lack what is needed.
+pub fn plan_supports<E: From<SupportError>>(
+    layers: impl Iterator<Item = Result<Layer, E>>,
+    found: &Findings,
+    surface: &Surface,
+    options: &SupportOptions,
+) -> Result<Vec<IslandPlan>, E> {
+    let mut planner = Planner::new(found, surface, options)?;
+    let mut islands: Vec<&Island> = found.islands.list.iter().collect();
+    islands.sort_by_key(|island| island.number);
+    let mut pending: Vec<(&Island, Window)> =
+        islands.into_iter().map(|island| (island, planner.window(island))).collect();
+    let mut plans = Vec::new();
+    for (number, layer) in (0..).zip(layers) {
+        if pending.is_empty() {
+            break;
+        }
+        let mask = match layer?.image.into_image() {
+            Image::Mask(mask) => mask,
+            Image::Gray(gray) => gray.at_least(options.threshold.get()),
+        };
+        let born = pending.iter().take_while(|(island, _)| island.layer == number).count();
+        for (island, window) in pending.drain(..born) {
+            plans.push(planner.plan(island, &window, &mask));
+        }
+        for (_, window) in pending.iter_mut().filter(|(_, window)| window.end() == number) {
+            window.push(&mask);
+        }
+    }
+    if pending.is_empty() { Ok(plans) } else { Err(SupportError::MissingLayers.into()) }
+}
+
+/// How many radii a strut reaches beyond its contacts at most, where it hardly meets them.
+const MOST_RADII: f64 = 4.0;
+
+struct Planner<'a> {
+    found: &'a Findings,
+    surface: &'a Surface,
+    options: &'a SupportOptions,
+    raster: Raster,
+    directions: Vec<Vec3>,
+    /// The ends of the supports so far.
+    built: Vec<[Vec3; 2]>,
+}
+
+impl<'a> Planner<'a> {
+    fn new(
+        found: &'a Findings,
+        surface: &'a Surface,
+        options: &'a SupportOptions,
+    ) -> Result<Self, SupportError> {
+        let raster = Raster {
+            origin_mm: found.origin_mm.ok_or(SupportError::NoOrigin)?,
+            dpi: found.dpi.ok_or(SupportError::NoResolution)?,
+            size: found.size,
+        };
+        if let Some(layer) = found.layers.iter().find(|layer| span_mm(layer).is_none()) {
+            return Err(SupportError::NoHeight { index: layer.index });
+        }
+        let directions = directions(options.candidates.get(), options.max_tilt);
+        Ok(Self { found, surface, options, raster, directions, built: Vec::new() })
+    }
+
+    /// Returns the height of a layer's bottom.
+    fn bottom_mm(&self, number: u32) -> f64 {
+        span_mm(&self.found.layers[number as usize]).expect("heights were found for all layers")[0]
+    }
+
+    /// Returns how far supports reach from an island, to each side and down.
+    fn reach_mm(&self) -> [f64; 2] {
+        let (radius, length) = (self.options.radius.mm(), self.options.max_length.mm());
+        let (sin, _) = self.options.max_tilt.to_radians().sin_cos();
+        let length = length + MOST_RADII * radius;
+        [length * sin + radius, length + radius]
+    }
+
+    /// Returns the window to fill for an island.
+    fn window(&self, island: &Island) -> Window {
+        let [aside, down] = self.reach_mm();
+        let by = self.raster.pixels(Length::from_mm(aside));
+        let grown = |range: &Range<u32>, size: u32| {
+            range.start.saturating_sub(by)..range.end.saturating_add(by).min(size)
+        };
+        let [width, height] = self.raster.size;
+        let lowest = self.bottom_mm(island.layer) - down;
+        let layers = &self.found.layers[..island.layer as usize];
+        let above =
+            layers.iter().rposition(|layer| span_mm(layer).is_some_and(|[z, _]| z < lowest));
+        // What rests on the window's first layer is not asked for.
+        let first = above.map_or(0, |k| (k as u32).saturating_sub(1));
+        Window::new(grown(&island.region.columns, width), grown(&island.region.rows, height), first)
+    }
+
+    fn plan(&mut self, island: &Island, window: &Window, mask: &Mask) -> IslandPlan {
+        let [column, row] = island.first;
+        let runs = white_component(mask, column, row);
+        let surroundings = Surroundings {
+            raster: self.raster,
+            layers: &self.found.layers,
+            window,
+            layer: island.layer,
+            island: &runs,
+        };
+        let near = self.near(island);
+        let [hold, radius] =
+            [self.options.hold, self.options.radius].map(|length| length.pixels(self.raster.dpi));
+        let mut places = Vec::new();
+        for piece in divided(&runs, hold, PI * radius * radius) {
+            let place = self.place(&piece, &near, &surroundings);
+            let support = place.supports.first();
+            self.built.extend(support.map(|support| [support.origin_mm, support.contact_mm]));
+            places.push(place);
+        }
+        IslandPlan { island: island.clone(), places }
+    }
+
+    /// Returns the surface that supports of an island may meet.
+    fn near(&self, island: &Island) -> NearSurface {
+        let [aside, down] = self.reach_mm();
+        let more = aside + self.options.edge_clearance.mm();
+        let Region { columns, rows } = &island.region;
+        let [left, top] = self.raster.place_mm([columns.start.into(), rows.start.into()]);
+        let [right, bottom] = self.raster.place_mm([columns.end.into(), rows.end.into()]);
+        let z = self.bottom_mm(island.layer);
+        let clear = self.options.edge_clearance.mm();
+        let low = [left - more, bottom - more, z - down - clear];
+        self.surface.near(low, [right + more, top + more, z + clear])
+    }
+
+    /// Finds the supports of a piece of an island.
+    fn place(&self, piece: &Piece, near: &NearSurface, around: &Surroundings<'_>) -> HeldPlace {
+        let [x, y] = self.raster.place_mm(piece.middle);
+        let origin_mm = [x, y, self.bottom_mm(around.layer)];
+        let tried = self.directions.par_iter();
+        let tried = tried.map(|direction| self.support(origin_mm, *direction, near, around));
+        let tried: Vec<Result<Support, Rejection>> = tried.collect();
+        let count = |cause: Rejection| {
+            let failed = tried.iter().filter(|tried| tried.as_ref().err() == Some(&cause)).count();
+            (failed > 0).then_some((cause, failed as u32))
+        };
+        let rejected = Rejection::ALL.iter().filter_map(|cause| count(*cause)).collect();
+        let mut supports: Vec<Support> = tried.into_iter().filter_map(Result::ok).collect();
+        supports.sort_by(|a, b| a.length().um().total_cmp(&b.length().um()));
+        supports.truncate(self.options.keep.max(1));
+        HeldPlace { origin_mm, area: piece.area, supports, rejected }
+    }
+
+    /// Returns the support in a direction, or why there is none.
+    fn support(
+        &self,
+        origin_mm: Vec3,
+        direction: Vec3,
+        near: &NearSurface,
+        around: &Surroundings<'_>,
+    ) -> Result<Support, Rejection> {
+        let options = self.options;
+        let contact = near.entered(origin_mm, direction).ok_or(Rejection::Far)?;
+        if contact.length_mm > options.max_length.mm() {
+            return Err(Rejection::Far);
+        }
+        if near.has_crease_within(contact.at_mm, options.edge_clearance.mm()) {
+            return Err(Rejection::Edge);
+        }
+        let curvature = near.curvature(&contact, options.radius.mm());
+        if curvature > options.max_curvature {
+            return Err(Rejection::Curved);
+        }
+        let apart = |other: &[Vec3; 2]| distance_mm(*other, [origin_mm, contact.at_mm]);
+        let least = 2.0 * options.radius.mm() + self.raster.dpi.pitch().mm();
+        if self.built.iter().any(|other| apart(other) < least) {
+            return Err(Rejection::Crossing);
+        }
+        let support = Support {
+            origin_mm,
+            contact_mm: contact.at_mm,
+            ends: ends(origin_mm, direction, &contact, options.radius.mm()),
+            diameter: Length::from_um(2.0 * options.radius.um()),
+            tilt: (-direction[2]).clamp(0.0, 1.0).acos().to_degrees(),
+            curvature,
+        };
+        around.try_strut(&support.strut(), &contact, options.radius.mm())?;
+        Ok(support)
+    }
+}
+
+/// Returns the ends of the strut to draw. It reaches beyond the level bottom of the island and the
+/// contact's plane until all of its ends is beyond, and into the part at least by its radius.
+fn ends(origin: Vec3, direction: Vec3, contact: &Contact, radius_mm: f64) -> [[Length; 3]; 2] {
+    // The tangent of the angle between the axis and a plane's normal.
+    let slope = |cosine: f64| (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
+    let above = slope(-direction[2]).min(MOST_RADII);
+    let beyond = slope(-dot(direction, contact.normal)).clamp(1.0, MOST_RADII);
+    let from = along(origin, direction, -radius_mm * above);
+    let to = along(contact.at_mm, direction, radius_mm * beyond);
+    [from, to].map(|end| end.map(|place| Length::from_mm(place).to_whole_nm()))
+}

@@ -1,0 +1,277 @@
+//! Supports of whole parts, drawn and checked again.
+
+use lamp_fixtures::{Mesh, cavity_core, mug, needle, ring};
+use lamp_slicer::{FacetIndex, Part, Placement, SliceOptions, Slices, Units};
+use lamp_stack::{Dpi, Image, Layer, Length, Mask, MaskBuilder, Op};
+use proptest::prelude::*;
+
+use super::*;
+use crate::check::{CheckError, CheckOptions, Findings, check};
+
+/// A part, its layers and what is found in them.
+struct Checked {
+    surface: Surface,
+    layers: Vec<Layer>,
+    found: Findings,
+}
+
+fn found_in(layers: &[Layer]) -> Findings {
+    let layers = layers.iter().cloned().map(Ok::<_, CheckError>);
+    check(layers, Ok, &CheckOptions::default()).unwrap()
+}
+
+fn checked(mesh: Mesh, dpi: f64) -> Checked {
+    let part = Part::from_facets("part", mesh.facets);
+    let options = SliceOptions { dpi: Dpi::new(dpi).unwrap(), ..SliceOptions::default() };
+    let layers: Result<Vec<Layer>, _> = Slices::new(part.clone(), &options).unwrap().collect();
+    let facets = FacetIndex::new(part, &Placement::default(), Units::Millimetres).unwrap();
+    let (surface, layers) = (Surface::new(facets), layers.unwrap());
+    Checked { found: found_in(&layers), surface, layers }
+}
+
+impl Checked {
+    fn plan(&self, options: &SupportOptions) -> Vec<IslandPlan> {
+        let layers = self.layers.iter().cloned().map(Ok::<_, SupportError>);
+        plan_supports(layers, &self.found, &self.surface, options).unwrap()
+    }
+
+    /// Draws supports into the layers.
+    fn with(&self, plans: &[IslandPlan]) -> Vec<Layer> {
+        let supports: Vec<&Support> = plans.iter().flat_map(IslandPlan::supports).collect();
+        let drawn = self.layers.iter().map(|layer| {
+            let mut image = mask(layer).clone();
+            for support in &supports {
+                image = image.combined(Op::Union, &section(support, layer)).unwrap();
+            }
+            Layer { image: image.into(), ..layer.clone() }
+        });
+        drawn.collect()
+    }
+}
+
+fn mask(layer: &Layer) -> &Mask {
+    let Image::Mask(mask) = &*layer.image else { panic!("slices are masks") };
+    mask
+}
+
+fn middle(layer: &Layer) -> Length {
+    Length::from_um(layer.info.z_um.unwrap() + layer.info.thickness_um.unwrap() / 2.0)
+}
+
+fn section(support: &Support, layer: &Layer) -> Mask {
+    let size = [layer.image.width(), layer.image.height()];
+    let (origin, dpi) = (layer.info.origin_mm.unwrap(), layer.dpi.unwrap());
+    let runs: Vec<_> = support.strut().section(middle(layer), origin, dpi, size).collect();
+    let mut mask = MaskBuilder::new(size[0]);
+    for row in 0..size[1] {
+        let run = runs.iter().find(|run| run.0 == row);
+        mask.push_row(&run.map_or(vec![], |&(_, start, end)| vec![start, end])).unwrap();
+    }
+    mask.finish()
+}
+
+/// Returns the lengths of an island's supports, place by place.
+fn lengths(plan: &IslandPlan) -> Vec<Option<f64>> {
+    let length = |place: &HeldPlace| Some(place.supports.first()?.length().mm());
+    plan.places.iter().map(length).collect()
+}
+
+/// Checks that only islands that are left are islands after supports are drawn.
+fn assert_held(part: &Checked, plans: &[IslandPlan]) {
+    let left: Vec<_> =
+        plans.iter().filter(|plan| plan.is_left()).map(|plan| plan.island.layer).collect();
+    let after = found_in(&part.with(plans));
+    let mut islands: Vec<_> = after.islands.list.iter().map(|island| island.layer).collect();
+    islands.sort_unstable();
+    assert_eq!(islands, left);
+    assert_eq!(after.specks.count(), part.found.specks.count());
+}
+
+/// Options that hold an island at one point.
+fn undivided() -> SupportOptions {
+    SupportOptions { hold: Length::from_mm(50.0), ..SupportOptions::default() }
+}
+
+#[test]
+fn cores_in_a_cavity_are_held_by_the_nearest_walls() {
+    let part = checked(cavity_core(2_000), 254.0);
+    let plans = part.plan(&SupportOptions::default());
+    assert_held(&part, &plans);
+    // 10 x 6 mm and 4 x 6 mm, in pieces of 2 x 2 mm; 6 and 10 mm above the floor.
+    let lengths =
+        [0, 1].map(|k: usize| lengths(&plans[k]).into_iter().flatten().collect::<Vec<_>>());
+    assert_eq!((lengths[0].len(), lengths[1].len()), (15, 6));
+    assert_eq!(lengths[0][5..9], [6.0; 4]);
+    // The last column is 3 mm from a wall, which a tilt of 45° meets 3 sqrt(2) mm away.
+    let slanted = [4, 9, 14].map(|k| lengths[0][k]).into_iter().chain(lengths[1].clone());
+    for length in slanted {
+        assert!(length > 3.0 * 2f64.sqrt() && length < 4.3, "{length}");
+    }
+    let built: Vec<_> = plans.iter().flat_map(IslandPlan::supports).collect();
+    for (k, a) in built.iter().enumerate() {
+        for b in &built[..k] {
+            let apart =
+                super::fit::distance_mm([a.origin_mm, a.contact_mm], [b.origin_mm, b.contact_mm]);
+            assert!(apart > 0.5, "{a:?} {b:?}");
+        }
+    }
+    let alone = part.plan(&undivided());
+    let [one, other] = [0, 1].map(|k: usize| lengths_of_one(&alone[k]));
+    // The other one's wall is 4 mm from its middle.
+    assert!(one == 6.0 && (other / 32f64.sqrt() - 1.0).abs() < 0.01, "{one} {other}");
+}
+
+#[test]
+fn a_handle_is_held_from_the_side() {
+    let part = checked(mug(4_000), 254.0);
+    let [plan] = &part.plan(&undivided())[..] else { panic!("one island") };
+    let [place] = &plan.places[..] else { panic!("one place") };
+    // The wall is round, 10 mm about (-4, 0): 6.5 mm from the grip's middle at (12.5, 0).
+    for (x, found) in [12.5, 0.0, 8.0].into_iter().zip(place.origin_mm) {
+        assert!((x - found).abs() < 0.06, "{:?}", place.origin_mm);
+    }
+    let best = &place.supports[0];
+    assert!((best.length().mm() / (6.5 * 2f64.sqrt()) - 1.0).abs() < 0.02, "{best:?}");
+    assert!((best.curvature - 0.1).abs() < 0.01 && best.tilt > 44.0, "{best:?}");
+    assert_eq!(place.supports.len(), 3);
+    assert!(place.supports.is_sorted_by(|a, b| a.length().um() <= b.length().um()));
+    assert_held(&part, std::slice::from_ref(plan));
+
+    let flat = SupportOptions { max_curvature: 0.09, ..undivided() };
+    let [plan] = &part.plan(&flat)[..] else { panic!("one island") };
+    assert!(plan.is_left());
+    let curved = plan.places[0].rejected.iter().find(|(cause, _)| *cause == Rejection::Curved);
+    assert!(curved.is_some_and(|(_, count)| *count > 3), "{plan:?}");
+    assert_held(&part, std::slice::from_ref(plan));
+}
+
+#[test]
+fn an_island_without_a_way_is_left() {
+    let part = checked(needle(2_000), 254.0);
+    let plans = part.plan(&SupportOptions::default());
+    assert_eq!(plans[0].places[0].rejected, [(Rejection::Far, 400)]);
+    assert_held(&part, &plans);
+    // Posts stand 12 mm aside.
+    let far = SupportOptions { max_length: Length::from_mm(20.0), max_tilt: 60.0, ..undivided() };
+    let plans = part.plan(&far);
+    let length = lengths_of_one(&plans[0]);
+    assert!((length - 12.0 / 60f64.to_radians().sin()).abs() < 0.3, "{length}");
+    assert_held(&part, &plans);
+}
+
+#[test]
+fn a_ring_is_held_where_it_is_white() {
+    let part = checked(ring(2_000), 254.0);
+    let far = SupportOptions { max_length: Length::from_mm(20.0), max_tilt: 60.0, ..undivided() };
+    let plans = part.plan(&far);
+    let [x, y, z] = plans[0].places[0].origin_mm;
+    assert!(x.abs().max(y.abs()) > 5.0 && x.abs().max(y.abs()) < 5.1 && z == 10.0, "{x} {y} {z}");
+    assert_held(&part, &plans);
+}
+
+fn lengths_of_one(plan: &IslandPlan) -> f64 {
+    let [Some(length)] = lengths(plan)[..] else { panic!("{plan:?}") };
+    length
+}
+
+#[test]
+fn what_the_pages_lack_is_said() {
+    let mut part = checked(needle(2_000), 127.0);
+    let error = |part: &Checked| {
+        let layers = part.layers.iter().cloned().map(Ok::<_, SupportError>);
+        plan_supports(layers, &part.found, &part.surface, &SupportOptions::default()).unwrap_err()
+    };
+    part.layers.truncate(9);
+    assert_eq!(error(&part), SupportError::MissingLayers);
+    part.found.layers[7].z_um = None;
+    assert_eq!(error(&part), SupportError::NoHeight { index: 7 });
+    part.found.dpi = None;
+    assert_eq!(error(&part), SupportError::NoResolution);
+    part.found.origin_mm = None;
+    assert_eq!(error(&part), SupportError::NoOrigin);
+}
+
+/// A box between two corners.
+fn block([x, y, z]: [[f64; 2]; 3]) -> Vec<lamp_fixtures::Facet> {
+    let corner = |k: usize| [x[k & 1], y[k >> 1 & 1], z[k >> 2]].map(|place| place as f32);
+    let sides =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let halves = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    halves.map(|facet| facet.map(corner)).collect()
+}
+
+fn blocks() -> impl Strategy<Value = Mesh> {
+    let sides = ((-60i32..50, 10i32..50), (-60i32..50, 10i32..50), (12i32..70, 4i32..30));
+    prop::collection::vec(sides, 2..6).prop_map(|boxes| {
+        let plate = block([[-6.0, 6.0], [-6.0, 6.0], [0.0, 1.0]]);
+        let side =
+            |(start, size): (i32, i32)| [start, start + size].map(|q| f64::from(q) / 10.0 + 0.013);
+        let boxes = boxes.into_iter().flat_map(|(x, y, z)| block([side(x), side(y), side(z)]));
+        Mesh { facets: plate.into_iter().chain(boxes).collect() }
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn supports_of_random_blocks_hold_them_and_run_through_black(
+        mesh in blocks(),
+        (tilt, hold, diameter) in (10f64..70.0, 1f64..9.0, 4f64..9.0),
+    ) {
+        let sides: Vec<[f32; 3]> = mesh.facets.iter().flatten().copied().collect();
+        let part = checked(mesh, 127.0);
+        let options = SupportOptions {
+            candidates: NonZeroU32::new(100).unwrap(),
+            max_tilt: tilt,
+            hold: Length::from_mm(hold),
+            radius: Length::from_mm(diameter / 20.0),
+            ..SupportOptions::default()
+        };
+        let plans = part.plan(&options);
+        assert_held(&part, &plans);
+        let places = plans.iter().flat_map(|plan| &plan.places);
+        for support in places.flat_map(|place| &place.supports) {
+            // The contact lies on a side of a block, which is level or upright.
+            let on_side = |axis: usize| {
+                let at = support.contact_mm[axis];
+                sides.iter().any(|corner| (f64::from(corner[axis]) - at).abs() < 1e-5)
+            };
+            let axis = (0..3).find(|&axis| on_side(axis)).expect("there is a side");
+            for (centre, is_white) in pixels_before(support, &part.layers) {
+                let beyond = (centre[axis] - support.contact_mm[axis]).abs();
+                // A pixel, a layer and a quarter of the radius.
+                prop_assert!(!is_white || beyond < 0.3 + options.radius.mm() / 4.0, "{support:?} {centre:?}");
+            }
+        }
+    }
+}
+
+/// Returns the pixels between an island and its support's contact, by looking at each, and whether
+/// they were white.
+fn pixels_before(support: &Support, layers: &[Layer]) -> Vec<([f64; 3], bool)> {
+    let (length, radius) = (support.length().mm(), support.diameter.mm() / 2.0);
+    let [origin, contact] = [support.origin_mm, support.contact_mm];
+    let axis: [f64; 3] = std::array::from_fn(|k| (contact[k] - origin[k]) / length);
+    let mut pixels = Vec::new();
+    for layer in layers {
+        let z = middle(layer).mm();
+        if z > origin[2] || z < contact[2] {
+            continue;
+        }
+        let ([x0, y1], pitch) = (layer.info.origin_mm.unwrap(), layer.dpi.unwrap().pitch().mm());
+        for row in 0..layer.image.height() {
+            for column in 0..layer.image.width() {
+                let [x, y] = [column, row].map(|place| (f64::from(place) + 0.5) * pitch);
+                let centre = [x0 + x, y1 - y, z];
+                let from: [f64; 3] = std::array::from_fn(|k| centre[k] - origin[k]);
+                let place: f64 = (0..3).map(|k| from[k] * axis[k]).sum();
+                let away: f64 = (0..3).map(|k| (from[k] - place * axis[k]).powi(2)).sum();
+                if away < radius * radius && place > 0.0 && place < length {
+                    pixels.push((centre, mask(layer).is_white(column, row)));
+                }
+            }
+        }
+    }
+    pixels
+}
