@@ -14,7 +14,7 @@ use super::fit::{Surroundings, distance_mm, span_mm};
 use super::surface::{Contact, NearSurface, Surface};
 use super::window::{Raster, Window};
 use super::{HeldPlace, IslandPlan, Rejection, Support, SupportOptions};
-use crate::check::{Findings, Island, Region, white_component};
+use crate::check::{Findings, Island, Region, component_at};
 
 /// A reason that no supports can be planned for a stack.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -136,7 +136,7 @@ impl<'a> Planner<'a> {
 
     fn plan(&mut self, island: &Island, window: &Window, mask: &Mask) -> IslandPlan {
         let [column, row] = island.first;
-        let runs = white_component(mask, column, row);
+        let runs = component_at(mask, column, row);
         let surroundings = Surroundings {
             raster: self.raster,
             layers: &self.found.layers,
