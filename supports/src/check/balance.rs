@@ -9,10 +9,31 @@ pub(super) struct Base {
     /// where y grows.
     hull: Vec<[i64; 2]>,
     region: Region,
-    /// The sum of its pixels times the thickness of their layers, and their first moments.
+    weight: Weight,
+    off: Option<OffBalance>,
+}
+
+/// The sum of a body's pixels times the thickness of their layers, and their first moments.
+#[derive(Default)]
+pub(super) struct Weight {
     mass: f64,
     moments: [f64; 2],
-    off: Option<OffBalance>,
+}
+
+impl Weight {
+    /// Adds what a layer has of the body.
+    pub(super) fn grow(&mut self, layer: &Labelled, components: &[u32], thickness_um: f64) {
+        for &component in components {
+            let component = &layer.components.all[component as usize];
+            let moments = component.moments().map(|moment| moment * thickness_um);
+            self.unite(&Self { mass: component.area as f64 * thickness_um, moments });
+        }
+    }
+
+    pub(super) fn unite(&mut self, other: &Self) {
+        self.mass += other.mass;
+        self.moments = [0, 1].map(|k| self.moments[k] + other.moments[k]);
+    }
 }
 
 impl Base {
@@ -27,7 +48,7 @@ impl Base {
             }
         }
         let region = layer.components.all[components[0] as usize].region();
-        Self { hull: convex_hull(corners), region, mass: 0.0, moments: [0.0; 2], off: None }
+        Self { hull: convex_hull(corners), region, weight: Weight::default(), off: None }
     }
 
     /// Joins another body to this one.
@@ -36,8 +57,7 @@ impl Base {
         corners.extend(other.hull);
         self.hull = convex_hull(corners);
         self.region.unite(&other.region);
-        self.mass += other.mass;
-        self.moments = [0, 1].map(|k| self.moments[k] + other.moments[k]);
+        self.weight.unite(&other.weight);
         self.off = match (self.off.take(), other.off) {
             (Some(mut a), Some(b)) => {
                 a.layer = a.layer.min(b.layer);
@@ -48,6 +68,11 @@ impl Base {
         };
     }
 
+    /// Adds what floated until now.
+    pub(super) fn carry(&mut self, floating: &Weight) {
+        self.weight.unite(floating);
+    }
+
     /// Adds what a layer has of the body.
     pub(super) fn grow(
         &mut self,
@@ -56,15 +81,11 @@ impl Base {
         number: u32,
         thickness_um: f64,
     ) {
-        for &component in components {
-            let component = &layer.components.all[component as usize];
-            let moments = component.moments();
-            self.mass += component.area as f64 * thickness_um;
-            self.moments = [0, 1].map(|k| self.moments[k] + moments[k] * thickness_um);
-        }
-        let centre = self.moments.map(|moment| moment / self.mass);
+        self.weight.grow(layer, components, thickness_um);
+        let Weight { mass, moments } = self.weight;
+        let centre = moments.map(|moment| moment / mass);
         let off_pixels = distance(&self.hull, centre);
-        if off_pixels == 0.0 || self.mass == 0.0 {
+        if off_pixels == 0.0 || mass == 0.0 {
             return;
         }
         let first = self.off.as_ref().map_or(number, |off| off.layer);

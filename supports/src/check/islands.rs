@@ -1,6 +1,6 @@
 //! White bodies as they grow: which stand on the platform, which float, and where they join.
 
-use super::balance::Base;
+use super::balance::{Base, Weight};
 use super::components::Component;
 use super::contact::{Contact, Labelled};
 use super::findings::{End, Island, Listed, OffBalance, Region};
@@ -27,6 +27,8 @@ struct Floating {
     /// What is known of it so far.
     island: Island,
     holds_square: bool,
+    /// What a body will carry that it joins.
+    weight: Weight,
 }
 
 impl Growth {
@@ -91,7 +93,7 @@ impl Growth {
             largest_layer: layer,
             end: End::Loose,
         };
-        Body::Floating(Floating { island, holds_square: false })
+        Body::Floating(Floating { island, holds_square: false, weight: Weight::default() })
     }
 
     /// Makes one body of several: one that stands, or else the eldest island.
@@ -104,16 +106,22 @@ impl Growth {
                 (Body::Floating(island), _) => floating.push(island),
             }
         }
-        if let Some(base) = base {
+        if let Some(mut base) = base {
             let end = End::JoinsPart { layer };
-            floating.into_iter().for_each(|island| self.list(island, end));
+            for island in floating {
+                base.carry(&island.weight);
+                self.list(island, end);
+            }
             return Body::Standing(base);
         }
         floating.sort_by_key(|floating| floating.island.number);
         let mut floating = floating.into_iter();
-        let elder = floating.next().expect("a group has a body");
+        let mut elder = floating.next().expect("a group has a body");
         let end = End::JoinsIsland { layer, number: elder.island.number };
-        floating.for_each(|island| self.list(island, end));
+        for island in floating {
+            elder.weight.unite(&island.weight);
+            self.list(island, end);
+        }
         Body::Floating(elder)
     }
 
@@ -142,6 +150,7 @@ impl Floating {
         thickness_um: f64,
         speck: u32,
     ) {
+        self.weight.grow(layer, components, thickness_um);
         let area: u64 = components.iter().map(|&c| layer.components.all[c as usize].area).sum();
         let island = &mut self.island;
         island.floating_pixels += area;
