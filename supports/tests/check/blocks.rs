@@ -1,0 +1,74 @@
+//! Random blocks: boxes, white and black, and noise.
+
+use proptest::prelude::*;
+
+use crate::agree::agree;
+use crate::referee::{Block, Limits};
+
+/// Returns blocks of a size: boxes painted over each other, the first one white and from the
+/// platform up, then single voxels turned over.
+fn blocks(size: [usize; 3], noise: usize) -> impl Strategy<Value = Block> {
+    let span = |length: usize| (0..length, 1..=length / 2 + 1);
+    let boxes = (span(size[0]), span(size[1]), span(size[2]), any::<bool>());
+    let boxes = proptest::collection::vec(boxes, 1..12);
+    let voxels = size.iter().product::<usize>();
+    let turned = proptest::collection::vec(0..voxels, 0..=noise);
+    let thickness_um = proptest::collection::vec(25..200u32, size[2]);
+    (boxes, turned, thickness_um).prop_map(move |(boxes, turned, thickness_um)| {
+        let thickness_um = thickness_um.into_iter().map(f64::from).collect();
+        let white = vec![false; size.iter().product()];
+        let mut block = Block { size, white, pitch_um: 63.5, thickness_um };
+        for (k, (columns, rows, layers, is_white)) in boxes.into_iter().enumerate() {
+            let first_layer = if k == 0 { 0 } else { layers.0 };
+            for voxel in 0..block.white.len() {
+                let [column, row, layer] = block.place(voxel);
+                let inside =
+                    |at: usize, (from, length): (usize, usize)| (from..from + length).contains(&at);
+                if inside(column, columns)
+                    && inside(row, rows)
+                    && inside(layer, (first_layer, layers.1))
+                {
+                    block.white[voxel] = is_white || k == 0;
+                }
+            }
+        }
+        for voxel in turned {
+            block.white[voxel] = !block.white[voxel];
+        }
+        block
+    })
+}
+
+fn limits() -> impl Strategy<Value = Limits> {
+    let overhang_um = proptest::option::of(20.0..400.0);
+    (1..4usize, 0.0..1.0, overhang_um).prop_map(|(speck, least_support, max_overhang_um)| Limits {
+        speck,
+        least_support,
+        max_overhang_um,
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(400) })]
+
+    #[test]
+    fn blocks_of_boxes_agree(block in blocks([12, 10, 8], 6), limits in limits()) {
+        agree(&block, &limits);
+    }
+
+    #[test]
+    fn blocks_of_noise_agree(block in blocks([9, 7, 6], 200), limits in limits()) {
+        agree(&block, &limits);
+    }
+
+    #[test]
+    fn flat_blocks_agree(block in blocks([24, 20, 2], 120), limits in limits()) {
+        agree(&block, &limits);
+    }
+
+    // Layers are taken in batches of 16 a thread.
+    #[test]
+    fn tall_blocks_agree(block in blocks([7, 5, 50], 60), limits in limits()) {
+        agree(&block, &limits);
+    }
+}

@@ -1,0 +1,6 @@
+//! Checks of blocks and parts, compared in every number with a referee that fills voxels.
+
+mod agree;
+mod blocks;
+mod drawn;
+mod referee;
