@@ -2,7 +2,9 @@
 
 use proptest::prelude::*;
 
-use crate::agree::agree;
+use lamp_stack::GrayMask;
+
+use crate::agree::{THRESHOLD, agree, agree_as, layers};
 use crate::referee::{Block, Limits};
 
 /// Returns blocks of a size: boxes painted over each other, the first one white and from the
@@ -64,6 +66,29 @@ proptest! {
     #[test]
     fn flat_blocks_agree(block in blocks([24, 20, 2], 120), limits in limits()) {
         agree(&block, &limits);
+    }
+
+    #[test]
+    fn gray_blocks_agree(
+        block in blocks([11, 9, 7], 60),
+        levels in proptest::collection::vec(any::<u8>(), 693),
+        limits in limits(),
+    ) {
+        let [columns, rows, _] = block.size;
+        // White is any level from the threshold up, black any below.
+        let level = |voxel: usize| match (block.white[voxel], THRESHOLD.get()) {
+            (true, threshold) => levels[voxel].max(threshold),
+            (false, threshold) => levels[voxel].min(threshold - 1),
+        };
+        let image = |layer: usize| {
+            let mut gray = GrayMask::new(columns as u32);
+            for row in 0..rows {
+                let level = |column| (1, level(block.at([column, row, layer])));
+                gray.push_runs((0..columns).map(level)).unwrap();
+            }
+            gray.into()
+        };
+        agree_as(layers(&block, &image), &block, &limits);
     }
 
     // Layers are taken in batches of 16 a thread.

@@ -178,7 +178,33 @@ fn a_body_leans_when_its_centre_passes_its_base() {
 #[test]
 fn empty_and_border_layers_come_in_runs() {
     let block = block(&["... .#. ...", "... ... ...", "... ... ...", "#.. ... ...", ".#. ... ..."]);
-    assert_eq!(empty_layers(&block), [1..3]);
-    assert_eq!(border_layers(&block), [3..5]);
+    let runs = |layers: Vec<std::ops::Range<usize>>| format!("{layers:?}");
+    assert_eq!(runs(empty_layers(&block)), "[1..3]");
+    assert_eq!(runs(border_layers(&block)), "[3..5]");
+    agree(&block, &LIMITS);
+}
+
+/// Others call this an island, though a post holds it.
+#[test]
+fn what_a_post_holds_is_a_weak_joint_and_no_island() {
+    let block = block(&["...#... .......", "...#... .......", "####### #######"]);
+    assert_eq!(islands(&block, &LIMITS), []);
+    let joints = weak_joints(&block, &LIMITS);
+    assert_eq!(joints.iter().map(|j| (j.layer, j.support)).collect::<Vec<_>>(), [(2, 1)]);
+    agree(&block, &LIMITS);
+}
+
+#[test]
+fn a_support_that_ends_a_layer_below_holds_nothing() {
+    let block = block(&[
+        "#..#..# ....... .......",
+        "#..#..# ....... .......",
+        "#.....# ....... .......",
+        "#.###.# ..###.. .......",
+        "####### ####### #######",
+    ]);
+    let found = islands(&block, &LIMITS);
+    let told: Vec<_> = found.iter().map(|i| (i.layer, i.joins, i.is_speck)).collect();
+    assert_eq!(told, [(3, Some((4, None)), false)]);
     agree(&block, &LIMITS);
 }

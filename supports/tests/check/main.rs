@@ -3,4 +3,5 @@
 mod agree;
 mod blocks;
 mod drawn;
+mod parts;
 mod referee;

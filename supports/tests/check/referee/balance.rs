@@ -19,16 +19,23 @@ pub(crate) fn tilts(block: &Block) -> Vec<Tilt> {
     let mut growth = Growth::new(block);
     // For each birth, the first layer in which it leans, and the farthest.
     let mut leans: Vec<Option<(usize, f64)>> = Vec::new();
+    let mut weights: Vec<Weight> = Vec::new();
     for layer in 0..block.size[2] {
         growth.grow(layer);
         leans.resize(growth.births.len(), None);
-        for body in 0..growth.births.len() {
+        weights.resize(growth.births.len(), Weight::default());
+        for voxel in block.layer(layer) {
+            if let Some(name) = growth.names[voxel] {
+                weights[name] = weights[name].with(Weight::of(block, voxel));
+            }
+        }
+        for (body, lean) in leans.iter_mut().enumerate() {
             if growth.stands(body) && growth.is_eldest(body) {
-                let off_um = off_base(&growth, body) * block.pitch_um;
+                let off_um = off_base(&growth, &weights, body) * block.pitch_um;
                 // Less is what rounding leaves of zero.
                 if off_um > 1e-6 {
-                    let (first, farthest_um) = leans[body].unwrap_or((layer, 0.0));
-                    leans[body] = Some((first, off_um.max(farthest_um)));
+                    let (first, farthest_um) = lean.unwrap_or((layer, 0.0));
+                    *lean = Some((first, off_um.max(farthest_um)));
                 }
             }
         }
@@ -49,24 +56,36 @@ pub(crate) fn tilts(block: &Block) -> Vec<Tilt> {
     standing.filter_map(tilt).collect()
 }
 
-/// Returns how far a body's centre of gravity is outside of its base, in pixels; zero
-/// within it.
-fn off_base(growth: &Growth, body: usize) -> f64 {
-    let block = growth.block;
-    let its = (0..block.white.len()).filter(|&voxel| growth.names[voxel] == Some(body));
-    let (mut mass, mut moment, mut corners) = (0.0, [0.0; 2], Vec::new());
-    for voxel in its {
+/// The sum of some voxels' thicknesses, and those times their columns and rows.
+#[derive(Clone, Copy, Default)]
+struct Weight([f64; 3]);
+
+impl Weight {
+    fn of(block: &Block, voxel: usize) -> Self {
         let [column, row, layer] = block.place(voxel);
-        let weight = block.thickness_um[layer];
-        mass += weight;
-        moment[0] += weight * (column as f64 + 0.5);
-        moment[1] += weight * (row as f64 + 0.5);
-        if layer == 0 {
-            let corner = |i: usize| [(column + i % 2) as f64, (row + i / 2) as f64];
-            corners.extend((0..4).map(corner));
-        }
+        Self([1.0, column as f64 + 0.5, row as f64 + 0.5].map(|at| at * block.thickness_um[layer]))
     }
-    outside(&hull(&corners), moment.map(|m| m / mass))
+
+    fn with(self, other: Self) -> Self {
+        Self([0, 1, 2].map(|k| self.0[k] + other.0[k]))
+    }
+}
+
+/// Returns how far a body's centre of gravity is outside of its base, in pixels; zero
+/// within it. Weights are those that births had while they were the eldest of their bodies.
+fn off_base(growth: &Growth, weights: &[Weight], body: usize) -> f64 {
+    let block = growth.block;
+    let its = (0..weights.len()).filter(|&birth| growth.name(birth) == body);
+    let Weight([mass, x, y]) =
+        its.map(|birth| weights[birth]).fold(Weight::default(), Weight::with);
+    let base = block.layer(0).filter(|&voxel| growth.names[voxel] == Some(body));
+    let corners: Vec<[f64; 2]> = base
+        .flat_map(|voxel| {
+            let [column, row, _] = block.place(voxel);
+            (0..4).map(move |i| [(column + i % 2) as f64, (row + i / 2) as f64])
+        })
+        .collect();
+    outside(&hull(&corners), [x / mass, y / mass])
 }
 
 /// Returns the corners of the convex hull, by wrapping: each is followed by the one that has
