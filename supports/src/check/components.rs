@@ -28,10 +28,10 @@ pub(super) struct Component {
     /// The column and row of the first pixel, by rows.
     pub(super) first: [u32; 2],
     pub(super) area: u64,
-    /// Twice the sum over its pixels of the columns of their centres.
-    twice_x: u64,
-    /// The sum over its pixels of their rows.
-    sum_y: u64,
+    /// Twice the sum over its pixels of the columns of their centres; not of the background.
+    twice_x: f64,
+    /// The sum over its pixels of their rows; not of the background.
+    sum_y: f64,
     pub(super) columns: Range<u32>,
     pub(super) rows: Range<u32>,
 }
@@ -42,8 +42,8 @@ impl Component {
             is_white,
             first: [columns.start, row],
             area: 0,
-            twice_x: 0,
-            sum_y: 0,
+            twice_x: 0.0,
+            sum_y: 0.0,
             columns: columns.clone(),
             rows: row..row + 1,
         }
@@ -53,16 +53,27 @@ impl Component {
     fn add(&mut self, row: u32, columns: &Range<u32>) {
         let len = u64::from(columns.end - columns.start);
         self.area += len;
-        self.twice_x += len * u64::from(columns.start + columns.end);
-        self.sum_y += len * u64::from(row);
+        // Sums stay exact up to 2^53, which no layer comes near.
+        self.twice_x += (len * u64::from(columns.start + columns.end)) as f64;
+        self.sum_y += (len * u64::from(row)) as f64;
         self.columns.start = self.columns.start.min(columns.start);
         self.columns.end = self.columns.end.max(columns.end);
         self.rows.end = row + 1;
     }
 
+    fn unite(&mut self, other: &Self) {
+        self.area += other.area;
+        self.twice_x += other.twice_x;
+        self.sum_y += other.sum_y;
+        self.columns.start = self.columns.start.min(other.columns.start);
+        self.columns.end = self.columns.end.max(other.columns.end);
+        self.rows.start = self.rows.start.min(other.rows.start);
+        self.rows.end = self.rows.end.max(other.rows.end);
+    }
+
     /// Returns the sums over its pixels of the columns and rows of their centres.
     pub(super) fn moments(&self) -> [f64; 2] {
-        [self.twice_x as f64 / 2.0, self.sum_y as f64 + self.area as f64 / 2.0]
+        [self.twice_x / 2.0, self.sum_y + self.area as f64 / 2.0]
     }
 
     /// Returns the mean of its pixels' centres, as column and row.
@@ -73,24 +84,29 @@ impl Component {
 
 impl Components {
     pub(super) fn of(mask: &Mask) -> Self {
-        let segments = mask.change_count() + mask.height() as usize;
-        let mut sets = Sets { parents: Vec::new() };
-        let mut labels = vec![NONE; segments];
+        let mut sets = Sets::default();
+        let mut labels = vec![NONE; mask.change_count() + mask.height() as usize];
         let mut row_starts = Vec::with_capacity(mask.height() as usize + 1);
         let (mut start, mut above_start) = (0, 0);
         let mut above: &[u32] = &[];
-        for (number, row) in mask.rows().enumerate() {
+        for (number, row) in (0..).zip(mask.rows()) {
             row_starts.push(start as u32);
-            let end = start + row.len() + 1;
-            let (before, of_row) = labels[..end].split_at_mut(start);
-            if number > 0 {
-                sets.join_rows(above, &before[above_start..], row, of_row, mask.width());
+            let (before, of_row) = labels[..start + row.len() + 1].split_at_mut(start);
+            let labels_above = &before[above_start..];
+            if number > 0 && in_step(above, row) {
+                of_row.copy_from_slice(labels_above);
+            } else {
+                if number > 0 {
+                    sets.join_rows(above, labels_above, row, of_row, mask.width());
+                }
+                sets.label_rest(number, row, of_row, mask.width());
             }
-            sets.label_rest(row, of_row);
-            (above, above_start, start) = (row, start, end);
+            sets.count(number, row, of_row, mask.width());
+            (above, above_start) = (row, start);
+            start += row.len() + 1;
         }
         row_starts.push(start as u32);
-        let all = gather(mask, &mut labels, sets);
+        let all = sets.into_components(&mut labels, mask);
         Self { labels, row_starts, all }
     }
 
@@ -207,10 +223,27 @@ pub(super) fn for_each_overlap(
     }
 }
 
+/// Returns whether each segment of a row overlaps the one of the same number in another, and no
+/// other of its colour.
+#[inline]
+pub(super) fn in_step(a: &[u32], b: &[u32]) -> bool {
+    // Only one of the first segments may be empty.
+    let starts_alike = (a.first() == Some(&0)) == (b.first() == Some(&0));
+    let follows = |(a, b): (&[u32], &[u32])| a[0].max(b[0]) < a[1].min(b[1]);
+    a.len() == b.len() && starts_alike && a.windows(2).zip(b.windows(2)).all(follows)
+}
+
 /// Labels as sets: each points to a lower one of its set, the lowest to itself.
+#[derive(Default)]
 struct Sets {
     parents: Vec<u32>,
+    /// What is known of the pixels of each label.
+    counts: Vec<Component>,
 }
+
+/// The label of the first pixel. Where that is black, it is most of the background, whose pixels
+/// are not counted but inferred.
+const FIRST: u32 = 0;
 
 impl Sets {
     fn root(&mut self, mut label: u32) -> u32 {
@@ -231,10 +264,6 @@ impl Sets {
         labels: &mut [u32],
         width: u32,
     ) {
-        if above == row {
-            labels.copy_from_slice(labels_above);
-            return;
-        }
         for_each_overlap(above, row, width, |i, j, _| {
             if (i ^ j) & 1 == 1 {
                 return;
@@ -251,44 +280,64 @@ impl Sets {
     }
 
     /// Gives new labels to the segments of a row that have none.
-    fn label_rest(&mut self, row: &[u32], labels: &mut [u32]) {
-        let starts_white = usize::from(row.first() == Some(&0));
-        for label in labels[starts_white..].iter_mut().filter(|label| **label == NONE) {
-            *label = self.parents.len() as u32;
-            self.parents.push(*label);
+    fn label_rest(&mut self, number: u32, row: &[u32], labels: &mut [u32], width: u32) {
+        let first = usize::from(row.first() == Some(&0));
+        for (k, label) in labels.iter_mut().enumerate().skip(first) {
+            if *label == NONE {
+                *label = self.parents.len() as u32;
+                self.parents.push(*label);
+                self.counts.push(Component::new(k % 2 == 1, number, &segment(row, width, k)));
+            }
         }
+    }
+
+    /// Counts the pixels of a row.
+    fn count(&mut self, number: u32, row: &[u32], labels: &[u32], width: u32) {
+        let background = if self.counts[FIRST as usize].is_white { NONE } else { FIRST };
+        let mut start = 0;
+        for (&end, &label) in row.iter().chain([&width]).zip(labels) {
+            if label != background && label != NONE {
+                self.counts[label as usize].add(number, &(start..end));
+            }
+            start = end;
+        }
+    }
+
+    /// Numbers the components in the order of their first pixels.
+    fn into_components(self, labels: &mut [u32], mask: &Mask) -> Vec<Component> {
+        let Self { parents: mut numbers, counts } = self;
+        let mut all: Vec<Component> = Vec::new();
+        for (label, count) in counts.into_iter().enumerate() {
+            // Labels point at lower ones, which have their numbers by now.
+            numbers[label] = match numbers[label] as usize {
+                lower if lower == label => {
+                    all.push(count);
+                    all.len() as u32 - 1
+                }
+                lower => {
+                    let number = numbers[lower];
+                    all[number as usize].unite(&count);
+                    number
+                }
+            };
+        }
+        if all.len() < numbers.len() {
+            let renamed = labels.iter_mut().filter(|label| **label != NONE);
+            renamed.for_each(|label| *label = numbers[*label as usize]);
+        }
+        infer_background(&mut all, mask);
+        all
     }
 }
 
-/// Numbers the sets of labels, and gathers what is known of each.
-fn gather(mask: &Mask, labels: &mut [u32], sets: Sets) -> Vec<Component> {
-    let Sets { mut parents } = sets;
-    let mut count = 0;
-    for label in 0..parents.len() {
-        // Labels point at lower ones, which have their numbers by now.
-        parents[label] = match parents[label] as usize {
-            parent if parent == label => count,
-            parent => parents[parent],
-        };
-        count += u32::from(parents[label] == count);
+/// Sets the background to what the others leave of the image, and its rectangle to that of the
+/// image.
+fn infer_background(all: &mut [Component], mask: &Mask) {
+    let Some((first, others)) = all.split_first_mut() else { return };
+    if first.is_white {
+        return;
     }
-    let mut all: Vec<Component> = Vec::with_capacity(count as usize);
-    let mut labels = labels.iter_mut();
-    for (row, transitions) in (0..).zip(mask.rows()) {
-        let mut start = 0;
-        let ends = transitions.iter().copied().chain([mask.width()]);
-        for (k, (end, label)) in ends.zip(labels.by_ref()).enumerate() {
-            let columns = start..end;
-            start = end;
-            if *label == NONE {
-                continue;
-            }
-            *label = parents[*label as usize];
-            if *label as usize == all.len() {
-                all.push(Component::new(k % 2 == 1, row, &columns));
-            }
-            all[*label as usize].add(row, &columns);
-        }
-    }
-    all
+    let pixels = u64::from(mask.width()) * u64::from(mask.height());
+    first.area = pixels - others.iter().map(|other| other.area).sum::<u64>();
+    (first.columns, first.rows) = (0..mask.width(), 0..mask.height());
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use lamp_stack::Mask;
 
-use super::components::{Component, Components, for_each_overlap};
+use super::components::{Component, Components, for_each_overlap, in_step};
 use super::overhang::{OverhangPatch, Unheld, patches};
 
 /// A layer's image and its components.
@@ -71,6 +71,11 @@ impl Contact {
         for row in 0..layer.mask.height() {
             let [under, over] = [below, layer].map(|layer| layer.mask.row(row));
             let [labels_under, labels] = [below, layer].map(|layer| layer.components.of_row(row));
+            let is_near = |(a, b): (&u32, &u32)| a.abs_diff(*b) <= reach;
+            if in_step(under, over) && under.iter().zip(over).all(is_near) {
+                joints.add_row([under, over], [labels_under, labels], width);
+                continue;
+            }
             for_each_overlap(under, over, width, |i, j, columns| {
                 if (i ^ j) & 1 == 0 {
                     joints.add(labels[j], labels_under[i], columns.end - columns.start);
@@ -105,27 +110,43 @@ fn beyond(columns: &Range<u32>, black: [Option<u32>; 2], reach: u32) -> Option<R
 /// Counts common pixels of pairs of components.
 struct Joints {
     /// The pair that each component met last, which most rows meet again.
-    last: Vec<Option<Joint>>,
+    last: Vec<Joint>,
     earlier: Vec<Joint>,
 }
 
 impl Joints {
     fn new(components: usize) -> Self {
-        Self { last: vec![None; components], earlier: Vec::new() }
+        let last = (0..components as u32).map(|component| Joint { component, below: 0, pixels: 0 });
+        Self { last: last.collect(), earlier: Vec::new() }
     }
 
     #[inline]
     fn add(&mut self, component: u32, below: u32, pixels: u32) {
-        let pixels = u64::from(pixels);
-        match &mut self.last[component as usize] {
-            Some(last) if last.below == below => last.pixels += pixels,
-            last => self.earlier.extend(last.replace(Joint { component, below, pixels })),
+        let last = &mut self.last[component as usize];
+        if last.below != below {
+            self.earlier.push(*last);
+            (last.below, last.pixels) = (below, 0);
+        }
+        last.pixels += u64::from(pixels);
+    }
+
+    /// Counts for rows that are in step.
+    fn add_row(&mut self, rows: [&[u32]; 2], labels: [&[u32]; 2], width: u32) {
+        let [under, over] = rows.map(|row| row.iter().chain([&width]));
+        let mut start = 0;
+        for ((a, b), (&below, &component)) in under.zip(over).zip(labels[0].iter().zip(labels[1])) {
+            let end = *a.min(b);
+            if end > start {
+                self.add(component, below, end - start);
+            }
+            start = *a.max(b);
         }
     }
 
     fn finish(self) -> Vec<Joint> {
         let mut all = self.earlier;
-        all.extend(self.last.into_iter().flatten());
+        all.extend(self.last);
+        all.retain(|joint| joint.pixels > 0);
         all.sort_unstable();
         all.dedup_by(|next, kept| {
             let same = (next.component, next.below) == (kept.component, kept.below);

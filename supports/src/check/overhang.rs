@@ -160,34 +160,32 @@ impl Farthest<'_> {
     fn search(&mut self, runs: &[(u32, Range<u32>)]) {
         // The middles first: a good start leaves little to search.
         for (row, columns) in runs {
-            self.measure(columns.start + (columns.end - columns.start) / 2, *row);
+            self.measure(columns.start + (columns.end - columns.start) / 2, *row, 0);
         }
         for (row, columns) in runs {
-            let ends = [columns.start, columns.end - 1];
-            let squared = ends.map(|column| self.measure(column, *row));
-            self.between(*row, ends, squared);
+            self.within(*row, columns.clone());
         }
     }
 
-    /// Searches between two columns of a row whose distances are known. A step of a pixel
-    /// changes the distance by a pixel at most.
-    fn between(&mut self, row: u32, ends: [u32; 2], squared: [u64; 2]) {
-        let [start, end] = ends;
-        let [a, b] = squared.map(|squared| (squared as f64).sqrt());
-        let most = (a + b + f64::from(end - start)) / 2.0;
-        if end - start < 2 || most < ((self.squared + 1) as f64).sqrt() - 1e-6 {
-            return;
+    /// Searches columns of a row. A step of a pixel changes the distance by a pixel at most, so
+    /// the middle of the columns tells how far the farthest may be.
+    fn within(&mut self, row: u32, columns: Range<u32>) {
+        let middle = columns.start + (columns.end - columns.start) / 2;
+        let half = middle - columns.start;
+        let least = ((self.squared + 1) as f64).sqrt() - f64::from(half) - 1e-6;
+        let squared = self.measure(middle, row, least.max(0.0).powi(2) as u64);
+        if half > 0 && (squared as f64).sqrt() >= least {
+            self.within(row, columns.start..middle);
+            if middle + 1 < columns.end {
+                self.within(row, middle + 1..columns.end);
+            }
         }
-        let middle = start + (end - start) / 2;
-        let at_middle = self.measure(middle, row);
-        self.between(row, [start, middle], [squared[0], at_middle]);
-        self.between(row, [middle, end], [at_middle, squared[1]]);
     }
 
-    /// Returns the squared distance of a pixel to the nearest white, and remembers the first of
-    /// the largest.
-    fn measure(&mut self, column: u32, row: u32) -> u64 {
-        let squared = nearest(self.below, column, row);
+    /// Returns the squared distance of a pixel to the nearest white, or one below `enough` that it
+    /// does not exceed. Remembers the first of the largest.
+    fn measure(&mut self, column: u32, row: u32, enough: u64) -> u64 {
+        let squared = nearest(self.below, column, row, enough);
         if squared > self.squared {
             (self.squared, self.at) = (squared, [column, row]);
         }
@@ -195,12 +193,13 @@ impl Farthest<'_> {
     }
 }
 
-/// Returns the squared distance in pixels from a pixel's centre to the nearest white one's.
-fn nearest(mask: &Mask, column: u32, row: u32) -> u64 {
+/// Returns the squared distance in pixels from a pixel's centre to the nearest white one's, or to
+/// one that is nearer than `enough`, squared.
+fn nearest(mask: &Mask, column: u32, row: u32, enough: u64) -> u64 {
     let mut nearest = u64::MAX;
     for distance in 0..mask.height() {
         let squared = u64::from(distance).pow(2);
-        if squared >= nearest {
+        if squared >= nearest || nearest < enough {
             break;
         }
         for near in [row.checked_sub(distance), row.checked_add(distance)] {
