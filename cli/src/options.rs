@@ -207,6 +207,15 @@ pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
     }
 }
 
+/// Parses an angle in degrees, from 0 to 180.
+pub(crate) fn parse_angle(text: &str) -> Result<f64, String> {
+    let number = ["deg", "\u{b0}"].iter().find_map(|unit| text.strip_suffix(unit)).unwrap_or(text);
+    match number.trim_end().parse::<f64>() {
+        Ok(degrees) if (0.0..=180.0).contains(&degrees) => Ok(degrees),
+        _ => Err(format!("`{text}` is no angle from 0 to 180 degrees: write 45 or 45deg")),
+    }
+}
+
 /// Parses the memory to work in: at least 16 MB.
 pub(crate) fn parse_memory(text: &str) -> Result<u64, String> {
     match parse_bytes(text)? {

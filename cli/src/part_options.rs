@@ -5,7 +5,9 @@ use std::path::Path;
 
 use clap::Args;
 use lamp_slicer::brep::Prepared;
-use lamp_slicer::{Bodies, FacetIndex, Fill, OpenOptions, Part, Placement, SliceError, Units};
+use lamp_slicer::{
+    Axis, Bodies, FacetIndex, Fill, OpenOptions, Part, Placement, SliceError, Units,
+};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
@@ -56,6 +58,11 @@ pub(crate) struct PartOptions {
 impl PartOptions {
     pub(crate) fn placement(&self) -> Placement {
         self.placement.placement()
+    }
+
+    /// Returns the part's rotations with others after them, as `--rotate` takes them.
+    pub(crate) fn rotation_with(&self, turns: impl Iterator<Item = (Axis, f64)>) -> String {
+        self.placement.rotation_with(turns)
     }
 
     /// Returns the size of a part in its place.

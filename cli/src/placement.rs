@@ -58,6 +58,14 @@ impl PlacementOptions {
         }
         placement.translated(self.translate.map_or([0.0; 3], |Numbers(by_mm)| by_mm))
     }
+
+    /// Returns the rotations with others after them, as `--rotate` takes them.
+    pub(crate) fn rotation_with(&self, turns: impl Iterator<Item = (Axis, f64)>) -> String {
+        let more = turns.map(|(axis, degrees)| Rotation { axis, degrees });
+        let all: Vec<_> =
+            self.rotate.iter().copied().chain(more).map(|turn| turn.to_string()).collect();
+        all.join(",")
+    }
 }
 
 /// Finite numbers with commas between: `X,Y` or `X,Y,Z`.

@@ -23,12 +23,14 @@
 //! ```
 
 mod check;
+mod orient;
 mod support;
 
 pub use check::{
     CheckError, CheckOptions, End, Findings, Island, LayerFacts, Listed, OffBalance, Overhang,
     Pocket, PocketKind, Region, WeakJoint, check, component_at,
 };
+pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use support::{
     HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportOptions, Surface, plan_supports,
 };

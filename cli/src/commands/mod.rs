@@ -17,6 +17,7 @@ mod join;
 mod machine;
 mod man;
 mod material;
+mod orient;
 mod sample;
 mod show;
 pub(crate) mod slice;
@@ -53,6 +54,7 @@ pub(crate) enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Target(target::TargetArgs),
     Heights(heights::HeightsArgs),
+    Orient(orient::OrientArgs),
     Brep(brep::BrepArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
@@ -93,6 +95,7 @@ impl Command {
             Self::Calibrate(args) => calibrate::run(args, common),
             Self::Target(args) => target::run(args, common),
             Self::Heights(args) => heights::run(args, common),
+            Self::Orient(args) => orient::run(args, common),
             Self::Brep(args) => brep::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),

@@ -3,14 +3,13 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use anyhow::Context;
 use lamp_postprocess::{CopyPlacement, Layout, PartStack, PixelSize};
 use lamp_stack::{Mask, Orientation, white_runs};
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{FAMILY, GRAY_INK, PlotFormat, format_of, inks, png_of, with_font};
+use super::{Drawing, FAMILY, GRAY_INK, inks, picture_of, with_font};
 use crate::exit::Exit;
 
 /// The longer side of a build area, and the room around it, in pixels.
@@ -22,21 +21,7 @@ const LEGEND: i32 = 60;
 /// each copy's number among those of its part.
 pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, Exit> {
     let picture = LayoutPicture::new(layout);
-    let size = picture.size();
-    match format_of(path)? {
-        PlotFormat::Svg => {
-            let mut text = String::new();
-            // A text takes all that is drawn on it.
-            picture
-                .draw(&SVGBackend::with_string(&mut text, size).into_drawing_area())
-                .expect("a text takes all");
-            Ok(text.into_bytes())
-        }
-        PlotFormat::Png => {
-            let drawn = png_of(size, |area| picture.draw(area));
-            Ok(drawn.with_context(|| path.display().to_string())?)
-        }
-    }
+    picture_of(&picture, picture.size(), path)
 }
 
 struct LayoutPicture<'a> {
@@ -69,23 +54,6 @@ impl<'a> LayoutPicture<'a> {
     /// Where a pixel of the build is in the picture.
     fn at(&self, column: u32, row: u32) -> (i32, i32) {
         (MARGIN + self.scaled(column), MARGIN + self.scaled(row))
-    }
-
-    fn draw<B: DrawingBackend>(
-        &self,
-        area: &DrawingArea<B, plotters::coord::Shift>,
-    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-        with_font();
-        area.fill(&WHITE)?;
-        let colours: Vec<RGBColor> = inks().take(self.layout.parts().len()).collect();
-        for (at, number) in self.layout.placements().iter().zip(self.layout.numbers()) {
-            self.draw_copy(area, at, number, colours[at.part])?;
-        }
-        let PixelSize { width, height } = self.layout.pixels();
-        let border = GRAY_INK.stroke_width(3);
-        area.draw(&Rectangle::new([self.at(0, 0), self.at(width, height)], border))?;
-        self.draw_legend(area, &colours)?;
-        area.present()
     }
 
     fn draw_copy<B: DrawingBackend>(
@@ -164,6 +132,25 @@ impl<'a> LayoutPicture<'a> {
             1 => format!("{}: 1 copy", about.name()),
             copies => format!("{}: {copies} copies", about.name()),
         }
+    }
+}
+
+impl Drawing for LayoutPicture<'_> {
+    fn draw<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, plotters::coord::Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        with_font();
+        area.fill(&WHITE)?;
+        let colours: Vec<RGBColor> = inks().take(self.layout.parts().len()).collect();
+        for (at, number) in self.layout.placements().iter().zip(self.layout.numbers()) {
+            self.draw_copy(area, at, number, colours[at.part])?;
+        }
+        let PixelSize { width, height } = self.layout.pixels();
+        let border = GRAY_INK.stroke_width(3);
+        area.draw(&Rectangle::new([self.at(0, 0), self.at(width, height)], border))?;
+        self.draw_legend(area, &colours)?;
+        area.present()
     }
 }
 

@@ -3,6 +3,7 @@
 mod axis_scale;
 mod caption;
 mod layout;
+mod sphere;
 
 use std::io;
 use std::ops::Range;
@@ -18,6 +19,7 @@ use axis_scale::AxisScale;
 
 pub(crate) use caption::{CAPTION_HEIGHT, caption};
 pub(crate) use layout::layout_picture;
+pub(crate) use sphere::sphere_picture;
 
 use crate::exit::Exit;
 
@@ -101,6 +103,32 @@ pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, Exit> {
     match format_of(path)? {
         PlotFormat::Svg => Ok(svg(plots).into_bytes()),
         PlotFormat::Png => Ok(png(plots).with_context(|| path.display().to_string())?),
+    }
+}
+
+/// What is drawn by itself, not as a plot of curves.
+trait Drawing {
+    fn draw<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, plotters::coord::Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>>;
+}
+
+/// The bytes of a picture, in the format that the file's name says.
+fn picture_of(drawing: &impl Drawing, size: (u32, u32), path: &Path) -> Result<Vec<u8>, Exit> {
+    match format_of(path)? {
+        PlotFormat::Svg => {
+            let mut text = String::new();
+            let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
+            // A text takes all that is drawn on it.
+            drawing.draw(&area).expect("a text takes all");
+            drop(area);
+            Ok(text.into_bytes())
+        }
+        PlotFormat::Png => {
+            let drawn = png_of(size, |area| drawing.draw(area));
+            Ok(drawn.with_context(|| path.display().to_string())?)
+        }
     }
 }
 

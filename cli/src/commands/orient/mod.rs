@@ -1,0 +1,134 @@
+//! `lamp orient`: compares the poses in which a part can be built.
+
+mod images;
+mod report;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lamp_slicer::topology::CornerTable;
+use lamp_stack::{Dpi, Length};
+use lamp_supports::{PoseFacts, PoseLimits, measure, pareto, poses};
+
+use crate::exit::Exit;
+use crate::options::{Common, parse_angle, parse_thickness};
+use crate::part_arg::{PartArg, paths};
+use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
+use crate::plots::{self, sphere_picture};
+use crate::progress::say;
+use crate::streams::{check_beside, write_file};
+
+/// Find how to turn a part so that few islands float, and little overhangs
+///
+/// Islands, pits, overhanging area and size of each pose follow from the mesh alone. Poses that
+/// another one betters in every respect are left out; the best of the rest are sliced, and islands
+/// counted on their images.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp orient blade.stl
+  lamp orient blade.stl --cone 30deg --plot islands.svg
+  lamp orient core.stl --directions 2000 --thickness 25um --best 10
+  lamp orient blade.step --best 0 --json | jq -r '.best'")]
+pub(crate) struct OrientArgs {
+    /// The part: files, or - for standard input, as for `slice`
+    #[arg(value_name = "PART", required = true, value_parser = PartArg::parser())]
+    parts: Vec<PartArg>,
+
+    /// Directions to try, spread evenly; the part as it is and its axes are tried, too
+    #[arg(long, value_name = "N", default_value = "500")]
+    #[arg(value_parser = clap::value_parser!(u32).range(..=1_000_000))]
+    directions: u32,
+
+    /// Try only directions that are at most so far from the part's z axis: 0 to 180 degrees
+    #[arg(long, value_name = "ANGLE", default_value = "180deg", value_parser = parse_angle)]
+    cone: f64,
+
+    /// Angle from upright beyond which what faces down is an overhang: 0 to 90 degrees
+    #[arg(long, value_name = "ANGLE", default_value = "45deg", value_parser = parse_overhang_angle)]
+    max_overhang_angle: f64,
+
+    /// Layer thickness: islands and pits that are less deep are none
+    #[arg(long, value_name = "LENGTH", default_value = "100um", value_parser = parse_thickness)]
+    thickness: Length,
+
+    /// How many of the best poses to slice
+    #[arg(long, value_name = "N", default_value = "5")]
+    best: usize,
+
+    /// Resolution of their images
+    #[arg(long, value_name = "DPI", default_value = "200")]
+    dpi: Dpi,
+
+    /// Draw the islands of each direction over the sphere: a file that ends in .svg or .png
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+
+    /// Print JSON, as docs/json.md describes it
+    #[arg(long)]
+    json: bool,
+
+    #[command(flatten)]
+    solid: PartOptions,
+}
+
+fn parse_overhang_angle(text: &str) -> Result<f64, String> {
+    let angle = parse_angle(text)?;
+    if angle <= 90.0 { Ok(angle) } else { Err(format!("`{text}` is beyond 90 degrees")) }
+}
+
+/// The poses of a part, and what is known of them.
+struct Compared {
+    poses: Vec<PoseFacts>,
+    /// Those that no other betters, the best first.
+    pareto: Vec<usize>,
+    /// Islands on the images of the first of these.
+    image_islands: Vec<u64>,
+    /// How to turn the part in each pose, for `slice --rotate`.
+    rotations: Vec<String>,
+}
+
+impl Compared {
+    /// Returns the best pose: the one whose images have the fewest islands.
+    fn best(&self) -> usize {
+        let on_images = self.pareto.iter().zip(&self.image_islands);
+        let best = on_images.min_by_key(|(_, islands)| **islands).map(|(pose, _)| *pose);
+        // There is a best of any number of poses.
+        best.unwrap_or(self.pareto[0])
+    }
+}
+
+pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
+    if let Some(plot) = &args.plot {
+        plots::check_name(plot)?;
+        check_beside(plot, Path::new("-"), paths(&args.parts))?;
+    }
+    let say = |line: &str| {
+        if !common.quiet {
+            say(&format!("orient: {line}"));
+        }
+    };
+    let reading = Reading { dpi: args.dpi, may_be_open: false, say: &say };
+    let part = args.solid.open(&args.parts, &reading)?;
+    let limits =
+        PoseLimits { thickness_mm: args.thickness.mm(), max_overhang_deg: args.max_overhang_angle };
+    let table = CornerTable::of_part(&part, &args.solid.placement(), args.solid.units);
+    let table = table.map_err(|error| at_part(error.into(), &args.parts))?;
+    let poses = measure(&table, &poses(args.directions, args.cone), &limits);
+    drop(table);
+    let pareto = pareto(&poses);
+    let images = pareto.iter().take(args.best).map(|&pose| {
+        let islands = args.islands_on_images(&part, &poses[pose].pose);
+        islands.map_err(|error| at_part(error, &args.parts))
+    });
+    let image_islands = images.collect::<Result<_, Exit>>()?;
+    let rotations =
+        poses.iter().map(|facts| args.solid.rotation_with(facts.pose.turns())).collect();
+    let compared = Compared { poses, pareto, image_islands, rotations };
+    if let Some(path) = &args.plot {
+        let title = format!("Islands by the direction that is up: {}", name_of_all(&args.parts));
+        let bytes = sphere_picture(&title, &compared.poses, compared.best(), path)?;
+        write_file(path, |out| out.write_all(&bytes))?;
+    }
+    args.report(&compared)
+}
