@@ -73,6 +73,11 @@ fn no_codes_make_the_codec_panic_or_contradict_itself() {
 }
 
 #[test]
+fn no_stack_makes_a_check_panic_or_depend_on_where_its_rows_begin() {
+    survives("check", hostile::check);
+}
+
+#[test]
 fn files_by_other_programs_hold_no_surprise() {
     for (kind, entry) in [("stl", hostile::stl as fn(&[u8])), ("tiff", hostile::tiff)] {
         let Some(folder) = shared_data(kind) else {

@@ -4,6 +4,7 @@
 //! Each panics where a reader panics or an answer contradicts another; what
 //! is refused must be refused in one line.
 
+mod check;
 mod damage;
 mod seeds;
 
@@ -19,6 +20,7 @@ use lamp_stack::{
 };
 use tempfile::NamedTempFile;
 
+pub use check::check;
 pub use damage::damage;
 pub use seeds::{Seed, classic_tiff, seeds};
 

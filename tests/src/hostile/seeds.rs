@@ -40,6 +40,7 @@ pub fn seeds() -> Vec<Seed> {
         .chain(steps().into_iter().map(of("step")))
         .chain(tiff().into_iter().map(of("tiff")))
         .chain(g4_codes().into_iter().map(of("g4")))
+        .chain(blocks().into_iter().map(of("check")))
         .collect()
 }
 
@@ -309,5 +310,28 @@ fn g4_codes() -> Named {
         ("black", coded(&Mask::black(3000, 40))),
         ("none", coded(&Mask::black(0, 0))),
         ("widest", sized(u32::MAX, u32::MAX, &g4::encode(&Mask::black(u32::MAX, 9)))),
+    ]
+}
+
+/// Stacks to check, and blocks of pixels: columns, rows and speck, each less one, then bits.
+fn blocks() -> Named {
+    let block = |solid: fn(i32, i32, i32) -> bool| {
+        let voxels =
+            (0..12).flat_map(|z| (0..16).flat_map(move |y| (0..16).map(move |x| (x, y, z))));
+        let bits: String = voxels.map(|(x, y, z)| if solid(x, y, z) { '1' } else { '0' }).collect();
+        [vec![15, 15, 1], bytes(&bits)].concat()
+    };
+    vec![
+        ("ball.tif", stack(&layers(150.0), Format::Big)),
+        ("gray.tif", stack(&[gray_layer(), gray_layer()], Format::Big)),
+        (
+            "hollow",
+            block(|x, y, z| {
+                (x - 7).abs().max((y - 7).abs()) < 7
+                    && (x - 7).pow(2) + (y - 7).pow(2) + (z - 5).pow(2) > 12
+            }),
+        ),
+        ("islands", block(|x, y, z| z > 8 || (x / 4 + y / 4) % 2 == 0 && z >= x / 2)),
+        ("stairs", block(|x, y, z| x / 2 <= z && y > z)),
     ]
 }
