@@ -54,7 +54,7 @@ impl Component {
         let len = u64::from(columns.end - columns.start);
         self.area += len;
         // Sums stay exact up to 2^53, which no layer comes near.
-        self.twice_x += (len * u64::from(columns.start + columns.end)) as f64;
+        self.twice_x += (len * (u64::from(columns.start) + u64::from(columns.end))) as f64;
         self.sum_y += (len * u64::from(row)) as f64;
         self.columns.start = self.columns.start.min(columns.start);
         self.columns.end = self.columns.end.max(columns.end);

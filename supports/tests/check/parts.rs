@@ -5,7 +5,7 @@ use lamp_fixtures::{
     slanted_wall, twin_islands,
 };
 use lamp_slicer::{Axis, Part, Placement, SliceOptions, Slices};
-use lamp_stack::{Dpi, Image, Layer, Length};
+use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
 use lamp_supports::{End, Findings, PocketKind};
 
 use crate::agree::{agree_as, check};
@@ -237,4 +237,18 @@ fn walls_lean_until_they_hardly_rest_and_then_float() {
     assert_eq!((overhang.layers, overhang.reach_pixels()), ([1, 199], 4.0));
     assert!(found.weak_joints.list.iter().all(|joint| 5 * joint.support == joint.area));
     assert_eq!(counts(&leaning(6.0)), [199, 0, 0]);
+}
+
+#[test]
+fn the_widest_images_are_checked() {
+    let layer = |index, transitions: &[u32]| {
+        let rows = (0..=3).map(|row| row * transitions.len() as u32).collect();
+        let image = Mask::new(u32::MAX, rows, transitions.repeat(3)).unwrap().into();
+        let info = PageInfo { index, thickness_um: Some(100.0), ..PageInfo::default() };
+        Layer { info, dpi: Dpi::new(1500.0), image }
+    };
+    let layers = vec![layer(0, &[0, 9]), layer(1, &[0, 9, u32::MAX - 3]), layer(2, &[0])];
+    let found = check(layers, &LIMITS);
+    assert_eq!(islands(&found)[0].0, 1);
+    assert_eq!(found.overhangs.list[0].area, 3 * (u64::from(u32::MAX) - 12) - 30);
 }
