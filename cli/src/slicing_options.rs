@@ -238,6 +238,15 @@ impl SlicingOptions {
         }
     }
 
+    /// Returns how far up in each layer the part is cut: 0 at the bottom, 1 at the top.
+    pub(crate) fn cut(&self) -> f64 {
+        match self.plane {
+            PlaneRule::Bottom => 0.0,
+            PlaneRule::Middle => 0.5,
+            PlaneRule::Top => 1.0,
+        }
+    }
+
     /// Returns the thickness of all layers, if they have the same.
     pub(crate) fn uniform_thickness(&self) -> Option<Length> {
         (!self.adaptive).then_some(self.thickness)

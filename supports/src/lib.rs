@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use lamp_stack::{Dpi, Layer, Mask, PageInfo};
-//! use lamp_supports::{CheckError, CheckOptions, End, check};
+//! use lamp_supports::{CheckError, CheckOptions, Disagreements, End, check};
 //!
 //! // A post, and a block beside it that begins in layer 1 and joins the post in layer 2.
 //! let layer = |transitions: &[u32]| {
@@ -27,8 +27,8 @@ mod orient;
 mod support;
 
 pub use check::{
-    CheckError, CheckOptions, End, Findings, Island, LayerFacts, Listed, OffBalance, Overhang,
-    Pocket, PocketKind, Region, WeakJoint, check, component_at,
+    CheckError, CheckOptions, Disagreements, End, Findings, Island, LayerFacts, Listed,
+    LoneMinimum, OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint, check, component_at,
 };
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use support::{

@@ -244,7 +244,7 @@ impl LayerFacts {
         Self {
             index: info.index,
             z_um: info.z_um,
-            thickness_um: info.thickness_um,
+            thickness_um: info.thickness_um.filter(|um| um.is_finite() && *um > 0.0),
             stray_rows: info.stray_rows.len() as u32,
             has_white: false,
             white_at_border: false,

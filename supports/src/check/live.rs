@@ -88,6 +88,11 @@ impl<B> Live<B> {
         self.bodies.push(body);
     }
 
+    /// Returns the body of each component of the last layer, none for those of the other colour.
+    pub(super) fn of_components(&self) -> impl Iterator<Item = Option<&B>> {
+        self.of_component.iter().map(|&body| self.bodies.get(body as usize))
+    }
+
     /// Returns the bodies that the last layer is part of.
     pub(super) fn finish(self) -> Vec<B> {
         self.bodies

@@ -8,15 +8,18 @@
 mod balance;
 mod components;
 mod contact;
+mod drain;
 mod findings;
 mod islands;
 mod live;
 mod overhang;
 mod overhangs;
+mod pairs;
 mod pockets;
 
 use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
+use std::sync::Arc;
 
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, MemorySize};
 use rayon::prelude::*;
@@ -24,12 +27,14 @@ use thiserror::Error;
 
 use components::Components;
 use contact::{Contact, Labelled};
+use drain::Drain;
 pub use findings::{
     End, Findings, Island, LayerFacts, Listed, OffBalance, Overhang, Pocket, PocketKind, Region,
     WeakJoint,
 };
 use islands::Growth;
 use overhangs::Overhangs;
+pub use pairs::{Disagreements, LoneMinimum};
 use pockets::Hollows;
 
 /// What counts as a finding.
@@ -45,6 +50,8 @@ pub struct CheckOptions {
     /// How far white may reach beyond the white below; if `None`, as far as the layer is thick
     /// (45°).
     pub max_overhang: Option<Length>,
+    /// The width that a way out must have to drain a pocket; if `None`, a pixel and a layer do.
+    pub drain: Option<Length>,
 }
 
 impl Default for CheckOptions {
@@ -54,6 +61,7 @@ impl Default for CheckOptions {
             speck: NonZeroU32::new(3).expect("it is not zero"),
             least_support: 0.25,
             max_overhang: None,
+            drain: None,
         }
     }
 }
@@ -78,6 +86,9 @@ pub enum CheckError {
         /// Those of the first layer.
         first: [u32; 2],
     },
+    /// A drain has a width, and pixels or layers have none.
+    #[error("the stack does not say how {0}, so nothing is known of narrow drains")]
+    NoScale(&'static str),
     /// The images stand in different places.
     #[error("{layer} has another origin than the first layer: layers are compared pixel by pixel")]
     Origins {
@@ -104,7 +115,7 @@ where
 {
     let mut layers = layers.fuse();
     let mut checker: Option<Checker> = None;
-    let mut last: Option<Checked> = None;
+    let mut last: Option<Arc<Checked>> = None;
     loop {
         let batch = take_batch(&mut layers);
         if batch.is_empty() {
@@ -112,10 +123,13 @@ where
         }
         let labelled = batch.into_par_iter().map(|item| {
             let layer = decode(item?)?;
-            Ok(Checked::new(layer, options))
+            Ok(Arc::new(Checked::new(layer, options)))
         });
-        let batch: Vec<Checked> = labelled.collect::<Result<_, E>>()?;
-        let checker = checker.get_or_insert_with(|| Checker::new(&batch[0], options));
+        let batch: Vec<Arc<Checked>> = labelled.collect::<Result<_, E>>()?;
+        let checker = match &mut checker {
+            Some(checker) => checker,
+            none => none.insert(Checker::new(&batch[0], options)?),
+        };
         for layer in &batch {
             checker.compare(layer)?;
         }
@@ -128,7 +142,10 @@ where
         });
         let contacts: Vec<_> = contacts.collect();
         for (layer, contact) in batch.iter().zip(&contacts) {
-            checker.add(layer, contact.as_ref());
+            checker.add(layer, contact.as_ref())?;
+        }
+        if let Some(drain) = &mut checker.drain {
+            drain.advance(false);
         }
         last = batch.into_iter().next_back();
     }
@@ -201,24 +218,35 @@ struct Checker {
     size: [u32; 2],
     growth: Growth,
     hollows: Hollows,
+    drain: Option<Drain>,
     overhangs: Overhangs,
     weak_joints: Listed<WeakJoint>,
 }
 
 impl Checker {
-    fn new(first: &Checked, options: &CheckOptions) -> Self {
+    fn new(first: &Checked, options: &CheckOptions) -> Result<Self, CheckError> {
         let speck = options.speck.get();
-        Self {
+        let mut hollows = Hollows::new(speck);
+        let drain = options.drain.map(|drain| {
+            let dpi = first.dpi.ok_or(CheckError::NoScale("large a pixel is"))?;
+            Ok(Drain::new(drain.um(), dpi.pitch().um(), speck))
+        });
+        let drain: Option<Drain> = drain.transpose()?;
+        if drain.is_some() {
+            hollows = hollows.with_numbers();
+        }
+        Ok(Self {
             options: options.clone(),
             layers: Vec::new(),
             dpi: first.dpi,
             origin_mm: first.origin_mm,
             size: first.size(),
             growth: Growth::new(speck),
-            hollows: Hollows::new(speck),
+            hollows,
+            drain,
             overhangs: Overhangs::default(),
             weak_joints: Listed::default(),
-        }
+        })
     }
 
     /// Checks that a layer can be compared with the first.
@@ -241,7 +269,7 @@ impl Checker {
         Some(self.options.max_overhang.or_else(of_layer)?.pixels(self.dpi?))
     }
 
-    fn add(&mut self, layer: &Checked, contact: Option<&Contact>) {
+    fn add(&mut self, layer: &Arc<Checked>, contact: Option<&Contact>) -> Result<(), CheckError> {
         let number = self.layers.len() as u32;
         // Without thicknesses, all layers weigh the same.
         let thickness_um = layer.facts.thickness_um.unwrap_or(1.0);
@@ -252,7 +280,13 @@ impl Checker {
             let near = self.limit(&layer.facts).map_or(0, |limit| limit.ceil().min(1e9) as u32 + 1);
             self.overhangs.add(&contact.patches, number, near);
         }
+        if let Some(drain) = &mut self.drain {
+            let thickness_um = layer.facts.thickness_um;
+            let thickness_um = thickness_um.ok_or(CheckError::NoScale("thick its layers are"))?;
+            drain.add(layer.clone(), thickness_um, self.hollows.numbers());
+        }
         self.layers.push(layer.facts);
+        Ok(())
     }
 
     fn add_weak_joints(&mut self, layer: &Labelled, contact: &Contact, number: u32) {
@@ -280,6 +314,12 @@ impl Checker {
         self.growth.finish();
         self.hollows.finish();
         self.overhangs.finish();
+        let mut pockets = self.hollows.pockets.clone();
+        if let Some(drain) = self.drain {
+            let narrow = drain.finish(&self.hollows);
+            narrow.list.into_iter().for_each(|pocket| pockets.push(pocket));
+            pockets.left_out += narrow.left_out;
+        }
         let mut findings = Findings {
             layers: self.layers,
             dpi: self.dpi,
@@ -289,7 +329,7 @@ impl Checker {
             specks: self.growth.specks,
             weak_joints: self.weak_joints,
             overhangs: self.overhangs.ended,
-            pockets: self.hollows.pockets,
+            pockets,
             off_balance: self.growth.off_balance,
         };
         findings.sort();

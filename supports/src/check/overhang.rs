@@ -72,7 +72,13 @@ fn reaches(limit: f64) -> impl Iterator<Item = (u32, u32)> {
 }
 
 /// Adds what is left of a run without the white of a row, grown by `reach` on both sides.
-fn without(run: &Range<u32>, row: &[u32], width: u32, reach: u32, out: &mut Vec<Range<u32>>) {
+pub(super) fn without(
+    run: &Range<u32>,
+    row: &[u32],
+    width: u32,
+    reach: u32,
+    out: &mut Vec<Range<u32>>,
+) {
     let mut start = run.start;
     // The first white run that ends, grown, after the start.
     let first = row.partition_point(|&t| t.saturating_add(reach) <= start) & !1;

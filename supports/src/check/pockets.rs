@@ -13,10 +13,36 @@ pub(super) struct Hollows {
     live: Live<Hollow>,
     speck: u32,
     pub(super) pockets: Listed<Pocket>,
+    /// None if nobody asks.
+    numbers: Option<Numbers>,
+}
+
+/// Numbers of black bodies, in the order in which they begin. Those that unite have one.
+#[derive(Default)]
+struct Numbers {
+    parents: Vec<u32>,
+    is_open: Vec<bool>,
+}
+
+impl Numbers {
+    fn begin(&mut self) -> u32 {
+        let number = self.parents.len() as u32;
+        self.parents.push(number);
+        self.is_open.push(false);
+        number
+    }
+
+    fn of(&self, mut number: u32) -> u32 {
+        while self.parents[number as usize] != number {
+            number = self.parents[number as usize];
+        }
+        number
+    }
 }
 
 /// Black that is joined so far.
 struct Hollow {
+    number: u32,
     /// What it is if nothing more joins; the kind is decided at the end.
     pocket: Pocket,
     is_open: bool,
@@ -26,7 +52,13 @@ struct Hollow {
 
 impl Hollows {
     pub(super) fn new(speck: u32) -> Self {
-        Self { live: Live::new(false), speck, pockets: Listed::default() }
+        let (live, pockets) = (Live::new(false), Listed::default());
+        Self { live, speck, pockets, numbers: None }
+    }
+
+    /// Keeps the numbers of bodies that have ended, for [`is_open`](Self::is_open).
+    pub(super) fn with_numbers(self) -> Self {
+        Self { numbers: Some(Numbers::default()), ..self }
     }
 
     /// Adds a layer, given its number from the first and how it lies on the one below.
@@ -41,8 +73,16 @@ impl Hollows {
         let Next { groups, ended } = self.live.add(layer, joints);
         ended.into_iter().for_each(|hollow| self.end(hollow, false));
         for Group { bodies, components } in groups {
-            let mut hollow = bodies.into_iter().reduce(Hollow::united).unwrap_or_else(|| {
-                Hollow::begin(&layer.components.all[components[0] as usize], number)
+            let united = bodies.into_iter().reduce(|a, b| {
+                let [elder, younger] = [a.number.min(b.number), a.number.max(b.number)];
+                if let Some(numbers) = &mut self.numbers {
+                    numbers.parents[younger as usize] = elder;
+                }
+                Hollow::united(a, b, elder)
+            });
+            let mut hollow = united.unwrap_or_else(|| {
+                let first = &layer.components.all[components[0] as usize];
+                Hollow::begin(first, number, self.numbers.as_mut().map_or(0, Numbers::begin))
             });
             hollow.grow(layer, &components, number, thickness_um, self.speck);
             self.live.put(hollow);
@@ -55,7 +95,22 @@ impl Hollows {
         live.finish().into_iter().for_each(|hollow| self.end(hollow, true));
     }
 
+    /// Returns the number of the body that each component of the last layer is part of, for those
+    /// that are black.
+    pub(super) fn numbers(&self) -> Vec<Option<u32>> {
+        self.live.of_components().map(|body| body.map(|body| body.number)).collect()
+    }
+
+    /// Returns whether the body that once had a number reached the frame; to be asked at the end,
+    /// and if numbers are kept.
+    pub(super) fn is_open(&self, number: u32) -> bool {
+        self.numbers.as_ref().is_some_and(|it| it.is_open[it.of(number) as usize])
+    }
+
     fn end(&mut self, hollow: Hollow, is_at_top: bool) {
+        if let Some(numbers) = &mut self.numbers {
+            numbers.is_open[hollow.number as usize] = hollow.is_open;
+        }
         if hollow.is_open || !hollow.holds_square {
             return;
         }
@@ -69,19 +124,19 @@ impl Hollows {
 }
 
 impl Hollow {
-    fn begin(component: &Component, number: u32) -> Self {
+    fn begin(component: &Component, layer: u32, number: u32) -> Self {
         let pocket = Pocket {
             kind: PocketKind::Trap,
-            layers: [number; 2],
+            layers: [layer; 2],
             pixels: 0,
             pixels_um: 0.0,
             first: component.first,
             region: component.region(),
         };
-        Self { pocket, is_open: false, is_on_platform: number == 0, holds_square: false }
+        Self { number, pocket, is_open: false, is_on_platform: layer == 0, holds_square: false }
     }
 
-    fn united(self, other: Self) -> Self {
+    fn united(self, other: Self, number: u32) -> Self {
         let (mut elder, younger) = match (self.pocket.born(), other.pocket.born()) {
             (a, b) if a <= b => (self.pocket, other.pocket),
             _ => (other.pocket, self.pocket),
@@ -90,6 +145,7 @@ impl Hollow {
         elder.pixels_um += younger.pixels_um;
         elder.region.unite(&younger.region);
         Self {
+            number,
             pocket: elder,
             is_open: self.is_open || other.is_open,
             is_on_platform: self.is_on_platform || other.is_on_platform,

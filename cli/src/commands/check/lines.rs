@@ -2,13 +2,15 @@
 
 use lamp_postprocess::machine::Recoating;
 use lamp_supports::{
-    End, Findings, Island, LayerFacts, OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint,
+    Disagreements, End, Findings, Island, LayerFacts, LoneMinimum, OffBalance, Overhang, Pocket,
+    PocketKind, Region, WeakJoint,
 };
 use serde_json::{Value, json};
 
 use super::units::Scale;
 use super::{CheckArgs, Kind};
 use crate::height_options::significant;
+use crate::json_report::to_nm;
 
 /// What is said of a finding.
 pub(super) struct FindingLine {
@@ -33,6 +35,7 @@ pub(super) struct Shown {
 /// Returns the lines of all findings, the worst first.
 pub(super) fn of(
     findings: &Findings,
+    disagreements: &Disagreements,
     args: &CheckArgs,
     recoating: Option<&Recoating>,
 ) -> Vec<FindingLine> {
@@ -46,6 +49,10 @@ pub(super) fn of(
     add(Kind::Layers, stray_rows(findings, scale));
     let islands = findings.islands.list.iter();
     add(Kind::Islands, islands.map(|island| of_island(island, scale, recoating)).collect());
+    let minima = disagreements.minima.iter();
+    add(Kind::Islands, minima.map(|minimum| of_minimum(minimum, scale)).collect());
+    let islands = disagreements.islands.iter();
+    add(Kind::Islands, islands.map(|island| without_minimum(island, scale)).collect());
     let joints = findings.weak_joints.list.iter();
     add(Kind::Joints, joints.map(|joint| of_joint(joint, scale)).collect());
     let pockets = findings.pockets.list.iter();
@@ -133,6 +140,40 @@ fn of_island(island: &Island, scale: &Scale<'_>, recoating: Option<&Recoating>) 
             pixel: Some(island.first),
         }),
     }
+}
+
+fn of_minimum(minimum: &LoneMinimum, scale: &Scale<'_>) -> FindingLine {
+    let [x, y, z] = minimum.point_mm.map(to_nm);
+    let text = format!(
+        "the mesh has one {:.3} mm deep at x {x:.2}, y {y:.2}, z {z:.2} mm, and no layer begins an \
+         island there: it is too thin for the pixels",
+        minimum.depth_mm
+    );
+    let json = json!({
+        "kind": "minimum-without-island",
+        "layer": scale.index(minimum.layer),
+        "at_mm": [x, y],
+        "z_mm": z,
+        "depth_mm": to_nm(minimum.depth_mm),
+    });
+    FindingLine { word: "minimum without island", text, json, is_note: false, shown: None }
+}
+
+fn without_minimum(island: &Island, scale: &Scale<'_>) -> FindingLine {
+    let text = format!(
+        "number {} in {} begins at no minimum of the mesh: a gap makes it, or a wall too thin for \
+         the pixels",
+        island.number,
+        scale.layer_text(island.layer),
+    );
+    let json = json!({
+        "kind": "island-without-minimum",
+        "number": island.number,
+        "layer": scale.index(island.layer),
+        "z_mm": scale.z_mm(island.layer),
+        "at_mm": scale.point_mm(island.centroid),
+    });
+    FindingLine { word: "island without minimum", text, json, is_note: false, shown: None }
 }
 
 fn of_joint(joint: &WeakJoint, scale: &Scale<'_>) -> FindingLine {

@@ -5,6 +5,7 @@ mod pictures;
 mod report;
 mod units;
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Seek;
 use std::num::{NonZeroU8, NonZeroU32};
@@ -13,8 +14,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::machine::Machine;
+use lamp_slicer::Part;
+use lamp_slicer::topology::{CornerTable, minima};
 use lamp_stack::{Layer, Length, Page, Pages, StackError};
-use lamp_supports::{CheckError, CheckOptions, Findings};
+use lamp_supports::{CheckError, CheckOptions, Disagreements, Findings, LoneMinimum};
 
 use crate::catalogue::entry;
 use crate::exit::Exit;
@@ -78,6 +81,11 @@ pub(crate) struct CheckArgs {
     /// degrees]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     max_overhang: Option<Length>,
+
+    /// How wide a way out must be to drain a pocket: narrower ways are found, too, by placing a ball
+    /// of this size everywhere; takes several times longer [default: a pixel and a layer]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
+    drain: Option<Length>,
 
     /// Level from which a gray pixel is white
     #[arg(long, value_name = "LEVEL", default_value = "1")]
@@ -149,9 +157,10 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     let machine: Machine = entry(&args.machine)?;
     let mut checked = Vec::new();
     for path in &args.inputs {
-        let mut input = Input::open(path)?;
+        let mut input = Input::open(path, &args.slicing, common)?;
         let findings = args.check(&mut input, common)?;
-        let lines = lines::of(&findings, args, machine.recoating.as_ref());
+        let disagreements = args.disagreements(&mut input, &findings, common)?;
+        let lines = lines::of(&findings, &disagreements, args, machine.recoating.as_ref());
         let name = input_name(path);
         print(&printed(&name, &findings, &lines, common.verbose))?;
         checked.push(CheckedInput { name, input, findings, lines });
@@ -179,6 +188,7 @@ impl CheckArgs {
             speck: self.speck,
             least_support: self.least_support,
             max_overhang: self.max_overhang,
+            drain: self.drain,
         }
     }
 
@@ -219,19 +229,61 @@ impl CheckArgs {
     /// Slices a part.
     fn slices(
         &self,
-        part: &PartArg,
+        part: &PartInput,
         progress: &Progress,
     ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
+        let parts = [part.file.clone()];
         let say = |line: &str| progress.say(line);
-        let reading = Reading { dpi: self.slicing.dpi, may_be_open: false, say: &say };
-        let parts = [part.clone()];
         let exposure = self.slicing.exposure()?;
-        let model = self.slicing.solid.open(&parts, &reading)?;
         let layers = self.layers.clone();
-        let slices = self.slicing.slices(model, &part.name(), layers, self.memory, exposure, &say);
+        let slices = self.slicing.slices(
+            part.model.clone(),
+            &part.file.name(),
+            layers,
+            self.memory,
+            exposure,
+            &say,
+        );
         let (slices, _) = slices.map_err(|error| at_part(error, &parts))?;
         progress.expect(slices.layer_count() as u64);
         Ok(slices.map(move |layer| layer.map_err(|error| at_part(error.into(), &parts))))
+    }
+
+    /// Compares the islands in the layers of a part with the minima of its mesh.
+    fn disagreements(
+        &self,
+        input: &mut Input,
+        findings: &Findings,
+        common: &Common,
+    ) -> Result<Disagreements, Exit> {
+        let Input::Part(part) = input else { return Ok(Disagreements::default()) };
+        if !self.tells(Kind::Islands) {
+            return Ok(Disagreements::default());
+        }
+        let solid = &self.slicing.solid;
+        let table = CornerTable::of_part(&part.model, &solid.placement(), solid.units);
+        let table =
+            table.map_err(|error| at_part(error.into(), std::slice::from_ref(&part.file)))?;
+        let minima = minima(&table, [0.0, 0.0, 1.0]);
+        let mut found = findings.compare_minima(&minima, table.points(), self.slicing.cut());
+        if found.minima.is_empty() {
+            return Ok(found);
+        }
+        // Those within other bodies have white below.
+        let layers: BTreeSet<u32> = found.minima.iter().map(|minimum| minimum.layer).collect();
+        let mut held = BTreeSet::new();
+        let is_wanted = |layer| layers.contains(&layer);
+        self.for_each_layer(input, common, is_wanted, |layer, below, _| {
+            let here = found.minima.iter().filter(|minimum| minimum.layer == layer);
+            let is_held = |minimum: &&LoneMinimum| {
+                let [column, row] = minimum.pixel;
+                below.is_some_and(|below| below.is_white(column, row))
+            };
+            held.extend(here.filter(is_held).map(|minimum| (layer, minimum.pixel)));
+            Ok(())
+        })?;
+        found.minima.retain(|minimum| !held.contains(&(minimum.layer, minimum.pixel)));
+        Ok(found)
     }
 
     /// Returns whether findings of a kind are told.
@@ -243,7 +295,13 @@ impl CheckArgs {
 /// What is checked.
 enum Input {
     Stack(StackInput),
-    Part(PartArg),
+    Part(PartInput),
+}
+
+/// A part that is open.
+struct PartInput {
+    file: PartArg,
+    model: Part,
 }
 
 /// A stack that can be read again.
@@ -254,14 +312,19 @@ struct StackInput {
 }
 
 impl Input {
-    /// Tells a stack from a part by how it begins.
-    fn open(path: &Path) -> Result<Self, Exit> {
+    /// Tells a stack from a part by how it begins, and opens a part.
+    fn open(path: &Path, slicing: &SlicingOptions, common: &Common) -> Result<Self, Exit> {
         let is_part =
             !is_stream(path) && matches!(Pages::open(path), Err(StackError::NotTiff { .. }));
-        Ok(match is_part {
-            true => Self::Part(PartArg { path: path.to_owned(), placement: None }),
-            false => Self::Stack(StackInput { path: path.to_owned(), spooled: None }),
-        })
+        if !is_part {
+            return Ok(Self::Stack(StackInput { path: path.to_owned(), spooled: None }));
+        }
+        let progress = Progress::new("check", common, true);
+        let reading =
+            Reading { dpi: slicing.dpi, may_be_open: false, say: &|line| progress.say(line) };
+        let file = PartArg { path: path.to_owned(), placement: None };
+        let model = slicing.solid.open(std::slice::from_ref(&file), &reading)?;
+        Ok(Self::Part(PartInput { file, model }))
     }
 }
 

@@ -62,19 +62,15 @@ pub(super) fn write_pictures(
     for (number, CheckedInput { input, lines, .. }) in checked.iter_mut().enumerate() {
         let prefix = if several { format!("{:02}_", number + 1) } else { String::new() };
         let drawings = drawings(lines);
-        args.for_each_layer(
-            input,
-            common,
-            |position, below, layer| {
-                for (name, shown) in drawings.get(&position).into_iter().flatten() {
-                    let path = folder.path().join(format!("{prefix}{name}"));
-                    draw(&path, below, layer, shown)
-                        .map_err(|error| failed_at(name.clone(), error.into()))?;
-                }
-                Ok(())
-            },
-            |position| drawings.contains_key(&position),
-        )?;
+        let is_wanted = |position| drawings.contains_key(&position);
+        args.for_each_layer(input, common, is_wanted, |position, below, layer| {
+            for (name, shown) in drawings.get(&position).into_iter().flatten() {
+                let path = folder.path().join(format!("{prefix}{name}"));
+                let drawn = draw(&path, below, layer, shown);
+                drawn.map_err(|error| failed_at(name.clone(), error.into()))?;
+            }
+            Ok(())
+        })?;
     }
     folder.persist().map_err(|error| failed_at(name, error))
 }
@@ -94,12 +90,12 @@ fn drawings(lines: &[FindingLine]) -> BTreeMap<u32, Vec<(String, &Shown)>> {
 
 impl CheckArgs {
     /// Reads an input again, and calls `each` with the wanted layers and the layers below them.
-    fn for_each_layer(
+    pub(super) fn for_each_layer(
         &self,
         input: &mut Input,
         common: &Common,
-        mut each: impl FnMut(u32, Option<&Mask>, &Mask) -> Result<(), Exit>,
         is_wanted: impl Fn(u32) -> bool,
+        mut each: impl FnMut(u32, Option<&Mask>, &Mask) -> Result<(), Exit>,
     ) -> Result<(), Exit> {
         let mut below: Option<Mask> = None;
         let mut take = |position: u32, layer: Option<Layer>| {
