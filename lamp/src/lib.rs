@@ -8,6 +8,7 @@
 //! - [`adaptive`] finds how thick each layer may be.
 //! - [`grayscale`] knows resins: cure depths, calibration, dithering.
 //! - [`postprocess`] turns images into images: correction, compensation, builds, edits.
+//! - [`supports`] finds what floats or is trapped, and holds it.
 //! - [`stack`] has what they share: images as runs, layers, lengths, files and streams.
 //!
 //! A stage takes and gives an iterator over `Result<Layer, E>`, so stages are chained
@@ -57,3 +58,4 @@ pub use lamp_grayscale as grayscale;
 pub use lamp_postprocess as postprocess;
 pub use lamp_slicer as slicer;
 pub use lamp_stack as stack;
+pub use lamp_supports as supports;

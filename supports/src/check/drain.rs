@@ -2,7 +2,8 @@
 //!
 //! The places where a ball's centre may be are black, and nowhere nearer to white than its radius.
 //! These places are looked at like the black of the layers: what of them has no way to the frame is
-//! a pocket whose ways, if it has any, are too narrow. Only rows that hide others are compared.
+//! a pocket whose ways, if it has any, are too narrow. The platform is no obstacle: parts drain
+//! once they are off it.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -113,18 +114,13 @@ impl Drain {
     /// Returns the image of a layer of the window in which all is white where the ball's centre
     /// may not be.
     fn crowded(&self, number: usize) -> Mask {
-        let near = &self.window[number];
-        let mask = &near.layer.labelled.mask;
+        let mask = &self.window[number].layer.labelled.mask;
         let mut crowded = MaskBuilder::new(mask.width());
-        // The platform is as solid as white.
-        let is_low = near.middle_um < self.radius_um;
         let reaches = self.reaches(number);
         let (mut free, mut spare, mut row) = (Vec::new(), Vec::new(), Vec::new());
         for y in 0..mask.height() {
             free.clear();
-            if !is_low {
-                free.extend(black_runs(mask.row(y), mask.width()));
-            }
+            free.extend(black_runs(mask.row(y), mask.width()));
             for Reach { mask, aside } in &reaches {
                 if free.is_empty() {
                     break;

@@ -293,7 +293,7 @@ fn stray_rows(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingLine> {
         let of_run = &findings.layers[layers[0] as usize..=layers[1] as usize];
         let rows: u64 = of_run.iter().map(|layer| u64::from(layer.stray_rows)).sum();
         let text = format!(
-            "{} have {rows}, which may look like islands: correct them with fix first",
+            "{}: {rows}, which may look like islands; correct them with fix first",
             scale.layers_text(layers)
         );
         of_layers("stray rows", "stray-rows", text, layers, scale)
@@ -304,10 +304,8 @@ fn stray_rows(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingLine> {
 fn at_border(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingLine> {
     let runs = findings.runs_of_layers(|layer| layer.white_at_border);
     let line = |layers| {
-        let text = format!(
-            "{} have white there: the image may cut the part off",
-            scale.layers_text(layers)
-        );
+        let text =
+            format!("{}: white there; the image may cut the part off", scale.layers_text(layers));
         of_layers("border", "border", text, layers, scale)
     };
     runs.into_iter().map(line).collect()
@@ -317,8 +315,8 @@ fn empty(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingLine> {
     let runs = findings.runs_of_layers(|layer: &LayerFacts| !layer.has_white);
     let line = |layers: [u32; 2]| {
         let is_top = layers[1] as usize + 1 == findings.layers.len() && layers[0] > 0;
-        let above = if is_top { ", above the part" } else { ": nothing holds what is above" };
-        let text = format!("{} have no white{above}", scale.layers_text(layers));
+        let above = if is_top { "above the part" } else { "nothing holds what is above" };
+        let text = format!("{}: no white; {above}", scale.layers_text(layers));
         let line = of_layers("empty", "empty", text, layers, scale);
         FindingLine { is_note: is_top, ..line }
     };

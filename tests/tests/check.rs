@@ -1,0 +1,291 @@
+//! Checks what `lamp check` tells of stacks and parts.
+
+use lamp_fixtures::{Mesh, Sample, build, cup, mug, needle, ring, serpentine, slanted_wall};
+use lamp_stack::{Dpi, Layer, Mask, PageInfo};
+use lamp_tests::Scratch;
+use serde_json::Value;
+
+/// 254 dpi: a pixel is 100 um.
+const SLICE: &str = "--dpi 254 --thickness 100um";
+
+fn with(name: &str, mesh: &Mesh) -> Scratch {
+    let scratch = Scratch::new();
+    scratch.mesh(name, mesh);
+    scratch
+}
+
+fn report(scratch: &Scratch, name: &str) -> Value {
+    serde_json::from_slice(&scratch.bytes(name)).unwrap()
+}
+
+/// Returns the findings of a kind in a report.
+fn of_kind<'a>(report: &'a Value, kind: &str) -> Vec<&'a Value> {
+    let findings = report["findings"].as_array().unwrap().iter();
+    findings.filter(|finding| finding["kind"] == kind).collect()
+}
+
+#[test]
+fn a_stack_and_its_part_have_the_same_findings() {
+    let scratch = with("mug.stl", &mug(4000));
+    scratch.run(&format!("slice mug.stl {SLICE} -o mug.tif")).succeeds_quietly();
+    let of_stack = scratch.run("lamp check mug.tif --report stack.json").succeeds_quietly();
+    let of_part =
+        scratch.run(&format!("lamp check mug.stl {SLICE} --report part.json")).succeeds_quietly();
+    let [stack, text] = [of_stack, of_part].map(|ran| String::from_utf8(ran.stdout).unwrap());
+    assert_eq!(stack.replace("mug.tif", "mug.stl"), text);
+    let [stack, part] = ["stack.json", "part.json"].map(|name| report(&scratch, name));
+    assert_eq!(stack["findings"], part["findings"]);
+    let [island] = of_kind(&stack, "island")[..] else { panic!("{stack}") };
+    assert_eq!(
+        (&island["layer"], &island["joins"], &island["into"]),
+        (&80.into(), &140.into(), &"part".into())
+    );
+    let near = |value: &Value, wanted: f64| (value.as_f64().unwrap() / wanted - 1.0).abs() < 0.02;
+    assert!(near(&island["area_mm2"], 9.0) && near(&island["floating_mm3"], 54.0), "{island}");
+    // The greatest viscosity of 002 section 4.2.2: 97.5 Pa.
+    assert!(near(&island["drag_mn"], 9.0 * 97.5 / 1000.0), "{island}");
+    assert_eq!(of_kind(&stack, "cup").len(), 1);
+    for word in ["layer 80 (z 8.00 mm)", "joins the part in layer 140", "opens at the top only"] {
+        assert!(text.contains(word), "no `{word}` in {text}");
+    }
+}
+
+#[test]
+fn findings_end_a_strict_check_with_status_3() {
+    let scratch = with("ring.stl", &ring(2000));
+    let strict = format!("slice ring.stl {SLICE} | fix | lamp check --strict");
+    let ran = scratch.run(&strict);
+    assert_eq!(ran.statuses, [Some(0), Some(0), Some(3)], "{ran:?}");
+    assert!(ran.stderr.starts_with("lamp check: ") || ran.stderr.starts_with("check: "), "{ran:?}");
+    let ran = scratch.run(&format!("lamp check ring.stl {SLICE} --strict --only pockets,balance"));
+    ran.succeeds_quietly();
+}
+
+#[test]
+fn pictures_show_the_worst_findings() {
+    let scratch = with("ring.stl", &ring(2000));
+    scratch.run(&format!("slice ring.stl {SLICE} -o ring.tif")).succeeds_quietly();
+    scratch.run("lamp check ring.tif --evidence of_stack").succeeds_quietly();
+    scratch.run(&format!("lamp check ring.stl {SLICE} --evidence of_part")).succeeds_quietly();
+    let piped = format!("slice ring.stl {SLICE} | lamp check --evidence of_pipe");
+    scratch.run(&piped).succeeds_quietly();
+    let picture = "01_island_layer_00100.png";
+    let [stack, part, pipe] = ["of_stack", "of_part", "of_pipe"]
+        .map(|folder| scratch.bytes(&format!("{folder}/{picture}")));
+    assert!(stack == part && stack == pipe);
+    let image = image::load_from_memory(&stack).unwrap().to_rgb8();
+    let red = image.pixels().filter(|pixel| pixel.0 == [230, 30, 30]).count();
+    // The ring is 16 mm across and has a square hole of 10 mm; a quarter is shown around it.
+    let share = red as f64 / f64::from(image.width() * image.height());
+    assert!(
+        (share - 156.0 / (24.0 * 24.0)).abs() < 0.02,
+        "{share} of {image:?}",
+        image = image.dimensions()
+    );
+    let ran = scratch.run("lamp check ring.tif --evidence of_stack");
+    ran.is_refused_with(&["of_stack"]);
+    scratch.run("lamp check ring.tif --evidence of_stack --force").succeeds_quietly();
+}
+
+/// Layers of 10 x 10 pixels, 1 mm wide and high, each white in a square or in none.
+fn squares(sides: &[[u32; 2]]) -> Vec<Layer> {
+    let layer = |(index, [start, end]): (u32, &[u32; 2])| {
+        let mut mask = lamp_stack::MaskBuilder::new(10);
+        mask.push_black(*start);
+        (*start..*end).for_each(|_| mask.push_row(&[*start, *end]).unwrap());
+        mask.push_black(10 - end);
+        let info = PageInfo {
+            index,
+            z_um: Some(1000.0 * f64::from(index)),
+            thickness_um: Some(1000.0),
+            origin_mm: Some([0.0, 10.0]),
+            ..PageInfo::default()
+        };
+        Layer { info, dpi: Dpi::new(25.4), image: mask.finish().into() }
+    };
+    (0..).zip(sides).map(layer).collect()
+}
+
+#[test]
+fn overhangs_weak_joints_borders_and_empty_layers_are_told() {
+    let scratch = Scratch::new();
+    let [none, small, large, whole] = [[0, 0], [4, 6], [1, 9], [0, 9]];
+    scratch.stack("a.tif", squares(&[small, large, none, whole, none]));
+    let ran = scratch.run("lamp check a.tif --report a.json").succeeds_quietly();
+    let text = String::from_utf8(ran.stdout).unwrap();
+    for line in [
+        "a.tif: 5 layers, 5 findings",
+        "island: number 1 begins in layer 3 (z 3.00 mm) at x 4.50, y 5.50 mm with 81.0 mm2; never joins",
+        "weak joint: layer 1 (z 1.00 mm) at x 5.00, y 5.00 mm: 64.0 mm2 rest on 4.00 mm2 (6.25%)",
+        "overhang: layer 1 (z 1.00 mm) at x 1.50, y 8.50 mm: reaches 4.24 mm beyond",
+        "border: layer 3 (z 3.00 mm): white there",
+        "empty: layer 2 (z 2.00 mm): no white; nothing holds",
+        "empty: layer 4 (z 4.00 mm): no white; above the part",
+    ] {
+        assert!(text.contains(line), "no `{line}` in {text}");
+    }
+    let report = report(&scratch, "a.json");
+    assert_eq!(report["inputs"][0]["findings"], 5);
+    assert_eq!(of_kind(&report, "overhang")[0]["reach_px"], 18f64.sqrt());
+    // Reaches of 4 mm are allowed.
+    let ran = scratch.run(
+        "lamp check a.tif --max-overhang 4.3mm --least-support 6% --only joints,overhangs --strict",
+    );
+    ran.succeeds_quietly();
+}
+
+#[test]
+fn gray_is_white_from_a_threshold() {
+    let scratch = Scratch::new();
+    let gray = |layer: Layer, level: u8| {
+        let lamp_stack::Image::Mask(mask) = &*layer.image else { unreachable!() };
+        let mut gray = lamp_stack::GrayMask::new(mask.width());
+        for row in mask.rows() {
+            let runs = lamp_stack::white_runs(row, mask.width());
+            let runs = runs.flat_map(|(start, end)| [(start, 0), (end - start, level)]);
+            gray.push_runs(runs).unwrap();
+        }
+        Layer { image: gray.into(), ..layer }
+    };
+    let layers = squares(&[[1, 9], [2, 8], [2, 8]]);
+    let [a, b, c] = <[Layer; 3]>::try_from(layers).unwrap();
+    scratch.stack("g.tif", [gray(a, 255), gray(b, 100), gray(c, 255)]);
+    scratch.run("lamp check g.tif --strict").succeeds_quietly();
+    let ran = scratch.run("lamp check g.tif --threshold 101 --strict");
+    assert_eq!(ran.statuses, [Some(3)]);
+    assert!(String::from_utf8(ran.stdout).unwrap().contains("island: number 1 begins in layer 2"));
+}
+
+#[test]
+fn stray_rows_are_named_first() {
+    let scratch = with("ring.stl", &ring(2000));
+    scratch.run(&format!("slice ring.stl {SLICE} -o ring.tif")).succeeds_quietly();
+    let mut layers = scratch.layers("ring.tif");
+    layers[120].info.stray_rows = vec![5, 6];
+    scratch.stack("stray.tif", layers);
+    let ran = scratch.run("lamp check stray.tif").succeeds_quietly();
+    let text = String::from_utf8(ran.stdout).unwrap();
+    let second = text.lines().nth(1).unwrap();
+    assert!(second.starts_with("  stray rows: layer 120 (z 12.00 mm): 2, which"), "{text}");
+}
+
+#[test]
+fn threads_and_memory_change_no_byte() {
+    let scratch = Scratch::new();
+    scratch.part("blade.stl", Sample::Blade, 24_000);
+    let mut reports = Vec::new();
+    for options in ["--threads 1", "--threads 3", "--memory 16MB"] {
+        let line = format!(
+            "lamp check blade.stl --dpi 200 --rotate y:90 --drain 1mm --report r.json --force {options}"
+        );
+        let ran = scratch.run(&line).succeeds_quietly();
+        reports.push((ran.stdout, scratch.bytes("r.json")));
+    }
+    assert!(reports.iter().all(|report| *report == reports[0]));
+}
+
+#[test]
+fn a_chamber_behind_a_narrow_hole_drains_through_it_only_if_that_may_be_narrow() {
+    let scratch = with("core.stl", &lamp_fixtures::cavity_core(2000));
+    let narrow = |drain: &str| {
+        let line = format!("lamp check core.stl {SLICE} --only pockets --report d.json {drain}");
+        scratch.run(&line).succeeds_quietly();
+        let report = report(&scratch, "d.json");
+        of_kind(&report, "narrow").len()
+    };
+    // The gate is 2 x 2 mm.
+    assert_eq!(["", "--drain 1.9mm", "--drain 2.2mm"].map(narrow), [0, 0, 1]);
+    // A channel in which no such ball fits is no room.
+    scratch.mesh("serpentine.stl", &serpentine(2000));
+    let line = format!("lamp check serpentine.stl {SLICE} --only pockets --strict --drain 3mm");
+    scratch.run(&line).succeeds_quietly();
+}
+
+#[test]
+fn minima_that_pixels_miss_and_islands_that_the_mesh_lacks_are_told() {
+    // The needle's tip joins the beam before it is as wide as a pixel of 5 mm.
+    let scratch = with("needle.stl", &needle(2000));
+    let ran =
+        scratch.run("lamp check needle.stl --dpi 5.08 --only islands --speck 1 --report n.json");
+    ran.succeeds_quietly();
+    let found = report(&scratch, "n.json");
+    let [lone] = of_kind(&found, "minimum-without-island")[..] else { panic!("{found}") };
+    assert_eq!(lone["z_mm"], 10.0);
+    assert!(of_kind(&found, "island").is_empty());
+    let ran = scratch.run(&format!("lamp check needle.stl {SLICE} --only islands --report n.json"));
+    ran.succeeds_quietly();
+    let found = report(&scratch, "n.json");
+    assert_eq!(of_kind(&found, "island").len(), 1);
+    assert!(of_kind(&found, "minimum-without-island").is_empty());
+    // A wall that leans by more than its thickness in a layer falls apart into islands.
+    scratch.mesh("wall.stl", &slanted_wall(0.5, 1.0, 200));
+    scratch
+        .run("lamp check wall.stl --dpi 254 --thickness 1mm --only islands --report w.json")
+        .succeeds_quietly();
+    let found = report(&scratch, "w.json");
+    let islands = of_kind(&found, "island").len();
+    assert!(islands > 10 && of_kind(&found, "island-without-minimum").len() == islands, "{found}");
+}
+
+/// The sample blade at 1500 dpi and 100 um: layers where islands begin and join.
+#[test]
+fn islands_of_the_sample_blade_begin_at_its_minima() {
+    let scratch = Scratch::new();
+    scratch.mesh("blade.stl", &build(Sample::Blade, 100_000).unwrap());
+    for (rotate, expected) in [
+        ("x:0", &[][..]),
+        ("x:180", &[(80, 312), (150, 262)]),
+        ("y:90", &[(436, 458), (300, 346), (347, 348)]),
+        ("x:30", &[(1124, 1153)]),
+    ] {
+        let line = format!("lamp check blade.stl --rotate {rotate} --only islands --report b.json");
+        scratch.run(&line).succeeds_quietly();
+        let found = report(&scratch, "b.json");
+        let layers = |it: &Value| (it["layer"].as_u64().unwrap(), it["joins"].as_u64().unwrap());
+        let islands: Vec<_> = of_kind(&found, "island").into_iter().map(layers).collect();
+        assert_eq!(islands, expected, "{rotate}");
+        assert_eq!(
+            found["findings"].as_array().unwrap().len(),
+            expected.len(),
+            "{rotate}: {found}"
+        );
+    }
+}
+
+#[test]
+fn several_inputs_are_checked_each_on_its_own() {
+    let scratch = with("cup.stl", &cup(200));
+    scratch.mesh("ring.stl", &ring(2000));
+    scratch.run(&format!("slice cup.stl {SLICE} -o cup.tif")).succeeds_quietly();
+    let line = format!("lamp check cup.tif ring.stl {SLICE} --report all.json --evidence pictures");
+    let ran = scratch.run(&line).succeeds_quietly();
+    let text = String::from_utf8(ran.stdout).unwrap();
+    assert!(text.contains("cup.tif: 120 layers") && text.contains("ring.stl: "), "{text}");
+    let found = report(&scratch, "all.json");
+    assert_eq!(of_kind(&found, "cup")[0]["input"], 0);
+    assert_eq!(of_kind(&found, "island")[0]["input"], 1);
+    assert!(scratch.path("pictures/01_01_cup_layer_00020.png").exists());
+    assert!(scratch.path("pictures/02_01_island_layer_00100.png").exists());
+}
+
+#[test]
+fn what_cannot_be_checked_is_refused_in_a_sentence() {
+    let scratch = Scratch::new();
+    let mut layers = squares(&[[1, 9], [1, 9]]);
+    layers[1].image = Mask::black(12, 10).into();
+    scratch.stack("sizes.tif", layers);
+    scratch.run("lamp check sizes.tif").is_refused_with(&["sizes.tif", "layer 1", "12 x 10"]);
+    let mut layers = squares(&[[1, 9], [1, 9]]);
+    layers.iter_mut().for_each(|layer| layer.info.thickness_um = None);
+    scratch.stack("bare.tif", layers);
+    scratch.run("lamp check bare.tif --drain 1mm").is_refused_with(&["bare.tif", "thick"]);
+    scratch.run("lamp check bare.tif").succeeds_quietly();
+    scratch.write("nan.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex nan 1 0\nvertex 1 0 0\nendloop\nendfacet\nendsolid\n");
+    scratch.run("lamp check nan.stl").is_refused_with(&["nan.stl", "facet 0"]);
+    scratch.write("empty.stl", b"");
+    scratch.run("lamp check empty.stl").is_refused_with(&["empty.stl", "empty"]);
+    scratch.run("lamp check nothing.tif").is_refused_with(&["nothing.tif"]);
+    scratch.run("lamp check - -").is_wrong_usage(&["once"]);
+    scratch.run("lamp check a.tif --only rings").is_wrong_usage(&["rings"]);
+    scratch.run("lamp check a.tif --least-support 130%").is_wrong_usage(&["130%"]);
+}
