@@ -5,7 +5,7 @@
 //! corners 3t, 3t + 1 and 3t + 2, and everything is read from flat arrays by it.
 //!
 //! ```
-//! use lamp_slicer::topology::{CornerTable, Shells, facet_of, next, previous};
+//! use lamp_slicer::topology::{CornerTable, MeshCheck, Shells, facet_of, next, previous};
 //! use lamp_slicer::{Part, Placement, Units};
 //!
 //! let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
@@ -22,18 +22,31 @@
 //! assert_eq!(ends, [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]);
 //!
 //! assert_eq!(Shells::new(&table).count(), 1);
+//!
+//! let check = MeshCheck::new(&table);
+//! assert!(check.is_clean());
+//! assert!((check.lumps[0].mass.unwrap().volume_mm3 - 1.0 / 6.0).abs() < 1e-12);
 //! # Ok::<(), lamp_slicer::SliceError>(())
 //! ```
 
 mod around_edge;
+mod check;
 mod corner_table;
 mod edges;
 mod minima;
+mod faults;
+mod mass;
+mod nest;
 mod read;
+mod rims;
 mod shells;
 #[cfg(test)]
 mod testing;
 
+pub use check::{Lump, MeshCheck, ShellReport};
 pub use corner_table::{CornerTable, facet_of, next, previous};
 pub use minima::{Minimum, MinimumKind, Relief, minima};
+pub use faults::Doubled;
+pub use mass::Mass;
+pub use rims::RimLoop;
 pub use shells::Shells;

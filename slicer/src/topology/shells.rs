@@ -70,6 +70,12 @@ impl Shells {
         &self.turned
     }
 
+    /// Returns true if a facet is one of those [turned](Self::turned).
+    #[inline]
+    pub fn is_turned(&self, facet: u32) -> bool {
+        self.turned.binary_search(&facet).is_ok()
+    }
+
     /// Returns the shells that have one side only, as a Moebius strip: whichever of their facets
     /// are turned over, some neighbours disagree.
     pub fn one_sided(&self) -> &[u32] {
@@ -145,7 +151,7 @@ fn numbered(parents: &mut [u32]) -> (Vec<u32>, u32) {
     (numbers, count)
 }
 
-fn root(parents: &mut [u32], mut member: u32) -> u32 {
+pub(crate) fn root(parents: &mut [u32], mut member: u32) -> u32 {
     while parents[member as usize] != member {
         let above = parents[parents[member as usize] as usize];
         parents[member as usize] = above;
@@ -155,7 +161,7 @@ fn root(parents: &mut [u32], mut member: u32) -> u32 {
 }
 
 /// Makes the lower root that of both.
-fn unite(parents: &mut [u32], a: u32, b: u32) {
+pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) {
     let (a, b) = (root(parents, a), root(parents, b));
     parents[a.max(b) as usize] = a.min(b);
 }

@@ -1,0 +1,487 @@
+//! What is wrong with a mesh, and what its shells enclose.
+
+use lamp_brep::vector::{cross, length, sub};
+use lamp_stack::Grouped;
+
+use crate::topology::corner_table::facet_of;
+use crate::topology::faults::{is_finite, is_flat};
+use crate::topology::mass::Moments;
+use crate::topology::nest::containers;
+use crate::topology::rims::box_of;
+use crate::topology::{CornerTable, Doubled, Mass, RimLoop, Shells};
+
+/// A shell, and what it encloses.
+#[derive(Clone, Debug)]
+pub struct ShellReport {
+    /// Its body, from 0, among those of [`CornerTable::bodies`].
+    pub body: u32,
+    /// Its first facet.
+    pub first_facet: u32,
+    /// The number of its facets.
+    pub facets: u32,
+    /// The number of vertices at its corners.
+    pub vertices: u32,
+    /// The number of its edges. One that several pairs of neighbours share counts once for each.
+    pub edges: u32,
+    /// The number of sides of facets that have no neighbour.
+    pub open_sides: u32,
+    /// Whether it has one side only, so that nothing is inside or outside.
+    pub is_one_sided: bool,
+    /// Its area.
+    pub area_mm2: f64,
+    /// The least and the greatest corner of its box.
+    pub box_mm: [[f64; 3]; 2],
+    /// What it encloses, with facets that are turned over counted as their neighbours face. None if
+    /// it is open, one-sided or too large for 64 bits.
+    pub mass: Option<Box<Mass>>,
+    /// The closed shell right around it, if it is closed, too.
+    pub within: Option<u32>,
+    /// Whether it is a void: within an odd number of shells.
+    pub is_void: bool,
+}
+
+impl ShellReport {
+    /// Returns the Euler number, vertices less edges plus facets: 2 less twice the number of
+    /// handles, if the shell is closed.
+    pub fn euler(&self) -> i64 {
+        i64::from(self.vertices) - i64::from(self.edges) + i64::from(self.facets)
+    }
+
+    /// Returns true if most of its facets face into the material: the volume of an outer shell is
+    /// below zero, or that of a void above.
+    pub fn is_inside_out(&self) -> bool {
+        let volume = self.mass.as_ref().map_or(0.0, |mass| mass.volume_mm3);
+        if self.is_void { volume > 0.0 } else { volume < 0.0 }
+    }
+}
+
+/// A piece of material: what an outer shell encloses, without its voids.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lump {
+    /// Its outer shell.
+    pub outer: u32,
+    /// The shells of its voids, in rising order.
+    pub voids: Vec<u32>,
+    /// Its mass: positive, whichever way its shells face; none if the voids leave nothing.
+    pub mass: Option<Mass>,
+}
+
+/// What a check of a mesh finds.
+#[derive(Clone, Debug)]
+pub struct MeshCheck {
+    /// The shells.
+    pub shells: Vec<ShellReport>,
+    /// The lumps that closed shells make, in the order of their outer shells.
+    pub lumps: Vec<Lump>,
+    /// The loops around holes.
+    pub loops: Vec<RimLoop>,
+    /// Facets that face the other way than most of their neighbours.
+    pub turned: Vec<u32>,
+    /// Facets that repeat another.
+    pub doubled: Vec<Doubled>,
+    /// Facets without area.
+    pub flat: Vec<u32>,
+    /// Facets with a coordinate that is not finite.
+    pub not_finite: Vec<u32>,
+    /// The number of edges of three facets and more; [`CornerTable::crowded`] lists them.
+    pub crowded: usize,
+}
+
+impl MeshCheck {
+    /// Checks a mesh.
+    pub fn new(table: &CornerTable) -> Self {
+        Self::of_shells(table, &Shells::new(table))
+    }
+
+    /// Checks a mesh whose shells are known.
+    pub fn of_shells(table: &CornerTable, shells: &Shells) -> Self {
+        let mut reports = reports(table, shells);
+        let around = containers(table, shells, &reports);
+        for (shell, is_void) in voids(&around).into_iter().enumerate() {
+            reports[shell].within = around[shell];
+            reports[shell].is_void = is_void;
+        }
+        let facets = || 0..table.facet_count() as u32;
+        let is_not_finite = |facet: &u32| table.is_idle(*facet) && !is_finite(table, *facet);
+        Self {
+            lumps: lumps(&reports),
+            shells: reports,
+            loops: RimLoop::all(table),
+            turned: shells.turned().to_vec(),
+            doubled: Doubled::all(table),
+            flat: facets().filter(|&facet| is_flat(table, facet)).collect(),
+            not_finite: facets().filter(is_not_finite).collect(),
+            crowded: table.crowded().len(),
+        }
+    }
+
+    /// Returns the shells that face into the material.
+    pub fn inside_out(&self) -> impl Iterator<Item = u32> {
+        let shells = (0..).zip(&self.shells);
+        shells.filter(|(_, shell)| shell.is_inside_out()).map(|(number, _)| number)
+    }
+
+    /// Returns true if nothing was found: all shells are closed and face outwards, every edge has
+    /// two facets, and every facet an area.
+    pub fn is_clean(&self) -> bool {
+        let is_good = |shell: &ShellReport| shell.mass.is_some() && !shell.is_inside_out();
+        self.shells.iter().all(is_good)
+            && self.turned.is_empty()
+            && self.doubled.is_empty()
+            && self.flat.is_empty()
+            && self.not_finite.is_empty()
+            && self.crowded == 0
+    }
+}
+
+/// Looks at the facets of each shell.
+fn reports(table: &CornerTable, shells: &Shells) -> Vec<ShellReport> {
+    let facets = || (0..table.facet_count() as u32).map(|facet| (shells.of(facet), facet));
+    let in_shells = facets().filter(|(shell, _)| (*shell as usize) < shells.count());
+    let crowded = crowded_by_shell(table, shells);
+    let mut last_shell_at = vec![u32::MAX; table.points().len()];
+    let mut body_ends = table.bodies().map(|facets| facets.end).enumerate().peekable();
+    let groups = match shells.count() {
+        // No need to sort.
+        1 => None,
+        count => Some(Grouped::new(count, || {
+            in_shells.clone().map(|(shell, facet)| (shell as usize, facet))
+        })),
+    };
+    let only: Vec<u32> = match &groups {
+        None => in_shells.map(|(_, facet)| facet).collect(),
+        Some(_) => Vec::new(),
+    };
+    let report = |shell: usize| {
+        let facets = groups.as_ref().map_or(&only[..], |groups| groups.group(shell));
+        while body_ends.next_if(|&(_, end)| end <= facets[0]).is_some() {}
+        let body = body_ends.peek().map_or(0, |&(body, _)| body as u32);
+        let mut tally = Tally::new(table, shells, shell as u32, facets[0]);
+        facets.iter().for_each(|&facet| tally.add(facet, &mut last_shell_at));
+        tally.report(body, crowded.get(shell).copied().unwrap_or(0))
+    };
+    (0..shells.count()).map(report).collect()
+}
+
+/// Returns the number of crowded edges without neighbours in each shell; nothing if there are none.
+fn crowded_by_shell(table: &CornerTable, shells: &Shells) -> Vec<u32> {
+    let mut counts = Vec::new();
+    for corners in table.crowded().filter(|corners| table.opposite(corners[0]).is_none()) {
+        counts.resize(shells.count(), 0);
+        counts[shells.of(facet_of(corners[0])) as usize] += 1;
+    }
+    counts
+}
+
+/// Sums over the facets of a shell.
+struct Tally<'a> {
+    table: &'a CornerTable,
+    shells: &'a Shells,
+    shell: u32,
+    first: u32,
+    facets: u32,
+    vertices: u32,
+    rims: u32,
+    open_sides: u32,
+    twice_area: f64,
+    box_mm: [[f64; 3]; 2],
+    moments: Moments,
+}
+
+impl<'a> Tally<'a> {
+    fn new(table: &'a CornerTable, shells: &'a Shells, shell: u32, first: u32) -> Self {
+        let about = table.point(3 * first);
+        Self {
+            table,
+            shells,
+            shell,
+            first,
+            facets: 0,
+            vertices: 0,
+            rims: 0,
+            open_sides: 0,
+            twice_area: 0.0,
+            box_mm: box_of([about]),
+            moments: Moments::about(about),
+        }
+    }
+
+    #[inline]
+    fn add(&mut self, facet: u32, last_shell_at: &mut [u32]) {
+        let points = self.table.facet(facet);
+        let [a, b, c] = points;
+        self.facets += 1;
+        self.twice_area += length(cross(sub(b, a), sub(c, a)));
+        self.moments.add(if self.shells.is_turned(facet) { [a, c, b] } else { points });
+        for (corner, point) in (3 * facet..).zip(points) {
+            let last = &mut last_shell_at[self.table.vertex(corner) as usize];
+            if *last != self.shell {
+                *last = self.shell;
+                self.vertices += 1;
+                for axis in 0..3 {
+                    self.box_mm[0][axis] = self.box_mm[0][axis].min(point[axis]);
+                    self.box_mm[1][axis] = self.box_mm[1][axis].max(point[axis]);
+                }
+            }
+            if self.table.opposite(corner).is_none() {
+                self.open_sides += 1;
+                self.rims += u32::from(self.table.is_rim(corner));
+            }
+        }
+    }
+
+    fn report(self, body: u32, crowded: u32) -> ShellReport {
+        let is_one_sided = self.shells.one_sided().binary_search(&self.shell).is_ok();
+        let is_closed = self.open_sides == 0 && !is_one_sided;
+        let shared = (3 * self.facets - self.open_sides) / 2;
+        ShellReport {
+            body,
+            first_facet: self.first,
+            facets: self.facets,
+            vertices: self.vertices,
+            edges: shared + self.rims + crowded,
+            open_sides: self.open_sides,
+            is_one_sided,
+            area_mm2: 0.5 * self.twice_area,
+            box_mm: self.box_mm,
+            mass: self.moments.mass().filter(|_| is_closed).map(Box::new),
+            within: None,
+            is_void: false,
+        }
+    }
+}
+
+/// Returns for each shell whether it is a void: within an odd number of others. Shells that cross
+/// may be around each other; such a ring counts as outside.
+fn voids(around: &[Option<u32>]) -> Vec<bool> {
+    let mut known: Vec<Option<bool>> = vec![None; around.len()];
+    let mut way = Vec::new();
+    for shell in 0..around.len() {
+        let mut at = shell;
+        let mut is_void = loop {
+            if let Some(is_void) = known[at] {
+                break is_void;
+            }
+            // Whoever comes back here, on a ring, finds it.
+            known[at] = Some(true);
+            way.push(at);
+            match around[at] {
+                Some(outer) => at = outer as usize,
+                None => break true,
+            }
+        };
+        while let Some(inner) = way.pop() {
+            is_void = !is_void;
+            known[inner] = Some(is_void);
+        }
+    }
+    known.into_iter().map(Option::unwrap_or_default).collect()
+}
+
+fn lumps(shells: &[ShellReport]) -> Vec<Lump> {
+    let closed = || (0..).zip(shells).filter(|(_, shell)| shell.mass.is_some());
+    let outer = closed().filter(|(_, shell)| !shell.is_void);
+    let mut lumps: Vec<Lump> =
+        outer.map(|(outer, _)| Lump { outer, voids: Vec::new(), mass: None }).collect();
+    for (number, void) in closed().filter(|(_, shell)| shell.is_void) {
+        if let Some(Ok(at)) =
+            void.within.map(|outer| lumps.binary_search_by_key(&outer, |lump| lump.outer))
+        {
+            lumps[at].voids.push(number);
+        }
+    }
+    let signed = |shell: u32, sign: f64| {
+        let mass = shells[shell as usize].mass.as_deref().copied()?;
+        Some(mass.times(sign * mass.volume_mm3.signum()))
+    };
+    for lump in &mut lumps {
+        let voids = lump.voids.iter().map(|&void| signed(void, -1.0));
+        let masses: Vec<Mass> =
+            std::iter::once(signed(lump.outer, 1.0)).chain(voids).flatten().collect();
+        lump.mass = Mass::together(masses.iter().copied());
+    }
+    lumps
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use lamp_fixtures::{Defect, cone, cube_with_hole, inject, sphere, torus};
+
+    use super::*;
+    use crate::facet::Facet;
+    use crate::topology::testing::{block, table_of, turned};
+
+    fn checked(facets: &[Facet]) -> MeshCheck {
+        MeshCheck::new(&table_of(facets))
+    }
+
+    fn is_near(value: f64, exact: f64, share: f64) -> bool {
+        (value / exact - 1.0).abs() < share
+    }
+
+    #[test]
+    fn round_bodies_have_the_numbers_of_their_closed_forms() {
+        let ball = checked(&sphere(10.0, 100_000).facets);
+        let (volume, side) = (4.0 / 3.0 * PI * 1000.0, 0.4 * 100.0);
+        let mass = ball.shells[0].mass.as_ref().unwrap();
+        assert!(ball.is_clean());
+        assert_eq!((ball.shells.len(), ball.shells[0].euler()), (1, 2));
+        assert!(is_near(mass.volume_mm3, volume, 2e-4));
+        assert!(is_near(ball.shells[0].area_mm2, 4.0 * PI * 100.0, 2e-4));
+        assert!(mass.centre_mm[0].abs() < 1e-6 && is_near(mass.centre_mm[2], 10.0, 1e-6));
+        assert!((0..3).all(|k| is_near(mass.inertia_mm5[k][k], volume * side, 4e-4)));
+
+        let ring = checked(&torus(20.0, 5.0, 100_000).facets);
+        let volume = 2.0 * PI * PI * 20.0 * 25.0;
+        let mass = ring.shells[0].mass.as_ref().unwrap();
+        assert_eq!(ring.shells[0].euler(), 0);
+        assert!(is_near(mass.volume_mm3, volume, 1e-3));
+        assert!(is_near(mass.inertia_mm5[2][2], volume * (400.0 + 0.75 * 25.0), 2e-3));
+        assert!(is_near(mass.inertia_mm5[0][0], volume * (200.0 + 0.625 * 25.0), 2e-3));
+
+        let cone_of = |r: f64, h: f64| {
+            let volume = PI * r * r * h / 3.0;
+            (volume, h / 4.0, 0.3 * volume * r * r)
+        };
+        let mesh = cone(8.0, 0.0, 24.0, 100_000);
+        let found = checked(&mesh.facets);
+        let (volume, centre, inertia) = cone_of(8.0, 24.0);
+        let mass = found.shells[0].mass.as_ref().unwrap();
+        assert_eq!(found.shells[0].euler(), 2);
+        assert!(is_near(mass.volume_mm3, volume, 1e-3));
+        assert!(is_near(mass.centre_mm[2], centre, 5e-4));
+        assert!(is_near(mass.inertia_mm5[2][2], inertia, 1e-3));
+    }
+
+    #[test]
+    fn a_cube_with_a_hole_has_a_handle() {
+        let mesh = cube_with_hole(20.0, 5.0, 20_000);
+        let found = checked(&mesh.facets);
+        assert!(found.is_clean());
+        assert_eq!((found.shells.len(), found.shells[0].euler(), found.lumps.len()), (1, 0, 1));
+        let volume = found.lumps[0].mass.unwrap().volume_mm3;
+        assert!(is_near(volume, 8000.0 - PI * 500.0, 1e-3));
+    }
+
+    #[test]
+    fn voids_belong_to_the_lumps_around_them() {
+        let cube = |low: f32, high: f32| block([low; 3], [high; 3]);
+        // A shell in a void in a shell, with another void beside it, and a solid apart. The
+        // second void faces the wrong way.
+        let facets = [
+            turned(&cube(2.0, 8.0)),
+            cube(0.0, 20.0),
+            cube(12.0, 14.0),
+            cube(4.0, 6.0),
+            block([30.0, 0.0, 0.0], [31.0, 1.0, 1.0]),
+        ]
+        .concat();
+        let found = checked(&facets);
+        let within: Vec<_> = found.shells.iter().map(|shell| shell.within).collect();
+        assert_eq!(within, [Some(1), None, Some(1), Some(0), None]);
+        let lumps: Vec<_> =
+            found.lumps.iter().map(|lump| (lump.outer, lump.voids.clone())).collect();
+        assert_eq!(lumps, [(1, vec![0, 2]), (3, vec![]), (4, vec![])]);
+        let volumes: Vec<f64> =
+            found.lumps.iter().map(|lump| lump.mass.unwrap().volume_mm3).collect();
+        assert!(is_near(volumes[0], 8000.0 - 216.0 - 8.0, 1e-12));
+        assert_eq!(found.inside_out().collect::<Vec<_>>(), [2]);
+        assert!(!found.is_clean());
+    }
+
+    #[test]
+    fn shells_that_touch_are_nested_all_the_same() {
+        // From wall to wall, so that up to four of six directions start on it.
+        let outer = block([0.0; 3], [4.0; 3]);
+        for [low, high] in [[[1.0; 3], [4.0, 3.0, 3.0]], [[0.0, 0.0, 1.0], [4.0, 4.0, 3.0]]] {
+            let inner = block(low, high);
+            let facets = [outer.clone(), turned(&inner)].concat();
+            let found = checked(&facets);
+            let within: Vec<_> = found.shells.iter().map(|shell| shell.within).collect();
+            assert_eq!(within, [None, Some(0)]);
+        }
+        let beside = [outer, block([4.0, 0.5, 0.5], [5.0, 3.0, 3.0])].concat();
+        assert!(checked(&beside).shells.iter().all(|shell| shell.within.is_none()));
+    }
+
+    #[test]
+    fn many_shells_side_by_side_and_in_each_other() {
+        let mut facets = Vec::new();
+        for k in 0..40 {
+            let (low, high) = (k as f32, 200.0 - k as f32);
+            let cube = block([low; 3], [high; 3]);
+            facets.extend(if k % 2 == 0 { cube } else { turned(&cube) });
+        }
+        for k in 0..300 {
+            let [x, y] = [(k % 20) as f32, (k / 20) as f32].map(|c| 300.0 + 2.0 * c);
+            facets.extend(block([x, y, 0.0], [x + 1.0, y + 1.0, 1.0]));
+        }
+        let found = checked(&facets);
+        assert!(found.is_clean());
+        for k in 1..40 {
+            assert_eq!(found.shells[k].within, Some(k as u32 - 1));
+        }
+        assert!(found.shells[40..].iter().all(|shell| shell.within.is_none()));
+        assert_eq!(found.lumps.len(), 320);
+    }
+
+    #[test]
+    fn defects_are_found_where_they_are() {
+        let good = sphere(10.0, 2_000);
+        let spoiled = |defect| {
+            let mut mesh = good.clone();
+            let chosen = inject(&mut mesh, defect, 1, 3);
+            (checked(&mesh.facets), chosen[0] as u32)
+        };
+        let (found, _) = spoiled(Defect::Drop);
+        assert_eq!((found.loops.len(), found.loops[0].corners.len()), (1, 3));
+        assert!(found.shells[0].mass.is_none() && found.lumps.is_empty());
+        let (found, chosen) = spoiled(Defect::Flip);
+        assert_eq!(found.turned, [chosen]);
+        // Its volume is that of the mesh without the defect.
+        let mass = found.shells[0].mass.as_ref().unwrap();
+        assert!(is_near(mass.volume_mm3, good.volume_mm3(), 1e-9));
+        let (found, chosen) = spoiled(Defect::Duplicate);
+        assert_eq!((found.crowded, found.doubled.len(), found.doubled[0].of), (3, 1, chosen));
+        // Of one sphere: 1 facet more, and no edge more.
+        assert_eq!(found.shells[0].euler(), 3);
+        let (found, _) = spoiled(Defect::Nudge { by_mm: 0.1 });
+        assert_eq!((found.loops.len(), found.loops[0].corners.len()), (1, 4));
+        let (found, _) = spoiled(Defect::Gap { by_mm: 0.01 });
+        assert_eq!((found.shells.len(), found.loops.len()), (2, 2));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_findings() {
+        let mut facets = block([0.0; 3], [1.0; 3]);
+        facets[5][1][2] = f32::NAN;
+        facets.push([[f32::INFINITY, 0.0, 0.0], [0.0; 3], [1.0; 3]]);
+        facets.push([[f32::MAX; 3], [f32::MIN; 3], [f32::MAX, 0.0, f32::MIN]]);
+        facets.push([[1.0; 3], [1.0; 3], [0.0; 3]]);
+        let found = checked(&facets);
+        assert_eq!((found.not_finite, found.flat), (vec![5, 12], vec![14]));
+        assert_eq!((found.shells.len(), found.loops.len()), (2, 2));
+    }
+
+    #[test]
+    fn hostile_soups_end_in_findings() {
+        let mut numbers = lamp_fixtures::SplitMix(7);
+        for round in 0..30 {
+            let mut point = || {
+                [0; 3].map(|_| match numbers.below(9) {
+                    0 if round % 3 == 0 => f32::NAN,
+                    1 if round % 4 == 0 => f32::MAX,
+                    k => k as f32,
+                })
+            };
+            let facets: Vec<Facet> = (0..500).map(|_| [point(), point(), point()]).collect();
+            let found = checked(&facets);
+            assert!(!found.is_clean());
+            let closed = found.shells.iter().filter(|shell| shell.mass.is_some()).count();
+            let held: usize = found.lumps.iter().map(|lump| 1 + lump.voids.len()).sum();
+            assert!(held <= closed);
+        }
+    }
+}

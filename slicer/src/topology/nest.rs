@@ -1,0 +1,279 @@
+//! Tells which closed shells lie within which others, by rays.
+//!
+//! A ray along an axis goes through the facet of a shell that the axis sees best. Behind the last
+//! facet of this shell that it meets, the first one of another shell decides. If the ray leaves that shell there, the first one lies within
+//! it; if it enters it, both lie side by side, and within the same one. Where rays meet facets
+//! follows from the same arithmetic and ties as in slicing, so none slips through an edge. A shell
+//! that touches another where its ray starts tries the other directions.
+
+use rstar::primitives::GeomWithData;
+use rstar::{AABB, RTree};
+
+use crate::topology::check::ShellReport;
+use crate::topology::{CornerTable, Shells};
+
+/// A ray that starts nearer to a facet, as a share of the part's size, may start on it.
+const TOUCHING: f64 = 1e-9;
+
+/// The directions of rays: an axis, and 1 or -1.
+const DIRECTIONS: [(usize, f64); 6] =
+    [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0)];
+
+/// The first facet that a ray meets.
+#[derive(Clone, Copy, Debug)]
+struct Hit {
+    depth_mm: f64,
+    shell: u32,
+    is_exit: bool,
+}
+
+/// Where on its facet a ray starts, by the shares of the corners: not quite in the middle, where
+/// other meshes of the same shape have edges.
+const SHARES: [f64; 3] = [0.334_1, 0.332_7, 0.333_2];
+
+/// A ray that starts on a facet of a shell.
+#[derive(Clone, Copy, Debug)]
+struct Ray {
+    shell: u32,
+    start: [f64; 3],
+    /// Twice the area of the facet as the axis sees it.
+    seen: f64,
+    hit: Option<Hit>,
+    /// Whether it starts on another shell.
+    touches: bool,
+}
+
+impl Ray {
+    /// Notes a facet of another shell.
+    fn pass(&mut self, hit: Hit, touching_mm: f64) {
+        let ahead = hit.depth_mm - self.start[0];
+        self.touches |= ahead.abs() <= touching_mm;
+        if ahead > 0.0 && self.hit.is_none_or(|first| hit.depth_mm < first.depth_mm) {
+            self.hit = Some(hit);
+        }
+    }
+}
+
+/// Returns for each shell the closed one right around it. Only closed shells of the same body are
+/// looked at.
+pub(crate) fn containers(
+    table: &CornerTable,
+    shells: &Shells,
+    reports: &[ShellReport],
+) -> Vec<Option<u32>> {
+    let mut family = Family::new(reports.len());
+    let mut start = 0;
+    while start < reports.len() {
+        let end = start + reports[start..].partition_point(|it| it.body <= reports[start].body);
+        let closed = reports[start..end].iter().filter(|report| report.mass.is_some()).count();
+        if closed > 1 {
+            family.send_rays(table, shells, reports, start..end);
+        }
+        start = end;
+    }
+    family.containers()
+}
+
+/// What rays found: which shells lie side by side, and what is around them.
+struct Family {
+    siblings: Vec<u32>,
+    around: Vec<Option<u32>>,
+}
+
+impl Family {
+    fn new(shells: usize) -> Self {
+        Self { siblings: (0..shells as u32).collect(), around: vec![None; shells] }
+    }
+
+    fn send_rays(
+        &mut self,
+        table: &CornerTable,
+        shells: &Shells,
+        reports: &[ShellReport],
+        of_body: std::ops::Range<usize>,
+    ) {
+        let is_closed = |shell: &u32| reports[*shell as usize].mass.is_some();
+        let mut left: Vec<u32> =
+            (of_body.start as u32..of_body.end as u32).filter(is_closed).collect();
+        for (axis, sign) in DIRECTIONS {
+            let rays = Rays::new(table, shells, reports, axis, sign, &left).traced();
+            left.clear();
+            for ray in rays {
+                if ray.touches {
+                    left.push(ray.shell);
+                } else if let Some(hit) = ray.hit {
+                    self.note(ray.shell, hit);
+                }
+            }
+            if left.is_empty() {
+                return;
+            }
+        }
+    }
+
+    fn note(&mut self, shell: u32, hit: Hit) {
+        if hit.is_exit {
+            self.around[shell as usize] = Some(hit.shell);
+        } else {
+            crate::topology::shells::unite(&mut self.siblings, shell, hit.shell);
+        }
+    }
+
+    /// Returns what is around each shell: what is around any of its siblings.
+    fn containers(mut self) -> Vec<Option<u32>> {
+        let mut around = vec![None; self.around.len()];
+        let root = |siblings: &mut Vec<u32>, shell: usize| {
+            crate::topology::shells::root(siblings, shell as u32) as usize
+        };
+        for shell in 0..around.len() {
+            let of_shell = self.around[shell];
+            let first = root(&mut self.siblings, shell);
+            around[first] = around[first].or(of_shell);
+        }
+        (0..around.len()).map(|shell| around[root(&mut self.siblings, shell)]).collect()
+    }
+}
+
+/// Rays in one direction, from some shells of a body.
+struct Rays<'a> {
+    table: &'a CornerTable,
+    shells: &'a Shells,
+    reports: &'a [ShellReport],
+    axis: usize,
+    sign: f64,
+    body: u32,
+    touching_mm: f64,
+    rays: Vec<Ray>,
+}
+
+impl<'a> Rays<'a> {
+    fn new(
+        table: &'a CornerTable,
+        shells: &'a Shells,
+        reports: &'a [ShellReport],
+        axis: usize,
+        sign: f64,
+        of: &[u32],
+    ) -> Self {
+        let body = of.first().map_or(0, |&shell| reports[shell as usize].body);
+        let ray = |&shell: &u32| Ray {
+            shell,
+            start: [0.0; 3],
+            seen: f64::NEG_INFINITY,
+            hit: None,
+            touches: false,
+        };
+        let rays = of.iter().map(ray).collect();
+        let mut this = Self { table, shells, reports, axis, sign, body, touching_mm: 0.0, rays };
+        this.find_starts();
+        this
+    }
+
+    /// Returns a point as rays see it, with the first axis along them.
+    fn seen(&self, point: [f64; 3]) -> [f64; 3] {
+        let axis = self.axis;
+        [self.sign * point[axis], point[(axis + 1) % 3], point[(axis + 2) % 3]]
+    }
+
+    /// Returns the facets of closed shells of the body.
+    fn facets(&self) -> impl Iterator<Item = (u32, u32)> + use<'a> {
+        let (shells, reports) = (self.shells, self.reports);
+        let of_body = self.table.bodies().nth(self.body as usize).unwrap_or(0..0);
+        let with_shell = of_body.map(move |facet| (facet, shells.of(facet)));
+        with_shell.filter(move |&(_, shell)| {
+            reports.get(shell as usize).is_some_and(|report| report.mass.is_some())
+        })
+    }
+
+    fn find_starts(&mut self) {
+        let mut reach = 0.0_f64;
+        for (facet, shell) in self.facets() {
+            let corners = self.table.facet(facet).map(|point| self.seen(point));
+            reach = corners.iter().flatten().fold(reach, |reach, c| reach.max(c.abs()));
+            let Ok(ray) = self.rays.binary_search_by_key(&shell, |ray| ray.shell) else { continue };
+            let [a, b, c] = corners;
+            let seen = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1]);
+            let ray = &mut self.rays[ray];
+            if seen.abs() > ray.seen {
+                ray.seen = seen.abs();
+                ray.start = [0, 1, 2].map(|k| (0..3).map(|n| SHARES[n] * corners[n][k]).sum());
+            }
+        }
+        self.touching_mm = TOUCHING * reach;
+    }
+
+    /// Finds the first facet that each ray meets once it has left its own shell.
+    fn traced(mut self) -> Vec<Ray> {
+        let start =
+            |(number, ray): (usize, &Ray)| GeomWithData::new([ray.start[1], ray.start[2]], number);
+        let starts = RTree::bulk_load(self.rays.iter().enumerate().map(start).collect());
+        self.meet(&starts, |ray, meeting| {
+            if ray.shell == meeting.shell {
+                ray.start[0] = ray.start[0].max(meeting.depth_mm);
+            }
+        });
+        let touching_mm = self.touching_mm;
+        self.meet(&starts, |ray, meeting| {
+            if ray.shell != meeting.shell {
+                ray.pass(meeting, touching_mm);
+            }
+        });
+        self.rays
+    }
+
+    /// Calls `each` with every ray and each facet that it meets.
+    fn meet(
+        &mut self,
+        starts: &RTree<GeomWithData<[f64; 2], usize>>,
+        each: impl Fn(&mut Ray, Hit),
+    ) {
+        for (facet, shell) in self.facets() {
+            let corners = self.table.facet(facet).map(|point| self.seen(point));
+            let least = |k: usize| corners.iter().map(|c| c[k]).fold(f64::INFINITY, f64::min);
+            let most = |k: usize| corners.iter().map(|c| c[k]).fold(f64::NEG_INFINITY, f64::max);
+            let shadow = AABB::from_corners([least(1), least(2)], [most(1), most(2)]);
+            for start in starts.locate_in_envelope(shadow) {
+                let Some((depth_mm, rises)) = met(&corners, self.rays[start.data].start) else {
+                    continue;
+                };
+                let is_exit = (rises == self.faces_outward(facet, shell)) == (self.sign > 0.0);
+                each(&mut self.rays[start.data], Hit { depth_mm, shell, is_exit });
+            }
+        }
+    }
+
+    /// Returns true if a facet of a shell faces away from what the shell encloses.
+    fn faces_outward(&self, facet: u32, shell: u32) -> bool {
+        let encloses =
+            self.reports[shell as usize].mass.as_ref().is_some_and(|mass| mass.volume_mm3 > 0.0);
+        encloses != self.shells.is_turned(facet)
+    }
+}
+
+/// Returns where a line along the first axis meets a facet, and whether the facet faces along the
+/// axis there. As in slicing, a corner is above a plane, or past a row, if its coordinate is at
+/// least that of the line.
+fn met(corners: &[[f64; 3]; 3], [_, y, z]: [f64; 3]) -> Option<(f64, bool)> {
+    let mut ends = [[0.0; 2]; 2];
+    let mut found = [false; 2];
+    for k in 0..3 {
+        let (from, to) = (corners[k], corners[(k + 1) % 3]);
+        let rises = to[2] >= z;
+        if (from[2] >= z) == rises {
+            continue;
+        }
+        // Sorted, so that the facets on both sides find the same point.
+        let (low, high) = if rises { (from, to) } else { (to, from) };
+        let share = (z - low[2]) / (high[2] - low[2]);
+        ends[usize::from(rises)] = [0, 1].map(|axis| low[axis] + share * (high[axis] - low[axis]));
+        found[usize::from(rises)] = true;
+    }
+    let [down, up] = ends;
+    let is_past = up[1] >= y;
+    if found != [true; 2] || (down[1] >= y) == is_past {
+        return None;
+    }
+    let (low, high) = if is_past { (down, up) } else { (up, down) };
+    let share = (y - low[1]) / (high[1] - low[1]);
+    Some((low[0] + share * (high[0] - low[0]), is_past))
+}
