@@ -70,6 +70,11 @@ impl CornerTable {
         Self { points, vertices, edges, body_ends }
     }
 
+    /// Returns the points, the vertices of all corners, and the ends of bodies.
+    pub(crate) fn into_parts(self) -> (Vec<[f64; 3]>, Vec<u32>, Vec<u32>) {
+        (self.points, self.vertices, self.body_ends)
+    }
+
     /// Returns the number of facets.
     pub fn facet_count(&self) -> usize {
         self.vertices.len() / 3

@@ -32,6 +32,7 @@
 mod around_edge;
 mod check;
 mod corner_table;
+mod crossings;
 mod edges;
 mod minima;
 mod faults;
@@ -42,10 +43,12 @@ mod rims;
 mod shells;
 #[cfg(test)]
 mod testing;
+mod weld;
 
 pub use check::{Lump, MeshCheck, ShellReport};
 pub use corner_table::{CornerTable, facet_of, next, previous};
 pub use minima::{Minimum, MinimumKind, Relief, minima};
+pub use crossings::Crossings;
 pub use faults::Doubled;
 pub use mass::Mass;
 pub use rims::RimLoop;

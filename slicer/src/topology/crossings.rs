@@ -1,0 +1,153 @@
+//! Finds facets that pass through each other.
+
+use robust::{Coord3D, orient3d};
+use rstar::RTree;
+use rstar::primitives::{GeomWithData, Rectangle};
+
+use crate::topology::CornerTable;
+use crate::topology::rims::box_of;
+
+/// Facets that pass through each other.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Crossings {
+    /// The first pairs, each in rising order, and sorted.
+    pub pairs: Vec<[u32; 2]>,
+    /// The number of all pairs that were found.
+    pub count: usize,
+    /// Whether so many boxes of facets overlap that not all pairs were looked at.
+    pub is_partial: bool,
+}
+
+/// Pairs of overlapping boxes that are looked at, for each facet and on top of that. A facet of a
+/// usual mesh meets some twenty boxes.
+const PAIRS_PER_FACET: usize = 1000;
+const PAIRS_BESIDE: usize = 10_000_000;
+
+impl Crossings {
+    /// Finds all pairs of facets of a body of which one has an edge that passes through the other,
+    /// and keeps the first `most`.
+    ///
+    /// An edge passes through a facet if its ends are on both sides of the facet's plane, and the
+    /// point between is inside the facet or on its border; signs are exact. Facets with a common
+    /// edge, facets that only touch, and facets in one plane do not count.
+    pub fn new(table: &CornerTable, most: usize) -> Self {
+        let mut found = Self::default();
+        for facets in table.bodies() {
+            let busy = facets.filter(|&facet| !table.is_idle(facet));
+            let boxes = busy.map(|facet| {
+                let [low, high] = box_of(table.facet(facet));
+                GeomWithData::new(Rectangle::from_corners(low, high), facet)
+            });
+            let tree = RTree::bulk_load(boxes.collect());
+            let budget = PAIRS_BESIDE + PAIRS_PER_FACET * tree.size();
+            let mut looked_at = 0;
+            for (a, b) in tree.intersection_candidates_with_other_tree(&tree) {
+                looked_at += 1;
+                if looked_at > budget {
+                    found.is_partial = true;
+                    break;
+                }
+                if a.data < b.data && cross(table, a.data, b.data) {
+                    found.count += 1;
+                    found.pairs.push([a.data, b.data]);
+                    if found.pairs.len() / 2 > most {
+                        found.keep(most);
+                    }
+                }
+            }
+        }
+        found.keep(most);
+        found
+    }
+
+    fn keep(&mut self, most: usize) {
+        self.pairs.sort_unstable();
+        self.pairs.truncate(most);
+    }
+}
+
+/// Returns true if an edge of one of two facets passes through the other.
+fn cross(table: &CornerTable, a: u32, b: u32) -> bool {
+    let (of_a, of_b) = (table.facet_vertices(a), table.facet_vertices(b));
+    let common = of_a.iter().filter(|vertex| of_b.contains(vertex)).count();
+    common < 2 && (pierces(table, of_a, of_b) || pierces(table, of_b, of_a))
+}
+
+/// Returns true if an edge of the first facet, without a vertex of the second, passes through the
+/// second.
+fn pierces(table: &CornerTable, edges: [u32; 3], facet: [u32; 3]) -> bool {
+    let point = |vertex: u32| {
+        let [x, y, z] = table.points()[vertex as usize];
+        Coord3D { x, y, z }
+    };
+    let [a, b, c] = facet.map(point);
+    // The sides of the plane on which the ends are.
+    let sides = edges.map(|vertex| match facet.contains(&vertex) {
+        true => 0.0,
+        false => orient3d(a, b, c, point(vertex)),
+    });
+    (0..3).any(|k| {
+        let [from, to] = [k, (k + 1) % 3];
+        let are_apart = sides[from].min(sides[to]) < 0.0 && sides[from].max(sides[to]) > 0.0;
+        if !are_apart {
+            return false;
+        }
+        let (p, q) = (point(edges[from]), point(edges[to]));
+        let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
+        turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facet::Facet;
+    use crate::topology::testing::{block, table_of};
+
+    fn crossings(facets: &[Facet]) -> Crossings {
+        Crossings::new(&table_of(facets), 1000)
+    }
+
+    #[test]
+    fn a_bar_through_a_block_crosses_two_of_its_sides() {
+        let mut facets = block([0.0; 3], [4.0; 3]);
+        facets.extend(block([1.0, 2.0, -1.0], [1.5, 2.5, 5.0]));
+        let found = crossings(&facets);
+        assert!(found.count >= 8 && !found.is_partial);
+        // The bottom and the top of the block are its facets 0 to 3, the ends of the bar 12 to 15.
+        let inside = |pair: &[u32; 2]| pair[0] < 4 && pair[1] >= 16;
+        assert!(found.pairs.iter().all(inside), "{:?}", found.pairs);
+    }
+
+    #[test]
+    fn facets_that_touch_do_not_cross() {
+        let block_at = |x: f32| block([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]);
+        assert_eq!(crossings(&[block_at(0.0), block_at(1.0)].concat()), Crossings::default());
+        assert_eq!(crossings(&lamp_fixtures::blade(20_000).facets), Crossings::default());
+    }
+
+    #[test]
+    fn a_facet_through_its_own_vertex_fan_crosses() {
+        let o = [0.0; 3];
+        let across = [o, [-1.0, -1.0, -1.0], [-1.0, -1.0, 1.0f32]];
+        let flat = [o, [4.0, 0.0, 0.0], [0.0, 4.0, 0.0f32]];
+        assert_eq!(crossings(&[across, flat]).count, 0);
+        let across = [o, [1.0, 1.0, -1.0], [1.0, 1.0, 1.0f32]];
+        assert_eq!(crossings(&[across, flat]).pairs, [[0, 1]]);
+    }
+
+    #[test]
+    fn pairs_are_those_of_a_slow_search() {
+        let mut numbers = lamp_fixtures::SplitMix(3);
+        let mut point = || [0; 3].map(|_| numbers.below(40) as f32);
+        let facets: Vec<Facet> = (0..150).map(|_| [point(), point(), point()]).collect();
+        let table = table_of(&facets);
+        let all = (0..150).flat_map(|a| (a + 1..150).map(move |b| [a, b]));
+        let busy = all.filter(|pair| pair.iter().all(|&facet| !table.is_idle(facet)));
+        let slow: Vec<_> = busy.filter(|&[a, b]| cross(&table, a, b)).collect();
+        assert!(slow.len() > 100);
+        assert_eq!(Crossings::new(&table, usize::MAX).pairs, slow);
+        let few = Crossings::new(&table, 10);
+        assert_eq!((few.pairs.len(), few.count), (10, slow.len()));
+    }
+}
