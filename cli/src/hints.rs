@@ -56,6 +56,7 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::TooManyCrossings { .. } => "check it for facets that repeat, and --dpi",
         SliceError::ThreeMf(_) | SliceError::Obj { .. } => "export the part again",
         SliceError::NotFinite { .. } => "repair or export the part again",
+        SliceError::NothingLeft { .. } => "export the part again",
         SliceError::TooManyFacets { .. } => "export it with fewer facets",
         SliceError::TooFar { .. } => "check --units, --scale and --translate",
         SliceError::TooLarge { .. } => "check --units and --dpi",

@@ -141,6 +141,14 @@ pub enum SliceError {
         /// How many facets the part has.
         facets: usize,
     },
+    /// A mesh of facets that a repair drops.
+    #[error(
+        "a repair would drop all of its last {facets} facets: none has an area, or they cancel each other out"
+    )]
+    NothingLeft {
+        /// How many facets there were in the end.
+        facets: usize,
+    },
     /// An image would have too many pixels on a side.
     #[error(
         "an image would be {width} x {height} pixels, more than {} on a side",

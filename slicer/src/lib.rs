@@ -85,6 +85,7 @@ pub use placement::{Axis, PlacedFacet, Placement, facet_heights};
 pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};
 pub use slices::{GridRule, SliceOptions, Slices};
+pub use stl::write_stl;
 pub use table::Fill;
 pub use three_mf::{ModelFault, ThreeMfError};
 pub use trace::{EdgeFacet, FaultyEdge, OpenEnd, StrayBand, Trace, TracedBand};

@@ -61,6 +61,14 @@ impl Part {
     }
 }
 
+/// Writes facets as binary STL.
+///
+/// # Errors
+/// Returns an error if `out` fails.
+pub fn write_stl(facets: &[Facet], mut out: impl Write) -> io::Result<()> {
+    stl_io::write_stl(&mut out, facets.iter().map(triangle))
+}
+
 fn triangle(facet: &Facet) -> Triangle {
     let [a, b, c] = facet.map(|corner| corner.map(f64::from));
     let [e, f] = [b, c].map(|to| [0, 1, 2].map(|k| to[k] - a[k]));

@@ -17,6 +17,7 @@ mod join;
 mod machine;
 mod man;
 mod material;
+mod mesh;
 mod orient;
 mod sample;
 mod show;
@@ -56,6 +57,7 @@ pub(crate) enum Command {
     Heights(heights::HeightsArgs),
     Orient(orient::OrientArgs),
     Brep(brep::BrepArgs),
+    Mesh(mesh::MeshArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -97,6 +99,7 @@ impl Command {
             Self::Heights(args) => heights::run(args, common),
             Self::Orient(args) => orient::run(args, common),
             Self::Brep(args) => brep::run(args),
+            Self::Mesh(args) => mesh::run(args, common),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
         }

@@ -7,7 +7,7 @@ use crate::topology::corner_table::facet_of;
 use crate::topology::faults::{is_finite, is_flat};
 use crate::topology::mass::Moments;
 use crate::topology::nest::containers;
-use crate::topology::rims::box_of;
+use crate::topology::rims::{box_of, widen};
 use crate::topology::{CornerTable, Doubled, Mass, RimLoop, Shells};
 
 /// A shell, and what it encloses.
@@ -218,10 +218,7 @@ impl<'a> Tally<'a> {
             if *last != self.shell {
                 *last = self.shell;
                 self.vertices += 1;
-                for axis in 0..3 {
-                    self.box_mm[0][axis] = self.box_mm[0][axis].min(point[axis]);
-                    self.box_mm[1][axis] = self.box_mm[1][axis].max(point[axis]);
-                }
+                widen(&mut self.box_mm, point);
             }
             if self.table.opposite(corner).is_none() {
                 self.open_sides += 1;
@@ -393,7 +390,7 @@ mod tests {
 
     #[test]
     fn shells_that_touch_are_nested_all_the_same() {
-        // From wall to wall, so that up to four of six directions start on it.
+        // From wall to wall, so that up to two of three axes tell nothing.
         let outer = block([0.0; 3], [4.0; 3]);
         for [low, high] in [[[1.0; 3], [4.0, 3.0, 3.0]], [[0.0, 0.0, 1.0], [4.0, 4.0, 3.0]]] {
             let inner = block(low, high);
@@ -404,6 +401,19 @@ mod tests {
         }
         let beside = [outer, block([4.0, 0.5, 0.5], [5.0, 3.0, 3.0])].concat();
         assert!(checked(&beside).shells.iter().all(|shell| shell.within.is_none()));
+    }
+
+    #[test]
+    fn shells_that_pass_through_each_other_are_not_nested() {
+        let large = block([0.0; 3], [10.0; 3]);
+        // Out of one side, and from the inside through the wall of a cavity.
+        let beside = block([2.5, 3.5, 4.5], [12.5, 6.5, 5.5]);
+        assert!(checked(&[large.clone(), beside].concat()).is_clean());
+        let cavity = turned(&block([2.0; 3], [8.0; 3]));
+        let through = block([4.5, 3.5, 4.0], [9.0, 6.5, 5.0]);
+        let found = checked(&[large, cavity, through].concat());
+        assert_eq!(found.shells[1].within, Some(0));
+        assert!(!found.shells[2].is_void && found.inside_out().next().is_none());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use lamp_stack::Grouped;
 
 use crate::topology::around_edge::neighbours;
-use crate::topology::corner_table::{NONE, facet_of, next, previous};
+use crate::topology::corner_table::{NONE, next, previous};
 
 /// The edges of a mesh, as its corners see them.
 #[derive(Clone, Debug)]
@@ -16,7 +16,7 @@ pub(crate) struct Edges {
     pub(crate) count: u32,
     /// The corners opposite to each edge of three facets and more.
     pub(crate) crowded: Vec<Box<[u32]>>,
-    /// Whether a corner is opposite to such an edge, sorted.
+    /// The corners opposite to such edges, sorted.
     crowded_corners: Vec<u32>,
 }
 
@@ -26,19 +26,23 @@ impl Edges {
     /// Corners are put into bins by the lower vertex of their opposite edge, as algorithm 2 of 002
     /// does, and those of a bin sorted by the upper one.
     pub(crate) fn of(points: &[[f64; 3]], vertices: &[u32]) -> Self {
-        let finite: Vec<bool> =
-            points.iter().map(|point| point.iter().all(|c| c.is_finite())).collect();
-        let ends = |corner: u32| [next(corner), previous(corner)].map(|c| vertices[c as usize]);
-        let is_idle = |facet: u32| {
-            let [a, b, c] = [0, 1, 2].map(|k| vertices[3 * facet as usize + k]);
-            a == b || b == c || c == a || [a, b, c].iter().any(|&v| !finite[v as usize])
+        let is_finite = |point: &[f64; 3]| point.iter().all(|c| c.is_finite());
+        let all_are_finite = points.iter().all(is_finite);
+        let is_busy = |corners: &[u32]| {
+            let is_finite = |&vertex: &u32| is_finite(&points[vertex as usize]);
+            let [a, b, c] = [corners[0], corners[1], corners[2]];
+            a != b && b != c && c != a && (all_are_finite || corners.iter().all(is_finite))
         };
         let low_ends = || {
-            let corners = 0..vertices.len() as u32;
-            let busy = corners.filter(|&corner| !is_idle(facet_of(corner)));
-            busy.map(|corner| (ends(corner).into_iter().min().unwrap_or(NONE) as usize, corner))
+            let facets = (0..).step_by(3).zip(vertices.chunks_exact(3));
+            let busy = facets.filter(|(_, corners)| is_busy(corners));
+            busy.flat_map(|(first, corners): (u32, &[u32])| {
+                let [a, b, c] = [corners[0], corners[1], corners[2]];
+                [(b.min(c), first), (c.min(a), first + 1), (a.min(b), first + 2)]
+            })
         };
-        let mut bins = Grouped::new(points.len(), low_ends);
+        let mut bins =
+            Grouped::new(points.len(), || low_ends().map(|(low, corner)| (low as usize, corner)));
         let mut edges = Self {
             opposites: vec![NONE; vertices.len()],
             numbers: vec![NONE; vertices.len()],
@@ -46,12 +50,23 @@ impl Edges {
             crowded: Vec::new(),
             crowded_corners: Vec::new(),
         };
-        let high_end = |corner: u32| ends(corner).into_iter().max();
+        let high_end = |corner: u32| {
+            let [a, b] = [next(corner), previous(corner)].map(|c| vertices[c as usize]);
+            a.max(b)
+        };
+        let mut by_high_end = Vec::new();
         for vertex in 0..points.len() {
             let bin = bins.group_mut(vertex);
-            bin.sort_unstable_by_key(|&corner| (high_end(corner), corner));
-            for corners in bin.chunk_by(|&a, &b| high_end(a) == high_end(b)) {
-                edges.add(corners, points, vertices);
+            by_high_end.clear();
+            by_high_end.extend(bin.iter().map(|&corner| (high_end(corner), corner)));
+            by_high_end.sort_unstable();
+            for (place, &(_, corner)) in bin.iter_mut().zip(&by_high_end) {
+                *place = corner;
+            }
+            let mut start = 0;
+            for same in by_high_end.chunk_by(|a, b| a.0 == b.0) {
+                edges.add(&bin[start..start + same.len()], points, vertices);
+                start += same.len();
             }
         }
         edges.crowded_corners = edges.crowded.iter().flatten().copied().collect();

@@ -34,11 +34,12 @@ mod check;
 mod corner_table;
 mod crossings;
 mod edges;
-mod minima;
 mod faults;
 mod mass;
+mod minima;
 mod nest;
 mod read;
+mod repair;
 mod rims;
 mod shells;
 #[cfg(test)]
@@ -47,9 +48,10 @@ mod weld;
 
 pub use check::{Lump, MeshCheck, ShellReport};
 pub use corner_table::{CornerTable, facet_of, next, previous};
-pub use minima::{Minimum, MinimumKind, Relief, minima};
 pub use crossings::Crossings;
 pub use faults::Doubled;
 pub use mass::Mass;
+pub use minima::{Minimum, MinimumKind, Relief, minima};
+pub use repair::{Deed, RepairOptions, Repaired, Touched, repair};
 pub use rims::RimLoop;
 pub use shells::Shells;

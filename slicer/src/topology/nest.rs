@@ -3,33 +3,32 @@
 //! A ray along an axis goes through the facet of a shell that the axis sees best. Behind the last
 //! facet of this shell that it meets, the first one of another shell decides. If the ray leaves that shell there, the first one lies within
 //! it; if it enters it, both lie side by side, and within the same one. Where rays meet facets
-//! follows from the same arithmetic and ties as in slicing, so none slips through an edge. A shell
-//! that touches another where its ray starts tries the other directions.
+//! follows from the same arithmetic and ties as in slicing, so none slips through an edge. A ray that
+//! starts where its shell touches another goes the other way. All three axes must agree: shells that
+//! pass through each other are around nothing.
 
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 
 use crate::topology::check::ShellReport;
+use crate::topology::shells::{root, unite};
 use crate::topology::{CornerTable, Shells};
 
 /// A ray that starts nearer to a facet, as a share of the part's size, may start on it.
 const TOUCHING: f64 = 1e-9;
 
-/// The directions of rays: an axis, and 1 or -1.
-const DIRECTIONS: [(usize, f64); 6] =
-    [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0)];
+/// Where on its facet a ray starts, by the shares of the corners: not quite in the middle, where
+/// other meshes of the same shape have edges.
+const SHARES: [f64; 3] = [0.334_1, 0.332_7, 0.333_2];
 
-/// The first facet that a ray meets.
+/// Where a ray meets a facet.
 #[derive(Clone, Copy, Debug)]
 struct Hit {
     depth_mm: f64,
     shell: u32,
+    /// Whether the ray leaves the shell there.
     is_exit: bool,
 }
-
-/// Where on its facet a ray starts, by the shares of the corners: not quite in the middle, where
-/// other meshes of the same shape have edges.
-const SHARES: [f64; 3] = [0.334_1, 0.332_7, 0.333_2];
 
 /// A ray that starts on a facet of a shell.
 #[derive(Clone, Copy, Debug)]
@@ -55,83 +54,88 @@ impl Ray {
 }
 
 /// Returns for each shell the closed one right around it. Only closed shells of the same body are
-/// looked at.
+/// looked at. Shells that pass through each other are not within each other, as far as rays along
+/// three axes and the boxes of shells tell.
 pub(crate) fn containers(
     table: &CornerTable,
     shells: &Shells,
     reports: &[ShellReport],
 ) -> Vec<Option<u32>> {
-    let mut family = Family::new(reports.len());
+    let mut found = vec![None; reports.len()];
     let mut start = 0;
     while start < reports.len() {
         let end = start + reports[start..].partition_point(|it| it.body <= reports[start].body);
-        let closed = reports[start..end].iter().filter(|report| report.mass.is_some()).count();
-        if closed > 1 {
-            family.send_rays(table, shells, reports, start..end);
+        let is_closed = |shell: &u32| reports[*shell as usize].mass.is_some();
+        let closed: Vec<u32> = (start as u32..end as u32).filter(is_closed).collect();
+        if closed.len() > 1 {
+            let axes = [0, 1, 2].map(|axis| along_axis(table, shells, reports, axis, &closed));
+            for (number, &shell) in closed.iter().enumerate() {
+                let told = axes.each_ref().map(|around| around[number]);
+                let outer = agreed(told).filter(|&outer| is_inside(shell, outer, reports));
+                found[shell as usize] = outer;
+            }
         }
         start = end;
     }
-    family.containers()
+    found
 }
 
-/// What rays found: which shells lie side by side, and what is around them.
-struct Family {
-    siblings: Vec<u32>,
-    around: Vec<Option<u32>>,
+/// What a ray tells of a shell: what is right around it, if anything; nothing if the shell touches
+/// another at both ends of the ray.
+type Told = Option<Option<u32>>;
+
+/// Returns what all rays of a shell agree on.
+fn agreed(told: [Told; 3]) -> Option<u32> {
+    let mut known = told.into_iter().flatten();
+    let first = known.next()?;
+    first.filter(|_| known.all(|other| other == first))
 }
 
-impl Family {
-    fn new(shells: usize) -> Self {
-        Self { siblings: (0..shells as u32).collect(), around: vec![None; shells] }
-    }
+fn is_inside(shell: u32, outer: u32, reports: &[ShellReport]) -> bool {
+    let [inner, outer] = [shell, outer].map(|shell| reports[shell as usize].box_mm);
+    (0..3).all(|axis| outer[0][axis] <= inner[0][axis] && inner[1][axis] <= outer[1][axis])
+}
 
-    fn send_rays(
-        &mut self,
-        table: &CornerTable,
-        shells: &Shells,
-        reports: &[ShellReport],
-        of_body: std::ops::Range<usize>,
-    ) {
-        let is_closed = |shell: &u32| reports[*shell as usize].mass.is_some();
-        let mut left: Vec<u32> =
-            (of_body.start as u32..of_body.end as u32).filter(is_closed).collect();
-        for (axis, sign) in DIRECTIONS {
-            let rays = Rays::new(table, shells, reports, axis, sign, &left).traced();
-            left.clear();
-            for ray in rays {
-                if ray.touches {
-                    left.push(ray.shell);
-                } else if let Some(hit) = ray.hit {
-                    self.note(ray.shell, hit);
-                }
+/// Returns what rays along an axis tell of some closed shells of a body.
+fn along_axis(
+    table: &CornerTable,
+    shells: &Shells,
+    reports: &[ShellReport],
+    axis: usize,
+    closed: &[u32],
+) -> Vec<Told> {
+    let place = |shell: u32| closed.binary_search(&shell).unwrap_or_default() as u32;
+    let mut siblings: Vec<u32> = (0..closed.len() as u32).collect();
+    let mut around: Vec<Told> = vec![None; closed.len()];
+    let mut left = closed.to_vec();
+    for sign in [1.0, -1.0] {
+        for ray in Rays::new(table, shells, reports, axis, sign, &left).traced() {
+            if ray.touches {
+                continue;
             }
-            if left.is_empty() {
-                return;
+            let shell = place(ray.shell);
+            around[shell as usize] = Some(ray.hit.filter(|hit| hit.is_exit).map(|hit| hit.shell));
+            if let Some(hit) = ray.hit.filter(|hit| !hit.is_exit) {
+                unite(&mut siblings, shell, place(hit.shell));
             }
         }
-    }
-
-    fn note(&mut self, shell: u32, hit: Hit) {
-        if hit.is_exit {
-            self.around[shell as usize] = Some(hit.shell);
-        } else {
-            crate::topology::shells::unite(&mut self.siblings, shell, hit.shell);
+        left.retain(|&shell| around[place(shell) as usize].is_none());
+        if left.is_empty() {
+            break;
         }
     }
-
-    /// Returns what is around each shell: what is around any of its siblings.
-    fn containers(mut self) -> Vec<Option<u32>> {
-        let mut around = vec![None; self.around.len()];
-        let root = |siblings: &mut Vec<u32>, shell: usize| {
-            crate::topology::shells::root(siblings, shell as u32) as usize
-        };
-        for shell in 0..around.len() {
-            let of_shell = self.around[shell];
-            let first = root(&mut self.siblings, shell);
-            around[first] = around[first].or(of_shell);
-        }
-        (0..around.len()).map(|shell| around[root(&mut self.siblings, shell)]).collect()
+    // What is around a shell is around its siblings.
+    let mut of_family = vec![None; closed.len()];
+    for (shell, told) in (0..).zip(&around) {
+        let first = root(&mut siblings, shell) as usize;
+        of_family[first] = of_family[first].or(told.flatten());
     }
+    let family = |shell: u32| of_family[root(&mut siblings, shell) as usize];
+    (0..closed.len() as u32)
+        .map(family)
+        .zip(&around)
+        .map(|(of_all, own)| own.map(|_| of_all))
+        .collect()
 }
 
 /// Rays in one direction, from some shells of a body.

@@ -1,12 +1,12 @@
 //! Reads a part into a corner table, and gives equal corners one vertex.
 
-use std::hash::{BuildHasher, RandomState};
+use std::hash::BuildHasher;
 
-use hashbrown::HashTable;
+use hashbrown::{DefaultHashBuilder, HashTable};
 
 use crate::error::SliceError;
-use crate::facet::Units;
-use crate::part::Part;
+use crate::facet::{Facet, Units};
+use crate::part::{Part, rounded};
 use crate::placement::{PlacedPart, Placement};
 use crate::topology::CornerTable;
 use crate::topology::corner_table::NONE;
@@ -21,17 +21,23 @@ impl CornerTable {
     /// # Errors
     /// Returns an error if there are no facets, or more than 1431655764, or they cannot be read.
     pub fn of_part(part: &Part, placement: &Placement, units: Units) -> Result<Self, SliceError> {
-        let facets = part.facet_count();
-        if facets == 0 {
-            return Err(SliceError::NoFacets);
-        }
-        if facets >= NONE as usize / 3 {
-            return Err(SliceError::TooManyFacets { facets });
-        }
+        check_count(part.facet_count())?;
         let table = Self::read(&PlacedPart::new(part.clone(), placement, units).on_facets());
         let table = table.map_err(|error| part.reason(error))?;
         part.check_unchanged()?;
         Ok(table)
+    }
+
+    /// Creates the table of facets of one body, with points in their unit.
+    ///
+    /// # Errors
+    /// Returns an error if there are no facets, or too many.
+    pub fn of_facets(facets: &[Facet]) -> Result<Self, SliceError> {
+        check_count(facets.len())?;
+        let mut welder = Welder::default();
+        let corners = facets.as_flattened().iter();
+        let vertices = corners.map(|corner| welder.vertex(corner.map(f64::from))).collect();
+        Ok(Self::new(welder.points, vertices))
     }
 
     fn read(part: &PlacedPart) -> Result<Self, SliceError> {
@@ -61,13 +67,41 @@ impl CornerTable {
     }
 }
 
+impl Part {
+    /// Returns all facets, as one body: in file units, or in millimetres where the file states its
+    /// unit. Those of several items or files stand as these are placed.
+    ///
+    /// # Errors
+    /// Returns an error if they cannot be read.
+    pub fn facets(&self) -> Result<Vec<Facet>, SliceError> {
+        let placed = PlacedPart::new(self.clone(), &Placement::default(), Units::Millimetres);
+        let mut facets = Vec::with_capacity(self.facet_count());
+        for block in 0..self.block_count() {
+            let in_block = placed.for_each_in_block(block, |facet| {
+                facets.push(rounded(facet.map(|[x, y, z_um]| [x, y, z_um / 1000.0])));
+            });
+            in_block.map_err(|error| self.reason(error.into()))?;
+        }
+        self.check_unchanged()?;
+        Ok(facets)
+    }
+}
+
+fn check_count(facets: usize) -> Result<(), SliceError> {
+    match facets {
+        0 => Err(SliceError::NoFacets),
+        _ if facets >= NONE as usize / 3 => Err(SliceError::TooManyFacets { facets }),
+        _ => Ok(()),
+    }
+}
+
 /// Gives equal points one number.
 #[derive(Default)]
 struct Welder {
     points: Vec<[f64; 3]>,
     /// The numbers of those that are not forgotten. Its order never shows.
     known: HashTable<u32>,
-    hasher: RandomState,
+    hasher: DefaultHashBuilder,
 }
 
 impl Welder {
@@ -113,6 +147,8 @@ mod tests {
         for (facet, corners) in (0..).zip(&facets) {
             assert_eq!(table.facet(facet), corners.map(|corner| corner.map(f64::from)));
         }
+        let part = Part::from_facets("sphere", facets.clone());
+        assert_eq!(part.facets().unwrap(), facets);
     }
 
     #[test]

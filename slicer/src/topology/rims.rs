@@ -48,7 +48,7 @@ impl RimLoop {
                     Some(corner) => follow(table, corner, from, &mut take),
                     None => (vec![(rims[first], other)], false),
                 };
-                behind = behind.into_iter().filter(|(corner, _)| *corner != rims[first]).collect();
+                behind.retain(|(corner, _)| *corner != rims[first]);
                 ahead = reversed(table, behind).into_iter().chain(ahead).collect();
             }
             match is_closed {
@@ -105,13 +105,15 @@ fn without_repeats(way: Vec<(u32, u32)>) -> Vec<Vec<(u32, u32)>> {
 /// Returns the least and the greatest corner of a box around points.
 pub(crate) fn box_of(points: impl IntoIterator<Item = Vec3>) -> [Vec3; 2] {
     let mut ends = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for point in points {
-        for axis in 0..3 {
-            ends[0][axis] = ends[0][axis].min(point[axis]);
-            ends[1][axis] = ends[1][axis].max(point[axis]);
-        }
-    }
+    points.into_iter().for_each(|point| widen(&mut ends, point));
     ends
+}
+
+/// Widens a box to hold a point.
+#[inline]
+pub(crate) fn widen([low, high]: &mut [Vec3; 2], point: Vec3) {
+    *low = std::array::from_fn(|axis| low[axis].min(point[axis]));
+    *high = std::array::from_fn(|axis| high[axis].max(point[axis]));
 }
 
 /// Follows rims from one that begins at a vertex, as long as they are new. Returns each with the

@@ -13,7 +13,8 @@ use std::io::{Cursor, Write};
 use std::path::Path;
 
 use fax::decoder::decode_g4;
-use lamp_slicer::{Fill, OpenOptions, Part, SliceError, SliceOptions, Slices};
+use lamp_slicer::topology::{CornerTable, Crossings, MeshCheck, RepairOptions, Repaired, repair};
+use lamp_slicer::{Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, Units};
 use lamp_stack::{
     Dpi, EncodedPage, Format, Image, Layer, Length, Mask, MaskBuilder, PageWriter, Pages,
     StackError, g4 as codec,
@@ -27,6 +28,8 @@ pub use seeds::{Seed, classic_tiff, seeds};
 /// Parts are sliced only where their images are at most this high: the cost of
 /// a few facets grows with the rows they cross.
 const MAX_ROWS: u32 = 1000;
+/// Meshes are checked only where they have at most so many facets.
+const MAX_MESH: usize = 3000;
 /// Images are encoded only if that takes about this many codes at most: a
 /// run costs one for every 2560 pixels.
 const MAX_CODES: u64 = 1 << 20;
@@ -72,6 +75,31 @@ fn part(bytes: &[u8]) {
             (Err(tight), Err(roomy)) => assert_eq!(one_line(&tight), one_line(&roomy)),
             (tight, roomy) => panic!("the outcome depends on memory: {tight:?}, {roomy:?}"),
         }
+    }
+    if let Ok(part) = Part::open(file.path(), &OpenOptions::default()) {
+        mesh(&part);
+    }
+}
+
+/// Checks and repairs a mesh. A repair of what was repaired changes nothing.
+fn mesh(part: &Part) {
+    let facets = match part.facets() {
+        Ok(facets) if facets.len() <= MAX_MESH => facets,
+        Ok(_) => return,
+        Err(error) => return drop(one_line(&error)),
+    };
+    let table = CornerTable::of_part(part, &Placement::default(), Units::Millimetres);
+    match table {
+        Ok(table) => drop((MeshCheck::new(&table), Crossings::new(&table, 10))),
+        Err(error) => return drop(one_line(&error)),
+    }
+    let options = RepairOptions { weld: 0.001, close: 10.0 };
+    match repair(facets, &options) {
+        Ok(Repaired { facets, .. }) => {
+            let again = repair(facets, &options).expect("it was repaired before");
+            assert_eq!(again.touched, [], "a repair leaves something to repair");
+        }
+        Err(error) => drop(one_line(&error)),
     }
 }
 

@@ -1,0 +1,82 @@
+//! `lamp mesh check`: finds what is wrong with a mesh.
+
+use clap::Args;
+use lamp_slicer::topology::{CornerTable, Crossings, MeshCheck};
+use lamp_slicer::{Placement, SliceError};
+use lamp_stack::Length;
+
+use crate::commands::mesh::MeshPart;
+use crate::commands::mesh::answer::{MAX_LISTED, check_fields};
+use crate::commands::mesh::text::check_text;
+use crate::exit::Exit;
+use crate::json_report::print_answer;
+use crate::options::{Common, parse_distance};
+use crate::streams::print;
+
+/// Find what is wrong with a mesh, and what its shells enclose
+///
+/// Lists shells with their Euler numbers, areas, volumes, centres of mass and inertia, and the lumps
+/// of material that they make with their voids; holes, edges of three facets and more, facets turned
+/// over, doubled, without area or not finite. Facets are numbered from 0.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp mesh check blade.stl
+  lamp mesh check blade.stl --strict --self-intersections
+  lamp mesh check blade.stl --weld 5um --json | jq .loops")]
+pub(super) struct CheckArgs {
+    #[command(flatten)]
+    part: MeshPart,
+
+    /// Take vertices of open edges for one if they are no farther apart
+    #[arg(long, value_name = "LENGTH", default_value = "0um", value_parser = parse_distance)]
+    weld: Length,
+
+    /// Look for facets that pass through each other, too
+    #[arg(long)]
+    self_intersections: bool,
+
+    /// Exit with status 3 if anything was found
+    #[arg(long)]
+    strict: bool,
+
+    /// Print JSON, as docs/json.md describes it
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a check finds.
+pub(super) struct Findings {
+    pub(super) table: CornerTable,
+    pub(super) check: MeshCheck,
+    /// The corners that welding moved.
+    pub(super) welded: usize,
+    /// Facets that pass through each other, if these were looked for.
+    pub(super) crossings: Option<Crossings>,
+}
+
+impl Findings {
+    fn are_none(&self) -> bool {
+        let crossings = self.crossings.as_ref().map_or(0, |crossings| crossings.count);
+        self.check.is_clean() && crossings == 0
+    }
+}
+
+pub(super) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
+    let name = args.part.name();
+    let (part, _) = args.part.open("mesh check", common)?;
+    let table = CornerTable::of_part(&part, &Placement::default(), args.part.units);
+    let table = table.map_err(|error: SliceError| Exit::from(error).at(name.clone()))?;
+    let (table, welded) = table.welded(args.weld.mm());
+    let check = MeshCheck::new(&table);
+    let crossings = args.self_intersections.then(|| Crossings::new(&table, MAX_LISTED));
+    let findings = Findings { table, check, welded: welded.len(), crossings };
+    match args.json {
+        true => print_answer("lamp-mesh-1", &check_fields(&name, &findings))?,
+        false => print(&check_text(&name, &findings))?,
+    }
+    match args.strict && !findings.are_none() {
+        true => Err(Exit::Findings(format!("{name}: its mesh has faults"))),
+        false => Ok(()),
+    }
+}

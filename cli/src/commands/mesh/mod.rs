@@ -1,0 +1,94 @@
+//! `lamp mesh`: checks and repairs the meshes of parts.
+
+mod answer;
+mod check;
+mod repair;
+mod text;
+
+use std::io::{Read, stdin};
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use lamp_slicer::{Part, Units};
+use lamp_stack::Length;
+
+use crate::exit::Exit;
+use crate::options::{Common, one_of};
+use crate::progress::say;
+use crate::step_options::{HEADING, ReaderOptions, notes, parse_tolerance};
+use crate::streams::{input_name, is_stream};
+
+/// Check or repair the mesh of a part
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp mesh check blade.stl
+  lamp mesh repair blade.stl -o mended.stl --weld 5um")]
+pub(crate) struct MeshArgs {
+    #[command(subcommand)]
+    what: Mesh,
+}
+
+#[derive(Subcommand)]
+enum Mesh {
+    Check(check::CheckArgs),
+    Repair(repair::RepairArgs),
+}
+
+pub(crate) fn run(args: &MeshArgs, common: &Common) -> Result<(), Exit> {
+    match &args.what {
+        Mesh::Check(args) => check::run(args, common),
+        Mesh::Repair(args) => repair::run(args, common),
+    }
+}
+
+/// The part whose mesh is meant.
+#[derive(Args)]
+struct MeshPart {
+    /// The part: an STL, OBJ, 3MF or STEP file, or - for standard input
+    #[arg(value_name = "PART")]
+    part: PathBuf,
+
+    /// Unit of coordinates in STL and OBJ files; STEP and 3MF files state their own
+    #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
+    units: Units,
+
+    /// How far the facets of a STEP part may lie from its surfaces
+    #[arg(long, value_name = "LENGTH", default_value = "5um", value_parser = parse_tolerance)]
+    #[arg(help_heading = HEADING)]
+    chord: Length,
+
+    #[command(flatten)]
+    reader: ReaderOptions,
+}
+
+impl MeshPart {
+    /// Returns the name for messages.
+    fn name(&self) -> String {
+        input_name(&self.part)
+    }
+
+    /// Opens the part; returns its bytes, too, if they came from a stream.
+    fn open(&self, command: &str, common: &Common) -> Result<(Part, Vec<u8>), Exit> {
+        let options = self.reader.for_opening(self.chord)?;
+        let mut bytes = Vec::new();
+        let part = match is_stream(&self.part) {
+            true => stdin()
+                .lock()
+                .read_to_end(&mut bytes)
+                .map_err(Into::into)
+                .and_then(|_| Part::from_stream("stdin", &bytes[..], &options)),
+            false => Part::open(&self.part, &options),
+        };
+        let part = part.map_err(|error| Exit::from(error).at(self.name()))?;
+        if self.units != Units::default() && part.states_unit() {
+            let why = "a STEP or 3MF file states its own unit: leave out --units";
+            return Err(Exit::usage(why).at(self.name()));
+        }
+        if !common.quiet {
+            let notes = part.prepared().flat_map(notes);
+            notes.for_each(|note| say(&format!("{command}: {note}")));
+        }
+        Ok((part, bytes))
+    }
+}

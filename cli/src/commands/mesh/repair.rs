@@ -1,0 +1,165 @@
+//! `lamp mesh repair`: mends a mesh.
+
+use std::fs::File;
+use std::io::{self, IsTerminal, Read, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use lamp_slicer::topology::{CornerTable, RepairOptions, Repaired, repair};
+use lamp_slicer::{SliceError, write_stl};
+use lamp_stack::Length;
+use serde_json::{Map, Value, json};
+
+use crate::commands::mesh::MeshPart;
+use crate::commands::mesh::answer::{counts, deeds};
+use crate::commands::mesh::text::faults;
+use crate::exit::Exit;
+use crate::json_report::{JsonReport, parse_report};
+use crate::options::{Common, parse_distance};
+use crate::progress::say;
+use crate::streams::{check_beside, check_not_input, is_stream, write_file};
+
+/// Mend a mesh: weld, drop, turn over and add facets, and list each
+///
+/// Welds vertices of open edges, drops doubled facets and those without area, turns facets the same
+/// way and shells outwards (voids inwards), and closes small holes. Writes a binary STL, in the
+/// units of the file. A mesh in which nothing can be mended keeps its bytes.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp mesh repair blade.stl -o mended.stl
+  lamp mesh repair scan.stl -o mended.stl --weld 20um --close 5mm --report repair.json
+  lamp mesh repair blade.obj -o - | slice - -o blade.tif")]
+pub(super) struct RepairArgs {
+    #[command(flatten)]
+    part: MeshPart,
+
+    /// Where to write the mesh: an STL file, or - for standard output
+    #[arg(short, long, value_name = "OUT.stl")]
+    output: PathBuf,
+
+    /// Make vertices of open edges one if they are no farther apart
+    #[arg(long, value_name = "LENGTH", default_value = "5um", value_parser = parse_distance)]
+    weld: Length,
+
+    /// Close holes no wider than this: the width is the diagonal of the box around a hole's edges
+    #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_distance)]
+    close: Length,
+
+    /// Write a list of all facets touched, as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    report: Option<PathBuf>,
+
+    /// Exit with status 3 if faults are left; the mesh is written all the same
+    #[arg(long)]
+    strict: bool,
+}
+
+pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
+    let (name, input) = (args.part.name(), &args.part.part);
+    check_not_input(&args.output, [input])?;
+    if let Some(report) = &args.report {
+        check_beside(report, &args.output, [input])?;
+    }
+    let failed = |error: SliceError| Exit::from(error).at(name.clone());
+    let (part, bytes) = args.part.open("mesh repair", common)?;
+    let unit = if part.states_unit() { 1.0 } else { args.part.units.mm() };
+    let options = RepairOptions { weld: args.weld.mm() / unit, close: args.close.mm() / unit };
+    let repaired = part.facets().and_then(|facets| repair(facets, &options)).map_err(failed)?;
+    let output = &args.output;
+    match repaired.touched.is_empty() && is_stl(input, &bytes)? {
+        true => write_mesh(output, |out| {
+            copy(input, &bytes, out)?;
+            part.check_unchanged().map_err(io::Error::other)
+        })?,
+        false => write_mesh(output, |out| write_stl(&repaired.facets, out))?,
+    }
+    let left = faults_left(&repaired).map_err(failed)?;
+    if !common.quiet {
+        tell(&repaired, &left);
+    }
+    if let Some(report) = &args.report {
+        write_report(report, &name, &repaired)?;
+    }
+    match args.strict && !repaired.left.is_clean() {
+        true => Err(Exit::Findings(format!("{name}: faults are left in its mesh"))),
+        false => Ok(()),
+    }
+}
+
+/// Returns whether the input is an STL as it stands, and not packed or of another format.
+fn is_stl(input: &Path, bytes: &[u8]) -> Result<bool, Exit> {
+    let (mut start, mut size) = (Vec::new(), bytes.len() as u64);
+    let read = match is_stream(input) {
+        true => bytes.take(START_BYTES).read_to_end(&mut start),
+        false => File::open(input).and_then(|file| {
+            size = file.metadata()?.len();
+            file.take(START_BYTES).read_to_end(&mut start)
+        }),
+    };
+    read.with_context(|| input.display().to_string())?;
+    let count = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
+    let is_binary = count.is_some_and(|count| 84 + 50 * u64::from(count) == size);
+    Ok(is_binary || start.trim_ascii_start().starts_with(b"solid"))
+}
+
+/// What tells an STL: its header and count, or its first word after some blanks.
+const START_BYTES: u64 = 4096;
+
+fn copy(input: &Path, mut bytes: &[u8], out: &mut dyn Write) -> io::Result<()> {
+    match is_stream(input) {
+        true => io::copy(&mut bytes, out)?,
+        false => io::copy(&mut File::open(input)?, out)?,
+    };
+    Ok(())
+}
+
+fn write_mesh(
+    output: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Exit> {
+    if !is_stream(output) {
+        return write_file(output, write);
+    }
+    if io::stdout().is_terminal() {
+        return Err(Exit::usage("a mesh is not for a terminal: name a file with -o"));
+    }
+    let written = write(&mut io::stdout().lock());
+    written.map_err(|error| Exit::output(error, "standard output"))
+}
+
+/// Returns a sentence for each kind of fault that is left.
+fn faults_left(repaired: &Repaired) -> Result<Vec<String>, SliceError> {
+    match repaired.left.is_clean() {
+        true => Ok(Vec::new()),
+        false => Ok(faults(&CornerTable::of_facets(&repaired.facets)?, &repaired.left)),
+    }
+}
+
+fn tell(repaired: &Repaired, left: &[String]) {
+    let done: Vec<String> = deeds(repaired)
+        .map(|(deed, count)| format!("{count} {}", deed.replace('-', " ")))
+        .collect();
+    match done.is_empty() {
+        true => say("mesh repair: no facet was touched"),
+        false => say(&format!("mesh repair: facets: {}", done.join(", "))),
+    }
+    left.iter().for_each(|fault| say(&format!("mesh repair: left: {fault}")));
+}
+
+fn write_report(report: &Path, name: &str, repaired: &Repaired) -> Result<(), Exit> {
+    let deeds: Map<String, Value> =
+        deeds(repaired).map(|(deed, count)| (deed.to_owned(), count.into())).collect();
+    let head = json!({
+        "schema": "lamp-mesh-repair-1",
+        "part": name,
+        "facets": repaired.facets.len(),
+        "deeds": deeds,
+        "clean": repaired.left.is_clean(),
+        "left": counts(&repaired.left),
+    });
+    let touched = repaired.touched.iter();
+    let touched = touched.map(|it| json!({"facet": it.facet, "deed": it.deed.name()}));
+    JsonReport::new(&head).list("touched", touched).write(report)
+}
