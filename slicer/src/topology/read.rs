@@ -34,22 +34,22 @@ impl CornerTable {
     /// Returns an error if there are no facets, or too many.
     pub fn of_facets(facets: &[Facet]) -> Result<Self, SliceError> {
         check_count(facets.len())?;
-        let mut welder = Welder::default();
+        let mut welder = Welder::new(facets.len());
+        welder.start_body(facets.len());
         let corners = facets.as_flattened().iter();
         let vertices = corners.map(|corner| welder.vertex(corner.map(f64::from))).collect();
         Ok(Self::new(welder.points, vertices))
     }
 
     fn read(part: &PlacedPart) -> Result<Self, SliceError> {
-        let mut welder = Welder::default();
+        let mut welder = Welder::new(part.model.facet_count());
         let mut vertices = Vec::with_capacity(3 * part.model.facet_count());
         let mut body_ends = vec![0; part.model.pieces().len()];
-        let mut body = 0;
+        let mut body = None;
         for block in 0..part.model.block_count() {
             let (piece, _) = part.model.place_of(block);
-            if piece != body {
-                body = piece;
-                welder.forget();
+            if body.replace(piece) != Some(piece) {
+                welder.start_body(part.model.pieces()[piece].facets.count());
             }
             part.for_each_in_block(block, |facet| {
                 let vertex = |&[x, y, z_um]: &[f64; 3]| welder.vertex([x, y, z_um / 1000.0]);
@@ -96,35 +96,64 @@ fn check_count(facets: usize) -> Result<(), SliceError> {
 }
 
 /// Gives equal points one number.
-#[derive(Default)]
 struct Welder {
     points: Vec<[f64; 3]>,
-    /// The numbers of those that are not forgotten. Its order never shows.
+    /// The numbers of those of this body. Its order never shows.
     known: HashTable<u32>,
+    /// Those from here on are of this body.
+    first: u32,
+    /// By some bits of their hashes, the last points asked for: in most files facets follow their
+    /// neighbours.
+    recent: Box<[u32; RECENT]>,
     hasher: DefaultHashBuilder,
 }
 
+/// Few enough to stay in a processor's cache.
+const RECENT: usize = 1 << 13;
+
 impl Welder {
+    /// Expects a number of facets, of all bodies.
+    fn new(facets: usize) -> Self {
+        Self {
+            points: Vec::with_capacity(usual_vertices(facets)),
+            known: HashTable::new(),
+            first: 0,
+            recent: Box::new([NONE; RECENT]),
+            hasher: DefaultHashBuilder::default(),
+        }
+    }
+
+    /// Starts a body of so many facets. All points to come are other vertices than those before.
+    fn start_body(&mut self, facets: usize) {
+        self.known = HashTable::with_capacity(usual_vertices(facets));
+        self.first = self.points.len() as u32;
+    }
+
     fn vertex(&mut self, point: [f64; 3]) -> u32 {
         // Makes 0 of -0.
         let point = point.map(|c| c + 0.0);
-        let bits = |point: &[f64; 3]| point.map(f64::to_bits);
-        let Self { points, known, hasher } = self;
+        let Self { points, known, first, recent, hasher } = self;
+        let bits = |[x, y, z]: &[f64; 3]| (x.to_bits(), y.to_bits(), z.to_bits());
         let is_same = |&known: &u32| bits(&points[known as usize]) == bits(&point);
+        let hash = hasher.hash_one(bits(&point));
+        let place = &mut recent[hash as usize % RECENT];
+        if (*first..NONE).contains(place) && is_same(place) {
+            return *place;
+        }
         let hash_of = |&known: &u32| hasher.hash_one(bits(&points[known as usize]));
-        let entry = known.entry(hasher.hash_one(bits(&point)), is_same, hash_of);
         let next = points.len() as u32;
-        let vertex = *entry.or_insert(next).get();
+        let vertex = *known.entry(hash, is_same, hash_of).or_insert(next).get();
         if vertex == next {
             points.push(point);
         }
+        *place = vertex;
         vertex
     }
+}
 
-    /// Makes all points to come other vertices than those before.
-    fn forget(&mut self) {
-        self.known = HashTable::new();
-    }
+/// A closed mesh has half as many vertices as facets, and some.
+fn usual_vertices(facets: usize) -> usize {
+    facets / 2 + 2
 }
 
 #[cfg(test)]
