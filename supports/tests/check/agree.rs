@@ -47,6 +47,7 @@ pub(crate) fn check(layers: Vec<Layer>, limits: &Limits) -> Findings {
         speck: NonZeroU32::new(limits.speck as u32).unwrap(),
         least_support: limits.least_support,
         max_overhang: limits.max_overhang_um.map(Length::from_um),
+        ..CheckOptions::default()
     };
     let layers = layers.into_iter().map(Ok::<_, CheckError>);
     check_layers(layers, Ok, &options).unwrap()
