@@ -24,7 +24,6 @@ pub(super) struct OverhangPatch {
     pub(super) reach_squared: u64,
     /// The pixel that is so far: column and row.
     pub(super) farthest: [u32; 2],
-    pub(super) is_speck: bool,
 }
 
 /// Whether a distance, squared and in pixels, is within a limit. The margin takes up the rounding
@@ -33,7 +32,8 @@ fn is_within(squared: u64, limit: f64) -> bool {
     squared as f64 <= limit * limit * (1.0 + 1e-9)
 }
 
-/// Returns the patches that lie farther than `limit` pixels from the white of `below`, by rows.
+/// Returns the patches that lie farther than `limit` pixels from the white of `below`, by rows;
+/// those that hold no square of `speck` pixels are left out.
 /// The runs are sorted by row and column, and what white of their own row reaches is left out.
 pub(super) fn patches(below: &Mask, runs: &[Unheld], limit: f64, speck: u32) -> Vec<OverhangPatch> {
     let mut far: Vec<(u32, Range<u32>)> = Vec::new();
@@ -53,8 +53,9 @@ pub(super) fn patches(below: &Mask, runs: &[Unheld], limit: f64, speck: u32) -> 
         }
         far.extend(left.drain(..).map(|columns| (*row, columns)));
     }
-    let groups = touching(&far);
-    groups.into_iter().map(|runs| patch(below, &runs, speck)).collect()
+    let mut groups = touching(&far);
+    groups.retain(|runs| holds_square(runs.iter().cloned(), speck));
+    groups.iter().map(|runs| patch(below, runs)).collect()
 }
 
 /// Returns how far white of a row reaches sideways, for each distance in rows.
@@ -139,7 +140,7 @@ fn root(parents: &mut [usize], mut item: usize) -> usize {
 }
 
 /// Measures a patch.
-fn patch(below: &Mask, runs: &[(u32, Range<u32>)], speck: u32) -> OverhangPatch {
+fn patch(below: &Mask, runs: &[(u32, Range<u32>)]) -> OverhangPatch {
     let columns = runs.iter().map(|(_, columns)| columns);
     let start = columns.clone().map(|columns| columns.start).min().unwrap_or_default();
     let end = columns.clone().map(|columns| columns.end).max().unwrap_or_default();
@@ -151,7 +152,6 @@ fn patch(below: &Mask, runs: &[(u32, Range<u32>)], speck: u32) -> OverhangPatch 
         area: columns.map(|columns| u64::from(columns.end - columns.start)).sum(),
         reach_squared: farthest.squared,
         farthest: farthest.at,
-        is_speck: !holds_square(runs.iter().cloned(), speck),
     }
 }
 
@@ -163,13 +163,24 @@ struct Farthest<'a> {
 }
 
 impl Farthest<'_> {
+    /// Searches runs, sorted by row. As a step of a pixel changes the distance by a pixel at most,
+    /// a pixel in their midst tells how far the farthest may be.
     fn search(&mut self, runs: &[(u32, Range<u32>)]) {
-        // The middles first: a good start leaves little to search.
-        for (row, columns) in runs {
-            self.measure(columns.start + (columns.end - columns.start) / 2, *row, 0);
-        }
-        for (row, columns) in runs {
-            self.within(*row, columns.clone());
+        let (row, columns) = match runs {
+            [] => return,
+            [(row, columns)] => return self.within(*row, columns.clone()),
+            _ => &runs[runs.len() / 2],
+        };
+        let column = columns.start + (columns.end - columns.start) / 2;
+        let aside = runs.iter().map(|(_, c)| column.abs_diff(c.start).max(column.abs_diff(c.end)));
+        let aside = f64::from(aside.max().unwrap_or_default());
+        let along = f64::from((row - runs[0].0).max(runs[runs.len() - 1].0 - row));
+        let least = ((self.squared + 1) as f64).sqrt() - aside.hypot(along) - 1e-6;
+        let squared = self.measure(column, *row, least.max(0.0).powi(2) as u64);
+        if (squared as f64).sqrt() >= least {
+            let (upper, lower) = runs.split_at(runs.len() / 2);
+            self.search(upper);
+            self.search(lower);
         }
     }
 

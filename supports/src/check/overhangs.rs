@@ -20,7 +20,7 @@ impl Overhangs {
         let mut all = std::mem::take(&mut self.open);
         let mut of_patch = Vec::new();
         let mut parents: Vec<usize> = (0..before).collect();
-        for patch in patches.iter().filter(|patch| !patch.is_speck) {
+        for patch in patches {
             let overhang = Overhang::of(patch, number);
             let own = all.len();
             parents.push(own);
