@@ -47,7 +47,7 @@ pub(crate) fn check(layers: Vec<Layer>, limits: &Limits) -> Findings {
         speck: NonZeroU32::new(limits.speck as u32).unwrap(),
         least_support: limits.least_support,
         max_overhang: limits.max_overhang_um.map(Length::from_um),
-        ..CheckOptions::default()
+        drain: limits.drain_um.map(Length::from_um),
     };
     let layers = layers.into_iter().map(Ok::<_, CheckError>);
     check_layers(layers, Ok, &options).unwrap()
@@ -146,20 +146,24 @@ fn pockets_agree(block: &Block, limits: &Limits, found: &Findings) {
         let layers = ours.layers[0] as usize..ours.layers[1] as usize + 1;
         (layers, ours.pixels as usize, format!("{:?}", ours.kind), frame(&ours.region))
     });
-    let mut expected = referee::pockets(block, limits);
-    expected.retain(|pocket| !pocket.is_speck);
-    let mm3 = |pockets: &[referee::Pocket]| pockets.iter().map(|pocket| pocket.mm3).sum();
+    let named = |kind: Kind| match kind {
+        Kind::Trap => PocketKind::Trap,
+        Kind::Cup => PocketKind::Cup,
+        Kind::Sealed => PocketKind::Sealed,
+    };
+    let pockets = referee::pockets(block, limits);
+    let narrow = limits.drain_um.map(|drain_um| referee::narrow_pockets(block, limits, drain_um));
+    let expected = pockets.into_iter().map(|pocket| (named(pocket.kind), pocket));
+    let narrow = narrow.into_iter().flatten().map(|pocket| (PocketKind::Narrow, pocket));
+    let mut expected: Vec<_> = expected.chain(narrow).collect();
+    expected.retain(|(_, pocket)| !pocket.is_speck);
     let ours_um = found.pockets.list.iter().map(|ours| ours.pixels_um).sum();
-    near_mm3(block, ours_um, mm3(&expected));
-    let expected = expected.into_iter().map(|pocket| {
-        let kind = match pocket.kind {
-            Kind::Trap => PocketKind::Trap,
-            Kind::Cup => PocketKind::Cup,
-            Kind::Sealed => PocketKind::Sealed,
-        };
-        (pocket.layers, pocket.pixels, format!("{kind:?}"), pocket.frame)
-    });
+    let expected_mm3 = expected.iter().map(|(_, pocket)| pocket.mm3).sum();
+    let expected = expected
+        .into_iter()
+        .map(|(kind, pocket)| (pocket.layers, pocket.pixels, format!("{kind:?}"), pocket.frame));
     assert_eq!(sorted(ours), sorted(expected));
+    near_mm3(block, ours_um, expected_mm3);
 }
 
 fn balance_agrees(block: &Block, found: &Findings) {

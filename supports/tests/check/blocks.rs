@@ -43,10 +43,13 @@ fn blocks(size: [usize; 3], noise: usize) -> impl Strategy<Value = Block> {
 
 fn limits() -> impl Strategy<Value = Limits> {
     let overhang_um = proptest::option::of(20.0..400.0);
-    (1..4usize, 0.0..1.0, overhang_um).prop_map(|(speck, least_support, max_overhang_um)| Limits {
+    let drain_um = proptest::option::of(50.0..500.0);
+    let limits = (1..4usize, 0.0..1.0, overhang_um, drain_um);
+    limits.prop_map(|(speck, least_support, max_overhang_um, drain_um)| Limits {
         speck,
         least_support,
         max_overhang_um,
+        drain_um,
     })
 }
 

@@ -16,7 +16,8 @@ pub(crate) fn block(layers: &[&str]) -> Block {
     }
 }
 
-const LIMITS: Limits = Limits { speck: 2, least_support: 0.25, max_overhang_um: None };
+const LIMITS: Limits =
+    Limits { speck: 2, least_support: 0.25, max_overhang_um: None, drain_um: None };
 
 #[test]
 fn islands_join_elders_first() {

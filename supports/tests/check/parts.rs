@@ -11,7 +11,8 @@ use lamp_supports::{End, Findings, PocketKind};
 use crate::agree::{agree_as, check};
 use crate::referee::{Block, Limits};
 
-const LIMITS: Limits = Limits { speck: 3, least_support: 0.25, max_overhang_um: None };
+const LIMITS: Limits =
+    Limits { speck: 3, least_support: 0.25, max_overhang_um: None, drain_um: None };
 
 /// A tenth of a millimetre.
 const FINE_DPI: f64 = 254.0;
@@ -251,4 +252,15 @@ fn the_widest_images_are_checked() {
     let found = check(layers, &LIMITS);
     assert_eq!(islands(&found)[0].0, 1);
     assert_eq!(found.overhangs.list[0].area, 3 * (u64::from(u32::MAX) - 12) - 30);
+}
+
+#[test]
+fn a_gate_drains_a_cavity_if_it_is_as_wide_as_asked() {
+    let layers = slice(cavity_core(1000), 100.0, 250.0, upright());
+    let with_drain = |drain_um| {
+        let found = check(layers.clone(), &Limits { drain_um: Some(drain_um), ..LIMITS });
+        found.pockets.list.iter().map(|pocket| pocket.kind).collect::<Vec<_>>()
+    };
+    assert_eq!(with_drain(1000.0), []);
+    assert_eq!(with_drain(3000.0), [PocketKind::Narrow]);
 }

@@ -15,7 +15,7 @@ use std::ops::Range;
 pub(crate) use balance::tilts;
 pub(crate) use islands::{islands, weak_joints};
 pub(crate) use overhangs::{overhangs, patches};
-pub(crate) use pockets::{Kind, Pocket, narrow_pockets, pockets};
+pub(crate) use pockets::{Kind, narrow_pockets, pockets};
 
 /// A block of voxels: layer after layer from the bottom, each row after row from the top.
 #[derive(Clone)]
@@ -55,6 +55,8 @@ pub(crate) struct Limits {
     pub(crate) least_support: f64,
     /// How far an overhang may reach, in µm; `None` for the layer's thickness.
     pub(crate) max_overhang_um: Option<f64>,
+    /// The width of a drain in µm, if narrow ones are told.
+    pub(crate) drain_um: Option<f64>,
 }
 
 /// Columns and rows, half-open.
