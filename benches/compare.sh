@@ -6,7 +6,8 @@
 #
 #   benches/compare.sh [FACETS ...]        default: 100k 750k 5.5M
 #
-# MSLICER=path/to/mslicer adds mslicer. Needs 3 GB in TMPDIR.
+# MSLICER=path/to/mslicer adds mslicer, ISLAND_SCAN=path/to/island_scan_cli
+# DragonFruit's search for islands. Needs 3 GB in TMPDIR.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo build --release --quiet -p lamp-cli
@@ -89,6 +90,17 @@ stages() {
     row "\`tile\` (the same in a mesh)" tile blade.tif -o other.tif
 }
 
+# What finding islands takes, on the stack and from the part.
+checks() {
+    header "checks"
+    row "\`lamp convert\` (read, do nothing, write)" lamp convert blade.tif -o other.tif
+    row "\`lamp check blade.tif\` (all kinds)" lamp check -q blade.tif
+    row "\`lamp check blade.stl\` (the same, slicing on the way)" lamp check -q blade.stl
+    row "\`lamp check blade.stl --rotate x:180\`" lamp check -q blade.stl --rotate x:180
+    [ -z "${ISLAND_SCAN:-}" ] || row -1 "DragonFruit's \`island_scan_cli\` (islands alone)" \
+        "$ISLAND_SCAN" blade.stl --px-mm 0.016933333 --layer-height 0.1 --json
+}
+
 # What the pipeline takes beside its slowest stage alone, in wall time.
 pipe() { # pipe AREA
     local slowest=0 cpu mb wall
@@ -126,6 +138,7 @@ for count in "$@"; do
     printf '\n### Blade mould, %s facets, 1500 dpi, 100 um\n' "$count"
     slices
     stages
+    checks
     printf '\n| the pipe | wall | / slowest stage alone |\n|---|---|---|\n'
     pipe 4x4.5in
     [ "$count" != 750k ] || pipe 23x23in
