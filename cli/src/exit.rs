@@ -8,6 +8,7 @@ use lamp_grayscale::calibrate::{DataError, FitError};
 use lamp_postprocess::machine::MachineLimit;
 use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, TileError};
 use lamp_slicer::SliceError;
+use lamp_slicer::topology::NoSolid;
 use lamp_stack::{JoinError, SplitError, StackError};
 use lamp_supports::CheckError;
 
@@ -113,6 +114,7 @@ failures!(
     StripsError,
     LayoutError,
     MachineLimit,
+    NoSolid,
     CompensateError,
     JoinError,
     SplitError,

@@ -15,6 +15,7 @@ use lamp_postprocess::{
 };
 use lamp_slicer::SliceError;
 use lamp_slicer::brep::{BrepError, Matter, StepError};
+use lamp_slicer::topology::NoSolid;
 use lamp_stack::{CatalogueError, Length, StackError};
 
 /// Returns what to try about an error, to stand after its message.
@@ -32,6 +33,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(compensate))
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
+        .or_else(|| error.downcast_ref().map(no_solid))
         .or_else(|| error.downcast_ref().and_then(data))
         .or_else(|| error.downcast_ref().and_then(stack))
         .or_else(|| error.downcast_ref().and_then(input_output))
@@ -212,6 +214,10 @@ fn machine_limit(error: &MachineLimit) -> Option<String> {
         _ => return None,
     };
     Some(format!("{hint}, or take another --machine"))
+}
+
+fn no_solid(_: &NoSolid) -> String {
+    "lamp mesh check names the facets, and lamp mesh repair mends what it can".to_owned()
 }
 
 fn data(error: &DataError) -> Option<String> {

@@ -1,5 +1,6 @@
 //! Reads and writes stacks: files, folders, pipes and what stands beside them.
 
+use std::ffi::OsStr;
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, IsTerminal, Write};
@@ -335,6 +336,12 @@ pub(crate) fn check_png_name(path: &Path) -> Result<(), Exit> {
 /// Returns what a file's name ends in, in small letters.
 fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
+/// Returns true if a name is that of a STEP file.
+pub(crate) fn is_step_name(path: &Path) -> bool {
+    let is_step = |end: &OsStr| ["step", "stp"].iter().any(|name| end.eq_ignore_ascii_case(name));
+    path.extension().is_some_and(is_step)
 }
 
 /// Returns whether an output names a folder.

@@ -1,28 +1,31 @@
-//! `lamp convert`: writes a stack in another form, or a STEP part as STL.
+//! `lamp convert`: writes a stack in another form, a STEP part as STL, or a mesh as STEP.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
-use lamp_slicer::Part;
 use lamp_slicer::brep::{START_BYTES, is_step};
+use lamp_slicer::topology::{CornerTable, StepSolids};
+use lamp_slicer::{OpenOptions, Part, Placement, Units};
 use lamp_stack::{Layer, Length, StackError, png_of_layer, write_png_folder};
 
 use crate::exit::Exit;
-use crate::options::{Common, Input, Output};
+use crate::options::{Common, Input, Output, one_of};
 use crate::progress::say;
 use crate::step_options::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
 use crate::streams::{
-    check_beside, input_name, is_folder, is_stream, layers_of_input, new_folder, open_pages,
-    progress, write_file, write_layers, written_to,
+    check_beside, input_name, is_folder, is_step_name, is_stream, layers_of_input, new_folder,
+    open_pages, progress, write_file, write_layers, written_to,
 };
 
-/// Convert a stack to a file, a folder of pages or PNGs, or a STEP part to STL
+/// Convert a stack to a file, a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
 ///
 /// Images and their metadata stay as they are, and the command is not recorded: a stack converted
 /// from file to folder and back has the same bytes.
+///
+/// A mesh must be closed. In a STEP file its facets are flat faces, those in one plane a single one.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -30,13 +33,15 @@ Examples:
   lamp convert pages/ --classic -o build.tif
   lamp convert build.tif --layers 100..200 --png -o pictures/
   lamp convert build.tif --layers 600 -o layer.png
-  lamp convert part.step part.stl --chord 5um")]
+  lamp convert part.step part.stl --chord 5um
+  lamp convert part.stl part.step")]
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     input: Input,
-    /// Binary STL to write for a STEP part, in millimetres
-    #[arg(value_name = "PART.stl", value_parser = parse_stl)]
-    stl: Option<PathBuf>,
+    /// What to write for a part, in millimetres: a binary STL of a STEP part, or a STEP file of a
+    /// mesh
+    #[arg(value_name = "PART.stl|PART.step", value_parser = parse_part)]
+    part: Option<PathBuf>,
 
     #[command(flatten)]
     output: Output,
@@ -45,6 +50,10 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "LENGTH", default_value = "5um", value_parser = parse_tolerance)]
     #[arg(help_heading = HEADING)]
     chord: Length,
+
+    /// Unit of the coordinates of a mesh in an STL or OBJ file
+    #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
+    units: Units,
 
     #[command(flatten)]
     reader: ReaderOptions,
@@ -59,8 +68,10 @@ pub(crate) struct ConvertArgs {
 }
 
 pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
-    if let Some(stl) = args.stl() {
-        return args.write_stl(stl, common);
+    match args.part() {
+        Some(part) if is_stl_name(part) => return args.write_stl(part, common),
+        Some(part) => return args.write_step(part, common),
+        None => {}
     }
     let mut start = Vec::new();
     let path = &args.input.stack;
@@ -110,21 +121,55 @@ enum OutputKind {
 }
 
 impl ConvertArgs {
-    /// The STL to write, if one is named.
-    fn stl(&self) -> Option<&Path> {
+    /// The part to write, if one is named.
+    fn part(&self) -> Option<&Path> {
         let output = Some(self.output.output.as_path());
-        let output = output.filter(|output| parse_stl(&output.to_string_lossy()).is_ok());
-        self.stl.as_deref().or(output)
+        let output = output.filter(|output| parse_part(&output.to_string_lossy()).is_ok());
+        self.part.as_deref().or(output)
     }
 
-    /// Writes a STEP part as facets.
-    fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), Exit> {
-        let path = &self.input.stack;
+    /// Refuses options of stacks.
+    fn check_for_part(&self, output: &Path) -> Result<(), Exit> {
         if self.input.layers.is_some() || self.png || self.output.classic {
             let why = "--layers, --png and --classic are for stacks, not for parts";
             return Err(Exit::usage(why));
         }
-        check_beside(stl, Path::new("-"), [path])?;
+        check_beside(output, Path::new("-"), [&self.input.stack])
+    }
+
+    /// Writes a mesh as solids with flat faces.
+    fn write_step(&self, step: &Path, common: &Common) -> Result<(), Exit> {
+        self.check_for_part(step)?;
+        let path = &self.input.stack;
+        let name = input_name(path);
+        let options = OpenOptions::default();
+        let part = match is_stream(path) {
+            true => Part::from_stream("stdin", io::stdin().lock(), &options),
+            false => Part::open(path, &options),
+        };
+        let part = part.map_err(|error| Exit::from(error).at(name.clone()))?;
+        if part.prepared().next().is_some() {
+            return Err(Exit::usage(format!("{name} is a STEP part already")));
+        }
+        let table = CornerTable::of_part(&part, &Placement::default(), self.units);
+        let table = table.map_err(|error| Exit::from(error).at(name.clone()))?;
+        let solids = StepSolids::new(&table).map_err(|error| Exit::from(error).at(name))?;
+        if !common.quiet {
+            say(&format!(
+                "convert: {}: {} facets as {} faces; solids: {}",
+                step.display(),
+                table.facet_count(),
+                solids.faces(),
+                solids.solids()
+            ));
+        }
+        write_file(step, |out| solids.write(part.name(), out))
+    }
+
+    /// Writes a STEP part as facets.
+    fn write_stl(&self, stl: &Path, common: &Common) -> Result<(), Exit> {
+        self.check_for_part(stl)?;
+        let path = &self.input.stack;
         let name = input_name(path);
         let options = self.reader.for_opening(self.chord)?;
         let model = bytes_of(path).and_then(|bytes| Part::from_step(&name, bytes, &options));
@@ -166,8 +211,12 @@ fn only_layer(
     }
 }
 
-fn parse_stl(text: &str) -> Result<PathBuf, String> {
+fn parse_part(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
-    let is_stl = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("stl"));
-    if is_stl { Ok(path) } else { Err(format!("`{text}` does not end in .stl")) }
+    let is_part = is_stl_name(&path) || is_step_name(&path);
+    if is_part { Ok(path) } else { Err(format!("`{text}` does not end in .stl or .step")) }
+}
+
+fn is_stl_name(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("stl"))
 }

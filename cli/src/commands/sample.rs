@@ -1,8 +1,7 @@
 //! `lamp sample`: writes sample parts.
 
-use std::ffi::OsStr;
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -12,7 +11,7 @@ use lamp_stack::Length;
 use crate::exit::Exit;
 use crate::options::{Common, parse_count};
 use crate::progress::Progress;
-use crate::streams::{is_stream, write_file};
+use crate::streams::{is_step_name, is_stream, write_file};
 
 /// Write a sample part as STL, whole or with defects, or as STEP with exact surfaces
 #[derive(Args)]
@@ -112,11 +111,6 @@ impl SampleArgs {
         let text = step(part, StepUnit::Millimetre);
         write_file(&self.output, |out| out.write_all(text.as_bytes()))
     }
-}
-
-fn is_step_name(path: &Path) -> bool {
-    let is_step = |end: &OsStr| ["step", "stp"].iter().any(|name| end.eq_ignore_ascii_case(name));
-    path.extension().is_some_and(is_step)
 }
 
 fn say_size(args: &SampleArgs, common: &Common, mesh: &Mesh) {

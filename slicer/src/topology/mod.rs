@@ -42,6 +42,7 @@ mod read;
 mod repair;
 mod rims;
 mod shells;
+mod step;
 #[cfg(test)]
 mod testing;
 mod weld;
@@ -55,3 +56,4 @@ pub use minima::{Minimum, MinimumKind, Relief, minima};
 pub use repair::{Deed, RepairOptions, Repaired, Touched, repair};
 pub use rims::RimLoop;
 pub use shells::Shells;
+pub use step::{NoSolid, StepSolids};

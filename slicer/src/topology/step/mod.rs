@@ -1,0 +1,205 @@
+//! Writes a mesh as a STEP file: a faceted B-rep of its lumps.
+
+mod entities;
+mod flat_faces;
+mod outline;
+
+use std::io::{self, Write};
+
+use lamp_brep::vector::{Vec3, add, cross, sub, unit};
+use lamp_stack::Grouped;
+use thiserror::Error;
+
+use crate::topology::{CornerTable, Lump, MeshCheck, Shells};
+use entities::{EntityWriter, text};
+use flat_faces::FlatFaces;
+use outline::{Dropped, outer_first, outlines};
+
+/// A reason that a mesh is no solid that a STEP file could hold.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NoSolid {
+    /// It has holes.
+    #[error("the mesh is not closed: {sides} sides of facets have no neighbour")]
+    Open {
+        /// The sides of facets that have no neighbour.
+        sides: u64,
+    },
+    /// It is closed, but its facets contradict each other.
+    #[error(
+        "the mesh bounds no solid: {turned} facets are turned over, {doubled} repeat others, \
+         {flat} have no area, {crowded} edges have three facets and more, and {shells} shells face \
+         inwards or have one side"
+    )]
+    Faulty {
+        /// The facets that face the other way than their neighbours.
+        turned: usize,
+        /// Those that repeat others.
+        doubled: usize,
+        /// Those without area, or with coordinates that are not finite.
+        flat: usize,
+        /// The edges of three facets and more.
+        crowded: usize,
+        /// The shells that face into the material, or have one side only.
+        shells: usize,
+    },
+}
+
+/// A mesh as solids with flat faces, to be written as a STEP file (ISO 10303-21, AP214).
+///
+/// Facets in one plane are one face, with loops inside it where it has holes; vertices are in one
+/// plane if they lie within 1e-9 of the part's size of it. Vertices exactly on a straight side of
+/// two faces are left out. All others keep their coordinates to the last bit.
+///
+/// Each lump of the mesh is a `FACETED_BREP`, and one with voids a `BREP_WITH_VOIDS`. Faces
+/// are bounded by `POLY_LOOP`s, which need neither edges nor curves, and so little text.
+#[derive(Debug)]
+pub struct StepSolids<'a> {
+    table: &'a CornerTable,
+    lumps: Vec<Lump>,
+    /// The faces of each shell.
+    of_shell: Grouped<u32>,
+    faces: FlatFaces,
+    dropped: Dropped,
+}
+
+impl<'a> StepSolids<'a> {
+    /// Finds the solids and faces of a mesh. It takes some 40 bytes a facet.
+    ///
+    /// # Errors
+    /// Returns an error if the mesh is open, or has any other fault of [`MeshCheck`].
+    pub fn new(table: &'a CornerTable) -> Result<Self, NoSolid> {
+        let shells = Shells::new(table);
+        let check = MeshCheck::of_shells(table, &shells);
+        check_solid(&check)?;
+        let mut faces = FlatFaces::new(table);
+        faces.split_where(|faces, facets| outlines(table, facets, faces).is_none());
+        let dropped = Dropped::new(table, &faces);
+        let shell_of = |face: u32| shells.of(faces.facets(face)[0]) as usize;
+        let of_shell =
+            Grouped::new(shells.count(), || (0..faces.count()).map(|face| (shell_of(face), face)));
+        Ok(Self { table, lumps: check.lumps, of_shell, faces, dropped })
+    }
+
+    /// Returns the number of solids.
+    pub fn solids(&self) -> usize {
+        self.lumps.len()
+    }
+
+    /// Returns the number of faces.
+    pub fn faces(&self) -> usize {
+        self.faces.count() as usize
+    }
+
+    /// Writes the file, in millimetres. `name` is the product's. The text goes out as it is made.
+    ///
+    /// # Errors
+    /// Returns an error if `out` does.
+    pub fn write(&self, name: &str, out: &mut dyn Write) -> io::Result<()> {
+        let mut file = EntityWriter::new(out);
+        file.head()?;
+        let points = self.write_points(&mut file)?;
+        let mut solids = Vec::with_capacity(self.lumps.len());
+        for lump in &self.lumps {
+            solids.push(self.write_lump(lump, &points, &mut file)?);
+        }
+        file.product(&text(name), &solids)?;
+        file.end()
+    }
+
+    /// Writes the vertices that faces have, and returns their entities.
+    fn write_points(&self, file: &mut EntityWriter<'_>) -> io::Result<Vec<u64>> {
+        let mut points = vec![0; self.table.points().len()];
+        for (vertex, point) in self.table.points().iter().enumerate() {
+            if self.dropped.is_used(vertex as u32) {
+                points[vertex] = file.add(|out| {
+                    let [x, y, z] = point.map(entities::Real);
+                    write!(out, "CARTESIAN_POINT('',({x},{y},{z}))")
+                })?;
+            }
+        }
+        Ok(points)
+    }
+
+    fn write_lump(
+        &self,
+        lump: &Lump,
+        points: &[u64],
+        file: &mut EntityWriter<'_>,
+    ) -> io::Result<u64> {
+        let outer = self.write_shell(lump.outer, points, file)?;
+        let mut voids = Vec::with_capacity(lump.voids.len());
+        for &void in &lump.voids {
+            let shell = self.write_shell(void, points, file)?;
+            // Its facets face into the void, away from the material, as the solid wants it.
+            voids.push(file.add(|out| write!(out, "ORIENTED_CLOSED_SHELL('',*,#{shell},.T.)"))?);
+        }
+        file.solid(outer, &voids)
+    }
+
+    fn write_shell(
+        &self,
+        shell: u32,
+        points: &[u64],
+        file: &mut EntityWriter<'_>,
+    ) -> io::Result<u64> {
+        let of_shell = self.of_shell.group(shell as usize);
+        let mut faces = Vec::with_capacity(of_shell.len());
+        for &face in of_shell {
+            faces.push(self.write_face(face, points, file)?);
+        }
+        file.with_list("CLOSED_SHELL('',", &faces, ")")
+    }
+
+    fn write_face(
+        &self,
+        face: u32,
+        points: &[u64],
+        file: &mut EntityWriter<'_>,
+    ) -> io::Result<u64> {
+        let facets = self.faces.facets(face);
+        let normal = normal(self.table, facets);
+        let outlines = outlines(self.table, facets, &self.faces).unwrap_or_default();
+        let mut outlines: Vec<Vec<u32>> =
+            outlines.into_iter().map(|outline| self.dropped.without(&outline)).collect();
+        outer_first(self.table, normal, &mut outlines);
+        let plane = file.plane(points[outlines[0][0] as usize], normal)?;
+        let mut bounds = Vec::with_capacity(outlines.len());
+        for (number, outline) in outlines.iter().enumerate() {
+            let corners: Vec<u64> = outline.iter().map(|&vertex| points[vertex as usize]).collect();
+            let polygon = file.with_list("POLY_LOOP('',", &corners, ")")?;
+            let kind = if number == 0 { "FACE_OUTER_BOUND" } else { "FACE_BOUND" };
+            bounds.push(file.add(|out| write!(out, "{kind}('',#{polygon},.T.)"))?);
+        }
+        file.with_list("FACE_SURFACE('',", &bounds, &format!(",#{plane},.T.)"))
+    }
+}
+
+fn check_solid(check: &MeshCheck) -> Result<(), NoSolid> {
+    let sides = check.shells.iter().map(|shell| u64::from(shell.open_sides)).sum();
+    match sides {
+        0 if check.is_clean() => Ok(()),
+        0 => Err(NoSolid::Faulty {
+            turned: check.turned.len(),
+            doubled: check.doubled.len(),
+            flat: check.flat.len() + check.not_finite.len(),
+            crowded: check.crowded,
+            shells: check.inside_out().count()
+                + check.shells.iter().filter(|shell| shell.is_one_sided).count(),
+        }),
+        sides => Err(NoSolid::Open { sides }),
+    }
+}
+
+/// Returns the unit normal of facets in one plane.
+fn normal(table: &CornerTable, facets: &[u32]) -> Vec3 {
+    let of_facet = |&facet: &u32| {
+        let [a, b, c] = table.facet(facet);
+        cross(sub(b, a), sub(c, a))
+    };
+    // Facets of a clean mesh have an area.
+    unit(facets.iter().map(of_facet).fold([0.0; 3], add)).unwrap_or([0.0, 0.0, 1.0])
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,177 @@
+use lamp_fixtures as parts;
+use lamp_fixtures::{Defect, Mesh, inject};
+
+use super::*;
+use crate::facet::{Facet, Units};
+use crate::open::{KernelName, OpenOptions};
+use crate::part::Part;
+use crate::placement::Placement;
+use crate::topology::testing::{block, table_of, turned};
+
+/// The facets and kilobytes of 002 table 3.
+const TABLE_3: [[f64; 2]; 7] = [
+    [12.0, 12.0],
+    [24.0, 24.0],
+    [540.0, 593.0],
+    [2376.0, 2935.0],
+    [2376.0, 2935.0],
+    [3872.0, 4763.0],
+    [6162.0, 7668.0],
+];
+
+/// Returns the slope and the intercept of the line that fits points best.
+fn fit(points: &[[f64; 2]]) -> [f64; 2] {
+    let count = points.len() as f64;
+    let mean = [0, 1].map(|k| points.iter().map(|point| point[k]).sum::<f64>() / count);
+    let moment = |k: usize| points.iter().map(|p| (p[0] - mean[0]) * (p[k] - mean[k])).sum::<f64>();
+    let slope = moment(1) / moment(0);
+    [slope, mean[1] - slope * mean[0]]
+}
+
+fn step(mesh: &Mesh) -> (String, usize) {
+    let table = table_of(&mesh.facets);
+    let solids = StepSolids::new(&table).unwrap();
+    let mut text = Vec::new();
+    solids.write("part", &mut text).unwrap();
+    (String::from_utf8(text).unwrap(), solids.faces())
+}
+
+/// The volume of a STEP file, and the number of its bodies.
+fn volume(text: &str, kernel: KernelName) -> (f64, usize) {
+    let options = OpenOptions { kernel, ..OpenOptions::default() };
+    let part = Part::from_step("part", text.as_bytes().to_vec(), &options).unwrap();
+    let table = CornerTable::of_part(&part, &Placement::default(), Units::Millimetres).unwrap();
+    let check = MeshCheck::new(&table);
+    let volumes = check.lumps.iter().map(|lump| lump.mass.as_ref().unwrap().volume_mm3);
+    (volumes.sum(), table.bodies().count())
+}
+
+fn kernels() -> Vec<KernelName> {
+    vec![
+        KernelName::Lamp,
+        #[cfg(feature = "occt")]
+        KernelName::Occt,
+    ]
+}
+
+fn assert_same_volume(mesh: &Mesh, text: &str) {
+    for kernel in kernels() {
+        let (found, _) = volume(text, kernel);
+        let exact = mesh.volume_mm3();
+        assert!((found / exact - 1.0).abs() < 1e-9, "{kernel:?}: {found} for {exact}");
+    }
+}
+
+#[test]
+fn a_facet_takes_less_than_half_of_what_table_3_says() {
+    let [per_facet, first] = fit(&TABLE_3);
+    assert_eq!((per_facet * 1e3).round(), 1246.0);
+    assert_eq!(((per_facet * 5.5e6 + first) / 1e4).round(), 685.0);
+    // None of the facets of a ball lie in one plane but at its poles.
+    let ball = parts::sphere(15.0, 6_162);
+    let (text, faces) = step(&ball);
+    assert!(faces as f64 > 0.9 * ball.facets.len() as f64);
+    let kilobytes = text.len() as f64 / 1e3 / ball.facets.len() as f64;
+    assert!(kilobytes < per_facet / 2.0, "{kilobytes}");
+    assert_same_volume(&ball, &text);
+}
+
+#[test]
+fn flat_sides_are_single_faces() {
+    // Sides and corners as the part has them, however many facets it has.
+    let has = |part: fn(usize) -> Mesh, faces: usize, corners: usize| {
+        for facets in [1, 3_000] {
+            let mesh = part(facets);
+            let (text, found) = step(&mesh);
+            assert_eq!((found, text.matches("CARTESIAN_POINT").count()), (faces, corners));
+            assert_same_volume(&mesh, &text);
+        }
+    };
+    has(parts::cup, 11, 16);
+    has(parts::closed_void, 12, 16);
+    has(parts::arch, 10, 16);
+    has(parts::ring, 25, 48);
+}
+
+#[test]
+fn solids_have_their_voids_and_faces_their_holes() {
+    let (void, _) = step(&parts::closed_void(1));
+    assert!(void.contains("BREP_WITH_VOIDS('',#") && void.contains("ORIENTED_CLOSED_SHELL"));
+    let (hole, _) = step(&parts::cube_with_hole(20.0, 5.0, 500));
+    assert_eq!(hole.matches("FACE_BOUND('',").count(), 2);
+    assert_same_volume(&parts::cube_with_hole(20.0, 5.0, 500), &hole);
+    let far = parts::cup(1).map(|[x, y, z]| [x + 50.0, y, z]);
+    let both = Mesh { facets: [parts::cup(1).facets, far.facets].concat() };
+    let (two, _) = step(&both);
+    assert_eq!(two.matches("FACETED_BREP('',").count(), 2);
+    for kernel in kernels() {
+        assert_eq!(volume(&two, kernel).1, 2);
+    }
+}
+
+/// A slab whose top has two dents, with rims that touch in one point.
+fn dented() -> Mesh {
+    const SIDE: usize = 4;
+    let node = |x: usize, y: usize, z: f32| {
+        let is_dent = z > 0.0 && matches!((x, y), (1, 1) | (3, 3));
+        [x as f32, y as f32, if is_dent { z - 0.5 } else { z }]
+    };
+    let mut facets: Vec<Facet> = Vec::new();
+    let mut quad = |[a, b, c, d]: [[f32; 3]; 4]| facets.extend([[a, b, c], [a, c, d]]);
+    for (x, y) in (0..SIDE * SIDE).map(|k| (k % SIDE, k / SIDE)) {
+        let around = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)];
+        quad(around.map(|(x, y)| node(x, y, 1.0)));
+        quad([0, 3, 2, 1].map(|k| around[k]).map(|(x, y)| node(x, y, 0.0)));
+    }
+    for k in 0..SIDE {
+        let sides = [
+            [(k, 0), (k + 1, 0)],
+            [(SIDE, k), (SIDE, k + 1)],
+            [(k + 1, SIDE), (k, SIDE)],
+            [(0, k + 1), (0, k)],
+        ];
+        for [(x, y), (u, v)] in sides {
+            quad([node(x, y, 0.0), node(u, v, 0.0), node(u, v, 1.0), node(x, y, 1.0)]);
+        }
+    }
+    Mesh { facets }
+}
+
+#[test]
+fn a_face_that_touches_itself_stays_in_facets() {
+    let mesh = dented();
+    let (text, faces) = step(&mesh);
+    let top = mesh.facets.iter().filter(|facet| facet.iter().all(|corner| corner[2] > 0.0)).count();
+    // Its dents are four flat sides each at least.
+    assert!(faces > 5 + 8 && faces <= 5 + top, "{faces} {top}");
+    assert_same_volume(&mesh, &text);
+}
+
+#[test]
+fn what_is_no_solid_is_refused() {
+    let refused = |mesh: &Mesh| StepSolids::new(&table_of(&mesh.facets)).unwrap_err();
+    for (defect, is_open) in [(Defect::Drop, true), (Defect::Flip, false)] {
+        let mut mesh = parts::sphere(5.0, 500);
+        inject(&mut mesh, defect, 3, 1);
+        assert_eq!(matches!(refused(&mesh), NoSolid::Open { .. }), is_open, "{defect:?}");
+    }
+    let inwards = Mesh { facets: turned(&block([0.0; 3], [1.0; 3])) };
+    assert!(matches!(refused(&inwards), NoSolid::Faulty { shells: 1, .. }));
+    let mut nan = parts::sphere(5.0, 500);
+    nan.facets.push([[f32::NAN; 3]; 3]);
+    assert!(matches!(refused(&nan), NoSolid::Faulty { flat: 1.., .. }));
+}
+
+#[test]
+fn numbers_and_texts_are_those_of_step() {
+    let real = |number: f64| entities::Real(number).to_string();
+    assert_eq!([0.0, -0.0, 1.0, -2.5].map(real), ["0.", "0.", "1.", "-2.5"]);
+    assert_eq!(
+        [1e-7, -1.5e20, 12.41950798034668].map(real),
+        ["1.E-7", "-1.5E20", "12.41950798034668"]
+    );
+    for number in [1e-5, 0.1 + 0.2, 1e15, 123456.789e3, 5e-324, f64::MAX] {
+        assert_eq!(real(number).parse(), Ok(number));
+    }
+    assert_eq!(text("it's a \\ Öl"), "it''s a \\\\ \\X2\\00D6\\X0\\l");
+}

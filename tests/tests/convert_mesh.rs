@@ -1,0 +1,61 @@
+//! Checks the STEP files that `lamp convert` makes of meshes.
+
+use lamp_fixtures::{Defect, StepUnit, cavity_core, closed_void, cup, inject, mug, step};
+use lamp_stack::Layer;
+use lamp_tests::{Scratch, masks};
+
+fn layers(scratch: &Scratch, part: &str) -> Vec<Layer> {
+    let line = format!("slice {part} --dpi 254 --thickness 1mm -q");
+    lamp_tests::read_stack(scratch.run(&line).succeeds_quietly().stdout)
+}
+
+#[test]
+fn the_step_file_slices_as_the_mesh() {
+    for mesh in [mug(1_000), cavity_core(2_000), closed_void(1)] {
+        let scratch = Scratch::new();
+        scratch.mesh("part.stl", &mesh);
+        let said = scratch.run("lamp convert part.stl part.step").succeeds().stderr;
+        assert!(said.contains("facets as") && said.contains("solids: 1"), "{said}");
+        let (of_mesh, of_step) = (layers(&scratch, "part.stl"), layers(&scratch, "part.step"));
+        assert_eq!(of_mesh.len(), of_step.len());
+        let differing = masks(&of_mesh).into_iter().zip(masks(&of_step)).filter(|(a, b)| a != b);
+        assert_eq!(differing.count(), 0);
+        // Same input, same bytes, whatever is named and from wherever it comes.
+        let bytes = scratch.bytes("part.step");
+        scratch.run("lamp convert part.stl -o again.stp -q --threads 1").succeeds_quietly();
+        assert!(scratch.bytes("again.stp") == bytes);
+    }
+}
+
+#[test]
+fn units_scale_the_solid() {
+    let scratch = Scratch::new();
+    scratch.mesh("cup.stl", &cup(1));
+    scratch.run("lamp convert cup.stl cup.step --units inch -q").succeeds_quietly();
+    let said = scratch.run("lamp brep cup.step --json").succeeds().stdout;
+    let said: serde_json::Value = serde_json::from_slice(&said).unwrap();
+    let volume = said["bodies"][0]["volume_mm3"].as_f64().unwrap();
+    let exact = (16.0 * 12.0 * 12.0 - 960.0) * 25.4f64.powi(3);
+    assert!((volume / exact - 1.0).abs() < 1e-6, "{said}");
+}
+
+#[test]
+fn what_is_no_solid_leaves_no_file() {
+    let scratch = Scratch::new();
+    let mut open = cup(500);
+    inject(&mut open, Defect::Drop, 2, 1);
+    scratch.mesh("open.stl", &open);
+    let words = ["open.stl", "6 sides", "lamp mesh check", "lamp mesh repair"];
+    scratch.run("lamp convert open.stl open.step").is_refused_with(&words);
+    let mut turned = cup(500);
+    inject(&mut turned, Defect::Flip, 2, 1);
+    scratch.mesh("turned.stl", &turned);
+    let words = ["turned.stl", "2 facets are turned over", "lamp mesh repair"];
+    scratch.run("lamp convert turned.stl turned.step").is_refused_with(&words);
+    scratch.write("cube.step", step(lamp_fixtures::StepSample::Cone, StepUnit::Inch).as_bytes());
+    scratch
+        .run("lamp convert cube.step other.step")
+        .is_wrong_usage(&["cube.step", "STEP part already"]);
+    scratch.run("lamp convert open.stl open.step --png").is_wrong_usage(&["--png", "stacks"]);
+    assert_eq!(scratch.names(), ["cube.step", "open.stl", "turned.stl"]);
+}
