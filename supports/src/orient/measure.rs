@@ -87,9 +87,11 @@ fn areas(table: &CornerTable) -> Vec<[f32; 4]> {
 
 impl Measured<'_> {
     fn facts(&self, pose: Pose, limits: &PoseLimits) -> PoseFacts {
-        let [along_x, along_y, up] = pose.axes();
+        let axes = pose.axes();
+        let up = axes[2];
         let heights = self.relief.heights(up);
-        let [lowest, highest] = self.extent(up);
+        let extents = self.extents(axes);
+        let [lowest, highest] = extents[2];
         let minima = self.relief.minima(up, &heights, limits.thickness_mm);
         // Heights are rounded, and whole layers common.
         let hair = 1e-9 * (highest - lowest);
@@ -102,19 +104,25 @@ impl Measured<'_> {
             islands: islands.iter().filter(|island| island.height_mm >= platform).count(),
             pits: pits.len(),
             overhang_mm2: self.overhang(up, &heights, platform, limits.max_overhang_deg),
-            height_mm: (highest - lowest).max(0.0),
-            footprint_mm: [along_x, along_y].map(|axis| {
-                let [low, high] = self.extent(axis);
-                (high - low).max(0.0)
-            }),
+            height_mm: length(extents[2]),
+            footprint_mm: [length(extents[0]), length(extents[1])],
         }
     }
 
-    /// Returns the least and the greatest coordinate along a unit vector.
-    fn extent(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
-        let along = self.points.iter().map(|point| x * point[0] + y * point[1] + z * point[2]);
-        along
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| [low.min(at), high.max(at)])
+    /// Returns the least and the greatest coordinates along three unit vectors.
+    fn extents(&self, axes: [[f64; 3]; 3]) -> [[f64; 2]; 3] {
+        let mut extents = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+        for point in &self.points {
+            for ([x, y, z], extent) in axes.iter().zip(&mut extents) {
+                let at = x * point[0] + y * point[1] + z * point[2];
+                // Points are finite, so these need not care for others as min and max do.
+                *extent = [
+                    if at < extent[0] { at } else { extent[0] },
+                    if at > extent[1] { at } else { extent[1] },
+                ];
+            }
+        }
+        extents
     }
 
     fn overhang(&self, up: [f64; 3], heights: &[f64], platform: f64, max_deg: f64) -> f64 {
@@ -131,6 +139,11 @@ impl Measured<'_> {
         let heights = self.table.facet_vertices(facet).map(|vertex| heights[vertex as usize]);
         heights.iter().any(|&height| height > platform)
     }
+}
+
+/// Returns the length of an extent; that of no points is none.
+fn length([low, high]: [f64; 2]) -> f64 {
+    (high - low).max(0.0)
 }
 
 #[cfg(test)]

@@ -67,6 +67,7 @@ pub struct Relief<'a> {
     table: &'a CornerTable,
     /// The corners at each vertex, without those of idle facets.
     corners: Grouped<u32>,
+    has_idle: bool,
 }
 
 impl<'a> Relief<'a> {
@@ -77,7 +78,8 @@ impl<'a> Relief<'a> {
             let busy = corners.filter(|&corner| !table.is_idle(facet_of(corner)));
             busy.map(|corner| (table.vertex(corner) as usize, corner))
         };
-        Self { table, corners: Grouped::new(table.points().len(), corners) }
+        let corners = Grouped::new(table.points().len(), corners);
+        Self { table, has_idle: corners.items().len() < table.corner_count() as usize, corners }
     }
 
     /// Returns the heights of all vertices along a unit vector that points up.

@@ -31,14 +31,15 @@ pub(super) fn level_regions(field: &Field<'_>) -> Vec<Vec<u32>> {
 fn has_lower(field: &Field<'_>) -> Vec<bool> {
     let table = field.relief.table;
     let mut has_lower = vec![false; field.heights.len()];
-    for facet in (0..table.facet_count() as u32).filter(|&facet| !table.is_idle(facet)) {
+    let has_idle = field.relief.has_idle;
+    let facets = 0..table.facet_count() as u32;
+    for facet in facets.filter(|&facet| !has_idle || !table.is_idle(facet)) {
         let vertices = table.facet_vertices(facet);
         let heights = vertices.map(|vertex| field.height(vertex));
         let lowest = heights[0].min(heights[1]).min(heights[2]);
         for (vertex, height) in vertices.into_iter().zip(heights) {
-            if height > lowest {
-                has_lower[vertex as usize] = true;
-            }
+            // Always written: which corner is the lowest, no processor can foresee.
+            has_lower[vertex as usize] |= height > lowest;
         }
     }
     has_lower
