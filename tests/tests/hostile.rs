@@ -78,6 +78,11 @@ fn no_stack_makes_a_check_panic_or_depend_on_where_its_rows_begin() {
 }
 
 #[test]
+fn no_facets_make_a_mesh_check_panic_or_a_repair_change_what_is_whole() {
+    survives("mesh", hostile::facets);
+}
+
+#[test]
 fn files_by_other_programs_hold_no_surprise() {
     for (kind, entry) in [("stl", hostile::stl as fn(&[u8])), ("tiff", hostile::tiff)] {
         let Some(folder) = shared_data(kind) else {

@@ -6,6 +6,7 @@
 
 mod check;
 mod damage;
+mod facets;
 mod seeds;
 
 use std::error::Error;
@@ -23,6 +24,7 @@ use tempfile::NamedTempFile;
 
 pub use check::check;
 pub use damage::damage;
+pub use facets::facets;
 pub use seeds::{Seed, classic_tiff, seeds};
 
 /// Parts are sliced only where their images are at most this high: the cost of

@@ -41,6 +41,7 @@ pub fn seeds() -> Vec<Seed> {
         .chain(tiff().into_iter().map(of("tiff")))
         .chain(g4_codes().into_iter().map(of("g4")))
         .chain(blocks().into_iter().map(of("check")))
+        .chain(meshes().into_iter().map(of("mesh")))
         .collect()
 }
 
@@ -333,5 +334,26 @@ fn blocks() -> Named {
         ),
         ("islands", block(|x, y, z| z > 8 || (x / 4 + y / 4) % 2 == 0 && z >= x / 2)),
         ("stairs", block(|x, y, z| x / 2 <= z && y > z)),
+    ]
+}
+
+/// Meshes: how far to weld and to close, then nine coordinates a facet, in quarters.
+fn meshes() -> Named {
+    let tetrahedron = |x: u8| {
+        let [o, a, b, c] = [[x, 0, 0], [x + 8, 0, 0], [x, 8, 0], [x, 0, 8]];
+        [[o, b, a], [o, a, c], [o, c, b], [a, b, c]].concat().concat()
+    };
+    let mesh = |facets: &[u8]| [&[1, 8], facets].concat();
+    let one = tetrahedron(0);
+    let beside = tetrahedron(16);
+    vec![
+        ("closed", mesh(&one)),
+        ("two", mesh(&[&one[..], &beside[..]].concat())),
+        ("crossing", mesh(&[&one[..], &tetrahedron(3)[..]].concat())),
+        ("open", mesh(&one[9..])),
+        ("doubled", mesh(&[&one[..], &one[..]].concat())),
+        ("turned", mesh(&[&one[..27], &one[33..36], &one[30..33], &one[27..30]].concat())),
+        ("unjoined", mesh(&[&one[..8], &[1], &one[9..]].concat())),
+        ("not_finite", mesh(&[&one[..8], &[0xFF], &one[9..]].concat())),
     ]
 }
