@@ -101,6 +101,15 @@ checks() {
         "$ISLAND_SCAN" blade.stl --px-mm 0.016933333 --layer-height 0.1 --json
 }
 
+# What a check and a repair of the mesh take beside ADMesh.
+meshes() {
+    header "the mesh"
+    ! has admesh || row "\`admesh blade.stl\`" admesh blade.stl
+    row "\`lamp mesh check blade.stl\`" lamp mesh check blade.stl
+    row "\`lamp mesh repair blade.stl\`" lamp mesh repair blade.stl -o other.stl
+    rm other.stl
+}
+
 # What the pipeline takes beside its slowest stage alone, in wall time.
 pipe() { # pipe AREA
     local slowest=0 cpu mb wall
@@ -137,6 +146,7 @@ for count in "$@"; do
     lamp sample blade --facets "$count" -o blade.stl --quiet
     printf '\n### Blade mould, %s facets, 1500 dpi, 100 um\n' "$count"
     slices
+    meshes
     stages
     checks
     printf '\n| the pipe | wall | / slowest stage alone |\n|---|---|---|\n'

@@ -10,9 +10,8 @@
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 
-use crate::topology::check::ShellReport;
 use crate::topology::shells::{root, unite};
-use crate::topology::{CornerTable, Shells};
+use crate::topology::{CornerTable, ShellReport, Shells};
 
 /// A ray that starts nearer to a facet, as a share of the part's size, may start on it.
 const TOUCHING: f64 = 1e-9;
