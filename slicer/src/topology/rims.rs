@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use lamp_brep::vector::{Vec3, distance};
 
 use crate::topology::CornerTable;
-use crate::topology::corner_table::{facet_of, next, previous};
+use crate::topology::corner_table::{next, previous};
 
 /// Rims that follow one another around a hole.
 #[derive(Clone, Debug, PartialEq)]
@@ -150,7 +150,7 @@ fn across_vertex(table: &CornerTable, rim: u32, vertex: u32) -> Option<u32> {
         let at =
             if table.vertex(next(entered)) == vertex { next(entered) } else { previous(entered) };
         // Of the two edges at the vertex, the one that was not entered by.
-        let left = 9 * facet_of(entered) + 3 - entered - at;
+        let left = if next(at) == entered { previous(at) } else { next(at) };
         match table.opposite(left) {
             Some(across) => entered = across,
             None => return table.is_rim(left).then_some(left),
