@@ -267,7 +267,7 @@ fn check_replaceable(path: &Path, replaces: bool) -> Result<Existing, StackError
 
 /// Returns whether commands give that name to files in the folders that they write.
 fn is_name_in_folders(name: &str) -> bool {
-    const STARTS: [&str; 4] = ["layer_", "layers_", "strip_", "squares_"];
+    const STARTS: [&str; 5] = ["check_", "layer_", "layers_", "strip_", "squares_"];
     let numbered = |start: &&str| {
         name.strip_prefix(start).is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
     };

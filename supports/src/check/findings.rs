@@ -125,9 +125,9 @@ impl Overhang {
 pub enum PocketKind {
     /// Nothing leads out: what it holds stays in.
     Trap,
-    /// It opens at the top only.
+    /// It opens at the top only, also off the platform.
     Cup,
-    /// The platform closes it.
+    /// The platform closes it below; it may also open at the top.
     Sealed,
     /// It has ways out, all too narrow.
     Narrow,

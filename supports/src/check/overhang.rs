@@ -222,7 +222,7 @@ fn nearest(mask: &Mask, column: u32, row: u32, enough: u64) -> u64 {
         for near in [row.checked_sub(distance), row.checked_add(distance)] {
             let near = near.filter(|near| *near < mask.height());
             if let Some(aside) = near.and_then(|near| aside(mask, column, near)) {
-                nearest = nearest.min(squared + u64::from(aside).pow(2));
+                nearest = nearest.min(squared.saturating_add(u64::from(aside).pow(2)));
             }
         }
     }

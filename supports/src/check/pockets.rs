@@ -115,8 +115,8 @@ impl Hollows {
             return;
         }
         let kind = match (is_at_top, hollow.is_on_platform) {
-            (true, _) => PocketKind::Cup,
-            (false, true) => PocketKind::Sealed,
+            (_, true) => PocketKind::Sealed,
+            (true, false) => PocketKind::Cup,
             (false, false) => PocketKind::Trap,
         };
         self.pockets.push(Pocket { kind, ..hollow.pocket });

@@ -59,7 +59,8 @@ pub(super) fn of(
     add(Kind::Pockets, pockets.map(|pocket| of_pocket(pocket, scale)).collect());
     let overhangs = findings.overhangs.list.iter();
     add(Kind::Overhangs, overhangs.map(|overhang| of_overhang(overhang, scale)).collect());
-    let off = findings.off_balance.list.iter();
+    // Less is rounding to pixels.
+    let off = findings.off_balance.list.iter().filter(|off| off.off_pixels >= 1.0);
     add(Kind::Balance, off.map(|off| of_balance(off, scale)).collect());
     add(Kind::Layers, at_border(findings, scale));
     add(Kind::Layers, empty(findings, scale));
@@ -314,11 +315,15 @@ fn at_border(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingLine> {
 fn empty(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingLine> {
     let runs = findings.runs_of_layers(|layer: &LayerFacts| !layer.has_white);
     let line = |layers: [u32; 2]| {
-        let is_top = layers[1] as usize + 1 == findings.layers.len() && layers[0] > 0;
-        let above = if is_top { "above the part" } else { "nothing holds what is above" };
+        let is_top = layers[1] as usize + 1 == findings.layers.len();
+        let above = match (is_top, layers[0]) {
+            (false, _) => "nothing holds what is above",
+            (true, 0) => "nothing is built",
+            (true, _) => "above the part",
+        };
         let text = format!("{}: no white; {above}", scale.layers_text(layers));
         let line = of_layers("empty", "empty", text, layers, scale);
-        FindingLine { is_note: is_top, ..line }
+        FindingLine { is_note: is_top && layers[0] > 0, ..line }
     };
     runs.into_iter().map(line).collect()
 }

@@ -206,11 +206,12 @@ impl CheckArgs {
                     progress.layer_done();
                     layer
                 };
-                lamp_supports::check(pages, decode, &options).map_err(|error| match error.cause() {
-                    Some(CheckError::Sizes { .. } | CheckError::Origins { .. }) => {
-                        error.at(name.clone())
+                lamp_supports::check(pages, decode, &options).map_err(|error: Exit| {
+                    // Errors of pages have their place.
+                    match error.cause::<CheckError>() {
+                        Some(_) => error.at(name.clone()),
+                        None => error,
                     }
-                    _ => error,
                 })
             }
             Input::Part(part) => {
@@ -366,7 +367,10 @@ const MOST_LINES: usize = 20;
 
 /// Returns the lines to print for an input.
 fn printed(name: &str, findings: &Findings, lines: &[FindingLine], all: bool) -> String {
-    let layers = findings.layers.len();
+    let layers = match findings.layers.len() {
+        1 => "1 layer".to_owned(),
+        layers => format!("{layers} layers"),
+    };
     let specks = match findings.specks.count() {
         0 => String::new(),
         1 => ", 1 speck".to_owned(),
@@ -377,7 +381,7 @@ fn printed(name: &str, findings: &Findings, lines: &[FindingLine], all: bool) ->
         1 => "1 finding".to_owned(),
         found => format!("{found} findings"),
     };
-    let mut text = format!("{}: {layers} layers, {found}{specks}\n", printable(name));
+    let mut text = format!("{}: {layers}, {found}{specks}\n", printable(name));
     for of_word in lines.chunk_by(|a, b| a.word == b.word) {
         let shown = if all { of_word.len() } else { of_word.len().min(MOST_LINES) };
         for line in &of_word[..shown] {

@@ -65,7 +65,7 @@ pub(super) fn write_pictures(
         let is_wanted = |position| drawings.contains_key(&position);
         args.for_each_layer(input, common, is_wanted, |position, below, layer| {
             for (name, shown) in drawings.get(&position).into_iter().flatten() {
-                let path = folder.path().join(format!("{prefix}{name}"));
+                let path = folder.path().join(format!("check_{prefix}{name}"));
                 let drawn = draw(&path, below, layer, shown);
                 drawn.map_err(|error| failed_at(name.clone(), error.into()))?;
             }

@@ -62,8 +62,8 @@ fn pocket(block: &Block, limits: &Limits, body: &[usize]) -> Pocket {
         .map(|layer| body.iter().filter(|voxel| layer_of(voxel) == layer).count())
         .collect();
     let kind = match (layers.start, layers.end) {
-        (_, end) if end == block.size[2] => Kind::Cup,
         (0, _) => Kind::Sealed,
+        (_, end) if end == block.size[2] => Kind::Cup,
         _ => Kind::Trap,
     };
     Pocket {
