@@ -10,7 +10,7 @@ use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, Til
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::NoSolid;
 use lamp_stack::{JoinError, SplitError, StackError};
-use lamp_supports::CheckError;
+use lamp_supports::{CheckError, SupportError};
 
 use crate::hints::hint;
 
@@ -108,6 +108,7 @@ macro_rules! failures {
 failures!(
     SliceError,
     CheckError,
+    SupportError,
     DitherError,
     EditError,
     TileError,

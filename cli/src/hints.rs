@@ -17,6 +17,7 @@ use lamp_slicer::SliceError;
 use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_slicer::topology::NoSolid;
 use lamp_stack::{CatalogueError, Length, StackError};
+use lamp_supports::SupportError;
 
 /// Returns what to try about an error, to stand after its message.
 pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
@@ -30,6 +31,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(tile))
         .or_else(|| error.downcast_ref().and_then(layout))
         .or_else(|| error.downcast_ref().and_then(edit))
+        .or_else(|| error.downcast_ref().and_then(support))
         .or_else(|| error.downcast_ref().and_then(compensate))
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
@@ -175,6 +177,17 @@ fn edit(error: &EditError) -> Option<String> {
             LayerProblem::NoCopies => "copies are for builds that tile made",
             _ => return None,
         },
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn support(error: &SupportError) -> Option<String> {
+    let hint = match error {
+        SupportError::NoResolution | SupportError::NoOrigin | SupportError::NoHeight { .. } => {
+            "support the stack that slice or fix wrote"
+        }
+        SupportError::MissingLayers => "support it again once nothing writes to it",
         _ => return None,
     };
     Some(hint.to_owned())

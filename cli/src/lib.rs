@@ -18,6 +18,7 @@ mod height_options;
 mod help;
 mod hints;
 mod json_report;
+mod kept_stack;
 mod memory;
 mod mesh_report;
 #[cfg(feature = "occt")]
@@ -38,6 +39,7 @@ mod second_opinion;
 mod signals;
 mod slicing_options;
 mod stack_facts;
+mod stack_part;
 mod step_options;
 mod streams;
 mod thumbnails;

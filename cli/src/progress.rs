@@ -50,6 +50,11 @@ impl Progress {
         }
     }
 
+    /// Returns whether details are printed.
+    pub(crate) fn is_verbose(&self) -> bool {
+        self.verbose
+    }
+
     /// Prints a line, unless quiet.
     pub(crate) fn say(&self, line: &str) {
         if !self.quiet {

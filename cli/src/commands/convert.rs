@@ -217,6 +217,6 @@ fn parse_part(text: &str) -> Result<PathBuf, String> {
     if is_part { Ok(path) } else { Err(format!("`{text}` does not end in .stl or .step")) }
 }
 
-fn is_stl_name(path: &Path) -> bool {
+pub(super) fn is_stl_name(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("stl"))
 }

@@ -16,10 +16,10 @@ use crate::cured_section::{
 use crate::exit::Exit;
 use crate::options::{Common, Input};
 use crate::part_arg::{PartArg, paths};
-use crate::part_options::{Reading, name_of_all};
+use crate::part_options::name_of_all;
 use crate::picture::PictureScale;
 use crate::progress::Progress;
-use crate::slicing_options::SlicingOptions;
+use crate::stack_part::RecordedSlicing;
 use crate::streams::{check_beside, check_png_name, input_name, print, read_layers, write_file};
 
 /// Draw a vertical section of what a stack cures, compared with the part
@@ -113,30 +113,10 @@ fn outline(
     stack: Option<&StackInfo>,
     name: &str,
 ) -> Result<Vec<SolidHeights>, Exit> {
-    let sliced = stack.and_then(|stack| {
-        let command = stack.commands.first()?;
-        let recorded = SlicingOptions::parts_of_command(command);
-        Some((SlicingOptions::of_command(command)?, recorded, &stack.digest))
-    });
-    let (options, recorded, digest) = sliced.with_context(|| {
+    let sliced = RecordedSlicing::of(stack).with_context(|| {
         format!("{name} does not record how its part was sliced: leave out --part")
     })?;
-    let reading = Reading { dpi: options.dpi, may_be_open: false, say: &|_| () };
-    let model = options.solid.open(parts, &reading)?;
+    let model = sliced.open(parts, name)?;
     let part = name_of_all(parts);
-    if model.digest() != digest {
-        return Err(Exit::Failed(anyhow!(
-            "{name} was not sliced from {part}, or the part has changed"
-        )));
-    }
-    // Names of files may have changed since, but not where the parts stand.
-    let given: Vec<_> = parts.iter().map(PartArg::recorded).collect();
-    if (recorded.contains('@') || parts.iter().any(|part| part.placement.is_some()))
-        && given.join(" ") != recorded
-    {
-        return Err(Exit::Failed(anyhow!(
-            "{name} was sliced from {recorded}: give --part with the same placements"
-        )));
-    }
-    course.outline(model, &options).map_err(|error| Exit::from(error).at(part))
+    course.outline(model, &sliced.options).map_err(|error| Exit::from(error).at(part))
 }

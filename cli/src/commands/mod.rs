@@ -23,6 +23,7 @@ mod sample;
 mod show;
 pub(crate) mod slice;
 mod split;
+mod support;
 mod target;
 mod tile;
 mod verify;
@@ -45,6 +46,7 @@ pub(crate) enum Command {
     Info(info::InfoArgs),
     Verify(verify::VerifyArgs),
     Check(check::CheckArgs),
+    Support(support::SupportArgs),
     Show(show::ShowArgs),
     Convert(convert::ConvertArgs),
     Join(join::JoinArgs),
@@ -87,6 +89,7 @@ impl Command {
             Self::Info(args) => info::run(args),
             Self::Verify(args) => verify::run(args, common),
             Self::Check(args) => check::run(args, common),
+            Self::Support(args) => support::run(args, common),
             Self::Show(args) => show::run(args),
             Self::Convert(args) => convert::run(args, common),
             Self::Join(args) => join::run(args, common),

@@ -101,7 +101,11 @@ pub(super) fn island_json(
 }
 
 /// Returns how hard the recoating blade drags on the largest floating area, in millinewtons.
-fn drag_mn(island: &Island, scale: &Scale<'_>, recoating: Option<&Recoating>) -> Option<f64> {
+pub(in crate::commands) fn drag_mn(
+    island: &Island,
+    scale: &Scale<'_>,
+    recoating: Option<&Recoating>,
+) -> Option<f64> {
     let [_, most_pa] = recoating?.shear_pa();
     Some(scale.area_mm2(island.largest_area)? * most_pa / 1000.0)
 }

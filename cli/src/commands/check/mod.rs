@@ -6,8 +6,6 @@ mod report;
 mod units;
 
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::Seek;
 use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -22,18 +20,19 @@ use lamp_supports::{CheckError, CheckOptions, Disagreements, Findings, LoneMinim
 use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::json_report::parse_report;
+use crate::kept_stack::KeptStack;
 use crate::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
 use crate::part_arg::PartArg;
 use crate::part_options::{Reading, at_part};
 use crate::progress::{Progress, printable};
 use crate::slicing_options::SlicingOptions;
-use crate::streams::{
-    check_beside, failed_at, in_range, input_name, is_stream, open_pages, print, spool_stdin,
-};
+use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, print};
 
 use lines::FindingLine;
+pub(super) use lines::drag_mn;
 use pictures::write_pictures;
 use report::write_report;
+pub(super) use units::Scale;
 
 /// Find what would be swept away, trapped or bent as a stack is built
 ///
@@ -295,7 +294,7 @@ impl CheckArgs {
 
 /// What is checked.
 enum Input {
-    Stack(StackInput),
+    Stack(KeptStack),
     Part(PartInput),
 }
 
@@ -305,20 +304,13 @@ struct PartInput {
     model: Part,
 }
 
-/// A stack that can be read again.
-struct StackInput {
-    path: PathBuf,
-    /// Standard input, kept.
-    spooled: Option<File>,
-}
-
 impl Input {
     /// Tells a stack from a part by how it begins, and opens a part.
     fn open(path: &Path, slicing: &SlicingOptions, common: &Common) -> Result<Self, Exit> {
         let is_part =
             !is_stream(path) && matches!(Pages::open(path), Err(StackError::NotTiff { .. }));
         if !is_part {
-            return Ok(Self::Stack(StackInput { path: path.to_owned(), spooled: None }));
+            return Ok(Self::Stack(KeptStack::new(path)));
         }
         let progress = Progress::new("check", common, true);
         let reading =
@@ -326,24 +318,6 @@ impl Input {
         let file = PartArg { path: path.to_owned(), placement: None };
         let model = slicing.solid.open(std::slice::from_ref(&file), &reading)?;
         Ok(Self::Part(PartInput { file, model }))
-    }
-}
-
-impl StackInput {
-    /// Opens the pages; standard input is kept if it will be read `again`.
-    fn pages(&mut self, again: bool) -> Result<Pages, Exit> {
-        if !is_stream(&self.path) || (!again && self.spooled.is_none()) {
-            return open_pages(&self.path);
-        }
-        let reopened = |file: &File| -> Result<Pages, StackError> {
-            let mut file = file.try_clone()?;
-            file.rewind()?;
-            Pages::from_file(file)
-        };
-        let file = self.spooled.take().map_or_else(spool_stdin, Ok)?;
-        let pages = reopened(&file).map_err(|error| failed_at(input_name(&self.path), error));
-        self.spooled = Some(file);
-        pages
     }
 }
 

@@ -1,0 +1,362 @@
+//! `lamp support`: ties floating islands to the part below them.
+
+mod plan_file;
+mod report;
+mod solid;
+
+use std::fmt;
+use std::num::{NonZeroU8, NonZeroU32};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_postprocess::machine::Machine;
+use lamp_postprocess::{Edits, edit};
+use lamp_stack::{Layer, Length, Page, PageInfo, StackInfo};
+use lamp_supports::{
+    CheckError, CheckOptions, Findings, IslandPlan, Support, SupportError, SupportOptions, Surface,
+    plan_supports,
+};
+use serde_json::Value;
+
+use crate::catalogue::entry;
+use crate::exit::Exit;
+use crate::json_report::parse_report;
+use crate::kept_stack::KeptStack;
+use crate::options::{Common, Output, parse_distance, parse_thickness};
+use crate::part_arg::{PartArg, paths};
+use crate::part_options::name_of_all;
+use crate::progress::Progress;
+use crate::stack_part::RecordedSlicing;
+use crate::streams::{
+    check_beside, check_not_input, failed_at, input_name, is_stream, layers_of, progress,
+    write_file, write_layers,
+};
+
+use plan_file::plan_text;
+use report::SupportReport;
+
+/// The heading of options that choose supports.
+const CHOICE: &str = "Choice of supports";
+
+/// Hold floating islands with the shortest supports to the part
+///
+/// Supports stay in the mould and become features of the casting, so look at each before you build.
+/// From the middle of an island, directions over a cone below it are tried: the shortest one wins
+/// that meets the part where it is smooth, even and away from creases, and that can be built. What
+/// has no such way is left, and told. The plan is a list of edits: delete or exchange supports in
+/// it, and let lamp edit draw it.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp support blade.tif --part blade.stl -o supported.tif
+  lamp support blade.tif --part blade.stl --plan supports.toml --stl supports.stl -o supported.tif
+  lamp edit blade.tif supports.toml -o supported.tif
+  lamp support blade.tif --part blade.stl --max-tilt 60deg --strict -o supported.tif
+
+Exit status: 0 if the work is done; 3 with --strict if islands are left.")]
+pub(crate) struct SupportArgs {
+    /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
+    #[arg(value_name = "STACK", default_value = "-")]
+    stack: PathBuf,
+
+    /// The part that the stack was sliced from; repeat it for several parts, as they were given to
+    /// slice
+    #[arg(long, value_name = "PART", required = true, value_parser = PartArg::parser())]
+    part: Vec<PartArg>,
+
+    /// Write the supports as a list of edits, with alternatives, for people to change
+    #[arg(long, value_name = "FILE.toml")]
+    plan: Option<PathBuf>,
+
+    /// Write the supports as an STL
+    #[arg(long, value_name = "FILE.stl", value_parser = solid::parse_stl)]
+    stl: Option<PathBuf>,
+
+    /// Write islands and supports as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    report: Option<PathBuf>,
+
+    /// Give up with status 3 if islands are left: no stack is written, and the next stage of a pipe
+    /// fails, too
+    #[arg(long)]
+    strict: bool,
+
+    /// Radius of supports
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().radius)]
+    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    radius: Length,
+
+    /// Largest angle of a support to the vertical
+    #[arg(long, value_name = "ANGLE", default_value_t = Degrees(SupportOptions::default().max_tilt))]
+    #[arg(help_heading = CHOICE)]
+    max_tilt: Degrees,
+
+    /// Greatest length of a support
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().max_length)]
+    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    max_length: Length,
+
+    /// Least distance of a contact to edges where the surface turns by more than 30 degrees
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().edge_clearance)]
+    #[arg(value_parser = parse_distance, help_heading = CHOICE)]
+    edge_clearance: Length,
+
+    /// Largest curvature of the surface around a contact: 1/mm is a radius of 1 mm
+    #[arg(long, value_name = "CURVATURE", help_heading = CHOICE)]
+    #[arg(default_value_t = Curvature(SupportOptions::default().max_curvature))]
+    max_curvature: Curvature,
+
+    /// Widest piece of an island that one support holds; wider islands are divided
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().hold)]
+    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    hold: Length,
+
+    /// Directions to try
+    #[arg(long, value_name = "N", default_value_t = 400, help_heading = CHOICE)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    candidates: u32,
+
+    /// Supports to list for each place: the one that is drawn, and alternatives
+    #[arg(long, value_name = "N", default_value_t = 3, help_heading = CHOICE)]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..))]
+    keep: u16,
+
+    /// Side of the square that an island must hold, in pixels
+    #[arg(long, value_name = "PIXELS", default_value = "3")]
+    speck: NonZeroU32,
+
+    /// Level from which a gray pixel is white
+    #[arg(long, value_name = "LEVEL", default_value = "1")]
+    threshold: NonZeroU8,
+
+    /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
+    #[arg(long, value_name = "M", default_value = "alpha")]
+    machine: PathBuf,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+pub(crate) fn run(args: &SupportArgs, common: &Common) -> Result<(), Exit> {
+    args.check_files()?;
+    let machine: Machine = entry(&args.machine)?;
+    let progress = progress("support", common, &args.output);
+    let mut stack = KeptStack::new(&args.stack);
+    let first = first_page(&mut stack)?;
+    let name = input_name(&args.stack);
+    let surface = args.surface(&first, &name)?;
+    let found = args.check(&mut stack, &progress)?;
+    let layers = layers_of(stack.pages(true)?, &args.stack, None);
+    let plans = plan_supports(layers, &found, &surface, &args.options());
+    let plans = plans.map_err(|error| match error.cause::<SupportError>() {
+        Some(_) => error.at(name),
+        None => error,
+    })?;
+    let part = first.stack.map(|stack| stack.part).unwrap_or_default();
+    let plan = plan_text(&part, &plans, &found);
+    args.write_beside(&plan, &plans)?;
+    let report = SupportReport::new(&plans, &found, machine.recoating.as_ref());
+    if let Some(path) = &args.report {
+        report.write(&part, path)?;
+    }
+    report.tell(&progress);
+    if let Some(left) = report.text_of_left() {
+        if args.strict {
+            return Err(Exit::Findings(left));
+        }
+        progress.warn(&left);
+    }
+    draw(&mut stack, &plan, &plans, args, &progress)
+}
+
+impl SupportArgs {
+    fn check_files(&self) -> Result<(), Exit> {
+        let inputs = || paths(&self.part).chain([&self.stack]);
+        if inputs().filter(|path| is_stream(path)).count() > 1 {
+            return Err(Exit::usage("only one input can be standard input"));
+        }
+        check_not_input(&self.output.output, paths(&self.part))?;
+        for beside in [&self.plan, &self.stl, &self.report].into_iter().flatten() {
+            check_beside(beside, &self.output.output, inputs())?;
+        }
+        Ok(())
+    }
+
+    fn options(&self) -> SupportOptions {
+        SupportOptions {
+            candidates: NonZeroU32::new(self.candidates).expect("it is in a range above zero"),
+            max_tilt: self.max_tilt.0,
+            edge_clearance: self.edge_clearance,
+            max_curvature: self.max_curvature.0,
+            max_length: self.max_length,
+            keep: self.keep.into(),
+            radius: self.radius,
+            hold: self.hold,
+            threshold: self.threshold,
+        }
+    }
+
+    /// Opens the part, where it lay when it was sliced. `first` is the stack's first page.
+    fn surface(&self, first: &PageInfo, name: &str) -> Result<Surface, Exit> {
+        let sliced = RecordedSlicing::of(first.stack.as_ref()).with_context(|| {
+            format!("{name} does not record how its part was sliced: slice it with lamp")
+        })?;
+        if let Some(why) = moved(first) {
+            return Err(Exit::Failed(anyhow!(
+                "{name} {why}, so it does not lie as its part: support it before"
+            )));
+        }
+        let part = sliced.open(&self.part, name)?;
+        let facets = sliced.options.solid.body(part);
+        Ok(Surface::new(facets.map_err(|error| Exit::from(error).at(name_of_all(&self.part)))?))
+    }
+
+    /// Finds the islands.
+    fn check(&self, stack: &mut KeptStack, progress: &Progress) -> Result<Findings, Exit> {
+        let options = CheckOptions {
+            threshold: self.threshold,
+            speck: self.speck,
+            ..CheckOptions::default()
+        };
+        let name = input_name(&self.stack);
+        let failed = |error| failed_at(name.clone(), error);
+        let pages = stack.pages(true)?.map(|page| page.map_err(failed));
+        let found =
+            lamp_supports::check(pages, |page: Page| page.decode().map_err(failed), &options);
+        progress.done();
+        found.map_err(|error| match error.cause::<CheckError>() {
+            Some(_) => error.at(name.clone()),
+            None => error,
+        })
+    }
+
+    /// Writes the plan and the STL.
+    fn write_beside(&self, plan: &str, plans: &[IslandPlan]) -> Result<(), Exit> {
+        if let Some(path) = &self.plan {
+            write_file(path, |out| out.write_all(plan.as_bytes()))?;
+        }
+        if let Some(path) = &self.stl {
+            write_file(path, |out| solid::prisms(supports(plans)).write_stl(out))?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the supports to draw.
+fn supports(plans: &[IslandPlan]) -> impl Iterator<Item = &Support> {
+    plans.iter().flat_map(IslandPlan::supports)
+}
+
+/// Returns what the first page says.
+fn first_page(stack: &mut KeptStack) -> Result<PageInfo, Exit> {
+    let page = stack.pages(true)?.next();
+    let page = page.unwrap_or(Err(lamp_stack::StackError::NoLayers));
+    Ok(page.map_err(|error| failed_at(input_name(&stack.path), error))?.info().clone())
+}
+
+/// Returns what was done to a stack so that it no longer lies as its part did when it was sliced.
+fn moved(first: &PageInfo) -> Option<&'static str> {
+    if first.other.get("compensate").is_some_and(|page| page.get("shrinkage").is_some()) {
+        return Some("was enlarged for shrinkage");
+    }
+    let StackInfo { commands, other, .. } = first.stack.as_ref()?;
+    if other.contains_key("tile") || commands.iter().any(|command| command.starts_with("tile ")) {
+        return Some("is a build");
+    }
+    let edits = commands.iter().filter_map(|command| command.strip_prefix("edit "));
+    let edits = edits.filter_map(|list| serde_json::from_str::<Vec<Value>>(list).ok()).flatten();
+    let turns = |edit: Value| ["rotate", "mirror"].iter().any(|key| edit.get(key).is_some());
+    edits.map(turns).any(|turns| turns).then_some("was turned by lamp edit")
+}
+
+/// Writes the stack with the supports, as `lamp edit` draws their plan.
+fn draw(
+    stack: &mut KeptStack,
+    plan: &str,
+    plans: &[IslandPlan],
+    args: &SupportArgs,
+    progress: &Progress,
+) -> Result<(), Exit> {
+    let layers = layers_of(stack.pages(true)?, &args.stack, None);
+    let layers: Box<dyn Iterator<Item = Result<Layer, Exit>>> = match supports(plans).next() {
+        None => Box::new(layers),
+        Some(_) => Box::new(edit(layers, Edits::from_toml(plan)?, vec![], vec![], |_, _| {})),
+    };
+    write_layers(layers, &args.output, progress)
+}
+
+/// An angle of a support.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Degrees(f64);
+
+impl fmt::Display for Degrees {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}deg", self.0)
+    }
+}
+
+impl FromStr for Degrees {
+    type Err = String;
+
+    /// Parses `45deg` or `45`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim_end_matches("deg").trim_end().parse() {
+            Ok(degrees) if (0.0..=80.0).contains(&degrees) => Ok(Self(degrees)),
+            _ => Err(format!("`{text}` is no tilt: write an angle from 0deg to 80deg")),
+        }
+    }
+}
+
+/// A curvature in 1/mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Curvature(f64);
+
+impl fmt::Display for Curvature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/mm", self.0)
+    }
+}
+
+impl FromStr for Curvature {
+    type Err = String;
+
+    /// Parses `1/mm`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.strip_suffix("/mm").and_then(|number| number.trim_end().parse().ok()) {
+            Some(number) if (0.0..f64::INFINITY).contains(&number) => Ok(Self(number)),
+            _ => Err(format!("`{text}` is no curvature: write 1/mm for a radius of 1 mm")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_and_curvatures_have_units() {
+        assert_eq!("45deg".parse(), Ok(Degrees(45.0)));
+        assert_eq!("0".parse(), Ok(Degrees(0.0)));
+        assert_eq!("0.5/mm".parse(), Ok(Curvature(0.5)));
+        for wrong in ["", "nan", "-1deg", "90", "45rad"] {
+            assert!(wrong.parse::<Degrees>().is_err(), "{wrong}");
+        }
+        for wrong in ["", "1", "nan/mm", "-1/mm", "inf/mm", "1/in"] {
+            assert!(wrong.parse::<Curvature>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn stacks_that_moved_are_told() {
+        let of = |commands: &[&str]| {
+            let commands = commands.iter().map(ToString::to_string).collect();
+            let stack = StackInfo { commands, ..StackInfo::default() };
+            moved(&PageInfo { stack: Some(stack), ..PageInfo::default() })
+        };
+        assert_eq!(of(&["slice a.stl", "edit [{\"pad\":{\"left\":\"1mm\"}}]"]), None);
+        assert_eq!(of(&["slice a.stl", "edit [{\"rotate\":90}]"]), Some("was turned by lamp edit"));
+        assert_eq!(of(&["slice a.stl", "tile --copies 2"]), Some("is a build"));
+    }
+}

@@ -1,0 +1,199 @@
+//! Tells what supports were planned: lines for people, and JSON.
+
+use std::path::Path;
+
+use lamp_postprocess::machine::Recoating;
+use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Support};
+use serde_json::{Map, Value, json};
+
+use crate::commands::check::{Scale, drag_mn};
+use crate::exit::Exit;
+use crate::height_options::significant;
+use crate::json_report::{JsonReport, to_nm};
+use crate::progress::Progress;
+
+/// The most lines that are printed, unless all are asked for.
+const MOST_LINES: usize = 20;
+
+/// The plans for the islands of a stack.
+pub(super) struct SupportReport<'a> {
+    plans: &'a [IslandPlan],
+    /// Islands that are too many to be listed, and so are left.
+    unlisted: u64,
+    scale: Scale<'a>,
+    recoating: Option<&'a Recoating>,
+}
+
+impl<'a> SupportReport<'a> {
+    pub(super) fn new(
+        plans: &'a [IslandPlan],
+        found: &'a Findings,
+        recoating: Option<&'a Recoating>,
+    ) -> Self {
+        let unlisted = found.islands.left_out;
+        Self { plans, unlisted, scale: Scale::new(found), recoating }
+    }
+
+    /// Prints what is done: first of all what that means.
+    pub(super) fn tell(&self, progress: &Progress) {
+        let count = self.supports().count();
+        if count > 0 {
+            let length: f64 = self.supports().map(|support| support.length().mm()).sum();
+            progress.say(&format!(
+                "{}, {} mm long and {} mm3 in all, so look at each",
+                match count {
+                    1 => "1 support stays in the mould and becomes a feature of the casting"
+                        .to_owned(),
+                    count => format!(
+                        "{count} supports stay in the mould and become features of the casting"
+                    ),
+                },
+                significant(length),
+                significant(self.volume_mm3()),
+            ));
+        } else if self.plans.is_empty() {
+            progress.say("there are no islands, and the layers stay as they are");
+        }
+        let lines: Vec<String> = self.plans.iter().flat_map(|plan| self.lines(plan)).collect();
+        let (first, more) = lines.split_at(lines.len().min(MOST_LINES));
+        first.iter().for_each(|line| progress.say(line));
+        more.iter().for_each(|line| progress.detail(line));
+        if !more.is_empty() && !progress.is_verbose() {
+            progress.say(&format!("{} more (--verbose or --report lists them)", more.len()));
+        }
+    }
+
+    /// Returns a line that sums up the islands that are left, if some are.
+    pub(super) fn text_of_left(&self) -> Option<String> {
+        let mut left = self.plans.iter().filter(|plan| plan.is_left());
+        let count = left.clone().count() as u64 + self.unlisted;
+        let first = left.next().map(|plan| {
+            let island = &plan.island;
+            let layer = self.scale.layer_text(island.layer);
+            format!(", the first in {layer} at {}", self.scale.point_text(island.centroid))
+        });
+        let are = if count == 1 { "island is" } else { "islands are" };
+        let first = first.unwrap_or_default();
+        (count > 0).then(|| {
+            format!(
+                "{count} {are} left floating{first}: allow more with --max-length or --max-tilt, \
+                 turn the part, or change it"
+            )
+        })
+    }
+
+    /// Writes the report.
+    pub(super) fn write(&self, part: &str, path: &Path) -> Result<(), Exit> {
+        let left = self.plans.iter().filter(|plan| plan.is_left()).count() as u64;
+        let head = json!({
+            "schema": "lamp-support-1",
+            "note": "supports stay in the mould and become features of the casting",
+            "part": part,
+            "islands": self.plans.len() as u64 + self.unlisted,
+            "left": left + self.unlisted,
+            "supports": self.supports().count(),
+            "volume_mm3": to_nm(self.volume_mm3()),
+        });
+        let islands = self.plans.iter().map(|plan| self.island_json(plan));
+        JsonReport::new(&head).list("plans", islands).write(path)
+    }
+
+    fn supports(&self) -> impl Iterator<Item = &Support> {
+        super::supports(self.plans)
+    }
+
+    fn volume_mm3(&self) -> f64 {
+        self.supports().map(Support::volume_mm3).sum()
+    }
+
+    /// Returns how hard the blade drags on what each support of an island holds, in millinewtons.
+    fn drag_mn(&self, plan: &IslandPlan) -> Option<f64> {
+        let drag = drag_mn(&plan.island, &self.scale, self.recoating)?;
+        Some(drag / plan.supports().count().max(1) as f64)
+    }
+
+    /// Returns a line for each place of an island.
+    fn lines<'b>(&'b self, plan: &'b IslandPlan) -> impl Iterator<Item = String> + 'b {
+        let drag = self.drag_mn(plan);
+        let drag = drag.map_or(String::new(), |mn| format!(", holds {} mN", significant(mn)));
+        let layer = self.scale.layer_text(plan.island.layer);
+        plan.places.iter().map(move |place| {
+            let [x, y, _] = place.origin_mm;
+            let at = format!("island {} in {layer} at x {x:.2}, y {y:.2} mm", plan.island.number);
+            let Some(support) = place.supports.first() else {
+                return format!("{at}: no way{}", causes(place));
+            };
+            let [x, y, z] = support.contact_mm;
+            format!(
+                "{at}: held {:.2} mm away at x {x:.2}, y {y:.2}, z {z:.2} mm, tilt {:.0} degrees, \
+                 {} mm3{drag}{}",
+                support.length().mm(),
+                support.tilt,
+                significant(support.volume_mm3()),
+                causes(place),
+            )
+        })
+    }
+
+    fn island_json(&self, plan: &IslandPlan) -> Value {
+        let island = &plan.island;
+        let drag = self.drag_mn(plan).map(to_nm);
+        let places: Vec<Value> = plan.places.iter().map(|place| place_json(place, drag)).collect();
+        json!({
+            "island": island.number,
+            "layer": self.scale.index(island.layer),
+            "z_mm": self.scale.z_mm(island.layer),
+            "at_mm": self.scale.point_mm(island.centroid),
+            "area_mm2": self.scale.area_mm2(island.area),
+            "drag_mn": drag_mn(island, &self.scale, self.recoating),
+            "left": plan.is_left(),
+            "places": places,
+        })
+    }
+}
+
+fn place_json(place: &HeldPlace, drag_mn: Option<f64>) -> Value {
+    let supports: Vec<Value> = place.supports.iter().map(|s| support_json(s, drag_mn)).collect();
+    let rejected =
+        place.rejected.iter().map(|(cause, count)| (cause.name().to_owned(), (*count).into()));
+    json!({
+        "at_mm": place.origin_mm.map(to_nm),
+        "area_px": place.area,
+        // The first is drawn, the others are alternatives.
+        "supports": supports,
+        "rejected": Value::Object(rejected.collect::<Map<String, Value>>()),
+    })
+}
+
+fn support_json(support: &Support, drag_mn: Option<f64>) -> Value {
+    let [from, to] = support.ends.map(|end| end.map(|place| to_nm(place.mm())));
+    json!({
+        "contact_mm": support.contact_mm.map(to_nm),
+        "length_mm": to_nm(support.length().mm()),
+        "tilt_degrees": to_nm(support.tilt),
+        "diameter_mm": to_nm(support.diameter.mm()),
+        "volume_mm3": to_nm(support.volume_mm3()),
+        "curvature_per_mm": to_nm(support.curvature),
+        "drag_mn": drag_mn,
+        "from_mm": from,
+        "to_mm": to,
+    })
+}
+
+/// Returns why directions failed: `; 12 too far, 3 near a crease`.
+fn causes(place: &HeldPlace) -> String {
+    let cause = |(cause, count): &(Rejection, u32)| {
+        let why = match cause {
+            Rejection::Far => "too far",
+            Rejection::Edge => "near a crease",
+            Rejection::Curved => "on a curve",
+            Rejection::Crossing => "beside another support",
+            Rejection::Blocked => "through other solid",
+            Rejection::Through => "out of the part again",
+            Rejection::Unsteady => "not steady",
+        };
+        format!("{count} {why}")
+    };
+    let causes: Vec<String> = place.rejected.iter().map(cause).collect();
+    if causes.is_empty() { String::new() } else { format!("; not {}", causes.join(", ")) }
+}

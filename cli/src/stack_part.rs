@@ -1,0 +1,55 @@
+//! The part that a stack was sliced from, opened again.
+
+use anyhow::anyhow;
+use lamp_slicer::Part;
+use lamp_stack::StackInfo;
+
+use crate::exit::Exit;
+use crate::part_arg::PartArg;
+use crate::part_options::{Reading, name_of_all};
+use crate::slicing_options::SlicingOptions;
+
+/// What a stack records of how its part was sliced.
+pub(crate) struct RecordedSlicing<'a> {
+    pub(crate) options: SlicingOptions,
+    /// The names of the part's files, with their placements.
+    files: &'a str,
+    digest: &'a str,
+}
+
+impl<'a> RecordedSlicing<'a> {
+    /// Returns `None` if a stack does not record it.
+    pub(crate) fn of(stack: Option<&'a StackInfo>) -> Option<Self> {
+        let stack = stack?;
+        let command = stack.commands.first()?;
+        let files = SlicingOptions::parts_of_command(command);
+        let options = SlicingOptions::of_command(command)?;
+        Some(Self { options, files, digest: &stack.digest })
+    }
+
+    /// Opens the part. `name` is the stack's.
+    ///
+    /// # Errors
+    /// Returns an error if the stack was not sliced from these files as they are and stand.
+    pub(crate) fn open(&self, parts: &[PartArg], name: &str) -> Result<Part, Exit> {
+        let reading = Reading { dpi: self.options.dpi, may_be_open: false, say: &|_| () };
+        let model = self.options.solid.open(parts, &reading)?;
+        if model.digest() != self.digest {
+            let part = name_of_all(parts);
+            return Err(Exit::Failed(anyhow!(
+                "{name} was not sliced from {part}, or the part has changed"
+            )));
+        }
+        // Names of files may have changed since, but not where the parts stand.
+        let given: Vec<_> = parts.iter().map(PartArg::recorded).collect();
+        if (self.files.contains('@') || parts.iter().any(|part| part.placement.is_some()))
+            && given.join(" ") != self.files
+        {
+            let files = self.files;
+            return Err(Exit::Failed(anyhow!(
+                "{name} was sliced from {files}: give --part with the same placements"
+            )));
+        }
+        Ok(model)
+    }
+}
