@@ -187,6 +187,7 @@ fn support(error: &SupportError) -> Option<String> {
         SupportError::NoResolution | SupportError::NoOrigin | SupportError::NoHeight { .. } => {
             "support the stack that slice or fix wrote"
         }
+        SupportError::TooMany => "give a wider --hold, or turn or change the part",
         SupportError::MissingLayers => "support it again once nothing writes to it",
         _ => return None,
     };

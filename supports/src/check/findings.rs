@@ -16,7 +16,7 @@ pub struct Region {
 
 impl Region {
     /// Grows the region to hold another one, too.
-    pub(super) fn unite(&mut self, other: &Self) {
+    pub(crate) fn unite(&mut self, other: &Self) {
         let both = |a: &Range<u32>, b: &Range<u32>| a.start.min(b.start)..a.end.max(b.end);
         self.columns = both(&self.columns, &other.columns);
         self.rows = both(&self.rows, &other.rows);

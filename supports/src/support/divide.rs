@@ -15,11 +15,15 @@ pub(super) struct Piece {
 }
 
 /// Divides an island by an even grid over its box into pieces up to `hold` pixels wide and high.
-/// Pieces of fewer than `least` pixels are left out, unless there is no other.
-pub(super) fn divided(runs: &Runs, hold: f64, least: f64) -> Vec<Piece> {
+/// Pieces of fewer than `least` pixels are left out, unless there is no other. Returns `None` if
+/// the grid has more than `most` cells.
+pub(super) fn divided(runs: &Runs, hold: f64, least: f64, most: usize) -> Option<Vec<Piece>> {
     let rows = bounds(runs.iter().map(|(row, _)| *row..row + 1));
     let columns = bounds(runs.iter().map(|(_, run)| run.clone()));
-    let (across, down) = (cells(&columns, hold), cells(&rows, hold));
+    let (across, down) = (cells(&columns, hold, most)?, cells(&rows, hold, most)?);
+    if across.len().saturating_mul(down.len()) > most {
+        return None;
+    }
     let within = |cell: (&Range<u32>, &Range<u32>)| -> Runs {
         let in_rows = runs.iter().filter(|(row, _)| cell.0.contains(row));
         let clipped =
@@ -29,23 +33,23 @@ pub(super) fn divided(runs: &Runs, hold: f64, least: f64) -> Vec<Piece> {
     let grid = down.iter().flat_map(|rows| across.iter().map(move |columns| (rows, columns)));
     let pieces: Vec<Piece> =
         grid.map(within).filter(|runs| !runs.is_empty()).map(|runs| piece(&runs)).collect();
-    if pieces.iter().any(|piece| piece.area as f64 >= least) {
-        pieces.into_iter().filter(|piece| piece.area as f64 >= least).collect()
-    } else {
-        vec![piece(runs)]
-    }
+    let is_large = |piece: &Piece| piece.area as f64 >= least;
+    Some(match pieces.iter().any(is_large) {
+        true => pieces.into_iter().filter(is_large).collect(),
+        false => vec![piece(runs)],
+    })
 }
 
 fn bounds(ranges: impl Iterator<Item = Range<u32>>) -> Range<u32> {
     ranges.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or_default()
 }
 
-/// Divides a range evenly into parts up to `hold` long.
-fn cells(range: &Range<u32>, hold: f64) -> Vec<Range<u32>> {
+/// Divides a range evenly into parts up to `hold` long, if they are not too many.
+fn cells(range: &Range<u32>, hold: f64, most: usize) -> Option<Vec<Range<u32>>> {
     let length = u64::from(range.end - range.start);
     let count = (length as f64 / hold).ceil().clamp(1.0, length.max(1) as f64) as u64;
     let at = |k: u64| range.start + (length * k / count) as u32;
-    (0..count).map(|k| at(k)..at(k + 1)).collect()
+    (count <= most as u64).then(|| (0..count).map(|k| at(k)..at(k + 1)).collect())
 }
 
 fn piece(runs: &Runs) -> Piece {
@@ -75,7 +79,7 @@ mod tests {
     #[test]
     fn a_ring_is_held_at_its_nearest_pixel() {
         let ring: Runs = vec![(3, 4..9), (4, 4..5), (4, 8..9), (5, 4..9)];
-        assert_eq!(divided(&ring, 9.0, 1.0), [Piece { area: 12, middle: [6.5, 3.5] }]);
+        assert_eq!(divided(&ring, 9.0, 1.0, 1), Some(vec![Piece { area: 12, middle: [6.5, 3.5] }]));
     }
 
     #[test]
@@ -83,16 +87,18 @@ mod tests {
         // An L: a bar of 12 x 2 pixels, and one of 2 x 7 below its left end.
         let mut runs: Runs = (0..2).map(|row| (row, 10..22)).collect();
         runs.extend((2..9).map(|row| (row, 10..12)));
-        let pieces = divided(&runs, 5.0, 1.0);
+        let divided = |hold, least| divided(&runs, hold, least, 108).unwrap();
+        let pieces = divided(5.0, 1.0);
         let places: Vec<_> = pieces.iter().map(|piece| (piece.area, piece.middle)).collect();
         assert_eq!(
             places,
             [(12, [35.0 / 3.0, 5.0 / 3.0]), (8, [16.0, 1.0]), (8, [20.0, 1.0]), (10, [11.0, 6.5])]
         );
         assert_eq!(pieces.iter().map(|piece| piece.area).sum::<u64>(), 38);
-        assert_eq!(divided(&runs, 5.0, 9.0).len(), 2);
-        assert_eq!(divided(&runs, 5.0, 99.0), [piece(&runs)]);
-        assert_eq!(divided(&runs, 1e9, 1.0).len(), 1);
-        assert_eq!(divided(&runs, 1e-9, 1.0).len(), 38);
+        assert_eq!(divided(5.0, 9.0).len(), 2);
+        assert_eq!(divided(5.0, 99.0), [piece(&runs)]);
+        assert_eq!(divided(1e9, 1.0).len(), 1);
+        assert_eq!(divided(1e-9, 1.0).len(), 38);
+        assert_eq!(super::divided(&runs, 1e-9, 1.0, 107), None);
     }
 }

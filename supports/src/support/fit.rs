@@ -18,6 +18,8 @@ pub(super) struct Surroundings<'a> {
     pub(super) layers: &'a [LayerFacts],
     /// The images below the island.
     pub(super) window: &'a Window,
+    /// The first layer that a support may reach.
+    pub(super) lowest: u32,
     /// The island's first layer, and its pixels there.
     pub(super) layer: u32,
     pub(super) island: &'a Runs,
@@ -40,7 +42,7 @@ impl Surroundings<'_> {
         let [low, high] = strut.heights();
         let mut below = Vec::new();
         let mut holds = false;
-        for number in self.window.first..self.layers.len() as u32 {
+        for number in self.lowest..self.layers.len() as u32 {
             let [bottom, thickness] = self.span_mm(number);
             let middle = Length::from_mm(bottom + thickness / 2.0);
             if middle > high {

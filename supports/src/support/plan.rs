@@ -32,6 +32,9 @@ pub enum SupportError {
         /// The layer's index.
         index: u32,
     },
+    /// There are more islands, or pieces of them, than anybody looks at.
+    #[error("the islands need more than {MOST_SUPPORTS} supports")]
+    TooMany,
     /// The layers are not those that were checked.
     #[error("the stack has fewer layers than when it was checked")]
     MissingLayers,
@@ -51,27 +54,31 @@ pub fn plan_supports<E: From<SupportError>>(
     let mut planner = Planner::new(found, surface, options)?;
     let mut islands: Vec<&Island> = found.islands.list.iter().collect();
     islands.sort_by_key(|island| island.number);
-    let mut pending: Vec<(&Island, Window)> =
-        islands.into_iter().map(|island| (island, planner.window(island))).collect();
-    let mut plans = Vec::new();
+    if islands.len() > MOST_SUPPORTS {
+        return Err(SupportError::TooMany.into());
+    }
+    let regions = planner.regions(&islands);
+    let (mut window, mut plans) = (Window::default(), Vec::new());
     for (number, layer) in (0..).zip(layers) {
-        if pending.is_empty() {
-            break;
-        }
+        let Some(next) = islands.get(plans.len()) else { break };
         let mask = match layer?.image.into_image() {
             Image::Mask(mask) => mask,
             Image::Gray(gray) => gray.at_least(options.threshold.get()),
         };
-        let born = pending.iter().take_while(|(island, _)| island.layer == number).count();
-        for (island, window) in pending.drain(..born) {
-            plans.push(planner.plan(island, &window, &mask));
+        window.forget_below(planner.lowest(next).saturating_sub(1));
+        for island in &islands[plans.len()..] {
+            if island.layer != number {
+                break;
+            }
+            plans.push(planner.plan(island, &window, &mask)?);
         }
-        for (_, window) in pending.iter_mut().filter(|(_, window)| window.end() == number) {
-            window.push(&mask);
-        }
+        window.push(&mask, regions[number as usize].as_ref());
     }
-    if pending.is_empty() { Ok(plans) } else { Err(SupportError::MissingLayers.into()) }
+    if plans.len() == islands.len() { Ok(plans) } else { Err(SupportError::MissingLayers.into()) }
 }
+
+/// The most supports of a stack. Drawing takes time for each, and a person looks at each.
+const MOST_SUPPORTS: usize = 10_000;
 
 /// How many radii a strut reaches beyond its contacts at most, where it hardly meets them.
 const MOST_RADII: f64 = 4.0;
@@ -117,44 +124,70 @@ impl<'a> Planner<'a> {
         [length * sin + radius, length + radius]
     }
 
-    /// Returns the window to fill for an island.
-    fn window(&self, island: &Island) -> Window {
-        let [aside, down] = self.reach_mm();
+    /// Returns the first layer that supports of an island may reach.
+    fn lowest(&self, island: &Island) -> u32 {
+        let [_, down] = self.reach_mm();
+        let lowest = self.bottom_mm(island.layer) - down;
+        let layers = &self.found.layers[..island.layer as usize];
+        let above =
+            layers.iter().rposition(|layer| span_mm(layer).is_some_and(|[z, _]| z < lowest));
+        above.unwrap_or(0) as u32
+    }
+
+    /// Returns what supports may reach in each layer, and what they rest on.
+    fn regions(&self, islands: &[&Island]) -> Vec<Option<Region>> {
+        let [aside, _] = self.reach_mm();
         let by = self.raster.pixels(Length::from_mm(aside));
         let grown = |range: &Range<u32>, size: u32| {
             range.start.saturating_sub(by)..range.end.saturating_add(by).min(size)
         };
         let [width, height] = self.raster.size;
-        let lowest = self.bottom_mm(island.layer) - down;
-        let layers = &self.found.layers[..island.layer as usize];
-        let above =
-            layers.iter().rposition(|layer| span_mm(layer).is_some_and(|[z, _]| z < lowest));
-        // What rests on the window's first layer is not asked for.
-        let first = above.map_or(0, |k| (k as u32).saturating_sub(1));
-        Window::new(grown(&island.region.columns, width), grown(&island.region.rows, height), first)
+        let mut regions: Vec<Option<Region>> = vec![None; self.found.layers.len()];
+        for island in islands {
+            let Region { columns, rows } = &island.region;
+            let reached = Region { columns: grown(columns, width), rows: grown(rows, height) };
+            let layers = self.lowest(island).saturating_sub(1)..island.layer;
+            for layer in &mut regions[layers.start as usize..layers.end as usize] {
+                match layer {
+                    Some(region) => region.unite(&reached),
+                    none => *none = Some(reached.clone()),
+                }
+            }
+        }
+        regions
     }
 
-    fn plan(&mut self, island: &Island, window: &Window, mask: &Mask) -> IslandPlan {
+    /// Plans the supports of an island, given its first layer's image and those below.
+    fn plan(
+        &mut self,
+        island: &Island,
+        window: &Window,
+        mask: &Mask,
+    ) -> Result<IslandPlan, SupportError> {
         let [column, row] = island.first;
         let runs = component_at(mask, column, row);
         let surroundings = Surroundings {
             raster: self.raster,
             layers: &self.found.layers,
             window,
+            lowest: self.lowest(island),
             layer: island.layer,
             island: &runs,
         };
         let near = self.near(island);
         let [hold, radius] =
             [self.options.hold, self.options.radius].map(|length| length.pixels(self.raster.dpi));
+        let most = MOST_SUPPORTS - self.built.len();
+        let pieces =
+            divided(&runs, hold, PI * radius * radius, most).ok_or(SupportError::TooMany)?;
         let mut places = Vec::new();
-        for piece in divided(&runs, hold, PI * radius * radius) {
+        for piece in pieces {
             let place = self.place(&piece, &near, &surroundings);
             let support = place.supports.first();
             self.built.extend(support.map(|support| [support.origin_mm, support.contact_mm]));
             places.push(place);
         }
-        IslandPlan { island: island.clone(), places }
+        Ok(IslandPlan { island: island.clone(), places })
     }
 
     /// Returns the surface that supports of an island may meet.

@@ -175,12 +175,15 @@ fn lengths_of_one(plan: &IslandPlan) -> f64 {
 }
 
 #[test]
-fn what_the_pages_lack_is_said() {
-    let mut part = checked(needle(2_000), 127.0);
-    let error = |part: &Checked| {
+fn what_the_pages_lack_and_too_many_places_are_errors() {
+    let mut part = checked(ring(2_000), 127.0);
+    let error_with = |part: &Checked, options: &SupportOptions| {
         let layers = part.layers.iter().cloned().map(Ok::<_, SupportError>);
-        plan_supports(layers, &part.found, &part.surface, &SupportOptions::default()).unwrap_err()
+        plan_supports(layers, &part.found, &part.surface, options).unwrap_err()
     };
+    let narrow = SupportOptions { hold: Length::from_um(1.0), ..SupportOptions::default() };
+    assert_eq!(error_with(&part, &narrow), SupportError::TooMany);
+    let error = |part: &Checked| error_with(part, &SupportOptions::default());
     part.layers.truncate(9);
     assert_eq!(error(&part), SupportError::MissingLayers);
     part.found.layers[7].z_um = None;

@@ -1,8 +1,11 @@
-//! The images around an island and below it.
+//! The images below islands.
 
+use std::collections::VecDeque;
 use std::ops::Range;
 
 use lamp_stack::{Dpi, Frame, Length, Mask, Strut, white_runs};
+
+use crate::check::Region;
 
 /// How the pixels of a stack lie in the part.
 #[derive(Clone, Copy, Debug)]
@@ -32,53 +35,56 @@ impl Raster {
     }
 }
 
-/// Layers below an island, cropped.
-#[derive(Clone, Debug)]
+/// The images below islands, cropped to what supports may reach.
+#[derive(Debug, Default)]
 pub(super) struct Window {
-    columns: Range<u32>,
-    rows: Range<u32>,
-    /// The number of the first layer.
-    pub(super) first: u32,
-    masks: Vec<Mask>,
+    /// The number of the first layer that is kept.
+    first: u32,
+    kept: VecDeque<Cropped>,
+}
+
+#[derive(Debug)]
+struct Cropped {
+    region: Region,
+    mask: Mask,
 }
 
 impl Window {
-    pub(super) fn new(columns: Range<u32>, rows: Range<u32>, first: u32) -> Self {
-        Self { columns, rows, first, masks: Vec::new() }
+    /// Adds the next layer, or nothing of it.
+    pub(super) fn push(&mut self, mask: &Mask, region: Option<&Region>) {
+        let nothing = Region { columns: 0..0, rows: 0..0 };
+        let region = region.cloned().unwrap_or(nothing);
+        let mask = mask.framed(Frame {
+            left: region.columns.start.into(),
+            top: region.rows.start.into(),
+            width: region.columns.len() as u32,
+            height: region.rows.len() as u32,
+        });
+        self.kept.push_back(Cropped { region, mask });
     }
 
-    /// Adds the next layer.
-    pub(super) fn push(&mut self, mask: &Mask) {
-        self.masks.push(mask.framed(Frame {
-            left: self.columns.start.into(),
-            top: self.rows.start.into(),
-            width: self.columns.len() as u32,
-            height: self.rows.len() as u32,
-        }));
+    /// Forgets the layers below one.
+    pub(super) fn forget_below(&mut self, layer: u32) {
+        while self.first < layer && self.kept.pop_front().is_some() {
+            self.first += 1;
+        }
     }
 
-    /// Returns the number of the next layer to add.
-    pub(super) fn end(&self) -> u32 {
-        self.first + self.masks.len() as u32
-    }
-
-    /// Returns the white runs of a layer within a run of a row. What is not in the window is
-    /// black.
+    /// Returns the white runs of a layer within a run of a row. What is not kept is black.
     pub(super) fn white_in(
         &self,
         layer: u32,
         row: u32,
         run: &Range<u32>,
     ) -> impl Iterator<Item = Range<u32>> + use<'_> {
-        let (run, left) = (run.clone(), self.columns.start);
-        let mask = layer.checked_sub(self.first).and_then(|k| self.masks.get(k as usize));
-        let runs = mask
-            .filter(|_| self.rows.contains(&row))
-            .map(|mask| white_runs(mask.row(row - self.rows.start), mask.width()));
-        let clipped = runs
-            .into_iter()
-            .flatten()
-            .map(move |(start, end)| run.start.max(left + start)..run.end.min(left + end));
+        let run = run.clone();
+        let cropped = layer.checked_sub(self.first).and_then(|k| self.kept.get(k as usize));
+        let cropped = cropped.filter(|cropped| cropped.region.rows.contains(&row));
+        let clipped = cropped.into_iter().flat_map(move |Cropped { region, mask }| {
+            let (run, left) = (run.clone(), region.columns.start);
+            let runs = white_runs(mask.row(row - region.rows.start), mask.width());
+            runs.map(move |(start, end)| run.start.max(left + start)..run.end.min(left + end))
+        });
         clipped.filter(|run| !run.is_empty())
     }
 }

@@ -3,11 +3,10 @@
 mod plan_file;
 mod report;
 mod solid;
+mod units;
 
-use std::fmt;
 use std::num::{NonZeroU8, NonZeroU32};
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
@@ -36,6 +35,7 @@ use crate::streams::{
 
 use plan_file::plan_text;
 use report::SupportReport;
+use units::{Curvature, Degrees};
 
 /// The heading of options that choose supports.
 const CHOICE: &str = "Choice of supports";
@@ -267,8 +267,9 @@ fn moved(first: &PageInfo) -> Option<&'static str> {
     }
     let edits = commands.iter().filter_map(|command| command.strip_prefix("edit "));
     let edits = edits.filter_map(|list| serde_json::from_str::<Vec<Value>>(list).ok()).flatten();
-    let turns = |edit: Value| ["rotate", "mirror"].iter().any(|key| edit.get(key).is_some());
-    edits.map(turns).any(|turns| turns).then_some("was turned by lamp edit")
+    let turns = |edit: &Value| ["rotate", "mirror"].iter().any(|key| edit.get(key).is_some());
+    let mut turned = edits.filter(turns);
+    turned.next().map(|_| "was turned by lamp edit")
 }
 
 /// Writes the stack with the supports, as `lamp edit` draws their plan.
@@ -287,66 +288,9 @@ fn draw(
     write_layers(layers, &args.output, progress)
 }
 
-/// An angle of a support.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Degrees(f64);
-
-impl fmt::Display for Degrees {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}deg", self.0)
-    }
-}
-
-impl FromStr for Degrees {
-    type Err = String;
-
-    /// Parses `45deg` or `45`.
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.trim_end_matches("deg").trim_end().parse() {
-            Ok(degrees) if (0.0..=80.0).contains(&degrees) => Ok(Self(degrees)),
-            _ => Err(format!("`{text}` is no tilt: write an angle from 0deg to 80deg")),
-        }
-    }
-}
-
-/// A curvature in 1/mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Curvature(f64);
-
-impl fmt::Display for Curvature {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/mm", self.0)
-    }
-}
-
-impl FromStr for Curvature {
-    type Err = String;
-
-    /// Parses `1/mm`.
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.strip_suffix("/mm").and_then(|number| number.trim_end().parse().ok()) {
-            Some(number) if (0.0..f64::INFINITY).contains(&number) => Ok(Self(number)),
-            _ => Err(format!("`{text}` is no curvature: write 1/mm for a radius of 1 mm")),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn angles_and_curvatures_have_units() {
-        assert_eq!("45deg".parse(), Ok(Degrees(45.0)));
-        assert_eq!("0".parse(), Ok(Degrees(0.0)));
-        assert_eq!("0.5/mm".parse(), Ok(Curvature(0.5)));
-        for wrong in ["", "nan", "-1deg", "90", "45rad"] {
-            assert!(wrong.parse::<Degrees>().is_err(), "{wrong}");
-        }
-        for wrong in ["", "1", "nan/mm", "-1/mm", "inf/mm", "1/in"] {
-            assert!(wrong.parse::<Curvature>().is_err(), "{wrong}");
-        }
-    }
 
     #[test]
     fn stacks_that_moved_are_told() {

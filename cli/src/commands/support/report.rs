@@ -12,7 +12,7 @@ use crate::height_options::significant;
 use crate::json_report::{JsonReport, to_nm};
 use crate::progress::Progress;
 
-/// The most lines that are printed, unless all are asked for.
+/// The most islands that are printed, unless all are asked for.
 const MOST_LINES: usize = 20;
 
 /// The plans for the islands of a stack.
@@ -54,12 +54,19 @@ impl<'a> SupportReport<'a> {
         } else if self.plans.is_empty() {
             progress.say("there are no islands, and the layers stay as they are");
         }
-        let lines: Vec<String> = self.plans.iter().flat_map(|plan| self.lines(plan)).collect();
-        let (first, more) = lines.split_at(lines.len().min(MOST_LINES));
-        first.iter().for_each(|line| progress.say(line));
-        more.iter().for_each(|line| progress.detail(line));
-        if !more.is_empty() && !progress.is_verbose() {
-            progress.say(&format!("{} more (--verbose or --report lists them)", more.len()));
+        for (number, plan) in self.plans.iter().enumerate() {
+            let line = self.line(plan);
+            if number < MOST_LINES {
+                progress.say(&line);
+            } else {
+                progress.detail(&line);
+            }
+            let places = plan.places.iter().filter(|_| plan.places.len() > 1);
+            places.for_each(|place| progress.detail(&place_line(place)));
+        }
+        let more = self.plans.len().saturating_sub(MOST_LINES);
+        if more > 0 && !progress.is_verbose() {
+            progress.say(&format!("{more} more islands (--verbose or --report lists them)"));
         }
     }
 
@@ -112,27 +119,27 @@ impl<'a> SupportReport<'a> {
         Some(drag / plan.supports().count().max(1) as f64)
     }
 
-    /// Returns a line for each place of an island.
-    fn lines<'b>(&'b self, plan: &'b IslandPlan) -> impl Iterator<Item = String> + 'b {
-        let drag = self.drag_mn(plan);
-        let drag = drag.map_or(String::new(), |mn| format!(", holds {} mN", significant(mn)));
-        let layer = self.scale.layer_text(plan.island.layer);
-        plan.places.iter().map(move |place| {
-            let [x, y, _] = place.origin_mm;
-            let at = format!("island {} in {layer} at x {x:.2}, y {y:.2} mm", plan.island.number);
-            let Some(support) = place.supports.first() else {
-                return format!("{at}: no way{}", causes(place));
-            };
-            let [x, y, z] = support.contact_mm;
-            format!(
-                "{at}: held {:.2} mm away at x {x:.2}, y {y:.2}, z {z:.2} mm, tilt {:.0} degrees, \
-                 {} mm3{drag}{}",
-                support.length().mm(),
-                support.tilt,
-                significant(support.volume_mm3()),
-                causes(place),
-            )
-        })
+    fn line(&self, plan: &IslandPlan) -> String {
+        let island = &plan.island;
+        let (layer, at) =
+            (self.scale.layer_text(island.layer), self.scale.point_text(island.centroid));
+        let start = format!("island {} in {layer} at {at}: ", island.number);
+        if let [place] = &plan.places[..] {
+            return start + &held(place, self.drag_mn(plan));
+        }
+        let (held, all) = (plan.supports().count(), plan.places.len());
+        if held == 0 {
+            return format!("{start}no way from any of {all} places{}", causes(&plan.places));
+        }
+        let lengths = || plan.supports().map(|support| support.length().mm());
+        format!(
+            "{start}held in {held} of {all} places, {:.2} to {:.2} mm away, {} mm3{}{}",
+            lengths().fold(f64::INFINITY, f64::min),
+            lengths().fold(0.0, f64::max),
+            significant(plan.supports().map(Support::volume_mm3).sum()),
+            drag_text(self.drag_mn(plan), ", each holds"),
+            causes(&plan.places),
+        )
     }
 
     fn island_json(&self, plan: &IslandPlan) -> Value {
@@ -180,20 +187,46 @@ fn support_json(support: &Support, drag_mn: Option<f64>) -> Value {
     })
 }
 
-/// Returns why directions failed: `; 12 too far, 3 near a crease`.
-fn causes(place: &HeldPlace) -> String {
-    let cause = |(cause, count): &(Rejection, u32)| {
-        let why = match cause {
-            Rejection::Far => "too far",
-            Rejection::Edge => "near a crease",
-            Rejection::Curved => "on a curve",
-            Rejection::Crossing => "beside another support",
-            Rejection::Blocked => "through other solid",
-            Rejection::Through => "out of the part again",
-            Rejection::Unsteady => "not steady",
-        };
-        format!("{count} {why}")
+fn place_line(place: &HeldPlace) -> String {
+    let [x, y, _] = place.origin_mm;
+    format!("  at x {x:.2}, y {y:.2} mm: {}", held(place, None))
+}
+
+/// Returns how a place is held.
+fn held(place: &HeldPlace, drag_mn: Option<f64>) -> String {
+    let causes = causes(std::slice::from_ref(place));
+    let Some(support) = place.supports.first() else { return format!("no way{causes}") };
+    let [x, y, z] = support.contact_mm;
+    format!(
+        "held {:.2} mm away at x {x:.2}, y {y:.2}, z {z:.2} mm, tilt {:.0} degrees, {} mm3{}{causes}",
+        support.length().mm(),
+        support.tilt,
+        significant(support.volume_mm3()),
+        drag_text(drag_mn, ", holds"),
+    )
+}
+
+fn drag_text(drag_mn: Option<f64>, holds: &str) -> String {
+    drag_mn.map_or(String::new(), |mn| format!("{holds} {} mN", significant(mn)))
+}
+
+/// Returns why directions failed: `; rejected: 12 too far, 3 near a crease`.
+fn causes(places: &[HeldPlace]) -> String {
+    let words = |cause: Rejection| match cause {
+        Rejection::Far => "too far",
+        Rejection::Edge => "near a crease",
+        Rejection::Curved => "on a curve",
+        Rejection::Crossing => "beside another support",
+        Rejection::Blocked => "through other solid",
+        Rejection::Through => "out of the part again",
+        Rejection::Unsteady => "not steady",
     };
-    let causes: Vec<String> = place.rejected.iter().map(cause).collect();
-    if causes.is_empty() { String::new() } else { format!("; not {}", causes.join(", ")) }
+    let rejected = || places.iter().flat_map(|place| &place.rejected);
+    let causes = Rejection::ALL.iter().filter_map(|&cause| {
+        let counts = rejected().filter(|(other, _)| *other == cause).map(|(_, count)| count);
+        let count: u32 = counts.sum();
+        (count > 0).then(|| format!("{count} {}", words(cause)))
+    });
+    let causes: Vec<String> = causes.collect();
+    if causes.is_empty() { String::new() } else { format!("; rejected: {}", causes.join(", ")) }
 }

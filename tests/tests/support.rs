@@ -1,0 +1,212 @@
+//! Checks that `lamp support` holds islands, and that its plan draws the same supports.
+
+use lamp_fixtures::Sample;
+use lamp_stack::Image;
+use lamp_tests::{Scratch, mask};
+use serde_json::Value;
+
+/// Cores that hang in a mould's cavity: 10 x 6 mm at 8 mm, and 4 x 6 mm at 12 mm.
+fn with_cores() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("core.stl", Sample::Core, 2_000);
+    scratch.run("slice core.stl --dpi 254 -q -o core.tif").succeeds_quietly();
+    scratch
+}
+
+fn report(scratch: &Scratch, name: &str) -> Value {
+    serde_json::from_slice(&scratch.bytes(name)).expect("a report is JSON")
+}
+
+/// Returns the lengths of the supports to draw, island by island.
+fn lengths(report: &Value) -> Vec<Vec<f64>> {
+    let of_plan = |plan: &Value| {
+        let places = plan["places"].as_array().unwrap().iter();
+        places.filter_map(|place| place["supports"][0]["length_mm"].as_f64()).collect()
+    };
+    report["plans"].as_array().unwrap().iter().map(of_plan).collect()
+}
+
+fn islands(scratch: &Scratch, stack: &str) -> Vec<u64> {
+    let line = format!("lamp check {stack} --only islands --report check.json");
+    scratch.run(&line).succeeds();
+    let report = report(scratch, "check.json");
+    let findings = report["findings"].as_array().unwrap().iter();
+    findings.map(|finding| finding["layer"].as_u64().unwrap()).collect()
+}
+
+#[test]
+fn supports_hold_islands_and_their_plan_draws_the_same() {
+    let scratch = with_cores();
+    assert_eq!(islands(&scratch, "core.tif"), [80, 120]);
+    let line = "lamp support core.tif --part core.stl --hold 20mm --plan plan.toml --stl struts.stl \
+                --report report.json -o held.tif";
+    let ran = scratch.run(line).succeeds();
+    let first = ran.stderr.lines().next().unwrap();
+    assert!(
+        first.contains("2 supports stay in the mould and become features of the casting"),
+        "{first}"
+    );
+    assert!(islands(&scratch, "held.tif").is_empty());
+
+    // Delete nothing, and the edits are the supports.
+    scratch.run("lamp edit core.tif plan.toml -q -o edited.tif").succeeds_quietly();
+    assert!(scratch.bytes("edited.tif") == scratch.bytes("held.tif"));
+    // The other core hangs again without the edit for it.
+    let plan = String::from_utf8(scratch.bytes("plan.toml")).unwrap();
+    let (first, _) = plan.split_once("# Island 2").unwrap();
+    scratch.write("one.toml", first.as_bytes());
+    scratch.run("lamp edit core.tif one.toml -q -o one.tif").succeeds_quietly();
+    assert_eq!(islands(&scratch, "one.tif"), [120]);
+    // Any alternative holds, too.
+    for number in [1, 2] {
+        let taken = |island: &str| {
+            let lines = island.lines().filter(|line| line.contains("strut = "));
+            let line = lines.map(|line| line.trim_start_matches("# ")).nth(number).unwrap();
+            format!("[[edit]]\n{line}\n")
+        };
+        let other: String = plan.split("# Island").skip(1).map(taken).collect();
+        scratch.write("other.toml", other.as_bytes());
+        scratch.run("lamp edit core.tif other.toml -q -o other.tif").succeeds_quietly();
+        assert!(islands(&scratch, "other.tif").is_empty(), "{other}");
+    }
+
+    let report = report(&scratch, "report.json");
+    assert_eq!((&report["islands"], &report["left"]), (&2.into(), &0.into()));
+    assert!(report["note"].as_str().unwrap().contains("features of the casting"));
+    let [one, other] = &lengths(&report)[..] else { panic!("two islands") };
+    // The floor is 6 mm below the one, a wall 4 mm beside the other.
+    assert_eq!(one, &[6.0]);
+    assert!((other[0] / 32f64.sqrt() - 1.0).abs() < 0.01, "{other:?}");
+    let support = &report["plans"][0]["places"][0]["supports"][0];
+    // 98 Pa at most on 60 mm2 (002 section 4.2.2).
+    assert!((support["drag_mn"].as_f64().unwrap() / 5.85 - 1.0).abs() < 0.01);
+    assert_eq!(support["contact_mm"], serde_json::json!([3.0, 0.0, 2.0]));
+
+    // The STL holds the same solids: what it covers is the difference of the stacks.
+    let layer = scratch.layers("core.tif").remove(0);
+    let (origin, image) = (layer.info.origin_mm.unwrap(), layer.image);
+    let slice = format!(
+        "slice struts.stl --dpi 254 --plane middle --origin {},{} --size {}x{}mm -q -o struts.tif",
+        origin[0],
+        origin[1],
+        f64::from(image.width()) / 10.0,
+        f64::from(image.height()) / 10.0
+    );
+    scratch.run(&slice).succeeds_quietly();
+    let white = |layers: &str| -> i64 {
+        scratch.layers(layers).iter().map(|layer| mask(layer).white_pixels() as i64).sum()
+    };
+    let added = white("held.tif") - white("core.tif");
+    // What reaches into cores and walls is white before: 0.5 mm of 11.7 mm.
+    let share = added as f64 / white("struts.tif") as f64;
+    assert!(share > 0.9 && share < 1.0, "{share}");
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads_and_from_a_pipe() {
+    let scratch = with_cores();
+    for threads in [1, 3] {
+        let line = format!(
+            "lamp support core.tif --part core.stl --threads {threads} --plan plan{threads}.toml -q -o held{threads}.tif"
+        );
+        scratch.run(&line).succeeds_quietly();
+    }
+    assert!(scratch.bytes("plan1.toml") == scratch.bytes("plan3.toml"));
+    assert!(scratch.bytes("held1.tif") == scratch.bytes("held3.tif"));
+    scratch
+        .run("slice core.stl --dpi 254 -q | lamp support --part core.stl -q > piped.tif")
+        .succeeds_quietly();
+    assert!(scratch.bytes("piped.tif") == scratch.bytes("held1.tif"));
+    assert!(islands(&scratch, "piped.tif").is_empty());
+    // Without islands nothing changes.
+    scratch.run("lamp support held1.tif --part core.stl -o again.tif").succeeds();
+    assert!(scratch.bytes("again.tif") == scratch.bytes("held1.tif"));
+}
+
+#[test]
+fn the_blade_upside_down_is_held_as_short_as_can_be() {
+    let scratch = Scratch::new();
+    scratch.part("blade.stl", Sample::Blade, 100_000);
+    scratch
+        .run("slice blade.stl --rotate x:180 --dpi 200 --layers 0..320 -q -o blade.tif")
+        .succeeds_quietly();
+    let held = |tilt: &str| {
+        let line = format!(
+            "lamp support blade.tif --part blade.stl --hold 50mm --max-tilt {tilt} --report report.json -q -o held.tif"
+        );
+        scratch.run(&line).succeeds_quietly();
+        let report = report(&scratch, "report.json");
+        let layers: Vec<_> =
+            (0..2).map(|k| report["plans"][k]["layer"].as_u64().unwrap()).collect();
+        assert_eq!(layers, [80, 150]);
+        assert!(islands(&scratch, "held.tif").is_empty());
+        let lengths = lengths(&report);
+        (lengths[0][0], lengths[1][0])
+    };
+    let [down, usual, far] = ["0deg", "45deg", "60deg"].map(held);
+    for (length, _) in [down, usual, far] {
+        assert!((length - 2.0).abs() < 1e-6, "{length}");
+    }
+    assert!(
+        (down.1 - 9.0).abs() < 1e-6 && usual.1 < 8.35 && far.1 < 6.95,
+        "{down:?} {usual:?} {far:?}"
+    );
+}
+
+#[test]
+fn islands_without_a_way_are_left_and_told() {
+    let scratch = Scratch::new();
+    scratch.part("needle.stl", Sample::Needle, 1_000);
+    scratch.run("slice needle.stl --dpi 254 -q -o needle.tif").succeeds_quietly();
+    let line = "lamp support needle.tif --part needle.stl --plan plan.toml --report report.json";
+    let ran = scratch.run(&format!("{line} -o held.tif")).succeeds();
+    assert!(
+        ran.stderr.contains("1 island is left floating, the first in layer 102"),
+        "{}",
+        ran.stderr
+    );
+    assert!(ran.stderr.contains("rejected: 400 too far"), "{}", ran.stderr);
+    let images = |name: &str| -> Vec<Image> {
+        scratch.layers(name).into_iter().map(|layer| layer.image.into_image()).collect()
+    };
+    assert!(images("held.tif") == images("needle.tif"));
+    assert_eq!(report(&scratch, "report.json")["left"], 1);
+
+    let strict = scratch.run(&format!("{line} --strict -o strict.tif"));
+    assert_eq!(strict.statuses, [Some(3)], "{strict:?}");
+    assert!(!scratch.names().contains(&"strict.tif".to_owned()));
+    let far =
+        scratch.run(&format!("{line} --max-length 20mm --max-tilt 60deg --strict -q -o far.tif"));
+    far.succeeds_quietly();
+    assert!(islands(&scratch, "far.tif").is_empty());
+}
+
+#[test]
+fn the_part_must_be_that_of_the_stack() {
+    let scratch = with_cores();
+    scratch.part("mug.stl", Sample::Mug, 2_000);
+    scratch.write("edits.toml", b"[[edit]]\nrotate = 180\n");
+    scratch.run("lamp edit core.tif edits.toml -q -o turned.tif").succeeds_quietly();
+    scratch.run("tile core.tif --area 2x2in -q -o build.tif").succeeds_quietly();
+    for (line, words) in [
+        ("lamp support core.tif --part mug.stl", "core.tif was not sliced from mug.stl"),
+        ("lamp support core.tif --part core.stl@1,0", "give --part with the same placements"),
+        ("lamp support turned.tif --part core.stl", "was turned by lamp edit"),
+        ("lamp support build.tif --part core.stl", "is a build"),
+        ("lamp support core.stl --part core.stl", "slice it first"),
+        ("lamp support core.tif --part absent.stl", "absent.stl"),
+    ] {
+        scratch.run(&format!("{line} -o out.tif")).is_refused_with(&[words]);
+    }
+    for (line, words) in [
+        ("core.tif --part core.stl --plan core.tif -o out.tif", "that is an input"),
+        ("core.tif --part core.stl -o core.stl", "that is an input"),
+        ("- --part - -o out.tif", "standard input"),
+        ("core.tif --part core.stl --max-tilt 90deg -o out.tif", "no tilt"),
+        ("core.tif --part core.stl --stl struts.tif -o out.tif", "end in .stl"),
+        ("core.tif -o out.tif", "--part"),
+    ] {
+        scratch.run(&format!("lamp support {line}")).is_wrong_usage(&[words]);
+    }
+    assert!(!scratch.names().contains(&"out.tif".to_owned()));
+}
