@@ -176,7 +176,7 @@ fn lengths_of_one(plan: &IslandPlan) -> f64 {
 
 #[test]
 fn what_the_pages_lack_and_too_many_places_are_errors() {
-    let mut part = checked(ring(2_000), 127.0);
+    let mut part = checked(ring(2_000), 254.0);
     let error_with = |part: &Checked, options: &SupportOptions| {
         let layers = part.layers.iter().cloned().map(Ok::<_, SupportError>);
         plan_supports(layers, &part.found, &part.surface, options).unwrap_err()
