@@ -38,7 +38,7 @@ const FORM: &str = "{about-with-newline}\n{usage-heading} {usage}{after-help}\n\
 const FEW: usize = 3;
 
 /// The options that `-h` shows, of the commands that have many.
-const USUAL: [(&str, &[&str]); 4] = [
+const USUAL: [(&str, &[&str]); 5] = [
     (
         "slice",
         &[
@@ -67,6 +67,10 @@ const USUAL: [(&str, &[&str]); 4] = [
             "thickness",
             "rotate",
         ],
+    ),
+    (
+        "support",
+        &["part", "plan", "stl", "report", "max_tilt", "max_length", "hold", "strict", "output"],
     ),
     ("heights", &["report", "plot", "uniform", "min", "max", "deviation", "cusp", "material"]),
 ];

@@ -16,6 +16,29 @@ pub(super) fn directions(count: u32, max_tilt: f64) -> Vec<[f64; 3]> {
     (0..count).map(direction).collect()
 }
 
+/// Returns the directions that lie beside one by an angle in radians, each a sixth of a turn from
+/// the next; those beyond the cone are tilted by `max_tilt` degrees instead.
+pub(super) fn beside(direction: [f64; 3], angle: f64, max_tilt: f64) -> [[f64; 3]; 6] {
+    let [x, y, z] = direction;
+    // Across, level: any will do straight down.
+    let level = x.hypot(y);
+    let (turn_x, turn_y) = if level > 1e-9 { (x / level, y / level) } else { (1.0, 0.0) };
+    let [across, up] = [[-turn_y, turn_x, 0.0], [z * turn_x, z * turn_y, -level]];
+    [0, 1, 2, 3, 4, 5].map(|sixth| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(sixth) / 6.0).sin_cos();
+        let turned = [0, 1, 2]
+            .map(|k| direction[k] * angle.cos() + (across[k] * cos + up[k] * sin) * angle.sin());
+        within(turned, max_tilt)
+    })
+}
+
+/// Returns a direction, turned into the cone if it lies beyond.
+fn within([x, y, z]: [f64; 3], max_tilt: f64) -> [f64; 3] {
+    let (sin, cos) = max_tilt.to_radians().sin_cos();
+    let level = x.hypot(y);
+    if -z >= cos || level == 0.0 { [x, y, z] } else { [x / level * sin, y / level * sin, -cos] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -38,5 +61,19 @@ mod tests {
             assert!(degrees < 4.0, "{tilt} {turn}: {degrees}");
         }
         assert_eq!(directions(1, 30.0).len(), 1);
+    }
+
+    #[test]
+    fn directions_beside_one_stay_in_the_cone() {
+        for direction in directions(50, 45.0) {
+            for turned in beside(direction, 0.05, 45.0) {
+                let dot = |b: [f64; 3]| (0..3).map(|k| turned[k] * b[k]).sum::<f64>();
+                assert!((dot(turned) - 1.0).abs() < 1e-12);
+                assert!(-turned[2] >= 45f64.to_radians().cos() - 1e-12);
+                assert!(dot(direction).acos() < 0.0501);
+                let is_inside = -direction[2] > 42f64.to_radians().cos();
+                assert!(!is_inside || (dot(direction).acos() - 0.05).abs() < 1e-9);
+            }
+        }
     }
 }

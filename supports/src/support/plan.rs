@@ -1,5 +1,6 @@
 //! Plans the supports of all islands of a stack in one pass over its layers.
 
+use std::cmp::Ordering;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -8,7 +9,7 @@ use lamp_stack::{Image, Layer, Length, Mask};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::cone::directions;
+use super::cone::{beside, directions};
 use super::divide::{Piece, divided};
 use super::fit::{Surroundings, distance_mm, span_mm};
 use super::surface::{Contact, NearSurface, Surface};
@@ -82,6 +83,9 @@ const MOST_SUPPORTS: usize = 10_000;
 
 /// How many radii a strut reaches beyond its contacts at most, where it hardly meets them.
 const MOST_RADII: f64 = 4.0;
+
+/// The least angle by which supports are turned to make them shorter: some 4 um at 10 mm.
+const LEAST_STEP: f64 = 4e-4;
 
 struct Planner<'a> {
     found: &'a Findings,
@@ -216,9 +220,29 @@ impl<'a> Planner<'a> {
         };
         let rejected = Rejection::ALL.iter().filter_map(|cause| count(*cause)).collect();
         let mut supports: Vec<Support> = tried.into_iter().filter_map(Result::ok).collect();
-        supports.sort_by(|a, b| a.length().um().total_cmp(&b.length().um()));
+        supports.sort_by(by_length);
         supports.truncate(self.options.keep.max(1));
+        if let Some(shortest) = supports.first_mut() {
+            self.shorten(shortest, near, around);
+        }
         HeldPlace { origin_mm, area: piece.area, supports, rejected }
+    }
+
+    /// Turns a support in ever smaller steps, from half of what lies between directions, as long
+    /// as that makes it shorter.
+    fn shorten(&self, support: &mut Support, near: &NearSurface, around: &Surroundings<'_>) {
+        let cone = 2.0 * PI * (1.0 - self.options.max_tilt.to_radians().cos());
+        let mut step = (cone / self.directions.len() as f64).sqrt() / 2.0;
+        while step > LEAST_STEP {
+            let axis = direction_of(support);
+            let turned = beside(axis, step, self.options.max_tilt)
+                .map(|direction| self.support(support.origin_mm, direction, near, around).ok());
+            let shortest = turned.into_iter().flatten().min_by(by_length);
+            match shortest.filter(|shorter| by_length(shorter, support).is_lt()) {
+                Some(shorter) => *support = shorter,
+                None => step /= 2.0,
+            }
+        }
     }
 
     /// Returns the support in a direction, or why there is none.
@@ -257,6 +281,16 @@ impl<'a> Planner<'a> {
         around.try_strut(&support.strut(), &contact, options.radius.mm())?;
         Ok(support)
     }
+}
+
+fn by_length(a: &Support, b: &Support) -> Ordering {
+    a.length().um().total_cmp(&b.length().um())
+}
+
+fn direction_of(support: &Support) -> Vec3 {
+    let along = [0, 1, 2].map(|k| support.contact_mm[k] - support.origin_mm[k]);
+    let length = dot(along, along).sqrt();
+    along.map(|part| part / length)
 }
 
 /// Returns the ends of the strut to draw. It reaches beyond the level bottom of the island and the
