@@ -27,8 +27,9 @@ mod orient;
 mod support;
 
 pub use check::{
-    CheckError, CheckOptions, Disagreements, End, Findings, Island, LayerFacts, Listed,
-    LoneMinimum, OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint, check, component_at,
+    CheckError, CheckOptions, Disagreements, End, Findings, Island, IslandMinimum, LayerFacts,
+    Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint, check,
+    component_at,
 };
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use support::{

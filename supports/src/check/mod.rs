@@ -34,7 +34,7 @@ pub use findings::{
 };
 use islands::Growth;
 use overhangs::Overhangs;
-pub use pairs::{Disagreements, LoneMinimum};
+pub use pairs::{Disagreements, IslandMinimum, LoneMinimum};
 use pockets::Hollows;
 
 /// What counts as a finding.

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use lamp_slicer::topology::{Minimum, MinimumKind};
+use lamp_slicer::topology::{CornerTable, Minimum, MinimumKind, minima};
 
 use super::findings::{Findings, Island, Region};
 
@@ -13,6 +13,36 @@ pub struct Disagreements {
     pub minima: Vec<LoneMinimum>,
     /// The islands that begin at no minimum, in the order of the findings.
     pub islands: Vec<Island>,
+}
+
+/// A minimum of a mesh, along z, with solid above.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IslandMinimum {
+    /// Its first vertex, in millimetres.
+    pub point_mm: [f64; 3],
+    /// How far the surface rises from it until it meets that of a lower one, in millimetres.
+    pub depth_mm: f64,
+    /// Least and greatest x, and least and greatest y, of its vertices in millimetres.
+    pub box_mm: [[f64; 2]; 2],
+}
+
+impl IslandMinimum {
+    /// Finds those of a mesh, the lowest first.
+    pub fn of_mesh(table: &CornerTable) -> Vec<Self> {
+        let mut found = minima(table, [0.0, 0.0, 1.0]);
+        found.retain(|minimum| minimum.kind == MinimumKind::Island);
+        let of_minimum = |minimum: &Minimum| {
+            let mut box_mm = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+            for &vertex in &minimum.region {
+                let point = table.points()[vertex as usize];
+                for (side, place) in box_mm.iter_mut().zip(point) {
+                    *side = [side[0].min(place), side[1].max(place)];
+                }
+            }
+            Self { point_mm: minimum.point, depth_mm: minimum.depth_mm, box_mm }
+        };
+        found.iter().map(of_minimum).collect()
+    }
 }
 
 /// A minimum of the mesh where the images begin no island.
@@ -29,24 +59,16 @@ pub struct LoneMinimum {
 }
 
 impl Findings {
-    /// Compares the islands with the minima of the mesh, along z, given its vertices and how far up
-    /// in each layer it was cut: 0 at the bottom, 1 at the top.
+    /// Compares the islands with the minima of the mesh, the lowest first, given how far up in each
+    /// layer it was cut: 0 at the bottom, 1 at the top.
     ///
     /// A minimum may show in later layers only, where it has grown as large as a pixel, and then
     /// somewhat aside. The list of minima may hold some that lie within other bodies. It is empty
     /// if layers have no known height, thickness, resolution or place.
-    pub fn compare_minima(
-        &self,
-        minima: &[Minimum],
-        points: &[[f64; 3]],
-        cut: f64,
-    ) -> Disagreements {
+    pub fn compare_minima(&self, minima: &[IslandMinimum], cut: f64) -> Disagreements {
         let Some(grid) = Grid::new(self, cut) else { return Disagreements::default() };
-        let places: Vec<Place<'_>> = minima
-            .iter()
-            .filter(|minimum| minimum.kind == MinimumKind::Island)
-            .filter_map(|minimum| grid.place(minimum, points))
-            .collect();
+        let places: Vec<Place<'_>> =
+            minima.iter().filter_map(|minimum| grid.place(minimum)).collect();
         let mut islands: Vec<&Island> = self.islands.list.iter().chain(&self.specks.list).collect();
         islands.sort_by_key(|island| island.layer);
         let is_lone = |place: &&Place<'_>| {
@@ -106,17 +128,13 @@ impl Grid {
     }
 
     /// Returns where a minimum shows; none if it stands on the platform or above the layers.
-    fn place<'a>(&self, minimum: &'a Minimum, points: &[[f64; 3]]) -> Option<Place<'a>> {
-        let layer = self.layer_above(minimum.height_mm);
+    fn place<'a>(&self, minimum: &'a IslandMinimum) -> Option<Place<'a>> {
+        let z_mm = minimum.point_mm[2];
+        let layer = self.layer_above(z_mm);
         let &thickness_mm = self.thickness_mm.get(layer).filter(|_| layer > 0)?;
-        let last = self.layer_above(minimum.height_mm + minimum.depth_mm).max(layer + 1);
-        let region = minimum.region.iter().map(|&vertex| points[vertex as usize]);
-        let mut sides = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-        for point in region {
-            for (side, at) in sides.iter_mut().zip([self.column(point[0]), self.row(point[1])]) {
-                *side = [side[0].min(at), side[1].max(at)];
-            }
-        }
+        let last = self.layer_above(z_mm + minimum.depth_mm).max(layer + 1);
+        let [x, [least_y, most_y]] = minimum.box_mm;
+        let sides = [x.map(|x| self.column(x)), [most_y, least_y].map(|y| self.row(y))];
         Some(Place {
             minimum,
             // A curved surface reaches below its facets.
@@ -131,7 +149,7 @@ impl Grid {
 
 /// Where a minimum shows in the images.
 struct Place<'a> {
-    minimum: &'a Minimum,
+    minimum: &'a IslandMinimum,
     /// The layers that may begin its island.
     layers: RangeInclusive<u32>,
     first: u32,
@@ -154,11 +172,11 @@ impl Place<'_> {
     }
 
     fn lone(&self, grid: &Grid) -> LoneMinimum {
-        let [x, y, _] = self.minimum.point;
+        let [x, y, _] = self.minimum.point_mm;
         let pixel = |at: f64, size: u32| (at.max(0.0) as u32).min(size.saturating_sub(1));
         LoneMinimum {
             layer: self.first,
-            point_mm: self.minimum.point,
+            point_mm: self.minimum.point_mm,
             depth_mm: self.minimum.depth_mm,
             pixel: [pixel(grid.column(x), grid.size[0]), pixel(grid.row(y), grid.size[1])],
         }

@@ -12,10 +12,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::machine::Machine;
-use lamp_slicer::Part;
-use lamp_slicer::topology::{CornerTable, minima};
+use lamp_slicer::topology::CornerTable;
+use lamp_slicer::{Part, SliceError};
 use lamp_stack::{Layer, Length, Page, Pages, StackError};
-use lamp_supports::{CheckError, CheckOptions, Disagreements, Findings, LoneMinimum};
+use lamp_supports::{
+    CheckError, CheckOptions, Disagreements, Findings, IslandMinimum, LoneMinimum,
+};
 
 use crate::catalogue::entry;
 use crate::exit::Exit;
@@ -157,8 +159,10 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     let mut checked = Vec::new();
     for path in &args.inputs {
         let mut input = Input::open(path, &args.slicing, common)?;
+        // The mesh is out of memory before the layers come.
+        let minima = args.minima(&input)?;
         let findings = args.check(&mut input, common)?;
-        let disagreements = args.disagreements(&mut input, &findings, common)?;
+        let disagreements = args.disagreements(&mut input, &minima, &findings, common)?;
         let lines = lines::of(&findings, &disagreements, args, machine.recoating.as_ref());
         let name = input_name(path);
         print(&printed(&name, &findings, &lines, common.verbose))?;
@@ -249,23 +253,30 @@ impl CheckArgs {
         Ok(slices.map(move |layer| layer.map_err(|error| at_part(error.into(), &parts))))
     }
 
+    /// Returns the minima of a part's mesh, if islands are told.
+    fn minima(&self, input: &Input) -> Result<Vec<IslandMinimum>, Exit> {
+        let Input::Part(part) = input else { return Ok(Vec::new()) };
+        if !self.tells(Kind::Islands) {
+            return Ok(Vec::new());
+        }
+        let solid = &self.slicing.solid;
+        let table = CornerTable::of_part(&part.model, &solid.placement(), solid.units);
+        let at_file = |error: SliceError| at_part(error.into(), std::slice::from_ref(&part.file));
+        Ok(IslandMinimum::of_mesh(&table.map_err(at_file)?))
+    }
+
     /// Compares the islands in the layers of a part with the minima of its mesh.
     fn disagreements(
         &self,
         input: &mut Input,
+        minima: &[IslandMinimum],
         findings: &Findings,
         common: &Common,
     ) -> Result<Disagreements, Exit> {
-        let Input::Part(part) = input else { return Ok(Disagreements::default()) };
-        if !self.tells(Kind::Islands) {
+        if !matches!(input, Input::Part(_)) || !self.tells(Kind::Islands) {
             return Ok(Disagreements::default());
         }
-        let solid = &self.slicing.solid;
-        let table = CornerTable::of_part(&part.model, &solid.placement(), solid.units);
-        let table =
-            table.map_err(|error| at_part(error.into(), std::slice::from_ref(&part.file)))?;
-        let minima = minima(&table, [0.0, 0.0, 1.0]);
-        let mut found = findings.compare_minima(&minima, table.points(), self.slicing.cut());
+        let mut found = findings.compare_minima(minima, self.slicing.cut());
         if found.minima.is_empty() {
             return Ok(found);
         }
