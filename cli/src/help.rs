@@ -59,7 +59,9 @@ const USUAL: [(&str, &[&str]); 5] = [
         &[
             "only",
             "speck",
+            "least_support",
             "max_overhang",
+            "drain",
             "report",
             "evidence",
             "strict",

@@ -28,7 +28,7 @@ pub enum EditError {
         problem: String,
     },
     /// The list has no edit.
-    #[error("there is no edit: add an [[edit]] table")]
+    #[error("there is no edit: add an [[edit]] table, or edit = [] for none")]
     NoEdits,
     /// An edit contradicts itself, or does not suit the stack.
     #[error("edit {number}: {problem}")]

@@ -84,9 +84,10 @@ pub fn poses(count: u32, cone_deg: f64) -> Vec<Pose> {
         axis[k % 3] = if k < 3 { 1.0 } else { -1.0 };
         axis
     });
-    // The axis that is up already is the given pose.
-    let axes = axes.filter(|&axis| axis[2] < 1.0 && axis[2] >= lowest - 1e-12);
-    std::iter::once(Pose::GIVEN).chain(axes.chain(spiral).map(Pose::with_up)).collect()
+    let axes = axes.filter(|&axis| axis[2] >= lowest - 1e-12);
+    // What is up already is the given pose.
+    let others = axes.chain(spiral).filter(|up| up[2] < 1.0);
+    std::iter::once(Pose::GIVEN).chain(others.map(Pose::with_up)).collect()
 }
 
 #[cfg(test)]

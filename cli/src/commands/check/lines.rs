@@ -28,7 +28,7 @@ pub(super) struct Shown {
     /// The layer, from the first that was read.
     pub(super) layer: u32,
     pub(super) region: Region,
-    /// A pixel of the component that is marked; if none, all white without white below is.
+    /// A pixel of the component that is marked; if none, the region's white without white below is.
     pub(super) pixel: Option<[u32; 2]>,
 }
 
@@ -200,6 +200,7 @@ fn of_joint(joint: &WeakJoint, scale: &Scale<'_>) -> FindingLine {
         "box_mm": scale.box_mm(&joint.region),
         "box_px": box_px(&joint.region),
         "area_px": joint.area,
+        "area_mm2": scale.area_mm2(joint.area),
         "support_px": joint.support,
         "support_percent": percent,
     });

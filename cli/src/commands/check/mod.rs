@@ -28,7 +28,7 @@ use crate::part_arg::PartArg;
 use crate::part_options::{Reading, at_part};
 use crate::progress::{Progress, printable};
 use crate::slicing_options::SlicingOptions;
-use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, print};
+use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 
 use lines::FindingLine;
 pub(super) use lines::drag_mn;
@@ -156,6 +156,8 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
     let machine: Machine = entry(&args.machine)?;
+    let evidence = args.evidence.as_deref().map(|folder| new_folder(folder, args.force));
+    let evidence = evidence.transpose()?;
     let mut checked = Vec::new();
     for path in &args.inputs {
         let mut input = Input::open(path, &args.slicing, common)?;
@@ -171,7 +173,7 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     if let Some(path) = &args.report {
         write_report(&checked, machine.recoating.as_ref(), path)?;
     }
-    if let Some(folder) = &args.evidence {
+    if let Some(folder) = evidence {
         write_pictures(&mut checked, args, common, folder)?;
     }
     let found: usize = checked.iter().map(CheckedInput::found).sum();
@@ -280,20 +282,20 @@ impl CheckArgs {
         if found.minima.is_empty() {
             return Ok(found);
         }
-        // Those within other bodies have white below.
+        // Where there is white, it rests on white: the body is joined to others from the start.
         let layers: BTreeSet<u32> = found.minima.iter().map(|minimum| minimum.layer).collect();
-        let mut held = BTreeSet::new();
+        let mut joined = BTreeSet::new();
         let is_wanted = |layer| layers.contains(&layer);
-        self.for_each_layer(input, common, is_wanted, |layer, below, _| {
+        self.for_each_layer(input, common, is_wanted, |layer, _, mask| {
             let here = found.minima.iter().filter(|minimum| minimum.layer == layer);
-            let is_held = |minimum: &&LoneMinimum| {
-                let [column, row] = minimum.pixel;
-                below.is_some_and(|below| below.is_white(column, row))
+            let is_white = |minimum: &&LoneMinimum| {
+                let [columns, rows] = minimum.pixel.map(|at| at.saturating_sub(NEAR)..=at + NEAR);
+                rows.into_iter().any(|row| columns.clone().any(|column| mask.is_white(column, row)))
             };
-            held.extend(here.filter(is_held).map(|minimum| (layer, minimum.pixel)));
+            joined.extend(here.filter(is_white).map(|minimum| (layer, minimum.pixel)));
             Ok(())
         })?;
-        found.minima.retain(|minimum| !held.contains(&(minimum.layer, minimum.pixel)));
+        found.minima.retain(|minimum| !joined.contains(&(minimum.layer, minimum.pixel)));
         Ok(found)
     }
 
@@ -346,6 +348,9 @@ impl CheckedInput {
         self.lines.iter().filter(|line| !line.is_note).count()
     }
 }
+
+/// How far from a minimum its first pixels may be.
+const NEAR: u32 = 2;
 
 /// The most lines of a kind that are printed, unless all are asked for.
 const MOST_LINES: usize = 20;

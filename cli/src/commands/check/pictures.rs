@@ -6,7 +6,7 @@ use std::io::{self, BufWriter};
 use std::ops::Range;
 use std::path::Path;
 
-use lamp_stack::{Image, Layer, Mask, Page, write_rgb_png};
+use lamp_stack::{FolderBeside, Image, Layer, Mask, Page, write_rgb_png};
 use lamp_supports::{Region, component_at};
 
 use super::lines::{FindingLine, Shown};
@@ -14,7 +14,7 @@ use super::{CheckArgs, CheckedInput, Input};
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::progress::Progress;
-use crate::streams::{failed_at, in_range, input_name, new_folder};
+use crate::streams::{failed_at, in_range, input_name};
 
 /// The most pictures of an input.
 const MOST_PICTURES: usize = 24;
@@ -54,10 +54,8 @@ pub(super) fn write_pictures(
     checked: &mut [CheckedInput],
     args: &CheckArgs,
     common: &Common,
-    folder: &Path,
+    folder: FolderBeside,
 ) -> Result<(), Exit> {
-    let name = folder.display().to_string();
-    let folder = new_folder(folder, args.force)?;
     let several = checked.len() > 1;
     for (number, CheckedInput { input, lines, .. }) in checked.iter_mut().enumerate() {
         let prefix = if several { format!("{:02}_", number + 1) } else { String::new() };
@@ -72,7 +70,7 @@ pub(super) fn write_pictures(
             Ok(())
         })?;
     }
-    folder.persist().map_err(|error| failed_at(name, error))
+    folder.persist().map_err(|error| Exit::Failed(error.into()))
 }
 
 /// Returns the names of pictures and what they show, by layer.
@@ -162,10 +160,19 @@ fn draw(path: &Path, below: Option<&Mask>, layer: &Mask, shown: &Shown) -> io::R
             let (here, under) = (white(layer), below.map_or_else(Vec::new, white));
             paint(&mut under.iter().cloned(), Shade::Below);
             paint(&mut here.iter().cloned(), Shade::White);
-            paint(&mut without(&here, &under).into_iter(), Shade::Unheld);
-            let of_row = found.partition_point(|(other, _)| *other < row);
-            let of_row = found[of_row..].iter().take_while(|(other, _)| *other == row);
-            paint(&mut of_row.map(|(_, run)| run.clone()), Shade::Found);
+            let unheld = without(&here, &under);
+            paint(&mut unheld.iter().cloned(), Shade::Unheld);
+            if shown.pixel.is_some() {
+                let of_row = found.partition_point(|(other, _)| *other < row);
+                let of_row = found[of_row..].iter().take_while(|(other, _)| *other == row);
+                paint(&mut of_row.map(|(_, run)| run.clone()), Shade::Found);
+            } else if shown.region.rows.contains(&row) {
+                let Range { start, end } = shown.region.columns;
+                paint(
+                    &mut unheld.iter().map(|run| run.start.max(start)..run.end.min(end)),
+                    Shade::Found,
+                );
+            }
         }
         let wide = shades.iter().flat_map(|shade| shade.colour().repeat(up as usize));
         let wide: Vec<u8> = wide.collect();

@@ -59,6 +59,10 @@ pub(super) struct RepairArgs {
 pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     let (name, input) = (args.part.name(), &args.part.part);
     check_not_input(&args.output, [input])?;
+    if args.output.extension().is_some_and(|end| !end.eq_ignore_ascii_case("stl")) {
+        let output = args.output.display();
+        return Err(Exit::usage(format!("{output}: meshes are written as STL: name a .stl file")));
+    }
     if let Some(report) = &args.report {
         check_beside(report, &args.output, [input])?;
     }

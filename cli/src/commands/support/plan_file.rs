@@ -19,6 +19,10 @@ pub(super) fn plan_text(part: &str, plans: &[IslandPlan], found: &Findings) -> S
 ",
         one_line(part)
     );
+    let mut places = plans.iter().flat_map(|plan| &plan.places);
+    if places.all(|place| place.supports.is_empty()) {
+        text += "edit = []\n";
+    }
     for plan in plans {
         let island = &plan.island;
         let layer = scale.layer_text(island.layer);
