@@ -1,6 +1,8 @@
 //! Checks what `lamp check` tells of stacks and parts.
 
-use lamp_fixtures::{Mesh, Sample, build, cup, mug, needle, ring, serpentine, slanted_wall};
+use lamp_fixtures::{
+    Mesh, Sample, build, closed_void, cup, mug, needle, ring, serpentine, slanted_wall,
+};
 use lamp_stack::{Dpi, Layer, Mask, PageInfo};
 use lamp_tests::Scratch;
 use serde_json::Value;
@@ -223,6 +225,16 @@ fn minima_that_pixels_miss_and_islands_that_the_mesh_lacks_are_told() {
     let found = report(&scratch, "w.json");
     let islands = of_kind(&found, "island").len();
     assert!(islands > 10 && of_kind(&found, "island-without-minimum").len() == islands, "{found}");
+}
+
+#[test]
+fn a_body_upon_another_begins_no_island() {
+    // A cup stands on a block; they share no vertex.
+    let (mut both, cup) = (closed_void(200), cup(200));
+    let lifted = |corner: [f32; 3]| [0.7 * corner[0], 0.7 * corner[1], corner[2] + 12.0];
+    both.facets.extend(cup.facets.iter().map(|facet| facet.map(lifted)));
+    let scratch = with("both.stl", &both);
+    scratch.run(&format!("lamp check both.stl {SLICE} --only islands --strict")).succeeds_quietly();
 }
 
 /// The sample blade at 1500 dpi and 100 um: layers where islands begin and join.

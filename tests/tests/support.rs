@@ -170,6 +170,8 @@ fn islands_without_a_way_are_left_and_told() {
         scratch.layers(name).into_iter().map(|layer| layer.image.into_image()).collect()
     };
     assert!(images("held.tif") == images("needle.tif"));
+    scratch.run("lamp edit needle.tif plan.toml -q -o drawn.tif").succeeds_quietly();
+    assert!(images("drawn.tif") == images("held.tif"));
     assert_eq!(report(&scratch, "report.json")["left"], 1);
 
     let strict = scratch.run(&format!("{line} --strict -o strict.tif"));
