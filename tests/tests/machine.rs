@@ -111,13 +111,14 @@ fn json_says_what_is_known_of_machines() {
             "thickness_um": [500.0, 1000.0],
             "mirrors": 64,
             "overlap": 8,
+            "recoating_pa": null,
             "defaults": {"dpi": null, "thickness_um": null, "margin": null},
             "sources": {
                 "area": "measured",
                 "height": "data sheet",
                 "dpi": "data sheet",
                 "thickness": "data sheet",
-                "strips": "data sheet",
+                "strips": "data sheet", "recoating": null,
             },
         }]})
     );
