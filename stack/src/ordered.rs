@@ -54,7 +54,9 @@ where
     })
 }
 
-fn take_batch<T: MemorySize, E>(
+/// Takes the next items to work on at once: up to sixteen per thread, or one per thread if they
+/// are large. None are left if it returns none.
+pub fn take_batch<T: MemorySize, E>(
     input: &mut impl Iterator<Item = Result<T, E>>,
     threads: usize,
 ) -> Vec<Result<T, E>> {

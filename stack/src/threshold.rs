@@ -1,6 +1,7 @@
 //! Gray images as masks: where they reach a level, and where they are exposed at all.
 
 use std::borrow::Cow;
+use std::num::NonZeroU8;
 
 use crate::gray::{GrayMask, LevelChange};
 use crate::layer::Image;
@@ -48,6 +49,14 @@ impl GrayMask {
 }
 
 impl Image {
+    /// Returns a mask of the pixels that have at least `level`; those of a mask have none or 255.
+    pub fn into_mask(self, level: NonZeroU8) -> Mask {
+        match self {
+            Self::Mask(mask) => mask,
+            Self::Gray(gray) => gray.at_least(level.get()),
+        }
+    }
+
     /// Returns a mask of the pixels that are exposed at all.
     pub fn exposed(&self) -> Cow<'_, Mask> {
         match self {

@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use lamp_stack::sets::unite;
 use lamp_stack::{GrayMask, Mask, combine_rows};
 
 use super::row_runs::RowRuns;
@@ -109,8 +110,7 @@ impl Components {
     fn of(rows: RowRuns) -> Self {
         let mut first: Vec<u32> = (0..rows.all().len() as u32).collect();
         rows.for_each_touching(|upper, lower| {
-            let [a, b] = [upper, lower].map(|run| root(&mut first, run));
-            first[a.max(b) as usize] = a.min(b);
+            unite(&mut first, upper as u32, lower as u32);
         });
         for run in 0..first.len() {
             // Runs point at earlier ones, which by now point at the first.
@@ -131,17 +131,6 @@ impl Components {
         let run = self.rows.find(column, row).expect("the pixel is in the shape");
         self.first[run] as usize
     }
-}
-
-/// Returns the first run known of a run's component, and shortens the way there.
-fn root(first: &mut [u32], run: usize) -> u32 {
-    let mut run = run as u32;
-    while first[run as usize] != run {
-        let next = first[first[run as usize] as usize];
-        first[run as usize] = next;
-        run = next;
-    }
-    run
 }
 
 #[cfg(test)]

@@ -7,10 +7,10 @@
 //! starts where its shell touches another goes the other way. All three axes must agree: shells that
 //! pass through each other are around nothing.
 
+use lamp_stack::sets::{root, unite};
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 
-use crate::topology::shells::{root, unite};
 use crate::topology::{CornerTable, ShellReport, Shells};
 
 /// A ray that starts nearer to a facet, as a share of the part's size, may start on it.

@@ -1,5 +1,7 @@
 //! Shells: facets that hang together by edges.
 
+use lamp_stack::sets::{root, unite};
+
 use crate::topology::CornerTable;
 use crate::topology::corner_table::{NONE, facet_of};
 
@@ -41,7 +43,9 @@ impl Shells {
             let alone = corners.iter().filter(|&&corner| table.opposite(corner).is_none());
             let mut met = alone.map(|&corner| of_facet[facet_of(corner) as usize]);
             let Some(first) = met.next() else { continue };
-            met.for_each(|sheet| unite(&mut parents, first, sheet));
+            for sheet in met {
+                unite(&mut parents, first, sheet);
+            }
         }
         let (numbers, count) = numbered(&mut parents);
         let busy = of_facet.iter_mut().filter(|sheet| **sheet != NONE);
@@ -149,21 +153,6 @@ fn numbered(parents: &mut [u32]) -> (Vec<u32>, u32) {
         numbers[member] = numbers[root];
     }
     (numbers, count)
-}
-
-pub(crate) fn root(parents: &mut [u32], mut member: u32) -> u32 {
-    while parents[member as usize] != member {
-        let above = parents[parents[member as usize] as usize];
-        parents[member as usize] = above;
-        member = above;
-    }
-    member
-}
-
-/// Makes the lower root that of both.
-pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parents, a), root(parents, b));
-    parents[a.max(b) as usize] = a.min(b);
 }
 
 #[cfg(test)]

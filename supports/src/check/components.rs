@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use lamp_stack::Mask;
+use lamp_stack::sets::unite;
 
 /// The label of an empty segment.
 const NONE: u32 = u32::MAX;
@@ -246,15 +247,6 @@ struct Sets {
 const FIRST: u32 = 0;
 
 impl Sets {
-    fn root(&mut self, mut label: u32) -> u32 {
-        while self.parents[label as usize] != label {
-            let next = self.parents[self.parents[label as usize] as usize];
-            self.parents[label as usize] = next;
-            label = next;
-        }
-        label
-    }
-
     /// Labels the segments of a row that touch some of their colour in the row above.
     fn join_rows(
         &mut self,
@@ -272,9 +264,7 @@ impl Sets {
             if lower == NONE {
                 labels[j] = upper;
             } else if lower != upper {
-                let [a, b] = [upper, lower].map(|label| self.root(label));
-                self.parents[a.max(b) as usize] = a.min(b);
-                labels[j] = a.min(b);
+                labels[j] = unite(&mut self.parents, upper, lower);
             }
         });
     }

@@ -99,7 +99,7 @@ impl Drain {
     }
 
     /// Returns the pockets that are none if their ways out count; `hollows` has all black.
-    pub(super) fn finish(mut self, hollows: &Hollows) -> Listed<Pocket> {
+    pub(super) fn finish(mut self, hollows: &mut Hollows) -> Listed<Pocket> {
         self.advance(true);
         self.rooms.finish();
         let Listed { mut list, left_out } = self.rooms.pockets;

@@ -1,5 +1,7 @@
 //! Bodies of one colour as layers are added: what a layer continues, unites, begins and ends.
 
+use lamp_stack::sets::{root, unite};
+
 use super::contact::{Joint, Labelled};
 
 const NONE: u32 = u32::MAX;
@@ -46,10 +48,7 @@ impl<B> Live<B> {
             is_continued[body as usize] = true;
             match &mut body_of[joint.component as usize] {
                 first if *first == NONE => *first = body,
-                first => {
-                    let [a, b] = [*first, body].map(|body| root(&mut parents, body));
-                    parents[a.max(b) as usize] = a.min(b);
-                }
+                first => *first = unite(&mut parents, *first, body),
             }
         }
         let mut groups: Vec<Group<B>> = Vec::new();
@@ -97,13 +96,4 @@ impl<B> Live<B> {
     pub(super) fn finish(self) -> Vec<B> {
         self.bodies
     }
-}
-
-fn root(parents: &mut [u32], mut body: u32) -> u32 {
-    while parents[body as usize] != body {
-        let next = parents[parents[body as usize] as usize];
-        parents[body as usize] = next;
-        body = next;
-    }
-    body
 }

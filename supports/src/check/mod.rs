@@ -21,7 +21,7 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Dpi, Image, Layer, Length, Mask, MemorySize};
+use lamp_stack::{Dpi, Layer, Length, Mask, MemorySize, take_batch};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -114,10 +114,12 @@ where
     E: From<CheckError> + Send,
 {
     let mut layers = layers.fuse();
+    // Of large layers two are in work at most, however many threads there are.
+    let at_once = rayon::current_num_threads().min(2);
     let mut checker: Option<Checker> = None;
     let mut last: Option<Arc<Checked>> = None;
     loop {
-        let batch = take_batch(&mut layers);
+        let batch = take_batch(&mut layers, at_once);
         if batch.is_empty() {
             return Ok(checker.ok_or(CheckError::NoLayers)?.finish());
         }
@@ -162,24 +164,6 @@ pub fn component_at(mask: &Mask, column: u32, row: u32) -> Vec<(u32, Range<u32>)
     components.runs(mask, component).collect()
 }
 
-/// The most layers that are in work at once, and the bytes from which there are two at most.
-const MOST_LAYERS: usize = 64;
-const LARGE_BYTES: usize = 32 << 20;
-
-fn take_batch<T: MemorySize, E>(
-    layers: &mut impl Iterator<Item = Result<T, E>>,
-) -> Vec<Result<T, E>> {
-    let threads = rayon::current_num_threads();
-    let (mut batch, mut bytes) = (Vec::new(), 0);
-    let few = |bytes: usize| if bytes < LARGE_BYTES { MOST_LAYERS.min(16 * threads) } else { 2 };
-    while batch.len() < few(bytes).min(16 * threads) {
-        let Some(layer) = layers.next() else { break };
-        bytes += layer.as_ref().map_or(LARGE_BYTES, MemorySize::bytes);
-        batch.push(layer);
-    }
-    batch
-}
-
 /// A layer, labelled.
 struct Checked {
     facts: LayerFacts,
@@ -193,11 +177,7 @@ struct Checked {
 impl Checked {
     fn new(layer: Layer, options: &CheckOptions) -> Self {
         let Layer { info, dpi, image } = layer;
-        let mask = match image.into_image() {
-            Image::Mask(mask) => mask,
-            Image::Gray(gray) => gray.at_least(options.threshold.get()),
-        };
-        let labelled = Labelled::new(mask);
+        let labelled = Labelled::new(image.into_image().into_mask(options.threshold));
         let mut facts = LayerFacts::new(&info);
         facts.has_white = labelled.of_colour(true).next().is_some();
         facts.white_at_border = labelled.of_colour(true).any(|white| labelled.reaches_frame(white));
@@ -314,12 +294,10 @@ impl Checker {
         self.growth.finish();
         self.hollows.finish();
         self.overhangs.finish();
-        let mut pockets = self.hollows.pockets.clone();
-        if let Some(drain) = self.drain {
-            let narrow = drain.finish(&self.hollows);
-            narrow.list.into_iter().for_each(|pocket| pockets.push(pocket));
-            pockets.left_out += narrow.left_out;
-        }
+        let narrow = self.drain.map(|drain| drain.finish(&mut self.hollows)).unwrap_or_default();
+        let mut pockets = self.hollows.pockets;
+        narrow.list.into_iter().for_each(|pocket| pockets.push(pocket));
+        pockets.left_out += narrow.left_out;
         let mut findings = Findings {
             layers: self.layers,
             dpi: self.dpi,

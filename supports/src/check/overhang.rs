@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use lamp_stack::sets::{root, unite};
 use lamp_stack::{Mask, white_runs};
 
 use super::components::holds_square;
@@ -101,7 +102,7 @@ pub(super) fn without(
 
 /// Gathers runs, sorted by row and column, that touch at their sides.
 fn touching(runs: &[(u32, Range<u32>)]) -> Vec<Vec<(u32, Range<u32>)>> {
-    let mut parents: Vec<usize> = (0..runs.len()).collect();
+    let mut parents: Vec<u32> = (0..runs.len() as u32).collect();
     let (mut above, mut row) = (0..0, 0..0);
     for (k, (number, columns)) in runs.iter().enumerate() {
         if k == 0 || runs[k - 1].0 != *number {
@@ -114,14 +115,13 @@ fn touching(runs: &[(u32, Range<u32>)]) -> Vec<Vec<(u32, Range<u32>)>> {
             above.start += 1;
         }
         for upper in above.clone().take_while(|&upper| runs[upper].1.start < columns.end) {
-            let [a, b] = [root(&mut parents, upper), root(&mut parents, k)];
-            parents[a.max(b)] = a.min(b);
+            unite(&mut parents, upper as u32, k as u32);
         }
     }
     let mut groups: Vec<Vec<(u32, Range<u32>)>> = Vec::new();
     let mut group_of = vec![0; runs.len()];
     for (k, run) in runs.iter().enumerate() {
-        let root = root(&mut parents, k);
+        let root = root(&mut parents, k as u32) as usize;
         if root == k {
             group_of[k] = groups.len();
             groups.push(Vec::new());
@@ -129,14 +129,6 @@ fn touching(runs: &[(u32, Range<u32>)]) -> Vec<Vec<(u32, Range<u32>)>> {
         groups[group_of[root]].push(run.clone());
     }
     groups
-}
-
-fn root(parents: &mut [usize], mut item: usize) -> usize {
-    while parents[item] != item {
-        parents[item] = parents[parents[item]];
-        item = parents[item];
-    }
-    item
 }
 
 /// Measures a patch.

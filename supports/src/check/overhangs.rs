@@ -1,5 +1,7 @@
 //! Gathers the patches of layers that follow each other.
 
+use lamp_stack::sets::{root, unite};
+
 use super::findings::{Listed, Overhang, Region};
 use super::overhang::OverhangPatch;
 
@@ -19,27 +21,27 @@ impl Overhangs {
         let before = self.open.len();
         let mut all = std::mem::take(&mut self.open);
         let mut of_patch = Vec::new();
-        let mut parents: Vec<usize> = (0..before).collect();
+        let mut parents: Vec<u32> = (0..before as u32).collect();
         for patch in patches {
             let overhang = Overhang::of(patch, number);
             let own = all.len();
-            parents.push(own);
+            parents.push(own as u32);
             for (region, group) in &self.last {
                 if region.is_near(&overhang.region, near) {
-                    let [a, b] = [root(&parents, *group), root(&parents, own)];
-                    parents[a.max(b)] = a.min(b);
+                    unite(&mut parents, *group as u32, own as u32);
                 }
             }
             of_patch.push((overhang.region.clone(), own));
             all.push(overhang);
         }
-        let continued: Vec<usize> = of_patch.iter().map(|(_, own)| root(&parents, *own)).collect();
+        let mut root_of = |item: usize| root(&mut parents, item as u32) as usize;
+        let continued: Vec<usize> = of_patch.iter().map(|(_, own)| root_of(*own)).collect();
         let mut kept: Vec<usize> = continued.clone();
         kept.sort_unstable();
         kept.dedup();
         let mut merged: Vec<Option<Overhang>> = vec![None; all.len()];
         for (k, overhang) in all.into_iter().enumerate() {
-            match &mut merged[root(&parents, k)] {
+            match &mut merged[root_of(k)] {
                 Some(first) => first.unite(&overhang),
                 none => *none = Some(overhang),
             }
@@ -58,13 +60,6 @@ impl Overhangs {
     pub(super) fn finish(&mut self) {
         std::mem::take(&mut self.open).into_iter().for_each(|overhang| self.ended.push(overhang));
     }
-}
-
-fn root(parents: &[usize], mut item: usize) -> usize {
-    while parents[item] != item {
-        item = parents[item];
-    }
-    item
 }
 
 impl Overhang {

@@ -3,6 +3,8 @@
 //! Bodies are joined over all layers before they are judged, so that a way out may lead up and
 //! down as often as it likes.
 
+use lamp_stack::sets::{root, unite};
+
 use super::components::Component;
 use super::contact::{Contact, Labelled};
 use super::findings::{Listed, Pocket, PocketKind};
@@ -29,13 +31,6 @@ impl Numbers {
         let number = self.parents.len() as u32;
         self.parents.push(number);
         self.is_open.push(false);
-        number
-    }
-
-    fn of(&self, mut number: u32) -> u32 {
-        while self.parents[number as usize] != number {
-            number = self.parents[number as usize];
-        }
         number
     }
 }
@@ -74,11 +69,10 @@ impl Hollows {
         ended.into_iter().for_each(|hollow| self.end(hollow, false));
         for Group { bodies, components } in groups {
             let united = bodies.into_iter().reduce(|a, b| {
-                let [elder, younger] = [a.number.min(b.number), a.number.max(b.number)];
                 if let Some(numbers) = &mut self.numbers {
-                    numbers.parents[younger as usize] = elder;
+                    unite(&mut numbers.parents, a.number, b.number);
                 }
-                Hollow::united(a, b, elder)
+                Hollow::united(a, b)
             });
             let mut hollow = united.unwrap_or_else(|| {
                 let first = &layer.components.all[components[0] as usize];
@@ -103,8 +97,9 @@ impl Hollows {
 
     /// Returns whether the body that once had a number reached the frame; to be asked at the end,
     /// and if numbers are kept.
-    pub(super) fn is_open(&self, number: u32) -> bool {
-        self.numbers.as_ref().is_some_and(|it| it.is_open[it.of(number) as usize])
+    pub(super) fn is_open(&mut self, number: u32) -> bool {
+        let numbers = self.numbers.as_mut();
+        numbers.is_some_and(|it| it.is_open[root(&mut it.parents, number) as usize])
     }
 
     fn end(&mut self, hollow: Hollow, is_at_top: bool) {
@@ -136,7 +131,7 @@ impl Hollow {
         Self { number, pocket, is_open: false, is_on_platform: layer == 0, holds_square: false }
     }
 
-    fn united(self, other: Self, number: u32) -> Self {
+    fn united(self, other: Self) -> Self {
         let (mut elder, younger) = match (self.pocket.born(), other.pocket.born()) {
             (a, b) if a <= b => (self.pocket, other.pocket),
             _ => (other.pocket, self.pocket),
@@ -145,7 +140,7 @@ impl Hollow {
         elder.pixels_um += younger.pixels_um;
         elder.region.unite(&younger.region);
         Self {
-            number,
+            number: self.number.min(other.number),
             pocket: elder,
             is_open: self.is_open || other.is_open,
             is_on_platform: self.is_on_platform || other.is_on_platform,

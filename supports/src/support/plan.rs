@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use lamp_slicer::brep::vector::{Vec3, along, dot};
-use lamp_stack::{Image, Layer, Length, Mask};
+use lamp_stack::{Layer, Length, Mask};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -62,10 +62,7 @@ pub fn plan_supports<E: From<SupportError>>(
     let (mut window, mut plans) = (Window::default(), Vec::new());
     for (number, layer) in (0..).zip(layers) {
         let Some(next) = islands.get(plans.len()) else { break };
-        let mask = match layer?.image.into_image() {
-            Image::Mask(mask) => mask,
-            Image::Gray(gray) => gray.at_least(options.threshold.get()),
-        };
+        let mask = layer?.image.into_image().into_mask(options.threshold);
         window.forget_below(planner.lowest(next).saturating_sub(1));
         for island in &islands[plans.len()..] {
             if island.layer != number {

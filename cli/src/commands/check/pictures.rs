@@ -6,7 +6,7 @@ use std::io::{self, BufWriter};
 use std::ops::Range;
 use std::path::Path;
 
-use lamp_stack::{FolderBeside, Image, Layer, Mask, Page, write_rgb_png};
+use lamp_stack::{FolderBeside, Layer, Mask, Page, combine_rows, write_rgb_png};
 use lamp_supports::{Region, component_at};
 
 use super::lines::{FindingLine, Shown};
@@ -97,10 +97,7 @@ impl CheckArgs {
     ) -> Result<(), Exit> {
         let mut below: Option<Mask> = None;
         let mut take = |position: u32, layer: Option<Layer>| {
-            let mask = layer.map(|layer| match layer.image.into_image() {
-                Image::Mask(mask) => mask,
-                Image::Gray(gray) => gray.at_least(self.threshold.get()),
-            });
+            let mask = layer.map(|layer| layer.image.into_image().into_mask(self.threshold));
             if let Some(mask) = mask.as_ref().filter(|_| is_wanted(position)) {
                 each(position, below.as_ref(), mask)?;
             }
@@ -153,14 +150,15 @@ fn draw(path: &Path, below: Option<&Mask>, layer: &Mask, shown: &Shown) -> io::R
                     }
                 }
             };
-            let white = |mask: &Mask| -> Vec<Range<u32>> {
-                let runs = lamp_stack::white_runs(mask.row(row), mask.width());
-                runs.map(|(start, end)| start..end).collect()
+            let runs = |row: &[u32]| -> Vec<Range<u32>> {
+                lamp_stack::white_runs(row, layer.width()).map(|(start, end)| start..end).collect()
             };
-            let (here, under) = (white(layer), below.map_or_else(Vec::new, white));
-            paint(&mut under.iter().cloned(), Shade::Below);
-            paint(&mut here.iter().cloned(), Shade::White);
-            let unheld = without(&here, &under);
+            let (here, under) = (layer.row(row), below.map_or(&[][..], |below| below.row(row)));
+            let mut difference = Vec::new();
+            combine_rows([here, under], |[here, under]| here && !under, &mut difference);
+            let unheld = runs(&difference);
+            paint(&mut runs(under).into_iter(), Shade::Below);
+            paint(&mut runs(here).into_iter(), Shade::White);
             paint(&mut unheld.iter().cloned(), Shade::Unheld);
             if shown.pixel.is_some() {
                 let of_row = found.partition_point(|(other, _)| *other < row);
@@ -189,22 +187,4 @@ fn around(region: &Region, mask: &Mask) -> Region {
         range.start.saturating_sub(by)..range.end.saturating_add(by).min(end)
     };
     Region { columns: grow(&region.columns, mask.width()), rows: grow(&region.rows, mask.height()) }
-}
-
-/// Returns what is in some runs and not in others, both in order.
-fn without(runs: &[Range<u32>], others: &[Range<u32>]) -> Vec<Range<u32>> {
-    let mut left = Vec::new();
-    for run in runs {
-        let mut start = run.start;
-        for other in others.iter().filter(|other| other.end > run.start && other.start < run.end) {
-            if other.start > start {
-                left.push(start..other.start);
-            }
-            start = start.max(other.end);
-        }
-        if start < run.end {
-            left.push(start..run.end);
-        }
-    }
-    left
 }

@@ -3,6 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use lamp_stack::sets::root;
+
 use super::Field;
 
 /// No component has come to the vertex.
@@ -95,7 +97,7 @@ impl<'a> Sweep<'a> {
             component =
                 if component == NONE { other } else { self.joined(component, other, height) };
         }
-        component = self.root(component);
+        component = root(&mut self.parents, component);
         if component != DEEP && height - self.births[component as usize] > self.deepest_mm {
             self.end(component, DEEP, self.deepest_mm);
             component = DEEP;
@@ -112,7 +114,7 @@ impl<'a> Sweep<'a> {
 
     /// Joins two components at a height, and returns the elder.
     fn joined(&mut self, a: u32, b: u32, height: f64) -> u32 {
-        let (a, b) = (self.root(a), self.root(b));
+        let (a, b) = (root(&mut self.parents, a), root(&mut self.parents, b));
         let [elder, younger] = [a.min(b), a.max(b)];
         if elder != younger {
             self.end(younger, elder, height - self.births[younger as usize]);
@@ -123,15 +125,6 @@ impl<'a> Sweep<'a> {
     fn end(&mut self, component: u32, parent: u32, depth_mm: f64) {
         self.parents[component as usize] = parent;
         self.depths[component as usize] = depth_mm.min(self.deepest_mm);
-    }
-
-    fn root(&mut self, mut component: u32) -> u32 {
-        while self.parents[component as usize] != component {
-            let above = self.parents[self.parents[component as usize] as usize];
-            self.parents[component as usize] = above;
-            component = above;
-        }
-        component
     }
 }
 
