@@ -1,0 +1,205 @@
+//! Spreads the light of an image sideways: the separable Gaussian of 001 eq. 5.
+
+use std::fmt::Debug;
+use std::iter::Sum;
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+use crate::wide::wide;
+
+/// A floating-point number that planners compute with.
+pub trait Real:
+    Copy
+    + Debug
+    + Default
+    + PartialOrd
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + AddAssign
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+    + Sub<Output = Self>
+    + Sum
+    + 'static
+{
+    /// Rounds a number to this precision.
+    fn of(number: f64) -> Self;
+    /// Returns the number.
+    fn f64(self) -> f64;
+    /// Returns the number within `low..=high`.
+    fn within(self, low: Self, high: Self) -> Self;
+}
+
+macro_rules! real {
+    ($($float:ty),*) => {$(
+        impl Real for $float {
+            #[inline(always)]
+            fn of(number: f64) -> Self {
+                number as Self
+            }
+
+            #[inline(always)]
+            fn f64(self) -> f64 {
+                self.into()
+            }
+
+            #[inline(always)]
+            fn within(self, low: Self, high: Self) -> Self {
+                let above = if self < low { low } else { self };
+                if above > high { high } else { above }
+            }
+        }
+    )*};
+}
+
+real!(f32, f64);
+
+/// Light farther away than this share of its peak says is left out: 5.3 σ.
+const FAINTEST: f64 = 1e-6;
+
+/// Columns that are summed up together. The width of images is a multiple of it.
+pub(crate) const LANES: usize = 16;
+
+/// A Gaussian of standard deviation σ, cut off where it is a millionth of its peak.
+///
+/// ```
+/// use lamp_planning::Blur;
+///
+/// let blur = Blur::<f64>::new(2.0);
+/// let mut image = vec![0.0; 32 * 32];
+/// image[16 * 32 + 16] = 1.0;
+/// let mut light = vec![0.0; 32 * 32];
+/// blur.apply(&image, 32, &mut light, &mut Vec::new());
+/// assert_eq!(light[16 * 32 + 16], 1.0);
+/// assert!((light[18 * 32 + 17] - f64::exp(-5.0 / 8.0)).abs() < 1e-15);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Blur<T> {
+    /// The weights at distances 0, 1, ...: that at 0 is 1.
+    taps: Vec<T>,
+}
+
+impl<T: Real> Blur<T> {
+    /// Creates the Gaussian of a standard deviation in pixels; zero leaves images as they are.
+    pub fn new(sigma: f64) -> Self {
+        let tap = |distance: usize| {
+            let distance = distance as f64;
+            if distance == 0.0 { 1.0 } else { (-distance * distance / (2.0 * sigma * sigma)).exp() }
+        };
+        let taps = (0..).map(tap).take_while(|&tap| tap >= FAINTEST).map(T::of).collect();
+        Self { taps }
+    }
+
+    /// Returns how far light spreads, in pixels.
+    pub fn radius(&self) -> usize {
+        self.taps.len() - 1
+    }
+
+    /// Returns what a wide white image has at each pixel: the sum of all weights.
+    pub fn sum(&self) -> f64 {
+        let side: f64 = self.taps[1..].iter().map(|tap| tap.f64()).sum();
+        (2.0 * side + 1.0).powi(2)
+    }
+
+    /// Spreads the light of an image given row by row, with black around it. `width` must be a
+    /// multiple of 16. `room` is working space, whose content is of no matter.
+    ///
+    /// # Panics
+    /// Panics if the images are not equally large, or no whole number of rows.
+    pub fn apply(&self, image: &[T], width: usize, light: &mut [T], room: &mut Vec<T>) {
+        assert_eq!(image.len(), light.len(), "both images are equally large");
+        assert!(width.is_multiple_of(LANES) && image.len().is_multiple_of(width.max(1)));
+        if self.radius() == 0 {
+            light.copy_from_slice(image);
+            return;
+        }
+        wide(
+            #[inline(always)]
+            || self.apply_rows_then_columns(image, width, light, room),
+        );
+    }
+
+    #[inline(always)]
+    fn apply_rows_then_columns(
+        &self,
+        image: &[T],
+        width: usize,
+        light: &mut [T],
+        room: &mut Vec<T>,
+    ) {
+        let rows = image.len() / width;
+        // Taps that reach beyond the image meet black only.
+        let along = &self.taps[..self.taps.len().min(width)];
+        let across = &self.taps[..self.taps.len().min(rows)];
+        let [left, above] = [along, across].map(|taps| taps.len() - 1);
+        room.clear();
+        room.resize(width + 2 * left + (rows + 2 * above) * width, T::default());
+        let (line, plane) = room.split_at_mut(width + 2 * left);
+        for (row, out) in
+            image.chunks_exact(width).zip(plane[above * width..].chunks_exact_mut(width))
+        {
+            line[left..left + width].copy_from_slice(row);
+            gather(along, line, left, 1, out);
+        }
+        for (row, out) in light.chunks_exact_mut(width).enumerate() {
+            gather(across, &plane[row * width..], above * width, width, out);
+        }
+    }
+}
+
+/// Sums up what lies symmetrically around each place: `out[x]` gets `from[start + x]` and its
+/// neighbours at multiples of `step`.
+#[inline(always)]
+fn gather<T: Real>(taps: &[T], from: &[T], start: usize, step: usize, out: &mut [T]) {
+    for (lanes, out) in out.chunks_exact_mut(LANES).enumerate() {
+        let centre = start + lanes * LANES;
+        let mut sums = [T::default(); LANES];
+        for (sum, &at) in sums.iter_mut().zip(&from[centre..centre + LANES]) {
+            *sum = taps[0] * at;
+        }
+        for (distance, &tap) in taps.iter().enumerate().skip(1) {
+            let low = &from[centre - distance * step..][..LANES];
+            let high = &from[centre + distance * step..][..LANES];
+            for lane in 0..LANES {
+                sums[lane] += tap * (low[lane] + high[lane]);
+            }
+        }
+        out.copy_from_slice(&sums);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pixel_is_the_sum_of_its_neighbours_weights() {
+        let (rows, width) = (9, 32);
+        let image: Vec<f64> =
+            (0..rows * width).map(|n| ((n * 7919) % 101) as f64 / 100.0).collect();
+        for sigma in [0.0, 0.3, 1.0, 2.0, 13.0] {
+            let blur = Blur::new(sigma);
+            let mut light = vec![0.0; image.len()];
+            blur.apply(&image, width, &mut light, &mut Vec::new());
+            for (place, &light) in light.iter().enumerate() {
+                let (row, column) = ((place / width) as f64, (place % width) as f64);
+                let weight = |other: usize| {
+                    let (down, right) = ((other / width) as f64, (other % width) as f64);
+                    let squared = (down - row).powi(2) + (right - column).powi(2);
+                    if squared == 0.0 { 1.0 } else { (-squared / (2.0 * sigma * sigma)).exp() }
+                };
+                let exact: f64 = image.iter().enumerate().map(|(n, a)| a * weight(n)).sum();
+                assert!((light - exact).abs() < 2e-5 * exact.max(1.0), "{sigma} {place}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_sum_is_that_of_a_wide_white_image() {
+        let blur = Blur::<f64>::new(2.0);
+        let mut light = vec![0.0; 64 * 64];
+        blur.apply(&vec![1.0; 64 * 64], 64, &mut light, &mut Vec::new());
+        assert!((light[32 * 64 + 32] - blur.sum()).abs() < 1e-12);
+        assert!((blur.sum() - std::f64::consts::TAU * 4.0).abs() < 1e-4);
+    }
+}

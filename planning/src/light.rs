@@ -1,0 +1,202 @@
+//! The model of planners: what a pixel of a layer adds to the dose of every voxel.
+
+use lamp_grayscale::resin::{Dose, ExposureTime, Intensity};
+use lamp_stack::{Dpi, Length};
+use thiserror::Error;
+
+use crate::blur::Blur;
+
+/// Where in its layer a voxel's dose is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SampleHeight {
+    /// At the top, where light enters.
+    #[default]
+    Top,
+    /// Half-way.
+    Middle,
+    /// At the bottom, where the layer must reach what it rests on.
+    Bottom,
+}
+
+/// What a resin's intensity is that of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum IntensityOf {
+    /// A wide white field, as radiometers read it.
+    Field,
+    /// The centre of one lit pixel of this size alone (001 eq. 5).
+    Pixel(Length),
+}
+
+/// How light spreads in a resin, fades with depth, and cures (001 eq. 1 to 6 and 10; 004 eq.
+/// 2.2 to 2.5 and 2.14).
+///
+/// Doses are told in units of the critical dose: a voxel of dose 1 or more is cured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// The light of full white, `I_0`.
+    pub intensity: Intensity,
+    /// What `intensity` is that of.
+    pub intensity_of: IntensityOf,
+    /// The dose that cures, `E_c`.
+    pub critical_dose: Dose,
+    /// The depth over which light fades by e, `D_p`.
+    pub penetration_depth: Length,
+    /// The standard deviation of the Gaussian that a pixel's light makes, `σ`.
+    pub spread: Length,
+    /// The exponent `γ` that turns a gray level `g` into light `(g / 255)^γ`.
+    pub gamma: f64,
+    /// Where in its layer a voxel's dose is told.
+    pub at: SampleHeight,
+}
+
+/// Why a layer's light is unknown.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum LightError {
+    /// A number of the model is not above zero, or not finite.
+    #[error("{0} must be above zero")]
+    NotPositive(&'static str),
+}
+
+/// How thick a layer is and how long it is exposed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerTime {
+    /// Its thickness.
+    pub thickness: Length,
+    /// Its exposure time.
+    pub time: ExposureTime,
+}
+
+/// What reaches the voxels of a layer, in units of the critical dose:
+/// `e = passed * e_above + own * (G a)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerLight {
+    /// The share of the dose of the layer above (nearer to the light) that passes down to this
+    /// one: `q`.
+    pub passed: f64,
+    /// The dose of a lit pixel at its own centre, from its own exposure, for light 1.
+    pub own: f64,
+}
+
+impl Light {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// Returns an error if the intensity, the critical dose, the penetration depth, `γ` or a
+    /// pixel's size is not above zero, or the spread is negative.
+    pub fn check(&self) -> Result<(), LightError> {
+        let pixel = match self.intensity_of {
+            IntensityOf::Field => 1.0,
+            IntensityOf::Pixel(size) => size.um(),
+        };
+        let numbers = [
+            ("the intensity", self.intensity.mw_per_cm2()),
+            ("the critical dose", self.critical_dose.mj_per_cm2()),
+            ("the penetration depth", self.penetration_depth.um()),
+            ("gamma", self.gamma),
+            ("the size of the spread's pixel", pixel),
+            ("the spread, where it is not zero,", self.spread.um() + f64::MIN_POSITIVE),
+        ];
+        match numbers.iter().find(|(_, number)| !(*number > 0.0 && number.is_finite())) {
+            Some((name, _)) => Err(LightError::NotPositive(name)),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns σ in pixels.
+    pub fn spread_pixels(&self, dpi: Dpi) -> f64 {
+        self.spread.um() / dpi.pitch().um()
+    }
+
+    /// Returns what reaches each layer. Layers count from the light: the last page comes first.
+    pub fn layers(&self, dpi: Dpi, layers: &[LayerTime]) -> Vec<LayerLight> {
+        let weight = match self.intensity_of {
+            IntensityOf::Field => 1.0 / Blur::<f64>::new(self.spread_pixels(dpi)).sum(),
+            IntensityOf::Pixel(size) => (dpi.pitch().um() / size.um()).powi(2),
+        };
+        let fade = |um: f64| (-um / self.penetration_depth.um()).exp();
+        let above_and_own = |above: Option<&LayerTime>, own: &LayerTime| {
+            let own_um = own.thickness.um();
+            let above_um = above.map_or(0.0, |above| above.thickness.um());
+            let (between_um, inside_um) = match self.at {
+                SampleHeight::Top => (above_um, 0.0),
+                SampleHeight::Middle => ((above_um + own_um) / 2.0, own_um / 2.0),
+                SampleHeight::Bottom => (own_um, own_um),
+            };
+            let dose = (self.intensity * own.time).mj_per_cm2() / self.critical_dose.mj_per_cm2();
+            LayerLight { passed: fade(between_um), own: dose * weight * fade(inside_um) }
+        };
+        let above = std::iter::once(None).chain(layers.iter().map(Some));
+        above.zip(layers).map(|(above, own)| above_and_own(above, own)).collect()
+    }
+
+    /// Returns the light of a gray level: 0 to 1 (001 eq. 10, whose factor 3 is in the intensity).
+    pub fn of_level(&self, level: u8) -> f64 {
+        (f64::from(level) / 255.0).powf(self.gamma)
+    }
+
+    /// Returns the gray level nearest to a light of 0 to 1.
+    pub fn level_of(&self, light: f64) -> u8 {
+        (255.0 * light.clamp(0.0, 1.0).powf(1.0 / self.gamma)).round() as u8
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn light(at: SampleHeight) -> Light {
+        Light {
+            intensity: Intensity::from_mw_per_cm2(7.394),
+            intensity_of: IntensityOf::Field,
+            critical_dose: Dose::from_mj_per_cm2(7.266),
+            penetration_depth: Length::from_um(877.9),
+            spread: Length::from_um(50.0),
+            gamma: 2.404,
+            at,
+        }
+    }
+
+    #[test]
+    fn doses_fade_between_the_places_where_they_are_told() {
+        let layer = |um: f64| LayerTime {
+            thickness: Length::from_um(um),
+            time: ExposureTime::from_ms(1000.0),
+        };
+        let layers = [layer(100.0), layer(50.0), layer(80.0)];
+        let dpi = Dpi::new(2540.0).unwrap();
+        let places = [
+            (SampleHeight::Top, [0.0, 100.0, 150.0]),
+            (SampleHeight::Middle, [50.0, 125.0, 190.0]),
+            (SampleHeight::Bottom, [100.0, 150.0, 230.0]),
+        ];
+        for (at, depths_um) in places {
+            let layers = light(at).layers(dpi, &layers);
+            let peak = 7.394 / 7.266 / Blur::<f64>::new(5.0).sum();
+            let mut share = 1.0;
+            for (layer, depth_um) in layers.iter().zip(depths_um) {
+                // The light of the topmost layer at the places of all.
+                share *= if depth_um == depths_um[0] { layer.own / peak } else { layer.passed };
+                let expected = (-depth_um / 877.9_f64).exp();
+                assert!((share - expected).abs() < 1e-12, "{at:?} {depth_um}");
+            }
+        }
+    }
+
+    #[test]
+    fn levels_and_light_turn_into_each_other() {
+        let light = light(SampleHeight::Top);
+        assert!((0..=255).all(|level| light.level_of(light.of_level(level)) == level));
+        assert!((light.of_level(128) - (128.0_f64 / 255.0).powf(2.404)).abs() < 1e-15);
+        assert_eq!((light.level_of(-1.0), light.level_of(2.0)), (0, 255));
+    }
+
+    #[test]
+    fn numbers_that_are_not_above_zero_are_named() {
+        assert_eq!(light(SampleHeight::Top).check(), Ok(()));
+        let dark = Light { intensity: Intensity::from_mw_per_cm2(0.0), ..light(SampleHeight::Top) };
+        assert_eq!(dark.check().unwrap_err().to_string(), "the intensity must be above zero");
+        let none = Light { spread: Length::from_um(0.0), ..light(SampleHeight::Top) };
+        assert_eq!(none.check(), Ok(()));
+    }
+}
