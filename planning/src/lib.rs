@@ -6,6 +6,7 @@
 
 mod blur;
 mod light;
+pub mod solver;
 mod wide;
 
 pub use blur::{Blur, Real};

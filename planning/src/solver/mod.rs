@@ -1,0 +1,9 @@
+//! Finds the light of each pixel of a few layers that costs least, with a bound on the best.
+
+mod operator;
+mod problem;
+mod search;
+
+pub use operator::Operator;
+pub use problem::{Problem, Role, Shape};
+pub use search::{Progress, Search, Solution, solve};

@@ -1,0 +1,149 @@
+//! What the voxels of a block want, and what light their pixels may have.
+
+use crate::blur::{LANES, Real};
+use crate::solver::operator::Operator;
+
+/// The size of a block of voxels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Its layers.
+    pub layers: usize,
+    /// The rows of each layer.
+    pub rows: usize,
+    /// The columns of each row: a multiple of 16.
+    pub width: usize,
+}
+
+impl Shape {
+    /// Returns the least shape with at least so many columns.
+    pub fn holding(layers: usize, rows: usize, columns: usize) -> Self {
+        Self { layers, rows, width: columns.next_multiple_of(LANES) }
+    }
+
+    /// Returns the voxels of a layer.
+    pub fn plane(self) -> usize {
+        self.rows * self.width
+    }
+
+    /// Returns the voxels of all layers.
+    pub fn voxels(self) -> usize {
+        self.layers * self.plane()
+    }
+}
+
+/// What a voxel wants, and what light the pixel at its place may have: a set of flags.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Role(u8);
+
+impl Role {
+    /// No matter, and no light.
+    pub const NONE: Self = Self(0);
+    /// A dose below [`Problem::least`] costs [`Problem::short_price`] a unit.
+    pub const CURED: Self = Self(1);
+    /// A dose above [`Problem::most`] costs 1 a unit.
+    pub const UNCURED: Self = Self(2);
+    /// Every unit of the dose costs 1.
+    pub const DARK: Self = Self(4);
+    /// The pixel may have light, up to 1.
+    pub const LIT: Self = Self(8);
+    /// The pixel has light 1.
+    pub const WHITE: Self = Self(16 | 8);
+    /// The pixel may have no less than [`Problem::least_light`].
+    pub const NEVER_DIM: Self = Self(32 | 8);
+
+    /// Returns both roles together.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Returns whether a role has all of another's flags.
+    pub fn has(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    #[inline(always)]
+    fn flag<T: Real>(self, bit: u8) -> T {
+        T::of(f64::from(self.0 >> bit & 1))
+    }
+}
+
+/// The light of some layers that costs least:
+///
+/// - of a voxel that is to be cured, (least - dose)₊ times the price,
+/// - of one that is not to be, (dose - most)₊,
+/// - of one that is to be dark, its dose (001 eq. 11).
+#[derive(Clone, Debug)]
+pub struct Problem<T> {
+    /// The doses that light makes.
+    pub operator: Operator<T>,
+    /// The role of each voxel.
+    pub roles: Vec<Role>,
+    /// The dose that each voxel has from elsewhere.
+    pub incoming: Vec<T>,
+    /// The dose that voxels which are to be cured should have.
+    pub least: T,
+    /// What they cost a unit below it.
+    pub short_price: T,
+    /// The dose that voxels which are not to be cured may have.
+    pub most: T,
+    /// The light of a pixel that may not be dim.
+    pub least_light: T,
+}
+
+/// Bounds of a number.
+#[derive(Clone, Copy)]
+pub(crate) struct Bounds<T> {
+    pub(crate) low: T,
+    pub(crate) high: T,
+}
+
+impl<T: Real> Problem<T> {
+    /// Returns what light a pixel may have.
+    #[inline(always)]
+    pub(crate) fn light_bounds(&self, role: Role) -> Bounds<T> {
+        let white: T = role.flag(4);
+        Bounds { low: white + self.least_light * role.flag(5), high: role.flag(3) }
+    }
+
+    /// Returns what a unit of a voxel's dose may cost: the slopes of its cost.
+    #[inline(always)]
+    pub(crate) fn price_bounds(&self, role: Role) -> Bounds<T> {
+        let dark: T = role.flag(2);
+        Bounds { low: dark - self.short_price * role.flag(0), high: dark + role.flag(1) }
+    }
+
+    /// Returns the dose from which on a voxel's cost changes, less what it has from elsewhere.
+    #[inline(always)]
+    pub(crate) fn aim(&self, voxel: usize, role: Role) -> T {
+        self.least * role.flag(0) + self.most * role.flag(1) - self.incoming[voxel]
+    }
+
+    /// Returns what doses cost.
+    pub fn cost(&self, doses: &[T]) -> f64 {
+        let cost = |(voxel, &dose): (usize, &T)| {
+            let role = self.roles[voxel];
+            let (bounds, beyond) = (self.price_bounds(role), (dose - self.aim(voxel, role)).f64());
+            (beyond * bounds.low.f64()).max(beyond * bounds.high.f64())
+        };
+        doses.iter().enumerate().map(cost).sum()
+    }
+
+    /// Returns a bound that no light's cost is below, from any prices within their bounds and
+    /// what they make of light.
+    pub fn bound(&self, prices: &[T], of_light: &[T]) -> f64 {
+        let term = |(voxel, (&price, &of_light)): (usize, (&T, &T))| {
+            let role = self.roles[voxel];
+            let light = self.light_bounds(role);
+            let of_light = of_light.f64();
+            let least = (of_light * light.low.f64()).min(of_light * light.high.f64());
+            least - price.f64() * self.aim(voxel, role).f64()
+        };
+        prices.iter().zip(of_light).enumerate().map(term).sum()
+    }
+
+    /// Returns the light of all pixels as bright as they may be.
+    pub fn brightest(&self) -> Vec<T> {
+        self.roles.iter().map(|&role| self.light_bounds(role).high).collect()
+    }
+}

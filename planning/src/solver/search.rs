@@ -1,0 +1,343 @@
+//! The search for the least cost: the primal-dual hybrid gradient, reflected, anchored and
+//! restarted, with steps for each pixel and voxel.
+//!
+//! Every iterate has a cost, and a bound from the prices of doses, so the search knows how far
+//! it is from the best.
+
+use crate::blur::Real;
+use crate::solver::problem::Problem;
+use crate::wide::wide;
+
+/// When a search ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    /// The largest difference between the cost and the bound.
+    pub gap: f64,
+    /// The most iterations.
+    pub iterations: usize,
+}
+
+/// The cost and the bound after some iterations: the best so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Iterations.
+    pub iteration: usize,
+    /// The cost of the best light.
+    pub cost: f64,
+    /// What no light costs less than.
+    pub bound: f64,
+}
+
+/// The light that was found.
+#[derive(Clone, Debug)]
+pub struct Solution<T> {
+    /// The light of each pixel.
+    pub light: Vec<T>,
+    /// The price of each voxel's dose that gives the bound.
+    pub prices: Vec<T>,
+    /// How cost and bound came together.
+    pub progress: Vec<Progress>,
+}
+
+impl<T> Solution<T> {
+    /// Returns the cost and the bound at the end.
+    ///
+    /// # Panics
+    /// Never: a search notes where it starts.
+    pub fn end(&self) -> Progress {
+        *self.progress.last().expect("a search notes where it starts")
+    }
+}
+
+/// Iterations between two looks at cost and bound.
+const LOOK_AFTER: usize = 10;
+/// Steps are no longer than those of a pixel or voxel that sees this share of the most light.
+const LEAST_SHARE: f64 = 1e-3;
+/// A restart follows when the gap has shrunk to this share,
+const SHRUNK: f64 = 0.2;
+/// or to this share without shrinking since the last look,
+const SHRUNK_AND_STUCK: f64 = 0.8;
+/// or when the iterations since the last restart are this share of all.
+const LONG: f64 = 0.36;
+/// Steps in light are at first longer than those in prices by 1 over this.
+const FIRST_WEIGHT: f64 = 0.3;
+
+/// Light, prices and what they make of each other.
+#[derive(Clone)]
+struct Iterate<T> {
+    light: Vec<T>,
+    prices: Vec<T>,
+    doses: Vec<T>,
+    of_light: Vec<T>,
+}
+
+impl<T: Real> Iterate<T> {
+    fn new(problem: &Problem<T>, light: Vec<T>, prices: Vec<T>) -> Self {
+        let nothing = vec![T::default(); light.len()];
+        let mut start = Self { light, prices, doses: nothing.clone(), of_light: nothing };
+        problem.operator.doses(&start.light, &mut start.doses);
+        problem.operator.prices_of_light(&start.prices, &mut start.of_light);
+        start
+    }
+
+    fn cost(&self, problem: &Problem<T>) -> f64 {
+        problem.cost(&self.doses)
+    }
+
+    fn bound(&self, problem: &Problem<T>) -> f64 {
+        problem.bound(&self.prices, &self.of_light)
+    }
+}
+
+/// How far a step goes in the light of a pixel and the price of a voxel (Pock and Chambolle
+/// 2011): one over the sum of what it sees, which makes all steps together just short enough.
+struct Steps<T> {
+    light: Vec<T>,
+    prices: Vec<T>,
+}
+
+impl<T: Real> Steps<T> {
+    fn new(problem: &Problem<T>) -> Self {
+        let one_if = |is: bool| T::of(f64::from(u8::from(is)));
+        let moves = |role| {
+            let (light, prices) = (problem.light_bounds(role), problem.price_bounds(role));
+            (one_if(light.low < light.high), one_if(prices.low < prices.high))
+        };
+        let (light, prices) = problem.roles.iter().map(|&role| moves(role)).unzip();
+        let seen = Iterate::new(problem, light, prices);
+        let over = |sums: &[T]| {
+            let most = sums.iter().fold(f64::MIN_POSITIVE, |most, sum| most.max(sum.f64()));
+            sums.iter().map(|sum| T::of(1.0 / sum.f64().max(LEAST_SHARE * most))).collect()
+        };
+        Self { light: over(&seen.of_light), prices: over(&seen.doses) }
+    }
+
+    /// Returns how far apart two iterates are in light and in prices, in steps.
+    fn distances(&self, a: &Iterate<T>, b: &Iterate<T>) -> [f64; 2] {
+        let distance = |a: &[T], b: &[T], steps: &[T]| {
+            let squares = a.iter().zip(b).zip(steps).map(|((&a, &b), step)| {
+                let apart = (a - b).f64();
+                apart * apart / step.f64()
+            });
+            squares.sum::<f64>().sqrt()
+        };
+        [distance(&a.light, &b.light, &self.light), distance(&a.prices, &b.prices, &self.prices)]
+    }
+}
+
+/// Finds the light that costs least, from a light and prices to start with.
+///
+/// The iteration is the reflected Halpern form of restarted PDHG (Lu and Yang 2024), for a
+/// problem whose light and prices all have bounds.
+///
+/// # Panics
+/// Panics if `light` or `prices` are not of the problem's size.
+pub fn solve<T: Real>(
+    problem: &Problem<T>,
+    light: Vec<T>,
+    prices: Vec<T>,
+    until: Search,
+) -> Solution<T> {
+    let voxels = problem.operator.shape().voxels();
+    assert!(light.len() == voxels && prices.len() == voxels, "each voxel has a start");
+    let steps = Steps::new(problem);
+    let mut now = Iterate::new(problem, light, prices);
+    let mut anchor = now.clone();
+    let mut next = now.clone();
+    let (cost, bound) = (now.cost(problem), now.bound(problem));
+    let mut best = Best {
+        light: now.light.clone(),
+        prices: now.prices.clone(),
+        progress: vec![Progress { iteration: 0, cost, bound }],
+    };
+    let (mut weight, mut since) = (FIRST_WEIGHT, 0);
+    let (mut gap_at_restart, mut gap_before) = (cost - bound, f64::INFINITY);
+    for iteration in 1..=until.iterations {
+        if best.gap() <= until.gap {
+            break;
+        }
+        step_light(problem, &steps, weight, &now, &mut next);
+        step_prices(problem, &steps, weight, &now, &mut next);
+        since += 1;
+        let share = f64::from(since) / f64::from(since + 1);
+        halfway(&mut now, &next, &anchor, share);
+        if iteration % LOOK_AFTER != 0 {
+            continue;
+        }
+        let (cost, bound) = (next.cost(problem), next.bound(problem));
+        best.look_at(iteration, &next, cost, bound);
+        let gap = cost - bound;
+        let stuck = gap < SHRUNK_AND_STUCK * gap_at_restart && gap > gap_before;
+        let long = f64::from(since) > LONG * iteration as f64;
+        if gap < SHRUNK * gap_at_restart || stuck || long {
+            let [light, prices] = steps.distances(&next, &anchor);
+            if light > 1e-9 && prices > 1e-9 {
+                weight = (weight * prices / light).sqrt();
+            }
+            now.clone_from(&next);
+            anchor.clone_from(&next);
+            (since, gap_at_restart, gap_before) = (0, gap, f64::INFINITY);
+        } else {
+            gap_before = gap;
+        }
+    }
+    Solution { light: best.light, prices: best.prices, progress: best.progress }
+}
+
+/// The best light and the best prices so far.
+struct Best<T> {
+    light: Vec<T>,
+    prices: Vec<T>,
+    progress: Vec<Progress>,
+}
+
+impl<T: Real> Best<T> {
+    fn last(&self) -> Progress {
+        *self.progress.last().expect("a search notes where it starts")
+    }
+
+    fn gap(&self) -> f64 {
+        self.last().cost - self.last().bound
+    }
+
+    fn look_at(&mut self, iteration: usize, next: &Iterate<T>, cost: f64, bound: f64) {
+        let mut progress = Progress { iteration, ..self.last() };
+        if cost < progress.cost {
+            progress.cost = cost;
+            self.light.copy_from_slice(&next.light);
+        }
+        if bound > progress.bound {
+            progress.bound = bound;
+            self.prices.copy_from_slice(&next.prices);
+        }
+        self.progress.push(progress);
+    }
+}
+
+/// A step of the light against its price, and the doses that it makes.
+fn step_light<T: Real>(
+    problem: &Problem<T>,
+    steps: &Steps<T>,
+    weight: f64,
+    now: &Iterate<T>,
+    next: &mut Iterate<T>,
+) {
+    let factor = T::of(1.0 / weight);
+    wide(
+        #[inline(always)]
+        || {
+            let pixels = next.light.iter_mut().zip(&problem.roles);
+            let prices = now.of_light.iter().zip(&steps.light);
+            for ((next, &role), (&light, (&price, &step))) in
+                pixels.zip(now.light.iter().zip(prices))
+            {
+                let bounds = problem.light_bounds(role);
+                *next = (light - step * factor * price).within(bounds.low, bounds.high);
+            }
+        },
+    );
+    problem.operator.doses(&next.light, &mut next.doses);
+}
+
+/// A step of the prices towards the slopes of the cost, at the doses that the light is going
+/// to make, and what they make of light.
+fn step_prices<T: Real>(
+    problem: &Problem<T>,
+    steps: &Steps<T>,
+    weight: f64,
+    now: &Iterate<T>,
+    next: &mut Iterate<T>,
+) {
+    let factor = T::of(weight);
+    let two = T::of(2.0);
+    wide(
+        #[inline(always)]
+        || {
+            let Iterate { prices, doses, .. } = &mut *next;
+            let voxels = prices.iter_mut().zip(&*doses).zip(now.prices.iter().zip(&now.doses));
+            let of_problem = problem.roles.iter().zip(&steps.prices);
+            for (voxel, (((next, &to), (&price, &from)), (&role, &step))) in
+                voxels.zip(of_problem).enumerate()
+            {
+                let bounds = problem.price_bounds(role);
+                let beyond = two * to - from - problem.aim(voxel, role);
+                *next = (price + step * factor * beyond).within(bounds.low, bounds.high);
+            }
+        },
+    );
+    problem.operator.prices_of_light(&next.prices, &mut next.of_light);
+}
+
+/// Reflects an iterate at the next, and draws the result towards the anchor.
+fn halfway<T: Real>(now: &mut Iterate<T>, next: &Iterate<T>, anchor: &Iterate<T>, share: f64) {
+    let (onwards, back, rest) = (T::of(2.0 * share), T::of(share), T::of(1.0 - share));
+    let draw = |now: &mut [T], next: &[T], anchor: &[T]| {
+        wide(
+            #[inline(always)]
+            || {
+                for ((now, &next), &anchor) in now.iter_mut().zip(next).zip(anchor) {
+                    *now = onwards * next - back * *now + rest * anchor;
+                }
+            },
+        );
+    };
+    draw(&mut now.light, &next.light, &anchor.light);
+    draw(&mut now.prices, &next.prices, &anchor.prices);
+    draw(&mut now.doses, &next.doses, &anchor.doses);
+    draw(&mut now.of_light, &next.of_light, &anchor.of_light);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blur::Blur;
+    use crate::light::LayerLight;
+    use crate::solver::{Operator, Role, Shape};
+
+    /// The problem of 001 appendix A: a cylinder of 5 pixels and 5 layers, with the boundary of
+    /// the layers from `first` on.
+    fn appendix_a(first: usize) -> Problem<f64> {
+        let shape = Shape::holding(5, 7, 7);
+        let layer = LayerLight { passed: 10_f64.powf(-0.008), own: 3.0 / 170.0 };
+        let operator = Operator::new(shape, Blur::new(13.0), vec![layer; 5]);
+        let is_lit = |row: usize, column: usize| {
+            let inside = |n: usize| (1..6).contains(&n);
+            let corner = |n: usize| n == 1 || n == 5;
+            inside(row) && inside(column) && !(corner(row) && corner(column))
+        };
+        let role = |voxel: usize| {
+            let (layer, place) = (voxel / shape.plane(), voxel % shape.plane());
+            let (row, column) = (place / shape.width, place % shape.width);
+            match (column < 7, is_lit(row, column), layer) {
+                (true, true, 0..2) => Role::LIT,
+                (true, true, _) => Role::LIT.and(Role::CURED),
+                (true, false, _) if layer >= first => Role::DARK,
+                _ => Role::NONE,
+            }
+        };
+        Problem {
+            operator,
+            roles: (0..shape.voxels()).map(role).collect(),
+            incoming: vec![0.0; shape.voxels()],
+            least: 1.0,
+            short_price: 300.0,
+            most: 1.0,
+            least_light: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_optimum_of_appendix_a_comes_out() {
+        for (first, least) in [(0, 18415.657695), (2, 14008.109334)] {
+            let problem = appendix_a(first);
+            let light = problem.brightest();
+            let prices = vec![0.0; light.len()];
+            let until = Search { gap: 5e-9 * least / 170.0, iterations: 20_000 };
+            let end = solve(&problem, light, prices, until).end();
+            assert!(end.bound <= end.cost, "{end:?}");
+            for found in [end.bound, end.cost] {
+                assert!((170.0 * found / least - 1.0).abs() < 1e-8, "{end:?}");
+            }
+        }
+    }
+}
