@@ -2,8 +2,8 @@
 //! line.
 
 use lamp_grayscale::material::{
-    Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine, Material,
-    TwoDepthNumbers, WidthNumbers,
+    Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine, GivenNumber,
+    Material, SpreadNumbers, TwoDepthNumbers, WidthNumbers,
 };
 use lamp_grayscale::resin::{Dose, Intensity, Quantity, WidthSensitivity};
 use lamp_stack::{Catalogued, Length};
@@ -82,21 +82,34 @@ fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
     })
 }
 
+fn spread() -> impl Strategy<Value = SpreadNumbers> {
+    (given(um()), option::of(given(um()))).prop_map(|(sigma, pixel)| SpreadNumbers { sigma, pixel })
+}
+
+fn gamma() -> impl Strategy<Value = GivenNumber> {
+    (number(), option::of(number()), text()).prop_map(|(value, plus_minus, source)| GivenNumber {
+        value,
+        plus_minus,
+        source,
+    })
+}
+
 fn constant() -> impl Strategy<Value = Constant> {
     let finite = any::<f64>().prop_filter("finite", |value| value.is_finite());
     (finite, text(), text()).prop_map(|(value, unit, source)| Constant { value, unit, source })
 }
 
 fn materials() -> impl Strategy<Value = Material> {
-    let light = given(number().prop_map(Intensity::from_mw_per_cm2));
+    let intensity = given(number().prop_map(Intensity::from_mw_per_cm2));
+    let light = (option::of(intensity), option::of(spread()), option::of(gamma()));
     let models =
         (curve(), option::of(lines()), option::of(lines()), option::of(two_depth()), widths());
     let constants = proptest::collection::btree_map("[a-z. \"]{0,6}", constant(), 0..3);
-    ("[a-z0-9-]{1,9}", text(), option::of(light), models, constants).prop_map(
+    ("[a-z0-9-]{1,9}", text(), light, models, constants).prop_map(
         |(
             name,
             description,
-            intensity,
+            (intensity, spread, gamma),
             (curve, gray, gray_light, two_depth, cure_width),
             constants,
         )| {
@@ -105,6 +118,8 @@ fn materials() -> impl Strategy<Value = Material> {
                 name,
                 description,
                 intensity,
+                spread,
+                gamma,
                 working_curve: Some(curve),
                 gray,
                 gray_light,

@@ -4,7 +4,15 @@ use std::fs;
 
 use lamp_tests::{Scratch, workspace_root};
 
-const NAMES: [&str; 5] = ["lamp-no-absorber", "lamp-suspension", "pegda-mw700", "sl-5510", "tmpta"];
+const NAMES: [&str; 7] = [
+    "lamp-no-absorber",
+    "lamp-suspension",
+    "pegda-mw700",
+    "pegda-sudan",
+    "sl-5510",
+    "tmpta",
+    "zsg-amber",
+];
 
 fn said(scratch: &Scratch, line: &str) -> String {
     String::from_utf8(scratch.run(line).succeeds_quietly().stdout).unwrap()
@@ -18,8 +26,10 @@ fn list_has_a_line_for_each_material() {
     assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), NAMES);
     assert_eq!(rows[1][1..6], ["1600", "mW/cm2", "working-curve,", "gray,", "dimmed-lamp"]);
     // No light and no model is printed if the source has none.
-    assert_eq!(rows[3][1..4], ["-", "working-curve,", "two-depth"]);
-    assert_eq!(rows[4][1..4], ["14", "mW/cm2", "-"]);
+    assert_eq!(rows[4][1..4], ["-", "working-curve,", "two-depth"]);
+    assert_eq!(rows[5][1..4], ["14", "mW/cm2", "-"]);
+    assert_eq!(rows[6][1..3], ["3185.57", "mW/cm2"]);
+    assert_eq!(rows[6][3..8], ["working-curve,", "spread", "145.6um,", "gamma", "2.404"]);
 }
 
 #[test]
@@ -72,6 +82,9 @@ fn check_says_in_a_sentence_what_a_file_allows() {
         ("lamp-suspension", "1600 mW/cm2, full white cures 100um in 136.7 ms"),
         ("pegda-mw700", "depths of 180um or more"),
         ("sl-5510", "add [intensity]"),
+        ("pegda-sudan", "working-curve, spread 50um; at 7.394 mW/cm2"),
+        // A wide field is brighter than the pixel that its intensity is told for.
+        ("zsg-amber", "gamma 2.404; at 3185.57 mW/cm2, full white cures 100um in 62.9 ms"),
         ("tmpta", "add [working-curve]"),
     ] {
         said(&scratch, &format!("lamp material show {name} > {name}.toml"));
@@ -91,7 +104,7 @@ fn the_example_of_the_documentation_is_a_material() {
     let (example, _) = from.split_once("```").unwrap();
     let checked = Scratch::new().run_on("lamp material check -", example.as_bytes()).succeeds();
     let said = String::from_utf8(checked.stdout).unwrap();
-    let words = "mine gives working-curve, gray, cure-width (1 size, 423.3um); at 1600 mW/cm2";
+    let words = "mine gives working-curve, gray, cure-width (1 size, 423.3um), spread 34um, gamma 2.2; at 1600";
     assert!(said.contains(words), "{said}");
 }
 

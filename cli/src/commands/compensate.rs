@@ -201,14 +201,14 @@ fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, Exit> {
     let time = layer.info.exposure_ms.filter(|ms| *ms >= 0.0).ok_or_else(|| {
         no_dose(format!("{} states no exposure time: give --dose", layer.info.name()))
     })?;
-    let light = material.intensity.as_ref().ok_or_else(|| {
+    let light = material.light().map_err(anyhow::Error::new)?.ok_or_else(|| {
         let name = &material.name;
         no_dose(format!(
             "{name} states no intensity of full white: give --dose, or add [intensity] to its \
              file"
         ))
     })?;
-    Ok(light.value * ExposureTime::from_ms(time))
+    Ok(light * ExposureTime::from_ms(time))
 }
 
 fn parse_offset(text: &str) -> Result<Length, String> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::{DepthRange, ExposureTime, Resin};
+use lamp_grayscale::resin::{DepthRange, ExposureTime, Intensity, Resin};
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
@@ -83,7 +83,9 @@ fn fields(material: &Material) -> Value {
     json!({
         "name": material.name,
         "description": material.description,
-        "light_mw_per_cm2": material.intensity.as_ref().map(|light| light.value.mw_per_cm2()),
+        "light_mw_per_cm2": light_of(material).map(Intensity::mw_per_cm2),
+        "spread_um": material.spread.as_ref().map(|spread| spread.sigma.value.um()),
+        "gamma": material.gamma.as_ref().map(|gamma| gamma.value),
         "models": models(material),
         "cure_width_um": material.cure_width.iter().map(|it| it.feature_size.um()).collect::<Vec<_>>(),
         "depths_um": depths.map(|depths| [Some(depths.from.um()), depths.to.map(Length::um)]),
@@ -96,18 +98,29 @@ fn fields(material: &Material) -> Value {
 
 /// A line for each built-in material.
 fn table() -> String {
-    let mut text = format!("{:<18}{:<18}{:<38}description\n", "name", "full white", "models");
+    let mut text = format!("{:<18}{:<18}{:<44}description\n", "name", "full white", "models");
     for material in Material::builtins() {
-        let light = material.intensity.as_ref().map(|light| light.value.to_string());
+        let light = light_of(&material).map(|light| light.to_string());
         let light = light.unwrap_or_else(|| "-".to_owned());
         let mut models = models_and_widths(&material);
         if models.is_empty() {
             models.push('-');
         }
         let Material { name, description, .. } = material;
-        text += &format!("{name:<18}{light:<18}{models:<38}{description}\n");
+        text += &format!("{name:<18}{light:<18}{models:<44}{description}\n");
     }
     text
+}
+
+/// The light of a wide field of full white. Built-in and checked materials have no faults.
+fn light_of(material: &Material) -> Option<Intensity> {
+    material.light().ok().flatten().map(significant)
+}
+
+/// Light to six digits: that of a field is a sum.
+fn significant(light: Intensity) -> Intensity {
+    let digits = format!("{:.5e}", light.mw_per_cm2());
+    Intensity::from_mw_per_cm2(digits.parse().unwrap_or(light.mw_per_cm2()))
 }
 
 /// The cure models of a material, by their tables.
@@ -123,7 +136,14 @@ fn models(material: &Material) -> Vec<&'static str> {
 
 fn models_and_widths(material: &Material) -> String {
     let models = models(material).into_iter().map(str::to_owned);
-    models.chain(widths(material)).collect::<Vec<_>>().join(", ")
+    models.chain(widths(material)).chain(light_laws(material)).collect::<Vec<_>>().join(", ")
+}
+
+/// How light spreads and how it follows gray levels.
+fn light_laws(material: &Material) -> impl Iterator<Item = String> {
+    let spread = material.spread.as_ref().map(|spread| format!("spread {}", spread.sigma.value));
+    let gamma = material.gamma.as_ref().map(|gamma| format!("gamma {}", gamma.value));
+    spread.into_iter().chain(gamma)
 }
 
 /// The sizes of the squares whose cure widths a material has.
@@ -162,7 +182,7 @@ fn allows(material: &Material) -> String {
         (layer, Ok(time)) => format!(
             "{} gives {models}{holds}; at {}, full white cures {layer} in {time:.1}",
             material.name,
-            resin.light()
+            significant(resin.light())
         ),
         (_, Err(why)) => format!("{} gives {models}{holds}, but {why}", material.name),
     }

@@ -22,6 +22,9 @@ pub enum MaterialError {
     /// The light of full white is not above zero.
     #[error("intensity.value must be above zero")]
     Dark,
+    /// The exponent of the light over the gray level is not above zero.
+    #[error("gamma.value must be above zero")]
+    Gamma,
     /// A constant is infinite or not a number.
     #[error("constants.{0}.value must be a finite number")]
     NoNumber(String),
@@ -57,8 +60,10 @@ impl Catalogued for Material {
         builtin!("lamp-no-absorber"),
         builtin!("lamp-suspension"),
         builtin!("pegda-mw700"),
+        builtin!("pegda-sudan"),
         builtin!("sl-5510"),
         builtin!("tmpta"),
+        builtin!("zsg-amber"),
     ];
     type CheckError = MaterialError;
 
@@ -73,6 +78,8 @@ impl Catalogued for Material {
         if let Some((name, _)) = self.constants.iter().find(|(_, c)| !c.value.is_finite()) {
             return Err(MaterialError::NoNumber(one_line(name)));
         }
+        self.spread()?;
+        self.gamma()?;
         self.working_curve()?;
         self.dimmed_lamp()?;
         self.gray_curve()?;
@@ -85,7 +92,10 @@ impl Catalogued for Material {
 
 #[cfg(test)]
 mod tests {
+    use lamp_stack::Length;
+
     use super::*;
+    use crate::material::Given;
 
     const WHOLE: &str = r#"name = "mine"
 description = "A resin of mine"
@@ -212,6 +222,51 @@ source = "notebook, page 3"
             slip.contains("cure-width[0].sensitivity") && slip.contains("a width sensitivity"),
             "{slip}"
         );
+    }
+
+    #[test]
+    fn spread_and_gamma_read_and_write_back() {
+        let with = |tables: &str| Material::from_toml(&format!("{WHOLE}{tables}"));
+        let material = with(
+            "[spread]\nsigma = { value = \"50 um\", source = \"a\" }\n\
+             [gamma]\nvalue = 2.2\nplus-minus = 0.1\nsource = \"b\"\n",
+        );
+        let mut material = material.unwrap();
+        assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material.clone()));
+        assert_eq!(material.spread().unwrap().unwrap().sigma().um(), 50.0);
+        assert_eq!(material.gamma(), Ok(2.2));
+        // A radiometer reads a wide field.
+        assert_eq!(material.light().unwrap().unwrap().mw_per_cm2(), 20.0);
+        let spread = material.spread.as_mut().unwrap();
+        spread.pixel = Some(Given { value: Length::from_um(25.0), ..spread.sigma.clone() });
+        // 8π pixels of two pixels' spread.
+        let light = material.light().unwrap().unwrap().mw_per_cm2();
+        assert!((light - 502.654825).abs() < 1e-6, "{light}");
+        assert_eq!(material.resin().unwrap().light().mw_per_cm2(), light);
+        let none = Material::from_toml(WHOLE).unwrap();
+        assert_eq!((none.spread(), none.gamma()), (Ok(None), Ok(1.0)));
+    }
+
+    #[test]
+    fn impossible_spreads_and_gammas_are_refused() {
+        let refused = |tables: &str| {
+            let error = Material::from_toml(&format!("{WHOLE}{tables}")).unwrap_err();
+            error.to_string()
+        };
+        let spread = |sigma: &str, pixel: &str| {
+            refused(&format!(
+                "[spread]\nsigma = {{ value = \"{sigma}\", source = \"a\" }}\n\
+                 pixel = {{ value = \"{pixel}\", source = \"a\" }}\n"
+            ))
+        };
+        assert_eq!(spread("-1 um", "1 um"), "spread.sigma must be zero or more");
+        assert_eq!(spread("1 um", "0 um"), "spread.pixel must be above zero");
+        let unit = spread("13", "1 um");
+        assert!(unit.contains("spread.sigma.value") && unit.contains("has no unit"), "{unit}");
+        for gamma in ["0", "-1", "nan", "inf"] {
+            let said = refused(&format!("[gamma]\nvalue = {gamma}\nsource = \"a\"\n"));
+            assert_eq!(said, "gamma.value must be above zero");
+        }
     }
 
     #[test]

@@ -23,11 +23,11 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use file::MaterialError;
-pub use number::{Constant, Given, GivenDepths, GivenLine};
+pub use number::{Constant, Given, GivenDepths, GivenLine, GivenNumber};
 
 use crate::resin::{
     CureModel, CureWidth, DepthRange, Dose, GrayCurve, Intensity, IntensityLines, ModelError,
-    Resin, StraightLine, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
+    Resin, Spread, StraightLine, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
 };
 
 /// The known numbers of a resin; unknown ones are absent. The default is empty and has no
@@ -39,8 +39,13 @@ pub struct Material {
     pub name: String,
     /// A description of one line.
     pub description: String,
-    /// The light of full white, `I_0`.
+    /// The light of full white, `I_0`: that of a wide field, or of one pixel where
+    /// [`SpreadNumbers::pixel`] says so. [`Material::light`] is that of a wide field.
     pub intensity: Option<Given<Intensity>>,
+    /// How far a pixel's light spreads sideways (001 eq. 5).
+    pub spread: Option<SpreadNumbers>,
+    /// The exponent `γ` of the light over the gray level (001 eq. 10).
+    pub gamma: Option<GivenNumber>,
     /// The working curve (002 eq. 30).
     pub working_curve: Option<CurveNumbers>,
     /// The working curve over the gray level (002 eq. 40).
@@ -58,6 +63,16 @@ pub struct Material {
     /// Other numbers of its source.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, Constant>,
+}
+
+/// The numbers of how far light spreads sideways.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct SpreadNumbers {
+    /// The standard deviation `σ`, half of 002's Gaussian width `W_o`.
+    pub sigma: Given<Length>,
+    /// The side of the pixel that the intensity is told for, if not for a wide field.
+    pub pixel: Option<Given<Length>>,
 }
 
 /// The numbers of a working curve.
@@ -131,6 +146,37 @@ pub enum ResinError {
 }
 
 impl Material {
+    /// Returns the light of a wide field of full white, if it is known.
+    ///
+    /// # Errors
+    /// Returns an error if a number of the spread is impossible.
+    pub fn light(&self) -> Result<Option<Intensity>, MaterialError> {
+        let gain = self.spread()?.map_or(1.0, |spread| spread.field_gain());
+        let wide = |light: f64| Intensity::from_mw_per_cm2(light * gain);
+        Ok(self.intensity.as_ref().map(|light| wide(light.value.mw_per_cm2())))
+    }
+
+    /// Returns how light spreads sideways, if it is known.
+    ///
+    /// # Errors
+    /// Returns an error if `σ` is below zero or the pixel is not above zero.
+    pub fn spread(&self) -> Result<Option<Spread>, MaterialError> {
+        let spread = |numbers: &SpreadNumbers| {
+            Spread::new(numbers.sigma.value, numbers.pixel.as_ref().map(|pixel| pixel.value))
+        };
+        self.spread.as_ref().map(spread).transpose().map_err(of("spread"))
+    }
+
+    /// Returns the exponent `γ`, with which a level `g` of 255 passes `(g/255)^γ` of the
+    /// light (001 eq. 10); 1 if none is given.
+    ///
+    /// # Errors
+    /// Returns an error if it is not above zero.
+    pub fn gamma(&self) -> Result<f64, MaterialError> {
+        let gamma = self.gamma.as_ref().map_or(1.0, |gamma| gamma.value);
+        if gamma > 0.0 && gamma.is_finite() { Ok(gamma) } else { Err(MaterialError::Gamma) }
+    }
+
     /// Returns the working curve, if there is one.
     ///
     /// # Errors
@@ -221,8 +267,8 @@ impl Material {
     /// Returns an error if there is no cure model or no intensity, or if numbers are
     /// impossible.
     pub fn resin(&self) -> Result<Resin, ResinError> {
-        let light = match &self.intensity {
-            Some(light) => light.value,
+        let light = match self.light()? {
+            Some(light) => light,
             None if self.has_model() => return Err(ResinError::NoLight(self.name.clone())),
             None => return Err(ResinError::NoModel(self.name.clone())),
         };

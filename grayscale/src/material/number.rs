@@ -25,6 +25,20 @@ pub struct Given<T> {
     pub source: String,
 }
 
+/// A number without a unit, and its source.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct GivenNumber {
+    /// The number.
+    pub value: f64,
+    /// Half the width of its 95% confidence interval, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plus_minus: Option<f64>,
+    /// The equation, table, figure or measurement.
+    #[serde(deserialize_with = "nonempty_text")]
+    pub source: String,
+}
+
 /// A straight line and its source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]

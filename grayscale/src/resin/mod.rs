@@ -10,6 +10,7 @@ mod model;
 #[cfg(test)]
 pub(crate) mod model_laws;
 pub mod shrinkage;
+mod spread;
 mod two_depth;
 mod units;
 mod working_curve;
@@ -23,6 +24,7 @@ pub use cure_width::{CureWidth, WidthLine};
 pub use filter::OpticalDensity;
 pub use gray_curve::{GrayCurve, IntensityLines, StraightLine};
 pub use model::{CureError, CureModel, DepthRange, ModelError};
+pub use spread::Spread;
 pub use two_depth::TwoDepth;
 pub use units::{
     Dose, ExposureTime, GrayLevel, Intensity, Quantity, QuantityError, WidthSensitivity,

@@ -145,6 +145,9 @@ pub enum ModelError {
     /// A number is not above zero, or not finite.
     #[error("{0} must be above zero")]
     NotPositive(&'static str),
+    /// A number is below zero, or not finite.
+    #[error("{0} must be zero or more")]
+    Negative(&'static str),
     /// A slope is below zero, or not finite.
     #[error("{0} must be zero or more: a model whose value falls towards white has no inverse")]
     Falls(&'static str),
@@ -160,4 +163,10 @@ pub enum ModelError {
 pub(super) fn positive(number: f64, what: &'static str) -> Result<(), ModelError> {
     let fine = number > 0.0 && number.is_finite();
     if fine { Ok(()) } else { Err(ModelError::NotPositive(what)) }
+}
+
+/// Checks that a number is zero or more and finite.
+pub(super) fn zero_or_more(number: f64, what: &'static str) -> Result<(), ModelError> {
+    let fine = number >= 0.0 && number.is_finite();
+    if fine { Ok(()) } else { Err(ModelError::Negative(what)) }
 }

@@ -52,7 +52,7 @@ pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Exit> {
     let base = files.base()?;
     let table = files.table()?;
     let at_place = |error: Exit| error.at(files.place());
-    let measured = depth_points(&table, files.light(base.as_ref()));
+    let measured = depth_points(&table, files.light(base.as_ref())?);
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let has_gray = table.columns().iter().any(|column| column == "gray");
     let model = args.model.unwrap_or(if has_gray { DepthModel::Gray } else { DepthModel::Jacobs });

@@ -106,9 +106,11 @@ impl CalibrationFiles {
     }
 
     /// The light that makes doses of times.
-    fn light(&self, base: Option<&Material>) -> Option<Intensity> {
-        let of_base = || base?.intensity.as_ref().map(|light| light.value);
-        self.intensity.or_else(of_base)
+    fn light(&self, base: Option<&Material>) -> Result<Option<Intensity>, Exit> {
+        match (self.intensity, base) {
+            (None, Some(base)) => Ok(base.light().map_err(anyhow::Error::new)?),
+            (given, _) => Ok(given),
+        }
     }
 
     fn table(&self) -> Result<CsvTable, Exit> {
@@ -159,6 +161,9 @@ impl CalibrationFiles {
             if let Some(value) = self.intensity {
                 let source = format!("given with {}", self.source_name());
                 material.intensity = Some(Given { value, plus_minus: None, source });
+                if let Some(spread) = &mut material.spread {
+                    spread.pixel = None;
+                }
             }
             add(&mut material);
             let text = material.to_toml().map_err(|error| self.no_material(output, error))?;

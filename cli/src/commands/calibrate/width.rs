@@ -51,7 +51,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     };
     let table = files.table()?;
     let at_place = |error: Exit| error.at(files.place());
-    let measured = width_points(&table, files.light(base.as_ref()), args.dpi);
+    let measured = width_points(&table, files.light(base.as_ref())?, args.dpi);
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;
     let progress = Progress::new("calibrate", common, true);

@@ -118,7 +118,7 @@ impl SquaresArgs {
         };
         let material: Material = entry(path)?;
         let name = path.display();
-        material.intensity.map(|light| light.value).ok_or_else(|| {
+        material.light().map_err(anyhow::Error::new)?.ok_or_else(|| {
             Exit::usage(format!("{name} states no intensity of full white: give --intensity"))
         })
     }
