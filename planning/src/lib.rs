@@ -6,8 +6,10 @@
 
 mod blur;
 mod light;
+mod resin_light;
 pub mod solver;
 mod wide;
 
 pub use blur::{Blur, Real};
 pub use light::{IntensityOf, LayerLight, LayerTime, Light, LightError, SampleHeight};
+pub use resin_light::NoLight;

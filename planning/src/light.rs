@@ -18,6 +18,8 @@ pub enum SampleHeight {
     Bottom,
 }
 
+lamp_stack::named!(SampleHeight { Top = "top", Middle = "middle", Bottom = "bottom" });
+
 /// What a resin's intensity is that of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum IntensityOf {

@@ -16,6 +16,9 @@ pub struct Spread {
 }
 
 impl Spread {
+    /// Light that does not spread, told for a wide field.
+    pub const NONE: Self = Self { sigma: Length::from_um(0.0), pixel: None };
+
     /// Creates the spread of a standard deviation `σ`; zero is light that does not spread.
     ///
     /// `pixel` says what a lamp's intensity was told for: the centre of one lit pixel of that
