@@ -5,5 +5,5 @@ mod problem;
 mod search;
 
 pub use operator::Operator;
-pub use problem::{Problem, Role, Shape};
+pub use problem::{Problem, Role, Shape, Terms};
 pub use search::{Progress, Search, Solution, solve};

@@ -38,9 +38,9 @@ pub struct Role(u8);
 impl Role {
     /// No matter, and no light.
     pub const NONE: Self = Self(0);
-    /// A dose below [`Problem::least`] costs [`Problem::short_price`] a unit.
+    /// A dose below [`Terms::least`] costs [`Terms::short_price`] a unit.
     pub const CURED: Self = Self(1);
-    /// A dose above [`Problem::most`] costs 1 a unit.
+    /// A dose above [`Terms::most`] costs 1 a unit.
     pub const UNCURED: Self = Self(2);
     /// Every unit of the dose costs 1.
     pub const DARK: Self = Self(4);
@@ -48,13 +48,19 @@ impl Role {
     pub const LIT: Self = Self(8);
     /// The pixel has light 1.
     pub const WHITE: Self = Self(16 | 8);
-    /// The pixel may have no less than [`Problem::least_light`].
+    /// The pixel may have no less than [`Terms::least_light`].
     pub const NEVER_DIM: Self = Self(32 | 8);
 
     /// Returns both roles together.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
+    }
+
+    /// Returns the role of a pixel that has no light.
+    #[must_use]
+    pub fn without_light(self) -> Self {
+        Self(self.0 & !(Self::WHITE.0 | Self::NEVER_DIM.0))
     }
 
     /// Returns whether a role has all of another's flags.
@@ -68,19 +74,13 @@ impl Role {
     }
 }
 
-/// The light of some layers that costs least:
+/// What doses cost, and the least light of a pixel that may not be dim:
 ///
-/// - of a voxel that is to be cured, (least - dose)₊ times the price,
-/// - of one that is not to be, (dose - most)₊,
-/// - of one that is to be dark, its dose (001 eq. 11).
-#[derive(Clone, Debug)]
-pub struct Problem<T> {
-    /// The doses that light makes.
-    pub operator: Operator<T>,
-    /// The role of each voxel.
-    pub roles: Vec<Role>,
-    /// The dose that each voxel has from elsewhere.
-    pub incoming: Vec<T>,
+/// - a voxel that is to be cured costs (least - dose)₊ times the price,
+/// - one that is not to be, (dose - most)₊,
+/// - one that is to be dark, its dose (001 eq. 11).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Terms<T> {
     /// The dose that voxels which are to be cured should have.
     pub least: T,
     /// What they cost a unit below it.
@@ -91,6 +91,19 @@ pub struct Problem<T> {
     pub least_light: T,
 }
 
+/// The light of some layers that costs least.
+#[derive(Clone, Debug)]
+pub struct Problem<T> {
+    /// The doses that light makes.
+    pub operator: Operator<T>,
+    /// The role of each voxel.
+    pub roles: Vec<Role>,
+    /// The dose that each voxel has from elsewhere.
+    pub incoming: Vec<T>,
+    /// What doses cost.
+    pub terms: Terms<T>,
+}
+
 /// Bounds of a number.
 #[derive(Clone, Copy)]
 pub(crate) struct Bounds<T> {
@@ -98,7 +111,7 @@ pub(crate) struct Bounds<T> {
     pub(crate) high: T,
 }
 
-impl<T: Real> Problem<T> {
+impl<T: Real> Terms<T> {
     /// Returns what light a pixel may have.
     #[inline(always)]
     pub(crate) fn light_bounds(&self, role: Role) -> Bounds<T> {
@@ -113,37 +126,41 @@ impl<T: Real> Problem<T> {
         Bounds { low: dark - self.short_price * role.flag(0), high: dark + role.flag(1) }
     }
 
-    /// Returns the dose from which on a voxel's cost changes, less what it has from elsewhere.
+    /// Returns the dose from which on a voxel's cost changes.
     #[inline(always)]
-    pub(crate) fn aim(&self, voxel: usize, role: Role) -> T {
-        self.least * role.flag(0) + self.most * role.flag(1) - self.incoming[voxel]
+    pub(crate) fn aim(&self, role: Role) -> T {
+        self.least * role.flag(0) + self.most * role.flag(1)
     }
 
+    /// Returns what a voxel's dose costs.
+    #[inline(always)]
+    pub(crate) fn cost(&self, role: Role, dose: T) -> f64 {
+        let (bounds, beyond) = (self.price_bounds(role), (dose - self.aim(role)).f64());
+        (beyond * bounds.low.f64()).max(beyond * bounds.high.f64())
+    }
+}
+
+impl<T: Real> Problem<T> {
     /// Returns what doses cost.
     pub fn cost(&self, doses: &[T]) -> f64 {
-        let cost = |(voxel, &dose): (usize, &T)| {
-            let role = self.roles[voxel];
-            let (bounds, beyond) = (self.price_bounds(role), (dose - self.aim(voxel, role)).f64());
-            (beyond * bounds.low.f64()).max(beyond * bounds.high.f64())
-        };
-        doses.iter().enumerate().map(cost).sum()
+        let voxels = doses.iter().zip(self.roles.iter().zip(&self.incoming));
+        voxels.map(|(&dose, (&role, &from))| self.terms.cost(role, dose + from)).sum()
     }
 
     /// Returns a bound that no light's cost is below, from any prices within their bounds and
     /// what they make of light.
     pub fn bound(&self, prices: &[T], of_light: &[T]) -> f64 {
-        let term = |(voxel, (&price, &of_light)): (usize, (&T, &T))| {
-            let role = self.roles[voxel];
-            let light = self.light_bounds(role);
+        let term = |((&price, &of_light), (&role, &incoming)): ((&T, &T), (&Role, &T))| {
+            let light = self.terms.light_bounds(role);
             let of_light = of_light.f64();
             let least = (of_light * light.low.f64()).min(of_light * light.high.f64());
-            least - price.f64() * self.aim(voxel, role).f64()
+            least + price.f64() * (incoming.f64() - self.terms.aim(role).f64())
         };
-        prices.iter().zip(of_light).enumerate().map(term).sum()
+        prices.iter().zip(of_light).zip(self.roles.iter().zip(&self.incoming)).map(term).sum()
     }
 
     /// Returns the light of all pixels as bright as they may be.
     pub fn brightest(&self) -> Vec<T> {
-        self.roles.iter().map(|&role| self.light_bounds(role).high).collect()
+        self.roles.iter().map(|&role| self.terms.light_bounds(role).high).collect()
     }
 }

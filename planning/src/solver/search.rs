@@ -100,7 +100,7 @@ impl<T: Real> Steps<T> {
     fn new(problem: &Problem<T>) -> Self {
         let one_if = |is: bool| T::of(f64::from(u8::from(is)));
         let moves = |role| {
-            let (light, prices) = (problem.light_bounds(role), problem.price_bounds(role));
+            let (light, prices) = (problem.terms.light_bounds(role), problem.terms.price_bounds(role));
             (one_if(light.low < light.high), one_if(prices.low < prices.high))
         };
         let (light, prices) = problem.roles.iter().map(|&role| moves(role)).unzip();
@@ -222,7 +222,7 @@ fn step_light<T: Real>(
     now: &Iterate<T>,
     next: &mut Iterate<T>,
 ) {
-    let factor = T::of(1.0 / weight);
+    let (factor, terms) = (T::of(1.0 / weight), problem.terms);
     wide(
         #[inline(always)]
         || {
@@ -231,7 +231,7 @@ fn step_light<T: Real>(
             for ((next, &role), (&light, (&price, &step))) in
                 pixels.zip(now.light.iter().zip(prices))
             {
-                let bounds = problem.light_bounds(role);
+                let bounds = terms.light_bounds(role);
                 *next = (light - step * factor * price).within(bounds.low, bounds.high);
             }
         },
@@ -248,19 +248,18 @@ fn step_prices<T: Real>(
     now: &Iterate<T>,
     next: &mut Iterate<T>,
 ) {
-    let factor = T::of(weight);
-    let two = T::of(2.0);
+    let (factor, two, terms) = (T::of(weight), T::of(2.0), problem.terms);
     wide(
         #[inline(always)]
         || {
             let Iterate { prices, doses, .. } = &mut *next;
-            let voxels = prices.iter_mut().zip(&*doses).zip(now.prices.iter().zip(&now.doses));
-            let of_problem = problem.roles.iter().zip(&steps.prices);
-            for (voxel, (((next, &to), (&price, &from)), (&role, &step))) in
-                voxels.zip(of_problem).enumerate()
+            let doses = doses.iter().zip(&now.doses).zip(&problem.incoming);
+            let voxels = problem.roles.iter().zip(&now.prices).zip(&steps.prices);
+            for ((next, ((&to, &from), &incoming)), ((&role, &price), &step)) in
+                prices.iter_mut().zip(doses).zip(voxels)
             {
-                let bounds = problem.price_bounds(role);
-                let beyond = two * to - from - problem.aim(voxel, role);
+                let bounds = terms.price_bounds(role);
+                let beyond = two * to - from + incoming - terms.aim(role);
                 *next = (price + step * factor * beyond).within(bounds.low, bounds.high);
             }
         },
@@ -292,7 +291,7 @@ mod tests {
     use super::*;
     use crate::blur::Blur;
     use crate::light::LayerLight;
-    use crate::solver::{Operator, Role, Shape};
+    use crate::solver::{Operator, Role, Shape, Terms};
 
     /// The problem of 001 appendix A: a cylinder of 5 pixels and 5 layers, with the boundary of
     /// the layers from `first` on.
@@ -319,10 +318,7 @@ mod tests {
             operator,
             roles: (0..shape.voxels()).map(role).collect(),
             incoming: vec![0.0; shape.voxels()],
-            least: 1.0,
-            short_price: 300.0,
-            most: 1.0,
-            least_light: 0.0,
+            terms: Terms { least: 1.0, short_price: 300.0, most: 1.0, least_light: 0.0 },
         }
     }
 
