@@ -5,9 +5,13 @@
 //! - [`Blur`] spreads the light of an image sideways.
 
 mod blur;
+mod doses;
 mod light;
 mod resin_light;
 pub mod solver;
+mod spool;
+mod tiled;
+pub mod voxels;
 mod wide;
 
 pub use blur::{Blur, Real};

@@ -100,7 +100,8 @@ impl<T: Real> Steps<T> {
     fn new(problem: &Problem<T>) -> Self {
         let one_if = |is: bool| T::of(f64::from(u8::from(is)));
         let moves = |role| {
-            let (light, prices) = (problem.terms.light_bounds(role), problem.terms.price_bounds(role));
+            let (light, prices) =
+                (problem.terms.light_bounds(role), problem.terms.price_bounds(role));
             (one_if(light.low < light.high), one_if(prices.low < prices.high))
         };
         let (light, prices) = problem.roles.iter().map(|&role| moves(role)).unzip();

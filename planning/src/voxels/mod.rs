@@ -1,0 +1,20 @@
+//! Chooses the gray level of each pixel from the doses of all layers together (001).
+//!
+//! Layers are planned a few at a time, from the light down: what they get from above is known
+//! then, and layers below them are looked ahead. In each, tiles near the part's surfaces are
+//! planned together with some way around them. A second pass, from the bottom up, adds up the
+//! prices of doses, which gives what no plan costs less than.
+
+mod block;
+mod bound;
+mod descent;
+mod levels;
+mod measure;
+mod options;
+mod outcome;
+mod plan;
+mod roles;
+
+pub use options::{Objective, Options, Sources, Window};
+pub use outcome::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, Tally};
+pub use plan::{PlanError, PlannedStack, plan};

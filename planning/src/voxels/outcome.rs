@@ -1,0 +1,134 @@
+//! What a plan reaches, counted by layer.
+
+use std::ops::AddAssign;
+
+/// Voxels of a layer, or of all, that are cured wrongly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Voxels that are cured and not wanted.
+    pub overcured: u64,
+    /// Voxels that are wanted and not cured.
+    pub undercured: u64,
+    /// Targets that are not cured. A target is a wanted voxel that white light cures.
+    pub lost: u64,
+}
+
+impl AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.overcured += other.overcured;
+        self.undercured += other.undercured;
+        self.lost += other.lost;
+    }
+}
+
+/// The doses of voxels, counted in steps of a twentieth of the critical dose.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DoseHistogram {
+    /// Wanted voxels, by dose.
+    pub wanted: [u64; DoseHistogram::STEPS],
+    /// Other voxels that light reaches, by dose.
+    pub other: [u64; DoseHistogram::STEPS],
+}
+
+impl DoseHistogram {
+    /// The number of steps. The last one also has all higher doses.
+    pub const STEPS: usize = 80;
+    /// The steps of a critical dose.
+    pub const PER_CRITICAL_DOSE: usize = 20;
+}
+
+impl Default for DoseHistogram {
+    fn default() -> Self {
+        Self { wanted: [0; Self::STEPS], other: [0; Self::STEPS] }
+    }
+}
+
+impl AddAssign<&Self> for DoseHistogram {
+    fn add_assign(&mut self, other: &Self) {
+        let add = |sums: &mut [u64], more: &[u64]| {
+            sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+        };
+        add(&mut self.wanted, &other.wanted);
+        add(&mut self.other, &other.other);
+    }
+}
+
+/// What the doses of a layer, or of all, come to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Voxels cured wrongly.
+    pub counts: Counts,
+    /// The same if all light were 5 % less.
+    pub dimmer: Counts,
+    /// The same if all light were 5 % more.
+    pub brighter: Counts,
+    /// What the plan makes least.
+    pub cost: f64,
+    /// The doses.
+    pub doses: DoseHistogram,
+}
+
+impl AddAssign<&Self> for Tally {
+    fn add_assign(&mut self, other: &Self) {
+        self.counts += other.counts;
+        self.dimmer += other.dimmer;
+        self.brighter += other.brighter;
+        self.cost += other.cost;
+        self.doses += &other.doses;
+    }
+}
+
+/// What a plan reaches in a layer.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LayerOutcome {
+    /// The layer's index, 0 at the bottom.
+    pub index: u32,
+    /// Wanted voxels.
+    pub wanted: u64,
+    /// Wanted voxels that white light cures.
+    pub targets: u64,
+    /// Voxels cured wrongly by white light.
+    pub before: Counts,
+    /// Voxels cured wrongly by the plan.
+    pub after: Counts,
+}
+
+/// How cost and bound of all blocks of voxels came together, in the iterations of the search.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GapAt {
+    /// Iterations of each block.
+    pub iteration: usize,
+    /// The sum of the differences between cost and bound of all blocks, as a share of what white
+    /// light costs them.
+    pub gap: f64,
+}
+
+/// What a plan reaches.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// Every layer, bottom first.
+    pub layers: Vec<LayerOutcome>,
+    /// What white light comes to: its cost is `P_0`.
+    pub before: Tally,
+    /// What the plan comes to, in gray levels as they are written: its cost is `P`.
+    pub after: Tally,
+    /// What no light of the same sources costs less than: `D`.
+    pub bound: f64,
+    /// How the search went.
+    pub search: Vec<GapAt>,
+    /// The time that all exposures take, in milliseconds.
+    pub exposure_ms: f64,
+}
+
+impl Outcome {
+    /// Returns how far the plan may be from the best, as a share of the unplanned error:
+    /// `(P - D) / P_0`, or 0 where there is no error.
+    pub fn gap(&self) -> f64 {
+        if self.before.cost > 0.0 { (self.after.cost - self.bound) / self.before.cost } else { 0.0 }
+    }
+
+    /// Returns the wanted voxels that white light does not cure.
+    pub fn uncurable(&self) -> u64 {
+        self.layers.iter().map(|layer| layer.wanted - layer.targets).sum()
+    }
+}

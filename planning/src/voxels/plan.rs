@@ -1,0 +1,270 @@
+//! Plans a stack: reads it, goes down and up, and gives its layers bottom first.
+
+use std::io;
+
+use lamp_grayscale::resin::ExposureTime;
+use lamp_stack::{Dpi, GrayMask, Image, Layer, Length, Mask, PageInfo, white_runs};
+use thiserror::Error;
+
+use crate::blur::Blur;
+use crate::light::{LayerTime, Light, LightError};
+use crate::solver::Terms;
+use crate::spool::{Runs, Spool};
+use crate::tiled::{Grid, Tiled};
+use crate::voxels::bound::Ascent;
+use crate::voxels::descent::{Descended, Setting, descend, price};
+use crate::voxels::levels::Levels;
+use crate::voxels::options::{Objective, Options, Window};
+use crate::voxels::outcome::{LayerOutcome, Outcome};
+use crate::voxels::roles::RoleRules;
+
+/// Why a stack cannot be planned.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// It has no layers.
+    #[error("there are no layers to plan")]
+    NoLayers,
+    /// A page is not as large as the first, or has another resolution.
+    #[error("{layer} is not as large as the first layer, or of another resolution")]
+    Unlike {
+        /// The layer's name.
+        layer: String,
+    },
+    /// A page lacks what the model needs.
+    #[error("{layer} does not state its {what}")]
+    Silent {
+        /// The layer's name.
+        layer: String,
+        /// What it does not state.
+        what: &'static str,
+    },
+    /// A page states a number that is not above zero.
+    #[error("{layer} states {what} that is not above zero")]
+    NotPositive {
+        /// The layer's name.
+        layer: String,
+        /// What it states.
+        what: &'static str,
+    },
+    /// The model's numbers are wrong.
+    #[error(transparent)]
+    Light(#[from] LightError),
+    /// The temporary file failed.
+    #[error("a temporary file: {0}")]
+    Io(#[from] io::Error),
+}
+
+/// What a unit of dose costs that a target lacks, with [`Objective::Boundary`]: so much that none
+/// lacks any in the end.
+const PRICE_OF_TARGETS: f32 = 300.0;
+/// The most voxels of a window that are planned in one piece.
+const ONE_PIECE: usize = 4 << 20;
+/// The least side of a tile, in pixels.
+const LEAST_SIDE: usize = 64;
+/// Layers of a window, settled and ahead.
+const WINDOW: usize = 30;
+/// The most layers that a window looks ahead.
+const MOST_AHEAD: usize = 15;
+/// A window looks ahead until this share of light is left.
+const LEFT: f64 = 0.02;
+
+/// Plans the gray levels of a stack's layers. `part` gives the wanted images, bottom first;
+/// `settled` is called with the number of layers that are done.
+///
+/// # Errors
+/// Returns the part's own error, or a [`PlanError`] if a layer is unlike the first, or lacks its
+/// thickness or exposure, or if a temporary file fails.
+pub fn plan<E: From<PlanError>>(
+    part: impl IntoIterator<Item = Result<Layer, E>>,
+    light: &Light,
+    options: &Options,
+    settled: impl FnMut(usize),
+) -> Result<PlannedStack, E> {
+    light.check().map_err(PlanError::from)?;
+    let mut wanted = Spool::new().map_err(PlanError::from)?;
+    let mut pages = Pages::default();
+    for layer in part {
+        let layer = layer?;
+        pages.add(&layer)?;
+        let image = layer.image.into_image().into_mask(options.wanted);
+        wanted.push(runs_of(&image)).map_err(PlanError::from)?;
+    }
+    let setting = setting(&pages, light, options).ok_or(PlanError::NoLayers)?;
+    let done = descend(&setting, &mut wanted, settled).map_err(PlanError::from)?;
+    let ascent = Ascent::new(&setting);
+    let next = pages.infos.len();
+    let outcome = outcome(&done, &pages);
+    Ok(PlannedStack { setting, wanted, done, pages, ascent, left: next, outcome })
+}
+
+/// What the pages of a stack state.
+#[derive(Debug, Default)]
+struct Pages {
+    infos: Vec<PageInfo>,
+    times: Vec<LayerTime>,
+    size: Option<[u32; 2]>,
+    dpi: Option<Dpi>,
+}
+
+impl Pages {
+    fn add(&mut self, layer: &Layer) -> Result<(), PlanError> {
+        let name = || layer.info.name();
+        let size = [layer.image.width(), layer.image.height()];
+        let silent = |what| PlanError::Silent { layer: name(), what };
+        let dpi = layer.dpi.ok_or_else(|| silent("resolution"))?;
+        if *self.size.get_or_insert(size) != size || *self.dpi.get_or_insert(dpi) != dpi {
+            return Err(PlanError::Unlike { layer: name() });
+        }
+        let above_zero = |number: f64, what| {
+            let fits = number > 0.0 && number.is_finite();
+            if fits { Ok(number) } else { Err(PlanError::NotPositive { layer: name(), what }) }
+        };
+        let um = layer.info.thickness_um.ok_or_else(|| silent("thickness"))?;
+        let ms = layer.info.exposure_ms.ok_or_else(|| silent("exposure"))?;
+        self.times.push(LayerTime {
+            thickness: Length::from_um(above_zero(um, "a thickness")?),
+            time: ExposureTime::from_ms(above_zero(ms, "an exposure")?),
+        });
+        self.infos.push(layer.info.clone());
+        Ok(())
+    }
+}
+
+fn runs_of(wanted: &Mask) -> Runs {
+    let mut runs = Runs::default();
+    for row in wanted.rows() {
+        let mut at = 0;
+        for (start, end) in white_runs(row, wanted.width()) {
+            runs.push(0, (start - at) as usize);
+            runs.push(255, (end - start) as usize);
+            at = end;
+        }
+        runs.push(0, (wanted.width() - at) as usize);
+    }
+    runs
+}
+
+fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
+    let (size, dpi) = (pages.size?, pages.dpi?);
+    let image = size.map(|side| side as usize);
+    let sigma = light.spread_pixels(dpi);
+    let blur = Blur::new(sigma);
+    let around = options.around.map_or(blur.radius(), |around| around as usize);
+    let [width, height] = image.map(|side| side + 2 * around);
+    let from_light: Vec<LayerTime> = pages.times.iter().rev().copied().collect();
+    let lights = light.layers(dpi, &from_light);
+    let window = options.window.unwrap_or_else(|| {
+        let passed = lights.iter().skip(1).map(|layer| layer.passed).fold(0.0, f64::max);
+        let ahead = (LEFT.ln() / passed.ln()).ceil().clamp(4.0, MOST_AHEAD as f64) as usize;
+        Window { settled: WINDOW - ahead, ahead }
+    });
+    let layers = (window.settled + window.ahead).min(lights.len());
+    let longest = width.max(height);
+    let is_small = longest * longest * layers <= ONE_PIECE;
+    let side = if is_small { longest } else { LEAST_SIDE.max((16.0 * sigma) as usize) };
+    let (least, short_price) = match options.objective {
+        Objective::Wrong => (1.0 + options.margin, 1.0),
+        Objective::Boundary => (1.0, PRICE_OF_TARGETS),
+    };
+    let most = (1.0 - options.margin) as f32;
+    let [image_width, image_height] = image;
+    Some(Setting {
+        grid: Grid { width, height, side },
+        rules: RoleRules::new(options, image_width, image_height, around),
+        terms: Terms { least: least as f32, short_price, most, least_light: 0.0 },
+        most_of_dark: if options.objective == Objective::Wrong { most } else { 0.0 },
+        levels: Levels::new(light, options.min_level),
+        lights,
+        gap: options.gap,
+        round_up: options.objective == Objective::Boundary,
+        has_min_level: options.min_level > 0,
+        window,
+        overlap: if is_small { 0 } else { (4.0 * sigma).ceil() as usize },
+        around,
+        image,
+        blur,
+    })
+}
+
+fn outcome(done: &Descended, pages: &Pages) -> Outcome {
+    let mut outcome = Outcome { search: done.search.clone(), ..Outcome::default() };
+    for (settled, info) in done.layers.iter().rev().zip(&pages.infos) {
+        outcome.layers.push(LayerOutcome {
+            index: info.index,
+            wanted: settled.wanted,
+            targets: settled.targets,
+            before: settled.before.counts,
+            after: settled.after.counts,
+        });
+        outcome.before += &settled.before;
+        outcome.after += &settled.after;
+    }
+    outcome.exposure_ms = pages.times.iter().map(|layer| layer.time.ms()).sum();
+    outcome
+}
+
+/// A planned stack: an iterator over its layers, bottom first.
+///
+/// The bound of its [`Outcome`] is complete once all layers were taken.
+#[derive(Debug)]
+pub struct PlannedStack {
+    setting: Setting,
+    wanted: Spool,
+    done: Descended,
+    pages: Pages,
+    ascent: Ascent,
+    /// The layers that are left.
+    left: usize,
+    outcome: Outcome,
+}
+
+impl PlannedStack {
+    /// Returns what the plan reaches.
+    pub fn outcome(&self) -> Outcome {
+        Outcome { bound: self.ascent.bound, ..self.outcome.clone() }
+    }
+
+    /// Returns a layer, counted from the light, and adds it to the bound.
+    fn layer(&mut self, layer: usize) -> io::Result<Layer> {
+        let setting = &self.setting;
+        let wanted = setting.read_wanted(&mut self.wanted, layer)?;
+        let mut codes = self.done.prices.read(layer)?;
+        let prices = Tiled::of_rows(setting.grid, 0.0, |_, row| {
+            codes.row(row, price);
+            io::Result::Ok(())
+        })?;
+        self.ascent.add(setting, layer, &prices, &wanted);
+        let page = self.pages.infos.len() - 1 - layer;
+        let image = self.image(layer)?;
+        Ok(Layer { info: self.pages.infos[page].clone(), dpi: self.pages.dpi, image: image.into() })
+    }
+
+    fn image(&mut self, layer: usize) -> io::Result<Image> {
+        let [width, height] = self.setting.image;
+        let around = self.setting.around;
+        let mut levels = self.done.levels.read(layer)?;
+        let mut row = vec![0; self.setting.grid.width];
+        let mut image = GrayMask::new(width as u32);
+        for number in 0..around + height {
+            levels.row(&mut row, |level| level as u8);
+            if number >= around {
+                let inside = &row[around..around + width];
+                let runs = inside.chunk_by(PartialEq::eq).map(|run| (run.len() as u32, run[0]));
+                image.push_runs(runs).expect("a row is as long as the image is wide");
+            }
+        }
+        Ok(Image::Gray(image))
+    }
+}
+
+impl Iterator for PlannedStack {
+    type Item = Result<Layer, PlanError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        // The last layer from the light is the stack's first.
+        let layer = self.left.checked_sub(1)?;
+        self.left = layer;
+        Some(self.layer(layer).map_err(PlanError::from))
+    }
+}
