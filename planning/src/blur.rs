@@ -90,6 +90,11 @@ impl<T: Real> Blur<T> {
         Self { taps }
     }
 
+    /// Returns the weights at distances 0, 1, ... along a row or a column: that at 0 is 1.
+    pub(crate) fn taps(&self) -> &[T] {
+        &self.taps
+    }
+
     /// Returns how far light spreads, in pixels.
     pub fn radius(&self) -> usize {
         self.taps.len() - 1

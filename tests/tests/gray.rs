@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use lamp_fixtures::Sample;
+use lamp_fixtures::{Sample, example_cylinder};
 use lamp_stack::{Image, gray_runs};
 use lamp_tests::{Ran, Scratch};
 
@@ -203,4 +203,30 @@ fn a_section_needs_its_own_part() {
     scratch.run(&line).is_refused_with(&["no pixel of the section"]);
     scratch.run(&format!("{cure} --scale 1000 -o t.png")).is_refused_with(&["smaller --scale"]);
     assert!(!scratch.path("t.png").exists());
+}
+
+/// The colours of what is cured, and of what is not.
+const CURED: [u8; 3] = [200, 204, 208];
+const EMPTY: [u8; 3] = [24, 26, 30];
+
+#[test]
+fn doses_add_up_to_those_of_001() {
+    let scratch = Scratch::new();
+    let mut layers: Vec<_> = example_cylinder().layers().collect();
+    layers.iter_mut().for_each(|layer| layer.info.exposure_ms = Some(1000.0));
+    scratch.stack("cylinder.tif", layers);
+    let cure = "lamp cure cylinder.tif --material zsg-amber --section y=0.0392mm -o s.png";
+    let said = scratch.run(&format!("{cure} --add-up")).succeeds_quietly().stdout;
+    let said = String::from_utf8(said).unwrap();
+    // Figure A.21: all 7 x 7 pixels of the third layer, and so of those below; 21 voxels here.
+    assert!(said.contains("white   cured 0.0026\n"), "{said}");
+    let (width, pixels) = rgb_pixels(&scratch.bytes("s.png"));
+    let [dark, lit] = [2 * width, 3 * width];
+    assert_eq!((width, pixels), (7, [vec![EMPTY; dark], vec![CURED; lit]].concat()));
+    // A layer's bottom has 10^-0.008 of its top's dose: too little only in corners.
+    let bottom = scratch.run(&format!("{cure} --add-up --at bottom")).succeeds_quietly().stdout;
+    assert_eq!(String::from_utf8(bottom).unwrap(), said);
+    is_wrong_usage(&scratch.run(&format!("{cure} --at bottom")), "--add-up");
+    let straight = scratch.run(&format!("{cure} --add-up").replace("zsg-amber", "lamp-suspension"));
+    assert!(straight.succeeds().stderr.contains("straight down"));
 }

@@ -7,18 +7,17 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::SolidHeights;
 use lamp_grayscale::material::Material;
+use lamp_planning::{Light, SampleHeight};
 use lamp_stack::StackInfo;
 
 use crate::catalogue::entry;
-use crate::cured_section::{
-    SectionExposures, SectionLine, SectionPicture, SectionPlane, parse_along,
-};
 use crate::exit::Exit;
-use crate::options::{Common, Input};
+use crate::options::{Common, Input, one_of_described};
 use crate::part_arg::{PartArg, paths};
 use crate::part_options::name_of_all;
 use crate::picture::PictureScale;
 use crate::progress::Progress;
+use crate::section::{Exposures, SectionLine, SectionPicture, SectionPlane, parse_along};
 use crate::stack_part::RecordedSlicing;
 use crate::streams::{check_beside, check_png_name, input_name, print, read_layers, write_file};
 
@@ -28,12 +27,14 @@ use crate::streams::{check_beside, check_png_name, input_name, print, read_layer
 /// material's cure model. A stack with gray layers is drawn twice: on the left with every pixel
 /// that is not black exposed in full, on the right by its gray levels. Resin cured outside the part
 /// is red, uncured places of the part are blue, and the part's outline is yellow; the areas are
-/// printed. The model ignores light that spreads sideways and exposures that add up. Dots are drawn
-/// as they are, so use a stack from before `dither`.
+/// printed. With --add-up, the doses of all exposures add up instead, and light spreads sideways as
+/// far as the material says ([spread]); a layer cures where its dose is the critical one. Dots are
+/// drawn as they are, so use a stack from before `dither`.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp cure gray.tif --material lamp-suspension --section y=12mm --part blade.stl -o section.png
+  lamp cure planned.tif --material mine.toml --section y=12mm --add-up -o section.png
   lamp cure gray.tif --material mine.toml --section x=3mm --along 10mm..14mm --layers 80..120 \\
       --scale 4 -o detail.png")]
 pub(crate) struct CureArgs {
@@ -57,6 +58,15 @@ pub(crate) struct CureArgs {
     #[arg(long, value_name = "A..B", value_parser = parse_along, allow_hyphen_values = true)]
     along: Option<Range<f64>>,
 
+    /// Add up the doses of all layers, with light that spreads sideways and down
+    #[arg(long)]
+    add_up: bool,
+
+    /// Where in a layer its dose is told
+    #[arg(long, value_name = "HEIGHT", default_value = "top", requires = "add_up")]
+    #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
+    at: SampleHeight,
+
     /// Scale of the picture: 4 draws each pixel as 4 x 4, 1/8 only every eighth
     #[arg(long, value_name = "N|1/N", default_value = "1")]
     scale: PictureScale,
@@ -66,15 +76,25 @@ pub(crate) struct CureArgs {
     output: PathBuf,
 }
 
+/// What `--help` says of the heights in a layer.
+const SAMPLE_HEIGHTS: [&str; 3] =
+    ["where light enters it", "half-way", "where it must reach what it rests on"];
+
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     check_png_name(&args.output)?;
     let material: Material = entry(&args.material)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
+    let light = args.add_up.then(|| Light::of_any(&material, args.at)).transpose();
+    let light = light.map_err(anyhow::Error::new)?;
     let name = input_name(&args.input.stack);
     let failed = |error: anyhow::Error| Exit::Failed(error).at(input_name(&args.input.stack));
     let progress = Progress::new("cure", common, true);
+    if args.add_up && material.spread.is_none() {
+        let name = &material.name;
+        progress.say(&format!("{name} does not say how far light spreads: it goes straight down"));
+    }
     let (mut exposures, mut stack) = (None, None);
     for layer in read_layers(&args.input, &progress)? {
         let layer = layer?;
@@ -87,7 +107,10 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
                 progress.say("these layers were compensated, so that they differ from the part");
             }
             let course = SectionLine::new(args.section, &layer).map_err(failed)?;
-            exposures = Some(SectionExposures::new(&resin, course));
+            exposures = Some(match light {
+                Some(light) => Exposures::added(&resin, light, course),
+                None => Exposures::alone(&resin, course),
+            });
             stack = layer.info.stack.clone();
         }
         let exposures = exposures.as_mut().expect("it was made for the first layer");

@@ -1,0 +1,152 @@
+//! The line of pixels that a vertical section runs through.
+
+use std::fmt;
+use std::ops::Range;
+use std::str::FromStr;
+
+use anyhow::{Context, anyhow};
+use lamp_grayscale::{PixelLine, SolidHeights};
+use lamp_slicer::{Axis, Part, SectionOptions, SliceError, section};
+use lamp_stack::{Dpi, Layer, Length};
+
+use crate::slicing_options::SlicingOptions;
+
+/// The plane of a section, in part coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum SectionPlane {
+    X(Length),
+    Y(Length),
+}
+
+impl FromStr for SectionPlane {
+    type Err = String;
+
+    /// Parses `y=12mm`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is not a section: write y=12mm or x=12mm");
+        let (axis, length) = text.split_once('=').ok_or_else(wrong)?;
+        let length: Length = length.parse().map_err(|error| format!("{error}"))?;
+        match axis.trim() {
+            "x" => Ok(Self::X(length)),
+            "y" => Ok(Self::Y(length)),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+impl fmt::Display for SectionPlane {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::X(at) => write!(f, "x = {:.3} mm", at.mm()),
+            Self::Y(at) => write!(f, "y = {:.3} mm", at.mm()),
+        }
+    }
+}
+
+/// Parses `3mm..6mm`.
+pub(crate) fn parse_along(text: &str) -> Result<Range<f64>, String> {
+    let wrong = || format!("`{text}` is not a stretch of the section: write A..B, as 3mm..6mm");
+    let (from, to) = text.split_once("..").ok_or_else(wrong)?;
+    let mm = |text: &str| text.parse().map_err(|_| wrong()).map(Length::mm);
+    let range = mm(from)?..mm(to)?;
+    if range.is_empty() { Err(wrong()) } else { Ok(range) }
+}
+
+/// The row or column of pixels along a section.
+#[derive(Clone, Copy)]
+pub(crate) struct SectionLine {
+    pub(crate) line: PixelLine,
+    corner_mm: [f64; 2],
+    pub(super) dpi: Dpi,
+    pub(super) pixels: u32,
+}
+
+impl SectionLine {
+    /// The line of pixels that a plane runs through, in the images that are
+    /// like the layer's.
+    pub(crate) fn new(plane: SectionPlane, layer: &Layer) -> anyhow::Result<Self> {
+        let corner_mm =
+            layer.info.origin_mm.context("its pages do not state their position on the part")?;
+        let dpi = layer.dpi.context("its pages do not state their resolution")?;
+        let [x0, y1] = corner_mm;
+        let pitch = dpi.pitch().mm();
+        let image = &layer.image;
+        let [width, height] = [image.width(), image.height()];
+        let (number, count, low) = match plane {
+            SectionPlane::X(x) => ((x.mm() - x0) / pitch, width, x0),
+            SectionPlane::Y(y) => ((y1 - y.mm()) / pitch, height, y1 - f64::from(height) * pitch),
+        };
+        if !(0.0..f64::from(count)).contains(&number) {
+            let high = low + f64::from(count) * pitch;
+            return Err(anyhow!("{plane} is outside its images: {low:.3} to {high:.3} mm"));
+        }
+        let (line, pixels) = match plane {
+            SectionPlane::X(_) => (PixelLine::Column(number as u32), height),
+            SectionPlane::Y(_) => (PixelLine::Row(number as u32), width),
+        };
+        Ok(Self { line, corner_mm, dpi, pixels })
+    }
+
+    /// Returns the plane through the centres of its pixels.
+    pub(crate) fn plane(&self) -> SectionPlane {
+        let pitch = self.dpi.pitch().mm();
+        let inwards = |pixel: u32| (f64::from(pixel) + 0.5) * pitch;
+        match self.line {
+            PixelLine::Row(row) => {
+                SectionPlane::Y(Length::from_mm(self.corner_mm[1] - inwards(row)))
+            }
+            PixelLine::Column(column) => {
+                SectionPlane::X(Length::from_mm(self.corner_mm[0] + inwards(column)))
+            }
+        }
+    }
+
+    /// Returns the pixels whose centres lie in a stretch of the section.
+    pub(super) fn within(&self, along_mm: &Range<f64>) -> Range<u32> {
+        let pitch = self.dpi.pitch().mm();
+        let [from, to] = match self.line {
+            PixelLine::Row(_) => [along_mm.start, along_mm.end].map(|x| x - self.corner_mm[0]),
+            PixelLine::Column(_) => [along_mm.end, along_mm.start].map(|y| self.corner_mm[1] - y),
+        };
+        let [from, to] = [from, to].map(|mm| (mm / pitch - 0.5).ceil());
+        let pixel = |number: f64| number.clamp(0.0, f64::from(self.pixels)) as u32;
+        pixel(from)..pixel(to)
+    }
+
+    /// Returns where the part is at each pixel. Turns the part so that the section is level and
+    /// heights run along its rows.
+    pub(crate) fn outline(
+        &self,
+        model: Part,
+        options: &SlicingOptions,
+    ) -> Result<Vec<SolidHeights>, SliceError> {
+        let options = options.for_slicing();
+        let turned = options.placement.rotated(Axis::Y, 90.0);
+        let pitch = self.dpi.pitch().mm();
+        let (placement, z, top_mm) = match self.plane() {
+            SectionPlane::X(x) => (turned, Length::from_um(-x.um()), self.corner_mm[1]),
+            SectionPlane::Y(y) => {
+                let right = self.corner_mm[0] + f64::from(self.pixels) * pitch;
+                (turned.rotated(Axis::X, 90.0), y, right)
+            }
+        };
+        let mut rows = section(
+            model,
+            &SectionOptions {
+                units: options.units,
+                placement,
+                fill: options.fill,
+                z,
+                dpi: self.dpi,
+                top_mm,
+                rows: self.pixels,
+            },
+        )?;
+        if let PixelLine::Row(_) = self.line {
+            // Rows count from the largest x.
+            rows.reverse();
+        }
+        let in_um = |[from, to]: [f64; 2]| [from * 1000.0, to * 1000.0];
+        Ok(rows.into_iter().map(|row| row.into_iter().map(in_um).collect()).collect())
+    }
+}
