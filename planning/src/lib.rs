@@ -3,13 +3,16 @@
 //! - [`Light`] is the model that the planners share: what a pixel of a layer adds to the dose of
 //!   each voxel, from a material's numbers.
 //! - [`Blur`] spreads the light of an image sideways.
+//! - [`speed`] plans the time of each layer, [`learn`] corrects it after every print.
 
 mod blur;
 mod doses;
+pub mod learn;
 mod light;
 mod resin_light;
 mod section;
 pub mod solver;
+pub mod speed;
 mod spool;
 mod tiled;
 pub mod voxels;

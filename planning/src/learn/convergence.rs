@@ -1,0 +1,161 @@
+//! Tells whether a law's changes shrink the errors of the next prints.
+//!
+//! If the times change by `L e`, the errors `e` become `(I - G L) e`. The spectral radius of that
+//! matrix says what becomes of them in the end; its 2-norm, whether they may grow first.
+
+use super::law::Law;
+use super::response::Response;
+
+/// How a law's errors shrink from print to print.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Convergence {
+    /// The spectral radius of `I - G L`: in the end, errors shrink by this with each print.
+    pub radius: f64,
+    /// Its 2-norm: no print's errors are larger than those of the print before, times this.
+    pub norm: f64,
+}
+
+impl Convergence {
+    /// Returns whether errors may grow from a print to the next. Rounding aside, a norm of 1 is
+    /// that of layers that no light changes.
+    pub fn may_grow(&self) -> bool {
+        self.norm > 1.0 + 1e-6
+    }
+}
+
+/// How often the matrix is applied for its norm.
+const NORM_ROUNDS: usize = 200;
+/// How often it is applied before and while the radius is read off.
+const RADIUS_ROUNDS: [usize; 2] = [400, 400];
+
+/// Returns how a law's errors shrink where the model says `assumed` and `real` is true. The law of
+/// several layers depends on the signs of the present `errors`.
+pub fn convergence(
+    law: &Law,
+    times: &[f64],
+    errors: &[f64],
+    [assumed, real]: [&Response; 2],
+) -> Convergence {
+    let shrink = Shrink::new(law, times, errors, [assumed, real]);
+    let radius = match law {
+        // The matrix is triangular: its eigenvalues are on its diagonal.
+        Law::Single { gain } => {
+            let own = real.per_second().into_iter().map(|voxels| (1.0 - gain * voxels).abs());
+            own.fold(0.0, f64::max)
+        }
+        _ => shrink.radius(),
+    };
+    Convergence { radius, norm: shrink.norm(1.0) }
+}
+
+/// Returns by how much a law's gains may be multiplied until errors may grow, up to a thousand.
+/// It is zero if any gain lets them grow.
+pub fn largest_safe_gain(law: &Law, times: &[f64], errors: &[f64], response: &Response) -> f64 {
+    let shrink = Shrink::new(law, times, errors, [response, response]);
+    let safe = |gain: f64| shrink.norm(gain) <= 1.0 + 1e-6;
+    // The norm is a convex function of the gain, and 1 at zero.
+    let (mut low, mut high) = (0.0, 1e3);
+    if safe(high) {
+        return high;
+    }
+    for _ in 0..60 {
+        let middle = if low == 0.0 { high / 4.0 } else { 0.5 * (low + high) };
+        *(if safe(middle) { &mut low } else { &mut high }) = middle;
+        if high < 1e-9 {
+            return 0.0;
+        }
+        if high - low < 1e-3 * high {
+            break;
+        }
+    }
+    low
+}
+
+/// The matrix `G L`, row by row.
+struct Shrink {
+    size: usize,
+    rows: Vec<f64>,
+}
+
+impl Shrink {
+    fn new(law: &Law, times: &[f64], errors: &[f64], [assumed, real]: [&Response; 2]) -> Self {
+        let size = times.len();
+        let mut rows = vec![0.0; size * size];
+        for column in 0..size {
+            let mut unit = vec![0.0; size];
+            unit[column] = 1.0;
+            let cured = real.apply(&law.linear(times, &unit, errors, assumed));
+            for (row, cured) in cured.into_iter().enumerate() {
+                rows[row * size + column] = cured;
+            }
+        }
+        Self { size, rows }
+    }
+
+    /// Returns `(I - gain G L) x`.
+    fn apply(&self, gain: f64, x: &[f64]) -> Vec<f64> {
+        let row = |(row, x_row): (&[f64], &f64)| {
+            x_row - gain * row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>()
+        };
+        self.rows.chunks_exact(self.size).zip(x).map(row).collect()
+    }
+
+    /// Returns `(I - gain G L)ᵀ x`.
+    fn transposed(&self, gain: f64, x: &[f64]) -> Vec<f64> {
+        let mut sums = x.to_vec();
+        for (row, x) in self.rows.chunks_exact(self.size).zip(x) {
+            sums.iter_mut().zip(row).for_each(|(sum, a)| *sum -= gain * x * a);
+        }
+        sums
+    }
+
+    fn norm(&self, gain: f64) -> f64 {
+        let mut x = start(self.size);
+        let mut square = 0.0;
+        for _ in 0..NORM_ROUNDS {
+            x = self.transposed(gain, &self.apply(gain, &x));
+            let next = length(&x);
+            if next == 0.0 {
+                return 0.0;
+            }
+            x.iter_mut().for_each(|x| *x /= next);
+            if (next - square).abs() < 1e-10 * next {
+                break;
+            }
+            square = next;
+        }
+        square.sqrt()
+    }
+
+    /// Returns the mean growth of a vector, after many rounds.
+    fn radius(&self) -> f64 {
+        let mut x = start(self.size);
+        let mut growth = 0.0;
+        let [before, while_read] = RADIUS_ROUNDS;
+        for round in 0..before + while_read {
+            x = self.apply(1.0, &x);
+            let next = length(&x);
+            if next == 0.0 {
+                return 0.0;
+            }
+            x.iter_mut().for_each(|x| *x /= next);
+            if round >= before {
+                growth += next.ln();
+            }
+        }
+        (growth / while_read as f64).exp()
+    }
+}
+
+/// A vector that no matrix of ours is likely to have no share of.
+fn start(size: usize) -> Vec<f64> {
+    let x: Vec<_> = (0..size).map(|k| 1.0 + (k as f64 * 0.754_877_666).fract()).collect();
+    let length = length(&x);
+    // Signs that change let fast changes from layer to layer show as soon as slow ones.
+    let signed = |(k, x): (usize, f64)| if k % 3 == 0 { -x / length } else { x / length };
+    x.into_iter().enumerate().map(signed).collect()
+}
+
+fn length(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}

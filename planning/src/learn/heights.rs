@@ -1,0 +1,229 @@
+//! Learns from the measured heights of faces that look down.
+//!
+//! Light that passes a face cures below it, down to where its dose is the critical one. A dose
+//! larger by a factor reaches deeper by the factor's logarithm times the penetration depth. So
+//! heights tell the logarithm of how far the doses differ from the model's. A step ω of the
+//! correction leaves 1 - ω D_true / D_model of the errors.
+
+use lamp_stack::Length;
+use thiserror::Error;
+
+use crate::light::{Light, SampleHeight};
+use crate::speed::{Simulation, TimedPart};
+
+/// A measured height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Height {
+    /// The column and row of the pixel where it was measured.
+    pub pixel: [u32; 2],
+    /// The height that the part has there.
+    pub z: Length,
+    /// The height that was measured.
+    pub measured: Length,
+    /// The standard deviation of the measurement.
+    pub sd: Length,
+}
+
+/// Why a height tells nothing.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum HeightError {
+    /// No face looks down at the place.
+    #[error("the part has no face there that looks down")]
+    NoFace,
+    /// By the model, nothing is cured above the face.
+    #[error("by the model nothing is cured above that face")]
+    NothingCured,
+}
+
+/// Returns the layer, counted from the light, whose bottom is a face of the part that looks down.
+///
+/// # Errors
+/// Returns an error if there is none within half a layer.
+pub fn face_at(part: &TimedPart, pixel: [u32; 2], z: Length) -> Result<usize, HeightError> {
+    let is_face = |layer: &usize| {
+        let below = layer + 1;
+        let ends = below == part.layers().len() || !part.is_wanted(below, pixel);
+        part.is_wanted(*layer, pixel) && ends
+    };
+    let away = |layer: usize| {
+        let layer = &part.layers()[layer];
+        (layer.z.um() - z.um()).abs() / layer.thickness.um()
+    };
+    let faces = (0..part.layers().len()).filter(is_face);
+    let nearest = faces.min_by(|&a, &b| away(a).total_cmp(&away(b)));
+    nearest.filter(|&layer| away(layer) <= 0.5).ok_or(HeightError::NoFace)
+}
+
+/// Returns the heights down to which the resin is cured at faces that look down, each given by its
+/// pixel and the layer above it. Times are in seconds, from the light on.
+///
+/// # Errors
+/// Returns an error if nothing is cured above a face.
+pub fn heights_of(
+    part: &TimedPart,
+    simulation: &Simulation<'_>,
+    light: &Light,
+    times: &[f64],
+    faces: &[([u32; 2], usize)],
+) -> Result<Vec<Length>, HeightError> {
+    let height = |&(pixel, layer): &([u32; 2], usize)| {
+        let doses = simulation.doses_at(pixel, times);
+        let down = doses[layer..].iter().take_while(|&&dose| dose >= 1.0).count();
+        let last = match down {
+            0 => doses[..layer].iter().rposition(|&dose| dose >= 1.0),
+            cured => Some(layer + cured - 1),
+        };
+        let last = last.ok_or(HeightError::NothingCured)?;
+        let of_last = &part.layers()[last];
+        let above = match light.at {
+            SampleHeight::Top => 1.0,
+            SampleHeight::Middle => 0.5,
+            SampleHeight::Bottom => 0.0,
+        };
+        let told_um = of_last.z.um() + above * of_last.thickness.um();
+        Ok(Length::from_um(told_um - light.penetration_depth.um() * doses[last].ln()))
+    };
+    faces.iter().map(height).collect()
+}
+
+/// What measurements add to the logarithm of each layer's dose: smooth over the height.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogDoses {
+    z_um: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// The standard deviation of doses before anything is measured: light and resin differ from
+/// their material's numbers by so much, as a logarithm.
+const UNSURE: f64 = 0.5;
+/// The share of the part's height over which doses differ alike.
+const ALIKE_OVER: f64 = 0.25;
+
+impl LogDoses {
+    /// Begins with doses as the model has them.
+    pub fn none(part: &TimedPart) -> Self {
+        let z_um: Vec<_> = part.layers().iter().map(|layer| layer.z.um()).collect();
+        Self { values: vec![0.0; z_um.len()], z_um }
+    }
+
+    /// Continues with known corrections, from the light on.
+    ///
+    /// # Panics
+    /// Panics if there are not as many as layers.
+    pub fn known(part: &TimedPart, values: Vec<f64>) -> Self {
+        assert_eq!(values.len(), part.layers().len(), "each layer has a correction");
+        Self { values, ..Self::none(part) }
+    }
+
+    /// Returns the corrections, from the light on.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Takes a Kalman step: a share `step` of the way to what measurements say, given the layers
+    /// of the faces, by how far the resin is cured deeper than the model says, and the standard
+    /// deviation of each, in micrometres.
+    pub fn step(&mut self, deeper: &[(usize, f64, f64)], light: &Light, step: f64) {
+        let depth_um = light.penetration_depth.um();
+        // Measurements of one layer are one, as exact as all of them together.
+        let mut layers: Vec<(usize, f64, f64)> = Vec::new();
+        let mut sorted = deeper.to_vec();
+        sorted.sort_by_key(|measured| measured.0);
+        for same in sorted.chunk_by(|a, b| a.0 == b.0) {
+            let precision: f64 = same.iter().map(|(_, _, sd)| sd.powi(-2)).sum();
+            let mean = same.iter().map(|(_, um, sd)| um * sd.powi(-2)).sum::<f64>() / precision;
+            layers.push((same[0].0, mean / depth_um, precision.recip() / (depth_um * depth_um)));
+        }
+        let size = layers.len();
+        let mut covariance = vec![0.0; size * size];
+        for (row, a) in layers.iter().enumerate() {
+            for (column, b) in layers.iter().enumerate() {
+                let noise = if row == column { a.2 } else { 0.0 };
+                covariance[row * size + column] = self.covariance(a.0, b.0) + noise;
+            }
+        }
+        let weights = solve(&mut covariance, layers.iter().map(|layer| layer.1).collect());
+        let gained: Vec<f64> = (0..self.values.len())
+            .map(|k| layers.iter().zip(&weights).map(|(a, w)| self.covariance(k, a.0) * w).sum())
+            .collect();
+        self.values.iter_mut().zip(gained).for_each(|(value, gained)| *value += step * gained);
+    }
+
+    /// How alike two layers differ from the model: a Matérn covariance of once differentiable
+    /// functions.
+    fn covariance(&self, a: usize, b: usize) -> f64 {
+        let ends = self.z_um[0] - self.z_um[self.z_um.len() - 1];
+        let range = (ALIKE_OVER * ends).max(f64::MIN_POSITIVE);
+        let away = 3.0_f64.sqrt() * (self.z_um[a] - self.z_um[b]).abs() / range;
+        UNSURE * UNSURE * (1.0 + away) * (-away).exp()
+    }
+}
+
+/// Solves the equations of a symmetric positive matrix, by Cholesky's factors.
+fn solve(matrix: &mut [f64], mut right: Vec<f64>) -> Vec<f64> {
+    let size = right.len();
+    for column in 0..size {
+        for row in column..size {
+            let earlier: f64 =
+                (0..column).map(|k| matrix[row * size + k] * matrix[column * size + k]).sum();
+            let left = matrix[row * size + column] - earlier;
+            matrix[row * size + column] =
+                if row == column { left.sqrt() } else { left / matrix[column * size + column] };
+        }
+    }
+    for row in 0..size {
+        let known: f64 = (0..row).map(|k| matrix[row * size + k] * right[k]).sum();
+        right[row] = (right[row] - known) / matrix[row * size + row];
+    }
+    for row in (0..size).rev() {
+        let known: f64 = (row + 1..size).map(|k| matrix[k * size + row] * right[k]).sum();
+        right[row] = (right[row] - known) / matrix[row * size + row];
+    }
+    right
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_fixtures::cavity_staircase;
+
+    use super::*;
+    use crate::speed::testing::{part, pegda};
+
+    #[test]
+    fn a_face_is_cured_down_to_the_critical_dose() {
+        let (part, light) = (part(&cavity_staircase(1)), pegda(0.0));
+        let simulation = Simulation::new(&part, &light, 1 << 30).unwrap();
+        // One flash of the topmost layer: it reaches D_p ln(E / E_c) below the top.
+        let mut times = vec![0.0; 60];
+        times[0] = 100.0 * 7.266 / 7.394;
+        let top = 60.0 * 100.0;
+        let face = ([40, 7], face_at(&part, [40, 7], Length::from_um(4500.0)).unwrap());
+        assert_eq!(face.1, 14);
+        let [height] = heights_of(&part, &simulation, &light, &times, &[face]).unwrap()[..] else {
+            panic!("there is one height")
+        };
+        let expected = top - light.penetration_depth.um() * 100.0_f64.ln();
+        assert!((height.um() - expected).abs() < 0.01, "{height} {expected}");
+        times[0] = 0.1;
+        let nothing = heights_of(&part, &simulation, &light, &times, &[face]);
+        assert_eq!(nothing, Err(HeightError::NothingCured));
+        for (pixel, z_um) in [([40, 7], 4400.0), ([2, 7], 4500.0), ([99, 7], 4500.0)] {
+            let face = face_at(&part, pixel, Length::from_um(z_um));
+            assert_eq!(face, Err(HeightError::NoFace), "{pixel:?}");
+        }
+    }
+
+    #[test]
+    fn a_step_goes_its_share_of_the_way_and_smoothly() {
+        let part = part(&cavity_staircase(1));
+        let mut learned = LogDoses::none(&part);
+        let light = pegda(50.0);
+        let deeper = |layer| (layer, 0.2 * light.penetration_depth.um(), 5.0);
+        learned.step(&[deeper(10), deeper(10), deeper(40)], &light, 0.5);
+        let values = learned.values();
+        assert!((values[10] - 0.1).abs() < 1e-3 && (values[40] - 0.1).abs() < 1e-3);
+        assert!(values.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 0.01));
+        assert!(values[25] > 0.02 && values[25] < 0.1);
+    }
+}

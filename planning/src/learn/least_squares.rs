@@ -1,0 +1,100 @@
+//! Solves for the model's step: least |(e - G dt) / noise|² + ρ |dt / t|².
+
+use super::law::ModelLaw;
+use super::response::Response;
+use crate::speed::{Stop, descend};
+
+/// What a step weighs, layer by layer.
+pub(crate) struct Weights {
+    /// 1 / noise².
+    errors: Vec<f64>,
+    /// ρ / t².
+    changes: Vec<f64>,
+}
+
+impl ModelLaw {
+    pub(crate) fn weights(&self, times: &[f64], response: &Response) -> Weights {
+        let noise = response.per_log_dose().iter().map(|voxels| (self.noise * voxels).max(1.0));
+        Weights {
+            errors: noise.map(|noise: f64| noise.powi(-2)).collect(),
+            changes: times.iter().map(|time| self.stiffness / (time * time)).collect(),
+        }
+    }
+}
+
+impl Weights {
+    /// Returns the matrix of the step's equations times a step: `Gᵀ W G dt + ρ dt / t²`.
+    fn apply(&self, response: &Response, changes: &[f64]) -> Vec<f64> {
+        let mut cured = response.apply(changes);
+        cured.iter_mut().zip(&self.errors).for_each(|(cured, weight)| *cured *= weight);
+        let mut sums = response.transposed(&cured);
+        let stiff = self.changes.iter().zip(changes);
+        sums.iter_mut().zip(stiff).for_each(|(sum, (weight, change))| *sum += weight * change);
+        sums
+    }
+
+    /// Returns the right side of the step's equations: `Gᵀ W e`.
+    fn pull(&self, response: &Response, errors: &[f64]) -> Vec<f64> {
+        let weighed: Vec<_> =
+            errors.iter().zip(&self.errors).map(|(e, weight)| e * weight).collect();
+        response.transposed(&weighed)
+    }
+
+    /// Returns the step without bounds, by conjugate gradients.
+    pub(crate) fn solve(&self, response: &Response, errors: &[f64]) -> Vec<f64> {
+        // In shares of the times the equations are well scaled.
+        let scale: Vec<_> = self.changes.iter().map(|weight| weight.sqrt().recip()).collect();
+        let scaled =
+            |a: &[f64]| a.iter().zip(&scale).map(|(a, scale)| a * scale).collect::<Vec<_>>();
+        let mut left = scaled(&self.pull(response, errors));
+        let mut step = vec![0.0; left.len()];
+        let mut along = left.clone();
+        let mut square = dot(&left, &left);
+        let enough = square * 1e-22;
+        for _ in 0..4 * step.len() {
+            if square <= enough {
+                break;
+            }
+            let turned = scaled(&self.apply(response, &scaled(&along)));
+            let length = square / dot(&along, &turned);
+            add(&mut step, length, &along);
+            add(&mut left, -length, &turned);
+            let next = dot(&left, &left);
+            along.iter_mut().zip(&left).for_each(|(a, left)| *a = left + next / square * *a);
+            square = next;
+        }
+        scaled(&step)
+    }
+}
+
+/// Returns the step within bounds.
+pub(crate) fn bounded_step(
+    response: &Response,
+    errors: &[f64],
+    weights: &Weights,
+    bounds: [&[f64]; 2],
+) -> Vec<f64> {
+    let scale: Vec<_> = weights.changes.iter().map(|weight| weight.sqrt().recip()).collect();
+    let times = |a: &[f64]| a.iter().zip(&scale).map(|(a, scale)| a * scale).collect::<Vec<_>>();
+    let shares = |a: &[f64]| a.iter().zip(&scale).map(|(a, scale)| a / scale).collect::<Vec<_>>();
+    let pull = weights.pull(response, errors);
+    let [low, high] = bounds.map(shares);
+    let mut step = shares(&weights.solve(response, errors));
+    let stop = Stop { steps: 500, fall: 1e-12 };
+    descend(&mut step, [&low, &high], stop, |step| {
+        let changes = times(step);
+        let bent = weights.apply(response, &changes);
+        let value = 0.5 * dot(&bent, &changes) - dot(&pull, &changes);
+        let slopes: Vec<_> = bent.iter().zip(&pull).map(|(bent, pull)| bent - pull).collect();
+        (value, times(&slopes))
+    });
+    times(&step)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn add(to: &mut [f64], times: f64, what: &[f64]) {
+    to.iter_mut().zip(what).for_each(|(to, what)| *to += times * what);
+}

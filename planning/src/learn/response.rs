@@ -1,0 +1,98 @@
+//! What a change of times does to the number of cured voxels.
+
+use lamp_stack::Length;
+
+use crate::light::{LayerLight, Light};
+use crate::speed::{PartError, Simulation, TimedPart};
+
+/// The doses over which voxels that cross the critical dose are counted: 1 / 1.3 to 1.3 times
+/// the present. Edges are pixels apart, so that a smaller range would see all or none of them.
+const RANGE: f64 = 1.3;
+
+/// The matrix `G`: by how many voxels of layer k more are cured when layer n gets a second more.
+/// `G_kn = s_k q^(k-n)` for n ≤ k, the layers counted from the light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Response {
+    /// The voxels of each layer that cross the critical dose as all doses rise by a factor, per
+    /// logarithm of it.
+    per_log_dose: Vec<f64>,
+    /// The same per unit of dose of a wide white field.
+    per_dose: Vec<f64>,
+    /// What passes from the layer above, and the dose of a second.
+    layers: Vec<LayerLight>,
+}
+
+impl Response {
+    /// Computes it where a part's layers have these times, in seconds.
+    pub fn of(simulation: &Simulation<'_>, times: &[f64]) -> Self {
+        let scaled = |share: f64| times.iter().map(|time| time * share).collect::<Vec<_>>();
+        let (more, less) = (scaled(RANGE), scaled(1.0 / RANGE));
+        let [more, less] = simulation.tally([&more, &less]);
+        let doses = simulation.field_doses(times);
+        let crossed = more
+            .layers
+            .iter()
+            .zip(&less.layers)
+            .map(|(more, less)| (more.over - less.over) + (less.under - more.under));
+        let per_log_dose: Vec<_> =
+            crossed.map(|voxels| voxels as f64 / (2.0 * RANGE.ln())).collect();
+        let per_dose = per_log_dose.iter().zip(doses).map(|(voxels, dose)| voxels / dose).collect();
+        let layers = simulation.layers().iter().map(|reach| reach.light).collect();
+        Self { per_log_dose, per_dose, layers }
+    }
+
+    /// Returns the same with another penetration depth: light fades by e over `share` times the
+    /// depth of the model.
+    ///
+    /// # Errors
+    /// Returns an error if the model's numbers are impossible.
+    pub fn at_depth(&self, part: &TimedPart, light: &Light, share: f64) -> Result<Self, PartError> {
+        let depth = Length::from_um(light.penetration_depth.um() * share);
+        let other = part.per_second(&Light { penetration_depth: depth, ..*light })?;
+        let layers = self
+            .layers
+            .iter()
+            .zip(other)
+            .map(|(layer, other)| LayerLight { passed: other.passed, ..*layer });
+        Ok(Self { layers: layers.collect(), ..self.clone() })
+    }
+
+    /// Returns the number of layers.
+    pub fn layers(&self) -> usize {
+        self.layers.len()
+    }
+
+    /// Returns the voxels of each layer that a second of its own light cures: `s`.
+    pub fn per_second(&self) -> Vec<f64> {
+        self.per_dose.iter().zip(&self.layers).map(|(voxels, layer)| voxels * layer.own).collect()
+    }
+
+    /// Returns the voxels of each layer that cross the critical dose as all doses rise by a
+    /// factor, per logarithm of it.
+    pub fn per_log_dose(&self) -> &[f64] {
+        &self.per_log_dose
+    }
+
+    /// Returns by how many voxels more are cured in each layer: `G dt`.
+    pub fn apply(&self, changes: &[f64]) -> Vec<f64> {
+        let mut dose = 0.0;
+        let layers = self.layers.iter().zip(&self.per_dose).zip(changes);
+        let cured = layers.map(|((layer, voxels), change)| {
+            dose = dose * layer.passed + layer.own * change;
+            dose * voxels
+        });
+        cured.collect()
+    }
+
+    /// Returns `Gᵀ x`.
+    pub fn transposed(&self, numbers: &[f64]) -> Vec<f64> {
+        let mut sums = vec![0.0; numbers.len()];
+        let mut sum = 0.0;
+        for k in (0..numbers.len()).rev() {
+            let below = self.layers.get(k + 1).map_or(0.0, |below| below.passed);
+            sum = sum * below + self.per_dose[k] * numbers[k];
+            sums[k] = sum * self.layers[k].own;
+        }
+        sums
+    }
+}

@@ -1,0 +1,135 @@
+//! Stores the light of pixel columns through all layers.
+//!
+//! Layers that are alike at many pixels give many equal columns: deep inside a part, far outside,
+//! along a straight wall. Equal columns are stored once, with their number.
+
+use std::collections::HashMap;
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
+
+/// Columns that are worked on at once: their doses through all layers stay in the cache.
+pub(crate) const LANES: usize = 256;
+
+/// The light of pixel columns, for a second of every layer's light, with signs: negative where a
+/// voxel is wanted, and zero of either sign where there is no light.
+#[derive(Clone, Debug)]
+pub(crate) struct Columns {
+    layers: usize,
+    blocks: Vec<Block>,
+}
+
+/// [`LANES`] columns side by side.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    /// How many pixels each column stands for.
+    pub(crate) weights: Vec<f32>,
+    /// Layer by layer.
+    pub(crate) light: Vec<f32>,
+}
+
+impl Columns {
+    pub(crate) fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    pub(crate) fn layers(&self) -> usize {
+        self.layers
+    }
+}
+
+/// Collects columns and merges equal ones.
+#[derive(Debug)]
+pub(crate) struct ColumnSet {
+    layers: usize,
+    /// The columns one after another.
+    light: Vec<f32>,
+    weights: Vec<f64>,
+    /// Columns by their hash; those with the same hash form a chain.
+    by_hash: HashMap<u64, usize, BuildHasherDefault<DefaultHasher>>,
+    next: Vec<usize>,
+}
+
+/// The end of a chain.
+const NONE: usize = usize::MAX;
+
+impl ColumnSet {
+    pub(crate) fn new(layers: usize) -> Self {
+        let by_hash = HashMap::default();
+        Self { layers, light: Vec::new(), weights: Vec::new(), by_hash, next: Vec::new() }
+    }
+
+    /// Returns the number of different columns.
+    pub(crate) fn len(&self) -> usize {
+        self.weights.len()
+    }
+
+    fn column(&self, number: usize) -> &[f32] {
+        &self.light[number * self.layers..][..self.layers]
+    }
+
+    /// Adds a column that stands for `weight` pixels.
+    pub(crate) fn add(&mut self, column: &[f32], weight: f64) {
+        let same = |a: &[f32]| a.iter().zip(column).all(|(a, b)| a.to_bits() == b.to_bits());
+        let bits: Vec<u32> = column.iter().map(|light| light.to_bits()).collect();
+        let hash = self.by_hash.hasher().hash_one(&bits);
+        let first = self.by_hash.get(&hash).copied().unwrap_or(NONE);
+        let mut at = first;
+        while at != NONE {
+            if same(self.column(at)) {
+                self.weights[at] += weight;
+                return;
+            }
+            at = self.next[at];
+        }
+        self.by_hash.insert(hash, self.len());
+        self.next.push(first);
+        self.light.extend_from_slice(column);
+        self.weights.push(weight);
+    }
+
+    /// Adds another set's columns, `times` as many of each.
+    pub(crate) fn add_all(&mut self, other: &Self, times: f64) {
+        for (number, weight) in other.weights.iter().enumerate() {
+            self.add(other.column(number), weight * times);
+        }
+    }
+
+    /// Returns the columns side by side.
+    pub(crate) fn finish(self) -> Columns {
+        let block = |first: usize| {
+            let numbers = first..(first + LANES).min(self.len());
+            let mut block =
+                Block { weights: vec![0.0; LANES], light: vec![0.0; LANES * self.layers] };
+            for (lane, number) in numbers.enumerate() {
+                block.weights[lane] = self.weights[number] as f32;
+                for (layer, &light) in self.column(number).iter().enumerate() {
+                    block.light[layer * LANES + lane] = light;
+                }
+            }
+            block
+        };
+        let blocks = (0..self.len()).step_by(LANES).map(block).collect();
+        Columns { layers: self.layers, blocks }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_columns_are_stored_once() {
+        let mut set = ColumnSet::new(2);
+        for column in [[0.5, -0.0], [0.5, 0.0], [0.5, -0.0], [-0.5, 0.0]] {
+            set.add(&column, 1.0);
+        }
+        let mut all = ColumnSet::new(2);
+        all.add(&[-0.5, 0.0], 5.0);
+        all.add_all(&set, 10.0);
+        let columns = all.finish();
+        let [block] = columns.blocks() else { panic!("one block is enough") };
+        assert_eq!(block.weights[..4], [15.0, 20.0, 10.0, 0.0]);
+        assert_eq!(block.light[..3], [-0.5, 0.5, 0.5]);
+        assert!(block.light[LANES + 1].is_sign_negative());
+        assert!(block.light[LANES + 2].is_sign_positive());
+    }
+}

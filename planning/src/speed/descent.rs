@@ -1,0 +1,160 @@
+//! Finds the least value of a smooth convex function between bounds: L-BFGS, projected.
+//!
+//! Source: D. P. Bertsekas, *Projected Newton methods for optimization problems with simple
+//! constraints*, SIAM J. Control Optim. 20 (1982), with the limited-memory matrix of J. Nocedal,
+//! *Updating quasi-Newton matrices with limited storage*, Math. Comp. 35 (1980).
+
+use std::collections::VecDeque;
+
+/// Pairs of steps and changes of the slopes that are remembered.
+const MEMORY: usize = 12;
+/// The share of the fall that the slopes promise which a step must bring.
+const ENOUGH: f64 = 1e-4;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stop {
+    pub(crate) steps: usize,
+    /// A fall of the value over a step, as a share of the value.
+    pub(crate) fall: f64,
+}
+
+struct Pair {
+    step: Vec<f64>,
+    change: Vec<f64>,
+    scale: f64,
+}
+
+/// Moves `x` towards the least value between the bounds. `function` returns a value and its
+/// slopes.
+pub(crate) fn descend(
+    x: &mut Vec<f64>,
+    [low, high]: [&[f64]; 2],
+    stop: Stop,
+    mut function: impl FnMut(&[f64]) -> (f64, Vec<f64>),
+) {
+    let clamp = |x: &mut [f64]| {
+        for (x, (&low, &high)) in x.iter_mut().zip(low.iter().zip(high)) {
+            *x = x.clamp(low, high);
+        }
+    };
+    clamp(x);
+    let (mut value, mut slopes) = function(x);
+    let mut pairs: VecDeque<Pair> = VecDeque::new();
+    for _ in 0..stop.steps {
+        // A bound that the slopes push against stays.
+        let is_free = |k: usize| if slopes[k] > 0.0 { x[k] > low[k] } else { x[k] < high[k] };
+        let free: Vec<bool> = (0..x.len()).map(is_free).collect();
+        let direction = direction(&slopes, &free, &pairs, x);
+        let mut length = 1.0;
+        let (next, next_value, next_slopes) = loop {
+            let mut next: Vec<_> = x.iter().zip(&direction).map(|(x, d)| x + length * d).collect();
+            clamp(&mut next);
+            let (next_value, next_slopes) = function(&next);
+            let promised: f64 = next
+                .iter()
+                .zip(&*x)
+                .zip(&slopes)
+                .map(|((next, x), slope)| (next - x) * slope)
+                .sum();
+            if next_value <= value + ENOUGH * promised.min(0.0) {
+                break (next, next_value, next_slopes);
+            }
+            length *= 0.3;
+            if length < 1e-6 {
+                if pairs.is_empty() {
+                    return;
+                }
+                break (x.clone(), value, slopes.clone());
+            }
+        };
+        let fall = value - next_value;
+        let step: Vec<_> = next.iter().zip(&*x).map(|(next, x)| next - x).collect();
+        let change: Vec<_> =
+            next_slopes.iter().zip(&slopes).map(|(next, now)| next - now).collect();
+        let curve = dot(&step, &change);
+        if step.iter().all(|&step| step == 0.0) {
+            // What is remembered misleads: begin anew along the slopes.
+            pairs.clear();
+            continue;
+        }
+        if curve > 1e-12 * dot(&change, &change).sqrt() * dot(&step, &step).sqrt() {
+            if pairs.len() == MEMORY {
+                pairs.pop_front();
+            }
+            pairs.push_back(Pair { step, change, scale: 1.0 / curve });
+        }
+        (*x, value, slopes) = (next, next_value, next_slopes);
+        if fall <= stop.fall * value.abs() {
+            return;
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Returns the direction of the two loops of L-BFGS, among the free numbers alone.
+fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -> Vec<f64> {
+    let only_free = |mut numbers: Vec<f64>| {
+        numbers.iter_mut().zip(free).filter(|(_, free)| !**free).for_each(|(n, _)| *n = 0.0);
+        numbers
+    };
+    let mut direction = only_free(slopes.iter().map(|slope| -slope).collect());
+    let along = |a: &[f64], b: &[f64]| dot(&only_free(a.to_vec()), b);
+    let mut shares = Vec::with_capacity(pairs.len());
+    for pair in pairs.iter().rev() {
+        let share = pair.scale * along(&pair.step, &direction);
+        direction.iter_mut().zip(&pair.change).for_each(|(d, change)| *d -= share * change);
+        shares.push(share);
+    }
+    direction = only_free(direction);
+    let first = match pairs.back() {
+        Some(pair) => 1.0 / (pair.scale * dot(&pair.change, &pair.change)),
+        // A tenth of the largest number is a step that no start makes too far.
+        None => {
+            let most = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, n| most.max(n.abs()));
+            0.1 * most(x) / most(&direction).max(f64::MIN_POSITIVE)
+        }
+    };
+    direction.iter_mut().for_each(|d| *d *= first);
+    for (pair, share) in pairs.iter().zip(shares.iter().rev()) {
+        let back = pair.scale * along(&pair.change, &direction);
+        direction.iter_mut().zip(&pair.step).for_each(|(d, step)| *d += (share - back) * step);
+    }
+    let direction = only_free(direction);
+    if dot(&direction, slopes) < 0.0 {
+        direction
+    } else {
+        only_free(slopes.iter().map(|slope| -slope * first.max(f64::MIN_POSITIVE)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quadratic of condition 1e4, whose least value is at 1, 2, 3, ...
+    fn valley(x: &[f64]) -> (f64, Vec<f64>) {
+        let mut value = 0.0;
+        let mut slopes = vec![0.0; x.len()];
+        for k in 0..x.len() {
+            let (away, bend) = (x[k] - (k + 1) as f64, 10_f64.powf(4.0 * k as f64 / 19.0));
+            value += 0.5 * bend * away * away;
+            slopes[k] = bend * away;
+        }
+        (value, slopes)
+    }
+
+    #[test]
+    fn the_bottom_of_a_valley_is_found_within_bounds() {
+        let stop = Stop { steps: 400, fall: 0.0 };
+        let (low, high) = (vec![0.0; 20], vec![12.5; 20]);
+        let mut x = vec![6.0; 20];
+        descend(&mut x, [&low, &high], stop, valley);
+        for (k, x) in x.iter().enumerate() {
+            assert!((x - ((k + 1) as f64).min(12.5)).abs() < 1e-5, "{k} {x}");
+        }
+    }
+}

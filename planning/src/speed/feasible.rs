@@ -1,0 +1,225 @@
+//! The times that a platform can keep: bounds on its speed and on the change from layer to layer.
+
+use lamp_stack::Length;
+use thiserror::Error;
+
+use super::part::PartLayer;
+
+/// A speed of the platform, in micrometres a second.
+pub type Speed = f64;
+
+/// What the platform can do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Platform {
+    /// The slowest speed: a layer's thickness divided by its time.
+    pub slowest: Speed,
+    /// The fastest.
+    pub fastest: Speed,
+    /// By how much the speed may differ from that of a neighbouring layer: 0.2 allows a fifth
+    /// more than the slower of the two.
+    pub max_change: Option<f64>,
+}
+
+/// Why no times are possible.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PlatformError {
+    /// The bounds leave nothing between them, or are not above zero.
+    #[error("the speeds must be above zero and rise: {0} to {1} um/s")]
+    Speeds(Speed, Speed),
+    /// The speed may not change at all, or by a number that is none.
+    #[error("the change of speed must be above zero: {0}")]
+    Change(f64),
+}
+
+/// The times that layers may have, in seconds.
+#[derive(Clone, Debug)]
+pub(crate) struct Feasible {
+    pub(crate) low: Vec<f64>,
+    pub(crate) high: Vec<f64>,
+    pub(crate) um: Vec<f64>,
+    /// How much larger the time of a micrometre may be than a neighbour's.
+    ratio: Option<f64>,
+}
+
+impl Feasible {
+    pub(crate) fn new(platform: &Platform, layers: &[PartLayer]) -> Result<Self, PlatformError> {
+        let Platform { slowest, fastest, max_change } = *platform;
+        if !(slowest > 0.0 && slowest <= fastest && fastest.is_finite()) {
+            return Err(PlatformError::Speeds(slowest, fastest));
+        }
+        if let Some(change) = max_change.filter(|change| !(*change > 0.0 && change.is_finite())) {
+            return Err(PlatformError::Change(change));
+        }
+        let um: Vec<_> = layers.iter().map(|layer| Length::um(layer.thickness)).collect();
+        let at = |speed: Speed| um.iter().map(|um| um / speed).collect();
+        let (low, high) = (at(fastest), at(slowest));
+        Ok(Self { low, high, um, ratio: max_change.map(|change| 1.0 + change) })
+    }
+
+    /// Returns whether nothing but the bounds limits the times.
+    pub(crate) fn is_box(&self) -> bool {
+        self.ratio.is_none()
+    }
+
+    /// Returns the mean seconds of a micrometre.
+    pub(crate) fn pace(&self, times: &[f64]) -> f64 {
+        times.iter().sum::<f64>() / self.um.iter().sum::<f64>()
+    }
+
+    /// Returns times that are possible, near those given, and equal to them if they are.
+    pub(crate) fn nearest(&self, times: &[f64]) -> Vec<f64> {
+        let clamped = times.iter().zip(self.low.iter().zip(&self.high));
+        let mut times: Vec<_> =
+            clamped.map(|(time, (&low, &high))| time.clamp(low, high)).collect();
+        let Some(ratio) = self.ratio else { return times };
+        // The least slowness that no layer's neighbours forbid is below the clamped one; the
+        // largest is above. Any power mean of both keeps the ratios.
+        let spread = |up: bool| {
+            let mut pace: Vec<_> = times.iter().zip(&self.um).map(|(time, um)| time / um).collect();
+            let mut limit = |from: usize, to: usize| {
+                pace[to] = if up {
+                    pace[to].max(pace[from] / ratio)
+                } else {
+                    pace[to].min(pace[from] * ratio)
+                };
+            };
+            let count = self.um.len();
+            (1..count).for_each(|k| limit(k - 1, k));
+            (1..count).rev().for_each(|k| limit(k, k - 1));
+            pace
+        };
+        let (low, high) = (spread(false), spread(true));
+        for (k, time) in times.iter_mut().enumerate() {
+            *time = ((low[k] * high[k]).sqrt() * self.um[k]).clamp(self.low[k], self.high[k]);
+        }
+        times
+    }
+
+    /// Returns by how much each pair of neighbours breaks the ratio, in seconds a micrometre:
+    /// first those whose upper layer is too slow.
+    pub(crate) fn excess(&self, times: &[f64]) -> Vec<[f64; 2]> {
+        let Some(ratio) = self.ratio else { return Vec::new() };
+        let pace = |k: usize| times[k] / self.um[k];
+        (1..times.len())
+            .map(|k| [pace(k - 1) - ratio * pace(k), pace(k) - ratio * pace(k - 1)])
+            .collect()
+    }
+
+    /// Adds the slopes of a sum of excesses, each multiplied with its price.
+    pub(crate) fn add_slopes(&self, prices: &[[f64; 2]], slopes: &mut [f64]) {
+        let Some(ratio) = self.ratio else { return };
+        for (pair, [above, below]) in prices.iter().enumerate() {
+            slopes[pair] += (above - ratio * below) / self.um[pair];
+            slopes[pair + 1] += (below - ratio * above) / self.um[pair + 1];
+        }
+    }
+
+    /// Returns the least sum of possible times, each multiplied with its slope.
+    ///
+    /// It is exact: layer by layer, the least sum of the layers so far is a convex function of
+    /// the last layer's pace, straight between corners.
+    pub(crate) fn least(&self, slopes: &[f64]) -> f64 {
+        let Some(ratio) = self.ratio else {
+            let each = slopes.iter().zip(self.low.iter().zip(&self.high));
+            return each.map(|(slope, (low, high))| (slope * low).min(slope * high)).sum();
+        };
+        let (low, high) = (self.low[0] / self.um[0], self.high[0] / self.um[0]);
+        let mut corners = vec![(low, 0.0), (high, 0.0)];
+        for (layer, (slope, um)) in slopes.iter().zip(&self.um).enumerate() {
+            if layer > 0 {
+                corners = widened(&corners, ratio, [low, high]);
+            }
+            for (pace, least) in &mut corners {
+                *least += slope * um * *pace;
+            }
+        }
+        corners.iter().map(|corner| corner.1).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Returns the least value of a function within a ratio of each place, from its corners.
+fn widened(corners: &[(f64, f64)], ratio: f64, [low, high]: [f64; 2]) -> Vec<(f64, f64)> {
+    let best = (0..corners.len()).min_by(|&a, &b| corners[a].1.total_cmp(&corners[b].1));
+    let best = best.expect("there are two corners or more");
+    let falling = corners[..=best].iter().map(|&(pace, least)| (pace / ratio, least));
+    let rising = corners[best..].iter().map(|&(pace, least)| (pace * ratio, least));
+    cut(&falling.chain(rising).collect::<Vec<_>>(), [low, high])
+}
+
+/// Returns a function's corners between two places.
+fn cut(corners: &[(f64, f64)], [low, high]: [f64; 2]) -> Vec<(f64, f64)> {
+    let at = |place: f64| {
+        let after = corners.partition_point(|corner| corner.0 < place).clamp(1, corners.len() - 1);
+        let ((x0, y0), (x1, y1)) = (corners[after - 1], corners[after]);
+        if x1 == x0 { y0.min(y1) } else { y0 + (y1 - y0) * (place - x0) / (x1 - x0) }
+    };
+    let within = corners.iter().copied().filter(|corner| corner.0 > low && corner.0 < high);
+    let ends = |place: f64| std::iter::once((place, at(place)));
+    ends(low).chain(within).chain(ends(high)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::Length;
+
+    use super::*;
+
+    fn feasible(count: u32, max_change: Option<f64>) -> Feasible {
+        let layer = |index: u32| PartLayer {
+            index,
+            z: Length::default(),
+            thickness: Length::from_um(50.0 + f64::from(index % 3) * 20.0),
+            time: None,
+        };
+        let platform = Platform { slowest: 20.0, fastest: 400.0, max_change };
+        Feasible::new(&platform, &(0..count).map(layer).collect::<Vec<_>>()).unwrap()
+    }
+
+    fn noise(seed: u32, n: u32) -> f64 {
+        let mix = (seed * 7919 + n * 104_729).wrapping_mul(2_654_435_761);
+        f64::from(mix >> 12) / f64::from(1_u32 << 20)
+    }
+
+    #[test]
+    fn nearest_times_keep_bounds_and_ratios() {
+        for seed in 0..50 {
+            let feasible = feasible(9, Some(0.2));
+            let times: Vec<_> = (0..9).map(|n| 6.0 * noise(seed, n)).collect();
+            let near = feasible.nearest(&times);
+            assert!(feasible.excess(&near).as_flattened().iter().all(|&excess| excess < 1e-12));
+            for (k, time) in near.iter().enumerate() {
+                assert!((feasible.low[k]..=feasible.high[k]).contains(time));
+            }
+            let again = feasible.nearest(&near);
+            assert!(near.iter().zip(&again).all(|(a, b)| (a / b - 1.0).abs() < 1e-12));
+        }
+    }
+
+    /// Against all times on a grid of steps of the ratio.
+    #[test]
+    fn the_least_sum_is_that_of_an_exhaustive_search() {
+        for seed in 0..40 {
+            let mut feasible = feasible(4, Some(0.5));
+            // On this grid of paces the least of straight pieces is met.
+            for k in 0..4 {
+                feasible.low[k] = feasible.um[k];
+                feasible.high[k] = feasible.um[k] * 1.5_f64.powi(6);
+            }
+            let slopes: Vec<_> = (0..4).map(|n| noise(seed, n) - 0.5).collect();
+            let mut least = f64::INFINITY;
+            for code in 0..7_u32.pow(4) {
+                let steps: [i32; 4] =
+                    std::array::from_fn(|k| (code / 7_u32.pow(k as u32) % 7) as i32);
+                if steps.windows(2).all(|pair| (pair[0] - pair[1]).abs() <= 1) {
+                    let time = |k: usize| feasible.um[k] * 1.5_f64.powi(steps[k]);
+                    least = least.min((0..4).map(|k| slopes[k] * time(k)).sum());
+                }
+            }
+            let found = feasible.least(&slopes);
+            assert!((found - least).abs() < 1e-9 * least.abs(), "{seed} {found} {least}");
+        }
+        let free = feasible(3, None);
+        assert_eq!(free.least(&[1.0, -1.0, 0.0]), free.low[0] - free.high[1]);
+    }
+}

@@ -1,0 +1,284 @@
+//! Computes the light of pixel columns, tile by tile.
+
+use lamp_stack::Image;
+use rayon::prelude::*;
+
+use super::columns::{ColumnSet, Columns};
+use super::part::{TimedPart, fill_window};
+use crate::blur::{Blur, LANES};
+use crate::light::Light;
+
+/// Sides of tiles. Where light spreads far, small ones have rims that cost more than they.
+const SIDES: [usize; 4] = [64, 128, 256, 512];
+/// The most bytes of a tile, with all layers, unless it is of the least side.
+const MOST_TILE_BYTES: usize = 32 << 20;
+
+/// A part's images under a light, from which columns are computed.
+pub(crate) struct Gather<'a> {
+    part: &'a TimedPart,
+    blur: Blur<f32>,
+    /// The light of each level, so that a wide white field has 1.
+    light_of: Vec<f32>,
+    side: usize,
+    /// The rows and columns where any layer is not black, and as far as light spreads around.
+    tiles: Vec<[i64; 2]>,
+}
+
+/// Working space of a thread.
+#[derive(Default)]
+struct Room {
+    levels: Vec<u8>,
+    /// The levels whose light is known.
+    spread_levels: Vec<u8>,
+    image: Vec<f32>,
+    spread: Vec<f32>,
+    blur: Vec<f32>,
+}
+
+impl<'a> Gather<'a> {
+    pub(crate) fn new(part: &'a TimedPart, light: &Light) -> Self {
+        let blur = Blur::<f32>::new(part.spread_pixels(light));
+        let sum = blur.sum();
+        let light_of = (0..=255).map(|level| (light.of_level(level) / sum) as f32).collect();
+        let bytes = |side: usize| side * side * part.images.len() * size_of::<f32>();
+        let fits = |&side: &usize| side <= 4 * blur.radius() && bytes(side) <= MOST_TILE_BYTES;
+        let side = SIDES.into_iter().rev().find(fits).unwrap_or(SIDES[0]);
+        let mut gather = Self { part, blur, light_of, side, tiles: Vec::new() };
+        gather.tiles = gather.lit_tiles();
+        gather
+    }
+
+    /// Returns the tiles that light reaches in some layer: their corners.
+    fn lit_tiles(&self) -> Vec<[i64; 2]> {
+        let radius = self.blur.radius() as i64;
+        let [width, height] = self.part.size().map(i64::from);
+        let corners = |size: i64| (-radius..size + radius).step_by(self.side);
+        let (across, down) = (corners(width).count(), corners(height).count());
+        let mut lit = vec![false; across * down];
+        let tile = |pixel: i64| ((pixel + radius) / self.side as i64) as usize;
+        for image in &self.part.images {
+            for row in 0..image.height() {
+                let rows = tile(i64::from(row) - radius)..=tile(i64::from(row) + radius);
+                for (from, to, _) in image.runs(row) {
+                    let from = tile(i64::from(from) - radius);
+                    let to = tile(i64::from(to) - 1 + radius).min(across - 1);
+                    for row in rows.clone().filter(|&row| row < down) {
+                        lit[row * across + from..=row * across + to].fill(true);
+                    }
+                }
+            }
+        }
+        let all = corners(height).flat_map(|row| corners(width).map(move |column| [column, row]));
+        all.zip(lit).filter_map(|(corner, lit)| lit.then_some(corner)).collect()
+    }
+
+    /// Returns the number of pixels in lit tiles.
+    pub(crate) fn pixels(&self) -> usize {
+        self.tiles.len() * self.side * self.side
+    }
+
+    /// Calls `each` with the columns of every tile, on all threads, and returns the results in
+    /// order. One pixel in each `step` x `step` is taken, at a place that differs from square to
+    /// square, and stands for all of them.
+    pub(crate) fn tiles<T: Send>(
+        &self,
+        step: u32,
+        each: impl Fn(ColumnSet) -> T + Sync,
+    ) -> impl Iterator<Item = T> {
+        // A batch's results are merged before the next begins.
+        let batch = 2 * rayon::current_num_threads();
+        self.tiles.chunks(batch).flat_map(move |corners| {
+            let tile = |room: &mut Room, &corner: &[i64; 2]| each(self.tile(corner, step, room));
+            corners.par_iter().map_init(Room::default, tile).collect::<Vec<_>>()
+        })
+    }
+
+    /// Returns all columns, or a sample of them that takes no more than `bytes`; and how many
+    /// pixels each sampled one stands for.
+    pub(crate) fn columns(&self, bytes: usize) -> (Columns, u32) {
+        let layers = self.part.images.len();
+        let most = (bytes / (layers * size_of::<f32>())).max(1);
+        let mut step = 1;
+        while self.pixels() / (step as usize * step as usize) > 64 * most {
+            step *= 2;
+        }
+        loop {
+            if let Some(columns) = self.sample(step, most) {
+                return (columns, step * step);
+            }
+            step *= 2;
+        }
+    }
+
+    /// Returns the columns of a sample, if there are at most so many.
+    fn sample(&self, step: u32, most: usize) -> Option<Columns> {
+        let mut all = ColumnSet::new(self.part.images.len());
+        for tile in self.tiles(step, |tile| tile) {
+            all.add_all(&tile, 1.0);
+            if all.len() > most && step < self.side as u32 {
+                return None;
+            }
+        }
+        Some(all.finish())
+    }
+
+    /// Returns the light at a pixel in each layer.
+    pub(crate) fn light_at(&self, pixel: [u32; 2]) -> Vec<f32> {
+        let room = &mut Room::default();
+        let window = Window { corner: pixel.map(i64::from), side: 1, radius: self.blur.radius() };
+        let of_layer = |image| {
+            self.spread(image, window, room);
+            room.spread[window.place([0, 0])]
+        };
+        self.part.images.iter().map(of_layer).collect()
+    }
+
+    /// Computes the light of a window of a layer.
+    fn spread(&self, image: &Image, window: Window, room: &mut Room) {
+        let pixels = window.width() * window.rows();
+        room.levels.resize(pixels, 0);
+        let corner = window.corner.map(|place| place - window.radius as i64);
+        fill_window(image, corner, window.width(), &mut room.levels);
+        if room.levels == room.spread_levels {
+            return;
+        }
+        room.spread_levels.clone_from(&room.levels);
+        let first = room.levels[0];
+        if room.levels.iter().all(|&level| level == first) {
+            let field = self.light_of[usize::from(first)] * self.blur.sum() as f32;
+            room.spread.clear();
+            room.spread.resize(pixels, field);
+            return;
+        }
+        room.image.clear();
+        room.image.extend(room.levels.iter().map(|&level| self.light_of[usize::from(level)]));
+        room.spread.resize(pixels, 0.0);
+        self.blur.apply(&room.image, window.width(), &mut room.spread, &mut room.blur);
+    }
+
+    /// Computes the columns of one tile. Columns without light are left out.
+    fn tile(&self, corner: [i64; 2], step: u32, room: &mut Room) -> ColumnSet {
+        let layers = self.part.images.len();
+        let places = sampled(corner, self.side, step);
+        let window = Window { corner, side: self.side, radius: self.blur.radius() };
+        let mut light = vec![0.0_f32; places.len() * layers];
+        room.spread_levels.clear();
+        for (layer, image) in self.part.images.iter().enumerate() {
+            self.spread(image, window, room);
+            for (number, &place) in places.iter().enumerate() {
+                let place = window.place(place);
+                let wanted = room.levels[place] >= self.part.wanted();
+                let sign = if wanted { -1.0 } else { 1.0 };
+                light[number * layers + layer] = room.spread[place] * sign;
+            }
+        }
+        let mut columns = ColumnSet::new(layers);
+        for column in light.chunks_exact(layers) {
+            if column.iter().any(|&light| light != 0.0 || light.is_sign_negative()) {
+                columns.add(column, f64::from(step * step));
+            }
+        }
+        columns
+    }
+}
+
+/// Pixels whose light is computed, and as far around as it comes from.
+#[derive(Clone, Copy)]
+struct Window {
+    corner: [i64; 2],
+    side: usize,
+    radius: usize,
+}
+
+impl Window {
+    fn rows(self) -> usize {
+        self.side + 2 * self.radius
+    }
+
+    fn width(self) -> usize {
+        self.rows().next_multiple_of(LANES)
+    }
+
+    /// Returns where a pixel is, counted from the corner.
+    fn place(self, [column, row]: [usize; 2]) -> usize {
+        (row + self.radius) * self.width() + column + self.radius
+    }
+}
+
+/// Returns the places in a tile that are taken: one of each `step` x `step` pixels.
+fn sampled(corner: [i64; 2], side: usize, step: u32) -> Vec<[usize; 2]> {
+    let step = step as usize;
+    let squares = || (0..side).step_by(step);
+    let place = |column: usize, row: usize| {
+        // Places must not repeat with the part's: a mix of the square's coordinates chooses.
+        let [x, y] = [corner[0] + column as i64, corner[1] + row as i64].map(|at| at as u64);
+        let mut mix = x.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ y.wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
+        mix = (mix ^ (mix >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mix ^= mix >> 32;
+        let [right, down] = [mix % step as u64, (mix >> 20) % step as u64].map(|at| at as usize);
+        [(column + right).min(side - 1), (row + down).min(side - 1)]
+    };
+    squares().flat_map(|row| squares().map(move |column| place(column, row))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_fixtures::cavity_staircase;
+
+    use super::*;
+    use crate::speed::testing::{part, pegda};
+
+    /// Returns the light of a pixel, summed up over all others.
+    fn light(part: &TimedPart, layer: usize, [column, row]: [i64; 2], sigma: f64) -> f64 {
+        let one = (-60..=60).map(|at: i64| (-0.5 * (at as f64 / sigma).powi(2)).exp());
+        let field = one.sum::<f64>().powi(2);
+        let mut sum = 0.0;
+        for y in 0..part.size()[1] {
+            for (from, to, _) in part.images[layer].runs(y) {
+                for x in from..to {
+                    let away = [i64::from(x) - column, i64::from(y) - row];
+                    let square = (away[0] * away[0] + away[1] * away[1]) as f64;
+                    sum += (-0.5 * square / (sigma * sigma)).exp();
+                }
+            }
+        }
+        sum / field
+    }
+
+    #[test]
+    fn light_is_the_sum_over_all_pixels() {
+        let part = part(&cavity_staircase(1));
+        let gather = Gather::new(&part, &pegda(200.0));
+        for pixel in [[0, 0], [5, 7], [20, 14], [44, 24], [49, 29]] {
+            let lights = gather.light_at(pixel);
+            for layer in [0, 20, 59] {
+                let exact = light(&part, layer, pixel.map(i64::from), 2.0);
+                assert!((f64::from(lights[layer]) - exact).abs() < 1e-4, "{pixel:?} {layer}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sample_stands_for_all_pixels() {
+        let part = part(&cavity_staircase(4));
+        let gather = Gather::new(&part, &pegda(50.0));
+        let (all, one) = gather.columns(usize::MAX);
+        let (some, many) = gather.columns(240 * 4 * 600);
+        assert!(one == 1 && many > 1);
+        // The wanted voxels of each layer, and their light.
+        let sums = |columns: &Columns, layer: usize| {
+            let lanes = super::super::columns::LANES;
+            let each = columns.blocks().iter().flat_map(|block| {
+                let light = &block.light[layer * lanes..(layer + 1) * lanes];
+                block.weights.iter().zip(light).filter(|(_, light)| light.is_sign_negative())
+            });
+            each.fold([0.0, 0.0], |[count, sum], (weight, light)| {
+                [count + f64::from(*weight), sum + f64::from(weight * -light)]
+            })
+        };
+        for layer in [0, 100, 239] {
+            let (all, some) = (sums(&all, layer), sums(&some, layer));
+            assert!(all.iter().zip(some).all(|(all, some)| (some / all - 1.0).abs() < 0.03));
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! The error that times leave, its slopes, and what they prove of any other times.
+//!
+//! The error is Σ_in (1 + m - e)₊ + Σ_out (e - 1 + m)₊ over the voxels of the part and those
+//! around, with their doses e and a margin m. A smoothed (x)₊ has slopes within 0 to 1. With any
+//! such slopes y, Σ y x is at most the error, whatever the times: they are multipliers.
+
+use rayon::prelude::*;
+
+use super::columns::{Block, Columns, LANES};
+use crate::light::LayerLight;
+use crate::wide::wide;
+
+/// What reaches a layer's voxels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Reach {
+    /// What passes, and the dose of a second under a wide white field.
+    pub(crate) light: LayerLight,
+    /// What the dose is multiplied with before it is compared: 1, or as measurements say.
+    pub(crate) scale: f64,
+}
+
+/// The error of times, and its slopes.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Priced {
+    /// The smoothed error.
+    pub(crate) error: f64,
+    /// By each layer's time.
+    pub(crate) slopes: Vec<f64>,
+    /// Σ y x: the errors at the smoothed one's slopes.
+    pub(crate) priced: f64,
+}
+
+impl Priced {
+    /// Returns an error that no times are below, given the least value of a sum of times, each
+    /// multiplied with its slope.
+    pub(crate) fn bound(&self, times: &[f64], least: f64) -> f64 {
+        let here: f64 = self.slopes.iter().zip(times).map(|(slope, time)| slope * time).sum();
+        (self.priced - here + least).max(0.0)
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.error += other.error;
+        self.priced += other.priced;
+        for (sum, slope) in self.slopes.iter_mut().zip(&other.slopes) {
+            *sum += slope;
+        }
+    }
+
+    pub(crate) fn none(layers: usize) -> Self {
+        Self { error: 0.0, slopes: vec![0.0; layers], priced: 0.0 }
+    }
+}
+
+/// The error of a part's voxels as a function of times.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hinge<'a> {
+    pub(crate) layers: &'a [Reach],
+    /// How far doses must stay away from 1.
+    pub(crate) margin: f64,
+    /// The error is exact this far from the kink and farther; zero leaves the kink.
+    pub(crate) smoothing: f64,
+}
+
+impl Hinge<'_> {
+    /// Returns the error of all columns and its slopes.
+    pub(crate) fn of(&self, columns: &Columns, times: &[f64]) -> Priced {
+        let price = |room: &mut Vec<f32>, block: &Block| self.of_block(block, times, room);
+        let blocks: Vec<_> = columns.blocks().par_iter().map_init(Vec::new, price).collect();
+        let mut all = Priced::none(columns.layers());
+        for block in &blocks {
+            all.add(block);
+        }
+        all
+    }
+
+    fn of_block(&self, block: &Block, times: &[f64], room: &mut Vec<f32>) -> Priced {
+        wide(
+            #[inline(always)]
+            || {
+                expose(block, self.layers, times, room);
+                self.price(block, room)
+            },
+        )
+    }
+
+    /// Runs from the last layer to the first with what a dose more would cost.
+    #[inline(always)]
+    fn price(&self, block: &Block, doses: &[f32]) -> Priced {
+        let mut priced = Priced::none(self.layers.len());
+        let mut cost = [0.0_f32; LANES];
+        for (layer, reach) in self.layers.iter().enumerate().rev() {
+            let of_layer = layer * LANES..(layer + 1) * LANES;
+            let (light, doses) = (&block.light[of_layer.clone()], &doses[of_layer]);
+            let below = self.layers.get(layer + 1).map_or(0.0, |below| below.light.passed as f32);
+            let scale = reach.scale as f32;
+            let [mut error, mut linear, mut slope] = [[0.0_f32; 16]; 3];
+            for lane in 0..LANES {
+                let sum = lane % 16;
+                let weight = block.weights[lane];
+                let sign = 1.0_f32.copysign(light[lane]);
+                let x = self.margin as f32 + sign * (doses[lane] * scale - 1.0);
+                let y = self.slope(x) * weight;
+                error[sum] += self.smoothed(x) * weight;
+                linear[sum] += x * y;
+                cost[lane] = cost[lane] * below + sign * y * scale;
+                slope[sum] += cost[lane] * light[lane].abs();
+            }
+            let total = |sums: [f32; 16]| sums.into_iter().map(f64::from).sum::<f64>();
+            priced.error += total(error);
+            priced.priced += total(linear);
+            priced.slopes[layer] = total(slope) * reach.light.own;
+        }
+        priced
+    }
+
+    #[inline(always)]
+    fn slope(&self, x: f32) -> f32 {
+        if self.smoothing == 0.0 {
+            return f32::from(u8::from(x > 0.0));
+        }
+        let smoothing = self.smoothing as f32;
+        ((x + smoothing) / (2.0 * smoothing)).clamp(0.0, 1.0)
+    }
+
+    #[inline(always)]
+    fn smoothed(&self, x: f32) -> f32 {
+        let slope = self.slope(x);
+        slope * x + self.smoothing as f32 * slope * (1.0 - slope)
+    }
+}
+
+/// Computes the doses of a block's voxels, layer by layer.
+#[inline(always)]
+pub(crate) fn expose(block: &Block, layers: &[Reach], times: &[f64], doses: &mut Vec<f32>) {
+    doses.resize(block.light.len(), 0.0);
+    let mut above = [0.0_f32; LANES];
+    for (layer, (reach, time)) in layers.iter().zip(times).enumerate() {
+        let (passed, own) = (reach.light.passed as f32, (reach.light.own * time) as f32);
+        let light = &block.light[layer * LANES..(layer + 1) * LANES];
+        let doses = &mut doses[layer * LANES..(layer + 1) * LANES];
+        for lane in 0..LANES {
+            above[lane] = above[lane] * passed + own * light[lane].abs();
+            doses[lane] = above[lane];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::speed::columns::ColumnSet;
+
+    fn columns() -> Columns {
+        let mut set = ColumnSet::new(5);
+        for n in 0..700_u32 {
+            let noise = |k: u32| {
+                let mix = (n * 5 + k).wrapping_mul(2_654_435_761) >> 8;
+                (mix % 2000) as f32 / 1000.0 - 1.0
+            };
+            set.add(&std::array::from_fn::<f32, 5, _>(|k| noise(k as u32)), f64::from(n % 3 + 1));
+        }
+        set.finish()
+    }
+
+    fn layers() -> Vec<Reach> {
+        let reach = |k: u32| Reach {
+            light: LayerLight { passed: 0.8, own: 0.5 + 0.1 * f64::from(k) },
+            scale: 1.0 + 0.05 * f64::from(k),
+        };
+        (0..5).map(reach).collect()
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_smoothed_error() {
+        let (columns, layers) = (columns(), layers());
+        let hinge = Hinge { layers: &layers, margin: 0.05, smoothing: 0.1 };
+        let times = [1.0, 0.5, 0.7, 0.2, 1.3];
+        let here = hinge.of(&columns, &times);
+        for layer in 0..5 {
+            let error = |step: f64| {
+                let mut times = times;
+                times[layer] += step;
+                hinge.of(&columns, &times).error
+            };
+            let slope = (error(0.01) - error(-0.01)) / 0.02;
+            assert!((here.slopes[layer] / slope - 1.0).abs() < 0.02, "{layer}");
+        }
+    }
+
+    #[test]
+    fn slopes_bound_the_error_of_all_times() {
+        let (columns, layers) = (columns(), layers());
+        let exact = Hinge { layers: &layers, margin: 0.05, smoothing: 0.0 };
+        for (first, smoothing) in [(0.3, 0.0), (1.0, 0.2), (3.0, 1.0)] {
+            let hinge = Hinge { smoothing, ..exact };
+            let times = [first; 5];
+            let priced = hinge.of(&columns, &times);
+            for other in 0..200_u32 {
+                let other: [f64; 5] =
+                    std::array::from_fn(|k| f64::from((other * 7 + k as u32 * 13) % 31) / 8.0);
+                let there = priced.slopes.iter().zip(&other).map(|(g, t)| g * t).sum();
+                let bound = priced.bound(&times, there);
+                assert!(bound <= exact.of(&columns, &other).error * (1.0 + 1e-5));
+            }
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! Plans the time of each layer: what the platform's speed is as light cures the part (004).
+//!
+//! Every layer's image stays as it is; its light passes through to the layers below, and adds to
+//! their doses. [`plan`] finds the times with the least error and bounds what any others could do.
+
+mod columns;
+mod descent;
+mod feasible;
+mod gather;
+mod hinge;
+mod part;
+mod plan;
+mod simulation;
+mod tally;
+#[cfg(test)]
+pub(crate) mod testing;
+
+pub(crate) use descent::{Stop, descend};
+pub use feasible::{Platform, PlatformError, Speed};
+pub use part::{PartError, PartLayer, PartPages, TimedPart};
+pub use plan::{PlanError, SpeedOptions, SpeedPlan, Stage, plan, plan_corrected};
+pub use simulation::Simulation;
+pub use tally::{DOSE_BINS, LIGHT_SHARES, Tally, Wrong};

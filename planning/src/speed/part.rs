@@ -1,0 +1,237 @@
+//! Gathers what planners of times need of a stack's pages.
+
+use lamp_grayscale::resin::ExposureTime;
+use lamp_stack::{Change, Dpi, Image, Layer, Length, RunImage};
+use thiserror::Error;
+
+use crate::light::{LayerLight, LayerTime, Light, LightError};
+
+/// A stack whose layers get times. Layers count from the light: the last page comes first.
+#[derive(Clone, Debug)]
+pub struct TimedPart {
+    pub(crate) images: Vec<Image>,
+    layers: Vec<PartLayer>,
+    dpi: Dpi,
+    wanted: u8,
+}
+
+/// What a page says about its layer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartLayer {
+    /// The layer's index in its stack.
+    pub index: u32,
+    /// The height of its bottom.
+    pub z: Length,
+    /// Its thickness.
+    pub thickness: Length,
+    /// Its exposure time, if the page states one.
+    pub time: Option<ExposureTime>,
+}
+
+/// Why pages get no times.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PartError {
+    /// There is no page.
+    #[error("there are no layers")]
+    NoLayers,
+    /// A page does not state its resolution.
+    #[error("{0} does not state its resolution")]
+    NoResolution(String),
+    /// A page does not state its height and thickness.
+    #[error("{0} does not state its height and thickness")]
+    NoThickness(String),
+    /// A thickness or an exposure time is not above zero.
+    #[error("{0} states a thickness or an exposure that is not above zero")]
+    NotPositive(String),
+    /// A page has another size or resolution than the first.
+    #[error("{0} has another size or resolution than the first")]
+    Unlike(String),
+    /// The model's numbers are impossible.
+    #[error(transparent)]
+    Light(#[from] LightError),
+}
+
+/// Takes the pages of a stack, bottom first.
+#[derive(Clone, Debug)]
+pub struct PartPages {
+    images: Vec<Image>,
+    layers: Vec<PartLayer>,
+    dpi: Option<Dpi>,
+    wanted: u8,
+}
+
+impl PartPages {
+    /// Begins with no pages. Pixels of level `wanted` or more belong to the part.
+    pub fn new(wanted: u8) -> Self {
+        Self { images: Vec::new(), layers: Vec::new(), dpi: None, wanted }
+    }
+
+    /// Takes the next page.
+    ///
+    /// # Errors
+    /// Returns an error if the page does not state its resolution, height and thickness, if a
+    /// number is not above zero, or if its image differs from the first in size or resolution.
+    pub fn push(&mut self, layer: Layer) -> Result<(), PartError> {
+        let name = || layer.info.name();
+        let dpi = layer.dpi.ok_or_else(|| PartError::NoResolution(name()))?;
+        let heights = layer.info.z_um.zip(layer.info.thickness_um);
+        let (z_um, thickness_um) = heights.ok_or_else(|| PartError::NoThickness(name()))?;
+        let positive = |number: f64| number > 0.0 && number.is_finite();
+        if !positive(thickness_um) || !layer.info.exposure_ms.is_none_or(positive) {
+            return Err(PartError::NotPositive(name()));
+        }
+        let size = |image: &Image| (image.width(), image.height());
+        let unlike = |first: &Image| size(first) != size(&layer.image);
+        if self.images.first().is_some_and(unlike) || *self.dpi.get_or_insert(dpi) != dpi {
+            return Err(PartError::Unlike(name()));
+        }
+        self.layers.push(PartLayer {
+            index: layer.info.index,
+            z: Length::from_um(z_um),
+            thickness: Length::from_um(thickness_um),
+            time: layer.info.exposure_ms.map(ExposureTime::from_ms),
+        });
+        self.images.push(layer.image.into_image());
+        Ok(())
+    }
+
+    /// Returns the part.
+    ///
+    /// # Errors
+    /// Returns an error if there was no page.
+    pub fn finish(self) -> Result<TimedPart, PartError> {
+        let Self { mut images, mut layers, dpi, wanted } = self;
+        let dpi = dpi.ok_or(PartError::NoLayers)?;
+        images.reverse();
+        layers.reverse();
+        Ok(TimedPart { images, layers, dpi, wanted })
+    }
+}
+
+impl TimedPart {
+    /// Returns the layers, the one nearest to the light first.
+    pub fn layers(&self) -> &[PartLayer] {
+        &self.layers
+    }
+
+    /// Returns the size of a pixel.
+    pub fn pitch(&self) -> Length {
+        self.dpi.pitch()
+    }
+
+    /// Returns the images' width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        [self.images[0].width(), self.images[0].height()]
+    }
+
+    /// Returns whether a pixel of a layer belongs to the part. Pixels outside the image do not.
+    pub fn is_wanted(&self, layer: usize, [column, row]: [u32; 2]) -> bool {
+        let [width, height] = self.size();
+        if column >= width || row >= height {
+            return false;
+        }
+        let level = match &self.images[layer] {
+            Image::Mask(mask) => 255 * u8::from(mask.is_white(column, row)),
+            Image::Gray(gray) => gray_level(gray.row(row), column),
+        };
+        level >= self.wanted
+    }
+
+    /// Returns the dose that each second adds to a layer under a wide white field, and what
+    /// passes from the layer above.
+    pub(crate) fn per_second(&self, light: &Light) -> Result<Vec<LayerLight>, PartError> {
+        light.check()?;
+        let second = ExposureTime::from_ms(1000.0);
+        let layer = |layer: &PartLayer| LayerTime { thickness: layer.thickness, time: second };
+        let layers: Vec<_> = self.layers.iter().map(layer).collect();
+        Ok(light.layers(self.dpi, &layers))
+    }
+
+    /// Returns σ in pixels.
+    pub(crate) fn spread_pixels(&self, light: &Light) -> f64 {
+        light.spread_pixels(self.dpi)
+    }
+
+    /// Returns the least level of the part.
+    pub(crate) fn wanted(&self) -> u8 {
+        self.wanted
+    }
+}
+
+fn gray_level(changes: &[lamp_stack::LevelChange], column: u32) -> u8 {
+    let past = changes.partition_point(|change| change.column <= column);
+    past.checked_sub(1).map_or(0, |last| changes[last].level)
+}
+
+/// Writes the levels of a window whose corner is at (`column`, `row`), row by row. Pixels outside
+/// the image are black.
+pub(crate) fn fill_window(image: &Image, [column, row]: [i64; 2], width: usize, levels: &mut [u8]) {
+    levels.fill(0);
+    for (row, line) in (row..).zip(levels.chunks_exact_mut(width)) {
+        if !(0..i64::from(image.height())).contains(&row) {
+            continue;
+        }
+        match image {
+            Image::Mask(mask) => fill_row(mask, row as u32, column, line, |p| 255 * u8::from(p)),
+            Image::Gray(gray) => fill_row(gray, row as u32, column, line, |p| p),
+        }
+    }
+}
+
+fn fill_row<C: Change>(
+    image: &RunImage<C>,
+    row: u32,
+    column: i64,
+    line: &mut [u8],
+    level: impl Fn(C::Pixel) -> u8,
+) {
+    let changes = image.row(row);
+    let past = changes.partition_point(|change| i64::from(change.column()) <= column);
+    let end = (column + line.len() as i64).min(i64::from(image.width()));
+    let (mut from, mut pixel) = (column.max(0), C::last_pixel(&changes[..past]));
+    let ends = changes[past..].iter().map(|change| (i64::from(change.column()), Some(change)));
+    for (to, change) in ends.chain([(end, None)]) {
+        let to = to.min(end);
+        if from < to {
+            line[(from - column) as usize..(to - column) as usize].fill(level(pixel));
+            from = to;
+        }
+        if to == end {
+            break;
+        }
+        pixel = change.map_or(pixel, |change| change.after(pixel));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{GrayMask, Mask};
+
+    use super::*;
+
+    #[test]
+    fn windows_hold_the_levels_of_their_pixels_and_black_around_the_image() {
+        let mask = Mask::new(6, vec![0, 2, 3, 3], vec![1, 3, 4]).unwrap();
+        let mut gray = GrayMask::new(6);
+        for _ in 0..3 {
+            gray.push_runs([(1, 9), (2, 200), (3, 77)]).unwrap();
+        }
+        for image in [Image::Mask(mask), Image::Gray(gray)] {
+            for corner in [[-3, -2], [0, 0], [2, 1], [5, 2], [7, 0], [-9, -9]] {
+                let mut levels = [1; 5 * 4];
+                fill_window(&image, corner, 5, &mut levels);
+                for (place, &level) in levels.iter().enumerate() {
+                    let at = [corner[0] + place as i64 % 5, corner[1] + place as i64 / 5];
+                    let inside = (0..6).contains(&at[0]) && (0..3).contains(&at[1]);
+                    let runs = || image.runs(at[1] as u32);
+                    let run = |(from, to, _): &(u32, u32, u8)| {
+                        (i64::from(*from)..i64::from(*to)).contains(&at[0])
+                    };
+                    let expected = if inside { runs().find(run).map_or(0, |run| run.2) } else { 0 };
+                    assert_eq!(level, expected, "{corner:?} {at:?}");
+                }
+            }
+        }
+    }
+}

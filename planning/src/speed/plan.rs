@@ -1,0 +1,310 @@
+//! Finds the time of each layer that leaves the least error.
+
+use lamp_grayscale::resin::ExposureTime;
+use thiserror::Error;
+
+use super::descent::{Stop, descend};
+use super::feasible::{Feasible, Platform, PlatformError};
+use super::hinge::{Hinge, Priced};
+use super::part::{PartError, TimedPart};
+use super::simulation::Simulation;
+use super::tally::Tally;
+use crate::light::Light;
+
+/// What to plan for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedOptions {
+    /// The model of light and resin.
+    pub light: Light,
+    /// What the platform can do.
+    pub platform: Platform,
+    /// How far doses should stay from the critical one, as a share of it.
+    pub margin: f64,
+    /// How far from the bound the error may be, as a share of the best single time's error.
+    pub gap: f64,
+    /// The bytes to work in.
+    pub memory: u64,
+}
+
+/// Why there is no plan.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// The pages or the model's numbers are impossible.
+    #[error(transparent)]
+    Part(#[from] PartError),
+    /// The platform's numbers are impossible.
+    #[error(transparent)]
+    Platform(#[from] PlatformError),
+    /// No voxel belongs to the part.
+    #[error("no pixel belongs to the part: all are below the wanted level")]
+    NothingWanted,
+}
+
+/// A stage of the search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stage {
+    /// The least error so far.
+    pub error: f64,
+    /// What no times of the platform can be below.
+    pub bound: f64,
+}
+
+/// The time of each layer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpeedPlan {
+    /// The times, of the layer nearest to the light first.
+    pub times: Vec<ExposureTime>,
+    /// The best time that is the same for all layers, whatever `max_change` says.
+    pub single: ExposureTime,
+    /// What the best single time does.
+    pub before: Tally,
+    /// What the plan does.
+    pub after: Tally,
+    /// The error of the best single time in the columns that the search sees, `P0`.
+    pub single_error: f64,
+    /// The search's stages; the last has the plan's error and bound.
+    pub stages: Vec<Stage>,
+    /// How many pixels each column that the search sees stands for. With 1, it sees all, and the
+    /// bound holds for the whole part.
+    pub sampled: u32,
+}
+
+impl SpeedPlan {
+    /// Returns how far the plan's error may be from the least, as a share of the best single
+    /// time's.
+    pub fn gap(&self) -> f64 {
+        self.stages.last().map_or(0.0, |last| gap(*last, self.single_error))
+    }
+}
+
+fn gap(stage: Stage, single_error: f64) -> f64 {
+    if stage.error == 0.0 { 0.0 } else { (stage.error - stage.bound) / single_error }
+}
+
+/// The doses around the kink over which the error is smoothed, stage by stage.
+const SMOOTHINGS: [f64; 8] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4];
+/// The steps of a stage.
+const STEPS: usize = 300;
+/// Finds the times of a part's layers.
+///
+/// # Errors
+/// Returns an error if the model's or the platform's numbers are impossible, or if no voxel
+/// belongs to the part.
+pub fn plan(part: &TimedPart, options: &SpeedOptions) -> Result<SpeedPlan, PlanError> {
+    let none = vec![0.0; part.layers().len()];
+    plan_corrected(part, options, &none)
+}
+
+/// Finds the times of a part's layers, given what measurements add to the logarithm of each
+/// layer's dose.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_corrected(
+    part: &TimedPart,
+    options: &SpeedOptions,
+    log_doses: &[f64],
+) -> Result<SpeedPlan, PlanError> {
+    let feasible = Feasible::new(&options.platform, part.layers())?;
+    let simulation = Simulation::corrected(part, &options.light, log_doses, options.memory)?;
+    let problem = Problem { simulation: &simulation, feasible, options };
+    let (single, single_error) = problem.best_single();
+    let (times, stages) = problem.search(&single, single_error);
+    let [before, after] = simulation.tally([&single, &times]);
+    if after.wanted.iter().all(|&count| count == 0) {
+        return Err(PlanError::NothingWanted);
+    }
+    let time = |seconds: &f64| ExposureTime::from_ms(seconds * 1000.0);
+    Ok(SpeedPlan {
+        times: times.iter().map(time).collect(),
+        single: time(&single[0]),
+        before,
+        after,
+        single_error,
+        stages,
+        sampled: simulation.sampled(),
+    })
+}
+
+struct Problem<'a> {
+    simulation: &'a Simulation<'a>,
+    feasible: Feasible,
+    options: &'a SpeedOptions,
+}
+
+impl Problem<'_> {
+    fn price(&self, times: &[f64], smoothing: f64) -> Priced {
+        let margin = self.options.margin;
+        let layers = self.simulation.layers();
+        Hinge { layers, margin, smoothing }.of(self.simulation.columns(), times)
+    }
+
+    /// Returns the best time that is the same for all layers, and its error. The error is convex,
+    /// so that its slope tells on which side the best is.
+    fn best_single(&self) -> (Vec<f64>, f64) {
+        let (low, high) = (&self.feasible.low, &self.feasible.high);
+        let layers = low.len();
+        let mut low = low.iter().copied().fold(f64::INFINITY, f64::min);
+        let mut high = high.iter().copied().fold(0.0, f64::max);
+        let mut best = (low, f64::INFINITY);
+        while high / low > 1.0 + 1e-5 {
+            let time = (low * high).sqrt();
+            let priced = self.price(&vec![time; layers], 0.0);
+            if priced.error < best.1 {
+                best = (time, priced.error);
+            }
+            let slope: f64 = priced.slopes.iter().sum();
+            *(if slope > 0.0 { &mut high } else { &mut low }) = time;
+        }
+        (vec![best.0; layers], best.1)
+    }
+
+    /// Goes from the best single time to the least error, which is smoothed less and less.
+    fn search(&self, single: &[f64], single_error: f64) -> (Vec<f64>, Vec<Stage>) {
+        let starts = [single.to_vec(), self.simulation.times_for(2.0)];
+        let starts = starts.map(|times| {
+            let times = self.feasible.nearest(&times);
+            (self.price(&times, 0.0).error, times)
+        });
+        let [single, prism] = starts;
+        let mut best = if prism.0 < single.0 { prism } else { single };
+        let mut times = best.1.clone();
+        let (mut bound, mut stages) = (0.0_f64, Vec::new());
+        let mut prices = Prices::new(&self.feasible, &times, single_error);
+        for smoothing in SMOOTHINGS {
+            let rounds = if self.feasible.is_box() { 1 } else { 4 };
+            for _ in 0..rounds {
+                self.descend(&mut times, smoothing, &prices);
+                prices.update(&self.feasible, &times);
+            }
+            let near = self.feasible.nearest(&times);
+            let error = self.price(&near, 0.0).error;
+            if error < best.0 {
+                best = (error, near);
+            }
+            let priced = self.price(&times, smoothing);
+            bound = bound.max(priced.bound(&times, self.feasible.least(&priced.slopes)));
+            let stage = Stage { error: best.0, bound: bound.min(best.0) };
+            stages.push(stage);
+            if gap(stage, single_error) <= self.options.gap {
+                break;
+            }
+        }
+        (best.1, stages)
+    }
+
+    fn descend(&self, times: &mut Vec<f64>, smoothing: f64, prices: &Prices) {
+        // In units of the times there, all layers' slopes are alike.
+        let scale = times.clone();
+        let bounds = [&self.feasible.low, &self.feasible.high]
+            .map(|ends| ends.iter().zip(&scale).map(|(end, scale)| end / scale).collect());
+        let [low, high]: [Vec<f64>; 2] = bounds;
+        let mut x = vec![1.0; scale.len()];
+        let stop = Stop { steps: STEPS, fall: 1e-9 };
+        descend(&mut x, [&low, &high], stop, |x| {
+            let times: Vec<_> = x.iter().zip(&scale).map(|(x, scale)| x * scale).collect();
+            let priced = self.price(&times, smoothing);
+            let (mut error, mut slopes) = (priced.error, priced.slopes);
+            error += prices.add(&self.feasible, &times, &mut slopes);
+            slopes.iter_mut().zip(&scale).for_each(|(slope, scale)| *slope *= scale);
+            (error, slopes)
+        });
+        *times = x.iter().zip(&scale).map(|(x, scale)| x * scale).collect();
+    }
+}
+
+/// The cost of breaking a ratio, and how much heavier it gets from round to round.
+const WEIGHT: f64 = 100.0;
+const HEAVIER: f64 = 1.5;
+
+/// What breaking the ratios of neighbours costs: an augmented Lagrangian.
+struct Prices {
+    of_pairs: Vec<[f64; 2]>,
+    weight: f64,
+}
+
+impl Prices {
+    fn new(feasible: &Feasible, single: &[f64], single_error: f64) -> Self {
+        let pairs = feasible.excess(single).len();
+        // An excess as large as the pace of the single time costs the error of many layers.
+        let pace = feasible.pace(single);
+        let weight = WEIGHT * (single_error + 1.0) / (pairs.max(1) as f64 * pace * pace);
+        Self { of_pairs: vec![[0.0; 2]; pairs], weight }
+    }
+
+    /// Adds the slopes of the cost, and returns it.
+    fn add(&self, feasible: &Feasible, times: &[f64], slopes: &mut [f64]) -> f64 {
+        let now = self.raised(feasible, times);
+        feasible.add_slopes(&now, slopes);
+        let squares = |pairs: &[[f64; 2]]| -> f64 {
+            pairs.as_flattened().iter().map(|price| price * price).sum()
+        };
+        (squares(&now) - squares(&self.of_pairs)) / (2.0 * self.weight)
+    }
+
+    fn raised(&self, feasible: &Feasible, times: &[f64]) -> Vec<[f64; 2]> {
+        let excess = feasible.excess(times).into_iter().zip(&self.of_pairs);
+        let raise = |(excess, prices): ([f64; 2], &[f64; 2])| {
+            std::array::from_fn(|k| (prices[k] + self.weight * excess[k]).max(0.0))
+        };
+        excess.map(raise).collect()
+    }
+
+    fn update(&mut self, feasible: &Feasible, times: &[f64]) {
+        self.of_pairs = self.raised(feasible, times);
+        self.weight *= HEAVIER;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_fixtures::cavity_staircase;
+
+    use super::*;
+    use crate::speed::testing::{options, part, pegda};
+
+    fn worst_change(part: &TimedPart, times: &[ExposureTime]) -> f64 {
+        let pace = times.iter().zip(part.layers()).map(|(t, layer)| t.ms() / layer.thickness.um());
+        let pace: Vec<_> = pace.collect();
+        pace.windows(2).map(|two| (two[0] / two[1]).max(two[1] / two[0]) - 1.0).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_staircase_with_a_cavity_keeps_its_steps() {
+        let part = part(&cavity_staircase(1));
+        let options = options(pegda(50.0), None);
+        let plan = plan(&part, &options).unwrap();
+        let [before, after] = [&plan.before, &plan.after].map(|tally| tally.wrong().sum());
+        assert!(10 * after <= 3 * before, "{after} of {before}");
+        assert!(plan.gap() <= 0.01 && plan.sampled == 1, "{}", plan.gap());
+        // Nor does any other single time come near, by count.
+        let simulation = Simulation::new(&part, &options.light, 1 << 30).unwrap();
+        for step in 0..20 {
+            let [tally] = simulation.tally([&[0.1 * 1.1_f64.powi(step); 60]]);
+            assert!(10 * after <= 3 * tally.wrong().sum(), "{step} {:?}", tally.wrong());
+        }
+    }
+
+    #[test]
+    fn speeds_change_no_more_than_they_may() {
+        let part = part(&cavity_staircase(1));
+        let limited = plan(&part, &options(pegda(50.0), Some(0.2))).unwrap();
+        let free = plan(&part, &options(pegda(50.0), None)).unwrap();
+        assert!(worst_change(&part, &limited.times) <= 0.2 + 1e-9);
+        assert!(worst_change(&part, &free.times) > 1.0);
+        let error = |plan: &SpeedPlan| plan.stages.last().unwrap().error;
+        assert!(error(&limited) > error(&free) && error(&limited) < limited.single_error);
+        assert!(limited.gap() <= 0.02, "{}", limited.gap());
+    }
+
+    #[test]
+    fn any_number_of_threads_plans_the_same() {
+        let part = part(&cavity_staircase(1));
+        let plan_with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| plan(&part, &options(pegda(50.0), Some(0.5))).unwrap())
+        };
+        assert_eq!(plan_with(1), plan_with(3));
+    }
+}

@@ -1,0 +1,123 @@
+//! Computes what times cure.
+
+use super::columns::Columns;
+use super::gather::Gather;
+use super::hinge::Reach;
+use super::part::{PartError, TimedPart};
+use super::tally::Tally;
+use crate::blur::Blur;
+use crate::light::Light;
+
+/// The share of the memory for columns, and the most that is of use.
+const COLUMNS_SHARE: u64 = 2;
+const MOST_COLUMN_BYTES: u64 = 256 << 20;
+
+/// A part under a light, whose layers can be given times.
+pub struct Simulation<'a> {
+    gather: Gather<'a>,
+    layers: Vec<Reach>,
+    columns: Columns,
+    sampled: u32,
+}
+
+impl<'a> Simulation<'a> {
+    /// Prepares a part, in `memory` bytes.
+    ///
+    /// # Errors
+    /// Returns an error if the model's numbers are impossible.
+    pub fn new(part: &'a TimedPart, light: &Light, memory: u64) -> Result<Self, PartError> {
+        Self::corrected(part, light, &vec![0.0; part.layers().len()], memory)
+    }
+
+    /// Prepares a part, given what measurements add to the logarithm of each layer's dose.
+    ///
+    /// # Errors
+    /// Returns an error if the model's numbers are impossible.
+    pub fn corrected(
+        part: &'a TimedPart,
+        light: &Light,
+        log_doses: &[f64],
+        memory: u64,
+    ) -> Result<Self, PartError> {
+        let field = Blur::<f32>::new(part.spread_pixels(light)).sum();
+        let per_second = part.per_second(light)?.into_iter().zip(log_doses);
+        let layers = per_second.map(|(mut light, log_dose)| {
+            // Columns have the light 1 under a wide white field.
+            light.own *= field;
+            Reach { light, scale: log_dose.exp() }
+        });
+        let layers = layers.collect();
+        let gather = Gather::new(part, light);
+        let bytes = (memory / COLUMNS_SHARE).min(MOST_COLUMN_BYTES);
+        let (columns, sampled) = gather.columns(bytes as usize);
+        Ok(Self { gather, layers, columns, sampled })
+    }
+
+    /// Counts what times do, each in seconds, of the layer nearest to the light first.
+    ///
+    /// # Panics
+    /// Panics if there are not as many times as layers.
+    pub fn tally<const N: usize>(&self, times: [&[f64]; N]) -> [Tally; N] {
+        assert!(times.iter().all(|times| times.len() == self.layers.len()));
+        let of = |columns: &Columns| times.map(|times| Tally::of(columns, &self.layers, times));
+        if self.sampled == 1 {
+            return of(&self.columns);
+        }
+        let mut sums = times.map(|_| Tally::none(self.layers.len()));
+        for tallies in self.gather.tiles(1, |set| of(&set.finish())) {
+            sums.iter_mut().zip(&tallies).for_each(|(sum, tally)| sum.add(tally));
+        }
+        sums
+    }
+
+    /// Returns the dose of each layer under a wide white field.
+    pub fn field_doses(&self, times: &[f64]) -> Vec<f64> {
+        let mut dose = 0.0;
+        let of_layer = |(reach, time): (&Reach, &f64)| {
+            dose = dose * reach.light.passed + reach.light.own * time;
+            dose * reach.scale
+        };
+        self.layers.iter().zip(times).map(of_layer).collect()
+    }
+
+    /// Returns the times that bring every layer to a dose under a wide white field. A layer that the
+    /// layers above bring there has none.
+    ///
+    /// With the dose 2, a wide prism has its critical dose at its walls, where light has fallen to
+    /// a half.
+    pub fn times_for(&self, dose: f64) -> Vec<f64> {
+        let mut above = 0.0;
+        let of_layer = |reach: &Reach| {
+            let passed = above * reach.light.passed;
+            above = passed.max(dose / reach.scale);
+            (above - passed) / reach.light.own
+        };
+        self.layers.iter().map(of_layer).collect()
+    }
+
+    /// Returns the dose of a pixel in each layer, in units of the critical dose.
+    pub fn doses_at(&self, pixel: [u32; 2], times: &[f64]) -> Vec<f64> {
+        let mut dose = 0.0;
+        let light = self.gather.light_at(pixel);
+        let of_layer = |((reach, time), light): ((&Reach, &f64), f32)| {
+            dose = dose * reach.light.passed + reach.light.own * time * f64::from(light);
+            dose * reach.scale
+        };
+        self.layers.iter().zip(times).zip(light).map(of_layer).collect()
+    }
+
+    /// Returns what reaches each layer in a second.
+    pub(crate) fn layers(&self) -> &[Reach] {
+        &self.layers
+    }
+
+    /// Returns the columns that a search sees.
+    pub(crate) fn columns(&self) -> &Columns {
+        &self.columns
+    }
+
+    /// Returns how many pixels each column of a search stands for.
+    pub(crate) fn sampled(&self) -> u32 {
+        self.sampled
+    }
+}

@@ -1,0 +1,49 @@
+//! What tests of times share.
+
+use lamp_fixtures::Voxels;
+use lamp_grayscale::resin::{Dose, Intensity};
+use lamp_stack::Length;
+
+use super::part::{PartPages, TimedPart};
+use super::{Platform, SpeedOptions};
+use crate::light::{IntensityOf, Light, SampleHeight};
+
+/// The resin of 004 with a Gaussian of this standard deviation.
+pub(crate) fn pegda(spread_um: f64) -> Light {
+    Light {
+        intensity: Intensity::from_mw_per_cm2(7.394),
+        intensity_of: IntensityOf::Field,
+        critical_dose: Dose::from_mj_per_cm2(7.266),
+        penetration_depth: Length::from_um(185.0 / -f64::ln(0.81)),
+        spread: Length::from_um(spread_um),
+        gamma: 1.0,
+        at: SampleHeight::Top,
+    }
+}
+
+/// What a print may differ from its model by: the light is 10 % brighter, light reaches a quarter
+/// deeper, and 15 % less dose cures.
+pub(crate) fn plant(model: &Light) -> Light {
+    Light {
+        intensity: Intensity::from_mw_per_cm2(1.1 * model.intensity.mw_per_cm2()),
+        critical_dose: Dose::from_mj_per_cm2(0.85 * model.critical_dose.mj_per_cm2()),
+        penetration_depth: Length::from_um(1.25 * model.penetration_depth.um()),
+        ..*model
+    }
+}
+
+pub(crate) fn part(voxels: &Voxels) -> TimedPart {
+    let mut pages = PartPages::new(128);
+    voxels.layers().for_each(|layer| pages.push(layer).unwrap());
+    pages.finish().unwrap()
+}
+
+pub(crate) fn options(light: Light, max_change: Option<f64>) -> SpeedOptions {
+    SpeedOptions {
+        light,
+        platform: Platform { slowest: 5.0, fastest: 2000.0, max_change },
+        margin: 0.05,
+        gap: 0.01,
+        memory: 1 << 30,
+    }
+}
