@@ -107,8 +107,10 @@ impl<T: Real> Steps<T> {
         let (light, prices) = problem.roles.iter().map(|&role| moves(role)).unzip();
         let seen = Iterate::new(problem, light, prices);
         let over = |sums: &[T]| {
-            let most = sums.iter().fold(f64::MIN_POSITIVE, |most, sum| most.max(sum.f64()));
-            sums.iter().map(|sum| T::of(1.0 / sum.f64().max(LEAST_SHARE * most))).collect()
+            let most = sums.iter().fold(0.0_f64, |most, sum| most.max(sum.f64()));
+            // Where nothing sees anything, any step will do that is a number.
+            let least = if most > 0.0 { LEAST_SHARE * most } else { 1.0 };
+            sums.iter().map(|sum| T::of(1.0 / sum.f64().max(least))).collect()
         };
         Self { light: over(&seen.of_light), prices: over(&seen.doses) }
     }
@@ -172,9 +174,13 @@ pub fn solve<T: Real>(
         let long = f64::from(since) > LONG * iteration as f64;
         if gap < SHRUNK * gap_at_restart || stuck || long {
             let [light, prices] = steps.distances(&next, &anchor);
-            if light > 1e-9 && prices > 1e-9 {
-                weight = (weight * prices / light).sqrt();
-            }
+            weight = match (light > 1e-9, prices > 1e-9) {
+                (true, true) => (weight * prices / light).sqrt(),
+                // Only prices move, and too slowly: light stays at its bounds.
+                (false, true) => weight * 4.0,
+                (true, false) => weight / 4.0,
+                (false, false) => weight,
+            };
             now.clone_from(&next);
             anchor.clone_from(&next);
             (since, gap_at_restart, gap_before) = (0, gap, f64::INFINITY);
