@@ -5,6 +5,8 @@ use std::io;
 
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
+use lamp_planning::NoLight;
+use lamp_planning::voxels::PlanError;
 use lamp_postprocess::machine::MachineLimit;
 use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, TileError};
 use lamp_slicer::SliceError;
@@ -106,6 +108,8 @@ macro_rules! failures {
 }
 
 failures!(
+    NoLight,
+    PlanError,
     SliceError,
     CheckError,
     SupportError,

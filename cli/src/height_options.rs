@@ -289,7 +289,7 @@ pub(crate) fn time_text(seconds: f64) -> String {
 }
 
 /// Parses a share: `2%` or `0.02`.
-fn parse_share(text: &str) -> Result<f64, String> {
+pub(crate) fn parse_share(text: &str) -> Result<f64, String> {
     let (number, factor) = match text.trim().strip_suffix('%') {
         Some(number) => (number.trim_end(), 0.01),
         None => (text.trim(), 1.0),

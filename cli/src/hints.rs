@@ -8,6 +8,7 @@ use std::io;
 use lamp_adaptive::HeightsError;
 use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::material::MaterialError;
+use lamp_planning::voxels::PlanError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
 use lamp_postprocess::{
     CompensateError, CompensateProblem, EditError, EditProblem, LayerProblem, LayoutError,
@@ -33,6 +34,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(edit))
         .or_else(|| error.downcast_ref().and_then(support))
         .or_else(|| error.downcast_ref().and_then(compensate))
+        .or_else(|| error.downcast_ref().and_then(plan))
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
         .or_else(|| error.downcast_ref().map(no_solid))
@@ -202,6 +204,16 @@ fn compensate(error: &CompensateError) -> Option<String> {
             "--min-feature 0um lets walls go and reports what is lost"
         }
         CompensateProblem::Tiled => "make up for shrinkage before tile",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn plan(error: &PlanError) -> Option<String> {
+    let hint = match error {
+        PlanError::Silent { what: "exposure", .. } => "give --exposure, as 2s",
+        PlanError::Silent { .. } => "plan the stack that slice wrote",
+        PlanError::Unlike { .. } => "plan the stack before its layers are cropped",
         _ => return None,
     };
     Some(hint.to_owned())

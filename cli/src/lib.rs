@@ -31,6 +31,7 @@ mod part_options;
 mod picture;
 mod pixel_location;
 mod placement;
+mod planning_options;
 mod plots;
 mod progress;
 mod recorded;

@@ -16,6 +16,7 @@ use crate::options::{Common, Input, one_of_described};
 use crate::part_arg::{PartArg, paths};
 use crate::part_options::name_of_all;
 use crate::picture::PictureScale;
+use crate::planning_options::SAMPLE_HEIGHTS;
 use crate::progress::Progress;
 use crate::section::{Exposures, SectionLine, SectionPicture, SectionPlane, parse_along};
 use crate::stack_part::RecordedSlicing;
@@ -76,10 +77,6 @@ pub(crate) struct CureArgs {
     output: PathBuf,
 }
 
-/// What `--help` says of the heights in a layer.
-const SAMPLE_HEIGHTS: [&str; 3] =
-    ["where light enters it", "half-way", "where it must reach what it rests on"];
-
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
@@ -87,7 +84,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let material: Material = entry(&args.material)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let light = args.add_up.then(|| Light::of_any(&material, args.at)).transpose();
-    let light = light.map_err(anyhow::Error::new)?;
+    let light = light?;
     let name = input_name(&args.input.stack);
     let failed = |error: anyhow::Error| Exit::Failed(error).at(input_name(&args.input.stack));
     let progress = Progress::new("cure", common, true);

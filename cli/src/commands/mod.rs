@@ -19,6 +19,7 @@ mod man;
 mod material;
 mod mesh;
 mod orient;
+mod plan;
 mod sample;
 mod show;
 pub(crate) mod slice;
@@ -53,6 +54,7 @@ pub(crate) enum Command {
     Split(split::SplitArgs),
     Machine(machine::MachineArgs),
     Material(material::MaterialArgs),
+    Plan(plan::PlanArgs),
     Cure(cure::CureArgs),
     Calibrate(calibrate::CalibrateArgs),
     Target(target::TargetArgs),
@@ -96,6 +98,7 @@ impl Command {
             Self::Split(args) => split::run(args, common),
             Self::Machine(args) => machine::run(args),
             Self::Material(args) => material::run(args),
+            Self::Plan(args) => plan::run(args, common),
             Self::Cure(args) => cure::run(args, common),
             Self::Calibrate(args) => calibrate::run(args, common),
             Self::Target(args) => target::run(args, common),

@@ -13,6 +13,8 @@ pub enum Objective {
     Boundary,
 }
 
+lamp_stack::named!(Objective { Wrong = "wrong", Boundary = "boundary" });
+
 /// Pixels whose light a plan chooses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sources {

@@ -1,0 +1,32 @@
+//! `lamp plan`: chooses exposures from the doses of all layers together.
+
+mod voxels;
+mod voxels_plot;
+mod voxels_report;
+
+use clap::{Args, Subcommand};
+
+use crate::exit::Exit;
+use crate::options::Common;
+
+/// Plan exposures, so that the doses of all layers together cure the part and nothing else
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp plan voxels part.tif --material mine.toml -o planned.tif
+  lamp cure planned.tif --material mine.toml --section y=12mm --add-up -o section.png")]
+pub(crate) struct PlanArgs {
+    #[command(subcommand)]
+    what: Plan,
+}
+
+#[derive(Subcommand)]
+enum Plan {
+    Voxels(voxels::VoxelsArgs),
+}
+
+pub(crate) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
+    match &args.what {
+        Plan::Voxels(args) => voxels::run(args, common),
+    }
+}

@@ -1,0 +1,238 @@
+//! `lamp plan voxels`: chooses the gray level of each pixel.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::voxels::{Objective, Options, Outcome, PlanError, PlannedStack, Sources, plan};
+use lamp_stack::Layer;
+
+use super::voxels_plot::plots_of;
+use super::voxels_report::{Planned, lines_of, write_report};
+use crate::exit::Exit;
+use crate::json_report::parse_report;
+use crate::options::{Common, Input, Output, one_of_described};
+use crate::planning_options::PlanningOptions;
+use crate::plots;
+use crate::progress::Progress;
+use crate::streams::{
+    check_beside, check_not_input, input_name, progress, read_layers, unless_found, write_file,
+    write_layers,
+};
+
+/// Choose the gray level of each pixel from the doses of all layers together
+///
+/// Light that cures a layer also cures below and beside it. Given the wanted part, 1-bit or gray,
+/// this writes gray pages under which as few voxels as possible are cured wrongly, and tells how
+/// far from the best plan they can be at most. Pages must state thickness and resolution.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp plan voxels part.tif --material mine.toml -o planned.tif
+  lamp plan voxels part.tif --material mine.toml --sources grow:3px --plot plan.svg -o planned.tif
+  slice part.stl --material mine.toml | lamp plan voxels --material mine.toml | dither > dots.tif
+  lamp plan voxels part.tif --material zsg-amber --exposure 373ms --objective boundary \\
+      --sources shell:1px --min-level 40 --report plan.json -o planned.tif")]
+pub(super) struct VoxelsArgs {
+    #[command(flatten)]
+    input: Input,
+
+    #[command(flatten)]
+    planning: PlanningOptions,
+
+    /// What the plan makes least
+    #[arg(long, default_value = "wrong", value_parser = one_of_described::<Objective>(&[
+        "How far doses lie on the wrong side of the critical one",
+        "The dose next to the part, while all that white light cures stays cured",
+    ]))]
+    objective: Objective,
+
+    /// Pixels whose light is chosen: those of the part (lit), and 3 around it (grow:3px), or 1
+    /// along its outlines only, while others stay white (shell:1px)
+    #[arg(long, value_name = "WHICH", default_value = "lit", value_parser = parse_sources)]
+    sources: Sources,
+
+    /// Lowest level of a pixel that is not black, for screens whose dark grays cure nothing
+    #[arg(long, value_name = "LEVEL", default_value = "0")]
+    min_level: u8,
+
+    /// Keep so many pixels along the part's outlines white, as wall:3px
+    #[arg(long, value_name = "WALL", value_parser = parse_wall)]
+    keep: Option<u32>,
+
+    /// Exposure time of pages that state none
+    #[arg(long, value_name = "TIME", value_parser = parse_exposure)]
+    exposure: Option<ExposureTime>,
+
+    /// Write what the plan reaches, by layer, as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    report: Option<PathBuf>,
+
+    /// Plot wrong voxels by layer, doses, counts at 5% less and more light, and how the search
+    /// went: a file that ends in .svg or .png
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+
+    /// Fail (status 3) and write no stack if white light cannot cure all wanted voxels
+    #[arg(long)]
+    strict: bool,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Returns the pixels of `3px`, which are some.
+fn parse_pixels(text: &str) -> Option<u32> {
+    text.strip_suffix("px")?.trim_end().parse().ok().filter(|pixels| (1..=1_000).contains(pixels))
+}
+
+fn parse_sources(text: &str) -> Result<Sources, String> {
+    let pixels = |text: &str| {
+        let wrong = || format!("`{text}` is not a number of pixels: write 1px to 1000px");
+        parse_pixels(text).ok_or_else(wrong)
+    };
+    match text.split_once(':') {
+        None if text == "lit" => Ok(Sources::Lit),
+        Some(("grow", by)) => pixels(by).map(Sources::Grow),
+        Some(("shell", by)) => pixels(by).map(Sources::Shell),
+        _ => Err(format!("`{text}` is none of lit, grow:3px, shell:1px")),
+    }
+}
+
+fn parse_wall(text: &str) -> Result<u32, String> {
+    let pixels = text.strip_prefix("wall:").and_then(parse_pixels);
+    pixels.ok_or_else(|| format!("`{text}` is not a wall: write wall:3px"))
+}
+
+fn parse_exposure(text: &str) -> Result<ExposureTime, String> {
+    match text.parse::<ExposureTime>() {
+        Ok(time) if time.ms() > 0.0 => Ok(time),
+        Ok(_) => Err("an exposure takes some time".to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
+    args.check_outputs()?;
+    let (material, light) = args.planning.light()?;
+    let command = args.command(&material.name);
+    let progress = progress("plan", common, &args.output);
+    let layers = read_layers(&args.input, &progress)?;
+    let layers = layers.map(|layer| Ok(args.prepared(layer?, &command)));
+    let mut settled = 0;
+    let planned = plan(layers, &light, &args.options(), |layers| {
+        (settled..layers).for_each(|_| progress.layer_done());
+        settled = layers;
+    });
+    let mut planned = planned.map_err(|error: Exit| args.at_input(error))?;
+    progress.done();
+    let outcome = planned.outcome();
+    let writing = Progress::new("plan", common, true);
+    writing.expect(outcome.layers.len() as u64);
+    let written = args.write(&mut planned, &outcome, &writing);
+    if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
+        return written;
+    }
+    let planned = Planned {
+        material: &material.name,
+        objective: args.objective,
+        margin: args.planning.margin,
+        outcome: &planned.outcome(),
+    };
+    for line in lines_of(&planned) {
+        progress.say(&line);
+    }
+    if let Some(path) = &args.report {
+        write_report(&planned, path)?;
+    }
+    if let Some(path) = &args.plot {
+        let bytes = plots::drawn(&plots_of(&planned), path)?;
+        write_file(path, |out| out.write_all(&bytes))?;
+    }
+    written
+}
+
+impl VoxelsArgs {
+    fn check_outputs(&self) -> Result<(), Exit> {
+        let inputs = || [&self.input.stack, &self.planning.material];
+        if let Some(plot) = &self.plot {
+            plots::check_name(plot)?;
+            check_beside(plot, &self.output.output, inputs().into_iter().chain(&self.report))?;
+        }
+        if let Some(report) = &self.report {
+            check_beside(report, &self.output.output, inputs())?;
+        }
+        check_not_input(&self.output.output, [&self.planning.material])
+    }
+
+    fn options(&self) -> Options {
+        Options {
+            wanted: self.planning.wanted,
+            objective: self.objective,
+            margin: self.planning.margin,
+            sources: self.sources,
+            min_level: self.min_level,
+            keep_wall: self.keep.unwrap_or(0),
+            gap: self.planning.gap,
+            ..Options::default()
+        }
+    }
+
+    /// The command, as pages record it.
+    fn command(&self, material: &str) -> String {
+        let PlanningOptions { wanted, margin, gap, at, .. } = &self.planning;
+        let mut command = format!(
+            "lamp plan voxels --material {material} --objective {} --wanted {wanted} --margin {}% \
+             --gap {}% --at {at}",
+            self.objective,
+            100.0 * margin,
+            100.0 * gap
+        );
+        match self.sources {
+            Sources::Lit => {}
+            Sources::Grow(by) => command += &format!(" --sources grow:{by}px"),
+            Sources::Shell(by) => command += &format!(" --sources shell:{by}px"),
+        }
+        if self.min_level > 0 {
+            command += &format!(" --min-level {}", self.min_level);
+        }
+        if let Some(wall) = self.keep {
+            command += &format!(" --keep wall:{wall}px");
+        }
+        command
+    }
+
+    /// Gives a page its exposure, if it states none, and records the command.
+    fn prepared(&self, mut layer: Layer, command: &str) -> Layer {
+        let given = self.exposure.map(ExposureTime::ms);
+        layer.info.exposure_ms = layer.info.exposure_ms.or(given);
+        if let Some(stack) = &mut layer.info.stack {
+            stack.commands.push(command.to_owned());
+        }
+        layer
+    }
+
+    /// Names the input in errors about its layers.
+    fn at_input(&self, error: Exit) -> Exit {
+        let is_of_layers = error.cause::<PlanError>().is_some();
+        if is_of_layers { error.at(input_name(&self.input.stack)) } else { error }
+    }
+
+    fn write(
+        &self,
+        planned: &mut PlannedStack,
+        outcome: &Outcome,
+        progress: &Progress,
+    ) -> Result<(), Exit> {
+        let layers = planned.by_ref().map(|layer| layer.map_err(Exit::from));
+        let finding = || {
+            let uncurable = outcome.uncurable();
+            let found = self.strict && uncurable > 0;
+            found.then(|| {
+                let name = input_name(&self.input.stack);
+                Exit::Findings(format!("{name}: white light cannot cure {uncurable} wanted voxels"))
+            })
+        };
+        write_layers(unless_found(layers, finding), &self.output, progress)
+    }
+}

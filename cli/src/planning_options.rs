@@ -1,0 +1,69 @@
+//! Options that planners of exposures share.
+
+use std::num::NonZeroU8;
+use std::path::PathBuf;
+
+use clap::Args;
+use lamp_grayscale::material::Material;
+use lamp_planning::{Light, SampleHeight};
+
+use crate::catalogue::entry;
+use crate::exit::Exit;
+use crate::height_options::parse_share;
+use crate::options::one_of_described;
+
+/// What `--help` says of the heights in a layer.
+pub(crate) const SAMPLE_HEIGHTS: [&str; 3] =
+    ["Where light enters it", "Half-way", "Where it must reach what it rests on"];
+
+/// What is to be cured, and by which light.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct PlanningOptions {
+    /// Resin: a built-in material's name (see lamp material list) or a file; it must say how far
+    /// light spreads ([spread]) and which dose cures ([working-curve])
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) material: PathBuf,
+
+    /// Lowest gray level of pixels that are wanted
+    #[arg(long, value_name = "LEVEL", default_value = "128")]
+    pub(crate) wanted: NonZeroU8,
+
+    /// How far beyond the critical dose voxels should be: so much above it where they are
+    /// wanted, so much below it elsewhere
+    #[arg(long, value_name = "SHARE", default_value = "5%", value_parser = parse_margin)]
+    pub(crate) margin: f64,
+
+    /// Stop so near to the best, as a share of the error without a plan
+    #[arg(long, value_name = "SHARE", default_value = "0.1%", value_parser = parse_gap)]
+    pub(crate) gap: f64,
+
+    /// Where in its layer a voxel's dose is told
+    #[arg(long, value_name = "HEIGHT", default_value = "top")]
+    #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
+    pub(crate) at: SampleHeight,
+}
+
+impl PlanningOptions {
+    /// Returns the material, and the light that it makes.
+    pub(crate) fn light(&self) -> Result<(Material, Light), Exit> {
+        let material: Material = entry(&self.material)?;
+        let light = Light::of(&material, self.at)?;
+        Ok((material, light))
+    }
+}
+
+/// Parses a margin below 100%.
+fn parse_margin(text: &str) -> Result<f64, String> {
+    match parse_share(text)? {
+        margin if margin < 1.0 => Ok(margin),
+        _ => Err(format!("`{text}` is not below 100%: nothing would count as black")),
+    }
+}
+
+/// Parses a gap above zero.
+fn parse_gap(text: &str) -> Result<f64, String> {
+    match parse_share(text)? {
+        0.0 => Err("the best is never met exactly: write 0.1%".to_owned()),
+        gap => Ok(gap),
+    }
+}
