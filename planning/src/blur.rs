@@ -54,13 +54,13 @@ macro_rules! real {
 
 real!(f32, f64);
 
-/// Light farther away than this share of its peak says is left out: 5.3 σ.
-const FAINTEST: f64 = 1e-6;
+/// Light is left out where it is less than this share of its peak: beyond 4.8 σ.
+const FAINTEST: f64 = 1e-5;
 
 /// Columns that are summed up together. The width of images is a multiple of it.
 pub(crate) const LANES: usize = 16;
 
-/// A Gaussian of standard deviation σ, cut off where it is a millionth of its peak.
+/// A Gaussian of standard deviation σ, cut off where it is a hundred-thousandth of its peak.
 ///
 /// ```
 /// use lamp_planning::Blur;
@@ -157,19 +157,107 @@ impl<T: Real> Blur<T> {
 #[inline(always)]
 fn gather<T: Real>(taps: &[T], from: &[T], start: usize, step: usize, out: &mut [T]) {
     for (lanes, out) in out.chunks_exact_mut(LANES).enumerate() {
-        let centre = start + lanes * LANES;
-        let mut sums = [T::default(); LANES];
-        for (sum, &at) in sums.iter_mut().zip(&from[centre..centre + LANES]) {
-            *sum = taps[0] * at;
+        out.copy_from_slice(&around(taps, from, start + lanes * LANES, step));
+    }
+}
+
+/// Sums up what lies symmetrically around the places from `centre` on.
+#[inline(always)]
+fn around<T: Real>(taps: &[T], from: &[T], centre: usize, step: usize) -> [T; LANES] {
+    let mut sums = [T::default(); LANES];
+    for (sum, &at) in sums.iter_mut().zip(&from[centre..centre + LANES]) {
+        *sum = taps[0] * at;
+    }
+    for (distance, &tap) in taps.iter().enumerate().skip(1) {
+        let low = &from[centre - distance * step..][..LANES];
+        let high = &from[centre + distance * step..][..LANES];
+        for lane in 0..LANES {
+            sums[lane] += tap * (low[lane] + high[lane]);
         }
-        for (distance, &tap) in taps.iter().enumerate().skip(1) {
-            let low = &from[centre - distance * step..][..LANES];
-            let high = &from[centre + distance * step..][..LANES];
-            for lane in 0..LANES {
-                sums[lane] += tap * (low[lane] + high[lane]);
-            }
+    }
+    sums
+}
+
+/// Some chunks of 16 pixels of an image, and a Gaussian among them: all other pixels are black.
+#[derive(Clone, Debug)]
+pub(crate) struct Chunks<T> {
+    blur: Blur<T>,
+    rows: usize,
+    width: usize,
+    /// Where each chunk begins in the image, in order.
+    at: Vec<usize>,
+    /// Where light that has spread along rows is needed, to spread across them.
+    along: Vec<usize>,
+}
+
+/// Room to blur chunks in.
+#[derive(Default)]
+pub(crate) struct ChunkRoom<T> {
+    lines: Vec<T>,
+    plane: Vec<T>,
+}
+
+impl<T: Real> Chunks<T> {
+    /// Creates the chunks of an image of so many rows and columns that begin `at` these pixels.
+    pub(crate) fn new(blur: Blur<T>, rows: usize, width: usize, at: Vec<usize>) -> Self {
+        let across = width / LANES;
+        let mut is_needed = vec![false; rows * across];
+        for chunk in at.iter().map(|at| at / LANES) {
+            let (row, column) = (chunk / across, chunk % across);
+            let near = row.saturating_sub(blur.radius())..(row + blur.radius() + 1).min(rows);
+            near.for_each(|row| is_needed[row * across + column] = true);
         }
-        out.copy_from_slice(&sums);
+        let needed = (0..rows * across).filter(|&chunk| is_needed[chunk]);
+        let along = needed.map(|chunk| chunk * LANES).collect();
+        Self { blur, rows, width, at, along }
+    }
+
+    /// Returns the pixels of all chunks.
+    pub(crate) fn pixels(&self) -> usize {
+        self.at.len() * LANES
+    }
+
+    /// Returns where each chunk begins in the image, in order.
+    pub(crate) fn starts(&self) -> &[usize] {
+        &self.at
+    }
+
+    /// Returns room for [`spread`](Self::spread).
+    pub(crate) fn room(&self) -> ChunkRoom<T> {
+        let [left, above] = self.borders();
+        ChunkRoom {
+            lines: vec![T::default(); self.rows * (self.width + 2 * left)],
+            plane: vec![T::default(); (self.rows + 2 * above) * self.width],
+        }
+    }
+
+    /// Taps that reach beyond the image meet black only.
+    fn borders(&self) -> [usize; 2] {
+        [self.width, self.rows].map(|side| self.blur.radius().min(side - 1))
+    }
+
+    /// Spreads the light of all chunks, chunk after chunk.
+    #[inline(always)]
+    pub(crate) fn spread(&self, image: &[T], light: &mut [T], room: &mut ChunkRoom<T>) {
+        let [left, above] = self.borders();
+        let (along, across) = (&self.blur.taps[..=left], &self.blur.taps[..=above]);
+        let stride = self.width + 2 * left;
+        let in_lines = |at: usize| at / self.width * stride + at % self.width + left;
+        for (&at, chunk) in self.at.iter().zip(image.chunks_exact(LANES)) {
+            room.lines[in_lines(at)..][..LANES].copy_from_slice(chunk);
+        }
+        for &at in &self.along {
+            let sums = around(along, &room.lines, in_lines(at), 1);
+            room.plane[above * self.width + at..][..LANES].copy_from_slice(&sums);
+        }
+        for (&at, chunk) in self.at.iter().zip(light.chunks_exact_mut(LANES)) {
+            chunk.copy_from_slice(&around(
+                across,
+                &room.plane,
+                above * self.width + at,
+                self.width,
+            ));
+        }
     }
 }
 

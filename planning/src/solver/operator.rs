@@ -1,12 +1,14 @@
 //! The doses that light makes, and what a price of doses makes of the light: the transpose.
 
-use crate::blur::{Blur, Real};
+use crate::blur::{Blur, ChunkRoom, Chunks, LANES, Real};
 use crate::light::LayerLight;
 use crate::solver::problem::Shape;
+use crate::wide::wide;
 
 /// The doses of a block of voxels from the light of its pixels, without matrices.
 ///
-/// Voxels stand layer by layer from the light, each row by row.
+/// Voxels stand layer by layer from the light, each row by row; or only some chunks of 16 of
+/// each layer, the same in all.
 ///
 /// ```
 /// use lamp_planning::solver::{Operator, Shape};
@@ -22,65 +24,134 @@ use crate::solver::problem::Shape;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Operator<T> {
-    shape: Shape,
-    blur: Blur<T>,
     layers: Vec<LayerLight>,
+    chunks: Chunks<T>,
 }
 
 impl<T: Real> Operator<T> {
     /// Creates the operator of a block. `layers` are from the light.
     ///
     /// # Panics
-    /// Panics if there are not as many layers as the shape has.
+    /// Panics if there are not as many layers as the shape has, or its width is not a multiple
+    /// of 16.
     pub fn new(shape: Shape, blur: Blur<T>, layers: Vec<LayerLight>) -> Self {
-        assert_eq!(layers.len(), shape.layers, "every layer has its light");
-        Self { shape, blur, layers }
+        let all = (0..shape.plane()).step_by(LANES).collect();
+        Self::of_chunks(shape, blur, layers, all)
     }
 
-    /// Returns the block's shape.
-    pub fn shape(&self) -> Shape {
-        self.shape
+    /// Creates the operator of the chunks of 16 voxels that begin at these places of each layer,
+    /// in order: all other pixels are black, and other doses are of no matter.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new) does.
+    pub fn of_chunks(
+        shape: Shape,
+        blur: Blur<T>,
+        layers: Vec<LayerLight>,
+        chunks: Vec<usize>,
+    ) -> Self {
+        assert_eq!(layers.len(), shape.layers, "every layer has its light");
+        assert!(shape.width.is_multiple_of(LANES), "rows are whole chunks");
+        Self { layers, chunks: Chunks::new(blur, shape.rows, shape.width, chunks) }
+    }
+
+    /// Returns the voxels of a layer.
+    pub fn plane(&self) -> usize {
+        self.chunks.pixels()
+    }
+
+    /// Returns the voxels of all layers.
+    pub fn voxels(&self) -> usize {
+        self.layers.len() * self.plane()
+    }
+
+    /// Returns where each chunk begins in its layer.
+    pub fn starts(&self) -> &[usize] {
+        self.chunks.starts()
+    }
+
+    /// Returns the number of layers.
+    pub(crate) fn layer_count(&self) -> usize {
+        self.layers.len()
+    }
+
+    pub(crate) fn room(&self) -> ChunkRoom<T> {
+        self.chunks.room()
     }
 
     /// Computes the doses of all voxels from the light of all pixels.
     pub fn doses(&self, light: &[T], doses: &mut [T]) {
-        let (plane, mut room) = (self.shape.plane(), Vec::new());
-        let mut done: &mut [T] = &mut [];
-        for ((of, light), rest) in
-            self.layers.iter().zip(light.chunks_exact(plane)).zip(doses.chunks_exact_mut(plane))
-        {
-            self.blur.apply(light, self.shape.width, rest, &mut room);
-            add_scaled(rest, T::of(of.own), done, T::of(of.passed));
-            done = rest;
+        let (plane, mut room) = (self.plane(), self.room());
+        if plane == 0 {
+            return;
         }
+        let mut above: &mut [T] = &mut [];
+        let layers = light.chunks_exact(plane).zip(doses.chunks_exact_mut(plane));
+        for (layer, (light, doses)) in layers.enumerate() {
+            self.doses_of_layer(layer, light, above, doses, &mut room);
+            above = doses;
+        }
+    }
+
+    /// Computes the doses of a layer from its light and the doses above, if there are any.
+    pub(crate) fn doses_of_layer(
+        &self,
+        layer: usize,
+        light: &[T],
+        above: &[T],
+        doses: &mut [T],
+        room: &mut ChunkRoom<T>,
+    ) {
+        let LayerLight { own, passed } = self.layers[layer];
+        let (own, passed) = (T::of(own), T::of(passed));
+        wide(
+            #[inline(always)]
+            || {
+                self.chunks.spread(light, doses, room);
+                if above.is_empty() {
+                    doses.iter_mut().for_each(|dose| *dose = *dose * own);
+                }
+                for (dose, &above) in doses.iter_mut().zip(above) {
+                    *dose = *dose * own + above * passed;
+                }
+            },
+        );
     }
 
     /// Computes what one unit of light of each pixel costs, where `prices` are those of doses.
     pub fn prices_of_light(&self, prices: &[T], of_light: &mut [T]) {
-        let (plane, mut room) = (self.shape.plane(), Vec::new());
-        let mut sum = vec![T::default(); plane];
-        let mut passed = T::default();
-        let layers = self.layers.iter().zip(prices.chunks_exact(plane));
-        for ((of, prices), out) in layers.zip(of_light.chunks_exact_mut(plane)).rev() {
-            for (sum, &price) in sum.iter_mut().zip(prices) {
-                *sum = *sum * passed + price;
-            }
-            self.blur.apply(&sum, self.shape.width, out, &mut room);
-            let own = T::of(of.own);
-            out.iter_mut().for_each(|price| *price = *price * own);
-            passed = T::of(of.passed);
+        let (plane, mut room) = (self.plane(), self.room());
+        if plane == 0 {
+            return;
+        }
+        let mut below = vec![T::default(); plane];
+        let layers = prices.chunks_exact(plane).zip(of_light.chunks_exact_mut(plane)).enumerate();
+        for (layer, (prices, of_light)) in layers.rev() {
+            self.prices_of_layer(layer, prices, &mut below, of_light, &mut room);
         }
     }
-}
 
-/// `doses * own + above * passed`, where there is a layer above.
-#[inline]
-fn add_scaled<T: Real>(doses: &mut [T], own: T, above: &[T], passed: T) {
-    if above.is_empty() {
-        doses.iter_mut().for_each(|dose| *dose = *dose * own);
-        return;
-    }
-    for (dose, &above) in doses.iter_mut().zip(above) {
-        *dose = *dose * own + above * passed;
+    /// Computes what the light of a layer costs. `sums` has the prices of all doses below, as
+    /// they count in the layer below, and gets this layer's.
+    pub(crate) fn prices_of_layer(
+        &self,
+        layer: usize,
+        prices: &[T],
+        sums: &mut [T],
+        of_light: &mut [T],
+        room: &mut ChunkRoom<T>,
+    ) {
+        let own = T::of(self.layers[layer].own);
+        let passed = T::of(self.layers.get(layer + 1).map_or(0.0, |below| below.passed));
+        wide(
+            #[inline(always)]
+            || {
+                for (sum, &price) in sums.iter_mut().zip(prices) {
+                    *sum = *sum * passed + price;
+                }
+                self.chunks.spread(sums, of_light, room);
+                of_light.iter_mut().for_each(|price| *price = *price * own);
+            },
+        );
     }
 }

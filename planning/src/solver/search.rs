@@ -4,6 +4,8 @@
 //! Every iterate has a cost, and a bound from the prices of doses, so the search knows how far
 //! it is from the best.
 
+use std::ops::Range;
+
 use crate::blur::Real;
 use crate::solver::problem::Problem;
 use crate::wide::wide;
@@ -141,7 +143,7 @@ pub fn solve<T: Real>(
     prices: Vec<T>,
     until: Search,
 ) -> Solution<T> {
-    let voxels = problem.operator.shape().voxels();
+    let voxels = problem.operator.voxels();
     assert!(light.len() == voxels && prices.len() == voxels, "each voxel has a start");
     let steps = Steps::new(problem);
     let mut now = Iterate::new(problem, light, prices);
@@ -159,11 +161,9 @@ pub fn solve<T: Real>(
         if best.gap() <= until.gap {
             break;
         }
-        step_light(problem, &steps, weight, &now, &mut next);
-        step_prices(problem, &steps, weight, &now, &mut next);
         since += 1;
         let share = f64::from(since) / f64::from(since + 1);
-        halfway(&mut now, &next, &anchor, share);
+        Step::new(problem, &steps, weight, share).take(&mut now, &mut next, &anchor);
         if iteration % LOOK_AFTER != 0 {
             continue;
         }
@@ -221,76 +221,117 @@ impl<T: Real> Best<T> {
     }
 }
 
-/// A step of the light against its price, and the doses that it makes.
-fn step_light<T: Real>(
-    problem: &Problem<T>,
-    steps: &Steps<T>,
-    weight: f64,
-    now: &Iterate<T>,
-    next: &mut Iterate<T>,
-) {
-    let (factor, terms) = (T::of(1.0 / weight), problem.terms);
-    wide(
-        #[inline(always)]
-        || {
-            let pixels = next.light.iter_mut().zip(&problem.roles);
-            let prices = now.of_light.iter().zip(&steps.light);
-            for ((next, &role), (&light, (&price, &step))) in
-                pixels.zip(now.light.iter().zip(prices))
-            {
-                let bounds = terms.light_bounds(role);
-                *next = (light - step * factor * price).within(bounds.low, bounds.high);
-            }
-        },
-    );
-    problem.operator.doses(&next.light, &mut next.doses);
+/// One iteration.
+struct Step<'a, T> {
+    problem: &'a Problem<T>,
+    steps: &'a Steps<T>,
+    /// Factors of steps in light and in prices.
+    in_light: T,
+    in_prices: T,
+    /// What the iterate after next is made of: the next, the one now, and the anchor.
+    onwards: T,
+    back: T,
+    rest: T,
 }
 
-/// A step of the prices towards the slopes of the cost, at the doses that the light is going
-/// to make, and what they make of light.
-fn step_prices<T: Real>(
-    problem: &Problem<T>,
-    steps: &Steps<T>,
-    weight: f64,
-    now: &Iterate<T>,
-    next: &mut Iterate<T>,
-) {
-    let (factor, two, terms) = (T::of(weight), T::of(2.0), problem.terms);
-    wide(
-        #[inline(always)]
-        || {
-            let Iterate { prices, doses, .. } = &mut *next;
-            let doses = doses.iter().zip(&now.doses).zip(&problem.incoming);
-            let voxels = problem.roles.iter().zip(&now.prices).zip(&steps.prices);
-            for ((next, ((&to, &from), &incoming)), ((&role, &price), &step)) in
-                prices.iter_mut().zip(doses).zip(voxels)
-            {
-                let bounds = terms.price_bounds(role);
-                let beyond = two * to - from + incoming - terms.aim(role);
-                *next = (price + step * factor * beyond).within(bounds.low, bounds.high);
-            }
-        },
-    );
-    problem.operator.prices_of_light(&next.prices, &mut next.of_light);
-}
+impl<'a, T: Real> Step<'a, T> {
+    fn new(problem: &'a Problem<T>, steps: &'a Steps<T>, weight: f64, share: f64) -> Self {
+        Self {
+            problem,
+            steps,
+            in_light: T::of(1.0 / weight),
+            in_prices: T::of(weight),
+            onwards: T::of(2.0 * share),
+            back: T::of(share),
+            rest: T::of(1.0 - share),
+        }
+    }
 
-/// Reflects an iterate at the next, and draws the result towards the anchor.
-fn halfway<T: Real>(now: &mut Iterate<T>, next: &Iterate<T>, anchor: &Iterate<T>, share: f64) {
-    let (onwards, back, rest) = (T::of(2.0 * share), T::of(share), T::of(1.0 - share));
-    let draw = |now: &mut [T], next: &[T], anchor: &[T]| {
+    /// Goes down through the layers for light and prices, and up for the prices of light. `now`
+    /// becomes what `next` reflects it to, drawn towards the anchor.
+    fn take(&self, now: &mut Iterate<T>, next: &mut Iterate<T>, anchor: &Iterate<T>) {
+        let operator = &self.problem.operator;
+        let (plane, mut room) = (operator.plane(), operator.room());
+        for layer in 0..operator.layer_count() {
+            let here = layer * plane..(layer + 1) * plane;
+            let above = layer.saturating_sub(1) * plane..layer * plane;
+            self.step_light(here.clone(), now, next);
+            let (done, doses) = next.doses.split_at_mut(here.start);
+            let light = &next.light[here.clone()];
+            operator.doses_of_layer(layer, light, &done[above], &mut doses[..plane], &mut room);
+            self.step_prices(here.clone(), now, next);
+            let draw = |now: &mut [T], next: &[T], anchor: &[T]| {
+                self.draw(&mut now[here.clone()], &next[here.clone()], &anchor[here.clone()]);
+            };
+            draw(&mut now.light, &next.light, &anchor.light);
+            draw(&mut now.doses, &next.doses, &anchor.doses);
+            draw(&mut now.prices, &next.prices, &anchor.prices);
+        }
+        let mut sums = vec![T::default(); plane];
+        for layer in (0..operator.layer_count()).rev() {
+            let here = layer * plane..(layer + 1) * plane;
+            let of_light = &mut next.of_light[here.clone()];
+            let prices = &next.prices[here.clone()];
+            operator.prices_of_layer(layer, prices, &mut sums, of_light, &mut room);
+            self.draw(&mut now.of_light[here.clone()], of_light, &anchor.of_light[here]);
+        }
+    }
+
+    /// A step of a layer's light against its price.
+    fn step_light(&self, here: Range<usize>, now: &Iterate<T>, next: &mut Iterate<T>) {
+        let terms = self.problem.terms;
+        let roles = &self.problem.roles[here.clone()];
+        let steps = &self.steps.light[here.clone()];
+        let prices = &now.of_light[here.clone()];
+        let (light, next) = (&now.light[here.clone()], &mut next.light[here]);
+        wide(
+            #[inline(always)]
+            || {
+                let pixels = next.iter_mut().zip(light).zip(prices.iter().zip(steps)).zip(roles);
+                for (((next, &light), (&price, &step)), &role) in pixels {
+                    let bounds = terms.light_bounds(role);
+                    let by = step * self.in_light * price;
+                    *next = (light - by).within(bounds.low, bounds.high);
+                }
+            },
+        );
+    }
+
+    /// A step of a layer's prices towards the slopes of the cost, at the doses that the light is
+    /// going to make.
+    fn step_prices(&self, here: Range<usize>, now: &Iterate<T>, next: &mut Iterate<T>) {
+        let (two, terms) = (T::of(2.0), self.problem.terms);
+        let roles = &self.problem.roles[here.clone()];
+        let steps = &self.steps.prices[here.clone()];
+        let incoming = &self.problem.incoming[here.clone()];
+        let (from, to) = (&now.doses[here.clone()], &next.doses[here.clone()]);
+        let (prices, next) = (&now.prices[here.clone()], &mut next.prices[here]);
+        wide(
+            #[inline(always)]
+            || {
+                let doses = from.iter().zip(to).zip(incoming);
+                let voxels = next.iter_mut().zip(prices).zip(steps.iter().zip(roles)).zip(doses);
+                for (((next, &price), (&step, &role)), ((&from, &to), &incoming)) in voxels {
+                    let bounds = terms.price_bounds(role);
+                    let beyond = two * to - from + incoming - terms.aim(role);
+                    let by = step * self.in_prices * beyond;
+                    *next = (price + by).within(bounds.low, bounds.high);
+                }
+            },
+        );
+    }
+
+    /// Reflects values at the next ones, and draws the result towards the anchor.
+    fn draw(&self, now: &mut [T], next: &[T], anchor: &[T]) {
         wide(
             #[inline(always)]
             || {
                 for ((now, &next), &anchor) in now.iter_mut().zip(next).zip(anchor) {
-                    *now = onwards * next - back * *now + rest * anchor;
+                    *now = self.onwards * next - self.back * *now + self.rest * anchor;
                 }
             },
         );
-    };
-    draw(&mut now.light, &next.light, &anchor.light);
-    draw(&mut now.prices, &next.prices, &anchor.prices);
-    draw(&mut now.doses, &next.doses, &anchor.doses);
-    draw(&mut now.of_light, &next.of_light, &anchor.of_light);
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,8 @@ use crate::voxels::roles::{LayerImages, RoleRules};
 
 /// The most iterations in a block.
 const MOST_ITERATIONS: usize = 5000;
+/// An error of white light that is less than this a voxel is no reason to search longer.
+const LEAST_ERROR: f64 = 0.002;
 
 /// The most iterations once dim pixels are black or brighter.
 const AGAIN: usize = 100;
@@ -70,6 +72,8 @@ pub(crate) struct Window<'a> {
     pub(crate) plans: &'a [Option<TilePlan>],
     /// How far around a tile light is chosen together with it, to be chosen again.
     pub(crate) overlap: usize,
+    /// How far from where a layer is not like its neighbours light may change.
+    pub(crate) near: usize,
     /// The gap to end at, as a share of the cost of white light.
     pub(crate) gap: f64,
     /// Whether levels are rounded up, so that no dose that was just enough is lost.
@@ -85,78 +89,184 @@ pub(crate) struct BlockResult {
     pub(crate) progress: Vec<Progress>,
 }
 
+/// What is planned of a tile in a layer.
+struct PlanOfLayer<'a> {
+    rect: &'a Rect,
+    levels: &'a [u8],
+    prices: &'a [f32],
+}
+
+/// The chunks of a block that are planned.
+struct Area {
+    rect: Rect,
+    /// Its layers in full.
+    shape: Shape,
+    /// Where the chunks begin in each layer.
+    starts: Vec<usize>,
+}
+
+impl Area {
+    /// Returns the values of the chunks of a layer in full.
+    fn chunks<'a, V>(&'a self, layer: &'a [V]) -> impl Iterator<Item = &'a [V]> {
+        self.starts.iter().map(|&start| &layer[start..start + LANES])
+    }
+
+    fn voxels(&self) -> usize {
+        self.shape.layers * self.starts.len() * LANES
+    }
+}
+
 impl Window<'_> {
     /// Plans a tile.
     pub(crate) fn plan(&self, tile: usize) -> BlockResult {
         let core = self.grid.tile(tile);
-        let area = core.grown(self.overlap).within(&self.grid.image());
-        let shape = Shape::holding(self.lights.len(), area.height(), area.width());
-        let mut problem = Problem {
-            operator: Operator::new(shape, self.blur.clone(), self.lights.to_vec()),
-            roles: self.roles(&area, shape),
-            incoming: self.incoming(&area, shape),
-            terms: self.terms,
-        };
-        let (mut light, prices) = self.start(&area, shape, &problem.roles);
-        let mut doses = vec![0.0; shape.voxels()];
+        let area = self.area(&core);
+        let operator = Operator::of_chunks(
+            area.shape,
+            self.blur.clone(),
+            self.lights.to_vec(),
+            area.starts.clone(),
+        );
+        let (roles, incoming) = (self.roles(&area), self.incoming(&area));
+        let mut problem = Problem { operator, roles, incoming, terms: self.terms };
+        let (light, prices) = self.start(&area, &problem.roles);
+        let mut doses = vec![0.0; area.voxels()];
         problem.operator.doses(&problem.brightest(), &mut doses);
         let unplanned = problem.cost(&doses);
-        let until = Search { gap: self.gap * unplanned, iterations: MOST_ITERATIONS };
+        let least = LEAST_ERROR * area.voxels() as f64;
+        let until = Search { gap: self.gap * unplanned.max(least), iterations: MOST_ITERATIONS };
         let mut solution = solve(&problem, light, prices, until);
         let progress = std::mem::take(&mut solution.progress);
-        light = solution.light;
+        let mut light = solution.light;
         if self.has_min_level && self.without_dim_light(&mut problem, &mut light) {
             let again = Search { iterations: AGAIN, ..until };
             light = solve(&problem, light, solution.prices.clone(), again).light;
         }
-        let level = |&light: &f32| {
-            let light = f64::from(light);
-            if self.round_up { self.levels.at_least(light) } else { self.levels.nearest(light) }
-        };
-        let levels: Vec<u8> = light.iter().map(level).collect();
-        let plan = TilePlan {
-            first: self.first,
-            levels: crop(&levels, &area, &core, shape),
-            prices: crop(&solution.prices, &area, &core, shape),
-            rect: core,
-        };
+        let plan = self.written(core, &area, &light, &solution.prices);
         BlockResult { plan, unplanned, progress }
     }
 
-    fn roles(&self, area: &Rect, shape: Shape) -> Vec<Role> {
-        let mut roles = vec![Role::NONE; shape.voxels()];
-        for (layer, roles) in roles.chunks_exact_mut(shape.plane()).enumerate() {
-            self.rules.write(self.images, self.at + layer, area, shape.width, roles);
+    /// Returns a tile's plan: what was planned already outside the chunks.
+    fn written(&self, core: Rect, area: &Area, light: &[f32], prices: &[f32]) -> TilePlan {
+        let pixels = core.width() * core.height();
+        let mut levels = vec![0; area.shape.layers * pixels];
+        for (layer, levels) in levels.chunks_exact_mut(pixels).enumerate() {
+            self.planned(layer, &core, core.width(), levels);
+        }
+        let mut plan = TilePlan {
+            first: self.first,
+            levels,
+            prices: vec![0.0; area.shape.layers * pixels],
+            rect: core,
+        };
+        let left = plan.rect.columns.start - area.rect.columns.start;
+        let top = plan.rect.rows.start - area.rect.rows.start;
+        let (width, height) = (plan.rect.width() as isize, plan.rect.height() as isize);
+        let all = light.chunks_exact(LANES).zip(prices.chunks_exact(LANES)).enumerate();
+        for (chunk, (light, prices)) in all {
+            let (layer, chunk) = (chunk / area.starts.len(), chunk % area.starts.len());
+            let start = area.starts[chunk];
+            let row = (start / area.shape.width) as isize - top;
+            if !(0..height).contains(&row) {
+                continue;
+            }
+            let first = (start % area.shape.width) as isize - left;
+            for (column, (&light, &price)) in (first..).zip(light.iter().zip(prices)) {
+                if (0..width).contains(&column) {
+                    let place = layer * pixels + (row * width + column) as usize;
+                    plan.levels[place] = self.level(light);
+                    plan.prices[place] = price;
+                }
+            }
+        }
+        plan
+    }
+
+    fn level(&self, light: f32) -> u8 {
+        let light = f64::from(light);
+        if self.round_up { self.levels.at_least(light) } else { self.levels.nearest(light) }
+    }
+
+    /// Finds the chunks near a tile whose light or doses can matter: those near places where a
+    /// layer is not like its neighbours.
+    fn area(&self, core: &Rect) -> Area {
+        let rect = core.grown(self.overlap).within(&self.grid.image());
+        let shape = Shape::holding(self.lights.len(), rect.height(), rect.width());
+        let view = rect.grown(self.near);
+        let (width, height) = (view.width(), view.height());
+        let (mut first, mut wanted) = (vec![0; width * height], vec![0; width * height]);
+        let mut edges = vec![false; width * height];
+        for layer in 0..self.lights.len() {
+            self.images[self.at + layer].wanted.copy(&view, 0, width, &mut wanted);
+            if layer == 0 {
+                first.copy_from_slice(&wanted);
+            }
+            for place in 0..wanted.len() {
+                let differs = |other: usize| wanted[place] != wanted[other];
+                let at_right = place % width + 1 < width && differs(place + 1);
+                let at_bottom = place + width < wanted.len() && differs(place + width);
+                edges[place] |= at_right || at_bottom || wanted[place] != first[place];
+            }
+        }
+        let mut is_near = vec![false; shape.plane() / LANES];
+        let across = shape.width / LANES;
+        let near = |at: usize, side: usize| at.saturating_sub(2 * self.near)..(at + 1).min(side);
+        for place in (0..edges.len()).filter(|&place| edges[place]) {
+            let rows = near(place / width, rect.height());
+            let columns = near(place % width, rect.width());
+            if !columns.is_empty() {
+                for row in rows {
+                    is_near[row * across..][columns.start / LANES..columns.end.div_ceil(LANES)]
+                        .fill(true);
+                }
+            }
+        }
+        let starts = (0..is_near.len()).filter(|&chunk| is_near[chunk]);
+        Area { rect, shape, starts: starts.map(|chunk| chunk * LANES).collect() }
+    }
+
+    fn roles(&self, area: &Area) -> Vec<Role> {
+        let mut of_layer = vec![Role::NONE; area.shape.plane()];
+        let mut roles = Vec::with_capacity(area.voxels());
+        for layer in 0..area.shape.layers {
+            let width = area.shape.width;
+            self.rules.write(self.images, self.at + layer, &area.rect, width, &mut of_layer);
+            area.chunks(&of_layer).for_each(|chunk| roles.extend_from_slice(chunk));
         }
         roles
     }
 
-    /// Returns the doses from the layers above and from the pixels around the block.
-    fn incoming(&self, area: &Rect, shape: Shape) -> Vec<f32> {
+    /// Returns the doses from the layers above and from the pixels that are not planned here.
+    fn incoming(&self, area: &Area) -> Vec<f32> {
         let border = self.blur.radius();
-        let view = area.grown(border);
-        let wide = Shape::holding(shape.layers, view.height(), view.width());
+        let view = area.rect.grown(border);
+        let wide = Shape::holding(area.shape.layers, view.height(), view.width());
         let mut levels = vec![0; wide.plane()];
-        let mut light = vec![0.0; wide.voxels()];
-        for (layer, light) in light.chunks_exact_mut(wide.plane()).enumerate() {
+        let mut light = Vec::with_capacity(wide.voxels());
+        for layer in 0..area.shape.layers {
             self.planned(layer, &view, wide.width, &mut levels);
-            light.iter_mut().zip(&levels).for_each(|(of, &level)| *of = self.levels.light(level));
-            let inside = light.chunks_exact_mut(wide.width).skip(border).take(area.height());
-            inside.for_each(|line| line[border..border + area.width()].fill(0.0));
+            light.extend(levels.iter().map(|&level| self.levels.light(level)));
+            let of_layer = &mut light[layer * wide.plane()..];
+            for start in &area.starts {
+                let (row, column) = (start / area.shape.width, start % area.shape.width);
+                let inside = LANES.min(area.rect.width() - column);
+                let place = (row + border) * wide.width + column + border;
+                of_layer[place..place + inside].fill(0.0);
+            }
         }
         let mut doses = vec![0.0; wide.voxels()];
         Operator::new(wide, self.blur.clone(), self.lights.to_vec()).doses(&light, &mut doses);
-        let mut above = vec![0.0; shape.plane()];
-        self.above.copy(area, 0.0, shape.width, &mut above);
-        let mut incoming = vec![0.0; shape.voxels()];
-        let layers = incoming.chunks_exact_mut(shape.plane()).zip(doses.chunks_exact(wide.plane()));
-        for ((incoming, doses), of) in layers.zip(self.lights) {
-            above.iter_mut().for_each(|dose| *dose *= of.passed as f32);
-            incoming.copy_from_slice(&above);
-            let lines = doses.chunks_exact(wide.width).skip(border);
-            for (to, from) in incoming.chunks_exact_mut(shape.width).zip(lines) {
-                let inside = &from[border..border + area.width()];
-                to.iter_mut().zip(inside).for_each(|(to, from)| *to += from);
+        let mut above = vec![0.0; area.shape.plane()];
+        self.above.copy(&area.rect, 0.0, area.shape.width, &mut above);
+        let mut incoming = Vec::with_capacity(area.voxels());
+        let mut passed = 1.0;
+        for (doses, of) in doses.chunks_exact(wide.plane()).zip(self.lights) {
+            passed *= of.passed as f32;
+            for (start, above) in area.starts.iter().zip(area.chunks(&above)) {
+                let (row, column) = (start / area.shape.width, start % area.shape.width);
+                let place = (row + border) * wide.width + column + border;
+                let own = doses[place..].iter().chain(std::iter::repeat(&0.0));
+                incoming.extend(above.iter().zip(own).map(|(&above, &own)| above * passed + own));
             }
         }
         incoming
@@ -166,30 +276,35 @@ impl Window<'_> {
     fn planned(&self, layer: usize, rect: &Rect, stride: usize, levels: &mut [u8]) {
         self.images[self.at + layer].wanted.copy(rect, 0, stride, levels);
         for tile in self.grid.met(rect) {
-            let plan = self.plans[tile].as_ref();
-            if let Some((plan, (from, _))) =
-                plan.and_then(|p| Some((p, p.layer(self.first + layer)?)))
-            {
-                copy_common(from, &plan.rect, rect, stride, levels);
+            if let Some(plan) = self.plan_of(tile, layer) {
+                copy_common(plan.levels, plan.rect, rect, stride, levels);
             }
         }
     }
 
     /// Returns the light and the prices to start from: those planned so far.
-    fn start(&self, area: &Rect, shape: Shape, roles: &[Role]) -> (Vec<f32>, Vec<f32>) {
-        let mut levels = vec![0; shape.plane()];
-        let mut light = Vec::with_capacity(shape.voxels());
-        let mut prices = vec![0.0; shape.voxels()];
-        for (layer, prices) in prices.chunks_exact_mut(shape.plane()).enumerate() {
-            self.planned(layer, area, shape.width, &mut levels);
-            light.extend(levels.iter().map(|&level| self.levels.light(level)));
-            for tile in self.grid.met(area) {
-                let plan = self.plans[tile].as_ref();
-                if let Some((plan, (_, from))) =
-                    plan.and_then(|p| Some((p, p.layer(self.first + layer)?)))
-                {
-                    copy_common(from, &plan.rect, area, shape.width, prices);
+    fn start(&self, area: &Area, roles: &[Role]) -> (Vec<f32>, Vec<f32>) {
+        let mut levels = vec![0; area.shape.plane()];
+        let mut of_layer = vec![0.0; area.shape.plane()];
+        let mut light = Vec::with_capacity(area.voxels());
+        let mut prices = Vec::with_capacity(area.voxels());
+        for layer in 0..area.shape.layers {
+            self.planned(layer, &area.rect, area.shape.width, &mut levels);
+            of_layer.fill(0.0);
+            for tile in self.grid.met(&area.rect) {
+                if let Some(plan) = self.plan_of(tile, layer) {
+                    copy_common(
+                        plan.prices,
+                        plan.rect,
+                        &area.rect,
+                        area.shape.width,
+                        &mut of_layer,
+                    );
                 }
+            }
+            for (levels, of) in area.chunks(&levels).zip(area.chunks(&of_layer)) {
+                light.extend(levels.iter().map(|&level| self.levels.light(level)));
+                prices.extend_from_slice(of);
             }
         }
         for ((light, price), &role) in light.iter_mut().zip(&mut prices).zip(roles) {
@@ -199,6 +314,13 @@ impl Window<'_> {
             *price = price.clamp(of_price.low, of_price.high);
         }
         (light, prices)
+    }
+
+    /// Returns what is planned of a tile in a layer of the window.
+    fn plan_of(&self, tile: usize, layer: usize) -> Option<PlanOfLayer<'_>> {
+        let plan = self.plans[tile].as_ref()?;
+        let (levels, prices) = plan.layer(self.first + layer)?;
+        Some(PlanOfLayer { rect: &plan.rect, levels, prices })
     }
 
     /// Makes dim pixels black, or bright enough, whichever is nearer, and keeps them so. Returns
@@ -220,14 +342,4 @@ impl Window<'_> {
         }
         any
     }
-}
-
-/// Returns the part of a block's values that is in a tile, without gaps.
-fn crop<V: Copy>(values: &[V], area: &Rect, core: &Rect, shape: Shape) -> Vec<V> {
-    debug_assert!(shape.width.is_multiple_of(LANES));
-    let left = (core.columns.start - area.columns.start) as usize;
-    let top = (core.rows.start - area.rows.start) as usize;
-    let planes = values.chunks_exact(shape.plane());
-    let lines = planes.flat_map(|p| p.chunks_exact(shape.width).skip(top).take(core.height()));
-    lines.flat_map(|line| &line[left..left + core.width()]).copied().collect()
 }

@@ -36,6 +36,8 @@ pub(crate) struct Setting {
     pub(crate) window: options::Window,
     /// How far around a tile light is chosen together with it.
     pub(crate) overlap: usize,
+    /// How far from where a layer is not like its neighbours light may change.
+    pub(crate) near: usize,
     /// How many voxels lie around the images.
     pub(crate) around: usize,
     /// The size of the images.
@@ -171,6 +173,7 @@ impl Descent<'_> {
                 at,
                 plans: &plans,
                 overlap: setting.overlap,
+                near: setting.near,
                 gap: setting.gap,
                 round_up: setting.round_up,
                 has_min_level: setting.has_min_level,

@@ -159,6 +159,7 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
         let ahead = (LEFT.ln() / passed.ln()).ceil().clamp(4.0, MOST_AHEAD as f64) as usize;
         Window { settled: WINDOW - ahead, ahead }
     });
+    let near = (4.0 * sigma).ceil() as usize;
     let layers = (window.settled + window.ahead).min(lights.len());
     let longest = width.max(height);
     let is_small = longest * longest * layers <= ONE_PIECE;
@@ -169,9 +170,10 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
     };
     let most = (1.0 - options.margin) as f32;
     let [image_width, image_height] = image;
+    let rules = RoleRules::new(options, image_width, image_height, around);
     Some(Setting {
         grid: Grid { width, height, side },
-        rules: RoleRules::new(options, image_width, image_height, around),
+        rules,
         terms: Terms { least: least as f32, short_price, most, least_light: 0.0 },
         most_of_dark: if options.objective == Objective::Wrong { most } else { 0.0 },
         levels: Levels::new(light, options.min_level),
@@ -180,7 +182,8 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
         round_up: options.objective == Objective::Boundary,
         has_min_level: options.min_level > 0,
         window,
-        overlap: if is_small { 0 } else { (4.0 * sigma).ceil() as usize },
+        overlap: if is_small { 0 } else { near },
+        near: near + rules.reach(),
         around,
         image,
         blur,

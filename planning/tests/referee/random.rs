@@ -74,7 +74,7 @@ proptest! {
 /// Checks that light times the price of light is doses times the price of doses.
 fn agree<T: Real>(case: &Case, seed: u64, tolerance: f64) -> Result<(), TestCaseError> {
     let operator = case.problem::<T>().operator;
-    let voxels = operator.shape().voxels();
+    let voxels = operator.voxels();
     let number = |n: usize| {
         let mixed = (seed ^ n as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         T::of((mixed >> 40) as f64 / f64::from(1 << 24))
