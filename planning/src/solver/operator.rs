@@ -8,7 +8,7 @@ use crate::wide::wide;
 /// The doses of a block of voxels from the light of its pixels, without matrices.
 ///
 /// Voxels stand layer by layer from the light, each row by row; or only some chunks of 16 of
-/// each layer, the same in all.
+/// each layer, the same in all. A layer whose own light is 0 costs little.
 ///
 /// ```
 /// use lamp_planning::solver::{Operator, Shape};
@@ -103,16 +103,19 @@ impl<T: Real> Operator<T> {
         room: &mut ChunkRoom<T>,
     ) {
         let LayerLight { own, passed } = self.layers[layer];
+        let is_dark = own == 0.0;
         let (own, passed) = (T::of(own), T::of(passed));
         wide(
             #[inline(always)]
             || {
-                self.chunks.spread(light, doses, room);
-                if above.is_empty() {
+                if is_dark {
+                    doses.fill(T::default());
+                } else {
+                    self.chunks.spread(light, doses, room);
                     doses.iter_mut().for_each(|dose| *dose = *dose * own);
                 }
                 for (dose, &above) in doses.iter_mut().zip(above) {
-                    *dose = *dose * own + above * passed;
+                    *dose += above * passed;
                 }
             },
         );
@@ -141,6 +144,7 @@ impl<T: Real> Operator<T> {
         of_light: &mut [T],
         room: &mut ChunkRoom<T>,
     ) {
+        let is_dark = self.layers[layer].own == 0.0;
         let own = T::of(self.layers[layer].own);
         let passed = T::of(self.layers.get(layer + 1).map_or(0.0, |below| below.passed));
         wide(
@@ -148,6 +152,10 @@ impl<T: Real> Operator<T> {
             || {
                 for (sum, &price) in sums.iter_mut().zip(prices) {
                     *sum = *sum * passed + price;
+                }
+                if is_dark {
+                    of_light.fill(T::default());
+                    return;
                 }
                 self.chunks.spread(sums, of_light, room);
                 of_light.iter_mut().for_each(|price| *price = *price * own);

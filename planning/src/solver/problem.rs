@@ -63,6 +63,12 @@ impl Role {
         Self(self.0 & !(Self::WHITE.0 | Self::NEVER_DIM.0))
     }
 
+    /// Returns the role of a voxel that later light may still cure, without light of its own.
+    #[must_use]
+    pub fn without_light_yet(self) -> Self {
+        Self(self.0 & (Self::UNCURED.0 | Self::DARK.0))
+    }
+
     /// Returns whether a role has all of another's flags.
     pub fn has(self, other: Self) -> bool {
         self.0 & other.0 == other.0

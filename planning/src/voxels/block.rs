@@ -62,7 +62,10 @@ pub(crate) struct Window<'a> {
     pub(crate) above: &'a Tiled<f32>,
     /// The window's first layer, counted from the light.
     pub(crate) first: usize,
-    /// The window's layers.
+    /// The window's layers whose light is chosen.
+    pub(crate) lit: usize,
+    /// All layers of the window. Those at the end have no light: they tell what the light above
+    /// does to voxels that are not to be cured, so far as it reaches.
     pub(crate) lights: &'a [LayerLight],
     /// The images of the window's layers, and of those near them.
     pub(crate) images: &'a [&'a LayerImages],
@@ -149,21 +152,21 @@ impl Window<'_> {
     /// Returns a tile's plan: what was planned already outside the chunks.
     fn written(&self, core: Rect, area: &Area, light: &[f32], prices: &[f32]) -> TilePlan {
         let pixels = core.width() * core.height();
-        let mut levels = vec![0; area.shape.layers * pixels];
+        let mut levels = vec![0; self.lit * pixels];
         for (layer, levels) in levels.chunks_exact_mut(pixels).enumerate() {
             self.planned(layer, &core, core.width(), levels);
         }
         let mut plan = TilePlan {
             first: self.first,
             levels,
-            prices: vec![0.0; area.shape.layers * pixels],
+            prices: vec![0.0; self.lit * pixels],
             rect: core,
         };
         let left = plan.rect.columns.start - area.rect.columns.start;
         let top = plan.rect.rows.start - area.rect.rows.start;
         let (width, height) = (plan.rect.width() as isize, plan.rect.height() as isize);
         let all = light.chunks_exact(LANES).zip(prices.chunks_exact(LANES)).enumerate();
-        for (chunk, (light, prices)) in all {
+        for (chunk, (light, prices)) in all.take(self.lit * area.starts.len()) {
             let (layer, chunk) = (chunk / area.starts.len(), chunk % area.starts.len());
             let start = area.starts[chunk];
             let row = (start / area.shape.width) as isize - top;
@@ -231,6 +234,9 @@ impl Window<'_> {
         for layer in 0..area.shape.layers {
             let width = area.shape.width;
             self.rules.write(self.images, self.at + layer, &area.rect, width, &mut of_layer);
+            if layer >= self.lit {
+                of_layer.iter_mut().for_each(|role| *role = role.without_light_yet());
+            }
             area.chunks(&of_layer).for_each(|chunk| roles.extend_from_slice(chunk));
         }
         roles

@@ -34,6 +34,8 @@ pub(crate) struct Setting {
     pub(crate) round_up: bool,
     pub(crate) has_min_level: bool,
     pub(crate) window: options::Window,
+    /// Layers below a window that its light reaches.
+    pub(crate) tail: usize,
     /// How far around a tile light is chosen together with it.
     pub(crate) overlap: usize,
     /// How far from where a layer is not like its neighbours light may change.
@@ -110,8 +112,9 @@ pub(crate) fn descend(
     let mut first = 0;
     while first < count {
         let end = (first + setting.window.settled + setting.window.ahead).min(count);
-        descent.look_ahead(end)?;
-        descent.plan_window(first, end);
+        let reached = (end + setting.tail).min(count);
+        descent.look_ahead(reached)?;
+        descent.plan_window(first, end, reached);
         let after = if end == count { count } else { first + setting.window.settled };
         for layer in first..after {
             descent.settle(layer)?;
@@ -140,9 +143,11 @@ impl Descent<'_> {
 
     /// Plans the tiles near surfaces: every second one across and down at once, so that none
     /// sees another that is being planned.
-    fn plan_window(&mut self, first: usize, end: usize) {
+    fn plan_window(&mut self, first: usize, end: usize, reached: usize) {
         let setting = self.setting;
         let images: Vec<&LayerImages> = self.images.iter().collect();
+        let mut lights = setting.lights[first..reached].to_vec();
+        lights[end - first..].iter_mut().for_each(|dark| dark.own = 0.0);
         let at = first - self.first_image;
         let reach = setting.blur.radius().max(setting.rules.reach());
         let near_surface = |&tile: &usize| {
@@ -168,7 +173,8 @@ impl Descent<'_> {
                 levels: &setting.levels,
                 above: &self.doses,
                 first,
-                lights: &setting.lights[first..end],
+                lit: end - first,
+                lights: &lights,
                 images: &images,
                 at,
                 plans: &plans,

@@ -62,12 +62,14 @@ const PRICE_OF_TARGETS: f32 = 300.0;
 const ONE_PIECE: usize = 4 << 20;
 /// The least side of a tile, in pixels.
 const LEAST_SIDE: usize = 64;
-/// Layers of a window, settled and ahead.
-const WINDOW: usize = 30;
-/// The most layers that a window looks ahead.
-const MOST_AHEAD: usize = 15;
+/// Layers of a window whose light is chosen.
+const WINDOW: usize = 24;
+/// The most of them that are chosen again.
+const MOST_AHEAD: usize = 10;
 /// A window looks ahead until this share of light is left.
-const LEFT: f64 = 0.02;
+const LEFT: f64 = 0.1;
+/// The most layers below a window that its light is followed to.
+const MOST_TAIL: usize = 60;
 
 /// Plans the gray levels of a stack's layers. `part` gives the wanted images, bottom first;
 /// `settled` is called with the number of layers that are done.
@@ -154,13 +156,17 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
     let [width, height] = image.map(|side| side + 2 * around);
     let from_light: Vec<LayerTime> = pages.times.iter().rev().copied().collect();
     let lights = light.layers(dpi, &from_light);
+    let passed = lights.iter().skip(1).map(|layer| layer.passed).fold(0.0, f64::max);
     let window = options.window.unwrap_or_else(|| {
-        let passed = lights.iter().skip(1).map(|layer| layer.passed).fold(0.0, f64::max);
         let ahead = (LEFT.ln() / passed.ln()).ceil().clamp(4.0, MOST_AHEAD as f64) as usize;
         Window { settled: WINDOW - ahead, ahead }
     });
+    // As far as the highest dose that white light can make stays above the critical dose.
+    let own = lights.iter().map(|layer| layer.own).fold(0.0, f64::max) * blur.sum();
+    let highest = own / (1.0 - passed);
+    let tail = (highest.max(1.0).ln() / -passed.ln()).ceil().clamp(0.0, MOST_TAIL as f64) as usize;
     let near = (4.0 * sigma).ceil() as usize;
-    let layers = (window.settled + window.ahead).min(lights.len());
+    let layers = (window.settled + window.ahead + tail).min(lights.len());
     let longest = width.max(height);
     let is_small = longest * longest * layers <= ONE_PIECE;
     let side = if is_small { longest } else { LEAST_SIDE.max((16.0 * sigma) as usize) };
@@ -182,6 +188,7 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
         round_up: options.objective == Objective::Boundary,
         has_min_level: options.min_level > 0,
         window,
+        tail,
         overlap: if is_small { 0 } else { near },
         near: near + rules.reach(),
         around,
