@@ -6,6 +6,7 @@ use std::io;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
 use lamp_planning::NoLight;
+use lamp_planning::speed::{PartError, PlatformError};
 use lamp_planning::voxels::PlanError;
 use lamp_postprocess::machine::MachineLimit;
 use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, TileError};
@@ -110,6 +111,9 @@ macro_rules! failures {
 failures!(
     NoLight,
     PlanError,
+    PartError,
+    lamp_planning::speed::PlanError,
+    PlatformError,
     SliceError,
     CheckError,
     SupportError,

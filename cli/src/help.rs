@@ -24,8 +24,9 @@ Parts:
 Resins and machines:
   material    list and check resins          machine     list and check machines
   calibrate   make a material                target      make images to measure
-  plan        plan exposures                 cure        draw what a stack cures
-  completions let shells complete commands   man         write manual pages
+  plan        plan exposures                 learn       correct them by prints
+  cure        draw what a stack cures        man         write manual pages
+  completions let shells complete commands
 
 lamp COMMAND -h lists the usual options of a command, --help all of them.
 All commands have -q, --quiet; --threads N; --options FILE.toml; -h, --help.

@@ -32,6 +32,7 @@ mod picture;
 mod pixel_location;
 mod placement;
 mod planning_options;
+mod platform_options;
 mod plots;
 mod progress;
 mod recorded;

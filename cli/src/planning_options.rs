@@ -53,7 +53,7 @@ impl PlanningOptions {
 }
 
 /// Parses a margin below 100%.
-fn parse_margin(text: &str) -> Result<f64, String> {
+pub(crate) fn parse_margin(text: &str) -> Result<f64, String> {
     match parse_share(text)? {
         margin if margin < 1.0 => Ok(margin),
         _ => Err(format!("`{text}` is not below 100%: nothing would count as black")),

@@ -14,6 +14,7 @@ mod fix;
 mod heights;
 mod info;
 mod join;
+mod learn;
 mod machine;
 mod man;
 mod material;
@@ -55,6 +56,7 @@ pub(crate) enum Command {
     Machine(machine::MachineArgs),
     Material(material::MaterialArgs),
     Plan(plan::PlanArgs),
+    Learn(learn::LearnArgs),
     Cure(cure::CureArgs),
     Calibrate(calibrate::CalibrateArgs),
     Target(target::TargetArgs),
@@ -99,6 +101,7 @@ impl Command {
             Self::Machine(args) => machine::run(args),
             Self::Material(args) => material::run(args),
             Self::Plan(args) => plan::run(args, common),
+            Self::Learn(args) => learn::run(args, common),
             Self::Cure(args) => cure::run(args, common),
             Self::Calibrate(args) => calibrate::run(args, common),
             Self::Target(args) => target::run(args, common),

@@ -66,6 +66,37 @@ pub(crate) fn highest(series: &[Series]) -> f64 {
     points.chain(bands).fold(0.0, f64::max)
 }
 
+/// Returns a series that is a curve alone.
+pub(crate) fn curve(name: &str, curve: Vec<(f64, f64)>) -> Series {
+    Series { name: name.to_owned(), points: Vec::new(), curve, band: Vec::new() }
+}
+
+/// Returns a linear axis.
+pub(crate) fn linear(label: &str, range: Range<f64>) -> PlotAxis {
+    PlotAxis { label: label.to_owned(), range, logarithmic: false }
+}
+
+/// Returns the corners of steps of a width, given where each begins and how high it is.
+pub(crate) fn stairs(steps: impl Iterator<Item = (f64, f64)>, width: f64) -> Vec<(f64, f64)> {
+    steps.flat_map(|(from, height)| [(from, height), (from + width, height)]).collect()
+}
+
+/// Returns a plot of curves over the height of layers in millimetres, whose y axis has all of
+/// them and zero.
+pub(crate) fn by_layer(title: String, label: &str, series: Vec<Series>) -> Plot {
+    let all = || series.iter().flat_map(|series| series.curve.iter().chain(&series.points));
+    let ends = |of: fn(&(f64, f64)) -> f64| {
+        let numbers = || all().map(of);
+        (numbers().fold(f64::MAX, f64::min), numbers().fold(f64::MIN, f64::max))
+    };
+    let ((first, last), (least, most)) = (ends(|at| at.0), ends(|at| at.1));
+    let (first, last) = if first < last { (first, last) } else { (0.0, 1.0) };
+    let (least, most) = (least.min(0.0), most.max(1e-9));
+    // Room for the legend.
+    let y = linear(label, 1.05 * least..most + 0.3 * (most - least));
+    Plot { title, x: linear("z (mm)", first..last), y, series }
+}
+
 /// File formats of plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PlotFormat {

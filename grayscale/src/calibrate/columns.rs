@@ -27,6 +27,47 @@ pub(super) fn check_columns(
     }
 }
 
+/// The numbers of a row of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NumberRow<const N: usize> {
+    /// Its line in the file, from 1.
+    pub line: usize,
+    /// The numbers; blank cells and missing columns have none.
+    pub numbers: [Option<f64>; N],
+}
+
+impl CsvTable {
+    /// Returns the line and the numbers of each row, in known columns. The first `needed` of them
+    /// must have numbers in all rows; of others, a column or a cell may be missing.
+    ///
+    /// # Errors
+    /// Returns an error if a column is needed and missing or is not known, or if a cell is not a
+    /// number.
+    pub fn numbers<const N: usize>(
+        &self,
+        columns: &'static [&'static str; N],
+        needed: usize,
+    ) -> Result<Vec<NumberRow<N>>, DataError> {
+        check_columns(self, columns)?;
+        let found = columns.map(|name| Column::find(self, name));
+        for (column, name) in found.iter().zip(columns).take(needed) {
+            column.ok_or(DataError::NoColumn(name))?;
+        }
+        let numbers = |row: &TableRow| {
+            let mut numbers = [None; N];
+            for (index, column) in found.iter().enumerate() {
+                numbers[index] = match column {
+                    Some(column) if index < needed => Some(column.number(row)?),
+                    Some(column) => column.number_or_blank(row)?,
+                    None => None,
+                };
+            }
+            Ok(NumberRow { line: row.line, numbers })
+        };
+        self.rows().iter().map(numbers).collect()
+    }
+}
+
 /// A column of a table.
 #[derive(Clone, Copy)]
 pub(super) struct Column {
@@ -109,5 +150,22 @@ impl DoseColumn {
         };
         let plausible = Dose::PLAUSIBLE.contains(&dose);
         if plausible { Ok(dose) } else { Err(self.column.impossible(row, wanted)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_are_needed_are_there() {
+        let numbers = |text| CsvTable::parse(text).unwrap().numbers(&["a", "b"], 1);
+        let row = |line, a, b| NumberRow { line, numbers: [Some(a), b] };
+        assert_eq!(numbers("a,b\n1,\n2,3\n"), Ok(vec![row(2, 1.0, None), row(3, 2.0, Some(3.0))]));
+        assert_eq!(numbers("note,a\nx,5\n"), Ok(vec![row(2, 5.0, None)]));
+        assert_eq!(numbers("b\n1\n"), Err(DataError::NoColumn("a")));
+        for wrong in ["a\n\"\"\n", "a\nNaN\n", "a\nx\n", "a,c\n1,2\n", "a,b\n1,inf\n"] {
+            assert!(numbers(wrong).is_err(), "{wrong}");
+        }
     }
 }

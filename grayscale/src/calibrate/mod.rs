@@ -40,6 +40,7 @@ use crate::material::Given;
 use crate::resin::{GrayLevel, Quantity};
 use significant::round_significant;
 
+pub use columns::NumberRow;
 pub use csv_table::{CsvTable, TableError};
 pub use exposure_times::ExposureTimes;
 pub use fit_curve::{CurveFit, fit_curve};

@@ -1,7 +1,8 @@
 //! Tells whether a law's changes shrink the errors of the next prints.
 //!
 //! If the times change by `L e`, the errors `e` become `(I - G L) e`. The spectral radius of that
-//! matrix says what becomes of them in the end; its 2-norm, whether they may grow first.
+//! matrix says what becomes of them in the end; its 2-norm, whether they may grow first. Errors are
+//! counted in voxels, and those of the model's step in shares of its noise, which it makes least.
 
 use super::law::Law;
 use super::response::Response;
@@ -80,13 +81,17 @@ struct Shrink {
 impl Shrink {
     fn new(law: &Law, times: &[f64], errors: &[f64], [assumed, real]: [&Response; 2]) -> Self {
         let size = times.len();
+        let noise = match law {
+            Law::Model(law) => law.noise_of(assumed),
+            _ => vec![1.0; size],
+        };
         let mut rows = vec![0.0; size * size];
         for column in 0..size {
             let mut unit = vec![0.0; size];
-            unit[column] = 1.0;
+            unit[column] = noise[column];
             let cured = real.apply(&law.linear(times, &unit, errors, assumed));
             for (row, cured) in cured.into_iter().enumerate() {
-                rows[row * size + column] = cured;
+                rows[row * size + column] = cured / noise[row];
             }
         }
         Self { size, rows }

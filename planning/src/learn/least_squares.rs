@@ -13,10 +13,14 @@ pub(crate) struct Weights {
 }
 
 impl ModelLaw {
+    /// Returns how exact the errors of each layer are, in voxels.
+    pub(crate) fn noise_of(&self, response: &Response) -> Vec<f64> {
+        response.per_log_dose().iter().map(|voxels| (self.noise * voxels).max(1.0)).collect()
+    }
+
     pub(crate) fn weights(&self, times: &[f64], response: &Response) -> Weights {
-        let noise = response.per_log_dose().iter().map(|voxels| (self.noise * voxels).max(1.0));
         Weights {
-            errors: noise.map(|noise: f64| noise.powi(-2)).collect(),
+            errors: self.noise_of(response).iter().map(|noise| noise.powi(-2)).collect(),
             changes: times.iter().map(|time| self.stiffness / (time * time)).collect(),
         }
     }

@@ -32,12 +32,31 @@ pub enum PlatformError {
     Change(f64),
 }
 
+impl Platform {
+    /// Returns the least and the longest time of each layer, in seconds.
+    ///
+    /// # Errors
+    /// Returns an error if the platform's numbers are impossible.
+    pub fn bounds(&self, layers: &[PartLayer]) -> Result<[Vec<f64>; 2], PlatformError> {
+        let feasible = Feasible::new(self, layers)?;
+        Ok([feasible.low, feasible.high])
+    }
+
+    /// Returns times that the platform can keep, near those given, in seconds.
+    ///
+    /// # Errors
+    /// Returns an error if the platform's numbers are impossible.
+    pub fn nearest(&self, layers: &[PartLayer], times: &[f64]) -> Result<Vec<f64>, PlatformError> {
+        Ok(Feasible::new(self, layers)?.nearest(times))
+    }
+}
+
 /// The times that layers may have, in seconds.
 #[derive(Clone, Debug)]
 pub(crate) struct Feasible {
     pub(crate) low: Vec<f64>,
     pub(crate) high: Vec<f64>,
-    pub(crate) um: Vec<f64>,
+    um: Vec<f64>,
     /// How much larger the time of a micrometre may be than a neighbour's.
     ratio: Option<f64>,
 }

@@ -83,7 +83,7 @@ fn gap(stage: Stage, single_error: f64) -> f64 {
 }
 
 /// The doses around the kink over which the error is smoothed, stage by stage.
-const SMOOTHINGS: [f64; 8] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4];
+const SMOOTHINGS: [f64; 6] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001];
 /// The steps of a stage.
 const STEPS: usize = 300;
 /// Finds the times of a part's layers.

@@ -1,5 +1,8 @@
 //! `lamp plan`: chooses exposures from the doses of all layers together.
 
+mod speed;
+mod speed_plot;
+mod speed_report;
 mod voxels;
 mod voxels_plot;
 mod voxels_report;
@@ -9,11 +12,14 @@ use clap::{Args, Subcommand};
 use crate::exit::Exit;
 use crate::options::Common;
 
+pub(crate) use speed::write_profile;
+
 /// Plan exposures, so that the doses of all layers together cure the part and nothing else
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp plan voxels part.tif --material mine.toml -o planned.tif
+  lamp plan speed part.tif --material mine.toml -o timed.tif --profile speed.csv
   lamp cure planned.tif --material mine.toml --section y=12mm --add-up -o section.png")]
 pub(crate) struct PlanArgs {
     #[command(subcommand)]
@@ -23,10 +29,12 @@ pub(crate) struct PlanArgs {
 #[derive(Subcommand)]
 enum Plan {
     Voxels(voxels::VoxelsArgs),
+    Speed(speed::SpeedArgs),
 }
 
 pub(crate) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
         Plan::Voxels(args) => voxels::run(args, common),
+        Plan::Speed(args) => speed::run(args, common),
     }
 }

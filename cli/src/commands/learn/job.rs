@@ -1,0 +1,357 @@
+//! A job: a folder that keeps a stack and what was learnt from its prints.
+//!
+//! ```text
+//! job.toml                what the job is for
+//! stack.tif               the stack
+//! material.toml           its resin
+//! print-000.csv           the times of the first print
+//! print-000-measured.csv  what was measured on it
+//! print-001-doses.csv     by what measured heights correct the doses
+//! print-001.csv           the times of the next
+//! ```
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use lamp_grayscale::calibrate::{CsvTable, NumberRow};
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::speed::{PartLayer, PartPages, Platform, TimedPart};
+use lamp_planning::{Light, SampleHeight};
+use lamp_stack::{Destination, Format, digest_of, write_stack};
+use serde::{Deserialize, Serialize};
+
+use super::KeptOptions;
+use super::measured::Measured;
+use super::step::Learned;
+use crate::catalogue::{entry, read_file, read_text};
+use crate::commands::plan::write_profile;
+use crate::exit::Exit;
+use crate::options::Input;
+use crate::progress::Progress;
+use crate::recorded;
+use crate::streams::{input_name, new_folder, read_beside, read_layers, write_file};
+
+const JOB: &str = "job.toml";
+const STACK: &str = "stack.tif";
+const MATERIAL: &str = "material.toml";
+/// Tables of times have a line for each layer.
+const MAX_TABLE: u64 = 64 << 20;
+const PROFILE: [&str; 5] = ["layer", "z_um", "thickness_um", "exposure_ms", "speed_um_per_s"];
+const DOSES: [&str; 2] = ["layer", "log_dose"];
+
+/// What a job is for.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct JobFile {
+    part: String,
+    /// The digest of the stack's file.
+    digest: String,
+    /// The images' top left corner in part coordinates, if the pages state it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    origin_mm: Option<[f64; 2]>,
+    wanted: u8,
+    #[serde(with = "recorded::text")]
+    at: SampleHeight,
+    margin: f64,
+    slowest_um_per_s: f64,
+    fastest_um_per_s: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    max_change: Option<f64>,
+}
+
+/// A print of a job.
+#[derive(Clone, Debug)]
+pub(super) struct Print {
+    /// The times in seconds, from the light on.
+    pub(super) times: Vec<f64>,
+    /// What was measured, and its text.
+    pub(super) measured: Option<(Measured, String)>,
+    /// What heights had taught before, from the light on.
+    pub(super) log_doses: Vec<f64>,
+}
+
+/// A job that is open.
+pub(super) struct Job {
+    folder: PathBuf,
+    file: JobFile,
+    pub(super) part: TimedPart,
+    pub(super) material: String,
+    pub(super) light: Light,
+    pub(super) prints: Vec<Print>,
+}
+
+/// Begins a job.
+pub(super) fn begin(
+    folder: &Path,
+    stack: &Path,
+    material: &Path,
+    kept: &KeptOptions,
+    progress: &Progress,
+) -> Result<(), Exit> {
+    let material: Material = entry(material)?;
+    let light = Light::of(&material, kept.at.unwrap_or_default())?;
+    light.check().map_err(|error| Exit::Failed(error.into()).at(material.name.clone()))?;
+    let name = input_name(stack);
+    let input = Input { stack: stack.to_owned(), layers: None };
+    let wanted = kept.wanted.map_or(128, std::num::NonZeroU8::get);
+    let mut pages = PartPages::new(wanted);
+    let (mut part, mut origin_mm) = (String::new(), None);
+    let new = new_folder_of(folder)?;
+    let file = new.path().join(STACK);
+    let layers = read_layers(&input, progress)?.map(|layer| -> Result<_, Exit> {
+        let layer = layer?;
+        if layer.info.exposure_ms.is_none() {
+            let silent = anyhow!(
+                "{} states no exposure, so that no profile was printed: lamp plan speed gives \
+                 times",
+                layer.info.name()
+            );
+            return Err(Exit::Failed(silent).at(name.clone()));
+        }
+        if let Some(info) = &layer.info.stack {
+            part.clone_from(&info.part);
+        }
+        origin_mm = origin_mm.or(layer.info.origin_mm);
+        pages.push(layer.clone()).map_err(|error| Exit::from(error).at(name.clone()))?;
+        progress.layer_done();
+        Ok(layer)
+    });
+    let written = write_stack(layers, Destination::File(file.clone()), Format::Big);
+    progress.done();
+    written?;
+    let digest = digest_of_file(&file)?;
+    if folder.join(JOB).exists() {
+        return Err(refuse_second(folder, stack, &digest)?);
+    }
+    let part_pages = pages.finish().map_err(|error| Exit::from(error).at(name))?;
+    let platform = kept.platform();
+    let margin = kept.margin.unwrap_or(0.05);
+    let job = JobFile {
+        part,
+        digest,
+        origin_mm,
+        wanted,
+        at: light.at,
+        margin,
+        slowest_um_per_s: platform.slowest,
+        fastest_um_per_s: platform.fastest,
+        max_change: platform.max_change,
+    };
+    let texts = || -> anyhow::Result<()> {
+        fs::write(new.path().join(JOB), toml::to_string(&job)?)?;
+        fs::write(new.path().join(MATERIAL), material.to_toml()?)?;
+        let times = part_pages.layers().iter().map(|layer| layer.time.unwrap_or_default());
+        let times: Vec<ExposureTime> = times.collect();
+        write_profile(&part_pages, &times, &mut File::create(new.path().join(profile_name(0)))?)?;
+        Ok(())
+    };
+    texts().with_context(|| folder.display().to_string())?;
+    new.persist().map_err(|error| Exit::Failed(error.into()).at(folder.display().to_string()))?;
+    progress.say(&format!(
+        "{} is begun: print 0 has the exposures of the stack's {} layers",
+        folder.display(),
+        part_pages.layers().len()
+    ));
+    Ok(())
+}
+
+/// A folder for a job, under another name at first. If there is a job, one that is never used.
+fn new_folder_of(folder: &Path) -> Result<lamp_stack::FolderBeside, Exit> {
+    let already = folder.join(JOB).exists();
+    let unused = folder.join("begun-again");
+    new_folder(if already { &unused } else { folder }, false)
+}
+
+/// Tells why a job cannot be begun a second time.
+fn refuse_second(folder: &Path, stack: &Path, digest: &str) -> Result<Exit, Exit> {
+    let (folder, stack) = (folder.to_owned(), input_name(stack));
+    let there = read_job(&folder)?;
+    let error = if there.digest == digest {
+        anyhow!("{} is the job of {stack} already: leave out --start", folder.display())
+    } else {
+        let part = if there.part.is_empty() { "another stack" } else { &there.part };
+        anyhow!(
+            "{} is the job of {part}, whose stack is not {stack}: name another folder",
+            folder.display()
+        )
+    };
+    Ok(Exit::Failed(error))
+}
+
+fn profile_name(print: usize) -> String {
+    format!("print-{print:03}.csv")
+}
+
+fn digest_of_file(file: &Path) -> Result<String, Exit> {
+    let digest = File::open(file).and_then(digest_of);
+    Ok(digest.with_context(|| file.display().to_string())?)
+}
+
+fn read_job(folder: &Path) -> Result<JobFile, Exit> {
+    let file = folder.join(JOB);
+    let read = || -> anyhow::Result<JobFile> {
+        if !file.exists() {
+            return Err(anyhow!("there is no job: begin it with --start STACK --material M"));
+        }
+        Ok(toml::from_str(&read_text(&file, 1 << 20, "a job's file")?)?)
+    };
+    Ok(read().with_context(|| folder.display().to_string())?)
+}
+
+impl Job {
+    /// Opens a job's folder.
+    pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Self, Exit> {
+        let file = read_job(folder)?;
+        let stack = folder.join(STACK);
+        if digest_of_file(&stack)? != file.digest {
+            let text = "this is not the stack that the job was begun with: begin another job";
+            return Err(Exit::Failed(anyhow!(text)).at(stack.display().to_string()));
+        }
+        let (material, _) = read_file::<Material>(&folder.join(MATERIAL))?;
+        let light = Light::of(&material, file.at)?;
+        let mut pages = PartPages::new(file.wanted);
+        for layer in read_beside(&stack)? {
+            let place = || stack.display().to_string();
+            pages.push(layer?).map_err(|error| Exit::from(error).at(place()))?;
+        }
+        progress.done();
+        let part = pages.finish()?;
+        let material = material.name.clone();
+        let mut job =
+            Self { folder: folder.to_owned(), file, part, material, light, prints: Vec::new() };
+        while job.folder.join(profile_name(job.prints.len())).exists() {
+            let print = job.read_print(job.prints.len())?;
+            job.prints.push(print);
+        }
+        if job.prints.is_empty() {
+            let text = format!("there is no {}: begin the job again", profile_name(0));
+            return Err(Exit::Failed(anyhow!(text)).at(folder.display().to_string()));
+        }
+        Ok(job)
+    }
+
+    fn read_print(&self, number: usize) -> Result<Print, Exit> {
+        let times = self.read_column(&profile_name(number), &PROFILE, 3)?;
+        let doses = doses_name(number);
+        let log_doses = if self.folder.join(&doses).exists() {
+            self.read_column(&doses, &DOSES, 1)?
+        } else {
+            vec![0.0; times.len()]
+        };
+        let measured = self.folder.join(measured_name(number));
+        // Without a next print, what was measured was kept by a run that did not end.
+        let next = self.folder.join(profile_name(number + 1));
+        let is_learnt_from = measured.exists() && next.exists();
+        let measured = is_learnt_from.then(|| Measured::read(&measured)).transpose()?;
+        if times.iter().any(|ms| *ms <= 0.0) {
+            let text = "exposure_ms must be above zero".to_owned();
+            return Err(self.failed(&profile_name(number), anyhow!(text)));
+        }
+        Ok(Print { times: times.iter().map(|ms| ms / 1000.0).collect(), measured, log_doses })
+    }
+
+    /// Reads a number of each layer, from the light on.
+    fn read_column<const N: usize>(
+        &self,
+        name: &str,
+        columns: &'static [&'static str; N],
+        column: usize,
+    ) -> Result<Vec<f64>, Exit> {
+        let read = || -> anyhow::Result<Vec<f64>> {
+            let text = read_text(&self.folder.join(name), MAX_TABLE, "a table of times")?;
+            let rows = CsvTable::parse(&text)?.numbers(columns, column + 1)?;
+            let layers = self.part.layers();
+            let is_layer = |(row, layer): (&NumberRow<N>, &PartLayer)| {
+                row.numbers[0] == Some(f64::from(layer.index))
+            };
+            if rows.len() != layers.len() || !rows.iter().rev().zip(layers).all(is_layer) {
+                return Err(anyhow!("its layers are not those of the job's stack"));
+            }
+            Ok(rows.iter().rev().filter_map(|row| row.numbers[column]).collect())
+        };
+        read().map_err(|error| self.failed(name, error))
+    }
+
+    fn failed(&self, name: &str, error: anyhow::Error) -> Exit {
+        Exit::Failed(error).at(self.folder.join(name).display().to_string())
+    }
+
+    /// Returns the print that was measured.
+    pub(super) fn print_to_learn_from(&self, asked: Option<usize>) -> Result<usize, Exit> {
+        let last = self.prints.len() - 1;
+        let number = asked.unwrap_or(last);
+        let place = self.folder.display();
+        if number > last {
+            return Err(Exit::Failed(anyhow!(
+                "{place}: print {number} was never planned, and so not printed: the last is {last}"
+            )));
+        }
+        if number < last {
+            return Err(Exit::Failed(anyhow!(
+                "{place}: print {number} was learnt from already: print {last} is the last"
+            )));
+        }
+        Ok(number)
+    }
+
+    /// Refuses what was given for an earlier print, word for word.
+    pub(super) fn refuse_known(&self, print: usize, text: &str) -> Result<(), Exit> {
+        let same = |print: &Print| print.measured.as_ref().is_some_and(|(_, known)| known == text);
+        match self.prints.iter().position(same) {
+            Some(earlier) => Err(Exit::Failed(anyhow!(
+                "{}: these are the measurements of print {earlier}, given twice: measure print \
+                 {print}",
+                self.folder.display()
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Keeps what was measured and learnt.
+    pub(super) fn keep(&self, print: usize, text: &str, learned: &Learned) -> Result<(), Exit> {
+        let file = |name: String| self.folder.join(name);
+        if learned.log_doses.iter().any(|&log| log != 0.0) {
+            write_file(&file(doses_name(print + 1)), |out| self.write_doses(learned, out))?;
+        }
+        write_file(&file(measured_name(print)), |out| out.write_all(text.as_bytes()))?;
+        // The print is there once its times are.
+        write_file(&file(profile_name(print + 1)), |out| self.write_profile(&learned.times, out))
+    }
+
+    fn write_doses(&self, learned: &Learned, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{}", DOSES.join(","))?;
+        for (layer, log_dose) in self.part.layers().iter().zip(&learned.log_doses).rev() {
+            writeln!(out, "{},{log_dose}", layer.index)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn write_profile(&self, times: &[f64], out: &mut dyn Write) -> io::Result<()> {
+        let time = |seconds: &f64| ExposureTime::from_ms(seconds * 1000.0);
+        write_profile(&self.part, &times.iter().map(time).collect::<Vec<_>>(), out)
+    }
+
+    pub(super) fn platform(&self) -> Platform {
+        let JobFile { slowest_um_per_s, fastest_um_per_s, max_change, .. } = self.file;
+        Platform { slowest: slowest_um_per_s, fastest: fastest_um_per_s, max_change }
+    }
+
+    pub(super) fn margin(&self) -> f64 {
+        self.file.margin
+    }
+
+    pub(super) fn origin_mm(&self) -> Option<[f64; 2]> {
+        self.file.origin_mm
+    }
+}
+
+fn measured_name(print: usize) -> String {
+    format!("print-{print:03}-measured.csv")
+}
+
+fn doses_name(print: usize) -> String {
+    format!("print-{print:03}-doses.csv")
+}

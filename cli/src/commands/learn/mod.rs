@@ -1,0 +1,216 @@
+//! `lamp learn`: corrects the times of layers after every print.
+
+mod job;
+mod measured;
+mod plot;
+mod report;
+mod step;
+
+use std::num::NonZeroU8;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use lamp_planning::SampleHeight;
+use lamp_planning::learn::Law;
+use lamp_planning::speed::{Platform, Speed};
+
+use crate::exit::Exit;
+use crate::json_report::parse_report;
+use crate::memory;
+use crate::options::{Common, one_of_described, parse_memory};
+use crate::planning_options::{SAMPLE_HEIGHTS, parse_margin};
+use crate::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
+use crate::plots;
+use crate::progress::Progress;
+use crate::streams::{check_beside, print, write_file};
+
+use job::Job;
+use measured::Measured;
+use report::{lines_of, write_report};
+
+/// Correct the times of layers after every print, from what was measured
+///
+/// A job is a folder that keeps a stack, its material, and all prints: the times of each and what
+/// was measured. Begin one with a stack that has exposure times, print it, and give what you
+/// measured: the heights of faces that look down, or the wrongly cured pixels of each layer. The
+/// times for the next print are written, and whether such steps make errors smaller is told.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp learn job/ --start timed.tif --material mine.toml
+  lamp learn job/ --measured heights.csv -o next.csv
+  lamp learn job/ --measured areas.csv --law single --gain 6e-6 --plot learn.svg -o next.csv")]
+pub(crate) struct LearnArgs {
+    /// Folder of the job
+    #[arg(value_name = "JOB")]
+    job: PathBuf,
+
+    /// Begin the job with this stack, whose pages state their exposures: those of print 0
+    #[arg(long, value_name = "STACK", conflicts_with = "measured")]
+    start: Option<PathBuf>,
+
+    #[command(flatten)]
+    kept: KeptOptions,
+
+    /// What was measured on a print: x_mm, y_mm, z_mm, measured_mm and sd_um, or layer, over_px and
+    /// under_px
+    #[arg(long, value_name = "FILE.csv", requires = "output")]
+    measured: Option<PathBuf>,
+
+    /// The print that was measured: 0 is the first [default: the last]
+    #[arg(long, value_name = "N", requires = "measured")]
+    print: Option<usize>,
+
+    /// Law that turns wrong pixels into times
+    #[arg(long, value_enum, default_value = "model")]
+    law: LawName,
+
+    /// Gain of the laws single and multi, in seconds a pixel [default: 6e-6]
+    #[arg(long, value_name = "S/PX", value_parser = parse_gain)]
+    gain: Option<f64>,
+
+    /// Share of the way that measured heights move the doses
+    #[arg(long, value_name = "SHARE", default_value = "0.5", value_parser = parse_step)]
+    step: f64,
+
+    /// Write the layers' times for the next print
+    #[arg(short, long, value_name = "NEXT.csv", requires = "measured")]
+    output: Option<PathBuf>,
+
+    /// Write the errors of all prints and what is told of the next as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report, requires = "measured")]
+    report: Option<PathBuf>,
+
+    /// Plot the errors and the times of all prints: a file that ends in .svg or .png
+    #[arg(long, value_name = "FILE", requires = "measured")]
+    plot: Option<PathBuf>,
+
+    /// Memory to work in, beside the layers' edges [default: a quarter of what there is]
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
+}
+
+/// What a job is begun with, and keeps.
+#[derive(Args, Clone, Debug)]
+struct KeptOptions {
+    /// Resin: a built-in material's name (see lamp material list) or a file
+    #[arg(long, value_name = "NAME|FILE", requires = "start")]
+    material: Option<PathBuf>,
+
+    /// Lowest gray level of pixels that are wanted [default: 128]
+    #[arg(long, value_name = "LEVEL", requires = "start")]
+    wanted: Option<NonZeroU8>,
+
+    /// Where in its layer a voxel's dose is told [default: top]
+    #[arg(long, value_name = "HEIGHT", requires = "start")]
+    #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
+    at: Option<SampleHeight>,
+
+    /// How far from the critical dose plans keep voxels [default: 5%]
+    #[arg(long, value_name = "SHARE", requires = "start", value_parser = parse_margin)]
+    margin: Option<f64>,
+
+    /// Slowest and fastest speed of the platform [default: 5um/s..2mm/s]
+    #[arg(long, value_name = "A..B", requires = "start", value_parser = parse_speeds)]
+    speed: Option<(Speed, Speed)>,
+
+    /// By how much the speed may differ from that of a neighbouring layer, as 20%
+    #[arg(long, value_name = "SHARE", requires = "start", value_parser = parse_change)]
+    max_change: Option<f64>,
+}
+
+impl KeptOptions {
+    fn platform(&self) -> Platform {
+        let (slowest, fastest) = self.speed.unwrap_or(DEFAULT_SPEEDS);
+        Platform { slowest, fastest, max_change: self.max_change }
+    }
+}
+
+/// Laws of learning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LawName {
+    /// The step that the model says is best
+    Model,
+    /// Each layer by its own error
+    Single,
+    /// Each layer by the errors around and below
+    Multi,
+}
+
+impl LearnArgs {
+    fn law(&self) -> Result<Law, Exit> {
+        let gain = self.gain.unwrap_or(Law::GAIN);
+        match self.law {
+            LawName::Model if self.gain.is_some() => {
+                Err(Exit::usage("--gain is for --law single and multi: the model needs none"))
+            }
+            LawName::Model => Ok(Law::model()),
+            LawName::Single => Ok(Law::Single { gain }),
+            LawName::Multi => Ok(Law::multi(gain)),
+        }
+    }
+}
+
+pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
+    let progress = Progress::new("learn", common, true);
+    if let Some(stack) = &args.start {
+        let Some(material) = &args.kept.material else {
+            return Err(Exit::usage("--start needs the resin: give --material NAME|FILE"));
+        };
+        return job::begin(&args.job, stack, material, &args.kept, &progress);
+    }
+    let (Some(measured), Some(output)) = (&args.measured, &args.output) else {
+        return Err(Exit::usage(
+            "begin a job with --start STACK --material M, or give what was --measured",
+        ));
+    };
+    args.check_outputs(measured)?;
+    let law = args.law()?;
+    let memory = args.memory.unwrap_or_else(|| memory::available() / 4);
+    let job = Job::open(&args.job, &progress)?;
+    let print_number = job.print_to_learn_from(args.print)?;
+    let (measured, text) = Measured::read(measured)?;
+    job.refuse_known(print_number, &text)?;
+    let learned = step::learn(&job, print_number, &measured, &law, args.step, memory)?;
+    job.keep(print_number, &text, &learned)?;
+    write_file(output, |out| job.write_profile(&learned.times, out))?;
+    let job = Job::open(&args.job, &progress)?;
+    if let Some(path) = &args.report {
+        write_report(&job, print_number, &learned, path)?;
+    }
+    if let Some(path) = &args.plot {
+        let bytes = plots::drawn(&plot::plots_of(&job), path)?;
+        write_file(path, |out| out.write_all(&bytes))?;
+    }
+    print(&lines_of(&job, print_number, &learned))
+}
+
+impl LearnArgs {
+    fn check_outputs(&self, measured: &Path) -> Result<(), Exit> {
+        if let Some(plot) = &self.plot {
+            plots::check_name(plot)?;
+        }
+        let files = [&self.output, &self.report, &self.plot];
+        let files: Vec<_> = files.into_iter().flatten().collect();
+        let measured = measured.to_owned();
+        for (number, path) in files.iter().enumerate() {
+            let others = std::iter::once(&measured).chain(files[..number].iter().copied());
+            check_beside(path, Path::new("-"), others)?;
+        }
+        Ok(())
+    }
+}
+
+fn parse_gain(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(gain) if gain > 0.0 && gain < 1e3 => Ok(gain),
+        _ => Err(format!("`{text}` is not a gain in seconds a pixel: write 6e-6")),
+    }
+}
+
+fn parse_step(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(step) if step > 0.0 && step <= 2.0 => Ok(step),
+        _ => Err(format!("`{text}` is not a step above 0 and up to 2: write 0.5")),
+    }
+}

@@ -1,0 +1,103 @@
+//! Tells what was learnt, in lines and as JSON.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::job::{Job, Print};
+use super::measured::Measured;
+use super::step::Learned;
+use crate::exit::Exit;
+use crate::height_options::{significant, time_text};
+use crate::json_report::JsonReport;
+
+/// The lines that are printed.
+pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {
+    let errors: Vec<_> = job.prints.iter().filter_map(error_of).map(|(text, _)| text).collect();
+    let mut text = format!("errors of prints 0 to {print}: {}\n", errors.join(", "));
+    if let Some(rms) = rms(&learned.deeper_um) {
+        text += &format!("heights are {} um off what the model says\n", significant(rms));
+    }
+    for (share, shrink) in &learned.shrink {
+        text += &format!(
+            "with {share} times the penetration depth: spectral radius {}, norm {}\n",
+            significant(shrink.radius),
+            significant(shrink.norm)
+        );
+    }
+    if learned.shrink.iter().any(|(_, shrink)| shrink.may_grow()) {
+        text += "warning: the norm is above 1, so that errors may grow from print to print";
+        text += &match learned.safe_gain {
+            Some(gain) if gain > 0.0 => {
+                format!("; the largest safe gain is {}\n", significant(gain))
+            }
+            Some(_) => "; no gain of this law is safe\n".to_owned(),
+            None => "\n".to_owned(),
+        };
+    }
+    let total: f64 = learned.times.iter().sum();
+    text + &format!("print {}: {} of exposures\n", print + 1, time_text(total))
+}
+
+/// Writes the report.
+pub(super) fn write_report(
+    job: &Job,
+    print: usize,
+    learned: &Learned,
+    path: &Path,
+) -> Result<(), Exit> {
+    let head = json!({
+        "schema": "lamp-learn-1",
+        "material": job.material,
+        "print": print,
+        "safe_gain": learned.safe_gain,
+        "model_off_um": rms(&learned.deeper_um),
+        "exposure_s": learned.times.iter().sum::<f64>(),
+    });
+    let shrink = learned.shrink.iter().map(
+        |(share, shrink)| json!({ "depth": share, "radius": shrink.radius, "norm": shrink.norm }),
+    );
+    let prints = job.prints.iter().enumerate().map(|(number, print)| {
+        let mut value = json!({ "print": number, "exposure_s": print.times.iter().sum::<f64>() });
+        if let Some((_, error)) = error_of(print) {
+            value["error"] = error;
+        }
+        value
+    });
+    let layers = job.part.layers().iter().enumerate().rev().map(|(at, layer)| {
+        json!({
+            "layer": layer.index,
+            "z_um": layer.z.to_whole_nm().um(),
+            "exposure_ms": 1000.0 * job.prints[print].times[at],
+            "next_ms": 1000.0 * learned.times[at],
+            "log_dose": learned.log_doses[at],
+        })
+    });
+    JsonReport::new(&head)
+        .list("convergence", shrink)
+        .list("prints", prints)
+        .list("by_layer", layers)
+        .write(path)
+}
+
+/// Returns the error of a print that was measured: as text, and as JSON.
+fn error_of(print: &Print) -> Option<(String, Value)> {
+    Some(match &print.measured.as_ref()?.0 {
+        Measured::Areas(rows) => {
+            let wrong: f64 = rows.iter().map(|row| row.over + row.under).sum();
+            (format!("{wrong} pixels"), json!({ "wrong_px": wrong }))
+        }
+        Measured::Heights(rows) => {
+            let away: Vec<_> =
+                rows.iter().map(|row| 1000.0 * (row.measured_mm - row.z_mm)).collect();
+            let rms = rms(&away)?;
+            (format!("{} um", significant(rms)), json!({ "rms_um": rms }))
+        }
+    })
+}
+
+/// Returns the root of the mean square, of some numbers.
+fn rms(numbers: &[f64]) -> Option<f64> {
+    let squares: f64 = numbers.iter().map(|number| number * number).sum();
+    (!numbers.is_empty()).then(|| (squares / numbers.len() as f64).sqrt())
+}

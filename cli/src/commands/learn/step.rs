@@ -1,0 +1,157 @@
+//! Turns what was measured into the times of the next print.
+
+use anyhow::anyhow;
+use lamp_planning::learn::{
+    Convergence, Law, LogDoses, Response, convergence, face_at, heights_of, largest_safe_gain,
+};
+use lamp_planning::speed::{Simulation, SpeedOptions, plan_corrected};
+use lamp_stack::Length;
+
+use super::job::Job;
+use super::measured::{AreaRow, HeightRow, Measured};
+use crate::exit::Exit;
+
+/// How near the best plan a corrected one comes, as a share of the unplanned error.
+const GAP: f64 = 0.001;
+/// The penetration depths, as shares of the model's, for which errors are told to shrink or grow.
+const DEPTHS: [f64; 3] = [1.0, 0.7, 1.3];
+
+/// The next print, and what is known of it.
+pub(super) struct Learned {
+    /// The times in seconds, from the light on.
+    pub(super) times: Vec<f64>,
+    /// What heights have taught, from the light on.
+    pub(super) log_doses: Vec<f64>,
+    /// How errors shrink with each print, by what the penetration depth is.
+    pub(super) shrink: Vec<(f64, Convergence)>,
+    /// The largest gain with which no print's errors grow, where the law has a gain.
+    pub(super) safe_gain: Option<f64>,
+    /// By how far measured heights are below those that the model says, in micrometres.
+    pub(super) deeper_um: Vec<f64>,
+}
+
+pub(super) fn learn(
+    job: &Job,
+    print: usize,
+    measured: &Measured,
+    law: &Law,
+    step: f64,
+    memory: u64,
+) -> Result<Learned, Exit> {
+    match measured {
+        Measured::Areas(rows) => from_areas(job, print, rows, law, memory),
+        Measured::Heights(rows) => from_heights(job, print, rows, step, memory),
+    }
+}
+
+/// The errors of each layer from the light on; layers that are not told have none.
+pub(super) fn errors_by_layer(job: &Job, rows: &[AreaRow]) -> Result<Vec<f64>, Exit> {
+    let layers = job.part.layers();
+    let mut errors = vec![0.0; layers.len()];
+    for row in rows {
+        let at = layers.iter().position(|layer| layer.index == row.layer).ok_or_else(|| {
+            let [first, last] = [layers.last(), layers.first()].map(|of| of.map_or(0, |l| l.index));
+            Exit::Failed(anyhow!(
+                "line {}: there is no layer {}: the stack has layers {first} to {last}",
+                row.line,
+                row.layer
+            ))
+        })?;
+        errors[at] = row.under - row.over;
+    }
+    Ok(errors)
+}
+
+fn from_areas(
+    job: &Job,
+    print: usize,
+    rows: &[AreaRow],
+    law: &Law,
+    memory: u64,
+) -> Result<Learned, Exit> {
+    let errors = errors_by_layer(job, rows)?;
+    let now = &job.prints[print];
+    let simulation = Simulation::corrected(&job.part, &job.light, &now.log_doses, memory)?;
+    let response = Response::of(&simulation, &now.times);
+    let [low, high] = job.platform().bounds(job.part.layers())?;
+    let times = law.next(&now.times, &errors, &response, [&low, &high]);
+    let times = job.platform().nearest(job.part.layers(), &times)?;
+    let mut shrink = Vec::new();
+    for share in DEPTHS {
+        let real = response.at_depth(&job.part, &job.light, share)?;
+        shrink.push((share, convergence(law, &now.times, &errors, [&response, &real])));
+    }
+    let gain = match law {
+        Law::Single { gain } => Some(*gain),
+        Law::Multi(law) => Some(law.gain),
+        Law::Model(_) => None,
+    };
+    let safe = |gain| gain * largest_safe_gain(law, &now.times, &errors, &response);
+    Ok(Learned {
+        times,
+        log_doses: now.log_doses.clone(),
+        shrink,
+        safe_gain: gain.map(safe),
+        deeper_um: Vec::new(),
+    })
+}
+
+fn from_heights(
+    job: &Job,
+    print: usize,
+    rows: &[HeightRow],
+    step: f64,
+    memory: u64,
+) -> Result<Learned, Exit> {
+    let now = &job.prints[print];
+    let faces = rows.iter().map(|row| face_of(job, row)).collect::<Result<Vec<_>, _>>()?;
+    let simulation = Simulation::corrected(&job.part, &job.light, &now.log_doses, memory)?;
+    let mut deeper = Vec::new();
+    for (row, face) in rows.iter().zip(&faces) {
+        let expected = heights_of(&job.part, &simulation, &job.light, &now.times, &[*face]);
+        let expected = expected.map_err(|error| at_line(row, error.into()))?;
+        deeper.push((face.1, expected[0].um() - 1000.0 * row.measured_mm, row.sd_um));
+    }
+    let mut log_doses = LogDoses::known(&job.part, now.log_doses.clone());
+    log_doses.step(&deeper, &job.light, step);
+    let options = SpeedOptions {
+        light: job.light,
+        platform: job.platform(),
+        margin: job.margin(),
+        gap: GAP,
+        memory,
+    };
+    let plan = plan_corrected(&job.part, &options, log_doses.values())?;
+    let left = |share: f64| {
+        let left = (1.0 - step * share).abs();
+        (share, Convergence { radius: left, norm: left })
+    };
+    Ok(Learned {
+        times: plan.times.iter().map(|time| time.ms() / 1000.0).collect(),
+        log_doses: log_doses.values().to_vec(),
+        shrink: DEPTHS.map(left).to_vec(),
+        safe_gain: None,
+        deeper_um: deeper.iter().map(|deeper| deeper.1).collect(),
+    })
+}
+
+/// The pixel and the layer of a face that was measured.
+fn face_of(job: &Job, row: &HeightRow) -> Result<([u32; 2], usize), Exit> {
+    let silent = "the stack's pages do not state their position on the part";
+    let corner = job.origin_mm().ok_or_else(|| Exit::Failed(anyhow!(silent)))?;
+    let pitch = job.part.pitch().mm();
+    let [x, y] = row.place_mm;
+    let place = [(x - corner[0]) / pitch, (corner[1] - y) / pitch].map(f64::floor);
+    let outside =
+        place.iter().zip(job.part.size()).any(|(at, size)| !(0.0..f64::from(size)).contains(at));
+    if outside {
+        return Err(at_line(row, anyhow!("the place {x}, {y} mm is outside the images")));
+    }
+    let pixel = place.map(|at| at as u32);
+    let face = face_at(&job.part, pixel, Length::from_mm(row.z_mm));
+    face.map(|layer| (pixel, layer)).map_err(|error| at_line(row, error.into()))
+}
+
+fn at_line(row: &HeightRow, error: anyhow::Error) -> Exit {
+    Exit::Failed(error).at(format!("line {}, z {} mm", row.line, row.z_mm))
+}

@@ -1,0 +1,179 @@
+//! `lamp plan speed`: chooses the time of each layer.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::speed::{PartError, PartPages, PlanError, SpeedOptions, TimedPart, plan};
+use lamp_stack::Layer;
+
+use super::speed_plot::plots_of;
+use super::speed_report::{Planned, lines_of, write_report};
+use crate::exit::Exit;
+use crate::json_report::parse_report;
+use crate::kept_stack::KeptStack;
+use crate::memory;
+use crate::options::{Common, Input, Output, parse_memory};
+use crate::planning_options::PlanningOptions;
+use crate::platform_options::PlatformOptions;
+use crate::plots;
+use crate::progress::Progress;
+use crate::streams::{
+    check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, write_file,
+    write_layers,
+};
+
+/// Choose the time of each layer, and so the speed of the platform
+///
+/// Light that cures a layer also cures below and beside it. The images stay as they are; each
+/// layer gets the time with which as few voxels as possible are cured wrongly, within what the
+/// platform can do. What the best plan could do is bounded, and told. Pages must state thickness
+/// and resolution.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp plan speed part.tif --material mine.toml -o timed.tif --profile speed.csv
+  lamp plan speed part.tif --material pegda-sudan --max-change 20% --plot plan.svg -o timed.tif
+  slice part.stl | lamp plan speed --material mine.toml --profile speed.csv | tile > build.tif")]
+pub(super) struct SpeedArgs {
+    #[command(flatten)]
+    input: Input,
+
+    #[command(flatten)]
+    planning: PlanningOptions,
+
+    #[command(flatten)]
+    platform: PlatformOptions,
+
+    /// Write the height, thickness, exposure time and platform speed of each layer
+    #[arg(long, value_name = "FILE.csv")]
+    profile: Option<PathBuf>,
+
+    /// Write what the plan reaches, by layer, as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    report: Option<PathBuf>,
+
+    /// Plot wrong voxels and times by layer, doses, counts at 5% less and more light, and how the
+    /// search went: a file that ends in .svg or .png
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+
+    /// Memory to work in, beside the layers' edges; with less, the search sees fewer pixels
+    /// [default: a quarter of what there is, as far as it helps]
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
+    args.check_outputs()?;
+    let (material, light) = args.planning.light()?;
+    let options = SpeedOptions {
+        light,
+        platform: args.platform.platform(),
+        margin: args.planning.margin,
+        gap: args.planning.gap,
+        memory: args.memory.unwrap_or_else(|| memory::available() / 4),
+    };
+    let progress = progress("plan", common, &args.output);
+    let mut stack = KeptStack::new(&args.input.stack);
+    let name = input_name(&args.input.stack);
+    let part = args.part(&mut stack, &progress)?;
+    let plan = plan(&part, &options).map_err(|error: PlanError| Exit::from(error).at(name))?;
+    let planned = Planned { material: &material.name, part: &part, plan: &plan };
+    args.write(&mut stack, &planned, &progress)?;
+    for line in lines_of(&planned) {
+        progress.say(&line);
+    }
+    if let Some(path) = &args.profile {
+        write_file(path, |out| write_profile(&part, &plan.times, out))?;
+    }
+    if let Some(path) = &args.report {
+        write_report(&planned, args.planning.margin, path)?;
+    }
+    if let Some(path) = &args.plot {
+        let bytes = plots::drawn(&plots_of(&planned), path)?;
+        write_file(path, |out| out.write_all(&bytes))?;
+    }
+    Ok(())
+}
+
+impl SpeedArgs {
+    fn check_outputs(&self) -> Result<(), Exit> {
+        if let Some(plot) = &self.plot {
+            plots::check_name(plot)?;
+        }
+        let beside = [&self.profile, &self.report, &self.plot];
+        let beside: Vec<_> = beside.into_iter().flatten().collect();
+        for (number, path) in beside.iter().enumerate() {
+            let inputs = [&self.input.stack, &self.planning.material].into_iter();
+            let others = inputs.chain(beside[..number].iter().copied());
+            check_beside(path, &self.output.output, others)?;
+        }
+        check_not_input(&self.output.output, [&self.planning.material])
+    }
+
+    fn part(&self, stack: &mut KeptStack, progress: &Progress) -> Result<TimedPart, Exit> {
+        let name = || input_name(&self.input.stack);
+        let mut pages = PartPages::new(self.planning.wanted.get());
+        for layer in layers_of_input(stack.pages(true)?, &self.input, progress) {
+            pages.push(layer?).map_err(|error: PartError| Exit::from(error).at(name()))?;
+        }
+        pages.finish().map_err(|error| Exit::from(error).at(name()))
+    }
+
+    fn write(
+        &self,
+        stack: &mut KeptStack,
+        planned: &Planned<'_>,
+        progress: &Progress,
+    ) -> Result<(), Exit> {
+        let command = self.command(planned.material);
+        let layers = layers_of(stack.pages(false)?, &self.input.stack, self.input.layers.clone());
+        // Times count from the light.
+        let timed = layers.zip(planned.plan.times.iter().rev()).map(|(layer, time)| {
+            let mut layer: Layer = layer?;
+            layer.info.exposure_ms = Some(rounded(*time));
+            if let Some(stack) = &mut layer.info.stack {
+                stack.commands.push(command.clone());
+            }
+            Ok(layer)
+        });
+        write_layers(timed, &self.output, progress)
+    }
+
+    /// The command, as pages record it.
+    fn command(&self, material: &str) -> String {
+        let PlanningOptions { wanted, margin, gap, at, .. } = &self.planning;
+        format!(
+            "lamp plan speed --material {material} --wanted {wanted} --margin {}% --gap {}% --at \
+             {at}{}",
+            100.0 * margin,
+            100.0 * gap,
+            self.platform.words()
+        )
+    }
+}
+
+/// Returns a time in milliseconds, rounded to the microsecond.
+pub(crate) fn rounded(time: ExposureTime) -> f64 {
+    (time.ms() * 1000.0).round() / 1000.0
+}
+
+/// Writes the layers' times, bottom first.
+pub(crate) fn write_profile(
+    part: &TimedPart,
+    times: &[ExposureTime],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    writeln!(out, "layer,z_um,thickness_um,exposure_ms,speed_um_per_s")?;
+    for (layer, time) in part.layers().iter().zip(times).rev() {
+        let [z_um, um] = [layer.z, layer.thickness].map(|length| length.to_whole_nm().um());
+        let ms = rounded(*time);
+        writeln!(out, "{},{z_um},{um},{ms},{:.3}", layer.index, 1000.0 * um / ms)?;
+    }
+    Ok(())
+}

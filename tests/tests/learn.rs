@@ -1,0 +1,180 @@
+//! Checks what `lamp learn` makes of measured prints.
+
+use lamp_fixtures::cavity_staircase;
+use lamp_tests::Scratch;
+use serde_json::Value;
+
+const PLAN: &str = "lamp plan speed stairs.tif --material pegda-sudan --gap 5% -q -o timed.tif";
+
+/// A folder with a job of the staircase.
+fn with_job() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.stack("stairs.tif", cavity_staircase(1).layers());
+    scratch.run(PLAN).succeeds();
+    scratch.run("lamp learn job/ --start timed.tif --material pegda-sudan -q").succeeds();
+    scratch
+}
+
+/// The times of a profile, bottom first.
+fn times(scratch: &Scratch, name: &str) -> Vec<f64> {
+    let text = String::from_utf8(scratch.bytes(name)).unwrap();
+    text.lines().skip(1).map(|row| row.split(',').nth(3).unwrap().parse().unwrap()).collect()
+}
+
+fn areas(over: impl Fn(u32) -> u32, under: impl Fn(u32) -> u32) -> String {
+    let rows = (0..60).map(|layer| format!("{layer},{},{}\n", over(layer), under(layer)));
+    "layer,over_px,under_px\n".to_owned() + &rows.collect::<String>()
+}
+
+#[test]
+fn a_job_keeps_every_print() {
+    let scratch = with_job();
+    let planned: Vec<_> =
+        scratch.layers("timed.tif").iter().map(|layer| layer.info.exposure_ms.unwrap()).collect();
+    assert_eq!(times(&scratch, "job/print-000.csv"), planned);
+    // Eq. 3.5: each time changes by the gain for each pixel.
+    let table = areas(|layer| if layer == 30 { 1000 } else { 0 }, |layer| 100 * (layer % 2));
+    scratch.write("a.csv", table.as_bytes());
+    let line = "lamp learn job/ --measured a.csv --law single --gain 2e-6 -o next.csv \
+                --report learn.json --plot learn.svg";
+    let said = String::from_utf8(scratch.run(line).succeeds().stdout).unwrap();
+    assert!(said.contains("errors of prints 0 to 0: 4000 pixels"), "{said}");
+    let next = times(&scratch, "next.csv");
+    assert_eq!(next, times(&scratch, "job/print-001.csv"));
+    for (layer, (next, was)) in next.iter().zip(&planned).enumerate() {
+        let error = if layer == 30 { -1000.0 } else { f64::from(100 * (layer as u32 % 2)) };
+        let expected = (was + 1000.0 * 2e-6 * error).max(50.0);
+        assert!((next - expected).abs() < 2e-3, "{layer}: {next} {expected}");
+    }
+    let report: Value = serde_json::from_slice(&scratch.bytes("learn.json")).unwrap();
+    assert_eq!(report["prints"][0]["error"]["wrong_px"], 4000.0);
+    assert_eq!(report["convergence"].as_array().unwrap().len(), 3);
+    let plot = String::from_utf8(scratch.bytes("learn.svg")).unwrap();
+    assert!(plot.contains("Pixels to cure in each layer") && plot.contains("print 1"));
+    // The same table is not that of the next print.
+    scratch
+        .run("lamp learn job/ --measured a.csv -o next.csv")
+        .is_refused_with(&["given twice: measure print 1"]);
+    scratch.write("b.csv", areas(|_| 20, |_| 0).as_bytes());
+    scratch.run("lamp learn job/ --measured b.csv --print 1 -o last.csv").succeeds();
+    let last = times(&scratch, "last.csv");
+    assert!(last.iter().sum::<f64>() < next.iter().sum());
+    for law in ["multi", "model"] {
+        let line = format!("lamp learn job/ --measured c.csv --law {law} -o last.csv");
+        scratch.write("c.csv", format!("# {law}\n{}", areas(|_| 20, |layer| layer)).as_bytes());
+        scratch.run(&line).succeeds();
+    }
+}
+
+#[test]
+fn a_gain_that_is_too_large_names_a_safe_one() {
+    let scratch = with_job();
+    scratch.write("a.csv", areas(|_| 50, |_| 0).as_bytes());
+    let line = "lamp learn job/ --measured a.csv --law single --gain 1 -o next.csv";
+    let said = String::from_utf8(scratch.run(line).succeeds().stdout).unwrap();
+    assert!(said.contains("warning: the norm is above 1"), "{said}");
+    assert!(said.contains("the largest safe gain is"), "{said}");
+}
+
+#[test]
+fn heights_that_are_too_low_shorten_times() {
+    let scratch = with_job();
+    // The corner of the part in its frame is 0.5 mm off, and layers are 0.1 mm.
+    let heights = "x_mm,y_mm,z_mm,measured_mm,sd_um\n\
+                   2.05,0.75,1.5,1.0,20\n3.05,0.75,3.0,2.5,20\n4.05,0.75,4.5,4.0,\n2.05,1.55,5.2,4.7,20\n";
+    scratch.write("heights.csv", heights.as_bytes());
+    let said =
+        scratch.run("lamp learn job/ --measured heights.csv -o next.csv --plot h.svg").succeeds();
+    let said = String::from_utf8(said.stdout).unwrap();
+    assert!(said.contains("errors of prints 0 to 0: 500 um"), "{said}");
+    let [was, next] = ["job/print-000.csv", "next.csv"].map(|name| times(&scratch, name));
+    assert!(next.iter().sum::<f64>() < 0.95 * was.iter().sum::<f64>());
+    assert!(scratch.names().contains(&"h.svg".to_owned()));
+    let doses = String::from_utf8(scratch.bytes("job/print-001-doses.csv")).unwrap();
+    assert!(doses.starts_with("layer,log_dose\n") && doses.lines().count() == 61);
+}
+
+#[test]
+fn what_teaches_nothing_is_refused_and_changes_nothing() {
+    let scratch = with_job();
+    let names = || {
+        let mut names: Vec<_> = std::fs::read_dir(scratch.path("job"))
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    };
+    let before = names();
+    for (table, text) in [
+        (
+            "layer,over_px,under_px\n70,1,0\n",
+            "line 2: there is no layer 70: the stack has layers 0 to 59",
+        ),
+        ("layer,over_px,under_px\n7,1,0\n8,0,0\n7,0,3\n", "line 4: layer 7 stands in line 2, too"),
+        ("layer,over_px,under_px\n7,x,0\n", "line 2, column over_px: `x` is not a number"),
+        ("layer,over_px,under_px\n7,,0\n", "line 2, column over_px: `` is not a number"),
+        ("layer,over_px,under_px\n7,-1,0\n", "line 2: there are no fewer than 0 wrong pixels"),
+        ("layer,over_px,under_px\n7.5,1,0\n", "line 2, column layer: 7.5 is not a layer"),
+        ("layer,over_px,under_px\n", "there are no measurements below the header"),
+        ("layer,over_px\n1,2\n", "there is no column under_px"),
+        ("", "the file is empty"),
+        (
+            "x_mm,y_mm,z_mm,measured_mm\n2.05,0.75,1.6,1\n",
+            "line 2, z 1.6 mm: the part has no face there",
+        ),
+        (
+            "x_mm,y_mm,z_mm,measured_mm\n99,0.75,1.5,1\n",
+            "the place 99, 0.75 mm is outside the images",
+        ),
+        ("x_mm,y_mm,z_mm,measured_mm\n1,1,1,NaN\n", "column measured_mm: `NaN` is not a number"),
+        (
+            "x_mm,y_mm,z_mm,measured_mm\n2.05,0.75,1.5,1\n2.05,0.75,1.5,1.2\n",
+            "line 3: this place was measured in line 2, too",
+        ),
+        ("x_mm,y_mm,z_mm,measured_mm,sd_um\n2.05,0.75,1.5,1,0\n", "0 is not above zero"),
+    ] {
+        scratch.write("bad.csv", table.as_bytes());
+        scratch.run("lamp learn job/ --measured bad.csv -o next.csv").is_refused_with(&[text]);
+    }
+    scratch.write("good.csv", areas(|_| 1, |_| 0).as_bytes());
+    for (line, text) in [
+        (
+            "job/ --measured good.csv --print 3 -o next.csv",
+            "print 3 was never planned, and so not printed",
+        ),
+        ("none/ --measured good.csv -o next.csv", "there is no job: begin it with --start"),
+        ("job/ --start timed.tif --material pegda-sudan", "is the job of timed.tif already"),
+        (
+            "new/ --start stairs.tif --material pegda-sudan",
+            "states no exposure, so that no profile was printed",
+        ),
+        ("new/ --start timed.tif --material pegda-mw700", "[spread]"),
+    ] {
+        scratch.run(&format!("lamp learn {line}")).is_refused_with(&[text]);
+    }
+    for line in [
+        "job/",
+        "job/ --measured good.csv",
+        "new/ --start timed.tif",
+        "job/ --measured good.csv --gain 1 -o n.csv",
+    ] {
+        scratch.run(&format!("lamp learn {line}")).is_wrong_usage(&[]);
+    }
+    assert_eq!(names(), before);
+    assert!(!scratch.names().contains(&"next.csv".to_owned()));
+    assert!(!scratch.names().contains(&"new".to_owned()));
+}
+
+#[test]
+fn a_job_is_of_one_stack() {
+    let scratch = with_job();
+    scratch.run("lamp plan speed stairs.tif --material pegda-sudan --gap 5% --layers 0..30 -q -o half.tif").succeeds();
+    let other = scratch.run("lamp learn job/ --start half.tif --material pegda-sudan");
+    other.is_refused_with(&["whose stack is not half.tif: name another folder"]);
+    scratch.write("good.csv", areas(|_| 1, |_| 0).as_bytes());
+    std::fs::copy(scratch.path("half.tif"), scratch.path("job/stack.tif")).unwrap();
+    scratch
+        .run("lamp learn job/ --measured good.csv -o next.csv")
+        .is_refused_with(&["this is not the stack that the job was begun with"]);
+}
