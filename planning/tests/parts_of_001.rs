@@ -1,0 +1,211 @@
+//! The helix and the slope of 001, planned, with its numbers and those of others' rules.
+
+use lamp_fixtures::{HELIX_CURED, Voxels, dna_helix, overhang_slope};
+use lamp_grayscale::resin::{Dose, Intensity};
+use lamp_planning::solver::{Operator, Shape};
+use lamp_planning::voxels::{
+    LayerOutcome, Objective, Options, Outcome, PlanError, Sources, Window, plan,
+};
+use lamp_planning::{Blur, IntensityOf, LayerLight, Light, SampleHeight};
+use lamp_stack::Length;
+
+/// A part and its light. Layers count from the light.
+struct Case {
+    part: Voxels,
+    /// Light that passes a layer is 10 to the minus this.
+    fade: f64,
+    sigma: f64,
+    /// The dose that cures, where a lit pixel alone has 1.
+    critical: f64,
+}
+
+impl Case {
+    /// 001's voxels of 11.2 um are taken 5 at a time.
+    fn helix() -> Self {
+        let case = Self { part: dna_helix(), fade: 5.0 * 0.008, sigma: 2.6, critical: 1.0 };
+        let mut doses = case.doses(&case.white());
+        doses.sort_by(f64::total_cmp);
+        Self { critical: doses[doses.len() - HELIX_CURED], ..case }
+    }
+
+    /// White light cures 19.1e-2 mm2 under the slope.
+    fn slope(sigma: f64) -> Self {
+        let case = Self { part: overhang_slope(), fade: 0.008, sigma, critical: 1.0 };
+        let mut doses = case.under_the_slope(&case.doses(&case.white()));
+        doses.sort_by(f64::total_cmp);
+        let voxels = (19.1e-2 / case.voxel_mm2()).round() as usize;
+        Self { critical: doses[doses.len() - voxels], ..case }
+    }
+
+    fn voxel_mm2(&self) -> f64 {
+        self.part.pitch().mm() * self.part.thickness().mm()
+    }
+
+    /// Returns the doses of voxels that are not wanted, from the slab's underside down.
+    fn under_the_slope(&self, doses: &[f64]) -> Vec<f64> {
+        let places = doses.iter().enumerate().filter(|(voxel, _)| {
+            let (layer, column) = (voxel / 225, voxel % 225);
+            layer >= 20 && column >= 105 && !self.holds(*voxel)
+        });
+        places.map(|(_, &dose)| dose).collect()
+    }
+
+    fn holds(&self, voxel: usize) -> bool {
+        let [width, height, layers] = self.part.size();
+        let (layer, place) = (voxel / (width * height), voxel % (width * height));
+        self.part.holds([place % width, place / width, layers - 1 - layer])
+    }
+
+    fn white(&self) -> Vec<f64> {
+        let voxels: usize = self.part.size().iter().product();
+        (0..voxels).map(|voxel| f64::from(u8::from(self.holds(voxel)))).collect()
+    }
+
+    /// Returns the doses that light makes, without padding.
+    fn doses(&self, light: &[f64]) -> Vec<f64> {
+        let [width, height, layers] = self.part.size();
+        let shape = Shape::holding(layers, height, width);
+        let of_layer = LayerLight { passed: 10_f64.powf(-self.fade), own: 1.0 / self.critical };
+        let operator = Operator::<f64>::new(shape, Blur::new(self.sigma), vec![of_layer; layers]);
+        let mut padded = vec![0.0; shape.voxels()];
+        for (line, light) in padded.chunks_exact_mut(shape.width).zip(light.chunks_exact(width)) {
+            line[..width].copy_from_slice(light);
+        }
+        let mut doses = padded.clone();
+        operator.doses(&padded, &mut doses);
+        doses.chunks_exact(shape.width).flat_map(|line| &line[..width]).copied().collect()
+    }
+
+    fn overcured(&self, light: &[f64]) -> f64 {
+        let doses = self.doses(light);
+        let is_over = |&(voxel, &dose): &(usize, &f64)| dose >= 1.0 && !self.holds(voxel);
+        doses.iter().enumerate().filter(is_over).count() as f64
+    }
+
+    fn plan(&self, options: &Options) -> Outcome {
+        let light = Light {
+            intensity: Intensity::from_mw_per_cm2(1.0),
+            intensity_of: IntensityOf::Pixel(self.part.pitch()),
+            critical_dose: Dose::from_mj_per_cm2(self.critical),
+            penetration_depth: Length::from_um(
+                self.part.thickness().um() / (self.fade * std::f64::consts::LN_10),
+            ),
+            spread: Length::from_um(self.sigma * self.part.pitch().um()),
+            gamma: 2.404,
+            at: SampleHeight::Top,
+        };
+        let layers = self.part.layers().map(|mut layer| {
+            layer.info.exposure_ms = Some(1000.0);
+            Ok::<_, PlanError>(layer)
+        });
+        let options = Options { around: Some(0), ..*options };
+        let mut planned = plan(layers, &light, &options, |_| {}).unwrap();
+        planned.by_ref().for_each(|layer| drop(layer.unwrap()));
+        planned.outcome()
+    }
+}
+
+/// Returns by how many percent overcured voxels, and the cured volume, become fewer.
+fn percent_less(part: &Voxels, outcome: &Outcome) -> [f64; 2] {
+    let less = |before: f64, after: f64| 100.0 * (1.0 - after / before);
+    let [before, after] = [outcome.before.counts, outcome.after.counts];
+    let over = less(before.overcured as f64, after.overcured as f64);
+    let volume = [before, after]
+        .map(|counts| part.count() as f64 + counts.overcured as f64 - counts.undercured as f64);
+    [over, less(volume[0], volume[1])]
+}
+
+fn share_lost(outcome: &Outcome) -> f64 {
+    let targets: u64 = outcome.layers.iter().map(|layer| layer.targets).sum();
+    outcome.after.counts.lost as f64 / targets as f64
+}
+
+#[test]
+fn the_helix_loses_overcured_voxels_as_in_001() {
+    let helix = Case::helix();
+    let boundary = |sources| {
+        let options =
+            Options { objective: Objective::Boundary, sources, gap: 3e-3, ..Options::default() };
+        let outcome = helix.plan(&options);
+        assert!(outcome.bound <= outcome.after.cost);
+        assert!(share_lost(&outcome) < 0.025, "{:?}", outcome.after.counts);
+        percent_less(&helix.part, &outcome)
+    };
+    let [over, volume] = boundary(Sources::Shell(1));
+    assert!((over - 24.2).abs() < 2.0 && (volume - 11.6).abs() < 2.0, "{over} {volume}");
+    let [over, _] = boundary(Sources::Lit);
+    assert!(over >= 93.0, "{over}");
+}
+
+#[test]
+fn nearly_nothing_of_the_helix_is_wrong_in_the_end() {
+    let helix = Case::helix();
+    let outcome = helix.plan(&Options::default());
+    let [over, _] = percent_less(&helix.part, &outcome);
+    assert!(over >= 98.0, "{over}");
+    assert!(share_lost(&outcome) <= 0.02, "{:?}", outcome.after.counts);
+    assert!(outcome.bound <= outcome.after.cost && outcome.gap() <= 1.2e-3, "{}", outcome.gap());
+}
+
+/// What users of UVtools do against light from above: they dim pixels by the number of lit layers
+/// above, or light them above some lit layers only.
+#[test]
+fn rules_of_thumb_leave_most_overcured_voxels() {
+    let helix = Case::helix();
+    let white = helix.white();
+    let [width, height, _] = helix.part.size();
+    let plane = width * height;
+    let before = helix.overcured(&white);
+    let percent_less = |light: Vec<f64>| 100.0 * (1.0 - helix.overcured(&light) / before);
+    let is_lit = |voxel: usize| white[voxel] > 0.0;
+
+    let dimmed = |voxel: usize| {
+        let above = [25.0, 15.0, 10.0, 5.0].into_iter().zip(1..);
+        let above = above.filter(|&(_, up)| voxel >= up * plane && is_lit(voxel - up * plane));
+        let level = 255.0 - above.map(|(by, _)| by).sum::<f64>();
+        white[voxel] * level / 255.0
+    };
+    let less = percent_less((0..white.len()).map(dimmed).collect());
+    assert!((less - 13.0).abs() < 2.0, "{less}");
+
+    // What lies below the part counts as lit: it is the platform.
+    let below =
+        |voxel: usize, down: usize| white.get(voxel + down * plane).is_none_or(|&w| w > 0.0);
+    let above_five =
+        |voxel: usize| white[voxel] * f64::from(u8::from((1..=5).all(|down| below(voxel, down))));
+    let less = percent_less((0..white.len()).map(above_five).collect());
+    assert!((less - 46.0).abs() < 2.0, "{less}");
+}
+
+#[test]
+fn the_slope_is_cured_as_it_should_be() {
+    let slope = Case::slope(13.0);
+    let cured = |doses: Vec<f64>| doses.into_iter().filter(|&dose| dose >= 1.0).count() as f64;
+    let under = cured(slope.under_the_slope(&slope.doses(&slope.white())));
+    assert!((under * slope.voxel_mm2() - 19.1e-2).abs() < 3e-4);
+
+    let options = Options { objective: Objective::Boundary, gap: 5e-3, ..Options::default() };
+    let outcome = slope.plan(&options);
+    let over = outcome.after.counts.overcured as f64 * slope.voxel_mm2();
+    assert!(over <= 1e-2, "{over}");
+    assert!(share_lost(&outcome) < 0.01, "{:?}", outcome.after.counts);
+}
+
+#[test]
+fn windows_are_nearly_as_good_as_the_whole_and_show_no_seams() {
+    for slope in [Case::slope(4.0), Case::slope(13.0)] {
+        let plan_in = |settled, ahead| {
+            let window = Some(Window { settled, ahead });
+            slope.plan(&Options { margin: 0.0, window, gap: 2e-4, ..Options::default() })
+        };
+        let (whole, windows) = (plan_in(80, 0), plan_in(15, 15));
+        let worse = (windows.after.cost - whole.bound) / whole.before.cost;
+        assert!(worse < 1e-3, "{worse}");
+        assert!(windows.bound <= whole.after.cost, "{} {}", windows.bound, whole.after.cost);
+        // A seam would be a layer with far more wrong voxels than the whole plan has there.
+        for (windows, whole) in windows.layers.iter().zip(&whole.layers) {
+            let wrong = |of: &LayerOutcome| of.after.overcured + of.after.undercured;
+            assert!(wrong(windows) <= wrong(whole) + 3, "{windows:?} {whole:?}");
+        }
+    }
+}
