@@ -9,6 +9,7 @@ mod blur;
 mod doses;
 pub mod learn;
 mod light;
+mod region;
 mod resin_light;
 mod section;
 pub mod solver;
@@ -20,5 +21,6 @@ mod wide;
 
 pub use blur::{Blur, Real};
 pub use light::{IntensityOf, LayerLight, LayerTime, Light, LightError, SampleHeight};
+pub use region::RegionDoses;
 pub use resin_light::NoLight;
 pub use section::DoseSection;

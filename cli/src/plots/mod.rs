@@ -2,6 +2,7 @@
 
 mod axis_scale;
 mod caption;
+mod dose_map;
 mod layout;
 mod sphere;
 
@@ -18,6 +19,7 @@ use plotters::style::{FontStyle, register_font};
 use axis_scale::AxisScale;
 
 pub(crate) use caption::{CAPTION_HEIGHT, caption};
+pub(crate) use dose_map::{DoseMap, dose_map};
 pub(crate) use layout::layout_picture;
 pub(crate) use sphere::sphere_picture;
 

@@ -1,5 +1,6 @@
 //! `lamp plan`: chooses exposures from the doses of all layers together.
 
+mod layer_map;
 mod speed;
 mod speed_plot;
 mod speed_report;

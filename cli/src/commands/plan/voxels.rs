@@ -7,6 +7,7 @@ use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::voxels::{Objective, Options, Outcome, PlanError, PlannedStack, Sources, plan};
 use lamp_stack::Layer;
 
+use super::layer_map::{LayerMap, MapOptions};
 use super::voxels_plot::plots_of;
 use super::voxels_report::{Planned, lines_of, write_report};
 use crate::exit::Exit;
@@ -73,6 +74,9 @@ pub(super) struct VoxelsArgs {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
+    #[command(flatten)]
+    map: MapOptions,
+
     /// Fail (status 3) and write no stack if white light cannot cure all wanted voxels
     #[arg(long)]
     strict: bool,
@@ -118,9 +122,10 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     let command = args.command(&material.name);
     let progress = progress("plan", common, &args.output);
     let layers = read_layers(&args.input, &progress)?;
+    let mut map = LayerMap::new(&args.map, light, args.planning.wanted.get());
     let layers = layers.map(|layer| Ok(args.prepared(layer?, &command)));
     let mut settled = 0;
-    let planned = plan(layers, &light, &args.options(), |layers| {
+    let planned = plan(seen_by(&mut map, layers), &light, &args.options(), |layers| {
         (settled..layers).for_each(|_| progress.layer_done());
         settled = layers;
     });
@@ -129,7 +134,7 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     let outcome = planned.outcome();
     let writing = Progress::new("plan", common, true);
     writing.expect(outcome.layers.len() as u64);
-    let written = args.write(&mut planned, &outcome, &writing);
+    let written = args.write(&mut planned, &mut map, &outcome, &writing);
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }
@@ -149,18 +154,35 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
         let bytes = plots::drawn(&plots_of(&planned), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
     }
+    if let Some((path, bytes)) = map.drawn()? {
+        write_file(path, |out| out.write_all(&bytes))?;
+    }
     written
+}
+
+/// Passes a part's layers on, and shows them to a map.
+fn seen_by(
+    map: &mut LayerMap<'_>,
+    mut layers: impl Iterator<Item = Result<Layer, Exit>>,
+) -> impl Iterator<Item = Result<Layer, Exit>> {
+    std::iter::from_fn(move || match layers.next() {
+        Some(layer) => Some(layer.and_then(|layer| map.before(&layer).map(|()| layer))),
+        None => map.check().err().map(Err),
+    })
 }
 
 impl VoxelsArgs {
     fn check_outputs(&self) -> Result<(), Exit> {
-        let inputs = || [&self.input.stack, &self.planning.material];
-        if let Some(plot) = &self.plot {
-            plots::check_name(plot)?;
-            check_beside(plot, &self.output.output, inputs().into_iter().chain(&self.report))?;
+        for picture in self.plot.iter().chain(&self.map.map) {
+            plots::check_name(picture)?;
         }
-        if let Some(report) = &self.report {
-            check_beside(report, &self.output.output, inputs())?;
+        let beside = || self.report.iter().chain(&self.plot).chain(&self.map.map);
+        for (number, path) in beside().enumerate() {
+            let inputs = [&self.input.stack, &self.planning.material];
+            check_beside(path, &self.output.output, inputs)?;
+            if beside().take(number).any(|other| other == path) {
+                return Err(Exit::usage(format!("{}: named twice", path.display())));
+            }
         }
         check_not_input(&self.output.output, [&self.planning.material])
     }
@@ -221,10 +243,12 @@ impl VoxelsArgs {
     fn write(
         &self,
         planned: &mut PlannedStack,
+        map: &mut LayerMap<'_>,
         outcome: &Outcome,
         progress: &Progress,
     ) -> Result<(), Exit> {
         let layers = planned.by_ref().map(|layer| layer.map_err(Exit::from));
+        let layers = layers.inspect(|layer| layer.iter().for_each(|layer| map.after(layer)));
         let finding = || {
             let uncurable = outcome.uncurable();
             let found = self.strict && uncurable > 0;
