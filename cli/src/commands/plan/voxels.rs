@@ -61,6 +61,10 @@ pub(super) struct VoxelsArgs {
     #[arg(long, value_name = "WALL", value_parser = parse_wall)]
     keep: Option<u32>,
 
+    /// Count so many voxels around the images, too, as 0px [default: as far as light spreads]
+    #[arg(long, value_name = "PIXELS", value_parser = parse_around)]
+    around: Option<u32>,
+
     /// Exposure time of pages that state none
     #[arg(long, value_name = "TIME", value_parser = parse_exposure)]
     exposure: Option<ExposureTime>,
@@ -106,6 +110,12 @@ fn parse_sources(text: &str) -> Result<Sources, String> {
 fn parse_wall(text: &str) -> Result<u32, String> {
     let pixels = text.strip_prefix("wall:").and_then(parse_pixels);
     pixels.ok_or_else(|| format!("`{text}` is not a wall: write wall:3px"))
+}
+
+fn parse_around(text: &str) -> Result<u32, String> {
+    let none = (text == "0px").then_some(0);
+    let wrong = || format!("`{text}` is not a number of pixels: write 0px to 1000px");
+    none.or_else(|| parse_pixels(text)).ok_or_else(wrong)
 }
 
 fn parse_exposure(text: &str) -> Result<ExposureTime, String> {
@@ -196,6 +206,7 @@ impl VoxelsArgs {
             min_level: self.min_level,
             keep_wall: self.keep.unwrap_or(0),
             gap: self.planning.gap,
+            around: self.around,
             ..Options::default()
         }
     }
@@ -220,6 +231,9 @@ impl VoxelsArgs {
         }
         if let Some(wall) = self.keep {
             command += &format!(" --keep wall:{wall}px");
+        }
+        if let Some(around) = self.around {
+            command += &format!(" --around {around}px");
         }
         command
     }
