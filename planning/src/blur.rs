@@ -58,7 +58,7 @@ real!(f32, f64);
 const FAINTEST: f64 = 1e-5;
 
 /// Columns that are summed up together. The width of images is a multiple of it.
-pub(crate) const LANES: usize = 16;
+pub(crate) const LANES: usize = 32;
 
 /// A Gaussian of standard deviation σ, cut off where it is a hundred-thousandth of its peak.
 ///
@@ -107,7 +107,7 @@ impl<T: Real> Blur<T> {
     }
 
     /// Spreads the light of an image given row by row, with black around it. `width` must be a
-    /// multiple of 16. `room` is working space, whose content is of no matter.
+    /// multiple of 32. `room` is working space, whose content is of no matter.
     ///
     /// # Panics
     /// Panics if the images are not equally large, or no whole number of rows.
@@ -178,7 +178,7 @@ fn around<T: Real>(taps: &[T], from: &[T], centre: usize, step: usize) -> [T; LA
     sums
 }
 
-/// Some chunks of 16 pixels of an image, and a Gaussian among them: all other pixels are black.
+/// Some chunks of 32 pixels of an image, and a Gaussian among them: all other pixels are black.
 #[derive(Clone, Debug)]
 pub(crate) struct Chunks<T> {
     blur: Blur<T>,

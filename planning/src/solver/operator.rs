@@ -7,7 +7,7 @@ use crate::wide::wide;
 
 /// The doses of a block of voxels from the light of its pixels, without matrices.
 ///
-/// Voxels stand layer by layer from the light, each row by row; or only some chunks of 16 of
+/// Voxels stand layer by layer from the light, each row by row; or only some chunks of 32 of
 /// each layer, the same in all. A layer whose own light is 0 costs little.
 ///
 /// ```
@@ -15,12 +15,12 @@ use crate::wide::wide;
 /// use lamp_planning::{Blur, LayerLight};
 ///
 /// let layers = vec![LayerLight { passed: 0.5, own: 2.0 }; 3];
-/// let shape = Shape { layers: 3, rows: 1, width: 16 };
+/// let shape = Shape { layers: 3, rows: 1, width: 32 };
 /// let operator = Operator::<f64>::new(shape, Blur::new(0.0), layers);
-/// let (mut light, mut doses) = (vec![0.0; 48], vec![0.0; 48]);
+/// let (mut light, mut doses) = (vec![0.0; 96], vec![0.0; 96]);
 /// light[3] = 1.0;
 /// operator.doses(&light, &mut doses);
-/// assert_eq!([doses[3], doses[16 + 3], doses[32 + 3]], [2.0, 1.0, 0.5]);
+/// assert_eq!([doses[3], doses[32 + 3], doses[64 + 3]], [2.0, 1.0, 0.5]);
 /// ```
 #[derive(Clone, Debug)]
 pub struct Operator<T> {
@@ -33,13 +33,13 @@ impl<T: Real> Operator<T> {
     ///
     /// # Panics
     /// Panics if there are not as many layers as the shape has, or its width is not a multiple
-    /// of 16.
+    /// of 32.
     pub fn new(shape: Shape, blur: Blur<T>, layers: Vec<LayerLight>) -> Self {
         let all = (0..shape.plane()).step_by(LANES).collect();
         Self::of_chunks(shape, blur, layers, all)
     }
 
-    /// Creates the operator of the chunks of 16 voxels that begin at these places of each layer,
+    /// Creates the operator of the chunks of 32 voxels that begin at these places of each layer,
     /// in order: all other pixels are black, and other doses are of no matter.
     ///
     /// # Panics

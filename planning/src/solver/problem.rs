@@ -10,7 +10,7 @@ pub struct Shape {
     pub layers: usize,
     /// The rows of each layer.
     pub rows: usize,
-    /// The columns of each row: a multiple of 16.
+    /// The columns of each row: a multiple of 32.
     pub width: usize,
 }
 

@@ -52,7 +52,7 @@ impl<T> Solution<T> {
 }
 
 /// Iterations between two looks at cost and bound.
-const LOOK_AFTER: usize = 10;
+const LOOK_AFTER: usize = 5;
 /// Steps are no longer than those of a pixel or voxel that sees this share of the most light.
 const LEAST_SHARE: f64 = 1e-3;
 /// A restart follows when the gap has shrunk to this share,

@@ -132,10 +132,10 @@ impl Window<'_> {
         );
         let (roles, incoming) = (self.roles(&area), self.incoming(&area));
         let mut problem = Problem { operator, roles, incoming, terms: self.terms };
-        let (light, prices) = self.start(&area, &problem.roles);
         let mut doses = vec![0.0; area.voxels()];
         problem.operator.doses(&problem.brightest(), &mut doses);
         let unplanned = problem.cost(&doses);
+        let (light, prices) = self.start(&area, &problem, &doses);
         let least = LEAST_ERROR * area.voxels() as f64;
         let until = Search { gap: self.gap * unplanned.max(least), iterations: MOST_ITERATIONS };
         let mut solution = solve(&problem, light, prices, until);
@@ -288,15 +288,16 @@ impl Window<'_> {
         }
     }
 
-    /// Returns the light and the prices to start from: those planned so far.
-    fn start(&self, area: &Area, roles: &[Role]) -> (Vec<f32>, Vec<f32>) {
+    /// Returns the light and the prices to start from: those planned so far. Where nothing is, the
+    /// light is that of the part, and prices are halfway to those of the doses of white light.
+    fn start(&self, area: &Area, problem: &Problem<f32>, white: &[f32]) -> (Vec<f32>, Vec<f32>) {
         let mut levels = vec![0; area.shape.plane()];
         let mut of_layer = vec![0.0; area.shape.plane()];
         let mut light = Vec::with_capacity(area.voxels());
         let mut prices = Vec::with_capacity(area.voxels());
         for layer in 0..area.shape.layers {
             self.planned(layer, &area.rect, area.shape.width, &mut levels);
-            of_layer.fill(0.0);
+            of_layer.fill(f32::NAN);
             for tile in self.grid.met(&area.rect) {
                 if let Some(plan) = self.plan_of(tile, layer) {
                     copy_common(
@@ -313,10 +314,15 @@ impl Window<'_> {
                 prices.extend_from_slice(of);
             }
         }
-        for ((light, price), &role) in light.iter_mut().zip(&mut prices).zip(roles) {
-            let (of_light, of_price) =
-                (self.terms.light_bounds(role), self.terms.price_bounds(role));
+        for (voxel, (light, price)) in light.iter_mut().zip(&mut prices).enumerate() {
+            let role = problem.roles[voxel];
+            let of_light = self.terms.light_bounds(role);
             *light = light.clamp(of_light.low, of_light.high);
+            let of_price = self.terms.price_bounds(role);
+            if price.is_nan() {
+                let is_above = white[voxel] + problem.incoming[voxel] >= self.terms.aim(role);
+                *price = 0.5 * if is_above { of_price.high } else { of_price.low };
+            }
             *price = price.clamp(of_price.low, of_price.high);
         }
         (light, prices)
