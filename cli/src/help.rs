@@ -27,7 +27,6 @@ Resins and machines:
   plan        plan exposures                 learn       correct them by prints
   cure        draw what a stack cures        man         write manual pages
   completions let shells complete commands
-
 lamp COMMAND -h lists the usual options of a command, --help all of them.
 All commands have -q, --quiet; --threads N; --options FILE.toml; -h, --help.
 ";

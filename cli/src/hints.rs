@@ -8,6 +8,7 @@ use std::io;
 use lamp_adaptive::HeightsError;
 use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::material::MaterialError;
+use lamp_planning::speed::PartError;
 use lamp_planning::voxels::PlanError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
 use lamp_postprocess::{
@@ -35,6 +36,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(support))
         .or_else(|| error.downcast_ref().and_then(compensate))
         .or_else(|| error.downcast_ref().and_then(plan))
+        .or_else(|| error.downcast_ref().and_then(timed_part))
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
         .or_else(|| error.downcast_ref().map(no_solid))
@@ -214,6 +216,15 @@ fn plan(error: &PlanError) -> Option<String> {
         PlanError::Silent { what: "exposure", .. } => "give --exposure, as 2s",
         PlanError::Silent { .. } => "plan the stack that slice wrote",
         PlanError::Unlike { .. } => "plan the stack before its layers are cropped",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn timed_part(error: &PartError) -> Option<String> {
+    let hint = match error {
+        PartError::NoResolution(_) | PartError::NoThickness(_) => "use the stack that slice wrote",
+        PartError::Unlike(_) => "use the stack from before its layers were cropped",
         _ => return None,
     };
     Some(hint.to_owned())

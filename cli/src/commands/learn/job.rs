@@ -10,7 +10,7 @@
 //! print-001.csv           the times of the next
 //! ```
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -20,23 +20,21 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::speed::{PartLayer, PartPages, Platform, TimedPart};
 use lamp_planning::{Light, SampleHeight};
-use lamp_stack::{Destination, Format, digest_of, write_stack};
+use lamp_stack::digest_of;
 use serde::{Deserialize, Serialize};
 
-use super::KeptOptions;
 use super::measured::Measured;
 use super::step::Learned;
-use crate::catalogue::{entry, read_file, read_text};
+use crate::catalogue::{read_file, read_text};
 use crate::commands::plan::write_profile;
 use crate::exit::Exit;
-use crate::options::Input;
 use crate::progress::Progress;
 use crate::recorded;
-use crate::streams::{input_name, new_folder, read_beside, read_layers, write_file};
+use crate::streams::{read_beside, write_file};
 
-const JOB: &str = "job.toml";
-const STACK: &str = "stack.tif";
-const MATERIAL: &str = "material.toml";
+pub(super) const JOB: &str = "job.toml";
+pub(super) const STACK: &str = "stack.tif";
+pub(super) const MATERIAL: &str = "material.toml";
 /// Tables of times have a line for each layer.
 const MAX_TABLE: u64 = 64 << 20;
 const PROFILE: [&str; 5] = ["layer", "z_um", "thickness_um", "exposure_ms", "speed_um_per_s"];
@@ -45,21 +43,21 @@ const DOSES: [&str; 2] = ["layer", "log_dose"];
 /// What a job is for.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct JobFile {
-    part: String,
+pub(super) struct JobFile {
+    pub(super) part: String,
     /// The digest of the stack's file.
-    digest: String,
+    pub(super) digest: String,
     /// The images' top left corner in part coordinates, if the pages state it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    origin_mm: Option<[f64; 2]>,
-    wanted: u8,
+    pub(super) origin_mm: Option<[f64; 2]>,
+    pub(super) wanted: u8,
     #[serde(with = "recorded::text")]
-    at: SampleHeight,
-    margin: f64,
-    slowest_um_per_s: f64,
-    fastest_um_per_s: f64,
+    pub(super) at: SampleHeight,
+    pub(super) margin: f64,
+    pub(super) slowest_um_per_s: f64,
+    pub(super) fastest_um_per_s: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    max_change: Option<f64>,
+    pub(super) max_change: Option<f64>,
 }
 
 /// A print of a job.
@@ -83,114 +81,16 @@ pub(super) struct Job {
     pub(super) prints: Vec<Print>,
 }
 
-/// Begins a job.
-pub(super) fn begin(
-    folder: &Path,
-    stack: &Path,
-    material: &Path,
-    kept: &KeptOptions,
-    progress: &Progress,
-) -> Result<(), Exit> {
-    let material: Material = entry(material)?;
-    let light = Light::of(&material, kept.at.unwrap_or_default())?;
-    light.check().map_err(|error| Exit::Failed(error.into()).at(material.name.clone()))?;
-    let name = input_name(stack);
-    let input = Input { stack: stack.to_owned(), layers: None };
-    let wanted = kept.wanted.map_or(128, std::num::NonZeroU8::get);
-    let mut pages = PartPages::new(wanted);
-    let (mut part, mut origin_mm) = (String::new(), None);
-    let new = new_folder_of(folder)?;
-    let file = new.path().join(STACK);
-    let layers = read_layers(&input, progress)?.map(|layer| -> Result<_, Exit> {
-        let layer = layer?;
-        if layer.info.exposure_ms.is_none() {
-            let silent = anyhow!(
-                "{} states no exposure, so that no profile was printed: lamp plan speed gives \
-                 times",
-                layer.info.name()
-            );
-            return Err(Exit::Failed(silent).at(name.clone()));
-        }
-        if let Some(info) = &layer.info.stack {
-            part.clone_from(&info.part);
-        }
-        origin_mm = origin_mm.or(layer.info.origin_mm);
-        pages.push(layer.clone()).map_err(|error| Exit::from(error).at(name.clone()))?;
-        progress.layer_done();
-        Ok(layer)
-    });
-    let written = write_stack(layers, Destination::File(file.clone()), Format::Big);
-    progress.done();
-    written?;
-    let digest = digest_of_file(&file)?;
-    if folder.join(JOB).exists() {
-        return Err(refuse_second(folder, stack, &digest)?);
-    }
-    let part_pages = pages.finish().map_err(|error| Exit::from(error).at(name))?;
-    let platform = kept.platform();
-    let margin = kept.margin.unwrap_or(0.05);
-    let job = JobFile {
-        part,
-        digest,
-        origin_mm,
-        wanted,
-        at: light.at,
-        margin,
-        slowest_um_per_s: platform.slowest,
-        fastest_um_per_s: platform.fastest,
-        max_change: platform.max_change,
-    };
-    let texts = || -> anyhow::Result<()> {
-        fs::write(new.path().join(JOB), toml::to_string(&job)?)?;
-        fs::write(new.path().join(MATERIAL), material.to_toml()?)?;
-        let times = part_pages.layers().iter().map(|layer| layer.time.unwrap_or_default());
-        let times: Vec<ExposureTime> = times.collect();
-        write_profile(&part_pages, &times, &mut File::create(new.path().join(profile_name(0)))?)?;
-        Ok(())
-    };
-    texts().with_context(|| folder.display().to_string())?;
-    new.persist().map_err(|error| Exit::Failed(error.into()).at(folder.display().to_string()))?;
-    progress.say(&format!(
-        "{} is begun: print 0 has the exposures of the stack's {} layers",
-        folder.display(),
-        part_pages.layers().len()
-    ));
-    Ok(())
-}
-
-/// A folder for a job, under another name at first. If there is a job, one that is never used.
-fn new_folder_of(folder: &Path) -> Result<lamp_stack::FolderBeside, Exit> {
-    let already = folder.join(JOB).exists();
-    let unused = folder.join("begun-again");
-    new_folder(if already { &unused } else { folder }, false)
-}
-
-/// Tells why a job cannot be begun a second time.
-fn refuse_second(folder: &Path, stack: &Path, digest: &str) -> Result<Exit, Exit> {
-    let (folder, stack) = (folder.to_owned(), input_name(stack));
-    let there = read_job(&folder)?;
-    let error = if there.digest == digest {
-        anyhow!("{} is the job of {stack} already: leave out --start", folder.display())
-    } else {
-        let part = if there.part.is_empty() { "another stack" } else { &there.part };
-        anyhow!(
-            "{} is the job of {part}, whose stack is not {stack}: name another folder",
-            folder.display()
-        )
-    };
-    Ok(Exit::Failed(error))
-}
-
-fn profile_name(print: usize) -> String {
+pub(super) fn profile_name(print: usize) -> String {
     format!("print-{print:03}.csv")
 }
 
-fn digest_of_file(file: &Path) -> Result<String, Exit> {
+pub(super) fn digest_of_file(file: &Path) -> Result<String, Exit> {
     let digest = File::open(file).and_then(digest_of);
     Ok(digest.with_context(|| file.display().to_string())?)
 }
 
-fn read_job(folder: &Path) -> Result<JobFile, Exit> {
+pub(super) fn read_job(folder: &Path) -> Result<JobFile, Exit> {
     let file = folder.join(JOB);
     let read = || -> anyhow::Result<JobFile> {
         if !file.exists() {

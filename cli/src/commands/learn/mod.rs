@@ -1,5 +1,6 @@
 //! `lamp learn`: corrects the times of layers after every print.
 
+mod begin;
 mod job;
 mod measured;
 mod plot;
@@ -157,7 +158,7 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
         let Some(material) = &args.kept.material else {
             return Err(Exit::usage("--start needs the resin: give --material NAME|FILE"));
         };
-        return job::begin(&args.job, stack, material, &args.kept, &progress);
+        return begin::begin(&args.job, stack, material, &args.kept, &progress);
     }
     let (Some(measured), Some(output)) = (&args.measured, &args.output) else {
         return Err(Exit::usage(

@@ -1,0 +1,118 @@
+//! Begins a job.
+
+use std::fs::{self, File};
+use std::path::Path;
+
+use anyhow::{Context, anyhow};
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::Light;
+use lamp_planning::speed::PartPages;
+use lamp_stack::{Destination, FolderBeside, Format, write_stack};
+
+use super::KeptOptions;
+use super::job::{JOB, JobFile, MATERIAL, STACK, digest_of_file, profile_name, read_job};
+use crate::catalogue::entry;
+use crate::commands::plan::write_profile;
+use crate::exit::Exit;
+use crate::options::Input;
+use crate::progress::Progress;
+use crate::streams::{input_name, new_folder, read_layers};
+
+/// Begins a job.
+pub(super) fn begin(
+    folder: &Path,
+    stack: &Path,
+    material: &Path,
+    kept: &KeptOptions,
+    progress: &Progress,
+) -> Result<(), Exit> {
+    let material: Material = entry(material)?;
+    let light = Light::of(&material, kept.at.unwrap_or_default())?;
+    light.check().map_err(|error| Exit::Failed(error.into()).at(material.name.clone()))?;
+    let name = input_name(stack);
+    let input = Input { stack: stack.to_owned(), layers: None };
+    let wanted = kept.wanted.map_or(128, std::num::NonZeroU8::get);
+    let mut pages = PartPages::new(wanted);
+    let (mut part, mut origin_mm) = (String::new(), None);
+    let new = new_folder_of(folder)?;
+    let file = new.path().join(STACK);
+    let layers = read_layers(&input, progress)?.map(|layer| -> Result<_, Exit> {
+        let layer = layer?;
+        if layer.info.exposure_ms.is_none() {
+            let silent = anyhow!(
+                "{} states no exposure, so that no profile was printed: lamp plan speed gives \
+                 times",
+                layer.info.name()
+            );
+            return Err(Exit::Failed(silent).at(name.clone()));
+        }
+        if let Some(info) = &layer.info.stack {
+            part.clone_from(&info.part);
+        }
+        origin_mm = origin_mm.or(layer.info.origin_mm);
+        pages.push(layer.clone()).map_err(|error| Exit::from(error).at(name.clone()))?;
+        progress.layer_done();
+        Ok(layer)
+    });
+    let written = write_stack(layers, Destination::File(file.clone()), Format::Big);
+    progress.done();
+    written?;
+    let digest = digest_of_file(&file)?;
+    if folder.join(JOB).exists() {
+        return Err(refuse_second(folder, stack, &digest)?);
+    }
+    let part_pages = pages.finish().map_err(|error| Exit::from(error).at(name))?;
+    let platform = kept.platform();
+    let margin = kept.margin.unwrap_or(0.05);
+    let job = JobFile {
+        part,
+        digest,
+        origin_mm,
+        wanted,
+        at: light.at,
+        margin,
+        slowest_um_per_s: platform.slowest,
+        fastest_um_per_s: platform.fastest,
+        max_change: platform.max_change,
+    };
+    let texts = || -> anyhow::Result<()> {
+        fs::write(new.path().join(JOB), toml::to_string(&job)?)?;
+        fs::write(new.path().join(MATERIAL), material.to_toml()?)?;
+        let times = part_pages.layers().iter().map(|layer| layer.time.unwrap_or_default());
+        let times: Vec<ExposureTime> = times.collect();
+        write_profile(&part_pages, &times, &mut File::create(new.path().join(profile_name(0)))?)?;
+        Ok(())
+    };
+    texts().with_context(|| folder.display().to_string())?;
+    new.persist().map_err(|error| Exit::Failed(error.into()).at(folder.display().to_string()))?;
+    progress.say(&format!(
+        "{} is begun: print 0 has the exposures of the stack's {} layers",
+        folder.display(),
+        part_pages.layers().len()
+    ));
+    Ok(())
+}
+
+/// A folder for a job, under another name at first. If there is a job, one that is never used.
+fn new_folder_of(folder: &Path) -> Result<FolderBeside, Exit> {
+    let already = folder.join(JOB).exists();
+    let unused = folder.join("begun-again");
+    new_folder(if already { &unused } else { folder }, false)
+}
+
+/// Tells why a job cannot be begun a second time.
+fn refuse_second(folder: &Path, stack: &Path, digest: &str) -> Result<Exit, Exit> {
+    let (folder, stack) = (folder.to_owned(), input_name(stack));
+    let there = read_job(&folder)?;
+    let error = if there.digest == digest {
+        anyhow!("{} is the job of {stack} already: leave out --start", folder.display())
+    } else {
+        let part = if there.part.is_empty() { "another stack" } else { &there.part };
+        anyhow!(
+            "{} is the job of {part}, whose stack is not {stack}: name another folder",
+            folder.display()
+        )
+    };
+    Ok(Exit::Failed(error))
+}
