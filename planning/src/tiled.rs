@@ -105,6 +105,11 @@ impl<V: Copy + PartialEq> Tiled<V> {
         Self { grid, tiles: vec![Tile::Flat(value); grid.tile_count()] }
     }
 
+    /// Returns the number of tiles that have several values.
+    pub(crate) fn dense_count(&self) -> u64 {
+        self.tiles.iter().filter(|tile| matches!(tile, Tile::Dense(_))).count() as u64
+    }
+
     /// Creates an image from rows, which `row` writes one after the other.
     pub(crate) fn of_rows<E>(
         grid: Grid,

@@ -61,7 +61,7 @@ fn overcured_voxels_go_from_84_to_none_also_in_levels() {
     assert_eq!(targets, [21, 21, 21, 0, 0]);
     let best = 18_415.657_695 / 170.0;
     assert!((outcome.bound / best - 1.0).abs() < 1e-4, "{}", outcome.bound / best);
-    assert!((outcome.after.cost / best - 1.0).abs() < 2e-3, "{}", outcome.after.cost / best);
+    assert!((outcome.after.cost / best - 1.0).abs() < 5e-3, "{}", outcome.after.cost / best);
 }
 
 #[test]

@@ -147,7 +147,7 @@ impl<T: Real> Terms<T> {
 }
 
 impl<T: Real> Problem<T> {
-    /// Returns what doses cost.
+    /// Returns what doses cost, those of all voxels or of the first ones.
     pub fn cost(&self, doses: &[T]) -> f64 {
         let voxels = doses.iter().zip(self.roles.iter().zip(&self.incoming));
         voxels.map(|(&dose, (&role, &from))| self.terms.cost(role, dose + from)).sum()

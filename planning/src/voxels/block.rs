@@ -134,9 +134,11 @@ impl Window<'_> {
         let mut problem = Problem { operator, roles, incoming, terms: self.terms };
         let mut doses = vec![0.0; area.voxels()];
         problem.operator.doses(&problem.brightest(), &mut doses);
-        let unplanned = problem.cost(&doses);
+        // Layers without light are planned in a later window.
+        let lit = self.lit * area.starts.len() * LANES;
+        let unplanned = problem.cost(&doses[..lit]);
         let (light, prices) = self.start(&area, &problem, &doses);
-        let least = LEAST_ERROR * area.voxels() as f64;
+        let least = LEAST_ERROR * lit as f64;
         let until = Search { gap: self.gap * unplanned.max(least), iterations: MOST_ITERATIONS };
         let mut solution = solve(&problem, light, prices, until);
         let progress = std::mem::take(&mut solution.progress);
@@ -321,7 +323,8 @@ impl Window<'_> {
             let of_price = self.terms.price_bounds(role);
             if price.is_nan() {
                 let is_above = white[voxel] + problem.incoming[voxel] >= self.terms.aim(role);
-                *price = 0.5 * if is_above { of_price.high } else { of_price.low };
+                let slope = if is_above { of_price.high } else { of_price.low };
+                *price = 0.5 * slope.clamp(-1.0, 1.0);
             }
             *price = price.clamp(of_price.low, of_price.high);
         }

@@ -40,6 +40,8 @@ pub(crate) struct Setting {
     pub(crate) overlap: usize,
     /// How far from where a layer is not like its neighbours light may change.
     pub(crate) near: usize,
+    /// About how many bytes to use at most.
+    pub(crate) memory: Option<u64>,
     /// How many voxels lie around the images.
     pub(crate) around: usize,
     /// The size of the images.
@@ -64,6 +66,11 @@ pub(crate) struct Descended {
     pub(crate) layers: Vec<SettledLayer>,
     pub(crate) search: Vec<GapAt>,
 }
+
+/// Tiles near a surface in some layer of a window, for each that a surface runs through in one.
+const NEAR_SURFACE: u64 = 3;
+/// The bytes of a planned pixel.
+const BYTES_PLANNED: u64 = 5;
 
 /// Where the way down is.
 struct Descent<'a> {
@@ -111,11 +118,12 @@ pub(crate) fn descend(
     let count = setting.lights.len();
     let mut first = 0;
     while first < count {
-        let end = (first + setting.window.settled + setting.window.ahead).min(count);
+        let settles = descent.layers_in_memory(first)?;
+        let end = (first + settles + setting.window.ahead).min(count);
         let reached = (end + setting.tail).min(count);
         descent.look_ahead(reached)?;
         descent.plan_window(first, end, reached);
-        let after = if end == count { count } else { first + setting.window.settled };
+        let after = if end == count { count } else { first + settles };
         for layer in first..after {
             descent.settle(layer)?;
         }
@@ -127,6 +135,25 @@ pub(crate) fn descend(
 }
 
 impl Descent<'_> {
+    /// Returns how many layers a window can settle that begins at a layer, within the memory.
+    fn layers_in_memory(&mut self, first: usize) -> io::Result<usize> {
+        let setting = self.setting;
+        let Some(memory) = setting.memory else { return Ok(setting.window.settled) };
+        self.look_ahead(first + 1)?;
+        let side = setting.grid.side;
+        let tile = (side * side) as u64;
+        let of_doses = [&self.white_ahead, &self.white, &self.doses];
+        // The next layer's doses are made before the last one's go.
+        let doses: u64 = of_doses.iter().map(|doses| doses.dense_count()).sum::<u64>() * 8 * tile;
+        let images = &self.images[first - self.first_image];
+        let near_surface = NEAR_SURFACE * images.wanted.dense_count();
+        let a_layer = tile * (2 * images.wanted.dense_count() + BYTES_PLANNED * near_surface);
+        let layers = memory.saturating_sub(doses) / a_layer.max(1);
+        let others = setting.window.ahead + setting.tail;
+        let settled = usize::try_from(layers).unwrap_or(usize::MAX).saturating_sub(others);
+        Ok(settled.clamp(1, setting.window.settled))
+    }
+
     /// Reads images up to a layer, and finds their targets.
     fn look_ahead(&mut self, end: usize) -> io::Result<()> {
         let setting = self.setting;

@@ -55,6 +55,9 @@ pub struct Options {
     pub gap: f64,
     /// How many voxels around the images count: light reaches them, but no pixel.
     pub around: Option<u32>,
+    /// About how many bytes to use at most: with less, fewer layers are planned at a time, which
+    /// takes longer and moves gray levels a little.
+    pub memory: Option<u64>,
     /// How many layers are planned at a time; by the light's depth where `None`.
     pub window: Option<Window>,
 }
@@ -70,6 +73,7 @@ impl Default for Options {
             keep_wall: 0,
             gap: 1e-3,
             around: None,
+            memory: None,
             window: None,
         }
     }

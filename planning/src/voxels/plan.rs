@@ -192,6 +192,7 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
         has_min_level: options.min_level > 0,
         window,
         tail,
+        memory: options.memory,
         overlap: if is_small { 0 } else { near },
         near: near + rules.reach(),
         around,

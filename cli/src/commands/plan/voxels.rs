@@ -12,7 +12,8 @@ use super::voxels_plot::plots_of;
 use super::voxels_report::{Planned, lines_of, write_report};
 use crate::exit::Exit;
 use crate::json_report::parse_report;
-use crate::options::{Common, Input, Output, one_of_described};
+use crate::memory;
+use crate::options::{Common, Input, Output, one_of_described, parse_memory};
 use crate::planning_options::PlanningOptions;
 use crate::plots;
 use crate::progress::Progress;
@@ -77,6 +78,11 @@ pub(super) struct VoxelsArgs {
     /// went: a file that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+
+    /// Memory to work in; with less, fewer layers are planned at a time, which takes longer and
+    /// moves gray levels a little [default: a quarter of what there is, as far as it helps]
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
 
     #[command(flatten)]
     map: MapOptions,
@@ -207,6 +213,7 @@ impl VoxelsArgs {
             keep_wall: self.keep.unwrap_or(0),
             gap: self.planning.gap,
             around: self.around,
+            memory: Some(self.memory.unwrap_or_else(|| memory::available() / 4)),
             ..Options::default()
         }
     }
