@@ -26,6 +26,13 @@ description = "A resin of mine"
 value = "2 W/cm2"
 source = "radiometer"
 
+[spread]
+sigma = { value = "34 um", source = "camera" }
+
+[gamma]
+value = 2.2
+source = "radiometer"
+
 [working-curve.critical-dose]
 value = "100 mJ/cm2"
 source = "notebook"
@@ -59,6 +66,8 @@ fn materials() {
             "name": "mine",
             "description": "A resin of mine",
             "light_mw_per_cm2": 2000.0,
+            "spread_um": 34.0,
+            "gamma": 2.2,
             "models": ["working-curve"],
             "cure_width_um": [500.0],
             "depths_um": [0.0, null],
