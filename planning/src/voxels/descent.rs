@@ -17,6 +17,7 @@ use crate::voxels::measure::{TileValues, Voxel};
 use crate::voxels::options;
 use crate::voxels::outcome::{GapAt, Tally};
 use crate::voxels::roles::{LayerImages, REACH, RoleRules};
+use crate::voxels::unplanned::price_unplanned;
 
 /// What stays the same for all layers.
 #[derive(Debug)]
@@ -229,11 +230,12 @@ impl Descent<'_> {
         let setting = self.setting;
         let at = layer - self.first_image;
         let wanted = &self.images[at].wanted;
-        let planned = self.planned(layer, wanted);
+        let mut planned = self.planned(layer, wanted);
         let (lights, of) = (setting.levels.lights(), setting.lights[layer]);
         self.white = next_layer(&self.white, wanted, lights, of, &setting.blur);
         self.doses = next_layer(&self.doses, &planned.levels, lights, of, &setting.blur);
         let images: Vec<&LayerImages> = self.images.iter().collect();
+        price_unplanned(setting, &images, at, &self.doses, &mut planned.prices);
         let tally = self.tally(&images, at);
         self.done.layers.push(tally);
         let [mut levels, mut prices] = [Runs::default(), Runs::default()];

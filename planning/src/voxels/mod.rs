@@ -14,6 +14,7 @@ mod options;
 mod outcome;
 mod plan;
 mod roles;
+mod unplanned;
 
 pub use options::{Objective, Options, Sources, Window};
 pub use outcome::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, Tally};
