@@ -1,7 +1,10 @@
 //! Checks `lamp plan voxels`: plans of known parts, its files, and what it refuses.
 
-use lamp_fixtures::{Voxels, cavity_staircase, example_cylinder, overhang_slope};
-use lamp_stack::{GrayMask, Layer};
+use lamp_fixtures::{Sample, Voxels, cavity_staircase, example_cylinder, overhang_slope};
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::{LayerTime, Light, RegionDoses, SampleHeight};
+use lamp_stack::{Catalogued, GrayMask, Layer, Length};
 use lamp_tests::Scratch;
 use serde_json::Value;
 
@@ -317,4 +320,46 @@ fn wrong_options_are_status_2() {
         assert!(ran.stderr.contains(word), "{ran:?}");
         assert!(!scratch.path("out.tif").exists());
     }
+}
+
+/// The doses of a stack's first layer.
+fn doses_of_first(layers: &[Layer], light: Light) -> Vec<f64> {
+    let first = &layers[0];
+    let [columns, rows] = [0..first.image.width(), 0..first.image.height()];
+    let mut doses = RegionDoses::new(light, first.dpi.unwrap(), columns, rows);
+    for layer in layers {
+        let exposed = LayerTime {
+            thickness: Length::from_um(layer.info.thickness_um.unwrap()),
+            time: ExposureTime::from_ms(layer.info.exposure_ms.unwrap()),
+        };
+        doses.expose(&layer.image, exposed, |level| light.of_level(level));
+    }
+    doses.doses().to_vec()
+}
+
+#[test]
+fn dots_of_a_plan_with_margin_lose_little() {
+    let scratch = Scratch::new();
+    scratch.part("stairs.stl", Sample::Stairs, 1_000);
+    // Pixels of 25 um: the spread is that of two.
+    let slice = "slice stairs.stl --dpi 1016 --thickness 100um --layers 24..44";
+    scratch.run(&format!("{slice} --material pegda-sudan -o part.tif")).succeeds();
+    scratch
+        .run("lamp plan voxels part.tif --material pegda-sudan --margin 10% | dither > dots.tif")
+        .succeeds();
+    let light = Light::of(&Material::builtin("pegda-sudan").unwrap(), SampleHeight::Top).unwrap();
+    let (part, dots) = (scratch.layers("part.tif"), scratch.layers("dots.tif"));
+    let (mut targets, mut lost, mut black) = (0, 0, 0);
+    for layer in 0..part.len() {
+        let [white, dotted] = [&part, &dots].map(|stack| doses_of_first(&stack[layer..], light));
+        let wanted = levels(&part[layer]).concat();
+        let lit = levels(&dots[layer]).concat();
+        for (place, wanted) in wanted.iter().enumerate().filter(|(_, level)| **level > 0) {
+            black += usize::from(lit[place] != *wanted);
+            targets += usize::from(white[place] >= 1.0);
+            lost += usize::from(white[place] >= 1.0 && dotted[place] < 1.0);
+        }
+    }
+    assert!(targets > 100_000 && black > 10_000, "{targets} {black}");
+    assert!(lost * 300 < targets, "{lost} of {targets}");
 }
