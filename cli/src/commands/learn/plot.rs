@@ -2,7 +2,8 @@
 
 use super::job::{Job, Print};
 use super::measured::Measured;
-use crate::plots::{Plot, Series, by_layer, curve};
+use super::report::{PrintError, error_of};
+use crate::plots::{Plot, Series, by_layer, curve, linear};
 
 /// The most prints that are drawn: the first, and the last.
 const MOST: usize = 8;
@@ -16,6 +17,7 @@ pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
         .filter(|(number, _)| *number == 0 || number + MOST > job.prints.len())
         .collect();
     let mut plots = Vec::new();
+    plots.extend(course(job));
     let areas: Vec<_> = drawn.iter().filter_map(|&(n, print)| areas(job, n, print)).collect();
     if !areas.is_empty() {
         let title = "Pixels to cure in each layer; below zero: too many are cured".to_owned();
@@ -35,6 +37,27 @@ pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
     });
     plots.push(by_layer("Time of each layer".to_owned(), "exposure (s)", times.collect()));
     plots
+}
+
+/// The errors from print to print.
+fn course(job: &Job) -> Vec<Plot> {
+    let of = |title: &str, label: &str, is_of: fn(PrintError) -> bool| {
+        let errors = job.prints.iter().map(error_of).enumerate();
+        let points: Vec<_> = errors
+            .filter_map(|(number, error)| Some((number, error.filter(|error| is_of(*error))?)))
+            .map(|(number, error)| (number as f64, error.number()))
+            .collect();
+        let most = points.iter().map(|point| point.1).fold(1e-9, f64::max);
+        let series = vec![Series { points: points.clone(), ..curve("errors", points.clone()) }];
+        let x = linear("print", -0.5..job.prints.len() as f64 - 0.5);
+        let y = linear(label, 0.0..1.3 * most);
+        (!points.is_empty()).then(|| Plot { title: title.to_owned(), x, y, series })
+    };
+    let is_of_areas = |error| matches!(error, PrintError::Pixels(_));
+    let is_of_heights = |error| matches!(error, PrintError::Micrometres(_));
+    let areas = of("Wrong pixels of each print", "pixels", is_of_areas);
+    let heights = of("Errors of heights, root mean square", "error (µm)", is_of_heights);
+    areas.into_iter().chain(heights).collect()
 }
 
 fn areas(job: &Job, number: usize, print: &Print) -> Option<Series> {

@@ -13,7 +13,7 @@ use crate::json_report::JsonReport;
 
 /// The lines that are printed.
 pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {
-    let errors: Vec<_> = job.prints.iter().filter_map(error_of).map(|(text, _)| text).collect();
+    let errors: Vec<_> = job.prints.iter().filter_map(error_of).map(PrintError::text).collect();
     let mut text = format!("errors of prints 0 to {print}: {}\n", errors.join(", "));
     if let Some(rms) = rms(&learned.deeper_um) {
         text += &format!("heights are {} um off what the model says\n", significant(rms));
@@ -59,8 +59,8 @@ pub(super) fn write_report(
     );
     let prints = job.prints.iter().enumerate().map(|(number, print)| {
         let mut value = json!({ "print": number, "exposure_s": print.times.iter().sum::<f64>() });
-        if let Some((_, error)) = error_of(print) {
-            value["error"] = error;
+        if let Some(error) = error_of(print) {
+            value["error"] = error.json();
         }
         value
     });
@@ -80,18 +80,46 @@ pub(super) fn write_report(
         .write(path)
 }
 
-/// Returns the error of a print that was measured: as text, and as JSON.
-fn error_of(print: &Print) -> Option<(String, Value)> {
+/// The error of a print.
+#[derive(Clone, Copy)]
+pub(super) enum PrintError {
+    /// Wrong pixels of all layers.
+    Pixels(f64),
+    /// The root of the mean square by which heights are off.
+    Micrometres(f64),
+}
+
+impl PrintError {
+    pub(super) fn number(self) -> f64 {
+        let (Self::Pixels(number) | Self::Micrometres(number)) = self;
+        number
+    }
+
+    fn text(self) -> String {
+        match self {
+            Self::Pixels(wrong) => format!("{wrong} pixels"),
+            Self::Micrometres(um) => format!("{} um", significant(um)),
+        }
+    }
+
+    fn json(self) -> Value {
+        match self {
+            Self::Pixels(wrong) => json!({ "wrong_px": wrong }),
+            Self::Micrometres(um) => json!({ "rms_um": um }),
+        }
+    }
+}
+
+/// Returns the error of a print that was measured.
+pub(super) fn error_of(print: &Print) -> Option<PrintError> {
     Some(match &print.measured.as_ref()?.0 {
         Measured::Areas(rows) => {
-            let wrong: f64 = rows.iter().map(|row| row.over + row.under).sum();
-            (format!("{wrong} pixels"), json!({ "wrong_px": wrong }))
+            PrintError::Pixels(rows.iter().map(|row| row.over + row.under).sum())
         }
         Measured::Heights(rows) => {
             let away: Vec<_> =
                 rows.iter().map(|row| 1000.0 * (row.measured_mm - row.z_mm)).collect();
-            let rms = rms(&away)?;
-            (format!("{} um", significant(rms)), json!({ "rms_um": rms }))
+            PrintError::Micrometres(rms(&away)?)
         }
     })
 }

@@ -1,25 +1,15 @@
 //! Plots what a plan of gray levels reaches.
 
-use std::ops::Range;
-
 use lamp_planning::voxels::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, Tally};
 
 use super::voxels_report::Planned;
 use crate::height_options::significant;
-use crate::plots::{Plot, PlotAxis, Series};
+use crate::plots::{Plot, PlotAxis, Series, curve, linear};
 
 /// The plots of a plan, one below the other.
 pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {
     let outcome = planned.outcome;
     vec![by_layer(planned), by_dose(outcome), by_light(outcome), by_iteration(outcome)]
-}
-
-fn curve(name: &str, curve: Vec<(f64, f64)>) -> Series {
-    Series { name: name.to_owned(), points: vec![], curve, band: vec![] }
-}
-
-fn axis(label: &str, range: Range<f64>) -> PlotAxis {
-    PlotAxis { label: label.to_owned(), range, logarithmic: false }
 }
 
 /// Counts below one are drawn here, for a logarithm has no zero.
@@ -61,7 +51,7 @@ fn by_layer(planned: &Planned<'_>) -> Plot {
         planned.material,
         significant(outcome.exposure_ms / 1000.0)
     );
-    counts_plot(title, axis("layer", first..last.max(first + 1.0)), series)
+    counts_plot(title, linear("layer", first..last.max(first + 1.0)), series)
 }
 
 /// Voxels by dose, in steps.
@@ -81,7 +71,7 @@ fn by_dose(outcome: &Outcome) -> Plot {
         of("others, as planned", &after.other),
     ];
     let doses = DoseHistogram::STEPS as f64 / DoseHistogram::PER_CRITICAL_DOSE as f64;
-    counts_plot("Voxels by dose".to_owned(), axis("dose (critical doses)", 0.0..doses), series)
+    counts_plot("Voxels by dose".to_owned(), linear("dose (critical doses)", 0.0..doses), series)
 }
 
 /// Voxels that are cured wrongly at a little less and more light.
@@ -98,7 +88,7 @@ fn by_light(outcome: &Outcome) -> Plot {
         of("undercured by white light", before, |counts| counts.undercured),
         of("undercured as planned", after, |counts| counts.undercured),
     ];
-    let x = axis("light (%)", 94.0..106.0);
+    let x = linear("light (%)", 94.0..106.0);
     counts_plot("Voxels cured wrongly at less and more light".to_owned(), x, series)
 }
 
@@ -113,6 +103,6 @@ fn by_iteration(outcome: &Outcome) -> Plot {
     let name = format!("in all blocks; {:.3}% in the whole stack", 100.0 * outcome.gap());
     let series = vec![Series { points: gaps.clone(), ..curve(&name, gaps) }];
     let y = logarithmic("gap (% of the unplanned error)", least / 2.0, most);
-    let x = axis("iterations", 0.0..1.02 * last);
+    let x = linear("iterations", 0.0..1.02 * last);
     Plot { title: "Gap to the best plan".to_owned(), x, y, series }
 }
