@@ -9,8 +9,8 @@ use crate::blur::Blur;
 use crate::light::Light;
 
 /// The share of the memory for columns, and the most that is of use.
-const COLUMNS_SHARE: u64 = 2;
-const MOST_COLUMN_BYTES: u64 = 256 << 20;
+const COLUMNS_SHARE: u64 = 4;
+const MOST_COLUMN_BYTES: u64 = 64 << 20;
 
 /// A part under a light, whose layers can be given times.
 pub struct Simulation<'a> {
