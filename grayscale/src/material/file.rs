@@ -260,6 +260,7 @@ source = "notebook, page 3"
             ))
         };
         assert_eq!(spread("-1 um", "1 um"), "spread.sigma must be zero or more");
+        assert_eq!(spread("60 mm", "1 um"), "spread.sigma must be at most 2 mm");
         assert_eq!(spread("1 um", "0 um"), "spread.pixel must be above zero");
         let unit = spread("13", "1 um");
         assert!(unit.contains("spread.sigma.value") && unit.contains("has no unit"), "{unit}");

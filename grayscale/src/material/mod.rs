@@ -159,7 +159,7 @@ impl Material {
     /// Returns how light spreads sideways, if it is known.
     ///
     /// # Errors
-    /// Returns an error if `σ` is below zero or the pixel is not above zero.
+    /// Returns an error if `σ` is below zero or above 2 mm, or the pixel is not above zero.
     pub fn spread(&self) -> Result<Option<Spread>, MaterialError> {
         let spread = |numbers: &SpreadNumbers| {
             Spread::new(numbers.sigma.value, numbers.pixel.as_ref().map(|pixel| pixel.value))

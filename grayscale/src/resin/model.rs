@@ -148,6 +148,9 @@ pub enum ModelError {
     /// A number is below zero, or not finite.
     #[error("{0} must be zero or more")]
     Negative(&'static str),
+    /// A number is larger than any that is known.
+    #[error("{0} must be at most {1}")]
+    TooLarge(&'static str, &'static str),
     /// A slope is below zero, or not finite.
     #[error("{0} must be zero or more: a model whose value falls towards white has no inverse")]
     Falls(&'static str),

@@ -19,6 +19,10 @@ impl Spread {
     /// Light that does not spread, told for a wide field.
     pub const NONE: Self = Self { sigma: Length::from_um(0.0), pixel: None };
 
+    /// The largest standard deviation, ten times those of 001 and 002: what is beyond is a slip of
+    /// the unit, and would have every pixel light the whole image.
+    pub const WIDEST: Length = Length::from_um(2000.0);
+
     /// Creates the spread of a standard deviation `σ`; zero is light that does not spread.
     ///
     /// `pixel` says what a lamp's intensity was told for: the centre of one lit pixel of that
@@ -26,9 +30,13 @@ impl Spread {
     /// field, as a radiometer reads it.
     ///
     /// # Errors
-    /// Returns an error if `σ` is below zero, the pixel is not above zero, or one is not finite.
+    /// Returns an error if `σ` is below zero or above [`Self::WIDEST`], the pixel is not above
+    /// zero, or one is not finite.
     pub fn new(sigma: Length, pixel: Option<Length>) -> Result<Self, ModelError> {
         zero_or_more(sigma.um(), "sigma")?;
+        if sigma.um() > Self::WIDEST.um() {
+            return Err(ModelError::TooLarge("sigma", "2 mm"));
+        }
         pixel.map_or(Ok(()), |pixel| positive(pixel.um(), "pixel"))?;
         Ok(Self { sigma, pixel })
     }
