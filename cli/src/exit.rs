@@ -5,9 +5,9 @@ use std::io;
 
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
-use lamp_planning::NoLight;
 use lamp_planning::speed::{PartError, PlatformError};
 use lamp_planning::voxels::PlanError;
+use lamp_planning::{LightError, NoLight};
 use lamp_postprocess::machine::MachineLimit;
 use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, TileError};
 use lamp_slicer::SliceError;
@@ -109,6 +109,7 @@ macro_rules! failures {
 }
 
 failures!(
+    LightError,
     NoLight,
     PlanError,
     PartError,

@@ -8,6 +8,7 @@ use std::io;
 use lamp_adaptive::HeightsError;
 use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::material::MaterialError;
+use lamp_planning::LightError;
 use lamp_planning::speed::PartError;
 use lamp_planning::voxels::PlanError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
@@ -35,6 +36,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(edit))
         .or_else(|| error.downcast_ref().and_then(support))
         .or_else(|| error.downcast_ref().and_then(compensate))
+        .or_else(|| error.downcast_ref().and_then(light))
         .or_else(|| error.downcast_ref().and_then(plan))
         .or_else(|| error.downcast_ref().and_then(timed_part))
         .or_else(|| error.downcast_ref().and_then(strips))
@@ -211,8 +213,19 @@ fn compensate(error: &CompensateError) -> Option<String> {
     Some(hint.to_owned())
 }
 
+fn light(error: &LightError) -> Option<String> {
+    match error {
+        LightError::TooWide { .. } => {
+            Some("check [spread] in the material's file, or slice with a lower --dpi".to_owned())
+        }
+        _ => None,
+    }
+}
+
 fn plan(error: &PlanError) -> Option<String> {
     let hint = match error {
+        // It is transparent, so that it is no cause of its own.
+        PlanError::Light(error) => return light(error),
         PlanError::Silent { what: "exposure", .. } => "give --exposure, as 2s",
         PlanError::Silent { .. } => "plan the stack that slice wrote",
         PlanError::Unlike { .. } => "plan the stack before its layers are cropped",

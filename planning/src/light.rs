@@ -58,7 +58,16 @@ pub enum LightError {
     /// A number of the model is not above zero, or not finite.
     #[error("{0} must be above zero")]
     NotPositive(&'static str),
+    /// Light spreads over more pixels than can be computed with.
+    #[error("light spreads over {pixels} pixels (σ), more than {MOST_SPREAD}")]
+    TooWide {
+        /// The standard deviation.
+        pixels: u64,
+    },
 }
+
+/// The widest spread, in pixels. Real ones are some ten.
+const MOST_SPREAD: u64 = 256;
 
 /// How thick a layer is and how long it is exposed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,6 +112,15 @@ impl Light {
             Some((name, _)) => Err(LightError::NotPositive(name)),
             None => Ok(()),
         }
+    }
+
+    /// Checks that light does not spread over too many pixels.
+    ///
+    /// # Errors
+    /// Returns an error if the spread is wider than 256 pixels.
+    pub fn check_spread(&self, dpi: Dpi) -> Result<(), LightError> {
+        let pixels = self.spread_pixels(dpi).ceil() as u64;
+        if pixels > MOST_SPREAD { Err(LightError::TooWide { pixels }) } else { Ok(()) }
     }
 
     /// Returns σ in pixels.
@@ -183,6 +201,15 @@ mod tests {
                 assert!((share - expected).abs() < 1e-12, "{at:?} {depth_um}");
             }
         }
+    }
+
+    #[test]
+    fn light_that_spreads_too_wide_is_refused() {
+        let dpi = Dpi::new(2540.0).unwrap();
+        let wide = |um| Light { spread: Length::from_um(um), ..light(SampleHeight::Top) };
+        assert_eq!(wide(2560.0).check_spread(dpi), Ok(()));
+        assert_eq!(wide(2561.0).check_spread(dpi), Err(LightError::TooWide { pixels: 257 }));
+        assert!(wide(1e300).check_spread(dpi).is_err());
     }
 
     #[test]

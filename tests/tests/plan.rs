@@ -274,12 +274,15 @@ fn what_cannot_be_planned_is_refused() {
         scratch.write(name, kept.join("\n\n").as_bytes());
     };
     without("dim.toml", "[intensity]");
+    scratch.write("wide.toml", material.replace("\"50 um\"", "\"1e9 mm\"").as_bytes());
     without("curveless.toml", "[working-curve");
     for (line, words) in [
         ("stairs.tif --material lamp-suspension", &["how far light spreads", "[spread]"][..]),
         ("stairs.tif --material curveless.toml", &["which dose cures", "[working-curve]"]),
         ("stairs.tif --material dim.toml", &["how bright", "[intensity]"]),
         ("stairs.tif --material none.toml", &["none.toml"]),
+        ("stairs.tif --material wide.toml", &["spreads over 10000000000 pixels", "[spread]"]),
+        ("stairs.tif --material wide.toml --map m.svg --map-layer 3", &["spreads over"]),
         ("thin.tif", &["thin.tif", "layer 30", "does not state its thickness", "slice"]),
         ("flat.tif", &["flat.tif", "layer 30", "a thickness that is not above zero"]),
         ("dark.tif", &["dark.tif", "layer 30", "an exposure that is not above zero"]),

@@ -105,7 +105,10 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
             }
             let course = SectionLine::new(args.section, &layer).map_err(failed)?;
             exposures = Some(match light {
-                Some(light) => Exposures::added(&resin, light, course),
+                Some(light) => {
+                    light.check_spread(course.dpi)?;
+                    Exposures::added(&resin, light, course)
+                }
                 None => Exposures::alone(&resin, course),
             });
             stack = layer.info.stack.clone();

@@ -57,7 +57,7 @@ pub(crate) fn parse_along(text: &str) -> Result<Range<f64>, String> {
 pub(crate) struct SectionLine {
     pub(crate) line: PixelLine,
     corner_mm: [f64; 2],
-    pub(super) dpi: Dpi,
+    pub(crate) dpi: Dpi,
     pub(super) pixels: u32,
 }
 

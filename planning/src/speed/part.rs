@@ -142,6 +142,7 @@ impl TimedPart {
     /// passes from the layer above.
     pub(crate) fn per_second(&self, light: &Light) -> Result<Vec<LayerLight>, PartError> {
         light.check()?;
+        light.check_spread(self.dpi)?;
         let second = ExposureTime::from_ms(1000.0);
         let layer = |layer: &PartLayer| LayerTime { thickness: layer.thickness, time: second };
         let layers: Vec<_> = self.layers.iter().map(layer).collect();

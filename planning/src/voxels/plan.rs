@@ -95,6 +95,8 @@ pub fn plan<E: From<PlanError>>(
         let image = layer.image.into_image().into_mask(options.wanted);
         wanted.push(runs_of(&image)).map_err(PlanError::from)?;
     }
+    let dpi = pages.dpi.ok_or(PlanError::NoLayers)?;
+    light.check_spread(dpi).map_err(PlanError::from)?;
     let setting = setting(&pages, light, options).ok_or(PlanError::NoLayers)?;
     let done = descend(&setting, &mut wanted, settled).map_err(PlanError::from)?;
     let ascent = Ascent::new(&setting);

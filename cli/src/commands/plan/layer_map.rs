@@ -71,6 +71,7 @@ impl<'a> LayerMap<'a> {
 
     fn begin(&self, layer: &Layer) -> Result<Option<Begun>, Exit> {
         let Some(dpi) = layer.dpi else { return Ok(None) };
+        self.light.check_spread(dpi)?;
         let (image, name) = (&layer.image, layer.info.name());
         let all = Region::of(image);
         let region = self.options.map_region.as_ref().unwrap_or(&all).on(image);

@@ -54,7 +54,12 @@ fn change(before: u64, after: u64) -> String {
     if before == 0 {
         return String::new();
     }
-    format!(" ({:+.1}%)", 100.0 * (after as f64 / before as f64 - 1.0))
+    let percent = 100.0 * (after as f64 / before as f64 - 1.0);
+    // As many decimals as tell what is left from nothing.
+    let is_told =
+        |&decimals: &usize| after == 0 || !format!("{percent:.decimals$}").starts_with("-100");
+    let decimals = (1..8).find(is_told).unwrap_or(8);
+    format!(" ({percent:+.decimals$}%)")
 }
 
 /// Tells of wanted voxels that white light does not cure.
@@ -125,4 +130,18 @@ fn tally(tally: &Tally) -> Value {
 fn counts(counts: Counts) -> Value {
     let Counts { overcured, undercured, lost } = counts;
     json!({ "overcured": overcured, "undercured": undercured, "lost": lost })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_is_told_from_nothing() {
+        assert_eq!(change(84, 0), " (-100.0%)");
+        assert_eq!(change(61_503, 34), " (-99.9%)");
+        assert_eq!(change(222_532, 2), " (-99.999%)");
+        assert_eq!(change(100, 110), " (+10.0%)");
+        assert_eq!(change(0, 5), "");
+    }
 }
