@@ -86,7 +86,8 @@ impl<T: Real> Blur<T> {
             let distance = distance as f64;
             if distance == 0.0 { 1.0 } else { (-distance * distance / (2.0 * sigma * sigma)).exp() }
         };
-        let taps = (0..).map(tap).take_while(|&tap| tap >= FAINTEST).map(T::of).collect();
+        // Light that spreads wider is refused: this only bounds the memory until then.
+        let taps = (0..2048).map(tap).take_while(|&tap| tap >= FAINTEST).map(T::of).collect();
         Self { taps }
     }
 
