@@ -25,7 +25,7 @@ pub(crate) struct PlanningOptions {
     pub(crate) material: PathBuf,
 
     /// Lowest gray level of pixels that are wanted
-    #[arg(long, value_name = "LEVEL", default_value = "128")]
+    #[arg(long, value_name = "LEVEL", default_value = "128", value_parser = parse_wanted)]
     pub(crate) wanted: NonZeroU8,
 
     /// How far beyond the critical dose voxels should be: so much above it where they are
@@ -50,6 +50,10 @@ impl PlanningOptions {
         let light = Light::of(&material, self.at)?;
         Ok((material, light))
     }
+}
+
+fn parse_wanted(text: &str) -> Result<NonZeroU8, String> {
+    text.parse().map_err(|_| format!("`{text}` is not a gray level: write 1 to 255"))
 }
 
 /// Parses a margin below 100%.

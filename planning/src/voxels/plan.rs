@@ -238,7 +238,8 @@ pub struct PlannedStack {
 impl PlannedStack {
     /// Returns what the plan reaches.
     pub fn outcome(&self) -> Outcome {
-        Outcome { bound: self.ascent.bound, ..self.outcome.clone() }
+        // No light costs less than nothing.
+        Outcome { bound: self.ascent.bound.max(0.0), ..self.outcome.clone() }
     }
 
     /// Returns a layer, counted from the light, and adds it to the bound.

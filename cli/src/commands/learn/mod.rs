@@ -23,7 +23,7 @@ use crate::planning_options::{SAMPLE_HEIGHTS, parse_margin};
 use crate::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::plots;
 use crate::progress::Progress;
-use crate::streams::{check_beside, print, write_file};
+use crate::streams::{check_beside, input_name, print, write_file};
 
 use job::Job;
 use measured::Measured;
@@ -170,9 +170,11 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     let memory = args.memory.unwrap_or_else(|| memory::available() / 4);
     let job = Job::open(&args.job, &progress)?;
     let print_number = job.print_to_learn_from(args.print)?;
+    let name = input_name(measured);
     let (measured, text) = Measured::read(measured)?;
     job.refuse_known(print_number, &text)?;
-    let learned = step::learn(&job, print_number, &measured, &law, args.step, memory)?;
+    let learned = step::learn(&job, print_number, &measured, &law, args.step, memory)
+        .map_err(|error| error.at(name))?;
     job.keep(print_number, &text, &learned)?;
     write_file(output, |out| job.write_profile(&learned.times, out))?;
     let job = Job::open(&args.job, &progress)?;
