@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::doses::Room;
 use crate::solver::Role;
 use crate::tiled::{Tile, Tiled};
-use crate::voxels::descent::Setting;
+use crate::voxels::setting::Setting;
 
 /// Adds up, from the bottom up, what doses' prices make of the light of each layer.
 #[derive(Debug)]

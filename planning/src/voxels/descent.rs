@@ -5,49 +5,17 @@ use std::io;
 
 use rayon::prelude::*;
 
-use crate::blur::Blur;
 use crate::doses::next_layer;
-use crate::light::LayerLight;
-use crate::solver::{Progress, Role, Terms};
+use crate::solver::Role;
 use crate::spool::{Runs, Spool};
-use crate::tiled::{Grid, Tile, Tiled};
+use crate::tiled::{Tile, Tiled};
 use crate::voxels::block::{TilePlan, Window};
-use crate::voxels::levels::Levels;
 use crate::voxels::measure::{TileValues, Voxel};
-use crate::voxels::options;
 use crate::voxels::outcome::{GapAt, Tally};
-use crate::voxels::roles::{LayerImages, REACH, RoleRules};
+use crate::voxels::roles::{LayerImages, REACH};
+use crate::voxels::search_sums::SearchSums;
+use crate::voxels::setting::{Setting, code};
 use crate::voxels::unplanned::price_unplanned;
-
-/// What stays the same for all layers.
-#[derive(Debug)]
-pub(crate) struct Setting {
-    pub(crate) grid: Grid,
-    pub(crate) blur: Blur<f32>,
-    pub(crate) rules: RoleRules,
-    pub(crate) terms: Terms<f32>,
-    /// The dose from which on voxels cost that are not to be cured.
-    pub(crate) most_of_dark: f32,
-    pub(crate) levels: Levels,
-    /// The layers, from the light.
-    pub(crate) lights: Vec<LayerLight>,
-    pub(crate) gap: f64,
-    pub(crate) round_up: bool,
-    pub(crate) has_min_level: bool,
-    pub(crate) window: options::Window,
-    /// Layers below a window that its light reaches.
-    pub(crate) tail: usize,
-    /// How far around a tile light is chosen together with it.
-    pub(crate) overlap: usize,
-    /// How far from where a layer is not like its neighbours light may change.
-    pub(crate) near: usize,
-    /// About how many bytes to use at most.
-    pub(crate) memory: Option<u64>,
-    /// How many voxels lie around the images.
-    pub(crate) around: usize,
-    /// The size of the images.
-    pub(crate) image: [usize; 2],
-}
 
 /// A layer as it was settled.
 #[derive(Debug, Default)]
@@ -383,78 +351,4 @@ fn targets(wanted: &Tiled<u8>, white: &Tiled<f32>) -> Tiled<u8> {
         }
     };
     Tiled { grid: wanted.grid, tiles: wanted.tiles.iter().zip(&white.tiles).map(tile).collect() }
-}
-
-impl Setting {
-    /// Reads the part's image of a layer, counted from the light.
-    pub(crate) fn read_wanted(&self, wanted: &mut Spool, layer: usize) -> io::Result<Tiled<u8>> {
-        let [width, height] = self.image;
-        let mut runs = wanted.read(self.lights.len() - 1 - layer)?;
-        Tiled::of_rows(self.grid, 0, |row, values| {
-            values.fill(0);
-            if (self.around..self.around + height).contains(&row) {
-                runs.row(&mut values[self.around..self.around + width], |value| value as u8);
-            }
-            Ok(())
-        })
-    }
-
-    /// Returns the dose from which on a voxel's cost changes, by the price of its dose: prices
-    /// below 0 are those of voxels that are to be cured.
-    pub(crate) fn aim(&self, price: f32) -> f32 {
-        if price < 0.0 { self.terms.least } else { self.most_of_dark }
-    }
-}
-
-/// Bits of a price that are not written down: it then has 12 significant ones. Any prices give a
-/// bound, and whole numbers stay what they are.
-const LEFT_OUT: u32 = 12;
-
-/// Returns the code of a price.
-fn code(price: f32) -> u32 {
-    price.to_bits() >> LEFT_OUT
-}
-
-/// Returns the price of a code.
-pub(crate) fn price(code: u32) -> f32 {
-    f32::from_bits(code << LEFT_OUT)
-}
-
-/// How cost and bound of blocks come together, added up.
-#[derive(Default)]
-struct SearchSums {
-    /// The sum of gaps at each look of the blocks that were not done before.
-    gaps: Vec<f64>,
-    /// What the blocks that were done have left, from the next look on.
-    left: Vec<f64>,
-    iterations: Vec<usize>,
-    unplanned: f64,
-}
-
-impl SearchSums {
-    fn add(&mut self, progress: &[Progress], unplanned: f64) {
-        self.unplanned += unplanned;
-        for (look, now) in progress.iter().enumerate() {
-            if look == self.gaps.len() {
-                self.gaps.push(0.0);
-                self.left.push(0.0);
-                self.iterations.push(now.iteration);
-            }
-            self.gaps[look] += now.cost - now.bound;
-        }
-        if let Some(end) = progress.last() {
-            self.left[progress.len() - 1] += end.cost - end.bound;
-        }
-    }
-
-    fn shares(&self) -> Vec<GapAt> {
-        let mut left = 0.0;
-        let looks = self.gaps.iter().zip(&self.left).zip(&self.iterations);
-        let share = |((gap, done), &iteration): ((&f64, &f64), &usize)| {
-            let all = gap + left;
-            left += done;
-            GapAt { iteration, gap: if self.unplanned > 0.0 { all / self.unplanned } else { 0.0 } }
-        };
-        looks.map(share).collect()
-    }
 }

@@ -14,6 +14,8 @@ mod options;
 mod outcome;
 mod plan;
 mod roles;
+mod search_sums;
+mod setting;
 mod unplanned;
 
 pub use options::{Objective, Options, Sources, Window};

@@ -12,11 +12,12 @@ use crate::solver::Terms;
 use crate::spool::{Runs, Spool};
 use crate::tiled::{Grid, Tiled};
 use crate::voxels::bound::Ascent;
-use crate::voxels::descent::{Descended, Setting, descend, price};
+use crate::voxels::descent::{Descended, descend};
 use crate::voxels::levels::Levels;
 use crate::voxels::options::{Objective, Options, Window};
 use crate::voxels::outcome::{LayerOutcome, Outcome};
 use crate::voxels::roles::RoleRules;
+use crate::voxels::setting::{Setting, price};
 
 /// Why a stack cannot be planned.
 #[derive(Debug, Error)]

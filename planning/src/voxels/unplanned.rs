@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use crate::blur::LANES;
 use crate::solver::{Role, Terms};
 use crate::tiled::{Tile, Tiled};
-use crate::voxels::descent::Setting;
 use crate::voxels::roles::LayerImages;
+use crate::voxels::setting::Setting;
 
 /// Gives voxels that were not planned, far from surfaces, the slope of their cost as their price:
 /// without it the bound would lack what they cost. `images` are those within reach of `at`.
