@@ -83,7 +83,9 @@ fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
 }
 
 fn spread() -> impl Strategy<Value = SpreadNumbers> {
-    (given(um()), option::of(given(um()))).prop_map(|(sigma, pixel)| SpreadNumbers { sigma, pixel })
+    let sigma = (0.001..2000.0_f64).prop_map(Length::from_um);
+    (given(sigma), option::of(given(um())))
+        .prop_map(|(sigma, pixel)| SpreadNumbers { sigma, pixel })
 }
 
 fn gamma() -> impl Strategy<Value = GivenNumber> {
