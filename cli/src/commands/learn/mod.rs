@@ -23,7 +23,7 @@ use crate::planning_options::{SAMPLE_HEIGHTS, parse_margin};
 use crate::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::plots;
 use crate::progress::Progress;
-use crate::streams::{check_beside, input_name, print, write_file};
+use crate::streams::{check_beside, input_name, is_stream, print, write_file};
 
 use job::Job;
 use measured::Measured;
@@ -165,6 +165,9 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
             "begin a job with --start STACK --material M, or give what was --measured",
         ));
     };
+    if is_stream(output) {
+        return Err(Exit::usage("name a file for the next profile, as -o next.csv"));
+    }
     args.check_outputs(measured)?;
     let law = args.law()?;
     let memory = args.memory.unwrap_or_else(|| memory::available() / 4);
