@@ -84,7 +84,7 @@ fn materials() {
     let list = answer(&scratch, "lamp material list --json");
     let names: Vec<_> =
         list["materials"].as_array().unwrap().iter().map(|it| &it["name"]).collect();
-    assert_eq!(names.len(), 5);
+    assert_eq!(names.len(), 7);
     let dark = &list["materials"][0];
     assert_eq!(dark["name"], "lamp-no-absorber");
     assert_eq!((&dark["light_mw_per_cm2"], &dark["depths_um"]), (&Value::Null, &Value::Null));
