@@ -4,6 +4,7 @@ use lamp_fixtures::{Mesh, cavity_core, mug, needle, ring};
 use lamp_slicer::{FacetIndex, Part, Placement, SliceOptions, Slices, Units};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, MaskBuilder, Op};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 use super::*;
 use crate::check::{CheckError, CheckOptions, Findings, check};

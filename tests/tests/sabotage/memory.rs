@@ -13,7 +13,7 @@ fn too_little_memory_is_one_sentence_and_no_file() {
         // Mebibytes, in steps that are small where it matters.
         let limits = trials(8).min(100);
         for step in 0..limits {
-            let mebibytes = 24 + 376 * step * step / (limits * limits);
+            let mebibytes = 32 + 368 * step * step / (limits * limits);
             let line = format!("{} --threads 4", job.line);
             let what = format!("`{line}` with {mebibytes} MiB");
             let ended =
