@@ -1,4 +1,4 @@
-//! Finds materials and machines, built in or in files, by the name given in an option.
+//! Finds materials, machines and projectors, built in or in files, by the name given in an option.
 
 use std::fs::File;
 use std::io::{self, IsTerminal, Read};

@@ -25,8 +25,8 @@ Resins and machines:
   material    list and check resins          machine     list and check machines
   calibrate   make a material                target      make images to measure
   plan        plan exposures                 learn       correct them by prints
-  cure        draw what a stack cures        man         write manual pages
-  completions let shells complete commands
+  projector   list and check projectors      cure        draw what a stack cures
+  completions let shells complete commands   man         write manual pages
 lamp COMMAND -h lists the usual options of a command, --help all of them.
 All commands have -q, --quiet; --threads N; --options FILE.toml; -h, --help.
 ";

@@ -9,6 +9,7 @@ use lamp_adaptive::HeightsError;
 use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::material::MaterialError;
 use lamp_planning::LightError;
+use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::PartError;
 use lamp_planning::voxels::PlanError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
@@ -27,7 +28,9 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
     let catalogued = || {
         let material = error.downcast_ref::<CatalogueError<MaterialError>>();
         let machine = error.downcast_ref::<CatalogueError<MachineError>>();
-        material.and_then(catalogue).or_else(|| machine.and_then(catalogue))
+        let projector = error.downcast_ref::<CatalogueError<ProjectorError>>();
+        let hint = material.and_then(catalogue).or_else(|| machine.and_then(catalogue));
+        hint.or_else(|| projector.and_then(catalogue))
     };
     let hint = error.downcast_ref().and_then(slicing);
     hint.or_else(|| error.downcast_ref().and_then(heights))

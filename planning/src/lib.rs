@@ -9,6 +9,7 @@ mod blur;
 mod doses;
 pub mod learn;
 mod light;
+pub mod projector;
 mod region;
 mod resin_light;
 mod section;

@@ -21,6 +21,7 @@ mod material;
 mod mesh;
 mod orient;
 mod plan;
+mod projector;
 mod sample;
 mod show;
 pub(crate) mod slice;
@@ -55,6 +56,7 @@ pub(crate) enum Command {
     Split(split::SplitArgs),
     Machine(machine::MachineArgs),
     Material(material::MaterialArgs),
+    Projector(projector::ProjectorArgs),
     Plan(plan::PlanArgs),
     Learn(learn::LearnArgs),
     Cure(cure::CureArgs),
@@ -100,6 +102,7 @@ impl Command {
             Self::Split(args) => split::run(args, common),
             Self::Machine(args) => machine::run(args),
             Self::Material(args) => material::run(args),
+            Self::Projector(args) => projector::run(args),
             Self::Plan(args) => plan::run(args, common),
             Self::Learn(args) => learn::run(args, common),
             Self::Cure(args) => cure::run(args, common),

@@ -27,7 +27,7 @@ pub use model::{CureError, CureModel, DepthRange, ModelError};
 pub use spread::Spread;
 pub use two_depth::TwoDepth;
 pub use units::{
-    Dose, ExposureTime, GrayLevel, Intensity, Quantity, QuantityError, WidthSensitivity,
+    Dose, ExposureTime, GrayLevel, Intensity, Power, Quantity, QuantityError, WidthSensitivity,
 };
 pub use working_curve::WorkingCurve;
 

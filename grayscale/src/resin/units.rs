@@ -133,6 +133,12 @@ quantity! {
 }
 
 quantity! {
+    /// The power of light, as of a ray. Parsed from `mW` or `W`.
+    Power, "a power", "milliwatts", from_mw, mw, "mW", "8e-11 mW",
+    [("W", 1000.0, 1.0)]
+}
+
+quantity! {
     /// The time for which a layer is exposed. Parsed from `ms` or `s`.
     ExposureTime, "an exposure time", "milliseconds", from_ms, ms, "ms", "200 ms",
     [("s", 1000.0, 1.0)]

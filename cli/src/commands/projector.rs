@@ -1,0 +1,164 @@
+//! `lamp projector`: lists, shows and checks projectors.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use lamp_planning::projector::{Focus, Lens, Projector, SpreadOf};
+use lamp_stack::{Catalogued, Length, Size};
+use serde_json::{Value, json};
+
+use crate::catalogue;
+use crate::exit::Exit;
+use crate::json_report::{print_answer, to_nm};
+use crate::streams::{input_name, print};
+
+/// List, show or check projectors: where and how bright mirrors light the glass
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp projector list
+  lamp projector show zhao > mine.toml
+  lamp projector check mine.toml")]
+pub(crate) struct ProjectorArgs {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// List the built-in projectors
+    List {
+        /// Print JSON, as docs/json.md describes it
+        #[arg(long)]
+        json: bool,
+    },
+    /// Check a projector's file and print it as it was written, to read or to start a new one from
+    Show {
+        /// Projector: a built-in projector's name, a file, or - for standard input
+        #[arg(value_name = "PROJECTOR")]
+        projector: PathBuf,
+
+        /// Print JSON, as docs/json.md describes it, instead of the file
+        #[arg(long)]
+        json: bool,
+    },
+    /// Check a projector file and report what it lights, and where its lens images
+    Check {
+        /// The file, or - for standard input
+        file: PathBuf,
+
+        /// Print JSON, as docs/json.md describes it
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+pub(crate) fn run(args: &ProjectorArgs) -> Result<(), Exit> {
+    match &args.action {
+        Action::List { json: true } => answer(Projector::builtins()),
+        Action::List { json: false } => print(&table()),
+        Action::Show { projector, json: true } => answer([catalogue::entry(projector)?]),
+        Action::Show { projector, json: false } => catalogue::show::<Projector>(projector),
+        Action::Check { file, json } => check(file, *json),
+    }
+}
+
+fn answer(projectors: impl IntoIterator<Item = Projector>) -> Result<(), Exit> {
+    let projectors: Vec<Value> =
+        projectors.into_iter().map(|projector| fields(&projector)).collect();
+    print_answer("lamp-projector-1", &json!({ "projectors": projectors }))
+}
+
+/// What is known of a projector, and what follows from it.
+fn fields(projector: &Projector) -> Value {
+    let (cone, sigma) = match projector.spread() {
+        SpreadOf::Cone(half) => (Some(half.um()), None),
+        SpreadOf::Gaussian(sigma) => (None, Some(sigma.um())),
+    };
+    json!({
+        "name": projector.name,
+        "description": projector.description,
+        "mirrors": [projector.display.columns, projector.display.rows],
+        "pitch_um": projector.pitch.value.um(),
+        "mirror_um": to_nm(projector.mirror_image().mm()) * 1000.0,
+        "image_mm": projector.image().map(|side| to_nm(side.mm())),
+        "voxel_um": projector.voxel.as_ref().map(|voxel| voxel.value.um()),
+        "cone_um": cone,
+        "sigma_um": sigma,
+        "light_mw_per_cm2": projector.irradiance().mw_per_cm2(),
+        "step_ms": projector.step.value.ms(),
+        "chamber_um": projector.chamber.as_ref().map(|chamber| chamber.value.um()),
+        "focus_mm": focus(projector).map(|focus| to_nm(focus.image.mm())),
+        "given": projector,
+    })
+}
+
+fn focus(projector: &Projector) -> Option<Focus> {
+    projector.lens.as_ref().and_then(Lens::focus)
+}
+
+/// A line for each built-in projector.
+fn table() -> String {
+    let mut text = format!(
+        "{:<10}{:<10}{:<9}{:<15}{:<14}{:<14}description\n",
+        "name", "mirrors", "pitch", "image", "full white", "spread"
+    );
+    for projector in Projector::builtins() {
+        let Projector { name, description, display, pitch, .. } = &projector;
+        let mirrors = format!("{}x{}", display.columns, display.rows);
+        let pitch = two_digits(pitch.value).to_string();
+        let (image, spread) = (image(&projector), spread(&projector));
+        let light = format!("{:.3}", projector.irradiance());
+        text += &format!(
+            "{name:<10}{mirrors:<10}{pitch:<9}{image:<15}{light:<14}{spread:<14}{description}\n"
+        );
+    }
+    text
+}
+
+fn two_digits(length: Length) -> Length {
+    Length::from_um((length.um() * 100.0).round() / 100.0)
+}
+
+fn image(projector: &Projector) -> String {
+    let [width, height] =
+        projector.image().map(|side| Length::from_um((side.um() / 10.0).round() * 10.0));
+    Size { width, height }.to_string()
+}
+
+fn spread(projector: &Projector) -> String {
+    match projector.spread() {
+        SpreadOf::Cone(half) => format!("cone {half}"),
+        SpreadOf::Gaussian(sigma) => format!("sigma {sigma}"),
+    }
+}
+
+fn check(path: &Path, json: bool) -> Result<(), Exit> {
+    let (projector, _) = catalogue::read_file(path)?;
+    if json {
+        return answer([projector]);
+    }
+    print(&format!("{}: {}\n", input_name(path), lights(&projector)))
+}
+
+/// Says in a sentence what a projector lights, and where its lens images.
+fn lights(projector: &Projector) -> String {
+    let lens = match focus(projector) {
+        Some(focus) => format!(
+            "its lens images the mirrors {:.2}mm behind its middle, {:.2}mm off",
+            focus.image.mm(),
+            focus.off.mm().abs()
+        ),
+        None => "no lens is given, so its focus is not checked".to_owned(),
+    };
+    format!(
+        "{} lights {} of glass with {}x{} mirrors of {} at {:.3}, in steps of {}; {lens}",
+        projector.name,
+        image(projector),
+        projector.display.columns,
+        projector.display.rows,
+        two_digits(projector.pitch.value),
+        projector.irradiance(),
+        projector.step.value,
+    )
+}

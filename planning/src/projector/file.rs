@@ -1,0 +1,333 @@
+//! Projector files.
+
+use lamp_grayscale::material::Given;
+use lamp_grayscale::resin::{Intensity, Quantity};
+use lamp_stack::{Builtin, Catalogued, Length, MAX_SIDE};
+use thiserror::Error;
+
+use super::{GrayLight, Lens, Projector, Rays};
+
+/// Why a projector's numbers contradict each other.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ProjectorError {
+    /// No mirrors, or more than images may have.
+    #[error("display: columns and rows must be between 1 and {MAX_SIDE}")]
+    Display,
+    /// A number that must be above zero, and of a size that projectors have.
+    #[error("{0} must be above zero, and at most {1}")]
+    Impossible(&'static str, &'static str),
+    /// A number that must be zero or more, and of a size that projectors have.
+    #[error("{0} must be zero or more, and at most {1}")]
+    Negative(&'static str, &'static str),
+    /// Light that spreads in no way, or in two.
+    #[error("spread: give either cone or sigma")]
+    Spread,
+    /// No light, or two that may contradict each other.
+    #[error("give either [rays] or [light]")]
+    Light,
+    /// Rays that nothing can count.
+    #[error("rays: points and directions must be between 1 and 99")]
+    Rays,
+    /// Light that no projector has: a unit may be wrong.
+    #[error("the light of a wide white field is {0}: no projector has so little or so much")]
+    Implausible(Intensity),
+    /// Shares of gray levels that are none.
+    #[error(
+        "gray: shares must go from level 0 to 255, levels rising, shares from 0 to 1 and never falling"
+    )]
+    Gray,
+    /// Rays leave a point in a wider or narrower beam than any lens takes.
+    #[error("lens: divergence must be above 0 and below 90 degrees")]
+    Divergence,
+    /// A lens that bends no light together.
+    #[error("lens: index must be above 1 and at most 5")]
+    Index,
+    /// A lens that images the mirrors nowhere behind it.
+    #[error("lens: {object} is too near to it: it images the mirrors nowhere")]
+    NoImage {
+        /// From the mirrors to the middle of the lens.
+        object: Length,
+    },
+    /// A lens that is out of focus.
+    #[error(
+        "lens: it is out of focus by {off}: it images mirrors {object} away at {image}, not at \
+         {wanted}, where a point's light would be {blur} wide and a mirror's image is {mirror}"
+    )]
+    OutOfFocus {
+        /// How far the image is off.
+        off: Length,
+        /// From the mirrors to the middle of the lens.
+        object: Length,
+        /// Where the image is.
+        image: Length,
+        /// Where it is wanted.
+        wanted: Length,
+        /// How wide the light of a point is there.
+        blur: Length,
+        /// The side of a mirror's image.
+        mirror: Length,
+    },
+}
+
+macro_rules! builtin {
+    ($name:literal) => {
+        Builtin { name: $name, toml: include_str!(concat!("../../projectors/", $name, ".toml")) }
+    };
+}
+
+impl Catalogued for Projector {
+    const KIND: &'static str = "projector";
+    const BUILTINS: &'static [Builtin] = &[builtin!("jariwala"), builtin!("zhao")];
+    type CheckError = ProjectorError;
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn check(&self) -> Result<(), ProjectorError> {
+        let mirrors = 1..=MAX_SIDE;
+        if !(mirrors.contains(&self.display.columns) && mirrors.contains(&self.display.rows)) {
+            return Err(ProjectorError::Display);
+        }
+        above_zero("pitch.value", &self.pitch, 1e4, "10 mm")?;
+        if let Some(mirror) = &self.mirror {
+            above_zero("mirror.side", &mirror.side, 1e4, "10 mm")?;
+            not_negative("mirror.gap", &mirror.gap, 1e4, "10 mm")?;
+        }
+        if let Some(voxel) = &self.voxel {
+            above_zero("voxel.value", voxel, 1e4, "10 mm")?;
+        }
+        if let Some(chamber) = &self.chamber {
+            above_zero("chamber.value", chamber, 1e6, "1 m")?;
+        }
+        match (&self.spread.cone, &self.spread.sigma) {
+            (Some(cone), None) => not_negative("spread.cone", cone, 1e4, "10 mm")?,
+            (None, Some(sigma)) => not_negative("spread.sigma", sigma, 1e4, "10 mm")?,
+            _ => return Err(ProjectorError::Spread),
+        }
+        above_zero("step.value", &self.step, 6e4, "a minute")?;
+        self.check_light()?;
+        self.gray.as_ref().map_or(Ok(()), GrayLight::check)?;
+        self.lens.as_ref().map_or(Ok(()), |lens| lens.check(self.mirror_image()))
+    }
+}
+
+impl Projector {
+    fn check_light(&self) -> Result<(), ProjectorError> {
+        if self.rays.is_some() == self.light.is_some() {
+            return Err(ProjectorError::Light);
+        }
+        self.rays.as_ref().map_or(Ok(()), Rays::check)?;
+        let light = self.irradiance();
+        let plausible = Intensity::PLAUSIBLE.contains(&light);
+        if plausible { Ok(()) } else { Err(ProjectorError::Implausible(light)) }
+    }
+}
+
+impl Rays {
+    fn check(&self) -> Result<(), ProjectorError> {
+        let some = 1..=99;
+        let countable = some.contains(&self.points) && some.contains(&self.directions);
+        if countable { Ok(()) } else { Err(ProjectorError::Rays) }
+    }
+}
+
+impl GrayLight {
+    fn check(&self) -> Result<(), ProjectorError> {
+        let shares = &self.shares;
+        let ends = [shares.first(), shares.last()].map(|end| end.map(|&(level, _)| level));
+        let rises = shares.windows(2).all(|two| two[0].0 < two[1].0 && two[0].1 <= two[1].1);
+        let shares_of_one = shares.iter().all(|(_, share)| (0.0..=1.0).contains(share));
+        let fine = ends == [Some(0), Some(255)] && rises && shares_of_one;
+        if fine { Ok(()) } else { Err(ProjectorError::Gray) }
+    }
+}
+
+impl Lens {
+    /// Checks that it images points within the image of a mirror.
+    fn check(&self, mirror: Length) -> Result<(), ProjectorError> {
+        for (key, length) in [
+            ("lens.radius", &self.radius),
+            ("lens.object", &self.object),
+            ("lens.image", &self.image),
+        ] {
+            above_zero(key, length, 1e7, "10 m")?;
+        }
+        not_negative("lens.thickness", &self.thickness, 1e6, "1 m")?;
+        if !(1.0 < self.index.value && self.index.value <= 5.0) {
+            return Err(ProjectorError::Index);
+        }
+        if !(0.0 < self.divergence.value && self.divergence.value < 90.0) {
+            return Err(ProjectorError::Divergence);
+        }
+        let object = self.object.value;
+        let focus = self.focus().ok_or(ProjectorError::NoImage { object })?;
+        let blur = Length::from_um(2.0 * focus.blur.um());
+        if blur.um() <= mirror.um() {
+            return Ok(());
+        }
+        let [off, image] = [focus.off.um().abs(), focus.image.um()].map(rounded_to_10_um);
+        let [blur, mirror] = [blur, mirror].map(|it| Length::from_um(it.um().round()));
+        let wanted = self.image.value;
+        Err(ProjectorError::OutOfFocus { off, object, image, wanted, blur, mirror })
+    }
+}
+
+fn rounded_to_10_um(um: f64) -> Length {
+    Length::from_um((um / 10.0).round() * 10.0)
+}
+
+fn above_zero<T: Quantity>(
+    key: &'static str,
+    given: &Given<T>,
+    most: f64,
+    in_words: &'static str,
+) -> Result<(), ProjectorError> {
+    let number = given.value.number();
+    let possible = number > 0.0 && number <= most;
+    if possible { Ok(()) } else { Err(ProjectorError::Impossible(key, in_words)) }
+}
+
+fn not_negative(
+    key: &'static str,
+    given: &Given<Length>,
+    most: f64,
+    in_words: &'static str,
+) -> Result<(), ProjectorError> {
+    let possible = (0.0..=most).contains(&given.value.um());
+    if possible { Ok(()) } else { Err(ProjectorError::Negative(key, in_words)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::projector::SpreadOf;
+
+    const WHOLE: &str = r#"name = "mine"
+description = "A projector of mine"
+
+[display]
+columns = 1920
+rows = 1080
+source = "data sheet"
+
+[mirror]
+side = { value = "7 um", source = "data sheet" }
+gap = { value = "0.6 um", source = "data sheet" }
+
+[pitch]
+value = "15.2 um"
+source = "ruler"
+
+[spread]
+sigma = { value = "8 um", source = "camera" }
+
+[light]
+value = "12 mW/cm2"
+source = "radiometer"
+
+[step]
+value = "10 ms"
+source = "data sheet"
+
+[chamber]
+value = "0.5 mm"
+source = "spacer"
+
+[gray]
+shares = [[0, 0], [128, 0.3], [255, 1]]
+source = "radiometer"
+
+[lens]
+radius = { value = "50 mm", source = "data sheet" }
+thickness = { value = "5 mm", source = "data sheet" }
+index = { value = 1.5, source = "data sheet" }
+object = { value = "150 mm", source = "ruler" }
+image = { value = "309.69 mm", source = "ruler" }
+divergence = { value = 1, source = "data sheet" }
+"#;
+
+    fn refused(from: &str, to: &str) -> String {
+        assert!(WHOLE.contains(from), "{from}");
+        let error = Projector::from_toml(&WHOLE.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(!error.contains('\n'), "{error:?}");
+        error
+    }
+
+    #[test]
+    fn built_in_projectors_are_whole_and_bear_their_names() {
+        for builtin in Projector::BUILTINS {
+            let projector = Projector::from_toml(builtin.toml).unwrap();
+            assert_eq!(projector.name, builtin.name);
+        }
+        assert!(Projector::BUILTINS.is_sorted_by_key(|builtin| builtin.name));
+        let [jariwala, zhao] = ["jariwala", "zhao"].map(|name| Projector::builtin(name).unwrap());
+        assert_eq!(zhao.spread(), SpreadOf::Cone(Length::from_um(12.0)));
+        assert!((zhao.irradiance().mw_per_cm2() - 0.18821).abs() < 1e-5);
+        assert!((zhao.mirror_image().um() - 25.838).abs() < 1e-3);
+        assert!((zhao.image()[0].mm() - 28.550).abs() < 1e-3);
+        assert_eq!(jariwala.irradiance().to_string(), "2.57 mW/cm2");
+        assert!((jariwala.pitch.value.um() * 90.0 - 560.0).abs() < 1e-9);
+        assert_eq!(jariwala.fill(), 1.0);
+    }
+
+    #[test]
+    fn gray_levels_have_their_share() {
+        let mine = Projector::from_toml(WHOLE).unwrap();
+        assert_eq!([0, 64, 128, 255].map(|level| mine.share(level)), [0.0, 0.15, 0.3, 1.0]);
+        let plain = Projector { gray: None, ..mine };
+        assert_eq!([0, 51, 255].map(|level| plain.share(level)), [0.0, 0.2, 1.0]);
+    }
+
+    #[test]
+    fn errors_name_the_key_and_what_to_do() {
+        for (from, to, words) in [
+            ("rows = 1080", "rows = 0", &["display", "between 1 and"][..]),
+            ("15.2 um", "15.2", &["line 14", "pitch.value", "unit"]),
+            ("15.2 um", "0 um", &["pitch.value must be above zero"]),
+            ("15.2 um", "1 m", &["pitch.value", "at most 10 mm"]),
+            ("\"7 um\"", "\"-7 um\"", &["mirror.side must be above zero"]),
+            ("0.6 um", "-0.6 um", &["mirror.gap must be zero or more"]),
+            ("sigma", "sigmas", &["line 18", "spread", "sigmas"]),
+            ("sigma = { value = \"8 um\", source = \"camera\" }", "", &["either cone or sigma"]),
+            ("8 um", "-8 um", &["spread.sigma must be zero or more"]),
+            ("12 mW/cm2", "0 mW/cm2", &["wide white field", "0 mW/cm2"]),
+            ("12 mW/cm2", "nan mW/cm2", &["light.value", "not an intensity"]),
+            ("[light]", "[lamp]", &["unknown key `lamp`"]),
+            ("\"radiometer\"", "\"\"", &["light.source", "is empty"]),
+            ("10 ms", "0 ms", &["step.value must be above zero"]),
+            ("0.5 mm", "0 mm", &["chamber.value must be above zero"]),
+            ("[128, 0.3]", "[128, 1.3]", &["gray: shares"]),
+            ("[128, 0.3]", "[255, 0.3]", &["gray: shares"]),
+            ("[0, 0], ", "", &["gray: shares", "from level 0"]),
+            ("[128, 0.3]", "[128, nan]", &["gray: shares"]),
+            ("value = 1.5", "value = 1.0", &["lens: index"]),
+            ("value = 1,", "value = nan,", &["lens: divergence"]),
+            ("150 mm", "90 mm", &["lens", "nowhere"]),
+            ("309.69 mm", "250 mm", &["out of focus by 59.69mm", "at 309.69mm, not at 250mm"]),
+        ] {
+            let error = refused(from, to);
+            for word in words {
+                assert!(error.contains(word), "no `{word}` in {error:?}");
+            }
+        }
+        let rays = "[rays]\npoints = 9\ndirections = 15\nsource = \"a\"\n\
+                    power = { value = \"1 mW\", source = \"a\" }\n[step]";
+        assert_eq!(refused("[step]", rays), "give either [rays] or [light]");
+    }
+
+    #[test]
+    fn the_lens_of_000_is_refused_with_how_far_it_is_off() {
+        let lens = WHOLE
+            .replace("15.2 um", "11.85 um")
+            .replace("\"50 mm", "\"34.25 mm")
+            .replace("\"5 mm\"", "\"4.4 mm\"")
+            .replace("value = 1.5", "value = 1.460")
+            .replace("150 mm", "152 mm")
+            .replace("309.69 mm", "132 mm");
+        let error = Projector::from_toml(&lens).unwrap_err().to_string();
+        assert!(error.contains("out of focus by 15.22mm"), "{error}");
+        assert!(error.contains("152mm away at 147.22mm, not at 132mm"), "{error}");
+    }
+}
