@@ -4,6 +4,7 @@
 //!   each voxel, from a material's numbers.
 //! - [`Blur`] spreads the light of an image sideways.
 //! - [`speed`] plans the time of each layer, [`learn`] corrects it after every print.
+//! - [`projector`] and [`target`] are what planners on a fixed glass start from.
 
 mod blur;
 mod doses;
@@ -16,6 +17,7 @@ mod section;
 pub mod solver;
 pub mod speed;
 mod spool;
+pub mod target;
 mod tiled;
 pub mod voxels;
 mod wide;

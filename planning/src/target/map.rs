@@ -1,0 +1,122 @@
+//! Heights of columns on a grid.
+
+use lamp_stack::Length;
+use rayon::prelude::*;
+
+use super::TargetError;
+
+/// Square columns on the glass, their middle on the optical axis. x grows along a row; the first
+/// row has the greatest y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// How many columns a row has.
+    pub columns: usize,
+    /// How many rows there are.
+    pub rows: usize,
+    /// The side of a column.
+    pub pitch_um: f64,
+}
+
+impl Grid {
+    /// Returns the least odd grid that holds a rectangle: the middle of one column is on the axis.
+    pub(super) fn around([width, height]: [Length; 2], pitch: Length) -> Self {
+        let count = |side: Length| 2 * (side.um() / pitch.um() / 2.0).ceil() as usize + 1;
+        Self { columns: count(width), rows: count(height), pitch_um: pitch.um() }
+    }
+
+    /// Returns how many columns there are in all.
+    pub fn count(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// Returns the x of the middle of a column, in micrometres.
+    pub fn x_um(&self, column: usize) -> f64 {
+        (column as f64 - (self.columns as f64 - 1.0) / 2.0) * self.pitch_um
+    }
+
+    /// Returns the y of the middle of a row, in micrometres.
+    pub fn y_um(&self, row: usize) -> f64 {
+        ((self.rows as f64 - 1.0) / 2.0 - row as f64) * self.pitch_um
+    }
+
+    /// Returns the value of each column at its middle, row by row.
+    pub(super) fn map(&self, value: impl Fn(f64, f64) -> f64 + Sync) -> Vec<f64> {
+        let mut values = vec![0.0; self.count()];
+        values.par_chunks_mut(self.columns.max(1)).enumerate().for_each(|(row, values)| {
+            let y = self.y_um(row);
+            for (column, place) in values.iter_mut().enumerate() {
+                *place = value(self.x_um(column), y);
+            }
+        });
+        values
+    }
+}
+
+/// The height of each column of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeightMap {
+    /// Where the columns are.
+    pub grid: Grid,
+    /// Their heights in micrometres, row by row; 0 where nothing is wanted.
+    pub heights_um: Vec<f64>,
+}
+
+impl HeightMap {
+    /// Returns the height of a column, in micrometres.
+    pub fn height_um(&self, column: usize, row: usize) -> f64 {
+        self.heights_um[row * self.grid.columns + column]
+    }
+
+    /// Returns the greatest height, in micrometres.
+    pub fn highest_um(&self) -> f64 {
+        self.heights_um.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Returns how many columns have a height, but a lower one than this.
+    pub fn lower_than(&self, least: Length) -> usize {
+        self.heights_um.iter().filter(|&&um| um > 0.0 && um < least.um()).count()
+    }
+
+    /// Checks that no column is higher than the chamber.
+    ///
+    /// # Errors
+    /// Returns an error that names the highest one.
+    pub fn check_chamber(&self, chamber: Length) -> Result<(), TargetError> {
+        let highest = self.highest_um();
+        if highest <= chamber.um() {
+            return Ok(());
+        }
+        let at = self.heights_um.iter().position(|&um| um == highest).unwrap_or(0);
+        let place = Place::of(&self.grid, at);
+        Err(TargetError::AboveChamber { place, height: Length::from_um(highest), chamber })
+    }
+}
+
+/// A column, for messages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Its number in the row, from 0.
+    pub column: usize,
+    /// Its row, from 0.
+    pub row: usize,
+    /// Where its middle is.
+    pub x: Length,
+    /// Where its middle is.
+    pub y: Length,
+}
+
+impl Place {
+    pub(super) fn of(grid: &Grid, at: usize) -> Self {
+        let (column, row) = (at % grid.columns, at / grid.columns);
+        let [x, y] = [grid.x_um(column), grid.y_um(row)];
+        let [x, y] = [x, y].map(|um| Length::from_um(um).to_whole_nm());
+        Self { column, row, x, y }
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { column, row, x, y } = self;
+        write!(f, "column {column} of row {row} (x {x}, y {y})")
+    }
+}

@@ -1,0 +1,108 @@
+//! Targets of planners on a fixed glass: what is to be cured, as a height above each point of
+//! the glass (000 section 3.3).
+//!
+//! A target is one of three: shapes by their measures ([`Shapes`]), a height map as a PNG, or a
+//! part with a flat bottom. All give heights at the middles of square columns.
+//!
+//! ```
+//! use lamp_planning::target::{Grid, Target};
+//!
+//! let sphere = Target::builtin("sphere").unwrap();
+//! let map = sphere.heights(&Grid { columns: 300, rows: 300, pitch_um: 10.0 })?;
+//! assert_eq!((map.highest_um().round(), map.height_um(0, 0)), (400.0, 0.0));
+//! # Ok::<(), lamp_planning::target::TargetError>(())
+//! ```
+
+mod error;
+mod file;
+mod map;
+mod open;
+mod part;
+mod picture;
+mod round;
+mod shapes;
+
+use lamp_stack::{Catalogued, Length};
+
+pub use error::TargetError;
+pub use map::{Grid, HeightMap, Place};
+pub use open::TargetOptions;
+pub use picture::MapScale;
+pub use round::Round;
+pub use shapes::{Base, Channels, Direction, Lens, Shapes, ShapesError};
+
+use part::PartColumns;
+use picture::HeightPicture;
+
+/// What is to be cured, centred on the optical axis.
+#[derive(Debug)]
+pub struct Target(Source);
+
+#[derive(Debug)]
+enum Source {
+    Shapes(Shapes),
+    Picture(HeightPicture),
+    Part(Box<PartColumns>),
+}
+
+impl Target {
+    /// Returns the built-in target of a name.
+    pub fn builtin(name: &str) -> Option<Self> {
+        Shapes::builtin(name).map(Self::from)
+    }
+
+    /// Returns its name: that in its file, or of the file.
+    pub fn name(&self) -> &str {
+        match &self.0 {
+            Source::Shapes(shapes) => &shapes.name,
+            Source::Picture(picture) => picture.name(),
+            Source::Part(part) => part.name(),
+        }
+    }
+
+    /// Returns the width and height of the rectangle on the glass that holds it.
+    pub fn size(&self) -> [Length; 2] {
+        let size_um = match &self.0 {
+            Source::Shapes(shapes) => shapes.size_um(),
+            Source::Picture(picture) => picture.size_um(),
+            Source::Part(part) => part.size_um(),
+        };
+        size_um.map(Length::from_um)
+    }
+
+    /// Returns the height of each column of a grid, at its middle (000 section 3.3.1). What lies
+    /// beyond the grid is left out.
+    ///
+    /// # Errors
+    /// Returns an error if no column has any, or if a column of a part has an overhang, a hole or
+    /// no bottom on the glass.
+    pub fn heights(&self, grid: &Grid) -> Result<HeightMap, TargetError> {
+        let heights_um = match &self.0 {
+            Source::Shapes(shapes) => grid.map(|x, y| shapes.height_um(x, y)),
+            Source::Picture(picture) => grid.map(|x, y| picture.height_um(x, y)),
+            Source::Part(part) => part.heights_um(grid)?,
+        };
+        let map = HeightMap { grid: *grid, heights_um };
+        if map.highest_um() > 0.0 { Ok(map) } else { Err(TargetError::Empty { grid: *grid }) }
+    }
+
+    /// Returns its height over the distance from the axis. Height maps and parts are seen at
+    /// points `step` apart.
+    ///
+    /// # Errors
+    /// Returns an error if it is not round, or as [`heights`](Self::heights).
+    pub fn round(&self, step: Length) -> Result<Round, TargetError> {
+        match &self.0 {
+            Source::Shapes(shapes) => Round::of_shapes(shapes),
+            Source::Picture(_) | Source::Part(_) => {
+                Round::of_map(&self.heights(&Grid::around(self.size(), step))?)
+            }
+        }
+    }
+}
+
+impl From<Shapes> for Target {
+    fn from(shapes: Shapes) -> Self {
+        Self(Source::Shapes(shapes))
+    }
+}

@@ -1,0 +1,139 @@
+//! Height maps as PNG pictures: gray levels are heights.
+
+use std::io::{BufRead, Seek};
+
+use lamp_stack::Length;
+use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
+
+use super::TargetError;
+
+/// What the pixels of a height map mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapScale {
+    /// The side of a pixel on the glass.
+    pub pixel: Length,
+    /// The height of full white.
+    pub full: Length,
+}
+
+/// A picture of more pixels is no target.
+const MAX_PIXELS: u64 = 1 << 26;
+
+/// A height map, its middle on the axis.
+#[derive(Debug)]
+pub(super) struct HeightPicture {
+    name: String,
+    columns: usize,
+    rows: usize,
+    scale: MapScale,
+    /// Row by row, 65535 for full white.
+    levels: Vec<u16>,
+}
+
+impl HeightPicture {
+    /// Reads a PNG of gray levels, of 16 bits or 8.
+    pub(super) fn read(
+        name: &str,
+        from: impl BufRead + Seek,
+        scale: MapScale,
+    ) -> Result<Self, TargetError> {
+        let (pixel, full) = (scale.pixel, scale.full);
+        if !(pixel.um() > 0.0 && pixel.um() <= 1e6 && full.um() > 0.0 && full.um() <= 1e6) {
+            return Err(TargetError::Scale { pixel, full });
+        }
+        let mut decoder = Decoder::new_with_limits(from, Limits { bytes: 1 << 28 });
+        decoder.set_transformations(Transformations::IDENTITY);
+        let mut reader = decoder.read_info()?;
+        let info = reader.info();
+        let (width, height) = (info.width, info.height);
+        if u64::from(width) * u64::from(height) > MAX_PIXELS {
+            return Err(TargetError::LargePicture { width, height });
+        }
+        let (colour, depth) = (info.color_type, info.bit_depth);
+        let bytes_a_level = match (colour, depth) {
+            (ColorType::Grayscale, BitDepth::Sixteen) => 2,
+            (ColorType::Grayscale, BitDepth::Eight) => 1,
+            _ => return Err(TargetError::NotGray { bits: depth as u8, colour }),
+        };
+        let (columns, rows) = (width as usize, height as usize);
+        let mut bytes = vec![0; columns * rows * bytes_a_level];
+        reader.next_frame(&mut bytes)?;
+        reader.finish()?;
+        let levels = match bytes_a_level {
+            2 => bytes.chunks_exact(2).map(|two| u16::from_be_bytes([two[0], two[1]])).collect(),
+            _ => bytes.iter().map(|&level| u16::from(level) * 257).collect(),
+        };
+        Ok(Self { name: name.to_owned(), columns, rows, scale, levels })
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn size_um(&self) -> [f64; 2] {
+        [self.columns, self.rows].map(|count| count as f64 * self.scale.pixel.um())
+    }
+
+    /// Returns the height of the pixel that holds a point, 0 beyond the picture.
+    pub(super) fn height_um(&self, x: f64, y: f64) -> f64 {
+        let pixel = self.scale.pixel.um();
+        let [width, height] = [self.columns, self.rows].map(|count| count as f64);
+        let (column, row) = ((x / pixel + width / 2.0).floor(), (height / 2.0 - y / pixel).floor());
+        if !((0.0..width).contains(&column) && (0.0..height).contains(&row)) {
+            return 0.0;
+        }
+        let level = self.levels[row as usize * self.columns + column as usize];
+        f64::from(level) / f64::from(u16::MAX) * self.scale.full.um()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    const SCALE: MapScale = MapScale { pixel: Length::from_um(10.0), full: Length::from_um(500.0) };
+
+    fn png(columns: u32, rows: u32, colour: ColorType, depth: BitDepth, data: &[u8]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, columns, rows);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        encoder.write_header().unwrap().write_image_data(data).unwrap();
+        bytes
+    }
+
+    fn read(bytes: &[u8]) -> Result<HeightPicture, String> {
+        HeightPicture::read("map", Cursor::new(bytes), SCALE).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn levels_are_heights() {
+        let data: Vec<u8> =
+            [0_u16, 65535, 13107, 1].into_iter().flat_map(u16::to_be_bytes).collect();
+        let map = read(&png(2, 2, ColorType::Grayscale, BitDepth::Sixteen, &data)).unwrap();
+        assert_eq!(map.size_um(), [20.0, 20.0]);
+        // The first row has the greatest y.
+        let at = |x, y| map.height_um(x, y);
+        assert_eq!([at(-5.0, 5.0), at(5.0, 5.0), at(-5.0, -5.0)], [0.0, 500.0, 100.0]);
+        assert_eq!(
+            [at(9.9, 9.9), at(10.1, 5.0), at(5.0, -10.1), at(f64::NAN, 0.0)],
+            [500.0, 0.0, 0.0, 0.0]
+        );
+        let map = read(&png(1, 1, ColorType::Grayscale, BitDepth::Eight, &[51])).unwrap();
+        assert_eq!(map.height_um(0.0, 0.0), 100.0);
+    }
+
+    #[test]
+    fn other_pictures_are_refused() {
+        let colour = read(&png(1, 1, ColorType::Rgb, BitDepth::Eight, &[1, 2, 3])).unwrap_err();
+        assert!(colour.contains("this has Rgb ones of 8 bits"), "{colour}");
+        let whole = png(4, 4, ColorType::Grayscale, BitDepth::Eight, &[7; 16]);
+        for end in [0, 8, 20, whole.len() - 20] {
+            assert!(read(&whole[..end]).unwrap_err().contains("no whole PNG"), "{end}");
+        }
+        let scale = MapScale { full: Length::from_um(f64::NAN), ..SCALE };
+        assert!(HeightPicture::read("map", Cursor::new(&whole), scale).is_err());
+    }
+}
