@@ -3,9 +3,12 @@
 
 use lamp_grayscale::material::{
     Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine, GivenNumber,
-    Material, SpreadNumbers, TwoDepthNumbers, WidthNumbers,
+    KineticNumbers, Material, SpreadNumbers, TwoDepthNumbers, WidthNumbers,
 };
-use lamp_grayscale::resin::{Dose, Intensity, Quantity, WidthSensitivity};
+use lamp_grayscale::resin::{
+    Absorptivity, Concentration, Diffusivity, Dose, Intensity, Quantity, RateConstant,
+    WidthSensitivity,
+};
 use lamp_stack::{Catalogued, Length};
 use proptest::option;
 use proptest::prelude::*;
@@ -96,6 +99,36 @@ fn gamma() -> impl Strategy<Value = GivenNumber> {
     })
 }
 
+fn kinetics() -> impl Strategy<Value = KineticNumbers> {
+    let rate = || given(number().prop_map(RateConstant::from_m3_per_mol_s));
+    let moles = || given(number().prop_map(Concentration::from_mol_per_m3));
+    let share = || {
+        (1e-6..0.99, option::of(number()), text())
+            .prop_map(|(value, plus_minus, source)| GivenNumber { value, plus_minus, source })
+    };
+    let absorptivity = given(number().prop_map(Absorptivity::from_m2_per_mol));
+    let diffusion = given(number().prop_map(Diffusivity::from_m2_per_s));
+    let light = (given(um()), share(), absorptivity);
+    (light, (rate(), rate(), rate()), diffusion, (moles(), moles()), share()).prop_map(
+        |(light, rates, oxygen_diffusion, (oxygen, photoinitiator), critical_conversion)| {
+            let (wavelength, quantum_efficiency, absorptivity) = light;
+            let (propagation, termination, termination_by_oxygen) = rates;
+            KineticNumbers {
+                wavelength,
+                quantum_efficiency,
+                absorptivity,
+                propagation,
+                termination,
+                termination_by_oxygen,
+                oxygen_diffusion,
+                oxygen,
+                photoinitiator,
+                critical_conversion,
+            }
+        },
+    )
+}
+
 fn constant() -> impl Strategy<Value = Constant> {
     let finite = any::<f64>().prop_filter("finite", |value| value.is_finite());
     (finite, text(), text()).prop_map(|(value, unit, source)| Constant { value, unit, source })
@@ -106,13 +139,14 @@ fn materials() -> impl Strategy<Value = Material> {
     let light = (option::of(intensity), option::of(spread()), option::of(gamma()));
     let models =
         (curve(), option::of(lines()), option::of(lines()), option::of(two_depth()), widths());
+    let models = (models, option::of(kinetics()));
     let constants = proptest::collection::btree_map("[a-z. \"]{0,6}", constant(), 0..3);
     ("[a-z0-9-]{1,9}", text(), light, models, constants).prop_map(
         |(
             name,
             description,
             (intensity, spread, gamma),
-            (curve, gray, gray_light, two_depth, cure_width),
+            ((curve, gray, gray_light, two_depth, cure_width), kinetics),
             constants,
         )| {
             let dimmed = gray.clone();
@@ -129,6 +163,7 @@ fn materials() -> impl Strategy<Value = Material> {
                     .map(|CurveLines { critical_dose, .. }| DimmedLines { critical_dose }),
                 two_depth,
                 cure_width,
+                kinetics,
                 constants,
             }
         },

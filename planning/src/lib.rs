@@ -8,6 +8,7 @@
 
 mod blur;
 mod doses;
+pub mod ecpl;
 pub mod learn;
 mod light;
 pub mod projector;

@@ -27,7 +27,7 @@ fn list_has_a_line_for_each_material() {
     assert_eq!(rows[1][1..6], ["1600", "mW/cm2", "working-curve,", "gray,", "dimmed-lamp"]);
     // No light and no model is printed if the source has none.
     assert_eq!(rows[4][1..4], ["-", "working-curve,", "two-depth"]);
-    assert_eq!(rows[5][1..4], ["14", "mW/cm2", "-"]);
+    assert_eq!(rows[5][1..4], ["14", "mW/cm2", "kinetics"]);
     assert_eq!(rows[6][1..3], ["3185.57", "mW/cm2"]);
     assert_eq!(rows[6][3..8], ["working-curve,", "spread", "145.6um,", "gamma", "2.404"]);
 }
@@ -85,7 +85,7 @@ fn check_says_in_a_sentence_what_a_file_allows() {
         ("pegda-sudan", "working-curve, spread 50um; at 7.394 mW/cm2"),
         // A wide field is brighter than the pixel that its intensity is told for.
         ("zsg-amber", "gamma 2.404; at 3185.57 mW/cm2, full white cures 100um in 62.9 ms"),
-        ("tmpta", "add [working-curve]"),
+        ("tmpta", "in order and gives kinetics, but tmpta has no cure model: add [working-curve]"),
     ] {
         said(&scratch, &format!("lamp material show {name} > {name}.toml"));
         let text = said(&scratch, &format!("lamp material check {name}.toml"));

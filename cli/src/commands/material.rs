@@ -130,6 +130,7 @@ fn models(material: &Material) -> Vec<&'static str> {
         ("gray", material.gray.is_some() || material.gray_light.is_some()),
         ("dimmed-lamp", material.dimmed_lamp.is_some()),
         ("two-depth", material.two_depth.is_some()),
+        ("kinetics", material.kinetics.is_some()),
     ];
     all.into_iter().filter(|&(_, given)| given).map(|(name, _)| name).collect()
 }
@@ -170,8 +171,10 @@ fn allows(material: &Material) -> String {
     let resin = match material.resin() {
         Ok(resin) => resin,
         Err(why) => {
-            let widths = widths(material).map(|widths| format!(" and gives {widths}"));
-            return format!("in order{}, but {why}", widths.unwrap_or_default());
+            let others = material.kinetics.iter().map(|_| "kinetics".to_owned());
+            let others: Vec<_> = others.chain(widths(material)).collect();
+            let gives = if others.is_empty() { "" } else { " and gives " };
+            return format!("in order{gives}{}, but {why}", others.join(", "));
         }
     };
     let depths = resin.model().depths();

@@ -86,6 +86,7 @@ impl Catalogued for Material {
         self.gray_lines()?;
         self.two_depth()?;
         self.cure_width()?;
+        self.kinetics()?;
         Ok(())
     }
 }

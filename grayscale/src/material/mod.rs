@@ -14,6 +14,7 @@
 //! ```
 
 mod file;
+mod kinetics;
 mod number;
 
 use std::collections::BTreeMap;
@@ -23,6 +24,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use file::MaterialError;
+pub use kinetics::KineticNumbers;
 pub use number::{Constant, Given, GivenDepths, GivenLine, GivenNumber};
 
 use crate::resin::{
@@ -60,6 +62,8 @@ pub struct Material {
     /// The cure width of features of several sizes (002 section 3.4.4).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cure_width: Vec<WidthNumbers>,
+    /// The rates of its reaction (003 section 4.1).
+    pub kinetics: Option<KineticNumbers>,
     /// Other numbers of its source.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, Constant>,

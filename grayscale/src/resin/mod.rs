@@ -6,6 +6,7 @@ mod composition;
 mod cure_width;
 mod filter;
 mod gray_curve;
+mod kinetics;
 mod model;
 #[cfg(test)]
 pub(crate) mod model_laws;
@@ -23,11 +24,13 @@ pub use composition::{Absorber, Inhibition, Suspension};
 pub use cure_width::{CureWidth, WidthLine};
 pub use filter::OpticalDensity;
 pub use gray_curve::{GrayCurve, IntensityLines, StraightLine};
+pub use kinetics::Kinetics;
 pub use model::{CureError, CureModel, DepthRange, ModelError};
 pub use spread::Spread;
 pub use two_depth::TwoDepth;
 pub use units::{
-    Dose, ExposureTime, GrayLevel, Intensity, Power, Quantity, QuantityError, WidthSensitivity,
+    Absorptivity, Concentration, Diffusivity, Dose, ExposureTime, GrayLevel, Intensity, Power,
+    Quantity, QuantityError, RateConstant, WidthSensitivity,
 };
 pub use working_curve::WorkingCurve;
 

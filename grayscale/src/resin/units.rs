@@ -152,6 +152,31 @@ quantity! {
     [("mm/(J/cm2)", 1.0, 1.0)]
 }
 
+quantity! {
+    /// How many moles of a species are in a volume. Parsed from `mol/m3` or the equal `mmol/l`.
+    Concentration, "a concentration", "mol/m³", from_mol_per_m3, mol_per_m3,
+    "mol/m3", "1.05 mol/m3", [("mmol/l", 1.0, 1.0)]
+}
+
+quantity! {
+    /// The rate constant of a reaction between two species. Parsed from `m3/(mol s)` or
+    /// `l/(mol s)`.
+    RateConstant, "a rate constant", "m³/(mol s)", from_m3_per_mol_s, m3_per_mol_s,
+    "m3/(mol s)", "1.66 m3/(mol s)", [("l/(mol s)", 1.0, 1000.0)]
+}
+
+quantity! {
+    /// How much light a mole absorbs: the decadic molar absorptivity. Parsed from `m2/mol`.
+    Absorptivity, "an absorptivity", "m²/mol", from_m2_per_mol, m2_per_mol,
+    "m2/mol", "15 m2/mol", []
+}
+
+quantity! {
+    /// How fast a species spreads in a resin. Parsed from `m2/s` or `um2/s`.
+    Diffusivity, "a diffusivity", "m²/s", from_m2_per_s, m2_per_s, "m2/s", "1e-10 m2/s",
+    [("um2/s", 1.0, 1e12)]
+}
+
 impl Dose {
     /// 1e-6 to 1e9 mJ/cm². No measurement of a resin lies outside, but a typing error may.
     pub const PLAUSIBLE: RangeInclusive<Self> = Self(1e-6)..=Self(1e9);

@@ -1,0 +1,78 @@
+//! A bitmap of discs and rings, and how long it is shown.
+
+use std::ops::Range;
+
+use lamp_grayscale::resin::ExposureTime;
+
+/// A bitmap of rings around the axis, and how long it is shown (003 section 5: `B_i`, `L_i`,
+/// `R_i` and `T_i`).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exposure {
+    /// From which to which pixel from the axis each ring is white, inner ones first and apart. A
+    /// disc begins at zero.
+    pub rings: Vec<Range<u32>>,
+    /// How long.
+    pub time: ExposureTime,
+}
+
+impl Exposure {
+    /// Returns a disc of so many pixels, shown for a time.
+    pub fn disc(pixels: u32, time: ExposureTime) -> Self {
+        Self { rings: std::iter::once(0..pixels).collect(), time }
+    }
+
+    /// Returns how many pixels from the axis its light ends.
+    pub fn reach(&self) -> u32 {
+        self.rings.last().map_or(0, |ring| ring.end)
+    }
+
+    /// Returns whether the ring of pixels that begins so far from the axis is white.
+    pub fn is_white(&self, ring: u32) -> bool {
+        self.rings.iter().any(|rings| rings.contains(&ring))
+    }
+}
+
+/// Makes the bitmaps of rings that are white for a number of the display's steps each, the
+/// innermost first: all begin together, so each bitmap lies within the one before.
+pub(super) fn nested(steps: &[u32], step: ExposureTime) -> Vec<Exposure> {
+    let mut ends: Vec<u32> = steps.iter().copied().filter(|&steps| steps > 0).collect();
+    ends.sort_unstable();
+    ends.dedup();
+    let mut shown = 0;
+    let exposure = |&end: &u32| {
+        let time = ExposureTime::from_ms(f64::from(end - shown) * step.ms());
+        shown = end;
+        Exposure { rings: rings_of(steps.iter().map(|&steps| steps >= end)), time }
+    };
+    ends.iter().map(exposure).collect()
+}
+
+/// Returns the rings of pixels that are white one by one from the axis.
+pub(super) fn rings_of(white: impl Iterator<Item = bool>) -> Vec<Range<u32>> {
+    let mut rings: Vec<Range<u32>> = Vec::new();
+    for (ring, _) in (0..).zip(white).filter(|&(_, white)| white) {
+        match rings.last_mut() {
+            Some(last) if last.end == ring => last.end += 1,
+            _ => rings.push(ring..ring + 1),
+        }
+    }
+    rings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_rings_become_nested_bitmaps() {
+        let plan = nested(&[5, 5, 0, 7, 7, 2, 0], ExposureTime::from_ms(100.0));
+        let rings: Vec<_> = plan.iter().map(|exposure| exposure.rings.clone()).collect();
+        assert_eq!(rings[..2], [[0..2, 3..6], [0..2, 3..5]]);
+        assert_eq!(rings[2], rings_of([false, false, false, true, true].into_iter()));
+        let times: Vec<_> = plan.iter().map(|exposure| exposure.time.ms()).collect();
+        assert_eq!(times, [200.0, 300.0, 200.0]);
+        assert!(plan[1].is_white(4) && !plan[1].is_white(2));
+        assert_eq!(plan[0].reach(), 6);
+        assert_eq!(nested(&[0, 0], ExposureTime::from_ms(100.0)), []);
+    }
+}

@@ -1,0 +1,128 @@
+//! Plans bitmaps and times for a round part.
+
+use thiserror::Error;
+
+use super::exposure::Exposure;
+use super::profile::{Profile, Wanted};
+use super::setting::{Setting, SettingError};
+use super::simulation::Simulation;
+use super::{joint, seed};
+
+/// Columns that see the part's edge: pixels that a plan may light beyond it.
+const BEYOND: f64 = 1.0;
+
+/// How to plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// The times of all rings of pixels at once.
+    #[default]
+    Joint,
+    /// Bitmap after bitmap, as 003 does.
+    Seed,
+}
+
+lamp_stack::named!(Method { Joint = "joint", Seed = "seed" });
+
+/// Why there is no plan.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// The setting exposes nothing.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A height is not a number, infinite or below zero.
+    #[error("the height {radius_um:.1} um from the axis is not a number of zero or more")]
+    NoHeight {
+        /// Where.
+        radius_um: f64,
+    },
+    /// The part is empty.
+    #[error("the target is empty: it has no height above zero")]
+    Empty,
+    /// The part is higher than the chamber.
+    #[error("the target is {wanted_um:.1} um high, the chamber only {chamber_um:.1} um")]
+    TooHigh {
+        /// The part's height.
+        wanted_um: f64,
+        /// The chamber's.
+        chamber_um: f64,
+    },
+    /// The part is wider than the display.
+    #[error("the target reaches {wanted_um:.1} um from its axis, the light only {lit_um:.1} um")]
+    TooWide {
+        /// The part's radius.
+        wanted_um: f64,
+        /// Half of the display's shorter side.
+        lit_um: f64,
+    },
+    /// The light is too weak.
+    #[error("{seconds:.0} s of light cure {cured_um:.1} um, the target is {wanted_um:.1} um high")]
+    TooDim {
+        /// The longest time.
+        seconds: f64,
+        /// What it cures.
+        cured_um: f64,
+        /// What is wanted.
+        wanted_um: f64,
+    },
+}
+
+/// Bitmaps and times, and what they cure.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// The chamber.
+    pub simulation: Simulation,
+    /// The part, at the columns of the chamber.
+    pub wanted: Wanted,
+    /// The bitmaps in order.
+    pub exposures: Vec<Exposure>,
+    /// What they cure.
+    pub cured: Profile,
+}
+
+/// Plans a round part of `radius_um`, whose height at each distance from its axis is given in
+/// micrometres.
+///
+/// # Errors
+/// Returns an error if a height is impossible, the part does not fit the chamber or the display,
+/// or the light does not cure it.
+pub fn plan(
+    setting: Setting,
+    radius_um: f64,
+    height_um: impl Fn(f64) -> f64,
+    method: Method,
+) -> Result<Planned, PlanError> {
+    setting.check()?;
+    let lit_um = f64::from(setting.pixels) * setting.pixel_um;
+    if radius_um.is_nan() || radius_um > lit_um {
+        return Err(PlanError::TooWide { wanted_um: radius_um, lit_um });
+    }
+    let pixels = (radius_um / setting.pixel_um + BEYOND).ceil().min(f64::from(setting.pixels));
+    let simulation = Simulation::new(setting, pixels as u32, radius_um)?;
+    let wanted = Wanted::new(simulation.reaction().cells(), height_um);
+    wanted.check(&simulation)?;
+    let exposures = match method {
+        Method::Joint => joint::plan(&simulation, &wanted)?,
+        Method::Seed => seed::plan(&simulation, &wanted),
+    };
+    let cured = simulation.cure(&exposures);
+    Ok(Planned { simulation, wanted, exposures, cured })
+}
+
+impl Wanted {
+    fn check(&self, simulation: &Simulation) -> Result<(), PlanError> {
+        let cells = simulation.reaction().cells();
+        let possible = |height: f64| height >= 0.0 && height.is_finite();
+        if let Some(x) = self.heights_um.iter().position(|&height| !possible(height)) {
+            return Err(PlanError::NoHeight { radius_um: cells.middle_um(x) });
+        }
+        let (wanted_um, chamber_um) = (self.highest_um(), simulation.setting().chamber_um);
+        if wanted_um == 0.0 {
+            return Err(PlanError::Empty);
+        }
+        if wanted_um > chamber_um {
+            return Err(PlanError::TooHigh { wanted_um, chamber_um });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,94 @@
+//! The section of a round part: heights by the distance from its axis.
+
+use super::cells::Cells;
+use super::reactor::{Chamber, Reaction};
+
+/// What is cured: the height of each column of cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    /// The chamber's cells.
+    pub cells: Cells,
+    /// Heights above the glass, in micrometres, from the axis.
+    pub heights_um: Vec<f64>,
+    /// How far it is solid on the glass, in micrometres from the axis.
+    pub base_um: f64,
+}
+
+impl Profile {
+    pub(super) fn of(chamber: &Chamber, reaction: &Reaction) -> Self {
+        Self {
+            cells: *reaction.cells(),
+            heights_um: chamber.heights_um(reaction),
+            base_um: chamber.base_um(reaction),
+        }
+    }
+
+    /// Returns the height at the axis, in micrometres.
+    pub fn sag_um(&self) -> f64 {
+        self.heights_um.first().copied().unwrap_or(0.0)
+    }
+
+    /// Returns the greatest height, in micrometres.
+    pub fn highest_um(&self) -> f64 {
+        self.heights_um.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Returns the height at a distance from the axis, in micrometres.
+    pub fn height_um(&self, radius_um: f64) -> f64 {
+        height_um(&self.cells, &self.heights_um, radius_um)
+    }
+}
+
+/// Returns the height at a distance from the axis, linearly between middles of columns.
+fn height_um(cells: &Cells, heights_um: &[f64], radius_um: f64) -> f64 {
+    let at = (radius_um / cells.width_um - 0.5).max(0.0);
+    let column = at.floor() as usize;
+    let height = |column: usize| heights_um.get(column).copied().unwrap_or(0.0);
+    height(column) + (at - at.floor()) * (height(column + 1) - height(column))
+}
+
+/// A round part to be made: the height of each column of cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    /// The chamber's cells.
+    pub cells: Cells,
+    /// Heights above the glass, in micrometres, from the axis.
+    pub heights_um: Vec<f64>,
+}
+
+impl Wanted {
+    /// Takes the heights at the middles of columns.
+    pub fn new(cells: &Cells, height_um: impl Fn(f64) -> f64) -> Self {
+        let heights_um = (0..cells.across).map(|x| height_um(cells.middle_um(x))).collect();
+        Self { cells: *cells, heights_um }
+    }
+
+    /// Returns the height at a distance from the axis, in micrometres.
+    pub fn height_um(&self, radius_um: f64) -> f64 {
+        height_um(&self.cells, &self.heights_um, radius_um)
+    }
+
+    /// Returns the greatest height, in micrometres.
+    pub fn highest_um(&self) -> f64 {
+        self.heights_um.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Returns the root mean square of cured minus wanted height, in micrometres, over the glass
+    /// where either is above zero.
+    pub fn rms_um(&self, cured: &Profile) -> f64 {
+        self.rms_below(cured, f64::INFINITY)
+    }
+
+    /// Returns the same for what is wanted below a height.
+    pub(super) fn rms_below(&self, cured: &Profile, most_um: f64) -> f64 {
+        let [mut sum, mut area] = [0.0; 2];
+        for (x, (wanted, height)) in self.heights_um.iter().zip(&cured.heights_um).enumerate() {
+            if *wanted > 0.0 || *height > 0.0 {
+                let weight = cured.cells.weight(x);
+                sum += weight * (height - wanted.min(most_um)).powi(2);
+                area += weight;
+            }
+        }
+        if area > 0.0 { (sum / area).sqrt() } else { 0.0 }
+    }
+}

@@ -1,0 +1,227 @@
+//! The reaction in a chamber, step by step (003 equations 4, 5, 10, 11 and 13).
+
+use lamp_grayscale::resin::{Intensity, Kinetics, Quantity};
+
+use super::cells::Cells;
+use super::diffusion::Diffusion;
+use crate::wide::wide;
+
+/// Cells whose radicals are found together.
+const LANES: usize = 8;
+
+/// Radicals are known this well before the last step of Newton's method, which squares it.
+const NEAR: f64 = 1e-6;
+
+/// A step of Newton's method from above at least takes a third of the way: enough for any number.
+const MOST_STEPS: usize = 100;
+
+/// How a chamber reacts within one step of time.
+#[derive(Clone, Debug)]
+pub struct Reaction {
+    cells: Cells,
+    /// The step, in seconds.
+    seconds: f64,
+    /// The share of the initiator that a W/m² splits in a step.
+    split: f64,
+    /// By which power of e light fades in half a cell of a mol/m³ of initiator.
+    fade: f64,
+    /// `2 k_t dt`.
+    ended: f64,
+    /// `k_t,O2 dt`.
+    stopped: f64,
+    initiator: f64,
+    oxygen: f64,
+    propagation: f64,
+    critical: f64,
+    diffusion: Option<Diffusion>,
+}
+
+impl Reaction {
+    /// Prepares steps of `seconds`.
+    pub fn new(kinetics: &Kinetics, cells: Cells, seconds: f64) -> Self {
+        let watt_per_m2 = Intensity::from_mw_per_cm2(0.1);
+        let um2_per_s = 1e12 * kinetics.oxygen_diffusion.number();
+        Self {
+            cells,
+            seconds,
+            split: kinetics.splitting(watt_per_m2) * seconds,
+            fade: 0.5 * kinetics.fading() * cells.height_um,
+            ended: 2.0 * kinetics.termination.number() * seconds,
+            stopped: kinetics.termination_by_oxygen.number() * seconds,
+            initiator: kinetics.photoinitiator.number(),
+            oxygen: kinetics.oxygen.number(),
+            propagation: kinetics.propagation.number(),
+            critical: kinetics.critical_conversion,
+            diffusion: Diffusion::new(&cells, um2_per_s * seconds),
+        }
+    }
+
+    /// Returns the chamber's cells.
+    pub const fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// Returns how long a step is, in seconds.
+    pub const fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    /// Returns how far the conversion is beyond the critical one.
+    fn beyond_critical(&self, growth: f64) -> f64 {
+        -(-self.propagation * growth).exp_m1() - self.critical
+    }
+}
+
+/// What is in a chamber: concentrations in mol/m³, cell by cell.
+#[derive(Clone, Debug)]
+pub struct Chamber {
+    initiator: Vec<f64>,
+    radicals: Vec<f64>,
+    oxygen: Vec<f64>,
+    /// The time integral of the radicals.
+    growth: Vec<f64>,
+    /// Columns from here on never had light.
+    reach: usize,
+}
+
+impl Chamber {
+    /// Fills a chamber with fresh resin.
+    pub fn new(reaction: &Reaction) -> Self {
+        let filled = |with| vec![with; reaction.cells.count()];
+        Self {
+            initiator: filled(reaction.initiator),
+            radicals: filled(0.0),
+            oxygen: filled(reaction.oxygen),
+            growth: filled(0.0),
+            reach: 0,
+        }
+    }
+
+    /// Lets a step pass under light, in W/m² at the glass of each column: oxygen spreads, then
+    /// light splits initiator, then radicals come to terms with each other and with oxygen, each
+    /// implicitly.
+    pub fn pass(&mut self, reaction: &Reaction, light: &[f64]) {
+        let lit = light.iter().rposition(|&light| light > 0.0).map_or(0, |last| last + 1);
+        self.reach = self.reach.max(lit);
+        wide(
+            #[inline(always)]
+            || {
+                if let Some(diffusion) = &reaction.diffusion {
+                    diffusion.spread(&mut self.oxygen);
+                }
+                self.react(reaction, light);
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn react(&mut self, reaction: &Reaction, light: &[f64]) {
+        let mut left: Vec<f64> =
+            light[..self.reach].iter().map(|light| light * reaction.split).collect();
+        let mut made = vec![0.0; self.reach];
+        let width = reaction.cells.across;
+        for row in (0..reaction.cells.deep).map(|z| z * width..z * width + self.reach) {
+            split(reaction, &mut left, &mut self.initiator[row.clone()], &mut made);
+            made.iter_mut().zip(&self.radicals[row.clone()]).for_each(|(made, had)| *made += had);
+            let radicals = &mut self.radicals[row.clone()];
+            let oxygen = &mut self.oxygen[row.clone()];
+            let growth = &mut self.growth[row];
+            let groups = radicals.chunks_mut(LANES).zip(oxygen.chunks_mut(LANES));
+            let groups = groups.zip(growth.chunks_mut(LANES)).zip(made.chunks(LANES));
+            for (((radicals, oxygen), growth), made) in groups {
+                settle(reaction, radicals, oxygen, growth, made);
+            }
+        }
+    }
+
+    /// Returns how high each column is solid from the glass, in micrometres: up to where the
+    /// conversion first falls below the critical one, linearly between middles of cells.
+    pub fn heights_um(&self, reaction: &Reaction) -> Vec<f64> {
+        (0..reaction.cells.across).map(|x| self.height_um(reaction, x)).collect()
+    }
+
+    fn height_um(&self, reaction: &Reaction, x: usize) -> f64 {
+        let Cells { across, deep, height_um, .. } = reaction.cells;
+        let beyond = |z: usize| reaction.beyond_critical(self.growth[z * across + x]);
+        let Some(liquid) = (0..deep).find(|&z| beyond(z) < 0.0) else {
+            return deep as f64 * height_um;
+        };
+        let Some(solid) = liquid.checked_sub(1) else { return 0.0 };
+        let share = beyond(solid) / (beyond(solid) - beyond(liquid));
+        (solid as f64 + 0.5 + share) * height_um
+    }
+
+    /// Returns how far resin is solid on the glass, in micrometres from the axis, linearly
+    /// between middles of cells.
+    pub fn base_um(&self, reaction: &Reaction) -> f64 {
+        let Cells { across, width_um, .. } = reaction.cells;
+        let beyond = |x: usize| reaction.beyond_critical(self.growth[x]);
+        let Some(solid) = (0..across).rev().find(|&x| beyond(x) >= 0.0) else { return 0.0 };
+        if solid + 1 == across {
+            return across as f64 * width_um;
+        }
+        let share = beyond(solid) / (beyond(solid) - beyond(solid + 1));
+        (solid as f64 + 0.5 + share) * width_um
+    }
+}
+
+/// Lets light through a row of cells and splits their initiator; `left` is the share that it
+/// would split where it enters, and then where it leaves. `made` gets the new radicals.
+#[inline(always)]
+fn split(reaction: &Reaction, left: &mut [f64], initiator: &mut [f64], made: &mut [f64]) {
+    for ((left, initiator), made) in left.iter_mut().zip(initiator).zip(made) {
+        let half = (-reaction.fade * *initiator).exp();
+        let share = *left * half;
+        *left = share * half;
+        *initiator /= 1.0 + share;
+        *made = 2.0 * share * *initiator;
+    }
+}
+
+/// Finds the radicals `R` of some cells, where `source` is what was there and what light made:
+///
+///     R + 2 k_t dt R² + k dt R O / (1 + k dt R) = source,   k = k_t,O2
+///
+/// The left side grows with R, so there is one solution. Multiplied by 1 + k dt R, it is a cubic
+/// that is convex above zero: from above, Newton's method never passes the solution.
+#[inline(always)]
+fn settle(
+    reaction: &Reaction,
+    radicals: &mut [f64],
+    oxygen: &mut [f64],
+    growth: &mut [f64],
+    source: &[f64],
+) {
+    let (a, b) = (reaction.ended, reaction.stopped);
+    let lanes = |cells: &[f64]| {
+        let mut lanes = [0.0; LANES];
+        lanes[..cells.len()].copy_from_slice(cells);
+        lanes
+    };
+    let (s, o, mut r) = (lanes(source), lanes(oxygen), lanes(radicals));
+    let linear: [f64; LANES] = std::array::from_fn(|k| 1.0 + b * (o[k] - s[k]));
+    let slope = |k: usize, r: f64| (3.0 * a * b * r + 2.0 * (a + b)) * r + linear[k];
+    for k in 0..LANES {
+        // The solution is at most the source; where the cubic falls, start there.
+        r[k] = if r[k] < s[k] && slope(k, r[k]) > 0.0 { r[k] } else { s[k] };
+    }
+    for _ in 0..MOST_STEPS {
+        let mut far = false;
+        for k in 0..LANES {
+            let value = ((a * b * r[k] + (a + b)) * r[k] + linear[k]) * r[k] - s[k];
+            let next = (r[k] - value / slope(k, r[k])).min(s[k]);
+            far |= (next - r[k]).abs() > NEAR * next;
+            r[k] = next;
+        }
+        if !far {
+            break;
+        }
+    }
+    for (k, (radicals, (oxygen, growth))) in
+        radicals.iter_mut().zip(oxygen.iter_mut().zip(growth)).enumerate()
+    {
+        *growth += 0.5 * reaction.seconds * (*radicals + r[k]);
+        *oxygen /= 1.0 + b * r[k];
+        *radicals = r[k];
+    }
+}

@@ -1,0 +1,126 @@
+//! Bitmap after bitmap, as 003 section 5 plans.
+
+use lamp_grayscale::resin::ExposureTime;
+use rayon::prelude::*;
+
+use super::Exposure;
+use super::profile::{Profile, Wanted};
+use super::reactor::Chamber;
+use super::simulation::{Shown, Simulation};
+
+/// Whole seconds of the database of single discs (003 table 2).
+const DATABASE_S: u32 = 30;
+
+/// Pixels of its largest disc.
+const DATABASE_PIXELS: u32 = 45;
+
+/// A later disc shines this long at most, in seconds.
+const LONGEST_S: f64 = 10.0;
+
+/// A disc that made the part worse for so many seconds is not shown on.
+const WORSE_S: f64 = 1.0;
+
+/// Plans a first disc from the database, and then one smaller disc after the other, until what is
+/// cured is as high as wanted, or none betters it.
+pub(super) fn plan(simulation: &Simulation, wanted: &Wanted) -> Vec<Exposure> {
+    let Some((pixels, seconds)) = first_disc(simulation, wanted) else { return Vec::new() };
+    let mut plan = vec![Exposure::disc(pixels, ExposureTime::from_ms(f64::from(seconds) * 1000.0))];
+    let mut chamber = Chamber::new(simulation.reaction());
+    let shown = [disc(simulation, pixels, f64::from(seconds))];
+    simulation.expose(&mut chamber, &shown, 0, |_, _| ());
+    let mut reach = pixels;
+    while let Some(next) = next_disc(simulation, wanted, &chamber, reach) {
+        plan.push(Exposure::disc(next.pixels, next.time));
+        (reach, chamber) = (next.pixels, next.chamber);
+    }
+    plan
+}
+
+fn disc(simulation: &Simulation, pixels: u32, until_s: f64) -> Shown {
+    Shown { until_s, light: simulation.light(|ring| ring < pixels as usize) }
+}
+
+/// Returns how far a profile is from the part up to its own height, as a share of that height
+/// (003 equation 15). Not divided, the thinnest films would be best.
+fn misfit(wanted: &Wanted, profile: &Profile) -> f64 {
+    let highest = profile.highest_um();
+    if highest == 0.0 { f64::INFINITY } else { wanted.rms_below(profile, highest) / highest }
+}
+
+/// Returns the disc of the database that fits best, in pixels and seconds (003 section 5.1).
+pub(super) fn first_disc(simulation: &Simulation, wanted: &Wanted) -> Option<(u32, u32)> {
+    let most = DATABASE_PIXELS.min(simulation.rings() as u32);
+    let best_time = |pixels: u32| {
+        let mut chamber = Chamber::new(simulation.reaction());
+        let shown = [disc(simulation, pixels, f64::from(DATABASE_S))];
+        let every = (1.0 / simulation.reaction().seconds()).round() as usize;
+        let mut best = (f64::INFINITY, pixels, 0);
+        simulation.expose(&mut chamber, &shown, 0, |step, chamber| {
+            if step > 0 && step % every == 0 {
+                let fit = misfit(wanted, &Profile::of(chamber, simulation.reaction()));
+                if fit < best.0 {
+                    best = (fit, pixels, (step / every) as u32);
+                }
+            }
+        });
+        best
+    };
+    let all: Vec<_> = (1..=most).into_par_iter().map(best_time).collect();
+    let best = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    best.0.is_finite().then_some((best.1, best.2))
+}
+
+/// A disc to show after others.
+struct Next {
+    pixels: u32,
+    time: ExposureTime,
+    misfit: f64,
+    chamber: Chamber,
+}
+
+/// Returns the smaller disc that fits best (003 section 5.2, equations 16 and 17), if one betters
+/// the part.
+fn next_disc(
+    simulation: &Simulation,
+    wanted: &Wanted,
+    chamber: &Chamber,
+    reach: u32,
+) -> Option<Next> {
+    let now = Profile::of(chamber, simulation.reaction());
+    let rms_now = wanted.rms_um(&now);
+    let tries = (1..reach).into_par_iter().filter_map(|pixels| {
+        try_disc(simulation, wanted, chamber, pixels).filter(|next| {
+            wanted.rms_um(&Profile::of(&next.chamber, simulation.reaction())) < rms_now
+        })
+    });
+    let tries: Vec<_> = tries.collect();
+    tries.into_iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit))
+}
+
+/// Finds the time for which a disc fits best.
+fn try_disc(
+    simulation: &Simulation,
+    wanted: &Wanted,
+    chamber: &Chamber,
+    pixels: u32,
+) -> Option<Next> {
+    let step_s = simulation.setting().step.ms() / 1000.0;
+    let mut chamber = chamber.clone();
+    let mut best: Option<Next> = None;
+    let mut shown_s = 0.0;
+    while shown_s < LONGEST_S {
+        simulation.expose(&mut chamber, &[disc(simulation, pixels, step_s)], 0, |_, _| ());
+        shown_s += step_s;
+        let misfit = misfit(wanted, &Profile::of(&chamber, simulation.reaction()));
+        let time = ExposureTime::from_ms((shown_s * 1e6).round() / 1e3);
+        match &best {
+            Some(best) if best.misfit <= misfit => {
+                if shown_s > best.time.ms() / 1000.0 + WORSE_S {
+                    break;
+                }
+            }
+            _ => best = Some(Next { pixels, time, misfit, chamber: chamber.clone() }),
+        }
+    }
+    best
+}

@@ -1,0 +1,164 @@
+//! What bitmaps cure, one after the other.
+
+use super::PlanError;
+use super::cells::Cells;
+use super::exposure::Exposure;
+use super::lamplight::light_of;
+use super::profile::Profile;
+use super::reactor::{Chamber, Reaction};
+use super::setting::{Setting, SettingError};
+
+/// A chamber and its projector, ready to be exposed.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    setting: Setting,
+    reaction: Reaction,
+    /// The light of each ring of pixels, in W/m² at each column.
+    rings: Vec<Vec<f64>>,
+}
+
+/// What is shown until a time in seconds: the light of each column.
+#[derive(Clone, Debug)]
+pub(super) struct Shown {
+    pub(super) until_s: f64,
+    pub(super) light: Vec<f64>,
+}
+
+impl Simulation {
+    /// Prepares a chamber for bitmaps that reach `pixels` from the axis, and for a part of
+    /// `radius_um`.
+    ///
+    /// # Errors
+    /// Returns an error if a number is impossible, or the chamber too large.
+    pub fn new(setting: Setting, pixels: u32, radius_um: f64) -> Result<Self, SettingError> {
+        setting.check()?;
+        let lit_um = f64::from(pixels) * setting.pixel_um;
+        let cells = setting.cells(radius_um.max(lit_um))?;
+        let reaction = Reaction::new(&setting.kinetics, cells, setting.seconds());
+        let watt_per_m2 = 10.0 * setting.light.mw_per_cm2();
+        let ring = |ring: u32| {
+            let shining =
+                f64::from(ring) * setting.pixel_um..f64::from(ring + 1) * setting.pixel_um;
+            let light = light_of(&cells, shining, setting.sigma_um);
+            light.into_iter().map(|share| share * watt_per_m2).collect()
+        };
+        Ok(Self { setting, reaction, rings: (0..pixels).map(ring).collect() })
+    }
+
+    /// Returns what it was made for.
+    pub const fn setting(&self) -> &Setting {
+        &self.setting
+    }
+
+    /// Returns its steps.
+    pub const fn reaction(&self) -> &Reaction {
+        &self.reaction
+    }
+
+    /// Returns how many rings of pixels it knows.
+    pub(super) fn rings(&self) -> usize {
+        self.rings.len()
+    }
+
+    /// Returns what a plan cures when its last bitmap goes dark.
+    pub fn cure(&self, plan: &[Exposure]) -> Profile {
+        let mut chamber = Chamber::new(&self.reaction);
+        self.expose(&mut chamber, &self.shown(plan), 0, |_, _| ());
+        Profile::of(&chamber, &self.reaction)
+    }
+
+    /// Returns what a plan cures up to the end of each of its bitmaps.
+    pub fn growth(&self, plan: &[Exposure]) -> Vec<Profile> {
+        let shown = self.shown(plan);
+        let step_of = |shown: &Shown| (shown.until_s / self.reaction.seconds()).round() as usize;
+        let ends: Vec<usize> = shown.iter().map(step_of).collect();
+        let mut grown = Vec::with_capacity(plan.len());
+        self.expose(&mut Chamber::new(&self.reaction), &shown, 0, |step, chamber| {
+            for _ in ends.iter().filter(|&&end| end == step) {
+                grown.push(Profile::of(chamber, &self.reaction));
+            }
+        });
+        grown
+    }
+
+    /// Returns the times, in seconds, and heights that a wide white field cures, step by step of
+    /// the display until it reaches `wanted_um`.
+    pub(super) fn wide_field(
+        &self,
+        wanted_um: f64,
+        longest_s: f64,
+    ) -> Result<Vec<(f64, f64)>, PlanError> {
+        let column = Cells { across: 1, ..*self.reaction.cells() };
+        let step_s = self.setting.step.ms() / 1000.0;
+        let reaction = Reaction::new(&self.setting.kinetics, column, self.reaction.seconds());
+        let each = (step_s / self.reaction.seconds()).round().max(1.0) as usize;
+        let seconds = each as f64 * self.reaction.seconds();
+        let light = [10.0 * self.setting.light.mw_per_cm2()];
+        let mut chamber = Chamber::new(&reaction);
+        let mut heights = Vec::new();
+        for step in 1_u32.. {
+            (0..each).for_each(|_| chamber.pass(&reaction, &light));
+            let time = f64::from(step) * seconds;
+            let cured_um = chamber.heights_um(&reaction)[0];
+            heights.push((time, cured_um));
+            if cured_um >= wanted_um {
+                break;
+            }
+            if time >= longest_s {
+                return Err(PlanError::TooDim { seconds: time, cured_um, wanted_um });
+            }
+        }
+        Ok(heights)
+    }
+
+    fn shown(&self, plan: &[Exposure]) -> Vec<Shown> {
+        let mut until_s = 0.0;
+        let shown = |exposure: &Exposure| {
+            until_s += exposure.time.ms() / 1000.0;
+            Shown { until_s, light: self.light(|ring| exposure.is_white(ring as u32)) }
+        };
+        plan.iter().map(shown).collect()
+    }
+
+    /// Returns the light of those rings that are white.
+    pub(super) fn light(&self, is_white: impl Fn(usize) -> bool) -> Vec<f64> {
+        let mut light = vec![0.0; self.reaction.cells().across];
+        for (_, ring) in self.rings.iter().enumerate().filter(|&(ring, _)| is_white(ring)) {
+            light.iter_mut().zip(ring).for_each(|(sum, light)| *sum += light);
+        }
+        light
+    }
+
+    /// Exposes a chamber from a step on, and shows it to `before` each step. The light of a step
+    /// is the mean of what is shown in it.
+    pub(super) fn expose(
+        &self,
+        chamber: &mut Chamber,
+        shown: &[Shown],
+        from: usize,
+        mut before: impl FnMut(usize, &Chamber),
+    ) {
+        let seconds = self.reaction.seconds();
+        let end_s = shown.last().map_or(0.0, |last| last.until_s);
+        // A plan of whole steps must not get another one by rounding.
+        let steps = (end_s / seconds - 1e-6).ceil().max(0.0) as usize;
+        let mut light = Vec::new();
+        for step in from..steps {
+            let [start, end] = [step, step + 1].map(|step| step as f64 * seconds);
+            light.clear();
+            light.resize(self.reaction.cells().across, 0.0);
+            let mut begun = 0.0;
+            for shown in shown {
+                let overlap = end.min(shown.until_s) - start.max(begun);
+                begun = shown.until_s;
+                if overlap > 1e-9 * seconds {
+                    let share = overlap / seconds;
+                    light.iter_mut().zip(&shown.light).for_each(|(sum, l)| *sum += share * l);
+                }
+            }
+            before(step, chamber);
+            chamber.pass(&self.reaction, &light);
+        }
+        before(steps.max(from), chamber);
+    }
+}
