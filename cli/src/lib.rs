@@ -31,6 +31,8 @@ mod part_options;
 mod picture;
 mod pixel_location;
 mod placement;
+#[allow(dead_code, reason = "its planners follow")]
+mod plan_folder;
 mod planning_options;
 mod platform_options;
 mod plots;
@@ -44,6 +46,8 @@ mod stack_facts;
 mod stack_part;
 mod step_options;
 mod streams;
+#[allow(dead_code, reason = "its planners follow")]
+mod target_arg;
 mod thumbnails;
 mod usage;
 

@@ -144,7 +144,7 @@ impl FolderBeside {
     }
 
     /// Creates a folder that will become `path`, and then replaces a folder there. That may only
-    /// hold files with the names of pages, ranges of layers, strips, targets or pictures, as this
+    /// hold files with the names of pages, ranges of layers, strips, targets, plans or pictures, as this
     /// workspace writes them. It stays until the new one is complete.
     ///
     /// # Errors
@@ -272,7 +272,13 @@ fn is_name_in_folders(name: &str) -> bool {
         name.strip_prefix(start).is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
     };
     let is_image = name.ends_with(".tif") || name.ends_with(".png");
-    matches!(name, "strips.json" | "squares.csv") || is_image && STARTS.iter().any(numbered)
+    let is_of_plan = matches!(
+        name,
+        "bitmaps.tif" | "report.json" | "section.svg" | "residual.png" | "times.png"
+    );
+    matches!(name, "strips.json" | "squares.csv")
+        || is_of_plan
+        || is_image && STARTS.iter().any(numbered)
 }
 
 /// Returns the parent folder of `path`.
@@ -334,6 +340,9 @@ mod tests {
         for ours in ["layer_00007_rows_00001-00002_left.png", "strip_000.tif", "strips.json"] {
             assert!(is_name_in_folders(ours), "{ours}");
         }
+        assert!(
+            ["bitmaps.tif", "report.json", "times.png"].iter().all(|name| is_name_in_folders(name))
+        );
         assert!(["squares_00025px.tif", "squares.csv"].iter().all(|name| is_name_in_folders(name)));
         for other in ["thesis.doc", "layer.png", "layer_a.png", "img_0001.png", "layer_1.stl", ""] {
             assert!(!is_name_in_folders(other), "{other}");

@@ -3,6 +3,7 @@
 mod axis_scale;
 mod caption;
 mod dose_map;
+mod heat_map;
 mod layout;
 mod sphere;
 
@@ -20,6 +21,7 @@ use axis_scale::AxisScale;
 
 pub(crate) use caption::{CAPTION_HEIGHT, caption};
 pub(crate) use dose_map::{DoseMap, dose_map};
+pub(crate) use heat_map::{Colours, HeatMap, heat_map};
 pub(crate) use layout::layout_picture;
 pub(crate) use sphere::sphere_picture;
 

@@ -34,6 +34,8 @@ pub use shapes::{Base, Channels, Direction, Lens, Shapes, ShapesError};
 use part::PartColumns;
 use picture::HeightPicture;
 
+use crate::projector::Projector;
+
 /// What is to be cured, centred on the optical axis.
 #[derive(Debug)]
 pub struct Target(Source);
@@ -68,6 +70,22 @@ impl Target {
             Source::Part(part) => part.size_um(),
         };
         size_um.map(Length::from_um)
+    }
+
+    /// Checks that a projector lights all of it.
+    ///
+    /// # Errors
+    /// Returns an error if it is wider than the display's image.
+    pub fn check_width(&self, projector: &Projector) -> Result<(), TargetError> {
+        let (size, light) = (self.size(), projector.image());
+        let fits = |axis: usize| size[axis].um() <= light[axis].um();
+        if fits(0) && fits(1) {
+            return Ok(());
+        }
+        Err(TargetError::Wide {
+            size: size.map(Length::to_whole_nm),
+            light: light.map(Length::to_whole_nm),
+        })
     }
 
     /// Returns the height of each column of a grid, at its middle (000 section 3.3.1). What lies

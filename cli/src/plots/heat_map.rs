@@ -1,0 +1,276 @@
+//! Draws a number for each square of a lattice as its colour, with a scale beside it.
+
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::prelude::*;
+
+use super::axis_scale::AxisScale;
+use super::{Drawing, GRAY_INK, SCALE, font, picture_of, with_font};
+use crate::exit::Exit;
+
+/// Numbers on a square lattice, its middle on the axis of the light.
+pub(crate) struct HeatMap {
+    pub(crate) title: String,
+    /// What the numbers are, with their unit.
+    pub(crate) label: String,
+    /// Squares in a row.
+    pub(crate) columns: usize,
+    /// The numbers, row by row; the first row has the greatest y.
+    pub(crate) values: Vec<f64>,
+    /// The side of a square, in millimetres.
+    pub(crate) pitch_mm: f64,
+    pub(crate) colours: Colours,
+}
+
+/// How numbers are coloured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Colours {
+    /// Blue below zero, red above, as far in both directions.
+    AboutZero,
+    /// Dark at zero, light at the most.
+    FromZero,
+}
+
+/// The longer side of a map, and the most pixels of a square.
+const SIDE: usize = 1000;
+const MOST_PIXELS: usize = 40;
+/// What stands around a map, in points: title, axes and the scale.
+const TITLE: u32 = 40;
+const LEFT: u32 = 62;
+const BELOW: u32 = 44;
+const MARGIN: u32 = 16;
+const BAR: u32 = 20;
+const BAR_LABELS: u32 = 62;
+
+type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+type Area<B> = DrawingArea<B, plotters::coord::Shift>;
+
+/// The bytes of a map as a PNG.
+pub(crate) fn heat_map(map: &HeatMap) -> Result<Vec<u8>, Exit> {
+    let map = map.coarsened();
+    picture_of(&map, map.size(), "map.png".as_ref())
+}
+
+impl HeatMap {
+    fn rows(&self) -> usize {
+        self.values.len() / self.columns
+    }
+
+    /// Returns a map of at most [`SIDE`] squares along a side. Each stands for several, by that of
+    /// them that is farthest from zero.
+    fn coarsened(&self) -> Self {
+        let many = self.columns.max(self.rows()).div_ceil(SIDE);
+        let [columns, rows] = [self.columns, self.rows()].map(|count| count / many);
+        let worst = |place: usize| {
+            let (column, row) = (place % columns * many, place / columns * many);
+            let squares = (row..row + many)
+                .flat_map(|row| &self.values[row * self.columns..][column..column + many]);
+            squares.copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
+        };
+        Self {
+            title: self.title.clone(),
+            label: self.label.clone(),
+            columns,
+            values: (0..columns * rows).map(worst).collect(),
+            pitch_mm: self.pitch_mm * many as f64,
+            colours: self.colours,
+        }
+    }
+
+    /// The pixels along a side of a square.
+    fn cell(&self) -> usize {
+        (SIDE / self.columns.max(self.rows())).clamp(1, MOST_PIXELS)
+    }
+
+    fn map_size(&self) -> [u32; 2] {
+        [self.columns, self.rows()].map(|count| (count * self.cell()) as u32)
+    }
+
+    fn size(&self) -> (u32, u32) {
+        let [width, height] = self.map_size();
+        let beside = LEFT + 4 * MARGIN + BAR + BAR_LABELS;
+        // Titles and scales need room, too.
+        let height = (height + (TITLE + BELOW + MARGIN) * SCALE).max(300 * SCALE);
+        ((width + beside * SCALE).max(460 * SCALE), height)
+    }
+
+    fn scale(&self) -> ColourScale {
+        let most = self.values.iter().map(|value| value.abs()).fold(0.0, f64::max).max(1e-9);
+        match self.colours {
+            Colours::AboutZero => ColourScale { least: -most, most, stops: &DIVERGING },
+            Colours::FromZero => ColourScale { least: 0.0, most, stops: &RISING },
+        }
+    }
+
+    fn draw_map<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
+        let half = |count: usize| count as f64 * self.pitch_mm / 2.0;
+        let (right, top) = (half(self.columns), half(self.rows()));
+        let axis = |end: f64| AxisScale { range: -end..end, logarithmic: false };
+        let mut chart = ChartBuilder::on(area)
+            .margin_left(MARGIN * SCALE)
+            .x_label_area_size(BELOW * SCALE)
+            .y_label_area_size(LEFT * SCALE)
+            .build_cartesian_2d(axis(right), axis(top))?;
+        chart
+            .configure_mesh()
+            .disable_mesh()
+            .x_desc("x (mm)")
+            .y_desc("y (mm)")
+            .axis_desc_style(font(15))
+            .label_style(font(13))
+            .axis_style(GRAY_INK.stroke_width(SCALE))
+            .draw()?;
+        let [width, height] = self.map_size();
+        let painted = BitMapElement::with_owned_buffer((0, 0), (width, height), self.painted());
+        let painted = painted.expect("a map has as many pixels as its size says");
+        chart.plotting_area().strip_coord_spec().draw(&painted)
+    }
+
+    /// Returns the squares as pixels of red, green and blue.
+    fn painted(&self) -> Vec<u8> {
+        let (cell, scale) = (self.cell(), self.scale());
+        let mut pixels = Vec::with_capacity(3 * self.values.len() * cell * cell);
+        for row in self.values.chunks_exact(self.columns) {
+            let colours = row.iter().map(|&value| scale.colour(value));
+            let line: Vec<u8> = colours
+                .flat_map(|RGBColor(red, green, blue)| [red, green, blue].repeat(cell))
+                .collect();
+            (0..cell).for_each(|_| pixels.extend_from_slice(&line));
+        }
+        pixels
+    }
+
+    fn draw_scale<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
+        const STEPS: u32 = 256;
+        let scale = self.scale();
+        let ColourScale { least, most, .. } = scale;
+        let axis = |range| AxisScale { range, logarithmic: false };
+        let mut chart = ChartBuilder::on(area)
+            .x_label_area_size(BELOW * SCALE)
+            .y_label_area_size(BAR_LABELS * SCALE)
+            .build_cartesian_2d(axis(0.0..1.0), axis(least..most))?;
+        chart
+            .configure_mesh()
+            .disable_mesh()
+            .disable_x_axis()
+            .y_desc(&self.label)
+            .axis_desc_style(font(15))
+            .label_style(font(13))
+            .axis_style(GRAY_INK.stroke_width(SCALE))
+            .draw()?;
+        let value = |step: u32| least + (most - least) * f64::from(step) / f64::from(STEPS);
+        chart.draw_series((0..STEPS).map(|step| {
+            let (low, high) = (value(step), value(step + 1));
+            Rectangle::new([(0.0, low), (1.0, high)], scale.colour((low + high) / 2.0).filled())
+        }))?;
+        Ok(())
+    }
+}
+
+/// The colours from the least to the greatest number.
+struct ColourScale {
+    least: f64,
+    most: f64,
+    stops: &'static [[f64; 3]; 5],
+}
+
+impl ColourScale {
+    fn colour(&self, value: f64) -> RGBColor {
+        let share = ((value - self.least) / (self.most - self.least)).clamp(0.0, 1.0);
+        let at = share * (self.stops.len() - 1) as f64;
+        let below = (at as usize).min(self.stops.len() - 2);
+        let along = at - below as f64;
+        let [from, to] = [self.stops[below], self.stops[below + 1]];
+        let [red, green, blue] =
+            std::array::from_fn(|ink| (from[ink] + along * (to[ink] - from[ink])).round() as u8);
+        RGBColor(red, green, blue)
+    }
+}
+
+/// Blue, white and red, which also those who see few colours can tell apart.
+const DIVERGING: [[f64; 3]; 5] = [
+    [33.0, 102.0, 172.0],
+    [146.0, 197.0, 222.0],
+    [247.0, 247.0, 247.0],
+    [244.0, 165.0, 130.0],
+    [178.0, 24.0, 43.0],
+];
+
+/// From dark to light, evenly to the eye, as viridis.
+const RISING: [[f64; 3]; 5] = [
+    [68.0, 1.0, 84.0],
+    [59.0, 82.0, 139.0],
+    [33.0, 145.0, 140.0],
+    [94.0, 201.0, 98.0],
+    [253.0, 231.0, 37.0],
+];
+
+impl Drawing for HeatMap {
+    fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
+        with_font();
+        area.fill(&WHITE)?;
+        let [width, height] = self.map_size();
+        let (title, below) = area.split_vertically(TITLE * SCALE);
+        title.draw_text(&self.title, &font(17), ((MARGIN * SCALE) as i32, (11 * SCALE) as i32))?;
+        let (map, scale) = below.split_horizontally(width + (MARGIN + LEFT) * SCALE);
+        let plot_height = height + BELOW * SCALE;
+        self.draw_map(&map.split_vertically(plot_height).0)?;
+        let (bar, _) = scale.split_horizontally((MARGIN + BAR_LABELS + BAR) * SCALE);
+        let (_, bar) = bar.split_horizontally(MARGIN * SCALE);
+        self.draw_scale(&bar.split_vertically(plot_height.max(250 * SCALE)).0)?;
+        area.present()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(columns: usize, values: Vec<f64>, colours: Colours) -> HeatMap {
+        let [title, label] = ["A map", "height (um)"].map(str::to_owned);
+        HeatMap { title, label, columns, values, pitch_mm: 0.01, colours }
+    }
+
+    #[test]
+    fn zero_is_white_and_the_ends_are_as_far() {
+        let scale = map(2, vec![-1.0, 0.0, 0.5, 4.0], Colours::AboutZero).scale();
+        assert_eq!([scale.least, scale.most], [-4.0, 4.0]);
+        assert_eq!(scale.colour(0.0), RGBColor(247, 247, 247));
+        assert_eq!(scale.colour(4.0), RGBColor(178, 24, 43));
+        assert_eq!(scale.colour(-9.0), RGBColor(33, 102, 172));
+    }
+
+    #[test]
+    fn a_coarser_map_keeps_the_worst() {
+        let mut values = vec![0.0; 3000 * 1500];
+        (values[7], values[3000 * 1499 + 2999]) = (-5.0, 3.0);
+        let coarse = map(3000, values, Colours::AboutZero).coarsened();
+        assert_eq!((coarse.columns, coarse.rows()), (1000, 500));
+        assert_eq!((coarse.values[2], coarse.values[1000 * 500 - 1]), (-5.0, 3.0));
+        assert!((coarse.pitch_mm - 0.03).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_square_is_painted_in_its_colour() {
+        let map = map(3, vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0], Colours::FromZero);
+        let bytes = heat_map(&map).unwrap();
+        assert_eq!(bytes, heat_map(&map).unwrap());
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        let (colours, _) = pixels.as_chunks::<3>();
+        for value in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {
+            let RGBColor(red, green, blue) = map.scale().colour(value);
+            let count = colours.iter().filter(|&&ink| ink == [red, green, blue]).count();
+            assert!(count >= 1600, "{value}: {count} of {}x{}", info.width, info.height);
+        }
+    }
+
+    #[test]
+    fn any_numbers_can_be_drawn() {
+        for values in [vec![0.0], vec![f64::NAN], vec![f64::INFINITY, -1e300], vec![1e-320; 4]] {
+            for colours in [Colours::AboutZero, Colours::FromZero] {
+                assert!(heat_map(&map(values.len(), values.clone(), colours)).is_ok());
+            }
+        }
+    }
+}

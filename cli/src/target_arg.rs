@@ -1,0 +1,76 @@
+//! What planners on a fixed glass cure: a built-in target or a file.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_planning::projector::Projector;
+use lamp_planning::target::{MapScale, Shapes, Target, TargetOptions};
+use lamp_slicer::Units;
+use lamp_stack::{Catalogued, Length};
+
+use crate::exit::Exit;
+use crate::options::{one_of, parse_thickness};
+
+/// How a target's file is read.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct TargetReading {
+    /// Side of a height map's pixels on the glass
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, requires = "full")]
+    pixel: Option<Length>,
+
+    /// Height of a height map's full white
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, requires = "pixel")]
+    full: Option<Length>,
+
+    /// Unit of coordinates in STL and OBJ targets; STEP and 3MF files state their own
+    #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
+    units: Units,
+}
+
+/// The target that a plan is for.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct TargetArg {
+    /// What to cure: a built-in target (lens-array, sphere, hemisphere, ...; any other name lists
+    /// them), a TOML file of shapes, a PNG height map (--pixel, --full) or a part with a flat bottom
+    #[arg(value_name = "TARGET")]
+    pub(crate) target: PathBuf,
+
+    #[command(flatten)]
+    reading: TargetReading,
+}
+
+impl TargetArg {
+    /// Returns the target, which the projector's light must cover.
+    pub(crate) fn open(&self, projector: &Projector) -> Result<Target, Exit> {
+        self.reading.open(&self.target, projector)
+    }
+}
+
+impl TargetReading {
+    /// Returns the built-in target of a name, or that of a file, which the projector's light must
+    /// cover.
+    pub(crate) fn open(&self, path: &Path, projector: &Projector) -> Result<Target, Exit> {
+        let target = self.read(path)?;
+        if self.pixel.is_some() && !target.is_picture() {
+            return Err(Exit::usage("--pixel and --full are for height maps: leave them out"));
+        }
+        Ok(target.check_width(projector).with_context(|| path.display().to_string())?)
+            .map(|()| target)
+    }
+
+    fn read(&self, path: &Path) -> Result<Target, Exit> {
+        if let Some(builtin) = path.to_str().and_then(Target::builtin) {
+            return Ok(builtin);
+        }
+        if !path.exists() {
+            let names: Vec<_> = Shapes::BUILTINS.iter().map(|builtin| builtin.name).collect();
+            let (path, names) = (path.display(), names.join(", "));
+            let text = format!("{path}: there is no such file, nor a built-in target: {names}");
+            return Err(Exit::Failed(anyhow!(text)));
+        }
+        let scale = self.pixel.zip(self.full).map(|(pixel, full)| MapScale { pixel, full });
+        let options = TargetOptions { scale, units: self.units };
+        Ok(Target::open(path, &options).with_context(|| path.display().to_string())?)
+    }
+}
