@@ -7,6 +7,7 @@
 //! - [`projector`] and [`target`] are what planners on a fixed glass start from.
 
 mod blur;
+pub mod column;
 mod doses;
 pub mod ecpl;
 pub mod learn;

@@ -4,6 +4,7 @@ use lamp_stack::Length;
 
 use super::model::{CureError, CureModel, DepthRange, ModelError, positive};
 use super::units::Dose;
+use super::working_curve::WorkingCurve;
 
 /// The cure model with separate penetration depths of the liquid (`D_pL`) and the
 /// solid (`D_pS`): `z = D_pS ln(D_pL/D_pS (E/E_c - 1) + 1)` (000
@@ -42,6 +43,36 @@ impl TwoDepth {
             return Err(ModelError::NoDepths);
         }
         Ok(Self { critical_dose, liquid_depth, solid_depth, depths })
+    }
+
+    /// Returns the same equation for every depth.
+    #[must_use]
+    pub fn for_all_depths(self) -> Self {
+        Self { depths: DepthRange::ALL, ..self }
+    }
+
+    /// Returns the critical dose `E_c`.
+    pub fn critical_dose(&self) -> Dose {
+        self.critical_dose
+    }
+
+    /// Returns the penetration depth of the liquid, `D_pL`.
+    pub fn liquid_depth(&self) -> Length {
+        self.liquid_depth
+    }
+
+    /// Returns the penetration depth of the solid, `D_pS`.
+    pub fn solid_depth(&self) -> Length {
+        self.solid_depth
+    }
+}
+
+impl From<WorkingCurve> for TwoDepth {
+    /// Returns the same curve: liquid and solid have one penetration depth.
+    fn from(curve: WorkingCurve) -> Self {
+        let (critical_dose, depth) = (curve.critical_dose(), curve.penetration_depth());
+        let depths = DepthRange::ALL;
+        Self { critical_dose, liquid_depth: depth, solid_depth: depth, depths }
     }
 }
 

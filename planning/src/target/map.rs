@@ -106,7 +106,7 @@ pub struct Place {
 }
 
 impl Place {
-    pub(super) fn of(grid: &Grid, at: usize) -> Self {
+    pub(crate) fn of(grid: &Grid, at: usize) -> Self {
         let (column, row) = (at % grid.columns, at / grid.columns);
         let [x, y] = [grid.x_um(column), grid.y_um(row)];
         let [x, y] = [x, y].map(|um| Length::from_um(um).to_whole_nm());

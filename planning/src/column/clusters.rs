@@ -1,0 +1,176 @@
+//! Which mirrors are on together: the best clusters of their times (000 section 4.2.2).
+
+use rayon::join;
+
+/// The clusters of times for which the sum of squares of how far times are from the mean of their
+/// cluster is least. Mirrors below the first are off, which is a cluster at time zero.
+///
+/// 000 finds clusters by k-means, which stays in a local minimum, and has no cluster at zero.
+/// Times along a line allow dynamic programming, which finds the least sum.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clusters {
+    /// The least time of each cluster, shortest first, in steps of the display.
+    pub lowest: Vec<u64>,
+    /// The mean time of each, in steps.
+    pub means: Vec<f64>,
+    /// The sum of squares, in steps squared.
+    pub squares: f64,
+}
+
+/// Fewer distinct times than clusters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{wanted} bitmaps are more than the mirrors have distinct times: at most {distinct} are of use"
+)]
+pub struct TooFewTimes {
+    /// Clusters that are wanted.
+    pub wanted: usize,
+    /// Times above zero that differ by a step of the display.
+    pub distinct: usize,
+}
+
+/// Sums over the distinct times up to each.
+struct Sums {
+    /// Mirrors, their times, and the squares of them, told from the mean.
+    prefix: Vec<[f64; 3]>,
+    mean: f64,
+}
+
+impl Sums {
+    fn of(times: &[(u64, u64)]) -> Self {
+        let count: u64 = times.iter().map(|(_, count)| count).sum();
+        let all: f64 = times.iter().map(|&(time, count)| time as f64 * count as f64).sum();
+        let mean = all / count as f64;
+        let mut sums = [0.0; 3];
+        let prefix = std::iter::once(sums).chain(times.iter().map(|&(time, count)| {
+            let (time, count) = (time as f64 - mean, count as f64);
+            sums = [sums[0] + count, sums[1] + count * time, sums[2] + count * time * time];
+            sums
+        }));
+        Self { prefix: prefix.collect(), mean }
+    }
+
+    /// Returns the number, sum and sum of squares of the times from one to before another.
+    fn between(&self, from: usize, to: usize) -> [f64; 3] {
+        let [from, to] = [self.prefix[from], self.prefix[to]];
+        [to[0] - from[0], to[1] - from[1], to[2] - from[2]]
+    }
+
+    /// Returns the sum of squares of how far times are from their mean.
+    fn cost(&self, from: usize, to: usize) -> f64 {
+        let [count, sum, squares] = self.between(from, to);
+        (squares - sum * sum / count).max(0.0)
+    }
+
+    fn mean(&self, from: usize, to: usize) -> f64 {
+        let [count, sum, _] = self.between(from, to);
+        self.mean + sum / count
+    }
+}
+
+impl Clusters {
+    /// Returns the best clusters of times in steps of the display.
+    ///
+    /// # Errors
+    /// Returns an error if there are fewer distinct times above zero.
+    pub fn of(times: &[u64], count: usize) -> Result<Self, TooFewTimes> {
+        let mut sorted: Vec<_> = times.iter().copied().filter(|time| *time > 0).collect();
+        sorted.sort_unstable();
+        let mut distinct: Vec<(u64, u64)> = Vec::new();
+        for time in sorted {
+            match distinct.last_mut() {
+                Some((last, count)) if *last == time => *count += 1,
+                _ => distinct.push((time, 1)),
+            }
+        }
+        if distinct.len() < count || count == 0 {
+            return Err(TooFewTimes { wanted: count, distinct: distinct.len() });
+        }
+        let sums = Sums::of(&distinct);
+        let (starts, squares) = best_starts(&distinct, &sums, count);
+        let ends = starts.iter().skip(1).copied().chain([distinct.len()]);
+        let means = starts.iter().zip(ends).map(|(&from, to)| sums.mean(from, to)).collect();
+        let lowest = starts.iter().map(|&start| distinct[start].0).collect();
+        Ok(Self { lowest, means, squares })
+    }
+
+    /// Returns how many bitmaps light a mirror of a time: its cluster, from 1, or 0 if it is off.
+    pub fn of_time(&self, time: u64) -> usize {
+        self.lowest.partition_point(|lowest| *lowest <= time)
+    }
+}
+
+/// Returns where the best clusters begin, and their sum of squares.
+fn best_starts(times: &[(u64, u64)], sums: &Sums, count: usize) -> (Vec<usize>, f64) {
+    let n = times.len();
+    // The least sum of squares of the first times with so many clusters: first with none, off.
+    let mut off = 0.0;
+    let mut best: Vec<f64> = std::iter::once(0.0)
+        .chain(times.iter().map(|&(time, mirrors)| {
+            off += mirrors as f64 * (time as f64).powi(2);
+            off
+        }))
+        .collect();
+    let mut starts = Vec::with_capacity(count);
+    for cluster in 1..=count {
+        let mut next = vec![f64::INFINITY; n + 1];
+        let mut start = vec![0_u32; n + 1];
+        let row = Row { before: &best, sums };
+        row.fill(cluster, [cluster - 1, n - 1], &mut next[cluster..], &mut start[cluster..]);
+        best = next;
+        starts.push(start);
+    }
+    let mut end = n;
+    let mut found: Vec<_> = starts
+        .iter()
+        .rev()
+        .map(|start| {
+            end = start[end] as usize;
+            end
+        })
+        .collect();
+    found.reverse();
+    (found, best[n])
+}
+
+/// Numbers of times below which rows are not shared between threads.
+const SHARED: usize = 1 << 12;
+
+/// One cluster more than before.
+struct Row<'a> {
+    before: &'a [f64],
+    sums: &'a Sums,
+}
+
+impl Row<'_> {
+    /// Writes the least sums of squares for ends from `end` on, and where their last cluster
+    /// begins, which is within `starts`: later ends have no earlier start, so halves are apart.
+    fn fill(&self, end: usize, starts: [usize; 2], best: &mut [f64], start: &mut [u32]) {
+        if best.is_empty() {
+            return;
+        }
+        let half = best.len() / 2;
+        let middle = end + half;
+        let last = starts[1].min(middle - 1);
+        let cost = |from: usize| self.before[from] + self.sums.cost(from, middle);
+        let mut at = (f64::INFINITY, starts[0]);
+        for from in starts[0]..=last {
+            let cost = cost(from);
+            if cost < at.0 {
+                at = (cost, from);
+            }
+        }
+        let (best_low, best_high) = best.split_at_mut(half);
+        let (start_low, start_high) = start.split_at_mut(half);
+        (best_high[0], start_high[0]) = (at.0, at.1 as u32);
+        let mut low = || self.fill(end, [starts[0], at.1], best_low, start_low);
+        let (best_high, start_high) = (&mut best_high[1..], &mut start_high[1..]);
+        let mut high = || self.fill(middle + 1, [at.1, starts[1]], best_high, start_high);
+        if half > SHARED {
+            join(low, high);
+        } else {
+            low();
+            high();
+        }
+    }
+}

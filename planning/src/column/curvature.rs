@@ -1,0 +1,59 @@
+//! The second derivatives of how far doses are from those that are wanted.
+
+use super::light::{ColumnLight, product};
+use super::taps::Taps;
+
+/// A matrix that is symmetric and has no negative eigenvalue, as a product.
+pub(super) trait Curvature: Sync {
+    /// Returns the product with a number for each mirror.
+    fn apply(&self, mirrors: &[f64]) -> Vec<f64>;
+}
+
+/// The product of H's transpose with H, or its mean over shifts: a matrix for each axis.
+pub(super) struct Normal<'a> {
+    light: &'a ColumnLight,
+    taps: [Taps; 2],
+}
+
+impl<'a> Normal<'a> {
+    /// Creates the mean of the products for lights that are `light` shifted along x by each of
+    /// some lengths, and along y by each of them.
+    pub(super) fn mean(light: &'a ColumnLight, shifts_um: &[f64]) -> Self {
+        let shifted: Vec<_> = shifts_um.iter().map(|&um| light.shifted([um; 2])).collect();
+        let mean = |axis: usize| {
+            let normals: Vec<_> = shifted.iter().map(|light| light.taps()[axis].normal()).collect();
+            Taps::mean(&normals)
+        };
+        Self { light, taps: [mean(0), mean(1)] }
+    }
+}
+
+impl Curvature for Normal<'_> {
+    fn apply(&self, mirrors: &[f64]) -> Vec<f64> {
+        let square = self.light.setup().irradiance.powi(2);
+        let mut weighed: Vec<_> = mirrors.iter().map(|number| number * square).collect();
+        self.light.weigh(&mut weighed);
+        let mut out = product(&self.taps, &weighed);
+        self.light.weigh(&mut out);
+        out
+    }
+}
+
+/// The same with a weight for each column voxel of each of some lights, added up.
+pub(super) struct Weighted<'a> {
+    pub(super) lights: &'a [ColumnLight],
+    pub(super) weights: &'a [&'a [f64]],
+}
+
+impl Curvature for Weighted<'_> {
+    fn apply(&self, mirrors: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; mirrors.len()];
+        for (light, weights) in self.lights.iter().zip(self.weights) {
+            let mut doses = light.doses(mirrors);
+            doses.iter_mut().zip(*weights).for_each(|(dose, weight)| *dose *= weight);
+            let back = light.back(&doses);
+            sum.iter_mut().zip(back).for_each(|(sum, back)| *sum += back);
+        }
+        sum
+    }
+}

@@ -1,0 +1,78 @@
+//! The height that a dose cures, and the dose of a height (000 eq. 3.9, 3.10).
+
+use lamp_grayscale::material::{Material, MaterialError};
+use lamp_grayscale::resin::{CureModel, DepthRange, Dose, TwoDepth};
+use lamp_stack::Length;
+use thiserror::Error;
+
+/// The height over a glass that a dose cures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightCurve {
+    /// The model, for all heights.
+    model: TwoDepth,
+    /// The heights that it is known for.
+    known: DepthRange,
+}
+
+/// Why a material has no such curve.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NoHeights {
+    /// It does not say which dose cures how deep.
+    #[error(
+        "{0} does not say which dose cures how deep: add [two-depth] or [working-curve] to its file"
+    )]
+    Curve(String),
+    /// A number is impossible.
+    #[error(transparent)]
+    Numbers(#[from] MaterialError),
+}
+
+impl HeightCurve {
+    /// Returns the curve of a material: its `[two-depth]`, or its `[working-curve]`, which is the
+    /// same with one penetration depth.
+    ///
+    /// # Errors
+    /// Returns an error if the material has neither, or if one of its numbers is impossible.
+    pub fn of(material: &Material) -> Result<Self, NoHeights> {
+        if let Some(model) = material.two_depth()? {
+            return Ok(Self { model: model.for_all_depths(), known: model.depths() });
+        }
+        let curve = material.working_curve()?;
+        let curve = curve.ok_or_else(|| NoHeights::Curve(material.name.clone()))?;
+        Ok(Self { model: curve.into(), known: DepthRange::ALL })
+    }
+
+    /// Returns the height that a dose in mJ/cm2 cures, in um.
+    pub fn height_um(&self, dose: f64) -> f64 {
+        self.model.depth(Dose::from_mj_per_cm2(dose)).um()
+    }
+
+    /// Returns the dose in mJ/cm2 that cures a height in um, zero for none, or nothing if no dose
+    /// does.
+    pub fn dose(&self, height_um: f64) -> Option<f64> {
+        self.model.dose(Length::from_um(height_um)).ok().map(Dose::mj_per_cm2)
+    }
+
+    /// Returns the critical dose, in mJ/cm2.
+    pub fn critical_dose(&self) -> f64 {
+        self.model.critical_dose().mj_per_cm2()
+    }
+
+    /// Returns the heights that the curve was measured for.
+    pub fn known(&self) -> DepthRange {
+        self.known
+    }
+
+    /// Returns a height and its change with the dose, where the curve goes on straight below the
+    /// critical dose, so that it has a slope there.
+    pub(super) fn straight_below(&self, dose: f64) -> (f64, f64) {
+        let (critical, liquid) = (self.critical_dose(), self.model.liquid_depth().um());
+        let above = dose / critical - 1.0;
+        if above <= 0.0 {
+            return (liquid * above, liquid / critical);
+        }
+        let solid = self.model.solid_depth().um();
+        (self.height_um(dose), liquid / critical / (1.0 + liquid / solid * above))
+    }
+}

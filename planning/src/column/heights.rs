@@ -1,0 +1,111 @@
+//! Times whose cured heights are nearest to the target's (000 section 4.5.2).
+
+use super::curvature::Weighted;
+use super::curve::HeightCurve;
+use super::light::ColumnLight;
+use super::search::{Bounded, Place};
+use super::times::{Stop, Times, frank_wolfe_gap};
+
+/// How far cured heights are from those wanted, in um, on lights that count alike.
+///
+/// A column with a height counts by how far it is, also below the critical dose, where the curve
+/// goes on straight; an empty one by what is cured in it, so that light below the critical dose
+/// costs nothing.
+pub(super) struct HeightError<'a> {
+    pub(super) lights: &'a [ColumnLight],
+    pub(super) heights_um: &'a [f64],
+    pub(super) curve: HeightCurve,
+}
+
+/// A square for each column voxel that is as high and as steep as its error.
+pub(super) struct Squares {
+    /// mJ/cm2 at which each is zero.
+    pub(super) wanted: Vec<f64>,
+    pub(super) weights: Vec<f64>,
+    error: f64,
+}
+
+impl HeightError<'_> {
+    fn share(&self) -> f64 {
+        1.0 / self.lights.len() as f64
+    }
+
+    /// Returns the error, and squares like it, for the doses of one light.
+    pub(super) fn squares(&self, doses: &[f64]) -> Squares {
+        let share = self.share();
+        let mut squares = Squares { wanted: Vec::new(), weights: Vec::new(), error: 0.0 };
+        for (&dose, &wanted) in doses.iter().zip(self.heights_um) {
+            let (height, slope) = self.curve.straight_below(dose);
+            let counts = wanted > 0.0 || height > 0.0;
+            let left = if counts { height - wanted } else { 0.0 };
+            squares.error += share * 0.5 * left * left;
+            squares.weights.push(if counts { share * slope * slope } else { 0.0 });
+            squares.wanted.push(dose - left / slope);
+        }
+        squares
+    }
+
+    /// Returns the error of times.
+    pub(super) fn at(&self, seconds: &[f64]) -> f64 {
+        self.all_squares(seconds).iter().map(|squares| squares.error).sum()
+    }
+
+    fn all_squares(&self, seconds: &[f64]) -> Vec<Squares> {
+        self.lights.iter().map(|light| self.squares(&light.doses(seconds))).collect()
+    }
+}
+
+/// Finds the times, at most `max_s` seconds, whose heights are nearest: Newton's method, whose
+/// squares are found as those of doses are.
+pub(super) fn nearest_heights(error: &HeightError<'_>, max_s: f64, stop: Stop) -> Times {
+    let mirrors = error.lights[0].setup().mirrors.iter().product();
+    let mut x = vec![0.0; mirrors];
+    let mut squares = error.all_squares(&x);
+    let mut steps = 0;
+    loop {
+        let value: f64 = squares.iter().map(|squares| squares.error).sum();
+        let weights: Vec<_> = squares.iter().map(|squares| squares.weights.as_slice()).collect();
+        let curvature = Weighted { lights: error.lights, weights: &weights };
+        let mut pull = vec![0.0; mirrors];
+        for (light, squares) in error.lights.iter().zip(&squares) {
+            let weighed = squares.wanted.iter().zip(&squares.weights).map(|(want, by)| want * by);
+            let back = light.back(&weighed.collect::<Vec<_>>());
+            pull.iter_mut().zip(back).for_each(|(pull, back)| *pull += back);
+        }
+        let problem = Bounded { curvature: &curvature, pull: &pull, high: max_s };
+        let here = problem.place(x);
+        let gap = frank_wolfe_gap(&here, max_s);
+        if gap <= stop.gap * value || steps >= stop.steps {
+            return Times { seconds: here.x, error: value, gap, steps };
+        }
+        let enough = (0.1 * gap).max(0.3 * stop.gap * value);
+        let before = steps;
+        let next = problem.search(here.x.clone(), 8, |place, step| {
+            steps = before + step;
+            frank_wolfe_gap(place, max_s) <= enough || steps >= stop.steps
+        });
+        (x, squares) = nearer(error, &here, &next.x, value);
+        steps += 1;
+    }
+}
+
+/// Goes to `next`, or so much of the way there that the error falls.
+fn nearer(
+    error: &HeightError<'_>,
+    here: &Place,
+    next: &[f64],
+    value: f64,
+) -> (Vec<f64>, Vec<Squares>) {
+    let mut share = 1.0;
+    loop {
+        let between = here.x.iter().zip(next).map(|(from, to)| from + share * (to - from));
+        let x: Vec<_> = between.collect();
+        let squares = error.all_squares(&x);
+        let there: f64 = squares.iter().map(|squares| squares.error).sum();
+        // Steps that are all rounding may not fall any more.
+        if there <= value || share < 1e-3 {
+            return (x, squares);
+        }
+        share *= 0.5;
+    }
+}

@@ -1,0 +1,160 @@
+//! How long each of some bitmaps is on, so that their doses are nearest to those wanted.
+
+use rayon::prelude::*;
+
+use super::curvature::Curvature;
+use super::light::ColumnLight;
+use super::search::Bounded;
+
+/// Rows of column voxels that a thread takes at a time.
+const ROWS: usize = 16;
+
+/// What doses should be, on one light.
+pub(super) struct Wish<'a> {
+    pub(super) light: &'a ColumnLight,
+    /// mJ/cm2 of each column voxel.
+    pub(super) wanted: &'a [f64],
+    /// What a square of each counts; empty: 1.
+    pub(super) weights: &'a [f64],
+}
+
+/// A symmetric matrix, row by row.
+struct Dense(Vec<Vec<f64>>);
+
+impl Curvature for Dense {
+    fn apply(&self, numbers: &[f64]) -> Vec<f64> {
+        let dot = |row: &Vec<f64>| row.iter().zip(numbers).map(|(a, b)| a * b).sum();
+        self.0.iter().map(dot).collect()
+    }
+}
+
+/// Sums over column voxels of the light that clusters bring to them.
+struct Sums {
+    /// Of products of two clusters' light.
+    square: Vec<Vec<f64>>,
+    /// Of products with what is wanted.
+    pull: Vec<f64>,
+}
+
+impl Sums {
+    fn zero(clusters: usize) -> Self {
+        Self { square: vec![vec![0.0; clusters]; clusters], pull: vec![0.0; clusters] }
+    }
+
+    fn add(&mut self, other: &Self) {
+        let square = self.square.iter_mut().zip(&other.square);
+        for (row, other) in square.chain([(&mut self.pull, &other.pull)]) {
+            row.iter_mut().zip(other).for_each(|(sum, more)| *sum += more);
+        }
+    }
+}
+
+/// Returns for how many seconds each of `count` nested bitmaps is on: bitmap k lights the mirrors
+/// whose `clusters` are k and above, from 1. They are none below zero, together at most `max_s`,
+/// and of these those whose doses are nearest to the wishes (least squares).
+pub(super) fn best_seconds(
+    wishes: &[Wish<'_>],
+    clusters: &[u16],
+    count: usize,
+    max_s: f64,
+) -> Vec<f64> {
+    let mut sums = Sums::zero(count);
+    wishes.iter().for_each(|wish| sums.add(&sums_of(wish, clusters, count)));
+    // From clusters, which no two bitmaps share, to bitmaps, which light all clusters above.
+    let above = |numbers: &mut [f64]| {
+        for k in (1..numbers.len()).rev() {
+            numbers[k - 1] += numbers[k];
+        }
+    };
+    sums.square.iter_mut().for_each(|row| above(row));
+    for k in (1..count).rev() {
+        let (low, high) = sums.square.split_at_mut(k);
+        low[k - 1].iter_mut().zip(&high[0]).for_each(|(sum, more)| *sum += more);
+    }
+    above(&mut sums.pull);
+    within(nonnegative(&Dense(sums.square), &sums.pull, max_s), max_s)
+}
+
+/// Returns the numbers above zero that are nearest.
+fn nonnegative(square: &Dense, pull: &[f64], max_s: f64) -> Vec<f64> {
+    // Bitmaps of one size to the eye have one scale: each is told in shares of its own light.
+    let scale: Vec<_> =
+        square.0.iter().enumerate().map(|(k, row)| row[k].sqrt().max(f64::MIN_POSITIVE)).collect();
+    let scaled =
+        |row: &Vec<f64>, by: f64| row.iter().zip(&scale).map(|(a, s)| a / s / by).collect();
+    let square = Dense(square.0.iter().zip(&scale).map(|(row, &by)| scaled(row, by)).collect());
+    let pull: Vec<_> = pull.iter().zip(&scale).map(|(pull, by)| pull / by).collect();
+    let high = max_s * scale.iter().copied().fold(0.0, f64::max);
+    let problem = Bounded { curvature: &square, pull: &pull, high };
+    let most = pull.iter().copied().map(f64::abs).fold(0.0, f64::max);
+    let found = problem.search(vec![0.0; pull.len()], 1, |place, step| {
+        let left = place
+            .x
+            .iter()
+            .zip(&place.slopes)
+            .map(|(x, slope)| if *x > 0.0 { slope.abs() } else { (-slope).max(0.0) });
+        left.fold(0.0, f64::max) <= 1e-13 * most || step >= 100_000
+    });
+    found.x.iter().zip(&scale).map(|(x, by)| x / by).collect()
+}
+
+/// Shortens the last bitmaps, until all together are within the limit.
+fn within(mut seconds: Vec<f64>, max_s: f64) -> Vec<f64> {
+    let mut left = max_s;
+    for seconds in &mut seconds {
+        *seconds = seconds.min(left);
+        left -= *seconds;
+    }
+    seconds
+}
+
+fn sums_of(wish: &Wish<'_>, clusters: &[u16], count: usize) -> Sums {
+    let rows = wish.light.setup().voxels[1];
+    let chunks: Vec<_> = (0..rows.div_ceil(ROWS))
+        .into_par_iter()
+        .map(|chunk| {
+            let mut sums = Sums::zero(count);
+            (chunk * ROWS..((chunk + 1) * ROWS).min(rows))
+                .for_each(|row| add_row(&mut sums, wish, clusters, row));
+            sums
+        })
+        .collect();
+    let mut sums = Sums::zero(count);
+    chunks.iter().for_each(|chunk| sums.add(chunk));
+    sums
+}
+
+/// Adds what clusters bring to a row of column voxels.
+fn add_row(sums: &mut Sums, wish: &Wish<'_>, clusters: &[u16], row: usize) {
+    let setup = wish.light.setup();
+    let [width, columns] = [setup.mirrors[0], setup.voxels[0]];
+    let [along, down] = wish.light.taps();
+    let (top, heights) = down.row(row);
+    let mut light: Vec<(usize, f64)> = Vec::new();
+    for column in 0..columns {
+        let (left, widths) = along.row(column);
+        light.clear();
+        for (mirror_row, &by) in (top..).zip(heights) {
+            let start = mirror_row * width + left;
+            for (mirror, &share) in (start..start + widths.len()).zip(widths) {
+                let cluster = usize::from(clusters[mirror]);
+                let share = share * by * setup.irradiance * wish.light.flat(mirror);
+                if cluster == 0 || share == 0.0 {
+                    continue;
+                }
+                match light.iter_mut().find(|(other, _)| *other == cluster - 1) {
+                    Some((_, sum)) => *sum += share,
+                    None => light.push((cluster - 1, share)),
+                }
+            }
+        }
+        let voxel = row * columns + column;
+        let weight = wish.weights.get(voxel).copied().unwrap_or(1.0);
+        for &(cluster, share) in &light {
+            sums.pull[cluster] += weight * share * wish.wanted[voxel];
+            for &(other, too) in &light {
+                sums.square[cluster][other] += weight * share * too;
+            }
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The light of mirrors on column voxels (000 section 3.5).
+
+use rayon::prelude::*;
+
+use super::spread::{MirrorLine, Spread, Tracing, VoxelLine, taps};
+use super::taps::Taps;
+use crate::projector::{Projector, SpreadOf};
+use crate::target::Grid;
+use crate::wide::wide;
+
+/// A display as its image stands on the glass, and the column voxels that it lights. Both
+/// lattices have their middle on the optical axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setup {
+    /// Mirrors along x and y that are used: those in the middle of the display.
+    pub mirrors: [usize; 2],
+    /// Mirrors of the whole display.
+    pub display: [usize; 2],
+    /// From one mirror to the next, on the glass, in um.
+    pub pitch_um: f64,
+    /// The side of what a mirror reflects, on the glass, in um.
+    pub lit_um: f64,
+    /// How light from a point of a mirror spreads.
+    pub spread: Spread,
+    /// How light is found.
+    pub tracing: Tracing,
+    /// Irradiance of a wide white field, in mW/cm2.
+    pub irradiance: f64,
+    /// The light of each mirror as a share of a white one's, rows from the first: a flat-field
+    /// image. Empty: all are alike.
+    pub flat_field: Vec<f64>,
+    /// Column voxels along x and y.
+    pub voxels: [usize; 2],
+    /// The side of a column voxel, in um.
+    pub voxel_um: f64,
+}
+
+/// The light of mirrors on column voxels: 000's matrix H. It separates into a matrix for each
+/// axis, so products take a few numbers a mirror and axis.
+#[derive(Clone, Debug)]
+pub struct ColumnLight {
+    setup: Setup,
+    /// Column voxels by mirrors, along x and y.
+    taps: [Taps; 2],
+    /// Mirrors by column voxels.
+    transposed: [Taps; 2],
+}
+
+impl ColumnLight {
+    /// Creates the light of a setup.
+    pub fn new(setup: Setup) -> Self {
+        let taps = setup.taps([0.0; 2]);
+        let transposed = [taps[0].transposed(), taps[1].transposed()];
+        Self { setup, taps, transposed }
+    }
+
+    /// Returns what the light was made from.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// Returns the light on column voxels that stand so far from where they should, in um.
+    #[must_use]
+    pub fn shifted(&self, shift_um: [f64; 2]) -> Self {
+        let taps = self.setup.taps(shift_um);
+        let transposed = [taps[0].transposed(), taps[1].transposed()];
+        Self { setup: self.setup.clone(), taps, transposed }
+    }
+
+    /// Returns the doses of column voxels, in mJ/cm2, of the seconds that mirrors are on.
+    pub fn doses(&self, seconds: &[f64]) -> Vec<f64> {
+        let mut light: Vec<_> = seconds.iter().map(|time| time * self.setup.irradiance).collect();
+        self.weigh(&mut light);
+        product(&self.taps, &light)
+    }
+
+    /// Returns the product of the transpose of H with a number for each column voxel.
+    pub(super) fn back(&self, numbers: &[f64]) -> Vec<f64> {
+        let mut mirrors = product(&self.transposed, numbers);
+        mirrors.iter_mut().for_each(|number| *number *= self.setup.irradiance);
+        self.weigh(&mut mirrors);
+        mirrors
+    }
+
+    /// Returns which mirrors light a column voxel: the first of them and the one past the last,
+    /// along x and y. None light any if a range is empty.
+    pub fn reaching(&self) -> [std::ops::Range<usize>; 2] {
+        let range = |taps: &Taps| {
+            let sums = taps.row_sums();
+            let lights = |sum: &f64| *sum > 0.0;
+            let first = sums.iter().position(lights).unwrap_or(0);
+            first..sums.iter().rposition(lights).map_or(0, |last| last + 1)
+        };
+        [range(&self.transposed[0]), range(&self.transposed[1])]
+    }
+
+    pub(super) fn taps(&self) -> &[Taps; 2] {
+        &self.taps
+    }
+
+    /// Returns the light of a mirror as a share of a white one's.
+    pub(super) fn flat(&self, mirror: usize) -> f64 {
+        self.setup.flat_field.get(mirror).copied().unwrap_or(1.0)
+    }
+
+    /// Multiplies numbers of mirrors by the flat field.
+    pub(super) fn weigh(&self, mirrors: &mut [f64]) {
+        mirrors.iter_mut().zip(&self.setup.flat_field).for_each(|(number, light)| *number *= light);
+    }
+}
+
+impl Setup {
+    /// Returns the setup of a projector over a grid. Mirrors too far out to light it are left out.
+    pub fn of(projector: &Projector, grid: &Grid, tracing: Tracing) -> Self {
+        let spread = match projector.spread() {
+            SpreadOf::Cone(half) => Spread::Cone(half.um()),
+            SpreadOf::Gaussian(sigma) => Spread::Gaussian(sigma.um()),
+        };
+        let (pitch_um, lit_um) = (projector.pitch.value.um(), projector.mirror_image().um());
+        let display =
+            [projector.display.columns, projector.display.rows].map(|count| count as usize);
+        let voxels = [grid.columns, grid.rows];
+        let used = |axis: usize| {
+            let side = voxels[axis] as f64 * grid.pitch_um + lit_um + 2.0 * spread.reach();
+            let spare = display[axis] as f64 - (side / pitch_um).ceil() - 1.0;
+            // As many to both sides, so that the middle stays.
+            display[axis] - 2 * (spare / 2.0).max(0.0) as usize
+        };
+        Self {
+            mirrors: [used(0), used(1)],
+            display,
+            pitch_um,
+            lit_um,
+            spread,
+            tracing,
+            irradiance: projector.irradiance().mw_per_cm2(),
+            flat_field: Vec::new(),
+            voxels,
+            voxel_um: grid.pitch_um,
+        }
+    }
+
+    fn taps(&self, shift_um: [f64; 2]) -> [Taps; 2] {
+        [0, 1].map(|axis| {
+            let mirrors =
+                MirrorLine { count: self.mirrors[axis], pitch: self.pitch_um, lit: self.lit_um };
+            let voxels =
+                VoxelLine { count: self.voxels[axis], pitch: self.voxel_um, shift: shift_um[axis] };
+            taps(mirrors, voxels, self.spread, self.tracing)
+        })
+    }
+}
+
+/// Returns the product of a matrix for each axis, x first, with an image.
+pub(super) fn product([along, down]: &[Taps; 2], image: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; along.rows() * down.rows()];
+    let rows = out.par_chunks_mut(along.rows()).enumerate();
+    rows.for_each_init(
+        || vec![0.0; along.columns()],
+        |line, (row, out)| {
+            wide(|| {
+                down.apply_across(row, image, line);
+                along.apply(line, out);
+            });
+        },
+    );
+    out
+}

@@ -1,0 +1,25 @@
+//! Column cure (000): times of mirrors that cure each column of a part to its height, without
+//! layers, through a glass.
+
+mod bitmaps;
+mod clusters;
+mod curvature;
+mod curve;
+mod heights;
+mod levels;
+mod light;
+mod measures;
+mod plan;
+mod search;
+mod spread;
+mod taps;
+mod times;
+
+pub use bitmaps::Bitmap;
+pub use clusters::{Clusters, TooFewTimes};
+pub use curve::{HeightCurve, NoHeights};
+pub use light::{ColumnLight, Setup};
+pub use measures::Measures;
+pub use plan::{ColumnError, ColumnOptions, ColumnPlan, Objective, plan};
+pub use spread::{Spread, Tracing};
+pub use times::{Stop, Times, nearest_times};

@@ -1,0 +1,240 @@
+//! From a target to bitmaps (000 figure 5.1).
+
+use lamp_stack::Length;
+use thiserror::Error;
+
+use super::bitmaps::{Bitmap, Mirrors, black_and_white, gray};
+use super::clusters::{Clusters, TooFewTimes};
+use super::curve::HeightCurve;
+use super::heights::{HeightError, nearest_heights};
+use super::levels::{Wish, best_seconds};
+use super::light::ColumnLight;
+use super::times::{Stop, Times, nearest_times};
+use crate::target::{HeightMap, Place};
+
+/// What should be nearest to that of the target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Objective {
+    /// Doses: 000's "optimize E".
+    #[default]
+    Dose,
+    /// Heights: 000's "optimize z". Light that cures nothing costs nothing.
+    Height,
+}
+
+/// How to plan.
+#[derive(Clone, Debug)]
+pub struct ColumnOptions {
+    /// What should be nearest.
+    pub objective: Objective,
+    /// How many bitmaps are shown.
+    pub bitmaps: usize,
+    /// For gray bitmaps: the light of each level as a share of white's, rising.
+    pub gray: Option<Box<[f64; 256]>>,
+    /// For how long a mirror may be on, in seconds.
+    pub max_s: f64,
+    /// How far the glass may stand off along each axis: errors are means over this, none and
+    /// this to the other side.
+    pub robust: Length,
+    /// What all times are multiples of, in seconds.
+    pub step_s: f64,
+    /// When the search for times ends.
+    pub stop: Stop,
+}
+
+/// Why a target has no plan.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ColumnError {
+    /// A column has a height that no mirror reaches.
+    #[error("no light reaches {0}: the target is wider than what the display lights")]
+    Dark(Place),
+    /// A height that no dose cures.
+    #[error("no dose that can be written down cures {0}")]
+    NoDose(Length),
+    /// More bitmaps than there are times.
+    #[error(transparent)]
+    TooFewTimes(#[from] TooFewTimes),
+    /// All times are shorter than the display can show.
+    #[error(
+        "the longest time, {:.3} ms, is under the display's step of {:.3} ms: less light, or a \
+         resin that is slower, makes it longer", 1000.0 * longest_s, 1000.0 * step_s
+    )]
+    UnderAStep {
+        /// The longest time.
+        longest_s: f64,
+        /// The display's step.
+        step_s: f64,
+    },
+}
+
+/// A plan of bitmaps.
+#[derive(Clone, Debug)]
+pub struct ColumnPlan {
+    /// The times without clusters, which no bitmaps can beat by more than their gap.
+    pub best: Times,
+    /// Doses of the best times, in mJ/cm2.
+    pub best_doses: Vec<f64>,
+    /// The bitmaps, in the order of their display.
+    pub bitmaps: Vec<Bitmap>,
+    /// For how long each mirror is on, in seconds of white light.
+    pub seconds: Vec<f64>,
+    /// The error of the bitmaps, as [`Times::error`].
+    pub error: f64,
+    /// Doses of the bitmaps, in mJ/cm2.
+    pub doses: Vec<f64>,
+}
+
+impl ColumnPlan {
+    /// Returns by what share of the least error the bitmaps' error is above it.
+    pub fn excess(&self) -> f64 {
+        if self.error > self.best.error { self.error / self.best.error - 1.0 } else { 0.0 }
+    }
+}
+
+/// What a plan is for.
+struct Problem<'a> {
+    light: &'a ColumnLight,
+    /// The light, shifted by what the plan has to bear.
+    lights: Vec<ColumnLight>,
+    heights_um: &'a [f64],
+    wanted: Vec<f64>,
+    curve: HeightCurve,
+    options: &'a ColumnOptions,
+}
+
+/// Plans the bitmaps that cure a target through a glass.
+///
+/// # Errors
+/// Returns an error if light does not reach a column that has a height, if no dose cures it, if
+/// there are fewer distinct times than bitmaps, or if all are too short.
+pub fn plan(
+    light: &ColumnLight,
+    target: &HeightMap,
+    curve: HeightCurve,
+    options: &ColumnOptions,
+) -> Result<ColumnPlan, ColumnError> {
+    let problem = Problem::new(light, target, curve, options)?;
+    let best = problem.best_times();
+    let longest_s = best.seconds.iter().copied().fold(0.0, f64::max);
+    if longest_s < options.step_s {
+        return Err(ColumnError::UnderAStep { longest_s, step_s: options.step_s });
+    }
+    let (bitmaps, steps) = problem.bitmaps(&best)?;
+    let seconds: Vec<_> = steps.iter().map(|steps| steps * options.step_s).collect();
+    Ok(ColumnPlan {
+        best_doses: light.doses(&best.seconds),
+        doses: light.doses(&seconds),
+        error: problem.error(&seconds),
+        best,
+        bitmaps,
+        seconds,
+    })
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        light: &'a ColumnLight,
+        target: &'a HeightMap,
+        curve: HeightCurve,
+        options: &'a ColumnOptions,
+    ) -> Result<Self, ColumnError> {
+        let heights_um = &target.heights_um;
+        let lit = light.doses(&vec![1.0; light.setup().mirrors.iter().product()]);
+        let is_dark = |(height, light): (&f64, &f64)| *height > 0.0 && *light <= 0.0;
+        if let Some(column) = heights_um.iter().zip(&lit).position(is_dark) {
+            return Err(ColumnError::Dark(Place::of(&target.grid, column)));
+        }
+        let dose = |&um: &f64| curve.dose(um).ok_or(ColumnError::NoDose(Length::from_um(um)));
+        let wanted = heights_um.iter().map(dose).collect::<Result<_, _>>()?;
+        let shifts = options.shifts_um();
+        let shifts = shifts.iter().flat_map(|&y| shifts.iter().map(move |&x| [x, y]));
+        let lights = shifts.map(|shift| light.shifted(shift)).collect();
+        Ok(Self { light, lights, heights_um, wanted, curve, options })
+    }
+
+    fn height_error(&self) -> HeightError<'_> {
+        HeightError { lights: &self.lights, heights_um: self.heights_um, curve: self.curve }
+    }
+
+    fn best_times(&self) -> Times {
+        let ColumnOptions { objective, max_s, stop, .. } = *self.options;
+        match objective {
+            Objective::Dose => {
+                nearest_times(self.light, &self.wanted, max_s, &self.options.shifts_um(), stop)
+            }
+            Objective::Height => nearest_heights(&self.height_error(), max_s, stop),
+        }
+    }
+
+    /// Returns the bitmaps of times, and for how many steps each mirror is on.
+    fn bitmaps(&self, best: &Times) -> Result<(Vec<Bitmap>, Vec<f64>), ColumnError> {
+        let setup = self.light.setup();
+        let mirrors = Mirrors { count: setup.mirrors, display: setup.display };
+        let times: Vec<_> = best.seconds.iter().map(|s| s / self.options.step_s).collect();
+        let whole: Vec<_> = times.iter().map(|steps| steps.round() as u64).collect();
+        let clusters = Clusters::of(&whole, self.options.bitmaps)?;
+        if let Some(shares) = &self.options.gray {
+            return Ok(gray(mirrors, &times, &clusters, shares));
+        }
+        let of: Vec<_> = whole.iter().map(|&time| clusters.of_time(time) as u16).collect();
+        let seconds = self.best_seconds(best, &of);
+        let mut end = 0.0;
+        let ends: Vec<_> = seconds
+            .iter()
+            .map(|seconds| {
+                end += seconds;
+                (end / self.options.step_s).round() as u64
+            })
+            .collect();
+        Ok(black_and_white(mirrors, &of, &ends))
+    }
+
+    /// Returns the best times of bitmaps.
+    fn best_seconds(&self, best: &Times, clusters: &[u16]) -> Vec<f64> {
+        let ColumnOptions { objective, max_s, bitmaps, .. } = *self.options;
+        let wishes: Vec<_> = match objective {
+            Objective::Dose => Vec::new(),
+            Objective::Height => {
+                let error = self.height_error();
+                self.lights.iter().map(|light| error.squares(&light.doses(&best.seconds))).collect()
+            }
+        };
+        let wishes: Vec<_> = match objective {
+            Objective::Dose => self
+                .lights
+                .iter()
+                .map(|light| Wish { light, wanted: &self.wanted, weights: &[] })
+                .collect(),
+            Objective::Height => self
+                .lights
+                .iter()
+                .zip(&wishes)
+                .map(|(light, to)| Wish { light, wanted: &to.wanted, weights: &to.weights })
+                .collect(),
+        };
+        best_seconds(&wishes, clusters, bitmaps, max_s)
+    }
+
+    /// Returns the error of times.
+    fn error(&self, seconds: &[f64]) -> f64 {
+        match self.options.objective {
+            Objective::Height => self.height_error().at(seconds),
+            Objective::Dose => {
+                let of = |light: &ColumnLight| -> f64 {
+                    let doses = light.doses(seconds);
+                    doses.iter().zip(&self.wanted).map(|(dose, want)| (dose - want).powi(2)).sum()
+                };
+                0.5 * self.lights.iter().map(of).sum::<f64>() / self.lights.len() as f64
+            }
+        }
+    }
+}
+
+impl ColumnOptions {
+    /// Returns how far the light may be shifted along an axis.
+    fn shifts_um(&self) -> Vec<f64> {
+        let um = self.robust.um();
+        if um > 0.0 { vec![-um, 0.0, um] } else { vec![0.0] }
+    }
+}

@@ -1,0 +1,209 @@
+//! The times whose doses are nearest to those that are wanted: conjugate gradients between bounds.
+//!
+//! Source: Z. Dostál and J. Schöberl, *Minimizing quadratic functions subject to bound
+//! constraints with the rate of convergence and finite termination*, Comput. Optim. Appl. 30
+//! (2005): modified proportioning with reduced gradient projections, here with an upper bound.
+
+use rayon::prelude::*;
+
+use super::curvature::Curvature;
+
+/// Numbers that a thread takes at a time. Sums are those of chunks, in order, so that the number
+/// of threads changes no bit.
+const CHUNK: usize = 1 << 13;
+/// Steps along the slopes, as a share of what cannot raise the value.
+const STEP: f64 = 1.9;
+
+/// The least value of `x A x / 2 - b x` for `x` between zero and a bound.
+pub(super) struct Bounded<'a, C> {
+    pub(super) curvature: &'a C,
+    /// b: the slopes at zero, negated.
+    pub(super) pull: &'a [f64],
+    pub(super) high: f64,
+}
+
+/// Where a search stands: the times, and the slopes there.
+pub(super) struct Place {
+    pub(super) x: Vec<f64>,
+    pub(super) slopes: Vec<f64>,
+}
+
+/// How a number may move.
+#[derive(Clone, Copy)]
+struct Slope {
+    /// The slope of a number between its bounds.
+    free: f64,
+    /// The slope of a number at a bound that leads away from it.
+    chopped: f64,
+}
+
+fn slope_at(x: f64, slope: f64, high: f64) -> Slope {
+    if x <= 0.0 {
+        Slope { free: 0.0, chopped: slope.min(0.0) }
+    } else if x >= high {
+        Slope { free: 0.0, chopped: slope.max(0.0) }
+    } else {
+        Slope { free: slope, chopped: 0.0 }
+    }
+}
+
+/// The sums that choose what the next step is.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    chopped: f64,
+    reduced: f64,
+    /// Of free slopes times the product of the last direction.
+    conjugate: f64,
+}
+
+impl<C: Curvature> Bounded<'_, C> {
+    /// Searches from `x` until `is_done`, which is asked at every `look`th step and told how many
+    /// steps there were.
+    pub(super) fn search(
+        &self,
+        x: Vec<f64>,
+        look: usize,
+        mut is_done: impl FnMut(&Place, usize) -> bool,
+    ) -> Place {
+        let mut place = self.place(x);
+        let length = STEP / self.greatest();
+        let mut direction = self.free(&place);
+        let mut sums = self.sums(&place, None, length);
+        for step in 0_usize.. {
+            let is_still = sums.chopped == 0.0 && sums.reduced == 0.0;
+            if (step % look == 0 && is_done(&place, step)) || is_still {
+                break;
+            }
+            if sums.chopped <= sums.reduced {
+                let product = self.curvature.apply(&direction);
+                let (along, curvature, room) = self.along(&place, &direction, &product);
+                let best = along / curvature;
+                if best <= room {
+                    self.walk(&mut place, &direction, &product, best);
+                    sums = self.sums(&place, Some(&product), length);
+                    let turn = sums.conjugate / curvature;
+                    self.turn(&place, &mut direction, turn);
+                } else {
+                    self.walk(&mut place, &direction, &product, room);
+                    self.project(&mut place, length);
+                    sums = self.sums(&place, None, length);
+                    direction = self.free(&place);
+                }
+            } else {
+                let chopped = self.chopped(&place);
+                let product = self.curvature.apply(&chopped);
+                let (along, curvature, room) = self.along(&place, &chopped, &product);
+                self.walk(&mut place, &chopped, &product, (along / curvature).min(room));
+                sums = self.sums(&place, None, length);
+                direction = self.free(&place);
+            }
+        }
+        place
+    }
+
+    /// Returns the slopes at `x`.
+    pub(super) fn place(&self, x: Vec<f64>) -> Place {
+        let mut slopes = self.curvature.apply(&x);
+        slopes.iter_mut().zip(self.pull).for_each(|(slope, pull)| *slope -= pull);
+        Place { x, slopes }
+    }
+
+    /// Returns a bound of the greatest eigenvalue: no number of the matrix is negative.
+    fn greatest(&self) -> f64 {
+        let sums = self.curvature.apply(&vec![1.0; self.pull.len()]);
+        sums.into_iter().fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    fn free(&self, place: &Place) -> Vec<f64> {
+        self.slopes(place, |slope| slope.free)
+    }
+
+    fn chopped(&self, place: &Place) -> Vec<f64> {
+        self.slopes(place, |slope| slope.chopped)
+    }
+
+    fn slopes(&self, place: &Place, part: impl Fn(Slope) -> f64 + Sync) -> Vec<f64> {
+        let numbers = place.x.par_iter().zip(&place.slopes).with_min_len(CHUNK);
+        numbers.map(|(&x, &slope)| part(slope_at(x, slope, self.high))).collect()
+    }
+
+    fn sums(&self, place: &Place, product: Option<&[f64]>, length: f64) -> Sums {
+        let of_chunk = |chunk: usize, (x, slopes): (&[f64], &[f64])| {
+            let mut sums = Sums::default();
+            for (&x, &slope) in x.iter().zip(slopes) {
+                let Slope { free, chopped } = slope_at(x, slope, self.high);
+                // How far it can go before it meets a bound.
+                let reduced = free.clamp((x - self.high) / length, x / length);
+                sums.chopped += chopped * chopped;
+                sums.reduced += free * reduced;
+            }
+            if let Some(product) = product {
+                let product = &product[chunk * CHUNK..][..x.len()];
+                for ((&x, &slope), product) in x.iter().zip(slopes).zip(product) {
+                    sums.conjugate += slope_at(x, slope, self.high).free * product;
+                }
+            }
+            sums
+        };
+        let chunks = place.x.par_chunks(CHUNK).zip(place.slopes.par_chunks(CHUNK)).enumerate();
+        let sums: Vec<_> = chunks.map(|(chunk, numbers)| of_chunk(chunk, numbers)).collect();
+        sums.into_iter().fold(Sums::default(), |all, some| Sums {
+            chopped: all.chopped + some.chopped,
+            reduced: all.reduced + some.reduced,
+            conjugate: all.conjugate + some.conjugate,
+        })
+    }
+
+    /// Returns the slope along a direction downhill, its curvature, and how far it leads to a
+    /// bound.
+    fn along(&self, place: &Place, direction: &[f64], product: &[f64]) -> (f64, f64, f64) {
+        let of_chunk = |chunk: usize| {
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(direction.len());
+            let (mut along, mut curvature, mut room) = (0.0, 0.0, f64::INFINITY);
+            for k in range {
+                along += place.slopes[k] * direction[k];
+                curvature += direction[k] * product[k];
+                if direction[k] > 0.0 {
+                    room = room.min(place.x[k] / direction[k]);
+                } else if direction[k] < 0.0 {
+                    room = room.min((place.x[k] - self.high) / direction[k]);
+                }
+            }
+            (along, curvature, room)
+        };
+        let chunks: Vec<_> =
+            (0..direction.len().div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
+        let add = |(a, c, r): (f64, f64, f64), (along, curvature, room): (f64, f64, f64)| {
+            (a + along, c + curvature, r.min(room))
+        };
+        chunks.into_iter().fold((0.0, 0.0, f64::INFINITY), add)
+    }
+
+    /// Goes down a direction whose product is known.
+    fn walk(&self, place: &mut Place, direction: &[f64], product: &[f64], length: f64) {
+        let numbers = place.x.par_iter_mut().zip(&mut place.slopes);
+        let steps = direction.par_iter().zip(product);
+        numbers.zip(steps).with_min_len(CHUNK).for_each(|((x, slope), (direction, product))| {
+            *x = (*x - length * direction).clamp(0.0, self.high);
+            *slope -= length * product;
+        });
+    }
+
+    /// Goes down the free slopes and stays between the bounds.
+    fn project(&self, place: &mut Place, length: f64) {
+        let numbers = place.x.par_iter_mut().zip(&place.slopes).with_min_len(CHUNK);
+        numbers.for_each(|(x, &slope)| {
+            let free = slope_at(*x, slope, self.high).free;
+            *x = (*x - length * free).clamp(0.0, self.high);
+        });
+        *place = self.place(std::mem::take(&mut place.x));
+    }
+
+    /// Makes the direction the free slopes, less what is not conjugate to it.
+    fn turn(&self, place: &Place, direction: &mut [f64], turn: f64) {
+        let numbers = place.x.par_iter().zip(&place.slopes).zip(direction);
+        numbers.with_min_len(CHUNK).for_each(|((&x, &slope), direction)| {
+            *direction = slope_at(x, slope, self.high).free - turn * *direction;
+        });
+    }
+}

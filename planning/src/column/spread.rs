@@ -1,0 +1,156 @@
+//! How a mirror's light falls along one axis of the glass.
+
+use super::taps::Taps;
+
+/// How light from a point of a mirror spreads on the glass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spread {
+    /// Evenly over a square that reaches so far to each side, in um.
+    Cone(f64),
+    /// As a Gaussian of this standard deviation, in um.
+    Gaussian(f64),
+}
+
+/// How the light of mirrors is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Tracing {
+    /// As the integral over mirror, spread and column voxel.
+    #[default]
+    Exact,
+    /// By counting rays (000 eq. 3.11): so many points and directions along each axis of a mirror.
+    Rays {
+        /// Points of a mirror, at the middles of its equal parts.
+        points: usize,
+        /// Directions over the cone, with both ends.
+        directions: usize,
+    },
+}
+
+/// A line of mirrors: their image on the glass, in um.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MirrorLine {
+    pub(super) count: usize,
+    /// From a mirror to the next.
+    pub(super) pitch: f64,
+    /// What of the pitch reflects.
+    pub(super) lit: f64,
+}
+
+impl MirrorLine {
+    /// Returns the middle of a mirror, from the optical axis.
+    pub(super) fn middle(&self, mirror: usize) -> f64 {
+        (mirror as f64 - (self.count as f64 - 1.0) / 2.0) * self.pitch
+    }
+}
+
+/// A line of column voxels on the glass, in um.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct VoxelLine {
+    pub(super) count: usize,
+    pub(super) pitch: f64,
+    /// How far the line stands from the optical axis.
+    pub(super) shift: f64,
+}
+
+impl VoxelLine {
+    /// Returns where a position lies, in voxels from the first.
+    fn place(&self, um: f64) -> f64 {
+        (um - self.shift) / self.pitch + self.count as f64 / 2.0
+    }
+
+    /// Returns where voxel `edge` begins.
+    fn edge(&self, edge: usize) -> f64 {
+        (edge as f64 - self.count as f64 / 2.0) * self.pitch + self.shift
+    }
+}
+
+/// Returns the light of each voxel (rows) by the mirrors (columns).
+///
+/// Numbers are shares of the light of a wide white field: those of a voxel that all
+/// neighbours light add up to 1.
+pub(super) fn taps(
+    mirrors: MirrorLine,
+    voxels: VoxelLine,
+    spread: Spread,
+    tracing: Tracing,
+) -> Taps {
+    let scale = mirrors.pitch / voxels.pitch;
+    let row = |mirror| {
+        let middle = mirrors.middle(mirror);
+        let mut row = match tracing {
+            Tracing::Exact => shares(middle, mirrors.lit, voxels, spread),
+            Tracing::Rays { points, directions } => {
+                let half = match spread {
+                    Spread::Cone(half) => half,
+                    // Rays cannot follow a Gaussian to its end.
+                    Spread::Gaussian(sigma) => 3.0 * sigma,
+                };
+                let point = |k: usize| ((k as f64 + 0.5) / points as f64 - 0.5) * mirrors.lit;
+                let steps = (directions - 1).max(1) as f64;
+                let direction = |k: usize| half * (2.0 * k as f64 / steps - 1.0);
+                let weigh = |k: usize| match spread {
+                    Spread::Cone(_) => 1.0,
+                    Spread::Gaussian(sigma) => (-0.5 * (direction(k) / sigma).powi(2)).exp(),
+                };
+                let all: f64 = (0..directions).map(weigh).sum();
+                let ray = 1.0 / (points as f64 * all);
+                let rays = (0..points).flat_map(|p| (0..directions).map(move |d| (p, d)));
+                rays.map(|(p, d)| (middle + point(p) + direction(d), ray * weigh(d)))
+                    .map(|(um, share)| (voxels.place(um).floor(), share))
+                    .filter(|(voxel, _)| (0.0..voxels.count as f64).contains(voxel))
+                    .map(|(voxel, share)| (voxel as usize, share))
+                    .collect()
+            }
+        };
+        row.iter_mut().for_each(|(_, share)| *share *= scale);
+        row
+    };
+    let rows: Vec<_> = (0..mirrors.count).map(row).collect();
+    Taps::new(voxels.count, &rows).transposed()
+}
+
+/// A smaller share of a mirror's light is none.
+const LEAST_SHARE: f64 = 1e-9;
+
+/// Returns which shares of a mirror's light fall on voxels.
+fn shares(middle: f64, lit: f64, voxels: VoxelLine, spread: Spread) -> Vec<(usize, f64)> {
+    let reach = lit / 2.0 + spread.reach();
+    let place = |um| voxels.place(um).clamp(0.0, voxels.count as f64);
+    let first = place(middle - reach).floor() as usize;
+    let last = place(middle + reach).ceil() as usize;
+    let below = |edge| spread.light_below(voxels.edge(edge) - middle, lit);
+    // What is only rounding would let a mirror shine forever at nothing.
+    let shares = (first..last).map(|voxel| (voxel, below(voxel + 1) - below(voxel)));
+    shares.filter(|(_, share)| *share > LEAST_SHARE).collect()
+}
+
+impl Spread {
+    /// Returns how far light spreads, in um.
+    pub(super) fn reach(self) -> f64 {
+        match self {
+            Self::Cone(half) => half,
+            // What is left out is 2e-9 of the light.
+            Self::Gaussian(sigma) => 6.0 * sigma,
+        }
+    }
+
+    /// Returns the share of a mirror's light that falls below a position, told from the
+    /// middle of its image, which is `lit` wide.
+    fn light_below(self, um: f64, lit: f64) -> f64 {
+        (self.integral(um + lit / 2.0) - self.integral(um - lit / 2.0)) / lit
+    }
+
+    /// Returns the integral, up to a position, of the share of a point's light that falls below.
+    fn integral(self, um: f64) -> f64 {
+        match self {
+            Self::Cone(half) if um.abs() < half => (um + half).powi(2) / (4.0 * half),
+            Self::Cone(_) => um.max(0.0),
+            Self::Gaussian(sigma) if sigma > 0.0 => {
+                let z = um / sigma;
+                let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+                sigma * (z * (0.5 * libm::erfc(-z / std::f64::consts::SQRT_2)) + density)
+            }
+            Self::Gaussian(_) => um.max(0.0),
+        }
+    }
+}

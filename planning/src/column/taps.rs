@@ -1,0 +1,131 @@
+//! How mirrors light column voxels along one axis, as matrices of a few numbers a row.
+
+/// A matrix whose rows hold a few numbers side by side.
+///
+/// # Guarantees
+/// Every row has its numbers within the columns.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Taps {
+    columns: usize,
+    /// Numbers a row.
+    width: usize,
+    /// Where the numbers of each row begin.
+    first: Vec<usize>,
+    weights: Vec<f64>,
+}
+
+impl Taps {
+    /// Creates the matrix from the entries of its rows: column and number, in any order.
+    pub(super) fn new(columns: usize, rows: &[Vec<(usize, f64)>]) -> Self {
+        let ends = |row: &Vec<(usize, f64)>| {
+            let columns =
+                row.iter().filter(|(_, weight)| *weight != 0.0).map(|(column, _)| *column);
+            columns.clone().min().zip(columns.max())
+        };
+        let ends: Vec<_> = rows.iter().map(ends).collect();
+        let width = ends.iter().flatten().map(|(first, last)| last - first + 1).max();
+        let width = width.unwrap_or(1).min(columns);
+        let begin = |ends: &Option<(usize, usize)>| ends.map_or(0, |(first, _)| first);
+        let first: Vec<_> = ends.iter().map(|ends| begin(ends).min(columns - width)).collect();
+        let mut weights = vec![0.0; width * rows.len()];
+        for ((row, &first), weights) in rows.iter().zip(&first).zip(weights.chunks_mut(width)) {
+            for &(column, weight) in row.iter().filter(|(_, weight)| *weight != 0.0) {
+                weights[column - first] += weight;
+            }
+        }
+        Self { columns, width, first, weights }
+    }
+
+    pub(super) fn rows(&self) -> usize {
+        self.first.len()
+    }
+
+    pub(super) fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Returns a row's numbers, and the column of the first.
+    pub(super) fn row(&self, row: usize) -> (usize, &[f64]) {
+        (self.first[row], &self.weights[row * self.width..][..self.width])
+    }
+
+    /// Returns the columns of a row whose numbers are not zero.
+    fn entries(&self, row: usize) -> impl Iterator<Item = (usize, f64)> {
+        let (first, weights) = self.row(row);
+        (first..).zip(weights.iter().copied()).filter(|(_, weight)| *weight != 0.0)
+    }
+
+    pub(super) fn transposed(&self) -> Self {
+        let mut rows = vec![Vec::new(); self.columns];
+        for row in 0..self.rows() {
+            self.entries(row).for_each(|(column, weight)| rows[column].push((row, weight)));
+        }
+        Self::new(self.rows(), &rows)
+    }
+
+    /// Returns the product of the matrix's transpose with itself.
+    pub(super) fn normal(&self) -> Self {
+        let mut rows = vec![Vec::new(); self.columns];
+        for row in 0..self.rows() {
+            for (column, weight) in self.entries(row) {
+                rows[column].extend(self.entries(row).map(|(other, too)| (other, weight * too)));
+            }
+        }
+        Self::new(self.columns, &rows)
+    }
+
+    /// Returns the mean of matrices of one size.
+    pub(super) fn mean(matrices: &[Self]) -> Self {
+        let share = 1.0 / matrices.len() as f64;
+        let row = |row| {
+            let entries = matrices.iter().flat_map(move |matrix| matrix.entries(row));
+            entries.map(|(column, weight)| (column, share * weight)).collect()
+        };
+        let rows: Vec<Vec<_>> = (0..matrices[0].rows()).map(row).collect();
+        Self::new(matrices[0].columns, &rows)
+    }
+
+    /// Returns the sum of each row.
+    pub(super) fn row_sums(&self) -> Vec<f64> {
+        self.weights.chunks(self.width).map(|row| row.iter().sum()).collect()
+    }
+
+    /// Writes the product with a line.
+    pub(super) fn apply(&self, line: &[f64], out: &mut [f64]) {
+        match self.width {
+            // Rows of a few numbers are unrolled.
+            3 => self.apply_of::<3>(line, out),
+            4 => self.apply_of::<4>(line, out),
+            5 => self.apply_of::<5>(line, out),
+            6 => self.apply_of::<6>(line, out),
+            7 => self.apply_of::<7>(line, out),
+            _ => {
+                let rows = self.first.iter().zip(self.weights.chunks(self.width));
+                for (out, (&first, weights)) in out.iter_mut().zip(rows) {
+                    let line = &line[first..first + self.width];
+                    *out = weights.iter().zip(line).map(|(weight, at)| weight * at).sum();
+                }
+            }
+        }
+    }
+
+    fn apply_of<const WIDTH: usize>(&self, line: &[f64], out: &mut [f64]) {
+        let rows = self.first.iter().zip(self.weights.as_chunks::<WIDTH>().0);
+        for (out, (&first, weights)) in out.iter_mut().zip(rows) {
+            let line: &[f64; WIDTH] = line[first..].first_chunk().expect("rows are within");
+            *out = weights.iter().zip(line).map(|(weight, at)| weight * at).sum();
+        }
+    }
+
+    /// Writes row `row` of the product with an image whose lines have `out.len()` numbers.
+    pub(super) fn apply_across(&self, row: usize, image: &[f64], out: &mut [f64]) {
+        let length = out.len();
+        out.fill(0.0);
+        let (first, weights) = self.row(row);
+        for (line, &weight) in image[first * length..].chunks_exact(length).zip(weights) {
+            if weight != 0.0 {
+                out.iter_mut().zip(line).for_each(|(out, at)| *out += weight * at);
+            }
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Seconds that mirrors are on, and a proof of how near they are to the best (000 section 4.2).
+
+use rayon::prelude::*;
+
+use super::curvature::Normal;
+use super::light::ColumnLight;
+use super::search::{Bounded, Place};
+
+/// When a search for times ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// The gap to the least error that is allowed, as a share of the error.
+    pub gap: f64,
+    /// Steps after which it ends however near it is.
+    pub steps: usize,
+}
+
+/// Seconds that mirrors are on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Times {
+    /// Of each mirror, rows from the first.
+    pub seconds: Vec<f64>,
+    /// The error that was minimised: half the sum of squares of how far doses are from those
+    /// wanted, in (mJ/cm2)2.
+    pub error: f64,
+    /// How much smaller the least error can be, at most: the Frank-Wolfe gap.
+    pub gap: f64,
+    /// Steps of the search.
+    pub steps: usize,
+}
+
+impl Times {
+    /// Returns the gap as a share of the error; none if there is no error.
+    pub fn relative_gap(&self) -> f64 {
+        if self.gap > 0.0 { self.gap / self.error } else { 0.0 }
+    }
+}
+
+/// Returns the Frank-Wolfe gap: no times between zero and `high` have an error smaller by more.
+///
+/// The error is convex, so it lies above `error + slopes (t - x)` for all times t.
+pub(super) fn frank_wolfe_gap(place: &Place, high: f64) -> f64 {
+    let numbers = place.x.par_chunks(1 << 13).zip(place.slopes.par_chunks(1 << 13));
+    let of_chunk = |(x, slopes): (&[f64], &[f64])| -> f64 {
+        x.iter().zip(slopes).map(|(x, slope)| slope * x + high * (-slope).max(0.0)).sum()
+    };
+    numbers.map(of_chunk).collect::<Vec<_>>().into_iter().sum()
+}
+
+/// An error below this share of that without light counts as none.
+const NOTHING: f64 = 1e-12;
+
+/// Finds the times, at most `max_s` seconds, whose doses are nearest to `wanted` in mJ/cm2: the
+/// least half sum of squares (000 eq. 4.4), or its mean over lights shifted by `shifts_um` along
+/// each axis.
+pub fn nearest_times(
+    light: &ColumnLight,
+    wanted: &[f64],
+    max_s: f64,
+    shifts_um: &[f64],
+    stop: Stop,
+) -> Times {
+    let curvature = Normal::mean(light, shifts_um);
+    let pull = mean_pull(light, wanted, shifts_um);
+    let problem = Bounded { curvature: &curvature, pull: &pull, high: max_s };
+    let dark = 0.5 * wanted.iter().map(|dose| dose * dose).sum::<f64>();
+    let error = |place: &Place| dark + fall(place, &pull);
+    let (mut steps, mut gap) = (0, f64::INFINITY);
+    let place = problem.search(vec![0.0; pull.len()], 8, |place, step| {
+        (steps, gap) = (step, frank_wolfe_gap(place, max_s));
+        gap <= stop.gap * error(place).max(NOTHING * dark) || step >= stop.steps
+    });
+    // Slopes that steps have added up carry rounding: the proof is made of fresh ones.
+    let place = problem.place(place.x);
+    let gap = frank_wolfe_gap(&place, max_s);
+    Times { error: error(&place).max(0.0), gap, steps, seconds: place.x }
+}
+
+/// Returns the mean of H's transposes times the doses.
+fn mean_pull(light: &ColumnLight, wanted: &[f64], shifts_um: &[f64]) -> Vec<f64> {
+    let mut pull = vec![0.0; light.setup().mirrors.iter().product()];
+    for &x in shifts_um {
+        for &y in shifts_um {
+            let back = light.shifted([x, y]).back(wanted);
+            pull.iter_mut().zip(back).for_each(|(pull, back)| *pull += back);
+        }
+    }
+    let share = 1.0 / (shifts_um.len() * shifts_um.len()) as f64;
+    pull.iter_mut().for_each(|pull| *pull *= share);
+    pull
+}
+
+/// Returns x A x / 2 - b x.
+fn fall(place: &Place, pull: &[f64]) -> f64 {
+    let numbers = place.x.iter().zip(&place.slopes).zip(pull);
+    numbers.map(|((x, slope), pull)| 0.5 * x * (slope - pull)).sum()
+}
