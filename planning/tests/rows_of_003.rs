@@ -1,6 +1,8 @@
 //! The numbers of 003 that its text or a solver of the same equations gives, with the tolerances
 //! that docs/plan.md tells.
 
+use std::sync::LazyLock;
+
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Diffusivity, ExposureTime, Intensity, Kinetics};
 use lamp_planning::ecpl::{
@@ -142,13 +144,34 @@ const FIGURE_11_BY_BDF: [f64; 26] = [
     29.149, 19.597, 7.280,
 ];
 
-fn lens_of_150() -> Result<Planned, PlanError> {
-    plan(setting(LIGHT, 8.0), 150.0, cap(150.0, 60.0), Method::Joint)
+#[test]
+fn plans_that_the_display_cannot_show_are_refused() {
+    let refused = |plan: &[Exposure]| {
+        Simulation::of_plan(setting(LIGHT, BLUR_UM), plan, 0.0).unwrap_err().to_string()
+    };
+    let ok = Exposure::disc(12, seconds(7.9));
+    for (plan, said) in [
+        (vec![], "no bitmap shows anything"),
+        (vec![Exposure::disc(0, seconds(1.0))], "no bitmap shows anything"),
+        (
+            vec![ok.clone(), Exposure::disc(5, seconds(0.05))],
+            "bitmap 2 is shown for 50 ms: the display's step is 100 ms",
+        ),
+        (vec![Exposure::disc(5, seconds(f64::NAN))], "the display's step is 100 ms"),
+        (vec![Exposure::disc(385, seconds(1.0))], "385 pixels from the middle"),
+        (vec![Exposure::disc(5, seconds(4000.0))], "an hour is the most"),
+    ] {
+        assert!(refused(&plan).contains(said), "{}", refused(&plan));
+    }
+    assert!(Simulation::of_plan(setting(LIGHT, BLUR_UM), &[ok], 0.0).is_ok());
 }
+
+static LENS_OF_150: LazyLock<Planned> =
+    LazyLock::new(|| plan(setting(LIGHT, 8.0), 150.0, cap(150.0, 60.0), Method::Joint).unwrap());
 
 #[test]
 fn times_planned_together_leave_less_than_a_micrometre() {
-    let planned = lens_of_150().unwrap();
+    let planned = &LENS_OF_150;
     let rms = planned.wanted.rms_um(&planned.cured);
     assert!(rms <= 1.0, "{rms}");
     for exposure in &planned.exposures {
@@ -159,11 +182,37 @@ fn times_planned_together_leave_less_than_a_micrometre() {
         let nests = |ring| !pair[1].is_white(ring) || pair[0].is_white(ring);
         assert!((0..pair[1].reach()).all(nests), "{pair:?}");
     }
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(one.install(lens_of_150).unwrap().exposures, planned.exposures);
     let seed = plan(setting(LIGHT, 8.0), 150.0, cap(150.0, 60.0), Method::Seed).unwrap();
     let seed_rms = seed.wanted.rms_um(&seed.cured);
     assert!(rms < 0.2 * seed_rms, "{rms} {seed_rms}");
+}
+
+#[test]
+fn plans_are_the_same_for_any_number_of_threads() {
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let small = || plan(setting(LIGHT, 8.0), 40.0, cap(40.0, 15.0), Method::Joint).unwrap();
+        pool.install(small)
+    };
+    let [one, three] = [1, 3].map(on);
+    assert!(!one.exposures.is_empty());
+    assert_eq!((one.exposures, one.cured), (three.exposures, three.cured));
+}
+
+#[test]
+fn a_part_aside_is_off_by_more_the_farther_it_lies() {
+    let planned = &LENS_OF_150;
+    let aside = [0.0, 1.0, 3.0, 5.0].map(|um| planned.wanted.rms_aside_um(&planned.cured, um));
+    near(aside[0], planned.wanted.rms_um(&planned.cured), 1e-9);
+    // A slope of half a cap's diameter: the mean square of r/R over it, times half the shift's.
+    for (um, rms) in [(3.0, aside[2]), (5.0, aside[3])] {
+        let sphere = (150.0_f64.powi(2) + 60.0_f64.powi(2)) / 120.0;
+        let slopes = (sphere / 150.0).powi(2) * -(1.0 - (150.0 / sphere).powi(2)).ln() - 1.0;
+        near(rms, um * (0.5 * slopes).sqrt(), 0.1 * um);
+    }
+    assert!(aside.is_sorted());
+    let brighter = planned.simulation.under(1.02).cure(&planned.exposures);
+    assert!(brighter.sag_um() > planned.cured.sag_um() + 0.3, "{}", brighter.sag_um());
 }
 
 #[test]

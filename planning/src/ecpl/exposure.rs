@@ -1,8 +1,10 @@
 //! A bitmap of discs and rings, and how long it is shown.
 
 use std::ops::Range;
+use std::str::FromStr;
 
 use lamp_grayscale::resin::ExposureTime;
+use thiserror::Error;
 
 /// A bitmap of rings around the axis, and how long it is shown (003 section 5: `B_i`, `L_i`,
 /// `R_i` and `T_i`).
@@ -29,6 +31,33 @@ impl Exposure {
     /// Returns whether the ring of pixels that begins so far from the axis is white.
     pub fn is_white(&self, ring: u32) -> bool {
         self.rings.iter().any(|rings| rings.contains(&ring))
+    }
+}
+
+/// Why a text is no disc or ring.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error(
+    "`{0}` is neither a disc nor a ring: write the mirrors of its radius and its time, as \
+     12:7.9s, and 5-12:7.9s for a ring"
+)]
+pub struct NoExposure(String);
+
+impl FromStr for Exposure {
+    type Err = NoExposure;
+
+    /// Parses a disc, as `12:7.9s`, or a ring, as `5-12:7.9s`.
+    ///
+    /// # Errors
+    /// Returns an error if it is neither, or empty, or has no unit of time.
+    fn from_str(text: &str) -> Result<Self, NoExposure> {
+        let parsed = || {
+            let (ring, time) = text.trim().split_once(':')?;
+            let (inner, outer) = ring.split_once('-').unwrap_or(("0", ring));
+            let [inner, outer] = [inner.trim().parse().ok()?, outer.trim().parse().ok()?];
+            let rings = std::iter::once(inner..outer).collect();
+            (inner < outer).then_some(Self { rings, time: time.parse().ok()? })
+        };
+        parsed().ok_or_else(|| NoExposure(text.to_owned()))
     }
 }
 
@@ -62,6 +91,19 @@ pub(super) fn rings_of(white: impl Iterator<Item = bool>) -> Vec<Range<u32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn discs_and_rings_are_typed_in() {
+        let disc: Exposure = "12:7.9s".parse().unwrap();
+        assert_eq!(disc, Exposure::disc(12, ExposureTime::from_ms(7900.0)));
+        let ring: Exposure = " 5-12 : 800 ms".parse().unwrap();
+        assert_eq!((ring.reach(), ring.is_white(5), ring.is_white(4)), (12, true, false));
+        for text in ["", "12", "12:7.9", "0:1s", "12-5:1s", "-1:1s", "12:nans", "1:2:3s", "9e9:1s"]
+        {
+            let error = text.parse::<Exposure>().unwrap_err().to_string();
+            assert!(error.contains("as 12:7.9s"), "{error}");
+        }
+    }
 
     #[test]
     fn times_of_rings_become_nested_bitmaps() {

@@ -1,5 +1,6 @@
 //! Plans bitmaps and times for a round part.
 
+use lamp_grayscale::resin::ExposureTime;
 use thiserror::Error;
 
 use super::exposure::Exposure;
@@ -55,6 +56,35 @@ pub enum PlanError {
         /// Half of the display's shorter side.
         lit_um: f64,
     },
+    /// A plan without light.
+    #[error("no bitmap shows anything: give at least one white pixel")]
+    Dark,
+    /// A time that the display cannot keep.
+    #[error("bitmap {bitmap} is shown for {time}: the display's step is {step}")]
+    TooShort {
+        /// Which, from 1.
+        bitmap: usize,
+        /// Its time.
+        time: ExposureTime,
+        /// The display's step.
+        step: ExposureTime,
+    },
+    /// A plan that would take too long to follow.
+    #[error("the bitmaps take {seconds:.0} s together: an hour is the most")]
+    TooLong {
+        /// All of them.
+        seconds: f64,
+    },
+    /// A ring beyond the display.
+    #[error("bitmap {bitmap} reaches {reach} pixels from the middle, the display only {pixels}")]
+    BeyondDisplay {
+        /// Which, from 1.
+        bitmap: usize,
+        /// Pixels from the middle to where its light ends.
+        reach: u32,
+        /// Pixels from the middle to the display's nearest side.
+        pixels: u32,
+    },
     /// The light is too weak.
     #[error("{seconds:.0} s of light cure {cured_um:.1} um, the target is {wanted_um:.1} um high")]
     TooDim {
@@ -107,6 +137,38 @@ pub fn plan(
     };
     let cured = simulation.cure(&exposures);
     Ok(Planned { simulation, wanted, exposures, cured })
+}
+
+/// The longest plan, in seconds.
+const LONGEST_S: f64 = 3600.0;
+
+impl Simulation {
+    /// Prepares a chamber for a plan, and for a part of `radius_um`, zero if there is none.
+    ///
+    /// # Errors
+    /// Returns an error if nothing is shown, a time is below the display's step, a ring lies
+    /// beyond the display, all take more than an hour, or the setting is impossible.
+    pub fn of_plan(setting: Setting, plan: &[Exposure], radius_um: f64) -> Result<Self, PlanError> {
+        setting.check()?;
+        for (bitmap, exposure) in (1..).zip(plan) {
+            let (time, step, reach) = (exposure.time, setting.step, exposure.reach());
+            // Times that were written as decimals may be short of a step by rounding.
+            if time.ms().is_nan() || time.ms() < step.ms() * (1.0 - 1e-9) {
+                return Err(PlanError::TooShort { bitmap, time, step });
+            }
+            if reach > setting.pixels {
+                return Err(PlanError::BeyondDisplay { bitmap, reach, pixels: setting.pixels });
+            }
+        }
+        let seconds = plan.iter().map(|exposure| exposure.time.ms()).sum::<f64>() / 1000.0;
+        if seconds > LONGEST_S {
+            return Err(PlanError::TooLong { seconds });
+        }
+        match plan.iter().map(Exposure::reach).max() {
+            None | Some(0) => Err(PlanError::Dark),
+            Some(pixels) => Ok(Self::new(setting, pixels, radius_um)?),
+        }
+    }
 }
 
 impl Wanted {

@@ -2,6 +2,7 @@
 
 use super::cells::Cells;
 use super::reactor::{Chamber, Reaction};
+use crate::target::{Grid, HeightMap};
 
 /// What is cured: the height of each column of cells.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +37,13 @@ impl Profile {
     /// Returns the height at a distance from the axis, in micrometres.
     pub fn height_um(&self, radius_um: f64) -> f64 {
         height_um(&self.cells, &self.heights_um, radius_um)
+    }
+
+    /// Returns the heights of columns around the axis.
+    pub fn on(&self, grid: &Grid) -> HeightMap {
+        let columns = (0..grid.rows).flat_map(|row| (0..grid.columns).map(move |x| (x, row)));
+        let height = |(column, row)| self.height_um(grid.x_um(column).hypot(grid.y_um(row)));
+        HeightMap { grid: *grid, heights_um: columns.map(height).collect() }
     }
 }
 

@@ -4,6 +4,7 @@ use lamp_grayscale::resin::{ExposureTime, Intensity, Kinetics};
 use thiserror::Error;
 
 use super::cells::{Cells, Shape};
+use crate::projector::{Projector, SpreadOf};
 
 /// The longest step of the reaction, in seconds. Heights are then within 0.1 µm of those of
 /// steps ten times as short.
@@ -47,6 +48,12 @@ pub enum SettingError {
     /// A number is not above zero, or not finite.
     #[error("{0} must be above zero")]
     NotPositive(&'static str),
+    /// The projector's light spreads over a cone.
+    #[error("its light spreads over a cone: kinetics need `sigma` in [spread]")]
+    Cone,
+    /// The projector does not tell of a chamber.
+    #[error("it does not say how high the resin is: add [chamber] to its file")]
+    NoChamber,
     /// The blur is below zero, or not finite.
     #[error("the blur must be zero or more")]
     Blur,
@@ -61,6 +68,27 @@ pub enum SettingError {
 }
 
 impl Setting {
+    /// Takes the numbers of a projector and of its resin.
+    ///
+    /// # Errors
+    /// Returns an error if the projector spreads light otherwise than by a Gaussian, or does not
+    /// tell how high its chamber is.
+    pub fn of(projector: &Projector, kinetics: Kinetics) -> Result<Self, SettingError> {
+        let SpreadOf::Gaussian(sigma) = projector.spread() else {
+            return Err(SettingError::Cone);
+        };
+        let chamber = projector.chamber.as_ref().ok_or(SettingError::NoChamber)?;
+        Ok(Self {
+            kinetics,
+            light: projector.irradiance(),
+            sigma_um: sigma.um(),
+            pixel_um: projector.pitch.value.um(),
+            pixels: projector.display.columns.min(projector.display.rows) / 2,
+            step: projector.step.value,
+            chamber_um: chamber.value.um(),
+        })
+    }
+
     /// Checks that the numbers are possible.
     ///
     /// # Errors

@@ -1,5 +1,7 @@
 //! What bitmaps cure, one after the other.
 
+use lamp_grayscale::resin::Intensity;
+
 use super::PlanError;
 use super::cells::Cells;
 use super::exposure::Exposure;
@@ -43,6 +45,14 @@ impl Simulation {
             light.into_iter().map(|share| share * watt_per_m2).collect()
         };
         Ok(Self { setting, reaction, rings: (0..pixels).map(ring).collect() })
+    }
+
+    /// Returns the same with so many times the light.
+    pub fn under(&self, times: f64) -> Self {
+        let mut other = self.clone();
+        other.setting.light = Intensity::from_mw_per_cm2(times * self.setting.light.mw_per_cm2());
+        other.rings.iter_mut().flatten().for_each(|light| *light *= times);
+        other
     }
 
     /// Returns what it was made for.

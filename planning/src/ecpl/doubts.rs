@@ -1,0 +1,33 @@
+//! What is off when the part lies off its place.
+
+use std::f64::consts::TAU;
+
+use super::profile::{Profile, Wanted};
+
+/// Directions in which a part is compared: enough for a mean of squares that change like a
+/// cosine and its square.
+const DIRECTIONS: usize = 16;
+
+impl Wanted {
+    /// Returns the root mean square of cured minus wanted height, in micrometres, when all that
+    /// is cured lies `aside_um` off its place.
+    ///
+    /// All bitmaps come from one display, so that one shift moves the whole part and leaves its
+    /// shape as it is.
+    pub fn rms_aside_um(&self, cured: &Profile, aside_um: f64) -> f64 {
+        let [mut sum, mut area] = [0.0; 2];
+        for x in 0..self.heights_um.len() {
+            let (r, wanted) = (self.cells.middle_um(x), self.heights_um[x]);
+            for direction in 0..DIRECTIONS {
+                let angle = TAU * direction as f64 / DIRECTIONS as f64;
+                let from = (r + aside_um * angle.cos()).hypot(aside_um * angle.sin());
+                let height = cured.height_um(from);
+                if wanted > 0.0 || height > 0.0 {
+                    sum += self.cells.weight(x) * (height - wanted).powi(2);
+                    area += self.cells.weight(x);
+                }
+            }
+        }
+        if area > 0.0 { (sum / area).sqrt() } else { 0.0 }
+    }
+}
