@@ -9,6 +9,7 @@ use lamp_adaptive::HeightsError;
 use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::material::MaterialError;
 use lamp_planning::LightError;
+use lamp_planning::ecpl;
 use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::PartError;
 use lamp_planning::voxels::PlanError;
@@ -41,6 +42,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(compensate))
         .or_else(|| error.downcast_ref().and_then(light))
         .or_else(|| error.downcast_ref().and_then(plan))
+        .or_else(|| error.downcast_ref().and_then(ecpl))
         .or_else(|| error.downcast_ref().and_then(timed_part))
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
@@ -232,6 +234,16 @@ fn plan(error: &PlanError) -> Option<String> {
         PlanError::Silent { what: "exposure", .. } => "give --exposure, as 2s",
         PlanError::Silent { .. } => "plan the stack that slice wrote",
         PlanError::Unlike { .. } => "plan the stack before its layers are cropped",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn ecpl(error: &ecpl::PlanError) -> Option<String> {
+    let hint = match error {
+        ecpl::PlanError::TooHigh { .. } => "make it lower, or the chamber of the projector higher",
+        ecpl::PlanError::TooWide { .. } => "make it smaller, or take a projector with more mirrors",
+        ecpl::PlanError::TooDim { .. } => "make it lower, or the projector's light brighter",
         _ => return None,
     };
     Some(hint.to_owned())

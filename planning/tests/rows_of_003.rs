@@ -200,6 +200,14 @@ fn plans_are_the_same_for_any_number_of_threads() {
 }
 
 #[test]
+fn parts_of_many_rings_are_planned_at_knots() {
+    let low = Setting { chamber_um: 60.0, ..setting(LIGHT, 8.0) };
+    let planned = plan(low, 310.0, cap(310.0, 25.0), Method::Joint).unwrap();
+    let rms = planned.wanted.rms_um(&planned.cured);
+    assert!(rms <= 1.0, "{rms}");
+}
+
+#[test]
 fn a_part_aside_is_off_by_more_the_farther_it_lies() {
     let planned = &LENS_OF_150;
     let aside = [0.0, 1.0, 3.0, 5.0].map(|um| planned.wanted.rms_aside_um(&planned.cured, um));

@@ -1,4 +1,6 @@
 //! All times at once: bounded Gauss-Newton over the times of rings of pixels.
+//!
+//! Parts of many rings have times at fewer knots, and between them straight lines.
 
 use rayon::prelude::*;
 
@@ -29,6 +31,9 @@ const FINE_UM: f64 = 0.02;
 /// How strongly a first step is held back, as a share of the largest square of a slope.
 const HELD: f64 = 1e-2;
 
+/// Knots at most: each costs a simulation in every round.
+const MOST_KNOTS: usize = 48;
+
 /// Rounds of the search among whole steps of the display.
 const WHOLE_ROUNDS: usize = 4;
 
@@ -40,13 +45,14 @@ struct Search<'a> {
     weights: Vec<f64>,
     step_s: f64,
     longest_s: f64,
+    knots: usize,
 }
 
 /// What some times cure, and how that follows the times.
 struct Slopes {
     residuals: Vec<f64>,
-    /// The change of all residuals for a second more of each ring.
-    by_ring: Vec<Vec<f64>>,
+    /// The change of all residuals for a second more of each knot.
+    by_knot: Vec<Vec<f64>>,
 }
 
 /// Plans the times of all rings at once.
@@ -66,29 +72,55 @@ impl<'a> Search<'a> {
         let area: f64 = (0..cells.across).filter(is_part).map(|x| cells.weight(x)).sum();
         let weights = (0..cells.across).map(|x| (cells.weight(x) / area).sqrt()).collect();
         let step_s = simulation.setting().step.ms() / 1000.0;
-        Self { simulation, wanted, weights, step_s, longest_s }
+        let knots = simulation.rings().min(MOST_KNOTS);
+        Self { simulation, wanted, weights, step_s, longest_s, knots }
     }
 
-    /// Returns for each ring the time in which a wide field cures what is wanted there.
-    fn first_times(&self, wide: &[(f64, f64)]) -> Vec<f64> {
-        let pixel_um = self.simulation.setting().pixel_um;
+    /// Returns between which rings knots lie, as a share of the rings for each knot.
+    fn apart(&self) -> f64 {
+        let spans = |count: usize| count.saturating_sub(1).max(1) as f64;
+        spans(self.simulation.rings()) / spans(self.knots)
+    }
+
+    /// Returns the times of rings, from those of knots.
+    fn by_ring(&self, knots: &[f64]) -> Vec<f64> {
         let time = |ring: usize| {
-            let height = self.wanted.height_um((ring as f64 + 0.5) * pixel_um);
-            let enough = wide.iter().find(|&&(_, cured)| cured >= height);
-            enough.filter(|_| height > 0.0).map_or(0.0, |&(seconds, _)| seconds)
+            let at = ring as f64 / self.apart();
+            let knot = (at as usize).min(knots.len() - 1);
+            let next = knots[(knot + 1).min(knots.len() - 1)];
+            knots[knot] + (at - knot as f64) * (next - knots[knot])
         };
         (0..self.simulation.rings()).map(time).collect()
     }
 
-    fn shown(&self, times: &[f64]) -> Vec<Shown> {
-        let mut ends: Vec<f64> = times.iter().copied().filter(|&time| time > 0.0).collect();
-        ends.sort_unstable_by(f64::total_cmp);
-        ends.dedup();
-        let shown = |until_s| Shown {
-            until_s,
-            light: self.simulation.light(|ring| times[ring] >= until_s),
+    /// Returns for each knot the time in which a wide field cures what is wanted there.
+    fn first_times(&self, wide: &[(f64, f64)]) -> Vec<f64> {
+        let pixel_um = self.simulation.setting().pixel_um;
+        let time = |knot: usize| {
+            let ring = knot as f64 * self.apart() + 0.5;
+            let height = self.wanted.height_um(ring * pixel_um);
+            let enough = wide.iter().find(|&&(_, cured)| cured >= height);
+            enough.filter(|_| height > 0.0).map_or(0.0, |&(seconds, _)| seconds)
         };
-        ends.into_iter().map(shown).collect()
+        (0..self.knots).map(time).collect()
+    }
+
+    /// Returns what is shown when rings shine so long.
+    fn shown(&self, times: &[f64]) -> Vec<Shown> {
+        let mut rings: Vec<usize> = (0..times.len()).filter(|&ring| times[ring] > 0.0).collect();
+        rings.sort_by(|&a, &b| times[b].total_cmp(&times[a]));
+        let mut light = vec![0.0; self.simulation.reaction().cells().across];
+        let mut shown: Vec<Shown> = Vec::new();
+        for ring in rings {
+            light.iter_mut().zip(self.simulation.ring(ring)).for_each(|(sum, l)| *sum += l);
+            let until_s = times[ring];
+            match shown.last_mut() {
+                Some(last) if last.until_s == until_s => last.light.clone_from(&light),
+                _ => shown.push(Shown { until_s, light: light.clone() }),
+            }
+        }
+        shown.reverse();
+        shown
     }
 
     fn residuals(&self, chamber: &Chamber) -> Vec<f64> {
@@ -103,32 +135,45 @@ impl<'a> Search<'a> {
         self.residuals(&chamber)
     }
 
-    /// Finds the slopes by one step of the display more for each ring. What is cured before a
-    /// ring goes dark does not change, so each begins there.
-    fn slopes(&self, times: &[f64]) -> Slopes {
+    /// Finds the slopes by one step of the display more for each knot. What is cured before its
+    /// rings go dark does not change, so each begins there.
+    fn slopes(&self, knots: &[f64]) -> Slopes {
         let seconds = self.simulation.reaction().seconds();
-        let dark: Vec<usize> = times.iter().map(|time| (time / seconds) as usize).collect();
-        let mut kept: Vec<Option<Chamber>> = vec![None; times.len()];
+        let times = self.by_ring(knots);
+        let longer: Vec<Vec<f64>> = (0..knots.len()).map(|knot| self.longer(knots, knot)).collect();
+        let first_dark = |longer: &Vec<f64>| {
+            let changed = longer.iter().zip(&times).filter(|(longer, time)| longer != time);
+            let first = changed.map(|(_, time)| *time).fold(f64::INFINITY, f64::min);
+            (first.min(self.longest_s) / seconds) as usize
+        };
+        let dark: Vec<usize> = longer.iter().map(first_dark).collect();
+        let mut kept: Vec<Option<Chamber>> = vec![None; knots.len()];
         let mut chamber = Chamber::new(self.simulation.reaction());
-        self.simulation.expose(&mut chamber, &self.shown(times), 0, |step, now| {
+        self.simulation.expose(&mut chamber, &self.shown(&times), 0, |step, now| {
             for (kept, _) in kept.iter_mut().zip(&dark).filter(|&(_, &dark)| dark == step) {
                 *kept = Some(now.clone());
             }
         });
         let residuals = self.residuals(&chamber);
-        let slope = |(ring, kept): (usize, Option<Chamber>)| {
+        let slope = |(knot, kept): (usize, Option<Chamber>)| {
             let mut chamber = kept.expect("every ring goes dark by the end");
-            let mut longer = times.to_vec();
-            longer[ring] += self.step_s;
-            self.simulation.expose(&mut chamber, &self.shown(&longer), dark[ring], |_, _| ());
+            let shown = self.shown(&longer[knot]);
+            self.simulation.expose(&mut chamber, &shown, dark[knot], |_, _| ());
             let after = self.residuals(&chamber);
             after.iter().zip(&residuals).map(|(after, now)| (after - now) / self.step_s).collect()
         };
-        let by_ring = kept.into_par_iter().enumerate().map(slope).collect();
-        Slopes { residuals, by_ring }
+        let by_knot = kept.into_par_iter().enumerate().map(slope).collect();
+        Slopes { residuals, by_knot }
     }
 
-    /// Moves the times towards the least mean square, by Gauss-Newton held back as K. Levenberg
+    /// Returns the times of rings when one knot is a step of the display longer.
+    fn longer(&self, knots: &[f64], knot: usize) -> Vec<f64> {
+        let mut longer = knots.to_vec();
+        longer[knot] += self.step_s;
+        self.by_ring(&longer)
+    }
+
+    /// Moves the times of knots towards the least mean square, by Gauss-Newton held back as K. Levenberg
     /// and D. Marquardt do.
     fn smooth(&self, times: &mut Vec<f64>) {
         let mut held = HELD;
@@ -136,7 +181,7 @@ impl<'a> Search<'a> {
         let mut now = square(&slopes.residuals);
         for _ in 0..ROUNDS {
             let next = slopes.step(times, held, self.longest_s);
-            let then = square(&self.cured(&next));
+            let then = square(&self.cured(&self.by_ring(&next)));
             if then >= now {
                 held *= 8.0;
                 continue;
@@ -151,15 +196,16 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns the best times that are whole steps of the display, near these.
-    fn whole(&self, times: &[f64]) -> Vec<u32> {
-        let rounded = |times: &[f64]| -> Vec<u32> {
-            times.iter().map(|time| (time / self.step_s).round() as u32).collect()
-        };
+    /// Returns the times of rings in whole steps of the display, near those of knots: the best
+    /// ones, where each ring has its knot.
+    fn whole(&self, knots: &[f64]) -> Vec<u32> {
+        let mut best = self.rounded(&self.by_ring(knots));
+        if self.knots < self.simulation.rings() {
+            return best;
+        }
         let seconds = |steps: &[u32]| -> Vec<f64> {
             steps.iter().map(|&steps| f64::from(steps) * self.step_s).collect()
         };
-        let mut best = rounded(times);
         let mut least = square(&self.cured(&seconds(&best)));
         for _ in 0..WHOLE_ROUNDS {
             let slopes = self.slopes(&seconds(&best));
@@ -172,13 +218,25 @@ impl<'a> Search<'a> {
         }
         best
     }
+
+    /// Rounds times to whole steps of the display; what one ring loses, the next one gets.
+    fn rounded(&self, times: &[f64]) -> Vec<u32> {
+        let mut lost = 0.0;
+        let step = |time: &f64| {
+            let wanted = time / self.step_s + lost;
+            let steps = if *time > 0.0 { wanted.round().max(0.0) } else { 0.0 };
+            lost = if *time > 0.0 { wanted - steps } else { 0.0 };
+            steps as u32
+        };
+        times.iter().map(step).collect()
+    }
 }
 
 impl Slopes {
-    /// Returns the times that make the linear model's mean square least, not below zero, while
+    /// Returns the times of knots that make the linear model's mean square least, not below zero, while
     /// steps are held back.
     fn step(&self, times: &[f64], held: f64, longest_s: f64) -> Vec<f64> {
-        let steepest = self.by_ring.iter().map(|slope| square(slope)).fold(0.0, f64::max);
+        let steepest = self.by_knot.iter().map(|slope| square(slope)).fold(0.0, f64::max);
         let held = held * steepest;
         let bounds = [vec![0.0; times.len()], vec![longest_s; times.len()]];
         let mut next = times.to_vec();
@@ -188,7 +246,7 @@ impl Slopes {
             let left = self.after(&step);
             let value = 0.5 * (square(&left) + held * square(&step));
             let slope = |(ring, step): (&Vec<f64>, &f64)| dot(ring, &left) + held * step;
-            (value, self.by_ring.iter().zip(&step).map(slope).collect())
+            (value, self.by_knot.iter().zip(&step).map(slope).collect())
         });
         next
     }
@@ -196,7 +254,7 @@ impl Slopes {
     /// Returns the residuals of the linear model after a change of the times.
     fn after(&self, step: &[f64]) -> Vec<f64> {
         let mut left = self.residuals.clone();
-        for (slope, step) in self.by_ring.iter().zip(step) {
+        for (slope, step) in self.by_knot.iter().zip(step) {
             left.iter_mut().zip(slope).for_each(|(left, slope)| *left += slope * step);
         }
         left
@@ -219,7 +277,7 @@ impl Slopes {
                 let after: f64 = (0..left.len())
                     .map(|x| {
                         let change = |&(ring, by): &(usize, i32)| {
-                            f64::from(by) * step_s * self.by_ring[ring][x]
+                            f64::from(by) * step_s * self.by_knot[ring][x]
                         };
                         (left[x] + moves.iter().map(change).sum::<f64>()).powi(2)
                     })
@@ -232,7 +290,7 @@ impl Slopes {
             for (ring, by) in moves {
                 best[ring] = best[ring].saturating_add_signed(by);
                 let by_s = f64::from(by) * step_s;
-                let slope = &self.by_ring[ring];
+                let slope = &self.by_knot[ring];
                 left.iter_mut().zip(slope).for_each(|(left, slope)| *left += by_s * slope);
             }
         }

@@ -41,9 +41,7 @@ impl Profile {
 
     /// Returns the heights of columns around the axis.
     pub fn on(&self, grid: &Grid) -> HeightMap {
-        let columns = (0..grid.rows).flat_map(|row| (0..grid.columns).map(move |x| (x, row)));
-        let height = |(column, row)| self.height_um(grid.x_um(column).hypot(grid.y_um(row)));
-        HeightMap { grid: *grid, heights_um: columns.map(height).collect() }
+        grid.round(|radius_um| self.height_um(radius_um))
     }
 }
 
@@ -79,6 +77,12 @@ impl Wanted {
     /// Returns the greatest height, in micrometres.
     pub fn highest_um(&self) -> f64 {
         self.heights_um.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Returns how far what is cured is too low and too high at most, in micrometres.
+    pub fn extremes_um(&self, cured: &Profile) -> [f64; 2] {
+        let off = || self.heights_um.iter().zip(&cured.heights_um).map(|(wanted, um)| um - wanted);
+        [off().fold(0.0, |most: f64, off| most.max(-off)), off().fold(0.0, f64::max)]
     }
 
     /// Returns the root mean square of cured minus wanted height, in micrometres, over the glass

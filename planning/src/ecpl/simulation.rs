@@ -130,6 +130,11 @@ impl Simulation {
         plan.iter().map(shown).collect()
     }
 
+    /// Returns the light of a ring of pixels.
+    pub(super) fn ring(&self, ring: usize) -> &[f64] {
+        &self.rings[ring]
+    }
+
     /// Returns the light of those rings that are white.
     pub(super) fn light(&self, is_white: impl Fn(usize) -> bool) -> Vec<f64> {
         let mut light = vec![0.0; self.reaction.cells().across];

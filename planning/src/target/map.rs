@@ -39,6 +39,11 @@ impl Grid {
         ((self.rows as f64 - 1.0) / 2.0 - row as f64) * self.pitch_um
     }
 
+    /// Returns the map of what is round about the axis, by its height at a distance from it.
+    pub fn round(&self, height_um: impl Fn(f64) -> f64 + Sync) -> HeightMap {
+        HeightMap { grid: *self, heights_um: self.map(|x, y| height_um(x.hypot(y))) }
+    }
+
     /// Returns the value of each column at its middle, row by row.
     pub(super) fn map(&self, value: impl Fn(f64, f64) -> f64 + Sync) -> Vec<f64> {
         let mut values = vec![0.0; self.count()];

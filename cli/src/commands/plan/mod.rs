@@ -1,5 +1,7 @@
-//! `lamp plan`: chooses exposures from the doses of all layers together.
+//! `lamp plan`: chooses exposures.
 
+mod ecpl;
+mod kinetics_report;
 mod layer_map;
 mod speed;
 mod speed_plot;
@@ -21,6 +23,7 @@ pub(crate) use speed::write_profile;
 Examples:
   lamp plan voxels part.tif --material mine.toml -o planned.tif
   lamp plan speed part.tif --material mine.toml -o timed.tif --profile speed.csv
+  lamp plan ecpl hemisphere --projector jariwala --material tmpta -o plan/
   lamp cure planned.tif --material mine.toml --section y=12mm --add-up -o section.png")]
 pub(crate) struct PlanArgs {
     #[command(subcommand)]
@@ -31,11 +34,13 @@ pub(crate) struct PlanArgs {
 enum Plan {
     Voxels(voxels::VoxelsArgs),
     Speed(speed::SpeedArgs),
+    Ecpl(ecpl::EcplArgs),
 }
 
 pub(crate) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
         Plan::Voxels(args) => voxels::run(args, common),
         Plan::Speed(args) => speed::run(args, common),
+        Plan::Ecpl(args) => ecpl::run(args, common),
     }
 }

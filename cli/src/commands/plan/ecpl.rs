@@ -1,0 +1,149 @@
+//! `lamp plan ecpl`: bitmaps that cure a round part through a glass, by the resin's kinetics.
+
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use clap::Args;
+use lamp_grayscale::material::Material;
+use lamp_planning::ecpl::{Exposure, Method, Planned, Profile, Setting, plan};
+use lamp_planning::projector::Projector;
+use lamp_planning::target::{Grid, Round, Target};
+use lamp_stack::Length;
+use serde_json::json;
+
+use super::kinetics_report::{Cured, fields, lines_of};
+use crate::catalogue::entry;
+use crate::exit::Exit;
+use crate::options::{Common, one_of_described};
+use crate::plan_folder::{Bitmap, PlanFiles, PlanFolder};
+use crate::progress::Progress;
+use crate::target_arg::TargetArg;
+
+/// Choose bitmaps and times that cure a round part, by the kinetics of resin and oxygen
+///
+/// Oxygen stops the reaction until light has used it up, and comes back from where there is no
+/// light, so doses do not just add up. This computes the reaction in the chamber, and finds the
+/// time of each ring of mirrors with which what is cured is nearest to the target. Rings begin
+/// together, so that each bitmap lies within the one before. The folder gets bitmaps.tif,
+/// report.json and pictures.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp plan ecpl hemisphere --projector jariwala --material tmpta -o plan/
+  lamp plan ecpl lens.toml --projector mine.toml --material resin.toml --method seed -o plan/
+  lamp plan simulate plan/bitmaps.tif --model kinetics --projector jariwala --material tmpta \\
+      --target hemisphere")]
+pub(super) struct EcplArgs {
+    #[command(flatten)]
+    target: TargetArg,
+
+    /// Projector: a built-in projector's name (see lamp projector list) or a file; it must say how
+    /// high the chamber is, and spread light by a Gaussian
+    #[arg(long, value_name = "NAME|FILE")]
+    projector: PathBuf,
+
+    /// Resin: a built-in material's name (see lamp material list) or a file; it must have
+    /// [kinetics]
+    #[arg(long, value_name = "NAME|FILE")]
+    material: PathBuf,
+
+    /// How to find bitmaps and times
+    #[arg(long, default_value_t)]
+    #[arg(value_parser = one_of_described::<Method>(&[
+        "The times of all rings of mirrors at once",
+        "A disc from a table of discs, then one smaller disc after the other, as 003 does",
+    ]))]
+    method: Method,
+
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+
+    /// Replace a folder that an earlier run wrote, once the new one is complete
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
+    let folder = PlanFolder::new(&args.output, args.force)?;
+    let projector: Projector = entry(&args.projector)?;
+    let material: Material = entry(&args.material)?;
+    let setting = setting_of(&projector, &material)?;
+    let progress = Progress::new("plan", common, true);
+    let target = args.target.open(&projector)?;
+    let name = || args.target.target.display().to_string();
+    let round = round_of(&target).map_err(|error| error.at(name()))?;
+    let planned = plan(setting, round.radius_um(), |r| round.height_um(r), args.method)
+        .map_err(|error| failed(error).at(name()))?;
+    let Planned { simulation, wanted, exposures, cured } = &planned;
+    let reported = Cured { simulation, exposures, cured, wanted: Some(wanted) };
+    let mut report = json!({
+        "schema": "lamp-ecpl-1",
+        "target": target.name(),
+        "projector": projector.name,
+        "material": material.name,
+        "method": args.method.to_string(),
+    });
+    let report_fields = report.as_object_mut().expect("it is an object");
+    report_fields.extend(fields(&reported));
+    let grid = grid_of(cured, round.radius_um());
+    folder.write(&PlanFiles {
+        part: target.name(),
+        command: format!(
+            "lamp plan ecpl {} --projector {} --material {} --method {}",
+            target.name(),
+            projector.name,
+            material.name,
+            args.method
+        ),
+        pitch: projector.pitch.value,
+        bitmaps: &bitmaps(&projector, exposures),
+        report: &report,
+        target: Some(&grid.round(|radius_um| round.height_um(radius_um))),
+        cured: &cured.on(&grid),
+    })?;
+    lines_of(&reported).iter().for_each(|line| progress.say(line));
+    Ok(())
+}
+
+/// Returns what a projector exposes a resin to.
+pub(super) fn setting_of(projector: &Projector, material: &Material) -> Result<Setting, Exit> {
+    let Some(kinetics) = material.kinetics().map_err(anyhow::Error::new)? else {
+        let name = &material.name;
+        let text = format!("{name} does not tell the rates of its reaction: add [kinetics]");
+        return Err(Exit::Failed(anyhow!(text)));
+    };
+    Setting::of(projector, kinetics).map_err(|error| failed(error).at(projector.name.clone()))
+}
+
+/// Returns the profile of a target, which must be round.
+pub(super) fn round_of(target: &Target) -> Result<Round, Exit> {
+    let [width, height] = target.size().map(Length::um);
+    let step_um = (width.max(height) / MOST_ROWS).max(FINEST_UM);
+    target.round(Length::from_um(step_um)).map_err(failed)
+}
+
+/// Columns of maps and parts are so wide, in micrometres, or wider for large ones.
+const FINEST_UM: f64 = 2.0;
+const MOST_ROWS: f64 = 1000.0;
+
+/// Returns columns that hold all of a part, with room beside it.
+pub(super) fn grid_of(cured: &Profile, radius_um: f64) -> Grid {
+    let radius_um = 1.1 * radius_um.max(cured.base_um) + 10.0;
+    let pitch_um = (2.0 * radius_um / MOST_ROWS).max(FINEST_UM);
+    let columns = 2 * (radius_um / pitch_um).ceil() as usize + 1;
+    Grid { columns, rows: columns, pitch_um }
+}
+
+fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Exit {
+    Exit::Failed(error.into())
+}
+
+fn bitmaps(projector: &Projector, exposures: &[Exposure]) -> Vec<Bitmap> {
+    let display = &projector.display;
+    let bitmap = |exposure: &Exposure| Bitmap {
+        image: exposure.drawn(display.columns, display.rows).into(),
+        time: exposure.time,
+    };
+    exposures.iter().map(bitmap).collect()
+}

@@ -1,0 +1,128 @@
+//! What is told of what bitmaps cure by kinetics.
+
+use lamp_planning::ecpl::{Exposure, Profile, Simulation, Wanted};
+use serde_json::{Map, Value, json};
+
+/// What bitmaps cure, and what is wanted if that is known.
+pub(super) struct Cured<'a> {
+    pub(super) simulation: &'a Simulation,
+    pub(super) exposures: &'a [Exposure],
+    pub(super) cured: &'a Profile,
+    pub(super) wanted: Option<&'a Wanted>,
+}
+
+/// How far a part may lie aside, in micrometres.
+const ASIDE_UM: [f64; 3] = [1.0, 3.0, 5.0];
+
+/// The light of a lamp that differs by 2 %.
+const OTHER_LIGHT: [f64; 2] = [0.98, 1.02];
+
+/// The fields of a report.
+pub(super) fn fields(of: &Cured<'_>) -> Map<String, Value> {
+    let setting = of.simulation.setting();
+    let cells = of.simulation.reaction().cells();
+    let mut fields = Map::new();
+    let mut put = |key: &str, value: Value| fields.insert(key.to_owned(), value);
+    put("light_w_per_m2", json!(rounded(10.0 * setting.light.mw_per_cm2())));
+    put("blur_um", json!(setting.sigma_um));
+    put("pixel_um", json!(setting.pixel_um));
+    put("chamber_um", json!(setting.chamber_um));
+    put("cell_um", json!([cells.width_um, cells.height_um]));
+    put("step_s", json!(of.simulation.reaction().seconds()));
+    put("bitmaps", Value::Array(bitmaps(of)));
+    put("exposure_s", json!(rounded(seconds(of.exposures))));
+    put("cured", shape(of.cured));
+    let (radii, wanted): (Vec<f64>, _) = (
+        (0..cells.across).map(|x| cells.middle_um(x)).collect(),
+        of.wanted.map(|wanted| wanted.heights_um.iter().map(|um| rounded(*um)).collect::<Vec<_>>()),
+    );
+    let heights: Vec<f64> = of.cured.heights_um.iter().map(|um| rounded(*um)).collect();
+    put("profile", json!({ "radius_um": radii, "cured_um": heights, "wanted_um": wanted }));
+    put("measures", of.wanted.map_or(Value::Null, |wanted| measures(wanted, of.cured)));
+    let other = OTHER_LIGHT.map(|times| other_light(of, times));
+    put("other_light", Value::Array(other.to_vec()));
+    put("aside", of.wanted.map_or(Value::Null, |wanted| aside(wanted, of.cured)));
+    fields
+}
+
+/// The lines that are printed.
+pub(super) fn lines_of(of: &Cured<'_>) -> Vec<String> {
+    let Cured { exposures, cured, .. } = of;
+    let mut lines = vec![format!(
+        "{} bitmaps in {:.1} s cure {:.1} um at the axis, and a base of {:.1} um in radius",
+        exposures.len(),
+        seconds(exposures),
+        cured.sag_um(),
+        cured.base_um,
+    )];
+    let Some(wanted) = of.wanted else { return lines };
+    let [low, high] = wanted.extremes_um(cured);
+    lines.push(format!(
+        "off the target by {:.2} um (root mean square), up to {low:.1} um too low and {high:.1} um \
+         too high",
+        wanted.rms_um(cured)
+    ));
+    let aside = ASIDE_UM.map(|um| format!("{:.2}", wanted.rms_aside_um(cured, um)));
+    let other = OTHER_LIGHT
+        .map(|times| format!("{:.2}", wanted.rms_um(&of.simulation.under(times).cure(exposures))));
+    lines.push(format!(
+        "1, 3 and 5 um aside: off by {} um; with 2% less and more light: {} um",
+        aside.join(", "),
+        other.join(", ")
+    ));
+    lines
+}
+
+fn bitmaps(of: &Cured<'_>) -> Vec<Value> {
+    let grown = of.simulation.growth(of.exposures);
+    let bitmap = |(exposure, after): (&Exposure, &Profile)| {
+        let rings: Vec<_> = exposure.rings.iter().map(|ring| [ring.start, ring.end]).collect();
+        json!({
+            "rings": rings,
+            "exposure_ms": rounded(exposure.time.ms()),
+            "sag_um": rounded(after.sag_um()),
+            "base_radius_um": rounded(after.base_um),
+        })
+    };
+    of.exposures.iter().zip(&grown).map(bitmap).collect()
+}
+
+fn shape(cured: &Profile) -> Value {
+    json!({
+        "sag_um": rounded(cured.sag_um()),
+        "highest_um": rounded(cured.highest_um()),
+        "base_radius_um": rounded(cured.base_um),
+    })
+}
+
+fn measures(wanted: &Wanted, cured: &Profile) -> Value {
+    let [low, high] = wanted.extremes_um(cured);
+    json!({
+        "rms_um": rounded(wanted.rms_um(cured)),
+        "most_too_low_um": rounded(low),
+        "most_too_high_um": rounded(high),
+    })
+}
+
+fn other_light(of: &Cured<'_>, times: f64) -> Value {
+    let cured = of.simulation.under(times).cure(of.exposures);
+    let mut fields = shape(&cured);
+    fields["light"] = json!(times);
+    fields["rms_um"] = json!(of.wanted.map(|wanted| rounded(wanted.rms_um(&cured))));
+    fields
+}
+
+/// All bitmaps come from one display: what is aside lies so as a whole.
+fn aside(wanted: &Wanted, cured: &Profile) -> Value {
+    let one = |um| json!({ "aside_um": um, "rms_um": rounded(wanted.rms_aside_um(cured, um)) });
+    Value::Array(ASIDE_UM.map(one).to_vec())
+}
+
+fn seconds(exposures: &[Exposure]) -> f64 {
+    exposures.iter().map(|exposure| exposure.time.ms()).sum::<f64>() / 1000.0
+}
+
+/// Rounds to a thousandth.
+fn rounded(number: f64) -> f64 {
+    (number * 1000.0).round() / 1000.0
+}
