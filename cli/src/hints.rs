@@ -12,6 +12,7 @@ use lamp_planning::LightError;
 use lamp_planning::ecpl;
 use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::PartError;
+use lamp_planning::target::TargetError;
 use lamp_planning::voxels::PlanError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
 use lamp_postprocess::{
@@ -43,6 +44,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(light))
         .or_else(|| error.downcast_ref().and_then(plan))
         .or_else(|| error.downcast_ref().and_then(ecpl))
+        .or_else(|| error.downcast_ref().and_then(target))
         .or_else(|| error.downcast_ref().and_then(timed_part))
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
@@ -244,6 +246,22 @@ fn ecpl(error: &ecpl::PlanError) -> Option<String> {
         ecpl::PlanError::TooHigh { .. } => "make it lower, or the chamber of the projector higher",
         ecpl::PlanError::TooWide { .. } => "make it smaller, or take a projector with more mirrors",
         ecpl::PlanError::TooDim { .. } => "make it lower, or the projector's light brighter",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn target(error: &TargetError) -> Option<String> {
+    let hint = match error {
+        // It is transparent, so that it is no cause of its own.
+        TargetError::Part(error) => return slicing(error),
+        TargetError::NoScale => "give --pixel, as 10um, and --full, as 500um",
+        TargetError::Open { .. } => "lamp mesh repair mends what it can",
+        TargetError::NotOnGlass { .. } => "stand the part on its flat side",
+        TargetError::AboveChamber { .. } | TargetError::Wide { .. } => {
+            "check the target's lengths, or take another --projector"
+        }
+        TargetError::Empty { .. } => "check the target's lengths",
         _ => return None,
     };
     Some(hint.to_owned())

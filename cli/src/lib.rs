@@ -5,6 +5,7 @@
 
 mod arguments;
 mod band_pictures;
+mod bitmaps;
 mod body_overlaps;
 mod catalogue;
 mod commands;
@@ -31,7 +32,6 @@ mod part_options;
 mod picture;
 mod pixel_location;
 mod placement;
-#[allow(dead_code, reason = "its planners follow")]
 mod plan_folder;
 mod planning_options;
 mod platform_options;
@@ -46,7 +46,6 @@ mod stack_facts;
 mod stack_part;
 mod step_options;
 mod streams;
-#[allow(dead_code, reason = "its planners follow")]
 mod target_arg;
 mod thumbnails;
 mod usage;

@@ -4,14 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::target::HeightMap;
 use lamp_stack::{
-    Destination, Dpi, FolderBeside, Format, Image, Layer, Length, PageInfo, StackError, StackInfo,
+    Destination, Dpi, FolderBeside, Format, Layer, Length, PageInfo, StackError, StackInfo,
     write_stack,
 };
 use serde_json::Value;
 
+use crate::bitmaps::{Bitmap, MirrorSeconds};
 use crate::exit::Exit;
 use crate::plots::{Colours, HeatMap, Plot, curve, drawn, heat_map, linear, stairs};
 use crate::streams::new_folder;
@@ -26,13 +26,6 @@ const TIMES: &str = "times.png";
 pub(crate) struct PlanFolder {
     folder: FolderBeside,
     name: PathBuf,
-}
-
-/// What to display, and for how long.
-#[derive(Clone, Debug)]
-pub(crate) struct Bitmap {
-    pub(crate) image: Image,
-    pub(crate) time: ExposureTime,
 }
 
 /// A plan, and what it cures.
@@ -162,23 +155,12 @@ fn residual(files: &PlanFiles<'_>, target: &HeightMap) -> HeatMap {
 
 /// The time that each mirror is on; a gray level counts as its share of it.
 fn times(files: &PlanFiles<'_>) -> HeatMap {
-    let first = files.bitmaps.first().map(|bitmap| &bitmap.image);
-    let [columns, rows] = first.map_or([1, 1], |image| [image.width(), image.height()]);
-    let mut seconds = vec![0.0; columns as usize * rows as usize];
-    for Bitmap { image, time } in files.bitmaps {
-        for row in 0..rows {
-            for (start, end, level) in image.runs(row) {
-                let on = time.ms() / 1000.0 * f64::from(level) / 255.0;
-                let mirrors = &mut seconds[row as usize * columns as usize..][..columns as usize];
-                mirrors[start as usize..end as usize].iter_mut().for_each(|sum| *sum += on);
-            }
-        }
-    }
+    let sum = MirrorSeconds::of(files.bitmaps, |level| f64::from(level) / 255.0);
     HeatMap {
         title: format!("{}: time of each mirror", files.part),
         label: "time (s)".to_owned(),
-        columns: columns as usize,
-        values: seconds,
+        columns: sum.mirrors[0],
+        values: sum.seconds,
         pitch_mm: files.pitch.mm(),
         colours: Colours::FromZero,
     }

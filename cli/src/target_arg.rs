@@ -1,11 +1,14 @@
 //! What planners on a fixed glass cure: a built-in target or a file.
 
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_planning::projector::Projector;
-use lamp_planning::target::{MapScale, Shapes, Target, TargetOptions};
+use lamp_planning::target::{
+    Grid, HeightMap, MapScale, Shapes, Target, TargetError, TargetOptions,
+};
 use lamp_slicer::Units;
 use lamp_stack::{Catalogued, Length};
 
@@ -42,21 +45,50 @@ pub(crate) struct TargetArg {
 
 impl TargetArg {
     /// Returns the target, which the projector's light must cover.
-    pub(crate) fn open(&self, projector: &Projector) -> Result<Target, Exit> {
+    pub(crate) fn open(&self, projector: &Projector) -> Result<GivenTarget, Exit> {
         self.reading.open(&self.target, projector)
+    }
+}
+
+/// A target, and how it was given, for messages.
+pub(crate) struct GivenTarget {
+    target: Target,
+    given: String,
+}
+
+impl Deref for GivenTarget {
+    type Target = Target;
+
+    fn deref(&self) -> &Target {
+        &self.target
+    }
+}
+
+impl GivenTarget {
+    /// Returns the heights of a grid's columns, none above the projector's chamber.
+    pub(crate) fn heights(&self, grid: &Grid, projector: &Projector) -> Result<HeightMap, Exit> {
+        let heights = || {
+            let heights = self.target.heights(grid)?;
+            if let Some(chamber) = &projector.chamber {
+                heights.check_chamber(chamber.value)?;
+            }
+            Ok::<_, TargetError>(heights)
+        };
+        Ok(heights().with_context(|| self.given.clone())?)
     }
 }
 
 impl TargetReading {
     /// Returns the built-in target of a name, or that of a file, which the projector's light must
     /// cover.
-    pub(crate) fn open(&self, path: &Path, projector: &Projector) -> Result<Target, Exit> {
+    pub(crate) fn open(&self, path: &Path, projector: &Projector) -> Result<GivenTarget, Exit> {
         let target = self.read(path)?;
         if self.pixel.is_some() && !target.is_picture() {
             return Err(Exit::usage("--pixel and --full are for height maps: leave them out"));
         }
-        Ok(target.check_width(projector).with_context(|| path.display().to_string())?)
-            .map(|()| target)
+        let given = path.display().to_string();
+        target.check_width(projector).with_context(|| given.clone())?;
+        Ok(GivenTarget { target, given })
     }
 
     fn read(&self, path: &Path) -> Result<Target, Exit> {

@@ -2,7 +2,7 @@
 
 use lamp_grayscale::material::Given;
 use lamp_grayscale::resin::{Intensity, Quantity};
-use lamp_stack::{Builtin, Catalogued, Length, MAX_SIDE};
+use lamp_stack::{Builtin, Catalogued, Length};
 use thiserror::Error;
 
 use super::{GrayLight, Lens, Projector, Rays};
@@ -11,8 +11,8 @@ use super::{GrayLight, Lens, Projector, Rays};
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ProjectorError {
-    /// No mirrors, or more than images may have.
-    #[error("display: columns and rows must be between 1 and {MAX_SIDE}")]
+    /// No mirrors, or more than any display has.
+    #[error("display: columns and rows must be between 1 and 32768, 67 million mirrors at most")]
     Display,
     /// A number that must be above zero, and of a size that projectors have.
     #[error("{0} must be above zero, and at most {1}")]
@@ -70,6 +70,9 @@ pub enum ProjectorError {
     },
 }
 
+/// The most mirrors along a side, and in all.
+const MOST_MIRRORS: [u32; 2] = [1 << 15, 1 << 26];
+
 macro_rules! builtin {
     ($name:literal) => {
         Builtin { name: $name, toml: include_str!(concat!("../../projectors/", $name, ".toml")) }
@@ -86,8 +89,9 @@ impl Catalogued for Projector {
     }
 
     fn check(&self) -> Result<(), ProjectorError> {
-        let mirrors = 1..=MAX_SIDE;
-        if !(mirrors.contains(&self.display.columns) && mirrors.contains(&self.display.rows)) {
+        let [columns, rows] = [self.display.columns, self.display.rows];
+        let possible = |mirrors: u32| (1..=MOST_MIRRORS[0]).contains(&mirrors);
+        if !(possible(columns) && possible(rows) && columns * rows <= MOST_MIRRORS[1]) {
             return Err(ProjectorError::Display);
         }
         above_zero("pitch.value", &self.pitch, 1e4, "10 mm")?;
@@ -284,6 +288,8 @@ divergence = { value = 1, source = "data sheet" }
     fn errors_name_the_key_and_what_to_do() {
         for (from, to, words) in [
             ("rows = 1080", "rows = 0", &["display", "between 1 and"][..]),
+            ("rows = 1080", "rows = 32769", &["display", "between 1 and"]),
+            ("1920\nrows = 1080", "32768\nrows = 32768", &["display", "67 million"]),
             ("15.2 um", "15.2", &["line 14", "pitch.value", "unit"]),
             ("15.2 um", "0 um", &["pitch.value must be above zero"]),
             ("15.2 um", "1 m", &["pitch.value", "at most 10 mm"]),

@@ -18,6 +18,13 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// Returns the least grid that holds a rectangle about the axis.
+    pub fn over(size: [Length; 2], pitch: Length) -> Self {
+        // Sizes that are written as decimals may be more than whole columns by rounding.
+        let count = |side: Length| (side.um() / pitch.um() - 1e-9).ceil().max(1.0) as usize;
+        Self { columns: count(size[0]), rows: count(size[1]), pitch_um: pitch.um() }
+    }
+
     /// Returns the least odd grid that holds a rectangle: the middle of one column is on the axis.
     pub(super) fn around([width, height]: [Length; 2], pitch: Length) -> Self {
         let count = |side: Length| 2 * (side.um() / pitch.um() / 2.0).ceil() as usize + 1;

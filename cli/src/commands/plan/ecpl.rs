@@ -12,10 +12,11 @@ use lamp_stack::Length;
 use serde_json::json;
 
 use super::kinetics_report::{Cured, fields, lines_of};
+use crate::bitmaps::Bitmap;
 use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::options::{Common, one_of_described};
-use crate::plan_folder::{Bitmap, PlanFiles, PlanFolder};
+use crate::plan_folder::{PlanFiles, PlanFolder};
 use crate::progress::Progress;
 use crate::target_arg::TargetArg;
 

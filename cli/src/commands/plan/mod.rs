@@ -1,8 +1,10 @@
 //! `lamp plan`: chooses exposures.
 
+mod column_measures;
 mod ecpl;
 mod kinetics_report;
 mod layer_map;
+mod simulate;
 mod speed;
 mod speed_plot;
 mod speed_report;
@@ -35,6 +37,7 @@ enum Plan {
     Voxels(voxels::VoxelsArgs),
     Speed(speed::SpeedArgs),
     Ecpl(ecpl::EcplArgs),
+    Simulate(simulate::SimulateArgs),
 }
 
 pub(crate) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
@@ -42,5 +45,6 @@ pub(crate) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
         Plan::Voxels(args) => voxels::run(args, common),
         Plan::Speed(args) => speed::run(args, common),
         Plan::Ecpl(args) => ecpl::run(args, common),
+        Plan::Simulate(args) => simulate::run(args, common),
     }
 }

@@ -1,0 +1,58 @@
+//! What is told of cured columns beside their target.
+
+use lamp_grayscale::material::Material;
+use lamp_planning::column::{HeightCurve, Measures};
+use lamp_planning::target::HeightMap;
+use lamp_stack::Length;
+use serde_json::{Value, json};
+
+/// Returns the measures as a report has them.
+pub(super) fn fields(measures: &Measures) -> Value {
+    json!({
+        "dose_rms_mj_per_cm2": measures.dose_rms,
+        "dose_rms_share": measures.relative_rms,
+        "ra_um": measures.ra_um,
+        "rms_um": measures.rms_um,
+        "lowest_um": measures.lowest_um,
+        "highest_um": measures.highest_um,
+        "missing_columns": measures.missing,
+        "overcured_columns": measures.overcured,
+    })
+}
+
+/// Returns the measures in a line.
+pub(super) fn line(measures: &Measures) -> String {
+    let columns = |count: u64, what: &str| match count {
+        0 => String::new(),
+        1 => format!("; 1 column is {what}"),
+        _ => format!("; {count} columns are {what}"),
+    };
+    format!(
+        "heights: Ra {:.1} um, RMS {:.1} um, {:.1} to +{:.1} um; doses: RMS {:.1}%{}{}",
+        measures.ra_um,
+        measures.rms_um,
+        measures.lowest_um,
+        measures.highest_um,
+        100.0 * measures.relative_rms,
+        columns(measures.missing, "not cured"),
+        columns(measures.overcured, "cured beside the target"),
+    )
+}
+
+/// Returns a warning of columns for which the material's numbers do not hold, if there are some.
+pub(super) fn doubt(
+    target: &HeightMap,
+    curve: &HeightCurve,
+    material: &Material,
+) -> Option<String> {
+    let known = curve.known();
+    let low = target.lower_than(known.from);
+    (low > 0).then(|| {
+        format!(
+            "{low} columns of the target are lower than {}, from where on the numbers of {} hold: \
+             they may come out otherwise",
+            Length::to_whole_nm(known.from),
+            material.name
+        )
+    })
+}

@@ -1,0 +1,62 @@
+//! What bitmaps cure where doses add up, column by column (000).
+
+use lamp_planning::column::{ColumnLight, HeightCurve, Measures, Setup, Tracing};
+use lamp_planning::target::{Grid, HeightMap};
+use lamp_stack::Length;
+use serde_json::{Map, json};
+
+use super::{Outcome, Shown};
+use crate::bitmaps::MirrorSeconds;
+use crate::commands::plan::column_measures;
+use crate::exit::Exit;
+
+/// Returns the heights that the doses of all bitmaps together cure.
+pub(super) fn cured(shown: &Shown, tracing: Tracing) -> Result<Outcome, Exit> {
+    let Shown { exposures, projector, material, target } = shown;
+    let curve = HeightCurve::of(material).map_err(anyhow::Error::new)?;
+    let voxel = projector.voxel.as_ref().map_or(projector.pitch.value, |voxel| voxel.value);
+    let MirrorSeconds { mirrors, seconds } =
+        MirrorSeconds::of(&exposures.bitmaps, |level| projector.share(level));
+    let grid = match target {
+        Some(target) => Grid::over(target.size(), voxel),
+        None => Grid::over(lit(mirrors, projector.pitch.value), voxel),
+    };
+    let wanted = match target {
+        Some(target) => Some(target.heights(&grid, projector)?),
+        None => None,
+    };
+    let setup = Setup { mirrors, display: mirrors, ..Setup::of(projector, &grid, tracing) };
+    let doses = ColumnLight::new(setup).doses(&seconds);
+    let heights_um = doses.iter().map(|&dose| curve.height_um(dose)).collect();
+    let cured = HeightMap { grid, heights_um };
+    let volume_mm3 = volume_mm3(&cured);
+    let mut report = Map::new();
+    report.insert(
+        "cured".to_owned(),
+        json!({ "highest_um": cured.highest_um(), "volume_mm3": volume_mm3 }),
+    );
+    let bitmaps = match exposures.bitmaps.len() {
+        1 => "1 bitmap cures".to_owned(),
+        count => format!("{count} bitmaps cure"),
+    };
+    let (seconds, highest) = (exposures.seconds(), cured.highest_um());
+    let mut lines =
+        vec![format!("in {seconds:.1} s {bitmaps} up to {highest:.1} um, {volume_mm3:.4} mm3")];
+    if let Some(target) = &wanted {
+        let measures = Measures::of(&doses, &target.heights_um, &curve);
+        lines.push(column_measures::line(&measures));
+        lines.extend(column_measures::doubt(target, &curve, material));
+        report.insert("measures".to_owned(), column_measures::fields(&measures));
+    }
+    Ok(Outcome { cured, wanted, lines, report })
+}
+
+/// Returns the rectangle of the images of mirrors, and of one more all round.
+fn lit(mirrors: [usize; 2], pitch: Length) -> [Length; 2] {
+    mirrors.map(|count| Length::from_um((count + 2) as f64 * pitch.um()))
+}
+
+fn volume_mm3(map: &HeightMap) -> f64 {
+    let side_mm = map.grid.pitch_um / 1000.0;
+    map.heights_um.iter().sum::<f64>() / 1000.0 * side_mm * side_mm
+}

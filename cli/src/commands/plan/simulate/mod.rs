@@ -1,0 +1,168 @@
+//! `lamp plan simulate`: what bitmaps cure on a fixed glass.
+
+mod column;
+mod exposures;
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::Args;
+use lamp_grayscale::material::Material;
+use lamp_planning::column::Tracing;
+use lamp_planning::projector::Projector;
+use lamp_planning::target::HeightMap;
+use lamp_stack::named;
+use serde_json::{Map, Value, json};
+
+use crate::catalogue::entry;
+use crate::exit::Exit;
+use crate::options::{Common, one_of_described};
+use crate::plan_folder::{PlanFiles, PlanFolder};
+use crate::progress::Progress;
+use crate::target_arg::{GivenTarget, TargetReading};
+
+use exposures::Exposures;
+
+/// Tell what bitmaps cure on a fixed glass, a plan's or any others
+///
+/// Bitmaps are a stack whose pages say how long they are shown, or discs and rings typed in. With
+/// --target, what is cured is compared with what is wanted. -o writes it all, with pictures.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp plan simulate plan/bitmaps.tif --model column --projector zhao --material pegda-mw700 \\
+      --target lens-array
+  lamp plan simulate 12:7.9s,11:0.8s,5-10:1.2s --model column --projector zhao \\
+      --material pegda-mw700 -o cured/")]
+pub(super) struct SimulateArgs {
+    /// Bitmaps in their order: a plan's bitmaps.tif, or discs and rings by their radius in mirrors
+    /// and their time, as 12:7.9s,5-11:0.8s
+    #[arg(value_name = "BITMAPS")]
+    bitmaps: OsString,
+
+    /// How light cures
+    #[arg(long, value_parser = one_of_described::<Model>(&[
+        "Doses add up; each column is as high as its dose cures (000)",
+    ]))]
+    model: Model,
+
+    /// Projector: a built-in projector's name (see lamp projector list) or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    projector: PathBuf,
+
+    /// Resin: a built-in material's name (see lamp material list) or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    material: PathBuf,
+
+    /// Count rays from POINTS x POINTS points of a mirror in DIRECTIONS x DIRECTIONS directions, as
+    /// 000 does with 9x15, instead of integrating light exactly
+    #[arg(long, value_name = "POINTSxDIRECTIONS", value_parser = parse_rays)]
+    rays: Option<Tracing>,
+
+    /// What should be cured, to compare with: as the target of lamp plan column-cure
+    #[arg(long, value_name = "TARGET")]
+    target: Option<PathBuf>,
+
+    #[command(flatten)]
+    reading: TargetReading,
+
+    /// Write bitmaps, report and pictures to a new folder
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+
+    /// Replace a folder that an earlier run wrote, once the new one is complete
+    #[arg(long, requires = "output")]
+    force: bool,
+}
+
+/// How light cures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Model {
+    Column,
+}
+
+named!(Model { Column = "column" });
+
+/// Parses rays: `9x15` are 9 x 9 points of a mirror and 15 x 15 directions.
+pub(super) fn parse_rays(text: &str) -> Result<Tracing, String> {
+    let number = |text: &str| text.parse().ok().filter(|number| (1..=99).contains(number));
+    let rays = text.split_once('x').and_then(|(points, directions)| {
+        Some(Tracing::Rays { points: number(points)?, directions: number(directions)? })
+    });
+    rays.ok_or_else(|| format!("`{text}` is not a number of rays: write 9x15, each from 1 to 99"))
+}
+
+/// What bitmaps are shown for.
+struct Shown {
+    exposures: Exposures,
+    projector: Projector,
+    material: Material,
+    target: Option<GivenTarget>,
+}
+
+/// What bitmaps cure.
+struct Outcome {
+    cured: HeightMap,
+    /// What is wanted, on the same columns.
+    wanted: Option<HeightMap>,
+    /// What to print.
+    lines: Vec<String>,
+    /// What the report says beside what was given.
+    report: Map<String, Value>,
+}
+
+pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
+    let folder = match &args.output {
+        Some(path) => Some(PlanFolder::new(path, args.force)?),
+        None => None,
+    };
+    let progress = Progress::new("plan", common, true);
+    let projector: Projector = entry(&args.projector)?;
+    let target = match &args.target {
+        Some(path) => Some(args.reading.open(path, &projector)?),
+        None => None,
+    };
+    let shown = Shown {
+        exposures: Exposures::read(&args.bitmaps, &projector)?,
+        material: entry(&args.material)?,
+        projector,
+        target,
+    };
+    let outcome = match args.model {
+        Model::Column => column::cured(&shown, args.rays.unwrap_or_default())?,
+    };
+    outcome.lines.iter().for_each(|line| progress.say(line));
+    match folder {
+        Some(folder) => write(folder, args.model, &shown, &outcome),
+        None => Ok(()),
+    }
+}
+
+fn write(folder: PlanFolder, model: Model, shown: &Shown, outcome: &Outcome) -> Result<(), Exit> {
+    let Shown { exposures, projector, material, target } = shown;
+    let name = target.as_ref().map(|target| target.name());
+    let mut report = json!({
+        "schema": "lamp-simulation-1",
+        "model": model.to_string(),
+        "projector": projector.name,
+        "material": material.name,
+        "target": name,
+        "bitmaps": exposures.bitmaps.len(),
+        "exposure_s": exposures.seconds(),
+    });
+    let fields = report.as_object_mut().expect("it is an object");
+    fields.extend(outcome.report.clone());
+    let compared = name.map_or_else(String::new, |name| format!(" --target {name}"));
+    folder.write(&PlanFiles {
+        part: name.unwrap_or(&exposures.name),
+        command: format!(
+            "lamp plan simulate {} --model {model} --projector {} --material {}{compared}",
+            exposures.name, projector.name, material.name
+        ),
+        pitch: projector.pitch.value,
+        bitmaps: &exposures.bitmaps,
+        report: &report,
+        target: outcome.wanted.as_ref(),
+        cured: &outcome.cured,
+    })
+}
