@@ -161,7 +161,7 @@ fn targets_that_light_cannot_cure_are_refused_with_the_place() {
     scratch.write("cut.png", &white_png()[..40]);
     scratch.write("junk.stl", b"junk");
     for (target, words) in [
-        ("bridge.stl", &["bridge.stl", "column 50 of row 0", "empty from 200um to 400um"][..]),
+        ("bridge.stl", &["bridge.stl", "column 55 of row 5", "empty from 200um to 400um"][..]),
         ("step.stl", &["column 100 of row 0", "begins 50um above", "bottom must be flat"]),
         ("wide.stl", &["30mm x 1mm wide", "lights 28.54"]),
         ("nothing.toml", &["nothing.toml", "nothing to cure"]),

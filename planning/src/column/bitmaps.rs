@@ -104,6 +104,9 @@ pub(super) fn gray(
     let mut bitmaps = Vec::new();
     let mut shown = vec![0.0; times.len()];
     for to in edges {
+        if to == from {
+            continue;
+        }
         let lasts = (to - from) as f64;
         let level = |time: f64| nearest(shares, ((time - from as f64) / lasts).clamp(0.0, 1.0));
         let levels: Vec<u8> = times.iter().map(|&time| level(time)).collect();

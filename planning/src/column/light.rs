@@ -1,5 +1,6 @@
 //! The light of mirrors on column voxels (000 section 3.5).
 
+use lamp_stack::Length;
 use rayon::prelude::*;
 
 use super::spread::{MirrorLine, Spread, Tracing, VoxelLine, taps};
@@ -109,13 +110,46 @@ impl ColumnLight {
     }
 }
 
+/// A grid of more columns than fit in memory.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{columns} x {rows} columns of {pitch_um} um are too many: make them wider")]
+pub struct TooManyColumns {
+    /// Columns along x.
+    pub columns: usize,
+    /// Columns along y.
+    pub rows: usize,
+    /// The side of one, in um.
+    pub pitch_um: f64,
+}
+
+/// A grid of more columns is refused: doses alone would take a gigabyte.
+const MOST_COLUMNS: usize = 1 << 26;
+
 impl Setup {
+    /// Returns the grid that holds a part of some size, and around it all light of the mirrors
+    /// that light the part.
+    ///
+    /// # Errors
+    /// Returns an error if these are too many columns.
+    pub fn grid_around(
+        projector: &Projector,
+        size: [Length; 2],
+        voxel: Length,
+    ) -> Result<Grid, TooManyColumns> {
+        let pitch_um = voxel.um();
+        let beside = 2.0 * spread_of(projector).reach() + projector.mirror_image().um();
+        let margin = (beside / pitch_um).ceil() as usize;
+        let Grid { columns, rows, .. } = Grid::over(size, voxel);
+        let [columns, rows] = [columns, rows].map(|count| count.saturating_add(2 * margin));
+        if columns.saturating_mul(rows) > MOST_COLUMNS {
+            return Err(TooManyColumns { columns, rows, pitch_um });
+        }
+        Ok(Grid { columns, rows, pitch_um })
+    }
+
     /// Returns the setup of a projector over a grid. Mirrors too far out to light it are left out.
     pub fn of(projector: &Projector, grid: &Grid, tracing: Tracing) -> Self {
-        let spread = match projector.spread() {
-            SpreadOf::Cone(half) => Spread::Cone(half.um()),
-            SpreadOf::Gaussian(sigma) => Spread::Gaussian(sigma.um()),
-        };
+        let spread = spread_of(projector);
         let (pitch_um, lit_um) = (projector.pitch.value.um(), projector.mirror_image().um());
         let display =
             [projector.display.columns, projector.display.rows].map(|count| count as usize);
@@ -148,6 +182,13 @@ impl Setup {
                 VoxelLine { count: self.voxels[axis], pitch: self.voxel_um, shift: shift_um[axis] };
             taps(mirrors, voxels, self.spread, self.tracing)
         })
+    }
+}
+
+fn spread_of(projector: &Projector) -> Spread {
+    match projector.spread() {
+        SpreadOf::Cone(half) => Spread::Cone(half.um()),
+        SpreadOf::Gaussian(sigma) => Spread::Gaussian(sigma.um()),
     }
 }
 

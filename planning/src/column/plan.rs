@@ -22,6 +22,8 @@ pub enum Objective {
     Height,
 }
 
+lamp_stack::named!(Objective { Dose = "dose", Height = "height" });
+
 /// How to plan.
 #[derive(Clone, Debug)]
 pub struct ColumnOptions {

@@ -154,3 +154,67 @@ impl Spread {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MIRRORS: MirrorLine = MirrorLine { count: 41, pitch: 27.88, lit: 25.84 };
+    const VOXELS: VoxelLine = VoxelLine { count: 120, pitch: 10.0, shift: 0.0 };
+
+    /// The light of each mirror on all voxels, and of all mirrors on each voxel.
+    fn sums(spread: Spread, tracing: Tracing) -> [Vec<f64>; 2] {
+        let taps = taps(MIRRORS, VOXELS, spread, tracing);
+        [taps.transposed().row_sums(), taps.row_sums()]
+    }
+
+    #[test]
+    fn no_light_is_lost() {
+        let rays = Tracing::Rays { points: 9, directions: 15 };
+        for spread in [Spread::Cone(12.0), Spread::Cone(1e-9), Spread::Gaussian(20.0)] {
+            for tracing in [Tracing::Exact, rays] {
+                let [of_mirrors, _] = sums(spread, tracing);
+                // 1200 um of columns see some 40 mirrors; those at the ends lose some.
+                for (mirror, light) in of_mirrors.iter().enumerate().take(34).skip(7) {
+                    let off = light / (MIRRORS.pitch / VOXELS.pitch) - 1.0;
+                    assert!(off.abs() < 1e-7, "{spread:?} {tracing:?} {mirror}: {off:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_wide_field_is_even_where_light_spreads_far() {
+        let [_, of_voxels] = sums(Spread::Gaussian(60.0), Tracing::Exact);
+        for light in &of_voxels[45..75] {
+            assert!((light - 1.0).abs() < 1e-6, "{light}");
+        }
+    }
+
+    #[test]
+    fn a_gaussian_is_that_of_the_error_function() {
+        // A mirror without width, in the middle of an even number of columns.
+        let mirrors = MirrorLine { count: 1, pitch: 10.0, lit: 1e-3 };
+        let taps = taps(mirrors, VOXELS, Spread::Gaussian(15.0), Tracing::Exact);
+        for voxel in 55..65 {
+            let at = |um: f64| 0.5 * libm::erf(um / 15.0 / std::f64::consts::SQRT_2);
+            let from = 10.0 * (voxel as f64 - 60.0);
+            let light = taps.row(voxel).1[0];
+            assert!((light - (at(from + 10.0) - at(from))).abs() < 1e-8, "{voxel}: {light}");
+        }
+    }
+
+    #[test]
+    fn many_rays_come_near_the_integral() {
+        let exact = taps(MIRRORS, VOXELS, Spread::Cone(12.0), Tracing::Exact);
+        let rays = Tracing::Rays { points: 400, directions: 400 };
+        let counted = taps(MIRRORS, VOXELS, Spread::Cone(12.0), rays);
+        let line: Vec<_> = (0..MIRRORS.count).map(|mirror| ((mirror * 7) % 5) as f64).collect();
+        let [mut a, mut b] = [vec![0.0; 120], vec![0.0; 120]];
+        exact.apply(&line, &mut a);
+        counted.apply(&line, &mut b);
+        for (exact, counted) in a.iter().zip(&b) {
+            assert!((exact - counted).abs() < 0.01, "{exact} {counted}");
+        }
+    }
+}

@@ -129,3 +129,54 @@ impl Taps {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn dense(taps: &Taps) -> Vec<Vec<f64>> {
+        let row = |row| {
+            let mut dense = vec![0.0; taps.columns()];
+            taps.entries(row).for_each(|(column, weight)| dense[column] = weight);
+            dense
+        };
+        (0..taps.rows()).map(row).collect()
+    }
+
+    /// A matrix of up to 9 x 9 whole numbers.
+    fn any_taps() -> impl Strategy<Value = Taps> {
+        (1_usize..10).prop_flat_map(|columns| {
+            let entries = prop::collection::vec((0..columns, 0_i32..9), 0..6);
+            let row = entries.prop_map(|row| row.into_iter().map(|(at, w)| (at, f64::from(w))));
+            let rows = prop::collection::vec(row.prop_map(Iterator::collect), 1..10);
+            rows.prop_map(move |rows: Vec<Vec<_>>| Taps::new(columns, &rows))
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn products_are_those_of_matrices(taps in any_taps()) {
+            let full = dense(&taps);
+            let line: Vec<_> = (0..taps.columns()).map(|k| (k * k) as f64 - 7.0).collect();
+            let mut out = vec![f64::NAN; taps.rows()];
+            taps.apply(&line, &mut out);
+            for (row, out) in full.iter().zip(&out) {
+                let sum: f64 = row.iter().zip(&line).map(|(a, b)| a * b).sum();
+                prop_assert_eq!(sum, *out);
+            }
+            let transposed = dense(&taps.transposed());
+            let normal = dense(&taps.normal());
+            for i in 0..taps.columns() {
+                for j in 0..taps.columns() {
+                    let sum: f64 = full.iter().map(|row| row[i] * row[j]).sum();
+                    prop_assert_eq!(normal[i][j], sum);
+                }
+                for (row, full) in full.iter().enumerate() {
+                    prop_assert_eq!(transposed[i][row], full[i]);
+                }
+            }
+        }
+    }
+}

@@ -15,6 +15,7 @@
 
 mod error;
 mod file;
+mod gray_picture;
 mod map;
 mod open;
 mod part;
@@ -25,6 +26,7 @@ mod shapes;
 use lamp_stack::{Catalogued, Length};
 
 pub use error::TargetError;
+pub use gray_picture::GrayPicture;
 pub use map::{Grid, HeightMap, Place};
 pub use open::TargetOptions;
 pub use picture::MapScale;

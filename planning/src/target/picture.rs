@@ -3,9 +3,8 @@
 use std::io::{BufRead, Seek};
 
 use lamp_stack::Length;
-use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
-use super::TargetError;
+use super::{GrayPicture, TargetError};
 
 /// What the pixels of a height map mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,18 +15,12 @@ pub struct MapScale {
     pub full: Length,
 }
 
-/// A picture of more pixels is no target.
-const MAX_PIXELS: u64 = 1 << 26;
-
 /// A height map, its middle on the axis.
 #[derive(Debug)]
 pub(super) struct HeightPicture {
     name: String,
-    columns: usize,
-    rows: usize,
+    picture: GrayPicture,
     scale: MapScale,
-    /// Row by row, 65535 for full white.
-    levels: Vec<u16>,
 }
 
 impl HeightPicture {
@@ -41,29 +34,7 @@ impl HeightPicture {
         if !(pixel.um() > 0.0 && pixel.um() <= 1e6 && full.um() > 0.0 && full.um() <= 1e6) {
             return Err(TargetError::Scale { pixel, full });
         }
-        let mut decoder = Decoder::new_with_limits(from, Limits { bytes: 1 << 28 });
-        decoder.set_transformations(Transformations::IDENTITY);
-        let mut reader = decoder.read_info()?;
-        let info = reader.info();
-        let (width, height) = (info.width, info.height);
-        if u64::from(width) * u64::from(height) > MAX_PIXELS {
-            return Err(TargetError::LargePicture { width, height });
-        }
-        let (colour, depth) = (info.color_type, info.bit_depth);
-        let bytes_a_level = match (colour, depth) {
-            (ColorType::Grayscale, BitDepth::Sixteen) => 2,
-            (ColorType::Grayscale, BitDepth::Eight) => 1,
-            _ => return Err(TargetError::NotGray { bits: depth as u8, colour }),
-        };
-        let (columns, rows) = (width as usize, height as usize);
-        let mut bytes = vec![0; columns * rows * bytes_a_level];
-        reader.next_frame(&mut bytes)?;
-        reader.finish()?;
-        let levels = match bytes_a_level {
-            2 => bytes.chunks_exact(2).map(|two| u16::from_be_bytes([two[0], two[1]])).collect(),
-            _ => bytes.iter().map(|&level| u16::from(level) * 257).collect(),
-        };
-        Ok(Self { name: name.to_owned(), columns, rows, scale, levels })
+        Ok(Self { name: name.to_owned(), picture: GrayPicture::read(from)?, scale })
     }
 
     pub(super) fn name(&self) -> &str {
@@ -71,18 +42,18 @@ impl HeightPicture {
     }
 
     pub(super) fn size_um(&self) -> [f64; 2] {
-        [self.columns, self.rows].map(|count| count as f64 * self.scale.pixel.um())
+        [self.picture.columns, self.picture.rows].map(|count| count as f64 * self.scale.pixel.um())
     }
 
     /// Returns the height of the pixel that holds a point, 0 beyond the picture.
     pub(super) fn height_um(&self, x: f64, y: f64) -> f64 {
         let pixel = self.scale.pixel.um();
-        let [width, height] = [self.columns, self.rows].map(|count| count as f64);
+        let [width, height] = [self.picture.columns, self.picture.rows].map(|count| count as f64);
         let (column, row) = ((x / pixel + width / 2.0).floor(), (height / 2.0 - y / pixel).floor());
         if !((0.0..width).contains(&column) && (0.0..height).contains(&row)) {
             return 0.0;
         }
-        let level = self.levels[row as usize * self.columns + column as usize];
+        let level = self.picture.levels[row as usize * self.picture.columns + column as usize];
         f64::from(level) / f64::from(u16::MAX) * self.scale.full.um()
     }
 }
@@ -90,6 +61,8 @@ impl HeightPicture {
 #[cfg(test)]
 mod tests {
     use std::io::Cursor;
+
+    use png::{BitDepth, ColorType};
 
     use super::*;
 

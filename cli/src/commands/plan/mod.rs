@@ -1,6 +1,8 @@
 //! `lamp plan`: chooses exposures.
 
+mod column_cure;
 mod column_measures;
+mod column_report;
 mod ecpl;
 mod kinetics_report;
 mod layer_map;
@@ -25,6 +27,7 @@ pub(crate) use speed::write_profile;
 Examples:
   lamp plan voxels part.tif --material mine.toml -o planned.tif
   lamp plan speed part.tif --material mine.toml -o timed.tif --profile speed.csv
+  lamp plan column-cure lens-array --projector zhao --material pegda-mw700 -o plan/
   lamp plan ecpl hemisphere --projector jariwala --material tmpta -o plan/
   lamp cure planned.tif --material mine.toml --section y=12mm --add-up -o section.png")]
 pub(crate) struct PlanArgs {
@@ -35,6 +38,7 @@ pub(crate) struct PlanArgs {
 #[derive(Subcommand)]
 enum Plan {
     Voxels(voxels::VoxelsArgs),
+    ColumnCure(column_cure::ColumnCureArgs),
     Speed(speed::SpeedArgs),
     Ecpl(ecpl::EcplArgs),
     Simulate(simulate::SimulateArgs),
@@ -43,6 +47,7 @@ enum Plan {
 pub(crate) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
         Plan::Voxels(args) => voxels::run(args, common),
+        Plan::ColumnCure(args) => column_cure::run(args, common),
         Plan::Speed(args) => speed::run(args, common),
         Plan::Ecpl(args) => ecpl::run(args, common),
         Plan::Simulate(args) => simulate::run(args, common),

@@ -1,7 +1,7 @@
 //! What bitmaps cure where doses add up, column by column (000).
 
 use lamp_planning::column::{ColumnLight, HeightCurve, Measures, Setup, Tracing};
-use lamp_planning::target::{Grid, HeightMap};
+use lamp_planning::target::HeightMap;
 use lamp_stack::Length;
 use serde_json::{Map, json};
 
@@ -17,10 +17,8 @@ pub(super) fn cured(shown: &Shown, tracing: Tracing) -> Result<Outcome, Exit> {
     let voxel = projector.voxel.as_ref().map_or(projector.pitch.value, |voxel| voxel.value);
     let MirrorSeconds { mirrors, seconds } =
         MirrorSeconds::of(&exposures.bitmaps, |level| projector.share(level));
-    let grid = match target {
-        Some(target) => Grid::over(target.size(), voxel),
-        None => Grid::over(lit(mirrors, projector.pitch.value), voxel),
-    };
+    let size = target.as_ref().map_or_else(|| lit(mirrors, projector.pitch.value), |to| to.size());
+    let grid = Setup::grid_around(projector, size, voxel).map_err(anyhow::Error::new)?;
     let wanted = match target {
         Some(target) => Some(target.heights(&grid, projector)?),
         None => None,

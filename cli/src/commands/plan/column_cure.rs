@@ -1,0 +1,292 @@
+//! `lamp plan column-cure`: bitmaps that cure a part's columns through a glass.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::column::{
+    ColumnLight, ColumnOptions, ColumnPlan, HeightCurve, Objective, Setup, Stop, Tracing, plan,
+};
+use lamp_planning::projector::Projector;
+use lamp_planning::target::{GrayPicture, HeightMap, Target};
+use lamp_stack::Length;
+
+use super::column_measures::doubt;
+use super::column_report::{Reported, lines_of, report_of};
+use super::simulate::parse_rays;
+use crate::bitmaps::Bitmap;
+use crate::catalogue::entry;
+use crate::exit::Exit;
+use crate::height_options::parse_share;
+use crate::options::{Common, one_of_described, parse_count, parse_thickness};
+use crate::plan_folder::{PlanFiles, PlanFolder};
+use crate::progress::Progress;
+use crate::target_arg::{GivenTarget, TargetArg};
+
+/// Choose bitmaps and times that cure a part through a glass, without layers
+///
+/// Each column of resin is cured from the glass up to its height by the light that it gets in
+/// all. This finds the time of each mirror whose doses are nearest to those wanted, proves how
+/// near to the best they are, and groups mirrors into bitmaps, each within the one before. The
+/// folder gets bitmaps.tif, report.json and pictures.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp plan column-cure lens-array --projector zhao --material pegda-mw700 -o plan/
+  lamp plan column-cure part.stl --projector mine.toml --material resin.toml --bitmaps 40 -o plan/
+  lamp plan column-cure map.png --pixel 10um --full 450um --projector zhao \\
+      --material pegda-mw700 --optimise height --robust 3um -o plan/
+  lamp plan column-cure sphere --projector zhao --material pegda-mw700 --gray --bitmaps 5 -o plan/")]
+pub(super) struct ColumnCureArgs {
+    #[command(flatten)]
+    target: TargetArg,
+
+    /// Projector: a built-in projector's name (see lamp projector list) or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    projector: PathBuf,
+
+    /// Resin: a built-in material's name (see lamp material list) or a file; it must say which dose
+    /// cures how deep ([two-depth] or [working-curve])
+    #[arg(long, value_name = "NAME|FILE")]
+    material: PathBuf,
+
+    /// How many bitmaps there are, at most
+    #[arg(long, value_name = "N", default_value = "25", value_parser = parse_bitmaps)]
+    bitmaps: usize,
+
+    /// Make 8-bit bitmaps, for displays that show gray levels
+    #[arg(long)]
+    gray: bool,
+
+    /// What is to be nearest to the target's
+    #[arg(long, default_value = "dose", value_parser = one_of_described::<Objective>(&[
+        "Doses",
+        "Cured heights: light that cures nothing costs nothing",
+    ]))]
+    optimise: Objective,
+
+    /// Longest time of a mirror [default: four times what a wide white field takes for the highest
+    /// column]
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    max_time: Option<ExposureTime>,
+
+    /// Make the plan the best on average where the glass stands off by so much along each axis
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    robust: Option<Length>,
+
+    /// Count rays instead of integrating light: so many points and directions along each side of
+    /// a mirror, as 9x15
+    #[arg(long, value_name = "NxM", value_parser = parse_rays)]
+    rays: Option<Tracing>,
+
+    /// Light of each mirror: a gray PNG of the display's size, told against its mean
+    #[arg(long, value_name = "FILE.png")]
+    flat_field: Option<PathBuf>,
+
+    /// Side of a column [default: what the projector's file says]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    voxel: Option<Length>,
+
+    /// Stop so near to the best, as a share of the error
+    #[arg(long, value_name = "SHARE", default_value = "1e-6", value_parser = parse_gap)]
+    gap: f64,
+
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+
+    /// Replace a folder that an earlier run wrote
+    #[arg(long)]
+    force: bool,
+}
+
+fn parse_bitmaps(text: &str) -> Result<usize, String> {
+    match parse_count(text)? {
+        count @ 1..=1000 => Ok(count),
+        _ => Err(format!("`{text}` is not a number of bitmaps: write 1 to 1000")),
+    }
+}
+
+fn parse_time(text: &str) -> Result<ExposureTime, String> {
+    match text.parse::<ExposureTime>() {
+        Ok(time) if time.ms() > 0.0 => Ok(time),
+        Ok(_) => Err("a mirror must be allowed some time".to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn parse_gap(text: &str) -> Result<f64, String> {
+    match parse_share(text)? {
+        0.0 => Err("the best is never met exactly: write 1e-6".to_owned()),
+        gap => Ok(gap),
+    }
+}
+
+/// Steps after which a search ends, however near it is.
+const MOST_STEPS: usize = 20_000;
+
+pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
+    let folder = PlanFolder::new(&args.output, args.force)?;
+    let projector: Projector = entry(&args.projector)?;
+    let material: Material = entry(&args.material)?;
+    let curve = HeightCurve::of(&material).map_err(anyhow::Error::new)?;
+    let progress = Progress::new("plan", common, true);
+    let target = args.target.open(&projector)?;
+    let (map, light) = args.light(&projector, &target)?;
+    if let Some(text) = doubt(&map, &curve, &material) {
+        progress.warn(&text);
+    }
+    let options = args.options(&projector, &map, &curve)?;
+    let plan = plan(&light, &map, curve, &options)
+        .with_context(|| args.target.target.display().to_string())?;
+    let reported = Reported {
+        target: target.name(),
+        projector: &projector,
+        material: &material.name,
+        options: &options,
+        light: &light,
+        map: &map,
+        curve,
+        plan: &plan,
+    };
+    let bitmaps = args.bitmaps(&projector, &plan);
+    let cured = plan.doses.iter().map(|&dose| curve.height_um(dose)).collect();
+    folder.write(&PlanFiles {
+        part: target.name(),
+        command: args.command(&target, &projector, &material, &options),
+        pitch: projector.pitch.value,
+        bitmaps: &bitmaps,
+        report: &report_of(&reported),
+        target: Some(&map),
+        cured: &HeightMap { grid: map.grid, heights_um: cured },
+    })?;
+    lines_of(&reported).iter().for_each(|line| progress.say(line));
+    Ok(())
+}
+
+impl ColumnCureArgs {
+    /// Returns the target's columns, with room for light beside it, and the light on them.
+    fn light(
+        &self,
+        projector: &Projector,
+        target: &GivenTarget,
+    ) -> Result<(HeightMap, ColumnLight), Exit> {
+        let voxel = self.voxel.or(projector.voxel.as_ref().map(|voxel| voxel.value));
+        let Some(voxel) = voxel else {
+            let name = self.projector.display();
+            let text = format!("{name} does not say how wide columns are: give --voxel 10um");
+            return Err(Exit::Failed(anyhow!(text)));
+        };
+        let tracing = self.rays.unwrap_or_default();
+        let grid = Setup::grid_around(projector, target.size(), voxel)
+            .with_context(|| self.target.target.display().to_string())?;
+        let map = target.heights(&grid, projector)?;
+        let mut setup = Setup::of(projector, &grid, tracing);
+        if let Some(path) = &self.flat_field {
+            setup.flat_field = flat_field(path, &setup)?;
+        }
+        Ok((map, ColumnLight::new(setup)))
+    }
+
+    fn options(
+        &self,
+        projector: &Projector,
+        map: &HeightMap,
+        curve: &HeightCurve,
+    ) -> Result<ColumnOptions, Exit> {
+        let max_s = match self.max_time {
+            Some(time) => time.ms() / 1000.0,
+            None => {
+                let dose = curve.dose(map.highest_um()).unwrap_or(f64::INFINITY);
+                4.0 * dose / projector.irradiance().mw_per_cm2()
+            }
+        };
+        let shares: [f64; 256] = std::array::from_fn(|level| projector.share(level as u8));
+        if self.gray && !shares.is_sorted() {
+            let name = self.projector.display();
+            let text = format!("{name}: the light of gray levels must rise for gray bitmaps");
+            return Err(Exit::Failed(anyhow!(text)));
+        }
+        Ok(ColumnOptions {
+            objective: self.optimise,
+            bitmaps: self.bitmaps,
+            gray: self.gray.then(|| Box::new(shares)),
+            max_s,
+            robust: self.robust.unwrap_or_default(),
+            step_s: projector.step.value.ms() / 1000.0,
+            stop: Stop { gap: self.gap, steps: MOST_STEPS },
+        })
+    }
+
+    fn bitmaps(&self, projector: &Projector, plan: &ColumnPlan) -> Vec<Bitmap> {
+        let time = |steps: u64| ExposureTime::from_ms(projector.step.value.ms() * steps as f64);
+        let bitmaps = plan.bitmaps.iter();
+        bitmaps
+            .map(|bitmap| Bitmap { image: bitmap.image.clone(), time: time(bitmap.steps) })
+            .collect()
+    }
+
+    /// The command, as the bitmaps record it.
+    fn command(
+        &self,
+        target: &Target,
+        projector: &Projector,
+        material: &Material,
+        options: &ColumnOptions,
+    ) -> String {
+        let mut command = format!(
+            "lamp plan column-cure {} --projector {} --material {} --bitmaps {} --optimise {} \
+             --max-time {:.3}s --gap {}",
+            target.name(),
+            projector.name,
+            material.name,
+            self.bitmaps,
+            self.optimise,
+            options.max_s,
+            self.gap
+        );
+        if self.gray {
+            command += " --gray";
+        }
+        if let Some(Tracing::Rays { points, directions }) = self.rays {
+            command += &format!(" --rays {points}x{directions}");
+        }
+        if let Some(robust) = self.robust {
+            command += &format!(" --robust {robust}");
+        }
+        if let Some(voxel) = self.voxel {
+            command += &format!(" --voxel {voxel}");
+        }
+        if let Some(name) = self.flat_field.as_deref().and_then(Path::file_name) {
+            command += &format!(" --flat-field {}", name.display());
+        }
+        command
+    }
+}
+
+/// Reads the light of the mirrors that a setup uses.
+fn flat_field(path: &Path, setup: &Setup) -> Result<Vec<f64>, Exit> {
+    let name = || path.display().to_string();
+    let file = File::open(path).with_context(name)?;
+    let picture = GrayPicture::read(BufReader::new(file)).with_context(name)?;
+    let [columns, rows] = setup.display;
+    if [picture.columns, picture.rows] != [columns, rows] {
+        let (width, height) = (picture.columns, picture.rows);
+        let text =
+            format!("{width} x {height} pixels, but the display has {columns} x {rows} mirrors");
+        return Err(Exit::Failed(anyhow!(text).context(name())));
+    }
+    let sum: f64 = picture.levels.iter().map(|&level| f64::from(level)).sum();
+    if sum == 0.0 {
+        return Err(Exit::Failed(anyhow!("all black: no mirror has light").context(name())));
+    }
+    let mean = sum / picture.levels.len() as f64;
+    let [left, top] = [0, 1].map(|axis| (setup.display[axis] - setup.mirrors[axis]) / 2);
+    let row = |row: usize| &picture.levels[row * columns + left..][..setup.mirrors[0]];
+    let used = (top..top + setup.mirrors[1]).flat_map(row);
+    Ok(used.map(|&level| f64::from(level) / mean).collect())
+}

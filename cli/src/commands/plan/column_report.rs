@@ -1,0 +1,140 @@
+//! What a plan of column cure reaches, in lines and as JSON.
+
+use lamp_planning::column::{
+    ColumnLight, ColumnOptions, ColumnPlan, HeightCurve, Measures, Objective, Tracing,
+};
+use lamp_planning::projector::Projector;
+use lamp_planning::target::HeightMap;
+use serde_json::{Value, json};
+
+use super::column_measures::{fields, line};
+
+/// A plan, and what it was for.
+pub(super) struct Reported<'a> {
+    pub(super) target: &'a str,
+    pub(super) projector: &'a Projector,
+    pub(super) material: &'a str,
+    pub(super) options: &'a ColumnOptions,
+    pub(super) light: &'a ColumnLight,
+    pub(super) map: &'a HeightMap,
+    pub(super) curve: HeightCurve,
+    pub(super) plan: &'a ColumnPlan,
+}
+
+/// How far the glass may stand off, in um.
+const SHIFTS_UM: [f64; 3] = [1.0, 3.0, 5.0];
+/// How much brighter or darker light may be.
+const LIGHT: f64 = 0.02;
+
+/// The lines that are printed.
+pub(super) fn lines_of(reported: &Reported<'_>) -> Vec<String> {
+    let plan = reported.plan;
+    let measures = reported.measures(&plan.doses);
+    let steps: u64 = plan.bitmaps.iter().map(|bitmap| bitmap.steps).sum();
+    let seconds = steps as f64 * reported.options.step_s;
+    let mut lines = vec![
+        format!("{} bitmaps in {seconds:.3} s", plan.bitmaps.len()),
+        line(&measures),
+        format!(
+            "the bitmaps' error is {:.2}% above that of the best times, which is within {:.1e} of \
+             the least there is",
+            100.0 * plan.excess(),
+            plan.best.relative_gap()
+        ),
+    ];
+    if plan.best.relative_gap() > reported.options.stop.gap {
+        lines.push(format!(
+            "the search stopped after {} steps, before it was within {:.1e}: a shorter --max-time \
+             or a wider --gap ends sooner",
+            plan.best.steps, reported.options.stop.gap
+        ));
+    }
+    lines
+}
+
+impl Reported<'_> {
+    fn measures(&self, doses: &[f64]) -> Measures {
+        Measures::of(doses, &self.map.heights_um, &self.curve)
+    }
+
+    fn measured(&self, doses: &[f64]) -> Value {
+        fields(&self.measures(doses))
+    }
+
+    /// The plan where the glass stands off along x or y: the direction that is the worst.
+    fn shifted(&self, um: f64) -> Value {
+        let directions = [[um, 0.0], [-um, 0.0], [0.0, um], [0.0, -um]];
+        let doses = directions.map(|shift| self.light.shifted(shift).doses(&self.plan.seconds));
+        let worst =
+            doses.iter().max_by(|a, b| self.measures(a).rms_um.total_cmp(&self.measures(b).rms_um));
+        let mut value = self.measured(worst.expect("there are four"));
+        value["shift_um"] = um.into();
+        value
+    }
+
+    fn brighter(&self, by: f64) -> Value {
+        let doses: Vec<_> = self.plan.doses.iter().map(|dose| dose * by).collect();
+        let mut value = self.measured(&doses);
+        value["light"] = by.into();
+        value
+    }
+
+    /// Root mean square of how far bitmaps' times are from the best ones (000 eq. 4.16).
+    fn time_rms(&self) -> f64 {
+        let pairs = self.plan.seconds.iter().zip(&self.plan.best.seconds);
+        let squares: f64 = pairs.map(|(shown, best)| (shown - best).powi(2)).sum();
+        (squares / self.plan.seconds.len() as f64).sqrt()
+    }
+}
+
+/// The report, as docs/json.md describes it.
+pub(super) fn report_of(reported: &Reported<'_>) -> Value {
+    let Reported { plan, options, light, .. } = reported;
+    let setup = light.setup();
+    let step_ms = 1000.0 * options.step_s;
+    let times_ms: Vec<_> =
+        plan.bitmaps.iter().map(|bitmap| bitmap.steps as f64 * step_ms).collect();
+    let unit = match options.objective {
+        Objective::Dose => "(mJ/cm2)2",
+        Objective::Height => "um2",
+    };
+    let at_max = plan.best.seconds.iter().filter(|time| **time >= options.max_s).count();
+    let lights = [1.0 - LIGHT, 1.0 + LIGHT];
+    json!({
+        "schema": "lamp-plan-column-cure-1",
+        "target": reported.target,
+        "projector": reported.projector.name,
+        "material": reported.material,
+        "optimise": options.objective.to_string(),
+        "gray": options.gray.is_some(),
+        "rays": match setup.tracing {
+            Tracing::Exact => Value::Null,
+            Tracing::Rays { points, directions } => json!([points, directions]),
+        },
+        "robust_um": options.robust.um(),
+        "columns": setup.voxels,
+        "column_um": setup.voxel_um,
+        "mirrors": setup.mirrors,
+        "mirror_um": setup.pitch_um,
+        "irradiance_mw_per_cm2": setup.irradiance,
+        "max_time_s": options.max_s,
+        "mirrors_at_max_time": at_max,
+        "error_unit": unit,
+        "best": {
+            "error": plan.best.error,
+            "gap": plan.best.gap,
+            "relative_gap": plan.best.relative_gap(),
+            "steps": plan.best.steps,
+            "measures": reported.measured(&plan.best_doses),
+        },
+        "bitmaps": {
+            "times_ms": times_ms,
+            "error": plan.error,
+            "excess": plan.excess(),
+            "time_rms_s": reported.time_rms(),
+            "measures": reported.measured(&plan.doses),
+        },
+        "misaligned": SHIFTS_UM.map(|um| reported.shifted(um)),
+        "other_light": lights.map(|by| reported.brighter(by)),
+    })
+}
