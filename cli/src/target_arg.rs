@@ -19,11 +19,13 @@ use crate::options::{one_of, parse_thickness};
 #[derive(Args, Clone, Debug)]
 pub(crate) struct TargetReading {
     /// Side of a height map's pixels on the glass
-    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, requires = "full")]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    #[arg(requires_all = ["full", "target"])]
     pixel: Option<Length>,
 
     /// Height of a height map's full white
-    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, requires = "pixel")]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    #[arg(requires_all = ["pixel", "target"])]
     full: Option<Length>,
 
     /// Unit of coordinates in STL and OBJ targets; STEP and 3MF files state their own

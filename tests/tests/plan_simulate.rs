@@ -79,6 +79,24 @@ fn twice_the_time_and_gray_levels_are_the_doses_that_they_say() {
     assert!(((b + liquid_um) / (a + liquid_um) - 2.0).abs() < 1e-3, "{a} {b}");
 }
 
+#[test]
+fn a_plan_cures_what_its_report_says() {
+    let scratch = Scratch::new();
+    let plan = format!("lamp plan column-cure lens-array {ZHAO}");
+    scratch.run(&format!("{plan} -o plan/")).succeeds();
+    scratch.run(&format!("{plan} --gray --bitmaps 5 -o gray/")).succeeds();
+    for folder in ["plan", "gray"] {
+        let line = format!("--target lens-array -o {folder}-cured");
+        simulate(&scratch, &format!("{folder}/bitmaps.tif"), &line).succeeds();
+        let planned = report(&scratch, folder)["bitmaps"]["measures"].clone();
+        let cured = report(&scratch, &format!("{folder}-cured"))["measures"].clone();
+        for (measure, planned) in planned.as_object().unwrap() {
+            let [planned, cured] = [planned, &cured[measure]].map(|it| it.as_f64().unwrap());
+            assert!((planned - cured).abs() < 1e-6, "{folder}, {measure}: {planned} {cured}");
+        }
+    }
+}
+
 /// A stack of one page.
 fn page(scratch: &Scratch, name: &str, image: Mask, exposure_ms: Option<f64>) {
     let info = PageInfo { exposure_ms, ..PageInfo::default() };
@@ -161,8 +179,8 @@ fn targets_that_light_cannot_cure_are_refused_with_the_place() {
     scratch.write("cut.png", &white_png()[..40]);
     scratch.write("junk.stl", b"junk");
     for (target, words) in [
-        ("bridge.stl", &["bridge.stl", "column 55 of row 5", "empty from 200um to 400um"][..]),
-        ("step.stl", &["column 100 of row 0", "begins 50um above", "bottom must be flat"]),
+        ("bridge.stl", &["bridge.stl", "(x -495um, y 495um) is empty from 200um to 400um"][..]),
+        ("step.stl", &["(x 5um, y 495um) begins 50um above", "bottom must be flat"]),
         ("wide.stl", &["30mm x 1mm wide", "lights 28.54"]),
         ("nothing.toml", &["nothing.toml", "nothing to cure"]),
         ("nan.toml", &["line 5", "lens[0].sag", "not a length"]),
