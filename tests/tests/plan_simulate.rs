@@ -116,6 +116,7 @@ fn bitmaps_that_no_display_shows_are_refused() {
         ("short.tif", ["bitmap 1 is shown for 0.5 ms", "step is 1 ms"]),
         ("wide.tif", ["1025 x 8 pixels", "1024 x 768"]),
         ("none.tif", ["none.tif", "No such file"]),
+        ("40:60s,40:1e300s", ["bitmap 2 is shown", "more than a day"]),
         ("40:0.1ms", ["bitmap 1 is shown for 0.1 ms", "step is 1 ms"]),
     ] {
         simulate(&scratch, bitmaps, "-o cured").is_refused_with(&words);

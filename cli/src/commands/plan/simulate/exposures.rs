@@ -12,6 +12,9 @@ use crate::bitmaps::Bitmap;
 use crate::exit::Exit;
 use crate::streams::{input_name, is_stream, layers_of, open_pages};
 
+/// No plan takes longer.
+const A_DAY_MS: f64 = 86_400_000.0;
+
 /// Bitmaps in their order.
 pub(super) struct Exposures {
     /// The file's name without its folder, or the text.
@@ -92,8 +95,11 @@ impl Exposures {
     fn check_times(&self, step: ExposureTime) -> Result<(), Exit> {
         for (Bitmap { time, .. }, of) in self.bitmaps.iter().zip(1..) {
             // Times that were written as decimals may be short of a step by rounding.
-            let can_be = time.ms() >= step.ms() * (1.0 - 1e-9) && time.ms().is_finite();
-            if !can_be {
+            let is_shown = time.ms() >= step.ms() * (1.0 - 1e-9);
+            if time.ms() > A_DAY_MS {
+                return Err(Exit::Failed(anyhow!("bitmap {of} is shown for more than a day")));
+            }
+            if !is_shown {
                 return Err(Exit::Failed(anyhow!(
                     "bitmap {of} is shown for {time}, and the display's step is {step}"
                 )));
