@@ -103,6 +103,24 @@ fn table_4_3_at_25_bitmaps_has_these_digits() {
 }
 
 #[test]
+fn equation_4_11_drops_what_appendix_c_keeps() {
+    // It lights a mirror only from the mean of its cluster on: the shorter half stays behind.
+    let part = Part::builtin("sphere", 300);
+    let light = ColumnLight::new(zhao(151, 300, RAYS));
+    let seconds = part.times(&light).seconds;
+    let bitmaps = seeds_k_means(&seconds, 5);
+    let mut means = bitmaps.clone();
+    means.sort_by(f64::total_cmp);
+    means.dedup();
+    let printed: Vec<_> = seconds
+        .iter()
+        .map(|time| means.iter().rev().find(|mean| *mean <= time).copied().unwrap_or(0.0))
+        .collect();
+    assert_within("printed", part.measures(&light.doses(&printed)).ra_um, 45.24, 0.1);
+    assert_within("kept", part.measures(&light.doses(&bitmaps)).ra_um, 24.96, 0.1);
+}
+
+#[test]
 fn table_4_4_comes_out() {
     let part = Part::builtin("small-sphere", 200);
     let light = ColumnLight::new(zhao(101, 200, RAYS));
