@@ -199,10 +199,11 @@ impl<'a> Search<'a> {
     /// Returns the times of rings in whole steps of the display, near those of knots: the best
     /// ones, where each ring has its knot.
     fn whole(&self, knots: &[f64]) -> Vec<u32> {
-        let mut best = self.rounded(&self.by_ring(knots));
         if self.knots < self.simulation.rings() {
-            return best;
+            return self.rounded(&self.by_ring(knots));
         }
+        let mut best: Vec<u32> =
+            knots.iter().map(|time| (time / self.step_s).round() as u32).collect();
         let seconds = |steps: &[u32]| -> Vec<f64> {
             steps.iter().map(|&steps| f64::from(steps) * self.step_s).collect()
         };

@@ -12,6 +12,9 @@ const LANES: usize = 8;
 /// Radicals are known this well before the last step of Newton's method, which squares it.
 const NEAR: f64 = 1e-6;
 
+/// The greatest power for which [`faded`] is exact to 2e-11.
+const SMALL: f64 = 0.1;
+
 /// A step of Newton's method from above at least takes a third of the way: enough for any number.
 const MOST_STEPS: usize = 100;
 
@@ -169,13 +172,23 @@ impl Chamber {
 /// would split where it enters, and then where it leaves. `made` gets the new radicals.
 #[inline(always)]
 fn split(reaction: &Reaction, left: &mut [f64], initiator: &mut [f64], made: &mut [f64]) {
+    // Initiator is never made.
+    let is_small = reaction.fade * reaction.initiator <= SMALL;
     for ((left, initiator), made) in left.iter_mut().zip(initiator).zip(made) {
-        let half = (-reaction.fade * *initiator).exp();
+        let power = reaction.fade * *initiator;
+        let half = if is_small { faded(power) } else { (-power).exp() };
         let share = *left * half;
         *left = share * half;
         *initiator /= 1.0 + share;
         *made = 2.0 * share * *initiator;
     }
+}
+
+/// Returns e to the minus `power`, by its series.
+#[inline(always)]
+fn faded(power: f64) -> f64 {
+    let terms = [1.0 / 720.0, -1.0 / 120.0, 1.0 / 24.0, -1.0 / 6.0, 0.5, -1.0, 1.0];
+    terms.into_iter().fold(0.0, |sum, term| sum * power + term)
 }
 
 /// Finds the radicals `R` of some cells, where `source` is what was there and what light made:
@@ -223,5 +236,63 @@ fn settle(
         *growth += 0.5 * reaction.seconds * (*radicals + r[k]);
         *oxygen /= 1.0 + b * r[k];
         *radicals = r[k];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_grayscale::material::Material;
+    use lamp_stack::Catalogued;
+
+    use super::super::cells::Shape;
+    use super::*;
+
+    fn reaction(height_um: f64, seconds: f64) -> Reaction {
+        let kinetics = Material::builtin("tmpta").unwrap().kinetics().unwrap().unwrap();
+        let deep = (200.0 / height_um) as usize;
+        let cells = Cells { shape: Shape::Round, across: 3, deep, width_um: 4.0, height_um };
+        Reaction::new(&kinetics, cells, seconds)
+    }
+
+    #[test]
+    fn small_powers_fade_as_the_exponential() {
+        for power in [0.0, 0.01, 0.05, SMALL] {
+            assert!((faded(power) - (-power).exp()).abs() < 2e-11, "{power}");
+        }
+    }
+
+    #[test]
+    fn each_cell_solves_its_equation_for_weak_and_strong_light() {
+        for (light, seconds) in [(1e-3, 0.1), (25.7, 0.025), (1e4, 0.1), (1e9, 1.0)] {
+            let reaction = reaction(1.0, seconds);
+            let mut chamber = Chamber::new(&reaction);
+            for _ in 0..20 {
+                let before = chamber.clone();
+                let mut spread = before.oxygen.clone();
+                reaction.diffusion.as_ref().unwrap().spread(&mut spread);
+                chamber.pass(&reaction, &[light; 3]);
+                for (cell, oxygen) in spread.iter().enumerate() {
+                    let r = chamber.radicals[cell];
+                    let split = before.initiator[cell] - chamber.initiator[cell];
+                    let source = before.radicals[cell] + 2.0 * split;
+                    let stopped = oxygen - chamber.oxygen[cell];
+                    let left = r + reaction.ended * r * r + stopped - source;
+                    assert!(left.abs() < 1e-9 * (1.0 + source), "{light} {cell}: {left}");
+                    assert!(r >= 0.0 && chamber.oxygen[cell] >= 0.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cells_of_any_height_let_the_same_light_through() {
+        // 20 um fade too much for the series.
+        let [thin, thick] = [1.0, 20.0].map(|height_um| {
+            let reaction = reaction(height_um, 0.025);
+            let mut chamber = Chamber::new(&reaction);
+            (0..400).for_each(|_| chamber.pass(&reaction, &[25.7; 3]));
+            chamber.heights_um(&reaction)[0]
+        });
+        assert!((thin - 102.7).abs() < 0.2 && (thick - thin).abs() < 4.0, "{thin} {thick}");
     }
 }

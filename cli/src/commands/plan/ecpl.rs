@@ -79,7 +79,7 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
     let Planned { simulation, wanted, exposures, cured } = &planned;
     let reported = Cured { simulation, exposures, cured, wanted: Some(wanted) };
     let mut report = json!({
-        "schema": "lamp-ecpl-1",
+        "schema": "lamp-plan-ecpl-1",
         "target": target.name(),
         "projector": projector.name,
         "material": material.name,
