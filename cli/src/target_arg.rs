@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{
-    Grid, HeightMap, MapScale, Shapes, Target, TargetError, TargetOptions,
+    Grid, HeightMap, MapScale, Round, Shapes, Target, TargetError, TargetOptions,
 };
 use lamp_slicer::Units;
 use lamp_stack::{Catalogued, Length};
@@ -77,6 +77,14 @@ impl GivenTarget {
             Ok::<_, TargetError>(heights)
         };
         Ok(heights().with_context(|| self.given.clone())?)
+    }
+
+    /// Returns the heights over the distance from the axis, about which it must be round.
+    pub(crate) fn profile(&self) -> Result<Round, Exit> {
+        let [width, height] = self.target.size().map(Length::um);
+        let step_um = (width.max(height) / 1000.0).max(2.0);
+        let round = self.target.round(Length::from_um(step_um));
+        Ok(round.with_context(|| self.given.clone())?)
     }
 }
 

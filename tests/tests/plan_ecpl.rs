@@ -1,5 +1,6 @@
 //! Checks the plans of `lamp plan ecpl`.
 
+use lamp_stack::{GrayMask, Image, Layer, Mask, PageInfo};
 use lamp_tests::{Scratch, masks};
 use serde_json::Value;
 
@@ -58,11 +59,69 @@ fn a_plan_holds_nested_bitmaps_a_report_and_pictures() {
 }
 
 #[test]
+fn simulation_of_the_bitmaps_agrees_with_the_plan() {
+    let scratch = with_lens();
+    scratch.run(&format!("{PLAN} -o plan")).succeeds();
+    let line = "lamp plan simulate plan/bitmaps.tif --model kinetics --projector sharp.toml \
+                --material tmpta --target small.toml -o again";
+    scratch.run(line).succeeds();
+    let [planned, again] = ["plan", "again"].map(|folder| report(&scratch, folder));
+    for key in ["bitmaps", "cured", "measures", "profile", "other_light", "aside", "exposure_s"] {
+        assert_eq!(planned[key], again[key], "{key}");
+    }
+    for file in ["section.svg", "residual.png", "times.png"] {
+        let [planned, again] = ["plan", "again"].map(|it| scratch.bytes(&format!("{it}/{file}")));
+        assert!(planned == again, "{file}");
+    }
+}
+
+const KINETICS: &str = "--model kinetics --projector jariwala --material tmpta";
+
+#[test]
+fn figure_11_is_typed_in() {
+    let scratch = Scratch::new();
+    let discs = "12:7.9s,11:0.8s,10:1.3s,9:1.2s,8:1.8s,7:1.2s,6:1.7s,5:1.8s";
+    let line = format!("lamp plan simulate {discs} {KINETICS} --target hemisphere -o figure");
+    let said = scratch.run(&line).succeeds().stderr;
+    assert!(said.contains("8 bitmaps in 17.7 s cure"), "{said}");
+    let report = report(&scratch, "figure");
+    assert_eq!(report["schema"], "lamp-simulation-1");
+    assert!((number(&report, "/cured/sag_um") - 108.0).abs() < 10.8);
+    assert!((number(&report, "/cured/base_radius_um") - 105.0).abs() < 10.5);
+    assert!(number(&report, "/measures/rms_um") <= 5.0);
+    let grown: Vec<_> =
+        (0..8).map(|of| number(&report, &format!("/bitmaps/{of}/sag_um"))).collect();
+    assert!(grown.is_sorted() && grown[7] == number(&report, "/cured/sag_um"), "{grown:?}");
+    let alone = scratch.run(&format!("lamp plan simulate {discs} {KINETICS}")).succeeds().stderr;
+    assert!(!alone.contains("target"), "{alone}");
+}
+
+#[test]
+fn bitmaps_that_kinetics_cannot_take_are_refused() {
+    let scratch = with_lens();
+    let page = |image: Image| Layer {
+        info: PageInfo { exposure_ms: Some(900.0), ..PageInfo::default() },
+        dpi: None,
+        image: image.into(),
+    };
+    let square = Mask::new(8, vec![0, 0, 2, 4, 4], vec![2, 6, 2, 6]).unwrap();
+    scratch.stack("square.tif", [page(square.clone().into())]);
+    scratch.stack("gray.tif", [page(GrayMask::from_mask(&square).into())]);
+    let run = |bitmaps: &str| scratch.run(&format!("lamp plan simulate {bitmaps} {KINETICS}"));
+    run("square.tif").is_refused_with(&["square.tif", "bitmap 1", "not round"]);
+    run("gray.tif").is_refused_with(&["gray.tif", "bitmap 1 has gray levels"]);
+    run("12:50ms").is_refused_with(&["bitmap 1", "50 ms", "step is 100 ms"]);
+    run("12:2h").is_wrong_usage(&["12:2h", "12:7.9s"]);
+    run("12:4000s").is_refused_with(&["4000 s", "an hour"]);
+    run("12:1s --rays 9x15").is_wrong_usage(&["--rays", "column"]);
+    run("12:1s --target lens-array").is_refused_with(&["lens-array", "not round about the axis"]);
+}
+
+#[test]
 fn threads_do_not_change_a_byte() {
     let scratch = with_lens();
-    for threads in ["1", "3"] {
-        let mut command = scratch.command(&format!("{PLAN} --quiet -o on{threads}"));
-        assert!(command.env("RAYON_NUM_THREADS", threads).status().unwrap().success());
+    for threads in [1, 3] {
+        scratch.run(&format!("{PLAN} --threads {threads} -o on{threads}")).succeeds();
     }
     for file in ["bitmaps.tif", "report.json", "section.svg", "residual.png", "times.png"] {
         let [one, three] = [1, 3].map(|threads| scratch.bytes(&format!("on{threads}/{file}")));

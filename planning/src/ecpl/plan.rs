@@ -56,6 +56,14 @@ pub enum PlanError {
         /// Half of the display's shorter side.
         lit_um: f64,
     },
+    /// No bitmap would better the part.
+    #[error("the target is too small for pixels of {pixel_um:.2} um that are white for {step}")]
+    TooSmall {
+        /// The side of a pixel.
+        pixel_um: f64,
+        /// The display's step.
+        step: ExposureTime,
+    },
     /// A plan without light.
     #[error("no bitmap shows anything: give at least one white pixel")]
     Dark,
@@ -129,12 +137,18 @@ pub fn plan(
     }
     let pixels = (radius_um / setting.pixel_um + BEYOND).ceil().min(f64::from(setting.pixels));
     let simulation = Simulation::new(setting, pixels as u32, radius_um)?;
-    let wanted = Wanted::new(simulation.reaction().cells(), height_um);
+    let wanted = Wanted::new(simulation.reaction().cells(), &height_um);
     wanted.check(&simulation)?;
     let exposures = match method {
         Method::Joint => joint::plan(&simulation, &wanted)?,
         Method::Seed => seed::plan(&simulation, &wanted),
     };
+    if exposures.is_empty() {
+        return Err(PlanError::TooSmall { pixel_um: setting.pixel_um, step: setting.step });
+    }
+    // As anyone prepares it who has the bitmaps alone: the same heights to the last bit.
+    let simulation = Simulation::of_plan(setting, &exposures, radius_um)?;
+    let wanted = Wanted::new(simulation.reaction().cells(), height_um);
     let cured = simulation.cure(&exposures);
     Ok(Planned { simulation, wanted, exposures, cured })
 }

@@ -7,8 +7,7 @@ use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_planning::ecpl::{Exposure, Method, Planned, Profile, Setting, plan};
 use lamp_planning::projector::Projector;
-use lamp_planning::target::{Grid, Round, Target};
-use lamp_stack::Length;
+use lamp_planning::target::Grid;
 use serde_json::json;
 
 use super::kinetics_report::{Cured, fields, lines_of};
@@ -72,10 +71,9 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
     let setting = setting_of(&projector, &material)?;
     let progress = Progress::new("plan", common, true);
     let target = args.target.open(&projector)?;
-    let name = || args.target.target.display().to_string();
-    let round = round_of(&target).map_err(|error| error.at(name()))?;
+    let round = target.profile()?;
     let planned = plan(setting, round.radius_um(), |r| round.height_um(r), args.method)
-        .map_err(|error| failed(error).at(name()))?;
+        .map_err(|error| failed(error).at(args.target.target.display().to_string()))?;
     let Planned { simulation, wanted, exposures, cured } = &planned;
     let reported = Cured { simulation, exposures, cured, wanted: Some(wanted) };
     let mut report = json!({
@@ -117,14 +115,7 @@ pub(super) fn setting_of(projector: &Projector, material: &Material) -> Result<S
     Setting::of(projector, kinetics).map_err(|error| failed(error).at(projector.name.clone()))
 }
 
-/// Returns the profile of a target, which must be round.
-pub(super) fn round_of(target: &Target) -> Result<Round, Exit> {
-    let [width, height] = target.size().map(Length::um);
-    let step_um = (width.max(height) / MOST_ROWS).max(FINEST_UM);
-    target.round(Length::from_um(step_um)).map_err(failed)
-}
-
-/// Columns of maps and parts are so wide, in micrometres, or wider for large ones.
+/// Columns of maps are so wide, in micrometres, or wider for large parts.
 const FINEST_UM: f64 = 2.0;
 const MOST_ROWS: f64 = 1000.0;
 
@@ -136,7 +127,7 @@ pub(super) fn grid_of(cured: &Profile, radius_um: f64) -> Grid {
     Grid { columns, rows: columns, pitch_um }
 }
 
-fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Exit {
+pub(super) fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Exit {
     Exit::Failed(error.into())
 }
 

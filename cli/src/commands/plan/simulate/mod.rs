@@ -2,6 +2,7 @@
 
 mod column;
 mod exposures;
+mod kinetics;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -32,8 +33,8 @@ use exposures::Exposures;
 Examples:
   lamp plan simulate plan/bitmaps.tif --model column --projector zhao --material pegda-mw700 \\
       --target lens-array
-  lamp plan simulate 12:7.9s,11:0.8s,5-10:1.2s --model column --projector zhao \\
-      --material pegda-mw700 -o cured/")]
+  lamp plan simulate 12:7.9s,11:0.8s,5-10:1.2s --model kinetics --projector jariwala \\
+      --material tmpta --target hemisphere -o cured/")]
 pub(super) struct SimulateArgs {
     /// Bitmaps in their order: a plan's bitmaps.tif, or discs and rings by their radius in mirrors
     /// and their time, as 12:7.9s,5-11:0.8s
@@ -43,6 +44,7 @@ pub(super) struct SimulateArgs {
     /// How light cures
     #[arg(long, value_parser = one_of_described::<Model>(&[
         "Doses add up; each column is as high as its dose cures (000)",
+        "Light, radicals and oxygen react; bitmaps must be discs and rings (003)",
     ]))]
     model: Model,
 
@@ -79,9 +81,10 @@ pub(super) struct SimulateArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Model {
     Column,
+    Kinetics,
 }
 
-named!(Model { Column = "column" });
+named!(Model { Column = "column", Kinetics = "kinetics" });
 
 /// Parses rays: `9x15` are 9 x 9 points of a mirror and 15 x 15 directions.
 pub(super) fn parse_rays(text: &str) -> Result<Tracing, String> {
@@ -130,6 +133,10 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
     };
     let outcome = match args.model {
         Model::Column => column::cured(&shown, args.rays.unwrap_or_default())?,
+        Model::Kinetics if args.rays.is_some() => {
+            return Err(Exit::usage("--rays is for --model column: leave it out"));
+        }
+        Model::Kinetics => kinetics::cured(&shown)?,
     };
     outcome.lines.iter().for_each(|line| progress.say(line));
     match folder {

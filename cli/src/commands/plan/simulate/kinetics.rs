@@ -1,0 +1,51 @@
+//! What bitmaps of discs and rings cure by the kinetics of resin and oxygen (003).
+
+use anyhow::anyhow;
+use lamp_planning::ecpl::{Exposure, Simulation, Wanted};
+use lamp_stack::Image;
+
+use super::{Outcome, Shown};
+use crate::bitmaps::Bitmap;
+use crate::commands::plan::ecpl::{failed, grid_of, setting_of};
+use crate::commands::plan::kinetics_report::{Cured, fields, lines_of};
+use crate::exit::Exit;
+
+/// Returns the heights that all bitmaps cure, one after the other.
+pub(super) fn cured(shown: &Shown) -> Result<Outcome, Exit> {
+    let Shown { exposures, projector, material, target } = shown;
+    let setting = setting_of(projector, material)?;
+    let place = || exposures.name.clone();
+    let bitmaps = (1..).zip(&exposures.bitmaps).map(exposure).collect::<Result<Vec<_>, _>>();
+    let bitmaps = bitmaps.map_err(|error| error.at(place()))?;
+    let round = match target {
+        Some(target) => Some(target.profile()?),
+        None => None,
+    };
+    let radius_um = round.as_ref().map_or(0.0, |round| round.radius_um());
+    let simulation = Simulation::of_plan(setting, &bitmaps, radius_um)
+        .map_err(|error| failed(error).at(place()))?;
+    let cured = simulation.cure(&bitmaps);
+    let cells = simulation.reaction().cells();
+    let grid = grid_of(&cured, radius_um);
+    let wanted = round.as_ref().map(|round| Wanted::new(cells, |um| round.height_um(um)));
+    let reported = Cured {
+        simulation: &simulation,
+        exposures: &bitmaps,
+        cured: &cured,
+        wanted: wanted.as_ref(),
+    };
+    Ok(Outcome {
+        lines: lines_of(&reported),
+        report: fields(&reported),
+        wanted: round.map(|round| grid.round(|um| round.height_um(um))),
+        cured: cured.on(&grid),
+    })
+}
+
+fn exposure((of, bitmap): (usize, &Bitmap)) -> Result<Exposure, Exit> {
+    let Image::Mask(mask) = &bitmap.image else {
+        let text = format!("bitmap {of} has gray levels: kinetics take black and white ones");
+        return Err(Exit::Failed(anyhow!(text)));
+    };
+    Exposure::shown(mask, bitmap.time).map_err(|error| failed(error).at(format!("bitmap {of}")))
+}
