@@ -1,7 +1,7 @@
 //! Checks the plans of `lamp plan ecpl`.
 
-use lamp_stack::{GrayMask, Image, Layer, Mask, PageInfo};
-use lamp_tests::{Scratch, masks};
+use lamp_stack::{Image, Layer, Mask, PageInfo};
+use lamp_tests::{Scratch, masks, with_soft_edges};
 use serde_json::Value;
 
 /// A lens that plans quickly, and a projector that blurs by 8 um only.
@@ -106,7 +106,7 @@ fn bitmaps_that_kinetics_cannot_take_are_refused() {
     };
     let square = Mask::new(8, vec![0, 0, 2, 4, 4], vec![2, 6, 2, 6]).unwrap();
     scratch.stack("square.tif", [page(square.clone().into())]);
-    scratch.stack("gray.tif", [page(GrayMask::from_mask(&square).into())]);
+    scratch.stack("gray.tif", [page(with_soft_edges(&square).into())]);
     let run = |bitmaps: &str| scratch.run(&format!("lamp plan simulate {bitmaps} {KINETICS}"));
     run("square.tif").is_refused_with(&["square.tif", "bitmap 1", "not round"]);
     run("gray.tif").is_refused_with(&["gray.tif", "bitmap 1 has gray levels"]);

@@ -2,6 +2,7 @@
 
 use anyhow::anyhow;
 use lamp_planning::ecpl::{Exposure, Simulation, Wanted};
+use lamp_planning::target::Round;
 use lamp_stack::Image;
 
 use super::{Outcome, Shown};
@@ -21,7 +22,7 @@ pub(super) fn cured(shown: &Shown) -> Result<Outcome, Exit> {
         Some(target) => Some(target.profile()?),
         None => None,
     };
-    let radius_um = round.as_ref().map_or(0.0, |round| round.radius_um());
+    let radius_um = round.as_ref().map_or(0.0, Round::radius_um);
     let simulation = Simulation::of_plan(setting, &bitmaps, radius_um)
         .map_err(|error| failed(error).at(place()))?;
     let cured = simulation.cure(&bitmaps);
