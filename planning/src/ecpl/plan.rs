@@ -38,7 +38,7 @@ pub enum PlanError {
         radius_um: f64,
     },
     /// The part is empty.
-    #[error("the target is empty: it has no height above zero")]
+    #[error("there is nothing to cure: no middle of a column of cells has a height above zero")]
     Empty,
     /// The part is higher than the chamber.
     #[error("the target is {wanted_um:.1} um high, the chamber only {chamber_um:.1} um")]

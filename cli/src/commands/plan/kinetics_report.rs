@@ -48,9 +48,12 @@ pub(super) fn fields(of: &Cured<'_>) -> Map<String, Value> {
 /// The lines that are printed.
 pub(super) fn lines_of(of: &Cured<'_>) -> Vec<String> {
     let Cured { exposures, cured, .. } = of;
+    let bitmaps = match exposures.len() {
+        1 => "1 bitmap".to_owned(),
+        count => format!("{count} bitmaps"),
+    };
     let mut lines = vec![format!(
-        "{} bitmaps in {:.1} s cure {:.1} um at the axis, and a base of {:.1} um in radius",
-        exposures.len(),
+        "{bitmaps} in {:.1} s cure {:.1} um at the axis, and a base of {:.1} um in radius",
         seconds(exposures),
         cured.sag_um(),
         cured.base_um,
