@@ -42,6 +42,7 @@ fn options(objective: Objective) -> ColumnOptions {
     ColumnOptions {
         objective,
         bitmaps: 25,
+        fewer: false,
         gray: None,
         max_s: 600.0,
         robust: Length::default(),

@@ -102,9 +102,10 @@ fn what_cannot_be_planned_is_refused_in_a_sentence() {
         scratch.run(&format!("{LENSES} {options}")).is_refused_with(words);
         assert!(!scratch.path("plan").exists(), "{options}");
     };
-    refused("--bitmaps 1000 --max-time 500ms", &["more than the mirrors have distinct times"]);
+    refused("--bitmaps 1000 --max-time 500ms", &["longer than 0.5 s", "allow more"]);
     refused("--voxel 0.1um", &["too many"]);
-    refused("--rays 1x1", &["no light reaches"]);
+    refused("--voxel 10mm", &["columns of 10000 um are wider than 4 mirrors"]);
+    refused("--rays 1x1", &["no ray reaches column", "count more rays"]);
     let mut resin =
         String::from_utf8(scratch.run("lamp material show pegda-mw700").succeeds().stdout).unwrap();
     resin = resin.replace("11.593 mJ/cm2", "1.1593e-6 mJ/cm2");
@@ -115,6 +116,21 @@ fn what_cannot_be_planned_is_refused_in_a_sentence() {
     scratch.run(&LENSES.replace("zhao", "jariwala")).is_refused_with(&["jariwala", "--voxel 10um"]);
     scratch.run(&format!("{LENSES} --rays 9")).is_wrong_usage(&["9x15"]);
     scratch.run(&format!("{LENSES} --max-time 0s")).is_wrong_usage(&["some time"]);
+    scratch.run(&format!("{LENSES} --max-time 1e300s")).is_wrong_usage(&["a day at most"]);
+    scratch.run(&format!("{LENSES} --robust 1mm")).is_wrong_usage(&["--robust 1mm", "49um wide"]);
+}
+
+#[test]
+fn a_small_part_has_as_many_bitmaps_as_times() {
+    let scratch = Scratch::new();
+    let line = "lamp plan column-cure hemisphere --projector zhao --material pegda-mw700 -o plan";
+    scratch.run(line).succeeds();
+    assert!(scratch.layers("plan/bitmaps.tif").len() < 25);
+    // It warns of low columns, too.
+    let ran = scratch.run(&format!("{line} --bitmaps 25 --force"));
+    assert_eq!(ran.statuses, [Some(1)]);
+    let said = "25 bitmaps are more than the mirrors have distinct times: ask for";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub struct Clusters {
 /// Fewer distinct times than clusters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{wanted} bitmaps are more than the mirrors have distinct times: at most {distinct} are of use"
+    "{wanted} bitmaps are more than the mirrors have distinct times: ask for {distinct} at most"
 )]
 pub struct TooFewTimes {
     /// Clusters that are wanted.

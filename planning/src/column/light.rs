@@ -60,6 +60,11 @@ impl ColumnLight {
         &self.setup
     }
 
+    /// Returns the light, found in another way.
+    pub(super) fn by(&self, tracing: Tracing) -> Self {
+        Self::new(Setup { tracing, ..self.setup.clone() })
+    }
+
     /// Returns the light on column voxels that stand so far from where they should, in um.
     #[must_use]
     pub fn shifted(&self, shift_um: [f64; 2]) -> Self {
@@ -110,17 +115,33 @@ impl ColumnLight {
     }
 }
 
-/// A grid of more columns than fit in memory.
+/// A grid that no plan can be made for.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("{columns} x {rows} columns of {pitch_um} um are too many: make them wider")]
-pub struct TooManyColumns {
-    /// Columns along x.
-    pub columns: usize,
-    /// Columns along y.
-    pub rows: usize,
-    /// The side of one, in um.
-    pub pitch_um: f64,
+#[non_exhaustive]
+pub enum GridError {
+    /// More columns than fit in memory.
+    #[error("{columns} x {rows} columns of {pitch_um} um are too many: make them wider")]
+    TooMany {
+        /// Columns along x.
+        columns: usize,
+        /// Columns along y.
+        rows: usize,
+        /// The side of one, in um.
+        pitch_um: f64,
+    },
+    /// Columns that do not tell mirrors from each other.
+    #[error(
+        "columns of {pitch_um} um are wider than {MOST_MIRRORS} mirrors, which the plan could not \
+         tell from each other: make them narrower"
+    )]
+    Wide {
+        /// The side of a column, in um.
+        pitch_um: f64,
+    },
 }
+
+/// Wider columns are refused.
+const MOST_MIRRORS: f64 = 4.0;
 
 /// A grid of more columns is refused: doses alone would take a gigabyte.
 const MOST_COLUMNS: usize = 1 << 26;
@@ -130,21 +151,29 @@ impl Setup {
     /// that light the part.
     ///
     /// # Errors
-    /// Returns an error if these are too many columns.
+    /// Returns an error if these are too many columns, or too wide ones.
     pub fn grid_around(
         projector: &Projector,
         size: [Length; 2],
         voxel: Length,
-    ) -> Result<Grid, TooManyColumns> {
+    ) -> Result<Grid, GridError> {
         let pitch_um = voxel.um();
-        let beside = 2.0 * spread_of(projector).reach() + projector.mirror_image().um();
-        let margin = (beside / pitch_um).ceil() as usize;
+        if pitch_um > MOST_MIRRORS * projector.pitch.value.um() {
+            return Err(GridError::Wide { pitch_um });
+        }
+        let margin = (Self::reach(projector).um() / pitch_um).ceil() as usize;
         let Grid { columns, rows, .. } = Grid::over(size, voxel);
         let [columns, rows] = [columns, rows].map(|count| count.saturating_add(2 * margin));
         if columns.saturating_mul(rows) > MOST_COLUMNS {
-            return Err(TooManyColumns { columns, rows, pitch_um });
+            return Err(GridError::TooMany { columns, rows, pitch_um });
         }
         Ok(Grid { columns, rows, pitch_um })
+    }
+
+    /// Returns how wide the light of a mirror is.
+    pub fn reach(projector: &Projector) -> Length {
+        let spread = 2.0 * spread_of(projector).reach();
+        Length::from_um(spread + projector.mirror_image().um())
     }
 
     /// Returns the setup of a projector over a grid. Mirrors too far out to light it are left out.

@@ -18,7 +18,7 @@ mod times;
 pub use bitmaps::Bitmap;
 pub use clusters::{Clusters, TooFewTimes};
 pub use curve::{HeightCurve, NoHeights};
-pub use light::{ColumnLight, Setup, TooManyColumns};
+pub use light::{ColumnLight, GridError, Setup};
 pub use measures::Measures;
 pub use plan::{ColumnError, ColumnOptions, ColumnPlan, Objective, plan};
 pub use spread::{Spread, Tracing};

@@ -9,6 +9,7 @@ use super::curve::HeightCurve;
 use super::heights::{HeightError, nearest_heights};
 use super::levels::{Wish, best_seconds};
 use super::light::ColumnLight;
+use super::spread::Tracing;
 use super::times::{Stop, Times, nearest_times};
 use crate::target::{HeightMap, Place};
 
@@ -31,6 +32,8 @@ pub struct ColumnOptions {
     pub objective: Objective,
     /// How many bitmaps are shown.
     pub bitmaps: usize,
+    /// Whether fewer will do where mirrors have fewer distinct times.
+    pub fewer: bool,
     /// For gray bitmaps: the light of each level as a share of white's, rising.
     pub gray: Option<Box<[f64; 256]>>,
     /// For how long a mirror may be on, in seconds.
@@ -51,12 +54,26 @@ pub enum ColumnError {
     /// A column has a height that no mirror reaches.
     #[error("no light reaches {0}: the target is wider than what the display lights")]
     Dark(Place),
+    /// A column that has a height, and light, but not at the points where it is counted.
+    #[error("no ray reaches {0}: count more rays of each mirror")]
+    NoRay(Place),
     /// A height that no dose cures.
     #[error("no dose that can be written down cures {0}")]
     NoDose(Length),
     /// More bitmaps than there are times.
     #[error(transparent)]
     TooFewTimes(#[from] TooFewTimes),
+    /// The longest time is too short.
+    #[error(
+        "{mirrors} mirrors would have to be on for longer than {max_s} s, the longest time that is \
+         allowed: allow more"
+    )]
+    MaxTime {
+        /// Mirrors that are on for all of it.
+        mirrors: usize,
+        /// The longest time, in seconds.
+        max_s: f64,
+    },
     /// All times are shorter than the display can show.
     #[error(
         "the longest time, {:.3} ms, is under the display's step of {:.3} ms: less light, or a \
@@ -145,7 +162,15 @@ impl<'a> Problem<'a> {
         let lit = light.doses(&vec![1.0; light.setup().mirrors.iter().product()]);
         let is_dark = |(height, light): (&f64, &f64)| *height > 0.0 && *light <= 0.0;
         if let Some(column) = heights_um.iter().zip(&lit).position(is_dark) {
-            return Err(ColumnError::Dark(Place::of(&target.grid, column)));
+            let place = Place::of(&target.grid, column);
+            let exact = light.by(Tracing::Exact);
+            let seconds = vec![1.0; light.setup().mirrors.iter().product()];
+            let is_missed = exact.doses(&seconds)[column] > 0.0;
+            return Err(if is_missed {
+                ColumnError::NoRay(place)
+            } else {
+                ColumnError::Dark(place)
+            });
         }
         let dose = |&um: &f64| curve.dose(um).ok_or(ColumnError::NoDose(Length::from_um(um)));
         let wanted = heights_um.iter().map(dose).collect::<Result<_, _>>()?;
@@ -175,12 +200,12 @@ impl<'a> Problem<'a> {
         let mirrors = Mirrors { count: setup.mirrors, display: setup.display };
         let times: Vec<_> = best.seconds.iter().map(|s| s / self.options.step_s).collect();
         let whole: Vec<_> = times.iter().map(|steps| steps.round() as u64).collect();
-        let clusters = Clusters::of(&whole, self.options.bitmaps)?;
+        let clusters = self.clusters(best, &whole)?;
         if let Some(shares) = &self.options.gray {
             return Ok(gray(mirrors, &times, &clusters, shares));
         }
         let of: Vec<_> = whole.iter().map(|&time| clusters.of_time(time) as u16).collect();
-        let seconds = self.best_seconds(best, &of);
+        let seconds = self.best_seconds(best, &of, clusters.lowest.len());
         let mut end = 0.0;
         let ends: Vec<_> = seconds
             .iter()
@@ -192,9 +217,26 @@ impl<'a> Problem<'a> {
         Ok(black_and_white(mirrors, &of, &ends))
     }
 
+    /// Returns the clusters of times in steps.
+    fn clusters(&self, best: &Times, steps: &[u64]) -> Result<Clusters, ColumnError> {
+        let ColumnOptions { bitmaps, fewer, max_s, .. } = *self.options;
+        let too_few = match Clusters::of(steps, bitmaps) {
+            Ok(clusters) => return Ok(clusters),
+            Err(too_few) => too_few,
+        };
+        let mirrors = best.at_most(max_s);
+        if 2 * mirrors > steps.iter().filter(|steps| **steps > 0).count() {
+            return Err(ColumnError::MaxTime { mirrors, max_s });
+        }
+        match too_few.distinct {
+            distinct @ 1.. if fewer => Ok(Clusters::of(steps, distinct)?),
+            _ => Err(too_few.into()),
+        }
+    }
+
     /// Returns the best times of bitmaps.
-    fn best_seconds(&self, best: &Times, clusters: &[u16]) -> Vec<f64> {
-        let ColumnOptions { objective, max_s, bitmaps, .. } = *self.options;
+    fn best_seconds(&self, best: &Times, clusters: &[u16], count: usize) -> Vec<f64> {
+        let ColumnOptions { objective, max_s, .. } = *self.options;
         let wishes: Vec<_> = match objective {
             Objective::Dose => Vec::new(),
             Objective::Height => {
@@ -215,7 +257,7 @@ impl<'a> Problem<'a> {
                 .map(|(light, to)| Wish { light, wanted: &to.wanted, weights: &to.weights })
                 .collect(),
         };
-        best_seconds(&wishes, clusters, bitmaps, max_s)
+        best_seconds(&wishes, clusters, count, max_s)
     }
 
     /// Returns the error of times.

@@ -34,6 +34,11 @@ impl Times {
     pub fn relative_gap(&self) -> f64 {
         if self.gap > 0.0 { self.gap / self.error } else { 0.0 }
     }
+
+    /// Returns how many mirrors are on for the longest time that is allowed.
+    pub fn at_most(&self, max_s: f64) -> usize {
+        self.seconds.iter().filter(|seconds| **seconds >= max_s).count()
+    }
 }
 
 /// Returns the Frank-Wolfe gap: no times between zero and `high` have an error smaller by more.

@@ -55,6 +55,7 @@ pub(crate) fn options(objective: Objective, bitmaps: usize) -> ColumnOptions {
     ColumnOptions {
         objective,
         bitmaps,
+        fewer: false,
         gray: None,
         max_s: LONGEST_S,
         robust: Length::default(),

@@ -54,9 +54,9 @@ pub(super) struct ColumnCureArgs {
     #[arg(long, value_name = "NAME|FILE")]
     material: PathBuf,
 
-    /// How many bitmaps there are, at most
-    #[arg(long, value_name = "N", default_value = "25", value_parser = parse_bitmaps)]
-    bitmaps: usize,
+    /// How many bitmaps there are [default: 25, or as many as there are distinct times]
+    #[arg(long, value_name = "N", value_parser = parse_bitmaps)]
+    bitmaps: Option<usize>,
 
     /// Make 8-bit bitmaps, for displays that show gray levels
     #[arg(long)]
@@ -111,10 +111,15 @@ fn parse_bitmaps(text: &str) -> Result<usize, String> {
     }
 }
 
+/// No resin is exposed for longer.
+const A_DAY_S: f64 = 86_400.0;
+/// Bitmaps where none are asked for, as in 000.
+const BITMAPS: usize = 25;
+
 fn parse_time(text: &str) -> Result<ExposureTime, String> {
     match text.parse::<ExposureTime>() {
-        Ok(time) if time.ms() > 0.0 => Ok(time),
-        Ok(_) => Err("a mirror must be allowed some time".to_owned()),
+        Ok(time) if time.ms() > 0.0 && time.ms() <= 1000.0 * A_DAY_S => Ok(time),
+        Ok(_) => Err("a mirror must be allowed some time, and a day at most".to_owned()),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -200,11 +205,15 @@ impl ColumnCureArgs {
     ) -> Result<ColumnOptions, Exit> {
         let max_s = match self.max_time {
             Some(time) => time.ms() / 1000.0,
-            None => {
-                let dose = curve.dose(map.highest_um()).unwrap_or(f64::INFINITY);
-                4.0 * dose / projector.irradiance().mw_per_cm2()
-            }
+            None => self.usual_max_s(projector, map, curve)?,
         };
+        let reach = Setup::reach(projector);
+        if let Some(robust) = self.robust.filter(|robust| *robust > reach) {
+            let reach = Length::from_um(reach.um().floor());
+            let text =
+                format!("--robust {robust}: a mirror's light is about {reach} wide: give less");
+            return Err(Exit::usage(text));
+        }
         let shares: [f64; 256] = std::array::from_fn(|level| projector.share(level as u8));
         if self.gray && !shares.is_sorted() {
             let name = self.projector.display();
@@ -213,13 +222,33 @@ impl ColumnCureArgs {
         }
         Ok(ColumnOptions {
             objective: self.optimise,
-            bitmaps: self.bitmaps,
+            bitmaps: self.bitmaps.unwrap_or(BITMAPS),
+            fewer: self.bitmaps.is_none(),
             gray: self.gray.then(|| Box::new(shares)),
             max_s,
             robust: self.robust.unwrap_or_default(),
             step_s: projector.step.value.ms() / 1000.0,
             stop: Stop { gap: self.gap, steps: MOST_STEPS },
         })
+    }
+
+    /// Four times what a wide white field takes for the highest column.
+    fn usual_max_s(
+        &self,
+        projector: &Projector,
+        map: &HeightMap,
+        curve: &HeightCurve,
+    ) -> Result<f64, Exit> {
+        let highest = Length::from_um(map.highest_um());
+        let dose = curve.dose(highest.um()).unwrap_or(f64::INFINITY);
+        let wide_s = dose / projector.irradiance().mw_per_cm2();
+        if wide_s > A_DAY_S {
+            let name = self.target.target.display();
+            let text =
+                format!("{name}: a column of {highest} takes more than a day of white light");
+            return Err(Exit::Failed(anyhow!(text)));
+        }
+        Ok((4.0 * wide_s).min(A_DAY_S))
     }
 
     fn bitmaps(&self, projector: &Projector, plan: &ColumnPlan) -> Vec<Bitmap> {
@@ -244,7 +273,7 @@ impl ColumnCureArgs {
             target.name(),
             projector.name,
             material.name,
-            self.bitmaps,
+            options.bitmaps,
             self.optimise,
             options.max_s,
             self.gap

@@ -33,7 +33,10 @@ pub(super) fn lines_of(reported: &Reported<'_>) -> Vec<String> {
     let steps: u64 = plan.bitmaps.iter().map(|bitmap| bitmap.steps).sum();
     let seconds = steps as f64 * reported.options.step_s;
     let mut lines = vec![
-        format!("{} bitmaps in {seconds:.3} s", plan.bitmaps.len()),
+        match plan.bitmaps.len() {
+            1 => format!("1 bitmap of {seconds:.3} s"),
+            count => format!("{count} bitmaps in {seconds:.3} s"),
+        },
         line(&measures),
         format!(
             "the bitmaps' error is {:.2}% above that of the best times, which is within {:.1e} of \
@@ -47,6 +50,13 @@ pub(super) fn lines_of(reported: &Reported<'_>) -> Vec<String> {
             "the search stopped after {} steps, before it was within {:.1e}: a shorter --max-time \
              or a wider --gap ends sooner",
             plan.best.steps, reported.options.stop.gap
+        ));
+    }
+    let at_max = plan.best.at_most(reported.options.max_s);
+    if at_max > 0 {
+        lines.push(format!(
+            "{at_max} mirrors would be on for longer than --max-time {:.3}s if they could",
+            reported.options.max_s
         ));
     }
     lines
@@ -98,7 +108,6 @@ pub(super) fn report_of(reported: &Reported<'_>) -> Value {
         Objective::Dose => "(mJ/cm2)2",
         Objective::Height => "um2",
     };
-    let at_max = plan.best.seconds.iter().filter(|time| **time >= options.max_s).count();
     let lights = [1.0 - LIGHT, 1.0 + LIGHT];
     json!({
         "schema": "lamp-plan-column-cure-1",
@@ -118,7 +127,7 @@ pub(super) fn report_of(reported: &Reported<'_>) -> Value {
         "mirror_um": setup.pitch_um,
         "irradiance_mw_per_cm2": setup.irradiance,
         "max_time_s": options.max_s,
-        "mirrors_at_max_time": at_max,
+        "mirrors_at_max_time": plan.best.at_most(options.max_s),
         "error_unit": unit,
         "best": {
             "error": plan.best.error,
