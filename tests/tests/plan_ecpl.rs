@@ -150,6 +150,10 @@ fn what_cannot_be_cured_is_refused_in_a_sentence() {
     scratch.write("high.toml", high.as_bytes());
     let dim = String::from_utf8(scratch.bytes("sharp.toml")).unwrap();
     scratch.write("dim.toml", dim.replace("25.7 W/m2", "0.01 W/m2").as_bytes());
+    scratch.write("thin.toml", high.replace("'210 um'", "'0.1 um'").as_bytes());
+    let bright = dim.replace("25.7 W/m2", "900000 W/m2");
+    scratch.write("bright.toml", bright.as_bytes());
+    scratch.write("coarse.toml", dim.replace("\"0.1 s\"", "\"30 s\"").as_bytes());
     let plan = |target: &str, projector: &str, material: &str| {
         let line = format!(
             "lamp plan ecpl {target} --projector {projector} --material {material} -o plan"
@@ -160,6 +164,9 @@ fn what_cannot_be_cured_is_refused_in_a_sentence() {
         ("lens-array", "jariwala", "tmpta", &["lens-array", "not round about the axis"][..]),
         ("high.toml", "jariwala", "tmpta", &["210.0 um high", "200.0 um", "make it lower"]),
         ("small.toml", "dim.toml", "tmpta", &["small.toml", "300 s of light", "brighter"]),
+        ("thin.toml", "jariwala", "tmpta", &["thin.toml", "no better than nothing"]),
+        ("small.toml", "bright.toml", "tmpta", &["small.toml", "too small", "100 ms"]),
+        ("small.toml", "coarse.toml", "tmpta", &["step is 30000 ms", "2 s is the most"]),
         ("small.toml", "zhao", "tmpta", &["zhao", "over a cone", "sigma"]),
         ("small.toml", "jariwala", "pegda-mw700", &["pegda-mw700", "add [kinetics]"]),
     ] {

@@ -64,6 +64,19 @@ pub enum PlanError {
         /// The display's step.
         step: ExposureTime,
     },
+    /// The best plan is as far from the part as nothing is.
+    #[error(
+        "the best bitmaps cure {cured_um:.1} um where {wanted_um:.1} um are wanted, which is no \
+         better than nothing: light spreads too far, or cures too much in the display's step of {step}"
+    )]
+    NoBetter {
+        /// The height that they cure.
+        cured_um: f64,
+        /// The height that is wanted.
+        wanted_um: f64,
+        /// The display's step.
+        step: ExposureTime,
+    },
     /// A plan without light.
     #[error("no bitmap shows anything: give at least one white pixel")]
     Dark,
@@ -150,6 +163,11 @@ pub fn plan(
     let simulation = Simulation::of_plan(setting, &exposures, radius_um)?;
     let wanted = Wanted::new(simulation.reaction().cells(), height_um);
     let cured = simulation.cure(&exposures);
+    let nothing = Profile { heights_um: vec![0.0; cured.heights_um.len()], ..cured.clone() };
+    if wanted.rms_um(&cured) >= wanted.rms_um(&nothing) {
+        let (cured_um, wanted_um) = (cured.highest_um(), wanted.highest_um());
+        return Err(PlanError::NoBetter { cured_um, wanted_um, step: setting.step });
+    }
     Ok(Planned { simulation, wanted, exposures, cured })
 }
 

@@ -6,6 +6,9 @@ use thiserror::Error;
 use super::cells::{Cells, Shape};
 use crate::projector::{Projector, SpreadOf};
 
+/// The longest step of a display: 003's resin cures its part in some 20 s.
+const LONGEST_DISPLAY_S: f64 = 2.0;
+
 /// The longest step of the reaction, in seconds. Heights are then within 0.1 µm of those of
 /// steps ten times as short.
 const LONGEST_STEP_S: f64 = 0.025;
@@ -57,6 +60,11 @@ pub enum SettingError {
     /// The blur is below zero, or not finite.
     #[error("the blur must be zero or more")]
     Blur,
+    /// A step of the display that is too coarse for any plan.
+    #[error(
+        "the display's step is {0}: {LONGEST_DISPLAY_S} s is the most that parts can be planned with"
+    )]
+    LongStep(ExposureTime),
     /// Cells of a useful size would be too many.
     #[error("a chamber of {wide_um:.0} x {deep_um:.0} um is too large to compute")]
     TooLarge {
@@ -104,6 +112,9 @@ impl Setting {
             if !(number > 0.0 && number.is_finite()) {
                 return Err(SettingError::NotPositive(what));
             }
+        }
+        if self.step.ms() > 1000.0 * LONGEST_DISPLAY_S {
+            return Err(SettingError::LongStep(self.step));
         }
         if self.sigma_um >= 0.0 && self.sigma_um.is_finite() {
             Ok(())
