@@ -104,7 +104,7 @@ fn what_cannot_be_planned_is_refused_in_a_sentence() {
     };
     refused("--bitmaps 1000 --max-time 500ms", &["longer than 0.5 s", "allow more"]);
     refused("--voxel 0.1um", &["too many"]);
-    refused("--voxel 10mm", &["columns of 10000 um are wider than 4 mirrors"]);
+    refused("--voxel 10mm", &["columns of 10000 um are wider than a mirror's 27.88 um"]);
     refused("--rays 1x1", &["no ray reaches column", "count more rays"]);
     let mut resin =
         String::from_utf8(scratch.run("lamp material show pegda-mw700").succeeds().stdout).unwrap();
@@ -113,7 +113,9 @@ fn what_cannot_be_planned_is_refused_in_a_sentence() {
     scratch
         .run(&LENSES.replace("pegda-mw700", "fast.toml"))
         .is_refused_with(&["the longest time", "under the display's step of 1.000 ms"]);
-    scratch.run(&LENSES.replace("zhao", "jariwala")).is_refused_with(&["jariwala", "--voxel 10um"]);
+    scratch
+        .run(&LENSES.replace("zhao", "jariwala"))
+        .is_refused_with(&["jariwala", "--voxel, at most 6.222um"]);
     scratch.run(&format!("{LENSES} --rays 9")).is_wrong_usage(&["9x15"]);
     scratch.run(&format!("{LENSES} --max-time 0s")).is_wrong_usage(&["some time"]);
     scratch.run(&format!("{LENSES} --max-time 1e300s")).is_wrong_usage(&["a day at most"]);

@@ -129,19 +129,17 @@ pub enum GridError {
         /// The side of one, in um.
         pitch_um: f64,
     },
-    /// Columns that do not tell mirrors from each other.
+    /// Columns that do not tell mirrors from each other: doses could be met, and heights not.
     #[error(
-        "columns of {pitch_um} um are wider than {MOST_MIRRORS} mirrors, which the plan could not \
-         tell from each other: make them narrower"
+        "columns of {pitch_um} um are wider than a mirror's {mirror_um:.2} um: make them narrower"
     )]
     Wide {
         /// The side of a column, in um.
         pitch_um: f64,
+        /// From a mirror to the next, in um.
+        mirror_um: f64,
     },
 }
-
-/// Wider columns are refused.
-const MOST_MIRRORS: f64 = 4.0;
 
 /// A grid of more columns is refused: doses alone would take a gigabyte.
 const MOST_COLUMNS: usize = 1 << 26;
@@ -158,8 +156,9 @@ impl Setup {
         voxel: Length,
     ) -> Result<Grid, GridError> {
         let pitch_um = voxel.um();
-        if pitch_um > MOST_MIRRORS * projector.pitch.value.um() {
-            return Err(GridError::Wide { pitch_um });
+        let mirror_um = projector.pitch.value.um();
+        if pitch_um > mirror_um {
+            return Err(GridError::Wide { pitch_um, mirror_um });
         }
         let margin = (Self::reach(projector).um() / pitch_um).ceil() as usize;
         let Grid { columns, rows, .. } = Grid::over(size, voxel);

@@ -183,7 +183,9 @@ impl ColumnCureArgs {
         let voxel = self.voxel.or(projector.voxel.as_ref().map(|voxel| voxel.value));
         let Some(voxel) = voxel else {
             let name = self.projector.display();
-            let text = format!("{name} does not say how wide columns are: give --voxel 10um");
+            let most = projector.pitch.value.to_whole_nm();
+            let text =
+                format!("{name} does not say how wide columns are: give --voxel, at most {most}");
             return Err(Exit::Failed(anyhow!(text)));
         };
         let tracing = self.rays.unwrap_or_default();
