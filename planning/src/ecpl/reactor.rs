@@ -193,7 +193,9 @@ fn faded(power: f64) -> f64 {
 
 /// Finds the radicals `R` of some cells, where `source` is what was there and what light made:
 ///
-///     R + 2 k_t dt R² + k dt R O / (1 + k dt R) = source,   k = k_t,O2
+/// ```text
+/// R + 2 k_t dt R² + k dt R O / (1 + k dt R) = source,   k = k_t,O2
+/// ```
 ///
 /// The left side grows with R, so there is one solution. Multiplied by 1 + k dt R, it is a cubic
 /// that is convex above zero: from above, Newton's method never passes the solution.
