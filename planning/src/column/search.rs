@@ -78,7 +78,13 @@ impl<C: Curvature> Bounded<'_, C> {
                 let product = self.curvature.apply(&direction);
                 let (along, curvature, room) = self.along(&place, &direction, &product);
                 let best = along / curvature;
-                if best <= room {
+                // With one number free, nothing is conjugate to the last direction but zero.
+                let leads_down = along > 0.0 && curvature > 0.0;
+                if !leads_down {
+                    self.project(&mut place, length);
+                    sums = self.sums(&place, None, length);
+                    direction = self.free(&place);
+                } else if best <= room {
                     self.walk(&mut place, &direction, &product, best);
                     sums = self.sums(&place, Some(&product), length);
                     let turn = sums.conjugate / curvature;
@@ -205,5 +211,30 @@ impl<C: Curvature> Bounded<'_, C> {
         numbers.with_min_len(CHUNK).for_each(|((&x, &slope), direction)| {
             *direction = slope_at(x, slope, self.high).free - turn * *direction;
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A matrix of one number.
+    struct One(f64);
+
+    impl Curvature for One {
+        fn apply(&self, numbers: &[f64]) -> Vec<f64> {
+            vec![self.0 * numbers[0]]
+        }
+    }
+
+    #[test]
+    fn a_search_may_go_on_where_nothing_is_left() {
+        for k in 1..200 {
+            let (curvature, pull) = (One(1.0 / f64::from(k)), [f64::from(k % 17) + 0.1]);
+            let problem = Bounded { curvature: &curvature, pull: &pull, high: 1e3 };
+            let place = problem.search(vec![0.0], 50, |_, step| step >= 50);
+            let least = (pull[0] / curvature.0).min(1e3);
+            assert!((place.x[0] / least - 1.0).abs() < 1e-12, "{k}: {} for {least}", place.x[0]);
+        }
     }
 }
