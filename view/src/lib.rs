@@ -1,0 +1,1 @@
+//! A local web viewer of stacks: tiles of any scale come straight from runs.
