@@ -24,6 +24,9 @@ pub enum StackError {
         /// The first bytes of the input.
         start: Vec<u8>,
     },
+    /// The stack was written to, cut short or replaced after it was opened.
+    #[error("the stack has changed since it was opened; open it again")]
+    Changed,
     /// The input ends within a page.
     #[error("the stack is cut off: {}; run the stage that wrote it again", last_whole_text(*.last_whole))]
     CutOff {

@@ -106,13 +106,26 @@ impl Pages {
     }
 
     /// Returns what the pages say without their images, in order. Data is passed over.
-    pub fn headers(mut self) -> impl Iterator<Item = Result<PageHeader, StackError>> {
+    pub fn headers(self) -> impl Iterator<Item = Result<PageHeader, StackError>> {
+        self.without_images().map(|page| page.map(|page| page.header()))
+    }
+
+    /// Passes over the data of images: the pages cannot be decoded.
+    pub(crate) fn without_images(mut self) -> Self {
         self.images = false;
         self.source = match self.source {
             Source::One(reader) => Source::One(reader.without_images()),
             folder @ Source::Folder(_) => folder,
         };
-        self.map(|page| page.map(|page| page.header()))
+        self
+    }
+
+    /// Returns where the next page is, if there may be one.
+    pub(crate) fn next_place(&self) -> Option<PagePlace> {
+        match &self.source {
+            Source::One(reader) => Some(PagePlace::Offset(reader.next_offset())),
+            Source::Folder(files) => files.last().cloned().map(PagePlace::File),
+        }
     }
 
     fn next_page(&mut self) -> Option<Result<Page, StackError>> {
@@ -132,12 +145,8 @@ impl Pages {
     /// Reads the single page of a folder's file.
     fn page_of_file(&self, file: &Path) -> Result<Page, StackError> {
         let reader = PageReader::from_file(File::open(file)?)?;
-        let mut reader = reader.with_limits(self.limits).numbered(self.count, self.last_whole);
-        if !self.images {
-            reader = reader.without_images();
-        }
-        let page = reader.next().unwrap_or(Err(StackError::Empty))?;
-        if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
+        let reader = reader.with_limits(self.limits).numbered(self.count, self.last_whole);
+        only_page(if self.images { reader } else { reader.without_images() })
     }
 
     /// Checks that a page follows the page before it.
@@ -210,6 +219,20 @@ impl Iterator for Pages {
             }
         }
     }
+}
+
+/// Where a page is.
+pub(crate) enum PagePlace {
+    /// The offset of its directory in the stack's file.
+    Offset(u64),
+    /// A file of the stack's folder.
+    File(PathBuf),
+}
+
+/// Reads the page of a folder's file, which must have one alone.
+pub(crate) fn only_page(mut reader: PageReader) -> Result<Page, StackError> {
+    let page = reader.next().unwrap_or(Err(StackError::Empty))?;
+    if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
 }
 
 /// Lists the pages of a folder, last name first: its TIFFs or PNGs, or where there are none its

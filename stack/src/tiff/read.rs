@@ -112,14 +112,30 @@ impl PageReader {
 
     /// Passes over the data of images: the pages cannot be decoded.
     pub(crate) fn without_images(self) -> Self {
-        Self { images: false, ..self }
+        Self { source: self.source.reading_little_ahead(), images: false, ..self }
+    }
+
+    /// Returns the offset of the next page's directory.
+    pub(crate) fn next_offset(&self) -> u64 {
+        self.next
+    }
+
+    /// Goes to the page whose directory is at an offset of a file.
+    pub(crate) fn at_offset(&mut self, offset: u64) {
+        self.seen.clear();
+        self.next = offset;
     }
 
     /// Numbers the pages from `first`, after the layer `last_whole`, for a folder's later files.
     pub(crate) fn numbered(mut self, first: u32, last_whole: Option<u32>) -> Self {
+        self.number_from(first, last_whole);
+        self
+    }
+
+    /// Numbers the pages from `first`, after the layer `last_whole`.
+    pub(crate) fn number_from(&mut self, first: u32, last_whole: Option<u32>) {
         self.number = first;
         self.last_whole = last_whole;
-        self
     }
 
     /// Returns whether no page follows.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 /// A source of bytes.
 pub(super) enum Source {
@@ -25,6 +25,18 @@ impl Source {
         match self {
             Self::Stream { position, .. } => offset >= *position,
             Self::File { .. } => true,
+        }
+    }
+
+    /// Reads less of a file ahead, for small reads far from each other. A pipe that was opened
+    /// as a file stays as it is.
+    pub(super) fn reading_little_ahead(self) -> Self {
+        match self {
+            Self::File { mut file, position } => match file.seek(SeekFrom::Start(position)) {
+                Ok(_) => Self::File { file: BufReader::new(file.into_inner()), position },
+                Err(_) => Self::File { file, position },
+            },
+            stream @ Self::Stream { .. } => stream,
         }
     }
 
