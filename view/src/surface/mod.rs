@@ -1,0 +1,111 @@
+//! The surface of a stack, from runs.
+//!
+//! A stack is divided into cubic cells. The share of a cell that is white comes from the runs of
+//! the layers in it, and the surface runs where that share is a half: naive surface nets
+//! (S. Gibson, *Constrained elastic surface nets*, MICCAI 1998), as `fast-surface-nets` makes them.
+
+mod cells;
+mod nets;
+mod planes;
+mod scale;
+
+use lamp_stack::Length;
+use thiserror::Error;
+
+pub use cells::{CellGrid, MAX_CELLS, SurfaceOptions};
+
+/// The surface of a stack, as triangles.
+///
+/// # Guarantees
+/// It is closed: along each edge as many triangles run one way as the other. Where two pieces of
+/// the surface touch, four triangles meet in an edge. Triangles run counter-clockwise seen from
+/// outside.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// What coordinates count.
+    pub unit: SurfaceUnit,
+    /// The vertices, x to the right, y to the back and z up, in part coordinates.
+    pub vertices: Vec<[f32; 3]>,
+    /// The direction out of the part at each vertex, of length one.
+    pub normals: Vec<[f32; 3]>,
+    /// The vertices of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// What the coordinates of a surface count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SurfaceUnit {
+    /// Millimetres.
+    Millimetres,
+    /// Pixels, where the stack does not state its resolution and heights. A layer is then as thick
+    /// as a pixel is wide, and the lower left corner of the image is at zero.
+    Pixels,
+}
+
+/// The first bytes of a surface for the page.
+const MAGIC: &[u8; 4] = b"LSRF";
+/// The version of their form.
+const VERSION: u32 = 1;
+
+impl Surface {
+    /// Returns the corners of each triangle.
+    pub fn facets(&self) -> impl ExactSizeIterator<Item = [[f32; 3]; 3]> + '_ {
+        self.triangles.iter().map(|triangle| triangle.map(|vertex| self.vertices[vertex as usize]))
+    }
+
+    /// Returns the surface as the viewer's page reads it: `LSRF`, version, numbers of vertices and
+    /// triangles, vertices, normals and triangles, all little-endian and of four bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let head = [VERSION, self.vertices.len() as u32, self.triangles.len() as u32];
+        let places = self.vertices.iter().chain(&self.normals).flatten();
+        let mut bytes =
+            Vec::with_capacity(16 + 24 * self.vertices.len() + 12 * self.triangles.len());
+        bytes.extend_from_slice(MAGIC);
+        bytes.extend(head.into_iter().flat_map(u32::to_le_bytes));
+        bytes.extend(places.flat_map(|place| place.to_le_bytes()));
+        bytes.extend(self.triangles.iter().flatten().flat_map(|vertex| vertex.to_le_bytes()));
+        bytes
+    }
+}
+
+/// A stack without a surface.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// The heights of layers do not go up.
+    #[error("layer {layer}: by its z and thickness it does not stand above the layer before it")]
+    Heights {
+        /// The layer's index.
+        layer: u32,
+    },
+    /// Images of layers do not lie above each other.
+    #[error("layer {layer} has another resolution or origin than the layers before it")]
+    Unlike {
+        /// The layer's index.
+        layer: u32,
+    },
+    /// A layer's image is larger than its page said.
+    #[error("layer {layer} is larger than its page said before")]
+    Grown {
+        /// The layer's index.
+        layer: u32,
+    },
+    /// No cell is white enough.
+    #[error(
+        "there is no surface: all is black, or thinner than half a cell{}",
+        .cell.map(|side| format!(" of {}", side.to_whole_nm())).unwrap_or_default()
+    )]
+    Nothing {
+        /// The side of a cell, if the stack states its resolution.
+        cell: Option<Length>,
+    },
+    /// The surface has too many triangles.
+    #[error("the surface has more than {most} triangles")]
+    TooManyTriangles {
+        /// The limit.
+        most: usize,
+    },
+}
+
+#[cfg(test)]
+mod tests;
