@@ -14,6 +14,7 @@ use lamp_slicer::SliceError;
 use lamp_slicer::topology::NoSolid;
 use lamp_stack::{JoinError, SplitError, StackError};
 use lamp_supports::{CheckError, SupportError};
+use lamp_view::SurfaceError;
 
 use crate::hints::hint;
 
@@ -118,6 +119,7 @@ failures!(
     SliceError,
     CheckError,
     SupportError,
+    SurfaceError,
     DitherError,
     EditError,
     TileError,

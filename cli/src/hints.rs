@@ -24,6 +24,7 @@ use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_slicer::topology::NoSolid;
 use lamp_stack::{CatalogueError, Length, StackError};
 use lamp_supports::SupportError;
+use lamp_view::SurfaceError;
 
 /// Returns what to try about an error, to stand after its message.
 pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
@@ -40,6 +41,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(layout))
         .or_else(|| error.downcast_ref().and_then(edit))
         .or_else(|| error.downcast_ref().and_then(support))
+        .or_else(|| error.downcast_ref().and_then(surface))
         .or_else(|| error.downcast_ref().and_then(compensate))
         .or_else(|| error.downcast_ref().and_then(light))
         .or_else(|| error.downcast_ref().and_then(plan))
@@ -202,6 +204,15 @@ fn support(error: &SupportError) -> Option<String> {
         }
         SupportError::TooMany => "give a wider --hold, or turn or change the part",
         SupportError::MissingLayers => "support it again once nothing writes to it",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn surface(error: &SurfaceError) -> Option<String> {
+    let hint = match error {
+        SurfaceError::Nothing { .. } => "give more --cells",
+        SurfaceError::TooManyTriangles { .. } => "give fewer --cells",
         _ => return None,
     };
     Some(hint.to_owned())

@@ -333,6 +333,17 @@ pub(crate) fn check_png_name(path: &Path) -> Result<(), Exit> {
     Ok(())
 }
 
+/// Refuses to write a mesh under the name of another kind of file.
+pub(crate) fn check_stl_name(path: &Path) -> Result<(), Exit> {
+    match &*extension(path) {
+        "" | "stl" => Ok(()),
+        _ => {
+            let path = path.display();
+            Err(Exit::usage(format!("{path}: meshes are written as STL: name a .stl file")))
+        }
+    }
+}
+
 /// Returns what a file's name ends in, in small letters.
 fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
@@ -467,4 +478,19 @@ pub(crate) fn write_file(
         file.persist()
     };
     Ok(whole().with_context(|| path.display().to_string())?)
+}
+
+/// Writes a mesh to a file, as [`write_file`] does, or to standard output.
+pub(crate) fn write_mesh(
+    output: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Exit> {
+    if !is_stream(output) {
+        return write_file(output, write);
+    }
+    if io::stdout().is_terminal() {
+        return Err(Exit::usage("a mesh is not for a terminal: name a file with -o"));
+    }
+    let written = write(&mut io::stdout().lock());
+    written.map_err(|error| Exit::output(error, "standard output"))
 }

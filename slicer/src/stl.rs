@@ -65,8 +65,11 @@ impl Part {
 ///
 /// # Errors
 /// Returns an error if `out` fails.
-pub fn write_stl(facets: &[Facet], mut out: impl Write) -> io::Result<()> {
-    stl_io::write_stl(&mut out, facets.iter().map(triangle))
+pub fn write_stl(
+    facets: impl ExactSizeIterator<Item = Facet>,
+    mut out: impl Write,
+) -> io::Result<()> {
+    stl_io::write_stl(&mut out, facets.map(|facet| triangle(&facet)))
 }
 
 fn triangle(facet: &Facet) -> Triangle {

@@ -128,6 +128,17 @@ impl IndexedStack {
         self.end.as_ref()
     }
 
+    /// Returns the stack if it is whole.
+    ///
+    /// # Errors
+    /// Returns why no pages follow the last, if that is not the stack's end.
+    pub fn into_whole(mut self) -> Result<Self, StackError> {
+        match self.end.take() {
+            Some(error) => Err(error),
+            None => Ok(self),
+        }
+    }
+
     /// Reads a page by its position from the bottom.
     ///
     /// # Errors
@@ -233,6 +244,7 @@ mod tests {
                     let whole = stack.headers().len();
                     assert!(matches!(stack.end(), Some(StackError::CutOff { .. })), "{length}");
                     assert_eq!(stack.layer(whole - 1).unwrap().image, layers()[whole - 1].image);
+                    assert!(stack.into_whole().is_err());
                 }
                 Err(error) => assert!(matches!(error, StackError::CutOff { .. }), "{error}"),
             }

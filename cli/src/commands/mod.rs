@@ -19,6 +19,7 @@ mod machine;
 mod man;
 mod material;
 mod mesh;
+mod mesh_out;
 mod orient;
 mod plan;
 mod projector;
@@ -66,6 +67,7 @@ pub(crate) enum Command {
     Orient(orient::OrientArgs),
     Brep(brep::BrepArgs),
     Mesh(mesh::MeshArgs),
+    MeshOut(mesh_out::MeshOutArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -112,6 +114,7 @@ impl Command {
             Self::Orient(args) => orient::run(args, common),
             Self::Brep(args) => brep::run(args),
             Self::Mesh(args) => mesh::run(args, common),
+            Self::MeshOut(args) => mesh_out::run(args, common),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
         }

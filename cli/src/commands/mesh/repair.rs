@@ -1,7 +1,7 @@
 //! `lamp mesh repair`: mends a mesh.
 
 use std::fs::File;
-use std::io::{self, IsTerminal, Read, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -18,7 +18,7 @@ use crate::exit::Exit;
 use crate::json_report::{JsonReport, parse_report};
 use crate::options::{Common, parse_distance};
 use crate::progress::say;
-use crate::streams::{check_beside, check_not_input, is_stream, write_file};
+use crate::streams::{check_beside, check_not_input, check_stl_name, is_stream, write_mesh};
 
 /// Mend a mesh: weld, drop, turn over and add facets, and list each
 ///
@@ -59,10 +59,7 @@ pub(super) struct RepairArgs {
 pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     let (name, input) = (args.part.name(), &args.part.part);
     check_not_input(&args.output, [input])?;
-    if args.output.extension().is_some_and(|end| !end.eq_ignore_ascii_case("stl")) {
-        let output = args.output.display();
-        return Err(Exit::usage(format!("{output}: meshes are written as STL: name a .stl file")));
-    }
+    check_stl_name(&args.output)?;
     if let Some(report) = &args.report {
         check_beside(report, &args.output, [input])?;
     }
@@ -77,7 +74,7 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
             copy(input, &bytes, out)?;
             part.check_unchanged().map_err(io::Error::other)
         })?,
-        false => write_mesh(output, |out| write_stl(&repaired.facets, out))?,
+        false => write_mesh(output, |out| write_stl(repaired.facets.iter().copied(), out))?,
     }
     let left = faults_left(&repaired).map_err(failed)?;
     if !common.quiet {
@@ -117,20 +114,6 @@ fn copy(input: &Path, mut bytes: &[u8], out: &mut dyn Write) -> io::Result<()> {
         false => io::copy(&mut File::open(input)?, out)?,
     };
     Ok(())
-}
-
-fn write_mesh(
-    output: &Path,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), Exit> {
-    if !is_stream(output) {
-        return write_file(output, write);
-    }
-    if io::stdout().is_terminal() {
-        return Err(Exit::usage("a mesh is not for a terminal: name a file with -o"));
-    }
-    let written = write(&mut io::stdout().lock());
-    written.map_err(|error| Exit::output(error, "standard output"))
 }
 
 /// Returns a sentence for each kind of fault that is left.

@@ -1,0 +1,106 @@
+//! `lamp mesh-out`: writes the surface of a stack.
+
+use std::io::Seek;
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lamp_slicer::write_stl;
+use lamp_stack::{IndexedStack, StackError};
+use lamp_view::{CellGrid, MAX_CELLS, Surface, SurfaceError, SurfaceOptions, SurfaceUnit};
+
+use crate::exit::Exit;
+use crate::options::Common;
+use crate::progress::Progress;
+use crate::streams::{
+    check_not_input, check_stl_name, failed_at, input_name, is_stream, spool_stdin, write_mesh,
+};
+
+/// Write the surface of a stack as a mesh
+///
+/// The stack is divided into cubic cells, a whole number of pixels wide. The surface runs where
+/// cells are half white: what is thinner than half a cell is left out, and edges are rounded by up
+/// to half a cell. Gray levels count by their share of white. The mesh is a closed binary STL in
+/// millimetres, at the place of the part.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp mesh-out build.tif -o surface.stl
+  lamp mesh-out fixed.tif -o part.stl --cells 512
+  slice blade.stl | fix | lamp mesh-out -o - | lamp mesh check -")]
+pub(crate) struct MeshOutArgs {
+    /// The stack: a TIFF or picture file, a folder of pages, or - for standard input
+    #[arg(value_name = "STACK", default_value = "-")]
+    stack: PathBuf,
+
+    /// Where to write the mesh: an STL file, or - for standard output
+    #[arg(short, long, value_name = "OUT.stl")]
+    output: PathBuf,
+
+    /// About how many cells there are along the longest side, from 8 to 1024
+    #[arg(long, value_name = "N", default_value = "256", value_parser = parse_cells)]
+    cells: NonZeroU32,
+}
+
+/// What an STL of two gigabytes holds.
+const MAX_TRIANGLES: usize = 40_000_000;
+
+fn parse_cells(text: &str) -> Result<NonZeroU32, String> {
+    let cells =
+        text.parse().ok().filter(|cells: &NonZeroU32| (8..=MAX_CELLS).contains(&cells.get()));
+    cells.ok_or_else(|| format!("`{text}` is not a number of cells from 8 to {MAX_CELLS}"))
+}
+
+pub(crate) fn run(args: &MeshOutArgs, common: &Common) -> Result<(), Exit> {
+    check_not_input(&args.output, [&args.stack])?;
+    check_stl_name(&args.output)?;
+    let stack = open(&args.stack)?;
+    let progress = Progress::new("mesh-out", common, true);
+    let surface = surface_of(&stack, args, &progress);
+    progress.done();
+    let surface = surface?;
+    if surface.unit == SurfaceUnit::Pixels {
+        progress.say(
+            "the stack does not state its resolution and heights: the mesh's unit is a pixel, and a \
+             layer is as thick as a pixel is wide",
+        );
+    }
+    write_mesh(&args.output, |out| write_stl(surface.facets(), out))
+}
+
+/// Opens a stack that is whole.
+fn open(path: &Path) -> Result<IndexedStack, Exit> {
+    let opened = match is_stream(path) {
+        true => {
+            let mut file = spool_stdin()?;
+            file.rewind().map_err(StackError::from).and_then(|()| IndexedStack::from_file(file))
+        }
+        false => IndexedStack::open(path),
+    };
+    let failed = |error: StackError| failed_at(input_name(path), error);
+    let stack = opened.map_err(failed)?;
+    stack.into_whole().map_err(failed)
+}
+
+fn surface_of(
+    stack: &IndexedStack,
+    args: &MeshOutArgs,
+    progress: &Progress,
+) -> Result<Surface, Exit> {
+    let name = input_name(&args.stack);
+    let at_stack = |error: SurfaceError| Exit::from(error).at(name.clone());
+    let options =
+        SurfaceOptions { cells: args.cells, layers_a_cell: None, max_triangles: MAX_TRIANGLES };
+    let grid = CellGrid::new(stack.headers(), &options).map_err(at_stack)?;
+    progress.expect(grid.layers() as u64);
+    grid.surface(|position| {
+        let layer = stack.layer(position).map_err(|error| failed_at(name.clone(), error))?;
+        progress.layer_done();
+        Ok(layer)
+    })
+    .map_err(|error: Exit| match error.cause::<SurfaceError>() {
+        Some(_) => error.at(name.clone()),
+        // Errors of layers have their place.
+        None => error,
+    })
+}
