@@ -6,17 +6,18 @@ use crate::options::GENERAL;
 
 /// The help of `lamp`, for a screen of 24 lines and 80 columns.
 const LAMP: &str = "\
-Turn CAD parts into layer images for projection photopolymerization.
-Usage: lamp COMMAND [OPTIONS]
+Turn CAD parts into layer images for photopolymerization: lamp COMMAND [OPTIONS]
 From part to build:        slice blade.stl | fix | dither | tile > build.tif
   slice       cut a part into layers         fix         correct stray rows
   dither      turn gray levels into dots     tile        lay out copies
   compensate  narrow by what light adds      edit        change a design
 Stacks:
+  view        look at layers in a browser    show        draw layers
   check       find islands and pockets       support     hold islands
-  info        describe a stack               verify      prove that it is whole
-  show        draw layers                    convert     write in another form
+  info        describe a stack               report      write a page to send
+  verify      prove that it is whole         compare     tell where two differ
   join        join ranges of layers          split       split into ranges
+  convert     write in another form          mesh-out    write the surface as STL
 Parts:
   mesh        check and repair a mesh        orient      find how to build it
   brep        check a STEP part              heights     find layer thicknesses
@@ -27,8 +28,7 @@ Resins and machines:
   plan        plan exposures                 learn       correct them by prints
   projector   list and check projectors      cure        draw what a stack cures
   completions let shells complete commands   man         write manual pages
-lamp COMMAND -h lists the usual options of a command, --help all of them.
-All commands have -q, --quiet; --threads N; --options FILE.toml; -h, --help.
+COMMAND -h lists usual options, --help all; all have -q, --threads N, --options.
 ";
 
 /// Examples stand between usage and options.

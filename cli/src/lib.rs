@@ -41,6 +41,7 @@ mod recorded;
 mod second_opinion;
 mod section;
 mod signals;
+mod sliced_part;
 mod slicing_options;
 mod stack_facts;
 mod stack_part;

@@ -1,6 +1,7 @@
 //! Reads the pages of a stack in any order.
 
 use std::fs::{self, File, Metadata};
+use std::io::Seek;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
@@ -79,20 +80,20 @@ impl IndexedStack {
         Self::from_file(File::open(path)?)
     }
 
-    /// Reads an open file as [`Self::open`] does.
+    /// Reads an open file from its start, as [`Self::open`] does.
     ///
     /// # Errors
     /// Returns an error if not even the first page can be read.
     pub fn from_file(file: File) -> Result<Self, StackError> {
         let stamp = Stamp::of(&file.metadata()?);
+        (&file).rewind()?;
         Self::read(Pages::from_file(file.try_clone()?)?, |places| {
             let offsets = places.into_iter().filter_map(|place| match place {
                 PagePlace::Offset(offset) => Some(offset),
                 PagePlace::File(_) => None,
             });
-            let mut start = file.try_clone()?;
-            std::io::Seek::rewind(&mut start)?;
-            let reader = Mutex::new(PageReader::from_file(start)?);
+            (&file).rewind()?;
+            let reader = Mutex::new(PageReader::from_file(file.try_clone()?)?);
             let offsets = offsets.collect();
             Ok(Source::File(Box::new(FileSource { reader, file, stamp, offsets })))
         })

@@ -142,6 +142,14 @@ impl Image {
         }
     }
 
+    /// Gives back the memory that rows to come were expected to take.
+    pub fn shrink_to_fit(&mut self) {
+        match self {
+            Self::Mask(mask) => mask.shrink_to_fit(),
+            Self::Gray(gray) => gray.shrink_to_fit(),
+        }
+    }
+
     /// Returns the nonblack runs of a row, as the first column, the column after the last, and
     /// the level.
     ///

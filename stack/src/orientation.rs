@@ -96,6 +96,20 @@ impl Orientation {
         if self.is_across() { (height, width) } else { (width, height) }
     }
 
+    /// Returns the column and row that a pixel of the oriented image has in the image, which is
+    /// `size` pixels wide and high.
+    ///
+    /// # Panics
+    /// Panics if the oriented image has no such pixel.
+    pub fn unturned(self, [column, row]: [u32; 2], size: [u32; 2]) -> [u32; 2] {
+        let (width, height) = self.size(size[0], size[1]);
+        assert!(column < width && row < height, "the pixel is outside the image");
+        let (columns, rows) = self.reversed();
+        let column = if columns { width - 1 - column } else { column };
+        let row = if rows { height - 1 - row } else { row };
+        if self.is_across() { [row, column] } else { [column, row] }
+    }
+
     /// Returns whether to reverse the columns and the rows, after exchanging rows and columns if
     /// the orientation [`is_across`](Self::is_across).
     fn reversed(self) -> (bool, bool) {

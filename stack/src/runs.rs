@@ -178,6 +178,12 @@ impl<C: Change> RunImage<C> {
         self.changes.reserve(changes);
     }
 
+    /// Gives back the memory that rows to come were expected to take.
+    pub fn shrink_to_fit(&mut self) {
+        self.row_offsets.shrink_to_fit();
+        self.changes.shrink_to_fit();
+    }
+
     /// Adds a row from outside this crate, after checking it.
     pub(crate) fn push_row_checked(&mut self, changes: &[C]) -> Result<(), RunError> {
         let row = self.row_offsets.len() - 1;

@@ -29,7 +29,7 @@ mod support;
 pub use check::{
     CheckError, CheckOptions, Disagreements, End, Findings, Island, IslandMinimum, LayerFacts,
     Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint, check,
-    component_at,
+    component_at, inner_components,
 };
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use support::{

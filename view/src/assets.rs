@@ -2,18 +2,18 @@
 
 /// A file of the page.
 #[derive(Clone, Copy, Debug)]
-pub struct Asset {
+pub(crate) struct Asset {
     /// What browsers are told that it is.
-    pub content_type: &'static str,
+    pub(crate) content_type: &'static str,
     /// Its bytes, compressed as gzip.
-    pub gzip: &'static [u8],
+    pub(crate) gzip: &'static [u8],
 }
 
 /// Name, content type and compressed bytes of each file, by `build.rs`.
 const FILES: &[(&str, &str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/assets.rs"));
 
 /// Returns a file of the page by its name.
-pub fn asset(name: &str) -> Option<Asset> {
+pub(crate) fn asset(name: &str) -> Option<Asset> {
     let (_, content_type, gzip) = FILES.iter().find(|(known, ..)| *known == name)?;
     Some(Asset { content_type, gzip })
 }

@@ -1,7 +1,31 @@
-//! A local web viewer of stacks: tiles of any scale come straight from runs.
+//! A local web viewer of stacks.
+//!
+//! Tiles of any scale come straight from the runs of a layer, by the share of each pixel that is
+//! white ([`lamp_stack::mean_levels`]): there is no pyramid, and nothing is written. A [`Viewer`]
+//! answers what the page asks; [`serve`] puts it on the loopback address, behind a token.
 
 mod assets;
+mod background;
+mod cache;
+mod colours;
+mod copies;
+mod edge;
+mod error;
+mod findings;
+mod overlay;
+mod pairs;
+mod server;
+mod stack;
 mod surface;
+mod tile;
+mod viewer;
 
-pub use assets::{Asset, asset, licences};
+pub use assets::licences;
+pub use background::Progress;
+pub use error::ViewError;
+pub use findings::{Finding, of_report};
+pub use overlay::Overlay;
+pub use server::{Address, Token, serve};
+pub use stack::ViewedStack;
 pub use surface::{CellGrid, MAX_CELLS, Surface, SurfaceError, SurfaceOptions, SurfaceUnit};
+pub use viewer::Viewer;

@@ -31,6 +31,7 @@ mod support;
 mod target;
 mod tile;
 mod verify;
+mod view;
 
 use clap::{ArgMatches, FromArgMatches, Subcommand};
 
@@ -52,6 +53,7 @@ pub(crate) enum Command {
     Check(check::CheckArgs),
     Support(support::SupportArgs),
     Show(show::ShowArgs),
+    View(view::ViewArgs),
     Convert(convert::ConvertArgs),
     Join(join::JoinArgs),
     Split(split::SplitArgs),
@@ -99,6 +101,7 @@ impl Command {
             Self::Check(args) => check::run(args, common),
             Self::Support(args) => support::run(args, common),
             Self::Show(args) => show::run(args),
+            Self::View(args) => view::run(args, common),
             Self::Convert(args) => convert::run(args, common),
             Self::Join(args) => join::run(args, common),
             Self::Split(args) => split::run(args, common),

@@ -21,7 +21,7 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Dpi, Layer, Length, Mask, MemorySize, take_batch};
+use lamp_stack::{Dpi, Layer, Length, Mask, MaskBuilder, MemorySize, take_batch};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -162,6 +162,33 @@ pub fn component_at(mask: &Mask, column: u32, row: u32) -> Vec<(u32, Range<u32>)
     let components = Components::of(mask);
     let component = components.at(mask, column, row);
     components.runs(mask, component).collect()
+}
+
+/// Returns a mask of the components of a colour that do not touch the image's border.
+pub fn inner_components(mask: &Mask, white: bool) -> Mask {
+    let components = Components::of(mask);
+    let [width, height] = [mask.width(), mask.height()];
+    let is_inner: Vec<bool> = components
+        .all
+        .iter()
+        .map(|component| {
+            let inside = |range: &Range<u32>, size: u32| range.start > 0 && range.end < size;
+            component.is_white == white
+                && inside(&component.columns, width)
+                && inside(&component.rows, height)
+        })
+        .collect();
+    let mut inner = MaskBuilder::new(width);
+    let mut row = Vec::new();
+    for (number, transitions) in (0..).zip(mask.rows()) {
+        // A segment that is inner ends before the border, at a transition.
+        let segments = components.of_row(number).iter().enumerate().skip(1);
+        let inner_ones = segments.filter(|(_, label)| is_inner[**label as usize]);
+        row.clear();
+        row.extend(inner_ones.flat_map(|(k, _)| [transitions[k - 1], transitions[k]]));
+        inner.push_row(&row).expect("segments of one colour do not touch");
+    }
+    inner.finish()
 }
 
 /// A layer, labelled.

@@ -10,23 +10,24 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, FromArgMatches};
 use lamp_postprocess::machine::Machine;
+use lamp_slicer::SliceError;
 use lamp_slicer::topology::CornerTable;
-use lamp_slicer::{Part, SliceError};
-use lamp_stack::{Layer, Length, Page, Pages, StackError};
+use lamp_stack::{Layer, Length, Page, PageHeader};
 use lamp_supports::{
     CheckError, CheckOptions, Disagreements, Findings, IslandMinimum, LoneMinimum,
 };
+use serde_json::{Value, json};
 
 use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::json_report::parse_report;
 use crate::kept_stack::KeptStack;
 use crate::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
-use crate::part_arg::PartArg;
-use crate::part_options::{Reading, at_part};
+use crate::part_options::at_part;
 use crate::progress::{Progress, printable};
+use crate::sliced_part::SlicedPart;
 use crate::slicing_options::SlicingOptions;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 
@@ -186,6 +187,37 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     Ok(())
 }
 
+/// Returns what `lamp check` finds in a stack without further options, in the form of its report,
+/// and with a `text` for each finding.
+pub(super) fn report_of(
+    headers: &[PageHeader],
+    pages: impl Iterator<Item = Result<Page, Exit>>,
+    done: impl Fn() + Sync,
+) -> Result<Value, Exit> {
+    let command = CheckArgs::augment_args(clap::Command::new("check").no_binary_name(true));
+    let matches = command.get_matches_from([""; 0]);
+    let args = CheckArgs::from_arg_matches(&matches).expect("no option is required");
+    let decode = |page: Page| {
+        let layer = page.decode()?;
+        done();
+        Ok::<_, Exit>(layer)
+    };
+    let findings = lamp_supports::check(pages, decode, &args.options())?;
+    let machine: Machine = entry(&args.machine)?;
+    let lines = lines::of(&findings, &Disagreements::default(), &args, machine.recoating.as_ref());
+    let told = lines.into_iter().map(|line| {
+        let mut json = line.json;
+        json["text"] = line.text.into();
+        json
+    });
+    let [width, height] = headers.first().map_or([0; 2], |first| first.size);
+    Ok(json!({
+        "schema": report::SCHEMA,
+        "inputs": [{"width_px": width, "height_px": height}],
+        "findings": told.collect::<Vec<_>>(),
+    }))
+}
+
 impl CheckArgs {
     fn options(&self) -> CheckOptions {
         CheckOptions {
@@ -235,24 +267,13 @@ impl CheckArgs {
     /// Slices a part.
     fn slices(
         &self,
-        part: &PartInput,
+        part: &SlicedPart,
         progress: &Progress,
     ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
-        let parts = [part.file.clone()];
         let say = |line: &str| progress.say(line);
-        let exposure = self.slicing.exposure()?;
-        let layers = self.layers.clone();
-        let slices = self.slicing.slices(
-            part.model.clone(),
-            &part.file.name(),
-            layers,
-            self.memory,
-            exposure,
-            &say,
-        );
-        let (slices, _) = slices.map_err(|error| at_part(error, &parts))?;
-        progress.expect(slices.layer_count() as u64);
-        Ok(slices.map(move |layer| layer.map_err(|error| at_part(error.into(), &parts))))
+        let slices = part.layers(&self.slicing, self.layers.clone(), self.memory, &say)?;
+        progress.expect(slices.count);
+        Ok(slices.layers)
     }
 
     /// Returns the minima of a part's mesh, if islands are told.
@@ -308,29 +329,15 @@ impl CheckArgs {
 /// What is checked.
 enum Input {
     Stack(KeptStack),
-    Part(PartInput),
-}
-
-/// A part that is open.
-struct PartInput {
-    file: PartArg,
-    model: Part,
+    Part(SlicedPart),
 }
 
 impl Input {
     /// Tells a stack from a part by how it begins, and opens a part.
     fn open(path: &Path, slicing: &SlicingOptions, common: &Common) -> Result<Self, Exit> {
-        let is_part =
-            !is_stream(path) && matches!(Pages::open(path), Err(StackError::NotTiff { .. }));
-        if !is_part {
-            return Ok(Self::Stack(KeptStack::new(path)));
-        }
         let progress = Progress::new("check", common, true);
-        let reading =
-            Reading { dpi: slicing.dpi, may_be_open: false, say: &|line| progress.say(line) };
-        let file = PartArg { path: path.to_owned(), placement: None };
-        let model = slicing.solid.open(std::slice::from_ref(&file), &reading)?;
-        Ok(Self::Part(PartInput { file, model }))
+        let part = SlicedPart::open(path, slicing, &|line| progress.say(line))?;
+        Ok(part.map_or_else(|| Self::Stack(KeptStack::new(path)), Self::Part))
     }
 }
 

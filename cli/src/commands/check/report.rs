@@ -11,6 +11,9 @@ use super::units::Scale;
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
 
+/// The form of the report.
+pub(super) const SCHEMA: &str = "lamp-check-1";
+
 /// Writes the findings in all inputs, and the specks.
 pub(super) fn write_report(
     checked: &[CheckedInput],
@@ -43,7 +46,7 @@ pub(super) fn write_report(
         let specks = checked.findings.specks.list.iter();
         specks.map(move |speck| named(number, &island_json(speck, &scale, recoating)))
     });
-    JsonReport::new(&json!({ "schema": "lamp-check-1" }))
+    JsonReport::new(&json!({ "schema": SCHEMA }))
         .list("inputs", inputs)
         .list("findings", findings)
         .list("specks", specks)

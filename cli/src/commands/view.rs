@@ -1,0 +1,149 @@
+//! `lamp view`: shows stacks and parts in a browser.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_stack::{Destination, Format, IndexedStack, write_stack};
+use lamp_view::{Address, Token, ViewedStack, Viewer, licences, of_report, serve};
+
+use super::check;
+use crate::exit::Exit;
+use crate::options::{Common, parse_memory};
+use crate::progress::Progress;
+use crate::sliced_part::SlicedPart;
+use crate::slicing_options::SlicingOptions;
+use crate::streams::{failed_at, input_name, is_stream, print, spool_stdin};
+
+/// Look at layers in a browser
+///
+/// Prints an address to open; it has a secret, so that nobody else on this machine can see the
+/// layers. Zoom and place stay while the layer changes. Shown on demand: what is new over the layer
+/// below, what a second stack adds or lacks, stray rows and what `fix` changed, findings of `lamp
+/// check`, and the part in 3D. A part is sliced first. Ctrl-C ends the viewer.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp view build.tif --open
+  lamp view build.tif --check
+  lamp view fixed.tif sliced.tif --open
+  lamp view blade.stl --dpi 600 --open
+  lamp view build.tif --report check.json --port 8700")]
+pub(crate) struct ViewArgs {
+    /// Stacks (TIFF or picture files, folders of pages, - for standard input) or parts. The second
+    /// is compared with the first
+    #[arg(value_name = "STACK|PART", default_value = "-")]
+    inputs: Vec<PathBuf>,
+
+    /// Open the address in the usual browser
+    #[arg(long)]
+    open: bool,
+
+    /// Look for what `lamp check` finds in the first stack, in the background
+    #[arg(long, conflicts_with = "report")]
+    check: bool,
+
+    /// Show what a report of `lamp check` or `lamp support` tells of the first stack
+    #[arg(long, value_name = "FILE.json")]
+    report: Vec<PathBuf>,
+
+    /// Port of the loopback address [default: any that is free]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    port: u16,
+
+    /// Memory for decoded layers and all else; layers not looked at for the longest go first
+    #[arg(long, value_name = "BYTES", default_value = "512MB", value_parser = parse_memory)]
+    memory: u64,
+
+    /// Print the licences of the libraries in the page
+    #[arg(long)]
+    licences: bool,
+
+    #[command(flatten)]
+    slicing: SlicingOptions,
+}
+
+pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
+    if args.licences {
+        return print(&licences());
+    }
+    if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
+        return Err(Exit::usage("standard input can be read only once: give - once"));
+    }
+    let address = Address::new(args.port).with_context(|| match args.port {
+        0 => "a port of the loopback address".to_owned(),
+        port => format!("port {port} of the loopback address"),
+    })?;
+    let stacks = args.inputs.iter().map(|input| opened(input, args, common));
+    let stacks = stacks.collect::<Result<Vec<_>, Exit>>()?;
+    let viewer =
+        Arc::new(Viewer::new(stacks, args.memory, concat!("lamp ", env!("CARGO_PKG_VERSION"))));
+    if args.check {
+        viewer.find(|stack, progress| find(stack, progress).map_err(|error| error.to_string()));
+    } else if !args.report.is_empty() {
+        let headers = viewer.stacks()[0].headers();
+        let findings = args.report.iter().map(|path| {
+            let report = read_json(path)?;
+            of_report(&report, headers)
+                .map_err(|why| Exit::Failed(anyhow!("{}: {why}", path.display())))
+        });
+        viewer.set_findings(findings.collect::<Result<Vec<_>, Exit>>()?.concat());
+    }
+    let token = Token::new().context("random numbers for the address")?;
+    let first = address.with(&token);
+    print(&format!("{first}\n"))?;
+    if args.open && open::that_detached(&first).is_err() {
+        Progress::new("view", common, true).say("no browser was found: open the address above");
+    }
+    Ok(serve(viewer, address, token, rayon::current_num_threads()).context("the viewer")?)
+}
+
+/// Opens a stack; a part is sliced into a temporary file.
+fn opened(path: &Path, args: &ViewArgs, common: &Common) -> Result<ViewedStack, Exit> {
+    let progress = Progress::new("view", common, true);
+    let name = input_name(path);
+    let failed = |error| failed_at(name.clone(), error);
+    let part = SlicedPart::open(path, &args.slicing, &|line| progress.say(line))?;
+    let pages = match part {
+        Some(part) => IndexedStack::from_file(sliced(&part, args, &progress)?).map_err(failed)?,
+        None if is_stream(path) => IndexedStack::from_file(spool_stdin()?).map_err(failed)?,
+        None => IndexedStack::open(path).map_err(failed)?,
+    };
+    if let Some(end) = pages.end() {
+        progress.warn(&format!("{name}: {end}; the layers before are shown"));
+    }
+    let shown = path.file_name().map_or(name.clone(), |name| name.to_string_lossy().into_owned());
+    Ok(ViewedStack::new(shown, pages))
+}
+
+fn sliced(part: &SlicedPart, args: &ViewArgs, progress: &Progress) -> Result<File, Exit> {
+    let slices = part.layers(&args.slicing, None, None, &|line| progress.say(line))?;
+    progress.expect(slices.count);
+    let layers = slices.layers.inspect(|_| progress.layer_done());
+    let place = "a temporary file for the layers";
+    let file = tempfile::tempfile().context(place)?;
+    let to = Destination::Stream(Box::new(file.try_clone().context(place)?));
+    write_stack(layers, to, Format::Big)?;
+    progress.done();
+    Ok(file)
+}
+
+/// Finds what `lamp check` finds.
+fn find(
+    stack: &ViewedStack,
+    progress: &lamp_view::Progress,
+) -> Result<Vec<lamp_view::Finding>, Exit> {
+    let headers = stack.headers();
+    progress.expect(headers.len() as u64);
+    let pages = (0..headers.len()).map(|position| Ok(stack.page(position)?));
+    let report = check::report_of(headers, pages, || progress.one_done())?;
+    of_report(&report, headers).map_err(|why| Exit::Failed(anyhow!(why)))
+}
+
+fn read_json(path: &Path) -> Result<serde_json::Value, Exit> {
+    let name = || path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(name)?;
+    Ok(serde_json::from_str(&text).with_context(name)?)
+}

@@ -1,0 +1,102 @@
+//! Work that goes on while the viewer answers.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use serde_json::{Value, json};
+
+/// How far work is.
+#[derive(Debug, Default)]
+pub struct Progress {
+    done: AtomicU64,
+    of: AtomicU64,
+}
+
+impl Progress {
+    /// Tells how much there is to do.
+    pub fn expect(&self, of: u64) {
+        self.of.store(of, Ordering::Relaxed);
+    }
+
+    /// Tells that one more is done.
+    pub fn one_done(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Work that goes on while the viewer answers, and what comes of it.
+pub(crate) struct Background<T> {
+    progress: Progress,
+    result: Mutex<Stage<T>>,
+}
+
+enum Stage<T> {
+    NotWanted,
+    Running,
+    Ready(T),
+    Failed(String),
+}
+
+impl<T> Default for Background<T> {
+    fn default() -> Self {
+        Self { progress: Progress::default(), result: Mutex::new(Stage::NotWanted) }
+    }
+}
+
+impl<T> Background<T> {
+    /// Says that work will run.
+    pub(crate) fn start(&self) {
+        *self.lock() = Stage::Running;
+    }
+
+    /// Says that work will run, unless it was said before. Returns whether it was not.
+    pub(crate) fn start_once(&self) -> bool {
+        let mut stage = self.lock();
+        let is_new = matches!(*stage, Stage::NotWanted);
+        if is_new {
+            *stage = Stage::Running;
+        }
+        is_new
+    }
+
+    /// Works, and keeps what comes of it: also that it failed.
+    pub(crate) fn run(&self, work: impl FnOnce(&Progress) -> Result<T, String>) {
+        self.start();
+        let result = catch_unwind(AssertUnwindSafe(|| work(&self.progress)));
+        *self.lock() = match result {
+            Ok(Ok(result)) => Stage::Ready(result),
+            Ok(Err(message)) => Stage::Failed(message),
+            Err(_) => Stage::Failed("an error of the program; please report it".to_owned()),
+        };
+    }
+
+    pub(crate) fn is_wanted(&self) -> bool {
+        !matches!(*self.lock(), Stage::NotWanted)
+    }
+
+    /// Returns what `of` takes from the result, if it is there.
+    pub(crate) fn get<U>(&self, of: impl FnOnce(&T) -> U) -> Option<U> {
+        match &*self.lock() {
+            Stage::Ready(result) => Some(of(result)),
+            _ => None,
+        }
+    }
+
+    /// Returns how far the work is.
+    pub(crate) fn state(&self) -> Value {
+        let (status, message) = match &*self.lock() {
+            Stage::NotWanted => ("none", None),
+            Stage::Running => ("running", None),
+            Stage::Ready(_) => ("ready", None),
+            Stage::Failed(message) => ("failed", Some(message.clone())),
+        };
+        let number = |number: &AtomicU64| number.load(Ordering::Relaxed);
+        let Progress { done, of } = &self.progress;
+        json!({"status": status, "message": message, "done": number(done), "of": number(of)})
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Stage<T>> {
+        self.result.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,158 @@
+//! Which copy of a build, and of which part, a pixel belongs to.
+
+use lamp_stack::{Orientation, PageInfo};
+use serde::Deserialize;
+use serde_json::Value;
+
+/// A copy of a part on a build, as `tile` records it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Placed {
+    part: String,
+    /// Counted from 1 among the copies of the part.
+    number: usize,
+    /// The number of copies of the part.
+    of: usize,
+    left: i64,
+    top: i64,
+    /// The part's width and height before it was turned.
+    size: [u32; 2],
+    turn: Orientation,
+}
+
+/// The copies of a build.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Copies(Vec<Placed>);
+
+/// Where a pixel is in a copy.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub(crate) struct InCopy {
+    /// The part's name.
+    pub(crate) part: String,
+    /// The copy, counted from 1 among those of the part.
+    pub(crate) number: usize,
+    /// The number of copies of the part.
+    pub(crate) of: usize,
+    /// The column in the part as it was placed, before it was turned.
+    pub(crate) x: u32,
+    /// The row.
+    pub(crate) y: u32,
+}
+
+/// The keys of `stack.tile`, or of one of its parts, that place copies.
+#[derive(Deserialize)]
+struct Places {
+    part: Option<String>,
+    part_pixels: [u32; 2],
+    copies: Vec<[i64; 2]>,
+    turns: Option<Vec<String>>,
+}
+
+impl Places {
+    fn placed(self, part: &str) -> Vec<Placed> {
+        let of = self.copies.len();
+        let part = self.part.unwrap_or_else(|| part.to_owned());
+        let turn = |index: usize| {
+            let text = self.turns.as_ref().and_then(|turns| turns.get(index));
+            text.and_then(|text| text.parse().ok()).unwrap_or_default()
+        };
+        let places = self.copies.iter().enumerate();
+        places
+            .map(|(index, &[left, top])| Placed {
+                part: part.clone(),
+                number: index + 1,
+                of,
+                left,
+                top,
+                size: self.part_pixels,
+                turn: turn(index),
+            })
+            .collect()
+    }
+}
+
+impl Copies {
+    /// Reads what `tile` records on the first page of a build. Of other stacks there are none.
+    pub(crate) fn of(info: &PageInfo) -> Self {
+        let Some(stack) = &info.stack else { return Self::default() };
+        let Some(tile) = stack.other.get("tile") else { return Self::default() };
+        let of_parts = tile["parts"].as_array().map_or(std::slice::from_ref(tile), Vec::as_slice);
+        let places = |value: &Value| serde_json::from_value::<Places>(value.clone()).ok();
+        Self(of_parts.iter().filter_map(places).flat_map(|at| at.placed(&stack.part)).collect())
+    }
+
+    /// Returns the copy whose rectangle holds a pixel.
+    pub(crate) fn at(&self, x: u32, y: u32) -> Option<InCopy> {
+        self.0.iter().find_map(|copy| copy.at(x, y))
+    }
+}
+
+impl Placed {
+    fn at(&self, x: u32, y: u32) -> Option<InCopy> {
+        let [width, height] = self.size;
+        let (across, down) = self.turn.size(width, height);
+        let inside = |at: u32, start: i64, size: u32| {
+            let at = u32::try_from(i64::from(at).checked_sub(start)?).ok()?;
+            (at < size).then_some(at)
+        };
+        let turned = [inside(x, self.left, across)?, inside(y, self.top, down)?];
+        let [x, y] = self.turn.unturned(turned, self.size);
+        let (part, number, of) = (self.part.clone(), self.number, self.of);
+        Some(InCopy { part, number, of, x, y })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{MaskBuilder, StackInfo};
+    use serde_json::json;
+
+    use super::*;
+
+    fn copies(tile: Value) -> Copies {
+        let other = [("tile".to_owned(), tile)].into_iter().collect();
+        let stack = StackInfo { part: "blade".to_owned(), other, ..StackInfo::default() };
+        Copies::of(&PageInfo { stack: Some(stack), ..PageInfo::default() })
+    }
+
+    #[test]
+    fn a_pixel_is_found_in_copies_that_are_turned() {
+        for turn in Orientation::ALL {
+            // A part of one white pixel in 4 x 3.
+            let mut part = MaskBuilder::new(4);
+            part.push_row(&[]).unwrap();
+            part.push_row(&[3]).unwrap();
+            part.push_row(&[]).unwrap();
+            let turned = part.finish().oriented(turn).unwrap();
+            let copies = copies(json!({
+                "part_pixels": [4, 3], "copies": [[90, 90], [10, 20]], "turns": ["0", turn.to_string()]
+            }));
+            let mut found = Vec::new();
+            for row in 0..turned.height() {
+                for column in 0..turned.width() {
+                    let at = copies.at(10 + column, 20 + row).unwrap();
+                    assert_eq!((at.part.as_str(), at.number, at.of), ("blade", 2, 2));
+                    assert_eq!(turned.is_white(column, row), [at.x, at.y] == [3, 1], "{turn}");
+                    found.push([at.x, at.y]);
+                }
+            }
+            found.sort_unstable();
+            found.dedup();
+            assert_eq!(found.len(), 12);
+            assert_eq!(copies.at(9, 20), None);
+            assert_eq!(copies.at(10 + turned.width(), 20), None);
+        }
+    }
+
+    #[test]
+    fn several_parts_have_their_names() {
+        let copies = copies(json!({"parts": [
+            {"part": "blade", "part_pixels": [4, 3], "copies": [[0, 0]]},
+            {"part": "vane", "part_pixels": [4, 3], "copies": [[-2, 9], [8, 9]]},
+            {"part": "torn", "copies": 7},
+        ]}));
+        let at = copies.at(1, 10).unwrap();
+        assert_eq!((at.part.as_str(), at.number, at.of, at.x, at.y), ("vane", 1, 2, 3, 1));
+        assert_eq!(copies.at(30, 30), None);
+        assert_eq!(Copies::of(&PageInfo::default()), Copies::default());
+    }
+}

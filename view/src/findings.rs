@@ -1,0 +1,302 @@
+//! What `lamp check` and `lamp support` found, in the form that the page shows.
+
+use std::ops::Range;
+
+use lamp_stack::{Frame, Mask, MaskBuilder, Op, PageHeader};
+use lamp_supports::inner_components;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::overlay::only_in;
+
+/// Something that a person should look at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// The kind, as reports of `lamp check` have it, or `support`.
+    pub kind: String,
+    /// The position of its first layer in the stack, from 0.
+    pub layer: usize,
+    /// The position of its last layer.
+    pub last_layer: usize,
+    /// The rectangle around it: left column, top row, and the ends of both; if it has a place.
+    #[serde(rename = "box")]
+    pub bounds: Option<[u32; 4]>,
+    /// A point within it.
+    pub at: Option<[f64; 2]>,
+    /// A line about it.
+    pub text: String,
+}
+
+/// A list that is longer than this cannot be looked through.
+const MOST: usize = 10_000;
+
+/// Reads a report of `lamp check` or `lamp support` about a stack, given its pages. A finding may
+/// have a `text` for people; otherwise its numbers are told.
+///
+/// # Errors
+/// Returns a sentence if it is no such report, or one about another stack.
+pub fn of_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, String> {
+    let found = match report["schema"].as_str() {
+        Some("lamp-check-1") => check_report(report, headers)?,
+        Some("lamp-support-1") => support_report(report, headers),
+        _ => return Err("this is no report of lamp check or lamp support".to_owned()),
+    };
+    let fits = |finding: &&Finding| finding.last_layer < headers.len();
+    if found.iter().filter(fits).count() < found.len() {
+        return Err("the report is about a stack with other layers".to_owned());
+    }
+    Ok(found)
+}
+
+/// Returns the position of a layer by its index.
+fn position(headers: &[PageHeader], index: u64) -> usize {
+    let same = headers.iter().position(|header| u64::from(header.info.index) == index);
+    same.unwrap_or(usize::MAX)
+}
+
+fn check_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, String> {
+    let inputs = report["inputs"].as_array().map_or(&[][..], Vec::as_slice);
+    let [input] = inputs else {
+        return Err(format!("the report is about {} stacks: check this one alone", inputs.len()));
+    };
+    let size = headers.first().map_or([0; 2], |first| first.size);
+    if [&input["width_px"], &input["height_px"]] != size.map(Value::from).each_ref() {
+        return Err("the report is about a stack of another size".to_owned());
+    }
+    let findings = report["findings"].as_array().into_iter().flatten().take(MOST);
+    Ok(findings.filter_map(|finding| of_json(finding, headers)).collect())
+}
+
+fn of_json(json: &Value, headers: &[PageHeader]) -> Option<Finding> {
+    let layer = json["layer"].as_u64()?;
+    let last = json["last_layer"].as_u64().unwrap_or(layer);
+    let list = |key: &str| -> Option<Vec<f64>> {
+        json[key].as_array()?.iter().map(Value::as_f64).collect()
+    };
+    let bounds = list("box_px").or_else(|| list("base_box_px"));
+    let bounds = bounds.and_then(|bounds| <[f64; 4]>::try_from(bounds).ok()).map(|bounds| {
+        let [left, right, top, bottom] = bounds.map(|at| at as u32);
+        [left, top, right, bottom]
+    });
+    let number = |key: &str, unit: &str| {
+        json[key].as_f64().map(|value| format!("{} {unit}", (value * 1000.0).round() / 1000.0))
+    };
+    let text = json["text"].as_str().map(str::to_owned);
+    let facts = [
+        number("area_mm2", "mm2").or(number("area_px", "px")),
+        number("support_percent", "% rests on white"),
+        number("reach_mm", "mm beyond the layer below"),
+        number("volume_mm3", "mm3"),
+        number("off_mm", "mm off its base"),
+        json["joins"].as_u64().map(|layer| format!("joins in layer {layer}")),
+    ];
+    Some(Finding {
+        kind: json["kind"].as_str()?.to_owned(),
+        layer: position(headers, layer),
+        last_layer: position(headers, last),
+        bounds,
+        at: list("at_px").and_then(|at| at.try_into().ok()),
+        text: text.unwrap_or_else(|| facts.into_iter().flatten().collect::<Vec<_>>().join(", ")),
+    })
+}
+
+/// The half side of the square around an island that is held, in pixels.
+const AROUND: u32 = 12;
+
+fn support_report(report: &Value, headers: &[PageHeader]) -> Vec<Finding> {
+    let plans = report["plans"].as_array().into_iter().flatten().take(MOST);
+    plans.filter_map(|plan| of_plan(plan, headers)).collect()
+}
+
+fn of_plan(plan: &Value, headers: &[PageHeader]) -> Option<Finding> {
+    let layer = position(headers, plan["layer"].as_u64()?);
+    let header = headers.get(layer);
+    let at = header.and_then(|header| {
+        let at = plan["at_mm"].as_array()?;
+        let ([left, top], pitch) = (header.info.origin_mm?, header.dpi?.pitch().mm());
+        let [x, y] = [at.first()?.as_f64()?, at.get(1)?.as_f64()?];
+        Some([(x - left) / pitch, (top - y) / pitch])
+    });
+    let bounds = at.zip(header).map(|(at, header)| {
+        let pixel = at.map(|at| at.max(0.0) as u32);
+        let low = pixel.map(|at| at.saturating_sub(AROUND));
+        let high = |axis: usize| pixel[axis].saturating_add(AROUND).min(header.size[axis]);
+        [low[0], low[1], high(0), high(1)]
+    });
+    let places = plan["places"].as_array().into_iter().flatten();
+    let held = places.filter(|place| place["supports"].get(0).is_some()).count();
+    let what = match (plan["left"].as_bool().unwrap_or(false), held) {
+        (true, _) => "left: no support was found".to_owned(),
+        (false, 1) => "held by 1 support".to_owned(),
+        (false, held) => format!("held by {held} supports"),
+    };
+    let number = plan["number"].as_u64().map_or_else(String::new, |n| format!(" {n}"));
+    let text = format!("island{number}, {what}");
+    Some(Finding { kind: "support".to_owned(), layer, last_layer: layer, bounds, at, text })
+}
+
+impl Finding {
+    /// Returns whether it concerns a layer.
+    pub(crate) fn is_in(&self, layer: usize) -> bool {
+        (self.layer..=self.last_layer).contains(&layer)
+    }
+}
+
+/// Draws the pixels of the findings of a layer, given the layer below.
+pub(crate) fn drawn<'a>(
+    findings: impl Iterator<Item = &'a Finding>,
+    layer: &Mask,
+    below: &Mask,
+) -> Mask {
+    let mut all = Mask::black(layer.width(), layer.height());
+    for finding in findings {
+        let Some(bounds) = finding.bounds else { continue };
+        // A pixel around, so that what is found does not touch the border.
+        let frame = around(bounds);
+        let here = layer.framed(frame);
+        let found = match finding.kind.as_str() {
+            "trap" | "cup" | "sealed" | "narrow" => inner_components(&here, false),
+            "island" | "weak-joint" => inner_components(&here, true),
+            "overhang" => only_in(&here, &below.framed(frame)),
+            _ => here,
+        };
+        let found = cut(&found, &frame, bounds, [layer.width(), layer.height()]);
+        all = all.combined(Op::Union, &found).expect("they have one size");
+    }
+    all
+}
+
+fn around([left, top, right, bottom]: [u32; 4]) -> Frame {
+    let length = |from: u32, to: u32| to.saturating_sub(from).saturating_add(2);
+    Frame {
+        left: i64::from(left) - 1,
+        top: i64::from(top) - 1,
+        width: length(left, right),
+        height: length(top, bottom),
+    }
+}
+
+/// Puts what a frame holds within bounds back into an image of this size.
+fn cut(found: &Mask, frame: &Frame, bounds: [u32; 4], [width, height]: [u32; 2]) -> Mask {
+    let back = Frame { left: -frame.left, top: -frame.top, width, height };
+    let within = |start: u32, end: u32, size: u32| {
+        start.min(size)..end.clamp(start, size.max(start)).min(size)
+    };
+    let (columns, rows) =
+        (within(bounds[0], bounds[2], width), within(bounds[1], bounds[3], height));
+    let window = window([width, height], columns, rows);
+    found.framed(back).combined(Op::Intersect, &window).expect("they have one size")
+}
+
+/// Returns a mask that is white in a rectangle.
+fn window([width, height]: [u32; 2], columns: Range<u32>, rows: Range<u32>) -> Mask {
+    let mut mask = MaskBuilder::new(width);
+    let rows = if columns.is_empty() { 0..0 } else { rows };
+    mask.push_black(rows.start);
+    let ends: Vec<u32> =
+        [columns.start, columns.end].into_iter().filter(|&at| at < width).collect();
+    for _ in rows.clone() {
+        mask.push_row(&ends).expect("the columns increase");
+    }
+    mask.push_black(height - rows.end);
+    mask.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{Compression, PageInfo};
+    use serde_json::json;
+
+    use super::*;
+
+    fn headers(layers: u32) -> Vec<PageHeader> {
+        let header = |index| PageHeader {
+            info: PageInfo { index, origin_mm: Some([0.0, 1.0]), ..PageInfo::default() },
+            dpi: lamp_stack::Dpi::new(254.0),
+            size: [60, 40],
+            gray: false,
+            compression: Compression::G4,
+            data_bytes: 0,
+            exposed_px: None,
+            pages: None,
+        };
+        (5..5 + layers).map(header).collect()
+    }
+
+    #[test]
+    fn reports_are_read() {
+        let report = json!({
+            "schema": "lamp-check-1",
+            "inputs": [{"width_px": 60, "height_px": 40}],
+            "findings": [
+                {"kind": "island", "layer": 6, "box_px": [10, 14, 20, 22], "at_px": [12.0, 21.0],
+                 "area_mm2": 0.5, "joins": 8},
+                {"kind": "trap", "layer": 5, "last_layer": 7, "box_px": [0, 3, 1, 4], "volume_mm3": 2},
+                {"kind": "off-balance", "layer": 7, "base_box_px": [1, 2, 3, 4], "off_mm": 1.25},
+            ],
+        });
+        let found = of_report(&report, &headers(3)).unwrap();
+        let island = &found[0];
+        assert_eq!((island.layer, island.last_layer, island.at), (1, 1, Some([12.0, 21.0])));
+        assert_eq!(island.bounds, Some([10, 20, 14, 22]));
+        assert_eq!(island.text, "0.5 mm2, joins in layer 8");
+        assert_eq!((found[1].layer, found[1].last_layer), (0, 2));
+        assert_eq!(found[2].bounds, Some([1, 3, 2, 4]));
+        assert!(of_report(&report, &headers(2)).unwrap_err().contains("other layers"));
+    }
+
+    #[test]
+    fn reports_of_other_stacks_are_refused() {
+        let with = |inputs| json!({"schema": "lamp-check-1", "inputs": inputs, "findings": []});
+        let error = |report: &Value| of_report(report, &headers(3)).unwrap_err();
+        assert!(error(&json!({"schema": "lamp-plan-1"})).contains("no report"));
+        assert!(error(&json!([])).contains("no report"));
+        assert!(error(&with(json!([{"width_px": 61, "height_px": 40}]))).contains("another size"));
+        assert!(error(&with(json!([{}, {}]))).contains("2 stacks"));
+    }
+
+    #[test]
+    fn plans_of_supports_are_read() {
+        let plan = |left: bool, supports: Value| {
+            json!({"number": 3, "layer": 6, "at_mm": [2.0, 0.5], "left": left,
+                   "places": [{"supports": supports}]})
+        };
+        let plans = json!([plan(false, json!([{}])), plan(true, json!([]))]);
+        let report = json!({"schema": "lamp-support-1", "plans": plans});
+        let found = of_report(&report, &headers(3)).unwrap();
+        assert_eq!(found[0].text, "island 3, held by 1 support");
+        assert_eq!(found[0].bounds, Some([8, 0, 32, 17]));
+        let at = found[0].at.unwrap();
+        assert!((at[0] - 20.0).abs() < 1e-9 && (at[1] - 5.0).abs() < 1e-9, "{at:?}");
+        assert_eq!(found[1].text, "island 3, left: no support was found");
+    }
+
+    #[test]
+    fn the_pixels_of_findings_are_drawn() {
+        let mask = |rows: &[&[u32]]| {
+            let mut mask = MaskBuilder::new(12);
+            rows.iter().for_each(|row| mask.push_row(row).unwrap());
+            mask.finish()
+        };
+        // A ring, a block beside it, and a block that hangs over to the right.
+        let layer = mask(&[&[], &[1, 5, 7, 8, 9], &[1, 2, 4, 5, 7, 8, 9], &[1, 5, 9], &[]]);
+        let below = mask(&[&[], &[9, 10], &[9, 10], &[9, 10], &[]]);
+        let finding = |kind: &str, bounds| Finding {
+            kind: kind.to_owned(),
+            layer: 0,
+            last_layer: 0,
+            bounds: Some(bounds),
+            at: None,
+            text: String::new(),
+        };
+        let drawn = |kind, bounds| drawn([finding(kind, bounds)].iter(), &layer, &below);
+        assert_eq!(drawn("trap", [2, 2, 4, 3]), mask(&[&[], &[], &[2, 4], &[], &[]]));
+        assert_eq!(drawn("island", [7, 1, 8, 3]), mask(&[&[], &[7, 8], &[7, 8], &[], &[]]));
+        let hangs: &[u32] = &[10];
+        assert_eq!(drawn("overhang", [9, 1, 12, 4]), mask(&[&[], hangs, hangs, hangs, &[]]));
+        // Boxes of false reports.
+        assert_eq!(drawn("empty", [50, 50, 60, 60]).white_pixels(), 0);
+        assert_eq!(drawn("island", [8, 3, 7, 1]).white_pixels(), 0);
+        assert_eq!(drawn("island", [0, 0, u32::MAX, u32::MAX]).white_pixels(), 9 + 2 + 4);
+    }
+}

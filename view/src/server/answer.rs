@@ -1,0 +1,75 @@
+//! Answers: their kinds, and what stands on all of them.
+
+use axum::Json;
+use axum::http::header::{CONTENT_ENCODING, CONTENT_TYPE};
+use axum::http::{HeaderName, HeaderValue, StatusCode};
+use axum::response::{IntoResponse, Response};
+use serde_json::{Value, json};
+
+use crate::assets::Asset;
+use crate::error::ViewError;
+
+/// What browsers may do with an answer: nothing from elsewhere is loaded, nobody frames it, and
+/// nothing is kept on disk.
+const POLICY: [(&str, &str); 4] = [
+    (
+        "content-security-policy",
+        "default-src 'self'; img-src 'self' blob: data:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    ),
+    ("x-content-type-options", "nosniff"),
+    ("referrer-policy", "no-referrer"),
+    ("cache-control", "no-store"),
+];
+
+/// Adds the policy to an answer.
+pub(super) fn with_policy(mut answer: Response) -> Response {
+    for (name, value) in POLICY {
+        let name = HeaderName::from_static(name);
+        answer.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    answer
+}
+
+/// An answer that says why there is no other.
+pub(super) fn refusal(status: StatusCode, why: &str) -> Response {
+    with_policy((status, Json(json!({"error": why}))).into_response())
+}
+
+/// An answer of bytes of a kind.
+fn bytes(kind: &'static str, bytes: impl IntoResponse) -> Response {
+    let mut answer = bytes.into_response();
+    answer.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(kind));
+    answer
+}
+
+pub(super) fn png(file: Vec<u8>) -> Response {
+    bytes("image/png", file)
+}
+
+pub(super) fn binary(file: Vec<u8>) -> Response {
+    bytes("application/octet-stream", file)
+}
+
+pub(super) fn json_of(value: &Value) -> Response {
+    Json(value).into_response()
+}
+
+pub(super) fn asset(asset: &Asset) -> Response {
+    let mut answer = bytes(asset.content_type, asset.gzip);
+    answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    answer
+}
+
+impl IntoResponse for ViewError {
+    fn into_response(self) -> Response {
+        let status = match &self {
+            Self::NoSuch(_) => StatusCode::NOT_FOUND,
+            Self::Malformed(_) => StatusCode::BAD_REQUEST,
+            Self::Changed(_) => StatusCode::GONE,
+            Self::Unreadable(_) => StatusCode::UNPROCESSABLE_ENTITY,
+            // Nobody reads it.
+            Self::GivenUp => StatusCode::SERVICE_UNAVAILABLE,
+        };
+        refusal(status, &self.to_string())
+    }
+}

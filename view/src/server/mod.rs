@@ -1,0 +1,62 @@
+//! The viewer on the loopback address.
+
+mod answer;
+mod connections;
+mod guard;
+mod routes;
+mod token;
+mod work;
+
+use std::io;
+use std::net::{Ipv4Addr, TcpListener};
+use std::sync::Arc;
+
+use guard::Guard;
+pub use token::Token;
+use work::Workers;
+
+use crate::viewer::Viewer;
+
+/// A port of the loopback address where the viewer will answer.
+pub struct Address {
+    listener: TcpListener,
+    port: u16,
+}
+
+impl Address {
+    /// Takes a port of the loopback address; any free one if it is 0.
+    ///
+    /// # Errors
+    /// Returns an error if the port is not free.
+    pub fn new(port: u16) -> io::Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+        listener.set_nonblocking(true)?;
+        let port = listener.local_addr()?.port();
+        Ok(Self { listener, port })
+    }
+
+    /// Returns the first address to open. It has the token, so it is for the person alone who
+    /// started the viewer.
+    pub fn with(&self, token: &Token) -> String {
+        format!("http://127.0.0.1:{}/?token={token}", self.port)
+    }
+}
+
+/// Answers at an address until the process ends, with at most so many threads at work.
+///
+/// # Errors
+/// Returns an error if the system does not let it start.
+pub fn serve(
+    viewer: Arc<Viewer>,
+    address: Address,
+    token: Token,
+    threads: usize,
+) -> io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    runtime.block_on(async {
+        let listener = tokio::net::TcpListener::from_std(address.listener)?;
+        let guard = Arc::new(Guard::new(token, address.port));
+        let workers = Arc::new(Workers::new(viewer, threads));
+        connections::answer(listener, routes::routes(workers, guard)).await
+    })
+}

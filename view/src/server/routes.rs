@@ -1,0 +1,188 @@
+//! The addresses of the viewer.
+
+use std::num::NonZeroU8;
+use std::sync::Arc;
+
+use axum::Router;
+use axum::extract::rejection::{PathRejection, QueryRejection};
+use axum::extract::{Path, Query, Request, State};
+use axum::http::StatusCode;
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::answer::{asset, binary, json_of, png, refusal, with_policy};
+use super::guard::Guard;
+use super::work::Workers;
+use crate::assets;
+use crate::error::ViewError;
+use crate::overlay::Overlay;
+use crate::tile::TileAt;
+use crate::viewer::Kind;
+
+/// Returns all addresses, behind the guard.
+pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
+    Router::new()
+        .route("/", get(|| async { page() }))
+        .route("/assets/{name}", get(|Path(name): Path<String>| async move { named(&name) }))
+        .route("/api/session", get(session))
+        .route("/api/findings", get(findings))
+        .route("/api/surface", get(surface_state))
+        .route("/api/surface.bin", get(surface))
+        .route("/api/stacks/{stack}/layers", get(layers))
+        .route("/api/stacks/{stack}/layers/{layer}", get(layer))
+        .route("/api/stacks/{stack}/layers/{layer}/pixel", get(pixel))
+        .route("/api/stacks/{stack}/layers/{layer}/edge", get(edge))
+        .route("/tiles/{stack}/{layer}/{kind}/{reduction}/{x}/{file}", get(tile))
+        .fallback(|| async { ViewError::NoSuch("page") })
+        .with_state(workers)
+        .layer(middleware::from_fn(move |request: Request, next: Next| {
+            let guard = Arc::clone(&guard);
+            async move {
+                match guard.answer(&request) {
+                    Some(answer) => answer,
+                    None => with_policy(next.run(request).await),
+                }
+            }
+        }))
+}
+
+type Answer = Result<Response, ViewError>;
+/// Numbers of an address that are not numbers are of nothing that there is.
+type Numbers<T> = Result<Path<T>, PathRejection>;
+type Keys<T> = Result<Query<T>, QueryRejection>;
+
+fn numbers<T>(path: Numbers<T>) -> Result<T, ViewError> {
+    path.map(|Path(numbers)| numbers).map_err(|_| ViewError::NoSuch("page"))
+}
+
+fn keys<T>(query: Keys<T>) -> Result<T, ViewError> {
+    query.map(|Query(keys)| keys).map_err(|_| ViewError::Malformed("the query is not understood"))
+}
+
+fn page() -> Response {
+    named("index.html")
+}
+
+fn named(name: &str) -> Response {
+    match assets::asset(name) {
+        Some(found) => asset(&found),
+        None => refusal(StatusCode::NOT_FOUND, "there is no such file"),
+    }
+}
+
+async fn session(State(workers): State<Arc<Workers>>) -> Response {
+    json_of(&workers.viewer().session())
+}
+
+async fn findings(State(workers): State<Arc<Workers>>) -> Answer {
+    json(workers, |viewer, _| Ok(viewer.findings())).await
+}
+
+/// The surface is made once somebody asks for it.
+async fn surface_state(State(workers): State<Arc<Workers>>) -> Response {
+    workers.viewer().want_surface();
+    json_of(&workers.viewer().surface_state())
+}
+
+async fn surface(State(workers): State<Arc<Workers>>) -> Answer {
+    workers.run(|viewer, _| viewer.surface().map(binary)).await
+}
+
+async fn layers(State(workers): State<Arc<Workers>>, path: Numbers<usize>) -> Answer {
+    let stack = numbers(path)?;
+    json(workers, move |viewer, _| Ok(viewer.stack(stack)?.layers())).await
+}
+
+async fn layer(State(workers): State<Arc<Workers>>, path: Numbers<(usize, usize)>) -> Answer {
+    let (stack, layer) = numbers(path)?;
+    let facts = json_of(&workers.viewer().layer(stack, layer)?);
+    workers.expect_near(stack, layer);
+    Ok(facts)
+}
+
+#[derive(Deserialize)]
+struct PixelKeys {
+    x: u32,
+    y: u32,
+    threshold: Option<NonZeroU8>,
+}
+
+async fn pixel(
+    State(workers): State<Arc<Workers>>,
+    path: Numbers<(usize, usize)>,
+    query: Keys<PixelKeys>,
+) -> Answer {
+    let (stack, layer) = numbers(path)?;
+    let PixelKeys { x, y, threshold } = keys(query)?;
+    let work = move |viewer: &crate::Viewer, given_up: &_| {
+        viewer.pixel(stack, layer, [x, y], threshold, given_up)
+    };
+    json(workers, work).await
+}
+
+#[derive(Deserialize)]
+struct EdgeKeys {
+    x: f64,
+    y: f64,
+    radius: f64,
+}
+
+async fn edge(
+    State(workers): State<Arc<Workers>>,
+    path: Numbers<(usize, usize)>,
+    query: Keys<EdgeKeys>,
+) -> Answer {
+    let (stack, layer) = numbers(path)?;
+    let EdgeKeys { x, y, radius } = keys(query)?;
+    let work = move |viewer: &crate::Viewer, given_up: &_| {
+        viewer.edge(stack, layer, [x, y], radius, given_up)
+    };
+    json(workers, work).await
+}
+
+#[derive(Deserialize)]
+struct TileKeys {
+    threshold: Option<NonZeroU8>,
+}
+
+async fn tile(
+    State(workers): State<Arc<Workers>>,
+    path: Numbers<(usize, usize, String, u32, u32, String)>,
+    query: Keys<TileKeys>,
+) -> Answer {
+    let (stack, layer, kind, reduction, x, file) = numbers(path)?;
+    let y = file.strip_suffix(".png").and_then(|y| y.parse().ok());
+    let y = y.ok_or(ViewError::NoSuch("tile"))?;
+    let threshold = keys(query)?.threshold;
+    let kind = match (kind.as_str(), threshold) {
+        ("layer", None) => Kind::Layer,
+        ("layer", Some(threshold)) => Kind::Cured(threshold),
+        (name, _) => {
+            let overlay: Result<Overlay, _> = name.parse();
+            Kind::Over(overlay.map_err(|_| ViewError::NoSuch("overlay"))?)
+        }
+    };
+    let at = TileAt { reduction, x, y };
+    workers
+        .run(move |viewer, given_up| viewer.tile(stack, layer, kind, at, given_up).map(png))
+        .await
+}
+
+/// Answers with JSON that a worker makes.
+async fn json(
+    workers: Arc<Workers>,
+    work: impl FnOnce(&crate::Viewer, &crate::viewer::GivenUp) -> Result<Value, ViewError>
+    + Send
+    + 'static,
+) -> Answer {
+    workers.run(|viewer, given_up| work(viewer, given_up).map(|value| json_of(&value))).await
+}
+
+impl IntoResponse for Box<ViewError> {
+    fn into_response(self) -> Response {
+        (*self).into_response()
+    }
+}

@@ -1,0 +1,114 @@
+//! Work for answers: so much at a time, none that was given up, and ahead what comes next.
+
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+
+use tokio::sync::Semaphore;
+
+use crate::error::ViewError;
+use crate::viewer::{GivenUp, Kind, Viewer};
+
+/// Does the work for answers.
+pub(super) struct Workers {
+    viewer: Arc<Viewer>,
+    /// As many permits as threads.
+    free: Arc<Semaphore>,
+    wish: Arc<Wish>,
+}
+
+impl Workers {
+    pub(super) fn new(viewer: Arc<Viewer>, threads: usize) -> Self {
+        let wish = Arc::new(Wish::default());
+        let (ahead, wanted) = (Arc::clone(&viewer), Arc::clone(&wish));
+        // It ends with the process.
+        std::thread::spawn(move || wanted.work(&ahead));
+        Self { viewer, free: Arc::new(Semaphore::new(threads.max(1))), wish }
+    }
+
+    pub(super) fn viewer(&self) -> &Arc<Viewer> {
+        &self.viewer
+    }
+
+    /// Works on a thread of its own once one is free. If the answer is given up, so is the work:
+    /// before it starts, or at its next step.
+    pub(super) async fn run<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Viewer, &GivenUp) -> Result<T, ViewError> + Send + 'static,
+    ) -> Result<T, ViewError> {
+        let permit = Arc::clone(&self.free).acquire_owned().await;
+        let dropped = WhenDropped(GivenUp::default());
+        let (viewer, given_up) = (Arc::clone(&self.viewer), dropped.0.clone());
+        let done = tokio::task::spawn_blocking(move || {
+            let result = work(&viewer, &given_up);
+            drop(permit);
+            result
+        });
+        let failed =
+            |_| ViewError::Unreadable("an error of the program; please report it".to_owned());
+        done.await.unwrap_or_else(|error| Err(failed(error)))
+    }
+
+    /// Tells that a layer is looked at: those beside it are decoded ahead.
+    pub(super) fn expect_near(&self, stack: usize, layer: usize) {
+        self.wish.set(stack, layer);
+    }
+}
+
+/// Gives up the work when nobody waits for it any more.
+struct WhenDropped(GivenUp);
+
+impl Drop for WhenDropped {
+    fn drop(&mut self) {
+        self.0.set();
+    }
+}
+
+/// The layer that was looked at last, until the layers beside it are decoded.
+#[derive(Default)]
+struct Wish {
+    state: Mutex<Seen>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct Seen {
+    /// The stack, the layer, and whether the one looked at before was above.
+    last: Option<(usize, usize, bool)>,
+    is_new: bool,
+}
+
+impl Wish {
+    fn set(&self, stack: usize, layer: usize) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let down = match state.last {
+            Some((same, before, down)) if same == stack && before == layer => down,
+            Some((same, before, _)) => same == stack && before > layer,
+            None => false,
+        };
+        *state = Seen { last: Some((stack, layer, down)), is_new: true };
+        self.changed.notify_one();
+    }
+
+    /// Decodes layers beside the one that was looked at last, first on the way that it was
+    /// reached by.
+    fn work(&self, viewer: &Viewer) {
+        loop {
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            while !state.is_new {
+                state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            }
+            state.is_new = false;
+            let Some((stack, layer, down)) = state.last else { continue };
+            drop(state);
+            let (above, below) = (layer.checked_add(1), layer.checked_sub(1));
+            let near = if down { [below, above] } else { [above, below] };
+            for layer in near.into_iter().flatten() {
+                let is_old = || self.state.lock().unwrap_or_else(PoisonError::into_inner).is_new;
+                if is_old() {
+                    break;
+                }
+                // Who looks at it will be told of errors.
+                let _ = viewer.image(stack, layer, Kind::Layer, &GivenUp::default());
+            }
+        }
+    }
+}

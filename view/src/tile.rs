@@ -1,0 +1,107 @@
+//! Tiles of images as PNG files.
+
+use std::io;
+use std::num::NonZeroU32;
+use std::ops::Range;
+
+use lamp_stack::{Image, mean_levels};
+
+/// The width and height of a tile in pixels; at the right and lower border tiles have fewer.
+pub(crate) const TILE_SIDE: u32 = 512;
+
+/// A place in the pyramid of tiles of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TileAt {
+    /// A pixel of the tile is the mean of 2^reduction x 2^reduction pixels.
+    pub(crate) reduction: u32,
+    /// The tile, counted from the left.
+    pub(crate) x: u32,
+    /// The tile, counted from the top.
+    pub(crate) y: u32,
+}
+
+impl TileAt {
+    /// Returns the side of the squares whose means are taken, and the columns and rows of the
+    /// image, if there is such a tile.
+    pub(crate) fn on(self, size: [u32; 2]) -> Option<(NonZeroU32, [Range<u32>; 2])> {
+        let side = 1u32.checked_shl(self.reduction).and_then(NonZeroU32::new)?;
+        let step = u64::from(TILE_SIDE) * u64::from(side.get());
+        let range = |at: u32, size: u32| {
+            let start = u32::try_from(u64::from(at) * step).ok().filter(|&start| start < size)?;
+            Some(start..(u64::from(start) + step).min(size.into()) as u32)
+        };
+        Some((side, [range(self.x, size[0])?, range(self.y, size[1])?]))
+    }
+}
+
+/// How a tile's levels become colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Inks {
+    /// Levels are shades of gray.
+    Gray,
+    /// Levels are the opacity of one colour.
+    One([u8; 3]),
+}
+
+/// Draws a tile of an image, if there is one at that place.
+pub(crate) fn tile(image: &Image, at: TileAt, inks: Inks) -> Option<Vec<u8>> {
+    let (side, [columns, rows]) = at.on([image.width(), image.height()])?;
+    let size = [columns.len(), rows.len()].map(|pixels| pixels.div_ceil(side.get() as usize));
+    let levels: Vec<u8> = mean_levels(image, columns, rows, side).flatten().collect();
+    Some(png(size.map(|pixels| pixels as u32), &levels, inks).expect("memory takes any bytes"))
+}
+
+fn png([width, height]: [u32; 2], levels: &[u8], inks: Inks) -> io::Result<Vec<u8>> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    match inks {
+        Inks::Gray => encoder.set_color(png::ColorType::Grayscale),
+        Inks::One(colour) => {
+            encoder.set_color(png::ColorType::Indexed);
+            encoder.set_palette(colour.repeat(256));
+            encoder.set_trns((0..=255).collect::<Vec<u8>>());
+        }
+    }
+    encoder.write_header()?.write_image_data(levels)?;
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::Mask;
+
+    use super::*;
+
+    fn pixels(file: &[u8]) -> (u32, u32, Vec<u8>) {
+        let mut decoder = png::Decoder::new(io::Cursor::new(file));
+        decoder.set_transformations(png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        (info.width, info.height, pixels)
+    }
+
+    #[test]
+    fn tiles_cover_the_image_and_no_more() {
+        let at = |reduction, x, y| TileAt { reduction, x, y }.on([1025, 512]);
+        let side = |side| NonZeroU32::new(side).unwrap();
+        assert_eq!(at(0, 2, 0), Some((side(1), [1024..1025, 0..512])));
+        assert_eq!(at(1, 1, 0), Some((side(2), [1024..1025, 0..512])));
+        assert_eq!(at(31, 0, 0), Some((side(1 << 31), [0..1025, 0..512])));
+        for (reduction, x, y) in [(0, 3, 0), (0, 0, 1), (1, 2, 0), (32, 0, 0), (0, u32::MAX, 0)] {
+            assert_eq!(at(reduction, x, y), None, "{reduction} {x} {y}");
+        }
+    }
+
+    #[test]
+    fn a_colour_s_opacity_is_the_level() {
+        // `#.` over `##`.
+        let image = Image::Mask(Mask::new(2, vec![0, 2, 3], vec![0, 1, 0]).unwrap());
+        let at = |reduction| TileAt { reduction, x: 0, y: 0 };
+        let drawn = pixels(&tile(&image, at(0), Inks::One([1, 2, 3])).unwrap());
+        assert_eq!(drawn, (2, 2, vec![1, 2, 3, 255, 1, 2, 3, 0, 1, 2, 3, 255, 1, 2, 3, 255]));
+        assert_eq!(pixels(&tile(&image, at(1), Inks::Gray).unwrap()), (1, 1, vec![191]));
+    }
+}

@@ -1,0 +1,428 @@
+//! What the server answers, without the server.
+
+use std::num::NonZeroU8;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use lamp_stack::{Image, Mask, StackError};
+use serde_json::{Value, json};
+use thiserror::Error;
+
+use crate::background::{Background, Progress};
+use crate::cache::{Cache, Key, image_bytes};
+use crate::edge::nearest_edge;
+use crate::error::ViewError;
+use crate::findings::{self, Finding};
+use crate::overlay::{Overlay, bands, fixed_bands, only_in, rows};
+use crate::pairs::Partners;
+use crate::stack::{ViewedStack, level, place_mm};
+use crate::surface::{CellGrid, SurfaceError, SurfaceOptions};
+use crate::tile::{Inks, TILE_SIDE, TileAt, tile};
+
+/// Stacks that are viewed together, and the images of them that are kept.
+pub struct Viewer {
+    stacks: Vec<ViewedStack>,
+    partners: Partners,
+    cache: Cache<Kind>,
+    findings: Background<Vec<Finding>>,
+    surface: Background<Vec<u8>>,
+    version: &'static str,
+}
+
+/// Which image of a layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Kind {
+    /// As it is.
+    Layer,
+    /// White where a gray image has at least this level.
+    Cured(NonZeroU8),
+    /// Laid over it.
+    Over(Overlay),
+}
+
+/// Tells that nobody waits for an answer any more.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct GivenUp(Arc<AtomicBool>);
+
+impl GivenUp {
+    pub(crate) fn set(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    fn check(&self) -> Result<(), ViewError> {
+        if self.0.load(Ordering::Relaxed) { Err(ViewError::GivenUp) } else { Ok(()) }
+    }
+}
+
+/// What a viewer takes beside its images: the page, the texts of pages, tiles in work.
+const OTHER_MEMORY: u64 = 48 << 20;
+
+impl Viewer {
+    /// Views stacks; the second is compared with the first. `memory` is in bytes.
+    ///
+    /// # Panics
+    /// Panics if there is no stack.
+    pub fn new(stacks: Vec<ViewedStack>, memory: u64, version: &'static str) -> Self {
+        assert!(!stacks.is_empty(), "there is nothing to view");
+        let images = memory.saturating_sub(OTHER_MEMORY).try_into().unwrap_or(usize::MAX);
+        Self {
+            partners: Partners::of(&stacks),
+            stacks,
+            cache: Cache::new(images),
+            findings: Background::default(),
+            surface: Background::default(),
+            version,
+        }
+    }
+
+    /// The stacks, in the order in which they were given.
+    pub fn stacks(&self) -> &[ViewedStack] {
+        &self.stacks
+    }
+
+    /// Shows findings of the first stack.
+    pub fn set_findings(&self, findings: Vec<Finding>) {
+        self.findings.run(|_| Ok(findings));
+    }
+
+    /// Looks for findings of the first stack on a thread of their own.
+    pub fn find(
+        self: &Arc<Self>,
+        find: impl FnOnce(&ViewedStack, &Progress) -> Result<Vec<Finding>, String> + Send + 'static,
+    ) {
+        let viewer = Arc::clone(self);
+        self.findings.start();
+        std::thread::spawn(move || {
+            viewer.findings.run(|progress| find(&viewer.stacks[0], progress));
+        });
+    }
+
+    /// Makes the surface of the first stack on a thread of its own, unless that was begun before.
+    pub(crate) fn want_surface(self: &Arc<Self>) {
+        if self.surface.start_once() {
+            let viewer = Arc::clone(self);
+            std::thread::spawn(move || {
+                viewer.surface.run(|progress| surface_of(&viewer.stacks[0], progress));
+            });
+        }
+    }
+
+    /// Returns what is viewed.
+    pub(crate) fn session(&self) -> Value {
+        let overlays: Vec<Value> = Overlay::ALL
+            .into_iter()
+            .filter(|overlay| self.has(*overlay))
+            .map(|overlay| {
+                let [red, green, blue] = overlay.colour();
+                let colour = format!("#{red:02x}{green:02x}{blue:02x}");
+                json!({"id": overlay.name(), "label": overlay.label(), "colour": colour})
+            })
+            .collect();
+        json!({
+            "version": self.version,
+            "tile": TILE_SIDE,
+            "stacks": self.stacks.iter().map(ViewedStack::summary).collect::<Vec<_>>(),
+            "overlays": overlays,
+            "findings": self.findings.is_wanted(),
+        })
+    }
+
+    fn has(&self, overlay: Overlay) -> bool {
+        let any = |has: &dyn Fn(&lamp_stack::PageHeader) -> bool| {
+            self.stacks.iter().flat_map(ViewedStack::headers).any(has)
+        };
+        match overlay {
+            Overlay::Below | Overlay::New => true,
+            Overlay::Added | Overlay::Missing => self.partners.are_comparable(),
+            Overlay::Fixed => any(&|header| header.info.other.contains_key("fix")),
+            Overlay::Stray => any(&|header| !header.info.stray_rows.is_empty()),
+            Overlay::Findings => self.findings.is_wanted(),
+        }
+    }
+
+    pub(crate) fn stack(&self, stack: usize) -> Result<&ViewedStack, ViewError> {
+        self.stacks.get(stack).ok_or(ViewError::NoSuch("stack"))
+    }
+
+    /// Returns what is known of a layer without its image.
+    pub(crate) fn layer(&self, stack: usize, layer: usize) -> Result<Value, ViewError> {
+        let mut facts = self.stack(stack)?.layer(layer)?;
+        facts["partner"] = self.partners.of_layer(stack, layer).map(|at| at.layer).into();
+        Ok(facts)
+    }
+
+    /// Draws a tile.
+    pub(crate) fn tile(
+        &self,
+        stack: usize,
+        layer: usize,
+        kind: Kind,
+        at: TileAt,
+        given_up: &GivenUp,
+    ) -> Result<Vec<u8>, ViewError> {
+        // A tile that there is not costs nothing.
+        let size = self.stack(stack)?.header(layer)?.size;
+        at.on(size).ok_or(ViewError::NoSuch("tile"))?;
+        let image = self.image(stack, layer, kind, given_up)?;
+        given_up.check()?;
+        let inks = match kind {
+            Kind::Over(overlay) => Inks::One(overlay.colour()),
+            Kind::Layer | Kind::Cured(_) => Inks::Gray,
+        };
+        tile(&image, at, inks).ok_or(ViewError::NoSuch("tile"))
+    }
+
+    /// Returns an image of a layer.
+    pub(crate) fn image(
+        &self,
+        stack: usize,
+        layer: usize,
+        kind: Kind,
+        given_up: &GivenUp,
+    ) -> Result<Arc<Image>, ViewError> {
+        let of = self.stack(stack)?;
+        of.header(layer)?;
+        given_up.check()?;
+        let key = Key { stack, layer, kind };
+        match kind {
+            Kind::Layer => self.cache.get(key, of.expected_bytes(layer), || of.image(layer)),
+            Kind::Cured(level) => {
+                let image = self.image(stack, layer, Kind::Layer, given_up)?;
+                if matches!(*image, Image::Mask(_)) {
+                    return Ok(image);
+                }
+                let cured = || Ok(Image::Mask(Image::clone(&image).into_mask(level)));
+                self.cache.get(key, image_bytes(&image), cured)
+            }
+            Kind::Over(Overlay::Findings) if self.findings.get(|_| ()).is_none() => {
+                // They may come yet, so this is not kept.
+                let [width, height] = of.header(layer)?.size;
+                Ok(Arc::new(Image::Mask(Mask::black(width, height))))
+            }
+            Kind::Over(overlay) => {
+                let drawing = self.drawing(stack, layer, overlay, given_up)?;
+                self.cache.get(key, drawing.most_bytes(), || Ok(Image::Mask(drawing.draw())))
+            }
+        }
+    }
+
+    /// Gathers what an overlay is drawn from.
+    fn drawing(
+        &self,
+        stack: usize,
+        layer: usize,
+        overlay: Overlay,
+        given_up: &GivenUp,
+    ) -> Result<Drawing, ViewError> {
+        let image = |stack, layer| self.image(stack, layer, Kind::Layer, given_up);
+        let below = || layer.checked_sub(1).map(|below| image(stack, below)).transpose();
+        let header = self.stack(stack)?.header(layer)?;
+        Ok(match overlay {
+            Overlay::Below => {
+                Drawing::OnlyIn { a: below()?, b: Some(image(stack, layer)?), size: header.size }
+            }
+            Overlay::New => {
+                Drawing::OnlyIn { a: Some(image(stack, layer)?), b: below()?, size: header.size }
+            }
+            Overlay::Added | Overlay::Missing => {
+                let at = self.partners.of_layer(stack, layer);
+                let other = at.as_ref().map(|at| image(at.stack, at.layer)).transpose()?;
+                let other =
+                    other.zip(at).map(|(image, at)| Arc::new(at.framed(&image, header.size)));
+                let here = Some(image(stack, layer)?);
+                let [a, b] = if overlay == Overlay::Added { [other, here] } else { [here, other] };
+                Drawing::OnlyIn { a, b, size: header.size }
+            }
+            Overlay::Fixed => Drawing::Rows { bands: fixed_bands(&header.info), size: header.size },
+            Overlay::Stray => {
+                Drawing::Rows { bands: bands(&header.info.stray_rows), size: header.size }
+            }
+            Overlay::Findings => {
+                let of_layer = |found: &Vec<Finding>| {
+                    found.iter().filter(|found| stack == 0 && found.is_in(layer)).cloned().collect()
+                };
+                let found: Vec<Finding> = self.findings.get(of_layer).unwrap_or_default();
+                Drawing::Findings { found, layer: image(stack, layer)?, below: below()? }
+            }
+        })
+    }
+
+    /// Returns what is known of a pixel.
+    pub(crate) fn pixel(
+        &self,
+        stack: usize,
+        layer: usize,
+        [x, y]: [u32; 2],
+        threshold: Option<NonZeroU8>,
+        given_up: &GivenUp,
+    ) -> Result<Value, ViewError> {
+        let of = self.stack(stack)?;
+        let header = of.header(layer)?;
+        if x >= header.size[0] || y >= header.size[1] {
+            return Err(ViewError::NoSuch("pixel"));
+        }
+        let image = self.image(stack, layer, Kind::Layer, given_up)?;
+        let level = level(&image, x, y);
+        let white = level >= threshold.map_or(1, NonZeroU8::get);
+        let place = place_mm(header, x, y);
+        let here = |found: &Vec<Finding>| {
+            let all =
+                found.iter().enumerate().filter(|(_, found)| stack == 0 && found.is_in(layer));
+            let holds = |found: &Finding| {
+                found.bounds.is_some_and(|[left, top, right, bottom]| {
+                    (left..right).contains(&x) && (top..bottom).contains(&y)
+                })
+            };
+            all.filter(|(_, found)| holds(found)).map(|(id, _)| id).collect()
+        };
+        let found: Vec<usize> = self.findings.get(here).unwrap_or_default();
+        Ok(json!({
+            "level": level,
+            "white": white,
+            "x_mm": place.map(|[x, _]| x),
+            "y_mm": place.map(|[_, y]| y),
+            "copy": of.copies.at(x, y),
+            "component": self.component(&image, [x, y], threshold),
+            "findings": found,
+        }))
+    }
+
+    /// Returns the area and the rectangle of the component that holds a pixel, unless the layer
+    /// has so many edges that one would wait for it.
+    fn component(&self, image: &Image, [x, y]: [u32; 2], threshold: Option<NonZeroU8>) -> Value {
+        const MOST_CHANGES: usize = 20_000_000;
+        if image.change_count() > MOST_CHANGES {
+            return Value::Null;
+        }
+        let mask = image.clone().into_mask(threshold.unwrap_or(NonZeroU8::MIN));
+        let runs = lamp_supports::component_at(&mask, x, y);
+        let area: u64 = runs.iter().map(|(_, columns)| columns.len() as u64).sum();
+        let columns = || runs.iter().map(|(_, columns)| columns);
+        let left = columns().map(|columns| columns.start).min();
+        let right = columns().map(|columns| columns.end).max();
+        let rows = runs.first().map(|run| run.0)..runs.last().map(|run| run.0 + 1);
+        json!({"area_px": area, "box": [left, rows.start, right, rows.end]})
+    }
+
+    /// Returns the point nearest to a point on an edge between black and white.
+    pub(crate) fn edge(
+        &self,
+        stack: usize,
+        layer: usize,
+        at: [f64; 2],
+        radius: f64,
+        given_up: &GivenUp,
+    ) -> Result<Value, ViewError> {
+        if !(radius >= 0.0 && at.iter().all(|at| at.is_finite())) {
+            return Err(ViewError::Malformed("x, y and radius must be numbers"));
+        }
+        let image = self.image(stack, layer, Kind::Layer, given_up)?;
+        let point = nearest_edge(&image.exposed(), at, radius);
+        Ok(json!({"x": point.map(|point| point[0]), "y": point.map(|point| point[1])}))
+    }
+
+    /// Returns how far the search for findings is, and what it found.
+    pub(crate) fn findings(&self) -> Value {
+        let mut state = self.findings.state();
+        let list = self.findings.get(|found| {
+            let numbered = found.iter().enumerate().map(|(id, found)| {
+                let mut json = serde_json::to_value(found).expect("findings are plain");
+                json["id"] = id.into();
+                json
+            });
+            numbered.collect::<Vec<Value>>()
+        });
+        state["list"] = list.unwrap_or_default().into();
+        state
+    }
+
+    /// Returns how far the surface is.
+    pub(crate) fn surface_state(&self) -> Value {
+        self.surface.state()
+    }
+
+    /// Returns the surface, if it is ready.
+    pub(crate) fn surface(&self) -> Result<Vec<u8>, ViewError> {
+        self.surface.get(Vec::clone).ok_or(ViewError::NoSuch("surface yet"))
+    }
+}
+
+/// Makes the surface of a stack. One thread does, so that the others are free for tiles.
+fn surface_of(stack: &ViewedStack, progress: &Progress) -> Result<Vec<u8>, String> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let pool = pool.map_err(|error| error.to_string())?;
+    let made = pool.install(|| -> Result<Vec<u8>, SurfaceFault> {
+        let grid = CellGrid::new(stack.headers(), &SurfaceOptions::default())?;
+        progress.expect(grid.layers() as u64);
+        let layer = |position| {
+            progress.one_done();
+            Ok::<_, SurfaceFault>(stack.page(position)?.decode()?)
+        };
+        Ok(grid.surface(layer)?.to_bytes())
+    });
+    made.map_err(|fault| fault.to_string())
+}
+
+/// Why there is no surface.
+#[derive(Debug, Error)]
+enum SurfaceFault {
+    #[error("{0}")]
+    Surface(#[from] SurfaceError),
+    #[error("{}", ViewError::from(.0))]
+    Stack(#[from] StackError),
+}
+
+/// What an overlay is drawn from.
+enum Drawing {
+    /// What is white in `a` and not in `b`; what is not there is black.
+    OnlyIn {
+        a: Option<Arc<Image>>,
+        b: Option<Arc<Image>>,
+        size: [u32; 2],
+    },
+    Rows {
+        bands: Vec<std::ops::Range<u32>>,
+        size: [u32; 2],
+    },
+    Findings {
+        found: Vec<Finding>,
+        layer: Arc<Image>,
+        below: Option<Arc<Image>>,
+    },
+}
+
+impl Drawing {
+    fn most_bytes(&self) -> usize {
+        let bytes =
+            |image: &Option<Arc<Image>>| image.as_ref().map_or(0, |image| image_bytes(image));
+        match self {
+            Self::OnlyIn { a, b, .. } => bytes(a) + bytes(b),
+            Self::Rows { size, .. } => 8 * size[1] as usize,
+            Self::Findings { layer, .. } => image_bytes(layer),
+        }
+    }
+
+    fn draw(&self) -> Mask {
+        match self {
+            Self::OnlyIn { a, b, size: [width, height] } => {
+                let Some(a) = a else { return Mask::black(*width, *height) };
+                let only = match b {
+                    Some(b) => only_in(&a.exposed(), &b.exposed()),
+                    None => a.exposed().into_owned(),
+                };
+                only.framed(whole([*width, *height]))
+            }
+            Self::Rows { bands, size } => rows(*size, bands),
+            Self::Findings { found, layer, below } => {
+                let layer = layer.exposed();
+                let black = Mask::black(layer.width(), 0);
+                let below = below.as_ref().map(|below| below.exposed());
+                findings::drawn(found.iter(), &layer, below.as_deref().unwrap_or(&black))
+            }
+        }
+    }
+}
+
+fn whole([width, height]: [u32; 2]) -> lamp_stack::Frame {
+    lamp_stack::Frame { left: 0, top: 0, width, height }
+}
