@@ -17,7 +17,7 @@ Stacks:
   info        describe a stack               report      write a page to send
   verify      prove that it is whole         compare     tell where two differ
   join        join ranges of layers          split       split into ranges
-  convert     write in another form          mesh-out    write the surface as STL
+  convert     write in another form          mesh-out    write a surface, STL
 Parts:
   mesh        check and repair a mesh        orient      find how to build it
   brep        check a STEP part              heights     find layer thicknesses
