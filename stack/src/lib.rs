@@ -23,12 +23,14 @@
 //! # }
 //! ```
 
+mod boxes;
 mod catalogue;
 mod check;
 mod combine;
 mod counting_sort;
 mod coverage;
 mod depth_levels;
+mod difference;
 mod digest;
 mod error;
 mod find;
@@ -49,6 +51,7 @@ mod orientation;
 mod output;
 mod packbits;
 mod page_folder;
+mod pairing;
 mod picture_page;
 mod png_page;
 mod png_write;
@@ -65,12 +68,14 @@ mod tiff;
 mod totals;
 mod verify;
 
+pub use boxes::{WhiteBox, largest_boxes};
 pub use catalogue::{Builtin, CatalogueError, Catalogued, nonempty_text};
 pub use check::CheckFault;
 pub use combine::{Combine, Op, combine_rows};
 pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use coverage::mean_levels;
 pub use depth_levels::DepthLevels;
+pub use difference::{Difference, Overlaid};
 pub use digest::{digest_of, digest_of_digests};
 pub use error::{PageFault, StackError, UnsupportedFeature};
 pub use find::stacks_in;
@@ -87,6 +92,7 @@ pub use named::{Named, UnknownName};
 pub use ordered::{MemorySize, map_in_order, take_batch};
 pub use orientation::{Orientation, OrientationError};
 pub use output::{Destination, write_stack};
+pub use pairing::{Pairing, PairingError, Section, shift_between};
 pub use picture_page::PictureFormat;
 pub use png_write::{
     png_of_layer, write_gray_animation, write_gray_png, write_png_folder, write_rgb_png,

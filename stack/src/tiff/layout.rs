@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 /// The division of a page into strips or tiles, in row order. A strip has the page's width.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layout {
     pub(super) tiled: bool,
     /// A piece's width; tiles may extend beyond the page's right side.

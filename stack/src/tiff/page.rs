@@ -177,6 +177,25 @@ impl Page {
         }
     }
 
+    /// Returns whether both pages have one coded image and one check of it, so that they decode to
+    /// the same image or both fail.
+    pub fn is_coded_as(&self, other: &Self) -> bool {
+        let check = |page: &Self| {
+            let check = page.check.as_ref().and_then(|check| check.page.as_ref());
+            check.map(|check| check.image)
+        };
+        self.limits == other.limits
+            && self.width == other.width
+            && self.gray == other.gray
+            && self.white_is_zero == other.white_is_zero
+            && self.orientation == other.orientation
+            && self.compression == other.compression
+            && self.differences == other.differences
+            && self.layout == other.layout
+            && check(self) == check(other)
+            && self.pieces == other.pieces
+    }
+
     /// Forgets the page's check, so that any image is taken.
     pub(crate) fn without_check(self) -> Self {
         Self { check: None, ..self }
