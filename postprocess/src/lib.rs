@@ -43,7 +43,7 @@ pub use edit::{
 pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
 pub use offset::{
     CompensateError, CompensateOptions, CompensateProblem, Compensated, Loss, Shrinkage, ThinWall,
-    Widths, compensate, offset, offset_one_bit, shrink,
+    Widths, beyond_tolerance, compensate, offset, offset_one_bit, shrink,
 };
 pub use strips::{
     IndexError, JoinSwathsError, StripDifference, StripWriter, StripsError, Swaths, SwathsError,

@@ -26,6 +26,7 @@ mod plain;
 mod row_runs;
 mod scale;
 mod skeleton;
+mod tolerance;
 mod walls;
 mod widths;
 
@@ -41,6 +42,7 @@ pub use compensate::{
 };
 pub use components::Loss;
 pub(crate) use components::without_holes;
+pub use tolerance::beyond_tolerance;
 pub use walls::ThinWall;
 pub use widths::Widths;
 
