@@ -120,7 +120,7 @@ impl GrayMask {
                     let to = levels.get(next).map_or(end, |change| change.column.min(end));
                     let row = &mut rows[usize::from(level)];
                     row.pop_if(|last| *last == from);
-                    if row.len() % 2 == 0 {
+                    if row.len().is_multiple_of(2) {
                         row.push(from);
                     }
                     if to < self.width() {
