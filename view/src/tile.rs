@@ -27,7 +27,8 @@ impl TileAt {
         let side = 1u32.checked_shl(self.reduction).and_then(NonZeroU32::new)?;
         let step = u64::from(TILE_SIDE) * u64::from(side.get());
         let range = |at: u32, size: u32| {
-            let start = u32::try_from(u64::from(at) * step).ok().filter(|&start| start < size)?;
+            let start = u64::from(at).checked_mul(step)?;
+            let start = u32::try_from(start).ok().filter(|&start| start < size)?;
             Some(start..(u64::from(start) + step).min(size.into()) as u32)
         };
         Some((side, [range(self.x, size[0])?, range(self.y, size[1])?]))
@@ -90,7 +91,7 @@ mod tests {
         assert_eq!(at(0, 2, 0), Some((side(1), [1024..1025, 0..512])));
         assert_eq!(at(1, 1, 0), Some((side(2), [1024..1025, 0..512])));
         assert_eq!(at(31, 0, 0), Some((side(1 << 31), [0..1025, 0..512])));
-        for (reduction, x, y) in [(0, 3, 0), (0, 0, 1), (1, 2, 0), (32, 0, 0), (0, u32::MAX, 0)] {
+        for (reduction, x, y) in [(0, 3, 0), (0, 0, 1), (1, 2, 0), (32, 0, 0), (31, u32::MAX, 0)] {
             assert_eq!(at(reduction, x, y), None, "{reduction} {x} {y}");
         }
     }

@@ -147,7 +147,8 @@ impl Viewer {
     /// Returns what is known of a layer without its image.
     pub(crate) fn layer(&self, stack: usize, layer: usize) -> Result<Value, ViewError> {
         let mut facts = self.stack(stack)?.layer(layer)?;
-        facts["partner"] = self.partners.of_layer(stack, layer).map(|at| at.layer).into();
+        facts["partner"] =
+            self.partners.of_layer(&self.stacks, stack, layer).map(|at| at.layer).into();
         Ok(facts)
     }
 
@@ -225,7 +226,7 @@ impl Viewer {
                 Drawing::OnlyIn { a: Some(image(stack, layer)?), b: below()?, size: header.size }
             }
             Overlay::Added | Overlay::Missing => {
-                let at = self.partners.of_layer(stack, layer);
+                let at = self.partners.of_layer(&self.stacks, stack, layer);
                 let other = at.as_ref().map(|at| image(at.stack, at.layer)).transpose()?;
                 let other =
                     other.zip(at).map(|(image, at)| Arc::new(at.framed(&image, header.size)));
@@ -426,3 +427,7 @@ impl Drawing {
 fn whole([width, height]: [u32; 2]) -> lamp_stack::Frame {
     lamp_stack::Frame { left: 0, top: 0, width, height }
 }
+
+#[cfg(test)]
+#[path = "viewer_tests.rs"]
+mod tests;

@@ -8,7 +8,7 @@ use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::{Path, Query, Request, State};
 use axum::http::StatusCode;
 use axum::middleware::{self, Next};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use axum::routing::get;
 use serde::Deserialize;
 use serde_json::Value;
@@ -26,7 +26,7 @@ use crate::viewer::Kind;
 pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
     Router::new()
         .route("/", get(|| async { page() }))
-        .route("/assets/{name}", get(|Path(name): Path<String>| async move { named(&name) }))
+        .route("/assets/{name}", get(file))
         .route("/api/session", get(session))
         .route("/api/findings", get(findings))
         .route("/api/surface", get(surface_state))
@@ -50,12 +50,12 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
 }
 
 type Answer = Result<Response, ViewError>;
-/// Numbers of an address that are not numbers are of nothing that there is.
-type Numbers<T> = Result<Path<T>, PathRejection>;
+/// What an address names. What is no number, or no text, is the name of nothing that there is.
+type Named<T> = Result<Path<T>, PathRejection>;
 type Keys<T> = Result<Query<T>, QueryRejection>;
 
-fn numbers<T>(path: Numbers<T>) -> Result<T, ViewError> {
-    path.map(|Path(numbers)| numbers).map_err(|_| ViewError::NoSuch("page"))
+fn named<T>(path: Named<T>) -> Result<T, ViewError> {
+    path.map(|Path(names)| names).map_err(|_| ViewError::NoSuch("page"))
 }
 
 fn keys<T>(query: Keys<T>) -> Result<T, ViewError> {
@@ -63,14 +63,18 @@ fn keys<T>(query: Keys<T>) -> Result<T, ViewError> {
 }
 
 fn page() -> Response {
-    named("index.html")
+    asset_named("index.html")
 }
 
-fn named(name: &str) -> Response {
+fn asset_named(name: &str) -> Response {
     match assets::asset(name) {
         Some(found) => asset(&found),
         None => refusal(StatusCode::NOT_FOUND, "there is no such file"),
     }
+}
+
+async fn file(path: Named<String>) -> Answer {
+    Ok(asset_named(&named(path)?))
 }
 
 async fn session(State(workers): State<Arc<Workers>>) -> Response {
@@ -91,13 +95,13 @@ async fn surface(State(workers): State<Arc<Workers>>) -> Answer {
     workers.run(|viewer, _| viewer.surface().map(binary)).await
 }
 
-async fn layers(State(workers): State<Arc<Workers>>, path: Numbers<usize>) -> Answer {
-    let stack = numbers(path)?;
+async fn layers(State(workers): State<Arc<Workers>>, path: Named<usize>) -> Answer {
+    let stack = named(path)?;
     json(workers, move |viewer, _| Ok(viewer.stack(stack)?.layers())).await
 }
 
-async fn layer(State(workers): State<Arc<Workers>>, path: Numbers<(usize, usize)>) -> Answer {
-    let (stack, layer) = numbers(path)?;
+async fn layer(State(workers): State<Arc<Workers>>, path: Named<(usize, usize)>) -> Answer {
+    let (stack, layer) = named(path)?;
     let facts = json_of(&workers.viewer().layer(stack, layer)?);
     workers.expect_near(stack, layer);
     Ok(facts)
@@ -112,10 +116,10 @@ struct PixelKeys {
 
 async fn pixel(
     State(workers): State<Arc<Workers>>,
-    path: Numbers<(usize, usize)>,
+    path: Named<(usize, usize)>,
     query: Keys<PixelKeys>,
 ) -> Answer {
-    let (stack, layer) = numbers(path)?;
+    let (stack, layer) = named(path)?;
     let PixelKeys { x, y, threshold } = keys(query)?;
     let work = move |viewer: &crate::Viewer, given_up: &_| {
         viewer.pixel(stack, layer, [x, y], threshold, given_up)
@@ -132,10 +136,10 @@ struct EdgeKeys {
 
 async fn edge(
     State(workers): State<Arc<Workers>>,
-    path: Numbers<(usize, usize)>,
+    path: Named<(usize, usize)>,
     query: Keys<EdgeKeys>,
 ) -> Answer {
-    let (stack, layer) = numbers(path)?;
+    let (stack, layer) = named(path)?;
     let EdgeKeys { x, y, radius } = keys(query)?;
     let work = move |viewer: &crate::Viewer, given_up: &_| {
         viewer.edge(stack, layer, [x, y], radius, given_up)
@@ -150,10 +154,10 @@ struct TileKeys {
 
 async fn tile(
     State(workers): State<Arc<Workers>>,
-    path: Numbers<(usize, usize, String, u32, u32, String)>,
+    path: Named<(usize, usize, String, u32, u32, String)>,
     query: Keys<TileKeys>,
 ) -> Answer {
-    let (stack, layer, kind, reduction, x, file) = numbers(path)?;
+    let (stack, layer, kind, reduction, x, file) = named(path)?;
     let y = file.strip_suffix(".png").and_then(|y| y.parse().ok());
     let y = y.ok_or(ViewError::NoSuch("tile"))?;
     let threshold = keys(query)?.threshold;
@@ -179,10 +183,4 @@ async fn json(
     + 'static,
 ) -> Answer {
     workers.run(|viewer, given_up| work(viewer, given_up).map(|value| json_of(&value))).await
-}
-
-impl IntoResponse for Box<ViewError> {
-    fn into_response(self) -> Response {
-        (*self).into_response()
-    }
 }
