@@ -1,0 +1,140 @@
+/** Puts the page together: what is viewed is the state, and the parts follow it. */
+
+import { get } from "./api.js";
+import { Findings } from "./findings.js";
+import { byId, count, element, mm } from "./format.js";
+import { Heights } from "./heights.js";
+import { listenToKeys } from "./keys.js";
+import { Marks } from "./marks.js";
+import { Measure } from "./measure.js";
+import { Overlays } from "./overlays.js";
+import { Picture } from "./picture.js";
+import { Pixel, tellLayer } from "./pixel.js";
+import { listenToShare } from "./share.js";
+import { SolidPanel } from "./solid_panel.js";
+import { State, fromHash, linkAddress } from "./state.js";
+
+/** Tells what went wrong, until something comes out again. */
+function fail(error) {
+  byId("message").textContent = error.message;
+  byId("message").hidden = false;
+}
+
+/** Tells something in the live region, which screen readers speak. */
+function say(text) {
+  byId("live").textContent = text;
+}
+
+async function start() {
+  const [session, first] = await Promise.all([get("/api/session"), get("/api/stacks/0/layers")]);
+  const rest = session.stacks.slice(1).map((_, stack) => get(`/api/stacks/${stack + 1}/layers`));
+  const tables = [first, ...(await Promise.all(rest))];
+  const state = new State();
+  state.set(fromHash(location.hash, session));
+  const unit = session.stacks[0].width;
+  const picture = new Picture(byId("sheets"), { tile: session.tile, unit });
+  const app = {
+    session,
+    state,
+    picture,
+    fail,
+    say,
+    columnsOf: (stack) => tables[stack],
+    get columns() {
+      return tables[state.view.stack];
+    },
+    /** The width and height of the present layer. */
+    size: () => ["width", "height"].map((side) => app.columns[side][state.view.layer]),
+  };
+  app.redraw = () => picture.refresh("findings");
+  app.overlays = new Overlays(app, () => show(app));
+  app.marks = new Marks(app);
+  app.heights = new Heights(app);
+  app.pixel = new Pixel(app);
+  app.measure = new Measure(app);
+  const choose = (at) => (app.measure.isOn ? app.measure.choose(at) : app.pixel.choose(at));
+  picture.onClick(choose);
+  app.pixelAtCentre = () => choose(picture.centre);
+  if (session.findings) app.findings = new Findings(app);
+  app.solid = new SolidPanel(app);
+  listenToKeys(app);
+  listenToShare(app);
+  linkAddress(state, session);
+  connect(app);
+}
+
+/** Lets the picture follow the state, and the state the picture. */
+function connect(app) {
+  const { picture, session, state } = app;
+  const stacks = session.stacks.map((stack, index) => Object.assign(element("option", stack.name), { value: index }));
+  byId("stack").replaceChildren(...stacks);
+  byId("stack").addEventListener("change", ({ target }) => {
+    const stack = Number(target.value);
+    state.set({ stack, layer: Math.min(state.view.layer, session.stacks[stack].layers - 1) });
+  });
+  byId("zoom-in").addEventListener("click", () => picture.zoomBy(1.5));
+  byId("zoom-out").addEventListener("click", () => picture.zoomBy(1 / 1.5));
+  byId("whole").addEventListener("click", () => picture.home());
+  picture.addEventListener("failed", ({ detail }) => fail(detail));
+  let placed = false;
+  picture.addEventListener("shown", () => {
+    if (!placed) place(app);
+    placed = true;
+    tellShown(app);
+  });
+  picture.addEventListener("view", () => {
+    if (placed) state.set({ centre: picture.centre, zoom: picture.zoom });
+  });
+  state.on(["stack", "layer", "overlays", "threshold"], () => show(app));
+  state.on(["stack"], () => tellStack(app));
+  addEventListener("hashchange", () => place(app));
+  tellStack(app);
+  app.heights.update();
+  show(app);
+}
+
+/** Brings the place of the state to the picture, if it has one. */
+function place({ picture, state }) {
+  const { centre, zoom } = state.view;
+  if (centre && zoom) picture.lookAt(centre, zoom);
+}
+
+function tellStack({ session, state }) {
+  const stack = session.stacks[state.view.stack];
+  document.title = `${stack.name} – LAMP`;
+  byId("stack").value = state.view.stack;
+  const size = stack.dpi ? `, ${mm((stack.width * 25.4) / stack.dpi)} wide at ${stack.dpi} dpi` : "";
+  const part = stack.part ? `${stack.part}: ` : "";
+  byId("facts").textContent =
+    `${part}${count(stack.layers)} layers of ${count(stack.width)} x ${count(stack.height)} px${size}`;
+  if (stack.end) fail(new Error(stack.end));
+}
+
+/** Shows the layer of the state with its overlays. */
+function show({ columns, overlays, picture, state }) {
+  const { stack, layer, threshold } = state.view;
+  const [width, height] = [columns.width[layer], columns.height[layer]];
+  const sheet = { stack, layer, width, height };
+  const gray = { ...sheet, kind: "layer", threshold: columns.gray[layer] ? threshold : null };
+  const over = state.view.overlays.map((kind) => ({ ...sheet, kind, threshold: null }));
+  picture.show({ sheets: [gray, ...over], opacity: { ...overlays.opacity } });
+}
+
+let asked = new AbortController();
+
+/** Tells about the layer that has come; the server then expects its neighbours. */
+async function tellShown({ columns, fail, picture, say, state }) {
+  const { stack, layer } = state.view;
+  asked.abort();
+  asked = new AbortController();
+  try {
+    const facts = await get(`/api/stacks/${stack}/layers/${layer}`, asked.signal);
+    tellLayer(facts);
+    picture.canvas.setAttribute("aria-label", `Layer picture: ${facts.name}`);
+    say(facts.name);
+  } catch (error) {
+    if (error.name !== "AbortError") fail(error);
+  }
+}
+
+start().catch(fail);

@@ -1,0 +1,78 @@
+/** What is drawn over the picture: marks on pixels, the grid of pixels, the scale. */
+
+import { byId } from "./format.js";
+
+/** From this zoom on, pixels have a grid. */
+const GRID_ZOOM = 12;
+
+/** Lines over the picture. A set of lines has a name, and is drawn white on black. */
+export class Marks {
+  #app;
+  #svg = byId("marks");
+  /** @type {Map<string, [number, number][][]>} lines of points, in pixels of the image */
+  #lines = new Map();
+
+  constructor(app) {
+    this.#app = app;
+    app.picture.addEventListener("view", () => this.draw());
+  }
+
+  /** Sets the lines of a name. */
+  set(name, lines) {
+    this.#lines.set(name, lines);
+    this.draw();
+  }
+
+  /** Sets a rectangle, `[left, top, right, bottom]`, or none. */
+  setBox(name, box) {
+    if (!box) return this.set(name, []);
+    const [left, top, right, bottom] = box;
+    const corners = [[left, top], [right, top], [right, bottom], [left, bottom], [left, top]];
+    this.set(name, [corners]);
+  }
+
+  /** Draws all for the present place and zoom. */
+  draw() {
+    const { picture } = this.#app;
+    const place = (point) => picture.toScreen(point).map((at) => at.toFixed(1)).join(" ");
+    const path = (lines) => lines.map((line) => `M${line.map(place).join("L")}`).join("");
+    const drawn = [path([...this.#lines.values()].flat())];
+    const paths = [line("grid", path(this.#grid())), line("under", drawn), line("", drawn)];
+    this.#svg.replaceChildren(...paths);
+    this.#scale();
+  }
+
+  #grid() {
+    const { picture, size } = this.#app;
+    if (picture.zoom < GRID_ZOOM) return [];
+    const { clientWidth, clientHeight } = this.#svg;
+    const [left, top] = picture.fromScreen([0, 0]).map((at) => Math.max(0, Math.floor(at)));
+    const end = picture.fromScreen([clientWidth, clientHeight]);
+    const [right, bottom] = end.map((at, axis) => Math.min(size()[axis], Math.ceil(at)));
+    const lines = [];
+    for (let x = left; x <= right; x++) lines.push([[x, top], [x, bottom]]);
+    for (let y = top; y <= bottom; y++) lines.push([[left, y], [right, y]]);
+    return lines;
+  }
+
+  /** Draws a bar of a round length of 60 to 150 screen pixels. */
+  #scale() {
+    const { picture, session, state } = this.#app;
+    const { dpi } = session.stacks[state.view.stack];
+    const pitch = dpi ? 25.4 / dpi : 1;
+    const most = (150 / picture.zoom) * pitch;
+    const ten = 10 ** Math.floor(Math.log10(most));
+    const round = [5, 2, 1].map((digit) => digit * ten).find((length) => length <= most);
+    const bar = byId("scale");
+    bar.style.width = `${(round / pitch) * picture.zoom}px`;
+    const millimetres = round < 0.1 ? `${+(round * 1000).toPrecision(1)} µm` : `${+round.toPrecision(1)} mm`;
+    bar.firstElementChild.textContent = dpi ? millimetres : `${+round.toPrecision(1)} px`;
+  }
+}
+
+function line(name, path) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  made.setAttribute("class", name);
+  made.setAttribute("d", path);
+  return made;
+}
