@@ -9,6 +9,7 @@ mod background;
 mod cache;
 mod colours;
 mod copies;
+mod drawing;
 mod edge;
 mod error;
 mod findings;
@@ -17,6 +18,7 @@ mod pairs;
 mod server;
 mod stack;
 mod surface;
+mod surface_work;
 mod tile;
 mod viewer;
 

@@ -4,19 +4,19 @@ use std::num::NonZeroU8;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use lamp_stack::{Image, Mask, StackError};
+use lamp_stack::{Image, Mask};
 use serde_json::{Value, json};
-use thiserror::Error;
 
 use crate::background::{Background, Progress};
 use crate::cache::{Cache, Key, image_bytes};
+use crate::drawing::Drawing;
 use crate::edge::nearest_edge;
 use crate::error::ViewError;
-use crate::findings::{self, Finding};
-use crate::overlay::{Overlay, bands, fixed_bands, only_in, rows};
+use crate::findings::Finding;
+use crate::overlay::{Overlay, bands, fixed_bands};
 use crate::pairs::Partners;
 use crate::stack::{ViewedStack, level, place_mm};
-use crate::surface::{CellGrid, SurfaceError, SurfaceOptions};
+use crate::surface_work::surface_of;
 use crate::tile::{Inks, TILE_SIDE, TileAt, tile};
 
 /// Stacks that are viewed together, and the images of them that are kept.
@@ -346,86 +346,6 @@ impl Viewer {
     pub(crate) fn surface(&self) -> Result<Vec<u8>, ViewError> {
         self.surface.get(Vec::clone).ok_or(ViewError::NoSuch("surface yet"))
     }
-}
-
-/// Makes the surface of a stack. One thread does, so that the others are free for tiles.
-fn surface_of(stack: &ViewedStack, progress: &Progress) -> Result<Vec<u8>, String> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let pool = pool.map_err(|error| error.to_string())?;
-    let made = pool.install(|| -> Result<Vec<u8>, SurfaceFault> {
-        let grid = CellGrid::new(stack.headers(), &SurfaceOptions::default())?;
-        progress.expect(grid.layers() as u64);
-        let layer = |position| {
-            progress.one_done();
-            Ok::<_, SurfaceFault>(stack.page(position)?.decode()?)
-        };
-        Ok(grid.surface(layer)?.to_bytes())
-    });
-    made.map_err(|fault| fault.to_string())
-}
-
-/// Why there is no surface.
-#[derive(Debug, Error)]
-enum SurfaceFault {
-    #[error("{0}")]
-    Surface(#[from] SurfaceError),
-    #[error("{}", ViewError::from(.0))]
-    Stack(#[from] StackError),
-}
-
-/// What an overlay is drawn from.
-enum Drawing {
-    /// What is white in `a` and not in `b`; what is not there is black.
-    OnlyIn {
-        a: Option<Arc<Image>>,
-        b: Option<Arc<Image>>,
-        size: [u32; 2],
-    },
-    Rows {
-        bands: Vec<std::ops::Range<u32>>,
-        size: [u32; 2],
-    },
-    Findings {
-        found: Vec<Finding>,
-        layer: Arc<Image>,
-        below: Option<Arc<Image>>,
-    },
-}
-
-impl Drawing {
-    fn most_bytes(&self) -> usize {
-        let bytes =
-            |image: &Option<Arc<Image>>| image.as_ref().map_or(0, |image| image_bytes(image));
-        match self {
-            Self::OnlyIn { a, b, .. } => bytes(a) + bytes(b),
-            Self::Rows { size, .. } => 8 * size[1] as usize,
-            Self::Findings { layer, .. } => image_bytes(layer),
-        }
-    }
-
-    fn draw(&self) -> Mask {
-        match self {
-            Self::OnlyIn { a, b, size: [width, height] } => {
-                let Some(a) = a else { return Mask::black(*width, *height) };
-                let only = match b {
-                    Some(b) => only_in(&a.exposed(), &b.exposed()),
-                    None => a.exposed().into_owned(),
-                };
-                only.framed(whole([*width, *height]))
-            }
-            Self::Rows { bands, size } => rows(*size, bands),
-            Self::Findings { found, layer, below } => {
-                let layer = layer.exposed();
-                let black = Mask::black(layer.width(), 0);
-                let below = below.as_ref().map(|below| below.exposed());
-                findings::drawn(found.iter(), &layer, below.as_deref().unwrap_or(&black))
-            }
-        }
-    }
-}
-
-fn whole([width, height]: [u32; 2]) -> lamp_stack::Frame {
-    lamp_stack::Frame { left: 0, top: 0, width, height }
 }
 
 #[cfg(test)]

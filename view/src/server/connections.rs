@@ -2,19 +2,24 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
+use axum::http::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::AbortHandle;
+use tower_service::Service;
 
 /// How long a connection may take for the head of a request, or be idle.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// The most connections at a time: a browser has about six. Beyond, the eldest is closed.
+/// The most connections at a time: a browser has about six. Beyond, the eldest is closed of those
+/// without a request that was let in.
 const MOST_CONNECTIONS: usize = 256;
 /// The most bytes of the head of a request.
 const MOST_HEAD: usize = 16 << 10;
@@ -23,7 +28,7 @@ const BREATH: Duration = Duration::from_millis(50);
 
 /// Answers connections until the process ends.
 pub(super) async fn answer(listener: TcpListener, routes: Router) -> io::Result<()> {
-    let open = Arc::new(Open::default());
+    let mut open = Open::default();
     loop {
         match listener.accept().await {
             Ok((stream, _)) => open.add(stream, routes.clone()),
@@ -33,29 +38,48 @@ pub(super) async fn answer(listener: TcpListener, routes: Router) -> io::Result<
     }
 }
 
-/// The connections that are open, eldest first.
-#[derive(Default)]
-struct Open(Mutex<VecDeque<AbortHandle>>);
+/// Tells whether a connection had a request that was let in.
+#[derive(Clone, Default)]
+pub(super) struct Trust(Arc<AtomicBool>);
 
-impl Open {
-    fn add(&self, stream: TcpStream, routes: Router) {
-        let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        open.retain(|connection| !connection.is_finished());
-        if open.len() >= MOST_CONNECTIONS
-            && let Some(eldest) = open.pop_front()
-        {
-            eldest.abort();
-        }
-        // Small answers are not held back for more to send.
-        let _ = stream.set_nodelay(true);
-        open.push_back(tokio::spawn(serve(stream, routes)).abort_handle());
+impl Trust {
+    pub(super) fn gain(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    fn is_gained(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
     }
 }
 
-async fn serve(stream: TcpStream, routes: Router) {
+/// The connections that are open, eldest first.
+#[derive(Default)]
+struct Open(VecDeque<(Trust, AbortHandle)>);
+
+impl Open {
+    fn add(&mut self, stream: TcpStream, routes: Router) {
+        self.0.retain(|(_, connection)| !connection.is_finished());
+        if self.0.len() >= MOST_CONNECTIONS {
+            let stranger = self.0.iter().position(|(trust, _)| !trust.is_gained());
+            if let Some((_, closed)) = self.0.remove(stranger.unwrap_or(0)) {
+                closed.abort();
+            }
+        }
+        // Small answers are not held back for more to send.
+        let _ = stream.set_nodelay(true);
+        let trust = Trust::default();
+        let connection = tokio::spawn(serve(stream, routes, trust.clone()));
+        self.0.push_back((trust, connection.abort_handle()));
+    }
+}
+
+async fn serve(stream: TcpStream, routes: Router, trust: Trust) {
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(MOST_HEAD);
-    let connection = http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(routes));
+    let service = service_fn(|mut request: Request<Incoming>| {
+        request.extensions_mut().insert(trust.clone());
+        routes.clone().call(request)
+    });
     // A connection that breaks off concerns nobody else.
-    let _ = connection.await;
+    let _ = http.serve_connection(TokioIo::new(stream), service).await;
 }

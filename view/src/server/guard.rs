@@ -6,6 +6,7 @@ use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
 use axum::response::{IntoResponse, Response};
 
 use super::answer::{refusal, with_policy};
+use super::connections::Trust;
 use super::token::Token;
 
 /// Lets requests pass that may.
@@ -29,6 +30,7 @@ impl Guard {
         }
         let is_get = request.method() == Method::GET;
         if self.has_cookie(request.headers()) {
+            request.extensions().get().map(Trust::gain);
             let method = "the viewer answers GET alone";
             return (!is_get).then(|| {
                 let mut refused = refusal(StatusCode::METHOD_NOT_ALLOWED, method);
