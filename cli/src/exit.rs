@@ -29,6 +29,8 @@ pub(crate) enum Exit {
     Output(anyhow::Error),
     /// The work is done, but found what needs a person: status 3.
     Findings(String),
+    /// The work is done, and two stacks differ: status 1, as of `cmp` and `diff`. All is told.
+    Different,
 }
 
 impl Exit {
@@ -52,6 +54,7 @@ impl Exit {
             Self::Failed(error) => Self::Failed(error.context(place)),
             Self::Output(error) => Self::Output(error.context(place)),
             Self::Findings(message) => Self::Findings(format!("{place}: {message}")),
+            Self::Different => Self::Different,
         }
     }
 
@@ -64,7 +67,7 @@ impl Exit {
     pub(crate) fn status(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
-            Self::Failed(_) | Self::Output(_) => 1,
+            Self::Failed(_) | Self::Output(_) | Self::Different => 1,
             Self::Findings(_) => 3,
         }
     }
@@ -87,6 +90,7 @@ impl fmt::Display for Exit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Findings(message) => f.write_str(message),
+            Self::Different => f.write_str("the stacks differ"),
             Self::Usage(error) | Self::Failed(error) | Self::Output(error) => {
                 write!(f, "{error:#}")?;
                 match error.chain().find_map(hint) {

@@ -40,6 +40,7 @@ mod progress;
 mod recorded;
 mod second_opinion;
 mod section;
+mod shades;
 mod signals;
 mod sliced_part;
 mod slicing_options;
@@ -158,6 +159,8 @@ fn keep_freed_memory() {
 fn finish(name: &str, result: Result<ExitCode, Exit>) -> ExitCode {
     wait_if_ending();
     match result {
+        // What differs stands on standard output.
+        Err(error @ Exit::Different) => ExitCode::from(error.status()),
         Err(error) if !error.is_reader_gone() => {
             say(&format!("{name}: {error}"));
             give_up(&error);

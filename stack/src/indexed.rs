@@ -119,6 +119,17 @@ impl IndexedStack {
         Ok(Self { headers, end, source: source(places)? })
     }
 
+    /// Returns the stack if it is not cut off or damaged.
+    ///
+    /// # Errors
+    /// Returns why no pages follow the last, if that is not the stack's end.
+    pub fn whole(self) -> Result<Self, StackError> {
+        match self.end {
+            Some(end) => Err(end),
+            None => Ok(self),
+        }
+    }
+
     /// Returns what the pages say, bottom first: at least one.
     pub fn headers(&self) -> &[PageHeader] {
         &self.headers

@@ -3,6 +3,7 @@
 mod brep;
 mod calibrate;
 mod check;
+mod compare;
 mod compensate;
 mod completions;
 mod convert;
@@ -50,6 +51,7 @@ pub(crate) enum Command {
     Demo(demo::DemoArgs),
     Info(info::InfoArgs),
     Verify(verify::VerifyArgs),
+    Compare(compare::CompareArgs),
     Check(check::CheckArgs),
     Support(support::SupportArgs),
     Show(show::ShowArgs),
@@ -98,6 +100,7 @@ impl Command {
             Self::Demo(args) => demo::run(args, common),
             Self::Info(args) => info::run(args),
             Self::Verify(args) => verify::run(args, common),
+            Self::Compare(args) => compare::run(args, common),
             Self::Check(args) => check::run(args, common),
             Self::Support(args) => support::run(args, common),
             Self::Show(args) => show::run(args),

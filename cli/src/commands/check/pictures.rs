@@ -2,32 +2,29 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::ops::Range;
-use std::path::Path;
 
-use lamp_stack::{FolderBeside, Layer, Mask, Page, combine_rows, write_rgb_png};
+use lamp_stack::{FolderBeside, Layer, Mask, Page, combine_rows, white_runs};
 use lamp_supports::{Region, component_at};
 
 use super::lines::{FindingLine, Shown};
 use super::{CheckArgs, CheckedInput, Input};
 use crate::exit::Exit;
 use crate::options::Common;
+use crate::picture;
 use crate::progress::Progress;
+use crate::shades::{Shade, ShadedPicture};
 use crate::streams::{failed_at, in_range, input_name};
 
 /// The most pictures of an input.
 const MOST_PICTURES: usize = 24;
-/// The least that is shown around a finding, in pixels, and the share of its size.
-const LEAST_AROUND: u32 = 16;
-const SHARE_AROUND: u32 = 4;
-/// The size that pictures come near to, in pixels, and the most that they enlarge.
+/// The longer side of pictures, in pixels.
 const SIDE: u32 = 480;
-const MOST_ENLARGED: u32 = 8;
 
 /// What a pixel shows. Of several pixels that share a picture's, the last named wins.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Shade {
+enum Kind {
     Black,
     /// White in the layer below only.
     Below,
@@ -37,7 +34,9 @@ enum Shade {
     Found,
 }
 
-impl Shade {
+impl Shade for Kind {
+    const NONE: Self = Self::Black;
+
     fn colour(self) -> [u8; 3] {
         match self {
             Self::Black => [0; 3],
@@ -64,8 +63,12 @@ pub(super) fn write_pictures(
         args.for_each_layer(input, common, is_wanted, |position, below, layer| {
             for (name, shown) in drawings.get(&position).into_iter().flatten() {
                 let path = folder.path().join(format!("check_{prefix}{name}"));
-                let drawn = draw(&path, below, layer, shown);
-                drawn.map_err(|error| failed_at(name.clone(), error.into()))?;
+                let draw = || {
+                    let mut out = BufWriter::new(File::create_new(&path)?);
+                    draw(&mut out, below, layer, shown)?;
+                    out.flush()
+                };
+                draw().map_err(|error| failed_at(name.clone(), error.into()))?;
             }
             Ok(())
         })?;
@@ -128,63 +131,35 @@ impl CheckArgs {
     }
 }
 
-fn draw(path: &Path, below: Option<&Mask>, layer: &Mask, shown: &Shown) -> io::Result<()> {
-    let Region { columns, rows } = around(&shown.region, layer);
+/// Draws a finding's region and what is around it.
+pub(in crate::commands) fn draw(
+    out: impl Write,
+    below: Option<&Mask>,
+    layer: &Mask,
+    shown: &Shown,
+) -> io::Result<()> {
+    let Region { columns, rows } = &shown.region;
+    let region = picture::Region { columns: columns.clone(), rows: rows.clone() };
     let found = shown.pixel.map_or_else(Vec::new, |[column, row]| component_at(layer, column, row));
-    let longer = (columns.end - columns.start).max(rows.end - rows.start);
-    let (down, up) = (longer.div_ceil(SIDE), (SIDE / longer).clamp(1, MOST_ENLARGED));
-    let size = [&columns, &rows].map(|range| (range.end - range.start).div_ceil(down) * up);
-    let shades = rows.step_by(down as usize).flat_map(|first| {
-        let mut shades = vec![Shade::Black; columns.len().div_ceil(down as usize)];
-        for row in first..(first + down).min(layer.height()) {
-            let mut paint = |runs: &mut dyn Iterator<Item = Range<u32>>, shade: Shade| {
-                for run in runs {
-                    let run = run.start.max(columns.start)..run.end.min(columns.end);
-                    if run.is_empty() {
-                        continue;
-                    }
-                    let first = (run.start - columns.start) / down;
-                    let end = (run.end - columns.start).div_ceil(down);
-                    for place in &mut shades[first as usize..end as usize] {
-                        *place = shade.max(*place);
-                    }
-                }
-            };
-            let runs = |row: &[u32]| -> Vec<Range<u32>> {
-                lamp_stack::white_runs(row, layer.width()).map(|(start, end)| start..end).collect()
-            };
-            let (here, under) = (layer.row(row), below.map_or(&[][..], |below| below.row(row)));
-            let mut difference = Vec::new();
-            combine_rows([here, under], |[here, under]| here && !under, &mut difference);
-            let unheld = runs(&difference);
-            paint(&mut runs(under).into_iter(), Shade::Below);
-            paint(&mut runs(here).into_iter(), Shade::White);
-            paint(&mut unheld.iter().cloned(), Shade::Unheld);
-            if shown.pixel.is_some() {
-                let of_row = found.partition_point(|(other, _)| *other < row);
-                let of_row = found[of_row..].iter().take_while(|(other, _)| *other == row);
-                paint(&mut of_row.map(|(_, run)| run.clone()), Shade::Found);
-            } else if shown.region.rows.contains(&row) {
-                let Range { start, end } = shown.region.columns;
-                paint(
-                    &mut unheld.iter().map(|run| run.start.max(start)..run.end.min(end)),
-                    Shade::Found,
-                );
-            }
+    let picture = ShadedPicture::new(region, [layer.width(), layer.height()], SIDE);
+    picture.write_png(out, |row, paint| {
+        let runs = |row: &[u32]| -> Vec<Range<u32>> {
+            white_runs(row, layer.width()).map(|(start, end)| start..end).collect()
+        };
+        let (here, under) = (layer.row(row), below.map_or(&[][..], |below| below.row(row)));
+        let mut difference = Vec::new();
+        combine_rows([here, under], |[here, under]| here && !under, &mut difference);
+        let unheld = runs(&difference);
+        runs(under).into_iter().for_each(|run| paint(run, Kind::Below));
+        runs(here).into_iter().for_each(|run| paint(run, Kind::White));
+        unheld.iter().for_each(|run| paint(run.clone(), Kind::Unheld));
+        if shown.pixel.is_some() {
+            let of_row = found.partition_point(|(other, _)| *other < row);
+            let of_row = found[of_row..].iter().take_while(|(other, _)| *other == row);
+            of_row.for_each(|(_, run)| paint(run.clone(), Kind::Found));
+        } else if rows.contains(&row) {
+            let within = |run: &Range<u32>| run.start.max(columns.start)..run.end.min(columns.end);
+            unheld.iter().for_each(|run| paint(within(run), Kind::Found));
         }
-        let wide = shades.iter().flat_map(|shade| shade.colour().repeat(up as usize));
-        let wide: Vec<u8> = wide.collect();
-        std::iter::repeat_n(wide, up as usize)
-    });
-    let file = File::create_new(path)?;
-    write_rgb_png(BufWriter::new(file), size[0], size[1], shades)
-}
-
-/// Returns a finding's region with what is around it.
-fn around(region: &Region, mask: &Mask) -> Region {
-    let grow = |range: &Range<u32>, end: u32| {
-        let by = LEAST_AROUND.max((range.end - range.start) / SHARE_AROUND);
-        range.start.saturating_sub(by)..range.end.saturating_add(by).min(end)
-    };
-    Region { columns: grow(&region.columns, mask.width()), rows: grow(&region.rows, mask.height()) }
+    })
 }

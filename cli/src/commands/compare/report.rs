@@ -1,0 +1,195 @@
+//! What a comparison tells: lines for people, and JSON.
+
+use std::cmp::Reverse;
+
+use lamp_stack::{PageHeader, Pairing};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::walk::{DifferenceBox, SectionDifference};
+use crate::json_report::to_nm;
+use crate::progress::printable;
+
+/// The most layers, and the most boxes of a layer, that are printed unless all are asked for.
+const MOST_LINES: usize = 20;
+const MOST_BOX_LINES: usize = 3;
+
+/// What was found between two stacks.
+pub(super) struct Comparison<'a> {
+    pub(super) names: [String; 2],
+    pub(super) pairing: &'a Pairing,
+    /// What the pages of the first and of the second stack say.
+    pub(super) headers: [&'a [PageHeader]; 2],
+    /// In pixels.
+    pub(super) tolerance: f64,
+    /// The sections that differ or in which something was forgiven, from the bottom up.
+    pub(super) sections: Vec<SectionDifference>,
+}
+
+impl Comparison<'_> {
+    /// Returns the sections that differ, from the bottom up.
+    fn told(&self) -> impl Iterator<Item = &SectionDifference> {
+        self.sections.iter().filter(|found| found.is_told())
+    }
+
+    pub(super) fn is_same(&self) -> bool {
+        self.told().next().is_none()
+    }
+
+    /// Returns the section with the most pixels that differ, if any do; of equal ones the lowest.
+    pub(super) fn worst(&self) -> Option<&SectionDifference> {
+        let differing = self.told().filter(|found| found.pixels() > 0);
+        differing.min_by_key(|found| Reverse(found.pixels()))
+    }
+
+    /// Returns the page whose pixels boxes are in: that of the first stack, if it has one there.
+    fn header(&self, found: &SectionDifference) -> &PageHeader {
+        let of_stack = |stack: usize, position: Option<usize>| {
+            position.map(|position| &self.headers[stack][position])
+        };
+        let header = of_stack(0, found.section.a).or_else(|| of_stack(1, found.section.b));
+        header.expect("a section has a layer")
+    }
+
+    fn name(&self, found: &SectionDifference) -> String {
+        let name = self.header(found).info.name();
+        let Some([bottom, top]) = found.section.heights_um.map(|ends| ends.map(|um| um / 1000.0))
+        else {
+            return name;
+        };
+        let is_whole_layer = |stack: usize, position: Option<usize>| {
+            let page = position.map(|position| &self.headers[stack][position].info);
+            page.and_then(|info| info.thickness_um)
+                .is_none_or(|um| (um / 1000.0 - (top - bottom)).abs() < 1e-5)
+        };
+        if is_whole_layer(0, found.section.a) && is_whole_layer(1, found.section.b) {
+            name
+        } else {
+            format!("{name}, z {bottom:.3} to {top:.3} mm")
+        }
+    }
+
+    fn sum(&self, of: fn(&SectionDifference) -> u64) -> u64 {
+        self.sections.iter().map(of).fold(0, u64::saturating_add)
+    }
+}
+
+/// Returns the lines to print: the worst layers first.
+pub(super) fn text(comparison: &Comparison<'_>, all: bool) -> String {
+    let [a, b] = &comparison.names;
+    let sections = comparison.pairing.sections().len();
+    let unit = if comparison.pairing.is_by_height() { "heights" } else { "layers" };
+    let mut told: Vec<_> = comparison.told().collect();
+    let forgiven = match comparison.sum(|found| found.forgiven) {
+        0 => String::new(),
+        pixels => format!("; {} forgiven", pixels_text(pixels)),
+    };
+    let mut text = match told.len() {
+        0 => format!("{a} and {b} are the same at {sections} {unit}{forgiven}\n"),
+        differ => format!(
+            "{a} and {b} differ at {differ} of {sections} {unit}: {} added, {} missing{forgiven}\n",
+            pixels_text(comparison.sum(|found| found.added)),
+            pixels_text(comparison.sum(|found| found.missing)),
+        ),
+    };
+    told.sort_by_key(|found| Reverse(found.pixels()));
+    let shown = if all { told.len() } else { told.len().min(MOST_LINES) };
+    for found in &told[..shown] {
+        text += &lines(comparison, found, all);
+    }
+    if shown < told.len() {
+        text += &format!("  {} more (--verbose or --json lists them)\n", told.len() - shown);
+    }
+    text.lines().map(|line| format!("{}\n", printable(line))).collect()
+}
+
+fn lines(comparison: &Comparison<'_>, found: &SectionDifference, all: bool) -> String {
+    let [a, b] = &comparison.names;
+    let only = match (found.section.a, found.section.b) {
+        (Some(_), None) => format!(", only in {a}"),
+        (None, Some(_)) => format!(", only in {b}"),
+        _ => String::new(),
+    };
+    let (name, added, missing) = (comparison.name(found), found.added, found.missing);
+    let mut text =
+        format!("  {name}{only}: {} added, {} missing\n", pixels_text(added), pixels_text(missing));
+    let boxes = if all { found.boxes.len() } else { found.boxes.len().min(MOST_BOX_LINES) };
+    for each in &found.boxes[..boxes] {
+        let ([left, right], [top, bottom]) = (each.columns, each.rows);
+        let place = match box_mm(comparison, found, each) {
+            Some([x0, x1, y0, y1]) => format!(" (x {x0:.3} to {x1:.3}, y {y0:.3} to {y1:.3} mm)"),
+            None => String::new(),
+        };
+        text += &format!(
+            "    {} in columns {left} to {}, rows {top} to {}{place}\n",
+            pixels_text(each.pixels),
+            right - 1,
+            bottom - 1
+        );
+    }
+    match found.box_count - boxes as u64 {
+        0 => {}
+        more => text += &format!("    {more} more places\n"),
+    }
+    text
+}
+
+fn pixels_text(pixels: u64) -> String {
+    if pixels == 1 { "1 pixel".to_owned() } else { format!("{pixels} pixels") }
+}
+
+/// Returns least and greatest x and y of a box, if the page says where its image lies.
+fn box_mm(
+    comparison: &Comparison<'_>,
+    found: &SectionDifference,
+    each: &DifferenceBox,
+) -> Option<[f64; 4]> {
+    let header = comparison.header(found);
+    let ([x, y], pitch) = (header.info.origin_mm?, header.dpi?.pitch().mm());
+    let [x0, x1] = each.columns.map(|column| to_nm(x + column as f64 * pitch));
+    let [y1, y0] = each.rows.map(|row| to_nm(y - row as f64 * pitch));
+    Some([x0, x1, y0, y1])
+}
+
+/// Returns what scripts are told.
+pub(super) fn answer(comparison: &Comparison<'_>) -> impl Serialize {
+    let page = |stack: usize, position: Option<usize>| {
+        position.map(|position| comparison.headers[stack][position].info.index)
+    };
+    let layers = comparison.sections.iter().map(|found| {
+        let mm = |end: usize| found.section.heights_um.map(|ends| to_nm(ends[end] / 1000.0));
+        json!({
+            "layer_a": page(0, found.section.a),
+            "layer_b": page(1, found.section.b),
+            "bottom_mm": mm(0),
+            "top_mm": mm(1),
+            "added_px": found.added,
+            "missing_px": found.missing,
+            "forgiven_px": found.forgiven,
+            "box_count": found.box_count,
+            "boxes": found.boxes.iter().map(|each| box_json(comparison, found, each)).collect::<Vec<_>>(),
+        })
+    });
+    json!({
+        "a": comparison.names[0],
+        "b": comparison.names[1],
+        "same": comparison.is_same(),
+        "by": if comparison.pairing.is_by_height() { "heights" } else { "indices" },
+        "compared": comparison.pairing.sections().len(),
+        "different": comparison.told().count(),
+        "tolerance_px": comparison.tolerance,
+        "added_px": comparison.sum(|found| found.added),
+        "missing_px": comparison.sum(|found| found.missing),
+        "forgiven_px": comparison.sum(|found| found.forgiven),
+        "layers": layers.collect::<Vec<_>>(),
+    })
+}
+
+fn box_json(comparison: &Comparison<'_>, found: &SectionDifference, each: &DifferenceBox) -> Value {
+    let ([left, right], [top, bottom]) = (each.columns, each.rows);
+    json!({
+        "pixels": each.pixels,
+        "box_px": [left, right, top, bottom],
+        "box_mm": box_mm(comparison, found, each),
+    })
+}

@@ -1,0 +1,74 @@
+//! Pictures of what pixels are, each kind in a colour.
+
+use std::io::{self, Write};
+use std::ops::Range;
+
+use lamp_stack::write_rgb_png;
+
+use crate::picture::Region;
+
+/// The least that is shown around a region, in pixels, and the share of its size.
+const LEAST_AROUND: u32 = 16;
+const SHARE_AROUND: u32 = 4;
+/// The most that small regions are enlarged.
+const MOST_ENLARGED: u32 = 8;
+
+/// What a pixel shows. Of several pixels that share a picture's, the greatest wins.
+pub(crate) trait Shade: Copy + Ord {
+    /// What is not painted.
+    const NONE: Self;
+
+    /// Returns red, green and blue.
+    fn colour(self) -> [u8; 3];
+}
+
+/// A picture of a region and what is around it, reduced or enlarged to come near to a size.
+pub(crate) struct ShadedPicture {
+    region: Region,
+    down: u32,
+    up: u32,
+}
+
+impl ShadedPicture {
+    /// A picture whose longer side has at most `side` pixels, of a region on an image of a width
+    /// and a height.
+    pub(crate) fn new(region: Region, [width, height]: [u32; 2], side: u32) -> Self {
+        let grow = |range: Range<u32>, end: u32| {
+            let by = LEAST_AROUND.max((range.end - range.start) / SHARE_AROUND);
+            range.start.saturating_sub(by)..range.end.saturating_add(by).min(end)
+        };
+        let region =
+            Region { columns: grow(region.columns, width), rows: grow(region.rows, height) };
+        let longer = (region.columns.len().max(region.rows.len()) as u32).max(1);
+        Self { region, down: longer.div_ceil(side), up: (side / longer).clamp(1, MOST_ENLARGED) }
+    }
+
+    /// Writes the picture as a PNG. `shade` is called with each row of the image that shows, from
+    /// the top, to paint runs of columns.
+    pub(crate) fn write_png<S: Shade>(
+        &self,
+        out: impl Write,
+        mut shade: impl FnMut(u32, &mut dyn FnMut(Range<u32>, S)),
+    ) -> io::Result<()> {
+        let Self { region: Region { columns, rows }, down, up } = self;
+        let [width, height] =
+            [columns, rows].map(|range| (range.len() as u32).div_ceil(*down) * up);
+        let pictured = rows.clone().step_by(*down as usize).flat_map(|first| {
+            let mut shades = vec![S::NONE; columns.len().div_ceil(*down as usize)];
+            for row in first..(first + down).min(rows.end) {
+                shade(row, &mut |run, shade| {
+                    let run = run.start.max(columns.start)..run.end.min(columns.end);
+                    if !run.is_empty() {
+                        let first = (run.start - columns.start) / down;
+                        let end = (run.end - columns.start).div_ceil(*down);
+                        let places = &mut shades[first as usize..end as usize];
+                        places.iter_mut().for_each(|place| *place = shade.max(*place));
+                    }
+                });
+            }
+            let wide = shades.iter().flat_map(|shade| shade.colour().repeat(*up as usize));
+            std::iter::repeat_n(wide.collect::<Vec<u8>>(), *up as usize)
+        });
+        write_rgb_png(out, width, height, pictured)
+    }
+}
