@@ -20,12 +20,14 @@ pub mod hostile;
 mod images;
 mod referees;
 mod scratch;
+mod viewing;
 
 pub use binaries::{bin, target_dir, workspace_root};
 pub use golden::{Change, Golden, Shade, difference};
 pub use images::{at_least, differing, edited, stripped, with_soft_edges};
 pub use referees::{Packed, ask, ask_python, packed, packed_mask, plain_pages};
 pub use scratch::{Ran, Scratch, ends_white, mask, masks, read_stack, write_gray_ramp};
+pub use viewing::{Answer, Viewing};
 
 use std::io::Write;
 use std::path::PathBuf;
