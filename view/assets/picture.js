@@ -18,6 +18,7 @@ export class Picture extends EventTarget {
   #wanted = null;
   #shown = null;
   #since = 0;
+  #busySince = 0;
   #loading = null;
 
   /**
@@ -155,18 +156,19 @@ export class Picture extends EventTarget {
   }
 
   async #loadWanted() {
-    this.canvas.setAttribute("aria-busy", "true");
     while (this.#shown !== this.#wanted) {
       const scene = this.#wanted;
       this.#since = performance.now();
       this.#loading = new AbortController();
+      this.#tellBusy();
       if (await this.#load(scene, this.#loading.signal)) {
         this.#reveal(scene);
         performance.measure("scene", { start: this.#since, detail: nameOf(scene.sheets[0]) });
       }
     }
     this.#loading = null;
-    this.canvas.setAttribute("aria-busy", "false");
+    this.canvas.dataset.shown = this.#shown.sheets.map(nameOf).join(" ");
+    this.#tellBusy();
     this.dispatchEvent(new CustomEvent("shown", { detail: this.#shown }));
   }
 
@@ -197,6 +199,7 @@ export class Picture extends EventTarget {
         error,
       });
     });
+    item.addHandler("fully-loaded-change", () => this.#tellBusy());
     this.#items.set(nameOf(sheet), item);
     return item;
   }
@@ -208,12 +211,13 @@ export class Picture extends EventTarget {
   }
 
   #loaded(item) {
-    return new Promise((loaded) => {
-      const seen = this.#viewer.viewport.getBoundsWithMargins().intersection(item.getBounds());
-      // Nothing of an image beside the screen is loaded.
-      if (!seen) loaded();
-      else item.whenFullyLoaded(loaded);
-    });
+    return new Promise((loaded) => (this.#hasAll(item) ? loaded() : item.whenFullyLoaded(loaded)));
+  }
+
+  /** Whether an image has all tiles that the screen shows. Beside the screen, none are loaded. */
+  #hasAll(item) {
+    const seen = this.#viewer.viewport.getBoundsWithMargins().intersection(item.getBounds());
+    return !seen || item.getFullyLoaded();
   }
 
   #reveal(scene) {
@@ -232,6 +236,15 @@ export class Picture extends EventTarget {
     item.source.stop();
     this.#viewer.world.removeItem(item);
     this.#items.delete(name);
+  }
+
+  /** Tells whether tiles are still to come, and how long the last ones took. */
+  #tellBusy() {
+    const isBusy = this.#loading != null || [...this.#items.values()].some((item) => !this.#hasAll(item));
+    const wasBusy = this.canvas.getAttribute("aria-busy") === "true";
+    if (isBusy && !wasBusy) this.#busySince = performance.now();
+    if (wasBusy && !isBusy) performance.measure("tiles", { start: this.#busySince });
+    this.canvas.setAttribute("aria-busy", `${isBusy}`);
   }
 
   #moved() {
