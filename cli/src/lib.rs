@@ -49,6 +49,7 @@ mod stack_part;
 mod step_options;
 mod streams;
 mod target_arg;
+mod terminal_picture;
 mod thumbnails;
 mod usage;
 

@@ -113,70 +113,74 @@ impl Facts {
     }
 
     fn text(&self, name: &str) -> String {
-        let totals = &self.totals;
-        let info = &totals.first.info;
-        let mut lines = vec![("stack", name.to_owned())];
-        if let Some(stack) = &info.stack {
-            lines.extend(stack_lines(stack));
-        }
-        lines.push(("layers", self.layers_text()));
-        let [width, height] = totals.first.size;
-        let others = if totals.one_size { "" } else { " on the first page; others differ" };
-        lines.push(("size", format!("{width} x {height} pixels{others}")));
-        lines.push(("resolution", resolution_text(&totals.first)));
-        if let (Some(bottom), Some(top)) = (info.z(), totals.top_mm()) {
-            lines.push(("z", format!("{:.3} to {top:.3} mm", bottom.mm())));
-        }
-        lines.extend(totals.thickness_um.map(|range| ("thickness", range_text(range, "um"))));
-        if let Some(exposure) = totals.exposure_ms {
-            let (text, seconds) = (range_text(exposure, "ms"), exposure.sum / 1000.0);
-            lines.push(("exposure", format!("{text}, {seconds:.1} s in all")));
-        }
-        lines.extend(self.area_text().map(|text| ("exposed", text)));
-        lines.extend(self.runs.map(|runs| ("runs", format!("{runs} transitions"))));
-        let names: Vec<_> =
-            totals.compressions.iter().map(|each| compression_name(*each)).collect();
-        lines.push(("data", format!("{} bytes, {}", totals.data_bytes, names.join(" and "))));
-        let stray = match totals.stray_rows {
-            0 => "none known".to_owned(),
-            rows => format!("{rows} in {} layers", totals.stray_layers),
-        };
-        lines.push(("stray rows", stray));
-        lines.push(("checks", self.checks_text().to_owned()));
-        // Names come from files: they must not steer the terminal.
-        let plain = |text: String| text.replace(char::is_control, "?");
-        lines
-            .into_iter()
-            .map(|(key, value)| (key, plain(value)))
-            .map(|(key, value)| format!("{:<12}{value}\n", format!("{key}:")))
-            .collect()
+        let lines = lines(&self.totals, name, self.runs).into_iter();
+        lines.map(|(key, value)| format!("{:<12}{value}\n", format!("{key}:"))).collect()
     }
+}
 
-    fn layers_text(&self) -> String {
-        let totals = &self.totals;
-        let gray = match totals.gray_pages {
-            0 => String::new(),
-            pages => format!(", {pages} of them gray"),
-        };
-        let (first, last) = (totals.first.info.index, totals.last.index);
-        format!("{} ({first} to {last}){gray}", totals.pages)
+/// Returns what is known of a stack of a name, and of its transitions if they were counted: a word
+/// and a text for each line.
+pub(super) fn lines(
+    totals: &StackTotals,
+    name: &str,
+    runs: Option<u64>,
+) -> Vec<(&'static str, String)> {
+    let info = &totals.first.info;
+    let mut lines = vec![("stack", name.to_owned())];
+    if let Some(stack) = &info.stack {
+        lines.extend(stack_lines(stack));
     }
-
-    /// `1.2 megapixels in all, 340.512 mm3`.
-    fn area_text(&self) -> Option<String> {
-        let pixels = self.totals.exposed_px?;
-        let volume = self.totals.volume_mm3.map(|volume| format!(", {volume:.3} mm3"));
-        Some(format!("{pixels} pixels in all layers{}", volume.unwrap_or_default()))
+    lines.push(("layers", layers_text(totals)));
+    let [width, height] = totals.first.size;
+    let others = if totals.one_size { "" } else { " on the first page; others differ" };
+    lines.push(("size", format!("{width} x {height} pixels{others}")));
+    lines.push(("resolution", resolution_text(&totals.first)));
+    if let (Some(bottom), Some(top)) = (info.z(), totals.top_mm()) {
+        lines.push(("z", format!("{:.3} to {top:.3} mm", bottom.mm())));
     }
+    lines.extend(totals.thickness_um.map(|range| ("thickness", range_text(range, "um"))));
+    if let Some(exposure) = totals.exposure_ms {
+        let (text, seconds) = (range_text(exposure, "ms"), exposure.sum / 1000.0);
+        lines.push(("exposure", format!("{text}, {seconds:.1} s in all")));
+    }
+    lines.extend(area_text(totals).map(|text| ("exposed", text)));
+    lines.extend(runs.map(|runs| ("runs", format!("{runs} transitions"))));
+    let names: Vec<_> = totals.compressions.iter().map(|each| compression_name(*each)).collect();
+    lines.push(("data", format!("{} bytes, {}", totals.data_bytes, names.join(" and "))));
+    let stray = match totals.stray_rows {
+        0 => "none known".to_owned(),
+        rows => format!("{rows} in {} layers", totals.stray_layers),
+    };
+    lines.push(("stray rows", stray));
+    lines.push(("checks", checks_text(totals, runs).to_owned()));
+    // Names come from files: they must not steer the terminal.
+    let plain = |text: String| text.replace(char::is_control, "?");
+    lines.into_iter().map(|(key, value)| (key, plain(value))).collect()
+}
 
-    fn checks_text(&self) -> &'static str {
-        match (self.totals.has_checks(), self.runs) {
-            (false, _) => "none: images and the number of layers cannot be proven",
-            (true, None) => {
-                "texts, order and number of layers are as written; lamp verify checks the images"
-            }
-            (true, Some(_)) => "images, texts, order and number of layers are as written",
+fn layers_text(totals: &StackTotals) -> String {
+    let gray = match totals.gray_pages {
+        0 => String::new(),
+        pages => format!(", {pages} of them gray"),
+    };
+    let (first, last) = (totals.first.info.index, totals.last.index);
+    format!("{} ({first} to {last}){gray}", totals.pages)
+}
+
+/// `1.2 megapixels in all, 340.512 mm3`.
+fn area_text(totals: &StackTotals) -> Option<String> {
+    let pixels = totals.exposed_px?;
+    let volume = totals.volume_mm3.map(|volume| format!(", {volume:.3} mm3"));
+    Some(format!("{pixels} pixels in all layers{}", volume.unwrap_or_default()))
+}
+
+fn checks_text(totals: &StackTotals, runs: Option<u64>) -> &'static str {
+    match (totals.has_checks(), runs) {
+        (false, _) => "none: images and the number of layers cannot be proven",
+        (true, None) => {
+            "texts, order and number of layers are as written; lamp verify checks the images"
         }
+        (true, Some(_)) => "images, texts, order and number of layers are as written",
     }
 }
 

@@ -24,6 +24,7 @@ mod mesh_out;
 mod orient;
 mod plan;
 mod projector;
+mod report;
 mod sample;
 mod show;
 pub(crate) mod slice;
@@ -55,6 +56,7 @@ pub(crate) enum Command {
     Check(check::CheckArgs),
     Support(support::SupportArgs),
     Show(show::ShowArgs),
+    Report(report::ReportArgs),
     View(view::ViewArgs),
     Convert(convert::ConvertArgs),
     Join(join::JoinArgs),
@@ -104,6 +106,7 @@ impl Command {
             Self::Check(args) => check::run(args, common),
             Self::Support(args) => support::run(args, common),
             Self::Show(args) => show::run(args),
+            Self::Report(args) => report::run(args, common),
             Self::View(args) => view::run(args, common),
             Self::Convert(args) => convert::run(args, common),
             Self::Join(args) => join::run(args, common),

@@ -14,9 +14,10 @@ use crate::picture::{Picture, PictureScale, Region};
 use crate::streams::{
     check_png_name, failed_at, input_name, is_stream, learning_part, open_pages, write_file,
 };
+use crate::terminal_picture::TerminalForm;
 use crate::thumbnails::{Thumbnail, contact_sheet, write_animation};
 
-/// Show a layer as a PNG picture, or many on one sheet or as an animation
+/// Show a layer as a PNG picture or in the terminal, or many on one sheet or as an animation
 ///
 /// The stack is read only up to the last layer shown, so one that is cut off after it works, too.
 #[derive(Args)]
@@ -25,7 +26,8 @@ Examples:
   lamp show build.tif --layer 600 --scale 1/8 -o layer.png
   lamp show build.tif --z 12mm --region 2000,1500,200,100 --scale 4 -o detail.png
   lamp show build.tif --layers 0..1270/40 -o sheet.png
-  lamp show build.tif --layers 0..1270/10 --animate -o build.png")]
+  lamp show build.tif --layers 0..1270/10 --animate -o build.png
+  lamp show build.tif --layer 600 --ascii")]
 pub(crate) struct ShowArgs {
     /// The stack: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
@@ -39,7 +41,8 @@ pub(crate) struct ShowArgs {
     region: Option<Region>,
 
     /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 the mean of 8 x 8 [default: 1; of
-    /// several layers, what makes each at most 400 pixels wide and high]
+    /// several layers, what makes each at most 400 pixels wide and high; in a terminal, what fits
+    /// its width]
     #[arg(long, value_name = "N|1/N")]
     scale: Option<PictureScale>,
 
@@ -52,7 +55,15 @@ pub(crate) struct ShowArgs {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=100))]
     fps: u16,
 
-    /// Where to write the PNG: a file, or - for standard output
+    /// Print the layer with characters, the brighter the fuller; a line shows two rows
+    #[arg(long, conflicts_with_all = ["animate", "layers"])]
+    ascii: bool,
+
+    /// Print the layer as a sixel picture, for terminals that draw them
+    #[arg(long, conflicts_with_all = ["ascii", "animate", "layers"])]
+    sixel: bool,
+
+    /// Where to write the picture: a file, or - for standard output
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     output: PathBuf,
 }
@@ -74,13 +85,23 @@ struct Shown {
     layers: Option<EveryNth>,
 }
 
-pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
-    if is_stream(&args.output) && io::stdout().is_terminal() {
-        return Err(Exit::usage(
-            "a picture is not for terminals: name a file with -o, or pipe it on",
-        ));
+impl ShowArgs {
+    /// Returns how the layer is drawn in the terminal, if it is.
+    fn terminal_form(&self) -> Option<TerminalForm> {
+        let sixel = self.sixel.then_some(TerminalForm::Sixel);
+        self.ascii.then_some(TerminalForm::Ascii).or(sixel)
     }
-    check_png_name(&args.output)?;
+}
+
+pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
+    if args.terminal_form().is_none() {
+        if is_stream(&args.output) && io::stdout().is_terminal() {
+            return Err(Exit::usage(
+                "a PNG is not for terminals: name a file with -o, pipe it on, or give --ascii or --sixel",
+            ));
+        }
+        check_png_name(&args.output)?;
+    }
     match &args.shown.layers {
         Some(layers) => show_many(args, layers),
         None => show_one(args),
@@ -93,10 +114,15 @@ fn show_one(args: &ShowArgs) -> Result<(), Exit> {
         (None, z) => layer_at(&args.stack, z.expect("one of the options is required"))?,
     };
     let region = region_on(args, &image)?;
-    let scale = args.scale.unwrap_or(PictureScale::Up(1));
+    let form = args.terminal_form();
+    let fitting = || form.map_or(PictureScale::Up(1), |form| form.fitting(&region));
+    let scale = args.scale.unwrap_or_else(fitting);
     check_size(scale.size(&region))?;
     let picture = Picture::new(&image, region, scale);
-    write(args, |out| picture.write_png(out))
+    write(args, |out| match form {
+        Some(form) => form.write(picture, out),
+        None => picture.write_png(out),
+    })
 }
 
 fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {

@@ -167,6 +167,11 @@ fn picture_of(drawing: &impl Drawing, size: (u32, u32), path: &Path) -> Result<V
     }
 }
 
+/// Returns a plot as an element of a page, which takes the width that the page gives it.
+pub(crate) fn inline_svg(plot: &Plot) -> String {
+    svg(std::slice::from_ref(plot))
+}
+
 fn svg(plots: &[Plot]) -> String {
     let mut text = String::new();
     let [pixels, size] = [PIXELS, SIZE].map(|size| all_of(size, plots));

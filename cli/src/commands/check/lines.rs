@@ -13,23 +13,23 @@ use crate::height_options::significant;
 use crate::json_report::to_nm;
 
 /// What is said of a finding.
-pub(super) struct FindingLine {
+pub(in crate::commands) struct FindingLine {
     /// What it is, in a word.
-    pub(super) word: &'static str,
-    pub(super) text: String,
-    pub(super) json: Value,
+    pub(in crate::commands) word: &'static str,
+    pub(in crate::commands) text: String,
+    pub(in crate::commands) json: Value,
     /// It is told, but does not count.
-    pub(super) is_note: bool,
-    pub(super) shown: Option<Shown>,
+    pub(in crate::commands) is_note: bool,
+    pub(in crate::commands) shown: Option<Shown>,
 }
 
 /// What a picture shows.
-pub(super) struct Shown {
+pub(in crate::commands) struct Shown {
     /// The layer, from the first that was read.
-    pub(super) layer: u32,
-    pub(super) region: Region,
+    pub(in crate::commands) layer: u32,
+    pub(in crate::commands) region: Region,
     /// A pixel of the component that is marked; if none, the region's white without white below is.
-    pub(super) pixel: Option<[u32; 2]>,
+    pub(in crate::commands) pixel: Option<[u32; 2]>,
 }
 
 /// Returns the lines of all findings, the worst first.

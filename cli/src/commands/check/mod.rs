@@ -14,7 +14,7 @@ use clap::{Args, FromArgMatches};
 use lamp_postprocess::machine::Machine;
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::CornerTable;
-use lamp_stack::{Layer, Length, Page, PageHeader};
+use lamp_stack::{Layer, Length, MemorySize, Page, PageHeader};
 use lamp_supports::{
     CheckError, CheckOptions, Disagreements, Findings, IslandMinimum, LoneMinimum,
 };
@@ -31,8 +31,8 @@ use crate::sliced_part::SlicedPart;
 use crate::slicing_options::SlicingOptions;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 
-use lines::FindingLine;
-pub(super) use lines::drag_mn;
+pub(super) use lines::{FindingLine, Shown, drag_mn};
+pub(super) use pictures::draw;
 use pictures::write_pictures;
 use report::write_report;
 pub(super) use units::Scale;
@@ -187,6 +187,31 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     Ok(())
 }
 
+/// Finds what `lamp check` finds with its usual options, and what it says of each. The blade is
+/// that of `machine`, or of the usual one.
+fn found_by_default<T: MemorySize + Send>(
+    layers: impl Iterator<Item = Result<T, Exit>>,
+    decode: impl Fn(T) -> Result<Layer, Exit> + Sync,
+    machine: Option<&Machine>,
+) -> Result<(Findings, Vec<FindingLine>), Exit> {
+    let command = CheckArgs::augment_args(clap::Command::new("check").no_binary_name(true));
+    let matches = command.get_matches_from([""; 0]);
+    let args = CheckArgs::from_arg_matches(&matches).expect("no option is required");
+    let findings = lamp_supports::check(layers, decode, &args.options())?;
+    let usual = entry(&args.machine)?;
+    let recoating = machine.unwrap_or(&usual).recoating.as_ref();
+    let lines = lines::of(&findings, &Disagreements::default(), &args, recoating);
+    Ok((findings, lines))
+}
+
+/// Finds in layers what [`found_by_default`] does.
+pub(super) fn found(
+    layers: impl Iterator<Item = Result<Layer, Exit>>,
+    machine: Option<&Machine>,
+) -> Result<(Findings, Vec<FindingLine>), Exit> {
+    found_by_default(layers, Ok, machine)
+}
+
 /// Returns what `lamp check` finds in a stack without further options, in the form of its report,
 /// and with a `text` for each finding.
 pub(super) fn report_of(
@@ -194,17 +219,12 @@ pub(super) fn report_of(
     pages: impl Iterator<Item = Result<Page, Exit>>,
     done: impl Fn() + Sync,
 ) -> Result<Value, Exit> {
-    let command = CheckArgs::augment_args(clap::Command::new("check").no_binary_name(true));
-    let matches = command.get_matches_from([""; 0]);
-    let args = CheckArgs::from_arg_matches(&matches).expect("no option is required");
     let decode = |page: Page| {
         let layer = page.decode()?;
         done();
         Ok::<_, Exit>(layer)
     };
-    let findings = lamp_supports::check(pages, decode, &args.options())?;
-    let machine: Machine = entry(&args.machine)?;
-    let lines = lines::of(&findings, &Disagreements::default(), &args, machine.recoating.as_ref());
+    let (_, lines) = found_by_default(pages, decode, None)?;
     let told = lines.into_iter().map(|line| {
         let mut json = line.json;
         json["text"] = line.text.into();

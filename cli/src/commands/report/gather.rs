@@ -1,0 +1,266 @@
+//! Gathers all that a report tells of a stack, in one pass over its layers.
+
+use std::cell::RefCell;
+
+use lamp_postprocess::machine::Machine;
+use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
+use lamp_supports::{CheckError, Findings};
+use serde_json::{Value, json};
+
+use super::measure::{LayerNumbers, new_pixels};
+use super::pictures::{Picture, of_finding, of_layer};
+use crate::commands::check::{self, FindingLine};
+use crate::exit::Exit;
+use crate::progress::Progress;
+use crate::stack_facts::StackFacts;
+
+/// The layers on the contact sheet, and the findings that are drawn.
+const SHEET: usize = 12;
+const MOST_DRAWN: usize = 5;
+
+/// What is known of a stack.
+pub(super) struct StackReport {
+    pub(super) name: String,
+    pub(super) totals: StackTotals,
+    pub(super) layers: Vec<LayerNumbers>,
+    /// What `lamp check` finds, or why it cannot check the stack.
+    pub(super) found: Result<Found, String>,
+    pub(super) sheet: Vec<Picture>,
+    pub(super) time: BuildTime,
+}
+
+/// What `lamp check` finds.
+pub(super) struct Found {
+    pub(super) findings: Findings,
+    pub(super) lines: Vec<FindingLine>,
+    /// Pictures of the worst, each with the number of its line.
+    pub(super) pictures: Vec<(usize, Picture)>,
+}
+
+/// How long a build takes, as far as that is known.
+pub(super) struct BuildTime {
+    /// The sum of all exposures in seconds, if every layer states one.
+    pub(super) exposure_s: Option<f64>,
+    /// The machine and the time that its recoating takes in all, if it is known.
+    pub(super) recoating: Option<(String, f64)>,
+}
+
+impl BuildTime {
+    fn new(layers: &[LayerNumbers], machine: Option<&Machine>) -> Self {
+        let exposures = layers.iter().map(|layer| layer.exposure_ms);
+        let exposure_ms: Option<f64> = exposures.sum();
+        let recoating = machine.and_then(|machine| {
+            let seconds = machine.recoating.as_ref()?.seconds * layers.len() as f64;
+            Some((machine.name.clone(), seconds))
+        });
+        Self { exposure_s: exposure_ms.map(|ms| ms / 1000.0), recoating }
+    }
+
+    /// Returns exposures and recoating in seconds, as far as they are known.
+    pub(super) fn sum_s(&self) -> Option<f64> {
+        Some(self.exposure_s? + self.recoating.as_ref().map_or(0.0, |(_, seconds)| *seconds))
+    }
+}
+
+impl Found {
+    /// Returns the number of findings that count.
+    pub(super) fn count(&self) -> usize {
+        self.lines.iter().filter(|line| !line.is_note).count()
+    }
+}
+
+impl StackReport {
+    pub(super) fn gather(
+        stack: &IndexedStack,
+        name: &str,
+        machine: Option<&Machine>,
+        progress: &Progress,
+    ) -> Result<Self, Exit> {
+        let headers = stack.headers();
+        progress.expect(headers.len() as u64);
+        let mut totals = StackTotals::of(&headers[0]);
+        headers[1..].iter().for_each(|header| totals.add(header));
+        let (numbers, sheet) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
+        let mut layers = measured(stack, &numbers, &sheet, progress);
+        let found = match check::found(&mut layers, machine) {
+            Ok((findings, lines)) => Ok((findings, lines)),
+            Err(error) => match error.cause::<CheckError>() {
+                Some(why) => Err(why.to_string()),
+                None => return Err(error),
+            },
+        };
+        // A check that gives up leaves layers.
+        layers.try_for_each(|layer| layer.map(drop))?;
+        drop(layers);
+        let found = match found {
+            Ok((findings, lines)) => {
+                let pictures = drawn(stack, &lines)?;
+                Ok(Found { findings, lines, pictures })
+            }
+            Err(why) => Err(why),
+        };
+        let layers = numbers.into_inner();
+        let time = BuildTime::new(&layers, machine);
+        Ok(Self { name: name.to_owned(), totals, layers, found, sheet: sheet.into_inner(), time })
+    }
+
+    /// Returns what needs a person, the worst first.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        match &self.found {
+            Ok(found) => warnings.extend(found_text(found)),
+            Err(why) => warnings.push(format!("It could not be checked for what floats: {why}.")),
+        }
+        let totals = &self.totals;
+        if totals.stray_rows > 0 {
+            warnings.push(format!(
+                "{} stray rows are left in {} layers: correct them with fix, or mend the part.",
+                totals.stray_rows, totals.stray_layers
+            ));
+        }
+        if !totals.has_checks() {
+            warnings.push("Its pages carry no checks: a changed image would not show.".to_owned());
+        }
+        if totals.first.dpi.is_none() {
+            warnings.push("It states no resolution: lengths are in pixels.".to_owned());
+        }
+        if self.time.exposure_s.is_none() {
+            warnings.push(
+                "Not every layer states an exposure: the build time is not known.".to_owned(),
+            );
+        }
+        warnings
+    }
+
+    /// Returns the numbers of the page.
+    pub(super) fn json(&self) -> Value {
+        let column =
+            |of: &dyn Fn(&LayerNumbers) -> Value| self.layers.iter().map(of).collect::<Vec<_>>();
+        let found = self.found.as_ref().ok();
+        let mut json =
+            serde_json::to_value(StackFacts::new(&self.totals)).expect("facts have text keys");
+        let more = json!({
+            "stack": self.name,
+            "fault": null,
+            "warnings": self.warnings(),
+            "build_exposure_s": self.time.exposure_s,
+            "recoating_s": self.time.recoating.as_ref().map(|(_, seconds)| seconds),
+            "build_s": self.time.sum_s(),
+            "fixed_rows": self.layers.iter().map(|layer| layer.fixed_rows).sum::<u64>(),
+            "unchecked": self.found.as_ref().err(),
+            "finding_count": found.map(Found::count),
+            "specks": found.map(|found| found.findings.specks.count()),
+            "findings": found.map(|found| found.lines.iter().map(|line| &line.json).collect::<Vec<_>>()),
+            "by_layer": {
+                "index": column(&|layer| layer.index.into()),
+                "z_um": column(&|layer| layer.z_um.into()),
+                "thickness_um": column(&|layer| layer.thickness_um.into()),
+                "exposure_ms": column(&|layer| layer.exposure_ms.into()),
+                "area_px": column(&|layer| layer.area_px.into()),
+                "perimeter_px": column(&|layer| layer.perimeter_px.into()),
+                "new_px": column(&|layer| layer.new_px.into()),
+                "gray_px": column(&|layer| layer.gray_px.into()),
+                "stray_rows": column(&|layer| layer.stray_rows.into()),
+                "fixed_rows": column(&|layer| layer.fixed_rows.into()),
+                "islands": self.islands_by_layer(),
+            },
+        });
+        let (Value::Object(all), Value::Object(more)) = (&mut json, more) else {
+            unreachable!("both are objects")
+        };
+        all.extend(more);
+        json
+    }
+
+    /// Returns how many islands begin in each layer.
+    pub(super) fn islands_by_layer(&self) -> Option<Vec<u64>> {
+        let found = self.found.as_ref().ok()?;
+        let mut islands = vec![0; self.layers.len()];
+        for island in &found.findings.islands.list {
+            islands[island.layer as usize] += 1;
+        }
+        Some(islands)
+    }
+}
+
+/// `3 islands, 1 cup were found ...`
+fn found_text(found: &Found) -> Option<String> {
+    let told: Vec<_> = found.lines.iter().filter(|line| !line.is_note).collect();
+    let kinds = told.chunk_by(|a, b| a.word == b.word);
+    let kinds: Vec<_> = kinds.map(|lines| format!("{} ({})", lines[0].word, lines.len())).collect();
+    let count = match told.len() {
+        0 => return None,
+        1 => "1 finding".to_owned(),
+        count => format!("{count} findings"),
+    };
+    Some(format!("{count} of lamp check: {}.", kinds.join(", ")))
+}
+
+/// Decodes all layers, in order, and counts and draws them on the way.
+fn measured<'a>(
+    stack: &'a IndexedStack,
+    numbers: &'a RefCell<Vec<LayerNumbers>>,
+    sheet: &'a RefCell<Vec<Picture>>,
+    progress: &'a Progress,
+) -> impl Iterator<Item = Result<Layer, Exit>> + 'a {
+    let count = stack.headers().len();
+    let pages = (0..count).map(|position| stack.page(position).map_err(failed));
+    let decoded = map_in_order(pages, |page: Page| {
+        let layer = page.decode().map_err(failed)?;
+        let numbers = LayerNumbers::of(&layer);
+        Ok((layer, numbers))
+    });
+    let mut below: Option<Mask> = None;
+    decoded.enumerate().map(move |(position, decoded)| {
+        let (layer, of_layer_numbers) = decoded?;
+        let exposed = layer.image.exposed().into_owned();
+        let new_px = new_pixels(&exposed, below.as_ref());
+        numbers.borrow_mut().push(LayerNumbers { new_px, ..of_layer_numbers });
+        below = Some(exposed);
+        if is_on_sheet(position, count) {
+            sheet.borrow_mut().push(of_layer(&layer));
+        }
+        progress.layer_done();
+        Ok(layer)
+    })
+}
+
+fn failed(error: lamp_stack::StackError) -> Exit {
+    Exit::Failed(error.into())
+}
+
+/// Returns whether a layer is on the sheet: the first, the last, and others evenly between.
+fn is_on_sheet(position: usize, count: usize) -> bool {
+    let shown = count.min(SHEET);
+    let last = (shown - 1).max(1);
+    (0..shown).any(|k| k * (count - 1) / last == position)
+}
+
+/// Draws the worst findings, as `lamp check --evidence` does.
+fn drawn(stack: &IndexedStack, lines: &[FindingLine]) -> Result<Vec<(usize, Picture)>, Exit> {
+    let shown =
+        lines.iter().enumerate().filter_map(|(number, line)| Some((number, line.shown.as_ref()?)));
+    let worst = shown.take(MOST_DRAWN).map(|(number, shown)| {
+        let mask = |position: u32| {
+            let layer = stack.layer(position as usize).map_err(failed)?;
+            Ok::<_, Exit>(layer.image.exposed().into_owned())
+        };
+        let below = shown.layer.checked_sub(1).map(mask).transpose()?;
+        Ok((number, of_finding(below.as_ref(), &mask(shown.layer)?, shown)))
+    });
+    worst.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_has_the_first_the_last_and_twelve_at_most() {
+        for count in 1..200 {
+            let on_sheet: Vec<_> = (0..count).filter(|&k| is_on_sheet(k, count)).collect();
+            assert_eq!(on_sheet.len(), count.min(SHEET));
+            assert_eq!((on_sheet[0], on_sheet[on_sheet.len() - 1]), (0, count - 1));
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! `lamp report`: one page to send that tells of a stack, or a folder of such pages.
+
+mod charts;
+mod gather;
+mod index;
+mod measure;
+mod page;
+mod pictures;
+
+use std::fs;
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use lamp_postprocess::machine::Machine;
+use lamp_stack::{IndexedStack, stacks_in};
+use serde_json::json;
+
+use crate::catalogue::entry;
+use crate::exit::Exit;
+use crate::json_report::print_answer;
+use crate::options::Common;
+use crate::progress::Progress;
+use crate::streams::{
+    check_beside, failed_at, input_name, is_folder, is_stream, new_folder, print, spool_stdin,
+    write_file,
+};
+
+use gather::StackReport;
+
+/// Write a page to send that tells of a stack: warnings, numbers, curves, pictures
+///
+/// The page is one HTML file that needs no network and no script, and prints on A4 and letter. Of a
+/// folder of stacks, -o names a folder, which gets a page for each stack and an index.html. Numbers
+/// are those of `lamp info` and, with its usual options, of `lamp check`.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp report build.tif -o report.html
+  lamp report night/ -o reports/
+  lamp report build.tif --json | jq .stacks[0].findings
+  slice blade.stl | fix | lamp report --machine alpha -o report.html
+
+Exit status: 0 if all pages are written, whatever they warn of; 1 if a stack cannot be read.")]
+pub(crate) struct ReportArgs {
+    /// A stack (a TIFF or picture file, a folder of pages, - for standard input) or a folder of stacks
+    #[arg(value_name = "STACK|FOLDER", default_value = "-")]
+    stack: PathBuf,
+
+    /// Where to write: an HTML file, or a folder of them with an index, as reports/
+    #[arg(short, long, value_name = "OUT", required_unless_present = "json")]
+    output: Option<PathBuf>,
+
+    /// Machine that builds it: its recoating counts in the build time, and its blade drags on what
+    /// floats: alpha, beta or a file (see lamp machine)
+    #[arg(long, value_name = "M")]
+    machine: Option<PathBuf>,
+
+    /// Replace a folder of reports that an earlier run wrote
+    #[arg(long)]
+    force: bool,
+
+    /// Print the numbers as a JSON object (docs/json.md)
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
+    let machine = args.machine.as_deref().map(entry::<Machine>).transpose()?;
+    let stacks = if is_stream(&args.stack) {
+        vec![args.stack.clone()]
+    } else {
+        stacks_in(&args.stack).with_context(|| input_name(&args.stack))?
+    };
+    if stacks.is_empty() {
+        return Err(Exit::Failed(anyhow!("{}: there is no stack in it", input_name(&args.stack))));
+    }
+    let work = Work { machine: machine.as_ref(), common };
+    match &args.output {
+        Some(folder) if is_folder(folder) || stacks.len() > 1 => {
+            work.write_folder(&stacks, folder, args)
+        }
+        output => work.write_page(&stacks, output.as_deref(), args),
+    }
+}
+
+struct Work<'a> {
+    machine: Option<&'a Machine>,
+    common: &'a Common,
+}
+
+impl Work<'_> {
+    /// Reports on a stack.
+    fn report(&self, path: &Path) -> Result<StackReport, Exit> {
+        let progress = Progress::new("report", self.common, true);
+        let stack = if is_stream(path) {
+            IndexedStack::from_file(spool_stdin()?)
+        } else {
+            IndexedStack::open(path)
+        };
+        let stack = stack.and_then(IndexedStack::whole);
+        let stack = stack.map_err(|error| failed_at(input_name(path), error))?;
+        let report = StackReport::gather(&stack, &shown_name(path), self.machine, &progress);
+        progress.done();
+        report.map_err(|error| error.at(input_name(path)))
+    }
+
+    /// Writes the page of a stack, or prints the numbers of all stacks.
+    fn write_page(
+        &self,
+        stacks: &[PathBuf],
+        output: Option<&Path>,
+        args: &ReportArgs,
+    ) -> Result<(), Exit> {
+        if let Some(output) = output {
+            if is_stream(output) && (io::stdout().is_terminal() || args.json) {
+                return Err(Exit::usage("a page is not for terminals: name a file with -o"));
+            }
+            check_beside(output, Path::new("-"), [&args.stack])?;
+        }
+        let mut answers = Vec::new();
+        for path in stacks {
+            let report = self.report(path)?;
+            match output {
+                Some(output) if is_stream(output) => print(&page::html(&report, None))?,
+                Some(output) => {
+                    write_file(output, |out| out.write_all(page::html(&report, None).as_bytes()))?;
+                }
+                None => {}
+            }
+            if args.json {
+                answers.push(report.json());
+            }
+        }
+        if args.json { print_stacks(&answers) } else { Ok(()) }
+    }
+
+    /// Writes a page of each stack and an index of them into a folder.
+    fn write_folder(
+        &self,
+        stacks: &[PathBuf],
+        output: &Path,
+        args: &ReportArgs,
+    ) -> Result<(), Exit> {
+        if output.extension().is_some_and(|end| end.eq_ignore_ascii_case("html")) {
+            let (stacks, name) = (stacks.len(), output.display());
+            return Err(Exit::usage(format!(
+                "{name}: there are {stacks} stacks: name a folder for their pages, as -o reports/"
+            )));
+        }
+        let folder = new_folder(output, args.force)?;
+        let mut entries = Vec::new();
+        let mut answers = Vec::new();
+        for (number, path) in (1..).zip(stacks) {
+            let name = name_below(path, &args.stack);
+            let report =
+                self.report(path).map(|report| StackReport { name: name.clone(), ..report });
+            let entry = match report {
+                Ok(report) => {
+                    let file = index::file_name(number, &name);
+                    let html = page::html(&report, Some("index.html"));
+                    let written = fs::write(folder.path().join(&file), html);
+                    written.map_err(|error| Exit::Output(error.into()).at(file.clone()))?;
+                    answers.push(report.json());
+                    index::Entry::of(&report, file)
+                }
+                Err(error) => {
+                    answers.push(json!({ "stack": name, "fault": error.to_string() }));
+                    index::Entry::faulty(name, error.to_string())
+                }
+            };
+            entries.push(entry);
+        }
+        let written = fs::write(folder.path().join("index.html"), index::html(&entries));
+        written.map_err(|error| Exit::Output(error.into()).at("index.html"))?;
+        folder.persist().map_err(|error| Exit::Failed(error.into()))?;
+        if args.json {
+            print_stacks(&answers)?;
+        }
+        match entries.iter().filter(|entry| entry.is_faulty()).count() {
+            0 => Ok(()),
+            faulty => Err(Exit::Failed(anyhow!(
+                "{faulty} of {} stacks cannot be read: the index says why",
+                entries.len()
+            ))),
+        }
+    }
+}
+
+fn print_stacks(stacks: &[serde_json::Value]) -> Result<(), Exit> {
+    print_answer("lamp-report-1", &json!({ "stacks": stacks }))
+}
+
+/// A report goes to other people: it names the file, not the folders it lies in.
+fn shown_name(path: &Path) -> String {
+    match path.file_name() {
+        Some(name) if !is_stream(path) => name.to_string_lossy().into_owned(),
+        _ => input_name(path),
+    }
+}
+
+/// Returns the name of a stack below a folder.
+fn name_below(path: &Path, folder: &Path) -> String {
+    match path.strip_prefix(folder) {
+        Ok(below) if below.file_name().is_some() => below.display().to_string(),
+        _ => shown_name(path),
+    }
+}

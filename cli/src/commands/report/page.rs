@@ -1,0 +1,174 @@
+//! The page of a stack, as HTML. maud escapes all texts, which come from files.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::charts::charts;
+use super::gather::{Found, StackReport};
+use super::pictures::Picture;
+use crate::commands::info;
+use crate::height_options::time_text;
+use crate::progress::printable;
+
+/// The most findings of a kind that are listed, as `lamp check` does.
+const MOST_LINES: usize = 20;
+
+/// Returns a whole page: its title, styles and content.
+pub(super) fn document(title: &str, content: &Markup) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                // The page needs nothing from anywhere.
+                meta http-equiv="Content-Security-Policy"
+                    content="default-src 'none'; img-src data:; style-src 'unsafe-inline'";
+                title { (printable(title)) }
+                style { (PreEscaped(include_str!("style.css"))) }
+            }
+            body { main { (content) } footer { "Written by lamp " (env!("CARGO_PKG_VERSION")) "." } }
+        }
+    };
+    page.into_string()
+}
+
+/// Returns the page of a stack, with a link to an index if it has one.
+pub(super) fn html(report: &StackReport, index: Option<&str>) -> String {
+    let part = report.totals.first.info.stack.as_ref().map(|stack| stack.part.as_str());
+    let name = part.filter(|part| !part.is_empty()).unwrap_or(&report.name);
+    let content = html! {
+        @if let Some(index) = index { nav { a href=(index) { "All reports" } } }
+        h1 { (printable(name)) }
+        p.subtitle { "Report of " (printable(&report.name)) }
+        (warnings(report))
+        section { h2 { "Stack" } (facts(report)) }
+        section { h2 { "Build time" } (build_time(report)) }
+        @if let Ok(found) = &report.found { section { h2 { "Findings" } (findings(found)) } }
+        section {
+            h2 { "Layers" }
+            div.sheet { @for picture in &report.sheet { (figure(picture)) } }
+        }
+        section {
+            h2 { "Over the height" }
+            div.charts { @for chart in charts(report) { div.chart { (PreEscaped(chart)) } } }
+        }
+    };
+    document(name, &content)
+}
+
+fn warnings(report: &StackReport) -> Markup {
+    let warnings = report.warnings();
+    html! {
+        @if warnings.is_empty() {
+            p.good { "Nothing to warn of." }
+        } @else {
+            section.warnings {
+                h2 { "Look at this first" }
+                ul { @for warning in &warnings { li { (printable(warning)) } } }
+            }
+        }
+    }
+}
+
+/// The lines of `lamp info`, and what only a report knows.
+fn facts(report: &StackReport) -> Markup {
+    let rows_fixed: u64 = report.layers.iter().map(|layer| layer.fixed_rows).sum();
+    let commands = report.totals.first.info.stack.as_ref().map_or(&[][..], |stack| &stack.commands);
+    html! {
+        table.facts {
+            @for (key, value) in info::lines(&report.totals, &report.name, None) {
+                tr { th { (key) } td { (value) } }
+            }
+            @if rows_fixed > 0 { tr { th { "stray rows fixed" } td { (rows_fixed) } } }
+            @for (key, option) in [("machine", "--machine"), ("material", "--material")] {
+                @if let Some(value) = option_of(commands, option) {
+                    tr { th { (key) } td { (printable(value)) } }
+                }
+            }
+        }
+    }
+}
+
+/// Returns the value that commands gave an option last.
+fn option_of<'a>(commands: &'a [String], option: &str) -> Option<&'a str> {
+    let value = |command: &'a String| {
+        let mut words = command.split_whitespace();
+        words.find(|word| *word == option)?;
+        words.next()
+    };
+    commands.iter().rev().find_map(value)
+}
+
+fn build_time(report: &StackReport) -> Markup {
+    let time = &report.time;
+    html! {
+        @match time.exposure_s {
+            None => p { "Not known: not every layer states its exposure." },
+            Some(exposure_s) => table.facts {
+                tr { th { "exposures" } td { (time_text(exposure_s)) } }
+                @if let Some((machine, seconds)) = &time.recoating {
+                    tr { th { "recoating" } td { (time_text(*seconds)) " by the blade of " (printable(machine)) } }
+                }
+                @if let Some(sum) = time.sum_s() { tr { th { "in all" } td { (time_text(sum)) } } }
+            },
+        }
+        @if time.recoating.is_none() {
+            p.note { "Recoating, peeling and moving are not in it: name a machine whose recoating is known with --machine." }
+        } @else {
+            p.note { "Peeling, waiting and moving are not in it." }
+        }
+    }
+}
+
+fn findings(found: &Found) -> Markup {
+    let kinds = found.lines.chunk_by(|a, b| a.word == b.word);
+    let specks = found.findings.specks.count();
+    html! {
+        @if found.lines.is_empty() { p { "lamp check finds nothing." } }
+        @if !found.pictures.is_empty() {
+            div.evidence {
+                @for (number, picture) in &found.pictures {
+                    figure {
+                        img src=(picture.address) alt=(found.lines[*number].word);
+                        figcaption { b { (found.lines[*number].word) } ": " (found.lines[*number].text) }
+                    }
+                }
+            }
+            p.note {
+                "Red: the finding. Yellow: other white without white below. White: white. Gray: white in the layer below only."
+            }
+        }
+        table.findings {
+            @for lines in kinds {
+                @for line in &lines[..lines.len().min(MOST_LINES)] {
+                    tr { th { (line.word) } td { (line.text) } }
+                }
+                @if lines.len() > MOST_LINES {
+                    tr { th { (lines[0].word) } td { (lines.len() - MOST_LINES) " more (lamp check --report lists them)" } }
+                }
+            }
+        }
+        @if specks > 0 { p.note { (specks) " specks: islands that never hold a square of 3 x 3 pixels." } }
+    }
+}
+
+fn figure(picture: &Picture) -> Markup {
+    html! {
+        figure {
+            img src=(picture.address) alt=(picture.caption);
+            figcaption { (picture.caption) }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_value_of_an_option_is_found() {
+        let commands = ["slice a.stl --material x", "fix", "dither --material"].map(str::to_owned);
+        assert_eq!(option_of(&commands, "--material"), Some("x"));
+        assert_eq!(option_of(&commands, "--machine"), None);
+    }
+}

@@ -1,0 +1,94 @@
+//! Reads back what `lamp show --ascii` and `--sixel` print.
+
+use lamp_stack::{Dpi, GrayMask, Layer, Mask, PageInfo};
+use lamp_tests::{Scratch, ask};
+
+fn layer(image: impl Into<lamp_stack::LayerImage>) -> [Layer; 1] {
+    [Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image: image.into() }]
+}
+
+/// A ring of a width and a height of 120 pixels.
+fn ring() -> Mask {
+    let mut ends = vec![0];
+    let mut transitions = Vec::new();
+    for row in 0..120i32 {
+        let away = (2 * row - 119).pow(2);
+        let half = |radius: i32| ((4 * radius * radius - away).max(0) as f64).sqrt() as i32 / 2;
+        let (outer, inner) = (half(55), half(40));
+        if outer > 0 {
+            let ends = if inner > 0 { vec![outer, inner] } else { vec![outer] };
+            let left = ends.iter().map(|end| 60 - end);
+            let columns = left.chain(ends.iter().rev().map(|end| 60 + end));
+            transitions.extend(columns.map(|column| column as u32));
+        }
+        ends.push(transitions.len() as u32);
+    }
+    Mask::new(120, ends, transitions).unwrap()
+}
+
+fn lines(scratch: &Scratch, columns: &str, options: &str) -> Vec<String> {
+    let mut command = scratch.command("lamp show ring.tif --layer 0 --ascii");
+    command.args(options.split_whitespace()).env("COLUMNS", columns);
+    let out = command.output().unwrap();
+    assert!(out.status.success() && out.stderr.is_empty(), "{out:?}");
+    String::from_utf8(out.stdout).unwrap().lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn characters_fit_the_width_of_the_terminal() {
+    let scratch = Scratch::new();
+    scratch.stack("ring.tif", layer(ring()));
+    for (columns, width, height) in
+        [("200", 120, 60), ("120", 120, 60), ("60", 60, 30), ("59", 40, 20), ("1", 1, 1)]
+    {
+        let lines = lines(&scratch, columns, "");
+        assert_eq!(lines.len(), height, "{columns}");
+        let longest = lines.iter().map(String::len).max().unwrap();
+        assert!(longest <= width && longest + 8 >= width, "{columns}: {longest}");
+        assert!(lines.iter().all(|line| line.is_ascii()));
+    }
+    // At one character for 1 x 2 pixels, each says whether both are white.
+    let (lines, mask) = (lines(&scratch, "120", ""), ring());
+    for (y, x) in (0..60u32).flat_map(|y| (0..120u32).map(move |x| (y, x))) {
+        let white = [2 * y, 2 * y + 1].iter().filter(|&&row| mask.is_white(x, row)).count();
+        let shown = lines[y as usize].as_bytes().get(x as usize).copied().unwrap_or(b' ');
+        assert_eq!(shown, [b' ', b'+', b'@'][white], "column {x}, line {y}");
+    }
+}
+
+#[test]
+fn scale_and_region_hold_for_characters_too() {
+    let scratch = Scratch::new();
+    scratch.stack("ring.tif", layer(ring()));
+    let part = lines(&scratch, "80", "--region 58,10,3,4 --scale 2");
+    assert_eq!(part, ["@@@@@@"; 4]);
+    assert_eq!(lines(&scratch, "20", "--scale 1/2").len(), 30);
+    let ran = scratch.run("lamp show ring.tif --layers 0..1 --ascii");
+    assert_eq!(ran.statuses, [Some(2)]);
+    scratch.run("lamp show ring.tif --layer 0 --ascii -o ring.txt").succeeds_quietly();
+    assert!(scratch.bytes("ring.txt").starts_with(b"\n"));
+}
+
+#[test]
+fn sixels_are_what_an_independent_decoder_reads() {
+    let scratch = Scratch::new();
+    // 50 columns and 9 rows of all gray levels, so that the last row of sixels is not full.
+    let mut gray = GrayMask::new(50);
+    for row in 0..9u32 {
+        gray.push_runs((0..50u32).map(|column| (1, ((row * 50 + column) % 256) as u8))).unwrap();
+    }
+    scratch.stack("gray.tif", layer(gray.clone()));
+    scratch.run("lamp show gray.tif --layer 0 --sixel -o gray.six").succeeds_quietly();
+    let asked = ["sixel:gray.six", "-depth", "8", "-set", "colorspace", "Gray", "gray:gray.raw"];
+    let Some(_) = ask(&scratch, "convert", &asked) else { return };
+    let pixels = scratch.bytes("gray.raw");
+    assert_eq!(pixels.len(), 50 * 9);
+    for (y, x) in (0..9u32).flat_map(|y| (0..50u32).map(move |x| (y, x))) {
+        let found = i32::from(pixels[(y * 50 + x) as usize]);
+        // 16 grays, stated in whole percent.
+        assert!(
+            (found - i32::from(gray.level(x, y))).abs() <= 8 + 2,
+            "column {x}, row {y}: {found}"
+        );
+    }
+}
