@@ -276,8 +276,10 @@ fn is_name_in_folders(name: &str) -> bool {
         name,
         "bitmaps.tif" | "report.json" | "section.svg" | "residual.png" | "times.png"
     );
+    let is_report = name == "index.html" || name.ends_with(".html") && numbered(&"report_");
     matches!(name, "strips.json" | "squares.csv")
         || is_of_plan
+        || is_report
         || is_image && STARTS.iter().any(numbered)
 }
 

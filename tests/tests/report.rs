@@ -190,7 +190,8 @@ fn a_folder_of_stacks_gets_an_index() {
     scratch.run("lamp convert mug.tif --layers 0..3 -o night/pages/").succeeds();
     scratch.run("lamp report night -o reports/").succeeds();
     let index = text(&scratch.bytes("reports/index.html"));
-    for file in ["001_deep_bar_tif.html", "002_mug_tif.html", "003_pages.html"] {
+    for file in ["report_001_deep_bar_tif.html", "report_002_mug_tif.html", "report_003_pages.html"]
+    {
         assert!(index.contains(&format!("href=\"{file}\"")), "{index}");
         assert!(text(&scratch.bytes(&format!("reports/{file}"))).contains("href=\"index.html\""));
     }

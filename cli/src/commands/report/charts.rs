@@ -54,7 +54,7 @@ pub(super) fn charts(report: &StackReport) -> Vec<String> {
             &format!("perimeter ({length_unit})"),
             vec![curve("edges", points(&|_, layer| Some(layer.perimeter_px as f64 * length)))],
         ),
-        islands.and_then(|islands| {
+        islands.filter(|islands| islands.iter().any(|&count| count > 0)).and_then(|islands| {
             chart(
                 "Islands",
                 "islands that begin",

@@ -52,7 +52,7 @@ impl Entry {
 pub(super) fn file_name(number: usize, stack: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     let stem: String = stack.chars().take(60).map(plain).collect();
-    format!("{number:03}_{stem}.html")
+    format!("report_{number:03}_{stem}.html")
 }
 
 /// Returns the index: stacks that cannot be read first.
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn names_of_pages_are_plain() {
-        assert_eq!(file_name(7, "night/a <b>.tif"), "007_night_a__b__tif.html");
-        assert_eq!(file_name(1000, "\u{202e}.."), "1000____.html");
+        assert_eq!(file_name(7, "night/a <b>.tif"), "report_007_night_a__b__tif.html");
+        assert_eq!(file_name(1000, "\u{202e}.."), "report_1000____.html");
     }
 }
