@@ -13,7 +13,7 @@ fn ring() -> Mask {
     let mut transitions = Vec::new();
     for row in 0..120i32 {
         let away = (2 * row - 119).pow(2);
-        let half = |radius: i32| ((4 * radius * radius - away).max(0) as f64).sqrt() as i32 / 2;
+        let half = |radius: i32| f64::from((4 * radius * radius - away).max(0)).sqrt() as i32 / 2;
         let (outer, inner) = (half(55), half(40));
         if outer > 0 {
             let ends = if inner > 0 { vec![outer, inner] } else { vec![outer] };
