@@ -253,8 +253,8 @@ fn a_pipe_is_compared_and_the_worst_layer_drawn() {
     let of = |colour: [u8; 3]| pixels.chunks(3).filter(|pixel| **pixel == colour).count() / 64;
     assert_eq!((of([230, 159, 0]), of([86, 180, 233]), of([150; 3])), (4 * 18, 2 * 20, 20 * 18));
     // The same images, coded otherwise.
-    scratch.run("lamp convert b.tif -o pages.png/").succeeds();
-    scratch.run("lamp compare b.tif pages.png").succeeds_quietly();
+    scratch.run("lamp convert b.tif --png -o pages/").succeeds();
+    scratch.run("lamp compare b.tif pages").succeeds_quietly();
     let ran = scratch.run("lamp compare a.tif a.tif --picture none.png").succeeds();
     assert!(ran.stderr.contains("nothing differs"), "{ran:?}");
     assert!(!scratch.names().contains(&"none.png".to_owned()));

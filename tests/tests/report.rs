@@ -92,7 +92,7 @@ fn numbers_of_layers_are_those_of_their_pixels() {
             let beside = [(1, 0), (-1, 0), (0, 1), (0, -1)];
             beside.iter().filter(|(dx, dy)| !white(mask, x + dx, y + dy)).count()
         };
-        let new = all().filter(|&(x, y)| k == 0 || !white(&masks[k - 1], x, y)).count();
+        let new = all().filter(|&(x, y)| k == 0 || !white(masks[k - 1], x, y)).count();
         assert_eq!(column("area_px")[k], json!(all().count()), "layer {k}");
         assert_eq!(column("perimeter_px")[k], json!(all().map(sides).sum::<usize>()), "layer {k}");
         assert_eq!(column("new_px")[k], json!(new), "layer {k}");
