@@ -54,17 +54,32 @@ impl GivenUp {
     }
 }
 
-/// What a viewer takes beside its images: the page, the texts of pages, tiles in work.
-const OTHER_MEMORY: u64 = 48 << 20;
+/// What a viewer takes beside its images: the page, what pages say, answers.
+const OTHER_MEMORY: u64 = 32 << 20;
+/// What a thread keeps of what decoding a layer took, for the next one.
+const MEMORY_A_THREAD: u64 = 48 << 20;
+
+/// Returns how much of the memory decoded images may take: at least half of it.
+fn for_images(memory: u64, threads: usize) -> u64 {
+    // One more thread decodes ahead.
+    let others = OTHER_MEMORY + (threads as u64 + 1) * MEMORY_A_THREAD;
+    memory - others.min(memory / 2)
+}
 
 impl Viewer {
-    /// Views stacks; the second is compared with the first. `memory` is in bytes.
+    /// Views stacks; the second is compared with the first. `memory` is in bytes, and as many
+    /// `threads` will ask.
     ///
     /// # Panics
     /// Panics if there is no stack.
-    pub fn new(stacks: Vec<ViewedStack>, memory: u64, version: &'static str) -> Self {
+    pub fn new(
+        stacks: Vec<ViewedStack>,
+        memory: u64,
+        threads: usize,
+        version: &'static str,
+    ) -> Self {
         assert!(!stacks.is_empty(), "there is nothing to view");
-        let images = memory.saturating_sub(OTHER_MEMORY).try_into().unwrap_or(usize::MAX);
+        let images = for_images(memory, threads).try_into().unwrap_or(usize::MAX);
         Self {
             partners: Partners::of(&stacks),
             stacks,

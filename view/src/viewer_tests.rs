@@ -43,7 +43,7 @@ fn viewer() -> Viewer {
     let info = PageInfo { stray_rows: vec![0, 1], other: other.into_iter().collect(), ..info };
     let a = stack("a.tif", vec![white([&[1, 4], &[1, 4], &[7]]), (info, image)]);
     let b = stack("b.tif", vec![white([&[1, 4], &[1, 4], &[7]]), white([&[2, 6], &[1, 5], &[]])]);
-    Viewer::new(vec![a, b], MEMORY, "lamp")
+    Viewer::new(vec![a, b], MEMORY, 2, "lamp")
 }
 
 fn drawn(viewer: &Viewer, stack: usize, layer: usize, overlay: Overlay) -> Image {
@@ -72,7 +72,7 @@ fn overlays_have_the_pixels_that_they_tell() {
         overlays.map(|overlay| overlay["id"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
     };
     assert_eq!(ids(&viewer), ["below", "new", "added", "missing", "fixed", "stray"]);
-    let one = Viewer::new(vec![stack("a.tif", vec![white([&[], &[], &[]])])], MEMORY, "lamp");
+    let one = Viewer::new(vec![stack("a.tif", vec![white([&[], &[], &[]])])], MEMORY, 2, "lamp");
     assert_eq!(ids(&one), ["below", "new"]);
 }
 
@@ -125,7 +125,7 @@ fn pixels_are_told() {
     gray.push_row(&[]).unwrap();
     gray.push_row(&[]).unwrap();
     let page = (PageInfo::default(), Image::Gray(gray));
-    let viewer = Viewer::new(vec![stack("gray.tif", vec![page])], MEMORY, "lamp");
+    let viewer = Viewer::new(vec![stack("gray.tif", vec![page])], MEMORY, 2, "lamp");
     let threshold = std::num::NonZeroU8::new(101);
     let pixel = |x, y, threshold| viewer.pixel(0, 0, [x, y], threshold, &GivenUp::default());
     let told = pixel(3, 0, None).unwrap();

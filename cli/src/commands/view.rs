@@ -78,8 +78,13 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
     })?;
     let stacks = args.inputs.iter().map(|input| opened(input, args, common));
     let stacks = stacks.collect::<Result<Vec<_>, Exit>>()?;
-    let viewer =
-        Arc::new(Viewer::new(stacks, args.memory, concat!("lamp ", env!("CARGO_PKG_VERSION"))));
+    let threads = rayon::current_num_threads();
+    let viewer = Arc::new(Viewer::new(
+        stacks,
+        args.memory,
+        threads,
+        concat!("lamp ", env!("CARGO_PKG_VERSION")),
+    ));
     if args.check {
         viewer.find(|stack, progress| find(stack, progress).map_err(|error| error.to_string()));
     } else if !args.report.is_empty() {
@@ -97,7 +102,7 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
     if args.open && open::that_detached(&first).is_err() {
         Progress::new("view", common, true).say("no browser was found: open the address above");
     }
-    Ok(serve(viewer, address, token, rayon::current_num_threads()).context("the viewer")?)
+    Ok(serve(viewer, address, token, threads).context("the viewer")?)
 }
 
 /// Opens a stack; a part is sliced into a temporary file.

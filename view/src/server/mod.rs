@@ -52,7 +52,9 @@ pub fn serve(
     token: Token,
     threads: usize,
 ) -> io::Result<()> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let mut runtime = tokio::runtime::Builder::new_current_thread();
+    // Threads keep memory: no more of them than work at a time.
+    let runtime = runtime.enable_all().max_blocking_threads(threads.max(1)).build()?;
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(address.listener)?;
         let guard = Arc::new(Guard::new(token, address.port));
