@@ -22,7 +22,7 @@ use lamp_postprocess::{
 use lamp_slicer::SliceError;
 use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_slicer::topology::NoSolid;
-use lamp_stack::{CatalogueError, Length, PairingError, StackError};
+use lamp_stack::{CatalogueError, Length, StackError};
 use lamp_supports::SupportError;
 use lamp_view::SurfaceError;
 
@@ -53,19 +53,8 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().map(no_solid))
         .or_else(|| error.downcast_ref().and_then(data))
         .or_else(|| error.downcast_ref().and_then(stack))
-        .or_else(|| error.downcast_ref().and_then(pairing))
         .or_else(|| error.downcast_ref().and_then(input_output))
         .or_else(catalogued)
-}
-
-fn pairing(error: &PairingError) -> Option<String> {
-    let hint = match error {
-        PairingError::Resolutions { .. } => "slice both with one --dpi",
-        PairingError::PartPixels { .. } => "slice both with one --origin and --size",
-        PairingError::Apart { .. } => "check that they are stacks of one part",
-        _ => return None,
-    };
-    Some(hint.to_owned())
 }
 
 fn slicing(error: &SliceError) -> Option<String> {

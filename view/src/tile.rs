@@ -71,7 +71,10 @@ fn png([width, height]: [u32; 2], levels: &[u8], inks: Inks) -> io::Result<Vec<u
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::Mask;
+    use std::num::NonZeroU8;
+
+    use lamp_stack::{GrayMask, Mask};
+    use proptest::prelude::*;
 
     use super::*;
 
@@ -104,5 +107,110 @@ mod tests {
         let drawn = pixels(&tile(&image, at(0), Inks::One([1, 2, 3])).unwrap());
         assert_eq!(drawn, (2, 2, vec![1, 2, 3, 255, 1, 2, 3, 0, 1, 2, 3, 255, 1, 2, 3, 255]));
         assert_eq!(pixels(&tile(&image, at(1), Inks::Gray).unwrap()), (1, 1, vec![191]));
+    }
+    /// Gray images of any size up to two and a half tiles, of long runs and of short ones.
+    fn images() -> impl Strategy<Value = Image> {
+        let side = || prop_oneof![1u32..40, 480..1300u32];
+        (side(), side(), 0usize..400, any::<bool>(), any::<u64>()).prop_map(
+            |(width, height, longest, is_mask, seed)| {
+                let mut random = seed | 1;
+                let mut next = move || {
+                    // xorshift: G. Marsaglia, 2003.
+                    random ^= random << 13;
+                    random ^= random >> 7;
+                    random ^= random << 17;
+                    random
+                };
+                let mut gray = GrayMask::new(width);
+                for _ in 0..height {
+                    let mut left = width;
+                    gray.push_runs(std::iter::from_fn(|| {
+                        let run = left.min(1 + (next() % (longest as u64 + 1)) as u32);
+                        left -= run;
+                        (run > 0).then(|| (run, next() as u8))
+                    }))
+                    .unwrap();
+                }
+                let gray = Image::Gray(gray);
+                if is_mask {
+                    Image::Mask(gray.into_mask(NonZeroU8::new(128).unwrap()))
+                } else {
+                    gray
+                }
+            },
+        )
+    }
+
+    /// The same, pixel by pixel.
+    fn slow_tile(levels: &[Vec<u8>], at: TileAt) -> (u32, u32, Vec<u8>) {
+        let [width, height] = [levels[0].len(), levels.len()];
+        let side = 1usize << at.reduction;
+        let starts = |tile: u32, size: usize| -> Vec<usize> {
+            let first = tile as usize * 512 * side;
+            (first..size.min(first + 512 * side)).step_by(side).collect()
+        };
+        let [columns, rows] = [starts(at.x, width), starts(at.y, height)];
+        let mean = |top: usize, left: usize| {
+            let (mut sum, mut pixels) = (0u64, 0u64);
+            for row in &levels[top..height.min(top + side)] {
+                for &level in &row[left..width.min(left + side)] {
+                    sum += u64::from(level);
+                    pixels += 1;
+                }
+            }
+            (sum as f64 / pixels as f64).round() as u8
+        };
+        let means = rows.iter().flat_map(|&top| columns.iter().map(move |&left| (top, left)));
+        (
+            columns.len() as u32,
+            rows.len() as u32,
+            means.map(|(top, left)| mean(top, left)).collect(),
+        )
+    }
+
+    fn painted(image: &Image) -> Vec<Vec<u8>> {
+        let row = |row: u32| {
+            let mut levels = vec![0; image.width() as usize];
+            for (start, end, level) in image.runs(row) {
+                levels[start as usize..end as usize].fill(level);
+            }
+            levels
+        };
+        (0..image.height()).map(row).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// Every tile at a scale, of images as they are and as cured at a threshold.
+        #[test]
+        fn every_tile_is_the_mean_of_its_pixels(
+            image in images(),
+            reduction in 0u32..12,
+            threshold in prop::option::of(1u8..),
+        ) {
+            let mut levels = painted(&image);
+            let shown = match threshold.and_then(NonZeroU8::new) {
+                Some(threshold) => {
+                    let cured = |level: u8| if level >= threshold.get() { 255 } else { 0 };
+                    levels.iter_mut().flatten().for_each(|level| *level = cured(*level));
+                    Image::Mask(image.into_mask(threshold))
+                }
+                None => image,
+            };
+            let tiles = |size: u32| size.div_ceil(512 << reduction);
+            for y in 0..=tiles(shown.height()) {
+                for x in 0..=tiles(shown.width()) {
+                    let at = TileAt { reduction, x, y };
+                    let file = tile(&shown, at, Inks::Gray);
+                    if x == tiles(shown.width()) || y == tiles(shown.height()) {
+                        prop_assert!(file.is_none(), "{at:?}");
+                        continue;
+                    }
+                    // Not by the macro, which would print millions of pixels.
+                    prop_assert!(pixels(&file.unwrap()) == slow_tile(&levels, at), "{at:?}");
+                }
+            }
+        }
     }
 }

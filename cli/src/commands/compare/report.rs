@@ -78,12 +78,7 @@ impl Comparison<'_> {
 pub(super) fn text(comparison: &Comparison<'_>, all: bool) -> String {
     let [a, b] = &comparison.names;
     let sections = comparison.pairing.sections().len();
-    let unit = match (comparison.pairing.is_by_height(), sections) {
-        (true, 1) => "height",
-        (true, _) => "heights",
-        (false, 1) => "layer",
-        (false, _) => "layers",
-    };
+    let unit = if comparison.pairing.is_by_height() { "heights" } else { "layers" };
     let mut told: Vec<_> = comparison.told().collect();
     let forgiven = match comparison.sum(|found| found.forgiven) {
         0 => String::new(),

@@ -12,7 +12,7 @@ use crate::progress::Progress;
 use crate::streams::failed_at;
 
 /// The most boxes that are kept of a section.
-const MOST_BOXES: usize = 20;
+const MOST_BOXES: usize = 100;
 
 /// A stack and its name.
 pub(super) type NamedStack<'a> = (&'a IndexedStack, &'a str);

@@ -114,11 +114,8 @@ impl Work<'_> {
         args: &ReportArgs,
     ) -> Result<(), Exit> {
         if let Some(output) = output {
-            if is_stream(output) && io::stdout().is_terminal() {
+            if is_stream(output) && (io::stdout().is_terminal() || args.json) {
                 return Err(Exit::usage("a page is not for terminals: name a file with -o"));
-            }
-            if is_stream(output) && args.json {
-                return Err(Exit::usage("standard output is for JSON: name a file with -o"));
             }
             check_beside(output, Path::new("-"), [&args.stack])?;
         }
