@@ -69,7 +69,7 @@ fn write_ascii(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
 /// Returns the character for the mean of levels, given their sum and number.
 fn character(sum: u32, count: u32) -> u8 {
     let steps = RAMP.len() as u32 - 1;
-    let step = (sum * steps + 127 * count) / (255 * count);
+    let step = (2 * sum * steps + 255 * count) / (2 * 255 * count);
     RAMP[step.max(u32::from(sum > 0)) as usize]
 }
 
