@@ -1,6 +1,6 @@
 //! Runs `lamp view`, and talks to it byte by byte.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::process::{Child, Stdio};
@@ -70,11 +70,6 @@ impl Viewing {
         &self.cookie
     }
 
-    /// Returns the process's number.
-    pub fn process(&self) -> u32 {
-        self.server.id()
-    }
-
     /// Returns a request for a target, with lines of headers that end in line breaks.
     pub fn request(&self, target: &str, headers: &str) -> String {
         let port = self.port;
@@ -126,13 +121,6 @@ impl Viewing {
         let mut file = self.said.try_clone().expect("a file has many handles");
         file.rewind().and_then(|()| file.read_to_string(&mut said)).expect("text");
         said
-    }
-
-    /// Returns the most memory that it had at a time, in bytes, where the system tells.
-    pub fn peak_memory(&self) -> Option<u64> {
-        let status = fs::read_to_string(format!("/proc/{}/status", self.process())).ok()?;
-        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-        peak.trim().strip_suffix(" kB")?.parse::<u64>().ok().map(|kib| kib * 1024)
     }
 }
 
