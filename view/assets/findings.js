@@ -79,8 +79,10 @@ export class Findings extends EventTarget {
   }
 
   #row(finding) {
-    const name = this.#app.columns.index[finding.layer];
-    const button = element("button", `Layer ${name}: ${finding.text}`);
+    const { text, layer } = finding;
+    const namesLayer = text.startsWith("layer");
+    const line = namesLayer ? `L${text.slice(1)}` : `Layer ${this.#app.columnsOf(0).index[layer]}: ${text}`;
+    const button = element("button", line);
     button.dataset.id = finding.id;
     button.addEventListener("click", () => this.show(finding));
     const row = element("li");

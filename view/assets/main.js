@@ -14,7 +14,7 @@ import { listenToShare } from "./share.js";
 import { SolidPanel } from "./solid_panel.js";
 import { State, fromHash, linkAddress } from "./state.js";
 
-/** Tells what went wrong, until something comes out again. */
+/** Tells what went wrong, until something else is shown. */
 function fail(error) {
   byId("message").textContent = error.message;
   byId("message").hidden = false;
@@ -106,20 +106,28 @@ function tellStack({ session, state }) {
   const size = stack.dpi ? `, ${mm((stack.width * 25.4) / stack.dpi)} wide at ${stack.dpi} dpi` : "";
   const part = stack.part ? `${stack.part}: ` : "";
   byId("facts").textContent =
-    `${part}${count(stack.layers)} layers of ${count(stack.width)} x ${count(stack.height)} px${size}`;
-  if (stack.end) fail(new Error(stack.end));
+    `${part}${count(stack.layers)} layers of ${count(stack.width)} x ${count(stack.height)} px${size}. ${stack.end ?? ""}`;
 }
 
-/** Shows the layer of the state with its overlays. */
+/** Shows the layer of the state with its overlays; the next one is expected in the same direction. */
 function show({ columns, overlays, picture, state }) {
+  byId("message").hidden = true;
   const { stack, layer, threshold } = state.view;
-  const [width, height] = [columns.width[layer], columns.height[layer]];
-  const sheet = { stack, layer, width, height };
-  const gray = { ...sheet, kind: "layer", threshold: columns.gray[layer] ? threshold : null };
-  const over = state.view.overlays.map((kind) => ({ ...sheet, kind, threshold: null }));
-  picture.show({ sheets: [gray, ...over], opacity: { ...overlays.opacity } });
+  const sheets = (layer) => {
+    const [width, height] = [columns.width[layer], columns.height[layer]];
+    const sheet = { stack, layer, width, height, threshold: null };
+    const over = state.view.overlays.map((kind) => ({ ...sheet, kind }));
+    return [{ ...sheet, kind: "layer", threshold: columns.gray[layer] ? threshold : null }, ...over];
+  };
+  if (layer !== shownLayer) direction = Math.sign(layer - shownLayer);
+  shownLayer = layer;
+  const next = layer + direction;
+  const isThere = next >= 0 && next < columns.index.length;
+  picture.show({ sheets: sheets(layer), opacity: { ...overlays.opacity }, next: isThere ? sheets(next) : [] });
 }
 
+let shownLayer = 0;
+let direction = 1;
 let asked = new AbortController();
 
 /** Tells about the layer that has come; the server then expects its neighbours. */

@@ -4,6 +4,11 @@ import { nameOf, tileSource } from "./source.js";
 
 /** A layer that takes longer than this is given up for the next one that is wanted. */
 const PATIENCE_MS = 150;
+/** After so many that were given up, one is waited for: a key held down still shows layers. */
+const MOST_GIVEN_UP = 3;
+
+/** What comes next is fetched ahead when nothing has come or moved for so long. */
+const STILL_MS = 80;
 
 /** The largest zoom, in screen pixels for a pixel. */
 export const MAX_ZOOM = 40;
@@ -18,6 +23,8 @@ export class Picture extends EventTarget {
   #wanted = null;
   #shown = null;
   #since = 0;
+  #givenUp = 0;
+  #still = 0;
   #busySince = 0;
   #loading = null;
 
@@ -137,14 +144,16 @@ export class Picture extends EventTarget {
   }
 
   /**
-   * Shows a scene as soon as all of it has come; until then the one before stays.
-   * @param {{sheets: import("./source.js").Sheet[], opacity: Record<string, number>}} scene
-   *     the layer first, then its overlays; how opaque each kind is
+   * Shows a scene as soon as all of it has come; until then the one before stays. What comes
+   * next is fetched ahead when all is still.
+   * @param {{sheets: Sheet[], opacity: Record<string, number>, next: Sheet[]}} scene
+   *     the layer first, then its overlays; how opaque each kind is; what is expected to be next
+   * @typedef {import("./source.js").Sheet} Sheet
    */
   show(scene) {
     this.#wanted = scene;
     if (!this.#loading) this.#loadWanted();
-    else if (performance.now() - this.#since > PATIENCE_MS) this.#loading.abort();
+    else if (performance.now() - this.#since > PATIENCE_MS && this.#givenUp < MOST_GIVEN_UP) this.#loading.abort();
   }
 
   /** Fetches the sheets of a kind again. */
@@ -163,6 +172,7 @@ export class Picture extends EventTarget {
       this.#tellBusy();
       if (await this.#load(scene, this.#loading.signal)) {
         this.#reveal(scene);
+        this.#givenUp = 0;
         performance.measure("scene", { start: this.#since, detail: nameOf(scene.sheets[0]) });
       }
     }
@@ -175,12 +185,14 @@ export class Picture extends EventTarget {
   /** Adds what is new in a scene, unseen; returns whether all of it came. */
   async #load(scene, signal) {
     const isFirst = this.#items.size === 0;
+    this.#keep(scene, this.#shown);
     const added = scene.sheets.filter((sheet) => !this.#items.has(nameOf(sheet)));
-    const items = await Promise.all(added.map((sheet) => this.#add(sheet, isFirst)));
-    const all = Promise.all(items.map((item) => this.#loaded(item)));
+    await Promise.all(added.map((sheet) => this.#add(sheet, isFirst)));
+    const all = Promise.all(scene.sheets.map((sheet) => this.#loaded(this.#items.get(nameOf(sheet)))));
     const stopped = new Promise((stop) => signal.addEventListener("abort", () => stop("stopped")));
     if ((await Promise.race([all, stopped])) !== "stopped") return true;
     for (const sheet of added) this.#remove(nameOf(sheet));
+    this.#givenUp += 1;
     return false;
   }
 
@@ -199,9 +211,10 @@ export class Picture extends EventTarget {
         error,
       });
     });
+    // Meanwhile what was fetched ahead may have become what is wanted.
+    if (this.#items.has(nameOf(sheet))) return this.#viewer.world.removeItem(item);
     item.addHandler("fully-loaded-change", () => this.#tellBusy());
     this.#items.set(nameOf(sheet), item);
-    return item;
   }
 
   /** The level that the present zoom needs: until it has come, coarser ones would only delay it. */
@@ -221,14 +234,29 @@ export class Picture extends EventTarget {
   }
 
   #reveal(scene) {
-    const names = new Set(scene.sheets.map(nameOf));
     for (const sheet of scene.sheets) {
       const item = this.#items.get(nameOf(sheet));
       item.source.minLevel = 0;
       item.setOpacity(scene.opacity[sheet.kind] ?? 1);
     }
-    for (const name of [...this.#items.keys()]) if (!names.has(name)) this.#remove(name);
     this.#shown = scene;
+    this.#keep(scene);
+  }
+
+  /** Removes all sheets but those of scenes. */
+  #keep(...scenes) {
+    const names = new Set(scenes.flatMap((scene) => scene?.sheets.map(nameOf) ?? []));
+    for (const name of [...this.#items.keys()]) if (!names.has(name)) this.#remove(name);
+  }
+
+  /** Fetches ahead what is expected next, once nothing else is to come. */
+  #expectNext() {
+    clearTimeout(this.#still);
+    this.#still = setTimeout(() => {
+      if (this.#loading || this.#shown !== this.#wanted) return;
+      const { next } = this.#shown;
+      for (const sheet of next) if (!this.#items.has(nameOf(sheet))) this.#add(sheet, false);
+    }, STILL_MS);
   }
 
   #remove(name) {
@@ -240,10 +268,19 @@ export class Picture extends EventTarget {
 
   /** Tells whether tiles are still to come, and how long the last ones took. */
   #tellBusy() {
-    const isBusy = this.#loading != null || [...this.#items.values()].some((item) => !this.#hasAll(item));
+    const shown = this.#shown?.sheets.map((sheet) => this.#items.get(nameOf(sheet))) ?? [];
+    const isBusy = this.#loading != null || shown.some((item) => item && !this.#hasAll(item));
     const wasBusy = this.canvas.getAttribute("aria-busy") === "true";
-    if (isBusy && !wasBusy) this.#busySince = performance.now();
-    if (wasBusy && !isBusy) performance.measure("tiles", { start: this.#busySince });
+    if (isBusy && !wasBusy) {
+      this.#busySince = performance.now();
+      clearTimeout(this.#still);
+      // What was fetched ahead is of another place now, and would come in between.
+      if (!this.#loading) queueMicrotask(() => this.#keep(this.#shown, this.#wanted));
+    }
+    if (wasBusy && !isBusy) {
+      performance.measure("tiles", { start: this.#busySince });
+      this.#expectNext();
+    }
     this.canvas.setAttribute("aria-busy", `${isBusy}`);
   }
 
