@@ -236,6 +236,7 @@ fn capabilities(chromium: &str, width: u32, height: u32) -> Capabilities {
         "--disable-background-networking",
         "--enable-unsafe-swiftshader",
         "--force-device-scale-factor=1",
+        "--force-prefers-reduced-motion",
         "--hide-scrollbars",
         format!("--window-size={width},{height}"),
     ]);
