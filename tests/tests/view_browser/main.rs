@@ -136,7 +136,7 @@ fn overlays_cover_the_pixels_that_they_tell_of() {
     let mut counts = [0; 6];
     for position in [5, 11] {
         let (layer, below, other) = (&fixed[position], &fixed[position - 1], &stray[position]);
-        let changed = bands(&layer.info.other["fix"]["bands"]);
+        let changed = layer.info.other.get("fix").map_or_else(Vec::new, |fix| bands(&fix["bands"]));
         let rules: [(&str, &dyn Fn([u32; 2]) -> bool); 6] = [
             ("below", &|at| white(below, at) && !white(layer, at)),
             ("new", &|at| white(layer, at) && !white(below, at)),
