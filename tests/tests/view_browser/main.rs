@@ -10,6 +10,8 @@ use serde_json::{Value, json};
 use browser::Browser;
 
 const WINDOW: [u32; 2] = [1400, 900];
+/// The tower's layers fit into it, each pixel 4 screen pixels wide.
+const LARGE: [u32; 2] = [1800, 1500];
 const UP: char = '\u{e013}';
 const END: char = '\u{e010}';
 const TAB: char = '\u{e004}';
@@ -131,7 +133,7 @@ fn overlays_cover_the_pixels_that_they_tell_of() {
     scratch.run("slice tower.stl --dpi 300 --layers 4..17 -o stray.tif").succeeds();
     scratch.run("fix stray.tif --max-width 2 -o fixed.tif").succeeds();
     let viewing = Viewing::start(&scratch, "fixed.tif stray.tif");
-    let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
+    let Some(browser) = Browser::open(&viewing, LARGE) else { return };
     let (fixed, stray) = (scratch.layers("fixed.tif"), scratch.layers("stray.tif"));
     let mut counts = [0; 6];
     for position in [5, 11] {
@@ -145,7 +147,7 @@ fn overlays_cover_the_pixels_that_they_tell_of() {
             ("fixed", &|[_, row]| changed.iter().any(|band| band.contains(&row))),
             ("stray", &|[_, row]| layer.info.stray_rows.contains(&row)),
         ];
-        browser.go(&format!("#stack=0&layer={position}&at=160,151.5&zoom=2"));
+        browser.go(&format!("#stack=0&layer={position}&at=160,151.5&zoom=4"));
         for ((overlay, wanted), count) in rules.into_iter().zip(&mut counts) {
             browser.click(&format!("#overlay-{overlay}"));
             let sheets = ["layer", overlay].map(|kind| format!("0/{position}/{kind}"));
