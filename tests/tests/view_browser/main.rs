@@ -26,6 +26,9 @@ fn demo() -> Scratch {
     scratch
 }
 
+/// Whether an overlay colours a pixel.
+type Rule<'a> = &'a dyn Fn([u32; 2]) -> bool;
+
 fn white(layer: &Layer, [column, row]: [u32; 2]) -> bool {
     mask(layer).is_white(column, row)
 }
@@ -139,7 +142,7 @@ fn overlays_cover_the_pixels_that_they_tell_of() {
     for position in [5, 11] {
         let (layer, below, other) = (&fixed[position], &fixed[position - 1], &stray[position]);
         let changed = layer.info.other.get("fix").map_or_else(Vec::new, |fix| bands(&fix["bands"]));
-        let rules: [(&str, &dyn Fn([u32; 2]) -> bool); 6] = [
+        let rules: [(&str, Rule); 6] = [
             ("below", &|at| white(below, at) && !white(layer, at)),
             ("new", &|at| white(layer, at) && !white(below, at)),
             ("added", &|at| white(other, at) && !white(layer, at)),
