@@ -56,7 +56,7 @@ impl GivenUp {
 
 /// What a viewer takes beside its images: the page, what pages say, answers.
 const OTHER_MEMORY: u64 = 32 << 20;
-/// What a thread keeps of what decoding a layer took, for the next one.
+/// What a thread takes beside the images that it makes.
 const MEMORY_A_THREAD: u64 = 48 << 20;
 
 /// Returns how much of the memory decoded images may take: at least half of it.

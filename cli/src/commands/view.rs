@@ -11,6 +11,7 @@ use lamp_view::{Address, Token, ViewedStack, Viewer, licences, of_report, serve}
 
 use super::check;
 use crate::exit::Exit;
+use crate::memory::give_freed_memory_back;
 use crate::options::{Common, parse_memory};
 use crate::progress::Progress;
 use crate::sliced_part::SlicedPart;
@@ -72,6 +73,7 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
     if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
+    give_freed_memory_back();
     let address = Address::new(args.port).with_context(|| match args.port {
         0 => "a port of the loopback address".to_owned(),
         port => format!("port {port} of the loopback address"),
