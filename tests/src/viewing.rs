@@ -35,6 +35,14 @@ pub struct Answer {
 }
 
 impl Viewing {
+    /// Returns the most memory that the viewer has taken, in bytes; none where the system does not
+    /// tell.
+    pub fn peak_memory(&self) -> Option<u64> {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.server.id())).ok()?;
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+        Some(peak.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
+    }
+
     /// Starts `lamp view` in a folder, and waits until it has printed its address.
     ///
     /// # Panics

@@ -429,6 +429,36 @@ fn damaged_and_tiny_stacks_are_shown_as_far_as_they_go() {
     assert_eq!((&found["level"], &found["component"]["area_px"]), (&255.into(), &1.into()));
 }
 
+#[test]
+fn memory_stays_within_its_limit() {
+    const LAYERS: u32 = 40;
+    const LIMIT: u64 = 128_000_000;
+    let scratch = Scratch::new();
+    // Layers of a million transitions, 4 MB each when decoded: stripes that change sides.
+    let layer = |index: u32| {
+        let mut mask = MaskBuilder::new(4096);
+        for row in 0..500 {
+            let stripes: Vec<u32> =
+                (0..2000).map(|stripe| 2 * stripe + (row + index) % 7).collect();
+            mask.push_row(&stripes).unwrap();
+        }
+        let info = PageInfo { index, ..PageInfo::default() };
+        Layer { info, dpi: None, image: mask.finish().into() }
+    };
+    scratch.stack("dense.tif", (0..LAYERS).map(layer));
+    let viewing = Viewing::start(&scratch, "dense.tif --threads 2 --memory 128MB");
+    let mut random = SplitMix::new(22);
+    for _ in 0..3 * LAYERS {
+        let layer = random.below(LAYERS as usize);
+        viewing.get(&format!("/api/stacks/0/layers/{layer}"));
+        for kind in ["layer", "new", "below"] {
+            assert_eq!(viewing.get(&format!("/tiles/0/{layer}/{kind}/2/0/0.png")).status, 200);
+        }
+    }
+    let Some(peak) = viewing.peak_memory() else { return };
+    assert!(peak <= LIMIT, "{peak} bytes");
+}
+
 /// Numbers that stand for a `#`, and words that stand for an `@`.
 const NUMBERS: &str =
     "0 0 0 0 0 0 1 1 7 15 16 31 32 255 256 4294967295 -1 1e9 18446744073709551616 %31 x";
