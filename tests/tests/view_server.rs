@@ -447,7 +447,7 @@ fn memory_stays_within_its_limit() {
     };
     scratch.stack("dense.tif", (0..LAYERS).map(layer));
     let viewing = Viewing::start(&scratch, "dense.tif --threads 2 --memory 128MB");
-    let mut random = SplitMix::new(22);
+    let mut random = SplitMix(22);
     for _ in 0..3 * LAYERS {
         let layer = random.below(LAYERS as usize);
         viewing.get(&format!("/api/stacks/0/layers/{layer}"));
