@@ -70,7 +70,9 @@ function connect(app) {
   byId("stack").replaceChildren(...stacks);
   byId("stack").addEventListener("change", ({ target }) => {
     const stack = Number(target.value);
-    state.set({ stack, layer: Math.min(state.view.layer, session.stacks[stack].layers - 1) });
+    // The other stack's layer at this height, if it has one.
+    const layer = (stack < 2 ? partner : null) ?? state.view.layer;
+    state.set({ stack, layer: Math.min(layer, session.stacks[stack].layers - 1) });
   });
   byId("zoom-in").addEventListener("click", () => picture.zoomBy(1.5));
   byId("zoom-out").addEventListener("click", () => picture.zoomBy(1 / 1.5));
@@ -128,6 +130,8 @@ function show({ columns, overlays, picture, state }) {
 
 let shownLayer = 0;
 let direction = 1;
+/** The layer of the other stack that belongs to the one that is shown. */
+let partner = null;
 let asked = new AbortController();
 
 /** Tells about the layer that has come; the server then expects its neighbours. */
@@ -137,6 +141,7 @@ async function tellShown({ columns, fail, picture, say, state }) {
   asked = new AbortController();
   try {
     const facts = await get(`/api/stacks/${stack}/layers/${layer}`, asked.signal);
+    ({ partner } = facts);
     tellLayer(facts);
     picture.canvas.setAttribute("aria-label", `Layer picture: ${facts.name}`);
     say(facts.name);

@@ -197,8 +197,7 @@ export class Picture extends EventTarget {
   }
 
   async #add(sheet, isFirst) {
-    const fail = (error) => this.dispatchEvent(new CustomEvent("failed", { detail: error }));
-    const source = tileSource(sheet, this.#side, fail);
+    const source = tileSource(sheet, this.#side, (error) => this.#fail(sheet, error));
     if (!isFirst) source.minLevel = this.#levelOf(source);
     const item = await new Promise((success, error) => {
       this.#viewer.addTiledImage({
@@ -215,6 +214,13 @@ export class Picture extends EventTarget {
     if (this.#items.has(nameOf(sheet))) return this.#viewer.world.removeItem(item);
     item.addHandler("fully-loaded-change", () => this.#tellBusy());
     this.#items.set(nameOf(sheet), item);
+  }
+
+  /** Tells why a sheet that is wanted does not come. One fetched ahead is tried again once it is. */
+  #fail(sheet, error) {
+    const isIn = (scene) => scene?.sheets.some((wanted) => nameOf(wanted) === nameOf(sheet));
+    if (isIn(this.#wanted)) this.dispatchEvent(new CustomEvent("failed", { detail: error }));
+    else if (!isIn(this.#shown) && this.#items.has(nameOf(sheet))) this.#remove(nameOf(sheet));
   }
 
   /** The level that the present zoom needs: until it has come, coarser ones would only delay it. */
