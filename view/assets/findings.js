@@ -44,16 +44,25 @@ export class Findings extends EventTarget {
   /** Goes to a finding: its layer, its place, and its overlay. */
   show(finding) {
     this.current = finding.id;
-    const { marks, overlays, picture, state } = this.#app;
+    const { overlays, picture, state } = this.#app;
     state.set({ stack: 0, layer: finding.layer });
     overlays.set("findings", true);
-    marks.setBox("finding", finding.box);
+    this.mark();
     if (finding.box) picture.fit(finding.box);
     for (const button of byId("findings-list").querySelectorAll("button")) {
       button.setAttribute("aria-current", `${button.dataset.id === `${finding.id}`}`);
     }
-    this.#app.say(`${finding.kind}: ${finding.text}`);
+    this.#app.say(`${finding.kind.replaceAll("-", " ")}: ${finding.text}`);
     this.dispatchEvent(new Event("change"));
+  }
+
+  /** Draws the rectangle of the current finding, where it is in the layer that is viewed. */
+  mark() {
+    const { marks, state } = this.#app;
+    const finding = this.list.find(({ id }) => id === this.current);
+    const { stack, layer } = state.view;
+    const isHere = finding && stack === 0 && finding.layer <= layer && layer <= finding.last_layer;
+    marks.setBox("finding", isHere ? finding.box : null);
   }
 
   #take(state) {
@@ -79,10 +88,9 @@ export class Findings extends EventTarget {
   }
 
   #row(finding) {
-    const { text, layer } = finding;
-    const namesLayer = text.startsWith("layer");
-    const line = namesLayer ? `L${text.slice(1)}` : `Layer ${this.#app.columnsOf(0).index[layer]}: ${text}`;
-    const button = element("button", line);
+    const { kind, text, layer } = finding;
+    const place = text.startsWith("layer") ? "" : `layer ${this.#app.columnsOf(0).index[layer]}, `;
+    const button = element("button", `${kind.replaceAll("-", " ")}: ${place}${text}`);
     button.dataset.id = finding.id;
     button.addEventListener("click", () => this.show(finding));
     const row = element("li");

@@ -88,6 +88,7 @@ function connect(app) {
     if (placed) state.set({ centre: picture.centre, zoom: picture.zoom });
   });
   state.on(["stack", "layer", "overlays", "threshold"], () => show(app));
+  state.on(["stack", "layer"], () => app.findings?.mark());
   state.on(["stack"], () => tellStack(app));
   addEventListener("hashchange", () => place(app));
   tellStack(app);

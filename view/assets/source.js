@@ -44,8 +44,10 @@ export function tileSource(sheet, side, fail) {
     `/tiles/${stack}/${layer}/${kind}/${maxLevel - level}/${x}/${y}.png${query}`;
   source.hasTransparency = () => kind !== "layer";
   source.downloadTileStart = async (job) => {
+    const own = new AbortController();
+    job.userData.stop = own;
     try {
-      const file = await (await ask(job.src, stop.signal)).blob();
+      const file = await (await ask(job.src, AbortSignal.any([stop.signal, own.signal]))).blob();
       job.finish(await createImageBitmap(file), null, "imageBitmap");
     } catch (error) {
       if (error.name === "AbortError") return forget(job);
@@ -53,7 +55,7 @@ export function tileSource(sheet, side, fail) {
       job.fail(error.message);
     }
   };
-  source.downloadTileAbort = () => stop.abort();
+  source.downloadTileAbort = (job) => job.userData.stop.abort();
   source.stop = () => stop.abort();
   return source;
 }

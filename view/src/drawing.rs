@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Frame, Image, Mask};
+use lamp_stack::{Frame, Image, Mask, Op};
 
 use crate::cache::image_bytes;
 use crate::findings::{self, Finding};
@@ -16,6 +16,13 @@ pub(crate) enum Drawing {
         a: Option<Arc<Image>>,
         b: Option<Arc<Image>>,
         size: [u32; 2],
+    },
+    /// What is white in the layer alone, or else in any of the others alone; what is not there is
+    /// black.
+    Differs {
+        layer: Arc<Image>,
+        others: Vec<Option<Image>>,
+        in_layer: bool,
     },
     Rows {
         bands: Vec<Range<u32>>,
@@ -35,6 +42,9 @@ impl Drawing {
             |image: &Option<Arc<Image>>| image.as_ref().map_or(0, |image| image_bytes(image));
         match self {
             Self::OnlyIn { a, b, .. } => bytes(a) + bytes(b),
+            Self::Differs { layer, others, .. } => {
+                image_bytes(layer) + others.iter().flatten().map(image_bytes).sum::<usize>()
+            }
             Self::Rows { size, .. } => 8 * size[1] as usize,
             Self::Findings { layer, .. } => image_bytes(layer),
         }
@@ -50,6 +60,19 @@ impl Drawing {
                     None => a.exposed().into_owned(),
                 };
                 only.framed(Frame { left: 0, top: 0, width: *width, height: *height })
+            }
+            Self::Differs { layer, others, in_layer } => {
+                let layer = layer.exposed();
+                let black = Mask::black(layer.width(), layer.height());
+                let differs = |other: &Option<Image>| {
+                    let other = other.as_ref().map(Image::exposed);
+                    let other = other.as_deref().unwrap_or(&black);
+                    if *in_layer { only_in(&layer, other) } else { only_in(other, &layer) }
+                };
+                let all = others.iter().map(differs);
+                let union =
+                    |a: Mask, b: Mask| a.combined(Op::Union, &b).expect("they have one size");
+                all.reduce(union).unwrap_or(black)
             }
             Self::Rows { bands, size } => rows(*size, bands),
             Self::Findings { found, layer, below } => {

@@ -6,12 +6,15 @@ use crate::stack::ViewedStack;
 
 /// The layers of the first two stacks that belong together.
 pub(crate) struct Partners {
-    /// The layers of the second stack for those of the first, and the other way round; none if
-    /// their pixels do not lie on each other.
-    of: Option<[Pairing; 2]>,
+    /// For each layer of the first stack those of the second, section by section upward, and the
+    /// other way round; none if their pixels do not lie on each other.
+    of: Option<[Vec<Sections>; 2]>,
 }
 
-/// The layer of the other stack that belongs to a layer.
+/// The other stack's layers along the height of a layer; none where it has no layer.
+type Sections = Vec<Option<usize>>;
+
+/// A layer of the other stack that belongs to a layer.
 pub(crate) struct Partner {
     pub(crate) stack: usize,
     pub(crate) layer: usize,
@@ -24,30 +27,52 @@ impl Partners {
     pub(crate) fn of(stacks: &[ViewedStack]) -> Self {
         let [a, b, ..] = stacks else { return Self { of: None } };
         let (a, b) = (a.headers(), b.headers());
-        let pairings = [Pairing::of(a, b), Pairing::of(b, a)];
-        let lie_on_each_other = shift_between(&a[0], &b[0]).is_ok();
-        Self { of: lie_on_each_other.then_some(pairings) }
+        if shift_between(&a[0], &b[0]).is_err() {
+            return Self { of: None };
+        }
+        let mut of = [vec![Vec::new(); a.len()], vec![Vec::new(); b.len()]];
+        for section in Pairing::of(a, b).sections() {
+            let sides = [(section.a, section.b), (section.b, section.a)];
+            for (layers, (layer, other)) in of.iter_mut().zip(sides) {
+                if let Some(layer) = layer {
+                    layers[layer].push(other);
+                }
+            }
+        }
+        Self { of: Some(of) }
     }
 
     pub(crate) fn are_comparable(&self) -> bool {
         self.of.is_some()
     }
 
-    /// Returns the layer of the other stack that belongs to a layer of these stacks.
+    fn sections(&self, stack: usize, layer: usize) -> &[Option<usize>] {
+        let of = self.of.as_ref().and_then(|of| of.get(stack)?.get(layer));
+        of.map_or(&[], Vec::as_slice)
+    }
+
+    /// Returns the other stack's layer in the middle of a layer.
+    pub(crate) fn middle(&self, stack: usize, layer: usize) -> Option<usize> {
+        let sections = self.sections(stack, layer);
+        *sections.get(sections.len() / 2)?
+    }
+
+    /// Returns the layers of the other stack that belong to a layer of these stacks; none where the
+    /// other one has no layer along its height.
     pub(crate) fn of_layer(
         &self,
         stacks: &[ViewedStack],
         stack: usize,
         layer: usize,
-    ) -> Option<Partner> {
-        let pairing = self.of.as_ref()?.get(stack)?;
+    ) -> Vec<Option<Partner>> {
         let header = |stack: usize, layer: usize| -> Option<&PageHeader> {
             stacks.get(stack)?.headers().get(layer)
         };
-        let (other, here) = (1 - stack, header(stack, layer)?);
-        let partner = pairing.partner(layer)?;
-        let shift = shift_between(here, header(other, partner)?).ok()?;
-        Some(Partner { stack: other, layer: partner, shift })
+        let partner = |other: usize| {
+            let shift = shift_between(header(stack, layer)?, header(1 - stack, other)?).ok()?;
+            Some(Partner { stack: 1 - stack, layer: other, shift })
+        };
+        self.sections(stack, layer).iter().map(|other| other.and_then(partner)).collect()
     }
 }
 

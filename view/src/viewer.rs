@@ -14,7 +14,7 @@ use crate::edge::nearest_edge;
 use crate::error::ViewError;
 use crate::findings::Finding;
 use crate::overlay::{Overlay, bands, fixed_bands};
-use crate::pairs::Partners;
+use crate::pairs::{Partner, Partners};
 use crate::stack::{ViewedStack, level, place_mm};
 use crate::surface_work::surface_of;
 use crate::tile::{Inks, TILE_SIDE, TileAt, tile};
@@ -162,8 +162,7 @@ impl Viewer {
     /// Returns what is known of a layer without its image.
     pub(crate) fn layer(&self, stack: usize, layer: usize) -> Result<Value, ViewError> {
         let mut facts = self.stack(stack)?.layer(layer)?;
-        facts["partner"] =
-            self.partners.of_layer(&self.stacks, stack, layer).map(|at| at.layer).into();
+        facts["partner"] = self.partners.middle(stack, layer).into();
         Ok(facts)
     }
 
@@ -241,13 +240,16 @@ impl Viewer {
                 Drawing::OnlyIn { a: Some(image(stack, layer)?), b: below()?, size: header.size }
             }
             Overlay::Added | Overlay::Missing => {
-                let at = self.partners.of_layer(&self.stacks, stack, layer);
-                let other = at.as_ref().map(|at| image(at.stack, at.layer)).transpose()?;
-                let other =
-                    other.zip(at).map(|(image, at)| Arc::new(at.framed(&image, header.size)));
-                let here = Some(image(stack, layer)?);
-                let [a, b] = if overlay == Overlay::Added { [other, here] } else { [here, other] };
-                Drawing::OnlyIn { a, b, size: header.size }
+                let others = self.partners.of_layer(&self.stacks, stack, layer);
+                let framed = |other: Option<Partner>| {
+                    other
+                        .map(|at| Ok(at.framed(&*image(at.stack, at.layer)?, header.size)))
+                        .transpose()
+                };
+                let others = others.into_iter().map(framed).collect::<Result<_, ViewError>>()?;
+                // What is added is in the second stack alone, also where that one is looked at.
+                let in_layer = (overlay == Overlay::Added) == (stack == 1);
+                Drawing::Differs { layer: image(stack, layer)?, others, in_layer }
             }
             Overlay::Fixed => Drawing::Rows { bands: fixed_bands(&header.info), size: header.size },
             Overlay::Stray => {

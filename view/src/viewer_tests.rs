@@ -63,7 +63,9 @@ fn overlays_have_the_pixels_that_they_tell() {
     is(0, 0, Overlay::Below, [&[], &[], &[]]);
     is(0, 1, Overlay::Added, [&[], &[4, 5], &[]]);
     is(0, 1, Overlay::Missing, [&[1, 2], &[], &[]]);
-    is(1, 1, Overlay::Added, [&[1, 2], &[], &[]]);
+    // The same where the second stack is looked at.
+    is(1, 1, Overlay::Added, [&[], &[4, 5], &[]]);
+    is(1, 1, Overlay::Missing, [&[1, 2], &[], &[]]);
     is(0, 1, Overlay::Stray, [&[0], &[0], &[]]);
     is(0, 1, Overlay::Fixed, [&[], &[], &[0]]);
     let ids = |viewer: &Viewer| {
@@ -74,6 +76,26 @@ fn overlays_have_the_pixels_that_they_tell() {
     assert_eq!(ids(&viewer), ["below", "new", "added", "missing", "fixed", "stray"]);
     let one = Viewer::new(vec![stack("a.tif", vec![white([&[], &[], &[]])])], MEMORY, 2, "lamp");
     assert_eq!(ids(&one), ["below", "new"]);
+}
+
+#[test]
+fn a_thick_layer_differs_where_any_thin_one_does() {
+    let page = |z_um, thickness_um, rows| {
+        let (info, image) = white(rows);
+        (PageInfo { z_um: Some(z_um), thickness_um: Some(thickness_um), ..info }, image)
+    };
+    let thick = stack("thick.tif", vec![page(0.0, 150.0, [&[1, 4], &[], &[]])]);
+    let thin = [page(0.0, 50.0, [&[1, 5], &[], &[]]), page(50.0, 50.0, [&[2, 4], &[], &[]])];
+    let viewer = Viewer::new(vec![thick, stack("thin.tif", thin.into())], MEMORY, 2, "lamp");
+    let is = |stack, layer, overlay, row: &[u32]| {
+        let wanted = Image::Mask(mask([row, &[], &[]]));
+        assert_eq!(drawn(&viewer, stack, layer, overlay), wanted, "{overlay}");
+    };
+    is(0, 0, Overlay::Added, &[4, 5]);
+    is(0, 0, Overlay::Missing, &[1, 4]);
+    is(1, 0, Overlay::Added, &[4, 5]);
+    is(1, 1, Overlay::Missing, &[1, 2]);
+    assert_eq!(viewer.layer(0, 0).unwrap()["partner"], json!(1));
 }
 
 #[test]

@@ -99,7 +99,9 @@ fn follow_a_finding(browser: &Browser) {
     browser.settle();
     let layer = browser.text("#layer-facts");
     let number = layer.lines().nth(1).unwrap();
-    assert_eq!(line.as_str().unwrap().split([' ', ':']).nth(1), Some(number), "{line}");
+    let mut words =
+        line.as_str().unwrap().split([' ', ',']).skip_while(|word| !word.starts_with("layer"));
+    assert_eq!(words.nth(1), Some(number), "{line}");
     let place = browser.place();
     assert_eq!(place["overlays"], "findings");
     let marked = "return document.querySelector('#marks path.under').getAttribute('d').length";

@@ -1,5 +1,6 @@
 //! Work for answers: so much at a time, none that was given up, and ahead what comes next.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use tokio::sync::Semaphore;
@@ -106,8 +107,9 @@ impl Wish {
                 if is_old() {
                     break;
                 }
-                // Who looks at it will be told of errors.
-                let _ = viewer.image(stack, layer, Kind::Layer, &GivenUp::default());
+                // Who looks at it will be told what fails.
+                let decode = || viewer.image(stack, layer, Kind::Layer, &GivenUp::default());
+                let _ = catch_unwind(AssertUnwindSafe(decode));
             }
         }
     }

@@ -100,10 +100,10 @@ impl Work<'_> {
             IndexedStack::open(path)
         };
         let stack = stack.and_then(IndexedStack::whole);
-        let stack = stack.map_err(|error| failed_at(input_name(path), error))?;
+        let stack = stack.map_err(|error| failed_at(shown_name(path), error))?;
         let report = StackReport::gather(&stack, &shown_name(path), self.machine, &progress);
         progress.done();
-        report.map_err(|error| error.at(input_name(path)))
+        report.map_err(|error| error.at(shown_name(path)))
     }
 
     /// Writes the page of a stack, or prints the numbers of all stacks.
