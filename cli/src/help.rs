@@ -6,7 +6,7 @@ use crate::options::GENERAL;
 
 /// The help of `lamp`, for a screen of 24 lines and 80 columns.
 const LAMP: &str = "\
-Turn CAD parts into layer images for photopolymerization: lamp COMMAND [OPTIONS]
+Turn parts into images for photopolymerization. Usage: lamp COMMAND [OPTIONS]
 From part to build:        slice blade.stl | fix | dither | tile > build.tif
   slice       cut a part into layers         fix         correct stray rows
   dither      turn gray levels into dots     tile        lay out copies
@@ -28,7 +28,7 @@ Resins and machines:
   plan        plan exposures                 learn       correct them by prints
   projector   list and check projectors      cure        draw what a stack cures
   completions let shells complete commands   man         write manual pages
-COMMAND -h lists usual options, --help all; all have -q, --threads N, --options.
+-h lists the usual options of a command, --help all; all have --quiet, --options
 ";
 
 /// Examples stand between usage and options.

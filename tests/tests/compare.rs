@@ -1,7 +1,7 @@
 //! Checks what `lamp compare` tells of stacks, against their pixels.
 
 use lamp_fixtures::Sample;
-use lamp_stack::{Dpi, GrayMask, Layer, Mask, PageInfo};
+use lamp_stack::{Dpi, GrayMask, Layer, Mask, PageInfo, StackInfo};
 use lamp_tests::{Ran, Scratch};
 use serde_json::{Value, json};
 
@@ -35,6 +35,7 @@ fn stack(scratch: &Scratch, name: &str, layers: impl IntoIterator<Item = Mask>) 
             z_um: Some(f64::from(index) * 100.0),
             thickness_um: Some(100.0),
             origin_mm: Some([0.0, 4.0]),
+            stack: (index == 0).then(StackInfo::default),
             ..PageInfo::default()
         };
         Layer { info, dpi: Dpi::new(254.0), image: mask.into() }
