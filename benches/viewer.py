@@ -27,6 +27,7 @@ from selenium.webdriver.chrome.service import Service
 MEMORY_MB = 512
 STARTS = 5
 STEPS = 40
+PAUSE = 0.7
 JUMPS = 40
 PLACES = 12
 BROWSED = 1000
@@ -148,7 +149,13 @@ def first_pictures(driver, lamp, stack):
 
 def steps(driver):
     settled(driver, 'goTo("#stack=0&layer=300")')
-    told("next layer", [settled(driver, 'press("ArrowUp")') for _ in range(STEPS)])
+    told("next layer, at once", [settled(driver, 'press("ArrowUp")') for _ in range(STEPS)])
+    times = []
+    for _ in range(STEPS):
+        # The next one is fetched ahead meanwhile.
+        time.sleep(PAUSE)
+        times.append(settled(driver, 'press("ArrowUp")'))
+    told(f"next layer, after {PAUSE} s", times)
 
 
 def jumps(driver, chance):
