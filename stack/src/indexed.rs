@@ -119,17 +119,6 @@ impl IndexedStack {
         Ok(Self { headers, end, source: source(places)? })
     }
 
-    /// Returns the stack if it is not cut off or damaged.
-    ///
-    /// # Errors
-    /// Returns why no pages follow the last, if that is not the stack's end.
-    pub fn whole(self) -> Result<Self, StackError> {
-        match self.end {
-            Some(end) => Err(end),
-            None => Ok(self),
-        }
-    }
-
     /// Returns what the pages say, bottom first: at least one.
     pub fn headers(&self) -> &[PageHeader] {
         &self.headers
@@ -140,13 +129,13 @@ impl IndexedStack {
         self.end.as_ref()
     }
 
-    /// Returns the stack if it is whole.
+    /// Returns the stack if it is not cut off or damaged.
     ///
     /// # Errors
     /// Returns why no pages follow the last, if that is not the stack's end.
-    pub fn into_whole(mut self) -> Result<Self, StackError> {
-        match self.end.take() {
-            Some(error) => Err(error),
+    pub fn into_whole(self) -> Result<Self, StackError> {
+        match self.end {
+            Some(end) => Err(end),
             None => Ok(self),
         }
     }

@@ -161,7 +161,7 @@ fn opened(path: &Path) -> Result<IndexedStack, Exit> {
     } else {
         IndexedStack::open(path)
     };
-    let stack = stack.and_then(IndexedStack::whole);
+    let stack = stack.and_then(IndexedStack::into_whole);
     stack.map_err(|error| failed_at(input_name(path), error))
 }
 

@@ -99,7 +99,7 @@ impl Work<'_> {
         } else {
             IndexedStack::open(path)
         };
-        let stack = stack.and_then(IndexedStack::whole);
+        let stack = stack.and_then(IndexedStack::into_whole);
         let stack = stack.map_err(|error| failed_at(shown_name(path), error))?;
         let report = StackReport::gather(&stack, &shown_name(path), self.machine, &progress);
         progress.done();
