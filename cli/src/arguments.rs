@@ -113,22 +113,7 @@ impl Arguments {
         let command =
             path.iter().try_fold(&self.lamp, |command, name| command.find_subcommand(name));
         let command = command.expect("a command that was parsed is one of lamp's");
-        let is_given = |option: &&Arg| {
-            matches.value_source(option.get_id().as_str()) == Some(ValueSource::CommandLine)
-        };
-        let given: Vec<&Arg> = command.get_arguments().filter(is_given).collect();
-        let is_free = |option: &Arg| {
-            let excludes = |a, b: &Arg| {
-                command.get_arg_conflicts_with(a).iter().any(|other| other.get_id() == b.get_id())
-            };
-            !given.iter().any(|other| {
-                other.get_id() == option.get_id()
-                    || excludes(other, option)
-                    || excludes(option, other)
-            })
-        };
-        let free = settings.iter().filter(|it| option_of(command, &it.key).is_some_and(is_free));
-        let words: Vec<OsString> = free.flat_map(|setting| setting.words.clone()).collect();
+        let words = words_left_open(command, matches, settings);
         // What stands behind `--` is no option.
         let end = self.words.iter().position(|word| word == "--").unwrap_or(self.words.len());
         self.words.splice(end..end, words);
@@ -136,8 +121,30 @@ impl Arguments {
     }
 }
 
+/// Returns the words of settings, but of none that is given already or contradicts what is.
+pub(crate) fn words_left_open(
+    command: &Command,
+    matches: &ArgMatches,
+    settings: &[Setting],
+) -> Vec<OsString> {
+    let is_given = |option: &&Arg| {
+        matches.value_source(option.get_id().as_str()) == Some(ValueSource::CommandLine)
+    };
+    let given: Vec<&Arg> = command.get_arguments().filter(is_given).collect();
+    let is_free = |option: &Arg| {
+        let excludes = |a, b: &Arg| {
+            command.get_arg_conflicts_with(a).iter().any(|other| other.get_id() == b.get_id())
+        };
+        !given.iter().any(|other| {
+            other.get_id() == option.get_id() || excludes(other, option) || excludes(option, other)
+        })
+    };
+    let free = settings.iter().filter(|it| option_of(command, &it.key).is_some_and(is_free));
+    free.flat_map(|setting| setting.words.clone()).collect()
+}
+
 /// Returns the defaults that a machine's file gives to `slice`.
-fn settings_of_machine(file: &Path) -> Result<Vec<Setting>, Exit> {
+pub(crate) fn settings_of_machine(file: &Path) -> Result<Vec<Setting>, Exit> {
     if is_stream(file) {
         return Err(Exit::usage("standard input is for the part: name the machine's file"));
     }

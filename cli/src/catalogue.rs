@@ -5,7 +5,7 @@ use std::io::{self, IsTerminal, Read};
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use lamp_stack::Catalogued;
+use lamp_stack::{Builtin, Catalogued, digest_of};
 
 use crate::exit::Exit;
 use crate::streams::{input_name, is_stream, print};
@@ -42,6 +42,22 @@ fn entry_and_text<T: Entry>(path: &Path) -> Result<(T, String), Exit> {
         return Err(Exit::Failed(anyhow!(text)));
     }
     read_file(path)
+}
+
+/// Returns a word for a document in an option: a built-in one's name, with the digest of its text;
+/// `file` for a file, whatever its name.
+pub(crate) fn canonical_word<T: Entry>(path: &Path) -> String {
+    let builtin = T::BUILTINS.iter().find(|builtin| path.to_str() == Some(builtin.name));
+    let word = |builtin: &Builtin| {
+        let digest = digest_of(builtin.toml.as_bytes()).expect("it is in memory");
+        format!("{}@{digest}", builtin.name)
+    };
+    builtin.map_or_else(|| "file".to_owned(), word)
+}
+
+/// Returns whether a word of an option means a file, and not a built-in document.
+pub(crate) fn is_file<T: Entry>(path: &Path) -> bool {
+    T::BUILTINS.iter().all(|builtin| path.to_str() != Some(builtin.name))
 }
 
 /// Reads a document's file, and its text.

@@ -29,6 +29,8 @@ pub(crate) enum Exit {
     Output(anyhow::Error),
     /// The work is done, but found what needs a person: status 3.
     Findings(String),
+    /// A task of a batch failed, with the status that tells its engine what to do.
+    Task(u8, String),
     /// The work is done, and two stacks differ: status 1, as of `cmp` and `diff`. All is told.
     Different,
 }
@@ -54,6 +56,7 @@ impl Exit {
             Self::Failed(error) => Self::Failed(error.context(place)),
             Self::Output(error) => Self::Output(error.context(place)),
             Self::Findings(message) => Self::Findings(format!("{place}: {message}")),
+            Self::Task(status, message) => Self::Task(status, format!("{place}: {message}")),
             Self::Different => Self::Different,
         }
     }
@@ -64,11 +67,22 @@ impl Exit {
         error.chain().find_map(|cause| cause.downcast_ref())
     }
 
+    /// Returns what kind of reading or writing failed, if that is the cause.
+    pub(crate) fn io_kind(&self) -> Option<io::ErrorKind> {
+        let (Self::Failed(error) | Self::Output(error)) = self else { return None };
+        let kind = |cause: &(dyn std::error::Error + 'static)| match cause.downcast_ref() {
+            Some(StackError::Io(error)) => Some(error.kind()),
+            _ => cause.downcast_ref().map(io::Error::kind),
+        };
+        error.chain().find_map(kind)
+    }
+
     pub(crate) fn status(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
             Self::Failed(_) | Self::Output(_) | Self::Different => 1,
             Self::Findings(_) => 3,
+            Self::Task(status, _) => *status,
         }
     }
 
@@ -89,7 +103,7 @@ impl Exit {
 impl fmt::Display for Exit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Findings(message) => f.write_str(message),
+            Self::Findings(message) | Self::Task(_, message) => f.write_str(message),
             Self::Different => f.write_str("the stacks differ"),
             Self::Usage(error) | Self::Failed(error) | Self::Output(error) => {
                 write!(f, "{error:#}")?;

@@ -10,7 +10,7 @@ use lamp_grayscale::resin::{ExposureTime, Resin};
 use lamp_stack::{DepthLevels, Length};
 use serde::{Deserialize, Serialize};
 
-use crate::catalogue::{entry, read_text};
+use crate::catalogue::{canonical_word, entry, is_file, read_text};
 use crate::exit::Exit;
 use crate::recorded::text;
 use crate::streams::input_name;
@@ -69,6 +69,22 @@ impl ExposureOptions {
         }
     }
 
+    /// Puts words of the same meaning, whatever the folders, in the place of paths.
+    pub(crate) fn make_canonical(&mut self) {
+        if let Some(path) = &mut self.material {
+            *path = canonical_word::<Material>(path).into();
+        }
+        if let Some(path) = &mut self.exposure_table {
+            *path = recorded_name(path).into();
+        }
+    }
+
+    /// Returns the files that the options name, to be changed.
+    pub(crate) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let material = self.material.iter_mut().filter(|path| is_file::<Material>(path));
+        material.chain(&mut self.exposure_table)
+    }
+
     /// Whether a material decides the exposure.
     pub(crate) fn has_material(&self) -> bool {
         self.material.is_some()
@@ -82,8 +98,7 @@ impl ExposureOptions {
     /// Returns the exposure, if a material or a table is given.
     pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Exit> {
         if let Some(path) = &self.exposure_table {
-            // Without blanks, as the stack's commands are words.
-            let name = path.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_");
+            let name = recorded_name(path);
             let times = read_times(path).with_context(|| input_name(path))?;
             return Ok(Some(Exposure { name, source: Source::Table(times) }));
         }
@@ -93,6 +108,11 @@ impl ExposureOptions {
         let source = Source::Resin { resin, overcure: self.overcure };
         Ok(Some(Exposure { name: material.name, source }))
     }
+}
+
+/// Returns what a stack calls a table: without blanks, as the stack's commands are words.
+fn recorded_name(table: &Path) -> String {
+    table.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_")
 }
 
 fn read_times(path: &Path) -> anyhow::Result<ExposureTimes> {

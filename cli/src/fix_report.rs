@@ -87,8 +87,23 @@ impl FixReport {
     }
 
     /// Returns how many bands were left as they are.
-    fn left(&self) -> usize {
+    pub(crate) fn left(&self) -> usize {
         self.bands.len() - self.corrected
+    }
+
+    /// Returns how many bands were corrected.
+    pub(crate) fn corrected(&self) -> usize {
+        self.corrected
+    }
+
+    /// Returns how many pixels were changed.
+    pub(crate) fn pixels(&self) -> u64 {
+        self.pixels
+    }
+
+    /// Returns where the first band is that was left, if any was.
+    pub(crate) fn first_left(&self) -> Option<&str> {
+        self.first_left.as_deref()
     }
 
     /// Returns a line that sums up what was corrected, if anything was.

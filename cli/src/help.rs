@@ -11,18 +11,18 @@ From part to build:        slice blade.stl | fix | dither | tile > build.tif
   slice       cut a part into layers         fix         correct stray rows
   dither      turn gray levels into dots     tile        lay out copies
   compensate  narrow by what light adds      edit        change a design
+  batch       do that for many parts         demo        try that on a sample
 Stacks:
   view        look at layers in a browser    show        draw layers
   check       find islands and pockets       support     hold islands
   info        describe a stack               report      write a page to send
   verify      prove that it is whole         compare     tell where two differ
   join        join ranges of layers          split       split into ranges
-  convert     write in another form          mesh-out    write a surface, STL
-Parts:
+  convert     write in another form          pack        make it small
+Parts, resins and machines:
   mesh        check and repair a mesh        orient      find how to build it
   brep        check a STEP part              heights     find layer thicknesses
-  sample      write a sample part            demo        do the main job on it
-Resins and machines:
+  sample      write a sample part            mesh-out    write a stack's surface
   material    list and check resins          machine     list and check machines
   calibrate   make a material                target      make images to measure
   plan        plan exposures                 learn       correct them by prints
@@ -81,7 +81,10 @@ const USUAL: [(&str, &[&str]); 5] = [
 const SLICE_HEADINGS: [(&str, &[&str]); 3] = [
     ("Images", &["dpi", "thickness", "plane", "margin", "origin", "size", "machine", "layers"]),
     ("Part", &["units", "fill", "trust_extent"]),
-    ("Output and memory", &["memory", "report", "strict", "output", "force", "classic"]),
+    (
+        "Output and memory",
+        &["memory", "report", "strict", "output", "force", "classic", "packbits"],
+    ),
 ];
 
 /// Gives `lamp`, and the commands below it, this form.

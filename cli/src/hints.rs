@@ -344,6 +344,7 @@ fn input_output(error: &io::Error) -> Option<String> {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
             "make room, or write to another disk"
         }
+        io::ErrorKind::ReadOnlyFilesystem => "write to another disk",
         _ => return None,
     };
     Some(hint.to_owned())

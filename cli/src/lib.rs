@@ -46,6 +46,7 @@ mod sliced_part;
 mod slicing_options;
 mod stack_facts;
 mod stack_part;
+mod stages;
 mod step_options;
 mod streams;
 mod target_arg;
@@ -115,7 +116,7 @@ pub fn run_stage(name: &str) -> ExitCode {
 }
 
 /// Returns a stage as a program: its own arguments, with lamp's general ones.
-fn stage(lamp: &clap::Command, name: &str) -> clap::Command {
+pub(crate) fn stage(lamp: &clap::Command, name: &str) -> clap::Command {
     let stage = lamp.find_subcommand(name).expect("a stage is a command of lamp").clone();
     let general = lamp.get_arguments().filter(|arg| arg.is_global_set()).cloned();
     stage

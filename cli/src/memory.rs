@@ -43,7 +43,8 @@ pub(crate) fn give_freed_memory_back() {
 /// Returns an amount of memory for messages, as `1.5 GB`.
 pub(crate) fn in_words(bytes: u64) -> String {
     match bytes {
-        0..1_000_000_000 => format!("{} MB", bytes / 1_000_000),
+        0..1_000_000 => format!("{} kB", bytes / 1000),
+        1_000_000..1_000_000_000 => format!("{} MB", bytes / 1_000_000),
         _ => format!("{:.1} GB", bytes as f64 / 1e9),
     }
 }

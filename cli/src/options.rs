@@ -46,6 +46,11 @@ pub(crate) struct Common {
 const THREAD_BYTES: u64 = 8 << 20;
 
 impl Common {
+    /// Returns options of a command that runs as a part of another one.
+    pub(crate) fn quiet() -> Self {
+        Self { quiet: true, verbose: false, threads: None, options: None }
+    }
+
     /// Returns the options file.
     pub(crate) fn file(&self) -> Option<&PathBuf> {
         self.options.as_ref()
@@ -100,6 +105,10 @@ pub(crate) struct Output {
     /// Write a classic TIFF (at most 4 GiB) instead of a BigTIFF
     #[arg(long)]
     pub(crate) classic: bool,
+
+    /// Write gray pages as PackBits, for readers without Deflate: several times the size
+    #[arg(long)]
+    pub(crate) packbits: bool,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
     #[arg(long)]

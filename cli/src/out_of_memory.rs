@@ -1,4 +1,4 @@
-//! Ends a command that gets no more memory: one sentence, status 1 and no temporary files.
+//! Ends a command that gets no more memory: one sentence, a status and no temporary files.
 //!
 //! Rust aborts a process whose allocation failed, and runs no destructors. Only the allocator
 //! itself can do better before that.
@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{self, Cursor, Write};
 use std::os::fd::AsFd;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering::Relaxed};
 use std::thread;
 use std::time::Duration;
 
@@ -23,6 +23,14 @@ static COMMAND: OnceLock<String> = OnceLock::new();
 /// Notes the name of the command that runs.
 pub(crate) fn note_command(name: &str) {
     COMMAND.get_or_init(|| name.to_owned());
+}
+
+/// The status that the process ends with.
+static STATUS: AtomicI32 = AtomicI32::new(1);
+
+/// Has the process end with another status than 1.
+pub(crate) fn end_with(status: i32) {
+    STATUS.store(status, Relaxed);
 }
 
 /// The system's allocator, except that the process ends where that gives nothing.
@@ -73,7 +81,7 @@ fn end(bytes: usize) -> ! {
     match ENDS_IT.compare_exchange(0, thread, Relaxed, Relaxed) {
         Ok(_) => {}
         // There is not even enough to remove folders. The next command removes them.
-        Err(ends_it) if ends_it == thread => exit(1),
+        Err(ends_it) if ends_it == thread => exit(STATUS.load(Relaxed)),
         Err(_) => loop {
             thread::sleep(Duration::MAX);
         },
@@ -81,7 +89,7 @@ fn end(bytes: usize) -> ! {
     say_no_more();
     tell(bytes);
     remove_temporaries();
-    exit(1)
+    exit(STATUS.load(Relaxed))
 }
 
 /// Prints the message past standard error's lock, which a thread may hold that waits in [`end`].

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
+use std::sync::{Arc, Mutex};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -15,9 +16,21 @@ pub(crate) struct Progress {
     verbose: bool,
     watched: bool,
     bar: ProgressBar,
+    /// Where lines go instead of standard error.
+    notes: Option<Notes>,
 }
 
+/// Lines that are kept instead of printed.
+pub(crate) type Notes = Arc<Mutex<Vec<String>>>;
+
 impl Progress {
+    /// Returns progress without a bar, whose lines go into `notes`: without those for who asks for
+    /// details.
+    pub(crate) fn noting(command: &'static str, notes: &Notes) -> Self {
+        let (bar, notes) = (ProgressBar::hidden(), Some(Arc::clone(notes)));
+        Self { command, quiet: false, verbose: false, watched: false, bar, notes }
+    }
+
     /// Returns progress with a bar if standard error is a terminal. Of the stages of a pipeline
     /// only the last shows one (`is_last`), because they share the terminal.
     pub(crate) fn new(command: &'static str, common: &Common, is_last: bool) -> Self {
@@ -26,7 +39,7 @@ impl Progress {
         let bar = ProgressBar::hidden();
         bar.set_style(style("{prefix} {human_pos} layers {per_sec}"));
         bar.set_prefix(command);
-        Self { command, quiet, verbose, watched, bar }
+        Self { command, quiet, verbose, watched, bar, notes: None }
     }
 
     /// Sets the number of layers to expect.
@@ -64,7 +77,11 @@ impl Progress {
 
     /// Prints a line, also if quiet.
     pub(crate) fn warn(&self, line: &str) {
-        self.bar.suspend(|| say(&format!("{}: {line}", self.command)));
+        let line = format!("{}: {line}", self.command);
+        match &self.notes {
+            Some(notes) => notes.lock().expect("nobody panics while it is held").push(line),
+            None => self.bar.suspend(|| say(&line)),
+        }
     }
 
     /// Removes the bar.

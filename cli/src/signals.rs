@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
 
 use anyhow::Context;
+use lamp_batch::end_children;
 use lamp_stack::remove_temporaries;
 use signal_hook::consts::{
     SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
@@ -34,7 +35,7 @@ pub(crate) fn say_no_more() {
     ENDS.store(true, Relaxed);
 }
 
-/// Lets Ctrl-C, and the signals that end a batch, take temporary files away
+/// Lets Ctrl-C, and the signals that end a batch, end tasks and take temporary files away
 /// before the process ends, with status 128 + the signal's number, as shells
 /// have it. A signal that is ignored, as `nohup` arranges, stays so. A file
 /// that passes the limit of sizes is an error of writing it, and no signal.
@@ -46,6 +47,7 @@ pub(crate) fn clean_up_on_signals() -> Result<(), Exit> {
     let watch = move || {
         if let Some(signal) = signals.forever().find(|&signal| signal != SIGXFSZ) {
             say_no_more();
+            end_children();
             remove_temporaries();
             std::process::exit(128 + signal);
         }

@@ -1,8 +1,9 @@
 //! A part where a stack may stand, too: it is sliced on the way.
 
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use lamp_postprocess::machine::Machine;
 use lamp_slicer::Part;
 use lamp_stack::{Layer, Pages, StackError};
 
@@ -10,12 +11,33 @@ use crate::exit::Exit;
 use crate::part_arg::PartArg;
 use crate::part_options::{Reading, at_part};
 use crate::slicing_options::SlicingOptions;
-use crate::streams::is_stream;
+use crate::streams::{input_name, is_stream};
 
 /// A part that is open.
 pub(crate) struct SlicedPart {
     pub(crate) file: PartArg,
     pub(crate) model: Part,
+}
+
+/// Refuses options of slicing where there is nothing to slice. `machine` gives defaults.
+///
+/// # Errors
+/// If an option is not as it is by default, and all inputs are stacks.
+pub(crate) fn check_slicing(
+    slicing: &SlicingOptions,
+    inputs: &[PathBuf],
+    machine: Option<&Machine>,
+) -> Result<(), Exit> {
+    let Some(option) = slicing.stated(machine) else { return Ok(()) };
+    // What cannot be opened is told of later.
+    if inputs.iter().any(|input| !is_stream(input) && Pages::open(input).is_err()) {
+        return Ok(());
+    }
+    let [what, verb] = if inputs.len() == 1 { ["a stack", "is"] } else { ["stacks", "are"] };
+    let names = inputs.iter().map(|input| input_name(input)).collect::<Vec<_>>().join(", ");
+    Err(Exit::usage(format!(
+        "{names} {verb} {what}, which {option} cannot change: leave it out, or name a part"
+    )))
 }
 
 /// The layers of a part.

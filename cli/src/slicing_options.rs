@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
-use lamp_postprocess::machine::{Machine, MachineLimit};
+use lamp_postprocess::machine::{Defaults, Machine, MachineLimit};
 use lamp_slicer::{
     Bodies, GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOptions, Slices,
 };
@@ -144,6 +144,25 @@ impl SlicingOptions {
         from_words(rest.find(" --").map_or("", |start| &rest[start..]))
     }
 
+    /// Returns the first option that is not as it is by default, where `machine` may give
+    /// defaults.
+    pub(crate) fn stated(&self, machine: Option<&Machine>) -> Option<String> {
+        let Defaults { dpi, thickness, margin } =
+            machine.map(|machine| machine.defaults.clone()).unwrap_or_default();
+        let usual = Self::default();
+        let usual = Self {
+            dpi: dpi.and_then(Dpi::new).unwrap_or(usual.dpi),
+            thickness: thickness.unwrap_or(usual.thickness),
+            margin: margin.unwrap_or(usual.margin),
+            ..usual
+        };
+        let words = |options: &Self| to_words(options, |_| true);
+        let (stated, usual) = (words(self), words(&usual));
+        let known: Vec<&str> = usual.split(" --").collect();
+        let stated = stated.split(" --").find(|word| !known.contains(word))?;
+        stated.split(' ').next().map(|name| format!("--{name}"))
+    }
+
     /// Returns the names of the files in a command that a stack records, with their
     /// placements.
     pub(crate) fn parts_of_command(command: &str) -> &str {
@@ -155,16 +174,34 @@ impl SlicingOptions {
     fn command(&self, part: &str, exposure: Option<&Exposure>) -> String {
         let mut options = self.clone();
         options.exposure.name(exposure);
-        let kernel = self.solid.brep.reader.is_usual();
-        let words = to_words(&options, |key| match key {
+        let usual_kernel = self.solid.brep.reader.is_usual();
+        let words =
+            to_words(&options, |key| options.says(key) && (key != "kernel" || !usual_kernel));
+        format!("slice {part}{words}")
+    }
+
+    /// Returns whether an option says something beside the others.
+    fn says(&self, key: &str) -> bool {
+        match key {
             "thickness" => !self.adaptive,
-            "kernel" => !kernel,
             "bodies" => self.solid.bodies != Bodies::default(),
-            "overcure" => options.exposure.has_material(),
+            "overcure" => self.exposure.has_material(),
             "margin" => self.origin.is_none(),
             _ => true,
-        });
-        format!("slice {part}{words}")
+        }
+    }
+
+    /// Returns the options as words, the same for all that mean the same. Of files, which have
+    /// digests, only names stand there that a stack records.
+    pub(crate) fn canonical(&self) -> String {
+        let mut options = self.clone();
+        options.exposure.make_canonical();
+        to_words(&options, |key| options.says(key))
+    }
+
+    /// Returns the files that the options name, to be changed.
+    pub(crate) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        self.exposure.files_mut()
     }
 
     /// The layers of a part, the first naming this command; `part` is the

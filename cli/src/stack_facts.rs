@@ -80,5 +80,6 @@ pub(crate) fn compression_name(compression: Compression) -> &'static str {
         Compression::PackBits => "PackBits",
         Compression::Png => "PNG",
         Compression::Picture(format) => format.name(),
+        Compression::Packed => "packed against the layer below",
     }
 }

@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, anyhow};
 use lamp_stack::{
-    Destination, FileBeside, FolderBeside, Format, Layer, Page, PageInfo, PageWriter, Pages,
-    PictureFormat, StackError, StackInfo, map_in_order, write_stack,
+    Destination, FileBeside, FolderBeside, Format, Layer, PackLevel, Page, PageInfo, PageWriter,
+    Pages, PictureFormat, StackError, StackInfo, map_in_order, write_packed, write_stack,
 };
 
 use crate::exit::Exit;
@@ -255,10 +255,53 @@ pub(crate) fn write_layers(
     output: &Output,
     progress: &Progress,
 ) -> Result<(), Exit> {
+    if is_packed_name(&output.output) {
+        return write_packed_layers(layers, output, PackLevel::default(), progress);
+    }
     let to = destination(output)?;
     let counted = layers.inspect(|_| progress.layer_done());
-    let written = write_stack(counted, to, format(output.classic));
+    let coded = counted.map(|layer| {
+        let layer = layer?;
+        let image = if output.packbits { layer.image.as_packbits() } else { layer.image };
+        Ok(Layer { image, ..layer })
+    });
+    let written = write_stack(coded, to, format(output.classic));
     written_to(&output.output, written, progress)
+}
+
+/// Writes layers as a packed stack where `output` says, counting them in `report`.
+pub(crate) fn write_packed_layers(
+    layers: impl Iterator<Item = Result<Layer, Exit>>,
+    output: &Output,
+    level: PackLevel,
+    progress: &Progress,
+) -> Result<(), Exit> {
+    if output.packbits {
+        return Err(for_tiffs("--packbits"));
+    }
+    let to = packed_destination(output)?;
+    let counted = layers.inspect(|_| progress.layer_done());
+    let written = write_packed(counted, to, format(output.classic), level);
+    written_to(&output.output, written, progress)
+}
+
+/// Refuses an option that other files than TIFFs do not have.
+pub(crate) fn for_tiffs(option: &str) -> Exit {
+    Exit::usage(format!("{option} is for TIFFs: leave it out, or name a .tif file"))
+}
+
+/// Returns where a packed stack is written.
+pub(crate) fn packed_destination(output: &Output) -> Result<Destination, Exit> {
+    if is_folder(&output.output) {
+        let name = output.output.display();
+        return Err(Exit::usage(format!("{name}: a packed stack is one file: name a .lamp file")));
+    }
+    destination(output)
+}
+
+/// Returns true if a name is that of a packed stack.
+pub(crate) fn is_packed_name(path: &Path) -> bool {
+    extension(path) == "lamp"
 }
 
 /// Passes layers on. At their end `finding` may stop the work: then no file is written, and a

@@ -31,6 +31,16 @@ pub(crate) fn show(error: &clap::Error) {
     }
 }
 
+/// Returns an error of usage as one sentence.
+pub(crate) fn sentence(error: &clap::Error) -> String {
+    let known = with_known_words(error);
+    let text = known.as_ref().unwrap_or(error).render().to_string();
+    let lines = text.lines().take_while(|line| !line.starts_with("Usage:") && *line != MORE);
+    let trimmed = lines.map(|line| line.trim().trim_start_matches("error: "));
+    let words: Vec<&str> = trimmed.filter(|line| !line.is_empty()).collect();
+    printable(&words.join("; ").replace(":; ", ": ").replace("; tip: ", "; ")).into_owned()
+}
+
 const MORE: &str = "For more information, try '--help'.";
 
 /// Says what to write instead of something that is not a whole number.
@@ -58,6 +68,22 @@ mod tests {
     use clap::{Arg, Command, value_parser};
 
     use super::*;
+
+    #[test]
+    fn a_sentence_says_what_is_wrong_and_what_to_write() {
+        let command = Command::new("fix")
+            .arg(Arg::new("method").long("method").value_parser(["nearest", "spline"]));
+        let said = |words: &[&str]| {
+            sentence(&command.clone().no_binary_name(true).try_get_matches_from(words).unwrap_err())
+        };
+        assert_eq!(
+            said(&["--metod", "spline"]),
+            "unexpected argument '--metod' found; a similar argument exists: '--method'"
+        );
+        let text = said(&["--method", "best"]);
+        assert!(text.starts_with("invalid value 'best' for '--method <method>'"), "{text}");
+        assert!(text.ends_with("[possible values: nearest, spline]"), "{text}");
+    }
 
     #[test]
     fn wrong_numbers_are_told_without_the_machine_s_words() {

@@ -3,8 +3,9 @@
 use lamp_stack::{GrayMask, Image, Layer, MAX_RUNS, Mask, map_in_order};
 use thiserror::Error;
 
+use crate::diffusion::{FLOYD_STEINBERG, SIERRA_LITE};
 use crate::dots::TooManyRuns;
-use crate::{blue_noise, diffusion, ordered, threshold};
+use crate::{blue_noise, ordered, threshold};
 
 /// A method that turns gray into dots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +19,9 @@ pub enum DitherMethod {
     /// Error diffusion: each pixel's error goes to the gray pixels right of and below it.
     /// The thresholds are those of the blue-noise mask.
     FloydSteinberg,
+    /// Error diffusion in rows that turn, with thresholds that hardly differ: the most even gray
+    /// within a layer.
+    SierraLite,
     /// No dots: pixels of at least half the full level (128 of 255) are white.
     Threshold,
 }
@@ -26,6 +30,7 @@ lamp_stack::named!(DitherMethod {
     BlueNoise = "blue-noise",
     Ordered = "ordered",
     FloydSteinberg = "floyd-steinberg",
+    SierraLite = "sierra-lite",
     Threshold = "threshold",
 });
 
@@ -77,7 +82,8 @@ pub fn dither_image(
     let dots = match method {
         DitherMethod::BlueNoise => blue_noise::SCREEN.dither(gray, blue_noise::shift(layer)),
         DitherMethod::Ordered => ordered::SCREEN.dither(gray, ordered::shift(layer)),
-        DitherMethod::FloydSteinberg => diffusion::diffuse(gray, blue_noise::shift(layer)),
+        DitherMethod::FloydSteinberg => FLOYD_STEINBERG.dither(gray, blue_noise::shift(layer)),
+        DitherMethod::SierraLite => SIERRA_LITE.dither(gray, blue_noise::shift(layer)),
         DitherMethod::Threshold => threshold::threshold(gray),
     };
     dots.map_err(|TooManyRuns| DitherError::TooManyRuns { layer })

@@ -282,6 +282,12 @@ impl Slices {
         Ok(self.image_of(index, &table, cutter, &open.unwrap_or_default()).0)
     }
 
+    /// Returns the number of crossings of each layer of the part, by an estimate: the work follows
+    /// it.
+    pub fn crossings_per_layer(&self) -> Vec<f64> {
+        self.survey.crossings_per_layer(&self.planes, self.grid.dpi.pitch().mm())
+    }
+
     /// Returns the heights of the layers.
     pub fn layer_heights(&self) -> LayerHeights {
         self.planes.heights()

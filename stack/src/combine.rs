@@ -164,7 +164,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::testing::{arbitrary_gray, arbitrary_mask, level};
+    use crate::testing::{arbitrary_gray, arbitrary_mask};
 
     /// As many rows and columns as both have, from the top left.
     fn common(a: &Image, b: &Image) -> crate::Frame {
@@ -180,7 +180,7 @@ mod tests {
             assert_eq!((made.width(), made.height()), (frame.width, frame.height));
             for row in 0..frame.height {
                 for column in 0..frame.width {
-                    let [a, b, made] = [&a, &b, &made].map(|image| level(image, column, row));
+                    let [a, b, made] = [&a, &b, &made].map(|image| image.level(column, row));
                     assert_eq!(made, op.level(a, b), "{op} at column {column}, row {row}");
                 }
             }

@@ -130,7 +130,7 @@ mod tests {
 
     use super::*;
     use crate::MAX_SIDE;
-    use crate::testing::{arbitrary_gray, arbitrary_mask, level, mask_of};
+    use crate::testing::{arbitrary_gray, arbitrary_mask, mask_of};
 
     /// The same, pixel by pixel.
     fn slow(image: &Image, columns: Range<u32>, rows: Range<u32>, side: u32) -> Vec<Vec<u8>> {
@@ -139,7 +139,7 @@ mod tests {
             let pixels = within(top, rows.end)
                 .flat_map(|row| within(left, columns.end).map(move |column| (column, row)));
             let levels: Vec<u64> =
-                pixels.map(|(column, row)| level(image, column, row).into()).collect();
+                pixels.map(|(column, row)| image.level(column, row).into()).collect();
             (levels.iter().sum::<u64>() as f64 / levels.len() as f64 + 0.5).floor() as u8
         };
         let of_row =

@@ -150,13 +150,13 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::testing::{arbitrary_gray, arbitrary_mask, level};
+    use crate::testing::{arbitrary_gray, arbitrary_mask};
 
     /// The level of a pixel of a frame's; black beyond the image.
     fn level_at(image: &Image, column: i64, row: i64) -> u8 {
         let inside = |at: i64, end: u32| u32::try_from(at).ok().filter(|&at| at < end);
         let at = inside(column, image.width()).zip(inside(row, image.height()));
-        at.map_or(0, |(column, row)| level(image, column, row))
+        at.map_or(0, |(column, row)| image.level(column, row))
     }
 
     fn check(a: &Image, b: &Image, shift: [i64; 2]) {

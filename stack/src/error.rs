@@ -139,6 +139,9 @@ pub enum StackError {
         /// The layer that does not fit.
         layer: u32,
     },
+    /// A packed stack was to be written to a folder.
+    #[error("a packed stack is one file, not a folder")]
+    PackedFolder,
     /// There is no layer to write.
     #[error("there is no layer to write")]
     NoLayers,
@@ -222,6 +225,12 @@ pub enum PageFault {
     /// The image has more runs than the reader's limits.
     #[error("it has more runs than an image may have")]
     TooManyRuns,
+    /// A part of a packed stack is damaged, or passes a reader's limit.
+    #[error("its packed {0} is damaged")]
+    Packed(&'static str),
+    /// An image has more rows than a packed stack takes.
+    #[error("its image has {0} rows, too many to pack: write a TIFF")]
+    TooTallToPack(u32),
     /// A PNG does not decode.
     #[error("its PNG is damaged: {0}")]
     Png(png::DecodingError),

@@ -107,7 +107,7 @@ mod tests {
 
     use super::*;
     use crate::Mask;
-    use crate::testing::{arbitrary_gray, arbitrary_mask, level};
+    use crate::testing::{arbitrary_gray, arbitrary_mask};
 
     fn arbitrary_frame() -> impl Strategy<Value = Frame> {
         (-40i64..90, -20i64..30, 0u32..120, 0u32..40).prop_map(|(left, top, width, height)| Frame {
@@ -125,8 +125,8 @@ mod tests {
             for (column, x) in (0..frame.width).zip(frame.left..) {
                 let outside =
                     x < 0 || x >= image.width().into() || y < 0 || y >= image.height().into();
-                let expected = if outside { 0 } else { level(image, x as u32, y as u32) };
-                assert_eq!(level(&framed, column, row), expected, "{frame:?} {column} {row}");
+                let expected = if outside { 0 } else { image.level(x as u32, y as u32) };
+                assert_eq!(framed.level(column, row), expected, "{frame:?} {column} {row}");
             }
         }
     }

@@ -52,8 +52,8 @@ struct FileSource {
     /// The same file, to look at while another thread reads.
     file: File,
     stamp: Stamp,
-    /// The offsets of the pages' directories.
-    offsets: Vec<u64>,
+    /// Where the reader finds the pages.
+    places: Vec<u64>,
 }
 
 impl IndexedStack {
@@ -88,14 +88,14 @@ impl IndexedStack {
         let stamp = Stamp::of(&file.metadata()?);
         (&file).rewind()?;
         Self::read(Pages::from_file(file.try_clone()?)?, |places| {
-            let offsets = places.into_iter().filter_map(|place| match place {
+            let places = places.into_iter().filter_map(|place| match place {
                 PagePlace::Offset(offset) => Some(offset),
                 PagePlace::File(_) => None,
             });
             (&file).rewind()?;
             let reader = Mutex::new(PageReader::from_file(file.try_clone()?)?);
-            let offsets = offsets.collect();
-            Ok(Source::File(Box::new(FileSource { reader, file, stamp, offsets })))
+            let places = places.collect();
+            Ok(Source::File(Box::new(FileSource { reader, file, stamp, places })))
         })
     }
 
@@ -156,8 +156,7 @@ impl IndexedStack {
                 // A reader that panicked is sent to an offset, too.
                 let mut reader = source.reader.lock().unwrap_or_else(PoisonError::into_inner);
                 reader.number_from(number, before);
-                reader.at_offset(source.offsets[position]);
-                reader.next().unwrap_or(Err(StackError::Changed))
+                reader.at_place(source.places[position])?.ok_or(StackError::Changed)
             }
             Source::Folder(files) => {
                 let (path, stamp) = &files[position];

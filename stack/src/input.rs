@@ -10,7 +10,7 @@ use crate::layer::Layer;
 use crate::limits::Limits;
 use crate::ordered::map_in_order;
 use crate::picture_page::PictureFormat;
-use crate::tiff::{Page, PageHeader, PageReader};
+use crate::tiff::{Format, Page, PageHeader, PageReader};
 
 /// An iterator over the pages of a stack, bottom first.
 #[derive(Debug)]
@@ -94,6 +94,22 @@ impl Pages {
         Self { source, limits, ..self }
     }
 
+    /// Returns the format of a TIFF, or of the one that was packed; [`Format::Big`] of others.
+    pub fn format(&self) -> Format {
+        match &self.source {
+            Source::One(reader) => reader.format(),
+            Source::Folder(_) => Format::Big,
+        }
+    }
+
+    /// Returns the format that [`write_packed`](crate::write_packed) was given, of a packed stack.
+    pub fn packed_format(&self) -> Option<Format> {
+        match &self.source {
+            Source::One(reader) => reader.packed_format(),
+            Source::Folder(_) => None,
+        }
+    }
+
     /// Returns the layers in order, decoded on all threads.
     pub fn layers(self) -> impl Iterator<Item = Result<Layer, StackError>> {
         map_in_order(self, Page::decode)
@@ -123,7 +139,7 @@ impl Pages {
     /// Returns where the next page is, if there may be one.
     pub(crate) fn next_place(&self) -> Option<PagePlace> {
         match &self.source {
-            Source::One(reader) => Some(PagePlace::Offset(reader.next_offset())),
+            Source::One(reader) => Some(PagePlace::Offset(reader.next_place())),
             Source::Folder(files) => files.last().cloned().map(PagePlace::File),
         }
     }
@@ -223,7 +239,7 @@ impl Iterator for Pages {
 
 /// Where a page is.
 pub(crate) enum PagePlace {
-    /// The offset of its directory in the stack's file.
+    /// The offset of its directory in the stack's file, or its number in a packed one.
     Offset(u64),
     /// A file of the stack's folder.
     File(PathBuf),

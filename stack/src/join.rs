@@ -23,6 +23,9 @@ pub enum JoinError {
         /// The cause.
         source: StackError,
     },
+    /// The joined stack cannot be written.
+    #[error(transparent)]
+    Write(#[from] StackError),
     /// The stacks differ in their part, size, resolution or commands.
     #[error("{} is no part of the same stack as {}: {difference}", path.display(), first.display())]
     Different {
@@ -78,7 +81,7 @@ pub fn join(
     stacks: Vec<PathBuf>,
 ) -> Result<impl Iterator<Item = Result<Layer, JoinError>> + use<>, JoinError> {
     let stack = survey(&stacks)?;
-    let pages = Joined { stacks: stacks.into_iter(), open: None, last: None, stack };
+    let pages = Joined::new(stacks, stack);
     Ok(map_in_order(pages, |(page, origin): (Page, PageOrigin)| {
         let mut layer = page.decode().map_err(|source| in_stack(&origin.path, source))?;
         layer.info.stack = origin.stack;
@@ -86,12 +89,12 @@ pub fn join(
     }))
 }
 
-fn in_stack(path: &Path, source: StackError) -> JoinError {
+pub(crate) fn in_stack(path: &Path, source: StackError) -> JoinError {
     JoinError::In { path: path.to_owned(), source }
 }
 
 /// Compares the stacks' first layers and returns the joined stack's metadata.
-fn survey(stacks: &[PathBuf]) -> Result<Option<StackInfo>, JoinError> {
+pub(crate) fn survey(stacks: &[PathBuf]) -> Result<Option<StackInfo>, JoinError> {
     let Some((first_path, others)) = stacks.split_first() else { return Ok(None) };
     let mut first = first_layer(first_path)?;
     let mut layers = layers_stated(&first);
@@ -146,8 +149,10 @@ fn facts(layer: &Layer) -> [(&'static str, String); 5] {
 }
 
 /// The pages of the stacks, one stack after the other.
-struct Joined {
+pub(crate) struct Joined {
     stacks: std::vec::IntoIter<PathBuf>,
+    /// Whether pages are read with their images.
+    images: bool,
     open: Option<(Arc<Path>, Pages)>,
     /// The last layer and the path of its stack.
     last: Option<(u32, Arc<Path>)>,
@@ -156,16 +161,27 @@ struct Joined {
 }
 
 /// A page's source and the stack metadata that it will carry.
-struct PageOrigin {
+pub(crate) struct PageOrigin {
     path: Arc<Path>,
-    stack: Option<StackInfo>,
+    pub(crate) stack: Option<StackInfo>,
 }
 
 impl Joined {
+    /// Starts with the first page, which carries `stack`.
+    pub(crate) fn new(stacks: Vec<PathBuf>, stack: Option<StackInfo>) -> Self {
+        Self { stacks: stacks.into_iter(), images: true, open: None, last: None, stack }
+    }
+
+    /// Passes over the data of images: the pages cannot be decoded.
+    pub(crate) fn without_images(self) -> Self {
+        Self { images: false, ..self }
+    }
+
     fn open_next(&mut self) -> Option<Result<(), JoinError>> {
         let path: Arc<Path> = self.stacks.next()?.into();
         Some(match Pages::open(&path) {
             Ok(pages) => {
+                let pages = if self.images { pages } else { pages.without_images() };
                 self.open = Some((path, pages));
                 Ok(())
             }

@@ -10,6 +10,8 @@ use crate::gray::{GrayMask, gray_runs};
 use crate::length::{Dpi, Length};
 use crate::mask::{Mask, white_runs};
 use crate::ordered::MemorySize;
+use crate::packbits;
+use crate::tiff::Compression;
 
 /// The exposure at one height: an image and its metadata.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,16 +26,22 @@ pub struct Layer {
 
 impl MemorySize for Layer {
     fn bytes(&self) -> usize {
-        let (rows, changes) = (self.image.height() as usize, self.image.change_count());
-        match *self.image {
-            Image::Mask(_) => 4 * (rows + changes),
-            Image::Gray(_) => 4 * rows + 8 * changes,
+        self.image.bytes()
+    }
+}
+
+impl MemorySize for Image {
+    fn bytes(&self) -> usize {
+        let (rows, changes) = (self.height() as usize, self.change_count());
+        match self {
+            Self::Mask(_) => 4 * (rows + changes),
+            Self::Gray(_) => 4 * rows + 8 * changes,
         }
     }
 }
 
-/// A layer's image. An image that was read may keep its page's T.6 strip and its check, so that
-/// a stage that does not change it need not make them again.
+/// A layer's image. An image that was read may keep its page's strip and its check, so that a
+/// stage that does not change it need not make them again.
 ///
 /// It dereferences to its [`Image`]. To change it, replace it with another image converted
 /// by `into`, which has neither.
@@ -51,18 +59,36 @@ impl MemorySize for Layer {
 #[derive(Clone, Debug)]
 pub struct LayerImage {
     image: Image,
-    strip: Option<Box<[u8]>>,
+    strip: Option<Strip>,
     check: Option<ImageCheck>,
+}
+
+/// An image as a page holds it, in one of the compressions that are written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Strip {
+    pub(crate) compression: Compression,
+    pub(crate) bytes: Box<[u8]>,
 }
 
 impl LayerImage {
     /// Creates an image as it was read.
-    pub(crate) fn of_page(image: Image, strip: Option<Vec<u8>>, check: Option<ImageCheck>) -> Self {
-        Self { image, strip: strip.map(Into::into), check }
+    pub(crate) fn of_page(image: Image, strip: Option<Strip>, check: Option<ImageCheck>) -> Self {
+        Self { image, strip, check }
     }
 
-    pub(crate) fn strip(&self) -> Option<&[u8]> {
-        self.strip.as_deref()
+    pub(crate) fn strip(&self) -> Option<&Strip> {
+        self.strip.as_ref()
+    }
+
+    /// Codes a gray image as PackBits, for readers without Deflate. The page takes several times as
+    /// many bytes. A mask stays as it is.
+    #[must_use]
+    pub fn as_packbits(mut self) -> Self {
+        if let Image::Gray(gray) = &self.image {
+            let bytes = packbits::encode(gray).into();
+            self.strip = Some(Strip { compression: Compression::PackBits, bytes });
+        }
+        self
     }
 
     /// Returns the check that the image was read with, or computes it.
@@ -131,6 +157,17 @@ impl Image {
         match self {
             Self::Mask(mask) => mask.height(),
             Self::Gray(gray) => gray.height(),
+        }
+    }
+
+    /// Returns the level of a pixel: of a mask, 0 or 255.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn level(&self, column: u32, row: u32) -> u8 {
+        match self {
+            Self::Mask(mask) => 255 * u8::from(mask.is_white(column, row)),
+            Self::Gray(gray) => gray.level(column, row),
         }
     }
 

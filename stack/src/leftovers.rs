@@ -45,7 +45,7 @@ pub(crate) fn claim(handle: &File, path: &Path) -> bool {
 }
 
 /// Removes the temporary files and folders in `folder` that no living process writes.
-pub(crate) fn remove_leftovers(folder: &Path) {
+pub fn remove_leftovers(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
         if is_temporary(&entry.file_name().to_string_lossy()) {

@@ -44,12 +44,13 @@ impl Length {
 }
 
 impl fmt::Display for Length {
-    /// Formats in micrometres below one millimetre and in millimetres above.
+    /// Formats in micrometres below one millimetre, and in millimetres above where that is exact:
+    /// two lengths never have the same text, and a text is read as the length that it is of.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.um.abs() < 1000.0 {
-            write!(f, "{}um", self.um)
-        } else {
+        if self.um.abs() >= 1000.0 && Self::from_mm(self.mm()) == *self {
             write!(f, "{}mm", self.mm())
+        } else {
+            write!(f, "{}um", self.um)
         }
     }
 }
@@ -146,8 +147,14 @@ impl FromStr for Size {
 }
 
 impl fmt::Display for Size {
+    /// Formats in millimetres where that is exact, and else in micrometres.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}x{}mm", self.width.mm(), self.height.mm())
+        let Self { width, height } = self;
+        if [width, height].iter().all(|side| Length::from_mm(side.mm()) == **side) {
+            write!(f, "{}x{}mm", width.mm(), height.mm())
+        } else {
+            write!(f, "{}x{}um", width.um, height.um)
+        }
     }
 }
 
@@ -247,6 +254,20 @@ mod tests {
             let length: Length = text.parse().unwrap();
             assert!((length.um() - um).abs() < 1e-9, "{text}");
         }
+    }
+
+    #[test]
+    fn texts_are_read_as_the_lengths_that_they_are_of() {
+        let next = |um: f64| f64::from_bits(um.to_bits() + 1);
+        for um in [100.0, 1e3 / 3.0, 1000.0, 1270.0, next(1000.0), next(1270.0), -2540.0, 1e7 / 3.0]
+        {
+            let length = Length::from_um(um);
+            assert_eq!(length.to_string().parse(), Ok(length), "{length}");
+            let size = Size { width: length, height: Length::from_um(80_500.0) };
+            assert!(um < 0.0 || size.to_string().parse() == Ok(size), "{size}");
+        }
+        assert_eq!(Length::from_um(next(1000.0)).to_string(), "1000.0000000000001um");
+        assert_eq!(Length::from_mm(12.7).to_string(), "12.7mm");
     }
 
     #[test]

@@ -274,7 +274,7 @@ mod tests {
 
     use super::*;
     use crate::Mask;
-    use crate::testing::{arbitrary_gray, arbitrary_mask, level, mask_of};
+    use crate::testing::{arbitrary_gray, arbitrary_mask, mask_of};
 
     fn drawn(mask: &Mask) -> Vec<String> {
         let pixel = |column, row| if mask.is_white(column, row) { '#' } else { '.' };
@@ -332,8 +332,8 @@ mod tests {
                 let x = 2 * i64::from(column) + 1 - i64::from(size.0);
                 let y = i64::from(size.1) - 2 * i64::from(row) - 1;
                 let (x, y) = source(orientation, (x, y));
-                let expected = level(image, ((x + width) / 2) as u32, ((height - y) / 2) as u32);
-                assert_eq!(level(&turned, column, row), expected, "{orientation} {column} {row}");
+                let expected = image.level(((x + width) / 2) as u32, ((height - y) / 2) as u32);
+                assert_eq!(turned.level(column, row), expected, "{orientation} {column} {row}");
             }
         }
     }
@@ -363,7 +363,7 @@ mod tests {
                 (0..upright.width()).flat_map(|x| (0..upright.height()).map(move |y| (x, y)))
             {
                 let (column, row) = stored_at(tag, x, y, 3, 2);
-                assert_eq!(level(&upright, x, y), level(&image, column, row), "tag {tag}");
+                assert_eq!(upright.level(x, y), image.level(column, row), "tag {tag}");
             }
         }
         assert_eq!([0, 9, u64::MAX].map(Orientation::of_tiff_tag), [None; 3]);

@@ -204,7 +204,7 @@ fn write_rows(
 }
 
 /// Packs a row's pixels, eight per byte, the first in the highest bit.
-fn bits(transitions: &[u32], width: u32) -> Vec<u8> {
+pub(crate) fn bits(transitions: &[u32], width: u32) -> Vec<u8> {
     let mut bytes = vec![0; width.div_ceil(8) as usize];
     for (start, end) in white_runs(transitions, width) {
         let (first, last) = ((start / 8) as usize, (end / 8) as usize);

@@ -1,6 +1,7 @@
 //! Stores the rows of 1-bit and gray images as runs in two flat arrays.
 
 use std::fmt::Debug;
+use std::ops::Range;
 
 use thiserror::Error;
 
@@ -157,6 +158,12 @@ impl<C: Change> RunImage<C> {
         &self.changes[self.row_offsets[row] as usize..self.row_offsets[row + 1] as usize]
     }
 
+    /// Returns which of the image's changes are a row's.
+    pub(crate) fn changes_of(&self, row: u32) -> std::ops::Range<usize> {
+        let row = row as usize;
+        self.row_offsets[row] as usize..self.row_offsets[row + 1] as usize
+    }
+
     /// Returns the changes of every row, from the top.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = &[C]> {
         self.row_offsets.windows(2).map(|ends| &self.changes[ends[0] as usize..ends[1] as usize])
@@ -165,6 +172,11 @@ impl<C: Change> RunImage<C> {
     /// Returns the number of changes up to each row's end, and the changes of all rows.
     pub(crate) fn row_ends_and_changes(&self) -> (&[u32], &[C]) {
         (&self.row_offsets[1..], &self.changes)
+    }
+
+    /// Returns where the changes of each row start, and where those of the last end.
+    pub(crate) fn row_offsets(&self) -> &[u32] {
+        &self.row_offsets
     }
 
     /// Returns the number of changes in all rows, which determines the cost of processing.
@@ -208,6 +220,42 @@ impl<C: Change> RunImage<C> {
             Err(_) => self.changes.truncate(first),
         }
         made
+    }
+
+    /// Adds the row that `make` appends to the image's changes in canonical form. Adds nothing
+    /// and returns `None` if it does.
+    #[inline]
+    pub(crate) fn push_row_made(
+        &mut self,
+        make: impl FnOnce(&mut Vec<C>) -> Option<()>,
+    ) -> Option<()> {
+        let first = self.changes.len();
+        if make(&mut self.changes).is_none() {
+            self.changes.truncate(first);
+            return None;
+        }
+        let row = self.row_offsets.len() - 1;
+        debug_assert_eq!(self.check_row(row, &self.changes[first..]), Ok(()));
+        self.row_offsets.push(self.changes.len() as u32);
+        Some(())
+    }
+
+    /// Adds the last row once more, or a black one if there is none.
+    pub(crate) fn push_again(&mut self) {
+        if let Some(last) = (self.row_offsets.len() as u32 - 1).checked_sub(1) {
+            self.changes.extend_from_within(self.changes_of(last));
+        }
+        self.row_offsets.push(self.changes.len() as u32);
+    }
+
+    /// Adds rows of another image of the same width.
+    pub(crate) fn push_rows(&mut self, from: &Self, rows: Range<u32>) {
+        let ends = &from.row_offsets[rows.start as usize..=rows.end as usize];
+        let [first, last] = [ends[0], ends[ends.len() - 1]];
+        // Offsets of either image wrap around alike.
+        let moved = (self.changes.len() as u32).wrapping_sub(first);
+        self.changes.extend_from_slice(&from.changes[first as usize..last as usize]);
+        self.row_offsets.extend(ends[1..].iter().map(|end| end.wrapping_add(moved)));
     }
 
     /// Adds a row in canonical form, without checking it.

@@ -4,7 +4,6 @@ use fax::{Color, VecWriter, decoder, encoder};
 use proptest::prelude::*;
 
 use crate::gray::GrayMask;
-use crate::layer::Image;
 use crate::mask::{Mask, MaskBuilder};
 
 pub(crate) fn mask_of<'a>(width: u32, rows: impl IntoIterator<Item = &'a [u32]>) -> Mask {
@@ -13,18 +12,6 @@ pub(crate) fn mask_of<'a>(width: u32, rows: impl IntoIterator<Item = &'a [u32]>)
         mask.push_row(row).unwrap();
     }
     mask.finish()
-}
-
-/// The level of a pixel: 0 or 255 in a mask.
-pub(crate) fn level(image: &Image, column: u32, row: u32) -> u8 {
-    match image {
-        Image::Mask(mask) => 255 * u8::from(mask.is_white(column, row)),
-        Image::Gray(gray) => {
-            let changes = gray.row(row);
-            let upto = changes.partition_point(|change| change.column <= column);
-            upto.checked_sub(1).map_or(0, |last| changes[last].level)
-        }
-    }
 }
 
 /// Masks whose rows are random, or the row above with some edges moved a

@@ -130,9 +130,10 @@ fn a_directory_that_other_programs_would_read_otherwise_is_an_error() {
 
 #[test]
 fn a_wrong_image_is_named() {
-    let layers = layers(gray_layer);
+    // The level of layer 2 is a byte of PackBits.
+    let packbits = |layer: Layer| Layer { image: layer.image.as_packbits(), ..layer };
+    let layers: Vec<_> = layers(gray_layer).into_iter().map(packbits).collect();
     let mut changed = write(&layers, Format::Big);
-    // The level of layer 2, as a run of PackBits has it.
     let at = changed.iter().rposition(|&byte| byte == 42).unwrap();
     changed[at] = 45;
     assert_eq!(fault(&changed), (2, CheckFault::Image));

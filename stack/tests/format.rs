@@ -296,11 +296,19 @@ fn run(program: &str, arguments: &[&str], stack: &Path) -> Option<String> {
     Some(text)
 }
 
+fn packbits(layer: Layer) -> Layer {
+    Layer { image: layer.image.as_packbits(), ..layer }
+}
+
 #[test]
 fn libtiff_reads_what_we_write_and_we_read_what_it_writes() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("stack.tif");
-    for (format, stack) in [(Format::Big, layers(3)), (Format::Classic, vec![gray_layer()])] {
+    for (format, stack) in [
+        (Format::Big, layers(3)),
+        (Format::Classic, vec![gray_layer()]),
+        (Format::Classic, vec![packbits(gray_layer())]),
+    ] {
         std::fs::write(&path, write(&stack, format)).unwrap();
         let Some(text) = run("tiffinfo", &["-D"], &path) else {
             eprintln!("tiffinfo is not installed: libtiff was not asked");
@@ -309,7 +317,7 @@ fn libtiff_reads_what_we_write_and_we_read_what_it_writes() {
         assert!(!text.to_lowercase().contains("warning"), "{text}");
         // Strips of two rows each, and both bit orders.
         for options in [["-r", "2", "-f", "msb2lsb"], ["-r", "100", "-f", "lsb2msb"]] {
-            for compression in ["none", "packbits", "g4"] {
+            for compression in ["none", "packbits", "zip", "g4"] {
                 if compression == "g4" && format == Format::Classic {
                     continue;
                 }

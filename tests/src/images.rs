@@ -66,13 +66,5 @@ pub fn stripped(layers: &[Layer]) -> Vec<Layer> {
 
 /// Returns the columns in which a row differs between two images of one size.
 pub fn differing(a: &Image, b: &Image, row: u32) -> Vec<u32> {
-    let level = |image: &Image, column: u32| match image {
-        Image::Mask(mask) => 255 * u8::from(mask.is_white(column, row)),
-        Image::Gray(gray) => {
-            let changes = gray.row(row);
-            let next = changes.partition_point(|change| change.column <= column);
-            next.checked_sub(1).map_or(0, |last| changes[last].level)
-        }
-    };
-    (0..a.width()).filter(|&column| level(a, column) != level(b, column)).collect()
+    (0..a.width()).filter(|&column| a.level(column, row) != b.level(column, row)).collect()
 }

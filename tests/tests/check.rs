@@ -319,6 +319,10 @@ fn what_cannot_be_checked_is_refused_in_a_sentence() {
     scratch.run("lamp check empty.stl").is_refused_with(&["empty.stl", "empty"]);
     scratch.run("lamp check nothing.tif").is_refused_with(&["nothing.tif"]);
     scratch.run("lamp check - -").is_wrong_usage(&["once"]);
+    for line in ["lamp check bare.tif --dpi 300", "lamp view bare.tif --thickness 50um"] {
+        let option = line.split(' ').nth(3).unwrap();
+        scratch.run(line).is_wrong_usage(&["bare.tif is a stack", option]);
+    }
     scratch.run("lamp check a.tif --only rings").is_wrong_usage(&["rings"]);
     scratch.run("lamp check a.tif --least-support 130%").is_wrong_usage(&["130%"]);
 }

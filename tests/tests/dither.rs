@@ -3,7 +3,7 @@
 use lamp_stack::{Destination, Dpi, Format, GrayMask, Layer, PageInfo, StackError, write_stack};
 use lamp_tests::{Scratch, masks, read_stack};
 
-const METHODS: [&str; 4] = ["blue-noise", "ordered", "floyd-steinberg", "threshold"];
+const METHODS: [&str; 5] = ["blue-noise", "ordered", "floyd-steinberg", "sierra-lite", "threshold"];
 
 /// Writes white squares on black, from layer 40 on, in a gray rim that rises from the left.
 fn with_gray_stack(dpi: f64) -> Scratch {

@@ -100,7 +100,7 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("tile cube.tif --gap -1mm -o x.tif", &["below zero"]),
         (
             "dither cube.tif --method magic -o x.tif",
-            &["magic", "blue-noise", "ordered", "floyd-steinberg", "threshold"],
+            &["magic", "blue-noise", "ordered", "floyd-steinberg", "sierra-lite", "threshold"],
         ),
         ("lamp sample teapot -o x.stl", &["teapot", "blade"]),
         ("lamp sample tower --facets 999 -o x.stl", &["at least 1000 facets, not 999"]),

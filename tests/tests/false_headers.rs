@@ -116,6 +116,44 @@ fn streams_without_end() {
     }
 }
 
+/// Returns a packed stack of one part, whose checks are right.
+fn packed(fields: [u32; 4], head: &[u8], images: &[u8]) -> Vec<u8> {
+    let images_crc = crc32fast::hash(images);
+    let fields = [&fields[..], &[images_crc]].concat();
+    let header: Vec<u8> =
+        [1].into_iter().chain(fields.iter().flat_map(|field| field.to_le_bytes())).collect();
+    let crc = crc32fast::hash(&[&header, head].concat()).to_le_bytes();
+    [b"\x93LAMP\r\n\x01\0", &header[..], &crc, head, images].concat()
+}
+
+fn packed_stacks_that_lie(scratch: &Scratch) {
+    // An image of 2^26 x 2^22 pixels and 2^27 changes, against its own rows; no line.
+    let large = [&[9][..], &[0x80, 0x80, 0x80, 0x20], &[0x80, 0x80, 0x80, 2]].concat();
+    let large = [&large[..], &[0x80, 0x80, 0x80, 0x40], &[0]].concat();
+    let size = |bytes: &[u8]| bytes.len() as u32;
+    // Sizes of the head and of the images, in the file or unpacked.
+    let most = u32::MAX;
+    for (fields, words) in [
+        ([1, most, 14, 0], "frame"),
+        ([1, 100 << 20, 14, 0], "cut off"),
+        ([most, 14, most, 0], "frame"),
+        ([64, 14, 100 << 20, 0], "frame"),
+        ([1, 14, 14, most], "frame"),
+        ([1, 14, 14, 1 << 30], "cut off"),
+    ] {
+        stack_is_refused(scratch, words, packed(fields, &large, &[]));
+    }
+    // All rows coded, or alike, without tokens; tokens of two gigabytes in nine bytes.
+    let all_rows = [0x80, 0x80, 0x80, 2];
+    let no_streams = [0; 8];
+    let coded = [&[4, 4], &all_rows[..], &no_streams].concat();
+    let tokens = [&[0, 0], &[0x80, 0x80, 0x80, 0x80, 7, 9][..], &[0; 9], &no_streams[..6]].concat();
+    for (images, words) in [(&coded[..], "image"), (&tokens, "images"), (&[0; 10], "image")] {
+        let fields = [1, size(&large), size(&large), size(images)];
+        stack_is_refused(scratch, words, packed(fields, &large, images));
+    }
+}
+
 fn codes_that_lie() {
     // Four billion rows of four billion pixels.
     is_cheaply_refused("row 800 is missing", || Ok(g4::decode(&[0xFF; 100], u32::MAX, u32::MAX)?));
@@ -157,6 +195,7 @@ fn a_header_that_lies_costs_nothing_but_an_error() {
     rayon_threads_start();
     stacks_that_lie(&scratch);
     streams_without_end();
+    packed_stacks_that_lie(&scratch);
     codes_that_lie();
     parts_that_lie(&scratch);
 }

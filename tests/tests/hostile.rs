@@ -68,6 +68,11 @@ fn no_tiff_makes_the_reader_panic_or_contradict_itself() {
 }
 
 #[test]
+fn no_packed_stack_makes_the_reader_panic_or_contradict_itself() {
+    survives("packed", hostile::packed);
+}
+
+#[test]
 fn no_codes_make_the_codec_panic_or_contradict_itself() {
     survives("g4", hostile::g4);
 }

@@ -61,12 +61,15 @@ fn numbers_are_those_of_info_and_check() {
     // The page shows the same, word by word.
     let page = shown(&text(&scratch.bytes("mug.html")));
     let info = text(&scratch.run("lamp info mug.tif").succeeds_quietly().stdout);
-    for value in info.lines().map(|line| line.split_once(':').unwrap().1.trim()) {
-        assert!(page.contains(value), "no `{value}` in {page}");
+    // Pages have the signs of units.
+    let signs =
+        |text: &str| text.replace(" um", " µm").replace(" mm2", " mm²").replace(" mm3", " mm³");
+    for value in info.lines().map(|line| signs(line.split_once(':').unwrap().1.trim())) {
+        assert!(page.contains(&value), "no `{value}` in {page}");
     }
     let check = text(&scratch.run("lamp check mug.tif").succeeds_quietly().stdout);
-    for value in check.lines().skip(1).map(|line| line.split_once(": ").unwrap().1) {
-        assert!(page.contains(value), "no `{value}` in {page}");
+    for value in check.lines().skip(1).map(|line| signs(line.split_once(": ").unwrap().1)) {
+        assert!(page.contains(&value), "no `{value}` in {page}");
     }
     assert!(page.contains("1 finding") || page.contains("findings of lamp check"));
 }

@@ -59,8 +59,17 @@ export class Picture extends EventTarget {
     });
     // Keys are the page's, so that they are the same wherever the focus is.
     this.#viewer.addHandler("canvas-key", (event) => (event.preventDefaultAction = true));
+    // The navigator would fetch each tile a second time; it takes its own once the layer is shown.
+    this.#viewer.navigator.world.addHandler("add-item", ({ item }) => {
+      item.setPreload(false);
+      item.savedCutOffLevel = 0;
+    });
+    // Pixels that are larger than the screen's stay squares. Told before it draws, not after.
+    this.#viewer.addHandler("viewport-change", () => {
+      this.#viewer.drawer.setImageSmoothingEnabled(this.zoom < 1);
+    });
     for (const name of ["update-viewport", "resize"]) {
-      this.#viewer.addHandler(name, () => this.#moved());
+      this.#viewer.addHandler(name, () => this.dispatchEvent(new Event("view")));
     }
   }
 
@@ -198,7 +207,9 @@ export class Picture extends EventTarget {
 
   async #add(sheet, isFirst) {
     const source = tileSource(sheet, this.#side, (error) => this.#fail(sheet, error));
-    if (!isFirst) source.minLevel = this.#levelOf(source);
+    // Until the level that the present zoom needs has come, coarser ones would only delay it.
+    const level = isFirst ? 0 : this.#levelOf(source);
+    source.getClosestLevel = () => level;
     const item = await new Promise((success, error) => {
       this.#viewer.addTiledImage({
         tileSource: source,
@@ -223,10 +234,10 @@ export class Picture extends EventTarget {
     else if (!isIn(this.#shown) && this.#items.has(nameOf(sheet))) this.#remove(nameOf(sheet));
   }
 
-  /** The level that the present zoom needs: until it has come, coarser ones would only delay it. */
+  /** The level that the present zoom needs. */
   #levelOf(source) {
     const reduction = Math.max(0, Math.floor(-Math.log2(this.zoom)));
-    return Math.max(0, source.maxLevel - reduction - 1);
+    return Math.max(0, source.maxLevel - reduction);
   }
 
   #loaded(item) {
@@ -242,7 +253,8 @@ export class Picture extends EventTarget {
   #reveal(scene) {
     for (const sheet of scene.sheets) {
       const item = this.#items.get(nameOf(sheet));
-      item.source.minLevel = 0;
+      // From now on, coarser levels come first at another zoom.
+      item.savedCutOffLevel = 0;
       item.setOpacity(scene.opacity[sheet.kind] ?? 1);
     }
     this.#shown = scene;
@@ -288,12 +300,6 @@ export class Picture extends EventTarget {
       this.#expectNext();
     }
     this.canvas.setAttribute("aria-busy", `${isBusy}`);
-  }
-
-  #moved() {
-    // Pixels that are larger than the screen's stay squares.
-    this.#viewer.drawer.setImageSmoothingEnabled(this.zoom < 1);
-    this.dispatchEvent(new Event("view"));
   }
 }
 

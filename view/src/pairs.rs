@@ -1,5 +1,7 @@
 //! Which layers of two stacks belong together.
 
+use std::sync::Arc;
+
 use lamp_stack::{Frame, Image, PageHeader, Pairing, shift_between};
 
 use crate::stack::ViewedStack;
@@ -78,8 +80,16 @@ impl Partners {
 
 impl Partner {
     /// Returns its image in the frame of the layer that it belongs to.
-    pub(crate) fn framed(&self, image: &Image, [width, height]: [u32; 2]) -> Image {
+    pub(crate) fn framed(&self, image: Arc<Image>, [width, height]: [u32; 2]) -> Arc<Image> {
         let [left, top] = self.shift.map(|shift| -shift);
-        image.framed(Frame { left, top, width, height })
+        framed(image, Frame { left, top, width, height })
     }
+}
+
+/// Returns an image in a frame, which is often the one that it has.
+pub(crate) fn framed(image: Arc<Image>, frame: Frame) -> Arc<Image> {
+    if frame.is_whole(image.width(), image.height()) {
+        return image;
+    }
+    Arc::new(image.framed(frame))
 }

@@ -127,11 +127,3 @@ pub(crate) fn place_mm(header: &PageHeader, x: u32, y: u32) -> Option<[f64; 2]> 
     let ([left, top], pitch) = (header.info.origin_mm?, header.dpi?.pitch().mm());
     Some([left + (f64::from(x) + 0.5) * pitch, top - (f64::from(y) + 0.5) * pitch])
 }
-
-/// Returns the level of a pixel.
-pub(crate) fn level(image: &Image, x: u32, y: u32) -> u8 {
-    match image {
-        Image::Mask(mask) => 255 * u8::from(mask.is_white(x, y)),
-        Image::Gray(gray) => gray.level(x, y),
-    }
-}

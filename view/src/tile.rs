@@ -56,7 +56,7 @@ fn png([width, height]: [u32; 2], levels: &[u8], inks: Inks) -> io::Result<Vec<u
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, width, height);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
+    encoder.set_compression(png::Compression::Fastest);
     match inks {
         Inks::Gray => encoder.set_color(png::ColorType::Grayscale),
         Inks::One(colour) => {

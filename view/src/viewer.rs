@@ -4,7 +4,7 @@ use std::num::NonZeroU8;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use lamp_stack::{Image, Mask};
+use lamp_stack::{Frame, Image, Mask};
 use serde_json::{Value, json};
 
 use crate::background::{Background, Progress};
@@ -14,8 +14,8 @@ use crate::edge::nearest_edge;
 use crate::error::ViewError;
 use crate::findings::Finding;
 use crate::overlay::{Overlay, bands, fixed_bands};
-use crate::pairs::{Partner, Partners};
-use crate::stack::{ViewedStack, level, place_mm};
+use crate::pairs::{Partner, Partners, framed};
+use crate::stack::{ViewedStack, place_mm};
 use crate::surface_work::surface_of;
 use crate::tile::{Inks, TILE_SIDE, TileAt, tile};
 
@@ -233,17 +233,18 @@ impl Viewer {
         let below = || layer.checked_sub(1).map(|below| image(stack, below)).transpose();
         let header = self.stack(stack)?.header(layer)?;
         Ok(match overlay {
-            Overlay::Below => {
-                Drawing::OnlyIn { a: below()?, b: Some(image(stack, layer)?), size: header.size }
-            }
-            Overlay::New => {
-                Drawing::OnlyIn { a: Some(image(stack, layer)?), b: below()?, size: header.size }
+            Overlay::Below | Overlay::New => {
+                let [width, height] = header.size;
+                let frame = Frame { left: 0, top: 0, width, height };
+                let others = vec![below()?.map(|below| framed(below, frame))];
+                let in_layer = overlay == Overlay::New;
+                Drawing::Differs { layer: image(stack, layer)?, others, in_layer }
             }
             Overlay::Added | Overlay::Missing => {
                 let others = self.partners.of_layer(&self.stacks, stack, layer);
                 let framed = |other: Option<Partner>| {
                     other
-                        .map(|at| Ok(at.framed(&*image(at.stack, at.layer)?, header.size)))
+                        .map(|at| Ok(at.framed(image(at.stack, at.layer)?, header.size)))
                         .transpose()
                 };
                 let others = others.into_iter().map(framed).collect::<Result<_, ViewError>>()?;
@@ -280,7 +281,7 @@ impl Viewer {
             return Err(ViewError::NoSuch("pixel"));
         }
         let image = self.image(stack, layer, Kind::Layer, given_up)?;
-        let level = level(&image, x, y);
+        let level = image.level(x, y);
         let white = level >= threshold.map_or(1, NonZeroU8::get);
         let place = place_mm(header, x, y);
         let here = |found: &Vec<Finding>| {

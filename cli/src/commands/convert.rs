@@ -9,15 +9,15 @@ use clap::Args;
 use lamp_slicer::brep::{START_BYTES, is_step};
 use lamp_slicer::topology::{CornerTable, StepSolids};
 use lamp_slicer::{OpenOptions, Part, Placement, Units};
-use lamp_stack::{Layer, Length, StackError, png_of_layer, write_png_folder};
+use lamp_stack::{Format, Layer, Length, StackError, png_of_layer, write_png_folder};
 
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output, one_of};
 use crate::progress::say;
 use crate::step_options::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
 use crate::streams::{
-    check_beside, input_name, is_folder, is_step_name, is_stream, layers_of_input, new_folder,
-    open_pages, progress, write_file, write_layers, written_to,
+    check_beside, for_tiffs, input_name, is_folder, is_step_name, is_stream, layers_of_input,
+    new_folder, open_pages, progress, write_file, write_layers, written_to,
 };
 
 /// Convert a stack to a file, a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
@@ -89,6 +89,9 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     if args.ignore_checks {
         pages = pages.without_checks();
     }
+    let mut to = args.output.clone();
+    // A packed stack gives the TIFF back that it was made of.
+    to.classic |= pages.packed_format() == Some(Format::Classic);
     let layers = layers_of_input(pages, &args.input, &progress).map(|layer| {
         let mut layer = layer?;
         if let Some(stack) = layer.info.stack.as_mut().filter(|_| args.ignore_checks) {
@@ -98,7 +101,7 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
         Ok(layer)
     });
     match shape {
-        OutputKind::Tiff => write_layers(layers, &args.output, &progress),
+        OutputKind::Tiff => write_layers(layers, &to, &progress),
         OutputKind::Pngs => {
             let counted = layers.inspect(|_| progress.layer_done());
             let folder = new_folder(output, args.output.force)?;
@@ -182,13 +185,12 @@ impl ConvertArgs {
     }
 
     fn shape(&self) -> Result<OutputKind, Exit> {
-        let Output { output, classic, .. } = &self.output;
+        let Output { output, classic, packbits, .. } = &self.output;
         let named_png = output.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
         match (is_folder(output), self.png) {
             (true, true) => Ok(OutputKind::Pngs),
-            (false, _) if named_png && *classic => {
-                Err(Exit::usage("--classic is for TIFFs: leave it out, or name a .tif file"))
-            }
+            (false, _) if named_png && *classic => Err(for_tiffs("--classic")),
+            (false, _) if named_png && *packbits => Err(for_tiffs("--packbits")),
             (false, _) if named_png => Ok(OutputKind::Png),
             (false, true) => Err(Exit::usage("PNGs go into a folder: name it, as -o pictures/")),
             (_, false) => Ok(OutputKind::Tiff),

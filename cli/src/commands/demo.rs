@@ -168,7 +168,7 @@ fn write(
 ) -> Result<(), Exit> {
     write_layers(
         layers,
-        &Output { output: stack.to_owned(), classic: false, force: false },
+        &Output { output: stack.to_owned(), classic: false, packbits: false, force: false },
         progress,
     )
 }

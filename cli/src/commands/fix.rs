@@ -1,17 +1,17 @@
 //! `lamp fix`: corrects stray rows, and reports them.
 
-use std::cell::RefCell;
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, Fixed};
+use lamp_postprocess::{Band, BandOutcome, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
 use crate::band_pictures::BandPictures;
 use crate::exit::Exit;
-use crate::fix_report::{FixReport, whereabouts};
+use crate::fix_report::whereabouts;
 use crate::json_report::parse_report;
-use crate::options::{Common, Input, Output, one_of_described};
+use crate::options::{Common, Input, Output};
+use crate::stages::fix::{FixSettings, Fixing};
 use crate::streams::{check_beside, progress, read_layers, unless_found, write_layers};
 
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
@@ -34,25 +34,8 @@ pub(crate) struct FixArgs {
     #[command(flatten)]
     input: Input,
 
-    /// Source of the missing crossings
-    #[arg(long, default_value_t, value_parser = one_of_described::<FixMethod>(&[
-        "What the good rows above and below share; edges of wide bands become steps",
-        "Smooth curves along the part's contours",
-    ]))]
-    method: FixMethod,
-
-    /// Leave bands of more rows as they are; half the part's smallest feature is a good limit
-    #[arg(long, value_name = "ROWS", default_value_t = FixOptions::default().max_width)]
-    max_width: u32,
-
-    /// Leave bands whose correction is less certain than this as they are, from 0 to 1
-    #[arg(long, value_name = "SHARE", default_value_t = FixOptions::default().min_confidence)]
-    #[arg(value_parser = parse_share)]
-    min_confidence: f64,
-
-    /// Use the layers below and above to find where contours cross bands of three rows and more
-    #[arg(long)]
-    use_neighbours: bool,
+    #[command(flatten)]
+    pub(crate) settings: FixSettings,
 
     /// Write all bands, and what was done about them, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
@@ -72,44 +55,32 @@ pub(crate) struct FixArgs {
     output: Output,
 }
 
-impl FixArgs {
-    fn options(&self) -> FixOptions {
-        FixOptions {
-            method: self.method,
-            max_width: self.max_width,
-            min_confidence: self.min_confidence,
-            use_neighbours: self.use_neighbours,
-        }
-    }
-}
-
 pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     for beside in [&args.report, &args.evidence].into_iter().flatten() {
         check_beside(beside, &args.output.output, [&args.input.stack])?;
     }
     let progress = progress("fix", common, &args.output);
-    let options = args.options();
-    let findings = RefCell::new(FixReport::new(options));
+    let options = args.settings.options();
+    let fixing = Fixing::new(&args.settings);
     let evidence = args.evidence.as_deref();
     let mut evidence =
         evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
     let mut layer_count = 0;
     let layers = read_layers(&args.input, &progress)?.inspect(|_| layer_count += 1);
-    let fixed = lamp_postprocess::fix(layers, options, |fixed| {
+    let fixed = fixing.layers(layers, 0..u32::MAX, |fixed| {
         for line in describe(fixed, &options) {
             progress.detail(&line);
         }
         if let Some(evidence) = &mut evidence {
             evidence.add(fixed);
         }
-        findings.borrow_mut().add(fixed);
     });
-    let finding = || findings.borrow().text_of_left().filter(|_| args.strict).map(Exit::Findings);
+    let finding = || fixing.report().text_of_left().filter(|_| args.strict).map(Exit::Findings);
     let written = write_layers(unless_found(fixed, finding), &args.output, &progress);
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }
-    let findings = findings.borrow();
+    let findings = fixing.report();
     if let Some(evidence) = evidence {
         evidence.finish()?;
     }
@@ -171,14 +142,6 @@ fn range_of(band: &Band) -> String {
     match band.rows {
         1 => band.first_row.to_string(),
         _ => format!("{}-{}", band.first_row, band.end() - 1),
-    }
-}
-
-/// Parses a share from 0 to 1.
-fn parse_share(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
-        _ => Err(format!("`{text}` is not a share: write a number from 0 to 1")),
     }
 }
 

@@ -4,12 +4,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::{is_strips, join_strips};
-use lamp_stack::{Layer, join};
+use lamp_stack::{Layer, PackLevel, Pages, join, join_packed};
 
 use crate::exit::Exit;
 use crate::options::{Common, Output};
 use crate::progress::Progress;
-use crate::streams::{input_name, is_stream, progress, write_layers};
+use crate::streams::{
+    format, input_name, is_packed_name, is_stream, packed_destination, progress, write_layers,
+    written_to,
+};
 
 /// Join stacks of consecutive layers into one stack
 ///
@@ -56,8 +59,23 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Exit> {
             }
         }
     }
+    if is_packed_name(&args.output.output) && args.stacks.iter().all(|stack| is_packed(stack)) {
+        return join_frames(&args.stacks, &args.output, &progress);
+    }
     let layers = join(args.stacks.clone())?.map(|layer| Ok(layer?));
     write_layers(counted(layers, &progress), &args.output, &progress)
+}
+
+/// Returns whether a stack is packed. One that cannot be opened is told of later.
+fn is_packed(stack: &Path) -> bool {
+    Pages::open(stack).is_ok_and(|pages| pages.packed_format().is_some())
+}
+
+/// Joins packed stacks without coding their images again.
+fn join_frames(stacks: &[PathBuf], output: &Output, progress: &Progress) -> Result<(), Exit> {
+    let to = packed_destination(output)?;
+    let joined = join_packed(stacks, to, format(output.classic), PackLevel::default());
+    written_to(&output.output, joined.map_err(Exit::from), progress)
 }
 
 /// Puts the strips of a folder back together.

@@ -1,8 +1,9 @@
 //! The commands, one file each: options, a library call, a report.
 
+mod batch;
 mod brep;
 mod calibrate;
-mod check;
+pub(crate) mod check;
 mod compare;
 mod compensate;
 mod completions;
@@ -22,6 +23,7 @@ mod material;
 mod mesh;
 mod mesh_out;
 mod orient;
+mod pack;
 mod plan;
 mod projector;
 mod report;
@@ -29,9 +31,9 @@ mod sample;
 mod show;
 pub(crate) mod slice;
 mod split;
-mod support;
+pub(crate) mod support;
 mod target;
-mod tile;
+pub(crate) mod tile;
 mod verify;
 mod view;
 
@@ -59,6 +61,7 @@ pub(crate) enum Command {
     Report(report::ReportArgs),
     View(view::ViewArgs),
     Convert(convert::ConvertArgs),
+    Pack(pack::PackArgs),
     Join(join::JoinArgs),
     Split(split::SplitArgs),
     Machine(machine::MachineArgs),
@@ -74,6 +77,7 @@ pub(crate) enum Command {
     Brep(brep::BrepArgs),
     Mesh(mesh::MeshArgs),
     MeshOut(mesh_out::MeshOutArgs),
+    Batch(Box<batch::BatchArgs>),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -109,6 +113,7 @@ impl Command {
             Self::Report(args) => report::run(args, common),
             Self::View(args) => view::run(args, common),
             Self::Convert(args) => convert::run(args, common),
+            Self::Pack(args) => pack::run(args, common),
             Self::Join(args) => join::run(args, common),
             Self::Split(args) => split::run(args, common),
             Self::Machine(args) => machine::run(args),
@@ -124,6 +129,7 @@ impl Command {
             Self::Brep(args) => brep::run(args),
             Self::Mesh(args) => mesh::run(args, common),
             Self::MeshOut(args) => mesh_out::run(args, common),
+            Self::Batch(args) => batch::run(args, common),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
         }

@@ -14,7 +14,7 @@ use crate::exit::Exit;
 use crate::memory::give_freed_memory_back;
 use crate::options::{Common, parse_memory};
 use crate::progress::Progress;
-use crate::sliced_part::SlicedPart;
+use crate::sliced_part::{SlicedPart, check_slicing};
 use crate::slicing_options::SlicingOptions;
 use crate::streams::{failed_at, input_name, is_stream, print, spool_stdin};
 
@@ -73,6 +73,7 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
     if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
+    check_slicing(&args.slicing, &args.inputs, None)?;
     give_freed_memory_back();
     let address = Address::new(args.port).with_context(|| match args.port {
         0 => "a port of the loopback address".to_owned(),

@@ -110,10 +110,12 @@ enum PlotFormat {
 
 /// Size of a plot, in points.
 const SIZE: (u32, u32) = (860, 560);
+/// Size of a plot in a page, in points: about as wide as pages show it, so that letters keep their
+/// size.
+const PAGE_SIZE: (u32, u32) = (560, 390);
 /// How many pixels of a PNG, or units of an SVG, a point has: places are whole
 /// numbers of them.
 const SCALE: u32 = 2;
-const PIXELS: (u32, u32) = (SIZE.0 * SCALE, SIZE.1 * SCALE);
 
 /// Checks, before the work, that a plot can have that name.
 pub(crate) fn check_name(path: &Path) -> Result<(), Exit> {
@@ -136,7 +138,7 @@ fn format_of(path: &Path) -> Result<PlotFormat, Exit> {
 /// Equal plots give equal bytes.
 pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, Exit> {
     match format_of(path)? {
-        PlotFormat::Svg => Ok(svg(plots).into_bytes()),
+        PlotFormat::Svg => Ok(svg(plots, SIZE).into_bytes()),
         PlotFormat::Png => Ok(png(plots).with_context(|| path.display().to_string())?),
     }
 }
@@ -169,22 +171,22 @@ fn picture_of(drawing: &impl Drawing, size: (u32, u32), path: &Path) -> Result<V
 
 /// Returns a plot as an element of a page, which takes the width that the page gives it.
 pub(crate) fn inline_svg(plot: &Plot) -> String {
-    svg(std::slice::from_ref(plot))
+    svg(std::slice::from_ref(plot), PAGE_SIZE)
 }
 
-fn svg(plots: &[Plot]) -> String {
+fn svg(plots: &[Plot], size: (u32, u32)) -> String {
     let mut text = String::new();
-    let [pixels, size] = [PIXELS, SIZE].map(|size| all_of(size, plots));
+    let [pixels, size] = [fine(size), size].map(|size| all_of(size, plots));
     // A text takes all that is drawn on it.
     draw_all(plots, &SVGBackend::with_string(&mut text, pixels).into_drawing_area())
         .expect("a text takes all");
-    let [fine, shown] =
+    let [drawn, shown] =
         [pixels, size].map(|(width, height)| format!(r#"width="{width}" height="{height}""#));
-    text.replacen(&fine, &shown, 1)
+    text.replacen(&drawn, &shown, 1)
 }
 
 fn png(plots: &[Plot]) -> anyhow::Result<Vec<u8>> {
-    png_of(all_of(PIXELS, plots), |area| draw_all(plots, area))
+    png_of(all_of(fine(SIZE), plots), |area| draw_all(plots, area))
 }
 
 /// The bytes of a PNG of what is drawn.
@@ -204,6 +206,11 @@ fn png_of<E: std::error::Error + Send + Sync>(
     png.set_depth(png::BitDepth::Eight);
     png.write_header()?.write_image_data(&pixels)?;
     Ok(bytes)
+}
+
+/// A size in pixels of a PNG, or units of an SVG.
+fn fine((width, height): (u32, u32)) -> (u32, u32) {
+    (width * SCALE, height * SCALE)
 }
 
 /// The size of several plots, given that of one.
@@ -334,8 +341,8 @@ mod tests {
 
     #[test]
     fn an_svg_is_the_same_each_time_and_holds_what_is_to_be_seen() {
-        let text = svg(&plots());
-        assert_eq!(text, svg(&plots()));
+        let text = svg(&plots(), SIZE);
+        assert_eq!(text, svg(&plots(), SIZE));
         for part in ["Cure depth", "dose (mJ/cm²)", "a &amp; b", "500", "<circle", "<polygon"] {
             assert!(text.contains(part), "no {part} in {text}");
         }
@@ -349,7 +356,7 @@ mod tests {
         let mut reader = png::Decoder::new(io::Cursor::new(bytes)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut pixels).unwrap();
-        assert_eq!((info.width, info.height), PIXELS);
+        assert_eq!((info.width, info.height), fine(SIZE));
         let (colours, _) = pixels.as_chunks::<3>();
         assert!(colours.contains(&[0, 114, 178]));
         assert_eq!(colours[0], [255; 3]);
@@ -357,7 +364,7 @@ mod tests {
 
     #[test]
     fn plots_stand_below_each_other() {
-        let two = svg(&plots().into_iter().chain(plots()).collect::<Vec<_>>());
+        let two = svg(&plots().into_iter().chain(plots()).collect::<Vec<_>>(), SIZE);
         assert!(two.starts_with("<svg width=\"860\" height=\"1120\" viewBox=\"0 0 1720 2240\""));
         assert_eq!(two.matches("Cure depth").count(), 2);
     }

@@ -65,7 +65,10 @@ fn the_ordered_pattern_fills_its_holes_in_turn() {
 /// Errors undo part of what the thresholds ask for.
 #[test]
 fn diffused_errors_fill_holes_less_regularly() {
-    check(DitherMethod::FloydSteinberg, 128, [1, 15], [13, 13]);
+    check(DitherMethod::FloydSteinberg, 128, [2, 14], [10, 10]);
+    check(DitherMethod::FloydSteinberg, 64, [0, 9], [29, 3]);
+    // Dots of layers that know nothing of each other.
+    check(DitherMethod::SierraLite, 64, [0, 13], [58, 10]);
 }
 
 #[test]

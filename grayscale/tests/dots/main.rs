@@ -3,6 +3,7 @@
 
 mod density;
 mod layers;
+mod ramp;
 mod spectrum;
 mod tiles;
 
@@ -10,8 +11,12 @@ use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_stack::{GrayMask, Mask, white_runs};
 
 /// The methods that make dots.
-const DOTS: [DitherMethod; 3] =
-    [DitherMethod::BlueNoise, DitherMethod::Ordered, DitherMethod::FloydSteinberg];
+const DOTS: [DitherMethod; 4] = [
+    DitherMethod::BlueNoise,
+    DitherMethod::Ordered,
+    DitherMethod::FloydSteinberg,
+    DitherMethod::SierraLite,
+];
 
 /// The period of every method's pattern, in pixels and in layers but for the
 /// ordered one's 256 layers.

@@ -131,11 +131,7 @@ impl TimedPart {
         if column >= width || row >= height {
             return false;
         }
-        let level = match &self.images[layer] {
-            Image::Mask(mask) => 255 * u8::from(mask.is_white(column, row)),
-            Image::Gray(gray) => gray_level(gray.row(row), column),
-        };
-        level >= self.wanted
+        self.images[layer].level(column, row) >= self.wanted
     }
 
     /// Returns the dose that each second adds to a layer under a wide white field, and what
@@ -158,11 +154,6 @@ impl TimedPart {
     pub(crate) fn wanted(&self) -> u8 {
         self.wanted
     }
-}
-
-fn gray_level(changes: &[lamp_stack::LevelChange], column: u32) -> u8 {
-    let past = changes.partition_point(|change| change.column <= column);
-    past.checked_sub(1).map_or(0, |last| changes[last].level)
 }
 
 /// Writes the levels of a window whose corner is at (`column`, `row`), row by row. Pixels outside

@@ -49,7 +49,7 @@ fn edited(
     let others = others.into_iter().map(|layers| OtherLayers {
         name: "other.tif".to_owned(),
         layers: Box::new(layers.into_iter().map(Ok)) as Box<dyn Iterator<Item = _>>,
-        may_reach_beyond: false,
+        may_reach_beyond: [false; 2],
     });
     edit(layers.into_iter().map(Ok), edits, others.collect(), vec![], |_, _| {}).collect()
 }

@@ -119,8 +119,9 @@ impl MemorySize for ToEdit {
 /// The other stacks, read up to the height of the edited one.
 struct AlignedStacks<E> {
     others: Vec<AlignedStack<E>>,
-    /// The number of each stack's edit, from 1, if that adds the whole stack.
-    whole: Vec<Option<usize>>,
+    /// The number of each stack's edit, from 1, if that adds the whole stack and no layer below,
+    /// or above, may be lost.
+    whole: Vec<[Option<usize>; 2]>,
     last: Option<PageInfo>,
 }
 
@@ -133,8 +134,8 @@ impl<E: From<EditError>> AlignedStacks<E> {
         let mut others = others.into_iter();
         for (number, edit, stack) in named {
             let other = others.next().expect("there is a stack for each that is named");
-            let whole = edit.adds_at_all_heights() && !other.may_reach_beyond;
-            beside.whole.push(whole.then_some(number));
+            let whole = other.may_reach_beyond.map(|may| edit.adds_at_all_heights() && !may);
+            beside.whole.push(whole.map(|whole| whole.then_some(number)));
             beside.others.push(AlignedStack::new(other, stack.by[2]));
         }
         beside
@@ -161,12 +162,12 @@ impl<E: From<EditError>> AlignedStacks<E> {
         outside: impl Fn(&mut AlignedStack<E>) -> Result<Option<String>, E>,
         is_above: bool,
     ) -> Result<(), E> {
-        for (other, number) in self.others.iter_mut().zip(&self.whole) {
-            let Some(number) = number else { continue };
+        for (other, numbers) in self.others.iter_mut().zip(&self.whole) {
+            let Some(number) = numbers[usize::from(is_above)] else { continue };
             if let Some(layer) = outside(other)? {
                 let stack = other.name.clone();
                 let lost = EditProblem::LayersLost { stack, layer, is_above };
-                return Err(lost.of_edit(*number).into());
+                return Err(lost.of_edit(number).into());
             }
         }
         Ok(())

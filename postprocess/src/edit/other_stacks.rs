@@ -13,9 +13,9 @@ pub struct OtherLayers<E> {
     pub name: String,
     /// The layers, from the bottom.
     pub layers: Box<dyn Iterator<Item = Result<Layer, E>>>,
-    /// Whether layers below or above the edited ones may be lost if the stack is added
-    /// over all heights.
-    pub may_reach_beyond: bool,
+    /// Whether layers below the edited ones, and those above, may be lost if the stack is
+    /// added over all heights.
+    pub may_reach_beyond: [bool; 2],
 }
 
 /// A stack that is read along with the edited one.

@@ -120,11 +120,7 @@ mod tests {
 
     fn level(image: &Image, column: i64, row: i64) -> u8 {
         let inside = |at: i64| (0..i64::from(SIDE)).contains(&at);
-        if inside(column) && inside(row) {
-            image.to_gray().level(column as u32, row as u32)
-        } else {
-            0
-        }
+        if inside(column) && inside(row) { image.level(column as u32, row as u32) } else { 0 }
     }
 
     proptest! {

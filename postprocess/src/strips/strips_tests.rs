@@ -22,10 +22,6 @@ fn image(width: u32, rows: &[Vec<(u32, u8)>], levels: bool) -> Image {
     Image::Mask(gray.to_mask().unwrap())
 }
 
-fn level(image: &Image, column: u32, row: u32) -> u8 {
-    image.to_gray().level(column, row)
-}
-
 proptest! {
     #[test]
     fn swaths_add_up_to_the_layer(
@@ -45,11 +41,11 @@ proptest! {
                 for (k, swath) in (0..).zip(&cut) {
                     if swaths.columns(k).contains(&column) {
                         of += 1;
-                        sum += u32::from(level(swath, column - swaths.columns(k).start, row));
+                        sum += u32::from(swath.level(column - swaths.columns(k).start, row));
                     }
                 }
                 prop_assert!((1..=2).contains(&of));
-                prop_assert_eq!(sum, u32::from(level(&layer, column, row)), "{} {}", column, row);
+                prop_assert_eq!(sum, u32::from(layer.level(column, row)), "{} {}", column, row);
             }
         }
         prop_assert_eq!(swaths.join(&cut), Ok(layer.to_gray().into_owned()));
@@ -63,7 +59,7 @@ fn ramps_rise_in_equal_steps_and_fall_alike() {
     let white = Image::Mask(Mask::black(22, 1).inverted());
     let levels = |k| {
         let cut = swaths.cut(&white, k);
-        (0..10).map(|column| level(&cut, column, 0)).collect::<Vec<_>>()
+        (0..10).map(|column| cut.level(column, 0)).collect::<Vec<_>>()
     };
     assert_eq!(levels(0), [255, 255, 255, 255, 255, 255, 204, 153, 102, 51]);
     assert_eq!(levels(1), [51, 102, 153, 204, 255, 255, 204, 153, 102, 51]);

@@ -1,4 +1,4 @@
-use lamp_stack::{Dpi, Frame, GrayMask, LevelChange, Mask, MaskBuilder, PageInfo, StackInfo};
+use lamp_stack::{Dpi, Frame, GrayMask, Mask, MaskBuilder, PageInfo, StackInfo};
 use proptest::prelude::*;
 use serde_json::json;
 
@@ -214,17 +214,6 @@ fn a_stack_that_changed_is_refused() {
     assert!(matches!(built, Err(TileError::Changed { .. })));
 }
 
-/// The level of a pixel, by looking it up.
-fn level(image: &Image, column: u32, row: u32) -> u8 {
-    match image {
-        Image::Mask(mask) => u8::from(mask.is_white(column, row)) * 255,
-        Image::Gray(gray) => {
-            let upto = gray.row(row).iter().rfind(|change| change.column <= column);
-            upto.map_or(0, |change: &LevelChange| change.level)
-        }
-    }
-}
-
 /// Images of the size of a part, one a layer.
 fn arbitrary_stack(gray: bool) -> impl Strategy<Value = Vec<Image>> {
     let level = if gray {
@@ -311,9 +300,9 @@ proptest! {
                 let found = built.image.framed(place).oriented(at.turn.inverse()).unwrap();
                 for row in 0..expected.height() {
                     for column in 0..expected.width() {
-                        let wanted = level(&expected, column, row);
+                        let wanted = expected.level(column, row);
                         let is_free = fit && outlines && wanted == 0;
-                        prop_assert!(is_free || level(&found, column, row) == wanted);
+                        prop_assert!(is_free || found.level(column, row) == wanted);
                     }
                 }
                 // Take the copy away: at last nothing is left.

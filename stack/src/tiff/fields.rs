@@ -147,6 +147,7 @@ impl Fields {
             layout: self.layout(width, height)?,
             pieces: Vec::new(),
             data_bytes: 0,
+            image: None,
         })
     }
 

@@ -23,8 +23,10 @@ mod tiles;
 mod unpack;
 mod write;
 
+pub(crate) use page::PackedShape;
 pub(crate) use page::bit_transitions;
 pub use page::{Compression, Page, PageHeader};
 pub use read::PageReader;
+pub(crate) use source::Source;
 pub(crate) use unpack::byte_runs;
 pub use write::{EncodedPage, Format, PageWriter};

@@ -1,12 +1,13 @@
 //! Decodes pages to layers.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use crate::check::{ChainReader, CheckFault, Line, LineCheck, image_crc};
+use crate::check::{ChainReader, CheckFault, ImageCheck, Line, LineCheck, image_crc};
 use crate::error::{PageFault, StackError};
 use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
-use crate::layer::{Image, Layer, LayerImage, PageInfo};
+use crate::layer::{Image, Layer, LayerImage, PageInfo, Strip};
 use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::mask::Mask;
@@ -43,6 +44,8 @@ pub enum Compression {
     Png,
     /// The page is another picture file.
     Picture(PictureFormat),
+    /// The page is one of a packed stack.
+    Packed,
 }
 
 /// A page that is not decoded yet.
@@ -66,6 +69,16 @@ pub struct Page {
     pub(super) pieces: Vec<Vec<u8>>,
     /// The number of bytes of all strips or tiles.
     pub(super) data_bytes: u64,
+    /// The image of a page of a packed stack, which is decoded when it is read. `pieces` holds its
+    /// strip, if that was kept.
+    pub(super) image: Option<Arc<Image>>,
+}
+
+/// The size and the kind of a packed image.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PackedShape {
+    pub(crate) size: [u32; 2],
+    pub(crate) gray: bool,
 }
 
 /// What a page says of its layer, without the image.
@@ -97,6 +110,9 @@ impl MemorySize for Page {
     fn bytes(&self) -> usize {
         // A code of one to four bits becomes a transition of four bytes; the other
         // compressions have no fixed ratio.
+        if let Some(image) = &self.image {
+            return image.bytes();
+        }
         let growth = match self.compression {
             Compression::Lzw
             | Compression::Deflate
@@ -134,6 +150,39 @@ impl Page {
             layout: Layout::strips(width, height, height),
             data_bytes: file.len() as u64,
             pieces: vec![file],
+            image: None,
+        }
+    }
+
+    /// Creates a page of a packed stack, whose line stands for its directory.
+    pub(crate) fn of_packed(
+        number: u32,
+        limits: Limits,
+        shape: &PackedShape,
+        line: Line,
+        data_bytes: u64,
+        image: Option<Arc<Image>>,
+        strip: Option<Vec<u8>>,
+    ) -> Self {
+        let [width, height] = shape.size;
+        let Line { info, check } = line;
+        let dpi = check.as_ref().and_then(|check| check.page.as_ref()?.dpi).and_then(Dpi::new);
+        Self {
+            number,
+            limits,
+            info,
+            check,
+            dpi,
+            width,
+            gray: shape.gray,
+            white_is_zero: false,
+            orientation: Orientation::default(),
+            compression: Compression::Packed,
+            differences: false,
+            layout: Layout::strips(width, height, height),
+            data_bytes,
+            pieces: strip.into_iter().collect(),
+            image,
         }
     }
 
@@ -177,6 +226,11 @@ impl Page {
         }
     }
 
+    /// Returns the check of the page's image, if it has one.
+    pub(crate) fn image_check(&self) -> Option<ImageCheck> {
+        Some(self.check.as_ref()?.page.as_ref()?.image)
+    }
+
     /// Returns whether both pages have one coded image and one check of it, so that they decode to
     /// the same image or both fail.
     pub fn is_coded_as(&self, other: &Self) -> bool {
@@ -194,6 +248,7 @@ impl Page {
             && self.layout == other.layout
             && check(self) == check(other)
             && self.pieces == other.pieces
+            && self.image == other.image
     }
 
     /// Forgets the page's check, so that any image is taken.
@@ -207,7 +262,9 @@ impl Page {
     /// Returns an error if a strip or tile does not decode to the size that the directory states,
     /// or if the image is not the one that the page's check was made of.
     pub fn decode(mut self) -> Result<Layer, StackError> {
+        let decoded = self.image.take().map(Arc::unwrap_or_clone);
         let image = match self.compression {
+            Compression::Packed => decoded.expect("pages are decoded only with images"),
             Compression::Png => png_page::decode(&self.pieces[0], &self.limits)
                 .map_err(|fault| fault.on(self.number))?,
             Compression::Picture(format) => {
@@ -226,7 +283,9 @@ impl Page {
         if check.is_some_and(|check| check.crc != image_crc(&image)) {
             return Err(StackError::Check { layer: self.info.index, fault: CheckFault::Image });
         }
-        let strip = self.is_in_our_layout().then(|| self.pieces.remove(0));
+        let strip = self
+            .strip_compression()
+            .and_then(|compression| Some(Strip { compression, bytes: self.pieces.pop()?.into() }));
         let image = LayerImage::of_page(image, strip, check);
         Ok(Layer { info: self.info, dpi: self.dpi, image })
     }
@@ -277,14 +336,20 @@ impl Page {
         Ok(())
     }
 
-    /// Returns whether a 1-bit page has the layout that this crate writes.
-    fn is_in_our_layout(&self) -> bool {
-        let one_strip = self.pieces.len() == 1 && !self.layout.tiled;
-        one_strip
-            && self.compression == Compression::G4
+    /// Returns the compression of the strip, if a page that this crate writes may hold it.
+    fn strip_compression(&self) -> Option<Compression> {
+        let is_ours = self.pieces.len() == 1
+            && !self.layout.tiled
             // Its codes would mean the image inverted.
             && !self.white_is_zero
-            && self.orientation == Orientation::default()
+            && !self.differences
+            && self.orientation == Orientation::default();
+        match self.compression {
+            Compression::Packed => Some(Compression::G4),
+            Compression::G4 if is_ours => Some(Compression::G4),
+            Compression::Deflate if is_ours && self.gray => Some(Compression::Deflate),
+            _ => None,
+        }
     }
 
     /// Returns each strip or row of tiles with the page's rows that it holds.

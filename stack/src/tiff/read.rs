@@ -8,9 +8,10 @@ use super::fields::{Fields, KNOWN, malformed, number};
 use super::page::{Compression, Page};
 use super::source::Source;
 use super::tags::{FILL_ORDER, type_size};
-use super::write::Notice;
+use super::write::{Format, Notice};
 use crate::error::{PageFault, StackError};
 use crate::limits::Limits;
+use crate::packed::{self, Unpacker};
 use crate::picture_page::{self, PictureFormat};
 use crate::png_page;
 use crate::text::one_line;
@@ -62,13 +63,20 @@ impl PageReader {
         if start.is_empty() {
             return Err(StackError::Empty);
         }
-        let kind = FileKind::of_start(&start);
+        let kind = match FileKind::of_start(&start) {
+            FileKind::Packed(_) => {
+                let format = source.read_up_to(8, 1)?;
+                let format = format.first().ok_or(StackError::CutOff { last_whole: None })?;
+                FileKind::Packed(Box::new(Unpacker::new(*format)))
+            }
+            kind => kind,
+        };
         let (little_endian, big) = match start.as_slice() {
             [b'I', b'I', 42, 0, ..] => (true, false),
             [b'M', b'M', 0, 42, ..] => (false, false),
             [b'I', b'I', 43, 0, ..] => (true, true),
             [b'M', b'M', 0, 43, ..] => (false, true),
-            _ if kind != FileKind::Tiff => (false, false),
+            _ if !matches!(kind, FileKind::Tiff) => (false, false),
             // The signature of a TIFF or a PNG is cut off.
             [b'I']
             | [b'I', b'I']
@@ -78,12 +86,15 @@ impl PageReader {
             | [b'M', b'M', 0] => {
                 return Err(StackError::CutOff { last_whole: None });
             }
-            start if png_page::SIGNATURE.starts_with(start) => {
+            start
+                if png_page::SIGNATURE.starts_with(start)
+                    || packed::SIGNATURE.starts_with(start) =>
+            {
                 return Err(StackError::CutOff { last_whole: None });
             }
             _ => return Err(StackError::NotTiff { start }),
         };
-        let next = if kind == FileKind::Tiff {
+        let next = if matches!(kind, FileKind::Tiff) {
             if big {
                 start = source.read_up_to(8, 8)?;
             } else {
@@ -115,15 +126,31 @@ impl PageReader {
         Self { source: self.source.reading_little_ahead(), images: false, ..self }
     }
 
-    /// Returns the offset of the next page's directory.
-    pub(crate) fn next_offset(&self) -> u64 {
-        self.next
+    /// Returns where [`at_place`](Self::at_place) finds the next page: the offset of its
+    /// directory, or in a packed stack its number.
+    pub(crate) fn next_place(&self) -> u64 {
+        match self.kind {
+            FileKind::Packed(_) => self.number.into(),
+            _ => self.next,
+        }
     }
 
-    /// Goes to the page whose directory is at an offset of a file.
-    pub(crate) fn at_offset(&mut self, offset: u64) {
+    /// Reads the page of a file at a place.
+    pub(crate) fn at_place(&mut self, place: u64) -> Result<Option<Page>, StackError> {
+        if let FileKind::Packed(unpacker) = &mut self.kind {
+            return unpacker.page(place as u32, &mut self.source, &self.limits);
+        }
         self.seen.clear();
-        self.next = offset;
+        self.next = place;
+        self.next().transpose()
+    }
+
+    /// Returns the format of the TIFF that was packed, of a packed stack.
+    pub(crate) fn packed_format(&self) -> Option<Format> {
+        match &self.kind {
+            FileKind::Packed(unpacker) => Some(unpacker.format()),
+            _ => None,
+        }
     }
 
     /// Numbers the pages from `first`, after the layer `last_whole`, for a folder's later files.
@@ -143,8 +170,23 @@ impl PageReader {
         self.next == 0
     }
 
-    fn read_page(&mut self) -> Result<Page, StackError> {
-        let (page, next) = match &self.kind {
+    /// Returns the format of a TIFF, or of the one that was packed.
+    pub(crate) fn format(&self) -> Format {
+        match &self.kind {
+            FileKind::Packed(unpacker) => unpacker.format(),
+            FileKind::Tiff if !self.big => Format::Classic,
+            _ => Format::Big,
+        }
+    }
+
+    fn read_page(&mut self) -> Result<Option<Page>, StackError> {
+        let (page, next) = match &mut self.kind {
+            FileKind::Packed(unpacker) => {
+                match unpacker.next(&mut self.source, &self.limits, self.images)? {
+                    Some(page) => (page, self.next),
+                    None => return Ok(None),
+                }
+            }
             FileKind::Tiff => self.read_tiff_page()?,
             FileKind::Png => (self.read_png()?, 0),
             FileKind::Picture { format, start } => {
@@ -155,7 +197,7 @@ impl PageReader {
         self.next = next;
         self.number += 1;
         self.last_whole = Some(page.info.index);
-        Ok(page)
+        Ok(Some(page))
     }
 
     /// Reads the next page and the link after it.
@@ -327,11 +369,12 @@ impl PageReader {
 }
 
 /// What the first bytes of a file say it is.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 enum FileKind {
     /// A TIFF, or nothing that is read.
     Tiff,
     Png,
+    Packed(Box<Unpacker>),
     /// Another picture, with its first bytes, which a stream gives only once.
     Picture {
         format: PictureFormat,
@@ -344,6 +387,7 @@ impl FileKind {
         match PictureFormat::of_start(start) {
             Some(format) => Self::Picture { format, start: start.to_owned() },
             None if start == png_page::SIGNATURE => Self::Png,
+            None if start == packed::SIGNATURE => Self::Packed(Box::new(Unpacker::new(0))),
             None => Self::Tiff,
         }
     }
@@ -358,10 +402,10 @@ impl Iterator for PageReader {
             return None;
         }
         let page = self.read_page();
-        if page.is_err() {
+        if !matches!(page, Ok(Some(_))) {
             self.next = 0;
         }
-        Some(page)
+        page.transpose()
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 /// A source of bytes.
-pub(super) enum Source {
+pub(crate) enum Source {
     Stream { stream: BufReader<Box<dyn Read + Send>>, position: u64 },
     File { file: BufReader<File>, position: u64 },
 }
@@ -21,16 +21,24 @@ impl fmt::Debug for Source {
 
 impl Source {
     /// Returns whether bytes at `offset` can still be read: a stream only goes forward.
-    pub(super) fn reaches(&self, offset: u64) -> bool {
+    pub(crate) fn reaches(&self, offset: u64) -> bool {
         match self {
             Self::Stream { position, .. } => offset >= *position,
             Self::File { .. } => true,
         }
     }
 
+    /// Returns the length in bytes of a file, `None` of a stream.
+    pub(crate) fn length(&self) -> io::Result<Option<u64>> {
+        match self {
+            Self::Stream { .. } => Ok(None),
+            Self::File { file, .. } => Ok(Some(file.get_ref().metadata()?.len())),
+        }
+    }
+
     /// Reads less of a file ahead, for small reads far from each other. A pipe that was opened
     /// as a file stays as it is.
-    pub(super) fn reading_little_ahead(self) -> Self {
+    pub(crate) fn reading_little_ahead(self) -> Self {
         match self {
             Self::File { mut file, position } => match file.seek(SeekFrom::Start(position)) {
                 Ok(_) => Self::File { file: BufReader::new(file.into_inner()), position },
@@ -41,7 +49,7 @@ impl Source {
     }
 
     /// Passes over `length` bytes at `offset`. Returns whether the input has them.
-    pub(super) fn skip(&mut self, offset: u64, length: u64) -> io::Result<bool> {
+    pub(crate) fn skip(&mut self, offset: u64, length: u64) -> io::Result<bool> {
         let end = offset.saturating_add(length);
         match self {
             Self::Stream { stream, position } => {
@@ -56,7 +64,7 @@ impl Source {
 
     /// Reads up to `length` bytes at `offset`, fewer at the end of the input. Memory grows with
     /// the bytes read, so a false length costs nothing.
-    pub(super) fn read_up_to(&mut self, offset: u64, length: u64) -> io::Result<Vec<u8>> {
+    pub(crate) fn read_up_to(&mut self, offset: u64, length: u64) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let position = match self {
             Self::Stream { stream, position } => {

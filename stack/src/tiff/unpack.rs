@@ -6,7 +6,7 @@ use flate2::read::ZlibDecoder;
 use weezl::{BitOrder, LzwStatus, decode::Decoder};
 
 use super::page::Compression;
-use crate::packbits;
+use crate::{deflate, packbits};
 
 /// A reason to stop decompressing.
 #[derive(Debug)]
@@ -38,6 +38,13 @@ pub(super) fn unpack(
     match compression {
         Compression::PackBits => cut_runs(packbits::Runs::new(bytes), shape, each),
         Compression::Lzw => cut_bytes(LzwReader::new(bytes), shape, each),
+        Compression::Deflate if !shape.differences => {
+            let length = u64::from(shape.row_bytes) * u64::from(shape.rows);
+            match deflate::runs(bytes, length) {
+                Some(runs) => cut_runs(runs.into_iter(), shape, each),
+                None => cut_bytes(ZlibDecoder::new(bytes), shape, each),
+            }
+        }
         Compression::Deflate => cut_bytes(ZlibDecoder::new(bytes), shape, each),
         _ => cut_bytes(bytes, shape, each),
     }

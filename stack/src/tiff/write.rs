@@ -4,8 +4,9 @@ use std::io::Write;
 
 use serde::{Deserialize, Serialize};
 
+use super::page::Compression;
 use super::tags::{
-    ASCII, BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, FILL_ORDER, IMAGE_DESCRIPTION,
+    ASCII, BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, DEFLATE, FILL_ORDER, IMAGE_DESCRIPTION,
     IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, NEW_SUBFILE_TYPE, ORIENTATION, PACK_BITS, PER_INCH,
     PHOTOMETRIC, PLANAR_CONFIGURATION, RATIONAL, RESOLUTION_UNIT, ROWS_PER_STRIP,
     SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS, STRIP_OFFSETS, T6, T6_OPTIONS, X_RESOLUTION,
@@ -15,7 +16,7 @@ use crate::check::{Chain, OpenLine};
 use crate::error::{GAVE_UP, StackError};
 use crate::layer::{Image, Layer};
 use crate::page_folder::PageFile;
-use crate::{g4, packbits};
+use crate::{deflate, g4};
 
 /// The variant of TIFF to write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,26 +59,26 @@ pub struct EncodedPage {
     index: u32,
     width: u32,
     height: u32,
-    gray: bool,
+    compression: Compression,
     resolution: (u32, u32),
     line: OpenLine,
     strip: Vec<u8>,
 }
 
 impl EncodedPage {
-    /// Encodes a layer: a mask as G4, a gray mask as PackBits. An unchanged mask keeps the strip
-    /// that it was read from, any unchanged image its check.
+    /// Encodes a layer: a mask as G4, a gray mask as Deflate. An unchanged image keeps the strip
+    /// and the check that it was read with.
     pub fn new(layer: &Layer) -> Self {
-        let (gray, strip) = match (&*layer.image, layer.image.strip()) {
-            (Image::Mask(_), Some(strip)) => (false, strip.to_vec()),
-            (Image::Mask(mask), None) => (false, g4::encode(mask)),
-            (Image::Gray(gray), _) => (true, packbits::encode(gray)),
+        let (compression, strip) = match (&*layer.image, layer.image.strip()) {
+            (_, Some(strip)) => (strip.compression, strip.bytes.to_vec()),
+            (Image::Mask(mask), None) => (Compression::G4, g4::encode(mask)),
+            (Image::Gray(gray), None) => (Compression::Deflate, deflate::encode(gray)),
         };
         Self {
             index: layer.info.index,
             width: layer.image.width(),
             height: layer.image.height(),
-            gray,
+            compression,
             resolution: layer.dpi.map_or((0, 1), crate::Dpi::to_rational),
             line: OpenLine::new(&layer.info, layer.dpi, layer.image.check()),
             strip,
@@ -110,13 +111,18 @@ impl EncodedPage {
             let (num, den) = self.resolution;
             (tag, RATIONAL, 1, [num.to_le_bytes(), den.to_le_bytes()].concat())
         };
+        let (is_gray, compression) = match self.compression {
+            Compression::PackBits => (true, PACK_BITS),
+            Compression::Deflate => (true, DEFLATE),
+            _ => (false, T6),
+        };
         let mut fields = vec![
             // A single page of a multipage image (TIFF 6.0, section 8, NewSubfileType).
             long(NEW_SUBFILE_TYPE, 2),
             long(IMAGE_WIDTH, self.width),
             long(IMAGE_LENGTH, self.height),
-            short(BITS_PER_SAMPLE, if self.gray { 8 } else { 1 }),
-            short(COMPRESSION, if self.gray { PACK_BITS } else { T6 }),
+            short(BITS_PER_SAMPLE, if is_gray { 8 } else { 1 }),
+            short(COMPRESSION, compression),
             short(PHOTOMETRIC, BLACK_IS_ZERO),
             short(FILL_ORDER, 1),
             text_field(description),
@@ -131,7 +137,7 @@ impl EncodedPage {
             fields.extend([resolution(X_RESOLUTION), resolution(Y_RESOLUTION)]);
             fields.push(short(RESOLUTION_UNIT, PER_INCH));
         }
-        if !self.gray {
+        if !is_gray {
             fields.push(long(T6_OPTIONS, 0));
         }
         fields.sort_by_key(|field| field.0);

@@ -6,14 +6,15 @@ use std::io::Write;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use lamp_fixtures::{
-    Defect, Mesh, Sample, StepDefect, StepSample, StepUnit, broken_step, build, inject, sphere,
-    step, three_mf, three_mf_model, torus,
+    Defect, Mesh, Sample, SplitMix, StepDefect, StepSample, StepUnit, broken_step, build, inject,
+    sphere, step, three_mf, three_mf_model, torus,
 };
 use lamp_slicer::{Part, SliceOptions, Slices};
 use lamp_stack::{
-    Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, PageInfo, PageWriter, g4,
-    png_of_layer,
+    Destination, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, MaskBuilder,
+    PackLevel, PageInfo, PageWriter, StackError, g4, png_of_layer, write_packed,
 };
+use tempfile::NamedTempFile;
 
 /// An input that a fuzz target starts from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,6 +40,7 @@ pub fn seeds() -> Vec<Seed> {
         .chain(three_mfs().into_iter().map(of("three_mf")))
         .chain(steps().into_iter().map(of("step")))
         .chain(tiff().into_iter().map(of("tiff")))
+        .chain(packed_stacks().into_iter().map(of("packed")))
         .chain(g4_codes().into_iter().map(of("g4")))
         .chain(blocks().into_iter().map(of("check")))
         .chain(meshes().into_iter().map(of("mesh")))
@@ -211,6 +213,45 @@ fn tiff() -> Named {
     .into_iter()
     .chain(foreign())
     .collect()
+}
+
+fn packed_stacks() -> Named {
+    let packed = |layers: Vec<Layer>, format| {
+        let file = NamedTempFile::new().expect("a temporary file");
+        let to = Destination::File(file.path().to_owned());
+        let layers = layers.into_iter().map(Ok::<_, StackError>);
+        write_packed(layers, to, format, PackLevel::default()).expect("there are layers");
+        std::fs::read(file.path()).expect("it was written")
+    };
+    let noise = |index: u32| {
+        let rows = (0..40).map(|row| {
+            let mut numbers = SplitMix(u64::from(100 * index + row));
+            let mut columns: Vec<u32> = (0..30).map(|_| numbers.below(200) as u32).collect();
+            columns.sort_unstable();
+            columns.dedup();
+            columns
+        });
+        let mut mask = MaskBuilder::new(200);
+        rows.for_each(|row| mask.push_row(&row).expect("inside the width"));
+        let info = PageInfo { index, ..PageInfo::default() };
+        Layer { info, dpi: None, image: mask.finish().into() }
+    };
+    let gray = |index| {
+        let layer = gray_layer();
+        Layer { info: PageInfo { index, ..PageInfo::default() }, ..layer }
+    };
+    let masks = packed(layers(150.0), Format::Big);
+    vec![
+        ("cut.lamp", masks[..masks.len() - 60].to_vec()),
+        ("masks.lamp", masks),
+        ("masks_classic.lamp", packed(layers(60.0), Format::Classic)),
+        ("gray.lamp", packed((0..3).map(gray).collect(), Format::Big)),
+        ("noise.lamp", packed((62..66).map(noise).collect(), Format::Big)),
+        (
+            "repeated.lamp",
+            packed(vec![noise(1), Layer { info: noise(2).info, ..noise(1) }], Format::Big),
+        ),
+    ]
 }
 
 /// What only other programs write.

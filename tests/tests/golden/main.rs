@@ -114,7 +114,7 @@ fn dithered() -> Images {
         let layers = read_stack(scratch.run(&line).succeeds_quietly().stdout);
         (format!("ramp_{method}"), mask(&layers[0]).clone())
     };
-    ["blue-noise", "ordered", "floyd-steinberg", "threshold"].map(dots).to_vec()
+    ["blue-noise", "ordered", "floyd-steinberg", "sierra-lite", "threshold"].map(dots).to_vec()
 }
 
 #[test]

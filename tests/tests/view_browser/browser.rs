@@ -176,6 +176,17 @@ impl Browser {
         serde_json::from_value(self.run(&script, vec![json!(pixels)])).unwrap()
     }
 
+    /// Counts the pixels of the screen that are neither black nor white.
+    pub(crate) fn shades(&self) -> u64 {
+        let script = format!(
+            "const canvas = document.querySelector('{CANVAS} > canvas');
+             const {{width, height}} = canvas;
+             const all = canvas.getContext('2d').getImageData(0, 0, width, height).data;
+             return all.filter((level, at) => at % 4 === 0 && level > 0 && level < 255).length;"
+        );
+        self.run(&script, Vec::new()).as_u64().unwrap()
+    }
+
     /// Checks that nothing but the server was asked, and that the console has no error.
     #[track_caller]
     pub(crate) fn was_quiet(&self) {

@@ -60,6 +60,17 @@ fn the_demo_build_is_seen_to_the_pixel() {
     let layers = scratch.layers("lamp-demo/alpha.tif");
     browser.shows(&["0/0/layer"]);
 
+    // Zoomed in by keys from where pixels are smaller than the screen's, they are squares.
+    browser.go("#stack=0&layer=5&at=3100.5,3600.5&zoom=0.6");
+    assert_ne!(browser.shades(), 0);
+    for _ in 0..3 {
+        browser.press('+');
+    }
+    browser.settle();
+    let zoom: f64 = browser.place()["zoom"].as_str().unwrap().parse().unwrap();
+    assert!(zoom > 1.0, "{zoom}");
+    assert_eq!(browser.shades(), 0);
+
     // Layers by keys and by the field; place and zoom stay.
     browser.go("#stack=0&layer=0&at=3100.5,3600.5&zoom=2");
     let before = browser.place();

@@ -13,13 +13,13 @@ use crate::height_options::significant;
 use crate::json_report::to_nm;
 
 /// What is said of a finding.
-pub(in crate::commands) struct FindingLine {
+pub(crate) struct FindingLine {
     /// What it is, in a word.
-    pub(in crate::commands) word: &'static str,
-    pub(in crate::commands) text: String,
-    pub(in crate::commands) json: Value,
+    pub(crate) word: &'static str,
+    pub(crate) text: String,
+    pub(crate) json: Value,
     /// It is told, but does not count.
-    pub(in crate::commands) is_note: bool,
+    pub(crate) is_note: bool,
     pub(in crate::commands) shown: Option<Shown>,
 }
 

@@ -20,18 +20,19 @@ use lamp_supports::{
 };
 use serde_json::{Value, json};
 
-use crate::catalogue::entry;
+use crate::catalogue::{canonical_word, entry};
 use crate::exit::Exit;
 use crate::json_report::parse_report;
 use crate::kept_stack::KeptStack;
 use crate::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
 use crate::part_options::at_part;
 use crate::progress::{Progress, printable};
-use crate::sliced_part::SlicedPart;
+use crate::sliced_part::{SlicedPart, check_slicing};
 use crate::slicing_options::SlicingOptions;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 
-pub(super) use lines::{FindingLine, Shown, drag_mn};
+pub(crate) use lines::FindingLine;
+pub(super) use lines::{Shown, drag_mn};
 pub(super) use pictures::draw;
 use pictures::write_pictures;
 use report::write_report;
@@ -157,20 +158,15 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
     let machine: Machine = entry(&args.machine)?;
+    check_slicing(&args.slicing, &args.inputs, Some(&machine))?;
     let evidence = args.evidence.as_deref().map(|folder| new_folder(folder, args.force));
     let evidence = evidence.transpose()?;
-    let mut checked = Vec::new();
-    for path in &args.inputs {
-        let mut input = Input::open(path, &args.slicing, common)?;
-        // The mesh is out of memory before the layers come.
-        let minima = args.minima(&input)?;
-        let findings = args.check(&mut input, common)?;
-        let disagreements = args.disagreements(&mut input, &minima, &findings, common)?;
-        let lines = lines::of(&findings, &disagreements, args, machine.recoating.as_ref());
-        let name = input_name(path);
-        print(&printed(&name, &findings, &lines, common.verbose))?;
-        checked.push(CheckedInput { name, input, findings, lines });
-    }
+    let checked = args.inputs.iter().map(|path| {
+        let checked = args.checked(path, &machine, common)?;
+        print(&printed(&checked.name, &checked.findings, &checked.lines, common.verbose))?;
+        Ok(checked)
+    });
+    let mut checked = checked.collect::<Result<Vec<_>, Exit>>()?;
     if let Some(path) = &args.report {
         write_report(&checked, machine.recoating.as_ref(), path)?;
     }
@@ -239,6 +235,38 @@ pub(super) fn report_of(
 }
 
 impl CheckArgs {
+    /// Finds what there is in an input.
+    fn checked(
+        &self,
+        path: &Path,
+        machine: &Machine,
+        common: &Common,
+    ) -> Result<CheckedInput, Exit> {
+        let mut input = Input::open(path, &self.slicing, common)?;
+        // The mesh is out of memory before the layers come.
+        let minima = self.minima(&input)?;
+        let findings = self.check(&mut input, common)?;
+        let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
+        let lines = lines::of(&findings, &disagreements, self, machine.recoating.as_ref());
+        Ok(CheckedInput { name: input_name(path), input, findings, lines })
+    }
+
+    /// Returns the machine, to be changed.
+    pub(crate) fn machine_mut(&mut self) -> &mut PathBuf {
+        &mut self.machine
+    }
+
+    /// Returns what there is in a stack, the worst first.
+    pub(crate) fn lines(&self, stack: &Path) -> Result<Vec<FindingLine>, Exit> {
+        Ok(self.checked(stack, &entry(&self.machine)?, &Common::quiet())?.lines)
+    }
+
+    /// Returns the options that matter to findings as one text.
+    pub(crate) fn canonical(&self) -> String {
+        let (only, machine) = (&self.only, canonical_word::<Machine>(&self.machine));
+        format!("check {only:?} {:?} --machine {machine}", self.options())
+    }
+
     fn options(&self) -> CheckOptions {
         CheckOptions {
             threshold: self.threshold,

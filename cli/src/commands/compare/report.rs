@@ -80,14 +80,20 @@ pub(super) fn text(comparison: &Comparison<'_>, all: bool) -> String {
     let sections = comparison.pairing.sections().len();
     let unit = if comparison.pairing.is_by_height() { "heights" } else { "layers" };
     let mut told: Vec<_> = comparison.told().collect();
-    let forgiven = match comparison.sum(|found| found.forgiven) {
-        0 => String::new(),
-        pixels => format!("; {} forgiven", pixels_text(pixels)),
+    let forgiven = comparison.sum(|found| found.forgiven);
+    let [but, besides] = match forgiven {
+        0 => [String::new(), String::new()],
+        1 => [", but for 1 pixel that the tolerance forgives", "; the tolerance forgives 1 more"]
+            .map(str::to_owned),
+        pixels => [
+            format!(", but for {pixels} pixels that the tolerance forgives"),
+            format!("; the tolerance forgives {pixels} more"),
+        ],
     };
     let mut text = match told.len() {
-        0 => format!("{a} and {b} are the same at {sections} {unit}{forgiven}\n"),
+        0 => format!("{a} and {b} are the same at {sections} {unit}{but}\n"),
         differ => format!(
-            "{a} and {b} differ at {differ} of {sections} {unit}: {} added, {} missing{forgiven}\n",
+            "{a} and {b} differ at {differ} of {sections} {unit}: {} added, {} missing{besides}\n",
             pixels_text(comparison.sum(|found| found.added)),
             pixels_text(comparison.sum(|found| found.missing)),
         ),

@@ -61,11 +61,13 @@ pub(super) fn charts(report: &StackReport) -> Vec<String> {
                 vec![curve("islands", points(&|k, _| Some(islands[k] as f64)))],
             )
         }),
-        chart(
-            "Thickness",
-            "thickness (µm)",
-            vec![curve("thickness", points(&|_, layer| layer.thickness_um))],
-        ),
+        same_thickness_um(layers)
+            .is_none()
+            .then(|| {
+                let thickness = curve("thickness", points(&|_, layer| layer.thickness_um));
+                chart("Thickness", "thickness (µm)", vec![thickness])
+            })
+            .flatten(),
         chart(
             "Exposure",
             "exposure (ms)",
@@ -89,6 +91,12 @@ pub(super) fn charts(report: &StackReport) -> Vec<String> {
         ));
     }
     charts.into_iter().flatten().collect()
+}
+
+/// Returns the thickness of all layers, if they have the same.
+pub(super) fn same_thickness_um(layers: &[LayerNumbers]) -> Option<f64> {
+    let first = layers.first()?.thickness_um?;
+    layers.iter().all(|layer| layer.thickness_um == Some(first)).then_some(first)
 }
 
 /// Returns points of which at most so many are left, with the extremes of neighbours.

@@ -28,6 +28,8 @@ use crate::streams::{
 };
 
 use gather::StackReport;
+pub(super) use page::document;
+pub(super) use pictures::{Picture, of_layer};
 
 /// Write a page to send that tells of a stack: warnings, numbers, curves, pictures
 ///

@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::charts::charts;
+use super::charts::{charts, same_thickness_um};
 use super::gather::{Found, StackReport};
 use super::pictures::Picture;
 use crate::commands::info;
@@ -13,7 +13,7 @@ use crate::progress::printable;
 const MOST_LINES: usize = 20;
 
 /// Returns a whole page: its title, styles and content.
-pub(super) fn document(title: &str, content: &Markup) -> String {
+pub(in crate::commands) fn document(title: &str, content: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -50,6 +50,9 @@ pub(super) fn html(report: &StackReport, index: Option<&str>) -> String {
         }
         section {
             h2 { "Over the height" }
+            @if let Some(um) = same_thickness_um(&report.layers) {
+                p { "Every layer is " (um) " µm thick." }
+            }
             div.charts { @for chart in charts(report) { div.chart { (PreEscaped(chart)) } } }
         }
     };
@@ -77,7 +80,7 @@ fn facts(report: &StackReport) -> Markup {
     html! {
         table.facts {
             @for (key, value) in info::lines(&report.totals, &report.name, None) {
-                tr { th { (key) } td { (value) } }
+                tr { th { (key) } td { (with_signs(&value)) } }
             }
             @if rows_fixed > 0 { tr { th { "stray rows fixed" } td { (rows_fixed) } } }
             @for (key, option) in [("machine", "--machine"), ("material", "--material")] {
@@ -130,7 +133,7 @@ fn findings(found: &Found) -> Markup {
                 @for (number, picture) in &found.pictures {
                     figure {
                         img src=(picture.address) alt=(found.lines[*number].word);
-                        figcaption { b { (found.lines[*number].word) } ": " (found.lines[*number].text) }
+                        figcaption { b { (found.lines[*number].word) } ": " (with_signs(&found.lines[*number].text)) }
                     }
                 }
             }
@@ -141,7 +144,7 @@ fn findings(found: &Found) -> Markup {
         table.findings {
             @for lines in kinds {
                 @for line in &lines[..lines.len().min(MOST_LINES)] {
-                    tr { th { (line.word) } td { (line.text) } }
+                    tr { th { (line.word) } td { (with_signs(&line.text)) } }
                 }
                 @if lines.len() > MOST_LINES {
                     tr { th { (lines[0].word) } td { (lines.len() - MOST_LINES) " more (lamp check --report lists them)" } }
@@ -150,6 +153,12 @@ fn findings(found: &Found) -> Markup {
         }
         @if specks > 0 { p.note { (specks) " specks: islands that never hold a square of 3 x 3 pixels." } }
     }
+}
+
+/// Returns a line that a terminal is told with the signs of units that charts have, too.
+fn with_signs(line: &str) -> String {
+    let signs = [(" mm2", " mm²"), (" mm3", " mm³"), (" um", " µm")];
+    signs.iter().fold(line.to_owned(), |line, (letters, sign)| line.replace(letters, sign))
 }
 
 fn figure(picture: &Picture) -> Markup {

@@ -1,6 +1,7 @@
 //! Pictures within a page.
 
 use lamp_stack::{Layer, Mask};
+use serde::{Deserialize, Serialize};
 
 use crate::commands::check::{Shown, draw};
 use crate::picture::{self, PictureScale, Region};
@@ -9,13 +10,14 @@ use crate::picture::{self, PictureScale, Region};
 const SIDE: u32 = 260;
 
 /// A PNG as the address of an image, and its caption.
-pub(super) struct Picture {
-    pub(super) address: String,
-    pub(super) caption: String,
+#[derive(Debug, Serialize, Deserialize)]
+pub(in crate::commands) struct Picture {
+    pub(in crate::commands) address: String,
+    pub(in crate::commands) caption: String,
 }
 
 /// Draws a layer. An image without pixels has none.
-pub(super) fn of_layer(layer: &Layer) -> Picture {
+pub(in crate::commands) fn of_layer(layer: &Layer) -> Picture {
     let region = Region::of(&layer.image);
     let mut png = Vec::new();
     if !region.columns.is_empty() && !region.rows.is_empty() {

@@ -12,7 +12,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{Edits, edit};
-use lamp_stack::{Layer, Length, Page, PageInfo, StackInfo};
+use lamp_stack::{Length, Page, PageInfo, StackInfo};
 use lamp_supports::{
     CheckError, CheckOptions, Findings, IslandPlan, Support, SupportError, SupportOptions, Surface,
     plan_supports,
@@ -28,6 +28,7 @@ use crate::part_arg::{PartArg, paths};
 use crate::part_options::name_of_all;
 use crate::progress::Progress;
 use crate::stack_part::RecordedSlicing;
+use crate::stages::Layers;
 use crate::streams::{
     check_beside, check_not_input, failed_at, input_name, is_stream, layers_of, progress,
     write_file, write_layers,
@@ -47,7 +48,7 @@ const CHOICE: &str = "Choice of supports";
 /// that meets the part where it is smooth, even and away from creases, and that can be built. What
 /// has no such way is left, and told. The plan is a list of edits: delete or exchange supports in
 /// it, and let lamp edit draw it.
-#[derive(Args)]
+#[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
   lamp support blade.tif --part blade.stl -o supported.tif
@@ -59,12 +60,12 @@ Exit status: 0 if the work is done; 3 with --strict if islands are left.")]
 pub(crate) struct SupportArgs {
     /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
-    stack: PathBuf,
+    pub(crate) stack: PathBuf,
 
     /// The part that the stack was sliced from; repeat it for several parts, as they were given to
     /// slice
     #[arg(long, value_name = "PART", required = true, value_parser = PartArg::parser())]
-    part: Vec<PartArg>,
+    pub(crate) part: Vec<PartArg>,
 
     /// Write the supports as a list of edits, with alternatives, for people to change
     #[arg(long, value_name = "FILE.toml")]
@@ -133,7 +134,7 @@ pub(crate) struct SupportArgs {
 
     /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
     #[arg(long, value_name = "M", default_value = "alpha")]
-    machine: PathBuf,
+    pub(crate) machine: PathBuf,
 
     #[command(flatten)]
     output: Output,
@@ -141,37 +142,58 @@ pub(crate) struct SupportArgs {
 
 pub(crate) fn run(args: &SupportArgs, common: &Common) -> Result<(), Exit> {
     args.check_files()?;
-    let machine: Machine = entry(&args.machine)?;
     let progress = progress("support", common, &args.output);
     let mut stack = KeptStack::new(&args.stack);
-    let first = first_page(&mut stack)?;
-    let name = input_name(&args.stack);
-    let surface = args.surface(&first, &name)?;
-    let found = args.check(&mut stack, &progress)?;
-    let layers = layers_of(stack.pages(true)?, &args.stack, None);
-    let plans = plan_supports(layers, &found, &surface, &args.options());
-    let plans = plans.map_err(|error| match error.cause::<SupportError>() {
-        Some(_) => error.at(name),
-        None => error,
-    })?;
-    let part = first.stack.map(|stack| stack.part).unwrap_or_default();
-    let plan = plan_text(&part, &plans, &found);
-    args.write_beside(&plan, &plans)?;
-    let report = SupportReport::new(&plans, &found, machine.recoating.as_ref());
-    if let Some(path) = &args.report {
-        report.write(&part, path)?;
-    }
-    report.tell(&progress);
-    if let Some(left) = report.text_of_left() {
-        if args.strict {
-            return Err(Exit::Findings(left));
-        }
-        progress.warn(&left);
-    }
-    draw(&mut stack, &plan, &plans, args, &progress)
+    let layers = args.layers(&mut stack, &progress)?;
+    write_layers(layers, &args.output, &progress)
 }
 
 impl SupportArgs {
+    /// Plans supports, writes what stands beside the stack, and returns the layers with supports,
+    /// as `lamp edit` draws their plan.
+    pub(crate) fn layers(
+        &self,
+        stack: &mut KeptStack,
+        progress: &Progress,
+    ) -> Result<Layers<'static>, Exit> {
+        let machine: Machine = entry(&self.machine)?;
+        let first = first_page(stack)?;
+        let name = input_name(&self.stack);
+        let surface = self.surface(&first, &name)?;
+        let found = self.check(stack, progress)?;
+        let layers = layers_of(stack.pages(true)?, &self.stack, None);
+        let plans = plan_supports(layers, &found, &surface, &self.options());
+        let plans = plans.map_err(|error| match error.cause::<SupportError>() {
+            Some(_) => error.at(name),
+            None => error,
+        })?;
+        let part = first.stack.map(|stack| stack.part).unwrap_or_default();
+        let plan = plan_text(&part, &plans, &found);
+        self.write_beside(&plan, &plans)?;
+        let report = SupportReport::new(&plans, &found, machine.recoating.as_ref());
+        if let Some(path) = &self.report {
+            report.write(&part, path)?;
+        }
+        report.tell(progress);
+        if let Some(left) = report.text_of_left() {
+            if self.strict {
+                return Err(Exit::Findings(left));
+            }
+            progress.warn(&left);
+        }
+        let layers = layers_of(stack.pages(true)?, &self.stack, None);
+        Ok(match supports(&plans).next() {
+            None => Box::new(layers),
+            Some(_) => Box::new(edit(layers, Edits::from_toml(&plan)?, vec![], vec![], |_, _| {})),
+        })
+    }
+
+    /// Returns the options that matter to bytes as one text. The machine only tells of forces.
+    pub(crate) fn canonical(&self) -> String {
+        let Self { threshold, speck, .. } = self;
+        format!("support {:?} --speck {speck} --threshold {threshold}", self.options())
+    }
+
     fn check_files(&self) -> Result<(), Exit> {
         let inputs = || paths(&self.part).chain([&self.stack]);
         if inputs().filter(|path| is_stream(path)).count() > 1 {
@@ -270,22 +292,6 @@ fn moved(first: &PageInfo) -> Option<&'static str> {
     let turns = |edit: &Value| ["rotate", "mirror"].iter().any(|key| edit.get(key).is_some());
     let mut turned = edits.filter(turns);
     turned.next().map(|_| "was turned by lamp edit")
-}
-
-/// Writes the stack with the supports, as `lamp edit` draws their plan.
-fn draw(
-    stack: &mut KeptStack,
-    plan: &str,
-    plans: &[IslandPlan],
-    args: &SupportArgs,
-    progress: &Progress,
-) -> Result<(), Exit> {
-    let layers = layers_of(stack.pages(true)?, &args.stack, None);
-    let layers: Box<dyn Iterator<Item = Result<Layer, Exit>>> = match supports(plans).next() {
-        None => Box::new(layers),
-        Some(_) => Box::new(edit(layers, Edits::from_toml(plan)?, vec![], vec![], |_, _| {})),
-    };
-    write_layers(layers, &args.output, progress)
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages};
 const HEADING: &str = "Mesh around the parts";
 
 /// Options of the mesh.
-#[derive(Args)]
+#[derive(Args, Clone, Debug)]
 pub(super) struct MeshArgs {
     /// Mesh around the parts, which keeps the suspension from sloshing: hexagon, square, an image
     /// that is repeated, or none
@@ -65,6 +65,11 @@ impl MeshArgs {
     pub(super) fn file(&self) -> Option<&PathBuf> {
         let is_shape = self.mesh.to_str().is_some_and(|name| name.parse::<CellShape>().is_ok());
         (!is_shape && self.mesh != Path::new("none")).then_some(&self.mesh)
+    }
+
+    /// Returns the place of the file of the mesh's pattern, if any.
+    pub(super) fn file_mut(&mut self) -> Option<&mut PathBuf> {
+        self.file().is_some().then_some(&mut self.mesh)
     }
 
     /// Checks that no option is without effect.

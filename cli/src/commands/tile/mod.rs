@@ -7,6 +7,7 @@ mod strips;
 use std::cell::RefCell;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
@@ -17,12 +18,13 @@ use lamp_postprocess::{
 };
 use lamp_stack::{Layer, Length, Size};
 
-use crate::catalogue::{entry, read_text};
+use crate::catalogue::{canonical_word, entry, is_file, read_text};
 use crate::exit::Exit;
 use crate::json_report::parse_report;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers, ranges};
 use crate::plots;
 use crate::progress::Progress;
+use crate::stages::Layers;
 use crate::streams::{check_beside, check_not_input, progress, unless_found, write_file};
 
 use mesh::MeshArgs;
@@ -38,7 +40,7 @@ use strips::StripArgs;
 /// A mesh fills the rest of the area. A moat along each part's outline stays free, and break lines
 /// cut through the mesh; the first layers are mesh alone. The default dimensions of the mesh are
 /// LAMP's own. --mesh none leaves the area black.
-#[derive(Args)]
+#[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
   slice blade.stl | fix | dither | tile > build.tif
@@ -138,6 +140,10 @@ pub(crate) struct TileArgs {
     #[arg(long)]
     classic: bool,
 
+    /// Write gray pages as PackBits, for readers without Deflate: several times the size
+    #[arg(long)]
+    packbits: bool,
+
     /// Replace folders that an earlier run wrote, once the new ones are complete
     #[arg(long)]
     force: bool,
@@ -145,65 +151,131 @@ pub(crate) struct TileArgs {
 
 pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     args.check()?;
-    let mesh = args.mesh.options()?;
     let output = args.output();
     let progress = match &output {
         Some(output) => progress("tile", common, output),
         None => Progress::new("tile", common, true),
     };
-    let machine: Option<Machine> = args.machine.as_deref().map(entry).transpose()?;
-    if let Some((machine, area)) = machine.as_ref().zip(args.area) {
-        machine.check_area(area).map_err(Exit::wrong_options)?;
-    }
+    let machine = args.machine()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
-    let file = args.layout.as_deref().map(read_layout).transpose()?;
-    let mut stacks = InputStack::open_all(&args.stacks, &args.layers, machine.as_ref())?;
-    let needs_outlines = args.fit || args.pack == PackBy::Outlines || args.mesh.needs_outlines();
-    let parts: Vec<PartStack> =
-        stacks.iter_mut().map(|stack| stack.part(needs_outlines)).collect::<Result<_, _>>()?;
-    let plain = TileOptions::default();
-    let machine_area = machine.as_ref().map(|machine| machine.area.value);
-    let file_area = file.as_ref().and_then(LayoutFile::area);
-    let area = args.area.or(machine_area).or(file_area).unwrap_or(plain.area);
-    let layout = match &file {
-        Some(file) => place(file, parts, area, args.layout.as_deref())?,
-        None => Layout::packed(
-            parts,
-            &args.counts(),
-            area,
-            args.gap.or(mesh.as_ref().map(MeshOptions::gap)).unwrap_or(plain.gap),
-            args.packing(),
-        )?,
-    };
-    let placed = layout.clone();
-    let layout = match &mesh {
-        Some(mesh) => layout.with_mesh(mesh)?,
-        None => layout,
-    };
-    let base_layers = mesh.map_or(0, |mesh| mesh.base_layers);
-    stacks
-        .iter()
-        .filter_map(InputStack::layer_count)
-        .max()
-        .inspect(|&layers| progress.expect(u64::from(layers) + u64::from(base_layers)));
-    let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
-    let heights = HeightOptions { settle: args.settle, resample: args.resample };
-    let stray_rows = RefCell::new(StrayTotals::default());
-    let build = layout.build(layers, heights, |stray| {
-        stray_rows.borrow_mut().add(stray);
-        progress.detail(&describe_stray(stray));
-    });
-    let stray_text = || stray_rows.borrow().text();
-    let finding = || stray_text().filter(|_| args.strict).map(Exit::Findings);
-    let build = within_height(build, machine);
-    strips::write(unless_found(build, finding), strips, output.as_ref(), &progress)?;
-    if let Some(text) = stray_text() {
+    let Build { layers, layout, stray_rows } = args.build(machine, &progress)?;
+    let finding = || stray_rows.borrow().text().filter(|_| args.strict).map(Exit::Findings);
+    strips::write(unless_found(layers, finding), strips, output.as_ref(), &progress)?;
+    if let Some(text) = stray_rows.borrow().text() {
         progress.warn(&text);
     }
-    args.tell(&placed)
+    args.tell(&layout)
+}
+
+/// A build that is being made.
+pub(crate) struct Build {
+    pub(crate) layers: Layers<'static>,
+    layout: Layout,
+    pub(crate) stray_rows: Rc<RefCell<StrayTotals>>,
 }
 
 impl TileArgs {
+    /// Returns the files that options name, without the stacks, to be changed.
+    pub(crate) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let machine = self.machine.iter_mut().filter(|path| is_file::<Machine>(path));
+        machine.chain(&mut self.layout).chain(self.mesh.file_mut())
+    }
+
+    /// Returns the options as one text, the same for all that mean the same; files without their
+    /// folders, and no stacks.
+    pub(crate) fn canonical(&self) -> String {
+        let mut options = Self { stacks: Vec::new(), ..self.clone() };
+        if let Some(machine) = &mut options.machine {
+            *machine = canonical_word::<Machine>(machine).into();
+        }
+        for file in options.files_mut() {
+            *file = file.file_name().unwrap_or_default().into();
+        }
+        format!("{options:?}")
+    }
+
+    /// Checks, before there are stacks, what can be checked of the number of copies of each.
+    pub(crate) fn check_for(&self, copies: &[Option<u32>]) -> Result<(), Exit> {
+        self.machine()?;
+        self.of(copies.iter().map(|&copies| (PathBuf::from("stack"), copies))).check()
+    }
+
+    fn of(&self, stacks: impl Iterator<Item = (PathBuf, Option<u32>)>) -> Self {
+        let stacks = stacks.map(|(path, copies)| StackArg { path, copies }).collect();
+        Self { stacks, ..self.clone() }
+    }
+
+    /// Returns the build of other stacks, with the number of copies of each.
+    pub(crate) fn build_of(
+        &self,
+        stacks: &[(PathBuf, Option<u32>)],
+        progress: &Progress,
+    ) -> Result<Build, Exit> {
+        self.of(stacks.iter().cloned()).build(self.machine()?, progress)
+    }
+
+    /// Reads the machine, if one is given.
+    fn machine(&self) -> Result<Option<Machine>, Exit> {
+        let machine: Option<Machine> = self.machine.as_deref().map(entry).transpose()?;
+        if let Some((machine, area)) = machine.as_ref().zip(self.area) {
+            machine.check_area(area).map_err(Exit::wrong_options)?;
+        }
+        Ok(machine)
+    }
+
+    /// Lays the copies out, and returns the layers of the build.
+    fn build(&self, machine: Option<Machine>, progress: &Progress) -> Result<Build, Exit> {
+        let mesh = self.mesh.options()?;
+        let file = self.layout.as_deref().map(read_layout).transpose()?;
+        let mut stacks = InputStack::open_all(&self.stacks, &self.layers, machine.as_ref())?;
+        let outlines = self.fit || self.pack == PackBy::Outlines || self.mesh.needs_outlines();
+        let parts = stacks.iter_mut().map(|stack| stack.part(outlines));
+        let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
+        let placed = self.placed(parts, file.as_ref(), machine.as_ref(), mesh.as_ref())?;
+        let layout = placed.clone();
+        let layout = match &mesh {
+            Some(mesh) => layout.with_mesh(mesh)?,
+            None => layout,
+        };
+        let base_layers = mesh.map_or(0, |mesh| mesh.base_layers);
+        stacks
+            .iter()
+            .filter_map(InputStack::layer_count)
+            .max()
+            .inspect(|&layers| progress.expect(u64::from(layers) + u64::from(base_layers)));
+        let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
+        let heights = HeightOptions { settle: self.settle, resample: self.resample };
+        let stray_rows = Rc::new(RefCell::new(StrayTotals::default()));
+        let (found, progress) = (Rc::clone(&stray_rows), progress.clone());
+        let build = layout.build(layers, heights, move |stray| {
+            found.borrow_mut().add(stray);
+            progress.detail(&describe_stray(stray));
+        });
+        let layers = Box::new(within_height(build, machine));
+        Ok(Build { layers, layout: placed, stray_rows })
+    }
+
+    /// Places the copies.
+    fn placed(
+        &self,
+        parts: Vec<PartStack>,
+        file: Option<&LayoutFile>,
+        machine: Option<&Machine>,
+        mesh: Option<&MeshOptions>,
+    ) -> Result<Layout, Exit> {
+        let plain = TileOptions::default();
+        let machine_area = machine.map(|machine| machine.area.value);
+        let file_area = file.and_then(LayoutFile::area);
+        let area = self.area.or(machine_area).or(file_area).unwrap_or(plain.area);
+        match file {
+            Some(file) => place(file, parts, area, self.layout.as_deref()),
+            None => {
+                let gap = self.gap.or(mesh.map(MeshOptions::gap)).unwrap_or(plain.gap);
+                Ok(Layout::packed(parts, &self.counts(), area, gap, self.packing())?)
+            }
+        }
+    }
+
     /// Checks, before the work, what can be checked.
     fn check(&self) -> Result<(), Exit> {
         let counted = self.stacks.iter().any(|stack| stack.copies.is_some());
@@ -241,7 +313,7 @@ impl TileArgs {
     fn output(&self) -> Option<Output> {
         let unless_strips = || self.strips.folder().is_none().then(|| PathBuf::from("-"));
         let output = self.output.clone().or_else(unless_strips)?;
-        Some(Output { output, classic: self.classic, force: self.force })
+        Some(Output { output, classic: self.classic, packbits: self.packbits, force: self.force })
     }
 
     fn counts(&self) -> Vec<Option<u32>> {
@@ -309,7 +381,7 @@ fn within_height(
 
 /// The stray rows that the parts' pages list.
 #[derive(Default)]
-struct StrayTotals {
+pub(crate) struct StrayTotals {
     rows: usize,
     layers: usize,
     /// The part and the layer of the first.
@@ -324,7 +396,7 @@ impl StrayTotals {
     }
 
     /// `blade.tif: 14 stray rows in 3 layers, the first in layer 12 (z 1.20 mm): ...`.
-    fn text(&self) -> Option<String> {
+    pub(crate) fn text(&self) -> Option<String> {
         let (part, layer) = self.first.as_ref()?;
         let counted = |count, one: &str, more| match count {
             1 => format!("1 {one}"),

@@ -15,7 +15,7 @@ use crate::streams::{format, new_folder, write_layers};
 const HEADING: &str = "Strips of a projector that scans";
 
 /// Options of the strips.
-#[derive(Args)]
+#[derive(Args, Clone, Debug)]
 pub(super) struct StripArgs {
     /// Cut each layer into the swaths that a scanning projector exposes: writes one stack per swath
     /// and an index, strips.json, into this new folder. lamp join puts the build together again

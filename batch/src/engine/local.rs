@@ -1,0 +1,101 @@
+//! Tasks as child processes: one that crashes costs itself alone.
+
+use std::collections::HashMap;
+use std::process::Command;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use super::process::start;
+use super::{Attempt, EngineError, Work};
+use crate::key::Key;
+use crate::ledger::{End, Ledger};
+
+/// Child processes on this machine.
+#[derive(Clone, Debug)]
+pub struct Local {
+    /// How many threads work at once, in all processes together.
+    pub jobs: usize,
+    /// The bytes of memory that tasks may take together, by their estimates. A task that takes more
+    /// runs alone.
+    pub memory: u64,
+}
+
+/// What a running task takes.
+#[derive(Clone, Copy)]
+struct Share {
+    threads: usize,
+    memory: u64,
+}
+
+impl Local {
+    pub(super) fn run(
+        &self,
+        work: &Work<'_>,
+        ledger: &mut Ledger<'_>,
+        tell: &mut dyn FnMut(&Attempt),
+    ) -> Result<(), EngineError> {
+        let (sender, ends): (Sender<(Key, End)>, Receiver<_>) = channel();
+        let mut running: HashMap<Key, Share> = HashMap::new();
+        loop {
+            let ready = ledger.ready();
+            for (at, &key) in ready.iter().enumerate() {
+                let memory = work.graph.task(key).cost.memory;
+                let Some(threads) = self.threads(&running, memory, ready.len() - at) else {
+                    break;
+                };
+                if let Err(error) = work.store.write_task(work.graph.task(key)) {
+                    let Some(why) = error.no_room() else { return Err(error.into()) };
+                    let end = End::NoRoom(why);
+                    let again = ledger.end(key, end.clone());
+                    tell(&Attempt { key, end, again });
+                    break;
+                }
+                let mut command = Command::new(&work.launcher.program);
+                command.args(work.launcher.words(key, work.store, "local", threads));
+                command.args(["--parent", &std::process::id().to_string()]);
+                start(command, key, sender.clone()).map_err(EngineError::Start)?;
+                ledger.start(key);
+                running.insert(key, Share { threads, memory });
+            }
+            if running.is_empty() {
+                return Ok(());
+            }
+            let (key, end) = ends.recv().expect("the sender is here, too");
+            running.remove(&key);
+            let again = ledger.end(key, end.clone());
+            tell(&Attempt { key, end, again });
+        }
+    }
+
+    /// Returns how many threads the next task gets, if there is room for it: its share of those
+    /// that are free, given how many tasks are ready.
+    fn threads(&self, running: &HashMap<Key, Share>, memory: u64, ready: usize) -> Option<usize> {
+        let taken: usize = running.values().map(|share| share.threads).sum();
+        let held: u64 = running.values().map(|share| share.memory).sum();
+        let free = self.jobs.saturating_sub(taken);
+        let fits = running.is_empty() || held.saturating_add(memory) <= self.memory;
+        (free > 0 && fits).then(|| (free / ready).max(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::key::Kind;
+    use crate::task::tests::task;
+
+    #[test]
+    fn threads_are_shared_among_what_is_ready() {
+        let local = Local { jobs: 8, memory: 100 };
+        let keys: Vec<Key> =
+            (0..8).map(|k| task(&k.to_string(), Kind::Range, &[]).recipe.key()).collect();
+        let mut running = HashMap::new();
+        assert_eq!(local.threads(&running, 1000, 1), Some(8), "a large task runs alone");
+        assert_eq!(local.threads(&running, 10, 3), Some(2));
+        assert_eq!(local.threads(&running, 10, 100), Some(1));
+        running.insert(keys[0], Share { threads: 7, memory: 60 });
+        assert_eq!(local.threads(&running, 40, 1), Some(1));
+        assert_eq!(local.threads(&running, 41, 1), None);
+        running.insert(keys[1], Share { threads: 1, memory: 0 });
+        assert_eq!(local.threads(&running, 0, 1), None);
+    }
+}

@@ -1,0 +1,144 @@
+//! Processes of tasks.
+
+use std::collections::BTreeSet;
+use std::io::{self, Read};
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::Sender;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::key::Key;
+use crate::ledger::End;
+use crate::store::Store;
+
+/// How a task's process is started: `lamp batch task KEY --store STORE`.
+#[derive(Clone, Debug)]
+pub struct Launcher {
+    /// The program.
+    pub program: PathBuf,
+}
+
+impl Launcher {
+    /// Returns the words of the command, after the program.
+    pub fn words(&self, key: Key, store: &Store, engine: &str, threads: usize) -> Vec<String> {
+        let store = store.root().display().to_string();
+        let words = ["batch", "task", &key.to_string(), "--store", &store, "--engine", engine];
+        let threads = ["--threads".to_owned(), threads.to_string()];
+        words.into_iter().map(str::to_owned).chain(threads).collect()
+    }
+}
+
+/// The children of this process that run now, and whether they are being ended.
+struct Running {
+    children: BTreeSet<u32>,
+    is_ending: bool,
+}
+
+static RUNNING: Mutex<Running> =
+    Mutex::new(Running { children: BTreeSet::new(), is_ending: false });
+
+fn running() -> MutexGuard<'static, Running> {
+    // The set is valid even if a thread panicked while it held the lock.
+    RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends the children of this process, which take their temporary files away, and waits for them,
+/// at most 10 s. From then on none is started, and none is told to have ended. Call it before
+/// exiting on a signal.
+pub fn end_children() {
+    let patience = Instant::now() + Duration::from_secs(10);
+    running().is_ending = true;
+    ask_to_end();
+    while !running().children.is_empty() && Instant::now() < patience {
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn ask_to_end() {
+    use rustix::process::{Pid, Signal, kill_process};
+    for pid in running().children.iter().filter_map(|&pid| Pid::from_raw(pid as i32)) {
+        // One that has ended by itself is as good.
+        let _ = kill_process(pid, Signal::TERM);
+    }
+}
+
+/// Children share the terminal, so that Ctrl-C reaches them, too.
+#[cfg(not(target_os = "linux"))]
+fn ask_to_end() {}
+
+/// Starts a process and sends how it ends, with the words that it left.
+pub(super) fn start(mut command: Command, key: Key, ends: Sender<(Key, End)>) -> io::Result<()> {
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut now = running();
+    if now.is_ending {
+        return Err(io::Error::new(io::ErrorKind::Interrupted, "a signal ends the night"));
+    }
+    let child = command.spawn()?;
+    now.children.insert(child.id());
+    drop(now);
+    let wait = move || {
+        let end = wait_for(child);
+        if !running().is_ending {
+            // The run has ended if nobody listens.
+            let _ = ends.send((key, end));
+        }
+    };
+    thread::Builder::new().spawn(wait)?;
+    Ok(())
+}
+
+/// The most bytes of last words that are kept.
+const MOST_WORDS: usize = 4096;
+
+fn wait_for(mut child: Child) -> End {
+    let id = child.id();
+    let mut words = Vec::new();
+    if let Some(mut stderr) = child.stderr.take() {
+        let mut some = [0; MOST_WORDS];
+        while let Ok(count @ 1..) = stderr.read(&mut some) {
+            words.extend_from_slice(&some[..count]);
+            words.drain(..words.len().saturating_sub(MOST_WORDS));
+        }
+    }
+    let status = child.wait();
+    running().children.remove(&id);
+    let words = String::from_utf8_lossy(&words).trim().to_owned();
+    match status {
+        Ok(status) => End::of_status(status.code(), why(status, &words)),
+        Err(error) => End::Failed(error.to_string()),
+    }
+}
+
+/// Returns the last words of a process: its last line, or what ended it.
+fn why(status: ExitStatus, words: &str) -> String {
+    let last = words.lines().last().unwrap_or_default();
+    let last = last.trim_start_matches("lamp: ").trim_start_matches("batch: ").to_owned();
+    match signal(status) {
+        Some(signal) if last.is_empty() => {
+            format!("its process was ended by signal {signal}{}", guess(signal))
+        }
+        Some(signal) => {
+            format!("its process was ended by signal {signal}{}: {last}", guess(signal))
+        }
+        None if last.is_empty() => format!("its process ended with {status}"),
+        None => last,
+    }
+}
+
+/// Returns what a signal mostly means.
+fn guess(signal: i32) -> &'static str {
+    if signal == 9 { ", as the system does when memory runs out" } else { "" }
+}
+
+#[cfg(unix)]
+fn signal(status: ExitStatus) -> Option<i32> {
+    std::os::unix::process::ExitStatusExt::signal(&status)
+}
+
+#[cfg(not(unix))]
+fn signal(_: ExitStatus) -> Option<i32> {
+    None
+}

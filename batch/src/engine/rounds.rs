@@ -1,0 +1,304 @@
+//! Tasks by a scheduler of several machines, handed over in rounds.
+//!
+//! A round is all that is still to be done, with what needs what. Schedulers lose some of their own
+//! books when they are killed, so how a task ended is read from the store alone: its manifest, or
+//! its line in the journal. What a round leaves undone goes into the next one.
+
+use std::collections::HashMap;
+use std::io;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use thiserror::Error;
+
+use super::{Attempt, EngineError, Work};
+use crate::journal::{Event, events};
+use crate::key::{Key, Kind};
+use crate::ledger::{End, Ledger, State};
+use crate::store::Store;
+use crate::task::Cost;
+
+/// The shortest and the longest time between two looks at a round.
+const LOOKS: [Duration; 2] = [Duration::from_millis(200), Duration::from_secs(5)];
+/// How long a scheduler may be silent: time enough to start it again.
+const SILENCE: Duration = Duration::from_secs(30 * 60);
+/// How long a result may take to be seen from another machine.
+const LATE: Duration = Duration::from_secs(2);
+
+/// A task of a round.
+#[derive(Clone, Debug)]
+pub(super) struct RoundTask {
+    pub(super) key: Key,
+    pub(super) kind: Kind,
+    /// The part or build that it is for.
+    pub(super) subject: String,
+    /// The tasks of the round that it needs, by their places in it.
+    pub(super) needs: Vec<usize>,
+    pub(super) cost: Cost,
+    /// The program and its words.
+    pub(super) command: Vec<String>,
+}
+
+/// Hands tasks to machines.
+pub(super) trait Scheduler {
+    /// What a round is known by.
+    type Job;
+
+    /// The engine's name.
+    const NAME: &'static str;
+
+    /// Hands a round over. Each task stands after those that it needs.
+    fn submit(&self, round: &[RoundTask], store: &Store) -> Result<Self::Job, SchedulerError>;
+
+    /// Returns whether tasks of a round wait or run.
+    fn is_at_work(&self, job: &Self::Job) -> Result<bool, SchedulerError>;
+
+    /// Takes back what has not been done.
+    fn cancel(&self, job: &Self::Job) -> Result<(), SchedulerError>;
+}
+
+/// Why a scheduler does not do its work.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SchedulerError {
+    /// A program of the scheduler is not there.
+    #[error("{program} cannot be started: install the scheduler, or put its programs on the PATH")]
+    Start {
+        /// The program.
+        program: &'static str,
+        /// Why.
+        source: io::Error,
+    },
+    /// The job file cannot be written.
+    #[error("the job file cannot be written to the folder for temporary files")]
+    JobFile {
+        /// Why.
+        source: io::Error,
+    },
+    /// A program of the scheduler failed.
+    #[error("{program} failed: {why}")]
+    Failed {
+        /// The program.
+        program: &'static str,
+        /// Its last words.
+        why: String,
+    },
+    /// A program of the scheduler gave an answer of another form.
+    #[error("{program} gave an answer that is not understood: {answer}")]
+    Answer {
+        /// The program.
+        program: &'static str,
+        /// How the answer begins.
+        answer: String,
+    },
+}
+
+/// Does all tasks of a ledger, round by round.
+pub(super) fn run<S: Scheduler>(
+    scheduler: &S,
+    work: &Work<'_>,
+    ledger: &mut Ledger<'_>,
+    tell: &mut dyn FnMut(&Attempt),
+) -> Result<(), EngineError> {
+    while !ledger.ready().is_empty() {
+        let round = round::<S>(work, ledger)?;
+        let before = failures(work.store)?;
+        let job = scheduler.submit(&round, work.store)?;
+        let pending = round.iter().map(|task| task.key).collect();
+        Following { work, ledger, tell, pending, before }.follow(scheduler, &job)?;
+    }
+    Ok(())
+}
+
+/// Returns all tasks that wait, written where processes find them.
+fn round<S: Scheduler>(
+    work: &Work<'_>,
+    ledger: &Ledger<'_>,
+) -> Result<Vec<RoundTask>, EngineError> {
+    let mut keys = ledger.keys();
+    keys.retain(|&key| ledger.state(key) == State::Waiting);
+    let places: HashMap<Key, usize> = keys.iter().copied().zip(0..).collect();
+    let program = work.launcher.program.display().to_string();
+    let task = |&key: &Key| {
+        let task = work.graph.task(key);
+        work.store.write_task(task)?;
+        let words = work.launcher.words(key, work.store, S::NAME, 1);
+        Ok(RoundTask {
+            key,
+            kind: task.recipe.kind,
+            subject: task.subject.clone(),
+            needs: task.needs.iter().filter_map(|need| places.get(need).copied()).collect(),
+            cost: task.cost,
+            command: std::iter::once(program.clone()).chain(words).collect(),
+        })
+    };
+    keys.iter().map(task).collect()
+}
+
+/// A round that is being done.
+struct Following<'a, 'b, 'c> {
+    work: &'a Work<'b>,
+    ledger: &'a mut Ledger<'c>,
+    tell: &'a mut dyn FnMut(&Attempt),
+    /// The tasks that have not ended yet.
+    pending: Vec<Key>,
+    /// How often each task had failed before the round.
+    before: HashMap<Key, usize>,
+}
+
+impl Following<'_, '_, '_> {
+    fn follow<S: Scheduler>(&mut self, scheduler: &S, job: &S::Job) -> Result<(), EngineError> {
+        let [mut pause, longest] = LOOKS;
+        let mut answered = Instant::now();
+        loop {
+            thread::sleep(pause);
+            pause = (pause * 3 / 2).min(longest);
+            // It is asked first: what it has ended by now is seen below.
+            let is_at_work = match scheduler.is_at_work(job) {
+                Ok(is_at_work) => {
+                    answered = Instant::now();
+                    is_at_work
+                }
+                Err(error) if answered.elapsed() > SILENCE => return Err(error.into()),
+                Err(_) => true,
+            };
+            let ended = self.look()?;
+            if ended > 0 {
+                pause = LOOKS[0];
+            }
+            if self.ledger.no_room().is_some() {
+                return Ok(scheduler.cancel(job)?);
+            }
+            if self.pending.is_empty() && !is_at_work {
+                return Ok(());
+            }
+            if !is_at_work {
+                thread::sleep(LATE);
+                self.look()?;
+                self.give_up();
+                return Ok(());
+            }
+        }
+    }
+
+    /// Takes note of what has ended. Returns of how many tasks.
+    fn look(&mut self) -> Result<usize, EngineError> {
+        let store = self.work.store;
+        let (done, pending): (Vec<Key>, Vec<Key>) =
+            self.pending.drain(..).partition(|&key| store.manifest(key).is_some());
+        self.pending = pending;
+        for &key in &done {
+            self.end(key, End::Done);
+        }
+        let mut count = done.len();
+        let failed = failed(store)?;
+        let mut times: HashMap<Key, usize> = HashMap::new();
+        for event in failed {
+            let time = times.entry(event.key).or_default();
+            *time += 1;
+            if *time <= self.before.get(&event.key).copied().unwrap_or(0) {
+                continue;
+            }
+            if let Some(place) = self.pending.iter().position(|&key| key == event.key) {
+                self.pending.remove(place);
+                self.end(event.key, End::of_status(event.status, event.why.unwrap_or_default()));
+                count += 1;
+            }
+        }
+        // What needs something that failed for good is not waited for.
+        self.pending.retain(|&key| self.ledger.state(key) == State::Waiting);
+        Ok(count)
+    }
+
+    /// Takes note of tasks that could have been done, and were not.
+    fn give_up(&mut self) {
+        let ready = self.ledger.ready();
+        for key in std::mem::take(&mut self.pending) {
+            if ready.contains(&key) {
+                let why = "it ended without a word, as tasks do that are killed or run out of \
+                           memory or time";
+                self.end(key, End::Crashed(why.to_owned()));
+            }
+        }
+    }
+
+    fn end(&mut self, key: Key, end: End) {
+        let again = self.ledger.end(key, end.clone());
+        (self.tell)(&Attempt { key, end, again });
+    }
+}
+
+/// Returns the events of tasks that failed.
+fn failed(store: &Store) -> Result<Vec<Event>, EngineError> {
+    let mut all = events(store).map_err(EngineError::Journal)?;
+    all.retain(|event| !event.is_done());
+    Ok(all)
+}
+
+/// Returns how often each task has failed.
+fn failures(store: &Store) -> Result<HashMap<Key, usize>, EngineError> {
+    let mut counts = HashMap::new();
+    for event in failed(store)? {
+        *counts.entry(event.key).or_default() += 1;
+    }
+    Ok(counts)
+}
+
+/// Runs a program of a scheduler and returns what it prints.
+pub(super) fn answer_of(
+    program: &'static str,
+    arguments: &[&str],
+    input: Option<&str>,
+) -> Result<String, SchedulerError> {
+    let start = |source| SchedulerError::Start { program, source };
+    let stdin = if input.is_some() { Stdio::piped() } else { Stdio::null() };
+    let mut child = Command::new(program)
+        .args(arguments)
+        .stdin(stdin)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(start)?;
+    if let (Some(input), Some(mut stdin)) = (input, child.stdin.take()) {
+        // A program that does not read to the end says why below.
+        let _ = io::Write::write_all(&mut stdin, input.as_bytes());
+    }
+    let output = child.wait_with_output().map_err(start)?;
+    if !output.status.success() {
+        let text = [output.stderr, output.stdout].concat();
+        let text = String::from_utf8_lossy(&text);
+        let why = text.lines().map(str::trim).find(|line| !line.is_empty());
+        let why = why.map_or_else(|| output.status.to_string(), str::to_owned);
+        return Err(SchedulerError::Failed { program, why });
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// Returns an error that shows how an answer begins.
+pub(super) fn not_understood(program: &'static str, answer: &str) -> SchedulerError {
+    SchedulerError::Answer { program, answer: answer.trim().chars().take(80).collect() }
+}
+
+#[cfg(test)]
+pub(super) mod testing {
+    use super::*;
+    use crate::task::tests::task;
+
+    /// Two ranges, what joins them, and what checks that.
+    pub(in crate::engine) fn round() -> Vec<RoundTask> {
+        let kinds = [Kind::Range, Kind::Range, Kind::Join, Kind::Check];
+        let needs = [vec![], vec![], vec![0, 1], vec![2]];
+        let entry = |(place, (kind, needs)): (usize, (Kind, Vec<usize>))| RoundTask {
+            key: task(&place.to_string(), kind, &[]).recipe.key(),
+            kind,
+            subject: "blade's".to_owned(),
+            needs,
+            cost: Cost { cpu_s: 90.0, memory: 300_000_000, disk: 5 },
+            command: ["/opt/my lamp", "batch", "task", &place.to_string()]
+                .map(str::to_owned)
+                .to_vec(),
+        };
+        kinds.into_iter().zip(needs).enumerate().map(entry).collect()
+    }
+}

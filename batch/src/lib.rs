@@ -1,0 +1,54 @@
+//! Batches: parts and builds overnight, whatever crashes meanwhile.
+//!
+//! A [`Night`] names parts and builds. Each becomes a few [`Task`]s; a task's [`Key`] is a digest
+//! of all that decides its result. The [`Store`] has results by their keys, each whole or absent,
+//! so the same batch again does only what is missing. An [`Engine`] runs tasks as processes.
+//!
+//! What a stage is, the program that runs tasks knows; this crate does not.
+//!
+//! ```
+//! use std::io::Write;
+//!
+//! use lamp_batch::{Kind, Manifest, Recipe, Store};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! let store = Store::create(&folder.path().join("store"))?;
+//! let recipe = Recipe {
+//!     kind: Kind::Range,
+//!     options: vec!["slice --dpi 1500".to_owned()],
+//!     inputs: vec!["blake3:af13...".to_owned()],
+//!     code: vec![("slice".to_owned(), 1)],
+//! };
+//! let key = recipe.key();
+//! assert!(store.manifest(key).is_none());
+//!
+//! let mut result = store.begin(key)?;
+//! result.file().write_all(b"layers")?;
+//! let written = Some(result.finish()?);
+//! store.publish(&Manifest { recipe, result: written, facts: Default::default() })?;
+//! assert!(store.check(key).is_ok());
+//! # Ok(())
+//! # }
+//! ```
+
+mod engine;
+mod gc;
+mod journal;
+mod key;
+mod ledger;
+mod named;
+mod night;
+mod store;
+mod task;
+
+pub use engine::{
+    Attempt, Engine, EngineError, Launcher, Local, SchedulerError, Work, end_children, status,
+};
+pub use gc::{Removed, collect};
+pub use journal::{Event, Journal, events, host, now};
+pub use key::{Key, KeyError, Kind, Recipe};
+pub use ledger::{End, Ledger, State};
+pub use named::{NamedTask, NamedTasks};
+pub use night::{Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage};
+pub use store::{Damage, Digests, Manifest, Store, StoreError, Unpublished, Written};
+pub use task::{Cost, Graph, InputFile, Task};

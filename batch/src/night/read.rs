@@ -1,0 +1,479 @@
+//! Reads night files, so that every error has its place.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use lamp_stack::one_line;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::{
+    Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, did_you_mean, twice,
+    words,
+};
+
+type Value<'a> = Spanned<DeValue<'a>>;
+type Read<T> = Result<T, NightError>;
+
+/// What a part may say; defaults, too, but for the first two.
+const PART_KEYS: [&str; 5] = ["file", "name", "check", "ranges", "stages"];
+
+const TABLES: [&str; 5] = ["defaults", "part", "build", "store", "output"];
+
+pub(super) fn night(text: &str, path: &Path) -> Read<Night> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let reader = Reader { text, folder };
+    let table = DeTable::parse(text).map_err(|error| {
+        let problem = format!("{}: a night file is TOML", one_line(error.message()));
+        NightError { place: reader.place(error.span().map_or(0, |span| span.start)), problem }
+    })?;
+    reader.night(table.get_ref(), path)
+}
+
+struct Reader<'a> {
+    text: &'a str,
+    folder: &'a Path,
+}
+
+/// What a `[[part]]` says, or `[defaults]`.
+#[derive(Clone, Default)]
+struct PartTable {
+    name: Option<(String, Place)>,
+    stages: Option<Vec<Stage>>,
+    ranges: Option<u32>,
+    check: Option<Stage>,
+    /// Options of single stages, which replace those in `stages`.
+    options: Vec<(String, Stage)>,
+}
+
+/// A part, as far as it has been read.
+struct Draft {
+    file: PathBuf,
+    place: Place,
+    table: PartTable,
+}
+
+/// Parts in the order of the file, and where each file is among them.
+#[derive(Default)]
+struct Drafts {
+    list: Vec<Draft>,
+    places: HashMap<PathBuf, usize>,
+}
+
+impl Drafts {
+    fn add(&mut self, draft: Draft) {
+        self.places.insert(real(&draft.file), self.list.len());
+        self.list.push(draft);
+    }
+}
+
+impl Reader<'_> {
+    fn place(&self, offset: usize) -> Place {
+        let before = self.text.get(..offset).unwrap_or(self.text);
+        let start = before.rfind('\n').map_or(0, |at| at + 1);
+        Place {
+            line: before.matches('\n').count() + 1,
+            column: before[start..].chars().count() + 1,
+        }
+    }
+
+    fn at<T>(&self, spanned: &Spanned<T>, problem: impl Into<String>) -> NightError {
+        NightError { place: self.place(spanned.span().start), problem: problem.into() }
+    }
+
+    fn night(&self, table: &DeTable<'_>, path: &Path) -> Read<Night> {
+        self.check_keys(table, &TABLES, "a night file has no")?;
+        let defaults = match table.get("defaults") {
+            Some(value) => self.part_table(self.table(value)?, &PART_KEYS[2..])?,
+            None => PartTable::default(),
+        };
+        let mut drafts = Drafts::default();
+        for value in self.tables(table, "part")? {
+            self.part(value, &mut drafts)?;
+        }
+        if drafts.list.is_empty() {
+            let place = Place { line: 1, column: 1 };
+            let problem = "there is no part: add [[part]] and below it file = \"parts/*.stl\"";
+            return Err(NightError { place, problem: problem.to_owned() });
+        }
+        let parts = drafts
+            .list
+            .into_iter()
+            .map(|draft| finished(draft, &defaults))
+            .collect::<Read<Vec<_>>>()?;
+        if let Some((before, part)) = twice(&parts, |part| &part.name) {
+            let problem = format!(
+                "two parts are called {}, {} and {}: give one of them a name of its own",
+                part.name,
+                before.file.display(),
+                part.file.display()
+            );
+            return Err(NightError { place: part.place, problem });
+        }
+        let mut builds = Vec::new();
+        for value in self.tables(table, "build")? {
+            builds.push(self.build(value, &parts)?);
+        }
+        if let Some((_, build)) = twice(&builds, |build: &Build| &build.name) {
+            let problem = format!("two builds are called {}: rename one", build.name);
+            return Err(NightError { place: build.tile.place, problem });
+        }
+        let store = match table.get("store") {
+            Some(value) => self.folder_of(self.table(value)?)?,
+            None => None,
+        };
+        let (store, store_place) = store.unzip();
+        Ok(Night {
+            parts,
+            builds,
+            store: store.unwrap_or_else(|| self.folder.join("lamp-store")),
+            store_place,
+            output: self.output(table.get("output"), path)?,
+        })
+    }
+
+    /// Checks that a table has no other keys.
+    fn check_keys(&self, table: &DeTable<'_>, known: &[&str], what: &str) -> Read<()> {
+        for key in table.keys() {
+            let name = key.get_ref().as_ref();
+            if !known.contains(&name) {
+                let meant = match did_you_mean(name, known.iter().copied()) {
+                    meant if meant.is_empty() => format!(": it has {}", known.join(", ")),
+                    meant => meant,
+                };
+                return Err(self.at(key, format!("{what} {}{meant}", one_line(name))));
+            }
+        }
+        Ok(())
+    }
+
+    fn table<'v>(&self, value: &'v Value<'_>) -> Read<&'v DeTable<'v>> {
+        match value.get_ref() {
+            DeValue::Table(table) => Ok(table),
+            _ => Err(self.at(value, "this is a table: write its name in brackets, as [defaults]")),
+        }
+    }
+
+    /// Returns the tables of a list such as `[[part]]`.
+    fn tables<'v>(&self, table: &'v DeTable<'_>, key: &str) -> Read<Vec<&'v Value<'v>>> {
+        match table.get(key) {
+            None => Ok(Vec::new()),
+            Some(value) => match value.get_ref() {
+                DeValue::Array(values) => {
+                    values.iter().map(|value| self.table(value).map(|_| value)).collect()
+                }
+                _ => Err(self.at(value, format!("write [[{key}]], for there may be several"))),
+            },
+        }
+    }
+
+    fn text<'v>(&self, value: &'v Value<'_>) -> Read<&'v str> {
+        match value.get_ref() {
+            DeValue::String(text) if !text.trim().is_empty() => Ok(text.as_ref()),
+            DeValue::String(_) => {
+                Err(self.at(value, "this is empty: write a text, or leave the key out"))
+            }
+            _ => Err(self.at(value, "this is no text: write it in quotes")),
+        }
+    }
+
+    fn list<'v>(&self, value: &'v Value<'_>) -> Read<Vec<&'v Value<'v>>> {
+        match value.get_ref() {
+            DeValue::Array(values) => Ok(values.iter().collect()),
+            DeValue::String(_) => Ok(vec![value]),
+            _ => Err(self.at(value, "this is no list of texts: write [\"a\", \"b\"]")),
+        }
+    }
+
+    /// Reads the words of a command.
+    fn command(&self, value: &Value<'_>, before: &[&str]) -> Read<Stage> {
+        let words = words::split(self.text(value)?).map_err(|problem| self.at(value, problem))?;
+        let before = before.iter().map(|&word| word.to_owned());
+        Ok(Stage { words: before.chain(words).collect(), place: self.place(value.span().start) })
+    }
+
+    fn part_table(&self, table: &DeTable<'_>, known: &[&str]) -> Read<PartTable> {
+        let mut read = PartTable::default();
+        for (key, value) in table {
+            match key.get_ref().as_ref() {
+                "name" => read.name = Some((self.name(value)?, self.place(value.span().start))),
+                "stages" => {
+                    let stages = self.list(value)?;
+                    let stages = stages.iter().map(|value| self.command(value, &[]));
+                    read.stages = Some(stages.collect::<Read<_>>()?);
+                    if read.stages.as_ref().is_some_and(Vec::is_empty) {
+                        return Err(self.at(value, "there is no stage: begin with \"slice\""));
+                    }
+                }
+                "check" => read.check = Some(self.command(value, &["check"])?),
+                "ranges" => read.ranges = Some(self.count(value)?),
+                "file" => {}
+                name => {
+                    let place = self.place(key.span().start);
+                    let words = match value.get_ref() {
+                        DeValue::String(text) if text.trim().is_empty() => vec![name.to_owned()],
+                        DeValue::String(_) => self.command(value, &[name])?.words,
+                        _ => {
+                            let meant = did_you_mean(name, known.iter().copied());
+                            let name = one_line(name);
+                            return Err(self.at(key, format!("there is no key {name}{meant}")));
+                        }
+                    };
+                    read.options.push((name.to_owned(), Stage { words, place }));
+                }
+            }
+        }
+        Ok(read)
+    }
+
+    fn count(&self, value: &Value<'_>) -> Read<u32> {
+        let number = match value.get_ref() {
+            DeValue::Integer(number) => number.to_string().parse().ok(),
+            _ => None,
+        };
+        let number = number.filter(|number| (1..=1000).contains(number));
+        number.ok_or_else(|| self.at(value, "write a whole number from 1 to 1000"))
+    }
+
+    /// Reads a name of a part or a build.
+    fn name(&self, value: &Value<'_>) -> Read<String> {
+        let name = self.text(value)?;
+        match bad_name(name) {
+            Some(problem) => Err(self.at(value, problem)),
+            None => Ok(name.to_owned()),
+        }
+    }
+
+    /// Reads a `[[part]]`: adds its files, or changes what was said of them before.
+    fn part(&self, value: &Value<'_>, drafts: &mut Drafts) -> Read<()> {
+        let table = self.table(value)?;
+        let read = self.part_table(table, &PART_KEYS)?;
+        let Some(file) = table.get("file") else {
+            return Err(self.at(value, "this part has no file: add file = \"parts/*.stl\""));
+        };
+        let mut files = Vec::new();
+        for value in self.list(file)? {
+            let place = self.place(value.span().start);
+            files.extend(self.files(value)?.into_iter().map(|file| (file, place)));
+        }
+        if let (Some((_, place)), true) = (&read.name, files.len() > 1) {
+            let problem = format!("there are {} files: a name is for one", files.len());
+            return Err(NightError { place: *place, problem });
+        }
+        for (file, place) in files {
+            match drafts.places.get(&real(&file)) {
+                Some(&place) => drafts.list[place].table.change(read.clone()),
+                None => drafts.add(Draft { file, place, table: read.clone() }),
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the files that a text names: one, or those that a pattern matches.
+    fn files(&self, value: &Value<'_>) -> Read<Vec<PathBuf>> {
+        let name = self.text(value)?;
+        let path = self.folder.join(name);
+        if path.exists() || !name.contains(['*', '?', '[']) {
+            return Ok(vec![path]);
+        }
+        let folder = glob::Pattern::escape(&self.folder.display().to_string());
+        let pattern = if Path::new(name).is_absolute() {
+            name.to_owned()
+        } else {
+            format!("{folder}/{name}")
+        };
+        let wrong = |error: glob::PatternError| self.at(value, format!("{name}: {}", error.msg));
+        let found = glob::glob(&pattern).map_err(wrong)?;
+        let files: Vec<_> = found.flatten().filter(|path| path.is_file()).collect();
+        if files.is_empty() {
+            return Err(
+                self.at(value, format!("no file matches {name}: check its folder and its end"))
+            );
+        }
+        Ok(files)
+    }
+
+    fn build(&self, value: &Value<'_>, parts: &[Part]) -> Read<Build> {
+        let table = self.table(value)?;
+        self.check_keys(table, &["name", "parts", "machine", "tile"], "a build has no key")?;
+        let name = table
+            .get("name")
+            .ok_or_else(|| self.at(value, "this build has no name: add name = \"monday\""))?;
+        let listed = table
+            .get("parts")
+            .ok_or_else(|| self.at(value, "this build has no parts: add parts = [\"blade:20\"]"))?;
+        let mut copies: Vec<(String, Option<u32>)> = Vec::new();
+        for value in self.list(listed)? {
+            let copy = self.copies(value, parts)?;
+            if copies.iter().any(|(name, _)| *name == copy.0) {
+                return Err(self.at(
+                    value,
+                    format!("{} stands twice in this build: add its copies up", copy.0),
+                ));
+            }
+            copies.push(copy);
+        }
+        if copies.is_empty() {
+            return Err(self.at(listed, "this build has no parts: name some, as \"blade:20\""));
+        }
+        let tile = match table.get("tile") {
+            Some(value) => self.command(value, &["tile"])?,
+            None => Stage { words: vec!["tile".to_owned()], place: self.place(value.span().start) },
+        };
+        let machine = table.get("machine").map(|value| {
+            let place = self.place(value.span().start);
+            let words = ["--machine".to_owned(), self.text(value)?.to_owned()];
+            Ok((words, place))
+        });
+        let tile = match machine.transpose()? {
+            Some((words, place)) => {
+                let place = if table.contains_key("tile") { tile.place } else { place };
+                Stage { words: tile.words.into_iter().chain(words).collect(), place }
+            }
+            None => tile,
+        };
+        Ok(Build { name: self.name(name)?, parts: copies, tile })
+    }
+
+    /// Reads `blade:20`.
+    fn copies(&self, value: &Value<'_>, parts: &[Part]) -> Read<(String, Option<u32>)> {
+        let text = self.text(value)?;
+        let (name, count) = match text.rsplit_once(':') {
+            Some((name, count)) => {
+                let count: Option<u32> = count.trim().parse().ok().filter(|&count| count > 0);
+                let problem = || format!("{text}: write a whole number of copies, as {name}:20");
+                (name, Some(count.ok_or_else(|| self.at(value, problem()))?))
+            }
+            None => (text, None),
+        };
+        if !parts.iter().any(|part| part.name == name) {
+            let meant = did_you_mean(name, parts.iter().map(|part| part.name.as_str()));
+            return Err(self.at(value, format!("there is no part {}{meant}", one_line(name))));
+        }
+        Ok((name.to_owned(), count))
+    }
+
+    /// Reads a table of a folder alone. Returns it with its place.
+    fn folder_of(&self, table: &DeTable<'_>) -> Read<Option<(PathBuf, Place)>> {
+        self.check_keys(table, &["folder"], "a store has no key")?;
+        let Some(value) = table.get("folder") else { return Ok(None) };
+        let folder = self.folder.join(self.text(value)?);
+        Ok(Some((folder, self.place(value.span().start))))
+    }
+
+    fn output(&self, value: Option<&Value<'_>>, path: &Path) -> Read<NightOutput> {
+        let stem = path.file_stem().unwrap_or("night".as_ref());
+        let mut output = NightOutput { folder: self.folder.join(stem), format: NightFormat::Lamp };
+        if output.folder == path {
+            output.folder.set_extension("out");
+        }
+        let Some(value) = value else { return Ok(output) };
+        let table = self.table(value)?;
+        self.check_keys(table, &["folder", "format"], "an output has no key")?;
+        if let Some(folder) = table.get("folder") {
+            output.folder = self.folder.join(self.text(folder)?);
+        }
+        if let Some(format) = table.get("format") {
+            output.format = match self.text(format)? {
+                "lamp" => NightFormat::Lamp,
+                "tif" => NightFormat::Tif,
+                other => {
+                    let problem = format!("{} is no format: write lamp or tif", one_line(other));
+                    return Err(self.at(format, problem));
+                }
+            };
+        }
+        Ok(output)
+    }
+}
+
+impl PartTable {
+    /// Lets a later table win.
+    fn change(&mut self, later: Self) {
+        self.name = later.name.or(self.name.take());
+        self.ranges = later.ranges.or(self.ranges);
+        self.check = later.check.or(self.check.take());
+        if later.stages.is_some() {
+            // Options of single stages were for the stages before.
+            let (name, check) = (self.name.take(), self.check.take());
+            *self = Self { name, check, ranges: self.ranges, ..later };
+            return;
+        }
+        self.options.extend(later.options);
+    }
+}
+
+/// Puts together what is said of a part.
+fn finished(draft: Draft, defaults: &PartTable) -> Read<Part> {
+    let Draft { file, place, table } = draft;
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (name, name_place) = table.name.unwrap_or((stem, place));
+    if let Some(problem) = bad_name(&name) {
+        return Err(NightError { place: name_place, problem });
+    }
+    let (stages, options) = match table.stages {
+        Some(stages) => (stages, table.options),
+        None => {
+            let all = defaults.options.iter().cloned().chain(table.options);
+            (defaults.stages.clone().unwrap_or_default(), all.collect())
+        }
+    };
+    let mut stages = stages;
+    for (name, options) in options {
+        let is_it = |stage: &&mut Stage| stage.words.first() == Some(&name);
+        if stages.iter_mut().filter(is_it).count() > 1 {
+            let problem = format!("{name} stands twice among the stages: write all stages anew");
+            return Err(NightError { place: options.place, problem });
+        }
+        let Some(stage) = stages.iter_mut().find(is_it) else {
+            let first = stages.iter().filter_map(|stage| stage.words.first());
+            let names: Vec<&str> = first.map(String::as_str).collect();
+            let known = PART_KEYS.into_iter().chain(names.iter().copied());
+            let meant = match did_you_mean(&name, known) {
+                meant if meant.is_empty() && names.is_empty() => {
+                    format!(": a part has {}", PART_KEYS.join(", "))
+                }
+                meant if meant.is_empty() => {
+                    format!(": the stages of {} are {}", stem_of(&file), names.join(", "))
+                }
+                meant => meant,
+            };
+            let problem = format!("there is no key or stage {}{meant}", one_line(&name));
+            return Err(NightError { place: options.place, problem });
+        };
+        *stage = options;
+    }
+    if stages.is_empty() {
+        let problem = "this part has no stages: add [defaults] and below it stages = \
+                       [\"slice --dpi 1500 --thickness 100um\", \"fix\"]";
+        return Err(NightError { place, problem: problem.to_owned() });
+    }
+    let ranges = table.ranges.or(defaults.ranges);
+    let plain = || Stage { words: vec!["check".to_owned()], place };
+    let check = table.check.or(defaults.check.clone()).unwrap_or_else(plain);
+    Ok(Part { name, file, stages, check, ranges, place })
+}
+
+fn stem_of(file: &Path) -> String {
+    one_line(&file.file_name().unwrap_or_default().to_string_lossy())
+}
+
+/// Returns why a text cannot be the name of a file and of a part in a build.
+fn bad_name(name: &str) -> Option<String> {
+    let is_bad = |c: char| c.is_control() || matches!(c, '/' | '\\' | ':');
+    let name = one_line(name);
+    if name.contains(is_bad) || name.starts_with('.') || name.is_empty() || name.len() > 100 {
+        return Some(format!(
+            "{name} is no name for a part or a build: give one of letters, digits, - and _, as name = \"blade-7\""
+        ));
+    }
+    None
+}
+
+/// Returns the path that all names of a file share.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}

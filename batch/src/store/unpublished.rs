@@ -1,0 +1,43 @@
+//! Results that are being written.
+
+use std::fs::File;
+use std::io::{self, Seek};
+use std::path::{Path, PathBuf};
+
+use lamp_stack::{FileBeside, digest_of};
+
+use super::manifest::Written;
+use super::sealed::put_in_place;
+
+/// A result that is being written, under a temporary name and locked. Dropped, it is removed.
+pub struct Unpublished {
+    beside: FileBeside,
+    path: PathBuf,
+}
+
+impl Unpublished {
+    pub(super) fn new(path: &Path) -> io::Result<Self> {
+        Ok(Self { beside: FileBeside::new(path)?, path: path.to_owned() })
+    }
+
+    /// Returns the file, for writing.
+    pub fn file(&mut self) -> &mut File {
+        self.beside.file()
+    }
+
+    /// Gives the result its place, read-only, synced, and its folder, too.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot be read, synced or renamed.
+    pub fn finish(mut self) -> io::Result<Written> {
+        let file = self.beside.file();
+        file.rewind()?;
+        let digest = digest_of(&*file)?;
+        let metadata = file.metadata()?;
+        let mut permissions = metadata.permissions();
+        permissions.set_readonly(true);
+        file.set_permissions(permissions)?;
+        put_in_place(self.beside, &self.path)?;
+        Ok(Written { digest, bytes: metadata.len() })
+    }
+}

@@ -1,0 +1,65 @@
+//! `lamp batch verify` and `gc`: what keeps a store sound and small.
+
+use anyhow::anyhow;
+use lamp_batch::{Damage, collect as collect_garbage};
+
+use super::deliver::check_files;
+use super::night_file::store_of;
+use super::task::named;
+use super::{GcArgs, StoreArgs};
+use crate::exit::Exit;
+use crate::memory::in_words;
+use crate::options::Common;
+use crate::progress::Progress;
+use crate::streams::print;
+
+/// Hashes all results anew, and takes away those that are damaged; and what was delivered of them.
+pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
+    let (store, night) = store_of(args)?;
+    let progress = Progress::new("batch verify", common, true);
+    let (mut whole, mut damaged) = (0, 0);
+    for key in store.keys().map_err(anyhow::Error::new)? {
+        match store.check(key) {
+            Ok(_) => whole += 1,
+            // A task that was never done, or whose process was ended, has none.
+            Err(Damage::NoManifest) if !store.has_manifest(key) => {}
+            Err(damage) => {
+                damaged += 1;
+                let name = named(&store, key);
+                progress
+                    .warn(&format!("{name}: {damage}: taken away, the next run makes it again"));
+                store.forget(key).map_err(anyhow::Error::new)?;
+            }
+        }
+    }
+    let (delivered, wrong) = match &night {
+        Some(night) => check_files(night, &store)?,
+        None => (0, Vec::new()),
+    };
+    wrong.iter().for_each(|problem| progress.warn(problem));
+    let mut problems = Vec::new();
+    if damaged > 0 {
+        problems.push(format!("{damaged} of {} results were damaged", whole + damaged));
+    }
+    if !wrong.is_empty() {
+        let all = delivered + wrong.len();
+        problems.push(format!("{} of {all} delivered files are not as they were", wrong.len()));
+    }
+    if !problems.is_empty() {
+        return Err(Exit::Failed(anyhow!(problems.join(", "))));
+    }
+    let files = night.map_or_else(String::new, |_| format!(", and {delivered} delivered files"));
+    print(&format!("{whole} results are whole{files}\n"))
+}
+
+/// Removes what no batch names.
+pub(super) fn collect(args: &GcArgs, _: &Common) -> Result<(), Exit> {
+    let (store, _) = store_of(&args.store)?;
+    let removed = collect_garbage(&store, args.keep).map_err(anyhow::Error::new)?;
+    print(&format!(
+        "{} results removed, {}; {} stay\n",
+        removed.results,
+        in_words(removed.bytes),
+        removed.kept
+    ))
+}

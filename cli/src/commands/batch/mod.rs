@@ -1,0 +1,201 @@
+//! `lamp batch`: parts and builds overnight, from one file.
+
+mod deliver;
+mod keep;
+mod night_file;
+mod notify;
+mod plan;
+mod plan_text;
+mod report;
+mod resources;
+mod room;
+mod run;
+mod status;
+mod summary;
+mod task;
+mod work;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+use lamp_batch::Key;
+
+use crate::exit::Exit;
+use crate::options::{Common, one_of_described, parse_memory};
+
+/// Make all parts and builds of a night, whatever crashes meanwhile
+///
+/// The night file names parts, their stages and builds; docs/batch.md shows one. Results are kept in
+/// a store by all that decides their bytes, whole or not at all, so that the same command again
+/// resumes a night that was ended, and does only what is missing.
+#[derive(Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "\
+Examples:
+  lamp batch night.toml
+  lamp batch plan night.toml
+  lamp batch night.toml --jobs 4 --memory 16GB --notify 'mail -s night ada@example.org'
+  lamp batch night.toml --engine slurm
+  lamp batch status night.toml
+  lamp batch gc night.toml --keep 30d
+
+Exit status: 0 all is done; 1 something failed; 2 wrong usage; 3 all is done, with findings that
+need a person (stray bands, islands); 130 and 143 ended by a signal."
+)]
+pub(crate) struct BatchArgs {
+    #[command(subcommand)]
+    command: Option<BatchCommand>,
+
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+#[derive(Args)]
+pub(crate) struct RunArgs {
+    /// The night file
+    #[arg(value_name = "NIGHT.toml")]
+    night: Option<PathBuf>,
+
+    /// What runs tasks. HyperQueue and Slurm find their servers as hq and sbatch do; all machines
+    /// must see the store, the parts and this program under the same paths
+    #[arg(long, value_name = "NAME", default_value_t)]
+    #[arg(value_parser = one_of_described::<EngineName>(&[
+        "Processes on this machine",
+        "HyperQueue: one's own machines, or allocations of a cluster",
+        "Slurm: arrays with dependencies",
+    ]))]
+    engine: EngineName,
+
+    /// How many threads work at once, in all tasks together [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
+    jobs: Option<u16>,
+
+    /// Memory that all tasks may take together, by their estimates [default: three quarters of what
+    /// there is]
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
+
+    /// How often a task that crashed is tried again
+    #[arg(long, value_name = "N", default_value = "2")]
+    retries: u32,
+
+    /// Command to run at the end, by the shell: a JSON summary on its input, the exit status in
+    /// LAMP_BATCH_STATUS
+    #[arg(long, value_name = "CMD")]
+    notify: Option<String>,
+}
+
+/// What runs tasks, as people name it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum EngineName {
+    #[default]
+    Local,
+    HyperQueue,
+    Slurm,
+}
+
+lamp_stack::named!(EngineName {
+    Local = "local",
+    HyperQueue = "hyperqueue",
+    Slurm = "slurm",
+});
+
+#[derive(Subcommand)]
+enum BatchCommand {
+    /// Print what a night will do: tasks, what exists, and what they take
+    Plan(NightArgs),
+    /// Print what has become of each part and build
+    Status(NightArgs),
+    /// Hash all results and delivered files anew, and take away results that are damaged
+    Verify(StoreArgs),
+    /// Remove results that no batch names which was run lately
+    Gc(GcArgs),
+    /// Do one task: what engines run
+    #[command(hide = true)]
+    Task(TaskArgs),
+}
+
+#[derive(Args)]
+struct NightArgs {
+    /// The night file
+    #[arg(value_name = "NIGHT.toml")]
+    night: PathBuf,
+}
+
+#[derive(Args)]
+struct StoreArgs {
+    /// A night file, whose store it is
+    #[arg(value_name = "NIGHT.toml", required_unless_present = "store")]
+    night: Option<PathBuf>,
+
+    /// The store itself
+    #[arg(long, value_name = "DIR", conflicts_with = "night")]
+    store: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct GcArgs {
+    #[command(flatten)]
+    store: StoreArgs,
+
+    /// How long ago a batch may have been run for its results to stay: 12h, 30d
+    #[arg(long, value_name = "TIME", default_value = "30d", value_parser = parse_age)]
+    keep: Duration,
+}
+
+#[derive(Args)]
+struct TaskArgs {
+    /// The task
+    #[arg(value_name = "KEY")]
+    key: Key,
+
+    /// The store that knows it
+    #[arg(long, value_name = "DIR")]
+    store: PathBuf,
+
+    /// The engine that runs it, for the journal
+    #[arg(long, value_name = "NAME", default_value = "hand")]
+    engine: String,
+
+    /// The process that started it, which it is to end with
+    #[arg(long, value_name = "PID")]
+    parent: Option<i32>,
+}
+
+pub(crate) fn run(args: &BatchArgs, common: &Common) -> Result<(), Exit> {
+    match &args.command {
+        None => run::run(&args.run, common),
+        Some(BatchCommand::Plan(args)) => plan_text::run(&args.night, common),
+        Some(BatchCommand::Status(args)) => status::run(&args.night, common),
+        Some(BatchCommand::Verify(args)) => keep::verify(args, common),
+        Some(BatchCommand::Gc(args)) => keep::collect(args, common),
+        Some(BatchCommand::Task(args)) => task::run(args),
+    }
+}
+
+/// Parses a time such as `12h` or `30d`.
+fn parse_age(text: &str) -> Result<Duration, String> {
+    let wrong = || format!("`{text}` is no time: write hours or days, as 12h or 30d");
+    let (number, hours) = match text.strip_suffix('d') {
+        Some(number) => (number, 24),
+        None => (text.strip_suffix('h').ok_or_else(wrong)?, 1),
+    };
+    let number: u32 = number.parse().map_err(|_| wrong())?;
+    Ok(Duration::from_secs(u64::from(number) * hours * 3600))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ages_have_units() {
+        assert_eq!(parse_age("30d"), Ok(Duration::from_secs(30 * 86400)));
+        assert_eq!(parse_age("0h"), Ok(Duration::ZERO));
+        for wrong in ["", "30", "d", "-1d", "1.5h", "5000000000d"] {
+            assert!(parse_age(wrong).unwrap_err().contains("as 12h or 30d"), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Reads the night file of a command.
+
+use std::env;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow};
+use lamp_batch::{Night, Store, StoreError};
+
+use super::StoreArgs;
+use crate::catalogue::read_text;
+use crate::exit::Exit;
+
+/// A night file is text of a few lines for each part.
+const MAX_FILE: u64 = 16 << 20;
+
+/// A night, and the file that it is from.
+pub(super) struct NightFile {
+    pub(super) night: Night,
+    /// As an absolute path.
+    pub(super) path: PathBuf,
+    /// As it was given, for messages.
+    pub(super) name: String,
+}
+
+impl NightFile {
+    /// Reads a night file. From here on this process works in its folder, so that all names of
+    /// files in it are from there.
+    pub(super) fn open(path: &Path) -> Result<Self, Exit> {
+        let name = path.display().to_string();
+        let failed = |error: anyhow::Error| Exit::Usage(error).at(name.clone());
+        if !path.is_file() {
+            let problem = if path.exists() { "it is no file" } else { "there is no such file" };
+            return Err(failed(anyhow!("{problem}: docs/batch.md shows a night file")));
+        }
+        let text = read_text(path, MAX_FILE, "a night file").map_err(failed)?;
+        let path = path.canonicalize().with_context(|| name.clone())?;
+        let night = Night::parse(&text, &path).map_err(|error| failed(error.into()))?;
+        let folder = path.parent().unwrap_or(Path::new("/"));
+        env::set_current_dir(folder).with_context(|| folder.display().to_string())?;
+        Ok(Self { night, path, name })
+    }
+
+    /// Opens the night's store, or makes it.
+    pub(super) fn store(&self) -> Result<Store, Exit> {
+        let at_its_place = |error: StoreError| match self.night.store_place {
+            Some(place) => Exit::Failed(error.into()).at(format!("{}: {place}", self.name)),
+            None => Exit::Failed(error.into()),
+        };
+        Store::create(&self.night.store).map_err(at_its_place)
+    }
+}
+
+/// Opens the store that a command names, and reads the night file that it is from, if one is named.
+pub(super) fn store_of(args: &StoreArgs) -> Result<(Store, Option<Night>), Exit> {
+    let night = match &args.night {
+        Some(night) => Some(NightFile::open(night)?.night),
+        None => None,
+    };
+    let folder = night.as_ref().map(|night| &night.store).or(args.store.as_ref());
+    let folder = folder.expect("one of them is required");
+    let store = Store::open(folder).map_err(|error| Exit::Usage(error.into()))?;
+    Ok((store, night))
+}

@@ -1,0 +1,49 @@
+//! Runs a command of the user's at the end.
+
+use std::io::{self, Write};
+use std::process::{Command, Stdio};
+
+use serde_json::json;
+
+use super::summary::Summary;
+use crate::progress::Progress;
+
+/// Runs a command by the shell, with a summary on its input and the status in its environment.
+/// That it fails changes nothing but is told.
+pub(super) fn notify(command: &str, status: u8, summary: &Summary, progress: &Progress) {
+    let text = json!({ "schema": "lamp-batch-1", "status": status, "summary": summary });
+    match run(command, status, &format!("{text}\n")) {
+        Ok(0) => {}
+        Ok(failed) => progress.warn(&format!("--notify: {command} ended with status {failed}")),
+        Err(error) => progress.warn(&format!("--notify: {command}: {error}")),
+    }
+}
+
+fn run(command: &str, status: u8, text: &str) -> io::Result<i32> {
+    let mut child = shell(command)
+        .env("LAMP_BATCH_STATUS", status.to_string())
+        .stdin(Stdio::piped())
+        .spawn()?;
+    let written = child.stdin.take().map_or(Ok(()), |mut input| input.write_all(text.as_bytes()));
+    // A command that does not read its input is none the worse.
+    if let Err(error) = written
+        && error.kind() != io::ErrorKind::BrokenPipe
+    {
+        return Err(error);
+    }
+    Ok(child.wait()?.code().unwrap_or(-1))
+}
+
+#[cfg(unix)]
+fn shell(command: &str) -> Command {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", command]);
+    shell
+}
+
+#[cfg(not(unix))]
+fn shell(command: &str) -> Command {
+    let mut shell = Command::new("cmd");
+    shell.args(["/C", command]);
+    shell
+}

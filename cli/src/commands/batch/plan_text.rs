@@ -1,0 +1,71 @@
+//! `lamp batch plan`: what a night will do, before it does it.
+
+use std::collections::{BTreeMap, HashSet};
+use std::path::Path;
+
+use lamp_batch::{Cost, Key, Kind, Ledger};
+
+use super::deliver::Deliverer;
+use super::night_file::NightFile;
+use super::plan::Plan;
+use super::room::Room;
+use crate::exit::Exit;
+use crate::height_options::time_text;
+use crate::memory::in_words;
+use crate::options::Common;
+use crate::progress::printable;
+use crate::streams::print;
+
+pub(super) fn run(night: &Path, common: &Common) -> Result<(), Exit> {
+    let file = NightFile::open(night)?;
+    let store = file.store()?;
+    let plan = Plan::new(&file, &store)?;
+    let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
+    let to_do: HashSet<Key> = ledger.keys().into_iter().collect();
+    let mut text = String::new();
+    for subject in &plan.subjects {
+        if let Err(why) = &subject.wanted {
+            text += &printable(&format!("{}: cannot be made: {why}", subject.name));
+            text.push('\n');
+        }
+    }
+    let mut kinds: BTreeMap<Kind, (usize, usize, Cost)> = BTreeMap::new();
+    for key in plan.graph.keys() {
+        let task = plan.graph.task(*key);
+        let (all, missing, cost) = kinds.entry(task.recipe.kind).or_default();
+        *all += 1;
+        if to_do.contains(key) {
+            *missing += 1;
+            *cost = [*cost, task.cost].into_iter().sum();
+        }
+        if common.verbose {
+            let state = if to_do.contains(key) { "to do" } else { "done or not needed" };
+            text += &format!("{key} {state}: {} ({})\n", printable(&task.subject), task.label);
+        }
+    }
+    for (kind, (all, missing, cost)) in &kinds {
+        text += &line(kind.name(), *missing, *all, cost);
+    }
+    let cost: Cost = kinds.values().map(|(.., cost)| *cost).sum();
+    text += &line("all", to_do.len(), plan.graph.keys().len(), &cost);
+    let deliverer = Deliverer { store: &store, output: &file.night.output };
+    if let Some(shortage) = Room::of(&plan, &ledger, &deliverer).shortage() {
+        text += &printable(&shortage);
+        text.push('\n');
+    }
+    print(&text)
+}
+
+/// A line of the plan: `range   8 of 12 to do, 40s of processors, 300 MB of memory, 2 MB on disk`.
+fn line(kind: &str, missing: usize, all: usize, cost: &Cost) -> String {
+    let takes = match missing {
+        0 => String::new(),
+        _ => format!(
+            ", about {} of a processor, {} of memory, {} on disk",
+            time_text(cost.cpu_s),
+            in_words(cost.memory),
+            in_words(cost.disk)
+        ),
+    };
+    format!("{kind:<6} {missing} of {all} tasks to do{takes}\n")
+}

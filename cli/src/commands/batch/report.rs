@@ -1,0 +1,238 @@
+//! The report of a night: one page, failures first.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs;
+use std::path::Path;
+
+use anyhow::Context;
+use lamp_batch::{Event, Key, Store, events};
+use lamp_stack::digest_of;
+use maud::{Markup, PreEscaped, html};
+
+use super::night_file::NightFile;
+use super::plan::Plan;
+use super::run::counts;
+use super::summary::{Line, LineState, Summary};
+use super::task::middle;
+use super::work::Checked;
+use crate::commands::report::{Picture, document};
+use crate::exit::Exit;
+use crate::height_options::time_text;
+use crate::memory::in_words;
+use crate::plots::{Plot, curve, inline_svg, linear};
+use crate::progress::printable;
+use crate::streams::write_file;
+
+/// The most findings of a part that are listed.
+const MOST_LINES: usize = 5;
+
+/// What tasks of a part or a build took.
+#[derive(Clone, Copy, Default)]
+struct Took {
+    seconds: f64,
+    cpu_s: f64,
+    memory: u64,
+}
+
+/// Writes the report.
+pub(super) fn write(
+    path: &Path,
+    file: &NightFile,
+    plan: &Plan,
+    store: &Store,
+    summary: &Summary,
+) -> Result<(), Exit> {
+    let done = done(plan, store)?;
+    let took = took(&done);
+    let pictures: HashMap<usize, (Picture, Vec<String>)> =
+        summary.lines().filter_map(|line| Some((line.place, seen(line, plan, store)?))).collect();
+    let stem = file.path.file_stem().unwrap_or_default().to_string_lossy();
+    let content = html! {
+        h1 { "Night " (printable(&stem)) }
+        p.subtitle { (counts(summary)) ", " (plan.graph.keys().len()) " tasks" }
+        (first(summary))
+        @for (title, lines) in [("Builds", &summary.builds), ("Parts", &summary.parts)] {
+            @if !lines.is_empty() { section { h2 { (title) } (table(lines, &took)) } }
+        }
+        section {
+            h2 { "Layers in the middle" }
+            div.sheet {
+                @for line in summary.builds.iter().chain(&summary.parts) {
+                    @if let Some((picture, lines)) = pictures.get(&line.place) {
+                        figure {
+                            img src=(picture.address) alt=(printable(&line.name));
+                            figcaption {
+                                b { (printable(&line.name)) } ", " (picture.caption)
+                                @for finding in lines.iter().take(MOST_LINES) { br; (printable(finding)) }
+                                @if lines.len() > MOST_LINES { br; (lines.len() - MOST_LINES) " more findings" }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        section {
+            h2 { "Over time" }
+            div.charts { @for chart in charts(&done) { div.chart { (PreEscaped(chart)) } } }
+        }
+    };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let page = document(&format!("Night {stem}"), &content);
+    write_file(path, |out| out.write_all(page.as_bytes()))?;
+    // Without the note it is written again.
+    let _ = store.keep_note(note(path), &digest(summary)?);
+    Ok(())
+}
+
+/// Returns whether the report is there and tells of this. A run that was killed before it wrote its
+/// own leaves that of an earlier one.
+pub(super) fn is_written(path: &Path, store: &Store, summary: &Summary) -> Result<bool, Exit> {
+    Ok(path.exists() && store.note(note(path)) == Some(digest(summary)?))
+}
+
+fn note(path: &Path) -> Key {
+    Key::of_note("report", &path.display().to_string())
+}
+
+fn digest(summary: &Summary) -> Result<String, Exit> {
+    let text = serde_json::to_vec(summary).context("the summary")?;
+    Ok(digest_of(&text[..]).context("the summary")?)
+}
+
+/// Returns how each task of the plan was done, the last time.
+fn done(plan: &Plan, store: &Store) -> Result<Vec<Event>, Exit> {
+    let all = events(store).context("the journal")?.into_iter().filter(Event::is_done);
+    let last: BTreeMap<Key, Event> = all.map(|event| (event.key, event)).collect();
+    let mut done: Vec<Event> =
+        plan.graph.keys().iter().filter_map(|key| last.get(key).cloned()).collect();
+    // Of equal parts, tasks are done once: they count for the first.
+    for event in &mut done {
+        event.subject.clone_from(&plan.graph.task(event.key).subject);
+    }
+    done.sort_by(|a, b| a.at.total_cmp(&b.at));
+    Ok(done)
+}
+
+fn took(done: &[Event]) -> HashMap<&str, Took> {
+    let mut took: HashMap<&str, Took> = HashMap::new();
+    for event in done {
+        let took = took.entry(&event.subject).or_default();
+        took.seconds += event.seconds;
+        took.cpu_s += event.cpu_s.unwrap_or(event.seconds);
+        took.memory = took.memory.max(event.memory.unwrap_or(0));
+    }
+    took
+}
+
+/// What a person must know first: what failed, and what to look at.
+fn first(summary: &Summary) -> Markup {
+    let is_told = |line: &&Line| line.state != LineState::Done;
+    let mut told: Vec<&Line> = summary.lines().filter(is_told).collect();
+    told.sort_by_key(|line| line.state);
+    html! {
+        @if told.is_empty() {
+            p.good { "All is done, and nothing needs a person." }
+        } @else {
+            section.warnings {
+                h2 { "Look at this first" }
+                ul {
+                    @for line in told {
+                        li {
+                            b { (printable(&line.name)) } " " (line.state.words())
+                            @if let Some(why) = &line.why { ": " (printable(why)) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn table(lines: &[Line], took: &HashMap<&str, Took>) -> Markup {
+    let known = |number: Option<u64>| number.map_or_else(String::new, |n| n.to_string());
+    html! {
+        table.index {
+            thead { tr {
+                th { "name" } th { "state" } th { "layers" } th { "stray bands fixed" } th { "left" }
+                th { "islands" } th { "time" } th { "of processors" } th { "peak memory" } th { "digest" }
+            } }
+            tbody {
+                @for line in lines {
+                    tr {
+                        td { (printable(&line.name)) }
+                        td { (line.state.words()) }
+                        td { (known(line.layers)) }
+                        td { (known(line.layers.map(|_| line.stray_fixed))) }
+                        td { (known(line.layers.map(|_| line.stray_left))) }
+                        td { (known(line.layers.map(|_| line.islands))) }
+                        @match took.get(line.name.as_str()) {
+                            Some(took) => {
+                                td { (time_text(took.seconds)) }
+                                td { (time_text(took.cpu_s)) }
+                                td { (in_words(took.memory)) }
+                            }
+                            None => { td {} td {} td {} }
+                        }
+                        td { (line.digest.as_deref().map_or("", |digest| &digest[..digest.len().min(23)])) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Returns the picture of a part or a build, and its findings.
+fn seen(line: &Line, plan: &Plan, store: &Store) -> Option<(Picture, Vec<String>)> {
+    let wanted = plan.subjects[line.place].wanted.as_ref().ok()?;
+    let Some(check) = wanted.check else {
+        store.manifest(wanted.stack)?;
+        return Some((middle(&store.result(wanted.stack)).ok()?, Vec::new()));
+    };
+    store.manifest(check)?;
+    let text = fs::read(store.result(check)).ok()?;
+    let checked: Checked = serde_json::from_slice(&text).ok()?;
+    Some((checked.picture?, checked.lines))
+}
+
+/// Draws how many tasks were at work, and how many were done.
+fn charts(done: &[Event]) -> Vec<String> {
+    let starts = done.iter().map(|event| event.at - event.seconds);
+    let Some(start) = starts.clone().reduce(f64::min) else { return Vec::new() };
+    let last = done.iter().map(|event| event.at).fold(start, f64::max);
+    let (unit, label) = match last - start {
+        ..200.0 => (1.0, "time (s)"),
+        ..10_000.0 => (60.0, "time (min)"),
+        _ => (3600.0, "time (h)"),
+    };
+    let end = ((last - start) / unit).max(1e-3);
+    let mut steps: Vec<(f64, i64)> = starts.map(|at| (at, 1)).collect();
+    steps.extend(done.iter().map(|event| (event.at, -1)));
+    let at_work = heights(steps, start, unit);
+    let finished = heights(done.iter().map(|event| (event.at, 1)).collect(), start, unit);
+    let chart = |title: &str, of: &str, points: Vec<(f64, f64)>| {
+        let most = points.iter().map(|point| point.1).fold(1.0, f64::max);
+        let plot = Plot {
+            title: title.to_owned(),
+            x: linear(label, 0.0..end),
+            y: linear(of, 0.0..1.3 * most),
+            series: vec![curve(of, points)],
+        };
+        inline_svg(&plot)
+    };
+    vec![chart("At work", "tasks at work", at_work), chart("Done", "tasks done", finished)]
+}
+
+/// Returns the corners of a staircase, given where it goes up and down.
+fn heights(mut steps: Vec<(f64, i64)>, start: f64, unit: f64) -> Vec<(f64, f64)> {
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut height = 0;
+    let mut corners = vec![(0.0, 0.0)];
+    for (at, by) in steps {
+        let x = ((at - start) / unit).max(0.0);
+        corners.push((x, height as f64));
+        height += by;
+        corners.push((x, height as f64));
+    }
+    corners
+}

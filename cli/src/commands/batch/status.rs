@@ -1,0 +1,57 @@
+//! `lamp batch status`: what has become of each part and build.
+
+use std::collections::BTreeMap;
+
+use lamp_batch::{Key, Ledger, events};
+
+use super::deliver::Deliverer;
+use super::night_file::NightFile;
+use super::plan::Plan;
+use super::run::counts;
+use super::summary::{Line, LineState, Summary};
+use crate::exit::Exit;
+use crate::options::Common;
+use crate::progress::printable;
+use crate::streams::print;
+
+pub(super) fn run(night: &std::path::Path, common: &Common) -> Result<(), Exit> {
+    let file = NightFile::open(night)?;
+    let store = file.store()?;
+    let plan = Plan::new(&file, &store)?;
+    let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
+    let deliverer = Deliverer { store: &store, output: &file.night.output };
+    let summary = Summary::new(&plan, &deliverer, &ledger);
+    let mut text = String::new();
+    for line in summary.lines().filter(|line| line.state != LineState::Done || common.verbose) {
+        text += &told(line);
+    }
+    let to_do = ledger.keys();
+    if !to_do.is_empty() {
+        // The last words of attempts, the latest of each task.
+        let failed = events(&store).map_err(|error| Exit::Failed(error.into()))?;
+        let failed = failed.into_iter().filter(|event| !event.is_done());
+        let last: BTreeMap<Key, _> = failed.map(|event| (event.key, event)).collect();
+        for event in to_do.iter().filter_map(|key| last.get(key)) {
+            let why = event.why.as_deref().unwrap_or("it failed");
+            text += &printable(&format!("{} ({}): last time: {why}", event.subject, event.label));
+            text.push('\n');
+        }
+    }
+    if common.verbose {
+        for key in plan.graph.keys() {
+            let task = plan.graph.task(*key);
+            let state = if store.manifest(*key).is_some() { "done" } else { "to do" };
+            text += &format!("{key} {state}: {} ({})\n", printable(&task.subject), task.label);
+        }
+    }
+    let done = summary.count(LineState::Done) + summary.count(LineState::NeedsPerson);
+    let all = summary.lines().count();
+    let counts = counts(&summary);
+    text += &format!("{done} of {all} are done ({counts}), {} tasks are to do\n", to_do.len());
+    print(&text)
+}
+
+fn told(line: &Line) -> String {
+    let why = line.why.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
+    format!("{}: {}{}\n", printable(&line.name), line.state.words(), printable(&why))
+}

@@ -1,0 +1,194 @@
+//! What has become of each part and build.
+
+use lamp_batch::{Ledger, Manifest, State, Store};
+use serde::Serialize;
+
+use super::deliver::Deliverer;
+use super::plan::{Plan, Subject, Wanted};
+use super::task::{FINDINGS, ISLANDS, LAYERS, findings_of};
+
+/// The parts and builds of a night: what failed first, then what needs a person.
+#[derive(Serialize)]
+pub(super) struct Summary {
+    pub(super) parts: Vec<Line>,
+    pub(super) builds: Vec<Line>,
+}
+
+/// A part or a build.
+#[derive(Clone, Serialize)]
+pub(super) struct Line {
+    pub(super) name: String,
+    pub(super) state: LineState,
+    /// Why it failed or waits, or what a person should look at.
+    pub(super) why: Option<String>,
+    /// Where its stack is.
+    pub(super) file: Option<String>,
+    pub(super) layers: Option<u64>,
+    /// Bands of stray rows that `fix` corrected, and those that it left; without `fix`, stray
+    /// rows.
+    pub(super) stray_fixed: u64,
+    pub(super) stray_left: u64,
+    pub(super) islands: u64,
+    /// All that `lamp check` finds.
+    pub(super) findings: u64,
+    /// The digest of the file.
+    pub(super) digest: Option<String>,
+    /// Where it is among the parts and builds of the plan.
+    #[serde(skip)]
+    pub(super) place: usize,
+}
+
+/// What has become of a part or a build, the worst first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum LineState {
+    Failed,
+    /// A part of the build failed.
+    Skipped,
+    /// It is not done, and nothing failed.
+    Waiting,
+    /// It is done, with findings that need a person.
+    NeedsPerson,
+    Done,
+}
+
+impl LineState {
+    /// Returns the words for it.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Failed => "failed",
+            Self::Skipped => "skipped",
+            Self::Waiting => "to do",
+            Self::NeedsPerson => "needs a person",
+            Self::Done => "done",
+        }
+    }
+}
+
+impl Summary {
+    /// Gathers what the store has, and what a run tells of the rest.
+    pub(super) fn new(plan: &Plan, deliverer: &Deliverer<'_>, ledger: &Ledger<'_>) -> Self {
+        let all = plan.subjects.iter().enumerate();
+        let mut lines: Vec<(bool, Line)> = all
+            .map(|(place, subject)| (subject.is_build, line(place, subject, deliverer, ledger)))
+            .collect();
+        // The sort keeps the order of the night file.
+        lines.sort_by_key(|(_, line)| line.state);
+        let of = |wanted: bool| {
+            let lines = lines.iter().filter(|(is_build, _)| *is_build == wanted);
+            lines.map(|(_, line)| line.clone()).collect()
+        };
+        Self { parts: of(false), builds: of(true) }
+    }
+
+    pub(super) fn lines(&self) -> impl Iterator<Item = &Line> {
+        self.parts.iter().chain(&self.builds)
+    }
+
+    /// Returns how many parts and builds are in a state.
+    pub(super) fn count(&self, state: LineState) -> usize {
+        self.lines().filter(|line| line.state == state).count()
+    }
+
+    /// Says that results could not be delivered.
+    pub(super) fn add_failures(&mut self, failures: &[(String, String)]) {
+        for line in self.parts.iter_mut().chain(&mut self.builds) {
+            if let Some((_, why)) = failures.iter().find(|(name, _)| *name == line.name) {
+                line.state = LineState::Failed;
+                line.why = Some(why.clone());
+            }
+        }
+        self.parts.sort_by_key(|line| line.state);
+        self.builds.sort_by_key(|line| line.state);
+    }
+}
+
+fn line(place: usize, subject: &Subject, deliverer: &Deliverer<'_>, ledger: &Ledger<'_>) -> Line {
+    let mut line = Line {
+        name: subject.name.clone(),
+        state: LineState::Waiting,
+        why: None,
+        file: None,
+        layers: None,
+        stray_fixed: 0,
+        stray_left: 0,
+        islands: 0,
+        findings: 0,
+        digest: None,
+        place,
+    };
+    let wanted = match &subject.wanted {
+        Ok(wanted) => wanted,
+        Err(why) => {
+            line.state = if subject.is_build { LineState::Skipped } else { LineState::Failed };
+            line.why = Some(why.clone());
+            return line;
+        }
+    };
+    let store = deliverer.store;
+    let stack = store.manifest(wanted.stack);
+    let check = wanted.check.map(|check| store.manifest(check));
+    if let Some(stack) = &stack {
+        line.add_stack(stack);
+        let delivered = deliverer.delivered(subject);
+        line.file = delivered.as_ref().map(|_| deliverer.path(subject).display().to_string());
+        line.digest = delivered.map(|delivered| delivered.digest);
+    }
+    if let Some(Some(check)) = &check {
+        line.islands = check.count(ISLANDS);
+        line.findings = check.count(FINDINGS);
+    }
+    (line.state, line.why) = if stack.is_some() && check.is_none_or(|check| check.is_some()) {
+        match line.needs() {
+            None => (LineState::Done, None),
+            needs => (LineState::NeedsPerson, needs),
+        }
+    } else {
+        line.unfinished(subject, wanted, ledger, store)
+    };
+    line
+}
+
+impl Line {
+    fn add_stack(&mut self, stack: &Manifest) {
+        self.layers = Some(stack.count(LAYERS));
+        let Some(found) = findings_of(stack) else { return };
+        self.stray_fixed = found.bands_corrected as u64;
+        let is_fixed = found.bands_corrected + found.bands_left > 0;
+        let left = if is_fixed { found.bands_left } else { found.stray_rows };
+        self.stray_left = left as u64;
+    }
+
+    /// Returns what a person should look at.
+    fn needs(&self) -> Option<String> {
+        let some = |count: u64, one: &str, more: &str| match count {
+            0 => None,
+            1 => Some(format!("1 {one}")),
+            count => Some(format!("{count} {more}")),
+        };
+        let stray = some(self.stray_left, "stray band is left", "stray bands are left");
+        let islands = some(self.islands, "island", "islands");
+        let all: Vec<_> = stray.into_iter().chain(islands).collect();
+        (!all.is_empty()).then(|| all.join(", "))
+    }
+
+    /// Returns why something is not done.
+    fn unfinished(
+        &self,
+        subject: &Subject,
+        wanted: &Wanted,
+        ledger: &Ledger<'_>,
+        store: &Store,
+    ) -> (LineState, Option<String>) {
+        let missing: Vec<_> = wanted.goals().filter(|key| store.manifest(*key).is_none()).collect();
+        let why = missing.iter().find_map(|key| ledger.why(*key)).map(str::to_owned);
+        let is_own = missing.iter().any(|key| matches!(ledger.state(*key), State::Failed(_)));
+        match why {
+            Some(why) if subject.is_build && !is_own => {
+                (LineState::Skipped, Some(format!("a part of it failed: {why}")))
+            }
+            Some(why) => (LineState::Failed, Some(why)),
+            None => (LineState::Waiting, ledger.no_room().map(str::to_owned)),
+        }
+    }
+}

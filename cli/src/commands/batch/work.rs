@@ -1,0 +1,47 @@
+//! What tasks do, as a store keeps it for the processes that do them.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::commands::report::Picture;
+
+/// What a task does, and where.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Work {
+    /// The folder that names of files are from.
+    pub(super) folder: PathBuf,
+    pub(super) what: What,
+}
+
+/// What a task does.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum What {
+    /// Makes layers of a part.
+    Range {
+        part: PathBuf,
+        /// The name that stands for the part's in the store.
+        stored_name: String,
+        stages: Vec<Vec<String>>,
+        layers: Range<u32>,
+    },
+    /// Joins ranges.
+    Join,
+    /// Applies a stage to a whole stack: which of those that need one.
+    Whole { part: PathBuf, stages: Vec<Vec<String>>, which: usize },
+    /// Finds what needs a person.
+    Check { words: Vec<String> },
+    /// Lays out copies.
+    Tile { words: Vec<String>, copies: Vec<Option<u32>> },
+}
+
+/// What is found in a part, as the result of its check.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(super) struct Checked {
+    /// A line for each finding, the worst first.
+    pub(super) lines: Vec<String>,
+    /// A layer in the middle.
+    pub(super) picture: Option<Picture>,
+}

@@ -1,0 +1,69 @@
+//! `lamp pack`: writes a stack as a packed file.
+
+use std::path::Path;
+
+use clap::Args;
+use lamp_stack::{Format, PackLevel};
+
+use crate::exit::Exit;
+use crate::options::{Common, Input, Output};
+use crate::progress::say;
+use crate::streams::{
+    is_packed_name, is_stream, layers_of_input, open_pages, progress, write_packed_layers,
+};
+
+/// Pack a stack: each layer as what differs from the one below
+///
+/// A packed stack takes from half (thick layers) to a fortieth (builds in a mesh) of its TIFF. Every
+/// command reads it as it reads a TIFF, and writes one where -o names a file that ends in .lamp.
+/// lamp convert gives the TIFF back, byte for byte. Images, texts and checks stay as they are, and
+/// the command is not recorded.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp pack build.tif -o build.lamp
+  slice blade.stl | fix | dither | lamp pack - -o blade.lamp
+  lamp pack build.tif --level 19 -o archive.lamp
+  lamp convert build.lamp -o build.tif")]
+pub(crate) struct PackArgs {
+    #[command(flatten)]
+    input: Input,
+
+    #[command(flatten)]
+    output: Output,
+
+    /// How hard to try to make it small, from 1 to 19 [default: what costs little]
+    #[arg(long, value_name = "N", value_parser = parse_level)]
+    level: Option<PackLevel>,
+}
+
+pub(crate) fn run(args: &PackArgs, common: &Common) -> Result<(), Exit> {
+    let output = args.output.output.as_path();
+    if !is_stream(output) && output.extension().is_some() && !is_packed_name(output) {
+        let name = output.display();
+        return Err(Exit::usage(format!("{name}: end the name of a packed stack in .lamp")));
+    }
+    let progress = progress("pack", common, &args.output);
+    let path = &args.input.stack;
+    let pages = open_pages(path)?;
+    let mut to = args.output.clone();
+    to.classic |= pages.format() == Format::Classic;
+    let layers = layers_of_input(pages, &args.input, &progress);
+    write_packed_layers(layers, &to, args.level.unwrap_or_default(), &progress)?;
+    if let Some((from, to)) = size_of(path).zip(size_of(output)).filter(|_| !common.quiet) {
+        let share = 100.0 * to as f64 / from as f64;
+        say(&format!("pack: {}: {to} bytes of {from} ({share:.1} %)", output.display()));
+    }
+    Ok(())
+}
+
+/// Returns the size of a file in bytes, which a stream or a folder has not.
+fn size_of(path: &Path) -> Option<u64> {
+    let file = if is_stream(path) { None } else { path.metadata().ok() };
+    file.filter(std::fs::Metadata::is_file).map(|file| file.len()).filter(|&bytes| bytes > 0)
+}
+
+fn parse_level(text: &str) -> Result<PackLevel, String> {
+    let level = text.parse().ok().and_then(PackLevel::new);
+    level.ok_or_else(|| format!("`{text}` is not a level: write a number from 1 to 19"))
+}

@@ -1,0 +1,134 @@
+//! What follows on the stages of parts: stacks checked, builds laid out. Each does what its command
+//! does, with the same bytes.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use lamp_stack::Layer;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::chain::taken;
+use super::parse::{parse_check, parse_tile};
+use crate::commands::check::CheckArgs;
+use crate::commands::tile::{Build, TileArgs};
+use crate::exit::Exit;
+use crate::progress::{Notes, Progress};
+
+/// Change when other bytes come from the same options and stacks.
+pub(crate) const JOIN_CODE: u32 = 1;
+pub(crate) const PACK_CODE: u32 = 2;
+const TILE_CODE: u32 = 1;
+const CHECK_CODE: u32 = 1;
+
+/// How a build is laid out: the options of `lamp tile`.
+#[derive(Clone)]
+pub(crate) struct Tiling(TileArgs);
+
+impl Tiling {
+    /// Reads options as they stand on a command line, split into words, the stacks left out. Files
+    /// stand in `folder`, unless their paths are absolute. `copies` are those of each stack.
+    ///
+    /// # Errors
+    /// Returns a sentence about the first option that is refused.
+    pub(crate) fn parse(
+        options: &[String],
+        copies: &[Option<u32>],
+        folder: &Path,
+    ) -> Result<Self, String> {
+        let args = parse_tile(options, folder)?;
+        args.check_for(copies).map_err(|error| error.to_string())?;
+        Ok(Self(args))
+    }
+
+    /// Returns the options as one text. The number of copies belongs to the stacks.
+    pub(crate) fn canonical(&self) -> String {
+        self.0.canonical()
+    }
+
+    /// Returns the files that options name.
+    pub(crate) fn input_files(&self) -> Vec<PathBuf> {
+        self.0.clone().files_mut().map(|path| path.clone()).collect()
+    }
+
+    /// Returns its name, and the number that changes when its bytes do.
+    pub(crate) fn code() -> (&'static str, u32) {
+        ("tile", TILE_CODE)
+    }
+
+    /// Lays out copies of stacks, and gives the layers of the build to `write`. Returns what is to
+    /// be said.
+    ///
+    /// # Errors
+    /// Returns the first error of the stacks or of `write`.
+    pub(crate) fn run(
+        &self,
+        stacks: &[(PathBuf, Option<u32>)],
+        write: impl FnOnce(&mut dyn Iterator<Item = Result<Layer, Exit>>) -> Result<(), Exit>,
+    ) -> Result<Vec<String>, Exit> {
+        let notes = Notes::default();
+        let build = self.0.build_of(stacks, &Progress::noting("tile", &notes))?;
+        let Build { mut layers, stray_rows, .. } = build;
+        write(&mut layers)?;
+        let stray = stray_rows.borrow().text().map(|text| format!("tile: {text}"));
+        Ok(taken(&notes).into_iter().chain(stray).collect())
+    }
+}
+
+/// What is looked for in a stack: the options of `lamp check`.
+pub(crate) struct Checking(CheckArgs);
+
+/// What a check found.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct CheckFindings {
+    /// How many of each kind, those that need a person.
+    pub(crate) kinds: BTreeMap<String, usize>,
+    /// A line for each finding, also for notes, the worst first.
+    pub(crate) lines: Vec<String>,
+    /// The same as in the report of `lamp check`, without the input's number.
+    pub(crate) findings: Vec<Value>,
+}
+
+impl CheckFindings {
+    /// Returns how many findings need a person.
+    pub(crate) fn found(&self) -> usize {
+        self.kinds.values().sum()
+    }
+}
+
+impl Checking {
+    /// Reads options as they stand on a command line, split into words, the stack left out. Files
+    /// stand in `folder`, unless their paths are absolute.
+    ///
+    /// # Errors
+    /// Returns a sentence about the first option that is refused.
+    pub(crate) fn parse(options: &[String], folder: &Path) -> Result<Self, String> {
+        parse_check(options, folder).map(Self)
+    }
+
+    /// Returns the options as one text.
+    pub(crate) fn canonical(&self) -> String {
+        self.0.canonical()
+    }
+
+    /// Returns its name, and the number that changes when its findings do.
+    pub(crate) fn code() -> (&'static str, u32) {
+        ("check", CHECK_CODE)
+    }
+
+    /// Finds what there is in a stack.
+    ///
+    /// # Errors
+    /// Returns an error if the stack cannot be read.
+    pub(crate) fn run(&self, stack: &Path) -> Result<CheckFindings, Exit> {
+        let mut found = CheckFindings::default();
+        for line in self.0.lines(stack)? {
+            if !line.is_note {
+                *found.kinds.entry(line.word.to_owned()).or_default() += 1;
+            }
+            found.lines.push(format!("{}: {}", line.word, line.text));
+            found.findings.push(line.json);
+        }
+        Ok(found)
+    }
+}

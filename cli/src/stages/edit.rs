@@ -1,0 +1,180 @@
+//! The stage that changes layers at image level.
+
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{self, Read, Seek};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use clap::{ArgGroup, Args};
+use lamp_postprocess::{Edits, OtherLayers, OtherPicture};
+use lamp_stack::{Layer, Limits, Op, Pages, digest_of};
+
+use crate::catalogue::read_text;
+use crate::exit::Exit;
+use crate::streams::{failed_at, input_name, layers_of, read_beside};
+
+/// Changes when other bytes come from the same options and layers.
+pub(crate) const CODE: u32 = 1;
+
+/// A list of edits is text of a few kilobytes.
+const MAX_LIST_BYTES: u64 = 1 << 20;
+
+/// What is changed.
+#[derive(Args, Clone)]
+#[command(group = ArgGroup::new("what").required(true).args(["edits", "union", "intersect", "difference", "xor"]))]
+pub(crate) struct EditSettings {
+    /// The edits, a TOML file
+    #[arg(value_name = "EDITS.toml")]
+    edits: Option<PathBuf>,
+
+    /// Keep what is white in either stack
+    #[arg(long, value_name = "STACK")]
+    union: Option<PathBuf>,
+
+    /// Keep what is white in both stacks
+    #[arg(long, value_name = "STACK")]
+    intersect: Option<PathBuf>,
+
+    /// Remove what is white in this stack
+    #[arg(long, value_name = "STACK")]
+    difference: Option<PathBuf>,
+
+    /// Keep what is white in exactly one of the stacks
+    #[arg(long, value_name = "STACK")]
+    xor: Option<PathBuf>,
+}
+
+/// The edits, and the files that they name.
+struct EditFiles {
+    edits: Edits,
+    stacks: Vec<PathBuf>,
+    pictures: Vec<PathBuf>,
+}
+
+impl EditSettings {
+    /// Returns the files that options name.
+    pub(crate) fn named(&self) -> impl Iterator<Item = &PathBuf> {
+        let Self { edits, union, intersect, difference, xor } = self;
+        [edits, union, intersect, difference, xor].into_iter().flatten()
+    }
+
+    /// Returns the files that options name, to be changed.
+    pub(crate) fn named_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let Self { edits, union, intersect, difference, xor } = self;
+        [edits, union, intersect, difference, xor].into_iter().flatten()
+    }
+
+    /// Returns the combination with another stack, if one is asked for.
+    fn combination(&self) -> Option<(Op, &PathBuf)> {
+        let ways = [
+            (Op::Union, &self.union),
+            (Op::Intersect, &self.intersect),
+            (Op::Difference, &self.difference),
+            (Op::Xor, &self.xor),
+        ];
+        ways.into_iter().find_map(|(op, file)| Some((op, file.as_ref()?)))
+    }
+
+    /// Returns the options as one text. Files have no names in it.
+    pub(crate) fn canonical(&self) -> String {
+        match self.combination() {
+            Some((op, _)) => format!("edit --{op}"),
+            None => "edit list".to_owned(),
+        }
+    }
+
+    fn files(&self) -> Result<EditFiles, Exit> {
+        if let Some((op, file)) = self.combination() {
+            let edits = Edits::combine(op, file.clone());
+            return Ok(EditFiles { edits, stacks: vec![file.clone()], pictures: vec![] });
+        }
+        let list = self.edits.as_deref().expect("one of the group is given");
+        let edits = || -> anyhow::Result<Edits> {
+            Ok(Edits::from_toml(&read_text(list, MAX_LIST_BYTES, "a list of edits")?)?)
+        };
+        let edits = edits().with_context(|| input_name(list))?;
+        // Files stand beside the list that names them.
+        let folder = list.parent().unwrap_or(Path::new(""));
+        let stacks = edits.stacks().map(|file| folder.join(file)).collect();
+        let pictures = edits.pictures().map(|file| folder.join(file)).collect();
+        Ok(EditFiles { edits, stacks, pictures })
+    }
+}
+
+/// Layers that are being edited.
+pub(crate) struct Editing {
+    list: Option<PathBuf>,
+    files: EditFiles,
+    /// How many layers each edit was made in.
+    counts: RefCell<Vec<usize>>,
+}
+
+impl Editing {
+    /// Reads the list of edits, if there is one.
+    pub(crate) fn new(settings: &EditSettings) -> Result<Self, Exit> {
+        let files = settings.files()?;
+        let counts = RefCell::new(vec![0; files.edits.count()]);
+        Ok(Self { list: settings.edits.clone(), files, counts })
+    }
+
+    /// Returns all files that are read.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.list.iter().chain(&self.files.stacks).chain(&self.files.pictures)
+    }
+
+    /// Returns the edited layers. Edits in those of `counted` are counted. `is_end` says whether
+    /// the first and the last layer are those of the whole stack, so that other stacks that are
+    /// added must not reach beyond.
+    pub(crate) fn layers<'a>(
+        &'a self,
+        layers: impl Iterator<Item = Result<Layer, Exit>> + 'a,
+        counted: Range<u32>,
+        is_end: [bool; 2],
+    ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + 'a, Exit> {
+        let EditFiles { edits, stacks, pictures } = &self.files;
+        let may_reach_beyond = is_end.map(|is_end| !is_end);
+        let other = |file: &PathBuf| {
+            let layers = Box::new(read_beside(file)?);
+            Ok(OtherLayers { name: input_name(file), layers, may_reach_beyond })
+        };
+        let others = stacks.iter().map(other).collect::<Result<_, Exit>>()?;
+        let pictures = pictures.iter().map(|file| open_picture(file)).collect::<Result<_, Exit>>();
+        Ok(lamp_postprocess::edit(layers, edits.clone(), others, pictures?, move |layer, done| {
+            if counted.contains(&layer.info.index) {
+                done.iter().for_each(|&edit| self.counts.borrow_mut()[edit] += 1);
+            }
+        }))
+    }
+
+    /// Returns the edits, from 1, that were made in no layer so far.
+    pub(crate) fn unused(&self) -> impl Iterator<Item = usize> {
+        let unused = |(number, count): (usize, &usize)| (*count == 0).then_some(number);
+        let unused: Vec<_> = (1..).zip(self.counts.borrow().iter()).filter_map(unused).collect();
+        unused.into_iter()
+    }
+}
+
+/// Returns what is said of an edit that was made in no layer.
+pub(crate) fn unused_text(edit: usize) -> String {
+    format!("edit {edit} applies to no layer: check its z or layers")
+}
+
+/// Opens a picture. A copy in a temporary file is read, so that the digest is of what is stamped.
+fn open_picture(path: &Path) -> Result<OtherPicture<Exit>, Exit> {
+    let name = path.display().to_string();
+    let max = Limits::default().png_bytes;
+    let copied = || -> anyhow::Result<(File, String)> {
+        let mut copy = tempfile::tempfile()?;
+        let bytes = io::copy(&mut File::open(path)?.take(max + 1), &mut copy)?;
+        ensure!(bytes <= max, "more than {} MiB is not a picture", max >> 20);
+        copy.rewind()?;
+        let digest = digest_of(&copy)?;
+        copy.rewind()?;
+        Ok((copy, digest))
+    };
+    let (copy, digest) = copied().with_context(|| name.clone())?;
+    let pages = Pages::from_file(copy).map_err(|error| failed_at(name.clone(), error))?;
+    Ok(OtherPicture { name, digest, pages: Box::new(layers_of(pages, path, None)) })
+}

@@ -1,0 +1,76 @@
+//! Names of parts in stacks that are stored by content.
+//!
+//! A stack records the name of its part's file. Stored under a name that the part's content gives,
+//! a result is the same whatever the file is called; it gets today's name on its way out.
+
+use std::path::Path;
+
+use lamp_stack::{Destination, Format, PackLevel, StackInfo, copy_packed, write_stack};
+use serde_json::Value;
+
+use super::slice::stem;
+use crate::exit::Exit;
+use crate::streams::{layers_of, open_pages};
+
+/// Returns the name under which stored results record a part, given its digest (`blake3:` and
+/// hexadecimal digits).
+pub(crate) fn stored_name(digest: &str) -> String {
+    let digits = digest.strip_prefix("blake3:").unwrap_or(digest);
+    format!("part-{}.stored", &digits[..digits.len().min(32)])
+}
+
+/// The files' names of parts, by those under which they are stored.
+pub(crate) struct Names(Vec<(String, String)>);
+
+impl Names {
+    /// Takes pairs of a stored name and a file's name.
+    pub(crate) fn new(names: impl IntoIterator<Item = (String, String)>) -> Self {
+        Self(names.into_iter().collect())
+    }
+
+    /// Copies a stored stack, packed, under the files' names.
+    ///
+    /// # Errors
+    /// Returns an error if the stack cannot be read, or the copy not be written.
+    pub(crate) fn copy(&self, stored: &Path, to: Destination) -> Result<(), Exit> {
+        Ok(copy_packed(stored, to, PackLevel::default(), |stack| self.named(stack))?)
+    }
+
+    /// Unpacks a stored stack to a TIFF, under the files' names.
+    ///
+    /// # Errors
+    /// Returns an error if the stack cannot be read, or the TIFF not be written.
+    pub(crate) fn unpack(&self, stored: &Path, to: Destination) -> Result<(), Exit> {
+        let layers = layers_of(open_pages(stored)?, stored, None);
+        let named = layers.map(|layer| -> Result<_, Exit> {
+            let mut layer = layer?;
+            layer.info.stack = layer.info.stack.take().map(|stack| self.named(stack));
+            Ok(layer)
+        });
+        write_stack(named, to, Format::Big)
+    }
+
+    /// Puts files' names in the place of stored ones.
+    pub(crate) fn named(&self, stack: StackInfo) -> StackInfo {
+        let mut value = serde_json::to_value(stack).expect("a stack's metadata is JSON");
+        self.rename(&mut value);
+        serde_json::from_value(value).expect("only texts changed")
+    }
+
+    fn rename(&self, value: &mut Value) {
+        match value {
+            Value::String(text) => {
+                for (stored, file) in &self.0 {
+                    // Commands have the whole name, all else what is before the last dot.
+                    let [short, file_short] = [stored, file].map(|name| stem(Path::new(name)));
+                    if text.contains(&short) {
+                        *text = text.replace(stored, file).replace(&short, &file_short);
+                    }
+                }
+            }
+            Value::Array(values) => values.iter_mut().for_each(|value| self.rename(value)),
+            Value::Object(values) => values.values_mut().for_each(|value| self.rename(value)),
+            _ => {}
+        }
+    }
+}

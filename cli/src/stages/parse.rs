@@ -1,0 +1,244 @@
+//! Reads stages as they stand on a command line.
+
+use std::ffi::OsString;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use clap::parser::ValueSource;
+use clap::{ArgMatches, CommandFactory, FromArgMatches};
+use lamp_postprocess::machine::Machine;
+
+use super::after::After;
+use super::chain::Stage;
+use super::compensate::{CompensateSettings, Compensating};
+use super::edit::{EditSettings, Editing};
+use super::slice::SliceSettings;
+use super::{Chain, Stages};
+use crate::Lamp;
+use crate::arguments::{settings_of_machine, words_left_open};
+use crate::catalogue::is_file;
+use crate::commands::check::CheckArgs;
+use crate::commands::support::SupportArgs;
+use crate::commands::tile::TileArgs;
+use crate::exit::Exit;
+use crate::help::formed;
+use crate::part_arg::PartArg;
+use crate::streams::is_stream;
+use crate::usage::sentence;
+
+/// A stage that is refused, and why in one sentence.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct StageError {
+    /// Its place in the list, from 0.
+    pub(crate) stage: usize,
+    /// Its command.
+    pub(crate) name: String,
+    pub(crate) why: String,
+}
+
+impl fmt::Display for StageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.name, self.why)
+    }
+}
+
+impl std::error::Error for StageError {}
+
+/// The stages that there are.
+const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
+
+/// Options that make no sense in a list of stages, and what to do instead.
+const REFUSED: [(&str, &str); 15] = [
+    ("output", "leave out -o: results go where the whole list of stages sends them"),
+    ("classic", "leave out --classic: results are stored packed"),
+    ("packbits", "leave out --packbits: results are stored packed"),
+    ("force", "leave out --force: nothing that stands is replaced"),
+    ("report", "leave out --report: findings stand with the results"),
+    ("evidence", "leave out --evidence: run this stage by hand for pictures of its findings"),
+    ("strict", "leave out --strict: findings are told, and decide the status at the end"),
+    ("layers", "leave out --layers: a part is cut into ranges of layers by itself"),
+    ("options", "leave out --options: write its options into the stage"),
+    ("plan", "leave out --plan: run lamp support by hand for its plan"),
+    ("stl", "leave out --stl: run lamp support by hand for its supports alone"),
+    ("strips", "leave out --strips: cut strips from the finished build, by lamp tile or lamp join"),
+    ("layout_out", "leave out --layout-out: run lamp tile by hand for the layout"),
+    ("layout_picture", "leave out --layout-picture: run lamp tile by hand for the picture"),
+    ("part", "leave out --part: the part is the one that the stages are for"),
+];
+
+/// Reads stages. Files that options name stand in `folder`, unless their paths are absolute.
+pub(super) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages, StageError> {
+    let (mut slice, mut per_layer, mut after) = (None, Vec::new(), Vec::new());
+    for (stage, words) in stages.iter().enumerate() {
+        let name = words.first().map_or("", String::as_str);
+        let refused = |why: String| StageError { stage, name: name.to_owned(), why };
+        if !STAGES.contains(&name) {
+            let stages = STAGES.join(", ");
+            return Err(refused(format!("it is no stage of a part: these are {stages}")));
+        }
+        let reader = Reader::new(name, words, folder).map_err(refused)?;
+        if (name == "slice") != (stage == 0) {
+            return Err(refused(match stage {
+                0 => "a part's first stage is slice".to_owned(),
+                _ => "slice is a part's first stage, and its only one of that name".to_owned(),
+            }));
+        }
+        match name {
+            "slice" => slice = Some(reader.slice().map_err(refused)?),
+            "support" => after.push(After::Support(reader.support())),
+            _ => {
+                let stage = reader.per_layer(name).map_err(refused)?;
+                // What follows a stage of the whole stack works on the whole stack, too.
+                if after.is_empty() {
+                    per_layer.push(stage);
+                } else {
+                    after.push(After::Layers(stage));
+                }
+            }
+        }
+    }
+    let none = || StageError {
+        stage: 0,
+        name: "stages".to_owned(),
+        why: "there are none: a part needs slice at least".to_owned(),
+    };
+    Ok(Stages { chain: Chain { slice: slice.ok_or_else(none)?, stages: per_layer }, after })
+}
+
+/// A stage's words, read.
+struct Reader<'a> {
+    matches: ArgMatches,
+    folder: &'a Path,
+}
+
+impl<'a> Reader<'a> {
+    fn new(name: &str, words: &[String], folder: &'a Path) -> Result<Self, String> {
+        static LAMP: OnceLock<clap::Command> = OnceLock::new();
+        let lamp = LAMP.get_or_init(|| formed(Lamp::command()));
+        let mut command = crate::stage(lamp, name);
+        command.build();
+        let mut words: Vec<OsString> = words.iter().map(OsString::from).collect();
+        // What the list of stages leaves out.
+        match name {
+            "slice" => words.push(PART.into()),
+            "support" => words.push(format!("--part={PART}").into()),
+            _ => {}
+        }
+        let matches = |words: &[OsString]| {
+            command.clone().try_get_matches_from(words).map_err(|error| match error.use_stderr() {
+                true => sentence(&error),
+                false => "help and version are for the command line".to_owned(),
+            })
+        };
+        let mut found = matches(&words)?;
+        check(&found, name)?;
+        if name == "slice"
+            && let Some(machine) = found.get_one::<PathBuf>("machine")
+        {
+            let settings = settings_of_machine(&of_machine(machine, folder))
+                .map_err(|error| error.to_string())?;
+            words.extend(words_left_open(&command, &found, &settings));
+            found = matches(&words)?;
+        }
+        Ok(Self { matches: found, folder })
+    }
+
+    /// Returns the arguments of that command.
+    fn read<T: FromArgMatches>(&self) -> T {
+        T::from_arg_matches(&self.matches).expect("the words are of that command")
+    }
+
+    fn slice(&self) -> Result<SliceSettings, String> {
+        let mut settings: SliceSettings = self.read();
+        if settings.parts.len() > 1 {
+            return Err("leave out the part's file: the stages are for one".to_owned());
+        }
+        settings.parts.clear();
+        settings.named_mut().for_each(|path| *path = self.folder.join(&*path));
+        settings.options.exposure().map_err(|error| error.to_string())?;
+        Ok(settings)
+    }
+
+    fn support(&self) -> Box<SupportArgs> {
+        let mut args: SupportArgs = self.read();
+        args.machine = of_machine(&args.machine, self.folder);
+        Box::new(args)
+    }
+
+    fn per_layer(&self, name: &str) -> Result<Stage, String> {
+        let said = |error: Exit| error.to_string();
+        let in_folder = |path: &mut PathBuf| *path = self.folder.join(&*path);
+        Ok(match name {
+            "fix" => Stage::Fix(self.read()),
+            "dither" => Stage::Dither(self.read()),
+            "compensate" => {
+                let mut settings: CompensateSettings = self.read();
+                settings.inputs_mut().for_each(in_folder);
+                Compensating::new(&settings).map_err(said)?;
+                Stage::Compensate(settings)
+            }
+            _ => {
+                let mut settings: EditSettings = self.read();
+                settings.named_mut().for_each(in_folder);
+                Editing::new(&settings).map_err(said)?;
+                Stage::Edit(settings)
+            }
+        })
+    }
+}
+
+/// Reads the options of `tile`, without stacks.
+pub(super) fn parse_tile(options: &[String], folder: &Path) -> Result<TileArgs, String> {
+    let mut args: TileArgs = Reader::new("tile", &with_name("tile", options), folder)?.read();
+    args.files_mut().for_each(|path| *path = folder.join(&*path));
+    Ok(args)
+}
+
+/// Reads the options of `check`, without stacks.
+pub(super) fn parse_check(options: &[String], folder: &Path) -> Result<CheckArgs, String> {
+    let mut args: CheckArgs = Reader::new("check", &with_name("check", options), folder)?.read();
+    let machine = args.machine_mut();
+    *machine = of_machine(machine, folder);
+    Ok(args)
+}
+
+fn with_name(name: &str, options: &[String]) -> Vec<String> {
+    [name.to_owned()].into_iter().chain(options.iter().cloned()).collect()
+}
+
+/// A word in the place of the part.
+const PART: &str = "part";
+
+/// Refuses options that make no sense in a list of stages.
+fn check(matches: &ArgMatches, name: &str) -> Result<(), String> {
+    let ids: Vec<&str> = matches.ids().map(clap::Id::as_str).collect();
+    let is_given =
+        |id: &str| ids.contains(&id) && matches.value_source(id) == Some(ValueSource::CommandLine);
+    let of_part = |id: &str| {
+        id == "part" && matches.get_many::<PartArg>(id).is_none_or(|parts| parts.len() < 2)
+    };
+    let refused = REFUSED.iter().find(|(id, _)| is_given(id) && !of_part(id));
+    if let Some((_, why)) = refused {
+        return Err((*why).to_owned());
+    }
+    if is_given("stacks") || is_given("inputs") {
+        return Err("leave out the stacks: what it works on is known".to_owned());
+    }
+    if ids.contains(&"stack")
+        && let Some(stack) = matches.get_one::<PathBuf>("stack")
+        && !is_stream(stack)
+    {
+        let stack = stack.display();
+        return Err(match name {
+            "edit" => format!("write edit - {stack}: it takes layers from the stage before"),
+            _ => format!("leave out {stack}: it takes layers from the stage before"),
+        });
+    }
+    Ok(())
+}
+
+/// Returns where a machine's file stands, or the name of a built-in one.
+fn of_machine(machine: &Path, folder: &Path) -> PathBuf {
+    if is_file::<Machine>(machine) { folder.join(machine) } else { machine.to_owned() }
+}

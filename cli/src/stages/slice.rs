@@ -1,0 +1,289 @@
+//! The stage that makes layers: a part is sliced.
+
+use std::cell::{Cell, RefCell};
+use std::iter;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lamp_postprocess::machine::{Machine, MachineLimit};
+use lamp_slicer::{Bodies, Part, Polished, SliceError, Slices};
+use lamp_stack::{Layer, Length, PageInfo, Size};
+
+use crate::body_overlaps::overlap_text;
+use crate::catalogue::{canonical_word, entry, is_file};
+use crate::exit::Exit;
+use crate::fallback::Bridged;
+use crate::mesh_report::Counts;
+use crate::options::{parse_layers, parse_memory};
+use crate::part_arg::{PartArg, paths};
+use crate::part_options::{Reading, at_part, name_of_all};
+use crate::progress::Progress;
+use crate::slicing_options::SlicingOptions;
+use crate::step_options::{HEADING, length};
+
+/// Changes when other bytes come from the same options and part.
+pub(crate) const CODE: u32 = 1;
+
+/// What is sliced, and how.
+#[derive(Args, Clone)]
+pub(crate) struct SliceSettings {
+    /// The part: STL, STEP, 3MF or OBJ files, also packed by gzip, or - for standard input
+    ///
+    /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns one about z and moves it
+    /// first. Where parts overlap they cancel out, or unite with --fill nonzero
+    #[arg(value_name = "PART", required = true, value_parser = PartArg::parser())]
+    pub(crate) parts: Vec<PartArg>,
+
+    #[command(flatten)]
+    pub(crate) options: SlicingOptions,
+
+    /// Machine to build on: alpha, beta or a file (see lamp machine)
+    ///
+    /// A part, a resolution or a layer thickness beyond its limits is refused before the work. Its
+    /// defaults hold where no other resolution, thickness or margin is given
+    #[arg(long, value_name = "M")]
+    pub(crate) machine: Option<PathBuf>,
+
+    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
+    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    pub(crate) layers: Option<Range<u32>>,
+
+    /// Memory for the table of crossings, at least 16MB; with less, fewer layers are cut at a time
+    /// [default: a quarter of what there is, as far as it helps]. Facets in no order of height are
+    /// first sorted in a temporary file, 36 bytes per facet. --adaptive also holds the mesh in
+    /// memory, 49 bytes per facet
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
+
+    /// An STL of the same STEP part, in millimetres. Layers where the STEP part has gaps are cut up
+    /// to 10 um off their plane, or else taken from this STL, as are layers that lack contours of
+    /// it
+    #[arg(long, value_name = "PART.stl", help_heading = HEADING)]
+    pub(crate) fallback: Option<PathBuf>,
+}
+
+/// A part that is being sliced.
+pub(crate) struct Slicing<'a> {
+    settings: &'a SliceSettings,
+    pub(crate) part: Part,
+    bridged: RefCell<Bridged>,
+    name_command: Box<dyn Fn(&mut Layer)>,
+    counts: Cell<Counts>,
+    is_blank: Cell<bool>,
+}
+
+impl SliceSettings {
+    /// Returns the files that are read.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        paths(&self.parts).chain(self.options.files()).chain(&self.fallback).chain(&self.machine)
+    }
+
+    /// Returns the files that options name, without the part.
+    pub(crate) fn named_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let machine = self.machine.iter_mut().filter(|path| is_file::<Machine>(path));
+        self.options.files_mut().chain(&mut self.fallback).chain(machine)
+    }
+
+    /// Returns the options as one text, defaults filled in. Files have only the names that stacks
+    /// record.
+    pub(crate) fn canonical(&self) -> String {
+        let mut words = format!("slice{}", self.options.canonical());
+        if self.fallback.is_some() {
+            words.push_str(" --fallback file");
+        }
+        // It changes no image, but refuses some.
+        if let Some(machine) = &self.machine {
+            words.push_str(&format!(" --machine {}", canonical_word::<Machine>(machine)));
+        }
+        words
+    }
+
+    /// Opens the part, and prepares to slice it. Stacks record `name` as that of its file, if it is
+    /// given.
+    pub(crate) fn open(
+        &self,
+        name: Option<&str>,
+        progress: &Progress,
+    ) -> Result<Slicing<'_>, Exit> {
+        let exposure = self.options.exposure()?;
+        let machine: Option<Machine> = self.machine.as_deref().map(entry).transpose()?;
+        if let Some(machine) = &machine {
+            self.options.check_machine(machine).map_err(Exit::wrong_options)?;
+        }
+        let note = |line: &str| progress.say(line);
+        let reading =
+            Reading { dpi: self.options.dpi, may_be_open: self.fallback.is_some(), say: &note };
+        let part = self.options.solid.open(&self.parts, &reading)?;
+        if self.fallback.is_some() && part.prepared().next().is_none() {
+            return Err(Exit::usage("--fallback needs a STEP part"));
+        }
+        let recorded: Vec<_> = self.parts.iter().map(PartArg::recorded).collect();
+        let recorded = name.map_or_else(|| recorded.join(" "), ToOwned::to_owned);
+        let (slices, name_command) = self
+            .options
+            .slices(part.clone(), &recorded, self.layers.clone(), self.memory, exposure, &note)
+            .map_err(|error| at_part(error, &self.parts))?;
+        if let Some(machine) = &machine {
+            let name = name_of_all(&self.parts);
+            check_part(machine, &slices).map_err(|limit| Exit::from(limit).at(name))?;
+        }
+        let layers = self.layers.clone();
+        let bridged = Bridged::new(slices, self.fallback.as_deref(), &self.options, layers)?;
+        let part_name = name.map(|name| stem(Path::new(name)));
+        let name_command = move |layer: &mut Layer| {
+            name_command(layer);
+            if let (Some(stack), Some(name)) = (&mut layer.info.stack, &part_name) {
+                stack.part.clone_from(name);
+            }
+        };
+        Ok(Slicing {
+            settings: self,
+            part,
+            bridged: RefCell::new(bridged),
+            name_command: Box::new(name_command),
+            counts: Cell::default(),
+            is_blank: Cell::new(true),
+        })
+    }
+}
+
+impl Slicing<'_> {
+    /// Returns doubts about the part, before the work.
+    pub(crate) fn doubts(&self) -> Vec<String> {
+        let SliceSettings { options, parts, .. } = self.settings;
+        let slices = &self.bridged.borrow().slices;
+        let size = options.solid.size(&self.part, slices.box_mm());
+        let doubts = [
+            size.doubt(options.dpi, options.uniform_thickness()),
+            options.solid.overlap_doubt(parts, slices.overlap()),
+        ];
+        doubts.into_iter().flatten().collect()
+    }
+
+    /// Returns the number of layers.
+    pub(crate) fn layer_count(&self) -> u32 {
+        self.bridged.borrow().slices.layer_count() as u32
+    }
+
+    /// Returns the layers. Those of `counted` are counted, and shown to `see`.
+    pub(crate) fn layers(
+        &self,
+        counted: Range<u32>,
+        mut see: impl FnMut(&PageInfo),
+    ) -> impl Iterator<Item = Result<Layer, Exit>> {
+        let next = || self.bridged.borrow_mut().next();
+        iter::from_fn(next).map(move |layer| {
+            let mut layer = layer.map_err(|error| self.at_part(error))?;
+            (self.name_command)(&mut layer);
+            if counted.contains(&layer.info.index) {
+                self.is_blank.set(self.is_blank.get() && layer.image.change_count() == 0);
+                let mut counts = self.counts.get();
+                counts.add(&layer.info);
+                self.counts.set(counts);
+                see(&layer.info);
+            }
+            Ok(layer)
+        })
+    }
+
+    fn at_part(&self, error: SliceError) -> Exit {
+        at_part(error.into(), &self.settings.parts)
+    }
+
+    /// Returns what was counted so far.
+    pub(crate) fn counts(&self) -> Counts {
+        self.counts.get()
+    }
+
+    /// Returns whether no layer so far had a white pixel.
+    pub(crate) fn is_blank(&self) -> bool {
+        self.is_blank.get()
+    }
+
+    /// Returns what is said of bodies that overlap in the layers so far.
+    pub(crate) fn overlap(&self) -> Option<String> {
+        let overlaps = self.bridged.borrow().slices.body_overlaps();
+        let SliceSettings { options, parts, .. } = self.settings;
+        overlap_text(&overlaps, &self.part, parts, options.solid.bodies)
+    }
+
+    /// Looks at the slices with `look`.
+    pub(crate) fn with_slices<T>(
+        &self,
+        look: impl FnOnce(&Slices) -> Result<T, SliceError>,
+    ) -> Result<T, Exit> {
+        look(&self.bridged.borrow().slices).map_err(|error| self.at_part(error))
+    }
+
+    /// Returns what else is to be said of the layers so far.
+    pub(crate) fn remarks(&self) -> Vec<String> {
+        self.bridged.borrow().text().into_iter().chain(self.overlap()).collect()
+    }
+
+    /// Returns the number of all layers of the part, also of those that are not wanted.
+    pub(crate) fn part_layers(&self) -> u32 {
+        self.bridged.borrow().slices.layer_heights().thicknesses_um().count() as u32
+    }
+
+    /// Tells what was found on the way; stray rows are listed in the file `report`, or could be.
+    pub(crate) fn tell(&self, progress: &Progress, report: Option<&Path>) {
+        let bridged = self.bridged.borrow();
+        if let Some(polished) = bridged.slices.polished().filter(|it| it.moved + it.kept > 0) {
+            progress.detail(&polish_text(polished));
+        }
+        if let Some(text) = bridged.text() {
+            progress.say(&text);
+        }
+        match self.overlap() {
+            Some(text) if self.settings.options.solid.bodies == Bodies::Xor => progress.warn(&text),
+            Some(text) => progress.say(&text),
+            None => {}
+        }
+        say_stray_rows(progress, self.counts(), report);
+    }
+}
+
+/// Returns what a stack calls a part by its file.
+pub(crate) fn stem(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Checks that a part lies within a machine's area and height.
+fn check_part(machine: &Machine, slices: &Slices) -> Result<(), MachineLimit> {
+    let [low, high] = slices.box_mm();
+    let side = |k: usize| Length::from_mm(high[k] - low[k]).to_whole_nm();
+    machine.check_footprint(Size { width: side(0), height: side(1) }, "the part")?;
+    let thicknesses = slices.layer_heights();
+    let height = Length::from_um(thicknesses.thicknesses_um().sum()).to_whole_nm();
+    machine.check_height(height, "the part")
+}
+
+/// What polishing did, in a line.
+fn polish_text(polished: Polished) -> String {
+    let Polished { moved, kept, mended, mean_mm, most_mm } = polished;
+    let mean = length(mean_mm);
+    let most = length(most_mm);
+    let kept = match kept {
+        0 => String::new(),
+        kept => format!(", {kept} stayed on their facets"),
+    };
+    format!(
+        "{moved} crossings were moved from facets to exact surfaces, by {mean} on average and \
+         {most} at most along their rows{kept}; {mended} were added or removed where contours \
+         turn"
+    )
+}
+
+fn say_stray_rows(progress: &Progress, counts: Counts, written: Option<&Path>) {
+    let Counts { stray_rows: rows, stray_layers: layers, .. } = counts;
+    if rows > 0 {
+        let names = match written {
+            Some(path) => format!("and {} lists the facets", path.display()),
+            None => "and --report FILE.json lists the facets".to_owned(),
+        };
+        progress.say(&format!(
+            "{rows} rows in {layers} layers do not balance: the mesh has gaps; fix corrects them, {names}"
+        ));
+    }
+}

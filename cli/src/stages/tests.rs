@@ -1,0 +1,353 @@
+//! Chains against the pipelines that people type.
+
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::Parser;
+use lamp_stack::{Destination, Format, Layer, join, write_stack};
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use tempfile::TempDir;
+
+use super::calls::{CheckFindings, Checking, Tiling};
+use super::{Names, RangeFindings, Stages, stored_name};
+use crate::Lamp;
+use crate::exit::Exit;
+use crate::options::Common;
+
+/// A folder with a part, and results.
+pub(super) struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    /// A tower with gaps in its mesh, so that `fix` has work to do, of 76 coarse layers.
+    pub(super) fn with_tower() -> Self {
+        let bench = Self::new();
+        bench.lamp("sample tower --facets 5k --defect drop --count 20 -o @t.stl");
+        bench.write("mine.toml", MATERIAL);
+        bench.write(
+            "edits.toml",
+            "[[edit]]\nop = \"subtract\"\nlayers = [3, 40]\nbox = { x = [\"-5mm\", \"5mm\"], y = [\"-5mm\", \"2mm\"] }\n\
+             [[edit]]\npad = { left = \"2mm\", top = \"1mm\" }\n",
+        );
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    pub(super) fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap()
+    }
+
+    /// Runs a command; words with an `@` before are files of the folder.
+    pub(super) fn lamp(&self, line: &str) {
+        let word = |word: &str| match word.split_once('@') {
+            Some((before, name)) => format!("{before}{}", self.path(name).display()),
+            None => word.to_owned(),
+        };
+        let words = ["lamp".to_owned()].into_iter().chain(line.split_whitespace().map(word));
+        let Lamp { command, .. } = Lamp::parse_from(words);
+        command.run(&Common::quiet()).unwrap_or_else(|error| panic!("{line}: {error}"));
+    }
+
+    /// Runs a pipeline by hand, a file between its stages, and returns its bytes.
+    pub(super) fn by_hand(&self, part: &str, stages: &[&str]) -> Vec<u8> {
+        let mut last = String::new();
+        for (k, stage) in stages.iter().enumerate() {
+            let (name, options) = stage.split_once(' ').unwrap_or((stage, ""));
+            let input = if k == 0 { part } else { &last };
+            // Lists of edits stand behind a word for the stack.
+            let options = options.strip_prefix("- ").unwrap_or(options);
+            let part = if name == "support" { format!("--part @{part}") } else { String::new() };
+            let next = format!("hand{k}.tif");
+            self.lamp(&format!("{name} @{input} {options} {part} -o @{next}"));
+            last = next;
+        }
+        self.bytes(&last)
+    }
+
+    /// Runs a chain for ranges that begin at `cuts`, and returns the joined bytes.
+    fn joined(&self, part: &str, stages: &Stages, cuts: &[u32]) -> (Vec<u8>, RangeFindings) {
+        let survey = stages.chain.survey(&self.path(part)).unwrap();
+        let ends = cuts.iter().copied().chain([survey.layers]);
+        let starts = [0].into_iter().chain(cuts.iter().copied());
+        let mut files = Vec::new();
+        let mut found = Vec::new();
+        for Range { start, end } in starts.zip(ends).map(|(start, end)| start..end) {
+            let file = self.path(&format!("range{start}.tif"));
+            found.push(self.range(part, stages, start..end, &file));
+            files.push(file);
+        }
+        let whole = self.path("joined.tif");
+        write_stack(join(files).unwrap(), Destination::File(whole.clone()), Format::Big).unwrap();
+        let found = found.into_iter().reduce(RangeFindings::joined).unwrap();
+        (fs::read(whole).unwrap(), found)
+    }
+
+    fn range(&self, part: &str, stages: &Stages, layers: Range<u32>, to: &Path) -> RangeFindings {
+        let write = |layers: &mut dyn Iterator<Item = _>| {
+            write_stack(layers, Destination::File(to.to_owned()), Format::Big)
+        };
+        stages.chain.run(&self.path(part), part, layers, write).unwrap()
+    }
+
+    pub(super) fn checked(&self, stack: &str) -> CheckFindings {
+        let checking = Checking::parse(&[], self.folder.path()).unwrap();
+        checking.run(&self.path(stack)).unwrap()
+    }
+
+    fn stages(&self, stages: &[&str]) -> Stages {
+        self.parsed(stages).unwrap_or_else(|why| panic!("{why}"))
+    }
+
+    fn parsed(&self, stages: &[&str]) -> Result<Stages, String> {
+        let words = |stage: &&str| {
+            let words = stage.split_whitespace().map(|word| word.trim_start_matches('@'));
+            words.map(ToOwned::to_owned).collect()
+        };
+        let stages: Vec<Vec<String>> = stages.iter().map(words).collect();
+        Stages::parse(&stages, self.folder.path())
+            .map_err(|error| format!("{}: {error}", error.stage))
+    }
+}
+
+const MATERIAL: &str = r#"name = "mine"
+description = "a resin"
+[[cure-width]]
+feature-size = "1 mm"
+critical-dose = { value = "100 mJ/cm2", source = "page 1" }
+sensitivity = { value = "0.5 um/(mJ/cm2)", source = "page 1" }
+"#;
+
+pub(super) const COARSE: &str = "slice --dpi 100 --thickness 1mm";
+pub(super) const GRAY: &str = "slice --dpi 100 --thickness 1mm --gray --material lamp-suspension";
+
+#[test]
+fn ranges_of_any_cut_have_the_bytes_of_the_pipeline_by_hand() {
+    let bench = Bench::with_tower();
+    bench.lamp("slice @t.stl --dpi 100 --thickness 1mm -o @other.tif");
+    let all = [
+        vec![COARSE],
+        vec![COARSE, "fix", "dither"],
+        vec![COARSE, "fix --use-neighbours --max-width 40 --min-confidence 0", "fix"],
+        vec![COARSE, "fix", "compensate --uniform 80um --shrinkage x:2%,y:1%", "dither"],
+        vec![
+            COARSE,
+            "edit - @edits.toml",
+            "fix --method nearest",
+            "compensate --uniform -50um --one-bit",
+        ],
+        vec![COARSE, "fix", "edit --union @other.tif"],
+        vec![GRAY, "fix", "dither --method floyd-steinberg", "edit - @edits.toml"],
+        vec![GRAY, "compensate --material @mine.toml --dose 300mJ/cm2", "dither --method ordered"],
+    ];
+    let by_hand: Vec<_> = all.iter().map(|stages| bench.by_hand("t.stl", stages)).collect();
+    let chains: Vec<_> = all.iter().map(|stages| bench.stages(stages)).collect();
+    let cuts = proptest::collection::btree_set(1_u32..75, 0..4);
+    let mut runner = TestRunner::new(ProptestConfig::with_cases(16));
+    runner
+        .run(&(0..all.len(), cuts), |(chain, cuts)| {
+            let cuts: Vec<u32> = cuts.into_iter().collect();
+            let (joined, _) = bench.joined("t.stl", &chains[chain], &cuts);
+            prop_assert!(joined == by_hand[chain], "{:?} cut at {cuts:?}", all[chain]);
+            Ok(())
+        })
+        .unwrap();
+    // Every chain is cut at least once, also where layers are one to a range.
+    for (stages, (chain, by_hand)) in all.iter().zip(chains.iter().zip(&by_hand)) {
+        let (joined, _) = bench.joined("t.stl", chain, &[1, 2, 3, 40, 75]);
+        assert!(joined == *by_hand, "{stages:?}");
+    }
+}
+
+#[test]
+fn adaptive_heights_and_step_parts_are_cut_alike() {
+    let bench = Bench::with_tower();
+    bench.lamp("sample sphere -o @s.stl");
+    bench.lamp("sample torus -o @t.step");
+    for (part, slice) in [
+        ("s.stl", "slice --dpi 300 --adaptive --min 200um --max 1mm"),
+        ("t.step", "slice --dpi 150 --thickness 500um"),
+    ] {
+        let by_hand = bench.by_hand(part, &[slice, "fix"]);
+        let (joined, _) = bench.joined(part, &bench.stages(&[slice, "fix"]), &[2, 7]);
+        assert!(joined == by_hand, "{part}");
+    }
+}
+
+#[test]
+fn whatever_reaches_beyond_the_part_is_told_by_the_range_at_that_end() {
+    let bench = Bench::with_tower();
+    bench.lamp("slice @t.stl --dpi 100 --thickness 1mm --translate 0,0,5 -o @higher.tif");
+    let stages = bench.stages(&[COARSE, "edit --union @higher.tif"]);
+    bench.range("t.stl", &stages, 0..40, &bench.path("low.tif"));
+    let write = |layers: &mut dyn Iterator<Item = Result<Layer, Exit>>| {
+        for layer in layers {
+            layer?;
+        }
+        Ok(())
+    };
+    let error = stages.chain.run(&bench.path("t.stl"), "t.stl", 40..76, write).unwrap_err();
+    assert!(error.to_string().contains("edit 1"), "{error}");
+}
+
+#[test]
+fn findings_of_ranges_add_up_to_those_of_the_whole() {
+    let bench = Bench::with_tower();
+    let stages = bench.stages(&[COARSE, "fix --max-width 1", "edit - @edits.toml"]);
+    let (_, whole) = bench.joined("t.stl", &stages, &[]);
+    let (_, found) = bench.joined("t.stl", &stages, &[5, 6, 50]);
+    assert_eq!(found, whole);
+    assert!(found.layers == 76 && found.stray_rows > 0 && found.bands_corrected > 0);
+    assert!(found.bands_left > 0 && found.first_left.is_some());
+    assert_eq!(found.notes(), [] as [&str; 0]);
+}
+
+#[test]
+fn the_same_options_have_one_text_whatever_their_form() {
+    let bench = Bench::with_tower();
+    fs::copy(bench.path("edits.toml"), bench.path("again.toml")).unwrap();
+    let canonical = |stages: &[&str]| bench.stages(stages).chain.canonical();
+    for (a, b) in [
+        ("slice", "slice --thickness 0.1mm -q --threads 3 --memory 64MB --dpi 1500dpi"),
+        ("slice --thickness 4mil", "slice --thickness 101.6um --plane top --margin 1"),
+        ("slice --machine alpha --dpi 1500", "slice --dpi 1500 --machine alpha"),
+        ("slice --size 1x1in --origin 0,25.4", "slice --origin 0,25.4mm --size 25.4x25.4mm"),
+    ] {
+        assert_eq!(canonical(&[a]), canonical(&[b]), "{a}");
+    }
+    for (a, b) in [
+        ("fix", "fix --method spline --max-width 15"),
+        ("dither", "dither --method blue-noise"),
+        ("compensate --uniform 25um", "compensate --uniform 0.025mm"),
+        ("compensate --shrinkage 2%", "compensate --shrinkage x:2%,y:2%"),
+        ("edit - @edits.toml", "edit - @again.toml"),
+    ] {
+        assert_eq!(canonical(&["slice", a]), canonical(&["slice", b]), "{a}");
+    }
+    let all = [
+        "slice --dpi 300",
+        "slice --gray --material lamp-suspension",
+        "slice --material lamp-suspension",
+        "slice --overcure 2 --material lamp-suspension",
+        "slice --thickness 1.0000000000000002mm",
+        "slice --thickness 1mm",
+        "slice --thickness 4mil",
+        "slice --thickness 0.004in",
+        "slice --machine alpha",
+        "slice --kernel both",
+        "slice --adaptive",
+        "slice --adaptive --min 20um",
+        "slice --no-polish",
+    ];
+    let mut texts: Vec<_> = all.iter().map(|slice| canonical(&[slice])).collect();
+    texts.sort();
+    texts.dedup();
+    assert_eq!(texts.len(), all.len());
+    let chain = bench.stages(&["slice --machine alpha", "edit - @edits.toml", "fix"]).chain;
+    assert_eq!(chain.input_files().unwrap(), [bench.path("edits.toml")]);
+    assert_eq!(
+        chain.code().iter().map(|(name, _)| *name).collect::<Vec<_>>(),
+        ["slice", "edit", "fix"]
+    );
+}
+
+#[test]
+fn options_that_make_no_sense_in_a_night_are_refused_in_one_sentence() {
+    let bench = Bench::with_tower();
+    for (stages, why) in [
+        (&[][..], "0: stages: there are none"),
+        (&["fix"], "0: fix: a part's first stage is slice"),
+        (&["slice", "slice"], "1: slice: slice is a part's first stage"),
+        (
+            &["slice", "tile --machine beta"],
+            "1: tile: it is no stage of a part: these are slice, fix",
+        ),
+        (&["slice", "fix --metod spline"], "similar argument exists: '--method'"),
+        (&["slice --dpi fine"], "0: slice: invalid value 'fine' for '--dpi <DPI>'"),
+        (&["slice a.stl"], "leave out the part's file"),
+        (&["slice -o a.tif"], "leave out -o"),
+        (&["slice --layers 3..5"], "leave out --layers"),
+        (&["slice --report a.json"], "leave out --report"),
+        (&["slice", "fix --strict"], "1: fix: leave out --strict"),
+        (&["slice", "fix a.tif"], "1: fix: leave out a.tif: it takes layers from the stage before"),
+        (&["slice", "edit edits.toml"], "1: edit: "),
+        (&["slice", "edit - none.toml"], "none.toml"),
+        (&["slice", "compensate"], "give --uniform 25um"),
+        (&["slice", "compensate --material none.toml"], "no such file"),
+        (&["slice --gray --plane middle --material lamp-suspension"], "leave out --plane"),
+        (&["slice", "support --part a.stl"], "leave out --part"),
+        (&["slice", "dither --help"], "for the command line"),
+    ] {
+        let said = bench.parsed(stages).err().unwrap_or_else(|| panic!("{stages:?} passes"));
+        assert!(said.contains(why) && said.lines().count() == 1, "{stages:?}: {said}");
+    }
+}
+
+#[test]
+fn what_follows_on_ranges_does_what_its_command_does() {
+    let bench = Bench::new();
+    bench.lamp("sample tower --facets 5k -o @t.stl");
+    let names = ["t.stl", &stored_name("blake3:0123456789abcdef")];
+    let stages = bench.stages(&[COARSE, "support --radius 1mm", "dither"]);
+    assert_eq!(stages.after.len(), 2);
+    let to = |name: &str| {
+        let file = bench.path(name);
+        move |layers: &mut dyn Iterator<Item = _>| {
+            write_stack(layers, Destination::File(file), Format::Big)
+        }
+    };
+    let part = bench.path("t.stl");
+    // Under the name of its content, from the part to the build.
+    stages.chain.run(&part, names[1], 0..76, to("sliced.tif")).unwrap();
+    stages.after[0].run(&part, &bench.path("sliced.tif"), to("held.tif")).unwrap();
+    stages.after[1].run(&part, &bench.path("held.tif"), to("dots.tif")).unwrap();
+    let words: Vec<String> = ["--mesh", "none", "--area", "8x8in"].map(str::to_owned).to_vec();
+    let tiling = Tiling::parse(&words, &[Some(2)], bench.folder.path()).unwrap();
+    tiling.run(&[(bench.path("dots.tif"), Some(2))], to("build.tif")).unwrap();
+    // Out of the store with today's name: the bytes of the commands by hand.
+    let by_hand = bench.by_hand("t.stl", &[COARSE, "support --radius 1mm", "dither"]);
+    let names = Names::new([(names[1].to_owned(), names[0].to_owned())]);
+    let out = |name: &str| Destination::File(bench.path(name));
+    names.unpack(&bench.path("dots.tif"), out("out.tif")).unwrap();
+    assert!(bench.bytes("out.tif") == by_hand);
+    bench.lamp("pack @dots.tif -o @dots.lamp");
+    names.copy(&bench.path("dots.lamp"), out("out.lamp")).unwrap();
+    bench.lamp("pack @hand2.tif -o @hand.lamp");
+    assert!(bench.bytes("out.lamp") == bench.bytes("hand.lamp"));
+    bench.lamp("tile @hand2.tif:2 --mesh none --area 8x8in -o @tiled.tif");
+    names.unpack(&bench.path("build.tif"), out("out.tif")).unwrap();
+    assert!(bench.bytes("out.tif") == bench.bytes("tiled.tif"));
+    // A check finds what the command reports.
+    bench.lamp("sample tower --facets 5k --defect drop --count 20 -o @gaps.stl");
+    bench.lamp("slice @gaps.stl --dpi 100 --thickness 1mm -o @gaps.tif");
+    bench.lamp("check @gaps.tif --report @check.json");
+    let report: serde_json::Value = serde_json::from_slice(&bench.bytes("check.json")).unwrap();
+    let found = bench.checked("gaps.tif");
+    let with_input = found.findings.iter().map(|finding| {
+        let mut finding = finding.clone();
+        finding["input"] = 0.into();
+        finding
+    });
+    assert_eq!(report["findings"], with_input.collect::<serde_json::Value>());
+    assert!(found.kinds["stray rows"] > 0 && found.lines[0].starts_with("stray rows: layer"));
+    let refused = |words: &[&str]| {
+        let words: Vec<String> = words.iter().map(ToString::to_string).collect();
+        Tiling::parse(&words, &[Some(1), None], bench.folder.path()).err().unwrap_or_default()
+    };
+    assert!(refused(&["--strips", "a/"]).contains("leave out --strips"));
+    assert!(refused(&["--copies", "3"]).contains("--copies is for one stack"));
+    assert!(refused(&["--layout", "none.json", "a.tif"]).contains("leave out the stacks"));
+}

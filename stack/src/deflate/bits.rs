@@ -1,0 +1,82 @@
+//! Reads and writes bits, the lowest of a byte first.
+
+/// Bits that become bytes.
+#[derive(Default)]
+pub(super) struct BitWriter {
+    bytes: Vec<u8>,
+    held: u64,
+    count: u8,
+}
+
+impl BitWriter {
+    /// Starts behind bytes.
+    pub(super) fn after(bytes: Vec<u8>) -> Self {
+        Self { bytes, ..Self::default() }
+    }
+
+    /// Appends the lowest `count` bits of `bits`, at most 32.
+    #[inline]
+    pub(super) fn put(&mut self, bits: u32, count: u8) {
+        self.held |= u64::from(bits) << self.count;
+        self.count += count;
+        if self.count >= 32 {
+            self.bytes.extend_from_slice(&(self.held as u32).to_le_bytes());
+            self.held >>= 32;
+            self.count -= 32;
+        }
+    }
+
+    /// Fills the last byte with zeros and returns all.
+    pub(super) fn finish(mut self) -> Vec<u8> {
+        let left = usize::from(self.count.div_ceil(8));
+        self.bytes.extend_from_slice(&self.held.to_le_bytes()[..left]);
+        self.bytes
+    }
+}
+
+/// Bits of bytes. Behind the last byte they are zero.
+pub(super) struct BitReader<'a> {
+    rest: &'a [u8],
+    held: u64,
+    count: u8,
+}
+
+impl<'a> BitReader<'a> {
+    pub(super) fn new(rest: &'a [u8]) -> Self {
+        Self { rest, held: 0, count: 0 }
+    }
+
+    /// Returns the next 32 bits at least, without taking them.
+    #[inline]
+    pub(super) fn peek(&mut self) -> u64 {
+        if self.count < 32 {
+            if let Some((word, rest)) = self.rest.split_first_chunk::<4>() {
+                self.held |= u64::from(u32::from_le_bytes(*word)) << self.count;
+                self.count += 32;
+                self.rest = rest;
+            } else if let Some((&byte, rest)) = self.rest.split_first() {
+                self.held |= u64::from(byte) << self.count;
+                self.count += 8;
+                self.rest = rest;
+                return self.peek();
+            }
+        }
+        self.held
+    }
+
+    /// Takes up to 32 bits that were peeked at, or returns `None` if there are fewer.
+    #[inline]
+    pub(super) fn skip(&mut self, count: u8) -> Option<()> {
+        self.count = self.count.checked_sub(count)?;
+        self.held >>= count;
+        Some(())
+    }
+
+    /// Takes up to 32 bits.
+    #[inline]
+    pub(super) fn take(&mut self, count: u8) -> Option<u32> {
+        let bits = self.peek() & ((1 << count) - 1);
+        self.skip(count)?;
+        Some(bits as u32)
+    }
+}

@@ -1,0 +1,193 @@
+//! Writes runs.
+
+use super::bits::BitWriter;
+use super::huffman::{code_lengths, codes};
+use super::{
+    END_OF_BLOCK, LENGTH_ORDER, MOST_BITS, MOST_COPIED, MOST_LENGTH_BITS, SYMBOLS, copies_of,
+};
+use crate::gray::{GrayMask, gray_runs};
+
+/// The number of runs in a block: enough that its codes take a hundredth of it.
+const BLOCK_RUNS: usize = 1 << 14;
+/// A zlib stream of Deflate with a window of 32 KiB, at the usual level.
+const ZLIB_HEADER: [u8; 2] = [0x78, 0x9C];
+
+/// Encodes a gray mask as a zlib stream of its bytes, row by row.
+pub(crate) fn encode(image: &GrayMask) -> Vec<u8> {
+    let runs = byte_runs(image);
+    let mut out = BitWriter::after(ZLIB_HEADER.to_vec());
+    let blocks = runs.len().div_ceil(BLOCK_RUNS).max(1);
+    for block in 0..blocks {
+        let runs = &runs[block * BLOCK_RUNS..runs.len().min((block + 1) * BLOCK_RUNS)];
+        put_block(&mut out, runs, block + 1 == blocks);
+    }
+    let mut bytes = out.finish();
+    bytes.extend_from_slice(&adler32(&runs).to_be_bytes());
+    bytes
+}
+
+/// Returns the runs `(length, byte)` of all rows; they go on from row to row.
+fn byte_runs(image: &GrayMask) -> Vec<(u32, u8)> {
+    let mut runs = Vec::with_capacity(image.change_count() + 1);
+    let mut push = |mut length: u32, level| {
+        if let Some((before, same)) = runs.last_mut()
+            && *same == level
+        {
+            // A run of a huge image is cut where its length would not fit.
+            let added = length.min(u32::MAX - *before);
+            *before += added;
+            length -= added;
+        }
+        if length > 0 {
+            runs.push((length, level));
+        }
+    };
+    for changes in image.rows() {
+        let mut column = 0;
+        for (start, end, level) in gray_runs(changes, image.width()) {
+            push(start - column, 0);
+            push(end - start, level);
+            column = end;
+        }
+        push(image.width() - column, 0);
+    }
+    runs
+}
+
+/// A run as it is written: bytes, then copies of the last.
+struct Copies {
+    /// The number of bytes that are written as such: one, or up to three if no copy is left.
+    bytes: u32,
+    longest: u32,
+    /// The length of a last copy that is shorter than the longest, or zero.
+    last: u32,
+}
+
+impl Copies {
+    fn of(length: u32) -> Self {
+        let (longest, last) = ((length - 1) / MOST_COPIED, (length - 1) % MOST_COPIED);
+        // No copy is shorter than three.
+        let bytes = if last < 3 { 1 + last } else { 1 };
+        Self { bytes, longest, last: if last < 3 { 0 } else { last } }
+    }
+}
+
+fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
+    let mut frequencies = [0; SYMBOLS];
+    frequencies[usize::from(END_OF_BLOCK)] = 1;
+    for &(length, byte) in runs {
+        let copies = Copies::of(length);
+        // A block of one colour may count beyond 32 bits; codes need no more than the order.
+        let mut add = |symbol: usize, times: u32| {
+            frequencies[symbol] = u32::saturating_add(frequencies[symbol], times);
+        };
+        add(byte.into(), copies.bytes);
+        add(SYMBOLS - 1, copies.longest);
+        if copies.last > 0 {
+            add(length_symbol(copies.last).into(), 1);
+        }
+    }
+    let lengths = code_lengths(&frequencies, MOST_BITS);
+    let codes = codes(&lengths);
+    out.put(u32::from(is_last), 1);
+    // Codes of its own.
+    out.put(2, 2);
+    put_lengths(out, &lengths);
+    let symbol =
+        |out: &mut BitWriter, symbol: usize| out.put(codes[symbol].into(), lengths[symbol]);
+    // The only distance, from the byte before, is a zero bit.
+    let longest = (u32::from(codes[SYMBOLS - 1]), lengths[SYMBOLS - 1] + 1);
+    for &(length, byte) in runs {
+        let copies = Copies::of(length);
+        (0..copies.bytes).for_each(|_| symbol(out, byte.into()));
+        put_often(out, longest, copies.longest);
+        if copies.last > 0 {
+            let last = length_symbol(copies.last);
+            let (first, bits) = copies_of(last).expect("it is the symbol of a length");
+            symbol(out, last.into());
+            out.put(copies.last - first, bits + 1);
+        }
+    }
+    symbol(out, END_OF_BLOCK.into());
+}
+
+/// Appends the same bits many times, as many at once as fit.
+fn put_often(out: &mut BitWriter, (bits, count): (u32, u8), mut times: u32) {
+    let together = 32 / count;
+    let all = (0..together).fold(0, |all, k| all | bits << (k * count));
+    while times >= together.into() {
+        out.put(all, together * count);
+        times -= u32::from(together);
+    }
+    (0..times).for_each(|_| out.put(bits, count));
+}
+
+/// Returns the symbol of a copy's length, 3 to 257.
+fn length_symbol(length: u32) -> u16 {
+    let from_three = length - 3;
+    let index = if from_three < 8 {
+        from_three
+    } else {
+        let bits = from_three.ilog2() - 2;
+        4 * bits + (from_three >> bits)
+    };
+    END_OF_BLOCK + 1 + index as u16
+}
+
+/// Appends the lengths of a block's codes. Of distances there is one, of one bit.
+fn put_lengths(out: &mut BitWriter, lengths: &[u8]) {
+    let mut tokens = Vec::new();
+    for run in lengths.iter().chain(&[1]).copied().collect::<Vec<_>>().chunk_by(|a, b| a == b) {
+        put_length_run(&mut tokens, run[0], run.len());
+    }
+    let mut frequencies = [0; 19];
+    tokens.iter().for_each(|&(symbol, ..)| frequencies[usize::from(symbol)] += 1);
+    let of_lengths = code_lengths(&frequencies, MOST_LENGTH_BITS);
+    let codes = codes(&of_lengths);
+    out.put(SYMBOLS as u32 - 257, 5);
+    out.put(0, 5);
+    out.put(LENGTH_ORDER.len() as u32 - 4, 4);
+    LENGTH_ORDER.iter().for_each(|&symbol| out.put(of_lengths[symbol].into(), 3));
+    for (symbol, more, bits) in tokens {
+        out.put(codes[usize::from(symbol)].into(), of_lengths[usize::from(symbol)]);
+        out.put(more, bits);
+    }
+}
+
+/// Adds the symbols, with bits that count on, of codes of one length that follow each other.
+fn put_length_run(tokens: &mut Vec<(u8, u32, u8)>, length: u8, mut count: usize) {
+    if length > 0 {
+        tokens.push((length, 0, 0));
+        count -= 1;
+    }
+    while count > 0 {
+        let (symbol, least, most, bits) = match (length, count) {
+            (_, 1 | 2) => (length, 1, 1, 0),
+            (1.., _) => (16, 3, 6, 2),
+            (_, 3..=10) => (17, 3, 10, 3),
+            _ => (18, 11, 138, 7),
+        };
+        let part = count.min(most);
+        tokens.push((symbol, (part - least) as u32, bits));
+        count -= part;
+    }
+}
+
+/// Returns the Adler-32 check of bytes, in a few operations a run.
+fn adler32(runs: &[(u32, u8)]) -> u32 {
+    const MODULUS: u64 = 65_521;
+    let (mut a, mut b) = (1, 0);
+    for &(length, byte) in runs {
+        let (length, byte) = (u64::from(length), u64::from(byte));
+        // a + byte, a + 2 byte, ... are added to b.
+        let (even, odd) = if length.is_multiple_of(2) {
+            (length / 2, length + 1)
+        } else {
+            (length, length.div_ceil(2))
+        };
+        let triangle = even % MODULUS * (odd % MODULUS) % MODULUS;
+        b = (b + length % MODULUS * a + triangle * byte) % MODULUS;
+        a = (a + length % MODULUS * byte) % MODULUS;
+    }
+    (b << 16 | a) as u32
+}

@@ -1,0 +1,281 @@
+//! `lamp batch`: nights that go on, do nothing twice, and say what needs a person.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use lamp_fixtures::{Defect, Sample, inject};
+use lamp_tests::{Ran, Scratch, tilted_ball};
+
+const STAGES: &str = "slice --dpi 60 --thickness 2mm";
+const TILE: &str = "--area 400x400mm --mesh none";
+
+/// Runs a night with what a test wants to see.
+fn night(scratch: &Scratch) -> Ran {
+    scratch.run("lamp batch night.toml --jobs 2 --verbose")
+}
+
+/// The tasks that a run has done, as it tells them.
+fn done(ran: &Ran) -> Vec<&str> {
+    ran.stderr
+        .lines()
+        .filter_map(|line| line.strip_prefix("batch: ")?.strip_suffix(" is done"))
+        .collect()
+}
+
+/// The files of a store with an end, of the tasks of one night.
+fn stored(scratch: &Scratch, end: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for shard in fs::read_dir(scratch.path("lamp-store/tasks")).unwrap() {
+        for entry in fs::read_dir(shard.unwrap().path()).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|have| have == end) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+fn write_over(path: &Path, bytes: &[u8]) {
+    let mut permissions = fs::metadata(path).unwrap().permissions();
+    #[expect(clippy::permissions_set_readonly_false, reason = "the folder is this test's")]
+    permissions.set_readonly(false);
+    fs::set_permissions(path, permissions).unwrap();
+    fs::write(path, bytes).unwrap();
+}
+
+/// What a report tells first, as text.
+fn first_of_report(scratch: &Scratch, folder: &str) -> String {
+    let html = String::from_utf8(scratch.bytes(&format!("{folder}/report.html"))).unwrap();
+    let start = html.find("Look at this first").expect("it tells what to look at");
+    html[start..].split("</section>").next().unwrap().to_owned()
+}
+
+/// Two cubes in three ranges, and a build of them.
+fn two_cubes() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("a.stl", Sample::Cube, 64);
+    scratch.part("b.stl", Sample::Cube, 100);
+    let night = "\
+        [defaults]\nstages = [\"slice --dpi 100 --thickness 100um\", \"fix\"]\nranges = 3\n\
+        [[part]]\nfile = \"*.stl\"\n\
+        [[build]]\nname = \"both\"\nparts = [\"a:2\", \"b\"]\ntile = \"--mesh none\"\n";
+    scratch.write("night.toml", night.as_bytes());
+    scratch
+}
+
+#[test]
+fn a_night_of_twenty_parts_names_the_bad_ones_first() {
+    let scratch = Scratch::new();
+    let mut parts = Vec::new();
+    for k in 0..17 {
+        let name = format!("blade-{k:02}");
+        scratch.part(&format!("{name}.stl"), Sample::Blade, 24_000 + 400 * k);
+        parts.push(name);
+    }
+    scratch.part("solid.stl", Sample::Cube, 64);
+    scratch.run("lamp convert solid.stl solid.step -q").succeeds();
+    fs::remove_file(scratch.path("solid.stl")).unwrap();
+    let whole = scratch.bytes("blade-03.stl");
+    scratch.write("broken.stl", &whole[..whole.len() / 2]);
+    let night_file = format!(
+        "[defaults]\nstages = [\"{STAGES}\", \"fix\"]\n\
+         [[part]]\nfile = [\"*.stl\", \"solid.step\", \"missing.stl\"]\n\
+         [[build]]\nname = \"one\"\nparts = [\"blade-00:2\", \"solid\"]\ntile = \"{TILE}\"\n\
+         [[build]]\nname = \"two\"\nparts = [\"blade-01\", \"blade-02\"]\ntile = \"{TILE}\"\n\
+         [[build]]\nname = \"three\"\nparts = [\"blade-05\", \"broken\"]\ntile = \"{TILE}\"\n\
+         [output]\nfolder = \"out\"\nformat = \"tif\"\n"
+    );
+    scratch.write("night.toml", night_file.as_bytes());
+    let ran = night(&scratch);
+    assert_eq!(ran.statuses, [Some(1)], "{ran:?}");
+    let first = first_of_report(&scratch, "out");
+    let names: Vec<&str> =
+        first.split("<li><b>").skip(1).map(|item| item.split('<').next().unwrap()).collect();
+    assert_eq!(names[..3], ["broken", "missing", "three"], "{first}");
+    // All others are there, with the bytes of the commands by hand.
+    for name in &parts {
+        scratch.run(&format!("lamp verify out/parts/{name}.tif -q")).succeeds();
+    }
+    for by_hand in [
+        format!("{STAGES} blade-00.stl -q | fix -q > blade-00.tif"),
+        format!("{STAGES} solid.step -q | fix -q > solid.tif"),
+        format!("tile blade-00.tif:2 solid.tif {TILE} -q > one.tif"),
+    ] {
+        scratch.run(&by_hand).succeeds();
+    }
+    for (by_hand, of_night) in
+        [("blade-00", "parts/blade-00"), ("solid", "parts/solid"), ("one", "builds/one")]
+    {
+        assert!(
+            scratch.bytes(&format!("{by_hand}.tif"))
+                == scratch.bytes(&format!("out/{of_night}.tif")),
+            "{of_night} has other bytes than by hand"
+        );
+    }
+    assert!(!scratch.path("out/builds/three.tif").exists());
+    // What is done is not done again.
+    let again = night(&scratch);
+    assert_eq!((again.statuses.clone(), done(&again)), (vec![Some(1)], vec![]), "{again:?}");
+    // With a stray band that is left instead of the bad ones, all is done and a person is needed.
+    let mut ball = tilted_ball();
+    inject(&mut ball, Defect::Drop, 5, 1);
+    scratch.mesh("broken.stl", &ball);
+    scratch.write("missing.stl", &whole);
+    let of_ball = "[[part]]\nfile = \"broken.stl\"\nslice = \"--dpi 300 --thickness 200um\"\n\
+                   fix = \"--max-width 4\"\n[[build]]";
+    let mended = night_file.replace(", \"broken\"]", "]").replacen("[[build]]", of_ball, 1);
+    scratch.write("night.toml", mended.as_bytes());
+    let ran = night(&scratch);
+    assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
+    assert!(done(&ran).iter().all(|task| !task.starts_with("blade")), "{ran:?}");
+    let first = first_of_report(&scratch, "out");
+    assert!(first.contains("<li><b>broken</b> needs a person: "), "{first}");
+    assert!(!first.contains("missing") && scratch.path("out/builds/three.tif").exists(), "{first}");
+}
+
+#[test]
+fn stray_bands_that_are_left_need_a_person() {
+    let scratch = Scratch::new();
+    let mut ball = tilted_ball();
+    inject(&mut ball, Defect::Drop, 5, 1);
+    scratch.mesh("ball.stl", &ball);
+    scratch.part("cube.stl", Sample::Cube, 64);
+    let text = "[defaults]\nstages = [\"slice --dpi 300 --thickness 200um\", \"fix --max-width 4\"]\n\
+                [[part]]\nfile = \"*.stl\"\n";
+    scratch.write("night.toml", text.as_bytes());
+    let ran = scratch.run("lamp batch night.toml --notify cat");
+    assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
+    assert!(
+        ran.stderr.contains("need a person: ball: ") && ran.stderr.contains("stray band"),
+        "{ran:?}"
+    );
+    let told = String::from_utf8(ran.stdout).unwrap();
+    assert!(told.contains("\"status\":3") && told.contains("\"state\":\"needs-person\""), "{told}");
+    assert!(first_of_report(&scratch, "night").contains("ball"));
+    assert_eq!(night(&scratch).statuses, [Some(3)]);
+}
+
+#[test]
+fn only_what_depends_on_a_change_is_done_again() {
+    let scratch = two_cubes();
+    let first = night(&scratch);
+    assert_eq!(first.statuses, [Some(0)], "{first:?}");
+    assert_eq!(done(&first).len(), 2 * (3 + 1 + 1) + 1, "{first:?}");
+    let build = scratch.bytes("night/builds/both.lamp");
+    // A touched file, and a renamed one that keeps its part's name.
+    fs::write(scratch.path("a.stl"), scratch.bytes("a.stl")).unwrap();
+    fs::rename(scratch.path("b.stl"), scratch.path("c.stl")).unwrap();
+    let text = String::from_utf8(scratch.bytes("night.toml")).unwrap();
+    let named = text.replace("[[build]]", "[[part]]\nfile = \"c.stl\"\nname = \"b\"\n[[build]]");
+    scratch.write("night.toml", named.as_bytes());
+    let touched = night(&scratch);
+    assert_eq!((touched.statuses.clone(), done(&touched)), (vec![Some(0)], vec![]), "{touched:?}");
+    // Other options of one part concern that part and the build; another form of the same, nothing.
+    let same = named.replace("100um", "0.1mm");
+    scratch.write("night.toml", same.as_bytes());
+    assert_eq!(done(&night(&scratch)), [""; 0]);
+    let edited = same.replace("name = \"b\"", "name = \"b\"\nfix = \"--max-width 9\"");
+    scratch.write("night.toml", edited.as_bytes());
+    let ran = night(&scratch);
+    assert!(ran.statuses == [Some(0)] && !done(&ran).is_empty(), "{ran:?}");
+    assert!(done(&ran).iter().all(|task| !task.starts_with("a ")), "{ran:?}");
+    // Back again: all is there still, and the build has the same bytes but for the file's new name.
+    scratch.write("night.toml", named.as_bytes());
+    assert_eq!(done(&night(&scratch)), [""; 0]);
+    fs::rename(scratch.path("c.stl"), scratch.path("b.stl")).unwrap();
+    scratch.write("night.toml", text.as_bytes());
+    assert_eq!(done(&night(&scratch)), [""; 0]);
+    assert!(scratch.bytes("night/builds/both.lamp") == build);
+}
+
+#[test]
+fn damaged_results_are_found_and_made_again() {
+    let scratch = two_cubes();
+    assert_eq!(night(&scratch).statuses, [Some(0)]);
+    let build = scratch.bytes("night/builds/both.lamp");
+    scratch.run("lamp batch verify night.toml").succeeds_quietly();
+    // Half a manifest is none.
+    let manifests = stored(&scratch, "json");
+    for manifest in &manifests {
+        let text = fs::read(manifest).unwrap();
+        write_over(manifest, &text[..text.len() / 2]);
+    }
+    let ran = night(&scratch);
+    assert_eq!(
+        (ran.statuses.clone(), done(&ran).len()),
+        (vec![Some(0)], manifests.len()),
+        "{ran:?}"
+    );
+    // A flipped bit in each result.
+    let results = stored(&scratch, "result");
+    for result in &results {
+        let mut bytes = fs::read(result).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 16;
+        write_over(result, &bytes);
+    }
+    let verified = scratch.run("lamp batch verify night.toml");
+    assert_eq!(verified.statuses, [Some(1)], "{verified:?}");
+    let told = format!("{0} of {0} results were damaged", results.len());
+    assert!(verified.stderr.contains(&told), "{verified:?}");
+    assert_eq!(done(&night(&scratch)).len(), results.len());
+    // Without verify, a task finds out when it uses one.
+    let text = String::from_utf8(scratch.bytes("night.toml")).unwrap();
+    let stacks: Vec<_> = stored(&scratch, "result");
+    for stack in &stacks {
+        let mut bytes = fs::read(stack).unwrap();
+        bytes[0] ^= 1;
+        write_over(stack, &bytes);
+    }
+    let edited = text.replace("--mesh none", "--mesh none --gap 3mm");
+    scratch.write("night.toml", edited.as_bytes());
+    let ran = night(&scratch);
+    assert!(ran.statuses == [Some(0)] && ran.stderr.contains("is made again"), "{ran:?}");
+    scratch.write("night.toml", text.as_bytes());
+    scratch.run("lamp batch verify night.toml");
+    assert_eq!(night(&scratch).statuses, [Some(0)]);
+    assert!(scratch.bytes("night/builds/both.lamp") == build);
+    let temporary = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().starts_with('.');
+    assert!(!stored(&scratch, "part").iter().any(temporary));
+}
+
+#[test]
+fn what_is_wrong_with_a_night_is_told_before_anything_runs() {
+    let scratch = two_cubes();
+    let text = String::from_utf8(scratch.bytes("night.toml")).unwrap();
+    for (from, to, words) in [
+        ("\"fix\"]", "\"fix --widht 3\"]", ["night.toml: line 2, column 48: fix: ", "--widht"]),
+        ("--dpi 100", "--dpi none", ["night.toml: line 2, column 11: slice: ", "none"]),
+        (
+            "--mesh none",
+            "--mesh none --cell 3mm",
+            ["night.toml: line 9, column 8: tile: ", "--cell"],
+        ),
+        ("[[build]]", "[[biuld]]", ["night.toml: line 6, column 3: ", "did you mean build?"]),
+        ("\"b\"]", "\"bb\"]", ["night.toml: line 8, column 17: ", "there is no part bb"]),
+    ] {
+        scratch.write("night.toml", text.replace(from, to).as_bytes());
+        for command in ["lamp batch night.toml", "lamp batch plan night.toml"] {
+            let ran = scratch.run(command).is_wrong_usage(&words);
+            assert_eq!(ran.stderr.lines().count(), 1, "{ran:?}");
+        }
+    }
+    assert!(!scratch.path("night").exists());
+    scratch.run("lamp batch").is_wrong_usage(&["name a night file"]);
+    scratch.run("lamp batch gone.toml").is_wrong_usage(&["gone.toml", "there is no such file"]);
+    scratch.write("night.toml", text.as_bytes());
+    let plan = scratch.run("lamp batch plan night.toml").succeeds_quietly();
+    let plan = String::from_utf8(plan.stdout).unwrap();
+    assert!(
+        plan.contains("range  6 of 6 tasks to do") && plan.contains("all    11 of 11"),
+        "{plan}"
+    );
+    assert_eq!(night(&scratch).statuses, [Some(0)]);
+    let removed = scratch.run("lamp batch gc night.toml").succeeds_quietly();
+    assert!(String::from_utf8(removed.stdout).unwrap().starts_with("6 results removed"));
+    let status = scratch.run("lamp batch status night.toml").succeeds_quietly();
+    let status = String::from_utf8(status.stdout).unwrap();
+    assert_eq!(status, "3 of 3 are done (2 parts and 1 build), 0 tasks are to do\n");
+}
