@@ -167,6 +167,10 @@ fn layers(dpi: f64) -> Vec<Layer> {
     slices.and_then(Iterator::collect).expect("a part that can be sliced")
 }
 
+fn in_packbits(layer: Layer) -> Layer {
+    Layer { image: layer.image.as_packbits(), ..layer }
+}
+
 fn gray_layer() -> Layer {
     let mut gray = GrayMask::new(300);
     gray.push_runs([(10, 0), (200, 255), (1, 128), (1, 127)]).expect("inside the width");
@@ -203,6 +207,7 @@ fn tiff() -> Named {
         ("masks_classic.tif", stack(&layers, Format::Classic)),
         ("gray.tif", stack(&gray, Format::Big)),
         ("gray_classic.tif", stack(&gray, Format::Classic)),
+        ("gray_packbits.tif", stack(&[in_packbits(gray_layer())], Format::Big)),
         ("plain.tif", plain(0, 1, false)),
         ("plain_reversed.tif", plain(1, 2, false)),
         ("plain_gray.tif", plain(0, 1, true)),
