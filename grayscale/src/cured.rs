@@ -4,7 +4,7 @@
 //! Exposures do not add up, light does not spread sideways, and what is cured stays
 //! cured: the single-layer experiment of 002 figure 67, repeated layer by layer.
 
-use lamp_stack::{Image, Length, gray_runs, white_runs};
+use lamp_stack::{Image, Length};
 
 /// The intervals of height in which a vertical line is inside something, as from and to
 /// in micrometres. They rise and do not touch.
@@ -36,38 +36,42 @@ impl PixelLine {
         }
     }
 
-    /// Calls `each` with the runs along the line that are not black: first pixel, end
-    /// and level.
+    /// Returns the runs along the line that are not black. Neighbours may have one level.
     ///
     /// # Panics
     /// Panics if the line does not cross the image.
-    fn for_each_run(self, image: &Image, mut each: impl FnMut(u32, u32, u8)) {
+    pub fn runs(self, image: &Image) -> Vec<LineRun> {
         match self {
-            Self::Row(row) => for_each_run_of_row(image, row, each),
+            Self::Row(row) => image.runs(row).collect(),
             Self::Column(column) => {
+                assert!(column < image.width(), "the line crosses the image");
+                let mut runs: Vec<LineRun> = Vec::new();
                 for row in 0..image.height() {
-                    for_each_run_of_row(image, row, |start, end, level| {
-                        if (start..end).contains(&column) {
-                            each(row, row + 1, level);
-                        }
-                    });
+                    match (level_at(image, row, column), runs.last_mut()) {
+                        (0, _) => {}
+                        (level, Some(run)) if run.1 == row && run.2 == level => run.1 += 1,
+                        (level, _) => runs.push((row, row + 1, level)),
+                    }
                 }
+                runs
             }
         }
     }
 }
 
-fn for_each_run_of_row(image: &Image, row: u32, mut each: impl FnMut(u32, u32, u8)) {
+/// A run along a line: its first pixel, the one after its last, and its level.
+pub type LineRun = (u32, u32, u8);
+
+fn level_at(image: &Image, row: u32, column: u32) -> u8 {
     match image {
         Image::Mask(mask) => {
-            for (start, end) in white_runs(mask.row(row), mask.width()) {
-                each(start, end, 255);
-            }
+            let before = mask.row(row).partition_point(|&change| change <= column);
+            if before % 2 == 1 { 255 } else { 0 }
         }
         Image::Gray(gray) => {
-            for (start, end, level) in gray_runs(gray.row(row), gray.width()) {
-                each(start, end, level);
-            }
+            let changes = gray.row(row);
+            let before = changes.partition_point(|change| change.column <= column);
+            before.checked_sub(1).map_or(0, |last| changes[last].level)
         }
     }
 }
@@ -103,16 +107,26 @@ impl CuredLine {
         top: Length,
         depth_of: impl Fn(u8) -> Length,
     ) {
-        let length = line.len(image) as usize;
-        self.pixels.resize(length.max(self.pixels.len()), SolidHeights::new());
-        line.for_each_run(image, |start, end, level| {
+        self.expose_runs(&line.runs(image), line.len(image), top, depth_of);
+    }
+
+    /// Exposes a layer, given the runs along the line and its number of pixels.
+    pub fn expose_runs(
+        &mut self,
+        runs: &[LineRun],
+        pixels: u32,
+        top: Length,
+        depth_of: impl Fn(u8) -> Length,
+    ) {
+        self.pixels.resize(self.pixels.len().max(pixels as usize), SolidHeights::new());
+        for &(start, end, level) in runs {
             let depth = depth_of(level).um();
             if depth > 0.0 {
                 for solid in &mut self.pixels[start as usize..end as usize] {
                     cure(solid, [top.um() - depth, top.um()]);
                 }
             }
-        });
+        }
     }
 
     /// Returns the heights at which each pixel of the line is solid.
@@ -121,11 +135,14 @@ impl CuredLine {
     }
 }
 
+/// Layers this near touch: exposure times are rounded to the microsecond, which takes up to a
+/// nanometre off the depth that just cures a layer.
+const TOUCHING_UM: f64 = 2e-3;
+
 /// Adds the interval that an exposure cures, merged with those that it meets.
 fn cure(solid: &mut SolidHeights, [mut from, to]: [f64; 2]) {
     while let Some(&[before, reached]) = solid.last() {
-        // Touching layers differ in the last digits of their heights.
-        if reached < from - 1e-6 {
+        if reached < from - TOUCHING_UM {
             break;
         }
         from = from.min(before);

@@ -8,7 +8,8 @@
 //!   gray level becomes the share of white pixels (002 section 3.3.1). Black and white
 //!   stay as they are, so no dot appears outside the part. [`homogeneity`] tells whether
 //!   the resin averages dots of a size.
-//! - [`CuredLine`] simulates what a stack cures.
+//! - [`CuredLine`] simulates what a stack cures, layer by layer, [`SummedLine`] where doses add up.
+//!   [`shared_height`] compares that with a part.
 //!
 //! ```
 //! use lamp_grayscale::{DitherMethod, dither_image};
@@ -34,13 +35,17 @@ mod dots;
 mod homogeneity;
 pub mod material;
 mod ordered;
+mod outline;
 pub mod resin;
 mod screen;
+mod summed;
 pub mod target;
 mod threshold;
 #[cfg(test)]
 mod void_and_cluster;
 
-pub use cured::{CuredLine, PixelLine, SolidHeights, excess};
+pub use cured::{CuredLine, LineRun, PixelLine, SolidHeights, excess};
 pub use dither::{DitherError, DitherMethod, dither, dither_image};
 pub use homogeneity::{EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
+pub use outline::{OutlinePiece, shared_height};
+pub use summed::SummedLine;

@@ -4,7 +4,7 @@ use lamp_grayscale::{PixelLine, SolidHeights};
 use lamp_stack::{Dpi, Image, Length};
 
 use crate::blur::Blur;
-use crate::light::{LayerTime, Light};
+use crate::light::{LayerTime, Light, SampleHeight};
 
 /// What a stack cures along a row or column of pixels, where doses add up and light spreads
 /// sideways and down (001 eq. 5).
@@ -161,6 +161,32 @@ impl DoseSection {
         cured.iter_mut().for_each(|solid| solid.reverse());
         cured
     }
+
+    /// Returns the heights at which each pixel of the line is cured, wherever in a layer the dose
+    /// is the critical one or more. Doses must be told at the layers' tops.
+    ///
+    /// # Panics
+    /// Panics if they are told elsewhere.
+    pub fn cured_by_height(&self) -> Vec<SolidHeights> {
+        assert_eq!(self.light.at, SampleHeight::Top, "doses are those of the tops");
+        let depth_um = self.light.penetration_depth.um();
+        let mut cured = Vec::new();
+        self.for_each_layer(|number, doses| {
+            let ExposedLayer { bottom, exposed, .. } = self.layers[number];
+            let thick_um = exposed.thickness.um();
+            let top_um = bottom.um() + thick_um;
+            cured.resize(doses.len(), SolidHeights::new());
+            for (solid, dose) in cured.iter_mut().zip(doses).filter(|(_, dose)| **dose > 1.0) {
+                let from = top_um - (depth_um * dose.ln()).min(thick_um);
+                match solid.last_mut() {
+                    Some(above) if above[0] <= top_um + 1e-6 => above[0] = from,
+                    _ => solid.push([from, top_um]),
+                }
+            }
+        });
+        cured.iter_mut().for_each(|solid| solid.reverse());
+        cured
+    }
 }
 
 /// Returns the ends of stretches of equal numbers, and the numbers.
@@ -179,7 +205,7 @@ mod tests {
     use lamp_stack::{GrayMask, Mask};
 
     use super::*;
-    use crate::light::{IntensityOf, SampleHeight};
+    use crate::light::IntensityOf;
 
     fn light(spread_um: f64, at: SampleHeight) -> Light {
         Light {
@@ -338,6 +364,32 @@ mod tests {
         // 1.125 critical doses cure a layer, and 0.8061 are left of them in the one below.
         let expected: [&[[f64; 2]]; 4] = [&[[300.0, 400.0]], &[[0.0, 100.0]], &[[0.0, 200.0]], &[]];
         assert_eq!(section.cured(), expected);
+    }
+
+    #[test]
+    fn heights_are_where_the_dose_is_critical() {
+        let light = light(0.0, SampleHeight::Top);
+        let mut section = DoseSection::new(light, PixelLine::Row(0), dpi());
+        let image = |white: bool| {
+            let changes = if white { vec![0] } else { Vec::new() };
+            Image::Mask(Mask::new(1, vec![0, changes.len() as u32], changes).unwrap())
+        };
+        let exposures = [false, true, false, true, true];
+        for (number, white) in (0..5).zip(exposures) {
+            let bottom = Length::from_um(100.0 * f64::from(number));
+            section.expose(&image(white), bottom, layer(100.0, 700.0), |_| 1.0);
+        }
+        let solid = &section.cured_by_height()[0];
+        let dose = |z_um: f64| {
+            let tops = (0..5).filter(|&k| exposures[k]).map(|k| 100.0 * (k as f64 + 1.0));
+            let above = tops.filter(|top| *top >= z_um);
+            above.map(|top| 0.875 * ((z_um - top) / 300.0).exp()).sum::<f64>()
+        };
+        for step in 0..5000 {
+            let z_um = 0.1 * f64::from(step) + 0.05;
+            let is_cured = solid.iter().any(|[from, to]| (*from..*to).contains(&z_um));
+            assert_eq!(is_cured, dose(z_um) >= 1.0, "{z_um}: {solid:?}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use lamp_stack::{Dpi, Length};
 use rayon::prelude::*;
 
-use crate::bodies::{Position, Turn};
+use crate::bodies::{FillRule, Position, Turn};
 use crate::cut::Cutter;
 use crate::error::SliceError;
 use crate::facet::Units;
@@ -50,36 +50,63 @@ pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, Sli
 }
 
 fn rows(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
-    let model = PlacedPart::new(model, &options.placement, options.units);
-    let survey = Survey::of(&model)?;
-    survey.check_extent(&model)?;
-    let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
-    let planes = Planes::one(options.z);
-    let rule = model.model.fill_rule(options.fill);
-    let cutter = Cutter { grid: &grid, planes: &planes, rule: &rule };
-    let z_um = planes.z_um(0);
-    let found = survey.blocks_between(z_um, z_um).into_par_iter().map(|block| {
-        let mut crossings = Vec::new();
-        let body = rule.name_of(model.model.place_of(block).0 as u32);
-        model.for_each_in_block(block, |facet| {
-            cutter.for_each_segment(facet, &(0..1), |_, segment| {
-                let [a, b] = segment.ends.map(|end| end.at);
-                cutter.for_each_crossing(a, b, segment.is_reversed, |row, column, rising| {
-                    let turn = Turn::new(body, if rising { 1 } else { -1 });
-                    crossings.push((row, grid.to_mm(column, 0.0)[0], turn));
-                });
-            });
-        })?;
-        Ok(crossings)
-    });
-    let mut crossings = found.collect::<Result<Vec<_>, SliceError>>()?.concat();
+    let cut = CutPart::new(model, options)?;
+    let mut crossings = cut.gather(|cutter, [a, b], is_reversed, body, crossings| {
+        cutter.for_each_crossing(a, b, is_reversed, |row, column, rising| {
+            let turn = Turn::new(body, if rising { 1 } else { -1 });
+            crossings.push((row, cutter.grid.to_mm(column, 0.0)[0], turn));
+        });
+    })?;
     crossings.par_sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     let mut rows = vec![Inside::new(); options.rows as usize];
-    let mut position = Position::outside(&rule);
+    let mut position = Position::outside(&cut.rule);
     for row in crossings.chunk_by(|a, b| a.0 == b.0) {
         rows[row[0].0 as usize] = inside(row, &mut position);
     }
     Ok(rows)
+}
+
+/// A part in its place, about to be cut by one plane.
+pub(crate) struct CutPart {
+    model: PlacedPart,
+    survey: Survey,
+    grid: PixelGrid,
+    planes: Planes,
+    pub(crate) rule: FillRule,
+}
+
+impl CutPart {
+    pub(crate) fn new(model: Part, options: &SectionOptions) -> Result<Self, SliceError> {
+        let model = PlacedPart::new(model, &options.placement, options.units);
+        let survey = Survey::of(&model)?;
+        survey.check_extent(&model)?;
+        let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
+        let rule = model.model.fill_rule(options.fill);
+        Ok(Self { model, survey, grid, planes: Planes::one(options.z), rule })
+    }
+
+    /// Calls `each` with every segment on the plane: its ends in pixels, whether it is reversed,
+    /// its body, and a list to add to. Returns all lists in one.
+    pub(crate) fn gather<T: Clone + Send>(
+        &self,
+        each: impl Fn(&Cutter<'_>, [[f64; 2]; 2], bool, u32, &mut Vec<T>) + Sync,
+    ) -> Result<Vec<T>, SliceError> {
+        let Self { model, survey, grid, planes, rule } = self;
+        let cutter = Cutter { grid, planes, rule };
+        let z_um = planes.z_um(0);
+        let found = survey.blocks_between(z_um, z_um).into_par_iter().map(|block| {
+            let mut list = Vec::new();
+            let body = rule.name_of(model.model.place_of(block).0 as u32);
+            model.for_each_in_block(block, |facet| {
+                cutter.for_each_segment(facet, &(0..1), |_, segment| {
+                    let ends = segment.ends.map(|end| end.at);
+                    each(&cutter, ends, segment.is_reversed, body, &mut list);
+                });
+            })?;
+            Ok(list)
+        });
+        Ok(found.collect::<Result<Vec<_>, SliceError>>()?.concat())
+    }
 }
 
 /// Returns the stretches between the crossings of a row.

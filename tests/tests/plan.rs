@@ -151,7 +151,7 @@ fn a_plan_says_what_sections_show() {
     let count = |when: &str, what: &str| told[when][what].as_f64().unwrap();
     for (stack, panel, when) in [("slope", "white", "before"), ("planned", "gray", "after")] {
         let cure = format!(
-            "lamp cure {stack}.tif --material zsg-amber --section y=0.005mm --add-up -o s.png"
+            "lamp cure {stack}.tif --material zsg-amber --section y=0.005mm --at top -o s.png"
         );
         let said = String::from_utf8(scratch.run(&cure).succeeds_quietly().stdout).unwrap();
         let row = said.lines().find_map(|row| row.strip_prefix(panel)).unwrap();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lamp_grayscale::SolidHeights;
+use lamp_grayscale::OutlinePiece;
 use lamp_grayscale::material::Material;
 use lamp_planning::{Light, SampleHeight};
 use lamp_stack::StackInfo;
@@ -18,24 +18,26 @@ use crate::part_options::name_of_all;
 use crate::picture::PictureScale;
 use crate::planning_options::SAMPLE_HEIGHTS;
 use crate::progress::Progress;
-use crate::section::{Exposures, SectionLine, SectionPicture, SectionPlane, parse_along};
+use crate::section::{CureRule, Exposures, SectionLine, SectionPicture, SectionPlane, parse_along};
 use crate::stack_part::RecordedSlicing;
 use crate::streams::{check_beside, check_png_name, input_name, print, read_layers, write_file};
 
 /// Draw a vertical section of what a stack cures, compared with the part
 ///
-/// Each exposure cures down from its layer's top, as deep as its gray level reaches in the
-/// material's cure model. A stack with gray layers is drawn twice: on the left with every pixel
-/// that is not black exposed in full, on the right by its gray levels. Resin cured outside the part
-/// is red, uncured places of the part are blue, and the part's outline is yellow; the areas are
-/// printed. With --add-up, the doses of all exposures add up instead, and light spreads sideways as
-/// far as the material says ([spread]); a layer cures where its dose is the critical one. Dots are
-/// drawn as they are, so use a stack from before `dither`.
+/// The doses of all exposures that reach a place add up: light fades as it goes down from each
+/// layer's top, and spreads sideways as far as the material says ([spread]). Resin is cured where
+/// they come to the critical dose. With --alone each exposure cures by itself, as deep as its gray
+/// level reaches in the material's cure model. A stack with gray layers is drawn twice: on the left
+/// with every pixel that is not black exposed in full, on the right by its gray levels. Resin cured
+/// outside the part is red, uncured places of the part are blue, and the part's outline is yellow;
+/// the areas, which are exact over whole pixels, are printed. Dots are drawn as they are, so use a
+/// stack from before `dither`.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp cure gray.tif --material lamp-suspension --section y=12mm --part blade.stl -o section.png
-  lamp cure planned.tif --material mine.toml --section y=12mm --add-up -o section.png
+  lamp cure gray.tif --material lamp-suspension --section y=12mm --alone -o section.png
+  lamp cure planned.tif --material mine.toml --section y=12mm --at top -o section.png
   lamp cure gray.tif --material mine.toml --section x=3mm --along 10mm..14mm --layers 80..120 \\
       --scale 4 -o detail.png")]
 pub(crate) struct CureArgs {
@@ -59,14 +61,19 @@ pub(crate) struct CureArgs {
     #[arg(long, value_name = "A..B", value_parser = parse_along, allow_hyphen_values = true)]
     along: Option<Range<f64>>,
 
-    /// Add up the doses of all layers, with light that spreads sideways and down
-    #[arg(long)]
+    /// Add up the doses of all layers that reach a place; this is the default
+    #[arg(long, conflicts_with = "alone")]
     add_up: bool,
 
-    /// Where in a layer its dose is told
-    #[arg(long, value_name = "HEIGHT", default_value = "top", requires = "add_up")]
+    /// Let each exposure cure by itself, without what the others add
+    #[arg(long)]
+    alone: bool,
+
+    /// Cure whole layers, by the dose at this height of each, as planners do, instead of any height
+    /// where the dose is the critical one
+    #[arg(long, value_name = "HEIGHT", conflicts_with = "alone")]
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
-    at: SampleHeight,
+    at: Option<SampleHeight>,
 
     /// Scale of the picture: 4 draws each pixel as 4 x 4, 1/8 only every eighth
     #[arg(long, value_name = "N|1/N", default_value = "1")]
@@ -77,21 +84,34 @@ pub(crate) struct CureArgs {
     output: PathBuf,
 }
 
+impl CureArgs {
+    /// Returns how exposures cure. Light of a material without `[spread]` goes straight down.
+    fn rule(&self, material: &Material) -> Result<CureRule, Exit> {
+        if self.alone {
+            return Ok(CureRule::Alone);
+        }
+        if let Some(at) = self.at {
+            return Ok(CureRule::Voxels(Light::of_any(material, at)?));
+        }
+        if material.spread.is_some() {
+            return Ok(CureRule::Spread(Light::of_any(material, SampleHeight::Top)?));
+        }
+        let fading = material.fading().map_err(anyhow::Error::new);
+        let fading = fading.context("doses cannot add up; see --alone");
+        Ok(CureRule::Straight(fading.map_err(Exit::Failed)?))
+    }
+}
+
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     check_png_name(&args.output)?;
     let material: Material = entry(&args.material)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
-    let light = args.add_up.then(|| Light::of_any(&material, args.at)).transpose();
-    let light = light?;
+    let rule = args.rule(&material)?;
     let name = input_name(&args.input.stack);
     let failed = |error: anyhow::Error| Exit::Failed(error).at(input_name(&args.input.stack));
     let progress = Progress::new("cure", common, true);
-    if args.add_up && material.spread.is_none() {
-        let name = &material.name;
-        progress.say(&format!("{name} does not say how far light spreads: it goes straight down"));
-    }
     let (mut exposures, mut stack) = (None, None);
     for layer in read_layers(&args.input, &progress)? {
         let layer = layer?;
@@ -104,13 +124,10 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
                 progress.say("these layers were compensated, so that they differ from the part");
             }
             let course = SectionLine::new(args.section, &layer).map_err(failed)?;
-            exposures = Some(match light {
-                Some(light) => {
-                    light.check_spread(course.dpi)?;
-                    Exposures::added(&resin, light, course)
-                }
-                None => Exposures::alone(&resin, course),
-            });
+            if let CureRule::Spread(light) | CureRule::Voxels(light) = rule {
+                light.check_spread(course.dpi)?;
+            }
+            exposures = Some(Exposures::new(&resin, rule, course));
             stack = layer.info.stack.clone();
         }
         let exposures = exposures.as_mut().expect("it was made for the first layer");
@@ -135,7 +152,7 @@ fn outline(
     course: &SectionLine,
     stack: Option<&StackInfo>,
     name: &str,
-) -> Result<Vec<SolidHeights>, Exit> {
+) -> Result<Vec<Vec<OutlinePiece>>, Exit> {
     let sliced = RecordedSlicing::of(stack).with_context(|| {
         format!("{name} does not record how its part was sliced: leave out --part")
     })?;

@@ -3,53 +3,71 @@
 use std::ops::Range;
 
 use anyhow::{Context, anyhow};
-use lamp_grayscale::resin::{ExposureTime, GrayLevel, Resin};
-use lamp_grayscale::{CuredLine, SolidHeights};
+use lamp_grayscale::resin::{ExposureTime, FadingLight, GrayLevel, Resin};
+use lamp_grayscale::{CuredLine, LineRun, SolidHeights, SummedLine};
 use lamp_planning::{DoseSection, LayerTime, Light};
 use lamp_stack::{Image, Layer, Length};
 
 use super::line::SectionLine;
 
+/// How exposures cure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum CureRule {
+    /// Each by itself, as deep as its gray level reaches.
+    Alone,
+    /// Together, where their doses add up to the critical one; light goes straight down.
+    Straight(FadingLight),
+    /// The same with light that spreads sideways.
+    Spread(Light),
+    /// The same, but whole layers, by the dose at one height of each.
+    Voxels(Light),
+}
+
+impl CureRule {
+    /// Returns what is said of it.
+    pub(super) fn text(&self) -> &'static str {
+        match self {
+            Self::Alone => "each layer alone",
+            Self::Straight(_) => "doses added up straight down",
+            Self::Spread(_) => "doses added up, with spread",
+            Self::Voxels(_) => "doses added up layer by layer",
+        }
+    }
+}
+
 /// The exposures of a stack along a section: every pixel that is not black in full, and by gray
 /// levels.
 pub(crate) struct Exposures<'a> {
     resin: &'a Resin,
+    pub(super) rule: CureRule,
     pub(crate) course: SectionLine,
     cured: Cured,
     has_gray: bool,
     pub(super) heights_um: Range<f64>,
 }
 
-/// What exposures cure.
+/// What exposures cure: in full, and by gray levels.
 enum Cured {
-    /// Each alone, as deep as its gray level reaches.
-    Alone { depths: Option<(ExposureTime, Vec<Length>)>, in_full: CuredLine, by_levels: CuredLine },
-    /// Together, where their doses add up to the critical one.
-    Added(Box<Added>),
-}
-
-struct Added {
-    light: Light,
-    in_full: DoseSection,
-    by_levels: DoseSection,
+    Alone { depths: Option<(ExposureTime, Vec<Length>)>, lines: [CuredLine; 2] },
+    Summed([SummedLine; 2]),
+    Spread(Box<(Light, [DoseSection; 2])>),
 }
 
 impl<'a> Exposures<'a> {
-    /// Exposures of which each cures by itself.
-    pub(crate) fn alone(resin: &'a Resin, course: SectionLine) -> Self {
-        let [in_full, by_levels] = [CuredLine::default(), CuredLine::default()];
-        Self::new(resin, course, Cured::Alone { depths: None, in_full, by_levels })
-    }
-
-    /// Exposures whose doses add up.
-    pub(crate) fn added(resin: &'a Resin, light: Light, course: SectionLine) -> Self {
-        let section = || DoseSection::new(light, course.line, course.dpi);
-        let added = Added { light, in_full: section(), by_levels: section() };
-        Self::new(resin, course, Cured::Added(Box::new(added)))
-    }
-
-    fn new(resin: &'a Resin, course: SectionLine, cured: Cured) -> Self {
-        Self { resin, course, cured, has_gray: false, heights_um: f64::MAX..f64::MIN }
+    /// Starts without a layer.
+    pub(crate) fn new(resin: &'a Resin, rule: CureRule, course: SectionLine) -> Self {
+        let cured = match rule {
+            CureRule::Alone => Cured::Alone { depths: None, lines: Default::default() },
+            CureRule::Straight(fading) => {
+                let line = SummedLine::new(fading, course.pixels);
+                Cured::Summed([line.clone(), line])
+            }
+            CureRule::Spread(light) | CureRule::Voxels(light) => {
+                let section = DoseSection::new(light, course.line, course.dpi);
+                Cured::Spread(Box::new((light, [section.clone(), section])))
+            }
+        };
+        Self { resin, rule, course, cured, has_gray: false, heights_um: f64::MAX..f64::MIN }
     }
 
     /// Exposes a layer. They come from the bottom up.
@@ -58,18 +76,27 @@ impl<'a> Exposures<'a> {
         let (line, image) = (self.course.line, &layer.image);
         let top = Length::from_um(bottom.um() + thickness.um());
         match &mut self.cured {
-            Cured::Alone { depths, in_full, by_levels } => {
+            Cured::Alone { depths, lines: [in_full, by_levels] } => {
                 if depths.as_ref().is_none_or(|(of, _)| *of != time) {
                     let depth = |level| self.resin.depth(GrayLevel::from_u8(level), time);
                     *depths = Some((time, (0..=255u8).map(depth).collect()));
                 }
                 let depths = &depths.as_ref().expect("they were just made").1;
-                in_full.expose(line, image, top, |_| depths[255]);
-                by_levels.expose(line, image, top, |level| depths[usize::from(level)]);
+                let (runs, pixels) = (line.runs(image), line.len(image));
+                in_full.expose_runs(&runs, pixels, top, |_| depths[255]);
+                by_levels.expose_runs(&runs, pixels, top, |level| depths[usize::from(level)]);
             }
-            Cured::Added(added) => {
+            Cured::Summed([in_full, by_levels]) => {
+                let end = self.course.pixels;
+                // A later page may be larger.
+                let within = |(from, to, level): LineRun| (from.min(end), to.min(end), level);
+                let runs: Vec<LineRun> = line.runs(image).into_iter().map(within).collect();
+                in_full.expose(whitened(&runs), bottom, thickness, time);
+                by_levels.expose(runs, bottom, thickness, time);
+            }
+            Cured::Spread(spread) => {
                 let exposed = LayerTime { thickness, time };
-                let Added { light, in_full, by_levels } = &mut **added;
+                let (light, [in_full, by_levels]) = &mut **spread;
                 in_full.expose(image, bottom, exposed, |_| 1.0);
                 by_levels.expose(image, bottom, exposed, |level| light.of_level(level));
             }
@@ -109,16 +136,22 @@ impl<'a> Exposures<'a> {
 
     /// What is cured at each pixel, with a name: in full, and by gray levels if there are any.
     pub(super) fn cured(&self) -> Vec<(&'static str, Vec<SolidHeights>)> {
-        let (in_full, by_levels) = match &self.cured {
-            Cured::Alone { in_full, by_levels, .. } => {
-                (in_full.pixels().to_vec(), by_levels.pixels().to_vec())
-            }
-            Cured::Added(added) => (added.in_full.cured(), added.by_levels.cured()),
+        let of = |k: usize| match &self.cured {
+            Cured::Alone { lines, .. } => lines[k].pixels().to_vec(),
+            Cured::Summed(lines) => lines[k].cured(self.heights_um.start),
+            Cured::Spread(spread) => match self.rule {
+                CureRule::Voxels(_) => spread.1[k].cured(),
+                _ => spread.1[k].cured_by_height(),
+            },
         };
-        let mut cured = vec![("white", in_full)];
-        if self.has_gray {
-            cured.push(("gray", by_levels));
-        }
-        cured
+        let names: &[_] = if self.has_gray { &["white", "gray"] } else { &["white"] };
+        names.iter().enumerate().map(|(k, &name)| (name, of(k))).collect()
     }
+}
+
+/// Returns the runs at full white, neighbours joined.
+fn whitened(runs: &[LineRun]) -> Vec<LineRun> {
+    let touching = |a: &LineRun, b: &LineRun| a.1 == b.0;
+    let white = |runs: &[LineRun]| (runs[0].0, runs[runs.len() - 1].1, 255);
+    runs.chunk_by(touching).map(white).collect()
 }

@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use anyhow::{Context, anyhow};
-use lamp_grayscale::{PixelLine, SolidHeights};
-use lamp_slicer::{Axis, Part, SectionOptions, SliceError, section};
+use lamp_grayscale::{OutlinePiece, PixelLine};
+use lamp_slicer::{Axis, Part, SectionOptions, SliceError, Trapezoid, section_area};
 use lamp_stack::{Dpi, Layer, Length};
 
 use crate::slicing_options::SlicingOptions;
@@ -113,13 +113,13 @@ impl SectionLine {
         pixel(from)..pixel(to)
     }
 
-    /// Returns where the part is at each pixel. Turns the part so that the section is level and
-    /// heights run along its rows.
+    /// Returns where the part is within each pixel. Turns the part so that the section is level
+    /// and heights run along its rows.
     pub(crate) fn outline(
         &self,
         model: Part,
         options: &SlicingOptions,
-    ) -> Result<Vec<SolidHeights>, SliceError> {
+    ) -> Result<Vec<Vec<OutlinePiece>>, SliceError> {
         let options = options.for_slicing();
         let turned = options.placement.rotated(Axis::Y, 90.0);
         let pitch = self.dpi.pitch().mm();
@@ -130,7 +130,7 @@ impl SectionLine {
                 (turned.rotated(Axis::X, 90.0), y, right)
             }
         };
-        let mut rows = section(
+        let rows = section_area(
             model,
             &SectionOptions {
                 units: options.units,
@@ -142,11 +142,24 @@ impl SectionLine {
                 rows: self.pixels,
             },
         )?;
-        if let PixelLine::Row(_) = self.line {
-            // Rows count from the largest x.
-            rows.reverse();
+        // Along a row, rows of the section count from the largest x.
+        let is_reversed = matches!(self.line, PixelLine::Row(_));
+        let piece = |piece: &Trapezoid| {
+            let in_um = |[from, to]: [f64; 2]| [from * 1000.0, to * 1000.0];
+            let Trapezoid { rows: [start, end], from_mm, to_mm } = *piece;
+            let [from_um, to_um] = [from_mm, to_mm].map(in_um);
+            if is_reversed {
+                let [from_um, to_um] = [from_um, to_um].map(|[a, b]| [b, a]);
+                OutlinePiece { along: [1.0 - end, 1.0 - start], from_um, to_um }
+            } else {
+                OutlinePiece { along: [start, end], from_um, to_um }
+            }
+        };
+        let mut pixels: Vec<Vec<_>> =
+            rows.iter().map(|pieces| pieces.iter().map(piece).collect()).collect();
+        if is_reversed {
+            pixels.reverse();
         }
-        let in_um = |[from, to]: [f64; 2]| [from * 1000.0, to * 1000.0];
-        Ok(rows.into_iter().map(|row| row.into_iter().map(in_um).collect()).collect())
+        Ok(pixels)
     }
 }

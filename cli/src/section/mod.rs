@@ -2,8 +2,9 @@
 
 mod exposures;
 mod line;
+mod painter;
 mod picture;
 
-pub(crate) use exposures::Exposures;
+pub(crate) use exposures::{CureRule, Exposures};
 pub(crate) use line::{SectionLine, SectionPlane, parse_along};
 pub(crate) use picture::SectionPicture;

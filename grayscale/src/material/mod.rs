@@ -28,8 +28,8 @@ pub use kinetics::KineticNumbers;
 pub use number::{Constant, Given, GivenDepths, GivenLine, GivenNumber};
 
 use crate::resin::{
-    CureModel, CureWidth, DepthRange, Dose, GrayCurve, Intensity, IntensityLines, ModelError,
-    Resin, Spread, StraightLine, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
+    CureModel, CureWidth, DepthRange, Dose, FadingLight, GrayCurve, Intensity, IntensityLines,
+    ModelError, Resin, Spread, StraightLine, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
 };
 
 /// The known numbers of a resin; unknown ones are absent. The default is empty and has no
@@ -144,6 +144,9 @@ pub enum ResinError {
     /// It does not say the light of full white.
     #[error("{0} does not say how bright full white is: add [intensity] to its file")]
     NoLight(String),
+    /// It does not say over which depth light fades.
+    #[error("{0} does not say how light fades: add [working-curve] or [gray] to its file")]
+    NoFading(String),
     /// Its numbers make no model.
     #[error(transparent)]
     Numbers(#[from] MaterialError),
@@ -255,6 +258,26 @@ impl Material {
         };
         let lines = self.cure_width.iter().map(line).collect();
         CureWidth::new(lines).map(Some).map_err(of("cure-width"))
+    }
+
+    /// Returns how its light fades, for doses that add up, by the most detailed model: the curves
+    /// of the gray levels, those of the light that gray levels pass, or the working curve.
+    ///
+    /// # Errors
+    /// Returns an error if there is none of them or no intensity, or if numbers are impossible.
+    pub fn fading(&self) -> Result<FadingLight, ResinError> {
+        let no_light = || ResinError::NoLight(self.name.clone());
+        let light = || self.light()?.ok_or_else(no_light);
+        if let Some(curve) = self.gray_curve()? {
+            return Ok(FadingLight::new(light()?, curve));
+        }
+        if let Some(lines) = self.gray_lines()? {
+            let light = light()?;
+            return Ok(FadingLight::new(light, lines.under(light)));
+        }
+        let curve = self.working_curve()?;
+        let curve = curve.ok_or_else(|| ResinError::NoFading(self.name.clone()))?;
+        Ok(FadingLight::of_curve(light()?, curve).map_err(of("working-curve"))?)
     }
 
     /// Returns whether there is a cure model.
