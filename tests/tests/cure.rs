@@ -162,7 +162,7 @@ fn areas_of_white_are_those_without_pixels() {
         let plane = place(&layers[0], row);
         let lines = layers[0].image.width() * 2;
         let white_mj = 1.6 * layers[0].info.exposure_ms.unwrap();
-        let top_um = f64::from(mesh.bounds_mm().1[2]) * 1000.0;
+        let top_um = mesh.bounds_mm().1[2] * 1000.0;
         let layers = Layers::of(&layers, thick_um);
         let exact = areas(&mesh, plane, lines, layers, white_mj, |_, solid| {
             let is_lit =
