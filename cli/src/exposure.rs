@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::catalogue::{canonical_word, entry, is_file, read_text};
 use crate::exit::Exit;
+use crate::measured_doses::MeasuredDoses;
 use crate::recorded::text;
 use crate::streams::input_name;
 
@@ -50,7 +51,7 @@ pub(crate) struct Exposure {
 }
 
 enum Source {
-    Resin { resin: Resin, overcure: f64 },
+    Resin { resin: Resin, overcure: f64, doses: MeasuredDoses },
     Table(ExposureTimes),
 }
 
@@ -105,7 +106,8 @@ impl ExposureOptions {
         let Some(path) = &self.material else { return Ok(None) };
         let material: Material = entry(path)?;
         let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
-        let source = Source::Resin { resin, overcure: self.overcure };
+        let doses = MeasuredDoses::of_depths(&material);
+        let source = Source::Resin { resin, overcure: self.overcure, doses };
         Ok(Some(Exposure { name: material.name, source }))
     }
 }
@@ -125,7 +127,7 @@ impl Exposure {
     pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, Exit> {
         let thickness = thickness.to_whole_nm();
         let time = match &self.source {
-            Source::Resin { resin, overcure } => {
+            Source::Resin { resin, overcure, .. } => {
                 let time = resin.exposure_time(thickness, *overcure);
                 time.map_err(|error| self.failed(error.into()))?
             }
@@ -146,6 +148,16 @@ impl Exposure {
             return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
         };
         resin.depth_levels(self.time(thickness)?).map_err(|error| self.failed(error.into()))
+    }
+
+    /// Returns a sentence if layers of these thicknesses take doses that the material was not
+    /// measured at.
+    pub(crate) fn doubt(&self, thicknesses: impl Iterator<Item = Length>) -> Option<String> {
+        let Source::Resin { resin, doses, .. } = &self.source else { return None };
+        for thickness in thicknesses {
+            doses.see(resin.light() * self.time(thickness).ok()?);
+        }
+        doses.doubt("layers")
     }
 
     fn failed(&self, error: anyhow::Error) -> Exit {

@@ -154,6 +154,12 @@ impl FoundHeights {
             say("the part has no volume in any row: it is flat, or too thin for this --row-pitch");
         }
     }
+
+    /// Returns a sentence if layers take doses that the material was not measured at.
+    pub(crate) fn doubt(&self, exposure: Option<&Exposure>) -> Option<String> {
+        let thickness = |layer: &SweptLayer| Length::from_um(layer.thickness_um);
+        exposure?.doubt(self.heights.layers.iter().map(thickness))
+    }
 }
 
 impl HeightOptions {

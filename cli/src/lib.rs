@@ -19,6 +19,7 @@ mod help;
 mod hints;
 mod json_report;
 mod kept_stack;
+mod measured_doses;
 mod memory;
 mod mesh_report;
 #[cfg(feature = "occt")]

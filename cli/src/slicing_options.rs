@@ -227,6 +227,7 @@ impl SlicingOptions {
         let options = SliceOptions { layers, heights, gray, memory, ..self.for_slicing() };
         if let Some(exposure) = exposure.as_ref().filter(|_| !self.adaptive) {
             exposure.time(self.thickness)?;
+            exposure.doubt(std::iter::once(self.thickness)).iter().for_each(|doubt| say(doubt));
         }
         let slices = Slices::new(model, &options)?;
         check_memory(&slices)?;
@@ -255,6 +256,7 @@ impl SlicingOptions {
         let part = self.heights.part(body, self.dpi, self.solid.fill)?;
         let found = self.heights.find(&part, exposure)?;
         found.warn(say);
+        found.doubt(exposure).iter().for_each(|doubt| say(doubt));
         if self.heights.has_budget() {
             let layers = found.heights.layers.len();
             say(&format!("{layers} layers keep the budget, with errors up to {}", found.bound()));

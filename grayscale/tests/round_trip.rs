@@ -3,7 +3,8 @@
 
 use lamp_grayscale::material::{
     Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine, GivenNumber,
-    KineticNumbers, Material, SpreadNumbers, TwoDepthNumbers, WidthNumbers,
+    GivenRange, KineticNumbers, Material, MeasuredRange, SpreadNumbers, TwoDepthNumbers,
+    WidthNumbers,
 };
 use lamp_grayscale::resin::{
     Absorptivity, Concentration, Diffusivity, Dose, Intensity, Quantity, RateConstant,
@@ -40,20 +41,37 @@ fn given<T: Quantity + std::fmt::Debug>(
     })
 }
 
+fn measured() -> impl Strategy<Value = Option<MeasuredRange>> {
+    let range = (text(), mj(), number(), option::of((um(), number())));
+    option::of(range.prop_map(|(source, from, share, depths)| MeasuredRange {
+        source,
+        doses: up_from(from, share),
+        depths: depths.map(|(from, share)| up_from(from, share)),
+    }))
+}
+
+/// Returns a range that ends a share above its beginning.
+fn up_from<T: Quantity>(from: T, share: f64) -> GivenRange<T> {
+    GivenRange { from, to: T::of(from.number() * (1.0 + share)) }
+}
+
 fn lines() -> impl Strategy<Value = CurveLines> {
-    (mj(), mj(), um(), um(), text()).prop_map(|(dose, dose_rise, depth, depth_rise, source)| {
-        CurveLines {
-            critical_dose: GivenLine { at_zero: dose, rise: dose_rise, source: source.clone() },
-            penetration_depth: GivenLine { at_zero: depth, rise: depth_rise, source },
-        }
+    let numbers = (mj(), mj(), um(), um(), text(), measured());
+    numbers.prop_map(|(dose, dose_rise, depth, depth_rise, source, measured)| CurveLines {
+        critical_dose: GivenLine { at_zero: dose, rise: dose_rise, source: source.clone() },
+        penetration_depth: GivenLine { at_zero: depth, rise: depth_rise, source },
+        measured,
     })
 }
 
 fn curve() -> impl Strategy<Value = CurveNumbers> {
-    (given(mj()), given(um())).prop_map(|(critical_dose, penetration_depth)| CurveNumbers {
-        critical_dose,
-        penetration_depth,
-    })
+    (given(mj()), given(um()), measured()).prop_map(
+        |(critical_dose, penetration_depth, measured)| CurveNumbers {
+            critical_dose,
+            penetration_depth,
+            measured,
+        },
+    )
 }
 
 fn two_depth() -> impl Strategy<Value = TwoDepthNumbers> {
@@ -61,12 +79,13 @@ fn two_depth() -> impl Strategy<Value = TwoDepthNumbers> {
         let to = ends.then_some(Length::from_um(2.0 * from.um()));
         GivenDepths { from, to, source }
     });
-    (given(mj()), given(um()), given(um()), option::of(depths)).prop_map(
-        |(critical_dose, liquid_depth, solid_depth, depths)| TwoDepthNumbers {
+    (given(mj()), given(um()), given(um()), option::of(depths), measured()).prop_map(
+        |(critical_dose, liquid_depth, solid_depth, depths, measured)| TwoDepthNumbers {
             critical_dose,
             liquid_depth,
             solid_depth,
             depths,
+            measured,
         },
     )
 }
@@ -74,12 +93,13 @@ fn two_depth() -> impl Strategy<Value = TwoDepthNumbers> {
 /// Returns distinct sizes.
 fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
     let slope = number().prop_map(WidthSensitivity::from_um_per_mj_per_cm2);
-    let numbers = (0.1..1.0f64, given(mj()), given(slope));
+    let numbers = (0.1..1.0f64, given(mj()), given(slope), measured());
     proptest::collection::vec(numbers, 0..3).prop_map(|sizes| {
-        let size = |(k, (share, critical_dose, sensitivity))| WidthNumbers {
+        let size = |(k, (share, critical_dose, sensitivity, measured))| WidthNumbers {
             feature_size: Length::from_um(f64::from(k) + share),
             critical_dose,
             sensitivity,
+            measured,
         };
         (0..).zip(sizes).map(size).collect()
     })

@@ -60,6 +60,7 @@ fn a_working_curve_comes_back_from_its_films() {
         "[working-curve.critical-dose]",
         "plus-minus = \"",
         "source = \"calibrated from films.csv, 21 points\"",
+        "[working-curve.measured.doses]\nfrom = \"320 mJ/cm2\"\nto = \"1920 mJ/cm2\"",
     ] {
         assert!(file.contains(words), "no {words} in:\n{file}");
     }
@@ -198,8 +199,30 @@ fn cure_widths_come_back_from_their_squares() {
     said(&scratch, "lamp calibrate width more.csv --material mine.toml -o mine.toml");
     let file = text(&scratch, "mine.toml");
     assert_eq!(file.matches("[[cure-width]]").count(), 4);
-    assert_eq!(file.matches("calibrated from more.csv").count(), 4);
-    assert_eq!(file.matches("calibrated from squares.csv").count(), 4);
+    assert_eq!(file.matches("calibrated from more.csv").count(), 6);
+    assert_eq!(file.matches("calibrated from squares.csv").count(), 6);
+}
+
+/// Squares that did not grow tell where growth begins, and commands know where it was measured.
+#[test]
+fn doses_outside_the_measured_ones_are_told() {
+    let scratch = Scratch::new();
+    scratch.write("squares.csv", squares(&[(450.0, 240.0, 0.16)]).as_bytes());
+    let table = said(&scratch, "lamp calibrate width squares.csv --quiet -o mine.toml");
+    assert!(
+        table.starts_with("10 points of 10 rows (0 washed away, 0 blank left out)\n"),
+        "{table}"
+    );
+    holds(estimate(&table, "Ec^w (mJ/cm2)", 0), 240.0);
+    scratch.run("lamp sample cube -o cube.stl").succeeds();
+    scratch.run("slice cube.stl --dpi 150 --thickness 5mm -o in.tif").succeeds();
+    for (dose, told) in [(300, false), (900, true)] {
+        let line =
+            format!("lamp compensate in.tif --material mine.toml --dose {dose}mJ/cm2 -o out.tif");
+        let said = scratch.run(&line).succeeds().stderr;
+        let words = "layers get 900 mJ/cm2, but mine was measured at 60 to 600 mJ/cm2";
+        assert_eq!(said.contains(words), told, "{said}");
+    }
 }
 
 #[test]

@@ -55,7 +55,10 @@ fn a_material_alone_says_how_long_white_layers_are_exposed() {
     scratch.run(&format!("slice tower.stl {COARSE} -o plain.tif")).succeeds_quietly();
     let line = format!("slice tower.stl {COARSE} --material mine.toml --overcure 1.5 -o timed.tif");
     scratch.run("lamp material show lamp-suspension > mine.toml").succeeds();
-    scratch.run(&line).succeeds_quietly();
+    // Doses beyond those that 002 measured are told.
+    let said = scratch.run(&line).succeeds().stderr;
+    let words = "layers get 2233 mJ/cm2, but lamp-suspension was measured at 320 to 1920 mJ/cm2";
+    assert!(said.contains(words) && said.lines().count() == 1, "{said}");
     let (plain, timed) = (scratch.layers("plain.tif"), scratch.layers("timed.tif"));
     for (plain, timed) in plain.iter().zip(&timed) {
         assert!(plain.image == timed.image);

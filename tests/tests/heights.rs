@@ -77,10 +77,11 @@ fn every_stage_keeps_what_layers_say() {
     let slice = format!(
         "slice tower.stl --dpi 200 --adaptive {LIMITS} --deviation 5% --material lamp-suspension"
     );
-    scratch.run(&format!("{slice} -o plain.tif")).succeeds_quietly();
+    let said = scratch.run(&format!("{slice} -o plain.tif")).succeeds().stderr;
+    assert!(said.contains("lamp-suspension was measured at 320 to 1920 mJ/cm2"), "{said}");
     let stages =
         "fix -q | lamp compensate --uniform 127um -q | dither -q | tile --mesh none -q > build.tif";
-    scratch.run(&format!("{slice} | {stages}")).succeeds_quietly();
+    scratch.run(&format!("{slice} -q | {stages}")).succeeds_quietly();
     let (plain, build) = (scratch.layers("plain.tif"), scratch.layers("build.tif"));
     assert_eq!(heights_of(&build), heights_of(&plain));
     for (plain, build) in plain.iter().zip(&build) {
@@ -91,7 +92,7 @@ fn every_stage_keeps_what_layers_say() {
     }
     // The command recorded on the first page reproduces the stack.
     let command = &plain[0].info.stack.as_ref().unwrap().commands[0];
-    let again = scratch.run(command).succeeds_quietly().stdout;
+    let again = scratch.run(command).succeeds().stdout;
     assert!(again == scratch.bytes("plain.tif"));
     let said = scratch.run("lamp info build.tif").succeeds().stdout;
     let said = String::from_utf8(said).unwrap();
@@ -121,7 +122,8 @@ fn gray_layers_have_the_levels_of_their_thickness() {
     let scratch = with_tower();
     let gray = "--gray --material lamp-suspension";
     let slice = "slice tower.stl --dpi 200 --adaptive --min 100um --max 600um --step 10um";
-    scratch.run(&format!("{slice} --deviation 3% {gray} -o gray.tif")).succeeds_quietly();
+    let said = scratch.run(&format!("{slice} --deviation 3% {gray} -o gray.tif")).succeeds().stderr;
+    assert!(said.contains("layers get 2") && said.contains("at 320 to 1920 mJ/cm2"), "{said}");
     let layers = scratch.layers("gray.tif");
     assert!(layers.iter().filter(|layer| matches!(*layer.image, Image::Gray(_))).count() > 20);
     let line = "lamp cure gray.tif --material lamp-suspension --section y=0mm --part tower.stl --alone -o x.png";

@@ -41,6 +41,10 @@ source = "notebook"
 value = "200 um"
 source = "notebook"
 
+[working-curve.measured]
+source = "notebook"
+doses = { from = "50 mJ/cm2", to = "900 mJ/cm2" }
+
 [[cure-width]]
 feature-size = "0.5 mm"
 critical-dose = { value = "150 mJ/cm2", source = "notebook" }
@@ -71,6 +75,7 @@ fn materials() {
             "models": ["working-curve"],
             "cure_width_um": [500.0],
             "depths_um": [0.0, null],
+            "measured_mj_per_cm2": [50.0, 900.0],
             "layer_um": 100.0,
             "exposure_ms": null,
             "why_not": null,

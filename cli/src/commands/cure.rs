@@ -12,6 +12,7 @@ use lamp_stack::StackInfo;
 
 use crate::catalogue::entry;
 use crate::exit::Exit;
+use crate::measured_doses::MeasuredDoses;
 use crate::options::{Common, Input, one_of_described};
 use crate::part_arg::{PartArg, paths};
 use crate::part_options::name_of_all;
@@ -112,6 +113,10 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let name = input_name(&args.input.stack);
     let failed = |error: anyhow::Error| Exit::Failed(error).at(input_name(&args.input.stack));
     let progress = Progress::new("cure", common, true);
+    let doses = match rule {
+        CureRule::Alone | CureRule::Straight(_) => MeasuredDoses::of_depths(&material),
+        CureRule::Spread(_) | CureRule::Voxels(_) => MeasuredDoses::of_working_curve(&material),
+    };
     let (mut exposures, mut stack) = (None, None);
     for layer in read_layers(&args.input, &progress)? {
         let layer = layer?;
@@ -131,10 +136,11 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
             stack = layer.info.stack.clone();
         }
         let exposures = exposures.as_mut().expect("it was made for the first layer");
-        exposures.add(&layer).map_err(failed)?;
+        doses.see(exposures.add(&layer).map_err(failed)?);
         progress.layer_done();
     }
     progress.done();
+    doses.doubt("layers").iter().for_each(|doubt| progress.say(doubt));
     let exposures = exposures.ok_or_else(|| failed(anyhow!("there are no such layers")))?;
     let outline = match &args.part[..] {
         [] => None,

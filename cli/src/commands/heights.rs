@@ -93,6 +93,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let found = found.map_err(|error| at_part(error, &args.parts))?;
     let uniform = args.uniform(&part).map_err(|error| at_part(error, &args.parts))?;
     found.warn(&say);
+    found.doubt(exposure.as_ref()).iter().for_each(|doubt| say(doubt));
     if let Some(path) = &args.report {
         write_file(path, |out| write_table(&found.heights, exposure.as_ref(), out))?;
     }

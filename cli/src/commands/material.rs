@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::{DepthRange, ExposureTime, Intensity, Resin};
+use lamp_grayscale::resin::{DepthRange, Dose, ExposureTime, Intensity, Resin};
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
 use crate::catalogue;
 use crate::exit::Exit;
 use crate::json_report::print_answer;
+use crate::measured_doses::MeasuredDoses;
 use crate::streams::{input_name, print};
 
 /// List, show or check materials: how deep light cures a resin
@@ -89,6 +90,7 @@ fn fields(material: &Material) -> Value {
         "models": models(material),
         "cure_width_um": material.cure_width.iter().map(|it| it.feature_size.um()).collect::<Vec<_>>(),
         "depths_um": depths.map(|depths| [Some(depths.from.um()), depths.to.map(Length::um)]),
+        "measured_mj_per_cm2": material.measured().map(|range| [range.doses.from, range.doses.to].map(Dose::mj_per_cm2)),
         "layer_um": example.as_ref().map(|(layer, _)| layer.um()),
         "exposure_ms": time.map(|time| time.ms()),
         "why_not": why,
@@ -182,11 +184,17 @@ fn allows(material: &Material) -> String {
     let holds =
         if depths == DepthRange::ALL { String::new() } else { format!(" (depths of {depths})") };
     match example(&resin) {
-        (layer, Ok(time)) => format!(
-            "{} gives {models}{holds}; at {}, full white cures {layer} in {time:.1}",
-            material.name,
-            significant(resin.light())
-        ),
+        (layer, Ok(time)) => {
+            let doses = MeasuredDoses::of_depths(material);
+            doses.see(resin.light() * time);
+            let doubt = doses.doubt("such layers").map(|doubt| format!(" ({doubt})"));
+            format!(
+                "{} gives {models}{holds}; at {}, full white cures {layer} in {time:.1}{}",
+                material.name,
+                significant(resin.light()),
+                doubt.unwrap_or_default()
+            )
+        }
         (_, Err(why)) => format!("{} gives {models}{holds}, but {why}", material.name),
     }
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use anyhow::{Context, anyhow};
-use lamp_grayscale::resin::{ExposureTime, FadingLight, GrayLevel, Resin};
+use lamp_grayscale::resin::{Dose, ExposureTime, FadingLight, GrayLevel, Resin};
 use lamp_grayscale::{CuredLine, LineRun, SolidHeights, SummedLine};
 use lamp_planning::{DoseSection, LayerTime, Light};
 use lamp_stack::{Image, Layer, Length};
@@ -70,8 +70,8 @@ impl<'a> Exposures<'a> {
         Self { resin, rule, course, cured, has_gray: false, heights_um: f64::MAX..f64::MIN }
     }
 
-    /// Exposes a layer. They come from the bottom up.
-    pub(crate) fn add(&mut self, layer: &Layer) -> anyhow::Result<()> {
+    /// Exposes a layer, and returns the dose of its white. They come from the bottom up.
+    pub(crate) fn add(&mut self, layer: &Layer) -> anyhow::Result<Dose> {
         let (bottom, LayerTime { thickness, time }) = self.exposure(layer)?;
         let (line, image) = (self.course.line, &layer.image);
         let top = Length::from_um(bottom.um() + thickness.um());
@@ -104,7 +104,7 @@ impl<'a> Exposures<'a> {
         self.has_gray |= matches!(&**image, Image::Gray(_));
         self.heights_um.start = self.heights_um.start.min(bottom.um());
         self.heights_um.end = self.heights_um.end.max(top.um());
-        Ok(())
+        Ok(self.resin.light() * time)
     }
 
     /// The height of a layer's bottom, its thickness and its time. Without a time, white cures

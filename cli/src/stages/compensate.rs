@@ -14,6 +14,7 @@ use lamp_stack::{Dpi, Layer, Length, LengthError};
 use crate::catalogue::{canonical_word, entry, is_file};
 use crate::compensate_report::WallReport;
 use crate::exit::Exit;
+use crate::measured_doses::MeasuredDoses;
 use crate::options::parse_distance;
 use crate::progress::Progress;
 
@@ -129,7 +130,8 @@ impl<'a> Compensating<'a> {
         let CompensateSettings { uniform, material, shrinkage, .. } = self.settings;
         let moves = uniform.is_some() || material.is_some();
         let again = self.done_before.borrow().lines(name, moves, shrinkage.is_some());
-        for line in again.into_iter().chain(self.walls.borrow().lines()) {
+        let doubt = self.by.doubt();
+        for line in again.into_iter().chain(doubt).chain(self.walls.borrow().lines()) {
             progress.say(&line);
         }
     }
@@ -179,7 +181,12 @@ impl DoneBefore {
 /// By what edges move.
 enum EdgeMove {
     Uniform(Length),
-    CureWidth { width: CureWidth, material: Box<Material>, dose: Option<Dose> },
+    CureWidth {
+        width: CureWidth,
+        material: Box<Material>,
+        dose: Option<Dose>,
+        doses: MeasuredDoses,
+    },
 }
 
 /// A layer without a dose, and why.
@@ -213,14 +220,26 @@ impl EdgeMove {
                 "{name} states no cure width: add [[cure-width]] to its file, or give --uniform"
             ))
         })?;
-        Ok(Self::CureWidth { width, material: Box::new(material), dose: args.dose })
+        let doses = MeasuredDoses::of_widths(&material);
+        Ok(Self::CureWidth { width, material: Box::new(material), dose: args.dose, doses })
+    }
+
+    /// Returns a sentence if layers got doses that the widths were not measured at.
+    fn doubt(&self) -> Option<String> {
+        match self {
+            Self::Uniform(_) => None,
+            Self::CureWidth { doses, .. } => doses.doubt("layers"),
+        }
     }
 
     fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, Exit> {
         let (width, dose) = match self {
             Self::Uniform(by) => return Ok(Widths::uniform(by.pixels(dpi))),
-            Self::CureWidth { width, dose: Some(dose), .. } => (width, *dose),
-            Self::CureWidth { width, material, dose: None } => (width, dose_of(layer, material)?),
+            Self::CureWidth { width, material, dose, doses } => {
+                let dose = dose.map_or_else(|| dose_of(layer, material), Ok)?;
+                doses.see(dose);
+                (width, dose)
+            }
         };
         let sizes: Vec<f64> =
             width.lines().iter().map(|line| line.feature_size.pixels(dpi)).collect();

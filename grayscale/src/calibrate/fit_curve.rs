@@ -2,6 +2,7 @@
 
 use lamp_stack::Length;
 
+use super::extent::Extent;
 use super::measurements::DepthPoint;
 use super::regression::LineFit;
 use super::{Estimate, FitError};
@@ -19,6 +20,7 @@ pub struct CurveFit {
     pub r2: f64,
     /// The number of points.
     pub points: usize,
+    extent: Option<Extent>,
     line: LineFit,
 }
 
@@ -44,6 +46,7 @@ pub fn fit_curve(points: &[DepthPoint]) -> Result<CurveFit, FitError> {
         penetration_depth: Estimate::even(line.slope, line.slope_half()),
         r2: line.r2,
         points: points.len(),
+        extent: Extent::of_depths(points),
         line,
     })
 }
@@ -61,6 +64,7 @@ impl CurveFit {
         CurveNumbers {
             critical_dose: self.critical_dose.given(source),
             penetration_depth: self.penetration_depth.given(source),
+            measured: self.extent.map(|extent| extent.measured(source)),
         }
     }
 }

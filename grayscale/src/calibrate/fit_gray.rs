@@ -2,32 +2,39 @@
 
 use lamp_stack::Length;
 
+use super::curve_lines::{CRITICAL_DOSE, CurveLinesFit, LinePoint, PENETRATION_DEPTH};
+use super::extent::Extent;
 use super::fit_curve::{CurveFit, fit_curve};
 use super::measurements::DepthPoint;
-use super::regression::LineFit;
 use super::significant::round_significant;
-use super::{Estimate, FitError, PointGroup};
+use super::{Estimate, FitError};
 use crate::material::{CurveLines, GivenLine};
 use crate::resin::{Dose, GrayLevel, Quantity};
 
 /// The working curve over the gray level, found from measurements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrayFit {
-    /// The working curve of each level, from the darkest.
+    /// The points of each level, from the darkest.
     pub levels: Vec<LevelFit>,
     /// `E_c(G)`.
     pub critical_dose: LineEstimate<Dose>,
     /// `D_p(G)`.
     pub penetration_depth: LineEstimate<Length>,
+    /// The share of the depths' scatter that the lines explain.
+    pub r2: f64,
+    extent: Option<Extent>,
+    lines: CurveLinesFit,
 }
 
-/// The working curve of a gray level, over the dose that arrives.
+/// The working curve of a gray level alone, over the dose that arrives, to compare with the lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelFit {
     /// The gray level.
     pub gray: GrayLevel,
-    /// Its curve.
-    pub curve: CurveFit,
+    /// The number of its points.
+    pub points: usize,
+    /// Its own curve, if its points tell one.
+    pub curve: Option<CurveFit>,
 }
 
 /// A straight line over the gray level.
@@ -38,81 +45,102 @@ pub struct LineEstimate<T> {
     /// The rise from black to white; zero if the line was `levelled`.
     pub rise: Estimate<T>,
     /// The negative rise of a line that falls by no more than its interval. The line is then
-    /// the mean, since the model takes no falling line.
+    /// kept level, since the model takes no falling line.
     pub levelled: Option<T>,
-    /// The share of the scatter that the line explains.
-    pub r2: f64,
 }
 
-/// Fits the lines `E_c(G)` and `D_p(G)` (002 eq. 40): the working curve of each gray
-/// level first, then a straight line through the curves' numbers.
+/// Fits the lines `E_c(G)` and `D_p(G)` (002 eq. 40) to the points of all levels at once, by
+/// nonlinear least squares.
 ///
-/// A line whose fall is within its interval is kept level.
+/// A line whose fall is within its interval is kept level. Intervals come from the covariance of
+/// the fit, by Student's t; those of a level line are as wide as those of the line that falls.
 ///
 /// # Errors
-/// Returns an error if there are fewer than three levels, a level has no working curve, or
-/// a line falls by more than its interval or begins at zero or less.
+/// Returns an error if there are fewer than three levels or too few points to tell the lines, or
+/// if a line falls by more than its interval or begins at zero or less.
 pub fn fit_gray(points: &[DepthPoint]) -> Result<GrayFit, FitError> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.gray.get().total_cmp(&b.gray.get()));
-    let fit = |group: &[DepthPoint]| {
-        let gray = group[0].gray;
-        let curve = fit_curve(group);
-        curve
-            .map(|curve| LevelFit { gray, curve })
-            .map_err(|error| error.within(PointGroup::Gray(gray)))
+    let level = |group: &[DepthPoint]| LevelFit {
+        gray: group[0].gray,
+        points: group.len(),
+        curve: fit_curve(group).ok(),
     };
-    let levels: Vec<LevelFit> =
-        sorted.chunk_by(|a, b| a.gray == b.gray).map(fit).collect::<Result<_, _>>()?;
+    let levels: Vec<LevelFit> = sorted.chunk_by(|a, b| a.gray == b.gray).map(level).collect();
     if levels.len() < 3 {
         return Err(FitError::TooFewLevels(levels.len()));
     }
-    let doses = levels.iter().map(|level| (level.gray, level.curve.critical_dose.value));
-    let depths = levels.iter().map(|level| (level.gray, level.curve.penetration_depth.value));
-    let critical_dose = line(doses, "the critical dose")?;
-    let penetration_depth = line(depths, "the penetration depth")?;
-    Ok(GrayFit { critical_dose, penetration_depth, levels })
+    let point = |p: &DepthPoint| LinePoint {
+        x: p.gray.get(),
+        log_dose: p.arriving().mj_per_cm2().ln(),
+        depth: p.depth.um(),
+    };
+    let points: Vec<_> = sorted.iter().map(point).collect();
+    let (sloped, lines) = rising_lines(&points)?;
+    Ok(GrayFit {
+        critical_dose: line(&sloped, &lines, CRITICAL_DOSE, "the critical dose")?,
+        penetration_depth: line(&sloped, &lines, PENETRATION_DEPTH, "the penetration depth")?,
+        r2: lines.r2,
+        extent: Extent::of_depths(&sorted),
+        levels,
+        lines,
+    })
+}
+
+/// Returns the lines as they fit best, and with those kept level that would fall.
+fn rising_lines(points: &[LinePoint]) -> Result<(CurveLinesFit, CurveLinesFit), FitError> {
+    let sloped = CurveLinesFit::new(points, [true; 4])?;
+    let (mut lines, mut free) = (sloped, [true; 4]);
+    // With one line level, the other may fall.
+    while let Some(falls) =
+        [CRITICAL_DOSE, PENETRATION_DEPTH].into_iter().find(|line| lines.numbers[line + 1] < 0.0)
+    {
+        free[falls + 1] = false;
+        lines = CurveLinesFit::new(points, free)?;
+    }
+    Ok((sloped, lines))
 }
 
 fn line<T: Quantity>(
-    values: impl Iterator<Item = (GrayLevel, T)>,
+    sloped: &CurveLinesFit,
+    lines: &CurveLinesFit,
+    number: usize,
     what: &'static str,
 ) -> Result<LineEstimate<T>, FitError> {
     let unit = T::UNIT;
-    let values: Vec<_> = values.map(|(gray, value)| (gray.get(), value.number())).collect();
-    let fit = LineFit::new(&values)?;
-    let (rise, half) = (fit.slope, fit.slope_half());
-    if rise < -half {
-        return Err(FitError::GrayFalls { what, fall: -rise, half, unit });
+    let (fell, rise) = (sloped.numbers[number + 1], lines.numbers[number + 1]);
+    let [half_at_zero, half] = [number, number + 1].map(|number| sloped.half(number));
+    if fell < -half {
+        return Err(FitError::GrayFalls { what, fall: -fell, half, unit });
     }
-    let line = if rise < 0.0 {
-        // The sloped line's interval reaches farther than the level one's.
-        let mean = values.iter().map(|value| value.1).sum::<f64>() / values.len() as f64;
-        LineEstimate {
-            at_zero: Estimate::new(mean, mean - fit.half_at(0.0), mean + fit.half_at(0.0)),
-            rise: Estimate::new(0.0, rise - half, rise + half),
-            levelled: Some(T::of(rise)),
-            r2: 0.0,
-        }
-    } else {
-        LineEstimate {
-            at_zero: Estimate::even(fit.at(0.0), fit.half_at(0.0)),
-            rise: Estimate::even(rise, half),
-            levelled: None,
-            r2: fit.r2,
-        }
+    let at_zero = lines.numbers[number];
+    let levelled = (rise == 0.0).then_some(fell.min(0.0));
+    let line = LineEstimate {
+        at_zero: Estimate::even(at_zero, half_at_zero),
+        rise: match levelled {
+            Some(fell) => Estimate::new(0.0, fell - half, (fell + half).max(0.0)),
+            None => Estimate::even(rise, half),
+        },
+        levelled: levelled.map(T::of),
     };
-    let at_zero = line.at_zero.value.number();
     if at_zero > 0.0 { Ok(line) } else { Err(FitError::GrayBegins { what, at_zero, unit }) }
 }
 
 impl GrayFit {
+    /// Returns the depth of a gray level after a dose of white, with its 95% interval. It is below
+    /// zero up to the critical dose.
+    pub fn depth(&self, gray: GrayLevel, white: Dose) -> Estimate<Length> {
+        let [depth, half] = self.lines.depth(gray.get(), (white * gray).mj_per_cm2().ln());
+        Estimate::even(depth, half)
+    }
+
     /// Returns the lines for a material file. Their intervals stand in the source, as lines
     /// have no other place for them.
     pub fn lines(&self, source: &str) -> CurveLines {
         CurveLines {
             critical_dose: given(&self.critical_dose, source),
             penetration_depth: given(&self.penetration_depth, source),
+            measured: self.extent.map(|extent| extent.measured(source)),
         }
     }
 }
@@ -174,7 +202,9 @@ mod tests {
         near(fit.penetration_depth.at_zero.value.um(), 193.1);
         near(fit.penetration_depth.rise.value.um(), 22.1);
         assert_eq!(fit.levels.len(), LEVELS.len());
-        near(fit.levels[0].curve.critical_dose.value.mj_per_cm2(), 108.92);
+        near(fit.levels[0].curve.unwrap().critical_dose.value.mj_per_cm2(), 108.92);
+        let (gray, white) = (fit.levels[1].gray, Dose::from_mj_per_cm2(960.0));
+        near(fit.depth(gray, white).value.um(), 241.663131);
         let lines = fit.lines("a test");
         assert_eq!(lines.critical_dose.at_zero.mj_per_cm2(), 101.8);
         assert!(lines.critical_dose.source.starts_with("a test; at-zero +- "));
@@ -182,17 +212,41 @@ mod tests {
 
     #[test]
     fn of_100_intervals_95_hold_the_truth() {
-        let fits = (0..2000).map(|seed| fit_gray(&points(of_lamp, 1.0, seed << 20)));
-        let held = share_held(fits, |fit| {
-            [
-                fit.critical_dose.at_zero.holds(Dose::from_mj_per_cm2(101.8)),
-                fit.critical_dose.rise.holds(Dose::from_mj_per_cm2(35.6)),
-                fit.penetration_depth.at_zero.holds(Length::from_um(193.1)),
-                fit.penetration_depth.rise.holds(Length::from_um(22.1)),
-            ]
-        });
-        // 95% +- 1.5% is three standard deviations of 2000 trials.
-        assert!(held.iter().all(|share| (share - 0.95).abs() < 0.0147), "{held:?}");
+        // Depths to 5 um, as in 002 section 3.3.5.
+        for spread in [1.0, 5.0] {
+            let fits = (0..2000).map(|seed| fit_gray(&points(of_lamp, spread, seed << 20)));
+            let held = share_held(fits, |fit| {
+                let (gray, white) = (fit.levels[2].gray, Dose::from_mj_per_cm2(700.0));
+                [
+                    fit.critical_dose.at_zero.holds(Dose::from_mj_per_cm2(101.8)),
+                    fit.critical_dose.rise.holds(Dose::from_mj_per_cm2(35.6)),
+                    fit.penetration_depth.at_zero.holds(Length::from_um(193.1)),
+                    fit.penetration_depth.rise.holds(Length::from_um(22.1)),
+                    fit.depth(gray, white).holds(Length::from_um(of_lamp(gray, white))),
+                ]
+            });
+            // 95% +- 1.5% is three standard deviations of 2000 trials.
+            assert!(held.iter().all(|share| (share - 0.95).abs() < 0.0147), "{spread}: {held:?}");
+        }
+    }
+
+    #[test]
+    fn all_points_tell_the_lines_more_sharply_than_lines_through_levels_curves() {
+        // What a line through three levels' own numbers would say, by Student's t of one degree.
+        let levels = [0.2, 0.5, 1.0];
+        let measured: Vec<_> = points(of_lamp, 5.0, 9)
+            .into_iter()
+            .filter(|point| levels.contains(&point.gray.get()))
+            .collect();
+        let fit = fit_gray(&measured).unwrap();
+        let of_levels: Vec<_> = fit
+            .levels
+            .iter()
+            .map(|level| (level.gray.get(), level.curve.unwrap().penetration_depth.value.um()))
+            .collect();
+        let through_levels = super::super::regression::LineFit::new(&of_levels).unwrap();
+        let rise = fit.penetration_depth.rise.plus_minus().um();
+        assert!(rise < through_levels.slope_half(), "{rise} {}", through_levels.slope_half());
     }
 
     #[test]
@@ -222,10 +276,13 @@ mod tests {
     }
 
     #[test]
-    fn three_levels_with_a_curve_each_are_the_least() {
-        let all = points(of_lamp, 0.0, 1);
+    fn a_level_of_two_films_counts() {
+        let all = points(of_lamp, 2.0, 1);
         assert_eq!(fit_gray(&all[..12]), Err(FitError::TooFewLevels(2)));
-        let error = fit_gray(&all[..20]).unwrap_err().to_string();
-        assert!(error.starts_with("gray level 0.8: 2 points are too few"), "{error}");
+        let [few, more] = [&all[4..], &all[..]].map(|points| fit_gray(points).unwrap());
+        assert_eq!((few.levels[0].points, few.levels[0].curve), (2, None));
+        assert!(few.critical_dose.rise.holds(Dose::from_mj_per_cm2(35.6)));
+        let half = |fit: &GrayFit| fit.critical_dose.rise.plus_minus().mj_per_cm2();
+        assert!(half(&few) > half(&more));
     }
 }

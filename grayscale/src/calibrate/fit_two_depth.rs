@@ -2,6 +2,7 @@
 
 use lamp_stack::Length;
 
+use super::extent::Extent;
 use super::matrix::{dot, inverse, product};
 use super::measurements::DepthPoint;
 use super::student_t::t_95;
@@ -26,6 +27,7 @@ pub struct TwoDepthFit {
     pub r2: f64,
     /// The number of points.
     pub points: usize,
+    extent: Option<Extent>,
     curve: TwoDepthCurve,
     /// The parameters' covariance, times the square of Student's t.
     spread: [[f64; 3]; 3],
@@ -56,7 +58,8 @@ pub fn fit_two_depth(points: &[DepthPoint]) -> Result<TwoDepthFit, FitError> {
         bends.iter().filter_map(|&bend| TwoDepthCurve::from_line(&data, bend)?.fitted(&data));
     let best = fits.min_by(|a, b| a.squares(&data).total_cmp(&b.squares(&data)));
     let curve = best.filter(|curve| curve.onset > 0.0).ok_or(FitError::NoFit)?;
-    TwoDepthFit::of(curve, &data, deepest).ok_or(FitError::NoFit)?.above_zero()
+    let fit = TwoDepthFit::of(curve, &data, deepest).ok_or(FitError::NoFit)?;
+    TwoDepthFit { extent: Extent::of_depths(points), ..fit }.above_zero()
 }
 
 fn check(data: &[(f64, f64)]) -> Result<(), FitError> {
@@ -100,6 +103,7 @@ impl TwoDepthFit {
             straight,
             r2: 1.0 - squares / scatter,
             points: data.len(),
+            extent: None,
             curve,
             spread,
         })
@@ -140,6 +144,7 @@ impl TwoDepthFit {
             liquid_depth: self.liquid_depth.given(source),
             solid_depth: self.solid_depth.given(&of_solid),
             depths: None,
+            measured: self.extent.map(|extent| extent.measured(source)),
         }
     }
 }

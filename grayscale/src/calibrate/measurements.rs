@@ -41,7 +41,8 @@ pub struct WidthPoint {
 pub struct Measured<T> {
     /// The measurements.
     pub points: Vec<T>,
-    /// The number of rows that cured or grew by nothing, and so lie on no line.
+    /// The number of rows of which nothing is left to measure: films that did not cure, squares
+    /// that were washed away.
     pub none: usize,
     /// The number of rows with an empty measurement.
     pub blank: usize,
@@ -138,7 +139,8 @@ pub fn depth_points(
 /// Reads cure widths from a table of `dose_mj_per_cm2` or, under a light,
 /// `exposure_ms`; `feature_px` or `feature_um`, the squares' side in the image; and
 /// `cured_um`, their side after curing, or `width_um`, the cure width itself (002
-/// eq. 60). Widths of zero and below grew by nothing.
+/// eq. 60). Squares that did not grow count, as do those that are smaller than their image by an
+/// error of measurement; those of a side of zero and below were washed away.
 ///
 /// # Errors
 /// Returns an error if a column is missing or unknown, or a cell is not a number in its range.
@@ -159,11 +161,11 @@ pub fn width_points(
             return Err(size.impossible(row, "a size from 0.001 um to 1 m"));
         }
         let Some(of_row) = width.length_or_blank(row)? else { return Ok(Read::Blank) };
+        if is_side && of_row.um() <= 0.0 {
+            return Ok(Read::Nothing);
+        }
         let width = if is_side { cure_width_of_square(of_row, side) } else { of_row };
-        // Widths below the shortest length are zero with a rounding error.
-        let feature_size = side.to_whole_nm();
-        let grew = width.um() >= *LENGTHS.start();
-        Ok(if grew { Read::Point(WidthPoint { feature_size, dose, width }) } else { Read::Nothing })
+        Ok(Read::Point(WidthPoint { feature_size: side.to_whole_nm(), dose, width }))
     })
 }
 
@@ -220,15 +222,17 @@ mod tests {
     #[test]
     fn widths_of_sides_and_widths() {
         // 25 pixels of 1500 dpi are 423.33 um.
-        let sides = "feature_px,dose_mj_per_cm2,cured_um\n25,200,450\n25,100,420\n25,300,\n";
+        let sides =
+            "feature_px,dose_mj_per_cm2,cured_um\n25,200,450\n25,100,420\n25,300,\n25,20,0\n";
         let by_side = widths(sides).unwrap();
-        assert_eq!((by_side.points.len(), by_side.none, by_side.blank), (1, 1, 1));
-        let point = by_side.points[0];
+        assert_eq!((by_side.points.len(), by_side.none, by_side.blank), (2, 1, 1));
+        let [point, smaller] = by_side.points[..] else { panic!("two points") };
+        assert!((smaller.width.um() + 1.666667).abs() < 1e-6);
         assert_eq!(point.feature_size.to_string(), "423.333um");
         assert!((point.width.um() - 13.333333).abs() < 1e-6);
-        // Rounding is no growth.
-        let rounded = "feature_px,dose_mj_per_cm2,cured_um\n25,200,423.3333333334\n";
-        assert_eq!(widths(rounded).unwrap().none, 1);
+        // No growth is a measurement.
+        let none = "feature_um,dose_mj_per_cm2,width_um\n423,200,0\n";
+        assert_eq!(widths(none).unwrap().points[0].width.um(), 0.0);
         let by_width = widths("feature_um,dose_mj_per_cm2,width_um\n423,200,13.3\n").unwrap();
         assert_eq!(by_width.points[0].feature_size.um(), 423.0);
         assert_eq!(by_width.points[0].width.um(), 13.3);

@@ -17,11 +17,15 @@
 
 mod columns;
 mod csv_table;
+mod curve_lines;
 mod exposure_times;
+mod extent;
 mod fit_curve;
 mod fit_gray;
 mod fit_two_depth;
 mod fit_widths;
+mod hinge;
+mod hinge_piece;
 #[cfg(test)]
 mod made_up;
 mod matrix;
@@ -37,7 +41,7 @@ use lamp_stack::Length;
 use thiserror::Error;
 
 use crate::material::Given;
-use crate::resin::{GrayLevel, Quantity};
+use crate::resin::Quantity;
 use significant::round_significant;
 
 pub use columns::NumberRow;
@@ -181,6 +185,17 @@ pub enum FitError {
         short(*.0)
     )]
     NoCriticalDose(f64),
+    /// Only the highest dose makes squares grow, which tells no line.
+    #[error(
+        "squares grow at the highest dose alone, which does not tell from which dose on: measure \
+         higher doses"
+    )]
+    LastDoseAlone,
+    /// The points leave a line open.
+    #[error(
+        "the points do not tell how the working curve changes: measure several doses at each level"
+    )]
+    NoLines,
     /// There are too few gray levels.
     #[error("{} too few: 3 are the least", are(*.0, "gray level"))]
     TooFewLevels(usize),
@@ -228,8 +243,6 @@ pub enum FitError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PointGroup {
-    /// The cure depths of a gray level.
-    Gray(GrayLevel),
     /// The cure widths of squares of a side.
     Squares(Length),
 }
@@ -237,7 +250,6 @@ pub enum PointGroup {
 impl fmt::Display for PointGroup {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Gray(level) => write!(f, "gray level {}", level.get()),
             Self::Squares(side) => write!(f, "squares of {side}"),
         }
     }
@@ -272,7 +284,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::resin::Dose;
+    use crate::resin::{Dose, GrayLevel};
 
     /// A number of any size, often a small round one.
     fn any_size() -> impl Strategy<Value = f64> {

@@ -78,6 +78,7 @@ impl Catalogued for Material {
         if let Some((name, _)) = self.constants.iter().find(|(_, c)| !c.value.is_finite()) {
             return Err(MaterialError::NoNumber(one_line(name)));
         }
+        self.check_measured()?;
         self.spread()?;
         self.gamma()?;
         self.working_curve()?;

@@ -15,6 +15,7 @@
 
 mod file;
 mod kinetics;
+mod measured;
 mod number;
 
 use std::collections::BTreeMap;
@@ -25,6 +26,7 @@ use thiserror::Error;
 
 pub use file::MaterialError;
 pub use kinetics::KineticNumbers;
+pub use measured::{GivenRange, MeasuredRange};
 pub use number::{Constant, Given, GivenDepths, GivenLine, GivenNumber};
 
 use crate::resin::{
@@ -87,6 +89,8 @@ pub struct CurveNumbers {
     pub critical_dose: Given<Dose>,
     /// `D_p`.
     pub penetration_depth: Given<Length>,
+    /// Where it was measured, if known.
+    pub measured: Option<MeasuredRange>,
 }
 
 /// The lines of a working curve over the gray level or the light.
@@ -97,6 +101,8 @@ pub struct CurveLines {
     pub critical_dose: GivenLine<Dose>,
     /// `D_p`.
     pub penetration_depth: GivenLine<Length>,
+    /// Where it was measured, if known.
+    pub measured: Option<MeasuredRange>,
 }
 
 /// The line of a working curve over the lamp's light. `D_p` is constant (002 figure 62).
@@ -119,6 +125,8 @@ pub struct TwoDepthNumbers {
     pub solid_depth: Given<Length>,
     /// The depths that it holds for, if not all.
     pub depths: Option<GivenDepths>,
+    /// Where it was measured, if known.
+    pub measured: Option<MeasuredRange>,
 }
 
 /// The numbers of the cure width of features of one size.
@@ -132,6 +140,8 @@ pub struct WidthNumbers {
     pub critical_dose: Given<Dose>,
     /// `D_p^w`.
     pub sensitivity: Given<WidthSensitivity>,
+    /// Where it was measured, if known.
+    pub measured: Option<MeasuredRange>,
 }
 
 /// Why no exposure follows from a material.

@@ -157,6 +157,9 @@ pub enum ModelError {
     /// The deepest depth is not above the shallowest.
     #[error("depths must begin at zero or more and end above where they begin")]
     NoDepths,
+    /// A range of measurements has no numbers above zero.
+    #[error("{0} must begin above zero and not end before it begins")]
+    NoRange(&'static str),
     /// There is no feature size, or one stands twice.
     #[error("feature-size must be there, and another one in each entry")]
     NoSizes,

@@ -89,6 +89,12 @@ impl HeightMap {
         self.heights_um.iter().filter(|&&um| um > 0.0 && um < least.um()).count()
     }
 
+    /// Returns how many columns have a height, but one outside of a range.
+    pub fn outside(&self, least: Length, most: Length) -> usize {
+        let range = least.um()..=most.um();
+        self.heights_um.iter().filter(|&um| *um > 0.0 && !range.contains(um)).count()
+    }
+
     /// Checks that no column is higher than the chamber.
     ///
     /// # Errors

@@ -121,15 +121,10 @@ impl DepthFit {
             }
             Self::Gray(fit) => {
                 text.heads();
-                for level in &fit.levels {
-                    let (gray, curve) = (level.gray.get(), &level.curve);
-                    text.estimate(&format!("Ec at {gray} (mJ/cm2)"), &curve.critical_dose);
-                    text.estimate(&format!("Dp at {gray} (um)"), &curve.penetration_depth);
-                    let r2 = format!("R^2 at {gray}, {} points", curve.points);
-                    text.line(&r2, &[&short(curve.r2)]);
-                }
+                fit.levels.iter().for_each(|level| write_level(text, level));
                 write_line(text, "Ec(G)", "mJ/cm2", &fit.critical_dose);
                 write_line(text, "Dp(G)", "um", &fit.penetration_depth);
+                text.line("R^2 of all", &[&short(fit.r2)]);
             }
         }
     }
@@ -152,11 +147,27 @@ impl DepthFit {
             Self::Jacobs(fit) => least(&fit.critical_dose),
             Self::TwoDepth(fit) => least(&fit.critical_dose),
             Self::Gray(fit) => {
-                let of_white =
-                    |level: &LevelFit| least(&level.curve.critical_dose) / level.gray.get();
-                fit.levels.iter().map(of_white).fold(f64::INFINITY, f64::min)
+                // The lighter a level, the less white light it needs.
+                let lightest = fit.levels.last().map_or(1.0, |level| level.gray.get());
+                let [at_zero, rise] = [fit.critical_dose.at_zero, fit.critical_dose.rise];
+                let rise = rise.value.mj_per_cm2();
+                (at_zero.value.mj_per_cm2() / lightest + rise) / 2.0
             }
         }
+    }
+}
+
+/// Writes what a level's own points tell.
+fn write_level(text: &mut EstimateTable, level: &LevelFit) {
+    let (gray, points) = (level.gray.get(), level.points);
+    let points = if points == 1 { "1 point".to_owned() } else { format!("{points} points") };
+    match &level.curve {
+        Some(curve) => {
+            text.estimate(&format!("Ec at {gray} (mJ/cm2)"), &curve.critical_dose);
+            text.estimate(&format!("Dp at {gray} (um)"), &curve.penetration_depth);
+            text.line(&format!("R^2 at {gray}, {points}"), &[&short(curve.r2)]);
+        }
+        None => text.line(&format!("{gray}: {points}, no curve alone"), &[]),
     }
 }
 
@@ -168,7 +179,6 @@ fn write_line<T: Quantity>(
 ) {
     text.estimate(&format!("{name} at zero ({unit})"), &line.at_zero);
     text.estimate(&format!("{name} rise ({unit})"), &line.rise);
-    text.line(&format!("R^2 of {name}"), &[&short(line.r2)]);
 }
 
 fn plot(title: String, fit: &DepthFit, points: &[DepthPoint]) -> Plot {
@@ -202,7 +212,7 @@ fn plot(title: String, fit: &DepthFit, points: &[DepthPoint]) -> Plot {
     Plot { title, x, y, series }
 }
 
-/// The curves of the gray model in the bands of the single levels.
+/// The curves of the gray model.
 fn of_levels(fit: &GrayFit, points: &[DepthPoint], doses: &[Dose]) -> Vec<Series> {
     let (ec, dp) = (&fit.critical_dose, &fit.penetration_depth);
     let model = GrayCurve::new(
@@ -214,11 +224,13 @@ fn of_levels(fit: &GrayFit, points: &[DepthPoint], doses: &[Dose]) -> Vec<Series
         let gray = level.gray;
         let of_level: Vec<_> = points.iter().filter(|p| p.gray == gray).copied().collect();
         let curve = |dose| model.gray_depth(gray, dose);
-        let band = |dose| level.curve.depth(dose * gray);
+        let band = |dose| fit.depth(gray, dose);
         let name = format!("gray {}", gray.get());
-        let of_band = level.curve.critical_dose.low;
+        let critical = model.at(gray).critical_dose().mj_per_cm2() / gray.get();
+        // The band ends where its upper end does.
+        let cures = |dose: &&Dose| fit.depth(gray, **dose).high.um() > 0.0;
         let begins =
-            [model.at(gray).critical_dose(), of_band].map(|dose| dose.mj_per_cm2() / gray.get());
+            [critical, doses.iter().find(cures).map_or(critical, |dose| dose.mj_per_cm2())];
         series(name, &of_level, doses, begins, curve, band)
     };
     fit.levels.iter().map(level).collect()

@@ -12,6 +12,7 @@ use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
 use crate::catalogue::entry;
 use crate::exit::Exit;
+use crate::measured_doses::MeasuredDoses;
 use crate::options::Common;
 use crate::plots::{Plot, PlotAxis, Series, highest};
 use crate::progress::Progress;
@@ -20,8 +21,9 @@ use crate::progress::Progress;
 ///
 /// The CSV file has a header with the columns feature_px (the squares' side in the image; or
 /// feature_um), dose_mj_per_cm2 (or exposure_ms, with --intensity), and cured_um (the side after
-/// curing; or width_um, the distance of each edge outside its image). Rows whose square is no
-/// larger than its image are left out. lamp target squares writes a file to fill in.
+/// curing; or width_um, the distance of each edge outside its image). Squares no larger than their
+/// image count: they say from which dose on squares grow. Leave out none but those that were washed
+/// away, or write 0 as their side. lamp target squares writes a file to fill in.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -45,10 +47,12 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     files.check()?;
     let base = files.base()?;
     let of_depths = args.depth_material.as_deref().map(entry).transpose()?;
-    let depths = match of_depths.as_ref().or(base.as_ref()) {
+    let of_depths = of_depths.as_ref().or(base.as_ref());
+    let depths = match of_depths {
         Some(material) => cure_depths(material).map_err(anyhow::Error::new)?,
         None => None,
     };
+    let doses = of_depths.map(MeasuredDoses::of_depths);
     let table = files.table()?;
     let at_place = |error: Exit| error.at(files.place());
     let measured = width_points(&table, files.light(base.as_ref())?, args.dpi);
@@ -61,10 +65,13 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
              --depth-material",
         );
     }
-    let mut text = EstimateTable::new(&measured, "not wider");
+    let mut text = EstimateTable::new(&measured, "washed away");
     for fit in &fits {
         write(&mut text, fit, args.dpi, depths.as_deref());
+        doses.iter().for_each(|doses| doses.see(fit.critical_dose.value));
     }
+    let doubt = doses.and_then(|doses| doses.doubt("broadening depths"));
+    doubt.iter().for_each(|doubt| progress.say(doubt));
     let title = format!("Cure width: {}", files.source_name());
     let plot = plot(title, &fits, &measured.points, args.dpi);
     let add = |material: &mut Material| {
@@ -88,7 +95,7 @@ fn cure_depths(material: &Material) -> Result<Option<Box<dyn CureModel>>, Materi
 
 fn write(text: &mut EstimateTable, fit: &WidthFit, dpi: Dpi, depths: Option<&dyn CureModel>) {
     let (size, below) = (size_name(fit, dpi), fit.below);
-    let below = if below > 0 { format!(" ({below} more below Ec^w)") } else { String::new() };
+    let below = if below > 0 { format!(" ({below} up to Ec^w)") } else { String::new() };
     text.line(&format!("\n{size}: {} points{below}", fit.points), &[]);
     text.heads();
     text.estimate("Ec^w (mJ/cm2)", &fit.critical_dose);
@@ -123,29 +130,32 @@ fn plot(title: String, fits: &[WidthFit], points: &[WidthPoint], dpi: Dpi) -> Pl
     let doses: Vec<_> =
         (0..=30).map(|i| Dose::from_mj_per_cm2(most * f64::from(i) / 30.0)).collect();
     let series: Vec<_> = fits.iter().map(|fit| series(fit, points, &doses, dpi)).collect();
-    let axis = |label: &str, end: f64| PlotAxis {
-        label: label.to_owned(),
-        range: 0.0..end,
-        logarithmic: false,
-    };
-    let (x, y) = (axis("dose (mJ/cm²)", most), axis("cure width (µm)", 1.08 * highest(&series)));
+    let axis = |label: &str, range| PlotAxis { label: label.to_owned(), range, logarithmic: false };
+    // Squares smaller than their image are below zero.
+    let lowest = points.iter().map(|point| point.width.um()).fold(0.0, f64::min);
+    let y = axis("cure width (µm)", 1.08 * lowest..1.08 * highest(&series));
+    let x = axis("dose (mJ/cm²)", 0.0..most);
     Plot { title, x, y, series }
 }
 
 fn series(fit: &WidthFit, points: &[WidthPoint], doses: &[Dose], dpi: Dpi) -> Series {
     let of_size = points.iter().filter(|point| point.feature_size == fit.feature_size);
-    let start = fit.critical_dose.low.mj_per_cm2().max(0.0);
-    let band = doses.iter().filter(|dose| dose.mj_per_cm2() > start).map(|&dose| {
+    let start = fit.critical_dose.low.mj_per_cm2();
+    let above = |from: f64| doses.iter().filter(move |dose| dose.mj_per_cm2() > from);
+    let band = above(start).map(|&dose| {
         let width = fit.width(dose);
-        [dose.mj_per_cm2(), width.low.um().max(0.0), width.high.um().max(0.0)]
+        [dose.mj_per_cm2(), width.low.um(), width.high.um()]
     });
-    let (from, to) = (fit.critical_dose.value, doses[doses.len() - 1]);
+    // A slope without an upper end has no band beyond the highest dose.
+    let band = band.filter(|[_, _, high]| high.is_finite());
+    let from = fit.critical_dose.value.mj_per_cm2();
+    let curve = above(from).map(|&dose| (dose.mj_per_cm2(), fit.width(dose).value.um()));
     let name =
         format!("{}: {}", size_name(fit, dpi), in_legend("Ec", "mJ/cm²", &fit.critical_dose));
     Series {
         name: name.replace(" um", " µm"),
         points: of_size.map(|point| (point.dose.mj_per_cm2(), point.width.um())).collect(),
-        curve: vec![(from.mj_per_cm2(), 0.0), (to.mj_per_cm2(), fit.width(to).value.um())],
+        curve: std::iter::once((from, 0.0)).chain(curve).collect(),
         band: std::iter::once([start, 0.0, 0.0]).chain(band).collect(),
     }
 }

@@ -39,20 +39,29 @@ pub(super) fn line(measures: &Measures) -> String {
     )
 }
 
-/// Returns a warning of columns for which the material's numbers do not hold, if there are some.
+/// Returns a warning of columns for which the material's numbers do not hold, or were not measured,
+/// if there are some.
 pub(super) fn doubt(
     target: &HeightMap,
     curve: &HeightCurve,
     material: &Material,
 ) -> Option<String> {
-    let known = curve.known();
+    let (known, name) = (curve.known(), &material.name);
     let low = target.lower_than(known.from);
-    (low > 0).then(|| {
-        format!(
-            "{low} columns of the target are lower than {}, from where on the numbers of {} hold: \
-             they may come out otherwise",
+    if low > 0 {
+        return Some(format!(
+            "{low} columns of the target are lower than {}, from where on the numbers of {name} \
+             hold: they may come out otherwise",
             Length::to_whole_nm(known.from),
-            material.name
+        ));
+    }
+    let measured = material.measured()?.depths?;
+    let outside = target.outside(measured.from, measured.to);
+    (outside > 0).then(|| {
+        let [from, to] = [measured.from, measured.to].map(Length::um);
+        format!(
+            "{outside} columns of the target are not of the {from:.0} to {to:.0} um that {name} \
+             was measured at: its numbers are extrapolated"
         )
     })
 }

@@ -13,6 +13,7 @@ use super::speed_report::{Planned, lines_of, write_report};
 use crate::exit::Exit;
 use crate::json_report::parse_report;
 use crate::kept_stack::KeptStack;
+use crate::measured_doses::MeasuredDoses;
 use crate::memory;
 use crate::options::{Common, Input, Output, parse_memory};
 use crate::planning_options::PlanningOptions;
@@ -85,7 +86,11 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     let plan = plan(&part, &options).map_err(|error: PlanError| Exit::from(error).at(name))?;
     let planned = Planned { material: &material.name, part: &part, plan: &plan };
     args.write(&mut stack, &planned, &progress)?;
-    for line in lines_of(&planned) {
+    let doses = MeasuredDoses::of_working_curve(&material);
+    if let Some(light) = material.light().map_err(anyhow::Error::new)? {
+        plan.times.iter().for_each(|&time| doses.see(light * time));
+    }
+    for line in lines_of(&planned).into_iter().chain(doses.doubt("layers")) {
         progress.say(&line);
     }
     if let Some(path) = &args.profile {

@@ -12,6 +12,7 @@ use super::voxels_plot::plots_of;
 use super::voxels_report::{Planned, lines_of, write_report};
 use crate::exit::Exit;
 use crate::json_report::parse_report;
+use crate::measured_doses::MeasuredDoses;
 use crate::memory;
 use crate::options::{Common, Input, Output, one_of_described, parse_memory};
 use crate::planning_options::PlanningOptions;
@@ -139,7 +140,14 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("plan", common, &args.output);
     let layers = read_layers(&args.input, &progress)?;
     let mut map = LayerMap::new(&args.map, light, args.planning.wanted.get());
-    let layers = layers.map(|layer| Ok(args.prepared(layer?, &command)));
+    let doses = MeasuredDoses::of_working_curve(&material);
+    let wide_field = material.light().map_err(anyhow::Error::new)?;
+    let layers = layers.map(|layer| {
+        let layer = args.prepared(layer?, &command);
+        let time = layer.info.exposure_ms.map(ExposureTime::from_ms);
+        wide_field.zip(time).into_iter().for_each(|(light, time)| doses.see(light * time));
+        Ok(layer)
+    });
     let mut settled = 0;
     let planned = plan(seen_by(&mut map, layers), &light, &args.options(), |layers| {
         (settled..layers).for_each(|_| progress.layer_done());
@@ -160,7 +168,7 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
         margin: args.planning.margin,
         outcome: &planned.outcome(),
     };
-    for line in lines_of(&planned) {
+    for line in lines_of(&planned).into_iter().chain(doses.doubt("layers")) {
         progress.say(&line);
     }
     if let Some(path) = &args.report {

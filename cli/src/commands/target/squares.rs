@@ -106,7 +106,8 @@ fn counted(count: usize, what: &str) -> String {
 }
 
 const TABLE_HEAD: &str = "\
-# Write each square's side after curing into cured_um; leave it empty where none was measured.
+# Write each square's side after curing into cured_um, also where it did not grow; leave it empty
+# where none was measured.
 # Then: lamp calibrate width squares.csv
 feature_px,dose_mj_per_cm2,cured_um
 ";

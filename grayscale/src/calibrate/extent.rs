@@ -1,0 +1,32 @@
+//! The doses and depths of measurements.
+
+use lamp_stack::Length;
+
+use super::measurements::DepthPoint;
+use crate::material::{GivenRange, MeasuredRange};
+use crate::resin::Dose;
+
+/// Where measurements lie. Doses are those of full white.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Extent {
+    doses: GivenRange<Dose>,
+    depths: Option<GivenRange<Length>>,
+}
+
+impl Extent {
+    /// Returns where films lie; none if there are none.
+    pub(super) fn of_depths(points: &[DepthPoint]) -> Option<Self> {
+        let depths = GivenRange::of(points.iter().map(|point| point.depth));
+        Some(Self { depths, ..Self::of_doses(points.iter().map(|point| point.dose))? })
+    }
+
+    /// Returns where measurements lie of which only the doses count.
+    pub(super) fn of_doses(doses: impl Iterator<Item = Dose>) -> Option<Self> {
+        GivenRange::of(doses).map(|doses| Self { doses, depths: None })
+    }
+
+    /// Returns the range for a material file.
+    pub(super) fn measured(self, source: &str) -> MeasuredRange {
+        MeasuredRange { source: source.to_owned(), doses: self.doses, depths: self.depths }
+    }
+}
