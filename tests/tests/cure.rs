@@ -154,9 +154,9 @@ fn areas_of_white_are_those_without_pixels() {
         scratch.mesh("part.stl", &mesh);
         let slice =
             format!("slice part.stl --dpi 15000 --thickness {thick_um}um --layers {first}..");
-        scratch.run(&format!("{slice} --material lamp-suspension -o white.tif")).succeeds_quietly();
+        scratch.run(&format!("{slice} --material lamp-suspension -o white.tif")).succeeds();
         let cure = "lamp cure white.tif --material lamp-suspension --section y=0.1mm --scale 1/50";
-        let ran = scratch.run(&format!("{cure} --part part.stl -o s.png")).succeeds_quietly();
+        let ran = scratch.run(&format!("{cure} --part part.stl -o s.png")).succeeds();
         let (found, row) = told(&String::from_utf8(ran.stdout).unwrap(), "white");
         let layers = scratch.layers("white.tif");
         let plane = place(&layers[0], row);
@@ -184,9 +184,9 @@ fn areas_of_gray_are_those_of_its_levels() {
     {
         scratch.mesh("part.stl", &mesh);
         let slice = format!("slice part.stl --thickness {thick_um}um --material lamp-suspension");
-        scratch.run(&format!("{slice} --gray -o gray.tif")).succeeds_quietly();
+        scratch.run(&format!("{slice} --gray -o gray.tif")).succeeds();
         let cure = "lamp cure gray.tif --material lamp-suspension --section y=0.1mm";
-        let ran = scratch.run(&format!("{cure} --part part.stl -o s.png")).succeeds_quietly();
+        let ran = scratch.run(&format!("{cure} --part part.stl -o s.png")).succeeds();
         let (found, row) = told(&String::from_utf8(ran.stdout).unwrap(), "gray");
         let layers = scratch.layers("gray.tif");
         let levels: Vec<Vec<u8>> = layers
