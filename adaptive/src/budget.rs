@@ -3,16 +3,26 @@
 use lamp_stack::Length;
 
 use crate::error::HeightsError;
-use crate::search::{Budget, HeightSearch, Heights};
+use crate::known::Known;
+use crate::search::{Budget, Climb, Grid, HeightSearch, Heights};
+use crate::swept_layer::SweptLayer;
+use crate::table::HeightTable;
 
-/// The inverse of the relative precision to which bounds are found.
-const PRECISION: f64 = 100.0;
+/// The relative precision to which bounds are found.
+const PRECISION: f64 = 0.01;
+
+/// That of guesses, which cost little.
+const GUESS_PRECISION: f64 = 0.001;
+
+/// Bounds below this one are rounding.
+const NOTHING: f64 = 1e-9;
 
 impl HeightSearch<'_> {
     /// Finds the smallest bound, to one percent, whose layers together cost at most
     /// `max`, and these layers. Each is the one that costs least for its thickness among
-    /// those within the bound. `cost` returns the cost of a layer by its thickness; a
-    /// cost of 1 counts layers.
+    /// those within the bound; of all ways to place as many at the same cost or less, the
+    /// layers are those that lose and gain least. `cost` returns the cost of a layer by its
+    /// thickness; a cost of 1 counts layers.
     ///
     /// The bound is infinite if the budget needs layers whose error is infinite.
     ///
@@ -24,28 +34,124 @@ impl HeightSearch<'_> {
         max: f64,
     ) -> Result<(f64, Heights), HeightsError> {
         let budget = Budget { cost: &cost, max };
-        let within = |bound| self.heights_within(bound, Some(budget));
-        let free = Budget { max: f64::INFINITY, ..budget };
-        let cheapest = self.heights_within(f64::INFINITY, Some(free))?.expect("it may cost all");
-        let least = free.of_all(&cheapest.layers);
+        let grid = self.grid()?;
+        let least = self.least_cost(&grid, budget);
         if least > max {
             return Err(HeightsError::Budget { least, budget: max });
         }
-        if let Some(heights) = within(0.0)? {
-            return Ok((0.0, heights));
+        let mut known = Known::new();
+        let (bound, climb) = self.smallest_bound(&grid, budget, &mut known);
+        Ok((bound, self.placed(&grid, climb, &known, bound, Some(budget))))
+    }
+
+    /// Returns what layers cost if none is too bad.
+    fn least_cost(&self, grid: &Grid, budget: Budget<'_>) -> f64 {
+        let (mut step, mut cost) = (0, 0.0);
+        while step < grid.end() {
+            let choices = self.thicknesses.choices(step, grid.ends());
+            let layers: Vec<SweptLayer> = choices
+                .iter()
+                .map(|choice| SweptLayer {
+                    thickness_um: grid.at(step + choice) - grid.at(step),
+                    ..SweptLayer::default()
+                })
+                .collect();
+            let chosen = self.choose(&layers, f64::INFINITY, Some(budget));
+            cost += budget.of(&layers[chosen]);
+            step += choices[chosen];
         }
-        let measures = cheapest.layers.iter().map(|layer| self.criterion.measure(layer));
-        let mut high = measures.filter(|measure| measure.is_finite()).fold(0.0, f64::max);
-        let Some(mut best) = within(high)? else { return Ok((f64::INFINITY, cheapest)) };
-        let mut low = 0.0;
-        // By ratios once there is a lower limit, since bounds span decades.
-        while high > low * (1.0 + 1.0 / PRECISION) && high > f64::MIN_POSITIVE {
+        cost
+    }
+
+    /// Finds the smallest bound whose layers are within the budget, and these.
+    fn smallest_bound(&self, grid: &Grid, budget: Budget<'_>, known: &mut Known) -> (f64, Climb) {
+        let (mut low, mut found) = self.guessed_bound(grid, budget, known);
+        let mut within = |bound| self.climb(grid, bound, Some(budget), known);
+        let was_guessed = found.is_some();
+        if low == 0.0
+            && !was_guessed
+            && let Some(climb) = within(0.0)
+        {
+            return (0.0, climb);
+        }
+        let (mut high, mut best) = match found.take() {
+            Some(found) => found,
+            None => {
+                let cheapest = within(f64::INFINITY).expect("its cost was looked at");
+                let high = self.worst(&cheapest.heights.layers);
+                let Some(climb) = within(high) else { return (f64::INFINITY, cheapest) };
+                (high, climb)
+            }
+        };
+        // Steps down that grow, since bounds span decades.
+        let mut ratio = if was_guessed { 1.0 + PRECISION } else { 8.0 };
+        while high > low * (1.0 + PRECISION) && high > NOTHING {
+            let middle = if low > 0.0 { f64::sqrt(low * high) } else { high / ratio };
+            match within(middle) {
+                Some(climb) => (high, best) = (middle, climb),
+                None => low = middle,
+            }
+            ratio = (ratio * ratio).min(8.0);
+        }
+        (high, best)
+    }
+
+    /// Looks at the bounds that facets alone lead to, and then at the one that the first search
+    /// leads to, so that few searches are left. Returns a bound that is too small, and one
+    /// within the budget with its layers, if they were found.
+    fn guessed_bound(
+        &self,
+        grid: &Grid,
+        budget: Budget<'_>,
+        known: &mut Known,
+    ) -> (f64, Option<(f64, Climb)>) {
+        let (mut low, mut found) = (0.0, None);
+        let Some(table) = &grid.table else { return (low, found) };
+        // The second guess is close: by aiming a little too high, one search confirms it.
+        for aim in [1.0, 1.0 + 0.4 * PRECISION] {
+            let bound = aim * self.guess_bound(grid, table, budget, known);
+            let high = found.as_ref().map_or(f64::INFINITY, |(high, _)| *high);
+            if !(low..high / (1.0 + PRECISION)).contains(&bound) {
+                break;
+            }
+            match self.climb(grid, bound, Some(budget), known) {
+                Some(climb) => found = Some((bound, climb)),
+                None => low = bound,
+            }
+        }
+        (low, found)
+    }
+
+    /// Guesses the smallest bound within the budget. It is infinite if there is none.
+    fn guess_bound(
+        &self,
+        grid: &Grid,
+        table: &HeightTable,
+        budget: Budget<'_>,
+        known: &Known,
+    ) -> f64 {
+        let within = |bound| self.guess(grid, table, bound, budget, known);
+        if within(0.0).is_some() {
+            return 0.0;
+        }
+        let Some(cheapest) = within(f64::INFINITY) else { return f64::INFINITY };
+        let (mut low, mut high) = (0.0, self.worst(&cheapest));
+        if within(high).is_none() {
+            return f64::INFINITY;
+        }
+        while high > low * (1.0 + GUESS_PRECISION) && high > NOTHING {
             let middle = if low > 0.0 { f64::sqrt(low * high) } else { high / 8.0 };
-            match within(middle)? {
-                Some(heights) => (high, best) = (middle, heights),
+            match within(middle) {
+                Some(_) => high = middle,
                 None => low = middle,
             }
         }
-        Ok((high, best))
+        high
+    }
+
+    /// Returns the greatest finite error of some layers.
+    fn worst(&self, layers: &[SweptLayer]) -> f64 {
+        let measures = layers.iter().map(|layer| self.criterion.measure(layer));
+        measures.filter(|measure| measure.is_finite()).fold(0.0, f64::max)
     }
 }

@@ -8,9 +8,10 @@ use lamp_stack::{Grouped, Length};
 use rayon::prelude::*;
 
 use crate::error::HeightsError;
+use crate::facets::Facets;
 use crate::profile::{Profile, ProfileChange};
 use crate::row_cuts::RowCuts;
-use crate::sweep::{Slope, Sweep, Toggle};
+use crate::sweep::{RowsAdd, Slope, Sweep, Toggle};
 use crate::swept_layer::{SweptLayer, SweptLayers};
 
 /// The number of stripes of rows that are worked on at once. It does not follow
@@ -42,8 +43,9 @@ impl Rows {
 
 /// A part seen along rows, for comparing it with layers.
 ///
-/// Volumes are those of the facets, exact along x and z; along y they are sums over
-/// rows, as in images.
+/// Volumes are exact for the facets wherever a vertical line meets one facet of a layer at
+/// most. Where it meets several, the difference is exact along x and z, and along y a sum
+/// over rows, as in images. If the mesh has a gap, so is all.
 #[derive(Debug)]
 pub struct LayeredPart {
     facets: FacetIndex,
@@ -72,6 +74,10 @@ impl LayeredPart {
     /// Returns the heights of the lowest and the highest point, in micrometres.
     pub fn heights_um(&self) -> [f64; 2] {
         [self.facets.min()[2], self.facets.max()[2]]
+    }
+
+    pub(crate) fn facets(&self) -> &FacetIndex {
+        &self.facets
     }
 
     /// Returns the heights of flat faces in micrometres, rising: of level facets whose
@@ -106,37 +112,53 @@ impl LayeredPart {
         let planes: Vec<f64> = tops_um.iter().map(|&top| plane(top) - bottom_um).collect();
         let last_um = plane(tops_um[tops_um.len() - 1]);
         let facets = self.facets.between(bottom_um, last_um);
-        let Rise { changes, bottom_width, unavoidable, rows_left_out } =
+        let Rise { changes, bottom_area, unavoidable, rows_left_out } =
             self.rise(&facets, [bottom_um, last_um], &planes);
         let steepest = steepest(&facets, bottom_um, tops_um);
-        let pitch_mm = self.rows.pitch_mm;
         let layer = |k: usize| {
-            let ProfileChange { width, lost, gained } = changes[k];
-            let top_width = (bottom_width + width).max(0.0);
+            let ProfileChange { area, lost, gained } = changes[k];
+            let top_area = (bottom_area + area).max(0.0);
             let (lost, gained) = (lost.max(0.0), gained.max(0.0));
             let thickness_um = tops_um[k] - bottom_um;
             // Above the part's top all of the layer is too much.
-            let above = top_width * (thickness_um - planes[k]);
+            let above = top_area * (thickness_um - planes[k]);
             SweptLayer {
                 bottom_um,
                 thickness_um,
-                volume_mm3: (top_width * planes[k] + lost - gained).max(0.0) * pitch_mm / 1000.0,
-                lost_mm3: lost * pitch_mm / 1000.0,
-                gained_mm3: (gained + above) * pitch_mm / 1000.0,
-                bottom_area_mm2: bottom_width * pitch_mm,
-                top_area_mm2: top_width * pitch_mm,
+                volume_mm3: (top_area * planes[k] + lost - gained).max(0.0) / 1000.0,
+                lost_mm3: lost / 1000.0,
+                gained_mm3: (gained + above) / 1000.0,
+                bottom_area_mm2: bottom_area,
+                top_area_mm2: top_area,
                 steepest: steepest[k],
                 rows_left_out,
             }
         };
         SweptLayers {
             each: (0..tops_um.len()).map(layer).collect(),
-            unavoidable_mm3: unavoidable * pitch_mm / 1000.0,
+            unavoidable_mm3: unavoidable / 1000.0,
         }
     }
 
-    /// Returns the changes from the bottom to each plane above it, summed over all rows.
+    /// Returns the changes from the bottom to each plane above it: those of facets alone, and
+    /// how rows differ from them. Where the mesh has a gap, rows alone count.
     fn rise(&self, facets: &[(PlacedFacet, u32)], z_um: [f64; 2], planes: &[f64]) -> Rise {
+        let stripes = self.stripes(facets);
+        let closed =
+            Facets::sum(facets, z_um[0], planes).filter(super::facets::Facets::bottom_is_closed);
+        if let Some(sum) = closed {
+            let mut rise = self.rows(&stripes, z_um, planes, RowsAdd::Differences);
+            if rise.rows_left_out == 0 {
+                rise.bottom_area += sum.bottom_area();
+                rise.changes.iter_mut().zip(sum.changes).for_each(|(rise, sum)| rise.add(sum));
+                return rise;
+            }
+        }
+        self.rows(&stripes, z_um, planes, RowsAdd::All)
+    }
+
+    /// Returns the facets by the stripes of rows that meet them.
+    fn stripes(&self, facets: &[(PlacedFacet, u32)]) -> Vec<Vec<(RowFacet, u32)>> {
         let stripe_rows = self.rows.count.div_ceil(STRIPES);
         let mut stripes: Vec<Vec<(RowFacet, u32)>> = (0..STRIPES).map(|_| Vec::new()).collect();
         for (facet, body) in facets {
@@ -146,19 +168,31 @@ impl LayeredPart {
                 stripes[stripe as usize].push((facet, self.rule.name_of(*body)));
             }
         }
-        let of_stripe = |(stripe, facets): (usize, Vec<(RowFacet, u32)>)| {
+        stripes
+    }
+
+    /// Returns what all rows add.
+    fn rows(
+        &self,
+        stripes: &[Vec<(RowFacet, u32)>],
+        z_um: [f64; 2],
+        planes: &[f64],
+        adds: RowsAdd,
+    ) -> Rise {
+        let stripe_rows = self.rows.count.div_ceil(STRIPES);
+        let of_stripe = |(stripe, facets): (usize, &Vec<(RowFacet, u32)>)| {
             let first = stripe as u32 * stripe_rows;
             let mut cuts = RowCuts::default();
-            for (facet, body) in &facets {
+            for (facet, body) in facets {
                 cuts.add_facet(facet, *body, [first, first + stripe_rows], z_um);
             }
-            self.sweep(&cuts, first, stripe_rows, planes)
+            self.sweep(&cuts, first, stripe_rows, planes, adds)
         };
-        let stripes: Vec<Rise> = stripes.into_par_iter().enumerate().map(of_stripe).collect();
+        let stripes: Vec<Rise> = stripes.par_iter().enumerate().map(of_stripe).collect();
         let mut sum =
             Rise { changes: vec![ProfileChange::default(); planes.len()], ..Rise::default() };
         for stripe in stripes {
-            sum.bottom_width += stripe.bottom_width;
+            sum.bottom_area += stripe.bottom_area;
             sum.unavoidable += stripe.unavoidable;
             sum.rows_left_out += stripe.rows_left_out;
             sum.changes.iter_mut().zip(stripe.changes).for_each(|(sum, change)| sum.add(change));
@@ -166,9 +200,9 @@ impl LayeredPart {
         sum
     }
 
-    fn sweep(&self, cuts: &RowCuts, first: u32, rows: u32, planes: &[f64]) -> Rise {
+    fn sweep(&self, cuts: &RowCuts, first: u32, rows: u32, planes: &[f64], adds: RowsAdd) -> Rise {
         let mut profile = Profile::new(planes);
-        let mut sweep = Sweep::new(&self.rule);
+        let mut sweep = Sweep::new(&self.rule, self.rows.pitch_mm, adds);
         let rows = rows as usize;
         let toggle = |toggle: &Toggle| ((toggle.row - first) as usize, *toggle);
         let slope = |slope: &Slope| ((slope.row - first) as usize, *slope);
@@ -183,22 +217,29 @@ impl LayeredPart {
         }
         Rise {
             changes: profile.changes(),
-            bottom_width: profile.bottom_width,
+            bottom_area: profile.bottom_area,
             unavoidable: profile.unavoidable,
             rows_left_out,
         }
     }
 }
 
-/// Changes of a part's section from a bottom up, in millimetres along rows and
-/// micrometres of height.
+/// Changes of a part's section from a bottom up, in square millimetres and micrometres of
+/// height.
 #[derive(Default)]
 struct Rise {
     /// For each plane.
     changes: Vec<ProfileChange>,
-    bottom_width: f64,
+    bottom_area: f64,
     unavoidable: f64,
     rows_left_out: u32,
+}
+
+/// Returns |N_z| of a facet's unit normal: 0 for upright facets and those without an area.
+pub(crate) fn cosine_to_vertical(facet: &PlacedFacet) -> f64 {
+    let normal = normal(facet);
+    let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+    if length > 0.0 { normal[2].abs() / length } else { 0.0 }
 }
 
 /// Returns a facet's normal, as long as twice its area in square millimetres.
@@ -215,11 +256,9 @@ fn steepest(facets: &[(PlacedFacet, u32)], bottom_um: f64, tops_um: &[f64]) -> V
     let mut steepest = vec![0.0; tops_um.len()];
     for (facet, _) in facets {
         let (low, high) = facet_heights(facet);
-        let normal = normal(facet);
-        let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
         let first = tops_um.partition_point(|&top| top <= low);
-        if high > bottom_um && length > 0.0 && first < tops_um.len() {
-            steepest[first] = f64::max(steepest[first], normal[2].abs() / length);
+        if high > bottom_um && first < tops_um.len() {
+            steepest[first] = f64::max(steepest[first], cosine_to_vertical(facet));
         }
     }
     for k in 1..steepest.len() {

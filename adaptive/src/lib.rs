@@ -3,11 +3,12 @@
 //! A layer is built as the part's section at its top, swept down. A
 //! [`LayeredPart`] compares such [`SweptLayer`]s with the part, for all tops that a
 //! layer may have at once. A [`Criterion`] measures a layer's error. A
-//! [`HeightSearch`] takes, from the bottom up, the thickest layers whose error is
-//! within a bound, or the most accurate ones within a budget (002 section 3.2).
+//! [`HeightSearch`] takes as few layers whose error is within a bound as it finds from the
+//! bottom up, or the most accurate ones within a budget (002 section 3.2), and places them
+//! where they err least together.
 //!
 //! ```
-//! use lamp_adaptive::{HeightSearch, LayeredPart, Thicknesses, VolumeDeviation};
+//! use lamp_adaptive::{HeightSearch, LayeredPart, Thicknesses, VolumeDeviation, Watch};
 //! use lamp_slicer::{FacetIndex, Fill, Part, Placement, Units};
 //! use lamp_stack::Length;
 //!
@@ -19,29 +20,40 @@
 //! let [min, max, step] = [10.0, 100.0, 1.0].map(Length::from_um);
 //! let thicknesses = Thicknesses::new(min, max, step)?;
 //! let criterion = &VolumeDeviation;
-//! let search = HeightSearch { part: &part, thicknesses: &thicknesses, criterion, snap: false };
+//! let search = HeightSearch {
+//!     part: &part,
+//!     thicknesses: &thicknesses,
+//!     criterion,
+//!     snap: false,
+//!     watch: Watch::default(),
+//! };
 //! let heights = search.heights(0.05)?;
 //! // Sections shrink faster towards the tip, and layers with them.
-//! assert_eq!(heights.layers[0].thickness_um, 49.0);
-//! assert!(heights.layers[10].thickness_um < 30.0);
-//! assert_eq!(heights.layers.last().unwrap().top_um(), 1000.0);
+//! assert_eq!(heights.layers[0].thickness_um, 43.0);
+//! let last = heights.layers.last().unwrap();
+//! assert!(last.thickness_um < 30.0);
+//! assert_eq!(last.top_um(), 1000.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod budget;
 mod criterion;
 mod error;
+mod facets;
+mod known;
 mod layered_part;
+mod placement;
 mod profile;
 mod row_cuts;
 mod search;
 mod sweep;
 mod swept_layer;
+mod table;
 mod thicknesses;
 
 pub use criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
 pub use error::HeightsError;
 pub use layered_part::LayeredPart;
-pub use search::{HeightSearch, Heights, uniform_heights};
+pub use search::{HeightSearch, Heights, Watch, uniform_heights};
 pub use swept_layer::{SweptLayer, SweptLayers};
 pub use thicknesses::Thicknesses;

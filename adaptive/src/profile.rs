@@ -1,48 +1,63 @@
 //! Sums what a layer lacks and has too much, for all tops it may have at once.
 //!
-//! Along a row, a facet is a line from one x and height to another. As a layer's
-//! top rises past this line, it changes what the layer lacks and has too much by a
-//! polynomial of the top's height; once the top is above all of the line, the change
-//! stays. So a line adds its polynomial at the first top above its lower end, and
-//! takes it away again at the first above its upper end. The cost of a line does not
+//! A facet rises from one height to another, and so does its line along a row. As a
+//! layer's top rises past it, it changes what the layer lacks and has too much by a
+//! polynomial of the top's height; once the top is above all of it, the change
+//! stays. So it adds its polynomial at the first top above its lower end, and
+//! takes it away again at the first above its upper end. Its cost does not
 //! depend on the number of tops.
 
 use lamp_slicer::scan::count_at_or_below;
 
-/// From this many tops between a line's ends on, a polynomial is cheaper than one
-/// sum for each top. Between closer ends it would also suffer from rounding, as it
-/// divides by their distance.
+/// From this many tops between a surface's ends on, a polynomial is cheaper than one
+/// sum for each top.
 const MANY_TOPS: usize = 6;
 
-/// A change as a layer's top rises past lines: of the section's width in millimetres,
-/// and of areas along the row, in millimetres times micrometres.
+/// A polynomial divides by the distance of the ends: where that is less than this part of
+/// all tops, it would suffer from rounding.
+const SMALL_PART: usize = 50;
+
+/// A change as a layer's top rises past lines: of the section's area in square
+/// millimetres, and of volumes in square millimetres times micrometres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ProfileChange {
-    pub(crate) width: f64,
+    pub(crate) area: f64,
     pub(crate) lost: f64,
     pub(crate) gained: f64,
 }
 
 impl ProfileChange {
     pub(crate) fn add(&mut self, other: Self) {
-        self.width += other.width;
+        self.area += other.area;
         self.lost += other.lost;
         self.gained += other.gained;
     }
 }
 
-/// A facet's line along a row. Along it, the heights lost and gained once tops are
-/// past it go evenly from one end to the other.
+/// A piece of surface. Between its ends, what it changes once tops are past it goes evenly
+/// from one value to the other.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SurfaceLine {
+pub(crate) struct Surface {
     pub(crate) heights: [f64; 2],
-    /// The extent along x; below zero if the part lies below the line.
-    pub(crate) width: f64,
+    /// The area that it covers, seen from above, in square millimetres.
+    pub(crate) extent: f64,
+    /// How dense this area is at its ends, as a share of its mean.
+    pub(crate) density: [f64; 2],
+    /// How much of it the section gains once the top is past it: less than 0 if the part
+    /// lies below.
+    pub(crate) section: f64,
+    /// The heights lost and gained once the top is past its ends.
     pub(crate) lost: [f64; 2],
     pub(crate) gained: [f64; 2],
 }
 
-impl SurfaceLine {
+/// The density of a line along a row.
+pub(crate) const EVEN: [f64; 2] = [1.0; 2];
+
+/// A polynomial's coefficients, from the first power of its argument on.
+type Cubic = [f64; 3];
+
+impl Surface {
     fn rising(self) -> Self {
         if self.heights[0] <= self.heights[1] {
             return self;
@@ -50,84 +65,74 @@ impl SurfaceLine {
         let turned = |[a, b]: [f64; 2]| [b, a];
         Self {
             heights: turned(self.heights),
+            density: turned(self.density),
             lost: turned(self.lost),
             gained: turned(self.gained),
             ..self
         }
     }
 
-    /// Returns the change once a share of the line is passed.
+    /// Returns the change of a value that goes from `a` to `b`, over the share passed.
+    fn integral(&self, [a, b]: [f64; 2]) -> Cubic {
+        let ([d, e], dx) = (self.density, self.extent);
+        let (rise, thickening) = (b - a, e - d);
+        [dx * a * d, dx * (a * thickening + rise * d) / 2.0, dx * rise * thickening / 3.0]
+    }
+
+    /// Returns what changes the section, what is lost and what is gained, over the share
+    /// passed.
+    fn integrals(&self) -> [Cubic; 3] {
+        [[self.section; 2], self.lost, self.gained].map(|ends| self.integral(ends))
+    }
+
+    /// Returns the change once a share of the surface's heights is passed.
     #[inline]
     fn passed(&self, share: f64) -> ProfileChange {
-        let dx = self.width.abs();
-        let area = |[a, b]: [f64; 2]| dx * share * (a + 0.5 * (b - a) * share);
-        ProfileChange {
-            width: self.width * share,
-            lost: area(self.lost),
-            gained: area(self.gained),
-        }
+        let [area, lost, gained] =
+            self.integrals().map(|[a, b, c]| share * (a + share * (b + share * c)));
+        ProfileChange { area, lost, gained }
     }
 }
 
-/// Coefficients of powers of the top's height.
-type Polynomial = [f64; 3];
+/// Coefficients of powers of the top's height, from 1 on.
+type Polynomial = [f64; 4];
 
+/// Polynomials of the section's area, what is lost, and what is gained.
 #[derive(Clone, Copy, Debug, Default)]
-struct Polynomials {
-    width: [f64; 2],
-    lost: Polynomial,
-    gained: Polynomial,
-}
+struct Polynomials([Polynomial; 3]);
 
 impl Polynomials {
-    fn of(line: &SurfaceLine) -> Self {
-        let [low, high] = line.heights;
+    fn of(surface: &Surface) -> Self {
+        let [low, high] = surface.heights;
         let slope = 1.0 / (high - low);
         let start = -low * slope;
-        let dx = line.width.abs();
-        let area = |[a, b]: [f64; 2]| {
-            let half = 0.5 * (b - a);
+        // The share passed is `start + slope top`.
+        Self(surface.integrals().map(|[a, b, c]| {
             [
-                dx * start * (a + half * start),
-                dx * slope * (a + 2.0 * half * start),
-                dx * slope * slope * half,
+                start * (a + start * (b + start * c)),
+                slope * (a + start * (2.0 * b + 3.0 * start * c)),
+                slope * slope * (b + 3.0 * start * c),
+                slope * slope * slope * c,
             ]
-        };
-        Self {
-            width: [line.width * start, line.width * slope],
-            lost: area(line.lost),
-            gained: area(line.gained),
-        }
+        }))
     }
 
     fn constant(change: ProfileChange) -> Self {
-        Self {
-            width: [change.width, 0.0],
-            lost: [change.lost, 0.0, 0.0],
-            gained: [change.gained, 0.0, 0.0],
-        }
+        Self([change.area, change.lost, change.gained].map(|value| [value, 0.0, 0.0, 0.0]))
     }
 
     fn add(&mut self, other: &Self, factor: f64) {
-        let add = |to: &mut [f64], from: &[f64]| {
-            to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
-        };
-        add(&mut self.width, &other.width);
-        add(&mut self.lost, &other.lost);
-        add(&mut self.gained, &other.gained);
+        let (to, from) = (self.0.as_flattened_mut(), other.0.as_flattened());
+        to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
     }
 
     fn at(&self, top: f64) -> ProfileChange {
-        let area = |p: &Polynomial| p[0] + top * (p[1] + top * p[2]);
-        ProfileChange {
-            width: self.width[0] + top * self.width[1],
-            lost: area(&self.lost),
-            gained: area(&self.gained),
-        }
+        let [area, lost, gained] = self.0.map(|p| p[0] + top * (p[1] + top * (p[2] + top * p[3])));
+        ProfileChange { area, lost, gained }
     }
 }
 
-/// Changes by top, over many lines.
+/// Changes by top, over many surfaces.
 #[derive(Debug)]
 pub(crate) struct Profile<'a> {
     /// Tops above the layer's bottom, in micrometres, rising.
@@ -138,8 +143,8 @@ pub(crate) struct Profile<'a> {
     starts: Vec<Polynomials>,
     /// The changes at single tops.
     alone: Vec<ProfileChange>,
-    /// The section's width at the bottom.
-    pub(crate) bottom_width: f64,
+    /// The section's area at the bottom.
+    pub(crate) bottom_area: f64,
     /// The least error, below the last top, of any layer up to this top or higher.
     pub(crate) unavoidable: f64,
 }
@@ -152,7 +157,7 @@ impl<'a> Profile<'a> {
             per_um: if span > 0.0 { (tops.len() - 1) as f64 / span } else { 0.0 },
             starts: vec![Polynomials::default(); tops.len() + 1],
             alone: vec![ProfileChange::default(); tops.len()],
-            bottom_width: 0.0,
+            bottom_area: 0.0,
             unavoidable: 0.0,
         }
     }
@@ -163,33 +168,33 @@ impl<'a> Profile<'a> {
         count_at_or_below(self.tops, height, (height - self.tops[0]) * self.per_um)
     }
 
-    pub(crate) fn add(&mut self, line: SurfaceLine) {
-        let line = line.rising();
-        let [low, high] = line.heights;
+    pub(crate) fn add(&mut self, surface: Surface) {
+        let surface = surface.rising();
+        let [low, high] = surface.heights;
         let (first, end) = (self.first_above(low), self.first_above(high));
-        if end - first < MANY_TOPS {
+        if end - first < MANY_TOPS.max(self.tops.len() / SMALL_PART) {
             for top in first..end {
                 let passed = (self.tops[top] - low) / (high - low);
-                self.alone[top].add(line.passed(passed));
+                self.alone[top].add(surface.passed(passed));
             }
         } else {
-            let polynomials = Polynomials::of(&line);
+            let polynomials = Polynomials::of(&surface);
             self.starts[first].add(&polynomials, 1.0);
             self.starts[end].add(&polynomials, -1.0);
         }
-        self.starts[end].add(&Polynomials::constant(line.passed(1.0)), 1.0);
+        self.starts[end].add(&Polynomials::constant(surface.passed(1.0)), 1.0);
     }
 
     /// Adds the unavoidable error of columns. `within` is the height inside at the
     /// first and the last of them, less the top if they end inside.
-    pub(crate) fn add_unavoidable(&mut self, width: f64, within: [f64; 2], ends_inside: bool) {
+    pub(crate) fn add_unavoidable(&mut self, extent: f64, within: [f64; 2], ends_inside: bool) {
         let last = self.tops[self.tops.len() - 1];
         let lesser = within.map(|within| {
             let within = if ends_inside { last + within } else { within };
             within.min(last - within).max(0.0)
         });
         // Between the ends the true one is no less: a minimum of lines is concave.
-        self.unavoidable += width * 0.5 * (lesser[0] + lesser[1]);
+        self.unavoidable += extent * 0.5 * (lesser[0] + lesser[1]);
     }
 
     /// Returns the changes from the layer's bottom to each top.
@@ -213,21 +218,28 @@ mod tests {
     fn polynomials_are_the_tops_one_by_one() {
         let tops: Vec<f64> = (25..=100).map(f64::from).collect();
         let mut profile = Profile::new(&tops);
-        let line =
-            |heights, width| SurfaceLine { heights, width, lost: [3.0, 40.0], gained: [1.5, -0.5] };
-        let lines = [
-            line([-5.0, 90.0], 0.3),
-            line([99.5, 10.0], -0.7),
-            line([60.2, 60.3], 0.1),
-            line([50.0, 50.0], 2.0),
-            line([97.0, 130.0], 0.2),
-            line([0.0, 20.0], -0.4),
+        let surface = |heights, section: f64, density| Surface {
+            heights,
+            extent: section.abs(),
+            density,
+            section: section.signum(),
+            lost: [3.0, 40.0],
+            gained: [1.5, -0.5],
+        };
+        let surfaces = [
+            surface([-5.0, 90.0], 0.3, EVEN),
+            surface([99.5, 10.0], -0.7, EVEN),
+            surface([60.2, 60.3], 0.1, [0.0, 2.0]),
+            surface([50.0, 50.0], 2.0, EVEN),
+            surface([97.0, 130.0], 0.2, [2.0, 0.0]),
+            surface([-3.0, 70.0], 0.4, [2.0, 0.0]),
+            surface([0.0, 20.0], -0.4, [0.0, 2.0]),
         ];
-        lines.iter().for_each(|&line| profile.add(line));
+        surfaces.iter().for_each(|&surface| profile.add(surface));
         for (k, change) in profile.changes().iter().enumerate() {
             let mut expected = ProfileChange::default();
-            for line in lines.map(SurfaceLine::rising) {
-                let [low, high] = line.heights;
+            for surface in surfaces.map(Surface::rising) {
+                let [low, high] = surface.heights;
                 let passed = if tops[k] <= low {
                     0.0
                 } else if tops[k] > high {
@@ -235,9 +247,9 @@ mod tests {
                 } else {
                     (tops[k] - low) / (high - low)
                 };
-                expected.add(line.passed(passed));
+                expected.add(surface.passed(passed));
             }
-            assert!((change.width - expected.width).abs() < 1e-12, "{k}");
+            assert!((change.area - expected.area).abs() < 1e-12, "{k}");
             assert!((change.lost - expected.lost).abs() < 1e-10, "{k}");
             assert!((change.gained - expected.gained).abs() < 1e-10, "{k}");
         }
@@ -246,12 +258,14 @@ mod tests {
     /// A flat face at a top is not in the layer below it: the section there is
     /// taken just under the face.
     #[test]
-    fn a_flat_line_counts_above_its_height() {
+    fn a_flat_surface_counts_above_its_height() {
         let tops = [10.0, 20.0, 30.0];
         let mut profile = Profile::new(&tops);
-        profile.add(SurfaceLine {
+        profile.add(Surface {
             heights: [20.0; 2],
-            width: 2.0,
+            extent: 2.0,
+            density: EVEN,
+            section: 1.0,
             lost: [0.0; 2],
             gained: [20.0; 2],
         });

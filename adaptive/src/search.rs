@@ -1,12 +1,17 @@
 //! Searches for layer heights from the bottom of a part up.
 
+use std::fmt;
+
 use lamp_slicer::{LayerHeights, SliceError};
 use lamp_stack::Length;
 
 use crate::criterion::Criterion;
 use crate::error::HeightsError;
+use crate::known::{Known, guessed, know};
 use crate::layered_part::LayeredPart;
+use crate::placement::{Placement, cost_of};
 use crate::swept_layer::SweptLayer;
+use crate::table::HeightTable;
 use crate::thicknesses::Thicknesses;
 
 /// More than any machine builds.
@@ -23,6 +28,25 @@ pub struct HeightSearch<'a> {
     pub criterion: &'a dyn Criterion,
     /// Makes layers end at flat faces.
     pub snap: bool,
+    /// Is told of each layer found.
+    pub watch: Watch<'a>,
+}
+
+/// What is told of each layer that a search finds. A search that tries several bounds begins
+/// again at the bottom.
+#[derive(Clone, Copy)]
+pub struct Watch<'a>(pub &'a dyn Fn(&SweptLayer));
+
+impl Default for Watch<'_> {
+    fn default() -> Self {
+        Self(&|_| ())
+    }
+}
+
+impl fmt::Debug for Watch<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Watch")
+    }
 }
 
 /// A part's layers, bottom first.
@@ -78,7 +102,7 @@ pub(crate) struct Budget<'a> {
 }
 
 impl Budget<'_> {
-    fn of(&self, layer: &SweptLayer) -> f64 {
+    pub(crate) fn of(&self, layer: &SweptLayer) -> f64 {
         (self.cost)(Length::from_um(layer.thickness_um))
     }
 
@@ -90,10 +114,45 @@ impl Budget<'_> {
 /// Up to this share of the thickest layer, looking at lower tops alone costs less.
 const NEAR: f64 = 0.6;
 
+/// Where layers may end: whole steps above the part's bottom.
+pub(crate) struct Grid {
+    bottom_um: f64,
+    step_um: f64,
+    /// Where layers are to end; the last is the part's top.
+    ends: Vec<usize>,
+    pub(crate) table: Option<HeightTable>,
+}
+
+impl Grid {
+    pub(crate) fn at(&self, step: usize) -> f64 {
+        self.bottom_um + step as f64 * self.step_um
+    }
+
+    /// Returns the steps where layers are to end.
+    pub(crate) fn ends(&self) -> &[usize] {
+        &self.ends
+    }
+
+    pub(crate) fn end(&self) -> usize {
+        self.ends[self.ends.len() - 1]
+    }
+}
+
+/// Layers found from the bottom up.
+pub(crate) struct Climb {
+    pub(crate) heights: Heights,
+    /// The steps in which layers end.
+    tops: Vec<usize>,
+}
+
+/// A placement must promise to err less than this share of what was found, to be looked at.
+const WORTHWHILE: f64 = 0.99;
+
 impl HeightSearch<'_> {
-    /// Finds the layers from the bottom up: each is the thickest whose measure is at most
-    /// `bound`, or the thinnest if there is none. They end at the part's top, rounded to
-    /// whole steps.
+    /// Finds the layers within a bound: as many as are found from the bottom up, where each is
+    /// the thickest whose measure is at most `bound`, or the thinnest if there is none; of all
+    /// ways to place as many, the one that loses and gains least. They end at the part's top,
+    /// rounded to whole steps.
     ///
     /// Source: 002 section 3.2.3, algorithms 12 and 13. These bisect; but thicker layers
     /// are not always worse, so here all thicknesses are tried that the criterion does
@@ -102,43 +161,110 @@ impl HeightSearch<'_> {
     /// # Errors
     /// Returns an error if there would be too many layers.
     pub fn heights(&self, bound: f64) -> Result<Heights, HeightsError> {
-        let found = self.heights_within(bound, None)?;
-        Ok(found.expect("layers that cost nothing are within any budget"))
+        let grid = self.grid()?;
+        let mut known = Known::new();
+        let climb = self.climb(&grid, bound, None, &mut known);
+        let climb = climb.expect("layers that cost nothing are within any budget");
+        Ok(self.placed(&grid, climb, &known, bound, None))
     }
 
-    /// Finds the layers as [`heights`](Self::heights) does. With a budget, each is the
-    /// one that costs least for its thickness among those within the bound. Returns
-    /// `None` once they exceed the budget.
-    pub(crate) fn heights_within(
-        &self,
-        bound: f64,
-        budget: Option<Budget<'_>>,
-    ) -> Result<Option<Heights>, HeightsError> {
+    /// Returns the steps where layers may end, and what facets say of them.
+    pub(crate) fn grid(&self) -> Result<Grid, HeightsError> {
         let [bottom_um, top_um] = self.part.heights_um();
         let step_um = self.thicknesses.step().um();
-        let at = |step: usize| bottom_um + step as f64 * step_um;
         let end = ((top_um - bottom_um) / step_um).round().max(1.0);
         if end / *self.thicknesses.steps().start() as f64 > MAX_LAYERS {
             return Err(too_high([bottom_um, top_um]));
         }
         let end = end as usize;
-        let ends = self.ends(end);
-        let (mut step, mut spent, mut layers) = (0, 0.0, Vec::new());
+        let table = HeightTable::new(self.part, step_um, end + self.thicknesses.steps().end());
+        Ok(Grid { bottom_um, step_um, ends: self.ends(end), table })
+    }
+
+    /// Finds the layers from the bottom up: each is the thickest within the bound. With a
+    /// budget, each is the one that costs least for its thickness among those within the
+    /// bound. Returns `None` once they exceed the budget. All layers that it asks about
+    /// are known then.
+    pub(crate) fn climb(
+        &self,
+        grid: &Grid,
+        bound: f64,
+        budget: Option<Budget<'_>>,
+        known: &mut Known,
+    ) -> Option<Climb> {
+        let (mut step, mut spent, mut layers, mut ended) = (0, 0.0, Vec::new(), Vec::new());
         let mut last_um = f64::INFINITY;
-        while step < end {
-            let choices = self.thicknesses.choices(step, &ends);
-            let tops: Vec<f64> = choices.iter().map(|choice| at(step + choice)).collect();
-            let found = self.layers(at(step), &tops, last_um, bound);
+        while step < grid.end() {
+            let choices = self.thicknesses.choices(step, &grid.ends);
+            let tops: Vec<f64> = choices.iter().map(|choice| grid.at(step + choice)).collect();
+            let found = self.layers(grid.at(step), &tops, last_um, bound);
             let chosen = self.choose(&found, bound, budget);
+            let layer = found[chosen];
+            know(known, step, choices.iter().copied().zip(found).collect());
             step += choices[chosen];
-            last_um = found[chosen].thickness_um;
-            spent += budget.map_or(0.0, |budget| budget.of(&found[chosen]));
+            last_um = layer.thickness_um;
+            spent += budget.map_or(0.0, |budget| budget.of(&layer));
             if budget.is_some_and(|budget| spent > budget.max) {
-                return Ok(None);
+                return None;
+            }
+            (self.watch.0)(&layer);
+            layers.push(layer);
+            ended.push(step);
+        }
+        Some(Climb { heights: Heights::of(self.part, layers), tops: ended })
+    }
+
+    /// Finds the layers from the bottom up by what facets say alone, and by what is known of
+    /// layers nearby.
+    pub(crate) fn guess(
+        &self,
+        grid: &Grid,
+        table: &HeightTable,
+        bound: f64,
+        budget: Budget<'_>,
+        known: &Known,
+    ) -> Option<Vec<SweptLayer>> {
+        let (mut step, mut spent, mut layers) = (0, 0.0, Vec::new());
+        while step < grid.end() {
+            let choices = self.thicknesses.choices(step, &grid.ends);
+            let found = guessed(table, known, step, &choices);
+            let chosen = self.choose(&found, bound, Some(budget));
+            step += choices[chosen];
+            spent += budget.of(&found[chosen]);
+            if spent > budget.max {
+                return None;
             }
             layers.push(found[chosen]);
         }
-        Ok(Some(Heights::of(self.part, layers)))
+        Some(layers)
+    }
+
+    /// Returns as many layers as were found from the bottom up, where they err least.
+    pub(crate) fn placed(
+        &self,
+        grid: &Grid,
+        climb: Climb,
+        known: &Known,
+        bound: f64,
+        budget: Option<Budget<'_>>,
+    ) -> Heights {
+        let Climb { heights: found, tops } = climb;
+        let Some(table) = &grid.table else { return found };
+        let (thicknesses, criterion, ends) = (self.thicknesses, self.criterion, &grid.ends[..]);
+        let placement = Placement { table, thicknesses, criterion, ends, bound, known };
+        let cost = cost_of(&found, criterion, bound);
+        let worthwhile = (cost.0, WORTHWHILE * (cost.1 - found.unbuilt_mm3));
+        let Some(best) = placement.least_error(&tops, worthwhile) else { return found };
+        let mut step = 0;
+        let layers = best.iter().map(|&steps| {
+            let layer = placement.known(step, steps);
+            let [bottom, top] = [step, step + steps].map(|step| grid.at(step));
+            step += steps;
+            layer.unwrap_or_else(|| self.part.layers(bottom, &[top]).each[0])
+        });
+        let better = Heights { layers: layers.collect(), ..found };
+        let is_within = budget.is_none_or(|budget| budget.of_all(&better.layers) <= budget.max);
+        if is_within && cost_of(&better, criterion, bound) < cost { better } else { found }
     }
 
     /// Returns the layers of all tops, or of the lower ones if no other can be within the
@@ -157,7 +283,12 @@ impl HeightSearch<'_> {
         self.part.layers(bottom_um, tops_um).each
     }
 
-    fn choose(&self, layers: &[SweptLayer], bound: f64, budget: Option<Budget<'_>>) -> usize {
+    pub(crate) fn choose(
+        &self,
+        layers: &[SweptLayer],
+        bound: f64,
+        budget: Option<Budget<'_>>,
+    ) -> usize {
         let measures: Vec<f64> = layers.iter().map(|layer| self.criterion.measure(layer)).collect();
         let mut good = (0..layers.len()).rev().filter(|&k| measures[k] <= bound);
         let cheapest = match budget {

@@ -4,10 +4,14 @@
 //! lines pass the same lines in the same order. Going up such a column, the part
 //! begins and ends in turn, and the layer's top decides which of these stretches
 //! the layer lacks or has too much. Nothing is sampled along x or z.
+//!
+//! Most columns pass one facet at most. There, facets alone say what is lost and gained,
+//! without rows ([`Facets`](crate::facets::Facets)). So rows need only add how other columns
+//! differ from that.
 
 use lamp_slicer::{FillRule, Position, Turn};
 
-use crate::profile::{Profile, SurfaceLine};
+use crate::profile::{EVEN, Profile, Surface};
 
 /// A point where the part's surface crosses the layer's bottom in a row.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,10 +44,21 @@ impl Slope {
     }
 }
 
+/// What rows add to a profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowsAdd {
+    /// All that they see.
+    All,
+    /// How that differs from what facets say alone, each as if no other were above or below.
+    Differences,
+}
+
 /// Adds rows to a profile. Lists keep their memory from row to row.
 #[derive(Debug)]
 pub(crate) struct Sweep<'a> {
     rule: &'a FillRule,
+    pitch_mm: f64,
+    adds: RowsAdd,
     ends: Vec<f64>,
     open: Vec<Slope>,
 }
@@ -52,8 +67,8 @@ pub(crate) struct Sweep<'a> {
 const MAX_SPLITS: u32 = 12;
 
 impl<'a> Sweep<'a> {
-    pub(crate) fn new(rule: &'a FillRule) -> Self {
-        Self { rule, ends: Vec::new(), open: Vec::new() }
+    pub(crate) fn new(rule: &'a FillRule, pitch_mm: f64, adds: RowsAdd) -> Self {
+        Self { rule, pitch_mm, adds, ends: Vec::new(), open: Vec::new() }
     }
 
     /// Adds a row, whose toggles and slopes are sorted from the left. Returns false
@@ -78,7 +93,7 @@ impl<'a> Sweep<'a> {
         self.ends.sort_unstable_by(f64::total_cmp);
         self.open.clear();
         let (mut toggles, mut slopes) = (toggles.iter(), slopes.iter());
-        let mut position = Position::outside(self.rule);
+        let (mut position, mut winding) = (Position::outside(self.rule), 0);
         for k in 1..self.ends.len() {
             let columns = [self.ends[k - 1], self.ends[k]];
             if columns[0] == columns[1] {
@@ -86,6 +101,7 @@ impl<'a> Sweep<'a> {
             }
             while let Some(toggle) = next_until(&mut toggles, |toggle| toggle.x <= columns[0]) {
                 position.cross(toggle.turn);
+                winding += toggle.turn.winding();
             }
             self.open.retain(|slope| slope.x[1] > columns[0]);
             while let Some(slope) = next_until(&mut slopes, |slope| slope.x[0] <= columns[0]) {
@@ -93,16 +109,29 @@ impl<'a> Sweep<'a> {
                     self.open.push(*slope);
                 }
             }
-            if position.is_inside() {
-                profile.bottom_width += columns[1] - columns[0];
-            }
+            let known = if self.adds == RowsAdd::All { 0 } else { winding };
+            let differs = i32::from(position.is_inside()) - known;
+            profile.bottom_area += f64::from(differs) * (columns[1] - columns[0]) * self.pitch_mm;
             match self.open.len() {
                 0 => {}
+                1 if differs == 0 && self.is_told(self.open[0], &position) => {
+                    let extent = (columns[1] - columns[0]) * self.pitch_mm;
+                    let heights = columns.map(|x| self.open[0].height(x));
+                    profile.add_unavoidable(extent, heights, false);
+                }
                 1 => self.pass(columns, &position, profile),
                 _ => self.split(columns, &position, MAX_SPLITS, profile),
             }
         }
         true
+    }
+
+    /// Returns true if facets say all of a line that no other is above or below.
+    fn is_told(&self, slope: Slope, position: &Position<'_>) -> bool {
+        let mut above = position.clone();
+        above.cross(slope.turn);
+        let step = i32::from(above.is_inside()) - i32::from(position.is_inside());
+        self.adds == RowsAdd::Differences && step == slope.turn.winding()
     }
 
     /// Adds columns over several lines; those on either side of a place where two
@@ -134,7 +163,7 @@ impl<'a> Sweep<'a> {
 
     /// Adds columns over lines that are sorted from below.
     fn pass(&self, columns: [f64; 2], position: &Position<'_>, profile: &mut Profile<'_>) {
-        let width = columns[1] - columns[0];
+        let extent = (columns[1] - columns[0]) * self.pitch_mm;
         let mut position = position.clone();
         let mut inside = position.is_inside();
         // The height inside each of the two columns, as if they ended outside.
@@ -143,22 +172,54 @@ impl<'a> Sweep<'a> {
         let mut unlike = [0.0; 2];
         for slope in &self.open {
             position.cross(slope.turn);
-            if position.is_inside() == inside {
-                continue;
-            }
             let heights = columns.map(|x| slope.height(x));
-            let before = unlike.map(|unlike| -unlike);
-            unlike = [heights[0] - unlike[0], heights[1] - unlike[1]];
-            let sign = if inside { 1.0 } else { -1.0 };
-            within = [within[0] + sign * heights[0], within[1] + sign * heights[1]];
-            profile.add(if inside {
-                SurfaceLine { heights, width: -width, lost: unlike, gained: before }
-            } else {
-                SurfaceLine { heights, width, lost: before, gained: unlike }
-            });
-            inside = !inside;
+            let mut seen = Change::default();
+            if position.is_inside() != inside {
+                let before = unlike.map(|unlike| -unlike);
+                unlike = [heights[0] - unlike[0], heights[1] - unlike[1]];
+                let sign = if inside { 1.0 } else { -1.0 };
+                within = [within[0] + sign * heights[0], within[1] + sign * heights[1]];
+                let [lost, gained] = if inside { [unlike, before] } else { [before, unlike] };
+                seen = Change { section: -sign, lost, gained };
+                inside = !inside;
+            }
+            if self.adds == RowsAdd::Differences {
+                seen = seen.without(Change::of_one(slope.turn, heights));
+            }
+            if seen != Change::default() {
+                let Change { section, lost, gained } = seen;
+                profile.add(Surface { heights, extent, density: EVEN, section, lost, gained });
+            }
         }
-        profile.add_unavoidable(width, within, inside);
+        profile.add_unavoidable(extent, within, inside);
+    }
+}
+
+/// What a line changes once the top is past it: the section, and at its two ends the heights
+/// lost and gained.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Change {
+    section: f64,
+    lost: [f64; 2],
+    gained: [f64; 2],
+}
+
+impl Change {
+    /// Returns the change by a line that no other is above or below.
+    fn of_one(turn: Turn, heights: [f64; 2]) -> Self {
+        match turn.winding() {
+            -1 => Self { section: -1.0, lost: heights, gained: [0.0; 2] },
+            _ => Self { section: 1.0, lost: [0.0; 2], gained: heights },
+        }
+    }
+
+    fn without(self, other: Self) -> Self {
+        let less = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
+        Self {
+            section: self.section - other.section,
+            lost: less(self.lost, other.lost),
+            gained: less(self.gained, other.gained),
+        }
     }
 }
 
@@ -187,12 +248,12 @@ mod tests {
 
     fn changes(fill: Fill, toggles: &[Toggle], slopes: &[Slope]) -> Vec<ProfileChange> {
         let mut profile = Profile::new(&[10.0, 20.0, 40.0]);
-        Sweep::new(&fill.into()).add(toggles, slopes, &mut profile);
+        Sweep::new(&fill.into(), 1.0, RowsAdd::All).add(toggles, slopes, &mut profile);
         profile.changes()
     }
 
-    fn change(width: f64, lost: f64, gained: f64) -> ProfileChange {
-        ProfileChange { width, lost, gained }
+    fn change(area: f64, lost: f64, gained: f64) -> ProfileChange {
+        ProfileChange { area, lost, gained }
     }
 
     /// A wall that leans in by 1 over 40, and one that leans out.
@@ -229,7 +290,7 @@ mod tests {
         let slopes = [slope([0.0, 4.0], [5.0, 9.0], 1), slope([0.0, 4.0], [9.0, 5.0], -1)];
         let found = changes(Fill::EvenOdd, &[], &slopes);
         // Two triangles, 4 high and 2 wide.
-        assert!((found[0].lost - 8.0).abs() < 1e-9 && found[0].width.abs() < 1e-9);
+        assert!((found[0].lost - 8.0).abs() < 1e-9 && found[0].area.abs() < 1e-9);
     }
 
     #[test]

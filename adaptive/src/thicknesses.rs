@@ -72,12 +72,24 @@ impl Thicknesses {
         let reached = ahead.iter().find(|&&end| self.can_fill(end - bottom));
         let Some(end) = reached.or(ahead.last()) else { return self.steps().collect() };
         let room = end - bottom;
+        // Far below the end, all may be filled.
+        if self.all_fill_from().is_some_and(|from| room >= self.steps.end() + from) {
+            return self.steps().collect();
+        }
         let beyond = self.least_beyond(room);
         let leads_on = |step: &usize| match room.checked_sub(*step) {
             Some(rest) => self.least_beyond(rest) == beyond,
             None => step - room == beyond,
         };
         self.steps().filter(leads_on).collect()
+    }
+
+    /// Returns a height in steps from which on layers can fill any, if there is one.
+    fn all_fill_from(&self) -> Option<usize> {
+        let (start, end) = (self.steps.start(), self.steps.end());
+        // From here on, what so many layers fill reaches what one more does.
+        let count = (start - 1).div_ceil((end - start).max(1)).max(1);
+        (end > start || *start == 1).then_some(count * start)
     }
 
     /// Returns the least excess, in steps, of layers that cover a height.
@@ -135,6 +147,15 @@ mod tests {
 
     #[test]
     fn narrow_limits_leave_gaps() {
+        for (min, max, from) in
+            [(6.0, 10.0, 12), (25.0, 100.0, 25), (10.0, 11.0, 90), (1.0, 1.0, 1)]
+        {
+            let thicknesses = thicknesses(min, max, 1.0).unwrap();
+            assert_eq!(thicknesses.all_fill_from(), Some(from));
+            assert!((from..500).all(|steps| thicknesses.can_fill(steps)));
+            assert!(from == 1 || !thicknesses.can_fill(from - 1));
+        }
+        assert_eq!(thicknesses(5.0, 5.0, 1.0).unwrap().all_fill_from(), None);
         let thicknesses = thicknesses(6.0, 10.0, 1.0).unwrap();
         assert!(!thicknesses.can_fill(11) && thicknesses.can_fill(12) && thicknesses.can_fill(0));
         assert_eq!(thicknesses.choices(0, &[17]), [7, 8, 9, 10]);

@@ -5,16 +5,20 @@ use std::f64::consts::PI;
 
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, HeightSearch, LayeredPart, SweptLayer, Thicknesses,
-    VolumeDeviation,
+    VolumeDeviation, Watch,
 };
 use lamp_fixtures::{Mesh, cone, sphere};
 use lamp_slicer::{FacetIndex, Fill, Part, Placement, Units};
 use lamp_stack::Length;
 
 fn part(mesh: &Mesh) -> LayeredPart {
+    along_rows(mesh, 5.0)
+}
+
+fn along_rows(mesh: &Mesh, pitch_um: f64) -> LayeredPart {
     let model = Part::from_facets("part", mesh.facets.clone());
     let facets = FacetIndex::new(model, &Placement::default(), Units::Millimetres).unwrap();
-    LayeredPart::new(facets, Length::from_um(5.0), Fill::EvenOdd).unwrap()
+    LayeredPart::new(facets, Length::from_um(pitch_um), Fill::EvenOdd).unwrap()
 }
 
 /// Returns the volumes lost, gained and of the part in a layer, in cubic millimetres, from areas
@@ -126,8 +130,13 @@ fn the_area_is_blind_to_an_inclined_cylinder() {
     let [min, max, step] = [50.0, 1000.0, 10.0].map(Length::from_um);
     let thicknesses = Thicknesses::new(min, max, step).unwrap();
     let layers = |criterion: &dyn Criterion| {
-        let search =
-            HeightSearch { part: &part, thicknesses: &thicknesses, criterion, snap: false };
+        let search = HeightSearch {
+            part: &part,
+            thicknesses: &thicknesses,
+            criterion,
+            snap: false,
+            watch: Watch::default(),
+        };
         search.heights(0.02).unwrap().layers
     };
     assert_eq!(layers(&AreaDeviation).len(), 10);
@@ -143,5 +152,43 @@ fn the_cusp_of_a_cone_follows_from_its_slope() {
     for layer in layers {
         let expected = layer.thickness_um * 0.5_f64.sqrt();
         assert!((CuspHeight.measure(&layer) / expected - 1.0).abs() < 1e-3, "{layer:?}");
+    }
+}
+
+/// Layers within 2% by rows four pixels of 1500 dpi apart are within 2% of what a cone and a sphere
+/// are, too.
+#[test]
+fn layers_within_a_bound_are_truly_within_it() {
+    let [min, max, step] = [25.0, 100.0, 1.0].map(Length::from_um);
+    let thicknesses = Thicknesses::new(min, max, step).unwrap();
+    let cone_radius = |z: f64| 3.0 - 2.9 * z / 4.0;
+    let ball_radius = |z: f64| (z * (4.0 - z)).max(0.0).sqrt();
+    let cases = [
+        (cone(3.0, 0.1, 4.0, 40_000), &cone_radius as &dyn Fn(f64) -> f64, 4.0),
+        // Near the poles, the mesh is not round.
+        (sphere(2.0, 400_000), &ball_radius, 3.8),
+    ];
+    for (mesh, radius, height) in cases {
+        let part = along_rows(&mesh, 4.0 * 25_400.0 / 1500.0);
+        let search = HeightSearch {
+            part: &part,
+            thicknesses: &thicknesses,
+            criterion: &VolumeDeviation,
+            snap: false,
+            watch: Watch::default(),
+        };
+        let layers = search.heights(0.02).unwrap().layers;
+        let thicker = layers.iter().filter(|layer| layer.thickness_um > 25.5);
+        let thicker = thicker.filter(|layer| {
+            layer.bottom_um > 1000.0 * (4.0 - height) && layer.top_um() < 1000.0 * height
+        });
+        let mut count = 0;
+        for layer in thicker {
+            let [bottom, top] = [layer.bottom_um, layer.top_um()].map(|um| um / 1000.0);
+            let [lost, gained, volume] = discs(bottom, top, radius);
+            assert!((lost + gained) / volume < 0.020_005, "{layer:?}: {lost} {gained} of {volume}");
+            count += 1;
+        }
+        assert!(count > 20, "{count}");
     }
 }

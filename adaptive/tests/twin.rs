@@ -8,9 +8,10 @@ use lamp_slicer::{
 };
 use lamp_stack::{Dpi, Length};
 
-/// 254 dpi: rows 0.1 mm apart.
-const PITCH_MM: f64 = 0.1;
-const SECTIONS: u32 = 400;
+/// 1270 dpi: rows 0.02 mm apart, so that sums over them are near what facets say exactly.
+const PITCH_MM: f64 = 0.02;
+const DPI: f64 = 1270.0;
+const SECTIONS: u32 = 100;
 
 struct Twin {
     mesh: Mesh,
@@ -29,7 +30,7 @@ impl Twin {
             placement: self.placement,
             fill: self.fill,
             z: Length::from_um(z_um),
-            dpi: Dpi::new(254.0).unwrap(),
+            dpi: Dpi::new(DPI).unwrap(),
             top_mm,
             rows,
         };
@@ -69,7 +70,7 @@ impl Twin {
             assert!(near(gained_mm3, gained), "{layer:?}, {gained} gained");
             assert!(near(volume_mm3, volume), "{layer:?}, {volume}");
             let area = top_section.iter().map(length).sum::<f64>() * PITCH_MM;
-            assert!((layer.top_area_mm2 - area).abs() < 1e-6 * (1.0 + area), "{layer:?}: {area}");
+            assert!((layer.top_area_mm2 - area).abs() < 1e-3 * (0.5 + area), "{layer:?}: {area}");
         }
     }
 }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart,
-    SweptLayer, Thicknesses, VolumeDeviation,
+    SweptLayer, Thicknesses, VolumeDeviation, Watch,
 };
 use lamp_grayscale::calibrate::format_significant;
 use lamp_slicer::{FacetIndex, Fill};
@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::exit::Exit;
 use crate::exposure::Exposure;
 use crate::options::{one_of, parse_thickness};
+use crate::progress::Progress;
 use crate::recorded::optional;
 
 pub(crate) const HEADING: &str = "Adaptive layer heights";
@@ -216,11 +217,20 @@ impl HeightOptions {
         &self,
         part: &LayeredPart,
         exposure: Option<&Exposure>,
+        progress: &Progress,
     ) -> Result<FoundHeights, Exit> {
         let thicknesses = self.thicknesses()?;
         let measure = self.measure()?;
         let criterion = measure.criterion();
-        let search = HeightSearch { part, thicknesses: &thicknesses, criterion, snap: self.snap };
+        let bar = progress.height_bar(part);
+        let watch = |layer: &SweptLayer| bar.move_to(layer);
+        let search = HeightSearch {
+            part,
+            thicknesses: &thicknesses,
+            criterion,
+            snap: self.snap,
+            watch: Watch(&watch),
+        };
         let failed = |error: HeightsError| Exit::Failed(error.into());
         let (bound, heights) = if let Some(layers) = self.layers_budget {
             search

@@ -5,6 +5,7 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::{Arc, Mutex};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use lamp_adaptive::{LayeredPart, SweptLayer};
 
 use crate::options::Common;
 
@@ -56,6 +57,19 @@ impl Progress {
         self.bar.inc(1);
     }
 
+    /// Returns a bar of how much of a part's height a search for layer heights has come past.
+    pub(crate) fn height_bar(&self, part: &LayeredPart) -> HeightBar {
+        let [bottom_um, top_um] = part.heights_um();
+        let bar = if self.watched {
+            ProgressBar::new((top_um - bottom_um) as u64)
+        } else {
+            ProgressBar::hidden()
+        };
+        bar.set_style(style("{prefix} layer heights {bar:40} {percent}%, {eta} left"));
+        bar.set_prefix(self.command);
+        HeightBar { bottom_um, bar }
+    }
+
     /// Prints a line of what is told only to who asks for it with `--verbose`.
     pub(crate) fn detail(&self, line: &str) {
         if self.verbose {
@@ -86,6 +100,25 @@ impl Progress {
 
     /// Removes the bar.
     pub(crate) fn done(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// A bar over the height of a part. It goes when it is dropped.
+pub(crate) struct HeightBar {
+    bottom_um: f64,
+    bar: ProgressBar,
+}
+
+impl HeightBar {
+    /// Moves to the top of a layer.
+    pub(crate) fn move_to(&self, layer: &SweptLayer) {
+        self.bar.set_position((layer.top_um() - self.bottom_um) as u64);
+    }
+}
+
+impl Drop for HeightBar {
+    fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
 }

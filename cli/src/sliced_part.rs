@@ -10,6 +10,7 @@ use lamp_stack::{Layer, Pages, StackError};
 use crate::exit::Exit;
 use crate::part_arg::PartArg;
 use crate::part_options::{Reading, at_part};
+use crate::progress::Progress;
 use crate::slicing_options::SlicingOptions;
 use crate::streams::{input_name, is_stream};
 
@@ -70,11 +71,11 @@ impl SlicedPart {
         slicing: &SlicingOptions,
         layers: Option<Range<u32>>,
         memory: Option<u64>,
-        say: &dyn Fn(&str),
+        progress: &Progress,
     ) -> Result<LayersOfPart<impl Iterator<Item = Result<Layer, Exit>> + use<>>, Exit> {
         let parts = [self.file.clone()];
         let (model, name) = (self.model.clone(), self.file.recorded());
-        let slices = slicing.slices(model, &name, layers, memory, slicing.exposure()?, say);
+        let slices = slicing.slices(model, &name, layers, memory, slicing.exposure()?, progress);
         let (slices, name_command) = slices.map_err(|error| at_part(error, &parts))?;
         let count = slices.layer_count() as u64;
         let layers = slices.map(move |layer| {

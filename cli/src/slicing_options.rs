@@ -20,6 +20,7 @@ use crate::memory::{available, in_words};
 use crate::options::{one_of, parse_thickness};
 use crate::part_options::PartOptions;
 use crate::placement::Numbers;
+use crate::progress::Progress;
 use crate::recorded::{from_words, optional, text, to_words};
 use crate::step_options::HEADING;
 
@@ -213,9 +214,10 @@ impl SlicingOptions {
         layers: Option<Range<u32>>,
         memory: Option<u64>,
         exposure: Option<Exposure>,
-        say: &dyn Fn(&str),
+        progress: &Progress,
     ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Exit> {
-        let heights = self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref(), say));
+        let heights =
+            self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref(), progress));
         let heights = heights.transpose()?;
         let shown = exposure.as_ref().filter(|_| self.gray);
         let gray = shown.map(|exposure| match &heights {
@@ -227,7 +229,10 @@ impl SlicingOptions {
         let options = SliceOptions { layers, heights, gray, memory, ..self.for_slicing() };
         if let Some(exposure) = exposure.as_ref().filter(|_| !self.adaptive) {
             exposure.time(self.thickness)?;
-            exposure.doubt(std::iter::once(self.thickness)).iter().for_each(|doubt| say(doubt));
+            exposure
+                .doubt(std::iter::once(self.thickness))
+                .iter()
+                .for_each(|doubt| progress.say(doubt));
         }
         let slices = Slices::new(model, &options)?;
         check_memory(&slices)?;
@@ -245,21 +250,22 @@ impl SlicingOptions {
         Ok((slices, name_command))
     }
 
-    /// Finds the layer heights; `say` prints notes on them.
+    /// Finds the layer heights, with notes on them.
     fn layer_heights(
         &self,
         model: &Part,
         exposure: Option<&Exposure>,
-        say: &dyn Fn(&str),
+        progress: &Progress,
     ) -> Result<LayerHeights, Exit> {
         let body = self.solid.body(model.clone())?;
         let part = self.heights.part(body, self.dpi, self.solid.fill)?;
-        let found = self.heights.find(&part, exposure)?;
-        found.warn(say);
-        found.doubt(exposure).iter().for_each(|doubt| say(doubt));
+        let found = self.heights.find(&part, exposure, progress)?;
+        found.warn(&|line| progress.say(line));
+        found.doubt(exposure).iter().for_each(|doubt| progress.say(doubt));
         if self.heights.has_budget() {
             let layers = found.heights.layers.len();
-            say(&format!("{layers} layers keep the budget, with errors up to {}", found.bound()));
+            let bound = found.bound();
+            progress.say(&format!("{layers} layers keep the budget, with errors up to {bound}"));
         }
         Ok(found.heights.layer_heights()?)
     }

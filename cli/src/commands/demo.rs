@@ -113,7 +113,7 @@ fn part_layers(
     let options = SlicingOptions::default();
     let model = Part::open(stl, &OpenOptions::default())?;
     let file = stl.file_name().unwrap_or_default().to_string_lossy();
-    let (slices, name_command) = options.slices(model, &file, range, None, None, &|_| {})?;
+    let (slices, name_command) = options.slices(model, &file, range, None, None, progress)?;
     progress.expect(slices.layer_count() as u64);
     let layers = slices.map(move |layer| {
         let mut layer = layer?;

@@ -20,7 +20,7 @@ use crate::options::{Common, parse_thickness};
 use crate::part_arg::{PartArg, paths};
 use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
 use crate::plots::{self, Plot, PlotAxis, Series, drawn};
-use crate::progress::say;
+use crate::progress::Progress;
 use crate::streams::{check_beside, print, write_file};
 
 /// Find how thick each layer of a part may be, and what that saves
@@ -75,11 +75,8 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     args.check()?;
     let exposure = args.exposure.exposure()?;
     args.heights.check(exposure.as_ref())?;
-    let say = |line: &str| {
-        if !common.quiet {
-            say(&format!("heights: {line}"));
-        }
-    };
+    let progress = Progress::new("heights", common, true);
+    let say = |line: &str| progress.say(line);
     let model =
         args.solid.open(&args.parts, &Reading { dpi: args.dpi, may_be_open: false, say: &say })?;
     let body = args.solid.body(model.clone());
@@ -89,7 +86,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let overlap = args.solid.overlap_doubt(&args.parts, body.overlap());
     size.doubt(args.dpi, None).iter().chain(&overlap).for_each(|doubt| say(doubt));
     let part = args.heights.part(body, args.dpi, args.solid.fill)?;
-    let found = args.heights.find(&part, exposure.as_ref());
+    let found = args.heights.find(&part, exposure.as_ref(), &progress);
     let found = found.map_err(|error| at_part(error, &args.parts))?;
     let uniform = args.uniform(&part).map_err(|error| at_part(error, &args.parts))?;
     found.warn(&say);

@@ -127,7 +127,7 @@ fn opened(path: &Path, args: &ViewArgs, common: &Common) -> Result<ViewedStack, 
 }
 
 fn sliced(part: &SlicedPart, args: &ViewArgs, progress: &Progress) -> Result<File, Exit> {
-    let slices = part.layers(&args.slicing, None, None, &|line| progress.say(line))?;
+    let slices = part.layers(&args.slicing, None, None, progress)?;
     progress.expect(slices.count);
     let layers = slices.layers.inspect(|_| progress.layer_done());
     let place = "a temporary file for the layers";

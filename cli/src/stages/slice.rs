@@ -122,7 +122,7 @@ impl SliceSettings {
         let recorded = name.map_or_else(|| recorded.join(" "), ToOwned::to_owned);
         let (slices, name_command) = self
             .options
-            .slices(part.clone(), &recorded, self.layers.clone(), self.memory, exposure, &note)
+            .slices(part.clone(), &recorded, self.layers.clone(), self.memory, exposure, progress)
             .map_err(|error| at_part(error, &self.parts))?;
         if let Some(machine) = &machine {
             let name = name_of_all(&self.parts);

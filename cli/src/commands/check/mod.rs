@@ -318,8 +318,7 @@ impl CheckArgs {
         part: &SlicedPart,
         progress: &Progress,
     ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
-        let say = |line: &str| progress.say(line);
-        let slices = part.layers(&self.slicing, self.layers.clone(), self.memory, &say)?;
+        let slices = part.layers(&self.slicing, self.layers.clone(), self.memory, progress)?;
         progress.expect(slices.count);
         Ok(slices.layers)
     }
