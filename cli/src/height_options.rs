@@ -21,7 +21,7 @@ use crate::recorded::optional;
 
 pub(crate) const HEADING: &str = "Adaptive layer heights";
 
-/// Pixels between measured rows: `docs/heights.md` shows what a smaller distance changes.
+/// Pixels between measured rows.
 const PIXELS_PER_ROW: f64 = 4.0;
 
 /// Options of adaptive heights.
@@ -83,8 +83,8 @@ pub(crate) struct HeightOptions {
     #[arg(long, help_heading = HEADING)]
     snap: bool,
 
-    /// Distance between the rows along which the part is measured; thinner features may be missed
-    /// [default: four pixels]
+    /// Distance between the rows that measure where parts of a layer lie above each other; features
+    /// thinner than that may be missed there [default: four pixels]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     #[serde(with = "optional")]
     row_pitch: Option<Length>,
