@@ -7,7 +7,7 @@ use clap::Args;
 use lamp_grayscale::calibrate::{CsvTable, ExposureTimes};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{ExposureTime, Resin};
-use lamp_stack::{DepthLevels, Length};
+use lamp_stack::{DepthLevels, FadingLevels, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::catalogue::{canonical_word, entry, is_file, read_text};
@@ -51,7 +51,7 @@ pub(crate) struct Exposure {
 }
 
 enum Source {
-    Resin { resin: Resin, overcure: f64, doses: MeasuredDoses },
+    Resin { material: Box<Material>, resin: Resin, overcure: f64, doses: MeasuredDoses },
     Table(ExposureTimes),
 }
 
@@ -107,8 +107,9 @@ impl ExposureOptions {
         let material: Material = entry(path)?;
         let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
         let doses = MeasuredDoses::of_depths(&material);
-        let source = Source::Resin { resin, overcure: self.overcure, doses };
-        Ok(Some(Exposure { name: material.name, source }))
+        let name = material.name.clone();
+        let (material, overcure) = (Box::new(material), self.overcure);
+        Ok(Some(Exposure { name, source: Source::Resin { material, resin, overcure, doses } }))
     }
 }
 
@@ -158,6 +159,18 @@ impl Exposure {
             doses.see(resin.light() * self.time(thickness).ok()?);
         }
         doses.doubt("layers")
+    }
+
+    /// Returns what each gray level leaves in layers of one thickness, where doses add up.
+    ///
+    /// # Errors
+    /// Where the resin does not say how light fades; a table of times never does.
+    pub(crate) fn fading_levels(&self, thickness: Length) -> Result<FadingLevels, Exit> {
+        let Source::Resin { material, .. } = &self.source else {
+            return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
+        };
+        let fading = material.fading().map_err(|error| self.failed(error.into()))?;
+        Ok(fading.levels(self.time(thickness)?))
     }
 
     fn failed(&self, error: anyhow::Error) -> Exit {

@@ -92,6 +92,14 @@ pub(crate) struct SlicingOptions {
     #[arg(long, requires = "material", conflicts_with = "exposure_table")]
     #[arg(help_heading = EXPOSURE)]
     gray: bool,
+
+    /// Choose gray levels for doses that add up, so that light of the layers above does not cure
+    /// through undersides
+    ///
+    /// With --gray. Down each column of pixels, the least light is taken away that leaves the
+    /// underside where it is, from the lowest layers first
+    #[arg(long, requires = "gray", help_heading = EXPOSURE)]
+    pub(crate) print_through: bool,
 }
 
 impl Default for SlicingOptions {
@@ -109,6 +117,7 @@ impl Default for SlicingOptions {
             heights: HeightOptions::default(),
             exposure: ExposureOptions::default(),
             gray: false,
+            print_through: false,
         }
     }
 }
@@ -219,14 +228,21 @@ impl SlicingOptions {
         let heights =
             self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref(), progress));
         let heights = heights.transpose()?;
-        let shown = exposure.as_ref().filter(|_| self.gray);
-        let gray = shown.map(|exposure| match &heights {
+        let alone = exposure.as_ref().filter(|_| self.gray && !self.print_through);
+        let gray = alone.map(|exposure| match &heights {
             Some(heights) => LayerLevels::by_thickness(heights, |um| exposure.levels(um)),
             None => exposure.levels(self.thickness).map(LayerLevels::from),
         });
         let gray = gray.transpose()?;
+        let summed = exposure.as_ref().filter(|_| self.gray && self.print_through);
+        let print_through = summed.map(|exposure| match &heights {
+            Some(heights) => LayerLevels::by_thickness(heights, |um| exposure.fading_levels(um)),
+            None => exposure.fading_levels(self.thickness).map(LayerLevels::from),
+        });
+        let print_through = print_through.transpose()?;
         let memory = table_memory(memory);
-        let options = SliceOptions { layers, heights, gray, memory, ..self.for_slicing() };
+        let options =
+            SliceOptions { layers, heights, gray, print_through, memory, ..self.for_slicing() };
         if let Some(exposure) = exposure.as_ref().filter(|_| !self.adaptive) {
             exposure.time(self.thickness)?;
             exposure
@@ -364,8 +380,8 @@ mod tests {
             "--dpi 72.25 --adaptive --min 0.5um --step 1um --criterion cusp --cusp 10um \
              --time-budget 28800s --row-pitch 1.5mm --snap --plane top --units inch \
              --fill nonzero --scale 1,2,0.5 --mirror x,y --rotate x:90,z:-12.5 \
-             --translate -5,0,12.7 --tolerance 1um --no-polish --gray --material lamp-suspension \
-             --overcure 1.5 --origin -1,77.2 --size 80x80.5mm",
+             --translate -5,0,12.7 --tolerance 1um --no-polish --gray --print-through \
+             --material lamp-suspension --overcure 1.5 --origin -1,77.2 --size 80x80.5mm",
             "--dpi 300 --thickness 1.5mm --plane middle --units mm --fill even-odd \
              --exposure-table my_times.csv --margin 0",
             "--dpi 300 --thickness 1mm --plane top --units mm --fill even-odd --bodies xor --margin 1",

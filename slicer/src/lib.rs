@@ -86,7 +86,7 @@ pub use placement::{Axis, PlacedFacet, Placement, facet_heights};
 pub use planes::{LayerHeights, PlaneRule};
 pub use section::{Inside, SectionOptions, section};
 pub use section_area::{Trapezoid, section_area};
-pub use slices::{GridRule, SliceOptions, Slices};
+pub use slices::{GridRule, SHORT_PX, SliceOptions, Slices};
 pub use stl::write_stl;
 pub use table::Fill;
 pub use three_mf::{ModelFault, ThreeMfError};

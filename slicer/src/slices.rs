@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Layer, Length, LevelChange, PageInfo, StackInfo};
+use lamp_stack::{Dpi, FadingLevels, Image, Layer, Length, LevelChange, Mask, PageInfo, StackInfo};
 use rayon::prelude::*;
 
 use crate::bodies::{BodyOverlap, FillRule, SharedCounts, SharedVolumes};
@@ -13,13 +13,15 @@ use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
 use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::Units;
-use crate::gray::{DepthSpan, LayerLevels};
+use crate::gray::{
+    ChosenLayer, DepthRows, DepthSpan, KnownDepths, LayerLevels, LevelChooser, PrintThrough,
+};
 use crate::grid::PixelGrid;
 use crate::part::Part;
 use crate::placement::{PlacedFacet, PlacedPart, Placement};
 use crate::planes::{LayerHeights, PlaneRule, Planes};
 use crate::survey::Survey;
-use crate::table::{CutLayer, FacetSource, Fill, OpenRows, Table, open_rows};
+use crate::table::{CutImage, CutLayer, FacetSource, Fill, OpenRows, Shading, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
 
 /// Options of slicing.
@@ -43,6 +45,10 @@ pub struct SliceOptions {
     /// The gray level of each depth below a layer's top, for layers that are gray where
     /// the part is less deep. The plane must then be [`PlaneRule::Top`].
     pub gray: Option<LayerLevels>,
+    /// What each gray level leaves in the resin below, for gray layers whose doses add up, instead
+    /// of `gray`: down each column of pixels, the least light is taken away from white layers that
+    /// leaves the undersides where they are. The plane must then be [`PlaneRule::Top`].
+    pub print_through: Option<LayerLevels<FadingLevels>>,
     /// Moves crossings of B-rep parts from facets onto the exact surfaces.
     pub polish: bool,
     /// The layers to be made; all if `None`.
@@ -100,6 +106,7 @@ impl Default for SliceOptions {
             placement: Placement::default(),
             fill: Fill::default(),
             gray: None,
+            print_through: None,
             polish: true,
             layers: None,
             grid: GridRule::Around { margin: 1 },
@@ -119,6 +126,10 @@ const MAX_LAYERS: usize = 1 << 17;
 /// times. They take a quarter of a gigabyte.
 const MAX_CROSSINGS: f64 = (1 << 25) as f64;
 
+/// The key of a page's pixels that even white does not cure down to the underside within their
+/// layer, where doses add up.
+pub const SHORT_PX: &str = "short_px";
+
 /// The layers of a part, bottom first.
 ///
 /// One look at all facets finds the part's box. Then z is processed in slabs of as
@@ -134,7 +145,11 @@ pub struct Slices {
     planes: Planes,
     rule: FillRule,
     gray: Option<LayerLevels>,
+    print_through: Option<PrintThrough>,
     wanted: Range<usize>,
+    /// The layers that are cut: those wanted, those above them whose light counts, and those below
+    /// with their undersides.
+    cut: Range<usize>,
     max_crossings: usize,
     /// The crossings of the largest layer, by an estimate.
     largest: f64,
@@ -148,6 +163,11 @@ pub struct Slices {
     shared: SharedVolumes,
     /// The layers of the table that are still to be made into images.
     pending: Range<usize>,
+    /// The layers whose levels are not chosen yet.
+    waiting: VecDeque<Layer>,
+    /// The depths of layers, and the number of the first.
+    depths: Vec<DepthRows>,
+    first_depths: usize,
     ready: VecDeque<Layer>,
     /// Whether the files were compared with what they were, after all layers.
     is_checked: bool,
@@ -166,7 +186,8 @@ impl Slices {
     }
 
     fn prepared(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
-        if options.gray.is_some() && options.plane != PlaneRule::Top {
+        let is_gray = options.gray.is_some() || options.print_through.is_some();
+        if is_gray && options.plane != PlaneRule::Top {
             return Err(SliceError::GrayPlane);
         }
         let model = PlacedPart::new(model, &options.placement, options.units);
@@ -183,6 +204,11 @@ impl Slices {
             None => Planes::uniform(bottom_um, top_um, options.thickness, options.plane)?,
         };
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
+        let print_through = options.print_through.clone();
+        let print_through = print_through.map(|levels| PrintThrough::new(levels, &planes));
+        let cut = print_through.as_ref().map_or(wanted.clone(), |light| {
+            light.first_below(wanted.start)..light.end_above(wanted.end - 1)
+        });
         let is_usual =
             wanted.len() <= MAX_LAYERS && wanted.len() as u64 * u64::from(grid.height) <= MAX_ROWS;
         if !is_usual && !model.model.trusts_extent() {
@@ -190,21 +216,22 @@ impl Slices {
         }
         // A list that grows holds up to twice what it needs.
         let max_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
-        let reach_um = options.gray.as_ref().map_or(0.0, LayerLevels::reach_um);
+        let reach_um = shading(options.gray.as_ref(), print_through.as_ref()).reach_um();
+        let reach_um = reach_um.unwrap_or(0.0);
         let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
-        if let Some(layer) = wanted.clone().find(|&layer| expected[layer] > MAX_CROSSINGS) {
+        if let Some(layer) = cut.clone().find(|&layer| expected[layer] > MAX_CROSSINGS) {
             let crossings = expected[layer];
             return Err(SliceError::TooManyCrossings { layer, crossings });
         }
-        if options.gray.is_some() {
+        if is_gray {
             let cutter = Cutter { grid: &grid, planes: &planes, rule: &rule };
             model.surfaces().iter().for_each(|surfaces| surfaces.examine_rims(cutter));
             for (layer, crossings) in expected.iter_mut().enumerate() {
                 *crossings *= 1.0 + spans_per_crossing(reach_um / planes.thickness_um(layer));
             }
         }
-        let largest = expected[wanted.clone()].iter().copied().fold(0.0, f64::max);
-        let slabs = slabs(&wanted, &expected, max_crossings);
+        let largest = expected[cut.clone()].iter().copied().fold(0.0, f64::max);
+        let slabs = slabs(&cut, &expected, max_crossings);
         let heights: Vec<_> =
             slabs.iter().map(|slab| heights_of(slab, &planes, reach_um)).collect();
         // If no temporary file can be written, slabs read all blocks that they meet.
@@ -219,10 +246,12 @@ impl Slices {
             grid,
             rule,
             gray: options.gray.clone(),
+            print_through,
             max_crossings,
             largest,
-            pending: wanted.start..wanted.start,
+            pending: cut.start..cut.start,
             wanted,
+            cut: cut.clone(),
             planes,
             slabs,
             buckets,
@@ -230,6 +259,9 @@ impl Slices {
             polished: Polished::default(),
             open_rows: OpenRows::new(),
             shared: SharedVolumes::default(),
+            waiting: VecDeque::new(),
+            depths: Vec::new(),
+            first_depths: cut.start,
             ready: VecDeque::new(),
             is_checked: false,
         })
@@ -260,7 +292,8 @@ impl Slices {
     }
 
     /// Cuts a layer once more, with its plane moved up, but not past its neighbours' or
-    /// out of the part. So 002 section 2.2.3 avoids sections that fail.
+    /// out of the part. So 002 section 2.2.3 avoids sections that fail. Where doses add up, its
+    /// levels are those of a part without the layers above.
     ///
     /// # Errors
     /// Returns an error if there is no such layer, or the file cannot be read.
@@ -273,13 +306,23 @@ impl Slices {
         }
         let planes = self.planes.moved(index, up.um(), [self.survey.min[2], self.survey.max[2]]);
         let cutter = Cutter { grid: &self.grid, planes: &planes, rule: &self.rule };
-        let reach_um = self.gray.as_ref().map(LayerLevels::reach_um);
+        let reach_um = self.shading().reach_um();
         let layers = index..index + 1;
         let below = reach_um.unwrap_or(0.0);
         let facets = MetBlocks::of(&self.model, &self.survey, &layers, &planes, below);
         let mut table = Table::default();
         let open = fill(&mut table, &facets, cutter, reach_um, layers, usize::MAX)?;
-        Ok(self.image_of(index, &table, cutter, &open.unwrap_or_default()).0)
+        let (mut layer, depths, _) =
+            self.image_of(index, &table, cutter, &open.unwrap_or_default());
+        if let (Some(light), Some(depths)) = (&self.print_through, depths) {
+            let rows = &[depths];
+            choose(light, index, KnownDepths { first: index, rows }, &mut layer);
+        }
+        Ok(layer)
+    }
+
+    fn shading(&self) -> Shading<'_> {
+        shading(self.gray.as_ref(), self.print_through.as_ref())
     }
 
     /// Returns the number of crossings of each layer of the part, by an estimate: the work follows
@@ -293,7 +336,12 @@ impl Slices {
         self.planes.heights()
     }
 
-    /// Returns the gray levels of depths, if layers are gray.
+    /// Returns whether layers are gray.
+    pub fn is_gray(&self) -> bool {
+        self.gray.is_some() || self.print_through.is_some()
+    }
+
+    /// Returns the gray levels of depths, if layers are gray by themselves.
     pub fn levels(&self) -> Option<&LayerLevels> {
         self.gray.as_ref()
     }
@@ -334,7 +382,7 @@ impl Slices {
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
-        let gray = self.gray.as_ref().map(LayerLevels::reach_um);
+        let gray = self.shading().reach_um();
         let reach_um = gray.unwrap_or(0.0);
         self.polished = self.polished.joined(self.table.polished());
         loop {
@@ -393,9 +441,40 @@ impl Slices {
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
         let layer = |layer| self.image_of(layer, &self.table, cutter, &self.open_rows);
         let made: Vec<_> = batch.clone().into_par_iter().map(layer).collect();
-        for (index, (layer, shared)) in batch.zip(made) {
-            self.add_shared(index, &shared);
-            self.ready.push_back(layer);
+        for (index, (layer, depths, shared)) in batch.zip(made) {
+            if self.wanted.contains(&index) {
+                self.add_shared(index, &shared);
+            }
+            match depths {
+                Some(depths) => {
+                    self.depths.push(depths);
+                    if self.wanted.contains(&index) {
+                        self.waiting.push_back(layer);
+                    }
+                }
+                None => self.ready.push_back(layer),
+            }
+        }
+        self.choose_levels();
+    }
+
+    /// Chooses the levels of the waiting layers above which all layers that count are known.
+    fn choose_levels(&mut self) {
+        let Some(light) = &self.print_through else { return };
+        let (Some(first), end) = (self.waiting.front(), self.pending.start) else { return };
+        let first = first.info.index as usize;
+        let is_known = |layer: &usize| light.end_above(*layer) <= end;
+        let count = (first..end.min(self.wanted.end)).take_while(is_known).count();
+        let known = KnownDepths { first: self.first_depths, rows: &self.depths };
+        let waiting = &mut self.waiting.make_contiguous()[..count];
+        waiting.par_iter_mut().enumerate().for_each(|(k, layer)| {
+            choose(light, first + k, known, layer);
+        });
+        self.ready.extend(self.waiting.drain(..count));
+        if first + count < self.wanted.end {
+            let done = light.first_below(first + count) - self.first_depths;
+            self.depths.drain(..done);
+            self.first_depths += done;
         }
     }
 
@@ -406,20 +485,28 @@ impl Slices {
         self.shared.add(layer, shared, pixel_mm3);
     }
 
-    /// Makes a layer of a table into an image, and counts the pixels that bodies share.
+    /// Makes a layer of a table into an image, or into depths and a black image, and counts the
+    /// pixels that bodies share.
     fn image_of(
         &self,
         layer: usize,
         table: &Table,
         cutter: Cutter<'_>,
         open_rows: &OpenRows,
-    ) -> (Layer, SharedCounts) {
+    ) -> (Layer, Option<DepthRows>, SharedCounts) {
         let CutLayer { image, stray_rows, closed, shared } =
-            table.layer(layer, cutter, self.model.surfaces(), self.gray.as_ref());
+            table.layer(layer, cutter, self.model.surfaces(), self.shading());
+        let (image, depths) = match image {
+            CutImage::Image(image) => (image, None),
+            CutImage::Depths(depths) => {
+                let black = Mask::black(self.grid.width, self.grid.height);
+                (Image::Mask(black), Some(depths))
+            }
+        };
         let open_rows = open_rows.get(&layer).cloned().unwrap_or_default();
         let closed = Some(closed);
         let info = PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) };
-        (Layer { info, dpi: Some(self.grid.dpi), image: image.into() }, shared)
+        (Layer { info, dpi: Some(self.grid.dpi), image: image.into() }, depths, shared)
     }
 
     /// Returns the number of layers to make into images at once: enough for all threads,
@@ -462,15 +549,15 @@ impl Iterator for Slices {
     type Item = Result<Layer, SliceError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.ready.is_empty() {
+        while self.ready.is_empty() {
             if self.pending.is_empty() {
-                if self.pending.end == self.wanted.end {
+                if self.pending.end == self.cut.end {
                     let is_checked = std::mem::replace(&mut self.is_checked, true);
                     let change = || self.model.model.check_unchanged().err();
                     return if is_checked { None } else { change().map(Err) };
                 }
                 if let Err(error) = self.fill_slab() {
-                    self.pending = self.wanted.end..self.wanted.end;
+                    self.pending = self.cut.end..self.cut.end;
                     self.is_checked = true;
                     return Some(Err(self.model.model.reason(error)));
                 }
@@ -478,6 +565,24 @@ impl Iterator for Slices {
             self.finish_batch();
         }
         self.ready.pop_front().map(Ok)
+    }
+}
+
+/// Returns what becomes of the layers' crossings.
+fn shading<'a>(gray: Option<&'a LayerLevels>, print_through: Option<&PrintThrough>) -> Shading<'a> {
+    match (print_through, gray) {
+        (Some(light), _) => Shading::Depths(light.within_um()),
+        (None, Some(levels)) => Shading::Levels(levels),
+        (None, None) => Shading::White,
+    }
+}
+
+/// Chooses a layer's levels, given its depths and those of the layers around it.
+fn choose(light: &PrintThrough, number: usize, known: KnownDepths<'_>, layer: &mut Layer) {
+    let ChosenLayer { image, short_px } = LevelChooser::new(light, number, known).choose();
+    layer.image = image.into();
+    if short_px > 0 {
+        layer.info.other.insert(SHORT_PX.to_owned(), short_px.into());
     }
 }
 

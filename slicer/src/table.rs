@@ -15,7 +15,7 @@ use crate::bodies::{Position, SharedCounts, SharedPixels};
 use crate::closure::{EndSum, RowSums};
 use crate::cut::{BodyCrossing, Crossing, Cutter, InRow, LayerShare, RowCrossing};
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
-use crate::gray::{DepthSpan, LayerLevels, Shader};
+use crate::gray::{DepthRows, DepthSpan, LayerLevels, LevelRows, ShadedRows, Shader};
 use crate::grid::PixelGrid;
 use crate::placement::PlacedFacet;
 
@@ -77,9 +77,37 @@ pub(crate) struct Table {
     tally: Tally,
 }
 
+/// What becomes of a layer's crossings.
+#[derive(Clone, Copy)]
+pub(crate) enum Shading<'a> {
+    /// A mask.
+    White,
+    /// Gray levels that cure the depth of the part.
+    Levels(&'a LayerLevels),
+    /// The depths of the part, as far as light reaches in micrometres.
+    Depths(f64),
+}
+
+impl Shading<'_> {
+    /// Returns how far below their sections layers look at facets.
+    pub(crate) fn reach_um(self) -> Option<f64> {
+        match self {
+            Self::White => None,
+            Self::Levels(levels) => Some(levels.reach_um()),
+            Self::Depths(reach_um) => Some(reach_um),
+        }
+    }
+}
+
+/// A layer's pixels.
+pub(crate) enum CutImage {
+    Image(Image),
+    Depths(DepthRows),
+}
+
 /// A layer made of its crossings.
 pub(crate) struct CutLayer {
-    pub(crate) image: Image,
+    pub(crate) image: CutImage,
     /// The rows whose crossings do not balance.
     pub(crate) stray_rows: Vec<u32>,
     /// Whether every contour closes.
@@ -235,19 +263,43 @@ impl Table {
         layer: usize,
         cutter: Cutter<'_>,
         surfaces: &[PlacedSurfaces],
-        gray: Option<&LayerLevels>,
+        shading: Shading<'_>,
     ) -> CutLayer {
-        let Cutter { grid, planes, rule } = cutter;
-        let reach_um = gray.map(LayerLevels::reach_um);
-        let spans = reach_um.map(|reach_um| self.spans(layer, cutter, surfaces, reach_um));
+        let width = cutter.grid.width;
+        let spans = shading.reach_um().map(|um| self.spans(layer, cutter, surfaces, um));
         let spans = spans.unwrap_or_default();
-        let shader = gray.map(|levels| {
-            Shader::new(levels.of_layer(layer), rule, planes, layer, &spans, grid.width)
-        });
+        match shading {
+            Shading::White => {
+                let (mask, _, cut) = self.rows::<LevelRows<'_>>(layer, cutter, surfaces, None);
+                cut.with(CutImage::Image(Image::Mask(mask)))
+            }
+            Shading::Levels(levels) => {
+                let rows = LevelRows::new(levels.of_layer(layer), width);
+                let shader = shader(rows, layer, cutter, &spans);
+                let (_, rows, cut) = self.rows(layer, cutter, surfaces, Some(shader));
+                cut.with(CutImage::Image(rows.expect("a shader makes rows").finish()))
+            }
+            Shading::Depths(_) => {
+                let shader = shader(DepthRows::new(width), layer, cutter, &spans);
+                let (_, rows, cut) = self.rows(layer, cutter, surfaces, Some(shader));
+                cut.with(CutImage::Depths(rows.expect("a shader makes rows")))
+            }
+        }
+    }
+
+    /// Returns a layer's mask, its shaded rows, and what else is known of it.
+    fn rows<R: ShadedRows>(
+        &self,
+        layer: usize,
+        cutter: Cutter<'_>,
+        surfaces: &[PlacedSurfaces],
+        shader: Option<Shader<'_, R>>,
+    ) -> (Mask, Option<R>, CutFindings) {
+        let Cutter { grid, rule, .. } = cutter;
         let more = self.more(layer, cutter, surfaces);
         let rows = ImageRows::new(grid, shader);
         let mut shared = SharedPixels::new(rule);
-        let (image, stray_rows) = if rule.has_bodies() {
+        let (mask, shaded, stray_rows) = if rule.has_bodies() {
             let mut position = Position::outside(rule);
             let crossings = || {
                 let all = self.by_body(layer).chain(more.iter().copied());
@@ -271,29 +323,53 @@ impl Table {
             )
         };
         let closed = self.is_closed(layer, rule.fill());
-        CutLayer { image, stray_rows, closed, shared: shared.counts() }
+        (mask, shaded, CutFindings { stray_rows, closed, shared: shared.counts() })
     }
+}
+
+/// What is known of a layer beside its pixels.
+struct CutFindings {
+    stray_rows: Vec<u32>,
+    closed: bool,
+    shared: SharedCounts,
+}
+
+impl CutFindings {
+    fn with(self, image: CutImage) -> CutLayer {
+        let Self { stray_rows, closed, shared } = self;
+        CutLayer { image, stray_rows, closed, shared }
+    }
+}
+
+/// Starts to shade a layer.
+fn shader<'a, R: ShadedRows>(
+    rows: R,
+    layer: usize,
+    cutter: Cutter<'a>,
+    spans: &'a [DepthSpan],
+) -> Shader<'a, R> {
+    Shader::new(rows, cutter.rule, cutter.planes, layer, spans, cutter.grid.width)
 }
 
 /// The rows of a layer's image, to be filled from the top.
-struct ImageRows<'a> {
+struct ImageRows<'a, R: ShadedRows> {
     width: u32,
     height: u32,
-    shader: Option<Shader<'a>>,
+    shader: Option<Shader<'a, R>>,
 }
 
-impl<'a> ImageRows<'a> {
-    fn new(grid: &PixelGrid, shader: Option<Shader<'a>>) -> Self {
+impl<'a, R: ShadedRows> ImageRows<'a, R> {
+    fn new(grid: &PixelGrid, shader: Option<Shader<'a, R>>) -> Self {
         Self { width: grid.width, height: grid.height, shader }
     }
 
-    /// Fills all rows with what `fill` makes of their sorted crossings. Returns the image,
-    /// and the rows for which `fill` returns false since they do not balance.
+    /// Fills all rows with what `fill` makes of their sorted crossings. Returns the mask, the
+    /// shaded rows, and the rows for which `fill` returns false since they do not balance.
     fn filled<C: InRow, I: Iterator<Item = (usize, C)>>(
         mut self,
         crossings: impl Fn() -> I,
         mut fill: impl FnMut(&[C], &mut Vec<u32>) -> bool,
-    ) -> (Image, Vec<u32>) {
+    ) -> (Mask, Option<R>, Vec<u32>) {
         let mut by_row = Grouped::new(self.height as usize, crossings);
         let mut row_offsets = Vec::with_capacity(self.height as usize + 1);
         row_offsets.push(0);
@@ -314,7 +390,7 @@ impl<'a> ImageRows<'a> {
         }
         let mask = Mask::new(self.width, row_offsets, transitions);
         let mask = mask.expect("sorted places without pairs increase strictly");
-        (self.shader.map_or(Image::Mask(mask), Shader::finish), stray_rows)
+        (mask, self.shader.map(Shader::finish), stray_rows)
     }
 }
 

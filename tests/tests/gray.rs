@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use lamp_fixtures::{Sample, example_cylinder};
-use lamp_stack::{Image, gray_runs};
+use lamp_stack::{Image, Layer, gray_runs};
 use lamp_tests::{Ran, Scratch};
 
 const COARSE: &str = "--dpi 300 --thickness 400um";
@@ -186,6 +186,42 @@ fn a_section_shows_what_gray_saves() {
         assert!(count(red, true) > 50 && count(red, false) < count(red, true) / 20);
         assert!(count(blue, true) > 50 && count(blue, false) > 50);
     }
+}
+
+#[test]
+fn print_through_stays_in_the_part() {
+    let scratch = with_tower();
+    let slice = "slice tower.stl --dpi 600 --thickness 200um --material lamp-suspension";
+    scratch.run(&format!("{slice} -o white.tif")).succeeds_quietly();
+    scratch.run(&format!("{slice} --gray --print-through -o summed.tif")).succeeds_quietly();
+    let line = "lamp cure summed.tif --material lamp-suspension --section y=0mm --part tower.stl";
+    let ran = scratch.run(&format!("{line} -o s.png")).succeeds_quietly();
+    let [white, gray] = areas(&ran.stdout)[..] else { panic!("two panels") };
+    assert!(white[0] > 1.0 && gray[0] < 0.1 * white[0], "{white:?} {gray:?}");
+    assert!(gray[1] < white[1] + 0.1 * white[0], "{white:?} {gray:?}");
+    // Outlines are those of white, but for pixels whose centres are on the underside.
+    let (white, summed) = (scratch.layers("white.tif"), scratch.layers("summed.tif"));
+    let lit = |image: &Image| -> u64 {
+        let runs = (0..image.height()).flat_map(|row| image.runs(row));
+        runs.map(|(start, end, _)| u64::from(end - start)).sum()
+    };
+    let count = |layers: &[Layer]| layers.iter().map(|layer| lit(&layer.image)).sum::<u64>();
+    let [white, all] = [&white, &summed].map(|layers| count(layers));
+    assert!(all <= white && white - all < 100, "{white} {all}");
+    let command = &summed[0].info.stack.as_ref().unwrap().commands[0];
+    assert!(command.contains(" --gray --print-through --material"), "{command}");
+
+    scratch
+        .run(&format!("{slice} --gray --print-through --layers 200..210 -o range.tif"))
+        .succeeds_quietly();
+    let range = scratch.layers("range.tif");
+    assert!(range.iter().zip(&summed[200..]).all(|(a, b)| a.image == b.image));
+    let line = format!("{slice} --gray --print-through --overcure 0.5 -o short.tif");
+    let ran = scratch.run(&line).succeeds();
+    assert!(ran.stderr.contains("not cured down to the underside"), "{ran:?}");
+    is_wrong_usage(&scratch.run(&format!("{slice} --print-through -o x.tif")), "--gray");
+    let line = format!("{slice} --gray --print-through --fallback tower.stl -o x.tif");
+    is_wrong_usage(&scratch.run(&line), "--fallback");
 }
 
 #[test]

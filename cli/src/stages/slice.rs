@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::machine::{Machine, MachineLimit};
-use lamp_slicer::{Bodies, Part, Polished, SliceError, Slices};
+use lamp_slicer::{Bodies, Part, Polished, SHORT_PX, SliceError, Slices};
 use lamp_stack::{Layer, Length, PageInfo, Size};
 
 use crate::body_overlaps::overlap_text;
@@ -70,6 +70,8 @@ pub(crate) struct Slicing<'a> {
     bridged: RefCell<Bridged>,
     name_command: Box<dyn Fn(&mut Layer)>,
     counts: Cell<Counts>,
+    /// The layers with pixels that white does not cure down to the underside, and those pixels.
+    short: Cell<[u64; 2]>,
     is_blank: Cell<bool>,
 }
 
@@ -106,6 +108,11 @@ impl SliceSettings {
         name: Option<&str>,
         progress: &Progress,
     ) -> Result<Slicing<'_>, Exit> {
+        if self.options.print_through && self.fallback.is_some() {
+            let why = "--print-through looks at all layers above one, and --fallback mends single \
+                       ones: leave out one of them";
+            return Err(Exit::usage(why));
+        }
         let exposure = self.options.exposure()?;
         let machine: Option<Machine> = self.machine.as_deref().map(entry).transpose()?;
         if let Some(machine) = &machine {
@@ -143,6 +150,7 @@ impl SliceSettings {
             bridged: RefCell::new(bridged),
             name_command: Box::new(name_command),
             counts: Cell::default(),
+            short: Cell::default(),
             is_blank: Cell::new(true),
         })
     }
@@ -181,6 +189,11 @@ impl Slicing<'_> {
                 let mut counts = self.counts.get();
                 counts.add(&layer.info);
                 self.counts.set(counts);
+                let short = layer.info.other.get(SHORT_PX).and_then(serde_json::Value::as_u64);
+                if let Some(pixels) = short {
+                    let [layers, all] = self.short.get();
+                    self.short.set([layers + 1, all + pixels]);
+                }
                 see(&layer.info);
             }
             Ok(layer)
@@ -239,6 +252,14 @@ impl Slicing<'_> {
             Some(text) if self.settings.options.solid.bodies == Bodies::Xor => progress.warn(&text),
             Some(text) => progress.say(&text),
             None => {}
+        }
+        if let [layers, pixels] = self.short.get()
+            && pixels > 0
+        {
+            progress.say(&format!(
+                "{pixels} pixels in {layers} layers are not cured down to the underside, even by \
+                 white; their pages say how many (short_px), and more --overcure cures them"
+            ));
         }
         say_stray_rows(progress, self.counts(), report);
     }

@@ -77,7 +77,7 @@ impl Survey {
         let crossings = slices.crossings_per_layer();
         let rows = f64::from(slices.grid().height);
         let weight = chain.stages.iter().map(Weight::of).fold(SLICE, Weight::joined);
-        let gray = if slices.levels().is_some() { GRAY } else { 1.0 };
+        let gray = if slices.is_gray() { GRAY } else { 1.0 };
         let seconds =
             |crossings: &f64| (weight.row_ns * rows + weight.crossing_ns * gray * crossings) * 1e-9;
         let blocks = crossings.chunks(BLOCK as usize);

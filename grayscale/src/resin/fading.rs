@@ -1,6 +1,6 @@
 //! How light fades in a resin, for doses that add up.
 
-use lamp_stack::Length;
+use lamp_stack::{FadingLevels, Length};
 
 use super::gray_curve::{GrayCurve, StraightLine};
 use super::model::ModelError;
@@ -44,6 +44,14 @@ impl FadingLight {
     pub fn share(&self, gray: GrayLevel, time: ExposureTime) -> f64 {
         let dose = self.light * time * gray;
         dose.mj_per_cm2() / self.curve.at(gray).critical_dose().mj_per_cm2()
+    }
+
+    /// Returns what each gray level leaves in an exposure, for slicing.
+    pub fn levels(&self, time: ExposureTime) -> FadingLevels {
+        FadingLevels::new(|gray| {
+            let gray = GrayLevel::clamped(gray);
+            (self.share(gray, time), self.penetration_depth(gray))
+        })
     }
 
     /// Returns the depth over which the light of a gray level fades by e.

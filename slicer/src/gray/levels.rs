@@ -6,22 +6,23 @@ use lamp_stack::{DepthLevels, Length};
 
 use crate::planes::LayerHeights;
 
-/// The gray levels of every layer of a part.
+/// The gray levels of every layer of a part: [`DepthLevels`], or
+/// [`FadingLevels`](lamp_stack::FadingLevels) where doses add up.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LayerLevels {
-    distinct: Vec<DepthLevels>,
+pub struct LayerLevels<L = DepthLevels> {
+    distinct: Vec<L>,
     /// The position in `distinct` of each layer's levels; layers beyond have the first.
     of_layer: Vec<u32>,
 }
 
-impl From<DepthLevels> for LayerLevels {
+impl<L> From<L> for LayerLevels<L> {
     /// Gives all layers the same levels.
-    fn from(levels: DepthLevels) -> Self {
+    fn from(levels: L) -> Self {
         Self { distinct: vec![levels], of_layer: Vec::new() }
     }
 }
 
-impl LayerLevels {
+impl<L> LayerLevels<L> {
     /// Creates the levels of layers whose exposures differ. `of_thickness` returns those
     /// of a thickness; it is called once for each, to the nanometre.
     ///
@@ -29,7 +30,7 @@ impl LayerLevels {
     /// Returns the first error of `of_thickness`.
     pub fn by_thickness<E>(
         heights: &LayerHeights,
-        mut of_thickness: impl FnMut(Length) -> Result<DepthLevels, E>,
+        mut of_thickness: impl FnMut(Length) -> Result<L, E>,
     ) -> Result<Self, E> {
         let mut distinct = Vec::new();
         let mut known = BTreeMap::new();
@@ -47,10 +48,22 @@ impl LayerLevels {
         Ok(Self { distinct, of_layer })
     }
 
-    pub(crate) fn of_layer(&self, layer: usize) -> &DepthLevels {
-        &self.distinct[self.of_layer.get(layer).map_or(0, |&index| index as usize)]
+    /// Returns the number of a layer's levels among the distinct ones.
+    pub(crate) fn number_of(&self, layer: usize) -> usize {
+        self.of_layer.get(layer).map_or(0, |&index| index as usize)
     }
 
+    /// Returns distinct levels by their number.
+    pub(crate) fn numbered(&self, number: usize) -> &L {
+        &self.distinct[number]
+    }
+
+    pub(crate) fn of_layer(&self, layer: usize) -> &L {
+        self.numbered(self.number_of(layer))
+    }
+}
+
+impl LayerLevels {
     /// Returns the depth from which on all pixels are white in all layers.
     pub(crate) fn reach_um(&self) -> f64 {
         self.distinct.iter().map(|levels| levels.reach().um()).fold(0.0, f64::max)

@@ -11,13 +11,23 @@
 //! of an edge follows from the edge's ends alone. So a line through a closed sheet of
 //! facets meets exactly one of them.
 //!
+//! Where doses add up ([`print_through`](self::print_through)), rows keep the depths instead, and
+//! levels are chosen down columns ([`columns`](self::columns)).
+//!
 //! Source: 002 section 3.3.10, algorithm 15, but with depths of the facets themselves
 //! instead of a solid cut out for each layer.
 
+mod columns;
 mod levels;
+mod print_through;
+mod row_pieces;
+mod rows;
 mod shade;
 mod sheet;
 
+pub(crate) use columns::{ChosenLayer, KnownDepths, LevelChooser};
 pub use levels::LayerLevels;
+pub(crate) use print_through::PrintThrough;
+pub(crate) use rows::{DepthRows, LevelRows, ShadedRows};
 pub(crate) use shade::Shader;
 pub(crate) use sheet::{DepthSpan, Sheet};

@@ -1,15 +1,13 @@
 //! Shades a layer's rows by the depth of the part below its section.
 
-use lamp_stack::{DepthLevels, GrayMask, Image, Length, LevelChange, MaskBuilder};
-
 use crate::bodies::{FillRule, Position};
 use crate::cut::InRow;
-use crate::gray::DepthSpan;
+use crate::gray::{DepthSpan, ShadedRows};
 use crate::planes::Planes;
 
-/// Makes a layer's rows gray, from the top.
-pub(crate) struct Shader<'a> {
-    levels: &'a DepthLevels,
+/// Shades a layer's rows, from the top.
+pub(crate) struct Shader<'a, R: ShadedRows> {
+    rows: R,
     rule: &'a FillRule,
     /// The depth of the layer's plane below its top.
     plane_depth_um: f64,
@@ -20,14 +18,14 @@ pub(crate) struct Shader<'a> {
     /// What a pixel's line is in on its way down.
     below: Position<'a>,
     met: Vec<(f64, &'a DepthSpan)>,
-    changes: Vec<LevelChange>,
-    image: GrayMask,
+    changes: Vec<(u32, R::Pixel)>,
+    width: u32,
 }
 
-impl<'a> Shader<'a> {
+impl<'a, R: ShadedRows> Shader<'a, R> {
     /// Starts a layer, given the sorted spans below its section.
     pub(crate) fn new(
-        levels: &'a DepthLevels,
+        rows: R,
         rule: &'a FillRule,
         planes: &Planes,
         layer: usize,
@@ -35,7 +33,7 @@ impl<'a> Shader<'a> {
         width: u32,
     ) -> Self {
         Self {
-            levels,
+            rows,
             rule,
             below: Position::outside(rule),
             plane_depth_um: planes.top_um(layer) - planes.z_um(layer),
@@ -43,7 +41,7 @@ impl<'a> Shader<'a> {
             open: Vec::new(),
             met: Vec::new(),
             changes: Vec::new(),
-            image: GrayMask::new(width),
+            width,
         }
     }
 
@@ -57,12 +55,12 @@ impl<'a> Shader<'a> {
         let mut position = Position::outside(self.rule);
         for (k, place) in places.iter().enumerate() {
             position.cross(place.turn());
-            let end = places.get(k + 1).map_or(self.image.width(), |next| next.column());
+            let end = places.get(k + 1).map_or(self.width, |next| next.column());
             if place.column() < end {
                 self.shade(place.column(), end, &position, &mut spans);
             }
         }
-        self.image.push_row(&self.changes).expect("changes come from the left");
+        self.rows.push_row(&self.changes);
     }
 
     /// Adds columns between two crossings of the row.
@@ -74,7 +72,7 @@ impl<'a> Shader<'a> {
         spans: &mut &'a [DepthSpan],
     ) {
         if !position.is_inside() {
-            return self.push(start, 0);
+            return self.push(start, R::OUTSIDE);
         }
         let mut column = start;
         while column < end {
@@ -92,13 +90,13 @@ impl<'a> Shader<'a> {
     /// Adds columns over the same facets.
     fn shade_evenly(&mut self, start: u32, end: u32, position: &Position<'a>) {
         if self.open.is_empty() {
-            return self.push(start, 255);
+            return self.push(start, R::DEEP);
         }
         let end = if self.open.iter().all(|span| span.is_level()) { start + 1 } else { end };
         for column in start..end {
-            let exit = self.exit_um(column, position).map(Length::from_um);
-            let level = exit.map_or(255, |depth| self.levels.level(depth));
-            self.push(column, level);
+            let exit = self.exit_um(column, position);
+            let pixel = exit.map_or(R::DEEP, |depth_um| self.rows.of_depth(depth_um));
+            self.push(column, pixel);
         }
     }
 
@@ -138,24 +136,15 @@ impl<'a> Shader<'a> {
         None
     }
 
-    fn push(&mut self, column: u32, level: u8) {
-        let here = self.changes.last().map_or(0, |change| change.level);
-        if level != here {
-            self.changes.push(LevelChange { column, level });
+    fn push(&mut self, column: u32, pixel: R::Pixel) {
+        let here = self.changes.last().map_or(R::OUTSIDE, |&(_, last)| last);
+        if pixel != here {
+            self.changes.push((column, pixel));
         }
     }
 
-    /// Returns the image: 1-bit if no pixel is gray.
-    pub(crate) fn finish(self) -> Image {
-        let image = self.image;
-        if image.rows().flatten().any(|change| change.level % 255 != 0) {
-            return Image::Gray(image);
-        }
-        let mut mask = MaskBuilder::new(image.width());
-        for row in image.rows() {
-            let transitions: Vec<u32> = row.iter().map(|change| change.column).collect();
-            mask.push_row(&transitions).expect("levels change at increasing columns");
-        }
-        Image::Mask(mask.finish())
+    /// Returns the rows.
+    pub(crate) fn finish(self) -> R {
+        self.rows
     }
 }

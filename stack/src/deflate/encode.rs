@@ -96,11 +96,11 @@ fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
     let symbol =
         |out: &mut BitWriter, symbol: usize| out.put(codes[symbol].into(), lengths[symbol]);
     // The only distance, from the byte before, is a zero bit.
-    let longest = (u32::from(codes[SYMBOLS - 1]), lengths[SYMBOLS - 1] + 1);
+    let longest = Often::new(codes[SYMBOLS - 1].into(), lengths[SYMBOLS - 1] + 1);
     for &(length, byte) in runs {
         let copies = Copies::of(length);
         (0..copies.bytes).for_each(|_| symbol(out, byte.into()));
-        put_often(out, longest, copies.longest);
+        longest.put(out, copies.longest);
         if copies.last > 0 {
             let last = length_symbol(copies.last);
             let (first, bits) = copies_of(last).expect("it is the symbol of a length");
@@ -111,15 +111,30 @@ fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
     symbol(out, END_OF_BLOCK.into());
 }
 
-/// Appends the same bits many times, as many at once as fit.
-fn put_often(out: &mut BitWriter, (bits, count): (u32, u8), mut times: u32) {
-    let together = 32 / count;
-    let all = (0..together).fold(0, |all, k| all | bits << (k * count));
-    while times >= together.into() {
-        out.put(all, together * count);
-        times -= u32::from(together);
+/// Bits that are written many times, as many at once as fit.
+struct Often {
+    bits: u32,
+    count: u8,
+    together: u8,
+    all: u32,
+}
+
+impl Often {
+    fn new(bits: u32, count: u8) -> Self {
+        let together = 32 / count;
+        let all = (0..together).fold(0, |all, k| all | bits << (k * count));
+        Self { bits, count, together, all }
     }
-    (0..times).for_each(|_| out.put(bits, count));
+
+    fn put(&self, out: &mut BitWriter, mut times: u32) {
+        while times >= self.together.into() {
+            out.put(self.all, self.together * self.count);
+            times -= u32::from(self.together);
+        }
+        for _ in 0..times {
+            out.put(self.bits, self.count);
+        }
+    }
 }
 
 /// Returns the symbol of a copy's length, 3 to 257.
