@@ -218,13 +218,60 @@ fn a_material_says_how_wide_each_feature_cures() {
             .map(|m| m.row(20).to_vec())
             .collect::<Vec<_>>()
     };
-    // 300 mJ/cm2 make 100 um of the wall and 200 um of the block; 500 twice that.
+    // 300 mJ/cm2 make 100 um of the wall and 200 um of the block, which is exposed 2 mm wide;
+    // 500 make 200 um of the wall and 343 um of the block, of which 1.71 mm are exposed.
     let by_page = with("");
-    assert_eq!(by_page, [[6, 26, 41, 49], [8, 24, 42, 48]]);
+    assert_eq!(by_page, [[6, 26, 41, 49], [7, 25, 42, 48]]);
     assert_eq!(with("--dose 0.3J/cm2"), [[6, 26, 41, 49], [6, 26, 41, 49]]);
     assert_eq!(with("--dose 100mJ/cm2"), [[4, 28, 40, 50], [4, 28, 40, 50]]);
     let page = |k: usize| scratch.layers("out.tif")[k].info.other.get("compensate").cloned();
     assert_eq!(page(0), None);
+}
+
+/// A resin that cures large features much wider than small ones, over 25 to 450 pixels.
+const STEEP: &str = r#"name = "steep"
+description = "a resin"
+[[cure-width]]
+feature-size = "0.4233 mm"
+critical-dose = { value = "100 mJ/cm2", source = "page 1" }
+sensitivity = { value = "0.02 um/(mJ/cm2)", source = "page 1" }
+[[cure-width]]
+feature-size = "7.62 mm"
+critical-dose = { value = "80 mJ/cm2", source = "page 2" }
+sensitivity = { value = "0.5 um/(mJ/cm2)", source = "page 2" }
+"#;
+
+/// The growth of each edge of a feature of a size in micrometres at 500 mJ/cm2, in this resin.
+fn steep_growth(size_um: f64) -> f64 {
+    let share = ((size_um - 423.3) / (7620.0 - 423.3)).clamp(0.0, 1.0);
+    (0.02 + 0.48 * share) * (400.0 + 20.0 * share)
+}
+
+#[test]
+fn squares_cure_to_their_size_on_a_steep_material() {
+    let scratch = Scratch::new();
+    scratch.write("steep.toml", STEEP.as_bytes());
+    let pitch = 25_400.0 / 1500.0;
+    for side in [40u32, 100, 300] {
+        let mut mask = MaskBuilder::new(320);
+        for row in 0..side + 8 {
+            let inside = [4, 4 + side];
+            let is_inside = (4..4 + side).contains(&row);
+            mask.push_row(if is_inside { &inside } else { &[] }).unwrap();
+        }
+        let mut square = layer(0, Image::Mask(mask.finish()));
+        square.dpi = Dpi::new(1500.0);
+        scratch.stack("in.tif", [square]);
+        let line = "lamp compensate in.tif --material steep.toml --dose 500mJ/cm2 -o out.tif";
+        scratch.run(line).succeeds_quietly();
+        let layers = scratch.layers("out.tif");
+        let row = side / 2;
+        let exposed: u32 = (0..320).map(|c| u32::from(gray(&layers[0]).level(c, row))).sum();
+        let exposed = f64::from(exposed) / 255.0 * pitch;
+        let cured = exposed + 2.0 * steep_growth(exposed);
+        let wanted = f64::from(side) * pitch;
+        assert!((cured - wanted).abs() < 0.5, "{side}: {exposed} um cure to {cured} of {wanted}");
+    }
 }
 
 #[test]

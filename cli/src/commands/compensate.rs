@@ -14,8 +14,8 @@ use crate::streams::{
 
 /// Narrow images by the width that resin cures beyond them, and make up for firing shrinkage
 ///
-/// Edges move by an exact Euclidean distance; fractions of a pixel become gray, which `dither`
-/// turns into dots. Walls that would become thinner than --min-feature are narrowed less, so that
+/// Edges move by the exact distance at every angle; fractions of a pixel become gray, which
+/// `dither` turns into dots. Walls that would become thinner than --min-feature are narrowed less, so that
 /// none breaks or is lost, and each is reported; with --min-feature 0um walls may vanish, and each
 /// piece that is lost or breaks apart is reported. Gray layers move by their outlines. Images are
 /// first enlarged for shrinkage; if you have the mesh, slice --scale is more exact.

@@ -19,7 +19,7 @@ use crate::options::parse_distance;
 use crate::progress::Progress;
 
 /// Changes when other bytes come from the same options and layers.
-pub(crate) const CODE: u32 = 2;
+pub(crate) const CODE: u32 = 3;
 
 /// By what edges move and images grow.
 #[derive(Args, Clone)]
@@ -241,11 +241,11 @@ impl EdgeMove {
                 (width, dose)
             }
         };
-        let sizes: Vec<f64> =
-            width.lines().iter().map(|line| line.feature_size.pixels(dpi)).collect();
+        // The image has the sizes that are wanted, not those that are to be exposed.
+        let sizes: Vec<f64> = width.cured_sizes(dose).iter().map(|size| size.pixels(dpi)).collect();
         let pitch = dpi.pitch().um();
         let size = |pixels: f64| Length::from_um(pixels * pitch);
-        Ok(Widths::by_size(&sizes, |pixels| width.width(dose, size(pixels)).pixels(dpi)))
+        Ok(Widths::by_size(&sizes, |pixels| width.width_of_cured(dose, size(pixels)).pixels(dpi)))
     }
 }
 

@@ -96,6 +96,37 @@ impl CureWidth {
     pub fn width(&self, dose: Dose, feature_size: Length) -> Length {
         self.at(feature_size).width(dose)
     }
+
+    /// Returns the size `s` to be exposed so that a feature cures to a size `L`:
+    /// `s + 2 C_w(s) = L`, as the measured sizes are those of exposed squares.
+    ///
+    /// Zero if the least feature cures larger than that.
+    pub fn exposed_size(&self, dose: Dose, cured_size: Length) -> Length {
+        let wanted = cured_size.um();
+        let [mut low, mut high] = [0.0, wanted.max(0.0)];
+        let is_too_large =
+            |size: f64| size + 2.0 * self.width(dose, Length::from_um(size)).um() > wanted;
+        // As many halves as a number has digits.
+        for _ in 0..64 {
+            let middle = (low + high) / 2.0;
+            if is_too_large(middle) { high = middle } else { low = middle }
+        }
+        Length::from_um(low)
+    }
+
+    /// Returns the growth of each edge of features that cure to a size: that of the exposed one.
+    pub fn width_of_cured(&self, dose: Dose, cured_size: Length) -> Length {
+        self.width(dose, self.exposed_size(dose, cured_size))
+    }
+
+    /// Returns the sizes to which the measured sizes cure at a dose, from the smallest. Between
+    /// two of them the width changes smoothly with the size.
+    pub fn cured_sizes(&self, dose: Dose) -> Vec<Length> {
+        let cured = |line: &WidthLine| line.feature_size.um() + 2.0 * line.width(dose).um();
+        let mut sizes: Vec<f64> = self.lines.iter().map(cured).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.into_iter().map(Length::from_um).collect()
+    }
 }
 
 #[cfg(test)]
@@ -145,6 +176,27 @@ mod tests {
             let width = slope * (300.0 - critical);
             assert!((um(&model, 300.0, size) - width).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn the_exposed_size_and_its_growth_make_the_cured_size() {
+        let lines = vec![line(400.0, 100.0, 0.05), line(7620.0, 80.0, 0.5)];
+        let model = CureWidth::new(lines).unwrap();
+        for mj in [50.0, 90.0, 300.0, 500.0] {
+            let dose = Dose::from_mj_per_cm2(mj);
+            for cured in [100.0, 441.0, 1693.3, 7620.0, 9000.0] {
+                let exposed = model.exposed_size(dose, Length::from_um(cured)).um();
+                let grown = exposed + 2.0 * um(&model, mj, exposed);
+                assert!((grown - cured).abs() < 1e-6, "{mj} {cured}: {exposed}");
+                let width = model.width_of_cured(dose, Length::from_um(cured)).um();
+                assert!((exposed + 2.0 * width - cured).abs() < 1e-6);
+            }
+        }
+        let dose = Dose::from_mj_per_cm2(300.0);
+        // The smallest grows by 10 um on each side.
+        assert_eq!(model.exposed_size(dose, Length::from_um(15.0)).um(), 0.0);
+        let cured: Vec<f64> = model.cured_sizes(dose).iter().map(|size| size.um()).collect();
+        assert_eq!(cured, [420.0, 7840.0]);
     }
 
     #[test]

@@ -2,8 +2,7 @@
 //! of a part.
 //!
 //! If each row that a disc reaches has as many runs as the row at its centre, and no run comes
-//! near another one's neighbour, each end of a run is measured only against the same end in the
-//! other rows.
+//! near another one's neighbour, each end of a run is cut only by the same end in the other rows.
 
 use super::erode::{Disc, Sources};
 use super::row_runs::Run;
@@ -21,16 +20,9 @@ pub(super) struct AlignedRows<'a> {
     rows: Vec<[&'a [Run]; 2]>,
 }
 
-/// A run of a row that runs along the others.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct AlignedRun {
-    /// The columns that lie in no source's outer disc.
-    pub(super) outer: Run,
-    /// The columns that lie in no source's inner disc; at least one.
-    pub(super) inner: Run,
-    /// The innermost ends by the distance in rows.
-    ends: [Run; MAX_REACH],
-}
+/// A run of a row that runs along the others: the columns that lie in no source's outer disc, and
+/// those that lie in no source's inner disc, at least one.
+type AlignedRun = [Run; 2];
 
 impl<'a> AlignedRows<'a> {
     /// Sets up for an outer and an inner disc, of which the inner one is the larger.
@@ -81,23 +73,6 @@ impl<'a> AlignedRows<'a> {
             narrowed
                 .fold(own, |left, (half, end)| (left.0.max(end.0 + half), left.1.min(end.1 - half)))
         });
-        (inner.0 < inner.1).then_some(AlignedRun { outer, inner, ends })
-    }
-}
-
-impl AlignedRun {
-    /// Makes `squares` the squared distances of the outer pixels to the left of the inner ones, or
-    /// to the right, from sources less than `reach` rows away.
-    pub(super) fn squares(&self, reach: usize, left: bool, squares: &mut Vec<u32>) {
-        squares.clear();
-        let columns = if left { self.outer.0..self.inner.0 } else { self.inner.1..self.outer.1 };
-        squares.extend(columns.map(|column| {
-            let square = |(away, end): (u32, &Run)| {
-                let aside = if left { column - end.0 + 1 } else { end.1 - column };
-                let aside = aside.clamp(0, 1 << 15) as u32;
-                away * away + aside * aside
-            };
-            (0..).zip(&self.ends[..reach]).map(square).min().unwrap_or(0)
-        }));
+        (inner.0 < inner.1).then_some([outer, inner])
     }
 }

@@ -3,18 +3,42 @@
 
 use lamp_stack::GrayMask;
 
-use super::aligned_rows::{AlignedRows, AlignedRun};
-use super::erode::{Disc, Erosion, Sources, at_least, more_than};
+use super::aligned_rows::AlignedRows;
+use super::closest::{Measured, measure};
+use super::erode::{Disc, Erosion, SourceColour, Sources, at_least, more_than};
+use super::outline::Outline;
 use super::row_runs::{RowRuns, Run, subtract};
 
-/// A region of an image whose edges move by one distance.
-#[derive(Debug)]
-pub(super) struct SizeClass {
-    /// The pixels of the region, none of them sources.
-    pub(super) region: RowRuns,
-    /// The distance in pixels, not below zero.
-    pub(super) by: f64,
+/// Edges, and by how many pixels they move away from the sources.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edges<'a> {
+    /// The outlines of white.
+    pub(super) outlines: &'a [Outline],
+    /// The distance at each corner of each outline; the same for all if `None`.
+    pub(super) by: Option<&'a [Vec<f64>]>,
+    /// The least and the greatest distance, not below zero.
+    pub(super) range: [f64; 2],
 }
+
+/// The nearest place of an edge, as seen from a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Near {
+    /// The distance of the pixel's middle in pixels, below zero beyond the edge.
+    pub(super) distance: f32,
+    /// The distance that the edge moves there.
+    pub(super) by: f32,
+    /// How slanted the edge is: the smaller side of its normal of length one.
+    pub(super) slant: f32,
+}
+
+/// Depths are counted in such parts of a pixel.
+pub(super) const SIXTEENTHS: u32 = 16;
+/// The greatest depth in pixels.
+const MAX_DEPTH: f32 = 256.0;
+
+/// The most by which the distance from the nearest source, middle to middle, differs from the
+/// distance from the edge between.
+const STAIR: f64 = 2.0;
 
 /// A run of a row of an [`EdgeMap`].
 #[derive(Clone, Copy, Debug)]
@@ -38,96 +62,113 @@ pub(super) struct EdgePixel {
 pub(super) struct EdgeMap {
     ends: Vec<usize>,
     runs: Vec<EdgeRun>,
-    /// The squared distance of each pixel near an edge from the nearest source.
-    pub(super) squares: Vec<u32>,
+    /// The nearest edge of each pixel near one.
+    near: Vec<Near>,
     /// The level of each of these pixels after the edge has moved.
     pub(super) levels: Vec<u8>,
 }
 
 impl EdgeMap {
-    /// Moves the edges of `classes`. Pixels at least `depth` further inside are deep inside. If
-    /// `all`, the map has pixels of level zero, too.
+    /// Moves the edges of a region, in which no pixel is a source. Pixels at least `depth` further
+    /// inside are deep inside. If `all`, the map has all pixels of level zero, too.
     pub(super) fn new(
         sources: &Sources,
+        region: &RowRuns,
         width: u32,
-        classes: &[SizeClass],
+        edges: Edges<'_>,
         depth: f64,
         all: bool,
     ) -> Self {
-        let height = classes.first().map_or(0, |class| class.region.height());
-        let discs: Vec<_> = classes
-            .iter()
-            .map(|class| {
-                let outer = if all { 0 } else { more_than(class.by) };
-                let inner = at_least(class.by + depth);
-                let discs = [Disc::below(outer, height), Disc::below(inner, height)];
-                (discs, LevelTable::new(class.by, inner))
-            })
-            .collect();
-        let mut edge = Self { ends: vec![0], ..Self::default() };
+        let [least, most] = edges.range;
+        let outer = if all { 0 } else { more_than(least - STAIR) };
+        let reach = most + f64::max(depth, STAIR);
+        let discs = [outer, at_least(reach)].map(|square| Disc::below(square, region.height()));
+        let mut map = Self::runs(sources, region, width, &discs);
+        let is_right = sources.colour() == SourceColour::Black;
+        let by = |of: usize, corner: usize| edges.by.map_or(most, |by| by[of][corner]);
+        measure(&mut map, edges.outlines, by, Measured { is_right, reach: reach + STAIR });
+        map.levels = map.near.iter().map(Near::level).collect();
+        map
+    }
+
+    /// Finds the pixels outside of the first disc around each source, and of these as runs deep
+    /// inside those outside of the second.
+    fn runs(sources: &Sources, region: &RowRuns, width: u32, discs: &[Disc; 2]) -> Self {
+        let mut map = Self { ends: vec![0], ..Self::default() };
         let [mut outer, mut inner] = [Erosion::default(), Erosion::default()];
-        let mut runs = Vec::new();
-        let mut squares = Vec::new();
-        let mut along = match &discs[..] {
-            [([outer, inner], levels)] => {
-                Some((AlignedRows::new(sources, [outer, inner], width), levels))
-            }
-            _ => None,
-        };
-        let mut sides = Vec::new();
-        for row in 0..height {
-            if let Some((along, levels)) = &mut along
-                && along.row(row, &mut sides)
-            {
-                edge.push_along(&sides, discs[0].0[1].halves().len(), levels, &mut squares);
-                edge.ends.push(edge.runs.len());
-                continue;
-            }
-            let first = edge.runs.len();
-            for (class, ([outer_disc, inner_disc], levels)) in classes.iter().zip(&discs) {
-                sources.erode(outer_disc, row, class.region.row(row), &mut outer);
-                sources.erode(inner_disc, row, &outer.runs, &mut inner);
-                let deep = inner.runs.iter().map(|&run| EdgeRun { columns: run, first: None });
-                edge.runs.extend(deep);
-                subtract(&outer.runs, &inner.runs, &mut runs);
-                for &run in &runs {
-                    sources.squares(row, run, levels.limit, &mut squares);
-                    edge.push(run, levels, &squares);
+        let mut along = AlignedRows::new(sources, [&discs[0], &discs[1]], width);
+        let (mut aligned, mut runs) = (Vec::new(), Vec::new());
+        for row in 0..region.height() {
+            if along.row(row, &mut aligned) {
+                for &[outer, inner] in &aligned {
+                    map.push_near((outer.0, inner.0));
+                    map.runs.push(EdgeRun { columns: inner, first: None });
+                    map.push_near((inner.1, outer.1));
                 }
+            } else {
+                let first = map.runs.len();
+                sources.erode(&discs[0], row, region.row(row), &mut outer);
+                sources.erode(&discs[1], row, &outer.runs, &mut inner);
+                let deep = inner.runs.iter().map(|&run| EdgeRun { columns: run, first: None });
+                map.runs.extend(deep);
+                subtract(&outer.runs, &inner.runs, &mut runs);
+                runs.iter().for_each(|&run| map.push_near(run));
+                map.runs[first..].sort_unstable_by_key(|run| run.columns);
             }
-            edge.runs[first..].sort_unstable_by_key(|run| run.columns);
-            edge.ends.push(edge.runs.len());
+            map.ends.push(map.runs.len());
         }
-        edge
+        map
     }
 
-    /// Adds a row of aligned runs.
-    fn push_along(
+    /// Adds a run near an edge, unless it is empty.
+    fn push_near(&mut self, run: Run) {
+        if run.0 < run.1 {
+            let first = u32::try_from(self.near.len()).expect("an image has fewer pixels at edges");
+            self.runs.push(EdgeRun { columns: run, first: Some(first) });
+            self.near.resize(self.near.len() + (run.1 - run.0) as usize, Near::FAR);
+        }
+    }
+
+    /// Calls `look` with each pixel near an edge in some columns of a row, from the first up to,
+    /// but without, the second.
+    pub(super) fn for_each_near(
         &mut self,
-        runs: &[AlignedRun],
-        reach: usize,
-        levels: &LevelTable,
-        squares: &mut Vec<u32>,
+        row: u32,
+        (start, end): Run,
+        mut look: impl FnMut(i32, &mut Near),
     ) {
-        for sides in runs {
-            let [outer, inner] = [sides.outer, sides.inner];
-            if outer.0 < inner.0 {
-                sides.squares(reach, true, squares);
-                self.push((outer.0, inner.0), levels, squares);
-            }
-            self.runs.push(EdgeRun { columns: inner, first: None });
-            if inner.1 < outer.1 {
-                sides.squares(reach, false, squares);
-                self.push((inner.1, outer.1), levels, squares);
+        if start >= end {
+            return;
+        }
+        let runs = &self.runs[self.ends[row as usize]..self.ends[row as usize + 1]];
+        let next = runs.partition_point(|run| run.columns.1 <= start);
+        for run in runs[next..].iter().take_while(|run| run.columns.0 < end) {
+            let Some(first) = run.first else { continue };
+            let [from, to] = [run.columns.0.max(start), run.columns.1.min(end)];
+            let places =
+                [from, to].map(|column| first as usize + (column - run.columns.0) as usize);
+            for (column, near) in (from..to).zip(&mut self.near[places[0]..places[1]]) {
+                look(column, near);
             }
         }
     }
 
-    fn push(&mut self, run: Run, levels: &LevelTable, squares: &[u32]) {
-        let first = u32::try_from(self.squares.len()).expect("an image has fewer pixels at edges");
-        self.runs.push(EdgeRun { columns: run, first: Some(first) });
-        self.squares.extend_from_slice(squares);
-        self.levels.extend(squares.iter().map(|&square| levels.of(square)));
+    /// Returns the depth of a pixel inside its edge, in sixteenths of a pixel, from 1 on.
+    pub(super) fn depth(&self, index: u32) -> u32 {
+        // A pixel at an upright edge is a pixel deep. Pixels that are too far to be measured are
+        // as deep as any edge is searched.
+        let distance = f64::from(self.near[index as usize].distance.min(MAX_DEPTH));
+        (f64::from(SIXTEENTHS) * (distance + 0.5)).round().max(1.0) as u32
+    }
+
+    /// Returns the nearest edge of a pixel.
+    pub(super) fn near(&self, index: u32) -> Near {
+        self.near[index as usize]
+    }
+
+    /// Returns the number of pixels near edges.
+    pub(super) fn near_count(&self) -> usize {
+        self.near.len()
     }
 
     pub(super) fn height(&self) -> u32 {
@@ -198,29 +239,37 @@ impl EdgeMap {
     }
 }
 
-/// Levels of pixels by their squared distance. Most squares are small, so a table spares roots.
-struct LevelTable {
-    by: f64,
-    /// The end of the squares.
-    limit: u64,
-    /// The levels of the first squares.
-    table: Vec<u8>,
+impl Near {
+    /// Farther from all edges than is measured.
+    const FAR: Self = Self { distance: f32::MAX, by: 0.0, slant: 0.0 };
+
+    /// Returns the nearest edge of a pixel in the direction of a normal of length one.
+    pub(super) fn new(distance: f64, by: f64, normal: [f64; 2]) -> Self {
+        let slant = normal[0].abs().min(normal[1].abs()) as f32;
+        Self { distance: distance as f32, by: by as f32, slant }
+    }
+
+    /// Returns the level of the pixel: the share of its area that is inside the moved edge.
+    fn level(&self) -> u8 {
+        level(share_inside(f64::from(self.distance) - f64::from(self.by), f64::from(self.slant)))
+    }
 }
 
-impl LevelTable {
-    fn new(by: f64, limit: u64) -> Self {
-        let table = (0..limit.min(4096) as u32).map(|square| Self::level(square, by)).collect();
-        Self { by, limit, table }
-    }
-
-    fn of(&self, square: u32) -> u8 {
-        let known = self.table.get(square as usize).copied();
-        known.unwrap_or_else(|| Self::level(square, self.by))
-    }
-
-    fn level(square: u32, by: f64) -> u8 {
-        level(f64::from(square).sqrt() - by)
-    }
+/// Returns the share of a pixel's area inside a straight edge, whose distance from the pixel's
+/// middle is below zero if that is outside, and whose normal has the smaller side `slant`.
+fn share_inside(distance: f64, slant: f64) -> f64 {
+    let steep = (1.0 - slant * slant).sqrt();
+    let away = distance.abs();
+    let beyond = (steep + slant) / 2.0 - away;
+    let share = if beyond <= 0.0 {
+        1.0
+    } else if beyond <= slant {
+        // The edge cuts a corner off.
+        1.0 - beyond * beyond / (2.0 * steep * slant)
+    } else {
+        0.5 + away / steep
+    };
+    if distance < 0.0 { 1.0 - share } else { share }
 }
 
 /// Returns the level of a pixel of which a share, from 0 to 1, is exposed.

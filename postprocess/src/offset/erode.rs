@@ -43,6 +43,10 @@ impl Sources {
         Self { colour, between }
     }
 
+    pub(super) fn colour(&self) -> SourceColour {
+        self.colour
+    }
+
     /// Returns the runs without a source in a row, which may lie outside the image.
     pub(super) fn row(&self, row: i64) -> &[Run] {
         match u32::try_from(row) {

@@ -2,38 +2,43 @@
 //!
 //! Source: 002 section 3.4: every cured region is wider than its image.
 //!
-//! The distance of a white pixel is that of its centre from the nearest black pixel's centre.
-//! Its square is a whole number, so distances are exact. Outside the image all is black. When an
-//! edge moves inwards by `r`, a pixel at distance `D` keeps the share `D - r`, from 0 to 1, as its
-//! level: a straight edge moves by exactly `r`. Growing is the shrinking of what is black, within
-//! the image. In 1-bit form a pixel is white if its share is a half or more.
+//! An edge lies on the mean line of its stair of pixels, so at no angle is it off. [`contours`]
+//! follows the stairs, [`straight`] splits them into the longest that straight edges leave, and
+//! [`outline`] joins their mean lines. When an edge moves inwards by `r`, a pixel whose middle is
+//! `d` inside of it keeps the share `d - r + 1/2`, from 0 to 1, as its level: a straight edge moves
+//! by exactly `r`. Growing is the shrinking of what is black, within the image. Outside the image
+//! all is black.
 //!
-//! [`erode`] cuts rows by the disc around each pixel of the other colour. [`boundary_distance`]
-//! measures the pixels near edges, [`aligned_rows`] does both at once for plain rows, and
+//! [`erode`] cuts rows by the disc around each pixel of the other colour, which finds the pixels
+//! near edges ([`aligned_rows`] is faster for plain rows); [`closest`] measures them, and
 //! [`edge_map`] keeps the result. [`skeleton`] finds thin walls, except where [`plain`] tells
 //! that there are none, and [`walls`] measures them. Where walls are not kept, [`components`]
-//! finds those that vanish or break. [`local_thickness`] gives the size of places, and [`scale`]
-//! makes up for firing.
+//! finds those that vanish or break. [`feature_size`] gives the size of the feature at each edge,
+//! and [`scale`] makes up for firing.
 
 mod aligned_rows;
-mod boundary_distance;
+mod closest;
 mod compensate;
 mod components;
+mod contours;
 mod edge_map;
 mod erode;
-mod local_thickness;
+mod feature_size;
+mod outline;
 mod plain;
 mod row_runs;
 mod scale;
 mod skeleton;
+mod straight;
 mod tolerance;
 mod walls;
 mod widths;
 
 use lamp_stack::{GrayMask, Mask};
 
-use edge_map::{EdgeMap, EdgePixel, SizeClass};
+use edge_map::{EdgeMap, Edges};
 use erode::{Disc, SourceColour, Sources};
+use feature_size::MovedOutlines;
 use row_runs::RowRuns;
 use skeleton::Cores;
 
@@ -46,8 +51,7 @@ pub use tolerance::beyond_tolerance;
 pub use walls::ThinWall;
 pub use widths::Widths;
 
-/// The greatest distance that edges move, in pixels; larger ones count as this. The sum of two
-/// squares of such distances fits in 32 bits.
+/// The greatest distance that edges move, in pixels; larger ones count as this.
 const MAX_OFFSET: f64 = 30_000.0;
 
 /// Moves all edges of a mask inwards by `inwards` pixels, outwards if below zero, up to 30 000.
@@ -66,13 +70,17 @@ const MAX_OFFSET: f64 = 30_000.0;
 pub fn offset(mask: &Mask, inwards: f64) -> GrayMask {
     let (colour, level_outside) =
         if inwards < 0.0 { (SourceColour::White, 255) } else { (SourceColour::Black, 0) };
-    let classes = [SizeClass { region: region(mask, colour), by: inwards.abs().min(MAX_OFFSET) }];
-    let edge = EdgeMap::new(&Sources::new(mask, colour), mask.width(), &classes, 1.0, false);
+    let outlines = outline::outlines(&RowRuns::white(mask));
+    let by = inwards.abs().min(MAX_OFFSET);
+    let edges = Edges { outlines: &outlines, by: None, range: [by, by] };
+    let sources = Sources::new(mask, colour);
+    let edge = EdgeMap::new(&sources, &region(mask, colour), mask.width(), edges, 1.0, false);
     edge.gray(mask.width(), level_outside)
 }
 
 /// Moves all edges of a mask inwards by `inwards` pixels, outwards if below zero, to the nearest
-/// pixel.
+/// pixel. Edges are taken as the stairs that they are: of what is left, no pixel's middle is
+/// nearer than the distance and half a pixel to the middle of one of the other colour.
 pub fn offset_one_bit(mask: &Mask, inwards: f64) -> Mask {
     let colour = if inwards < 0.0 { SourceColour::White } else { SourceColour::Black };
     let disc = Disc::below(erode::at_least(inwards.abs() + 0.5), mask.height());
@@ -81,34 +89,32 @@ pub fn offset_one_bit(mask: &Mask, inwards: f64) -> Mask {
     if colour == SourceColour::White { left.inverted() } else { left }
 }
 
-/// Moves the edges of a mask inwards by distances that depend on the sizes of places, and keeps
+/// Moves the edges of a mask inwards by distances that depend on the sizes of features, and keeps
 /// thin walls: none breaks, and each stays as wide as `min_feature` pixels, or as it was if it was
 /// thinner. Zero keeps no walls.
 ///
 /// Components without a pixel of half level are removed. If walls are kept, the cost follows the
 /// pixels near edges, as deep as edges move and half of `min_feature`.
 pub fn shrink(mask: &Mask, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<ThinWall>) {
-    let regions = local_thickness::by_size(mask, widths.sizes());
-    let classes: Vec<SizeClass> = regions
-        .into_iter()
-        .zip(widths.by())
-        .map(|(region, &by)| SizeClass { region, by })
-        .collect();
+    let white = RowRuns::white(mask);
+    let outlines = outline::outlines(&white);
+    let moved = (!widths.are_uniform()).then(|| feature_size::moved(&white, &outlines, widths));
+    let edges = match &moved {
+        Some(MovedOutlines { outlines, by, range }) => {
+            Edges { outlines, by: Some(by), range: *range }
+        }
+        None => Edges { outlines: &outlines, by: None, range: widths.range() },
+    };
     let sources = Sources::new(mask, SourceColour::Black);
     if min_feature <= 0.0 {
-        let edge = EdgeMap::new(&sources, mask.width(), &classes, 1.0, false);
+        let edge = EdgeMap::new(&sources, &white, mask.width(), edges, 1.0, false);
         return (edge.gray(mask.width(), 0), Vec::new());
     }
     // Further inside, a wall is wide enough even after it has shrunk.
     let depth = f64::max(1.0, 0.5 + min_feature / 2.0);
-    let mut edge = EdgeMap::new(&sources, mask.width(), &classes, depth, true);
-    let cores = Cores::of(&edge, widths.range()[1] + depth);
-    cores.widen(&mut edge, min_feature);
-    let by = |pixel: &EdgePixel| {
-        let holds = |class: &&SizeClass| class.region.find(pixel.column, pixel.row).is_some();
-        classes.iter().find(holds).map_or(0.0, |class| class.by)
-    };
-    let walls = cores.cores.iter().filter_map(|core| ThinWall::of(&edge, core, by)).collect();
+    let mut edge = EdgeMap::new(&sources, &white, mask.width(), edges, depth, true);
+    let cores = Cores::of(&edge, edges.range[1] + depth);
+    let walls = cores.keep(&mut edge, min_feature);
     (components::without_specks(edge.gray(mask.width(), 0)), walls)
 }
 
@@ -121,4 +127,8 @@ fn region(mask: &Mask, colour: SourceColour) -> RowRuns {
 }
 
 #[cfg(test)]
+mod edge_place_tests;
+#[cfg(test)]
 mod offset_tests;
+#[cfg(test)]
+mod size_tests;

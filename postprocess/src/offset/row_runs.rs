@@ -46,6 +46,19 @@ impl RowRuns {
         &self.runs[self.ends[row]..self.ends[row + 1]]
     }
 
+    /// Returns the runs of a row; none outside the image.
+    pub(super) fn row_or_none(&self, row: i64) -> &[Run] {
+        match u32::try_from(row) {
+            Ok(row) if row < self.height() => self.row(row),
+            _ => &[],
+        }
+    }
+
+    /// Returns the index of a run of a row, counted through all rows.
+    pub(super) fn index(&self, row: u32, run: usize) -> usize {
+        self.ends[row as usize] + run
+    }
+
     /// Returns the runs of all rows.
     pub(super) fn all(&self) -> &[Run] {
         &self.runs

@@ -8,9 +8,9 @@
 
 use lamp_stack::Grouped;
 
-use super::edge_map::{EdgeMap, EdgePixel, level};
-use super::erode;
+use super::edge_map::{EdgeMap, EdgePixel, SIXTEENTHS, level};
 use super::plain::plain_runs;
+use super::walls::{Across, ThinWall};
 
 /// The steps to the neighbours, (column, row), counter-clockwise from the right.
 const AROUND: [(i32, i32); 8] =
@@ -21,13 +21,16 @@ const BLACK: u32 = 0;
 const DEEP: u32 = 1;
 const FIRST: u32 = 2;
 
+/// From this width on, in pixels, a wall does not break between two rows of pixels.
+const SAFE_WIDTH: f64 = 1.5;
+
 /// The cores of thin walls: groups of connected skeleton pixels.
 #[derive(Debug)]
 pub(super) struct Cores {
     /// The neighbours of each pixel near an edge, unless its run is plain.
     around: Vec<[u32; 8]>,
     /// The pixels of each core.
-    pub(super) cores: Vec<Vec<EdgePixel>>,
+    cores: Vec<Vec<EdgePixel>>,
 }
 
 impl Cores {
@@ -46,18 +49,31 @@ impl Cores {
         Self { around, cores }
     }
 
-    /// Exposes each core to a width of `width` pixels, or as wide as the wall is.
-    pub(super) fn widen(&self, edge: &mut EdgeMap, width: f64) {
+    /// Exposes the walls of the cores where they would become thinner than `width` pixels: to
+    /// that, or as wide as they are. Returns them.
+    pub(super) fn keep(&self, edge: &mut EdgeMap, width: f64) -> Vec<ThinWall> {
+        let is_thin =
+            |core: &&EdgePixel| Across::at(edge, core).asked < f64::max(width, SAFE_WIDTH);
+        let thin: Vec<Vec<EdgePixel>> = self
+            .cores
+            .iter()
+            .map(|core| core.iter().filter(is_thin).copied().collect())
+            .filter(|thin: &Vec<_>| !thin.is_empty())
+            .collect();
+        for core in self.cores.iter().flatten() {
+            edge.levels[core.index as usize] = 255;
+        }
         // A slanted core has fewer pixels for its length, so each exposes a little more.
         let mut ball = Ball::new(width / 2.0 + 0.75);
         // A wall that is not wider than that stays whole.
         let mut whole_wall = Ball::new(width / 2.0 + 1.0);
-        let no_wider = erode::more_than(width / 2.0 + 0.5);
-        for core in self.cores.iter().flatten() {
-            let square = u64::from(edge.squares[core.index as usize]);
-            let ball = if square < no_wider { &mut whole_wall } else { &mut ball };
+        let no_wider = ((width / 2.0 + 0.75) * f64::from(SIXTEENTHS)).round() as u32;
+        for core in thin.iter().flatten() {
+            let is_narrow = edge.depth(core.index) <= no_wider;
+            let ball = if is_narrow { &mut whole_wall } else { &mut ball };
             ball.expose(core.index, &self.around, &mut edge.levels);
         }
+        thin.iter().filter_map(|places| ThinWall::of(edge, places)).collect()
     }
 }
 
@@ -105,7 +121,7 @@ impl Ball {
 
 /// Returns the neighbours of each pixel that is not in a plain run.
 fn neighbours(edge: &EdgeMap, plain: &[bool]) -> Vec<[u32; 8]> {
-    let mut all = vec![[BLACK; 8]; edge.squares.len()];
+    let mut all = vec![[BLACK; 8]; edge.near_count()];
     let mut plain = plain.iter();
     for row in 0..i64::from(edge.height()) {
         let rows = [-1, 0, 1].map(|step| edge.row(row + step));
@@ -146,9 +162,9 @@ fn neighbours(edge: &EdgeMap, plain: &[bool]) -> Vec<[u32; 8]> {
 
 /// Removes all pixels that may go, and those in plain runs. Returns which are left.
 fn thinned(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
-    let mut left = vec![false; edge.squares.len()];
+    let mut left = vec![false; edge.near_count()];
     edge.for_each(plain, |pixel| left[pixel.index as usize] = true);
-    let mut order = outside_first(&edge.squares, &left);
+    let mut order = outside_first(edge, &left);
     let ends = ends(edge, plain, around);
     order.retain(|&index| !ends[index as usize]);
     loop {
@@ -165,25 +181,25 @@ fn thinned(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
 }
 
 /// Returns the pixels that are present, the nearest to an edge first (a counting sort, stable).
-fn outside_first(squares: &[u32], there: &[bool]) -> Vec<u32> {
-    let those = || (0..).zip(squares).zip(there).filter(|(_, there)| **there).map(|(of, _)| of);
-    let most = squares.iter().copied().max().map_or(0, |most| most as usize);
-    Grouped::new(most + 1, || those().map(|(of, &square)| (square as usize, of))).into_items()
+fn outside_first(edge: &EdgeMap, there: &[bool]) -> Vec<u32> {
+    let those = || (0..).zip(there).filter(|(_, there)| **there).map(|(of, _)| of);
+    let most = those().map(|of| edge.depth(of)).max().map_or(0, |most| most as usize);
+    Grouped::new(most + 1, || those().map(|of| (edge.depth(of) as usize, of))).into_items()
 }
 
 /// Returns which pixels must stay so that walls keep their length: those furthest inside among
 /// their neighbours, except in corners.
 fn ends(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
-    let square = |index: u32| match index {
+    let depth = |index: u32| match index {
         BLACK => 0,
         DEEP => u32::MAX,
-        index => edge.squares[(index - FIRST) as usize],
+        index => edge.depth(index - FIRST),
     };
-    let mut ends = vec![false; edge.squares.len()];
+    let mut ends = vec![false; edge.near_count()];
     edge.for_each(plain, |pixel| {
         let index = pixel.index as usize;
-        let own = edge.squares[index];
-        let is_furthest = around[index].iter().all(|&other| square(other) <= own);
+        let own = edge.depth(pixel.index);
+        let is_furthest = around[index].iter().all(|&other| depth(other) <= own);
         // A pixel that stays exposed anyway must stay connected.
         ends[index] = is_furthest && (edge.levels[index] >= 128 || !is_in_corner(edge, &pixel));
     });
@@ -194,17 +210,14 @@ fn ends(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
 /// within twice the radius from a pixel that is deep inside, or the centre of a disc inside the
 /// shape that is larger than its own by a pixel.
 fn is_in_corner(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
-    let radius = f64::from(edge.squares[pixel.index as usize]).sqrt() + 1.0;
-    let larger = erode::at_least(radius);
-    let reach = (2.0 * radius) as i32;
+    let larger = edge.depth(pixel.index) + SIXTEENTHS;
+    let twice = 2.0 * f64::from(larger) / f64::from(SIXTEENTHS);
+    let reach = twice as i32;
     let is_larger = |column: i32, row: i32| {
         let place = edge.at(pixel.column + column, i64::from(pixel.row) + i64::from(row));
-        place.is_some_and(|along| {
-            along.is_none_or(|i| u64::from(edge.squares[i as usize]) >= larger)
-        })
+        place.is_some_and(|along| along.is_none_or(|index| edge.depth(index) >= larger))
     };
-    let is_near =
-        |column: i32, row: i32| u64::from((column * column + row * row) as u32) < 4 * larger;
+    let is_near = |column: i32, row: i32| f64::from(column * column + row * row) < twice * twice;
     (-reach..=reach)
         .any(|row| (-reach..=reach).any(|column| is_near(column, row) && is_larger(column, row)))
 }

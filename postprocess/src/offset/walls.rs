@@ -25,17 +25,11 @@ pub struct ThinWall {
 const MIN_DIFFERENCE: f64 = 0.25;
 
 impl ThinWall {
-    /// Returns the wall of a core whose sides should move by `by` each, if they moved less.
-    pub(super) fn of(
-        edge: &EdgeMap,
-        core: &[EdgePixel],
-        by: impl Fn(&EdgePixel) -> f64,
-    ) -> Option<Self> {
+    /// Returns the wall at some places of a core, if its sides moved less than asked.
+    pub(super) fn of(edge: &EdgeMap, core: &[EdgePixel]) -> Option<Self> {
         let mut places: Vec<&EdgePixel> = core.iter().collect();
-        places.sort_by_key(|pixel| edge.squares[pixel.index as usize]);
-        let middle = places[places.len() / 2];
-        let (width, made) = across(edge, middle);
-        let asked = (width - 2.0 * by(middle)).max(0.0);
+        places.sort_by_key(|pixel| edge.depth(pixel.index));
+        let Across { width, asked, made } = Across::at(edge, places[places.len() / 2]);
         if made - asked < MIN_DIFFERENCE {
             return None;
         }
@@ -48,25 +42,57 @@ impl ThinWall {
     }
 }
 
-/// Returns the width of a wall at a pixel, along the shortest of four ways across, and how much
-/// of that is exposed.
-fn across(edge: &EdgeMap, pixel: &EdgePixel) -> (f64, f64) {
-    let radius = f64::from(edge.squares[pixel.index as usize]).sqrt();
-    let most = (3.0 * radius) as i64 + 2;
-    let ways = [(1, 0), (0, 1), (1, 1), (1, -1)].map(|(right, down)| {
-        let place = |step: i64| {
-            let column = i64::from(pixel.column) + right * step;
-            let place = edge.at(column as i32, i64::from(pixel.row) + down * step)?;
-            Some(place.map_or(255, |index| edge.levels[index as usize]))
-        };
-        let ahead = (0..most).map_while(place);
-        let levels: Vec<u8> = ahead.chain((1..most).map_while(|step| place(-step))).collect();
+/// A wall at one place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Across {
+    /// The width before.
+    width: f64,
+    /// The width asked for, not below zero.
+    pub(super) asked: f64,
+    /// The width that is exposed.
+    made: f64,
+}
+
+/// Ways across a wall, (right, down). One of them is within 14 degrees of its normal.
+const WAYS: [(i64, i64); 8] = [(1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2)];
+
+impl Across {
+    /// Returns the wall at a pixel of its core, along the shortest of eight ways.
+    pub(super) fn at(edge: &EdgeMap, pixel: &EdgePixel) -> Self {
+        let ways = WAYS.map(|way| Self::along(edge, pixel, way));
+        let shortest = ways.into_iter().min_by(|a, b| a.width.total_cmp(&b.width));
+        shortest.expect("there are eight")
+    }
+
+    fn along(edge: &EdgeMap, pixel: &EdgePixel, (right, down): (i64, i64)) -> Self {
+        let most = 3 * i64::from(edge.depth(pixel.index)) / 16 + 2;
         let step = ((right * right + down * down) as f64).sqrt();
-        let sum: f64 = levels.iter().copied().map(f64::from).sum();
-        (levels.len() as f64 * step, sum / 255.0 * step)
-    });
-    let shortest = ways.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    let (width, made) = shortest.expect("there are four");
-    let true_width = width.min(2.0 * radius);
-    (true_width, made * true_width / width)
+        let at = |steps: i64| {
+            let column = i64::from(pixel.column) + right * steps;
+            edge.at(column as i32, i64::from(pixel.row) + down * steps)
+        };
+        // What lies between the pixels at the ends, and beyond them up to the edges.
+        let own = edge.near(pixel.index);
+        let mut sum = f64::from(edge.levels[pixel.index as usize]);
+        let mut sides = 0.0;
+        let mut moved = 0.0;
+        for sign in [1, -1] {
+            let mut last = own;
+            for place in (1..most).map_while(|steps| at(sign * steps)) {
+                sides += step;
+                match place {
+                    Some(index) => {
+                        last = edge.near(index);
+                        sum += f64::from(edge.levels[index as usize]);
+                    }
+                    None => sum += 255.0,
+                }
+            }
+            sides += f64::from(last.distance.max(0.0));
+            moved += f64::from(last.by);
+        }
+        let width = sides.max(0.5);
+        let made = (sum / 255.0 * step).min(width);
+        Self { width, asked: (width - moved).max(0.0), made }
+    }
 }

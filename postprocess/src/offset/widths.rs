@@ -1,6 +1,6 @@
-//! The distances that edges move, by the sizes of places.
+//! The distances that edges move, by the sizes of features.
 
-/// Distances that edges move inwards, in pixels, by the size of the place.
+/// Distances that edges move inwards, in pixels, by the size of the feature.
 ///
 /// ```
 /// use lamp_postprocess::Widths;
@@ -11,76 +11,69 @@
 /// ```
 ///
 /// # Guarantees
-/// Sizes increase. There is one more distance than sizes; the first is for places smaller than
-/// all. If there are sizes, no distance is below zero.
+/// There is a size; sizes increase. If there is more than one, no distance is below zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Widths {
-    sizes: Vec<f64>,
-    by: Vec<f64>,
+    /// Sizes, and the distance of each.
+    points: Vec<[f64; 2]>,
 }
 
-/// The greatest change of distance from one class of sizes to the next, in pixels.
-const STEP: f64 = 0.25;
-/// The greatest number of classes between two sizes, as each costs as much as one distance.
-const MAX_STEPS: f64 = 32.0;
+/// The straight lines that stand for the distances between two sizes.
+const LINES: u32 = 32;
 
 impl Widths {
     /// Returns one distance for all places; outwards if below zero.
     pub fn uniform(inwards: f64) -> Self {
-        Self { sizes: Vec::new(), by: vec![inwards] }
+        Self { points: vec![[0.0, inwards]] }
     }
 
-    /// Returns the distance `width` for each size, in pixels: that of the first of `sizes` for
-    /// smaller places, and that of the last for larger ones.
+    /// Returns the distance `width` for each size, in pixels, between the first and the last of
+    /// `sizes`: smooth between two of these. Smaller features move like those of the first size,
+    /// larger ones like those of the last.
     ///
-    /// Between two of `sizes` the distance changes in steps of up to a quarter of a pixel.
     /// Distances below zero count as zero.
     pub fn by_size(sizes: &[f64], width: impl Fn(f64) -> f64) -> Self {
-        let width = |size: f64| width(size).max(0.0);
-        let mut widths = Self::uniform(sizes.first().map_or(0.0, |&size| width(size)));
-        for pair in sizes.windows(2) {
-            let [from, to] = [pair[0], pair[1]];
-            let change = (width(to) - width(from)).abs();
-            let steps = (change / STEP).ceil().clamp(1.0, MAX_STEPS);
-            let size = |step: f64| from + (to - from) * step / steps;
-            for step in 0..steps as u32 {
-                let step = f64::from(step);
-                widths.push(size(step), width(size(step + 0.5)));
-            }
+        let mut points = Vec::new();
+        let mut push = |size: f64| points.push([size, width(size).max(0.0)]);
+        sizes.first().into_iter().for_each(|&size| push(size));
+        for pair in sizes.windows(2).filter(|pair| pair[0] < pair[1]) {
+            let share = |line: u32| f64::from(line) / f64::from(LINES);
+            (1..=LINES).for_each(|line| push(pair[0] + share(line) * (pair[1] - pair[0])));
         }
-        if let Some(&last) = sizes.last() {
-            widths.push(last, width(last));
-        }
-        widths
+        if points.is_empty() { Self::uniform(0.0) } else { Self { points } }
     }
 
-    /// Adds a class of larger places, unless their edges move like those of the class before.
-    fn push(&mut self, size: f64, by: f64) {
-        if self.by.last() != Some(&by) {
-            self.sizes.push(size);
-            self.by.push(by);
-        }
+    /// Returns the distance for features of a size.
+    pub(super) fn at(&self, size: f64) -> f64 {
+        let next = self.points.partition_point(|point| point[0] <= size);
+        let [Some(&[from, low]), Some(&[to, high])] =
+            [next.checked_sub(1).and_then(|before| self.points.get(before)), self.points.get(next)]
+        else {
+            return self.points[next.min(self.points.len() - 1)][1];
+        };
+        low + (size - from) / (to - from) * (high - low)
     }
 
-    /// Returns the sizes at which classes begin.
-    pub(super) fn sizes(&self) -> &[f64] {
-        &self.sizes
-    }
-
-    /// Returns the distance of each class.
-    pub(super) fn by(&self) -> &[f64] {
-        &self.by
+    /// Returns the size from which on all features move alike.
+    pub(super) fn largest_size(&self) -> f64 {
+        self.points[self.points.len() - 1][0]
     }
 
     /// Returns the least and the greatest distance.
     pub fn range(&self) -> [f64; 2] {
-        let least = self.by.iter().copied().fold(f64::INFINITY, f64::min);
-        [least, self.by.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+        let by = || self.points.iter().map(|point| point[1]);
+        [by().fold(f64::INFINITY, f64::min), by().fold(f64::NEG_INFINITY, f64::max)]
     }
 
     /// Returns whether no edge moves.
     pub fn are_zero(&self) -> bool {
-        self.by.iter().all(|&by| by == 0.0)
+        self.range() == [0.0, 0.0]
+    }
+
+    /// Returns whether all features move alike.
+    pub(super) fn are_uniform(&self) -> bool {
+        let [least, most] = self.range();
+        least == most
     }
 }
 
@@ -89,17 +82,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn between_two_sizes_it_changes_in_small_steps() {
-        let widths = Widths::by_size(&[20.0, 40.0], |size| size / 20.0);
-        assert_eq!(widths.sizes(), [20.0, 25.0, 30.0, 35.0, 40.0]);
-        assert_eq!(widths.by(), [1.0, 1.125, 1.375, 1.625, 1.875, 2.0]);
-        assert_eq!(widths.range(), [1.0, 2.0]);
+    fn between_sizes_it_changes_smoothly() {
+        let widths = Widths::by_size(&[20.0, 40.0, 100.0], |size| (size / 20.0).powi(2));
+        for (size, by) in [(0.0, 1.0), (20.0, 1.0), (33.0, 2.7225), (77.0, 14.8225), (400.0, 25.0)]
+        {
+            assert!((widths.at(size) - by).abs() < 0.003, "{size}");
+        }
+        assert_eq!((widths.largest_size(), widths.range()), (100.0, [1.0, 25.0]));
+        assert!(!widths.are_uniform());
     }
 
     #[test]
     fn one_size_is_the_same_for_all() {
-        assert_eq!(Widths::by_size(&[20.0], |_| 1.5), Widths::uniform(1.5));
-        assert_eq!(Widths::by_size(&[20.0, 30.0], |_| 1.5), Widths::uniform(1.5));
+        for widths in [Widths::by_size(&[20.0], |_| 1.5), Widths::by_size(&[20.0, 30.0], |_| 1.5)] {
+            assert!(widths.are_uniform() && !widths.are_zero());
+            assert_eq!([0.0, 20.0, 25.0, 90.0].map(|size| widths.at(size)), [1.5; 4]);
+        }
         assert!(Widths::by_size(&[20.0, 30.0], |size| -size).are_zero());
+        assert!(Widths::by_size(&[], |size| size).are_zero());
     }
 }
