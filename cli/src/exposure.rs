@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::calibrate::{CsvTable, ExposureTimes};
-use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::{ExposureTime, Resin};
+use lamp_grayscale::material::{Material, ResinError};
+use lamp_grayscale::resin::{CureModel, Dose, ExposureTime, Intensity, depth_levels};
 use lamp_stack::{DepthLevels, FadingLevels, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::catalogue::{canonical_word, entry, is_file, read_text};
 use crate::exit::Exit;
+use crate::lamp_option::LampOption;
 use crate::measured_doses::MeasuredDoses;
 use crate::recorded::text;
 use crate::streams::input_name;
@@ -38,6 +39,10 @@ pub(crate) struct ExposureOptions {
     #[serde(with = "text")]
     overcure: f64,
 
+    #[command(flatten, next_help_heading = EXPOSURE)]
+    #[serde(flatten)]
+    lamp: LampOption,
+
     /// Exposure times by layer thickness, instead of a material: a table with the columns
     /// thickness_um and exposure_ms. Times between two rows are interpolated linearly
     #[arg(long, value_name = "FILE.csv", conflicts_with = "material", help_heading = EXPOSURE)]
@@ -51,13 +56,26 @@ pub(crate) struct Exposure {
 }
 
 enum Source {
-    Resin { material: Box<Material>, resin: Resin, overcure: f64, doses: MeasuredDoses },
+    Resin(Box<Curing>),
     Table(ExposureTimes),
+}
+
+/// How white cures layers.
+struct Curing {
+    material: Material,
+    /// Unknown where only doses are.
+    light: Option<Intensity>,
+    model: Box<dyn CureModel>,
+    overcure: f64,
+    doses: MeasuredDoses,
+    /// What is doubtful about the lamp.
+    lamp_doubt: Option<String>,
 }
 
 impl Default for ExposureOptions {
     fn default() -> Self {
-        Self { material: None, overcure: 1.0, exposure_table: None }
+        let lamp = LampOption::default();
+        Self { material: None, overcure: 1.0, lamp, exposure_table: None }
     }
 }
 
@@ -104,12 +122,13 @@ impl ExposureOptions {
             return Ok(Some(Exposure { name, source: Source::Table(times) }));
         }
         let Some(path) = &self.material else { return Ok(None) };
-        let material: Material = entry(path)?;
-        let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
+        let (material, lamp_doubt) = self.lamp.material(entry(path)?)?;
+        let model = material.cure_model().map_err(|error| Exit::Failed(error.into()))?;
+        let light = material.light().map_err(anyhow::Error::new)?;
         let doses = MeasuredDoses::of_depths(&material);
-        let name = material.name.clone();
-        let (material, overcure) = (Box::new(material), self.overcure);
-        Ok(Some(Exposure { name, source: Source::Resin { material, resin, overcure, doses } }))
+        let (name, overcure) = (material.name.clone(), self.overcure);
+        let curing = Curing { material, light, model, overcure, doses, lamp_doubt };
+        Ok(Some(Exposure { name, source: Source::Resin(Box::new(curing)) }))
     }
 }
 
@@ -124,16 +143,36 @@ fn read_times(path: &Path) -> anyhow::Result<ExposureTimes> {
 }
 
 impl Exposure {
-    /// Returns the exposure time of a layer, rounded to the microsecond.
-    pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, Exit> {
-        let thickness = thickness.to_whole_nm();
-        let time = match &self.source {
-            Source::Resin { resin, overcure, .. } => {
-                let time = resin.exposure_time(thickness, *overcure);
-                time.map_err(|error| self.failed(error.into()))?
+    /// Checks that a layer has an exposure. Without a light, its dose is enough.
+    pub(crate) fn check(&self, thickness: Length) -> Result<(), Exit> {
+        match &self.source {
+            Source::Resin(curing) if curing.light.is_none() => {
+                self.dose(curing, thickness).map(|_| ())
             }
-            Source::Table(times) => times.of(thickness).ok_or_else(|| {
-                let [least, most] = times.limits();
+            _ => self.time(thickness).map(|_| ()),
+        }
+    }
+
+    /// Checks that exposures have times, and not only doses.
+    pub(crate) fn check_light(&self) -> Result<(), Exit> {
+        match &self.source {
+            Source::Resin(curing) if curing.light.is_none() => Err(self.no_light()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the exposure time of a layer, rounded to the microsecond.
+    ///
+    /// # Errors
+    /// Where the resin or the table does not tell it.
+    pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, Exit> {
+        let time = match &self.source {
+            Source::Resin(curing) => {
+                let light = curing.light.ok_or_else(|| self.no_light())?;
+                self.dose(curing, thickness)? / light
+            }
+            Source::Table(times) => times.of(thickness.to_whole_nm()).ok_or_else(|| {
+                let ([least, most], thickness) = (times.limits(), thickness.to_whole_nm());
                 self.failed(anyhow!("the table covers {least} to {most}, not {thickness}"))
             })?,
         };
@@ -145,20 +184,38 @@ impl Exposure {
     /// # Errors
     /// Where the resin does not say them; a table of times never does.
     pub(crate) fn levels(&self, thickness: Length) -> Result<DepthLevels, Exit> {
-        let Source::Resin { resin, .. } = &self.source else {
+        let Source::Resin(curing) = &self.source else {
             return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
         };
-        resin.depth_levels(self.time(thickness)?).map_err(|error| self.failed(error.into()))
+        let levels = depth_levels(&*curing.model, self.white(curing, thickness)?);
+        levels.map_err(|error| self.failed(error.into()))
     }
 
-    /// Returns a sentence if layers of these thicknesses take doses that the material was not
-    /// measured at.
-    pub(crate) fn doubt(&self, thicknesses: impl Iterator<Item = Length>) -> Option<String> {
-        let Source::Resin { resin, doses, .. } = &self.source else { return None };
-        for thickness in thicknesses {
-            doses.see(resin.light() * self.time(thickness).ok()?);
+    /// Returns sentences on a lamp, and on doses that layers of these thicknesses take, that the
+    /// material was not measured at.
+    pub(crate) fn doubts(&self, thicknesses: impl Iterator<Item = Length>) -> Vec<String> {
+        let Source::Resin(curing) = &self.source else { return Vec::new() };
+        thicknesses.flat_map(|um| self.white(curing, um)).for_each(|dose| curing.doses.see(dose));
+        curing.lamp_doubt.clone().into_iter().chain(curing.doses.doubt("layers")).collect()
+    }
+
+    /// Returns the dose that cures a layer.
+    fn dose(&self, curing: &Curing, thickness: Length) -> Result<Dose, Exit> {
+        let depth = Length::from_um(thickness.to_whole_nm().um() * curing.overcure);
+        curing.model.dose(depth).map_err(|error| self.failed(error.into()))
+    }
+
+    /// Returns the dose that a layer gets, by its rounded time where there is a light.
+    fn white(&self, curing: &Curing, thickness: Length) -> Result<Dose, Exit> {
+        match curing.light {
+            Some(light) => Ok(light * self.time(thickness)?),
+            None => self.dose(curing, thickness),
         }
-        doses.doubt("layers")
+    }
+
+    fn no_light(&self) -> Exit {
+        let error = ResinError::NoLight(self.name.clone());
+        Exit::Failed(error.into())
     }
 
     /// Returns what each gray level leaves in layers of one thickness, where doses add up.
@@ -166,10 +223,10 @@ impl Exposure {
     /// # Errors
     /// Where the resin does not say how light fades; a table of times never does.
     pub(crate) fn fading_levels(&self, thickness: Length) -> Result<FadingLevels, Exit> {
-        let Source::Resin { material, .. } = &self.source else {
+        let Source::Resin(curing) = &self.source else {
             return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
         };
-        let fading = material.fading().map_err(|error| self.failed(error.into()))?;
+        let fading = curing.material.fading().map_err(|error| self.failed(error.into()))?;
         Ok(fading.levels(self.time(thickness)?))
     }
 

@@ -156,10 +156,10 @@ impl FoundHeights {
         }
     }
 
-    /// Returns a sentence if layers take doses that the material was not measured at.
-    pub(crate) fn doubt(&self, exposure: Option<&Exposure>) -> Option<String> {
-        let thickness = |layer: &SweptLayer| Length::from_um(layer.thickness_um);
-        exposure?.doubt(self.heights.layers.iter().map(thickness))
+    /// Returns sentences on exposures that the material was not measured at.
+    pub(crate) fn doubts(&self, exposure: Option<&Exposure>) -> Vec<String> {
+        let thicknesses = self.heights.layers.iter().map(|it| Length::from_um(it.thickness_um));
+        exposure.map_or_else(Vec::new, |exposure| exposure.doubts(thicknesses))
     }
 }
 
@@ -245,7 +245,7 @@ impl HeightOptions {
         };
         if let Some(exposure) = exposure {
             for layer in &heights.layers {
-                exposure.time(Length::from_um(layer.thickness_um))?;
+                exposure.check(Length::from_um(layer.thickness_um))?;
             }
         }
         Ok(FoundHeights { measure, bound, heights })

@@ -19,6 +19,7 @@ mod help;
 mod hints;
 mod json_report;
 mod kept_stack;
+mod lamp_option;
 mod measured_doses;
 mod memory;
 mod mesh_report;

@@ -14,8 +14,8 @@ use serde_json::{Map, Value};
 const RECORDED: &str = "\
     dpi adaptive min max step criterion deviation cusp layers-budget time-budget layer-overhead \
     row-pitch snap thickness plane units fill bodies scale mirror rotate translate tolerance \
-    kernel no-polish gray print-through material overcure exposure-table origin size margin \
-    trust-extent";
+    kernel no-polish gray print-through material overcure lamp-intensity exposure-table origin size \
+    margin trust-extent";
 
 /// Returns the options as words: ` --dpi 1500 --snap` and so on, those for which `applies`
 /// holds.

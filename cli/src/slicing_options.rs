@@ -244,9 +244,9 @@ impl SlicingOptions {
         let options =
             SliceOptions { layers, heights, gray, print_through, memory, ..self.for_slicing() };
         if let Some(exposure) = exposure.as_ref().filter(|_| !self.adaptive) {
-            exposure.time(self.thickness)?;
+            exposure.check(self.thickness)?;
             exposure
-                .doubt(std::iter::once(self.thickness))
+                .doubts(std::iter::once(self.thickness))
                 .iter()
                 .for_each(|doubt| progress.say(doubt));
         }
@@ -277,7 +277,7 @@ impl SlicingOptions {
         let part = self.heights.part(body, self.dpi, self.solid.fill)?;
         let found = self.heights.find(&part, exposure, progress)?;
         found.warn(&|line| progress.say(line));
-        found.doubt(exposure).iter().for_each(|doubt| progress.say(doubt));
+        found.doubts(exposure).iter().for_each(|doubt| progress.say(doubt));
         if self.heights.has_budget() {
             let layers = found.heights.layers.len();
             let bound = found.bound();
@@ -336,6 +336,8 @@ impl SlicingOptions {
             return Err(Exit::usage(format!("{option} needs --adaptive")));
         }
         let exposure = self.exposure.exposure()?;
+        // Gray levels need only doses.
+        exposure.iter().filter(|_| !self.gray).try_for_each(Exposure::check_light)?;
         if self.adaptive {
             self.heights.check(exposure.as_ref())?;
         }

@@ -179,8 +179,11 @@ fn materials() -> impl Strategy<Value = Material> {
                 working_curve: Some(curve),
                 gray,
                 gray_light,
-                dimmed_lamp: dimmed
-                    .map(|CurveLines { critical_dose, .. }| DimmedLines { critical_dose }),
+                dimmed_lamp: dimmed.map(|CurveLines { critical_dose, .. }| DimmedLines {
+                    critical_dose,
+                    penetration_depth: None,
+                    lights: None,
+                }),
                 two_depth,
                 cure_width,
                 kinetics,

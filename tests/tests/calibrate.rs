@@ -203,6 +203,41 @@ fn cure_widths_come_back_from_their_squares() {
     assert_eq!(file.matches("calibrated from squares.csv").count(), 6);
 }
 
+#[test]
+fn the_line_of_an_ageing_lamp_comes_back_from_its_films() {
+    let scratch = Scratch::new();
+    let mut noise = SplitMix(36);
+    let mut csv = "lamp_mw_per_cm2,exposure_ms,depth_um\n".to_owned();
+    for mw in [512.0, 896.0, 1600.0] {
+        for mj in [100.0, 320.0, 480.0, 640.0, 960.0, 1280.0, 1920.0_f64] {
+            // 002 equation 36.
+            let depth = 211.0 * (mj / (109.0 + 18.31 * mw / 1000.0)).ln();
+            let measured = if depth > 0.0 { depth + noise.normal() } else { 0.0 };
+            csv += &format!("{mw},{:.4},{measured:.2}\n", 1000.0 * mj / mw);
+        }
+    }
+    scratch.write("filters.csv", csv.as_bytes());
+    let line = "lamp calibrate lamp filters.csv -o mine.toml --plot lamp.svg";
+    let table = said(&scratch, line);
+    assert!(table.starts_with("18 points of 21 rows (3 uncured, 0 blank left out)\n"), "{table}");
+    holds(estimate(&table, "Ec(I) at zero (mJ/cm2)", 0), 109.0);
+    let [_, low, high] = estimate(&table, "Ec(I) rise (mJ/cm2)", 0);
+    assert!(low <= 18.31 && 18.31 <= high && low > 0.0, "{low} to {high}");
+    holds(estimate(&table, "Dp (um)", 0), 211.0);
+    let file = text(&scratch, "mine.toml");
+    for words in ["[dimmed-lamp.lights]\nfrom = \"512 mW/cm2\"", "[working-curve.critical-dose]"] {
+        assert!(file.contains(words), "no {words} in:\n{file}");
+    }
+    assert!(text(&scratch, "lamp.svg").contains("896 mW/cm"));
+    // A material that has a working curve keeps it.
+    said(&scratch, "lamp calibrate lamp filters.csv --material lamp-suspension -o kept.toml");
+    let kept = text(&scratch, "kept.toml");
+    assert!(kept.contains("value = \"131.5 mJ/cm2\"") && kept.contains("from filters.csv, 18"));
+    let one: String = csv.lines().take(8).map(|line| format!("{line}\n")).collect();
+    scratch.write("one.csv", one.as_bytes());
+    scratch.run("lamp calibrate lamp one.csv").is_refused_with(&["1 light is too few"]);
+}
+
 /// Squares that did not grow tell where growth begins, and commands know where it was measured.
 #[test]
 fn doses_outside_the_measured_ones_are_told() {

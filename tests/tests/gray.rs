@@ -20,6 +20,25 @@ fn gray_pixels(image: &Image) -> u64 {
     runs.filter(|run| run.2 < 255).map(|run| u64::from(run.1 - run.0)).sum()
 }
 
+/// The levels of all pixels.
+fn levels(image: &Image) -> Vec<u8> {
+    let width = image.width();
+    let rows: Vec<Vec<(u32, u32, u8)>> = match image {
+        Image::Gray(gray) => gray.rows().map(|row| gray_runs(row, width).collect()).collect(),
+        Image::Mask(mask) => {
+            let white = |pair: &[u32]| (pair[0], pair.get(1).copied().unwrap_or(width), 255);
+            mask.rows().map(|row| row.chunks(2).map(white).collect()).collect()
+        }
+    };
+    let mut levels = Vec::new();
+    for runs in rows {
+        let mut row = vec![0; width as usize];
+        runs.iter().for_each(|&(from, to, level)| row[from as usize..to as usize].fill(level));
+        levels.extend(row);
+    }
+    levels
+}
+
 #[test]
 fn gray_stacks_go_through_the_pipeline() {
     let scratch = with_tower();
@@ -46,6 +65,69 @@ fn gray_stacks_go_through_the_pipeline() {
     let said = String::from_utf8(said).unwrap();
     for line in ["of them gray", "exposure:   550.942 ms", "CCITT Group 4 and Deflate"] {
         assert!(said.contains(line), "{said}");
+    }
+}
+
+/// Levels are shares of a dose, which a material without an intensity has, too.
+#[test]
+fn levels_need_no_light() {
+    let scratch = with_tower();
+    let show = scratch.run("lamp material show lamp-suspension").succeeds().stdout;
+    let bright = String::from_utf8(show).unwrap();
+    let (head, rest) = bright.split_once("[intensity]").unwrap();
+    let rest = rest.split_once("[working-curve.critical-dose]").unwrap().1;
+    let dark = format!("{head}[working-curve.critical-dose]{rest}");
+    scratch.write("dark.toml", dark.as_bytes());
+    for (material, name) in [("lamp-suspension", "bright"), ("dark.toml", "dark")] {
+        let line = format!("slice tower.stl {COARSE} --gray --material {material} -o {name}.tif");
+        scratch.run(&line).succeeds_quietly();
+    }
+    let [bright, dark] = ["bright.tif", "dark.tif"].map(|name| scratch.layers(name));
+    assert!(bright.iter().any(|layer| matches!(*layer.image, Image::Gray(_))));
+    for (bright, dark) in bright.iter().zip(&dark) {
+        // Times are rounded to a microsecond, which may move a level by one.
+        let differ = |(a, b): (u8, u8)| a.abs_diff(b) > 1;
+        assert!(!levels(&bright.image).into_iter().zip(levels(&dark.image)).any(differ));
+        assert_eq!(dark.info.exposure_ms, None);
+    }
+    let line = format!("slice tower.stl {COARSE} --material dark.toml -o white.tif");
+    scratch.run(&line).is_refused_with(&["how bright full white is", "[intensity]"]);
+}
+
+#[test]
+fn a_lamp_that_has_aged_exposes_for_longer() {
+    let scratch = with_tower();
+    let slice = format!("slice tower.stl {COARSE} --gray --material lamp-suspension");
+    let line = format!("{slice} --lamp-intensity 75% -o aged.tif");
+    scratch.run(&line).succeeds_quietly();
+    let aged = scratch.layers("aged.tif");
+    // (137.4 - 0.4 * 18.31) mJ/cm2 exp(400/215.2) at 1.2 W/cm2 (002 eq. 36 and 40).
+    let ms = aged[0].info.exposure_ms.unwrap();
+    assert!((ms - 695.432).abs() < 1e-3, "{ms}");
+    let command = &aged[0].info.stack.as_ref().unwrap().commands[0];
+    assert!(command.contains("--lamp-intensity 75%"), "{command}");
+    // The recorded command makes the same stack.
+    assert!(scratch.run(command).succeeds_quietly().stdout == scratch.bytes("aged.tif"));
+    // A lamp as it was changes nothing.
+    scratch.run(&format!("{slice} -o new.tif")).succeeds_quietly();
+    scratch.run(&format!("{slice} --lamp-intensity 1.6W/cm2 -o same.tif")).succeeds_quietly();
+    let [new, same] = ["new.tif", "same.tif"].map(|name| scratch.layers(name));
+    assert!(new.iter().zip(&same).all(|(a, b)| a.image == b.image));
+    assert_eq!(new[0].info.exposure_ms, same[0].info.exposure_ms);
+    let weak = scratch.run(&format!("{slice} --lamp-intensity od0.6 -o weak.tif")).succeeds();
+    assert!(weak.stderr.contains("was measured under 512 to 1600 mW/cm"), "{weak:?}");
+    // Cured under the same lamp, white is as deep as the layer.
+    let cure = "lamp cure aged.tif --material lamp-suspension --section y=0mm -o s.png";
+    let white = |line: &str| -> f64 {
+        let said = String::from_utf8(scratch.run(line).succeeds().stdout).unwrap();
+        let row = said.lines().find(|line| line.starts_with("white ")).unwrap();
+        row.rsplit(' ').next().unwrap().parse().unwrap()
+    };
+    let [under, not] = [white(&format!("{cure} --lamp-intensity 75%")), white(cure)];
+    assert!(not > under, "{not} {under}");
+    for wrong in ["0%", "od9", "bright"] {
+        let ran = scratch.run(&format!("{slice} --lamp-intensity {wrong} -o w.tif"));
+        is_wrong_usage(&ran, "is not");
     }
 }
 
@@ -88,7 +170,7 @@ fn what_cannot_be_exposed_is_refused() {
     for (options, words) in [
         ("--gray --material none", &["nor a built-in material", "lamp-suspension"][..]),
         ("--gray --material none.toml", &["none.toml"]),
-        ("--gray --material lamp-no-absorber", &["how bright"]),
+        ("--material lamp-no-absorber", &["how bright"]),
         ("--gray --material tmpta", &["no cure model"]),
         ("--gray --material pegda-mw700", &["all depths"]),
     ] {

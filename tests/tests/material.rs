@@ -108,6 +108,69 @@ fn the_example_of_the_documentation_is_a_material() {
     assert!(said.contains(words), "{said}");
 }
 
+/// The second block of TOML in docs/materials.md.
+fn composition() -> String {
+    let text = fs::read_to_string(workspace_root().join("docs/materials.md")).unwrap();
+    let block = text.split("```toml\n").nth(2).unwrap();
+    block.split_once("```").unwrap().0.to_owned()
+}
+
+#[test]
+fn a_composition_makes_a_material() {
+    let scratch = Scratch::new();
+    scratch.write("composition.toml", composition().as_bytes());
+    let made = scratch.run("lamp material make composition.toml -o made.toml").succeeds();
+    assert!(made.stderr.contains("calibrate before you build"), "{made:?}");
+    let printed = scratch.run("lamp material make composition.toml --quiet").succeeds_quietly();
+    assert_eq!(printed.stdout, scratch.bytes("made.toml"));
+    let file = String::from_utf8(printed.stdout).unwrap();
+    for words in ["name = \"six-percent\"", "[constants.volume-shrinkage]", "002 equation 58"] {
+        assert!(file.contains(words), "no {words} in {file}");
+    }
+    let line = "lamp material profile made.toml --dose 400mJ/cm2 --beam 17um";
+    assert!(said(&scratch, line).starts_with("cured "));
+    // More absorber cures less deep, from a higher dose on (002 section 3.4.6).
+    let numbers = |text: &str| -> [f64; 2] {
+        let made = scratch.run_on("lamp material make - --quiet", text.as_bytes()).succeeds();
+        let made = String::from_utf8(made.stdout).unwrap();
+        let value = |table: &str| -> f64 {
+            let (_, rest) =
+                made.split_once(&format!("[working-curve.{table}]\nvalue = \"")).unwrap();
+            rest.split(' ').next().unwrap().parse().unwrap()
+        };
+        [value("critical-dose"), value("penetration-depth")]
+    };
+    let [few, more] =
+        ["2 mmol/l", "4 mmol/l"].map(|c| numbers(&composition().replace("2 mmol/l", c)));
+    assert!(more[0] > few[0] && more[1] < few[1], "{few:?} {more:?}");
+    scratch.write("bad.toml", composition().replace("0.55", "1.55").as_bytes());
+    let words = ["bad.toml", "ceramic.share must be from 0 to below 1"];
+    scratch.run("lamp material make bad.toml").is_refused_with(&words);
+    let over = scratch.run("lamp material make composition.toml -o composition.toml");
+    assert!(over.stderr.contains("that is an input"), "{over:?}");
+}
+
+#[test]
+fn a_line_of_light_has_a_profile() {
+    let scratch = Scratch::new();
+    let line = "lamp material profile lamp-suspension --dose 600mJ/cm2";
+    let text = said(&scratch, &format!("{line} --beam 17um"));
+    assert!(text.starts_with("cured 29.620 um wide at the surface, 320.28 um deep"), "{text}");
+    assert_eq!(text.lines().count(), 13);
+    // Equation 46: fitted numbers.
+    let wide = said(&scratch, &format!("{line} --beam 60um --critical-dose 90mJ/cm2"));
+    assert!(wide.starts_with("cured 116.87 um wide"), "{wide}");
+    // The spread of the material is the beam; an old lamp needs less dose.
+    assert!(said(&scratch, "lamp material profile pegda-sudan --dose 20mJ/cm2").contains(" wide"));
+    let old = said(&scratch, &format!("{line} --beam 17um --lamp-intensity 50%"));
+    // 17 sqrt(2 ln(600/(109 + 18.31 0.8))).
+    assert!(old.starts_with("cured 30.215 um wide"), "{old}");
+    scratch.run(line).is_wrong_usage(&["no [spread]", "--beam"]);
+    let ran = scratch.run("lamp material profile lamp-suspension --dose 100mJ/cm2 --beam 17um");
+    let words = "lines get 100 mJ/cm2, but lamp-suspension was measured at 320 to 1920";
+    assert!(ran.succeeds().stderr.contains(words));
+}
+
 #[test]
 fn bad_files_are_refused_and_say_what_to_do() {
     let scratch = Scratch::new();

@@ -12,6 +12,7 @@ use lamp_stack::StackInfo;
 
 use crate::catalogue::entry;
 use crate::exit::Exit;
+use crate::lamp_option::LampOption;
 use crate::measured_doses::MeasuredDoses;
 use crate::options::{Common, Input, one_of_described};
 use crate::part_arg::{PartArg, paths};
@@ -48,6 +49,9 @@ pub(crate) struct CureArgs {
     /// Resin: a built-in material's name (see lamp material list) or a file
     #[arg(long, value_name = "NAME|FILE")]
     material: PathBuf,
+
+    #[command(flatten)]
+    lamp: LampOption,
 
     /// Where to cut, in part coordinates: y=12mm along a row of pixels, x=12mm along a column
     #[arg(long, value_name = "AXIS=LENGTH")]
@@ -107,12 +111,13 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     check_png_name(&args.output)?;
-    let material: Material = entry(&args.material)?;
+    let (material, lamp_doubt) = args.lamp.material(entry(&args.material)?)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let rule = args.rule(&material)?;
     let name = input_name(&args.input.stack);
     let failed = |error: anyhow::Error| Exit::Failed(error).at(input_name(&args.input.stack));
     let progress = Progress::new("cure", common, true);
+    lamp_doubt.iter().for_each(|doubt| progress.say(doubt));
     let doses = match rule {
         CureRule::Alone | CureRule::Straight(_) => MeasuredDoses::of_depths(&material),
         CureRule::Spread(_) | CureRule::Voxels(_) => MeasuredDoses::of_working_curve(&material),

@@ -74,6 +74,7 @@ pub(crate) struct HeightsArgs {
 pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     args.check()?;
     let exposure = args.exposure.exposure()?;
+    exposure.iter().try_for_each(Exposure::check_light)?;
     args.heights.check(exposure.as_ref())?;
     let progress = Progress::new("heights", common, true);
     let say = |line: &str| progress.say(line);
@@ -90,7 +91,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let found = found.map_err(|error| at_part(error, &args.parts))?;
     let uniform = args.uniform(&part).map_err(|error| at_part(error, &args.parts))?;
     found.warn(&say);
-    found.doubt(exposure.as_ref()).iter().for_each(|doubt| say(doubt));
+    found.doubts(exposure.as_ref()).iter().for_each(|doubt| say(doubt));
     if let Some(path) = &args.report {
         write_file(path, |out| write_table(&found.heights, exposure.as_ref(), out))?;
     }

@@ -117,7 +117,7 @@ impl Command {
             Self::Join(args) => join::run(args, common),
             Self::Split(args) => split::run(args, common),
             Self::Machine(args) => machine::run(args),
-            Self::Material(args) => material::run(args),
+            Self::Material(args) => material::run(args, common),
             Self::Projector(args) => projector::run(args),
             Self::Plan(args) => plan::run(args, common),
             Self::Learn(args) => learn::run(args, common),

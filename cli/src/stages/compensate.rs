@@ -14,6 +14,7 @@ use lamp_stack::{Dpi, Layer, Length, LengthError};
 use crate::catalogue::{canonical_word, entry, is_file};
 use crate::compensate_report::WallReport;
 use crate::exit::Exit;
+use crate::lamp_option::LampOption;
 use crate::measured_doses::MeasuredDoses;
 use crate::options::parse_distance;
 use crate::progress::Progress;
@@ -36,6 +37,9 @@ pub(crate) struct CompensateSettings {
     /// intensity]
     #[arg(long, value_name = "DOSE", value_parser = parse_dose, requires = "material")]
     dose: Option<Dose>,
+
+    #[command(flatten)]
+    lamp: LampOption,
 
     /// Keep walls at least this wide, or as they are if thinner; 0um lets them vanish [default: two
     /// pixels]
@@ -64,7 +68,7 @@ impl CompensateSettings {
 
     /// Returns the options as one text. Files have no names in it.
     pub(crate) fn canonical(&self) -> String {
-        let Self { uniform, material, dose, min_feature, one_bit, shrinkage } = self;
+        let Self { uniform, material, dose, lamp, min_feature, one_bit, shrinkage } = self;
         let mut words = "compensate".to_owned();
         let mut add = |key: &str, value: Option<String>| {
             words.extend(value.map(|value| format!(" --{key} {value}")));
@@ -73,6 +77,7 @@ impl CompensateSettings {
         add("material", material.as_deref().map(canonical_word::<Material>));
         // Debug tells a number apart from every other.
         add("dose", dose.map(|dose| format!("{dose:?}")));
+        add("lamp-intensity", lamp.canonical());
         add("min-feature", min_feature.map(|width| width.to_string()));
         add("shrinkage", shrinkage.map(|Shrinkage { x, y }| format!("{x},{y}")));
         if *one_bit {
@@ -130,8 +135,8 @@ impl<'a> Compensating<'a> {
         let CompensateSettings { uniform, material, shrinkage, .. } = self.settings;
         let moves = uniform.is_some() || material.is_some();
         let again = self.done_before.borrow().lines(name, moves, shrinkage.is_some());
-        let doubt = self.by.doubt();
-        for line in again.into_iter().chain(doubt).chain(self.walls.borrow().lines()) {
+        let doubts = self.by.doubts();
+        for line in again.into_iter().chain(doubts).chain(self.walls.borrow().lines()) {
             progress.say(&line);
         }
     }
@@ -181,12 +186,17 @@ impl DoneBefore {
 /// By what edges move.
 enum EdgeMove {
     Uniform(Length),
-    CureWidth {
-        width: CureWidth,
-        material: Box<Material>,
-        dose: Option<Dose>,
-        doses: MeasuredDoses,
-    },
+    CureWidth(Box<ByCureWidth>),
+}
+
+/// A cure width, and the doses that it is for.
+struct ByCureWidth {
+    width: CureWidth,
+    material: Material,
+    dose: Option<Dose>,
+    doses: MeasuredDoses,
+    /// What is doubtful about the lamp.
+    lamp_doubt: Option<String>,
 }
 
 /// A layer without a dose, and why.
@@ -211,7 +221,7 @@ impl EdgeMove {
                 (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
             };
         };
-        let material: Material = entry(path)?;
+        let (material, lamp_doubt) = args.lamp.material(entry(path)?)?;
         let name = &material.name;
         let width =
             material.cure_width().map_err(|error| Exit::Failed(error.into()).at(name.clone()))?;
@@ -221,24 +231,27 @@ impl EdgeMove {
             ))
         })?;
         let doses = MeasuredDoses::of_widths(&material);
-        Ok(Self::CureWidth { width, material: Box::new(material), dose: args.dose, doses })
+        let dose = args.dose;
+        Ok(Self::CureWidth(Box::new(ByCureWidth { width, material, dose, doses, lamp_doubt })))
     }
 
-    /// Returns a sentence if layers got doses that the widths were not measured at.
-    fn doubt(&self) -> Option<String> {
+    /// Returns sentences on a lamp and on doses that the widths were not measured at.
+    fn doubts(&self) -> Vec<String> {
         match self {
-            Self::Uniform(_) => None,
-            Self::CureWidth { doses, .. } => doses.doubt("layers"),
+            Self::Uniform(_) => Vec::new(),
+            Self::CureWidth(by) => {
+                by.lamp_doubt.clone().into_iter().chain(by.doses.doubt("layers")).collect()
+            }
         }
     }
 
     fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, Exit> {
         let (width, dose) = match self {
             Self::Uniform(by) => return Ok(Widths::uniform(by.pixels(dpi))),
-            Self::CureWidth { width, material, dose, doses } => {
-                let dose = dose.map_or_else(|| dose_of(layer, material), Ok)?;
-                doses.see(dose);
-                (width, dose)
+            Self::CureWidth(by) => {
+                let dose = by.dose.map_or_else(|| dose_of(layer, &by.material), Ok)?;
+                by.doses.see(dose);
+                (&by.width, dose)
             }
         };
         // The image has the sizes that are wanted, not those that are to be exposed.

@@ -37,12 +37,12 @@ pub struct LevelFit {
     pub curve: Option<CurveFit>,
 }
 
-/// A straight line over the gray level.
+/// A straight line over the gray level, or over the lamp's light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineEstimate<T> {
-    /// The value at level 0.
+    /// The value in the dark.
     pub at_zero: Estimate<T>,
-    /// The rise from black to white; zero if the line was `levelled`.
+    /// The rise from black to white, or for each W/cm²; zero if the line was `levelled`.
     pub rise: Estimate<T>,
     /// The negative rise of a line that falls by no more than its interval. The line is then
     /// kept level, since the model takes no falling line.
@@ -101,7 +101,7 @@ fn rising_lines(points: &[LinePoint]) -> Result<(CurveLinesFit, CurveLinesFit), 
     Ok((sloped, lines))
 }
 
-fn line<T: Quantity>(
+pub(super) fn line<T: Quantity>(
     sloped: &CurveLinesFit,
     lines: &CurveLinesFit,
     number: usize,
@@ -145,7 +145,7 @@ impl GrayFit {
     }
 }
 
-fn given<T: Quantity>(line: &LineEstimate<T>, source: &str) -> GivenLine<T> {
+pub(super) fn given<T: Quantity>(line: &LineEstimate<T>, source: &str) -> GivenLine<T> {
     let unit = T::UNIT;
     let half = |estimate: &Estimate<T>| round_significant(estimate.plus_minus().number(), 3);
     let (zero, rise) = (half(&line.at_zero), half(&line.rise));

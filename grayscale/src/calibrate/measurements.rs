@@ -25,6 +25,15 @@ impl DepthPoint {
     }
 }
 
+/// A measured cure depth under a lamp of some light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LampPoint {
+    /// The lamp's light.
+    pub lamp: Intensity,
+    /// The film, of full white.
+    pub film: DepthPoint,
+}
+
 /// A measured cure width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WidthPoint {
@@ -96,6 +105,7 @@ pub enum DataError {
     NoRows,
 }
 
+const LAMP: &str = "lamp_mw_per_cm2";
 const GRAY: &str = "gray";
 const DEPTH: &str = "depth_um";
 const SIZE_PIXELS: &str = "feature_px";
@@ -133,6 +143,34 @@ pub fn depth_points(
             return Err(depth.impossible(row, "what so dark a gray level cures"));
         }
         Ok(Read::Point(point))
+    })
+}
+
+/// Reads cure depths under several lights from a table of `lamp_mw_per_cm2`, the light;
+/// `dose_mj_per_cm2` or `exposure_ms`, the time under that light; and `depth_um`. Depths of zero and
+/// below cured nothing.
+///
+/// # Errors
+/// Returns an error if a column is missing or unknown, or a cell is not a number in its range.
+pub fn lamp_points(table: &CsvTable) -> Result<Measured<LampPoint>, DataError> {
+    check_columns(table, &[LAMP, DOSE, EXPOSURE, DEPTH])?;
+    let lamp = Column::find(table, LAMP).ok_or(DataError::NoColumn(LAMP))?;
+    let depth = Column::find(table, DEPTH).ok_or(DataError::NoColumn(DEPTH))?;
+    measured(table, |row| {
+        let light = lamp.number(row)?;
+        if !(1e-6..=1e9).contains(&light) {
+            return Err(lamp.impossible(row, "a light from 1e-6 to 1e9 mW/cm2"));
+        }
+        let lamp = Intensity::from_mw_per_cm2(light);
+        let dose = DoseColumn::find(table, Some(lamp))?.of(row)?;
+        Ok(match depth.length_or_blank(row)? {
+            None => Read::Blank,
+            Some(depth) if depth.um() <= 0.0 => Read::Nothing,
+            Some(depth) => Read::Point(LampPoint {
+                lamp,
+                film: DepthPoint { gray: GrayLevel::WHITE, dose, depth },
+            }),
+        })
     })
 }
 
@@ -217,6 +255,20 @@ mod tests {
         let by_time = depths("note,gray,depth_um,exposure_ms\nclear,0.5,188,200\n").unwrap();
         assert_eq!(by_time.points[0].dose, point.dose);
         assert_eq!(by_time.points[0].arriving().mj_per_cm2(), 160.0);
+    }
+
+    #[test]
+    fn times_under_a_lamp_make_doses_of_its_light() {
+        let read = |text: &str| lamp_points(&CsvTable::parse(text).unwrap());
+        let films =
+            read("lamp_mw_per_cm2,exposure_ms,depth_um\n800,400,188\n1600,200,0\n").unwrap();
+        assert_eq!((films.points.len(), films.none), (1, 1));
+        assert_eq!(films.points[0].lamp.mw_per_cm2(), 800.0);
+        assert_eq!(films.points[0].film.dose.mj_per_cm2(), 320.0);
+        let wrong = read("lamp_mw_per_cm2,dose_mj_per_cm2,depth_um\n0,400,188\n").unwrap_err();
+        assert!(wrong.to_string().contains("0 is not a light from 1e-6"), "{wrong}");
+        let none = read("dose_mj_per_cm2,depth_um\n400,188\n").unwrap_err();
+        assert_eq!(none, DataError::NoColumn("lamp_mw_per_cm2"));
     }
 
     #[test]

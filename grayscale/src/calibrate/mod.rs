@@ -22,6 +22,7 @@ mod exposure_times;
 mod extent;
 mod fit_curve;
 mod fit_gray;
+mod fit_lamp;
 mod fit_two_depth;
 mod fit_widths;
 mod hinge;
@@ -49,9 +50,12 @@ pub use csv_table::{CsvTable, TableError};
 pub use exposure_times::ExposureTimes;
 pub use fit_curve::{CurveFit, fit_curve};
 pub use fit_gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
+pub use fit_lamp::{LampFit, fit_lamp};
 pub use fit_two_depth::{TwoDepthFit, fit_two_depth};
 pub use fit_widths::{WidthFit, fit_widths};
-pub use measurements::{DataError, DepthPoint, Measured, WidthPoint, depth_points, width_points};
+pub use measurements::{
+    DataError, DepthPoint, LampPoint, Measured, WidthPoint, depth_points, lamp_points, width_points,
+};
 pub use significant::format_significant;
 
 /// The cure models that can be fitted to depths.
@@ -199,17 +203,20 @@ pub enum FitError {
     /// There are too few gray levels.
     #[error("{} too few: 3 are the least", are(*.0, "gray level"))]
     TooFewLevels(usize),
-    /// A line of the gray model falls by more than its interval.
+    /// There is only one light.
+    #[error("{} too few: 2 are the least", are(*.0, "light"))]
+    TooFewLights(usize),
+    /// A line over the gray level or the light falls by more than its interval.
     #[error(
-        "{what} falls by {} +- {} {unit} from black to white, but the gray model \
-         takes no falling line, as a whiter level might cure less: fit the working curve of one level",
+        "{what} falls by {} +- {} {unit} towards more light, but the model takes no falling \
+         line, as more light might cure less: fit the working curve of one light",
         short(*fall),
         short(*half)
     )]
     GrayFalls {
         /// The number's name.
         what: &'static str,
-        /// The fall from black to white.
+        /// The fall from black to white, or for each W/cm².
         fall: f64,
         /// Half of its 95% confidence interval.
         half: f64,

@@ -32,6 +32,12 @@ pub enum MaterialError {
     /// there is none.
     #[error("dimmed-lamp needs a working curve: add [working-curve.penetration-depth]")]
     NoWorkingCurve,
+    /// Gray levels were measured under an unknown light.
+    #[error(
+        "the gray levels follow the lamp, and no intensity says under which light they were \
+         measured: add [intensity]"
+    )]
+    NoLampOfGray,
 }
 
 impl Material {

@@ -90,6 +90,9 @@ impl Material {
             ("gray-light", lines(&self.gray_light)),
             ("two-depth", self.two_depth.as_ref().and_then(|it| it.measured.clone())),
         ];
+        let lights = self.dimmed_lamp.as_ref().and_then(|lines| lines.lights);
+        let checked = lights.map_or(Ok(()), |lights| lights.check("lights"));
+        checked.map_err(|problem| MaterialError::Model { table: "dimmed-lamp", problem })?;
         let widths = self.cure_width.iter().map(|it| ("cure-width", it.measured.clone()));
         for (table, range) in all.into_iter().chain(widths) {
             let checked = range.map_or(Ok(()), |range| range.check());

@@ -13,8 +13,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod composition;
 mod file;
 mod kinetics;
+mod lamp;
 mod measured;
 mod number;
 
@@ -24,6 +26,7 @@ use lamp_stack::Length;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+pub use composition::{Composition, CompositionError};
 pub use file::MaterialError;
 pub use kinetics::KineticNumbers;
 pub use measured::{GivenRange, MeasuredRange};
@@ -105,12 +108,17 @@ pub struct CurveLines {
     pub measured: Option<MeasuredRange>,
 }
 
-/// The line of a working curve over the lamp's light. `D_p` is constant (002 figure 62).
+/// The line of a working curve over the lamp's light. `D_p` is constant (002 figure 62): the working
+/// curve's, where it is not given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DimmedLines {
     /// `E_c`, with its rise for each W/cm².
     pub critical_dose: GivenLine<Dose>,
+    /// `D_p`.
+    pub penetration_depth: Option<Given<Length>>,
+    /// The lights that were measured, if known.
+    pub lights: Option<GivenRange<Intensity>>,
 }
 
 /// The numbers of a model of two penetration depths.
@@ -208,12 +216,15 @@ impl Material {
     /// Returns the working curve over the lamp's light, if there is one.
     ///
     /// # Errors
-    /// Returns an error if the line falls or does not begin above zero, or if no working
-    /// curve gives the penetration depth.
+    /// Returns an error if the line falls or does not begin above zero, or if neither it nor a
+    /// working curve gives the penetration depth.
     pub fn dimmed_lamp(&self) -> Result<Option<IntensityLines>, MaterialError> {
         let Some(lines) = &self.dimmed_lamp else { return Ok(None) };
-        let curve = self.working_curve()?.ok_or(MaterialError::NoWorkingCurve)?;
-        let stays = StraightLine { at_zero: curve.penetration_depth(), rise: Length::default() };
+        let depth = match &lines.penetration_depth {
+            Some(depth) => depth.value,
+            None => self.working_curve()?.ok_or(MaterialError::NoWorkingCurve)?.penetration_depth(),
+        };
+        let stays = StraightLine { at_zero: depth, rise: Length::default() };
         let lines = IntensityLines::new(lines.critical_dose.line(), stays);
         lines.map(Some).map_err(of("dimmed-lamp"))
     }
@@ -290,38 +301,35 @@ impl Material {
         Ok(FadingLight::of_curve(light()?, curve).map_err(of("working-curve"))?)
     }
 
-    /// Returns whether there is a cure model.
-    fn has_model(&self) -> bool {
-        let gray = self.gray.is_some() || self.gray_light.is_some();
-        gray || self.two_depth.is_some() || self.working_curve.is_some()
+    /// Returns the most detailed cure model: the curves of the gray levels, those of the light
+    /// that gray levels pass, two penetration depths, or the working curve.
+    ///
+    /// # Errors
+    /// Returns an error if there is none, if numbers are impossible, or if the curves are those of
+    /// the light that gray levels pass and there is no intensity.
+    pub fn cure_model(&self) -> Result<Box<dyn CureModel>, ResinError> {
+        if let Some(gray) = self.gray_curve()? {
+            return Ok(Box::new(gray));
+        }
+        if let Some(lines) = self.gray_lines()? {
+            let light = self.light()?.ok_or_else(|| ResinError::NoLight(self.name.clone()))?;
+            return Ok(Box::new(lines.under(light)));
+        }
+        if let Some(model) = self.two_depth()? {
+            return Ok(Box::new(model));
+        }
+        let curve = self.working_curve()?.ok_or_else(|| ResinError::NoModel(self.name.clone()))?;
+        Ok(Box::new(curve))
     }
 
-    /// Returns the resin under its lamp, by the most detailed model: the curves of the gray
-    /// levels, those of the light that gray levels pass, two penetration depths, or the
-    /// working curve.
+    /// Returns the resin under its lamp, by its [`cure_model`](Self::cure_model).
     ///
     /// # Errors
     /// Returns an error if there is no cure model or no intensity, or if numbers are
     /// impossible.
     pub fn resin(&self) -> Result<Resin, ResinError> {
-        let light = match self.light()? {
-            Some(light) => light,
-            None if self.has_model() => return Err(ResinError::NoLight(self.name.clone())),
-            None => return Err(ResinError::NoModel(self.name.clone())),
-        };
-        let gray = match self.gray_curve()? {
-            Some(curve) => Some(curve),
-            None => self.gray_lines()?.map(|lines| lines.under(light)),
-        };
-        let model: Box<dyn CureModel> = if let Some(gray) = gray {
-            Box::new(gray)
-        } else if let Some(model) = self.two_depth()? {
-            Box::new(model)
-        } else if let Some(curve) = self.working_curve()? {
-            Box::new(curve)
-        } else {
-            return Err(ResinError::NoModel(self.name.clone()));
-        };
+        let model = self.cure_model()?;
+        let light = self.light()?.ok_or_else(|| ResinError::NoLight(self.name.clone()))?;
         Ok(Resin::new(light, model).map_err(|_| MaterialError::Dark)?)
     }
 }

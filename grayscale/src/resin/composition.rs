@@ -64,6 +64,12 @@ pub struct Inhibition {
     pub wavelength: Length,
 }
 
+/// Returns the contrast of the refractive indices of particles and liquid, `Δn/n = (n_cer -
+/// n_o)/n_o` (002 eq. 55). The smaller it is, the less light is scattered to the side.
+pub fn refractive_contrast(ceramic: f64, liquid: f64) -> f64 {
+    (ceramic - liquid) / liquid
+}
+
 impl Suspension {
     /// Returns the attenuation `1/D_p = 1/l_sc + (1 - Φ)(c_P ε_P + c_D ε_D)`, for
     /// each centimetre (002 eq. 56 and 57).

@@ -21,7 +21,7 @@ use lamp_stack::{DepthLevels, Length};
 
 pub use beam::GaussianBeam;
 pub use broadening::{broadening_depth, cure_width_of_square};
-pub use composition::{Absorber, Inhibition, Suspension};
+pub use composition::{Absorber, Inhibition, Suspension, refractive_contrast};
 pub use cure_width::{CureWidth, WidthLine};
 pub use fading::FadingLight;
 pub use filter::OpticalDensity;
@@ -111,14 +111,23 @@ impl Resin {
     /// # Errors
     /// Returns an error if the model does not hold for all depths up to that of white.
     pub fn depth_levels(&self, time: ExposureTime) -> Result<DepthLevels, CureError> {
-        let depths = self.model.depths();
-        let reach = self.depth(GrayLevel::WHITE, time);
-        if depths.from.um() > 0.0 || depths.to.is_some_and(|to| to < reach) {
-            return Err(CureError::NotAllTo { reach, depths });
-        }
-        let depth_of = |gray| self.depth(GrayLevel::clamped(gray), time);
-        Ok(DepthLevels::new(reach, depth_of))
+        depth_levels(self.model(), self.light * time)
     }
+}
+
+/// Returns the gray levels that cure each depth in an exposure whose white brings the dose `white`,
+/// as [`Resin::depth_levels`] does: a level needs only doses.
+///
+/// # Errors
+/// Returns an error if the model does not hold for all depths up to that of white.
+pub fn depth_levels(model: &dyn CureModel, white: Dose) -> Result<DepthLevels, CureError> {
+    let depths = model.depths();
+    let reach = model.gray_depth(GrayLevel::WHITE, white);
+    if depths.from.um() > 0.0 || depths.to.is_some_and(|to| to < reach) {
+        return Err(CureError::NotAllTo { reach, depths });
+    }
+    let depth_of = |gray| model.gray_depth(GrayLevel::clamped(gray), white);
+    Ok(DepthLevels::new(reach, depth_of))
 }
 
 #[cfg(test)]

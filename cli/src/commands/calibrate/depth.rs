@@ -92,14 +92,18 @@ fn say_what_was_changed(fit: &DepthFit, progress: &Progress) {
     }
 }
 
-fn levelled<T: Quantity>(line: &LineEstimate<T>, what: &str, unit: &str, progress: &Progress) {
+pub(super) fn levelled<T: Quantity>(
+    line: &LineEstimate<T>,
+    what: &str,
+    unit: &str,
+    progress: &Progress,
+) {
     let Some(rise) = line.levelled else { return };
     let [fall, high, level] =
         [-rise.number(), line.rise.high.number(), line.at_zero.value.number()].map(short);
     progress.say(&format!(
-        "{what} falls by {fall} {unit} from black to white, perhaps by chance (it might as well \
-         rise by {high}): the gray model takes no falling line, so it is kept level at {level} \
-         {unit}"
+        "{what} falls by {fall} {unit} towards more light, perhaps by chance (it might as well \
+         rise by {high}): the model takes no falling line, so it is kept level at {level} {unit}"
     ));
 }
 
@@ -171,7 +175,7 @@ fn write_level(text: &mut EstimateTable, level: &LevelFit) {
     }
 }
 
-fn write_line<T: Quantity>(
+pub(super) fn write_line<T: Quantity>(
     text: &mut EstimateTable,
     name: &str,
     unit: &str,

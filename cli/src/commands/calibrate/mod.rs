@@ -2,6 +2,7 @@
 
 mod depth;
 mod estimate_table;
+mod lamp;
 mod width;
 
 use std::io::{self, IsTerminal};
@@ -39,12 +40,14 @@ pub(crate) struct CalibrateArgs {
 enum Calibration {
     Depth(depth::DepthArgs),
     Width(width::WidthArgs),
+    Lamp(lamp::LampArgs),
 }
 
 pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
         Calibration::Depth(args) => depth::run(args, common),
         Calibration::Width(args) => width::run(args, common),
+        Calibration::Lamp(args) => lamp::run(args, common),
     }
 }
 

@@ -1,4 +1,7 @@
-//! `lamp material`: lists, shows and checks materials.
+//! `lamp material`: lists, shows, checks and makes materials.
+
+mod make;
+mod profile;
 
 use std::path::{Path, PathBuf};
 
@@ -12,15 +15,18 @@ use crate::catalogue;
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::measured_doses::MeasuredDoses;
+use crate::options::Common;
 use crate::streams::{input_name, print};
 
-/// List, show or check materials: how deep light cures a resin
+/// List, show, check or make materials: how deep light cures a resin
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp material list
   lamp material show lamp-suspension > mine.toml
-  lamp material check mine.toml")]
+  lamp material check mine.toml
+  lamp material make composition.toml -o mine.toml
+  lamp material profile mine.toml --dose 500mJ/cm2 --beam 17um")]
 pub(crate) struct MaterialArgs {
     #[command(subcommand)]
     action: Action,
@@ -53,15 +59,19 @@ enum Action {
         #[arg(long)]
         json: bool,
     },
+    Make(make::MakeArgs),
+    Profile(profile::ProfileArgs),
 }
 
-pub(crate) fn run(args: &MaterialArgs) -> Result<(), Exit> {
+pub(crate) fn run(args: &MaterialArgs, common: &Common) -> Result<(), Exit> {
     match &args.action {
         Action::List { json: true } => answer(Material::builtins()),
         Action::List { json: false } => print(&table()),
         Action::Show { material, json: true } => answer([catalogue::entry(material)?]),
         Action::Show { material, json: false } => catalogue::show::<Material>(material),
         Action::Check { file, json } => check(file, *json),
+        Action::Make(args) => make::run(args, common),
+        Action::Profile(args) => profile::run(args, common),
     }
 }
 

@@ -1,0 +1,97 @@
+//! `lamp calibrate lamp`: fits how the critical dose follows the lamp.
+
+use clap::Args;
+use lamp_grayscale::calibrate::{LampFit, LampPoint, fit_lamp, lamp_points};
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::{Dose, Intensity};
+
+use super::CalibrationFiles;
+use super::depth::{levelled, write_line};
+use super::estimate_table::{EstimateTable, in_legend, short};
+use crate::exit::Exit;
+use crate::options::Common;
+use crate::plots::{Plot, PlotAxis, Series, highest};
+use crate::progress::Progress;
+
+/// Fit how the critical dose follows a lamp that ages, from cure depths under several lights
+///
+/// The CSV file has a header with the columns lamp_mw_per_cm2 (the light of full white under which
+/// the film was cured), dose_mj_per_cm2 (or exposure_ms, the time under that light) and depth_um.
+/// Filters before the lamp give several lights. --lamp-intensity of other commands reads the
+/// result.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp calibrate lamp filters.csv
+  lamp calibrate lamp filters.csv --material mine.toml -o mine.toml --plot lamp.svg")]
+pub(super) struct LampArgs {
+    #[command(flatten)]
+    files: CalibrationFiles,
+}
+
+pub(super) fn run(args: &LampArgs, common: &Common) -> Result<(), Exit> {
+    let files = &args.files;
+    files.check()?;
+    let base = files.base()?;
+    let table = files.table()?;
+    let at_place = |error: Exit| error.at(files.place());
+    let measured = lamp_points(&table).map_err(|error| at_place(error.into()))?;
+    let points = &measured.points[..];
+    let fit = fit_lamp(points).map_err(|error| at_place(error.into()))?;
+    let progress = Progress::new("calibrate", common, true);
+    levelled(&fit.critical_dose, "the critical dose", "mJ/cm2", &progress);
+    let mut text = EstimateTable::new(&measured, "uncured");
+    text.heads();
+    for &(lamp, films) in &fit.lights {
+        let critical = short(fit.critical_dose_at(lamp).mj_per_cm2());
+        text.line(&format!("Ec at {lamp}"), &[&critical, &format!("{films} points")]);
+    }
+    write_line(&mut text, "Ec(I)", "mJ/cm2", &fit.critical_dose);
+    text.estimate("Dp (um)", &fit.penetration_depth);
+    text.line("R^2", &[&short(fit.r2)]);
+    let source = files.source(points.len());
+    let add = |material: &mut Material| {
+        material.dimmed_lamp = Some(fit.lines(&source));
+        // Commands need a model of white, too.
+        if material.working_curve.is_none() {
+            material.working_curve = Some(fit.brightest(&source));
+        }
+    };
+    let title = format!("Cure depth by lamp: {}", files.source_name());
+    files.finish(base, add, &plot(title, &fit, points), &text.finish())
+}
+
+fn plot(title: String, fit: &LampFit, points: &[LampPoint]) -> Plot {
+    let doses = || points.iter().map(|point| point.film.dose.mj_per_cm2());
+    let critical = fit.critical_dose.at_zero.value.mj_per_cm2();
+    let range = doses().fold(critical, f64::min) / 1.1..doses().fold(0.0, f64::max) * 1.1;
+    let step = |i: u32| range.start * (range.end / range.start).powf(f64::from(i) / 30.0);
+    let steps: Vec<f64> = (0..=30).map(step).collect();
+    let series: Vec<_> =
+        fit.lights.iter().map(|&(lamp, _)| series(fit, lamp, points, &steps)).collect();
+    let y = PlotAxis {
+        label: "cure depth (µm)".to_owned(),
+        range: 0.0..1.08 * highest(&series),
+        logarithmic: false,
+    };
+    let x = PlotAxis { label: "dose (mJ/cm²)".to_owned(), range, logarithmic: true };
+    Plot { title, x, y, series }
+}
+
+/// The films under a light, and their curve.
+fn series(fit: &LampFit, lamp: Intensity, points: &[LampPoint], doses: &[f64]) -> Series {
+    let depth = |mj: f64| fit.depth(lamp, Dose::from_mj_per_cm2(mj));
+    let critical = fit.critical_dose_at(lamp).mj_per_cm2();
+    let curve = doses.iter().filter(|mj| **mj > critical).map(|&mj| (mj, depth(mj).value.um()));
+    let band = doses.iter().map(|&mj| {
+        let depth = depth(mj);
+        [mj, depth.low.um().max(0.0), depth.high.um().max(0.0)]
+    });
+    let of_lamp = points.iter().filter(|point| point.lamp == lamp);
+    Series {
+        name: format!("{lamp}: {}", in_legend("Dp", "µm", &fit.penetration_depth)),
+        points: of_lamp.map(|p| (p.film.dose.mj_per_cm2(), p.film.depth.um())).collect(),
+        curve: std::iter::once((critical, 0.0)).chain(curve).collect(),
+        band: band.collect(),
+    }
+}

@@ -1,0 +1,50 @@
+//! `lamp material make`: a material from what is mixed.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use lamp_grayscale::material::Composition;
+
+use crate::catalogue::read_file;
+use crate::exit::Exit;
+use crate::options::Common;
+use crate::progress::Progress;
+use crate::streams::{check_beside, input_name, is_stream, print, write_file};
+
+/// Make a material from the composition of a suspension
+///
+/// Critical dose, penetration depth and shrinkage follow from what is mixed by models that show
+/// trends: which way a recipe moves a resin. docs/materials.md has the file. Calibrate before you
+/// build.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp material make composition.toml
+  lamp material make composition.toml -o mine.toml")]
+pub(super) struct MakeArgs {
+    /// Composition: a TOML file, or - for standard input
+    composition: PathBuf,
+
+    /// Material file to write [default: standard output]
+    #[arg(short, long, value_name = "OUT", default_value = "-", hide_default_value = true)]
+    output: PathBuf,
+}
+
+pub(super) fn run(args: &MakeArgs, common: &Common) -> Result<(), Exit> {
+    let MakeArgs { composition, output } = args;
+    if !is_stream(output) {
+        check_beside(output, std::path::Path::new("-"), [composition])?;
+    }
+    let (mixed, _) = read_file::<Composition>(composition)?;
+    let failed = |error: anyhow::Error| Exit::Failed(error).at(input_name(composition));
+    let material = mixed.material().map_err(|error| failed(error.into()))?;
+    let text = material.to_toml().map_err(|error| failed(error.into()))?;
+    let progress = Progress::new("material", common, true);
+    if is_stream(output) {
+        print(&text)?;
+    } else {
+        write_file(output, |out| out.write_all(text.as_bytes()))?;
+    }
+    progress.say("these numbers show trends: calibrate before you build");
+    Ok(())
+}

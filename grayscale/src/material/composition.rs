@@ -1,0 +1,399 @@
+//! Materials from what is mixed: compositions as TOML files.
+
+use std::collections::BTreeMap;
+
+use lamp_stack::{Builtin, Catalogued, Length};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{Constant, CurveNumbers, Given, GivenNumber, Material};
+use crate::resin::shrinkage::{self, Monomer};
+use crate::resin::{
+    Absorber, Absorptivity, Concentration, Inhibition, Intensity, ModelError, Quantity, Suspension,
+    refractive_contrast,
+};
+
+/// What a suspension is made of, from which the models of 002 sections 3.4.2.2 to 3.4.2.4 say how
+/// it cures, about.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Composition {
+    /// The name: small letters, digits and `-`.
+    pub name: String,
+    /// A description of one line.
+    pub description: String,
+    /// The light of full white.
+    pub intensity: Option<Given<Intensity>>,
+    /// The light's wavelength.
+    pub wavelength: Given<Length>,
+    /// The ceramic; none in a liquid without particles.
+    pub ceramic: Option<Ceramic>,
+    /// The photoinitiator, `c_P` and `ε_P`.
+    pub photoinitiator: Dissolved,
+    /// The UV absorber, `c_D` and `ε_D`.
+    pub uv_absorber: Option<Dissolved>,
+    /// What keeps the resin from curing.
+    pub inhibition: InhibitionNumbers,
+    /// What shrinks, if that is wanted.
+    pub shrinkage: Option<ShrinkageNumbers>,
+}
+
+/// Ceramic particles, which scatter and do not absorb.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Ceramic {
+    /// The share of the volume `Φ`, 0 to 1.
+    pub share: GivenNumber,
+    /// The distance `l_sc` after which a photon's direction is random.
+    pub scattering_length: Given<Length>,
+    /// The refractive indices of particles and liquid.
+    pub refraction: Option<Refraction>,
+}
+
+/// Refractive indices, of which the contrast is told (002 eq. 55).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Refraction {
+    /// `n_cer`.
+    pub ceramic: GivenNumber,
+    /// `n_o`.
+    pub liquid: GivenNumber,
+}
+
+/// A substance in the liquid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Dissolved {
+    /// In the liquid, without the ceramic.
+    pub concentration: Given<Concentration>,
+    /// In powers of ten, as tables have it.
+    pub absorptivity: Given<Absorptivity>,
+}
+
+/// The inhibitor, which keeps a resin from curing until it is used up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct InhibitionNumbers {
+    /// `c_INH`, in the liquid.
+    pub inhibitor: Given<Concentration>,
+    /// `γ_INH`.
+    pub radicals_per_inhibitor: GivenNumber,
+    /// `γ_D`; zero if left out.
+    pub radicals_per_dye: Option<GivenNumber>,
+    /// `Ω`.
+    pub radicals_per_photon: GivenNumber,
+}
+
+/// The monomers and how much of them reacts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ShrinkageNumbers {
+    /// The density of the monomers together, in g/cm³.
+    pub density_g_per_cm3: GivenNumber,
+    /// The share `α` of their groups that react, 0 to 1.
+    pub conversion: Option<GivenNumber>,
+    /// Spectra from which the conversion follows, if it is not given.
+    pub spectra: Option<Spectra>,
+    /// The monomers.
+    pub monomers: Vec<MonomerNumbers>,
+}
+
+/// Areas of infrared peaks before and after curing (002 eq. 54).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Spectra {
+    /// C=C at 1620 /cm, C=C at 1410 /cm and C=O at 1750 /cm, before.
+    pub before: [f64; 3],
+    /// The same after curing.
+    pub after: [f64; 3],
+    /// The measurement.
+    pub source: String,
+}
+
+/// A monomer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct MonomerNumbers {
+    /// Its name.
+    pub name: String,
+    /// Acrylate groups of a molecule, `f`.
+    pub functionality: f64,
+    /// `M_m`.
+    pub molar_mass_g_per_mol: f64,
+    /// Its share of the molecules; shares that do not sum to one count by their ratios.
+    pub moles: f64,
+}
+
+/// Why a composition makes no material.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum CompositionError {
+    /// A number is impossible.
+    #[error("{0} must be {1}")]
+    Number(&'static str, &'static str),
+    /// Shrinkage needs one of two.
+    #[error("shrinkage needs either conversion or spectra")]
+    NoConversion,
+    /// The numbers give no working curve.
+    #[error("the composition makes no working curve: its {0}")]
+    NoCurve(#[from] ModelError),
+}
+
+const POSITIVE: &str = "above zero";
+
+impl Catalogued for Composition {
+    const KIND: &'static str = "composition";
+    const BUILTINS: &'static [Builtin] = &[];
+    type CheckError = CompositionError;
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn check(&self) -> Result<(), CompositionError> {
+        let number = |fine, what, wanted| {
+            if fine { Ok(()) } else { Err(CompositionError::Number(what, wanted)) }
+        };
+        let positive = |number: f64| number > 0.0 && number.is_finite();
+        number(positive(self.wavelength.value.um()), "wavelength", POSITIVE)?;
+        if let Some(Ceramic { share, scattering_length, refraction }) = &self.ceramic {
+            number((0.0..1.0).contains(&share.value), "ceramic.share", "from 0 to below 1")?;
+            number(positive(scattering_length.value.um()), "ceramic.scattering-length", POSITIVE)?;
+            let indices = refraction.iter().flat_map(|it| [it.ceramic.value, it.liquid.value]);
+            number(indices.into_iter().all(positive), "ceramic.refraction", POSITIVE)?;
+        }
+        let of = &self.inhibition;
+        let photon = of.radicals_per_photon.value;
+        number(positive(photon), "inhibition.radicals-per-photon", POSITIVE)?;
+        let dye = of.radicals_per_dye.as_ref().map_or(0.0, |it| it.value);
+        let not_below = |number: f64| number >= 0.0 && number.is_finite();
+        let taken = not_below(of.radicals_per_inhibitor.value) && not_below(dye);
+        number(taken, "inhibition.radicals-per-inhibitor and -per-dye", "zero or more")?;
+        self.shrinkage.as_ref().map_or(Ok(()), ShrinkageNumbers::check)?;
+        self.suspension().working_curve(&self.inhibition())?;
+        Ok(())
+    }
+}
+
+impl ShrinkageNumbers {
+    fn check(&self) -> Result<(), CompositionError> {
+        let positive = |number: f64| number > 0.0 && number.is_finite();
+        let number = |fine, what, wanted| {
+            if fine { Ok(()) } else { Err(CompositionError::Number(what, wanted)) }
+        };
+        number(positive(self.density_g_per_cm3.value), "shrinkage.density-g-per-cm3", POSITIVE)?;
+        let numbers = |it: &MonomerNumbers| {
+            [it.functionality, it.molar_mass_g_per_mol, it.moles].into_iter().all(positive)
+        };
+        let monomers = !self.monomers.is_empty() && self.monomers.iter().all(numbers);
+        number(monomers, "shrinkage.monomers", "there, with numbers above zero")?;
+        let areas = self.spectra.iter().flat_map(|it| [it.before, it.after]);
+        number(areas.flatten().all(positive), "areas of shrinkage.spectra", POSITIVE)?;
+        let conversion = self.conversion().ok_or(CompositionError::NoConversion)?;
+        number((0.0..=1.0).contains(&conversion), "shrinkage.conversion", "from 0 to 1")
+    }
+
+    /// Returns the conversion that is given or measured; none if both are, or none is.
+    fn conversion(&self) -> Option<f64> {
+        let areas = |[stretching, twisting, carbonyl]: [f64; 3]| shrinkage::PeakAreas {
+            stretching,
+            twisting,
+            carbonyl,
+        };
+        match (&self.conversion, &self.spectra) {
+            (Some(given), None) => Some(given.value),
+            (None, Some(it)) => Some(shrinkage::conversion(areas(it.before), areas(it.after))),
+            _ => None,
+        }
+    }
+}
+
+/// Returns a substance as the models have it: mol a litre, and l/(mol cm) to base e.
+fn absorber(of: &Dissolved) -> Absorber {
+    Absorber {
+        concentration: of.concentration.value.mol_per_m3() / 1000.0,
+        extinction: of.absorptivity.value.m2_per_mol() * 10.0 * std::f64::consts::LN_10,
+    }
+}
+
+impl Composition {
+    /// Returns the parts that attenuate light.
+    pub fn suspension(&self) -> Suspension {
+        let ceramic = self.ceramic.as_ref();
+        Suspension {
+            scattering_length: ceramic.map(|it| it.scattering_length.value),
+            ceramic: ceramic.map_or(0.0, |it| it.share.value),
+            photoinitiator: absorber(&self.photoinitiator),
+            dye: self.uv_absorber.as_ref().map_or(Absorber::NONE, absorber),
+        }
+    }
+
+    /// Returns what keeps the resin from curing.
+    pub fn inhibition(&self) -> Inhibition {
+        let of = &self.inhibition;
+        Inhibition {
+            inhibitor: of.inhibitor.value.mol_per_m3() / 1000.0,
+            radicals_per_inhibitor: of.radicals_per_inhibitor.value,
+            radicals_per_dye: of.radicals_per_dye.as_ref().map_or(0.0, |it| it.value),
+            radicals_per_photon: of.radicals_per_photon.value,
+            wavelength: self.wavelength.value,
+        }
+    }
+
+    /// Returns the share of its volume by which the suspension shrinks as it cures, if the
+    /// composition says what shrinks (002 eq. 51 to 54).
+    pub fn volume_shrinkage(&self) -> Option<f64> {
+        let of = self.shrinkage.as_ref()?;
+        let monomer = |it: &MonomerNumbers| {
+            let monomer =
+                Monomer { functionality: it.functionality, molar_mass: it.molar_mass_g_per_mol };
+            (monomer, it.moles)
+        };
+        let monomers: Vec<_> = of.monomers.iter().map(monomer).collect();
+        let filler = self.ceramic.as_ref().map_or(0.0, |it| it.share.value);
+        let groups = shrinkage::groups_of_mixture(&monomers, of.density_g_per_cm3.value, filler);
+        Some(shrinkage::volume_shrinkage(of.conversion()?, groups))
+    }
+
+    /// Returns the contrast of the refractive indices, if they are given (002 eq. 55).
+    pub fn contrast(&self) -> Option<f64> {
+        let of = self.ceramic.as_ref()?.refraction.as_ref()?;
+        Some(refractive_contrast(of.ceramic.value, of.liquid.value))
+    }
+
+    /// Returns the material that the models make of it: a working curve by 002 eq. 57 and 58, and
+    /// as constants what no cure model reads, the shrinkage (eq. 51 to 54) and the contrast of the
+    /// refractive indices (eq. 55).
+    ///
+    /// # Errors
+    /// Returns an error if the numbers give no working curve.
+    pub fn material(&self) -> Result<Material, CompositionError> {
+        let curve = self.suspension().working_curve(&self.inhibition())?;
+        let model = |equation: &str| format!("002 {equation}, for the composition {}", self.name);
+        let constant = |(name, share, equation): (&str, Option<f64>, &str)| {
+            let constant = |share: f64| Constant {
+                value: rounded(100.0 * share),
+                unit: "%".to_owned(),
+                source: model(equation),
+            };
+            share.map(|share| (name.to_owned(), constant(share)))
+        };
+        let constants = [
+            ("volume-shrinkage", self.volume_shrinkage(), "equation 52"),
+            ("refractive-contrast", self.contrast(), "equation 55"),
+        ];
+        Ok(Material {
+            name: self.name.clone(),
+            description: self.description.clone(),
+            intensity: self.intensity.clone(),
+            working_curve: Some(CurveNumbers {
+                critical_dose: given(curve.critical_dose(), model("equation 58")),
+                penetration_depth: given(curve.penetration_depth(), model("equation 57")),
+                measured: None,
+            }),
+            constants: constants.into_iter().filter_map(constant).collect::<BTreeMap<_, _>>(),
+            ..Material::default()
+        })
+    }
+}
+
+fn given<T: Quantity>(value: T, source: String) -> Given<T> {
+    Given { value: T::of(rounded(value.number())), plus_minus: None, source }
+}
+
+/// A number to six digits: models are less exact than that.
+fn rounded(number: f64) -> f64 {
+    format!("{number:.5e}").parse().expect("a written number reads back")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::resin::CureModel;
+
+    /// Made-up numbers of the right size: 6.514 m2/mol are 150 l/(mol cm) to base e.
+    const MIXED: &str = r#"
+name = "mixed"
+description = "A test"
+wavelength = { value = "0.365 um", source = "a" }
+[ceramic]
+share = { value = 0.55, source = "a" }
+scattering-length = { value = "1500 um", source = "a" }
+refraction = { ceramic = { value = 1.4603, source = "002" }, liquid = { value = 1.4560, source = "002" } }
+[photoinitiator]
+concentration = { value = "200 mmol/l", source = "a" }
+absorptivity = { value = "6.51441723 m2/mol", source = "a" }
+[uv-absorber]
+concentration = { value = "2 mmol/l", source = "a" }
+absorptivity = { value = "868.588964 m2/mol", source = "a" }
+[inhibition]
+inhibitor = { value = "1 mmol/l", source = "a" }
+radicals-per-inhibitor = { value = 1, source = "a" }
+radicals-per-dye = { value = 2, source = "a" }
+radicals-per-photon = { value = 0.6, source = "a" }
+[shrinkage]
+density-g-per-cm3 = { value = 1.02, source = "a" }
+conversion = { value = 0.5, source = "a" }
+monomers = [
+  { name = "HDDA", functionality = 2, molar-mass-g-per-mol = 226, moles = 0.95 },
+  { name = "four", functionality = 4, molar-mass-g-per-mol = 500, moles = 0.05 },
+]
+"#;
+
+    #[test]
+    fn equations_51_to_58_make_a_material() {
+        let mixed = Composition::from_toml(MIXED).unwrap();
+        let material = mixed.material().unwrap();
+        // Worked out in Python for resin/composition.rs and with bc for resin/shrinkage.rs.
+        let curve = material.working_curve().unwrap().unwrap();
+        assert!((curve.penetration_depth().um() - 262.009).abs() < 2e-3, "{curve:?}");
+        assert!((curve.critical_dose().mj_per_cm2() - 115.823).abs() < 2e-3, "{curve:?}");
+        assert_eq!(material.constants["volume-shrinkage"].value, 4.52394);
+        // 002 has 0.3%.
+        assert_eq!(material.constants["refractive-contrast"].value, 0.29533);
+        assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material));
+    }
+
+    #[test]
+    fn spectra_give_the_conversion() {
+        let text = MIXED.replace(
+            "conversion = { value = 0.5, source = \"a\" }",
+            "spectra = { before = [3, 1, 2], after = [1, 0.5, 2.5], source = \"a\" }",
+        );
+        let by_spectra = Composition::from_toml(&text).unwrap().volume_shrinkage().unwrap();
+        let half = Composition::from_toml(MIXED).unwrap().volume_shrinkage().unwrap();
+        assert!((by_spectra - 1.4 * half).abs() < 1e-12, "{by_spectra} {half}");
+    }
+
+    #[test]
+    fn a_liquid_without_particles_needs_no_ceramic() {
+        let (head, rest) = MIXED.split_once("[ceramic]").unwrap();
+        let rest = rest.split_once("[photoinitiator]").unwrap().1;
+        let liquid = Composition::from_toml(&format!("{head}[photoinitiator]{rest}")).unwrap();
+        // 1/(30 + 40) cm.
+        let curve = liquid.material().unwrap().working_curve().unwrap().unwrap();
+        assert!((curve.penetration_depth().um() - 1e4 / 70.0).abs() < 1e-3, "{curve:?}");
+        assert!(curve.dose(Length::from_um(100.0)).is_ok() && liquid.contrast().is_none());
+    }
+
+    #[test]
+    fn impossible_numbers_are_refused() {
+        for (from, to, words) in [
+            ("0.55", "1", "ceramic.share must be from 0 to below 1"),
+            ("0.365 um", "0 um", "wavelength must be above zero"),
+            ("200 mmol/l", "0 mmol/l", "no working curve: its critical-dose must be above zero"),
+            ("value = 0.6", "value = 0", "inhibition.radicals-per-photon must be above zero"),
+            ("value = 0.5,", "value = 1.5,", "shrinkage.conversion must be from 0 to 1"),
+            ("conversion = {", "degree = {", "unknown key `degree`"),
+            ("moles = 0.05", "moles = 0", "shrinkage.monomers must be there"),
+            ("2 mmol/l", "2", "`2` is not a concentration"),
+        ] {
+            assert!(MIXED.contains(from), "{from}");
+            let error = Composition::from_toml(&MIXED.replacen(from, to, 1)).unwrap_err();
+            assert!(error.to_string().contains(words), "{error} for {to}");
+        }
+        let neither = MIXED.replace("conversion = { value = 0.5, source = \"a\" }", "");
+        let error = Composition::from_toml(&neither).unwrap_err().to_string();
+        assert_eq!(error, "shrinkage needs either conversion or spectra");
+    }
+}

@@ -1,0 +1,150 @@
+//! A material under a lamp that has aged, or behind a filter.
+
+use super::{Given, Material, MaterialError};
+use crate::resin::{Intensity, Quantity};
+
+impl Material {
+    /// Returns the material under a lamp of another light, as one that has aged (002 section 3.3.8).
+    ///
+    /// The critical dose follows the lamp by [`dimmed_lamp`](Self::dimmed_lamp) (eq. 36); the
+    /// penetration depth stays. Of a gray level, which passes the share `G` of the light, the
+    /// critical dose moves by `G` times as much, and the penetration depth stays that of the level:
+    /// it depends on the screen and not on the light (002 figure 65). 002 does not combine the two.
+    /// Two penetration depths stay as they are, and so does all of a material that does not say
+    /// how it follows the lamp; its doses then only take other times.
+    ///
+    /// # Errors
+    /// Returns an error if the lines make no model under that light, or if gray levels follow the
+    /// lamp and no intensity says under which light they were measured.
+    pub fn under_lamp(&self, lamp: Intensity) -> Result<Self, MaterialError> {
+        let mut under = self.clone();
+        let source = "the lamp's present light".to_owned();
+        under.intensity = Some(Given { value: lamp, plus_minus: None, source });
+        // The light is now that of a wide field.
+        if let Some(spread) = &mut under.spread {
+            spread.pixel = None;
+        }
+        if let Some(lines) = self.dimmed_lamp()? {
+            let curve = lines.at(lamp);
+            if let Some(numbers) = &mut under.working_curve {
+                numbers.critical_dose.value = curve.critical_dose();
+                numbers.penetration_depth.value = curve.penetration_depth();
+            }
+            under.move_gray(self, lamp)?;
+        }
+        under.gray_curve()?;
+        under.gray_lines()?;
+        Ok(under)
+    }
+
+    /// Moves the lines over the gray level from the lamp of another material to this light.
+    fn move_gray(&mut self, measured: &Self, lamp: Intensity) -> Result<(), MaterialError> {
+        if self.gray.is_none() && self.gray_light.is_none() {
+            return Ok(());
+        }
+        let before = measured.light()?.ok_or(MaterialError::NoLampOfGray)?.mw_per_cm2();
+        let rise = measured.dimmed_lamp.as_ref().map(|lines| lines.critical_dose.rise.number());
+        if let Some(gray) = &mut self.gray {
+            let watts = (lamp.mw_per_cm2() - before) / 1000.0;
+            let line = &mut gray.critical_dose;
+            line.rise = Quantity::of(line.rise.number() + rise.unwrap_or(0.0) * watts);
+        }
+        if let Some(lines) = &mut self.gray_light {
+            // Over the light, a line of the gray level is steeper as the lamp is weaker.
+            let line = &mut lines.penetration_depth;
+            line.rise = Quantity::of(line.rise.number() * before / lamp.mw_per_cm2());
+        }
+        Ok(())
+    }
+
+    /// Returns whether the critical dose is known under other lights than its own.
+    pub fn follows_lamp(&self) -> bool {
+        self.dimmed_lamp.is_some()
+    }
+
+    /// Returns whether a light is one of those under which the critical dose was measured; also if
+    /// the file does not say which those are.
+    pub fn knows_lamp(&self, lamp: Intensity) -> bool {
+        let lights = self.dimmed_lamp.as_ref().and_then(|lines| lines.lights);
+        lights.is_none_or(|lights| lights.holds(lamp))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{Catalogued, Length};
+
+    use super::*;
+    use crate::resin::{Dose, GrayLevel};
+
+    const fn watts(w: f64) -> Intensity {
+        Intensity::from_mw_per_cm2(1000.0 * w)
+    }
+
+    fn lamp() -> Material {
+        Material::builtin("lamp-suspension").unwrap()
+    }
+
+    fn near(found: f64, wanted: f64) {
+        assert!((found - wanted).abs() < 1e-9 * wanted, "{found} for {wanted}");
+    }
+
+    #[test]
+    fn a_curve_follows_equation_36() {
+        let white = Material { gray: None, gray_light: None, ..lamp() };
+        let under = white.under_lamp(watts(0.8)).unwrap();
+        let curve = under.working_curve().unwrap().unwrap();
+        near(curve.critical_dose().mj_per_cm2(), 123.648);
+        assert_eq!(curve.penetration_depth().um(), 211.0);
+        // (109 + 18.31 0.8) exp(100/211) mJ/cm2 at 0.8 W/cm2.
+        let resin = under.resin().unwrap();
+        let time = resin.exposure_time(Length::from_um(100.0), 1.0).unwrap();
+        near(time.ms(), 123.648 * (100.0_f64 / 211.0).exp() / 0.8);
+    }
+
+    #[test]
+    fn gray_levels_follow_the_lamp_by_their_light() {
+        let same = lamp().under_lamp(watts(1.6)).unwrap();
+        assert_eq!((same.gray, same.gray_light), (lamp().gray, lamp().gray_light));
+        let under = lamp().under_lamp(watts(0.9)).unwrap();
+        let half = GrayLevel::new(0.5).unwrap();
+        let curve = under.gray_curve().unwrap().unwrap().at(half);
+        near(curve.critical_dose().mj_per_cm2(), 101.8 + 0.5 * (35.6 - 18.31 * 0.7));
+        near(curve.penetration_depth().um(), 193.1 + 0.5 * 22.1);
+        // Lines over the light: E_c is that of 0.45 W/cm2, D_p that of the level.
+        let only_light = Material { gray: None, ..lamp() };
+        let under = only_light.under_lamp(watts(0.9)).unwrap();
+        let curve = under.gray_lines().unwrap().unwrap().under(watts(0.9)).at(half);
+        near(curve.critical_dose().mj_per_cm2(), 103.7 + 19.6 * 0.45);
+        near(curve.penetration_depth().um(), 194.8 + 11.3 * 0.8);
+    }
+
+    #[test]
+    fn what_does_not_follow_the_lamp_takes_other_times() {
+        let pegda = Material::builtin("pegda-mw700").unwrap();
+        let under = pegda.under_lamp(Intensity::from_mw_per_cm2(0.1032)).unwrap();
+        assert!(!pegda.follows_lamp() && lamp().follows_lamp());
+        assert_eq!(under.two_depth, pegda.two_depth);
+        let depth = Length::from_um(300.0);
+        let times =
+            [&pegda, &under].map(|it| it.resin().unwrap().exposure_time(depth, 1.0).unwrap());
+        near(times[1].ms(), 2.0 * times[0].ms());
+    }
+
+    #[test]
+    fn gray_levels_need_the_light_that_they_were_measured_under() {
+        let dark = Material { intensity: None, ..lamp() };
+        assert_eq!(dark.under_lamp(watts(1.0)), Err(MaterialError::NoLampOfGray));
+        // Lines that fall towards white have no levels.
+        let mut steep = lamp();
+        steep.dimmed_lamp.as_mut().unwrap().critical_dose.rise = Dose::from_mj_per_cm2(60.0);
+        let error = steep.under_lamp(watts(0.5)).unwrap_err().to_string();
+        assert!(error.starts_with("gray.critical-dose.rise must be zero or more"), "{error}");
+    }
+
+    #[test]
+    fn lights_that_were_measured_are_known() {
+        assert!(lamp().knows_lamp(watts(0.9)) && !lamp().knows_lamp(watts(0.4)));
+        assert!(Material::builtin("pegda-mw700").unwrap().knows_lamp(watts(0.4)));
+    }
+}
