@@ -63,12 +63,12 @@ fn edges_of_squares_and_discs_move_by_the_distance_at_every_angle() {
         for degrees in [0.0, 1.0, 7.0, 15.0, 22.5, 30.0, 41.0, 45.0] {
             for side in [100.3, 300.0] {
                 let off_um = square_too_far(&square(side, degrees), by) * PITCH;
-                assert!(off_um.abs() < 0.2, "square {side} at {degrees} by {um}: {off_um}");
+                assert!(off_um.abs() < 0.5, "square {side} at {degrees} by {um}: {off_um}");
             }
         }
         for radius in [75.0, 147.6, 300.0, 1000.0] {
             let off_um = too_far(&disc(radius), std::f64::consts::PI, by) * PITCH;
-            assert!(off_um.abs() < 0.2, "disc {radius} by {um}: {off_um}");
+            assert!(off_um.abs() < 0.5, "disc {radius} by {um}: {off_um}");
         }
     }
 }
