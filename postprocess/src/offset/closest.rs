@@ -10,6 +10,8 @@ use super::outline::Outline;
 /// How far beyond the outline pixels may lie, in pixels: their colour and the mean line disagree
 /// by less.
 const BEYOND: f64 = 1.5;
+/// Up to this length in pixels a side may stand for the wedge beyond its end.
+const MAX_SLACK: f64 = 0.5;
 /// Room for rounding where sides and wedges meet, in pixels.
 const SLACK: f64 = 1e-6;
 
@@ -38,11 +40,46 @@ pub(super) fn measure(
         };
         let Some(last) = count.checked_sub(1) else { continue };
         let mut before = side(last);
+        let first = side(0);
+        let mut turned = Turn::between(&before, &first, measured.reach);
         for corner in 0..count {
-            let next = side(corner);
-            next.measure(map, measured);
-            measure_corner(map, &before, &next, measured);
-            before = next;
+            let here = if corner == 0 { first } else { side(corner) };
+            let next = if corner == last { first } else { side(corner + 1) };
+            let turns = Turn::between(&here, &next, measured.reach);
+            here.measure(map, measured, [turned, turns].map(|turn| turn.slack(measured.reach)));
+            if turned == Turn::Corner {
+                measure_corner(map, &before, &here, measured);
+            }
+            (before, turned) = (here, turns);
+        }
+    }
+}
+
+/// How an outline turns from a side to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Turn {
+    /// By so little, of this sine, that both sides may stand for the wedge between them.
+    Smooth(f64),
+    Corner,
+}
+
+impl Turn {
+    fn between(before: &Side, after: &Side, reach: f64) -> Self {
+        let [a, b] = [before.along, after.along];
+        let sine = a[0] * b[1] - a[1] * b[0];
+        let goes_on = a[0] * b[0] + a[1] * b[1] > 0.0;
+        if goes_on && sine.abs() * reach < MAX_SLACK {
+            Self::Smooth(sine.abs())
+        } else {
+            Self::Corner
+        }
+    }
+
+    /// By how much the sides are longer, so that no pixel lies between them.
+    fn slack(self, reach: f64) -> f64 {
+        match self {
+            Self::Smooth(sine) => SLACK + 0.51 * sine * reach.max(BEYOND),
+            Self::Corner => SLACK,
         }
     }
 }
@@ -65,16 +102,19 @@ impl Side {
     }
 
     /// Measures the pixels straight above the side.
-    fn measure(&self, map: &mut EdgeMap, Measured { is_right, reach }: Measured) {
+    /// At its ends there is room for turns.
+    fn measure(&self, map: &mut EdgeMap, measured: Measured, slack: [f64; 2]) {
+        let Measured { is_right, reach } = measured;
         let [x, y] = self.along;
         let inwards = if is_right { [-y, x] } else { [y, -x] };
-        let corners = [(0.0, -BEYOND), (self.length, -BEYOND), (0.0, reach), (self.length, reach)];
+        let ends = [-slack[0], self.length + slack[1]];
+        let corners = [(ends[0], -BEYOND), (ends[1], -BEYOND), (ends[0], reach), (ends[1], reach)];
         let rows = corners.map(|(along, away)| self.start[1] + along * y + away * inwards[1]);
         let slope = (self.by[1] - self.by[0]) / self.length;
         for row in rows_between(rows, map.height()) {
             let down = f64::from(row) + 0.5 - self.start[1];
             let mut columns = Interval::EVERYTHING;
-            columns.cut(x, down * y, [-SLACK, self.length + SLACK]);
+            columns.cut(x, down * y, ends);
             columns.cut(inwards[0], down * inwards[1], [-BEYOND, reach]);
             map.for_each_near(row, columns.pixels(self.start[0]), |column, near| {
                 let right = f64::from(column) + 0.5 - self.start[0];
@@ -96,10 +136,6 @@ fn measure_corner(
     Measured { is_right, reach }: Measured,
 ) {
     let turn = before.along[0] * after.along[1] - before.along[1] * after.along[0];
-    let goes_on = before.along[0] * after.along[0] + before.along[1] * after.along[1] > 0.0;
-    if turn.abs() < SLACK && goes_on {
-        return;
-    }
     // A wedge beyond a corner that juts out of the measured pixels holds few of them.
     let juts_out = (turn > 0.0) == is_right;
     let (radius, sign) = if juts_out { (BEYOND, -1.0) } else { (reach, 1.0) };

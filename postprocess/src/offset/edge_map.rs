@@ -255,11 +255,17 @@ impl Near {
     }
 }
 
+/// From this distance on no edge cuts a pixel.
+const HALF_DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// Returns the share of a pixel's area inside a straight edge, whose distance from the pixel's
 /// middle is below zero if that is outside, and whose normal has the smaller side `slant`.
 fn share_inside(distance: f64, slant: f64) -> f64 {
-    let steep = (1.0 - slant * slant).sqrt();
     let away = distance.abs();
+    if away >= HALF_DIAGONAL {
+        return if distance < 0.0 { 0.0 } else { 1.0 };
+    }
+    let steep = (1.0 - slant * slant).sqrt();
     let beyond = (steep + slant) / 2.0 - away;
     let share = if beyond <= 0.0 {
         1.0

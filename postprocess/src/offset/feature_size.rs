@@ -16,6 +16,8 @@ const STEP: f64 = 6.0;
 const ROUGHNESS: f64 = 3.0;
 /// Sides of outlines that are shorter, in pixels, take the size of those beside.
 const SHORT: f64 = 2.5;
+/// The cosine of a turn that is sharp.
+const SHARP: f64 = 0.9;
 /// The slope of a ray beside the normal.
 const TILT: f64 = 0.1;
 /// The rows of a band of places.
@@ -67,12 +69,22 @@ struct Place {
     length: f64,
     /// Whether it starts at a corner of the outline.
     is_first: bool,
-    /// Whether it starts or ends at one.
-    is_at_end: bool,
+    /// Whether it starts or ends where the outline turns sharply.
+    is_at_turn: bool,
 }
 
 /// Returns the places of an outline.
 fn places(outline: &Outline) -> Vec<Place> {
+    let count = outline.len();
+    let along = |of: usize| {
+        let [a, b] = [outline[of % count], outline[(of + 1) % count]];
+        [b[0] - a[0], b[1] - a[1]]
+    };
+    let turns = |corner: usize| {
+        let [a, b] = [along(corner + count - 1), along(corner)];
+        let cosine = (a[0] * b[0] + a[1] * b[1]) / (a[0].hypot(a[1]) * b[0].hypot(b[1]));
+        cosine < SHARP
+    };
     let mut places = Vec::new();
     for (of, &[x, y]) in outline.iter().enumerate() {
         let next = outline[(of + 1) % outline.len()];
@@ -87,7 +99,7 @@ fn places(outline: &Outline) -> Vec<Place> {
             inwards: [-down / side, right / side],
             length: side / count,
             is_first: step == 0,
-            is_at_end: step == 0 || step + 1 == count as u32,
+            is_at_turn: (step == 0 && turns(of)) || (step + 1 == count as u32 && turns(of + 1)),
         }));
     }
     places
@@ -97,7 +109,7 @@ impl Place {
     /// Returns how far the white goes on from the place along its normal, up to `most` pixels.
     fn across(&self, white: &RowRuns, most: f64) -> f64 {
         let straight = across(white, self.middle, self.inwards, most);
-        if straight >= most || !self.is_at_end {
+        if straight >= most || !self.is_at_turn {
             return straight;
         }
         // Next to a square corner the ray runs along the other side, and must not hit its stairs.
@@ -137,19 +149,33 @@ fn across(white: &RowRuns, [x, y]: [f64; 2], [right, down]: [f64; 2], most: f64)
     most
 }
 
+/// Returns at which places of an outline the size is found; others take those beside. What cuts
+/// a corner by a pixel or two has no direction of its own, and of short sides of a curve one in
+/// each step is enough.
+fn known(places: &[Place]) -> Vec<bool> {
+    let are_short = places.iter().all(|place| place.length < SHORT);
+    let mut since = STEP;
+    let is_known = |place: &Place| {
+        since += place.length;
+        let is_known =
+            are_short || (place.length >= SHORT && (since >= STEP / 2.0 || place.is_at_turn));
+        since = if is_known { 0.0 } else { since };
+        is_known
+    };
+    places.iter().map(is_known).collect()
+}
+
 /// Returns the sizes of the feature at the places of an outline, up to `most` pixels.
 fn sizes(white: &RowRuns, places: &[Place], bands: &Bands, most: f64) -> Vec<f64> {
-    let is_short = |place: &Place| place.length < SHORT;
-    let are_short = places.iter().all(is_short);
-    let size = |place: &Place| {
-        // What cuts a corner by a pixel or two has no direction of its own.
-        if is_short(place) && !are_short {
+    let is_known = known(places);
+    let size = |(place, is_known): (&Place, &bool)| {
+        if !is_known {
             return (most, 0.0);
         }
         let across = place.across(white, most);
         (across, bands.disc(place, across))
     };
-    let (across, discs): (Vec<f64>, Vec<f64>) = places.iter().map(size).unzip();
+    let (across, discs): (Vec<f64>, Vec<f64>) = places.iter().zip(&is_known).map(size).unzip();
     carried(discs, &across)
 }
 

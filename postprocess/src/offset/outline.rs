@@ -130,7 +130,7 @@ impl Arc {
     fn chords(&self) -> u32 {
         match self.rise.abs() {
             0.0 => 1,
-            rise if rise < 0.2 => 2,
+            rise if rise < 0.4 => 2,
             _ => 4,
         }
     }
