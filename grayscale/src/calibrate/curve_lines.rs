@@ -1,9 +1,9 @@
 //! Fits one working curve whose numbers are lines over a third quantity to all points at once.
 
-use super::FitError;
 use super::matrix::{dot, inverse, product};
 use super::regression::LineFit;
 use super::student_t::t_95;
+use super::{FitError, least_squares};
 
 /// A measured depth, at a logarithm of the dose and an `x` over which the curve's numbers change.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,32 +105,14 @@ fn normal(numbers: &Numbers, points: &[LinePoint], free: [bool; 4]) -> ([[f64; 4
     (matrix, vector)
 }
 
-/// Improves numbers by Levenberg and Marquardt's method until no step helps.
-fn fitted(mut numbers: Numbers, points: &[LinePoint], free: [bool; 4]) -> Option<Numbers> {
-    let mut left = squares(&numbers, points);
-    let mut damping = 1e-3;
-    for _ in 0..500 {
-        let (mut matrix, vector) = normal(&numbers, points, free);
-        for (i, row) in matrix.iter_mut().enumerate() {
-            row[i] *= 1.0 + damping;
-        }
-        let step = product(&inverse(matrix)?, &vector);
-        let next: Numbers = std::array::from_fn(|i| numbers[i] + step[i]);
-        let then = squares(&next, points);
-        if then < left {
-            let ended = left - then <= 1e-15 * left;
-            (numbers, left) = (next, then);
-            if ended {
-                break;
-            }
-            damping = (damping / 10.0).max(1e-12);
-        } else if damping > 1e9 {
-            break;
-        } else {
-            damping *= 10.0;
-        }
-    }
-    left.is_finite().then_some(numbers)
+/// Improves numbers until no step helps.
+fn fitted(numbers: Numbers, points: &[LinePoint], free: [bool; 4]) -> Option<Numbers> {
+    least_squares::fitted(
+        numbers,
+        |numbers| squares(numbers, points),
+        |numbers| normal(numbers, points, free),
+        |numbers, step: Numbers| std::array::from_fn(|i| numbers[i] + step[i]),
+    )
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ mod fit_two_depth;
 mod fit_widths;
 mod hinge;
 mod hinge_piece;
+mod least_squares;
 #[cfg(test)]
 mod made_up;
 mod matrix;

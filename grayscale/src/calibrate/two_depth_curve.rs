@@ -1,6 +1,6 @@
 //! The curve of the two-depth model, in parameters suited to fitting.
 
-use super::matrix::{inverse, product};
+use super::least_squares;
 
 /// `z = ln(1 + k a (E - E_c))/k`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,36 +68,18 @@ impl TwoDepthCurve {
         (matrix, vector)
     }
 
-    /// Improves the parameters by Levenberg and Marquardt's method until no step helps.
-    pub(super) fn fitted(mut self, data: &[(f64, f64)]) -> Option<Self> {
-        let mut squares = self.squares(data);
-        let mut damping = 1e-3;
-        for _ in 0..500 {
-            let (mut matrix, vector) = self.normal(data);
-            for (i, row) in matrix.iter_mut().enumerate() {
-                row[i] *= 1.0 + damping;
-            }
-            let step = product(&inverse(matrix)?, &vector);
-            let next = Self {
-                onset: self.onset + step[0],
-                log_rate: self.log_rate + step[1],
-                bend: (self.bend + step[2]).max(0.0),
-            };
-            let left = next.squares(data);
-            if left < squares {
-                let ended = squares - left <= 1e-14 * squares;
-                (self, squares) = (next, left);
-                if ended {
-                    break;
-                }
-                damping = (damping / 10.0).max(1e-12);
-            } else if damping > 1e9 {
-                break;
-            } else {
-                damping *= 10.0;
-            }
-        }
-        squares.is_finite().then_some(self)
+    /// Improves the parameters until no step helps.
+    pub(super) fn fitted(self, data: &[(f64, f64)]) -> Option<Self> {
+        least_squares::fitted(
+            self,
+            |curve| curve.squares(data),
+            |curve| curve.normal(data),
+            |curve, step: [f64; 3]| Self {
+                onset: curve.onset + step[0],
+                log_rate: curve.log_rate + step[1],
+                bend: (curve.bend + step[2]).max(0.0),
+            },
+        )
     }
 }
 

@@ -1,0 +1,40 @@
+//! Nonlinear least squares.
+
+use super::matrix::{inverse, product};
+
+/// Improves the numbers of a curve by Levenberg and Marquardt's method until no step helps.
+/// `squares` returns the sum of squared residuals, infinite where there is no curve; `normal` the
+/// products of the derivatives with each other and with the residuals; `moved` the numbers after
+/// a step.
+///
+/// Returns nothing if a step has no solution, or there is no curve to begin with.
+pub(super) fn fitted<T: Copy, const N: usize>(
+    mut numbers: T,
+    squares: impl Fn(&T) -> f64,
+    normal: impl Fn(&T) -> ([[f64; N]; N], [f64; N]),
+    moved: impl Fn(&T, [f64; N]) -> T,
+) -> Option<T> {
+    let mut left = squares(&numbers);
+    let mut damping = 1e-3;
+    for _ in 0..500 {
+        let (mut matrix, vector) = normal(&numbers);
+        for (i, row) in matrix.iter_mut().enumerate() {
+            row[i] *= 1.0 + damping;
+        }
+        let next = moved(&numbers, product(&inverse(matrix)?, &vector));
+        let then = squares(&next);
+        if then < left {
+            let ended = left - then <= 1e-15 * left;
+            (numbers, left) = (next, then);
+            if ended {
+                break;
+            }
+            damping = (damping / 10.0).max(1e-12);
+        } else if damping > 1e9 {
+            break;
+        } else {
+            damping *= 10.0;
+        }
+    }
+    left.is_finite().then_some(numbers)
+}
