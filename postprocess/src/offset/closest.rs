@@ -12,6 +12,8 @@ use super::outline::Outline;
 const BEYOND: f64 = 1.5;
 /// Up to this length in pixels a side may stand for the wedge beyond its end.
 const MAX_SLACK: f64 = 0.5;
+/// A column beyond all images.
+const MAX_COLUMN: f64 = (1 << 28) as f64;
 /// Room for rounding where sides and wedges meet, in pixels.
 const SLACK: f64 = 1e-6;
 
@@ -39,18 +41,16 @@ pub(super) fn measure(
             Side::new([outline[corner], outline[next]], [by(of, corner), by(of, next)])
         };
         let Some(last) = count.checked_sub(1) else { continue };
-        let mut before = side(last);
-        let first = side(0);
-        let mut turned = Turn::between(&before, &first, measured.reach);
+        let (mut before, mut here) = (side(last), side(0));
+        let mut turned = Turn::between(&before, &here, measured.reach);
         for corner in 0..count {
-            let here = if corner == 0 { first } else { side(corner) };
-            let next = if corner == last { first } else { side(corner + 1) };
+            let next = side((corner + 1) % count);
             let turns = Turn::between(&here, &next, measured.reach);
             here.measure(map, measured, [turned, turns].map(|turn| turn.slack(measured.reach)));
             if turned == Turn::Corner {
                 measure_corner(map, &before, &here, measured);
             }
-            (before, turned) = (here, turns);
+            (before, here, turned) = (here, next, turns);
         }
     }
 }
@@ -110,18 +110,20 @@ impl Side {
         let ends = [-slack[0], self.length + slack[1]];
         let corners = [(ends[0], -BEYOND), (ends[1], -BEYOND), (ends[0], reach), (ends[1], reach)];
         let rows = corners.map(|(along, away)| self.start[1] + along * y + away * inwards[1]);
+        let along = Strip::new([x, y], ends);
+        let across = Strip::new(inwards, [-BEYOND, reach]);
         let slope = (self.by[1] - self.by[0]) / self.length;
+        let slant = Near::slant(inwards);
+        let mut place = 0;
         for row in rows_between(rows, map.height()) {
             let down = f64::from(row) + 0.5 - self.start[1];
-            let mut columns = Interval::EVERYTHING;
-            columns.cut(x, down * y, ends);
-            columns.cut(inwards[0], down * inwards[1], [-BEYOND, reach]);
-            map.for_each_near(row, columns.pixels(self.start[0]), |column, near| {
+            let columns = along.in_row(down).and(across.in_row(down)).pixels(self.start[0]);
+            map.for_each_near(row, columns, &mut place, |column, near| {
                 let right = f64::from(column) + 0.5 - self.start[0];
                 let distance = right * inwards[0] + down * inwards[1];
                 if (distance as f32).abs() < near.distance.abs() {
-                    let along = right * x + down * y;
-                    *near = Near::new(distance, self.by[0] + slope * along, inwards);
+                    let by = self.by[0] + slope * (right * x + down * y);
+                    *near = Near { distance: distance as f32, by: by as f32, slant };
                 }
             });
         }
@@ -139,21 +141,23 @@ fn measure_corner(
     // A wedge beyond a corner that juts out of the measured pixels holds few of them.
     let juts_out = (turn > 0.0) == is_right;
     let (radius, sign) = if juts_out { (BEYOND, -1.0) } else { (reach, 1.0) };
+    let past_before = Strip::new(before.along, [-SLACK, f64::INFINITY]);
+    let short_of_after = Strip::new(after.along, [f64::NEG_INFINITY, SLACK]);
     let [x, y] = after.start;
+    let mut place = 0;
     for row in rows_between([y - radius, y + radius, y, y], map.height()) {
         let down = f64::from(row) + 0.5 - y;
-        let mut columns = Interval::EVERYTHING;
-        columns.cut(before.along[0], down * before.along[1], [-SLACK, f64::INFINITY]);
-        columns.cut(after.along[0], down * after.along[1], [f64::NEG_INFINITY, SLACK]);
         let half = (radius * radius - down * down).max(0.0).sqrt();
-        columns.cut(1.0, 0.0, [-half, half]);
-        map.for_each_near(row, columns.pixels(x), |column, near| {
+        let wedge = past_before.in_row(down).and(short_of_after.in_row(down));
+        let columns = wedge.and(Interval { low: -half, high: half }).pixels(x);
+        map.for_each_near(row, columns, &mut place, |column, near| {
             let right = f64::from(column) + 0.5 - x;
             let distance = right.hypot(down);
             // Straight above a side, the side knows better on which side of it a pixel is.
             if distance + 4.0 * SLACK < f64::from(near.distance.abs()) {
-                let normal = [right / distance, down / distance];
-                *near = Near::new(sign * distance, after.by[0], normal);
+                let slant = Near::slant([right / distance, down / distance]);
+                let distance = (sign * distance) as f32;
+                *near = Near { distance, by: after.by[0] as f32, slant };
             }
         });
     }
@@ -167,31 +171,51 @@ fn rows_between(places: [f64; 4], height: u32) -> std::ops::Range<u32> {
     row((least - 0.5).ceil())..row((greatest + 0.5).floor())
 }
 
+/// The pixels between two parallel lines, by rows.
+struct Strip {
+    /// The two places where the lines cross row zero.
+    at_zero: [f64; 2],
+    /// By how much both go on in each row.
+    by_row: f64,
+}
+
+/// The least slope of a line across rows: one along a row crosses it far beyond all images.
+const LEAST_SLOPE: f64 = 1e-12;
+
+impl Strip {
+    /// Takes the places whose products with a direction lie between two bounds.
+    fn new([right, down]: [f64; 2], bounds: [f64; 2]) -> Self {
+        let slope = if right.abs() < LEAST_SLOPE { LEAST_SLOPE } else { right };
+        let at_zero = bounds.map(|bound| bound / slope);
+        Self { at_zero, by_row: -down / slope }
+    }
+
+    /// Returns the places along a row.
+    fn in_row(&self, down: f64) -> Interval {
+        let [a, b] = self.at_zero.map(|place| place + down * self.by_row);
+        Interval { low: a.min(b), high: a.max(b) }
+    }
+}
+
 /// Places along a row, from a point on.
+#[derive(Clone, Copy)]
 struct Interval {
     low: f64,
     high: f64,
 }
 
 impl Interval {
-    const EVERYTHING: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
-
-    /// Keeps the places where `slope * place + rest` lies within bounds.
-    fn cut(&mut self, slope: f64, rest: f64, [low, high]: [f64; 2]) {
-        if slope.abs() < 1e-12 {
-            if !(low..=high).contains(&rest) {
-                self.high = f64::NEG_INFINITY;
-            }
-            return;
-        }
-        let [a, b] = [(low - rest) / slope, (high - rest) / slope];
-        self.low = self.low.max(a.min(b));
-        self.high = self.high.min(a.max(b));
+    /// Returns the places in both.
+    fn and(self, other: Self) -> Self {
+        Self { low: self.low.max(other.low), high: self.high.min(other.high) }
     }
 
     /// Returns the columns of the pixels with their middles there, of places from a column on.
-    fn pixels(&self, from: f64) -> (i32, i32) {
-        let start = (self.low + from - 0.5).ceil() as i32;
-        (start, (self.high + from + 0.5).floor() as i32)
+    fn pixels(self, from: f64) -> (i32, i32) {
+        // Clamped to what images have, so that rounding needs no more than a comparison.
+        let [low, high] =
+            [self.low + from - 0.5, self.high + from + 0.5].map(|at| at.clamp(0.0, MAX_COLUMN));
+        let start = low as i32;
+        (start + i32::from(f64::from(start) < low), high as i32)
     }
 }

@@ -7,7 +7,7 @@ use super::aligned_rows::AlignedRows;
 use super::closest::{Measured, measure};
 use super::erode::{Disc, Erosion, SourceColour, Sources, at_least, more_than};
 use super::outline::Outline;
-use super::row_runs::{RowRuns, Run, subtract};
+use super::row_runs::{RowRuns, Run, first_past, subtract};
 
 /// Edges, and by how many pixels they move away from the sources.
 #[derive(Clone, Copy, Debug)]
@@ -130,19 +130,20 @@ impl EdgeMap {
     }
 
     /// Calls `look` with each pixel near an edge in some columns of a row, from the first up to,
-    /// but without, the second.
+    /// but without, the second. `place` is the place of a run near there, as in the row before.
     pub(super) fn for_each_near(
         &mut self,
         row: u32,
         (start, end): Run,
+        place: &mut usize,
         mut look: impl FnMut(i32, &mut Near),
     ) {
         if start >= end {
             return;
         }
         let runs = &self.runs[self.ends[row as usize]..self.ends[row as usize + 1]];
-        let next = runs.partition_point(|run| run.columns.1 <= start);
-        for run in runs[next..].iter().take_while(|run| run.columns.0 < end) {
+        *place = first_past(runs, |run| run.columns.1, start, *place);
+        for run in runs[*place..].iter().take_while(|run| run.columns.0 < end) {
             let Some(first) = run.first else { continue };
             let [from, to] = [run.columns.0.max(start), run.columns.1.min(end)];
             let places =
@@ -243,10 +244,9 @@ impl Near {
     /// Farther from all edges than is measured.
     const FAR: Self = Self { distance: f32::MAX, by: 0.0, slant: 0.0 };
 
-    /// Returns the nearest edge of a pixel in the direction of a normal of length one.
-    pub(super) fn new(distance: f64, by: f64, normal: [f64; 2]) -> Self {
-        let slant = normal[0].abs().min(normal[1].abs()) as f32;
-        Self { distance: distance as f32, by: by as f32, slant }
+    /// Returns how slanted the edge with a normal of length one is.
+    pub(super) fn slant(normal: [f64; 2]) -> f32 {
+        normal[0].abs().min(normal[1].abs()) as f32
     }
 
     /// Returns the level of the pixel: the share of its area that is inside the moved edge.
@@ -280,5 +280,6 @@ fn share_inside(distance: f64, slant: f64) -> f64 {
 
 /// Returns the level of a pixel of which a share, from 0 to 1, is exposed.
 pub(super) fn level(share: f64) -> u8 {
-    (255.0 * share.clamp(0.0, 1.0)).round() as u8
+    // A cast rounds down, and is no call.
+    (255.0 * share.clamp(0.0, 1.0) + 0.5) as u8
 }

@@ -123,28 +123,30 @@ impl Place {
 
 /// Returns how far the white goes on from a point in a direction, up to `most` pixels.
 fn across(white: &RowRuns, [x, y]: [f64; 2], [right, down]: [f64; 2], most: f64) -> f64 {
-    let run = |column: f64, row: f64| {
-        let is_inside = row >= 0.0 && row < f64::from(white.height());
-        let run = is_inside.then(|| white.find(column.floor() as i32, row as u32)).flatten();
-        run.map(|run| white.all()[run])
-    };
     // The mean line may pass through black pixels: one of the next is white.
-    let is_white = |away: &f64| run(x + away * right, (y + away * down).floor()).is_some();
-    let Some(mut away) = [0.5, 1.0, 1.5].into_iter().find(is_white) else { return 1.0 };
-    let to = |side: f64, from: f64, slope: f64| {
-        if slope.abs() > 1e-9 { (side - from) / slope } else { f64::INFINITY }
+    let place = |away: &f64| white.place(x + away * right, (y + away * down).floor() as i64, 0);
+    let Some((mut away, mut place)) =
+        [0.5, 1.0, 1.5].into_iter().find_map(|away| Some((away, place(&away)?)))
+    else {
+        return 1.0;
     };
-    let mut row = (y + away * down).floor();
+    let by = [right, down].map(|slope| (slope.abs() > 1e-9).then(|| 1.0 / slope));
+    let to = |way: f64, by: Option<f64>| by.map_or(f64::INFINITY, |by| way * by);
+    let mut row = (y + away * down).floor() as i64;
+    let (mut next_row, step) = if down > 0.0 { (row + 1, 1) } else { (row, -1) };
     while away < most {
-        let Some((start, end)) = run(x + away * right, row) else { return away };
+        let Some(here) = white.place(x + away * right, row, place) else { return away };
+        place = here;
         // Up to the next row, or the end of the run if that comes first.
-        let to_side = to(f64::from(if right > 0.0 { end } else { start }), x, right);
-        let to_next = to(if down > 0.0 { row + 1.0 } else { row }, y, down);
+        let (start, end) = white.row(row as u32)[here];
+        let to_side = to(f64::from(if right > 0.0 { end } else { start }) - x, by[0]);
+        let to_next = to(next_row as f64 - y, by[1]);
         if to_side <= to_next {
             return to_side.min(most);
         }
         away = to_next;
-        row += down.signum();
+        row += step;
+        next_row += step;
     }
     most
 }

@@ -71,6 +71,16 @@ impl RowRuns {
         runs.get(next).filter(|run| run.0 <= column).map(|_| self.ends[row as usize] + next)
     }
 
+    /// Returns the place in its row of the run that holds a point, searched from a place on.
+    pub(super) fn place(&self, column: f64, row: i64, from: usize) -> Option<usize> {
+        if column < 0.0 {
+            return None;
+        }
+        let (runs, column) = (self.row_or_none(row), column as i32);
+        let place = first_past(runs, |run| run.1, column, from);
+        runs.get(place).filter(|run| run.0 <= column).map(|_| place)
+    }
+
     /// Calls `touch` with the indices of each two runs of neighbouring rows that touch, at sides
     /// or corners: the upper one, then the lower one.
     pub(super) fn for_each_touching(&self, mut touch: impl FnMut(usize, usize)) {
@@ -115,6 +125,23 @@ impl RowRuns {
         }
         mask.finish()
     }
+}
+
+/// Returns the place of the first run that ends beyond a column, searched from a place on.
+pub(super) fn first_past<T>(
+    runs: &[T],
+    end: impl Fn(&T) -> i32,
+    column: i32,
+    from: usize,
+) -> usize {
+    let mut place = from.min(runs.len());
+    while place > 0 && end(&runs[place - 1]) > column {
+        place -= 1;
+    }
+    while runs.get(place).is_some_and(|run| end(run) <= column) {
+        place += 1;
+    }
+    place
 }
 
 /// Makes `out` the parts of `runs` that are in none of `others`.
