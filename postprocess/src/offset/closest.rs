@@ -4,7 +4,7 @@
 //! wedge between its two sides: both are filled row by row (closest point transform, Mauch
 //! 2000). So each pixel near an edge is visited about once, however far edges move.
 
-use super::edge_map::{EdgeMap, Near};
+use super::edge_map::{Cut, EdgeMap, Near};
 use super::outline::Outline;
 
 /// How far beyond the outline pixels may lie, in pixels: their colour and the mean line disagree
@@ -113,17 +113,18 @@ impl Side {
         let along = Strip::new([x, y], ends);
         let across = Strip::new(inwards, [-BEYOND, reach]);
         let slope = (self.by[1] - self.by[0]) / self.length;
-        let slant = Near::slant(inwards);
+        let cut = Cut::new(inwards);
         let mut place = 0;
         for row in rows_between(rows, map.height()) {
             let down = f64::from(row) + 0.5 - self.start[1];
             let columns = along.in_row(down).and(across.in_row(down)).pixels(self.start[0]);
-            map.for_each_near(row, columns, &mut place, |column, near| {
+            map.for_each_near(row, columns, &mut place, |column, near, level| {
                 let right = f64::from(column) + 0.5 - self.start[0];
                 let distance = right * inwards[0] + down * inwards[1];
                 if (distance as f32).abs() < near.distance.abs() {
                     let by = self.by[0] + slope * (right * x + down * y);
-                    *near = Near { distance: distance as f32, by: by as f32, slant };
+                    *near = Near { distance: distance as f32, by: by as f32 };
+                    *level = cut.level(*near);
                 }
             });
         }
@@ -150,14 +151,13 @@ fn measure_corner(
         let half = (radius * radius - down * down).max(0.0).sqrt();
         let wedge = past_before.in_row(down).and(short_of_after.in_row(down));
         let columns = wedge.and(Interval { low: -half, high: half }).pixels(x);
-        map.for_each_near(row, columns, &mut place, |column, near| {
+        map.for_each_near(row, columns, &mut place, |column, near, level| {
             let right = f64::from(column) + 0.5 - x;
             let distance = right.hypot(down);
             // Straight above a side, the side knows better on which side of it a pixel is.
             if distance + 4.0 * SLACK < f64::from(near.distance.abs()) {
-                let slant = Near::slant([right / distance, down / distance]);
-                let distance = (sign * distance) as f32;
-                *near = Near { distance, by: after.by[0] as f32, slant };
+                *near = Near { distance: (sign * distance) as f32, by: after.by[0] as f32 };
+                *level = Cut::new([right / distance, down / distance]).level(*near);
             }
         });
     }
@@ -186,14 +186,14 @@ impl Strip {
     /// Takes the places whose products with a direction lie between two bounds.
     fn new([right, down]: [f64; 2], bounds: [f64; 2]) -> Self {
         let slope = if right.abs() < LEAST_SLOPE { LEAST_SLOPE } else { right };
-        let at_zero = bounds.map(|bound| bound / slope);
-        Self { at_zero, by_row: -down / slope }
+        let [a, b] = bounds.map(|bound| bound / slope);
+        Self { at_zero: [a.min(b), a.max(b)], by_row: -down / slope }
     }
 
     /// Returns the places along a row.
     fn in_row(&self, down: f64) -> Interval {
-        let [a, b] = self.at_zero.map(|place| place + down * self.by_row);
-        Interval { low: a.min(b), high: a.max(b) }
+        let [low, high] = self.at_zero.map(|place| place + down * self.by_row);
+        Interval { low, high }
     }
 }
 
@@ -207,15 +207,25 @@ struct Interval {
 impl Interval {
     /// Returns the places in both.
     fn and(self, other: Self) -> Self {
-        Self { low: self.low.max(other.low), high: self.high.min(other.high) }
+        Self { low: greater(self.low, other.low), high: lesser(self.high, other.high) }
     }
 
     /// Returns the columns of the pixels with their middles there, of places from a column on.
     fn pixels(self, from: f64) -> (i32, i32) {
         // Clamped to what images have, so that rounding needs no more than a comparison.
-        let [low, high] =
-            [self.low + from - 0.5, self.high + from + 0.5].map(|at| at.clamp(0.0, MAX_COLUMN));
+        let [low, high] = [self.low + from - 0.5, self.high + from + 0.5]
+            .map(|at| lesser(greater(at, 0.0), MAX_COLUMN));
         let start = low as i32;
         (start + i32::from(f64::from(start) < low), high as i32)
     }
+}
+
+/// Returns the greater of two numbers, in one instruction as neither is NaN.
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// Returns the lesser of two numbers, in one instruction as neither is NaN.
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }

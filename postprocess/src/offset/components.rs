@@ -56,13 +56,8 @@ pub(super) fn losses(before: &Mask, after: &Mask) -> Vec<Loss> {
 /// Removes components without a pixel of half level: faint rests of the edges of a wall that is
 /// kept elsewhere.
 pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
-    // Most images have no specks: no row has a run between black pixels that stays faint.
-    let is_faint = |row: u32| {
-        let parts = gray.row(row).split(|change| change.level == 0);
-        let brightest = parts.filter_map(|part| part.iter().map(|change| change.level).max());
-        brightest.min().is_some_and(|level| level < 128)
-    };
-    if !(0..gray.height()).any(is_faint) {
+    // Most images have no specks: all that is faint goes on to something bright.
+    if (0..gray.height()).all(|row| are_bright(&gray, row)) {
         return gray;
     }
     let components = Components::of(RowRuns::white(&gray.at_least(1)));
@@ -78,6 +73,45 @@ pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
     }
     let kept = components.rows.filtered(is_bright).mask(gray.width());
     lower(&gray, &GrayMask::from(&kept))
+}
+
+/// Returns whether each part of a row between black pixels has a pixel of half level, or goes on
+/// up or down to one.
+fn are_bright(gray: &GrayMask, row: u32) -> bool {
+    let mut faint = parts(gray, row).filter(|&(_, brightest)| brightest < 128);
+    faint.all(|(columns, _)| [-1, 1].into_iter().any(|step| goes_on(gray, row, &columns, step)))
+}
+
+/// Returns whether a part of a row goes on to a pixel of half level in a direction.
+fn goes_on(gray: &GrayMask, mut row: u32, columns: &Range<u32>, step: i32) -> bool {
+    let mut columns = columns.clone();
+    while let Some(next) = row.checked_add_signed(step).filter(|&next| next < gray.height()) {
+        let touches =
+            |part: &(Range<u32>, u8)| part.0.start <= columns.end && columns.start <= part.0.end;
+        let Some((part, brightest)) = parts(gray, next).find(touches) else { return false };
+        if brightest >= 128 {
+            return true;
+        }
+        (row, columns) = (next, part);
+    }
+    false
+}
+
+/// Returns the parts of a row between black pixels, with the greatest level of each.
+fn parts(gray: &GrayMask, row: u32) -> impl Iterator<Item = (Range<u32>, u8)> {
+    let mut changes = gray.row(row).iter();
+    std::iter::from_fn(move || {
+        let first = changes.find(|change| change.level > 0)?;
+        let (mut brightest, mut end) = (first.level, gray.width());
+        for change in changes.by_ref() {
+            if change.level == 0 {
+                end = change.column;
+                break;
+            }
+            brightest = brightest.max(change.level);
+        }
+        Some((first.column..end, brightest))
+    })
 }
 
 /// Returns the lower level of two images of one size at each pixel.
@@ -100,23 +134,47 @@ pub(crate) fn without_holes(mask: &Mask) -> Mask {
 }
 
 /// The runs of a shape by connected component.
-struct Components {
+pub(super) struct Components {
     rows: RowRuns,
     /// The first run of its component, for each run.
     first: Vec<u32>,
+    /// The pairs of runs that touch.
+    touching: usize,
 }
 
 impl Components {
-    fn of(rows: RowRuns) -> Self {
+    pub(super) fn of(rows: RowRuns) -> Self {
         let mut first: Vec<u32> = (0..rows.all().len() as u32).collect();
+        let mut touching = 0;
         rows.for_each_touching(|upper, lower| {
+            touching += 1;
             unite(&mut first, upper as u32, lower as u32);
         });
         for run in 0..first.len() {
             // Runs point at earlier ones, which by now point at the first.
             first[run] = first[first[run] as usize];
         }
-        Self { rows, first }
+        Self { rows, first, touching }
+    }
+
+    /// Returns the number of runs.
+    pub(super) fn run_count(&self) -> usize {
+        self.first.len()
+    }
+
+    /// Returns the first run of the component that a run is of.
+    pub(super) fn first(&self, run: usize) -> usize {
+        self.first[run] as usize
+    }
+
+    /// Returns the first run of each component.
+    pub(super) fn firsts(&self) -> impl Iterator<Item = usize> {
+        (0..self.run_count()).filter(|&run| self.first(run) == run)
+    }
+
+    /// Returns the number of holes: runs that touch around one close a loop (Euler).
+    pub(super) fn holes(&self) -> usize {
+        self.touching + self.firsts().count() - self.run_count()
     }
 
     /// Returns each run with its index and row.

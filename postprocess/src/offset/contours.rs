@@ -3,7 +3,7 @@
 //! A path has white on its right, seen on the screen. White pixels that touch at a corner are
 //! connected, so a path that comes to such a corner turns left.
 
-use super::row_runs::{RowRuns, Run};
+use super::row_runs::{RowRuns, Run, first_past};
 
 /// A direction along the sides of pixels.
 pub(super) type Direction = (i32, i32);
@@ -83,7 +83,7 @@ fn step(rows: &RowRuns, at: Passed, moves: &mut Vec<(Direction, u32)>) -> Passed
 /// Goes on at the upper corner of a left end: left along the row above, or right.
 fn past_left(row: i64, run: usize, runs: &[Run], above: &[Run]) -> (Passed, Direction, i32) {
     let (start, end) = runs[run];
-    let other = above.partition_point(|other| other.1 < start);
+    let other = first_past(above, |other| other.1, start - 1, run);
     match above.get(other) {
         Some(&(from, _)) if from < start => match run.checked_sub(1).map(|left| runs[left].1) {
             Some(left_end) if left_end >= from => {
@@ -99,7 +99,7 @@ fn past_left(row: i64, run: usize, runs: &[Run], above: &[Run]) -> (Passed, Dire
 /// Goes on at the lower corner of a right end: right along the row below, or left.
 fn past_right(row: i64, run: usize, runs: &[Run], below: &[Run]) -> (Passed, Direction, i32) {
     let (start, end) = runs[run];
-    let other = below.partition_point(|other| other.1 <= end);
+    let other = first_past(below, |other| other.1, end, run);
     if let Some(&(from, to)) = below.get(other)
         && from <= end
     {

@@ -1,7 +1,7 @@
 //! The edge map of an image: runs deep inside, and the distance and level of every pixel near an
 //! edge.
 
-use lamp_stack::GrayMask;
+use lamp_stack::{GrayMask, LevelChange};
 
 use super::aligned_rows::AlignedRows;
 use super::closest::{Measured, measure};
@@ -27,8 +27,6 @@ pub(super) struct Near {
     pub(super) distance: f32,
     /// The distance that the edge moves there.
     pub(super) by: f32,
-    /// How slanted the edge is: the smaller side of its normal of length one.
-    pub(super) slant: f32,
 }
 
 /// Depths are counted in such parts of a pixel.
@@ -62,6 +60,7 @@ pub(super) struct EdgePixel {
 pub(super) struct EdgeMap {
     ends: Vec<usize>,
     runs: Vec<EdgeRun>,
+    near_count: u32,
     /// The nearest edge of each pixel near one.
     near: Vec<Near>,
     /// The level of each of these pixels after the edge has moved.
@@ -86,8 +85,9 @@ impl EdgeMap {
         let mut map = Self::runs(sources, region, width, &discs);
         let is_right = sources.colour() == SourceColour::Black;
         let by = |of: usize, corner: usize| edges.by.map_or(most, |by| by[of][corner]);
+        map.near = vec![Near::FAR; map.near_count()];
+        map.levels = vec![255; map.near_count()];
         measure(&mut map, edges.outlines, by, Measured { is_right, reach: reach + STAIR });
-        map.levels = map.near.iter().map(Near::level).collect();
         map
     }
 
@@ -123,20 +123,20 @@ impl EdgeMap {
     /// Adds a run near an edge, unless it is empty.
     fn push_near(&mut self, run: Run) {
         if run.0 < run.1 {
-            let first = u32::try_from(self.near.len()).expect("an image has fewer pixels at edges");
-            self.runs.push(EdgeRun { columns: run, first: Some(first) });
-            self.near.resize(self.near.len() + (run.1 - run.0) as usize, Near::FAR);
+            self.runs.push(EdgeRun { columns: run, first: Some(self.near_count) });
+            let after = self.near_count.checked_add((run.1 - run.0) as u32);
+            self.near_count = after.expect("an image has fewer pixels at edges");
         }
     }
 
-    /// Calls `look` with each pixel near an edge in some columns of a row, from the first up to,
+    /// Calls `look` with each pixel near an edge and its level, in some columns of a row, from the first up to,
     /// but without, the second. `place` is the place of a run near there, as in the row before.
     pub(super) fn for_each_near(
         &mut self,
         row: u32,
         (start, end): Run,
         place: &mut usize,
-        mut look: impl FnMut(i32, &mut Near),
+        mut look: impl FnMut(i32, &mut Near, &mut u8),
     ) {
         if start >= end {
             return;
@@ -148,8 +148,10 @@ impl EdgeMap {
             let [from, to] = [run.columns.0.max(start), run.columns.1.min(end)];
             let places =
                 [from, to].map(|column| first as usize + (column - run.columns.0) as usize);
-            for (column, near) in (from..to).zip(&mut self.near[places[0]..places[1]]) {
-                look(column, near);
+            let levels = &mut self.levels[places[0]..places[1]];
+            let nears = &mut self.near[places[0]..places[1]];
+            for ((column, near), level) in (from..to).zip(nears).zip(levels) {
+                look(column, near, level);
             }
         }
     }
@@ -159,7 +161,7 @@ impl EdgeMap {
         // A pixel at an upright edge is a pixel deep. Pixels that are too far to be measured are
         // as deep as any edge is searched.
         let distance = f64::from(self.near[index as usize].distance.min(MAX_DEPTH));
-        (f64::from(SIXTEENTHS) * (distance + 0.5)).round().max(1.0) as u32
+        (f64::from(SIXTEENTHS) * (distance + 0.5) + 0.5).max(1.0) as u32
     }
 
     /// Returns the nearest edge of a pixel.
@@ -169,7 +171,7 @@ impl EdgeMap {
 
     /// Returns the number of pixels near edges.
     pub(super) fn near_count(&self) -> usize {
-        self.near.len()
+        self.near_count as usize
     }
 
     pub(super) fn height(&self) -> u32 {
@@ -196,13 +198,9 @@ impl EdgeMap {
     pub(super) fn for_each(&self, plain: &[bool], mut show: impl FnMut(EdgePixel)) {
         let mut plain = plain.iter();
         for row in 0..self.height() {
-            for run in self.row(row.into()) {
-                let is_plain = *plain.next().expect("one for each run");
-                let Some(first) = run.first.filter(|_| !is_plain) else { continue };
-                for (index, column) in (first..).zip(run.columns.0..run.columns.1) {
-                    show(EdgePixel { column, row, index });
-                }
-            }
+            let runs = self.row(row.into()).iter();
+            let runs = runs.filter(|_| !*plain.next().expect("one for each run"));
+            near_pixels(row, runs).for_each(&mut show);
         }
     }
 
@@ -210,76 +208,98 @@ impl EdgeMap {
     /// `level_outside`, 0 or 255, and those deep inside the other.
     pub(super) fn gray(&self, width: u32, level_outside: u8) -> GrayMask {
         let mut gray = GrayMask::new(width);
-        let mut runs = Vec::new();
+        let mut changes = Vec::new();
         for row in 0..self.height() {
-            self.levels_of_row(row, width, level_outside, &mut runs);
-            gray.push_runs(runs.iter().copied()).expect("runs as wide as the image");
+            self.changes_of_row(row, level_outside, &mut changes);
+            changes.pop_if(|change| change.column == width);
+            gray.push_row(&changes).expect("changes within the image");
         }
         gray
     }
 
-    /// Makes `runs` the runs of a row, (length, level).
-    fn levels_of_row(&self, row: u32, width: u32, level_outside: u8, runs: &mut Vec<(u32, u8)>) {
-        runs.clear();
-        let mut column = 0;
+    /// Makes `changes` the changes of a row, the last of which may lie right of the image.
+    fn changes_of_row(&self, row: u32, level_outside: u8, changes: &mut Vec<LevelChange>) {
+        changes.clear();
+        let (mut end, mut last) = (0, 0);
+        let mut push = |column: i32, level: u8| {
+            if level != last {
+                changes.push(LevelChange { column: column as u32, level });
+                last = level;
+            }
+        };
         for run in self.row(row.into()) {
-            let [start, end] = [run.columns.0, run.columns.1].map(|column| column as u32);
-            runs.push((start - column, level_outside));
-            let turned = |level: u8| if level_outside == 0 { level } else { 255 - level };
+            let (start, next_end) = run.columns;
+            if end < start {
+                push(end, level_outside);
+            }
+            end = next_end;
             match run.first {
-                None => runs.push((end - start, turned(255))),
+                None => push(start, 255 - level_outside),
                 Some(first) => {
                     let levels = &self.levels[first as usize..][..(end - start) as usize];
-                    let equal = levels.chunk_by(|a, b| a == b);
-                    runs.extend(equal.map(|run| (run.len() as u32, turned(run[0]))));
+                    for (column, level) in (start..).zip(levels) {
+                        push(column, level ^ level_outside);
+                    }
                 }
             }
-            column = end;
         }
-        runs.push((width - column, level_outside));
+        push(end, level_outside);
     }
+}
+
+/// Returns the pixels of those runs of a row that are near an edge.
+pub(super) fn near_pixels<'a>(
+    row: u32,
+    runs: impl IntoIterator<Item = &'a EdgeRun>,
+) -> impl Iterator<Item = EdgePixel> {
+    let near = runs.into_iter().filter_map(|run| Some((run.columns, run.first?)));
+    near.flat_map(move |((start, end), first)| {
+        (first..).zip(start..end).map(move |(index, column)| EdgePixel { column, row, index })
+    })
 }
 
 impl Near {
     /// Farther from all edges than is measured.
-    const FAR: Self = Self { distance: f32::MAX, by: 0.0, slant: 0.0 };
-
-    /// Returns how slanted the edge with a normal of length one is.
-    pub(super) fn slant(normal: [f64; 2]) -> f32 {
-        normal[0].abs().min(normal[1].abs()) as f32
-    }
-
-    /// Returns the level of the pixel: the share of its area that is inside the moved edge.
-    fn level(&self) -> u8 {
-        level(share_inside(f64::from(self.distance) - f64::from(self.by), f64::from(self.slant)))
-    }
+    const FAR: Self = Self { distance: f32::MAX, by: 0.0 };
 }
 
-/// From this distance on no edge cuts a pixel.
-const HALF_DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// How a straight edge cuts pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cut {
+    /// The smaller side of the edge's normal of length one.
+    slant: f64,
+    /// The greatest distance from the edge of the middle of a pixel that it cuts.
+    reach: f64,
+    /// The area of the corner that the edge cuts off a pixel, by its square height.
+    corner: f64,
+    /// By how much a pixel's area on a side grows with its distance, where no corner is cut off.
+    growth: f64,
+}
 
-/// Returns the share of a pixel's area inside a straight edge, whose distance from the pixel's
-/// middle is below zero if that is outside, and whose normal has the smaller side `slant`.
-fn share_inside(distance: f64, slant: f64) -> f64 {
-    let away = distance.abs();
-    if away >= HALF_DIAGONAL {
-        return if distance < 0.0 { 0.0 } else { 1.0 };
+impl Cut {
+    /// Takes the edge's normal of length one.
+    pub(super) fn new(normal: [f64; 2]) -> Self {
+        // As exact as distances are.
+        let slant = f64::from(normal[0].abs().min(normal[1].abs()) as f32);
+        let steep = (1.0 - slant * slant).sqrt();
+        let corner = if slant > 0.0 { 0.5 / (steep * slant) } else { 0.0 };
+        Self { slant, reach: (steep + slant) / 2.0, corner, growth: 1.0 / steep }
     }
-    let steep = (1.0 - slant * slant).sqrt();
-    let beyond = (steep + slant) / 2.0 - away;
-    let share = if beyond <= 0.0 {
-        1.0
-    } else if beyond <= slant {
-        // The edge cuts a corner off.
-        1.0 - beyond * beyond / (2.0 * steep * slant)
-    } else {
-        0.5 + away / steep
-    };
-    if distance < 0.0 { 1.0 - share } else { share }
+
+    /// Returns the level of a pixel after the edge has moved: the share of its area that is
+    /// inside.
+    pub(super) fn level(&self, near: Near) -> u8 {
+        let distance = f64::from(near.distance) - f64::from(near.by);
+        // No branches here, as the next pixel takes another one.
+        let cut_off = (self.reach - distance.abs()).max(0.0);
+        let corner = cut_off.min(self.slant);
+        let less = corner * corner * self.corner + (cut_off - corner) * self.growth;
+        level(0.5 + (0.5 - less).copysign(distance))
+    }
 }
 
 /// Returns the level of a pixel of which a share, from 0 to 1, is exposed.
 pub(super) fn level(share: f64) -> u8 {
     // A cast rounds down, and is no call.
-    (255.0 * share.clamp(0.0, 1.0) + 0.5) as u8
+    (255.0 * share + 0.5) as u8
 }

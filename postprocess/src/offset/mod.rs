@@ -11,10 +11,10 @@
 //!
 //! [`erode`] cuts rows by the disc around each pixel of the other colour, which finds the pixels
 //! near edges ([`aligned_rows`] is faster for plain rows); [`closest`] measures them, and
-//! [`edge_map`] keeps the result. [`skeleton`] finds thin walls, except where [`plain`] tells
-//! that there are none, and [`walls`] measures them. Where walls are not kept, [`components`]
-//! finds those that vanish or break. [`feature_size`] gives the size of the feature at each edge,
-//! and [`scale`] makes up for firing.
+//! [`edge_map`] keeps the result. [`skeleton`] finds thin walls, unless [`wide`] tells that the
+//! image has none, or [`plain`] that a place has none, and [`walls`] measures them. Where walls
+//! are not kept, [`components`] finds those that vanish or break. [`feature_size`] gives the size
+//! of the feature at each edge, and [`scale`] makes up for firing.
 
 mod aligned_rows;
 mod closest;
@@ -32,6 +32,7 @@ mod skeleton;
 mod straight;
 mod tolerance;
 mod walls;
+mod wide;
 mod widths;
 
 use lamp_stack::{GrayMask, Mask};

@@ -11,6 +11,7 @@ use lamp_stack::Grouped;
 use super::edge_map::{EdgeMap, EdgePixel, SIXTEENTHS, level};
 use super::plain::plain_runs;
 use super::walls::{Across, ThinWall};
+use super::wide::is_wide;
 
 /// The steps to the neighbours, (column, row), counter-clockwise from the right.
 const AROUND: [(i32, i32); 8] =
@@ -36,6 +37,13 @@ pub(super) struct Cores {
 impl Cores {
     /// Finds the cores of an edge map in which pixels from `depth` on are deep inside.
     pub(super) fn of(edge: &EdgeMap, depth: f64) -> Self {
+        if is_wide(edge, |pixel| is_deepest(edge, pixel) && stays_at_end(edge, pixel)) {
+            return Self { around: Vec::new(), cores: Vec::new() };
+        }
+        Self::by_thinning(edge, depth)
+    }
+
+    fn by_thinning(edge: &EdgeMap, depth: f64) -> Self {
         // The first reaches past a corner of 60 degrees, the second further than thinning at
         // one place can affect another.
         let [beside, margin] = [2.0 * depth, depth + 2.0].map(f64::ceil);
@@ -200,10 +208,24 @@ fn ends(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
         let index = pixel.index as usize;
         let own = edge.depth(pixel.index);
         let is_furthest = around[index].iter().all(|&other| depth(other) <= own);
-        // A pixel that stays exposed anyway must stay connected.
-        ends[index] = is_furthest && (edge.levels[index] >= 128 || !is_in_corner(edge, &pixel));
+        ends[index] = is_furthest && stays_at_end(edge, &pixel);
     });
     ends
+}
+
+/// Returns whether no neighbour of a pixel is further inside.
+fn is_deepest(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
+    let own = edge.depth(pixel.index);
+    AROUND.iter().all(|&(right, down)| {
+        let place = edge.at(pixel.column + right, i64::from(pixel.row) + i64::from(down));
+        place.is_none_or(|near| near.is_some_and(|index| edge.depth(index) <= own))
+    })
+}
+
+/// Returns whether a pixel furthest inside among its neighbours is the end of a wall. One that
+/// stays exposed anyway must stay connected.
+fn stays_at_end(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
+    edge.levels[pixel.index as usize] >= 128 || !is_in_corner(edge, pixel)
 }
 
 /// Returns whether a pixel lies in a corner, a blunt tip or a knob no longer than it is wide:
@@ -269,4 +291,56 @@ fn reached(from: EdgePixel, around: &[[u32; 8]], unseen: &mut [bool]) -> Vec<Edg
         }
     }
     group
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use proptest::strategy::ValueTree;
+    use proptest::test_runner::TestRunner;
+
+    use super::super::edge_map::Edges;
+    use super::super::erode::{SourceColour, Sources};
+    use super::super::offset_tests::{drawn, masks};
+    use super::super::outline::outlines;
+    use super::super::row_runs::RowRuns;
+    use super::*;
+
+    /// Whether a mask is told to be wide, and whether thinning leaves nothing.
+    fn wide_and_empty(mask: &lamp_stack::Mask, by: f64, depth: f64) -> [bool; 2] {
+        let white = RowRuns::white(mask);
+        let outlines = outlines(&white);
+        let edges = Edges { outlines: &outlines, by: None, range: [by, by] };
+        let sources = Sources::new(mask, SourceColour::Black);
+        let edge = EdgeMap::new(&sources, &white, mask.width(), edges, depth, true);
+        let must_stay = |pixel: &_| is_deepest(&edge, pixel) && stays_at_end(&edge, pixel);
+        [is_wide(&edge, must_stay), Cores::by_thinning(&edge, by + depth).cores.is_empty()]
+    }
+
+    #[test]
+    fn thinning_leaves_nothing_of_what_is_wide() {
+        let mut counts = [0; 2];
+        let mut runner = TestRunner::deterministic();
+        let cases = (masks(), 0.1..1.5f64, 1.0..1.5f64);
+        for _ in 0..3000 {
+            let (mask, by, depth) = cases.new_tree(&mut runner).unwrap().current();
+            let [is_wide, is_empty] = wide_and_empty(&mask, by, depth);
+            assert!(is_empty || !is_wide, "{by} {depth} {mask:?}");
+            counts[usize::from(is_wide)] += usize::from(mask.white_pixels() > 0);
+        }
+        assert!(counts[0] > 1000 && counts[1] > 30, "{counts:?}");
+    }
+
+    #[test]
+    fn rings_and_blocks_are_wide_where_walls_are_not() {
+        let ring = |inner: f64| {
+            drawn(200, 200, |column, row| {
+                let away = f64::from(column - 100).hypot(f64::from(row - 99));
+                (inner..90.0).contains(&away) && !(column.abs_diff(50) < 8 && row.abs_diff(90) < 9)
+            })
+        };
+        for (inner, is_wide) in [(0.0, true), (20.0, true), (84.0, false)] {
+            assert_eq!(wide_and_empty(&ring(inner), 1.5, 1.5), [is_wide; 2], "{inner}");
+        }
+    }
 }

@@ -8,6 +8,9 @@
 
 use super::contours::{Contour, Direction};
 
+/// The greatest length of a part in pixels, so that sums of squares stay within numbers.
+const MAX_LENGTH: i64 = 1 << 20;
+
 /// A stretch of a contour that a straight edge may have left.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StraightPart {
@@ -127,6 +130,9 @@ impl OpenPart {
 
     /// Returns whether the part stays a digital line with a corner more, and makes it that line.
     fn goes_on_to(&mut self, [x, y]: [i64; 2]) -> bool {
+        if x + y > MAX_LENGTH {
+            return false;
+        }
         let place = self.a * x - self.b * y - self.low;
         let width = self.a + self.b;
         if place == -1 {
@@ -172,5 +178,22 @@ impl OpenPart {
             start: [column, row],
             end: [f64::from(end.0), f64::from(end.1)],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_edge_is_of_several_parts_on_one_line() {
+        let length = 3_000_000;
+        let moves = vec![((1, 0), length), ((0, 1), 1), ((-1, 0), length), ((0, -1), 1)];
+        let mut parts = Vec::new();
+        straight_parts(&Contour { start: (5, 7), moves }, &mut parts);
+        let is_upper = |part: &&StraightPart| part.along[0] > 0.0;
+        let upper: Vec<_> = parts.iter().filter(is_upper).collect();
+        assert_eq!(upper.len(), 3, "{upper:?}");
+        assert!(upper.iter().all(|part| part.along == [1.0, 0.0] && part.point[1] == 7.0));
     }
 }
