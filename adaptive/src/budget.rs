@@ -45,7 +45,7 @@ impl HeightSearch<'_> {
     }
 
     /// Returns what layers cost if none is too bad.
-    fn least_cost(&self, grid: &Grid, budget: Budget<'_>) -> f64 {
+    fn least_cost(&self, grid: &Grid<'_>, budget: Budget<'_>) -> f64 {
         let (mut step, mut cost) = (0, 0.0);
         while step < grid.end() {
             let choices = self.thicknesses.choices(step, grid.ends());
@@ -64,7 +64,12 @@ impl HeightSearch<'_> {
     }
 
     /// Finds the smallest bound whose layers are within the budget, and these.
-    fn smallest_bound(&self, grid: &Grid, budget: Budget<'_>, known: &mut Known) -> (f64, Climb) {
+    fn smallest_bound(
+        &self,
+        grid: &Grid<'_>,
+        budget: Budget<'_>,
+        known: &mut Known,
+    ) -> (f64, Climb) {
         let (mut low, mut found) = self.guessed_bound(grid, budget, known);
         let mut within = |bound| self.climb(grid, bound, Some(budget), known);
         let was_guessed = found.is_some();
@@ -101,7 +106,7 @@ impl HeightSearch<'_> {
     /// within the budget with its layers, if they were found.
     fn guessed_bound(
         &self,
-        grid: &Grid,
+        grid: &Grid<'_>,
         budget: Budget<'_>,
         known: &mut Known,
     ) -> (f64, Option<(f64, Climb)>) {
@@ -125,7 +130,7 @@ impl HeightSearch<'_> {
     /// Guesses the smallest bound within the budget. It is infinite if there is none.
     fn guess_bound(
         &self,
-        grid: &Grid,
+        grid: &Grid<'_>,
         table: &HeightTable,
         budget: Budget<'_>,
         known: &Known,

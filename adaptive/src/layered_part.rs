@@ -1,18 +1,21 @@
 //! A part seen along rows, and its differences from layers.
 
 use std::ops::Range;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use lamp_slicer::scan::RowFacet;
 use lamp_slicer::{FacetIndex, Fill, FillRule, PlacedFacet, facet_heights};
-use lamp_stack::{Grouped, Length};
+use lamp_stack::Length;
 use rayon::prelude::*;
 
+use crate::closed::EdgeSum;
 use crate::error::HeightsError;
 use crate::facets::Facets;
+use crate::overlaps::{OverlapRows, Overlaps};
 use crate::profile::{Profile, ProfileChange};
-use crate::row_cuts::RowCuts;
-use crate::sweep::{RowsAdd, Slope, Sweep, Toggle};
-use crate::swept_layer::{SweptLayer, SweptLayers};
+use crate::row_cuts::{CutRows, RowCuts};
+use crate::sweep::{RowsAdd, Sweep};
+use crate::swept_layer::{Section, SweptLayer, SweptLayers};
 
 /// The number of stripes of rows that are worked on at once. It does not follow
 /// the threads, so that sums do not depend on them.
@@ -51,6 +54,16 @@ pub struct LayeredPart {
     facets: FacetIndex,
     rows: Rows,
     rule: FillRule,
+    mesh: OnceLock<MeshFacts>,
+    /// Found for the thickest layers asked about so far.
+    overlaps: Mutex<Option<Arc<OverlapRows>>>,
+}
+
+/// What is known of all facets together.
+#[derive(Clone, Copy, Debug)]
+struct MeshFacts {
+    is_closed: bool,
+    mean_height_um: f64,
 }
 
 impl LayeredPart {
@@ -68,7 +81,7 @@ impl LayeredPart {
         }
         let rows = Rows { top_mm: facets.max()[1], pitch_mm: pitch.mm(), count: count as u32 };
         let rule = facets.fill_rule(fill);
-        Ok(Self { facets, rows, rule })
+        Ok(Self { facets, rows, rule, mesh: OnceLock::new(), overlaps: Mutex::new(None) })
     }
 
     /// Returns the heights of the lowest and the highest point, in micrometres.
@@ -80,12 +93,47 @@ impl LayeredPart {
         &self.facets
     }
 
+    pub(crate) fn rule(&self) -> &FillRule {
+        &self.rule
+    }
+
+    pub(crate) fn row_facet(&self, facet: &PlacedFacet) -> Option<RowFacet> {
+        self.rows.of_facet(facet)
+    }
+
+    /// Returns where facets lie above each other in layers up to some thickness, if the mesh is
+    /// closed.
+    pub(crate) fn overlaps(&self, reach_um: f64) -> Option<Overlaps<'_>> {
+        let mesh = self.mesh.get_or_init(|| self.mesh_facts());
+        if !mesh.is_closed {
+            return None;
+        }
+        let known = || self.overlaps.lock().unwrap_or_else(PoisonError::into_inner);
+        let rows = known().clone().filter(|rows| rows.reach_um() >= reach_um);
+        // Not locked meanwhile, as threads that wait may be given other work on the part.
+        let find = || Arc::new(OverlapRows::new(self, reach_um, mesh.mean_height_um));
+        let rows = rows.unwrap_or_else(find);
+        *known() = Some(rows.clone());
+        Some(Overlaps::new(self, rows))
+    }
+
+    fn mesh_facts(&self) -> MeshFacts {
+        let (mut edges, mut count, mut height_um) = (EdgeSum::default(), 0u32, 0.0);
+        self.facets.for_each(|facet, body| {
+            edges.add(facet, self.rule.name_of(body));
+            let (low, high) = facet_heights(facet);
+            (count, height_um) = (count + 1, height_um + (high - low));
+        });
+        let mean_height_um = height_um / f64::from(count.max(1));
+        MeshFacts { is_closed: edges.is_closed(), mean_height_um }
+    }
+
     /// Returns the heights of flat faces in micrometres, rising: of level facets whose
     /// areas add up to at least a row's pitch squared. The lowest corner counts, since
     /// faces that were turned into their place are level only up to rounding.
     pub fn flat_faces_um(&self) -> Vec<f64> {
         let mut faces = Vec::new();
-        self.facets.for_each(|facet| {
+        self.facets.for_each(|facet, _| {
             let (low, high) = facet_heights(facet);
             if high - low <= LEVEL_UM {
                 faces.push((low, normal(facet)[2].abs() / 2.0));
@@ -113,26 +161,12 @@ impl LayeredPart {
         let last_um = plane(tops_um[tops_um.len() - 1]);
         let facets = self.facets.between(bottom_um, last_um);
         let Rise { changes, bottom_area, unavoidable, rows_left_out } =
-            self.rise(&facets, [bottom_um, last_um], &planes);
+            self.all(&facets, [bottom_um, last_um], &planes);
         let steepest = steepest(&facets, bottom_um, tops_um);
         let layer = |k: usize| {
-            let ProfileChange { area, lost, gained } = changes[k];
-            let top_area = (bottom_area + area).max(0.0);
-            let (lost, gained) = (lost.max(0.0), gained.max(0.0));
-            let thickness_um = tops_um[k] - bottom_um;
-            // Above the part's top all of the layer is too much.
-            let above = top_area * (thickness_um - planes[k]);
-            SweptLayer {
-                bottom_um,
-                thickness_um,
-                volume_mm3: (top_area * planes[k] + lost - gained).max(0.0) / 1000.0,
-                lost_mm3: lost / 1000.0,
-                gained_mm3: (gained + above) / 1000.0,
-                bottom_area_mm2: bottom_area,
-                top_area_mm2: top_area,
-                steepest: steepest[k],
-                rows_left_out,
-            }
+            let section = Section { plane_um: planes[k], bottom_area, change: changes[k] };
+            let layer = section.swept(bottom_um, tops_um[k] - bottom_um);
+            SweptLayer { steepest: steepest[k], rows_left_out, ..layer }
         };
         SweptLayers {
             each: (0..tops_um.len()).map(layer).collect(),
@@ -142,7 +176,7 @@ impl LayeredPart {
 
     /// Returns the changes from the bottom to each plane above it: those of facets alone, and
     /// how rows differ from them. Where the mesh has a gap, rows alone count.
-    fn rise(&self, facets: &[(PlacedFacet, u32)], z_um: [f64; 2], planes: &[f64]) -> Rise {
+    fn all(&self, facets: &[(PlacedFacet, u32)], z_um: [f64; 2], planes: &[f64]) -> Rise {
         let stripes = self.stripes(facets);
         let closed =
             Facets::sum(facets, z_um[0], planes).filter(super::facets::Facets::bottom_is_closed);
@@ -186,33 +220,30 @@ impl LayeredPart {
             for (facet, body) in facets {
                 cuts.add_facet(facet, *body, [first, first + stripe_rows], z_um);
             }
-            self.sweep(&cuts, first, stripe_rows, planes, adds)
+            self.rise(&cuts, first, stripe_rows as usize, planes, adds)
         };
         let stripes: Vec<Rise> = stripes.par_iter().enumerate().map(of_stripe).collect();
-        let mut sum =
-            Rise { changes: vec![ProfileChange::default(); planes.len()], ..Rise::default() };
-        for stripe in stripes {
-            sum.bottom_area += stripe.bottom_area;
-            sum.unavoidable += stripe.unavoidable;
-            sum.rows_left_out += stripe.rows_left_out;
-            sum.changes.iter_mut().zip(stripe.changes).for_each(|(sum, change)| sum.add(change));
-        }
-        sum
+        stripes.into_iter().reduce(Rise::and).expect("there are stripes")
     }
 
-    fn sweep(&self, cuts: &RowCuts, first: u32, rows: u32, planes: &[f64], adds: RowsAdd) -> Rise {
-        let mut profile = Profile::new(planes);
-        let mut sweep = Sweep::new(&self.rule, self.rows.pitch_mm, adds);
-        let rows = rows as usize;
-        let toggle = |toggle: &Toggle| ((toggle.row - first) as usize, *toggle);
-        let slope = |slope: &Slope| ((slope.row - first) as usize, *slope);
-        let mut toggles = Grouped::new(rows, || cuts.toggles.iter().map(toggle));
-        let mut slopes = Grouped::new(rows, || cuts.slopes.iter().map(slope));
+    pub(crate) fn sweep(&self, adds: RowsAdd) -> Sweep<'_> {
+        Sweep::new(&self.rule, self.rows.pitch_mm, adds)
+    }
+
+    /// Returns what some rows add, from the first on.
+    pub(crate) fn rise(
+        &self,
+        cuts: &RowCuts,
+        first: u32,
+        rows: usize,
+        planes: &[f64],
+        adds: RowsAdd,
+    ) -> Rise {
+        let (mut profile, mut sweep) = (Profile::new(planes), self.sweep(adds));
+        let mut of_rows = CutRows::new(cuts, first, rows);
         let mut rows_left_out = 0;
         for row in 0..rows {
-            let (toggles, slopes) = (toggles.group_mut(row), slopes.group_mut(row));
-            toggles.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
-            slopes.sort_unstable_by(|a, b| a.x[0].total_cmp(&b.x[0]));
+            let (toggles, slopes) = of_rows.sorted_row(row);
             rows_left_out += u32::from(!sweep.add(toggles, slopes, &mut profile));
         }
         Rise {
@@ -226,13 +257,23 @@ impl LayeredPart {
 
 /// Changes of a part's section from a bottom up, in square millimetres and micrometres of
 /// height.
-#[derive(Default)]
-struct Rise {
+pub(crate) struct Rise {
     /// For each plane.
-    changes: Vec<ProfileChange>,
-    bottom_area: f64,
+    pub(crate) changes: Vec<ProfileChange>,
+    pub(crate) bottom_area: f64,
     unavoidable: f64,
     rows_left_out: u32,
+}
+
+impl Rise {
+    /// Returns what two groups of rows add together.
+    pub(crate) fn and(mut self, other: Self) -> Self {
+        self.bottom_area += other.bottom_area;
+        self.unavoidable += other.unavoidable;
+        self.rows_left_out += other.rows_left_out;
+        self.changes.iter_mut().zip(other.changes).for_each(|(sum, change)| sum.add(change));
+        self
+    }
 }
 
 /// Returns |N_z| of a facet's unit normal: 0 for upright facets and those without an area.

@@ -37,23 +37,28 @@
 //! ```
 
 mod budget;
+mod closed;
 mod criterion;
 mod error;
 mod facets;
 mod known;
 mod layered_part;
+mod overlaps;
 mod placement;
 mod profile;
+mod range_max;
 mod row_cuts;
 mod search;
 mod sweep;
 mod swept_layer;
 mod table;
 mod thicknesses;
+mod uniform;
 
 pub use criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
 pub use error::HeightsError;
 pub use layered_part::LayeredPart;
-pub use search::{HeightSearch, Heights, Watch, uniform_heights};
+pub use search::{HeightSearch, Heights, Watch};
 pub use swept_layer::{SweptLayer, SweptLayers};
 pub use thicknesses::Thicknesses;
+pub use uniform::uniform_heights;

@@ -44,21 +44,26 @@ impl Placement<'_> {
         if end.saturating_mul(self.thicknesses.steps().count()) > MAX_WAYS {
             return None;
         }
+        // For each step, how many layers end at or below it.
         let mut layers_below = vec![0; end + 1];
         for (layer, top) in tops.iter().enumerate() {
             let below = if layer == 0 { 0 } else { tops[layer - 1] };
             layers_below[below + 1..=*top].fill(layer + 1);
         }
+        // Where a layer must end at least, so that those left reach the end.
+        let max = *self.thicknesses.steps().end();
+        let least = |layers: usize| end.saturating_sub((tops.len() - layers) * max);
+        let may_end = |top: usize, layers: usize| {
+            layers_below.get(top) == Some(&layers) && top >= least(layers)
+        };
         // The least cost up to each step, and the thickness of the layer below it.
         let mut best: Vec<Option<(Cost, usize)>> = vec![None; end + 1];
         best[0] = Some(((0, 0.0), 0));
         for step in 0..end {
             let Some((so_far, _)) = best[step] else { continue };
-            for Way { steps, cost } in self.ways(step) {
+            let layers = layers_below[step] + 1;
+            for Way { steps, cost } in self.ways(step, |top| may_end(top, layers)) {
                 let top = step + steps;
-                if layers_below.get(top) != Some(&(layers_below[step] + 1)) {
-                    continue;
-                }
                 let cost = (so_far.0 + cost.0, so_far.1 + cost.1);
                 if best[top].is_none_or(|(least, _)| cost < least) {
                     best[top] = Some((cost, steps));
@@ -79,31 +84,41 @@ impl Placement<'_> {
 
     /// Returns a layer that rows were asked about, if they were.
     pub(crate) fn known(&self, step: usize, steps: usize) -> Option<SweptLayer> {
-        let known = self.known.get(&step)?;
-        let place = known.binary_search_by_key(&steps, |(steps, _)| *steps).ok()?;
-        Some(known[place].1)
+        known_of(self.known.get(&step)?, steps)
     }
 
-    /// Returns the layers that the search may take from a step: those within the bound, or
-    /// the thinnest.
-    fn ways(&self, step: usize) -> Vec<Way> {
+    /// Returns the layers that the search may take from a step, and that may end where they do:
+    /// those within the bound, or the thinnest if no layer is.
+    fn ways(&self, step: usize, may_end: impl Fn(usize) -> bool) -> Vec<Way> {
         let choices = self.thicknesses.choices(step, self.ends);
-        let layers = choices.iter().zip(self.table.layers(step, &choices));
-        let layers =
-            layers.map(|(&steps, layer)| (steps, self.known(step, steps).unwrap_or(layer)));
-        let mut thinnest = None;
-        let mut ways = Vec::new();
-        for (steps, layer) in layers {
+        let known = self.known.get(&step);
+        let of = |(&steps, layer): (&usize, SweptLayer)| {
+            let layer = known.and_then(|known| known_of(known, steps)).unwrap_or(layer);
             let past = u32::from(self.criterion.measure(&layer) > self.bound);
-            let way = Way { steps, cost: (past, layer.lost_mm3 + layer.gained_mm3) };
-            if past == 0 {
-                ways.push(way);
-            } else if thinnest.is_none() && ways.is_empty() {
-                thinnest = Some(way);
-            }
+            Way { steps, cost: (past, layer.lost_mm3 + layer.gained_mm3) }
+        };
+        let ends = |steps: &usize| may_end(step + steps);
+        let Some(last) = choices.iter().rposition(ends) else { return Vec::new() };
+        let layers = choices.iter().zip(self.table.layers(step, &choices[..=last]));
+        let mut ways: Vec<Way> = layers.filter(|(steps, _)| ends(steps)).map(of).collect();
+        let is_thinnest_of_all = |way: &Way| {
+            let layers = || choices.iter().zip(self.table.layers(step, &choices));
+            way.steps == choices[0] && layers().all(|layer| of(layer).cost.0 > 0)
+        };
+        let has_good = ways.iter().any(|way| way.cost.0 == 0);
+        if !has_good && ways.first().is_some_and(is_thinnest_of_all) {
+            ways.truncate(1);
+        } else {
+            ways.retain(|way| way.cost.0 == 0);
         }
-        if ways.is_empty() { thinnest.into_iter().collect() } else { ways }
+        ways
     }
+}
+
+/// Returns the layer of a thickness, in steps, of those known from one step.
+fn known_of(known: &[(usize, SweptLayer)], steps: usize) -> Option<SweptLayer> {
+    let place = known.binary_search_by_key(&steps, |(steps, _)| *steps).ok()?;
+    Some(known[place].1)
 }
 
 /// Returns how many layers are past a bound, and the volume lost and gained.

@@ -2,6 +2,7 @@
 
 use lamp_slicer::Turn;
 use lamp_slicer::scan::RowFacet;
+use lamp_stack::Grouped;
 
 use crate::sweep::{Slope, Toggle};
 
@@ -24,7 +25,14 @@ impl RowCuts {
 
     /// Adds a facet's line in a row, between points of its long and one of its short edges.
     #[inline]
-    fn add(&mut self, row: u32, ends: [[f64; 2]; 2], is_flipped: bool, body: u32, z: [f64; 2]) {
+    pub(crate) fn add(
+        &mut self,
+        row: u32,
+        ends: [[f64; 2]; 2],
+        is_flipped: bool,
+        body: u32,
+        z: [f64; 2],
+    ) {
         let [long, short] = ends;
         let [bottom, top] = z;
         let (mut low, mut high) = if long[1] <= short[1] { (long, short) } else { (short, long) };
@@ -53,5 +61,31 @@ impl RowCuts {
             let heights = [left[1] - bottom, right[1] - bottom];
             self.slopes.push(Slope { row, x: [left[0], right[0]], heights, turn });
         }
+    }
+}
+
+/// What rows see, row by row.
+pub(crate) struct CutRows {
+    toggles: Grouped<Toggle>,
+    slopes: Grouped<Slope>,
+}
+
+impl CutRows {
+    /// Groups the cuts of some rows, from the first on.
+    pub(crate) fn new(cuts: &RowCuts, first: u32, rows: usize) -> Self {
+        let toggle = |toggle: &Toggle| ((toggle.row - first) as usize, *toggle);
+        let slope = |slope: &Slope| ((slope.row - first) as usize, *slope);
+        Self {
+            toggles: Grouped::new(rows, || cuts.toggles.iter().map(toggle)),
+            slopes: Grouped::new(rows, || cuts.slopes.iter().map(slope)),
+        }
+    }
+
+    /// Returns what a row sees, sorted from the left, given how far it is from the first.
+    pub(crate) fn sorted_row(&mut self, row: usize) -> (&[Toggle], &[Slope]) {
+        let (toggles, slopes) = (self.toggles.group_mut(row), self.slopes.group_mut(row));
+        toggles.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
+        slopes.sort_unstable_by(|a, b| a.x[0].total_cmp(&b.x[0]));
+        (toggles, slopes)
     }
 }

@@ -9,13 +9,14 @@ use crate::criterion::Criterion;
 use crate::error::HeightsError;
 use crate::known::{Known, guessed, know};
 use crate::layered_part::LayeredPart;
+use crate::overlaps::Overlaps;
 use crate::placement::{Placement, cost_of};
 use crate::swept_layer::SweptLayer;
 use crate::table::HeightTable;
 use crate::thicknesses::Thicknesses;
 
 /// More than any machine builds.
-const MAX_LAYERS: f64 = 1e6;
+pub(crate) const MAX_LAYERS: f64 = 1e6;
 
 /// A search for a part's layer heights.
 #[derive(Debug)]
@@ -60,7 +61,7 @@ pub struct Heights {
 }
 
 impl Heights {
-    fn of(part: &LayeredPart, layers: Vec<SweptLayer>) -> Self {
+    pub(crate) fn of(part: &LayeredPart, layers: Vec<SweptLayer>) -> Self {
         let (end_um, top_um) =
             (layers.last().map_or(0.0, SweptLayer::top_um), part.heights_um()[1]);
         let is_left = !layers.is_empty() && end_um < top_um;
@@ -115,15 +116,18 @@ impl Budget<'_> {
 const NEAR: f64 = 0.6;
 
 /// Where layers may end: whole steps above the part's bottom.
-pub(crate) struct Grid {
+pub(crate) struct Grid<'a> {
     bottom_um: f64,
     step_um: f64,
     /// Where layers are to end; the last is the part's top.
     ends: Vec<usize>,
     pub(crate) table: Option<HeightTable>,
+    /// How layers differ from what the table says, if that can be told without looking at all of
+    /// their rows.
+    overlaps: Option<Overlaps<'a>>,
 }
 
-impl Grid {
+impl Grid<'_> {
     pub(crate) fn at(&self, step: usize) -> f64 {
         self.bottom_um + step as f64 * self.step_um
     }
@@ -169,7 +173,7 @@ impl HeightSearch<'_> {
     }
 
     /// Returns the steps where layers may end, and what facets say of them.
-    pub(crate) fn grid(&self) -> Result<Grid, HeightsError> {
+    pub(crate) fn grid(&self) -> Result<Grid<'_>, HeightsError> {
         let [bottom_um, top_um] = self.part.heights_um();
         let step_um = self.thicknesses.step().um();
         let end = ((top_um - bottom_um) / step_um).round().max(1.0);
@@ -178,7 +182,8 @@ impl HeightSearch<'_> {
         }
         let end = end as usize;
         let table = HeightTable::new(self.part, step_um, end + self.thicknesses.steps().end());
-        Ok(Grid { bottom_um, step_um, ends: self.ends(end), table })
+        let overlaps = self.part.overlaps(*self.thicknesses.steps().end() as f64 * step_um);
+        Ok(Grid { bottom_um, step_um, ends: self.ends(end), table, overlaps })
     }
 
     /// Finds the layers from the bottom up: each is the thickest within the bound. With a
@@ -187,7 +192,7 @@ impl HeightSearch<'_> {
     /// are known then.
     pub(crate) fn climb(
         &self,
-        grid: &Grid,
+        grid: &Grid<'_>,
         bound: f64,
         budget: Option<Budget<'_>>,
         known: &mut Known,
@@ -196,8 +201,7 @@ impl HeightSearch<'_> {
         let mut last_um = f64::INFINITY;
         while step < grid.end() {
             let choices = self.thicknesses.choices(step, &grid.ends);
-            let tops: Vec<f64> = choices.iter().map(|choice| grid.at(step + choice)).collect();
-            let found = self.layers(grid.at(step), &tops, last_um, bound);
+            let found = self.layers(grid, step, &choices, last_um, bound);
             let chosen = self.choose(&found, bound, budget);
             let layer = found[chosen];
             know(known, step, choices.iter().copied().zip(found).collect());
@@ -218,7 +222,7 @@ impl HeightSearch<'_> {
     /// layers nearby.
     pub(crate) fn guess(
         &self,
-        grid: &Grid,
+        grid: &Grid<'_>,
         table: &HeightTable,
         bound: f64,
         budget: Budget<'_>,
@@ -242,7 +246,7 @@ impl HeightSearch<'_> {
     /// Returns as many layers as were found from the bottom up, where they err least.
     pub(crate) fn placed(
         &self,
-        grid: &Grid,
+        grid: &Grid<'_>,
         climb: Climb,
         known: &Known,
         bound: f64,
@@ -258,18 +262,31 @@ impl HeightSearch<'_> {
         let mut step = 0;
         let layers = best.iter().map(|&steps| {
             let layer = placement.known(step, steps);
-            let [bottom, top] = [step, step + steps].map(|step| grid.at(step));
+            let layer =
+                layer.unwrap_or_else(|| self.layers(grid, step, &[steps], f64::INFINITY, bound)[0]);
             step += steps;
-            layer.unwrap_or_else(|| self.part.layers(bottom, &[top]).each[0])
+            layer
         });
         let better = Heights { layers: layers.collect(), ..found };
         let is_within = budget.is_none_or(|budget| budget.of_all(&better.layers) <= budget.max);
         if is_within && cost_of(&better, criterion, bound) < cost { better } else { found }
     }
 
-    /// Returns the layers of all tops, or of the lower ones if no other can be within the
-    /// bound. The thickness of the layer before hints at how many these are.
-    fn layers(&self, bottom_um: f64, tops_um: &[f64], last_um: f64, bound: f64) -> Vec<SweptLayer> {
+    /// Returns the layers of all thicknesses, in steps, or of the lower ones if no other can be
+    /// within the bound. The thickness of the layer before hints at how many these are.
+    fn layers(
+        &self,
+        grid: &Grid<'_>,
+        bottom: usize,
+        choices: &[usize],
+        last_um: f64,
+        bound: f64,
+    ) -> Vec<SweptLayer> {
+        if let (Some(table), Some(overlaps)) = (&grid.table, &grid.overlaps) {
+            return overlaps.layers(table, bottom, choices);
+        }
+        let bottom_um = grid.at(bottom);
+        let tops_um: Vec<f64> = choices.iter().map(|choice| grid.at(bottom + choice)).collect();
         let max_um = tops_um[tops_um.len() - 1] - bottom_um;
         // These suffice where errors grow as the thickness squared.
         let near_um = 1.2 * (2.0 * last_um * max_um).sqrt();
@@ -280,7 +297,7 @@ impl HeightSearch<'_> {
                 return layers.each;
             }
         }
-        self.part.layers(bottom_um, tops_um).each
+        self.part.layers(bottom_um, &tops_um).each
     }
 
     pub(crate) fn choose(
@@ -323,23 +340,6 @@ impl HeightSearch<'_> {
     }
 }
 
-/// Returns a part's layers of one thickness, as the slicer makes them.
-///
-/// # Errors
-/// Returns an error if there would be too many layers, or they have no thickness.
-pub fn uniform_heights(part: &LayeredPart, thickness: Length) -> Result<Heights, HeightsError> {
-    let [bottom_um, top_um] = part.heights_um();
-    let thickness_um = thickness.um();
-    let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
-    // Negated, so that a thickness of NaN fails, too.
-    if !(thickness_um > 0.0 && count <= MAX_LAYERS) {
-        return Err(too_high([bottom_um, top_um]));
-    }
-    let at = |k: u32| bottom_um + f64::from(k) * thickness_um;
-    let layer = |k: u32| part.layers(at(k), &[at(k + 1)]).each[0];
-    Ok(Heights::of(part, (0..count as u32).map(layer).collect()))
-}
-
-fn too_high([bottom_um, top_um]: [f64; 2]) -> HeightsError {
+pub(crate) fn too_high([bottom_um, top_um]: [f64; 2]) -> HeightsError {
     HeightsError::TooHigh { height: Length::from_um(top_um - bottom_um).to_whole_nm() }
 }

@@ -87,6 +87,32 @@ impl<'a> Sweep<'a> {
         if !position.is_balanced() {
             return false;
         }
+        self.columns(toggles, slopes, |sweep, columns, position, winding| {
+            let known = if sweep.adds == RowsAdd::All { 0 } else { winding };
+            let differs = i32::from(position.is_inside()) - known;
+            profile.bottom_area += f64::from(differs) * (columns[1] - columns[0]) * sweep.pitch_mm;
+            match sweep.open.len() {
+                0 => {}
+                1 if differs == 0 && sweep.is_told(sweep.open[0], position) => {
+                    let extent = (columns[1] - columns[0]) * sweep.pitch_mm;
+                    let heights = columns.map(|x| sweep.open[0].height(x));
+                    profile.add_unavoidable(extent, heights, false);
+                }
+                1 => sweep.pass(columns, position, profile),
+                _ => sweep.split(columns, position, MAX_SPLITS, profile),
+            }
+        });
+        true
+    }
+
+    /// Calls `each` with all columns between two neighbouring ends of lines, while the lines
+    /// over them are open, with the position at the layer's bottom and the winding number there.
+    fn columns(
+        &mut self,
+        toggles: &[Toggle],
+        slopes: &[Slope],
+        mut each: impl FnMut(&mut Self, [f64; 2], &Position<'a>, i32),
+    ) {
         self.ends.clear();
         self.ends.extend(toggles.iter().map(|toggle| toggle.x));
         self.ends.extend(slopes.iter().flat_map(|slope| slope.x));
@@ -109,29 +135,44 @@ impl<'a> Sweep<'a> {
                     self.open.push(*slope);
                 }
             }
-            let known = if self.adds == RowsAdd::All { 0 } else { winding };
-            let differs = i32::from(position.is_inside()) - known;
-            profile.bottom_area += f64::from(differs) * (columns[1] - columns[0]) * self.pitch_mm;
-            match self.open.len() {
-                0 => {}
-                1 if differs == 0 && self.is_told(self.open[0], &position) => {
-                    let extent = (columns[1] - columns[0]) * self.pitch_mm;
-                    let heights = columns.map(|x| self.open[0].height(x));
-                    profile.add_unavoidable(extent, heights, false);
-                }
-                1 => self.pass(columns, &position, profile),
-                _ => self.split(columns, &position, MAX_SPLITS, profile),
-            }
+            each(self, columns, &position, winding);
         }
-        true
+    }
+
+    /// Calls `untold` with ranges of height in which facets do not say all of a row: where lines
+    /// are no more than `reach_um` above each other, or what a line parts is not the outside below
+    /// and the inside above, or the other way round.
+    pub(crate) fn untold(
+        &mut self,
+        toggles: &[Toggle],
+        slopes: &[Slope],
+        reach_um: f64,
+        mut untold: impl FnMut([f64; 2]),
+    ) {
+        self.columns(toggles, slopes, |sweep, columns, position, winding| {
+            let middle = 0.5 * (columns[0] + columns[1]);
+            sweep.open.sort_unstable_by(|p, q| p.height(middle).total_cmp(&q.height(middle)));
+            let mut above = position.clone();
+            let is_known = i32::from(position.is_inside()) == winding;
+            if !is_known || !sweep.open.iter().all(|slope| tells(slope.turn, &mut above)) {
+                return untold([f64::NEG_INFINITY, f64::INFINITY]);
+            }
+            for pair in sweep.open.windows(2) {
+                let [low, high] = [0, 1].map(|line: usize| columns.map(|x| pair[line].height(x)));
+                if (0..2).any(|end| high[end] - low[end] <= reach_um) {
+                    let ends = [low[0], low[1], high[0], high[1]];
+                    untold([
+                        ends.into_iter().fold(f64::INFINITY, f64::min),
+                        ends.into_iter().fold(f64::NEG_INFINITY, f64::max),
+                    ]);
+                }
+            }
+        });
     }
 
     /// Returns true if facets say all of a line that no other is above or below.
     fn is_told(&self, slope: Slope, position: &Position<'_>) -> bool {
-        let mut above = position.clone();
-        above.cross(slope.turn);
-        let step = i32::from(above.is_inside()) - i32::from(position.is_inside());
-        self.adds == RowsAdd::Differences && step == slope.turn.winding()
+        self.adds == RowsAdd::Differences && tells(slope.turn, &mut position.clone())
     }
 
     /// Adds columns over several lines; those on either side of a place where two
@@ -193,6 +234,14 @@ impl<'a> Sweep<'a> {
         }
         profile.add_unavoidable(extent, within, inside);
     }
+}
+
+/// Moves past a line from below. Returns true if that leads from outside to inside where the part
+/// is above the line, and from inside to outside where it is below.
+fn tells(turn: Turn, position: &mut Position<'_>) -> bool {
+    let below = position.is_inside();
+    position.cross(turn);
+    i32::from(position.is_inside()) - i32::from(below) == turn.winding()
 }
 
 /// What a line changes once the top is past it: the section, and at its two ends the heights

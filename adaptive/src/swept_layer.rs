@@ -1,5 +1,7 @@
 //! Layers as they are built, compared with the part.
 
+use crate::profile::ProfileChange;
+
 /// A layer as it is built, the part's section at its top swept down, compared with
 /// the part between the same heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,6 +27,37 @@ pub struct SweptLayer {
     /// The number of rows left out because their crossings do not balance: the mesh
     /// has a gap.
     pub rows_left_out: u32,
+}
+
+/// A section above a layer's bottom, and how the part changes up to it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Section {
+    /// Its height above the layer's bottom, in micrometres.
+    pub(crate) plane_um: f64,
+    /// The area of the section at the bottom, in square millimetres.
+    pub(crate) bottom_area: f64,
+    pub(crate) change: ProfileChange,
+}
+
+impl Section {
+    /// Returns the layer that is this section, swept down from the layer's top. Above the section,
+    /// where the part has ended, all of the layer is too much.
+    pub(crate) fn swept(&self, bottom_um: f64, thickness_um: f64) -> SweptLayer {
+        let Self { plane_um, bottom_area, change } = *self;
+        let top_area = (bottom_area + change.area).max(0.0);
+        let (lost, gained) = (change.lost.max(0.0), change.gained.max(0.0));
+        let above = top_area * (thickness_um - plane_um);
+        SweptLayer {
+            bottom_um,
+            thickness_um,
+            volume_mm3: (top_area * plane_um + lost - gained).max(0.0) / 1000.0,
+            lost_mm3: lost / 1000.0,
+            gained_mm3: (gained + above) / 1000.0,
+            bottom_area_mm2: bottom_area,
+            top_area_mm2: top_area,
+            ..SweptLayer::default()
+        }
+    }
 }
 
 /// Swept layers that begin at one height.

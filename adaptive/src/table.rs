@@ -9,7 +9,9 @@ use lamp_slicer::PlacedFacet;
 
 use crate::facets::area_from_above;
 use crate::layered_part::{LayeredPart, cosine_to_vertical};
-use crate::swept_layer::SweptLayer;
+use crate::profile::ProfileChange;
+use crate::range_max::RangeMax;
+use crate::swept_layer::{Section, SweptLayer};
 
 /// Areas seen from above that differ by no more than this share of all are the same.
 const CLOSED: f64 = 1e-9;
@@ -27,6 +29,8 @@ struct Facing {
     /// What is added to the density from this step's lower end on, and to its slope.
     density: f64,
     slope: f64,
+    /// How many pieces of facets begin at the lower end, less those that end there.
+    pieces: i32,
 }
 
 impl Facing {
@@ -47,6 +51,8 @@ struct Step {
     level_steepest: f64,
     /// The section's area just above the lower end, in square millimetres.
     area: f64,
+    /// How many facets more reach above the lower end than above that of the step below.
+    facets: i32,
 }
 
 impl Step {
@@ -64,33 +70,30 @@ pub(crate) struct HeightTable {
     steps: Vec<Step>,
 }
 
+/// A table while facets are added.
+struct Filling {
+    table: HeightTable,
+    steepest: RangeMax,
+}
+
 impl HeightTable {
     /// Sums a part's facets up. Returns nothing if these do not enclose it.
     pub(crate) fn new(part: &LayeredPart, step_um: f64, count: usize) -> Option<Self> {
         let [bottom_um, top_um] = part.heights_um();
         let steps = vec![Step::default(); count + 1];
-        let mut table = Self { bottom_um, top_um, step_um, steps };
+        let table = Self { bottom_um, top_um, step_um, steps };
+        let mut filling = Filling { table, steepest: RangeMax::new(count + 1) };
         let (mut sum, mut all) = (0.0, 0.0);
-        part.facets().for_each(|facet| {
+        part.facets().for_each(|facet, _| {
             let area = area_from_above(facet);
             (sum, all) = (sum + area, all + area.abs());
-            table.add(facet, area);
+            filling.add(facet, area);
         });
-        if sum.abs() > CLOSED * all {
-            return None;
-        }
-        table.spread();
-        let mut area = 0.0;
-        for step in &mut table.steps {
-            area += step.level_down - step.level_up;
-            step.area = area;
-            area += step.down.area - step.up.area;
-        }
-        Some(table)
+        (sum.abs() <= CLOSED * all).then(|| filling.finish())
     }
 
     /// Returns the height of a step's lower end, as the search computes it.
-    fn at(&self, step: usize) -> f64 {
+    pub(crate) fn at(&self, step: usize) -> f64 {
         self.bottom_um + step as f64 * self.step_um
     }
 
@@ -102,100 +105,26 @@ impl HeightTable {
         (guess + above) - usize::from(guess > 0 && self.at(guess) > height_um)
     }
 
-    fn add(&mut self, facet: &PlacedFacet, signed_area: f64) {
-        let mut heights = facet.map(|corner| corner[2]);
-        heights.sort_unstable_by(f64::total_cmp);
-        let [low, middle, high] = heights;
-        let steepest = cosine_to_vertical(facet);
-        let (first, last) = (self.step_of(low), self.step_of(high));
-        if low == high {
-            return self.add_level(first, low, signed_area, steepest);
-        }
-        // An upright facet covers nothing.
-        if signed_area == 0.0 {
-            return;
-        }
-        for step in &mut self.steps[first..=last] {
-            step.steepest = step.steepest.max(steepest);
-        }
-        let peak = 2.0 * signed_area.abs() / (high - low);
-        let up = signed_area > 0.0;
-        self.add_piece([low, middle], [0.0, peak], up);
-        self.add_piece([middle, high], [peak, 0.0], up);
-    }
-
-    /// Adds a piece of a facet, given the density at both ends.
-    fn add_piece(&mut self, heights: [f64; 2], [a, b]: [f64; 2], up: bool) {
-        let [low, high] = heights;
-        if low >= high {
-            return;
-        }
-        let slope = (b - a) / (high - low);
-        let density = |height: f64| a + slope * (height - low);
-        let (first, last) = (self.step_of(low), self.step_of(high));
-        if first == last {
-            return self.add_within(first, heights, [a, b], up);
-        }
-        let (start, end) = (self.at(first + 1), self.at(last));
-        self.add_within(first, [low, start], [a, density(start)], up);
-        self.add_within(last, [end, high], [density(end), b], up);
-        for (step, density, slope) in
-            [(first + 1, density(start), slope), (last, -density(end), -slope)]
-        {
-            let facing = self.steps[step].facing(up);
-            facing.density += density;
-            facing.slope += slope;
-        }
-    }
-
-    /// Adds a piece of a facet that lies within a step.
-    fn add_within(&mut self, step: usize, [from, to]: [f64; 2], [a, b]: [f64; 2], up: bool) {
-        let start = self.at(step);
-        let [p, q] = [from - start, to - start];
-        let facing = self.steps[step].facing(up);
-        facing.area += (q - p) * (a + b) / 2.0;
-        facing.moment += (q - p) * (a * (2.0 * p + q) + b * (p + 2.0 * q)) / 6.0;
-    }
-
-    /// Adds what facets cover over whole steps to these.
-    fn spread(&mut self) {
-        let um = self.step_um;
-        for up in [true, false] {
-            let (mut density, mut slope) = (0.0, 0.0);
-            for step in &mut self.steps {
-                let facing = step.facing(up);
-                density += facing.density;
-                slope += facing.slope;
-                facing.area += um * (density + slope * um / 2.0);
-                facing.moment += um * um * (density / 2.0 + slope * um / 3.0);
-                density += slope * um;
-            }
-        }
-    }
-
-    fn add_level(&mut self, step: usize, height_um: f64, signed_area: f64, steepest: f64) {
-        // No section lies above the part's highest faces.
-        if height_um >= self.top_um {
-            return;
-        }
-        let above = height_um - self.at(step);
-        let here = &mut self.steps[step];
-        if above == 0.0 {
-            let level = if signed_area > 0.0 { &mut here.level_up } else { &mut here.level_down };
-            *level += signed_area.abs();
-            here.level_steepest = here.level_steepest.max(steepest);
-        } else {
-            here.facing(signed_area > 0.0).add(signed_area.abs(), above);
-            here.steepest = here.steepest.max(steepest);
-        }
-    }
-
-    /// Returns the layers from one step to each of several rising thicknesses, in steps.
+    /// Returns the layers from one step to each of several rising thicknesses, in steps, as facets
+    /// say.
     pub(crate) fn layers<'a>(
         &'a self,
         bottom: usize,
         thicknesses: &'a [usize],
     ) -> impl Iterator<Item = SweptLayer> + 'a {
+        self.sections(bottom, thicknesses).map(move |(thickness_um, section, steepest)| {
+            let layer = section.swept(self.at(bottom), thickness_um);
+            SweptLayer { steepest, ..layer }
+        })
+    }
+
+    /// Returns the thicknesses of the same layers in micrometres, their sections, and the greatest
+    /// |N_z| of the facets in them.
+    pub(crate) fn sections<'a>(
+        &'a self,
+        bottom: usize,
+        thicknesses: &'a [usize],
+    ) -> impl Iterator<Item = (f64, Section, f64)> + 'a {
         let bottom_um = self.at(bottom);
         let bottom_area = self.steps[bottom].area;
         let (mut up, mut down, mut steepest) = (Facing::default(), Facing::default(), 0.0f64);
@@ -219,19 +148,124 @@ impl HeightTable {
             }
             let top_um = self.at(top);
             let plane_um = top_um.min(self.top_um.max(bottom_um)) - bottom_um;
-            let top_area = (bottom_area + down.area - up.area).max(0.0);
-            let thickness_um = top_um - bottom_um;
-            SweptLayer {
-                bottom_um,
-                thickness_um,
-                volume_mm3: (top_area * plane_um + up.moment - down.moment).max(0.0) / 1000.0,
-                lost_mm3: up.moment / 1000.0,
-                gained_mm3: (down.moment + top_area * (thickness_um - plane_um)) / 1000.0,
-                bottom_area_mm2: bottom_area,
-                top_area_mm2: top_area,
-                steepest,
-                rows_left_out: 0,
-            }
+            let (lost, gained) = (up.moment, down.moment);
+            let change = ProfileChange { area: down.area - up.area, lost, gained };
+            (top_um - bottom_um, Section { plane_um, bottom_area, change }, steepest)
         })
+    }
+}
+
+impl Filling {
+    fn add(&mut self, facet: &PlacedFacet, signed_area: f64) {
+        let mut heights = facet.map(|corner| corner[2]);
+        heights.sort_unstable_by(f64::total_cmp);
+        let [low, middle, high] = heights;
+        let steepest = cosine_to_vertical(facet);
+        let (first, last) = (self.table.step_of(low), self.table.step_of(high));
+        if low == high {
+            return self.add_level(first, low, signed_area, steepest);
+        }
+        let is_at = |step: usize, height: f64| self.table.at(step) >= height;
+        // The steps that it reaches into, and those whose lower ends it passes.
+        let end = last + usize::from(!is_at(last, high));
+        let passed = first + usize::from(!is_at(first, low));
+        if passed < end {
+            self.table.steps[passed].facets += 1;
+            if let Some(step) = self.table.steps.get_mut(end) {
+                step.facets -= 1;
+            }
+        }
+        // An upright facet covers nothing.
+        if signed_area == 0.0 {
+            return;
+        }
+        self.steepest.raise(first..end, steepest);
+        let peak = 2.0 * signed_area.abs() / (high - low);
+        let up = signed_area > 0.0;
+        self.add_piece([low, middle], [0.0, peak], up);
+        self.add_piece([middle, high], [peak, 0.0], up);
+    }
+
+    /// Adds a piece of a facet, given the density at both ends.
+    fn add_piece(&mut self, heights: [f64; 2], [a, b]: [f64; 2], up: bool) {
+        let [low, high] = heights;
+        if low >= high {
+            return;
+        }
+        let slope = (b - a) / (high - low);
+        let density = |height: f64| a + slope * (height - low);
+        let (first, last) = (self.table.step_of(low), self.table.step_of(high));
+        if first == last {
+            return self.add_within(first, heights, [a, b], up);
+        }
+        let (start, end) = (self.table.at(first + 1), self.table.at(last));
+        self.add_within(first, [low, start], [a, density(start)], up);
+        self.add_within(last, [end, high], [density(end), b], up);
+        for (step, density, slope, pieces) in
+            [(first + 1, density(start), slope, 1), (last, -density(end), -slope, -1)]
+        {
+            let facing = self.table.steps[step].facing(up);
+            facing.density += density;
+            facing.slope += slope;
+            facing.pieces += pieces;
+        }
+    }
+
+    /// Adds a piece of a facet that lies within a step.
+    fn add_within(&mut self, step: usize, [from, to]: [f64; 2], [a, b]: [f64; 2], up: bool) {
+        let start = self.table.at(step);
+        let [p, q] = [from - start, to - start];
+        let facing = self.table.steps[step].facing(up);
+        facing.area += (q - p) * (a + b) / 2.0;
+        facing.moment += (q - p) * (a * (2.0 * p + q) + b * (p + 2.0 * q)) / 6.0;
+    }
+
+    /// Adds what facets cover over whole steps to these, and the areas of sections. Where no facet
+    /// is left, nothing is, whatever rounding says.
+    fn finish(self) -> HeightTable {
+        let Self { mut table, steepest } = self;
+        let um = table.step_um;
+        for up in [true, false] {
+            let (mut density, mut slope, mut pieces) = (0.0, 0.0, 0);
+            for step in &mut table.steps {
+                let facing = step.facing(up);
+                pieces += facing.pieces;
+                density += facing.density;
+                slope += facing.slope;
+                if pieces == 0 {
+                    (density, slope) = (0.0, 0.0);
+                }
+                facing.area += um * (density + slope * um / 2.0);
+                facing.moment += um * um * (density / 2.0 + slope * um / 3.0);
+                density += slope * um;
+            }
+        }
+        let (mut area, mut facets) = (0.0, 0);
+        for (step, steepest) in table.steps.iter_mut().zip(steepest.finish()) {
+            step.steepest = step.steepest.max(steepest);
+            facets += step.facets;
+            area += step.level_down - step.level_up;
+            area = if facets == 0 { 0.0 } else { area };
+            step.area = area;
+            area += step.down.area - step.up.area;
+        }
+        table
+    }
+
+    fn add_level(&mut self, step: usize, height_um: f64, signed_area: f64, steepest: f64) {
+        let above = height_um - self.table.at(step);
+        let is_top = height_um >= self.table.top_um;
+        let here = &mut self.table.steps[step];
+        let known = if above == 0.0 { &mut here.level_steepest } else { &mut here.steepest };
+        *known = known.max(steepest);
+        // No section lies above the part's highest faces.
+        if is_top {
+            return;
+        }
+        if above > 0.0 {
+            return here.facing(signed_area > 0.0).add(signed_area.abs(), above);
+        }
+        let level = if signed_area > 0.0 { &mut here.level_up } else { &mut here.level_down };
+        *level += signed_area.abs();
     }
 }

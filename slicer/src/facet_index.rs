@@ -153,9 +153,9 @@ impl FacetIndex {
         placed.filter(is_met).collect()
     }
 
-    /// Calls `each` with every facet.
-    pub fn for_each(&self, mut each: impl FnMut(&PlacedFacet)) {
-        self.facets.items().iter().for_each(|facet| each(&self.placed(facet)));
+    /// Calls `each` with every facet and its body.
+    pub fn for_each(&self, mut each: impl FnMut(&PlacedFacet, u32)) {
+        self.facets.items().iter().for_each(|facet| each(&self.placed(facet), facet.1));
     }
 
     fn placed(&self, (facet, piece): &(Facet, u32)) -> PlacedFacet {
@@ -180,7 +180,7 @@ mod tests {
             let body = FacetIndex::new(model, &placement, Units::Millimetres).unwrap();
             let (min, max) = (body.min()[2], body.max()[2]);
             let mut all = Vec::new();
-            body.for_each(|facet| all.push(*facet));
+            body.for_each(|facet, _| all.push(*facet));
             assert_eq!(all.len(), facets.len());
             for k in -1..12 {
                 let low = min + (max - min) * f64::from(k) / 10.0;

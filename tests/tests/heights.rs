@@ -66,7 +66,14 @@ fn a_stack_has_the_layers_of_the_report() {
     let thick = rows.iter().filter(|row| row[2] == 2500.0).count();
     assert!(thick >= 7 && rows.len() > 100, "{thick} of {}", rows.len());
     let plot = String::from_utf8(scratch.bytes("heights.svg")).unwrap();
-    for text in ["Layer thickness", "Volume deviation", "volume 2.00%", "uniform 2.5mm", "z (mm)"] {
+    for text in [
+        "Layer thickness",
+        "Volume deviation",
+        "Volume lost and gained, from the bottom up",
+        "volume 2.00%",
+        "uniform 2.5mm",
+        "z (mm)",
+    ] {
         assert!(plot.contains(text), "{text}");
     }
 }

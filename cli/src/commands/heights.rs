@@ -45,7 +45,8 @@ pub(crate) struct HeightsArgs {
     #[arg(long, value_name = "FILE.csv")]
     report: Option<PathBuf>,
 
-    /// Plot thickness and deviation over z: a file that ends in .svg or .png
+    /// Plot thickness, deviation, and the volume lost and gained over z: a file that ends in .svg or
+    /// .png
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
@@ -280,34 +281,63 @@ fn summary(choices: &[Choice], measure: Measure) -> String {
     text
 }
 
-/// Thickness and deviation over z (002 figures 49 and 50).
-fn plots(part: &str, all: &[(String, Heights)]) -> [Plot; 2] {
-    let percent = |layer: &SweptLayer| 100.0 * layer.deviation();
-    let thickness = |layer: &SweptLayer| layer.thickness_um;
-    let z = |layer: &SweptLayer| [layer.bottom_um, layer.top_um()].map(|um| um / 1000.0);
-    let layers = &all[0].1.layers;
-    let (first, last) = (z(&layers[0])[0], z(&layers[layers.len() - 1])[1]);
-    let plot = |title: String, label: &str, value: &dyn Fn(&SweptLayer) -> f64| {
-        let series = |(name, heights): &(String, Heights)| {
-            let stairs = heights.layers.iter().filter(|layer| value(layer).is_finite());
-            let stairs = stairs.flat_map(|layer| z(layer).map(|z| (z, value(layer))));
-            Series {
-                name: name.clone(),
-                points: Vec::new(),
-                curve: stairs.collect(),
-                band: Vec::new(),
-            }
-        };
-        let series: Vec<_> = all.iter().map(series).collect();
-        let places = series.iter().flat_map(|series| &series.curve).map(|place| place.1);
-        let highest = places.fold(0.0, f64::max);
-        let axis =
-            |label: &str, range| PlotAxis { label: label.to_owned(), range, logarithmic: false };
-        let y = axis(label, 0.0..if highest > 0.0 { 1.25 * highest } else { 1.0 });
-        Plot { title, x: axis("z (mm)", first..last), y, series }
+/// Thickness, deviation, and the volume lost and gained up to each height, over z (002 figures 49
+/// to 51).
+fn plots(part: &str, all: &[(String, Heights)]) -> [Plot; 3] {
+    let of_layers = |heights: &Heights, value: fn(&SweptLayer) -> f64| {
+        let layers = heights.layers.iter().filter(|layer| value(layer).is_finite());
+        layers.flat_map(|layer| z_mm(layer).map(|z| (z, value(layer)))).collect()
     };
+    let title = |what: &str| format!("{what}: {part}");
     [
-        plot(format!("Layer thickness: {part}"), "thickness (µm)", &thickness),
-        plot(format!("Volume deviation: {part}"), "deviation (%)", &percent),
+        plot(title("Layer thickness"), "thickness (µm)", all, |heights| {
+            of_layers(heights, |layer| layer.thickness_um)
+        }),
+        plot(title("Volume deviation"), "deviation (%)", all, |heights| {
+            of_layers(heights, |layer| 100.0 * layer.deviation())
+        }),
+        plot(title("Volume lost and gained, from the bottom up"), "volume (mm3)", all, wrong_up_to),
     ]
+}
+
+/// Returns the heights of a layer's bottom and top, in millimetres.
+fn z_mm(layer: &SweptLayer) -> [f64; 2] {
+    [layer.bottom_um, layer.top_um()].map(|um| um / 1000.0)
+}
+
+/// Returns the volume that all layers up to a height lose and gain together, over that height.
+fn wrong_up_to(heights: &Heights) -> Vec<(f64, f64)> {
+    let mut sum = 0.0;
+    let mut places = vec![(z_mm(&heights.layers[0])[0], 0.0)];
+    for layer in &heights.layers {
+        sum += layer.lost_mm3 + layer.gained_mm3;
+        places.push((z_mm(layer)[1], sum));
+    }
+    let [lost, gained, _] = heights.volumes_mm3();
+    // With what is above the last layer.
+    places.push((places[places.len() - 1].0, lost + gained));
+    places
+}
+
+/// A plot of a curve for each choice of layers.
+fn plot(
+    title: String,
+    label: &str,
+    all: &[(String, Heights)],
+    curve: impl Fn(&Heights) -> Vec<(f64, f64)>,
+) -> Plot {
+    let series = |(name, heights): &(String, Heights)| Series {
+        name: name.clone(),
+        points: Vec::new(),
+        curve: curve(heights),
+        band: Vec::new(),
+    };
+    let series: Vec<_> = all.iter().map(series).collect();
+    let places = series.iter().flat_map(|series| &series.curve).map(|place| place.1);
+    let highest = places.fold(0.0, f64::max);
+    let axis = |label: &str, range| PlotAxis { label: label.to_owned(), range, logarithmic: false };
+    let y = axis(label, 0.0..if highest > 0.0 { 1.25 * highest } else { 1.0 });
+    let layers = &all[0].1.layers;
+    let (first, last) = (z_mm(&layers[0])[0], z_mm(&layers[layers.len() - 1])[1]);
+    Plot { title, x: axis("z (mm)", first..last), y, series }
 }

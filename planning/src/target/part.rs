@@ -71,7 +71,7 @@ impl PartColumns {
             [grid.columns, grid.rows].map(|count| (count as f64 - 1.0) / 2.0);
         let mut rows = vec![Vec::new(); grid.rows];
         let mut room = MOST_CROSSINGS * grid.count();
-        self.facets.for_each(|facet| {
+        self.facets.for_each(|facet, _| {
             let corners = facet
                 .map(|[x, y, z_um]| [column_of(x) + half_columns, row_of(y) + half_rows, z_um]);
             let Some(facet) = RowFacet::new(corners, grid.rows as u32) else { return };

@@ -21,7 +21,7 @@ impl Surface {
     pub fn new(facets: FacetIndex) -> Self {
         let middle = facets.min();
         let mut volume = 0.0;
-        facets.for_each(|facet| {
+        facets.for_each(|facet, _| {
             let [a, b, c] = facet.map(|corner| sub(corner, middle));
             volume += dot(a, cross(b, c));
         });
