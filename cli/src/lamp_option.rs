@@ -14,7 +14,7 @@ use crate::options::parse_light;
 use crate::recorded::optional;
 
 /// The present light of a lamp.
-#[derive(Args, Clone, Default, Serialize, Deserialize)]
+#[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct LampOption {
     /// Light of full white now, if the lamp has aged or shines through a filter: 1.2W/cm2, 75% of

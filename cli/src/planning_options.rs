@@ -10,6 +10,7 @@ use lamp_planning::{Light, SampleHeight};
 use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::height_options::parse_share;
+use crate::lamp_option::LampOption;
 use crate::options::one_of_described;
 
 /// What `--help` says of the heights in a layer.
@@ -23,6 +24,9 @@ pub(crate) struct PlanningOptions {
     /// light spreads ([spread]) and which dose cures ([working-curve])
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) material: PathBuf,
+
+    #[command(flatten)]
+    lamp: LampOption,
 
     /// Lowest gray level of pixels that are wanted
     #[arg(long, value_name = "LEVEL", default_value = "128", value_parser = parse_wanted)]
@@ -44,11 +48,19 @@ pub(crate) struct PlanningOptions {
 }
 
 impl PlanningOptions {
-    /// Returns the material, and the light that it makes.
-    pub(crate) fn light(&self) -> Result<(Material, Light), Exit> {
-        let material: Material = entry(&self.material)?;
+    /// Returns the material under the lamp as it is now, the light that it makes, and what is
+    /// doubtful about the lamp.
+    pub(crate) fn light(&self) -> Result<(Material, Light, Option<String>), Exit> {
+        let (material, doubt) = self.lamp.material(entry(&self.material)?)?;
         let light = Light::of(&material, self.at)?;
-        Ok((material, light))
+        Ok((material, light, doubt))
+    }
+
+    /// Returns the resin and the lamp as pages record them.
+    pub(crate) fn resin_words(&self, material: &str) -> String {
+        let lamp = self.lamp.canonical();
+        let lamp = lamp.map_or(String::new(), |light| format!(" --lamp-intensity {light}"));
+        format!("--material {material}{lamp}")
     }
 }
 

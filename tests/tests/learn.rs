@@ -178,3 +178,20 @@ fn a_job_is_of_one_stack() {
         .run("lamp learn job/ --measured good.csv -o next.csv")
         .is_refused_with(&["this is not the stack that the job was begun with"]);
 }
+
+/// A job keeps the resin under the lamp that it was printed with.
+#[test]
+fn a_job_keeps_the_lamp() {
+    let scratch = with_job();
+    let begin = "lamp learn aged/ --start timed.tif --material pegda-sudan --lamp-intensity 50%";
+    let said = scratch.run(begin).succeeds().stderr;
+    assert!(said.contains("pegda-sudan does not say how its critical dose follows"), "{said}");
+    let of = |job: &str| {
+        let text = String::from_utf8(scratch.bytes(&format!("{job}/material.toml"))).unwrap();
+        let (_, light) = text.split_once("[intensity]\nvalue = \"").unwrap();
+        light.split('"').next().unwrap().to_owned()
+    };
+    assert_eq!([of("job"), of("aged")], ["7.394 mW/cm2", "3.697 mW/cm2"]);
+    let late = "lamp learn job/ --measured a.csv --lamp-intensity 50% -o next.csv";
+    scratch.run(late).is_wrong_usage(&["--lamp-intensity"]);
+}

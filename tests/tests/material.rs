@@ -115,6 +115,17 @@ fn composition() -> String {
     block.split_once("```").unwrap().0.to_owned()
 }
 
+/// The same with the third block of TOML, and another share of the first peak.
+fn with_peaks(share: &str) -> String {
+    let text = fs::read_to_string(workspace_root().join("docs/materials.md")).unwrap();
+    let peaks = text.split("```toml\n").nth(3).unwrap().split_once("```").unwrap().0;
+    assert!(peaks.contains("value = 0.7,"));
+    let is_kept =
+        |line: &&str| !line.starts_with("wavelength") && !line.starts_with("absorptivity");
+    let kept: Vec<_> = composition().lines().filter(is_kept).map(str::to_owned).collect();
+    kept.join("\n") + "\n" + &peaks.replace("value = 0.7,", &format!("value = {share},"))
+}
+
 #[test]
 fn a_composition_makes_a_material() {
     let scratch = Scratch::new();
@@ -140,6 +151,13 @@ fn a_composition_makes_a_material() {
         };
         [value("critical-dose"), value("penetration-depth")]
     };
+    // By eq. 59 less of the light is lost on the way.
+    let alone =
+        composition().replace("[shrinkage]", "attenuated-by = \"photoinitiator\"\n[shrinkage]");
+    let [all, alone] = [composition(), alone].map(|text| numbers(&text));
+    assert!(alone[0] < 0.5 * all[0] && alone[1] == all[1], "{alone:?} {all:?}");
+    let [one, two] = ["0.7", "0.3"].map(|share| numbers(&with_peaks(share)));
+    assert!(two[1] > one[1], "{one:?} {two:?}");
     let [few, more] =
         ["2 mmol/l", "4 mmol/l"].map(|c| numbers(&composition().replace("2 mmol/l", c)));
     assert!(more[0] > few[0] && more[1] < few[1], "{few:?} {more:?}");

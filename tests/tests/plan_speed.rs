@@ -116,3 +116,31 @@ fn what_cannot_be_planned_is_refused_with_a_sentence() {
         scratch.run(&line).is_wrong_usage(&[]);
     }
 }
+
+/// Half the light takes twice the time, and a critical dose that follows the lamp less than that.
+#[test]
+fn a_lamp_that_ages_takes_longer() {
+    let scratch = with_stairs();
+    let plan = "lamp plan speed stairs.tif --gap 5% --speed 0.001um/s..1m/s";
+    let shown = scratch.run("lamp material show pegda-sudan").succeeds().stdout;
+    let follows = "\n[dimmed-lamp.critical-dose]\nat-zero = \"6 mJ/cm2\"\nrise = \"171.2 mJ/cm2\"\n\
+                   source = \"a test\"\n";
+    let material = String::from_utf8(shown).unwrap() + follows;
+    scratch.write("aging.toml", material.as_bytes());
+    let time = |material: &str, options: &str| -> f64 {
+        let line = format!("{plan} --material {material} {options} -o timed.tif");
+        let said = scratch.run(&line).succeeds().stderr;
+        let is_told = said.contains("pegda-sudan does not say how its critical dose follows");
+        assert_eq!(is_told, material == "pegda-sudan" && !options.is_empty(), "{said}");
+        let layers = scratch.layers("timed.tif");
+        let command = layers[0].info.stack.as_ref().unwrap().commands.last().unwrap();
+        assert!(command.contains(options), "{command}");
+        layers.iter().map(|layer| layer.info.exposure_ms.unwrap()).sum()
+    };
+    let (own, weak) = (time("pegda-sudan", ""), time("pegda-sudan", "--lamp-intensity 50%"));
+    let aged = time("aging.toml", "--lamp-intensity 50%");
+    // By equation 36, 6 + 0.1712 3.697 mJ/cm2 instead of 7.266.
+    let dose = (6.0 + 0.1712 * 3.697) / 7.266;
+    assert!((weak / own - 2.0).abs() < 0.02, "{weak} for {own}");
+    assert!((aged / own - 2.0 * dose).abs() < 0.02, "{aged} for {own}");
+}

@@ -6,11 +6,12 @@ use lamp_stack::{Builtin, Catalogued, Length};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::peaks::{Peak, check_light, mean};
 use super::{Constant, CurveNumbers, Given, GivenNumber, Material};
 use crate::resin::shrinkage::{self, Monomer};
 use crate::resin::{
     Absorber, Absorptivity, Concentration, Inhibition, Intensity, ModelError, Quantity, Suspension,
-    refractive_contrast,
+    WorkingCurve, refractive_contrast,
 };
 
 /// What a suspension is made of, from which the models of 002 sections 3.4.2.2 to 3.4.2.4 say how
@@ -24,8 +25,11 @@ pub struct Composition {
     pub description: String,
     /// The light of full white.
     pub intensity: Option<Given<Intensity>>,
-    /// The light's wavelength.
-    pub wavelength: Given<Length>,
+    /// The light's wavelength, unless the lamp has several peaks.
+    pub wavelength: Option<Given<Length>>,
+    /// The peaks of a lamp that has several, instead of a wavelength and absorptivities there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub peaks: Vec<Peak>,
     /// The ceramic; none in a liquid without particles.
     pub ceramic: Option<Ceramic>,
     /// The photoinitiator, `c_P` and `ε_P`.
@@ -66,8 +70,19 @@ pub struct Refraction {
 pub struct Dissolved {
     /// In the liquid, without the ceramic.
     pub concentration: Given<Concentration>,
-    /// In powers of ten, as tables have it.
-    pub absorptivity: Given<Absorptivity>,
+    /// In powers of ten, as tables have it; left out where the lamp's peaks have it.
+    pub absorptivity: Option<Given<Absorptivity>>,
+}
+
+/// What attenuates the light whose photons use up the inhibitor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AttenuatedBy {
+    /// Ceramic, photoinitiator and UV absorber (002 eq. 58).
+    #[default]
+    All,
+    /// The photoinitiator, as if it were alone (002 eq. 59).
+    Photoinitiator,
 }
 
 /// The inhibitor, which keeps a resin from curing until it is used up.
@@ -82,6 +97,9 @@ pub struct InhibitionNumbers {
     pub radicals_per_dye: Option<GivenNumber>,
     /// `Ω`.
     pub radicals_per_photon: GivenNumber,
+    /// What attenuates the light meanwhile.
+    #[serde(default)]
+    pub attenuated_by: AttenuatedBy,
 }
 
 /// The monomers and how much of them reacts.
@@ -131,6 +149,9 @@ pub enum CompositionError {
     /// A number is impossible.
     #[error("{0} must be {1}")]
     Number(&'static str, &'static str),
+    /// The light is not told, or told twice.
+    #[error("{0}")]
+    Light(&'static str),
     /// Shrinkage needs one of two.
     #[error("shrinkage needs either conversion or spectra")]
     NoConversion,
@@ -155,7 +176,7 @@ impl Catalogued for Composition {
             if fine { Ok(()) } else { Err(CompositionError::Number(what, wanted)) }
         };
         let positive = |number: f64| number > 0.0 && number.is_finite();
-        number(positive(self.wavelength.value.um()), "wavelength", POSITIVE)?;
+        check_light(self)?;
         if let Some(Ceramic { share, scattering_length, refraction }) = &self.ceramic {
             number((0.0..1.0).contains(&share.value), "ceramic.share", "from 0 to below 1")?;
             number(positive(scattering_length.value.um()), "ceramic.scattering-length", POSITIVE)?;
@@ -170,7 +191,7 @@ impl Catalogued for Composition {
         let taken = not_below(of.radicals_per_inhibitor.value) && not_below(dye);
         number(taken, "inhibition.radicals-per-inhibitor and -per-dye", "zero or more")?;
         self.shrinkage.as_ref().map_or(Ok(()), ShrinkageNumbers::check)?;
-        self.suspension().working_curve(&self.inhibition())?;
+        self.working_curve()?;
         Ok(())
     }
 }
@@ -208,24 +229,54 @@ impl ShrinkageNumbers {
     }
 }
 
-/// Returns a substance as the models have it: mol a litre, and l/(mol cm) to base e.
-fn absorber(of: &Dissolved) -> Absorber {
-    Absorber {
-        concentration: of.concentration.value.mol_per_m3() / 1000.0,
-        extinction: of.absorptivity.value.m2_per_mol() * 10.0 * std::f64::consts::LN_10,
-    }
-}
-
 impl Composition {
     /// Returns the parts that attenuate light.
     pub fn suspension(&self) -> Suspension {
         let ceramic = self.ceramic.as_ref();
+        let dye = self.uv_absorber.as_ref();
         Suspension {
             scattering_length: ceramic.map(|it| it.scattering_length.value),
             ceramic: ceramic.map_or(0.0, |it| it.share.value),
-            photoinitiator: absorber(&self.photoinitiator),
-            dye: self.uv_absorber.as_ref().map_or(Absorber::NONE, absorber),
+            photoinitiator: self.absorber(&self.photoinitiator, |peak| Some(&peak.photoinitiator)),
+            dye: dye
+                .map_or(Absorber::NONE, |dye| self.absorber(dye, |peak| peak.uv_absorber.as_ref())),
         }
+    }
+
+    /// Returns a substance as the models have it: mol a litre, and l/(mol cm) to base e; of a lamp
+    /// with peaks, the mean over its light.
+    fn absorber(
+        &self,
+        of: &Dissolved,
+        at: impl Fn(&Peak) -> Option<&Given<Absorptivity>>,
+    ) -> Absorber {
+        let number = |given: &Given<Absorptivity>| given.value.m2_per_mol();
+        let at_peak = |peak: &Peak| at(peak).map_or(0.0, number);
+        let absorptivity =
+            of.absorptivity.as_ref().map_or_else(|| mean(&self.peaks, |_| 1.0, at_peak), number);
+        Absorber {
+            concentration: of.concentration.value.mol_per_m3() / 1000.0,
+            extinction: absorptivity * 10.0 * std::f64::consts::LN_10,
+        }
+    }
+
+    /// Returns the wavelength; of a lamp with peaks, that of the photons that the photoinitiator
+    /// absorbs at the surface, in the mean.
+    fn wavelength(&self) -> Length {
+        let of_peaks = || {
+            let absorbed = |peak: &Peak| peak.photoinitiator.value.m2_per_mol();
+            Length::from_um(mean(&self.peaks, absorbed, |peak| peak.wavelength.value.um()))
+        };
+        self.wavelength.as_ref().map_or_else(of_peaks, |it| it.value)
+    }
+
+    fn working_curve(&self) -> Result<WorkingCurve, ModelError> {
+        let (suspension, inhibition) = (self.suspension(), self.inhibition());
+        let critical = match self.inhibition.attenuated_by {
+            AttenuatedBy::All => suspension.critical_dose(&inhibition),
+            AttenuatedBy::Photoinitiator => suspension.critical_dose_of_initiator(&inhibition),
+        };
+        WorkingCurve::new(critical, suspension.penetration_depth())
     }
 
     /// Returns what keeps the resin from curing.
@@ -236,7 +287,7 @@ impl Composition {
             radicals_per_inhibitor: of.radicals_per_inhibitor.value,
             radicals_per_dye: of.radicals_per_dye.as_ref().map_or(0.0, |it| it.value),
             radicals_per_photon: of.radicals_per_photon.value,
-            wavelength: self.wavelength.value,
+            wavelength: self.wavelength(),
         }
     }
 
@@ -261,14 +312,18 @@ impl Composition {
         Some(refractive_contrast(of.ceramic.value, of.liquid.value))
     }
 
-    /// Returns the material that the models make of it: a working curve by 002 eq. 57 and 58, and
-    /// as constants what no cure model reads, the shrinkage (eq. 51 to 54) and the contrast of the
+    /// Returns the material that the models make of it: a working curve by 002 eq. 57 and 58
+    /// or 59, and as constants what no cure model reads, the shrinkage (eq. 51 to 54) and the contrast of the
     /// refractive indices (eq. 55).
     ///
     /// # Errors
     /// Returns an error if the numbers give no working curve.
     pub fn material(&self) -> Result<Material, CompositionError> {
-        let curve = self.suspension().working_curve(&self.inhibition())?;
+        let curve = self.working_curve()?;
+        let of_dose = match self.inhibition.attenuated_by {
+            AttenuatedBy::All => "equation 58",
+            AttenuatedBy::Photoinitiator => "equation 59",
+        };
         let model = |equation: &str| format!("002 {equation}, for the composition {}", self.name);
         let constant = |(name, share, equation): (&str, Option<f64>, &str)| {
             let constant = |share: f64| Constant {
@@ -287,7 +342,7 @@ impl Composition {
             description: self.description.clone(),
             intensity: self.intensity.clone(),
             working_curve: Some(CurveNumbers {
-                critical_dose: given(curve.critical_dose(), model("equation 58")),
+                critical_dose: given(curve.critical_dose(), model(of_dose)),
                 penetration_depth: given(curve.penetration_depth(), model("equation 57")),
                 measured: None,
             }),
@@ -307,93 +362,5 @@ fn rounded(number: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::resin::CureModel;
-
-    /// Made-up numbers of the right size: 6.514 m2/mol are 150 l/(mol cm) to base e.
-    const MIXED: &str = r#"
-name = "mixed"
-description = "A test"
-wavelength = { value = "0.365 um", source = "a" }
-[ceramic]
-share = { value = 0.55, source = "a" }
-scattering-length = { value = "1500 um", source = "a" }
-refraction = { ceramic = { value = 1.4603, source = "002" }, liquid = { value = 1.4560, source = "002" } }
-[photoinitiator]
-concentration = { value = "200 mmol/l", source = "a" }
-absorptivity = { value = "6.51441723 m2/mol", source = "a" }
-[uv-absorber]
-concentration = { value = "2 mmol/l", source = "a" }
-absorptivity = { value = "868.588964 m2/mol", source = "a" }
-[inhibition]
-inhibitor = { value = "1 mmol/l", source = "a" }
-radicals-per-inhibitor = { value = 1, source = "a" }
-radicals-per-dye = { value = 2, source = "a" }
-radicals-per-photon = { value = 0.6, source = "a" }
-[shrinkage]
-density-g-per-cm3 = { value = 1.02, source = "a" }
-conversion = { value = 0.5, source = "a" }
-monomers = [
-  { name = "HDDA", functionality = 2, molar-mass-g-per-mol = 226, moles = 0.95 },
-  { name = "four", functionality = 4, molar-mass-g-per-mol = 500, moles = 0.05 },
-]
-"#;
-
-    #[test]
-    fn equations_51_to_58_make_a_material() {
-        let mixed = Composition::from_toml(MIXED).unwrap();
-        let material = mixed.material().unwrap();
-        // Worked out in Python for resin/composition.rs and with bc for resin/shrinkage.rs.
-        let curve = material.working_curve().unwrap().unwrap();
-        assert!((curve.penetration_depth().um() - 262.009).abs() < 2e-3, "{curve:?}");
-        assert!((curve.critical_dose().mj_per_cm2() - 115.823).abs() < 2e-3, "{curve:?}");
-        assert_eq!(material.constants["volume-shrinkage"].value, 4.52394);
-        // 002 has 0.3%.
-        assert_eq!(material.constants["refractive-contrast"].value, 0.29533);
-        assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material));
-    }
-
-    #[test]
-    fn spectra_give_the_conversion() {
-        let text = MIXED.replace(
-            "conversion = { value = 0.5, source = \"a\" }",
-            "spectra = { before = [3, 1, 2], after = [1, 0.5, 2.5], source = \"a\" }",
-        );
-        let by_spectra = Composition::from_toml(&text).unwrap().volume_shrinkage().unwrap();
-        let half = Composition::from_toml(MIXED).unwrap().volume_shrinkage().unwrap();
-        assert!((by_spectra - 1.4 * half).abs() < 1e-12, "{by_spectra} {half}");
-    }
-
-    #[test]
-    fn a_liquid_without_particles_needs_no_ceramic() {
-        let (head, rest) = MIXED.split_once("[ceramic]").unwrap();
-        let rest = rest.split_once("[photoinitiator]").unwrap().1;
-        let liquid = Composition::from_toml(&format!("{head}[photoinitiator]{rest}")).unwrap();
-        // 1/(30 + 40) cm.
-        let curve = liquid.material().unwrap().working_curve().unwrap().unwrap();
-        assert!((curve.penetration_depth().um() - 1e4 / 70.0).abs() < 1e-3, "{curve:?}");
-        assert!(curve.dose(Length::from_um(100.0)).is_ok() && liquid.contrast().is_none());
-    }
-
-    #[test]
-    fn impossible_numbers_are_refused() {
-        for (from, to, words) in [
-            ("0.55", "1", "ceramic.share must be from 0 to below 1"),
-            ("0.365 um", "0 um", "wavelength must be above zero"),
-            ("200 mmol/l", "0 mmol/l", "no working curve: its critical-dose must be above zero"),
-            ("value = 0.6", "value = 0", "inhibition.radicals-per-photon must be above zero"),
-            ("value = 0.5,", "value = 1.5,", "shrinkage.conversion must be from 0 to 1"),
-            ("conversion = {", "degree = {", "unknown key `degree`"),
-            ("moles = 0.05", "moles = 0", "shrinkage.monomers must be there"),
-            ("2 mmol/l", "2", "`2` is not a concentration"),
-        ] {
-            assert!(MIXED.contains(from), "{from}");
-            let error = Composition::from_toml(&MIXED.replacen(from, to, 1)).unwrap_err();
-            assert!(error.to_string().contains(words), "{error} for {to}");
-        }
-        let neither = MIXED.replace("conversion = { value = 0.5, source = \"a\" }", "");
-        let error = Composition::from_toml(&neither).unwrap_err().to_string();
-        assert_eq!(error, "shrinkage needs either conversion or spectra");
-    }
-}
+#[path = "composition_tests.rs"]
+mod tests;

@@ -19,6 +19,7 @@ mod kinetics;
 mod lamp;
 mod measured;
 mod number;
+mod peaks;
 
 use std::collections::BTreeMap;
 

@@ -4,7 +4,6 @@ use std::fs::{self, File};
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::Light;
 use lamp_planning::speed::PartPages;
@@ -27,7 +26,8 @@ pub(super) fn begin(
     kept: &KeptOptions,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    let material: Material = entry(material)?;
+    let (material, lamp_doubt) = kept.lamp.material(entry(material)?)?;
+    lamp_doubt.iter().for_each(|doubt| progress.say(doubt));
     let light = Light::of(&material, kept.at.unwrap_or_default())?;
     light.check().map_err(|error| Exit::Failed(error.into()).at(material.name.clone()))?;
     let name = input_name(stack);

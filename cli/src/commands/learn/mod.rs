@@ -17,6 +17,7 @@ use lamp_planning::speed::{Platform, Speed};
 
 use crate::exit::Exit;
 use crate::json_report::parse_report;
+use crate::lamp_option::LampOption;
 use crate::memory;
 use crate::options::{Common, one_of_described, parse_memory};
 use crate::planning_options::{SAMPLE_HEIGHTS, parse_margin};
@@ -97,6 +98,9 @@ struct KeptOptions {
     /// Resin: a built-in material's name (see lamp material list) or a file
     #[arg(long, value_name = "NAME|FILE", requires = "start")]
     material: Option<PathBuf>,
+
+    #[command(flatten)]
+    lamp: LampOption,
 
     /// Lowest gray level of pixels that are wanted [default: 128]
     #[arg(long, value_name = "LEVEL", requires = "start")]

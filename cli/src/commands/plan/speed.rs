@@ -71,7 +71,7 @@ pub(super) struct SpeedArgs {
 
 pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs()?;
-    let (material, light) = args.planning.light()?;
+    let (material, light, lamp_doubt) = args.planning.light()?;
     let options = SpeedOptions {
         light,
         platform: args.platform.platform(),
@@ -90,7 +90,8 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     if let Some(light) = material.light().map_err(anyhow::Error::new)? {
         plan.times.iter().for_each(|&time| doses.see(light * time));
     }
-    for line in lines_of(&planned).into_iter().chain(doses.doubt("layers")) {
+    let doubts = lamp_doubt.into_iter().chain(doses.doubt("layers"));
+    for line in lines_of(&planned).into_iter().chain(doubts) {
         progress.say(&line);
     }
     if let Some(path) = &args.profile {
@@ -154,8 +155,8 @@ impl SpeedArgs {
     fn command(&self, material: &str) -> String {
         let PlanningOptions { wanted, margin, gap, at, .. } = &self.planning;
         format!(
-            "lamp plan speed --material {material} --wanted {wanted} --margin {}% --gap {}% --at \
-             {at}{}",
+            "lamp plan speed {} --wanted {wanted} --margin {}% --gap {}% --at {at}{}",
+            self.planning.resin_words(material),
             100.0 * margin,
             100.0 * gap,
             self.platform.words()

@@ -135,7 +135,7 @@ fn parse_exposure(text: &str) -> Result<ExposureTime, String> {
 
 pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs()?;
-    let (material, light) = args.planning.light()?;
+    let (material, light, lamp_doubt) = args.planning.light()?;
     let command = args.command(&material.name);
     let progress = progress("plan", common, &args.output);
     let layers = read_layers(&args.input, &progress)?;
@@ -168,7 +168,8 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
         margin: args.planning.margin,
         outcome: &planned.outcome(),
     };
-    for line in lines_of(&planned).into_iter().chain(doses.doubt("layers")) {
+    let doubts = lamp_doubt.into_iter().chain(doses.doubt("layers"));
+    for line in lines_of(&planned).into_iter().chain(doubts) {
         progress.say(&line);
     }
     if let Some(path) = &args.report {
@@ -230,8 +231,8 @@ impl VoxelsArgs {
     fn command(&self, material: &str) -> String {
         let PlanningOptions { wanted, margin, gap, at, .. } = &self.planning;
         let mut command = format!(
-            "lamp plan voxels --material {material} --objective {} --wanted {wanted} --margin {}% \
-             --gap {}% --at {at}",
+            "lamp plan voxels {} --objective {} --wanted {wanted} --margin {}% --gap {}% --at {at}",
+            self.planning.resin_words(material),
             self.objective,
             100.0 * margin,
             100.0 * gap
