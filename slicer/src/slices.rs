@@ -13,9 +13,7 @@ use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
 use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::Units;
-use crate::gray::{
-    ChosenLayer, DepthRows, DepthSpan, KnownDepths, LayerLevels, LevelChooser, PrintThrough,
-};
+use crate::gray::{Columns, DepthRows, DepthSpan, LayerLevels, PrintThrough};
 use crate::grid::PixelGrid;
 use crate::part::Part;
 use crate::placement::{PlacedFacet, PlacedPart, Placement};
@@ -126,6 +124,10 @@ const MAX_LAYERS: usize = 1 << 17;
 /// times. They take a quarter of a gigabyte.
 const MAX_CROSSINGS: f64 = (1 << 25) as f64;
 
+/// Layers whose levels are chosen together: several times those whose light reaches one, which must be
+/// looked at again.
+const CHOSEN_AT_ONCE: usize = 64;
+
 /// The key of a page's pixels that even white does not cure down to the underside within their
 /// layer, where doses add up.
 pub const SHORT_PX: &str = "short_px";
@@ -165,9 +167,7 @@ pub struct Slices {
     pending: Range<usize>,
     /// The layers whose levels are not chosen yet.
     waiting: VecDeque<Layer>,
-    /// The depths of layers, and the number of the first.
-    depths: Vec<DepthRows>,
-    first_depths: usize,
+    columns: Columns,
     ready: VecDeque<Layer>,
     /// Whether the files were compared with what they were, after all layers.
     is_checked: bool,
@@ -260,8 +260,7 @@ impl Slices {
             open_rows: OpenRows::new(),
             shared: SharedVolumes::default(),
             waiting: VecDeque::new(),
-            depths: Vec::new(),
-            first_depths: cut.start,
+            columns: Columns::new(cut.start),
             ready: VecDeque::new(),
             is_checked: false,
         })
@@ -315,8 +314,9 @@ impl Slices {
         let (mut layer, depths, _) =
             self.image_of(index, &table, cutter, &open.unwrap_or_default());
         if let (Some(light), Some(depths)) = (&self.print_through, depths) {
-            let rows = &[depths];
-            choose(light, index, KnownDepths { first: index, rows }, &mut layer);
+            let mut columns = Columns::new(index);
+            columns.extend(light, vec![depths]);
+            choose(light, &columns, index, std::slice::from_mut(&mut layer));
         }
         Ok(layer)
     }
@@ -441,13 +441,14 @@ impl Slices {
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
         let layer = |layer| self.image_of(layer, &self.table, cutter, &self.open_rows);
         let made: Vec<_> = batch.clone().into_par_iter().map(layer).collect();
+        let mut new_depths = Vec::new();
         for (index, (layer, depths, shared)) in batch.zip(made) {
             if self.wanted.contains(&index) {
                 self.add_shared(index, &shared);
             }
             match depths {
                 Some(depths) => {
-                    self.depths.push(depths);
+                    new_depths.push(depths);
                     if self.wanted.contains(&index) {
                         self.waiting.push_back(layer);
                     }
@@ -455,26 +456,25 @@ impl Slices {
                 None => self.ready.push_back(layer),
             }
         }
-        self.choose_levels();
+        self.choose_levels(new_depths);
     }
 
-    /// Chooses the levels of the waiting layers above which all layers that count are known.
-    fn choose_levels(&mut self) {
+    /// Adds the depths of a batch, and chooses the levels of the waiting layers above which all
+    /// layers that count are known.
+    fn choose_levels(&mut self, depths: Vec<DepthRows>) {
         let Some(light) = &self.print_through else { return };
+        self.columns.extend(light, depths);
         let (Some(first), end) = (self.waiting.front(), self.pending.start) else { return };
         let first = first.info.index as usize;
         let is_known = |layer: &usize| light.end_above(*layer) <= end;
         let count = (first..end.min(self.wanted.end)).take_while(is_known).count();
-        let known = KnownDepths { first: self.first_depths, rows: &self.depths };
-        let waiting = &mut self.waiting.make_contiguous()[..count];
-        waiting.par_iter_mut().enumerate().for_each(|(k, layer)| {
-            choose(light, first + k, known, layer);
-        });
+        if count < CHOSEN_AT_ONCE && first + count < self.wanted.end {
+            return;
+        }
+        choose(light, &self.columns, first, &mut self.waiting.make_contiguous()[..count]);
         self.ready.extend(self.waiting.drain(..count));
         if first + count < self.wanted.end {
-            let done = light.first_below(first + count) - self.first_depths;
-            self.depths.drain(..done);
-            self.first_depths += done;
+            self.columns.forget_below(light.first_below(first + count));
         }
     }
 
@@ -577,12 +577,14 @@ fn shading<'a>(gray: Option<&'a LayerLevels>, print_through: Option<&PrintThroug
     }
 }
 
-/// Chooses a layer's levels, given its depths and those of the layers around it.
-fn choose(light: &PrintThrough, number: usize, known: KnownDepths<'_>, layer: &mut Layer) {
-    let ChosenLayer { image, short_px } = LevelChooser::new(light, number, known).choose();
-    layer.image = image.into();
-    if short_px > 0 {
-        layer.info.other.insert(SHORT_PX.to_owned(), short_px.into());
+/// Chooses the levels of layers from a first one on.
+fn choose(light: &PrintThrough, columns: &Columns, first: usize, layers: &mut [Layer]) {
+    let chosen = columns.choose(light, first..first + layers.len());
+    for (layer, chosen) in layers.iter_mut().zip(chosen) {
+        layer.image = chosen.image.into();
+        if chosen.short_px > 0 {
+            layer.info.other.insert(SHORT_PX.to_owned(), chosen.short_px.into());
+        }
     }
 }
 

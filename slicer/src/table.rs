@@ -3,6 +3,7 @@
 //! Source: 002 section 2.3.4, algorithm 9 and figure 26. There the table holds the
 //! whole part, here one slab of layers at a time, so that memory is bounded.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::io;
 use std::ops::Range;
@@ -219,20 +220,27 @@ impl Table {
         spans.map(|span| (span.end - span.start) as usize).sum()
     }
 
-    /// Returns the spans below a layer's section, row by row: those of facets, and those of
-    /// surfaces that facets miss.
+    /// Returns the spans below a layer's section by row, sorted by their starts: those of facets,
+    /// and those of surfaces that facets miss.
     fn spans(
         &self,
         layer: usize,
         cutter: Cutter<'_>,
         surfaces: &[PlacedSurfaces],
         reach_um: f64,
-    ) -> Vec<DepthSpan> {
-        let of_facets = self.shares(layer).flat_map(|share| &share.spans).copied();
-        let rims = surfaces.iter().map(|surfaces| surfaces.rims(cutter));
-        let of_rims = rims.flat_map(|rims| rims.spans(cutter.planes, layer, reach_um));
-        let mut spans: Vec<_> = of_facets.chain(of_rims).collect();
-        spans.sort_unstable_by_key(DepthSpan::place);
+    ) -> Grouped<DepthSpan> {
+        let spans = || {
+            let of_facets = self.shares(layer).flat_map(|share| &share.spans).copied();
+            let rims = surfaces.iter().map(|surfaces| surfaces.rims(cutter));
+            let of_rims = rims.flat_map(|rims| rims.spans(cutter.planes, layer, reach_um));
+            of_facets.chain(of_rims).map(|span| (span.row as usize, span))
+        };
+        let rows = cutter.grid.height as usize;
+        let mut spans = Grouped::new(rows, spans);
+        for row in 0..rows {
+            // By all they have, so that the order of threads shows nowhere.
+            sort_by(spans.group_mut(row), |a, b| a.partial_cmp(b).expect("spans are numbers"));
+        }
         spans
     }
 
@@ -346,7 +354,7 @@ fn shader<'a, R: ShadedRows>(
     rows: R,
     layer: usize,
     cutter: Cutter<'a>,
-    spans: &'a [DepthSpan],
+    spans: &'a Grouped<DepthSpan>,
 ) -> Shader<'a, R> {
     Shader::new(rows, cutter.rule, cutter.planes, layer, spans, cutter.grid.width)
 }
@@ -378,7 +386,7 @@ impl<'a, R: ShadedRows> ImageRows<'a, R> {
         for row in 0..self.height {
             let places = by_row.group_mut(row as usize);
             if !places.is_empty() {
-                sort(places);
+                sort_by(places, Ord::cmp);
                 if !fill(places, &mut transitions) {
                     stray_rows.push(row);
                 }
@@ -425,20 +433,20 @@ pub(crate) fn open_rows(
     Ok(layers.iter().copied().zip(sums.iter().map(RowSums::open_rows)).collect())
 }
 
-/// Sorts the crossings of a row: few by insertion, without a call.
+/// Sorts the items of a row: few by insertion, without a call.
 #[inline]
-fn sort<C: InRow>(places: &mut [C]) {
-    if places.len() > 16 {
-        return places.sort_unstable();
+fn sort_by<T: Copy>(items: &mut [T], order: impl Fn(&T, &T) -> Ordering) {
+    if items.len() > 16 {
+        return items.sort_unstable_by(order);
     }
-    for end in 1..places.len() {
-        let place = places[end];
+    for end in 1..items.len() {
+        let item = items[end];
         let mut at = end;
-        while at > 0 && places[at - 1] > place {
-            places[at] = places[at - 1];
+        while at > 0 && order(&items[at - 1], &item).is_gt() {
+            items[at] = items[at - 1];
             at -= 1;
         }
-        places[at] = place;
+        items[at] = item;
     }
 }
 

@@ -16,8 +16,7 @@ use crate::Length;
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthLevels {
     reach_um: f64,
-    /// From the depth at `i` on, the level is above `i`.
-    steps_um: Box<[f64; 255]>,
+    steps: LevelSteps,
 }
 
 impl DepthLevels {
@@ -27,7 +26,7 @@ impl DepthLevels {
     pub fn new(reach: Length, depth_of: impl Fn(f64) -> Length) -> Self {
         // The nearest level changes half way between two levels.
         let step = |i: usize| depth_of((i as f64 + 0.5) / 255.0).um();
-        Self { reach_um: reach.um(), steps_um: Box::new(std::array::from_fn(step)) }
+        Self { reach_um: reach.um(), steps: LevelSteps::new((0..255).map(step).collect()) }
     }
 
     /// Returns the level from 0 to 255 that cures a depth most nearly. A depth of
@@ -40,12 +39,96 @@ impl DepthLevels {
         } else if um >= self.reach_um {
             255
         } else {
-            self.steps_um.partition_point(|&step| step <= um) as u8
+            self.steps.level(um)
         }
     }
 
     /// Returns the depth from which on all is white.
     pub fn reach(&self) -> Length {
         Length::from_um(self.reach_um)
+    }
+}
+
+/// The depths from which on levels are whiter: rising, found in a few steps.
+///
+/// ```
+/// use lamp_stack::LevelSteps;
+///
+/// let steps = LevelSteps::new(vec![0.0, 10.0, 10.0, 55.0]);
+/// assert_eq!([-1.0, 0.0, 9.9, 10.0, 54.9, 55.0, 1e9].map(|um| steps.level(um)), [0, 1, 1, 3, 3, 4, 4]);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct LevelSteps {
+    steps_um: Vec<f64>,
+    /// The number of steps below each bin of depths.
+    below: Vec<u8>,
+    bins_per_um: f64,
+}
+
+impl LevelSteps {
+    /// Bins of depths, four for each step.
+    const BINS: usize = 1024;
+
+    /// Creates the steps: from the depth at `i` on, in micrometres, the level is above `i`.
+    ///
+    /// # Panics
+    /// Panics if there are more than 255.
+    pub fn new(steps_um: Vec<f64>) -> Self {
+        assert!(steps_um.len() <= 255, "a level has eight bits");
+        let last_um = steps_um.last().copied().unwrap_or(0.0);
+        let finite = last_um.is_finite() && last_um > 0.0;
+        let bins_per_um = if finite { Self::BINS as f64 / last_um } else { 0.0 };
+        let mut steps = Self { steps_um, below: vec![0; Self::BINS + 1], bins_per_um };
+        for &step_um in &steps.steps_um {
+            // Depths of this bin may lie below the step.
+            let bin = steps.bin(step_um);
+            steps.below[bin + 1..].iter_mut().for_each(|below| *below += 1);
+        }
+        steps
+    }
+
+    /// Returns the level at a depth: the number of steps at or below it.
+    #[inline]
+    pub fn level(&self, depth_um: f64) -> u8 {
+        let mut level = self.below[self.bin(depth_um)];
+        while self.steps_um.get(usize::from(level)).is_some_and(|&step_um| step_um <= depth_um) {
+            level += 1;
+        }
+        level
+    }
+
+    /// Returns a depth's bin: never a lower one for a greater depth.
+    #[inline]
+    fn bin(&self, depth_um: f64) -> usize {
+        ((depth_um * self.bins_per_um) as usize).min(Self::BINS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_change_no_level() {
+        let mut random = 1u64;
+        let mut next = move || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 33) as f64 / (1u64 << 31) as f64
+        };
+        for round in 0..40 {
+            let power = [1.0, 3.0, 0.2][round % 3];
+            let mut steps: Vec<f64> = (0..255).map(|_| 90.0 * next().powf(power) - 5.0).collect();
+            steps.sort_by(f64::total_cmp);
+            if round % 4 == 0 {
+                steps[200..].fill(f64::INFINITY);
+            }
+            let table = LevelSteps::new(steps.clone());
+            let random = (0..2000).map(|_| 120.0 * next() - 10.0);
+            let near = steps.iter().flat_map(|&step| [step.next_down(), step, step.next_up()]);
+            for depth in random.collect::<Vec<_>>().into_iter().chain(near) {
+                let level = steps.partition_point(|&step| step <= depth);
+                assert_eq!(usize::from(table.level(depth)), level, "{depth}");
+            }
+        }
     }
 }

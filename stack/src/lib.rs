@@ -77,7 +77,7 @@ pub use check::CheckFault;
 pub use combine::{Combine, Op, combine_rows};
 pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use coverage::mean_levels;
-pub use depth_levels::DepthLevels;
+pub use depth_levels::{DepthLevels, LevelSteps};
 pub use difference::{Difference, Overlaid};
 pub use digest::{digest_of, digest_of_digests};
 pub use error::{PageFault, StackError, UnsupportedFeature};

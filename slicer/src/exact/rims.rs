@@ -247,8 +247,8 @@ impl RimSearch<'_> {
 
 impl RimCrossing {
     /// Returns the place and height, to sort by.
-    fn key(&self) -> (u64, i32, f64) {
-        (self.span.place(), self.span.winding(), self.z_um)
+    fn key(&self) -> ([u32; 2], i32, f64) {
+        ([self.span.row, self.span.start], self.span.winding(), self.z_um)
     }
 
     fn is_same(&self, other: &Self) -> bool {

@@ -17,15 +17,17 @@
 //! Source: 002 section 3.3.10, algorithm 15, but with depths of the facets themselves
 //! instead of a solid cut out for each layer.
 
+mod above;
+mod below;
 mod columns;
 mod levels;
 mod print_through;
-mod row_pieces;
+mod row_lists;
 mod rows;
 mod shade;
 mod sheet;
 
-pub(crate) use columns::{ChosenLayer, KnownDepths, LevelChooser};
+pub(crate) use columns::Columns;
 pub use levels::LayerLevels;
 pub(crate) use print_through::PrintThrough;
 pub(crate) use rows::{DepthRows, LevelRows, ShadedRows};

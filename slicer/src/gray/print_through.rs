@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use lamp_stack::FadingLevels;
+use lamp_stack::{FadingLevels, LevelSteps};
 
 use crate::gray::LayerLevels;
 use crate::planes::Planes;
@@ -24,6 +24,8 @@ pub(crate) struct PrintThrough {
     white: Vec<f64>,
     reach_um: f64,
     within_um: f64,
+    /// The most layers above a layer that count.
+    most_above: u32,
     known: Mutex<HashMap<Surroundings, Arc<LevelsByDepth>>>,
 }
 
@@ -45,7 +47,16 @@ impl PrintThrough {
             most_um = most_um.max(planes.thickness_um(layer));
         }
         let within_um = most_um + BEYOND_UM;
-        Self { levels, tops_um, white, reach_um, within_um, known: Mutex::default() }
+        let known = Mutex::default();
+        let mut light = Self { levels, tops_um, white, reach_um, within_um, most_above: 0, known };
+        let above = |layer| (light.end_above(layer) - 1 - layer) as u32;
+        light.most_above = (0..light.len()).map(above).max().unwrap_or(0);
+        light
+    }
+
+    /// Returns the most layers above a layer that count.
+    pub(crate) fn most_above(&self) -> u32 {
+        self.most_above
     }
 
     /// Returns the depth from which on all pixels are white in all layers.
@@ -76,9 +87,12 @@ impl PrintThrough {
 
     /// Returns the distance of a layer's top from that of the layer below, if there is one.
     pub(crate) fn step_um(&self, layer: usize) -> f64 {
-        layer
-            .checked_sub(1)
-            .map_or(f64::INFINITY, |below| self.tops_um[layer] - self.tops_um[below])
+        layer.checked_sub(1).map_or(f64::INFINITY, |below| self.distance_um(layer, below))
+    }
+
+    /// Returns the distance of a layer's top from that of one below.
+    pub(crate) fn distance_um(&self, layer: usize, below: usize) -> f64 {
+        self.tops_um[layer] - self.tops_um[below]
     }
 
     /// Returns what the layers below leave at a depth under a layer's top if all of them, down to
@@ -158,7 +172,7 @@ impl Surroundings {
             });
             1.0 - above * (-depth_um / white_um).exp() - least.sum::<f64>()
         };
-        let (mut from_um, mut step_um) = (0.0, 1.0);
+        let (mut from_um, mut step_um, mut rising_um) = (0.0, 1.0, 0.0_f64);
         let steps_um = (0..255).map(|step| {
             let is_above = |depth_um: f64| own.is_above(step, depth_um, left(depth_um));
             // Steps follow each other closely: look near the one before.
@@ -173,33 +187,32 @@ impl Surroundings {
             }
             step_um = (high - from_um).max(0.1);
             from_um = low;
-            high
+            rising_um = high.max(rising_um);
+            rising_um
         });
-        let steps_um = steps_um.collect();
+        let steps_um: Vec<f64> = steps_um.collect();
         let falls_short_um = white_um * (above + own.share(255)).ln();
-        LevelsByDepth { steps_um, falls_short_um }
+        let [first_um, white_um] = [steps_um[1], steps_um[254]];
+        LevelsByDepth { first_um, white_um, steps: LevelSteps::new(steps_um), falls_short_um }
     }
 }
 
 /// The levels of a layer whose columns above are known.
 #[derive(Debug)]
 pub(crate) struct LevelsByDepth {
-    /// From which depth on the level is above this one's place.
-    steps_um: Vec<f64>,
+    /// The depth up to which the least level is enough.
+    pub(crate) first_um: f64,
+    /// The depth from which on it takes white.
+    pub(crate) white_um: f64,
+    steps: LevelSteps,
     /// The depth that even white does not cure.
     pub(crate) falls_short_um: f64,
 }
 
 impl LevelsByDepth {
-    /// Returns the depth up to which the least level is enough.
-    #[inline]
-    pub(crate) fn first_um(&self) -> f64 {
-        self.steps_um[1]
-    }
-
     /// Returns the level of a pixel below which the part is so deep.
     #[inline]
     pub(crate) fn level(&self, depth_um: f64) -> u8 {
-        self.steps_um.partition_point(|step| *step <= depth_um).max(1) as u8
+        self.steps.level(depth_um).max(1)
     }
 }

@@ -1,6 +1,10 @@
 //! What a shaded row is made of: gray levels, or the depths of the part.
 
+use std::iter;
+
 use lamp_stack::{DepthLevels, GrayMask, Image, LevelChange, MaskBuilder};
+
+use super::row_lists::RowLists;
 
 /// Rows that get the depth of the part below each pixel.
 pub(crate) trait ShadedRows {
@@ -72,13 +76,13 @@ pub(crate) fn finished(image: GrayMask) -> Image {
 #[derive(Debug)]
 pub(crate) struct DepthRows {
     width: u32,
-    row_offsets: Vec<u32>,
-    changes: Vec<(u32, f32)>,
+    /// The columns at which the depth changes, and the new depths.
+    changes: RowLists<(u32, f32)>,
 }
 
 impl DepthRows {
     pub(crate) fn new(width: u32) -> Self {
-        Self { width, row_offsets: vec![0], changes: Vec::new() }
+        Self { width, changes: RowLists::default() }
     }
 
     pub(crate) fn width(&self) -> u32 {
@@ -86,22 +90,54 @@ impl DepthRows {
     }
 
     pub(crate) fn height(&self) -> u32 {
-        (self.row_offsets.len() - 1) as u32
+        self.changes.len()
     }
 
-    /// Returns the columns of a row at which the depth changes, and the new depths.
+    /// Returns the pieces of equal depth that a row consists of, as the first column, the one after
+    /// the last, and the depth.
     #[inline]
-    pub(crate) fn row(&self, row: u32) -> &[(u32, f32)] {
-        let [from, to] = [0, 1].map(|k| self.row_offsets[row as usize + k] as usize);
-        &self.changes[from..to]
+    pub(crate) fn pieces(&self, row: u32) -> impl Iterator<Item = (u32, u32, f64)> {
+        pieces(self.changes.row(row), 0, self.width, 0.0)
+    }
+
+    /// Returns the pieces of equal depth of some columns of a row, as [`pieces`](Self::pieces).
+    #[inline]
+    pub(crate) fn pieces_within(
+        &self,
+        row: u32,
+        start: u32,
+        end: u32,
+    ) -> impl Iterator<Item = (u32, u32, f64)> {
+        let changes = self.changes.row(row);
+        let before = changes.partition_point(|&(column, _)| column <= start);
+        let depth = before.checked_sub(1).map_or(0.0, |last| changes[last].1);
+        pieces(&changes[before..], start, end, depth)
     }
 
     /// Returns the depth at a pixel.
     pub(crate) fn at(&self, row: u32, column: u32) -> f64 {
-        let changes = self.row(row);
+        let changes = self.changes.row(row);
         let before = changes.partition_point(|&(start, _)| start <= column);
         before.checked_sub(1).map_or(0.0, |last| changes[last].1.into())
     }
+}
+
+/// Returns the pieces of columns between changes, the first of which has a depth.
+#[inline]
+fn pieces(
+    changes: &[(u32, f32)],
+    start: u32,
+    end: u32,
+    depth: f32,
+) -> impl Iterator<Item = (u32, u32, f64)> {
+    let mut next = changes.iter();
+    let mut here = Some((start, depth));
+    iter::from_fn(move || {
+        let (from, depth) = here?;
+        here = next.next().copied().filter(|&(column, _)| column < end);
+        Some((from, here.map_or(end, |(column, _)| column), f64::from(depth)))
+    })
+    .filter(|(from, to, _)| from < to)
 }
 
 impl ShadedRows for DepthRows {
@@ -116,7 +152,31 @@ impl ShadedRows for DepthRows {
     }
 
     fn push_row(&mut self, changes: &[(u32, f32)]) {
-        self.changes.extend_from_slice(changes);
-        self.row_offsets.push(self.changes.len() as u32);
+        self.changes.push_row(|list| list.extend_from_slice(changes));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_pieces_of_one_depth() {
+        let mut rows = DepthRows::new(20);
+        rows.push_row(&[]);
+        rows.push_row(&[(0, 5.0), (4, f32::INFINITY), (9, 7.0), (10, 0.0), (15, 3.0)]);
+        assert_eq!(rows.pieces(0).collect::<Vec<_>>(), [(0, 20, 0.0)]);
+        let deep = f64::INFINITY;
+        let all = [(0, 4, 5.0), (4, 9, deep), (9, 10, 7.0), (10, 15, 0.0), (15, 20, 3.0)];
+        assert_eq!(rows.pieces(1).collect::<Vec<_>>(), all);
+        for start in 0..20 {
+            for end in start + 1..=20 {
+                let within =
+                    all.iter().map(|&(from, to, depth)| (from.max(start), to.min(end), depth));
+                let within: Vec<_> = within.filter(|(from, to, _)| from < to).collect();
+                assert_eq!(rows.pieces_within(1, start, end).collect::<Vec<_>>(), within);
+            }
+        }
+        assert_eq!([3, 4, 12, 19].map(|column| rows.at(1, column)), [5.0, deep, 0.0, 3.0]);
     }
 }

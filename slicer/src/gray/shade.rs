@@ -1,5 +1,7 @@
 //! Shades a layer's rows by the depth of the part below its section.
 
+use lamp_stack::Grouped;
+
 use crate::bodies::{FillRule, Position};
 use crate::cut::InRow;
 use crate::gray::{DepthSpan, ShadedRows};
@@ -11,8 +13,8 @@ pub(crate) struct Shader<'a, R: ShadedRows> {
     rule: &'a FillRule,
     /// The depth of the layer's plane below its top.
     plane_depth_um: f64,
-    /// The spans of the rows to come, by row.
-    spans: &'a [DepthSpan],
+    /// The spans below the section, by row and start.
+    spans: &'a Grouped<DepthSpan>,
     /// The spans over a column, in the order of their starts.
     open: Vec<&'a DepthSpan>,
     /// What a pixel's line is in on its way down.
@@ -23,13 +25,13 @@ pub(crate) struct Shader<'a, R: ShadedRows> {
 }
 
 impl<'a, R: ShadedRows> Shader<'a, R> {
-    /// Starts a layer, given the sorted spans below its section.
+    /// Starts a layer, given the spans below its section by row, sorted by their starts.
     pub(crate) fn new(
         rows: R,
         rule: &'a FillRule,
         planes: &Planes,
         layer: usize,
-        spans: &'a [DepthSpan],
+        spans: &'a Grouped<DepthSpan>,
         width: u32,
     ) -> Self {
         Self {
@@ -47,9 +49,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
 
     /// Adds the next row, given its sorted crossings with the section's contours.
     pub(crate) fn push_row(&mut self, row: u32, places: &[impl InRow]) {
-        let count = self.spans.iter().take_while(|span| span.row <= row).count();
-        let (mut spans, rest) = self.spans.split_at(count);
-        self.spans = rest;
+        let mut spans = self.spans.group(row as usize);
         self.changes.clear();
         self.open.clear();
         let mut position = Position::outside(self.rule);
@@ -89,12 +89,32 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
 
     /// Adds columns over the same facets.
     fn shade_evenly(&mut self, start: u32, end: u32, position: &Position<'a>) {
-        if self.open.is_empty() {
-            return self.push(start, R::DEEP);
+        match self.open[..] {
+            [] => return self.push(start, R::DEEP),
+            [span] => return self.shade_over(span, start, end, position),
+            _ => {}
         }
         let end = if self.open.iter().all(|span| span.is_level()) { start + 1 } else { end };
         for column in start..end {
             let exit = self.exit_um(column, position);
+            let pixel = exit.map_or(R::DEEP, |depth_um| self.rows.of_depth(depth_um));
+            self.push(column, pixel);
+        }
+    }
+
+    /// Adds columns over one facet: the same as any, in fewer steps.
+    fn shade_over(&mut self, span: &DepthSpan, start: u32, end: u32, position: &Position<'a>) {
+        self.below.move_to(position);
+        self.below.cross_often(span.body(), -span.winding());
+        let leaves = !self.below.is_inside();
+        let near_um = self.plane_depth_um + span.tie_um();
+        let end = if span.is_level() { start + 1 } else { end };
+        for column in start..end {
+            let depth_um = span.depth_um(column);
+            let exit = match depth_um > near_um {
+                true => leaves.then_some(depth_um),
+                false => self.exit_um(column, position),
+            };
             let pixel = exit.map_or(R::DEEP, |depth_um| self.rows.of_depth(depth_um));
             self.push(column, pixel);
         }

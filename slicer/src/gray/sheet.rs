@@ -20,7 +20,7 @@ const STANDING_UM: f64 = 1.0;
 
 /// The columns of a row, from `start` to `end`, over a facet below a section. Depths
 /// along them lie on a straight line.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub(crate) struct DepthSpan {
     pub(crate) row: u32,
     pub(crate) start: u32,
@@ -46,12 +46,6 @@ impl DepthSpan {
             signed_tie_um: (f64::from(winding) * tie_um) as f32,
             body,
         }
-    }
-
-    /// Returns the row and first column in one, to sort by.
-    #[inline]
-    pub(crate) fn place(&self) -> u64 {
-        u64::from(self.row) << 32 | u64::from(self.start)
     }
 
     /// Returns the depth below the layer's top at a column.

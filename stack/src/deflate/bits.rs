@@ -1,9 +1,12 @@
 //! Reads and writes bits, the lowest of a byte first.
 
+/// The most bits that can be written at a time.
+pub(super) const MOST_PUT: u8 = 56;
+
 /// Bits that become bytes.
-#[derive(Default)]
 pub(super) struct BitWriter {
     bytes: Vec<u8>,
+    /// The bits of the byte that is not full yet, and fewer than eight are.
     held: u64,
     count: u8,
 }
@@ -11,25 +14,28 @@ pub(super) struct BitWriter {
 impl BitWriter {
     /// Starts behind bytes.
     pub(super) fn after(bytes: Vec<u8>) -> Self {
-        Self { bytes, ..Self::default() }
+        Self { bytes, held: 0, count: 0 }
     }
 
-    /// Appends the lowest `count` bits of `bits`, at most 32.
+    /// Appends the lowest `count` bits of `bits`, at most [`MOST_PUT`]; those above are zero.
     #[inline]
-    pub(super) fn put(&mut self, bits: u32, count: u8) {
-        self.held |= u64::from(bits) << self.count;
+    pub(super) fn put(&mut self, bits: u64, count: u8) {
+        self.held |= bits << self.count;
         self.count += count;
-        if self.count >= 32 {
-            self.bytes.extend_from_slice(&(self.held as u32).to_le_bytes());
-            self.held >>= 32;
-            self.count -= 32;
-        }
+        let whole = usize::from(self.count / 8);
+        // Eight at once and back is faster than as many as there are.
+        let end = self.bytes.len() + whole;
+        self.bytes.extend_from_slice(&self.held.to_le_bytes());
+        self.bytes.truncate(end);
+        self.held = self.held.unbounded_shr(8 * whole as u32);
+        self.count %= 8;
     }
 
     /// Fills the last byte with zeros and returns all.
     pub(super) fn finish(mut self) -> Vec<u8> {
-        let left = usize::from(self.count.div_ceil(8));
-        self.bytes.extend_from_slice(&self.held.to_le_bytes()[..left]);
+        if self.count > 0 {
+            self.bytes.push(self.held as u8);
+        }
         self.bytes
     }
 }

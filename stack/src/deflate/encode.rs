@@ -1,6 +1,6 @@
 //! Writes runs.
 
-use super::bits::BitWriter;
+use super::bits::{BitWriter, MOST_PUT};
 use super::huffman::{code_lengths, codes};
 use super::{
     END_OF_BLOCK, LENGTH_ORDER, MOST_BITS, MOST_COPIED, MOST_LENGTH_BITS, SYMBOLS, copies_of,
@@ -64,8 +64,13 @@ struct Copies {
 }
 
 impl Copies {
+    #[inline]
     fn of(length: u32) -> Self {
-        let (longest, last) = ((length - 1) / MOST_COPIED, (length - 1) % MOST_COPIED);
+        let (longest, last) = if length <= MOST_COPIED {
+            (0, length - 1)
+        } else {
+            ((length - 1) / MOST_COPIED, (length - 1) % MOST_COPIED)
+        };
         // No copy is shorter than three.
         let bytes = if last < 3 { 1 + last } else { 1 };
         Self { bytes, longest, last: if last < 3 { 0 } else { last } }
@@ -73,66 +78,102 @@ impl Copies {
 }
 
 fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
-    let mut frequencies = [0; SYMBOLS];
-    frequencies[usize::from(END_OF_BLOCK)] = 1;
-    for &(length, byte) in runs {
-        let copies = Copies::of(length);
-        // A block of one colour may count beyond 32 bits; codes need no more than the order.
-        let mut add = |symbol: usize, times: u32| {
-            frequencies[symbol] = u32::saturating_add(frequencies[symbol], times);
-        };
-        add(byte.into(), copies.bytes);
-        add(SYMBOLS - 1, copies.longest);
-        if copies.last > 0 {
-            add(length_symbol(copies.last).into(), 1);
-        }
-    }
-    let lengths = code_lengths(&frequencies, MOST_BITS);
+    let lengths = code_lengths(&frequencies(runs), MOST_BITS);
     let codes = codes(&lengths);
-    out.put(u32::from(is_last), 1);
+    out.put(u32::from(is_last).into(), 1);
     // Codes of its own.
     out.put(2, 2);
     put_lengths(out, &lengths);
-    let symbol =
-        |out: &mut BitWriter, symbol: usize| out.put(codes[symbol].into(), lengths[symbol]);
+    let code = |symbol: usize| Bits { bits: codes[symbol].into(), count: lengths[symbol] };
+    let bytes: [Bits; 256] = std::array::from_fn(code);
     // The only distance, from the byte before, is a zero bit.
-    let longest = Often::new(codes[SYMBOLS - 1].into(), lengths[SYMBOLS - 1] + 1);
+    let zero = Bits { bits: 0, count: 1 };
+    let longest = Often::new(code(SYMBOLS - 1).then(zero));
+    let last: [Bits; MOST_COPIED as usize] = std::array::from_fn(|length| {
+        if length < 3 {
+            return Bits::default();
+        }
+        let symbol = length_symbol(length as u32);
+        let (first, count) = copies_of(symbol).expect("it is the symbol of a length");
+        let more = Bits { bits: length as u64 - u64::from(first), count };
+        code(symbol.into()).then(more).then(zero)
+    });
     for &(length, byte) in runs {
         let copies = Copies::of(length);
-        (0..copies.bytes).for_each(|_| symbol(out, byte.into()));
-        longest.put(out, copies.longest);
-        if copies.last > 0 {
-            let last = length_symbol(copies.last);
-            let (first, bits) = copies_of(last).expect("it is the symbol of a length");
-            symbol(out, last.into());
-            out.put(copies.last - first, bits + 1);
+        let first = bytes[usize::from(byte)];
+        if copies.bytes == 1 && copies.longest == 0 {
+            // At most 15 bits, and 15 and 5 and one.
+            let both = first.then(last[copies.last as usize]);
+            out.put(both.bits, both.count);
+            continue;
         }
+        (0..copies.bytes).for_each(|_| out.put(first.bits, first.count));
+        longest.put(out, copies.longest);
+        let last = last[copies.last as usize];
+        out.put(last.bits, last.count);
     }
-    symbol(out, END_OF_BLOCK.into());
+    let end = code(END_OF_BLOCK.into());
+    out.put(end.bits, end.count);
+}
+
+/// Returns how often each symbol occurs in a block.
+fn frequencies(runs: &[(u32, u8)]) -> [u32; SYMBOLS] {
+    let (mut bytes, mut last, mut longest) = ([0; 256], [0; MOST_COPIED as usize], 0);
+    for &(length, byte) in runs {
+        let copies = Copies::of(length);
+        bytes[usize::from(byte)] += copies.bytes;
+        last[copies.last as usize] += 1;
+        longest += u64::from(copies.longest);
+    }
+    let mut frequencies = [0; SYMBOLS];
+    frequencies[..256].copy_from_slice(&bytes);
+    frequencies[usize::from(END_OF_BLOCK)] = 1;
+    for (length, times) in (0..).zip(last).skip(3) {
+        frequencies[usize::from(length_symbol(length))] += times;
+    }
+    // A block of one colour may count beyond 32 bits; codes need no more than the order.
+    let longest = longest + u64::from(frequencies[SYMBOLS - 1]);
+    frequencies[SYMBOLS - 1] = longest.try_into().unwrap_or(u32::MAX);
+    frequencies
+}
+
+/// A code, the first bit lowest.
+#[derive(Clone, Copy, Default)]
+struct Bits {
+    bits: u64,
+    count: u8,
+}
+
+impl Bits {
+    /// Returns the bits with others behind them.
+    #[inline]
+    fn then(self, next: Self) -> Self {
+        Self { bits: self.bits | next.bits << self.count, count: self.count + next.count }
+    }
 }
 
 /// Bits that are written many times, as many at once as fit.
 struct Often {
-    bits: u32,
-    count: u8,
-    together: u8,
-    all: u32,
+    once: Bits,
+    together: u32,
+    all: Bits,
 }
 
 impl Often {
-    fn new(bits: u32, count: u8) -> Self {
-        let together = 32 / count;
-        let all = (0..together).fold(0, |all, k| all | bits << (k * count));
-        Self { bits, count, together, all }
+    fn new(once: Bits) -> Self {
+        let together = MOST_PUT / once.count;
+        let all = (0..together).fold(Bits::default(), |all, _| all.then(once));
+        Self { once, together: together.into(), all }
     }
 
+    #[inline]
     fn put(&self, out: &mut BitWriter, mut times: u32) {
-        while times >= self.together.into() {
-            out.put(self.all, self.together * self.count);
-            times -= u32::from(self.together);
+        while times >= self.together {
+            out.put(self.all.bits, self.all.count);
+            times -= self.together;
         }
         for _ in 0..times {
-            out.put(self.bits, self.count);
+            out.put(self.once.bits, self.once.count);
         }
     }
 }
@@ -159,13 +200,13 @@ fn put_lengths(out: &mut BitWriter, lengths: &[u8]) {
     tokens.iter().for_each(|&(symbol, ..)| frequencies[usize::from(symbol)] += 1);
     let of_lengths = code_lengths(&frequencies, MOST_LENGTH_BITS);
     let codes = codes(&of_lengths);
-    out.put(SYMBOLS as u32 - 257, 5);
+    out.put(SYMBOLS as u64 - 257, 5);
     out.put(0, 5);
-    out.put(LENGTH_ORDER.len() as u32 - 4, 4);
+    out.put(LENGTH_ORDER.len() as u64 - 4, 4);
     LENGTH_ORDER.iter().for_each(|&symbol| out.put(of_lengths[symbol].into(), 3));
     for (symbol, more, bits) in tokens {
         out.put(codes[usize::from(symbol)].into(), of_lengths[usize::from(symbol)]);
-        out.put(more, bits);
+        out.put(more.into(), bits);
     }
 }
 
@@ -191,18 +232,20 @@ fn put_length_run(tokens: &mut Vec<(u8, u32, u8)>, length: u8, mut count: usize)
 /// Returns the Adler-32 check of bytes, in a few operations a run.
 fn adler32(runs: &[(u32, u8)]) -> u32 {
     const MODULUS: u64 = 65_521;
+    // So few short runs at a time overflow no sum.
+    const SHORT: u32 = 1 << 16;
     let (mut a, mut b) = (1, 0);
-    for &(length, byte) in runs {
-        let (length, byte) = (u64::from(length), u64::from(byte));
-        // a + byte, a + 2 byte, ... are added to b.
-        let (even, odd) = if length.is_multiple_of(2) {
-            (length / 2, length + 1)
-        } else {
-            (length, length.div_ceil(2))
-        };
-        let triangle = even % MODULUS * (odd % MODULUS) % MODULUS;
-        b = (b + length % MODULUS * a + triangle * byte) % MODULUS;
-        a = (a + length % MODULUS * byte) % MODULUS;
+    for some in runs.chunks(64) {
+        for &(length, byte) in some {
+            let (mut length, byte) = (u64::from(length), u64::from(byte));
+            if length > u64::from(SHORT) {
+                // b grows by the sum of a + byte, a + 2 byte, ..., and that of MODULUS bytes is 0.
+                (a, b, length) = (a % MODULUS, b % MODULUS, length % MODULUS);
+            }
+            b += length * a + length * (length + 1) / 2 * byte;
+            a += length * byte;
+        }
+        (a, b) = (a % MODULUS, b % MODULUS);
     }
     (b << 16 | a) as u32
 }
