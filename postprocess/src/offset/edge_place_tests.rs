@@ -32,8 +32,13 @@ fn square(side: f64, degrees: f64) -> Mask {
 }
 
 fn disc(radius: f64) -> Mask {
+    disc_at(radius, [0.13, -0.29])
+}
+
+/// A disc whose middle is so far from that of the image.
+fn disc_at(radius: f64, off: [f64; 2]) -> Mask {
     let size = 2 * radius as u32 + 80;
-    let middle = [f64::from(size) / 2.0 + 0.13, f64::from(size) / 2.0 - 0.29];
+    let middle = off.map(|off| f64::from(size) / 2.0 + off);
     drawn(size, size, |column, row| {
         (f64::from(column) - middle[0]).hypot(f64::from(row) - middle[1]) < radius
     })
@@ -69,6 +74,31 @@ fn edges_of_squares_and_discs_move_by_the_distance_at_every_angle() {
         for radius in [75.0, 147.6, 300.0, 1000.0] {
             let off_um = too_far(&disc(radius), std::f64::consts::PI, by) * PITCH;
             assert!(off_um.abs() < 0.5, "disc {radius} by {um}: {off_um}");
+        }
+    }
+}
+
+#[test]
+fn small_discs_grow_and_vanish_by_their_closed_form() {
+    let by = 250.0 / PITCH;
+    let pi = std::f64::consts::PI;
+    for off in [[0.0, 0.0], [0.13, -0.29], [0.5, 0.0], [0.38, 0.21]] {
+        for radius in [10.0, 14.0, 14.5] {
+            // A faint pixel of a twentieth may be left in the middle.
+            assert!(area(&offset(&disc_at(radius, off), by)) < 0.05, "{radius} at {off:?}");
+        }
+        for radius in [15.0, 16.0, 18.3, 20.0, 22.0, 25.7, 30.0, 35.0] {
+            let most_um = if radius < 30.0 { 0.75 } else { 0.5 };
+            let mask = disc_at(radius, off);
+            // Outwards by the radius, inwards by what is missing along the edge: of the radius
+            // next to nothing is left.
+            let outwards = too_far(&mask, pi, -by);
+            let own = (mask.white_pixels() as f64 / pi).sqrt();
+            let missing = pi * (own - by).max(0.0).powi(2) - area(&offset(&mask, by));
+            for off_px in [outwards, missing / (2.0 * pi * own)] {
+                let off_um = off_px * PITCH;
+                assert!(off_um.abs() < most_um, "disc {radius} at {off:?}: {off_um}");
+            }
         }
     }
 }

@@ -9,15 +9,21 @@ use super::straight::{StraightPart, straight_parts};
 pub(super) type Outline = Vec<[f64; 2]>;
 
 /// The least cosine of the turn between two parts of one smooth edge.
-const SMOOTH: f64 = 0.88;
+///
+/// Straight parts of a disc of 15 pixels turn by 35 degrees; a corner of 45 stays one.
+const SMOOTH: f64 = 0.75;
 /// The least cosine of a turn at which lines that cross need not cross near the corner.
 const BLUNT: f64 = 0.7;
 /// How far the tip of a corner may lie beyond its pixels, in pixels.
 const MAX_TIP: f64 = 1.0;
 /// The greatest rise of an arc above its chord, in pixels, that a straight part can hide.
-const MAX_RISE: f64 = 0.8;
+const MAX_RISE: f64 = 1.1;
 /// The least rise that is worth corners between.
-const MIN_RISE: f64 = 0.03;
+const MIN_RISE: f64 = 0.02;
+/// The rise above chords from which on there are more of them.
+const CHORD_RISE: f64 = 0.06;
+/// The most chords of an arc.
+const MAX_CHORDS: f64 = 4.0;
 
 /// Returns the outlines of white pixels.
 pub(super) fn outlines(rows: &RowRuns) -> Vec<Outline> {
@@ -128,11 +134,7 @@ impl Arc {
 
     /// The number of chords that it is made of.
     fn chords(&self) -> u32 {
-        match self.rise.abs() {
-            0.0 => 1,
-            rise if rise < 0.4 => 2,
-            _ => 4,
-        }
+        (self.rise.abs() / CHORD_RISE).sqrt().ceil().clamp(1.0, MAX_CHORDS) as u32
     }
 
     /// Returns its rise above the mean line at a place from -1 to 1 along it.
