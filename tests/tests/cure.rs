@@ -105,9 +105,14 @@ fn areas(
 
 /// A prism along y whose left face overhangs by 12 degrees from the level.
 fn wedge() -> Mesh {
+    prism(1.0 / 12f64.to_radians().tan())
+}
+
+/// A prism along y, 2 mm high, whose left face overhangs by so many millimetres in each upwards.
+fn prism(overhang: f64) -> Mesh {
     let corner = |k: usize| {
         let [right, back, top] = [k & 1, k >> 1 & 1, k >> 2 & 1].map(|bit| bit as f64);
-        let left = -2.0 * top / 12f64.to_radians().tan();
+        let left = -2.0 * top * overhang;
         [right * 3.013 + (1.0 - right) * left, back * 0.7, top * 2.0].map(|c| c as f32)
     };
     const SIDES: [[usize; 4]; 6] =
@@ -211,5 +216,28 @@ fn areas_of_gray_are_those_of_its_levels() {
             exposed.map(|(k, row)| [(k + 1) as f64 * thick_um, gray(row[pixel])]).collect()
         });
         agree(found, exact, name);
+    }
+}
+
+/// An upright wall cuts pixels, and those whose centres it holds are wholly cured at best.
+#[test]
+fn pixels_leave_what_walls_cut_off() {
+    let scratch = Scratch::new();
+    scratch.mesh("part.stl", &prism(0.0));
+    scratch.run("slice part.stl --material lamp-suspension -o white.tif").succeeds();
+    let cure = "lamp cure white.tif --material lamp-suspension --section y=0.1mm";
+    let ran = scratch.run(&format!("{cure} --part part.stl -o s.png")).succeeds();
+    let (found, _) = told(&String::from_utf8(ran.stdout).unwrap(), "pixels");
+    let layer = &scratch.layers("white.tif")[0];
+    let (left, pitch) = (layer.info.origin_mm.unwrap()[0], layer.dpi.unwrap().pitch().mm());
+    let walls = [0.0, 3.013].map(|x| (x - left) / pitch);
+    let [first, end] = walls.map(|wall| (wall - 0.5).ceil());
+    let mm2 = |pixels: f64| pixels * pitch * 2.0;
+    let over = mm2((walls[0] - first).max(0.0) + (end - walls[1]).max(0.0));
+    let missing = mm2((first - walls[0]).max(0.0) + (walls[1] - end).max(0.0));
+    assert!(over + missing > 0.001, "the walls lie on edges of pixels");
+    let expected = [3.013 * 2.0, mm2(end - first), over, missing];
+    for (found, expected) in found.into_iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-4, "{found} {expected}");
     }
 }

@@ -82,7 +82,8 @@ impl SectionPicture {
             "{:<8}{:>12}{:>12}{:>12}{:>12}\n",
             "", "part", "cured", "overshoot", "missing"
         );
-        for (name, cured) in &self.cured {
+        let centres = ("pixels", self.centres(part));
+        for (name, cured) in self.cured.iter().chain([&centres]) {
             let shared = self.area_mm2(|pixel| shared_height(&cured[pixel], &part[pixel]));
             let cured = area(cured);
             // Rounding may leave less than nothing.
@@ -90,6 +91,19 @@ impl SectionPicture {
             text += &format!("{name:<8}{whole:>12.4}{cured:>12.4}{over:>12.4}{under:>12.4}\n");
         }
         text
+    }
+
+    /// Returns the heights of the part at each pixel's centre: what pixels would cure if each cured
+    /// just the part below and above its centre.
+    fn centres(&self, part: &[Vec<OutlinePiece>]) -> Vec<SolidHeights> {
+        let shown = |[from, to]: [f64; 2]| {
+            let heights = [from.max(self.heights_um.start), to.min(self.heights_um.end)];
+            (heights[0] < heights[1]).then_some(heights)
+        };
+        let centre = |pixel: &Vec<OutlinePiece>| {
+            pixel.iter().filter_map(|piece| piece.at(0.5).and_then(shown)).collect()
+        };
+        part.iter().map(centre).collect()
     }
 
     fn scene(&self) -> Scene<'_> {
