@@ -133,10 +133,48 @@ pub(crate) struct Cutter<'a> {
     pub(crate) rule: &'a FillRule,
 }
 
+/// A segment that crosses rows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowSegment {
+    /// The column and row of its upper end, in pixels.
+    upper: [f64; 2],
+    columns_per_row: f64,
+    first: u32,
+    /// The row after the last, times two, and whether the contour rises.
+    end_and_rising: u32,
+}
+
+impl RowSegment {
+    /// Returns the rows that it crosses.
+    #[inline]
+    pub(crate) fn rows(&self) -> Range<u32> {
+        self.first..self.end_and_rising >> 1
+    }
+
+    /// Returns the column in pixels at which it crosses a row.
+    #[inline]
+    fn column(&self, row: u32) -> f64 {
+        self.upper[0] + self.columns_per_row * (f64::from(row) - self.upper[1])
+    }
+
+    #[inline]
+    fn is_rising(&self) -> bool {
+        self.end_and_rising & 1 == 1
+    }
+
+    /// Returns its crossing of a row.
+    #[inline]
+    pub(crate) fn crossing(&self, grid: &PixelGrid, row: u32) -> Crossing {
+        Crossing::at(grid, row, self.column(row), self.is_rising())
+    }
+}
+
 /// The share of a layer that one worker finds.
 #[derive(Debug, Default)]
 pub(crate) struct LayerShare {
     crossings: Vec<Crossing>,
+    /// Segments whose crossings would take more memory, where crossings need not be known by body.
+    pub(crate) segments: Vec<RowSegment>,
     /// From which crossing on they are of which body; those before are of body 0.
     bodies: Vec<(u32, u32)>,
     /// Crossings of B-rep facets near which no point of the surface was found, and their
@@ -151,6 +189,7 @@ impl LayerShare {
     /// Empties the lists, which keep their memory.
     pub(crate) fn clear(&mut self) {
         self.crossings.clear();
+        self.segments.clear();
         self.bodies.clear();
         self.kept.clear();
         self.spans.clear();
@@ -166,7 +205,7 @@ impl LayerShare {
         &mut self.crossings
     }
 
-    /// Returns all crossings.
+    /// Returns all crossings but those of segments.
     pub(crate) fn crossings(&self) -> &[Crossing] {
         &self.crossings
     }
@@ -199,23 +238,33 @@ pub(crate) struct SegmentEnd {
 }
 
 impl Cutter<'_> {
-    /// Adds the crossings of a body's facet in `layers` to the shares of those layers, and
-    /// returns their number.
+    /// Adds the crossings of a body's facet in `layers` to the shares of those layers, and returns
+    /// the number of crossings that take as much memory. Segments that cross many rows are kept
+    /// as such if `keeps_segments`.
     #[inline]
     pub(crate) fn cut(
         &self,
         facet: &PlacedFacet,
         body: u32,
+        keeps_segments: bool,
         layers: &Range<usize>,
         shares: &mut [LayerShare],
     ) -> usize {
+        const AS_MUCH: usize = size_of::<RowSegment>() / size_of::<Crossing>();
         let mut count = 0;
         let (fill, salt) = (self.rule.fill(), self.rule.salt(body));
         self.for_each_segment(facet, layers, |layer, segment| {
             let share = &mut shares[layer - layers.start];
             let [a, b] = segment.ends.map(|end| end.at);
             share.ends.add([a, b], segment.is_reversed, fill, salt);
-            count += self.cross_rows(a, b, segment.is_reversed, share.of_body(body));
+            let Some(segment) = self.row_segment(a, b, segment.is_reversed) else { return };
+            if keeps_segments && segment.rows().len() > AS_MUCH {
+                count += AS_MUCH;
+                return share.segments.push(segment);
+            }
+            count += segment.rows().len();
+            let list = share.of_body(body);
+            segment.rows().for_each(|row| list.push(segment.crossing(self.grid, row)));
         });
         count
     }
@@ -284,21 +333,19 @@ impl Cutter<'_> {
         );
     }
 
-    /// Adds the crossings of rows with a segment between two points of a plane, in
-    /// pixels, and returns their number.
+    /// Returns a segment between two points of a plane, in pixels, if it crosses rows.
     #[inline]
-    fn cross_rows(
-        &self,
-        a: [f64; 2],
-        b: [f64; 2],
-        is_reversed: bool,
-        list: &mut Vec<Crossing>,
-    ) -> usize {
-        let before = list.len();
-        self.for_each_crossing(a, b, is_reversed, |row, column, rising| {
-            list.push(Crossing::at(self.grid, row, column, rising));
-        });
-        list.len() - before
+    fn row_segment(&self, a: [f64; 2], b: [f64; 2], is_reversed: bool) -> Option<RowSegment> {
+        let down = a[1] < b[1];
+        let (upper, lower) = if down { (a, b) } else { (b, a) };
+        let rising = down != is_reversed;
+        let (first, end) = (self.first_row(upper), self.first_row(lower));
+        (first < end).then(|| {
+            let columns_per_row = (lower[0] - upper[0]) / (lower[1] - upper[1]);
+            // Rows are below 2^31.
+            let end_and_rising = end << 1 | u32::from(rising);
+            RowSegment { upper, columns_per_row, first, end_and_rising }
+        })
     }
 
     /// Calls `each` with the row, the column in pixels and the direction of each
@@ -311,17 +358,8 @@ impl Cutter<'_> {
         is_reversed: bool,
         mut each: impl FnMut(u32, f64, bool),
     ) {
-        let down = a[1] < b[1];
-        let (upper, lower) = if down { (a, b) } else { (b, a) };
-        let rising = down != is_reversed;
-        let (first, end) = (self.first_row(upper), self.first_row(lower));
-        if first >= end {
-            return;
-        }
-        let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
-        for row in first..end {
-            each(row, upper[0] + slope * (f64::from(row) - upper[1]), rising);
-        }
+        let Some(segment) = self.row_segment(a, b, is_reversed) else { return };
+        segment.rows().for_each(|row| each(row, segment.column(row), segment.is_rising()));
     }
 
     /// Returns the first row whose centre is at or below a point in pixels.

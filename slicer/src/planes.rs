@@ -87,8 +87,14 @@ pub(crate) struct Planes {
 /// The distances between planes.
 #[derive(Clone, Debug)]
 enum Spacing {
-    Even { thickness_um: f64 },
+    Even { thickness_um: f64, per_um: f64 },
     Uneven(PlaneBins),
+}
+
+impl Spacing {
+    fn even(thickness_um: f64) -> Self {
+        Self::Even { thickness_um, per_um: 1.0 / thickness_um }
+    }
 }
 
 impl Planes {
@@ -122,7 +128,7 @@ impl Planes {
         Ok(Self {
             z_um: (0..count).map(plane).collect(),
             boundaries_um: (0..=count).map(|k| height(f64::from(k))).collect(),
-            spacing: Spacing::Even { thickness_um },
+            spacing: Spacing::even(thickness_um),
         })
     }
 
@@ -147,7 +153,7 @@ impl Planes {
         Self {
             z_um: vec![z.um()],
             boundaries_um: vec![z.um() - 1.0, z.um()],
-            spacing: Spacing::Even { thickness_um: 1.0 },
+            spacing: Spacing::even(1.0),
         }
     }
 
@@ -205,7 +211,7 @@ impl Planes {
     /// nanometre.
     pub(crate) fn thickness_um(&self, layer: usize) -> f64 {
         match self.spacing {
-            Spacing::Even { thickness_um } => thickness_um,
+            Spacing::Even { thickness_um, .. } => thickness_um,
             Spacing::Uneven(_) => to_nanometres(self.depth_um(&(layer..layer + 1))),
         }
     }
@@ -227,8 +233,8 @@ impl Planes {
     #[inline]
     pub(crate) fn at_or_below(&self, z_um: f64) -> usize {
         match &self.spacing {
-            Spacing::Even { thickness_um } => {
-                let guess = (z_um - self.z_um[0]) / thickness_um + 1.0;
+            Spacing::Even { per_um, .. } => {
+                let guess = (z_um - self.z_um[0]) * per_um + 1.0;
                 count_at_or_below(&self.z_um, z_um, guess)
             }
             Spacing::Uneven(bins) => bins.at_or_below(z_um),

@@ -9,7 +9,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use lamp_stack::{Grouped, Image, Mask};
+use lamp_stack::{Grouped, Image, KeyCounts, Mask};
 use rayon::prelude::*;
 
 use crate::bodies::{Position, SharedCounts, SharedPixels};
@@ -157,6 +157,8 @@ impl Table {
         let next = AtomicUsize::new(0);
         self.tally = Tally::default();
         let tally = &self.tally;
+        let has_surfaces = (0..facets.pieces()).any(|piece| facets.surfaces(piece).is_some());
+        let keeps_segments = !cutter.rule.has_bodies() && !has_surfaces;
         self.shares.par_iter_mut().try_for_each(|shares| -> io::Result<()> {
             shares.iter_mut().for_each(LayerShare::clear);
             shares.resize_with(shares.len().max(layers.len()), LayerShare::default);
@@ -182,7 +184,7 @@ impl Table {
                 }
                 facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
-                        unclaimed += cutter.cut(facet, body, &layers, shares);
+                        unclaimed += cutter.cut(facet, body, keeps_segments, &layers, shares);
                         if let Some(reach_um) = reach_um {
                             unclaimed += cutter.look_down(facet, body, reach_um, &layers, shares);
                         }
@@ -295,6 +297,35 @@ impl Table {
         }
     }
 
+    /// Returns a layer's crossings by row: those of facets, and others.
+    fn by_row(
+        &self,
+        layer: usize,
+        grid: &PixelGrid,
+        others: &[(u32, Crossing)],
+    ) -> Grouped<RowCrossing> {
+        let singles = || {
+            let of_facets = self.shares(layer).flat_map(LayerShare::crossings);
+            of_facets.chain(others.iter().map(|(_, crossing)| crossing)).copied()
+        };
+        let segments = || self.shares(layer).flat_map(|share| &share.segments);
+        let mut counts = KeyCounts::new(grid.height as usize);
+        singles().for_each(|crossing| counts.add(crossing.row()));
+        segments().for_each(|segment| {
+            let rows = segment.rows();
+            counts.add_each(rows.start as usize..rows.end as usize);
+        });
+        let mut rows = counts.into_groups();
+        let mut put = |crossing: Crossing| {
+            rows.put(crossing.row(), crossing.in_row()).expect("as many crossings as before");
+        };
+        singles().for_each(&mut put);
+        segments().for_each(|segment| {
+            segment.rows().for_each(|row| put(segment.crossing(grid, row)));
+        });
+        rows.finish()
+    }
+
     /// Returns a layer's mask, its shaded rows, and what else is known of it.
     fn rows<R: ShadedRows>(
         &self,
@@ -313,17 +344,13 @@ impl Table {
                 let all = self.by_body(layer).chain(more.iter().copied());
                 all.map(|(body, it)| (it.row(), BodyCrossing::new(body, it.in_row())))
             };
-            rows.filled(crossings, |places, transitions| {
+            let by_row = Grouped::new(grid.height as usize, crossings);
+            rows.filled(by_row, |places, transitions| {
                 by_body(places, transitions, &mut position, &mut shared)
             })
         } else {
-            let of_facets = || self.shares(layer).flat_map(LayerShare::crossings);
-            let crossings = || {
-                let all = of_facets().copied().chain(more.iter().map(|&(_, crossing)| crossing));
-                all.map(|crossing| (crossing.row(), crossing.in_row()))
-            };
             rows.filled(
-                crossings,
+                self.by_row(layer, grid, &more),
                 match rule.fill() {
                     Fill::EvenOdd => even_odd,
                     Fill::NonZero => non_zero,
@@ -371,14 +398,13 @@ impl<'a, R: ShadedRows> ImageRows<'a, R> {
         Self { width: grid.width, height: grid.height, shader }
     }
 
-    /// Fills all rows with what `fill` makes of their sorted crossings. Returns the mask, the
-    /// shaded rows, and the rows for which `fill` returns false since they do not balance.
-    fn filled<C: InRow, I: Iterator<Item = (usize, C)>>(
+    /// Fills all rows with what `fill` makes of their crossings, once they are sorted. Returns the
+    /// mask, the shaded rows, and the rows for which `fill` returns false since they do not balance.
+    fn filled<C: InRow>(
         mut self,
-        crossings: impl Fn() -> I,
+        mut by_row: Grouped<C>,
         mut fill: impl FnMut(&[C], &mut Vec<u32>) -> bool,
     ) -> (Mask, Option<R>, Vec<u32>) {
-        let mut by_row = Grouped::new(self.height as usize, crossings);
         let mut row_offsets = Vec::with_capacity(self.height as usize + 1);
         row_offsets.push(0);
         let mut transitions = Vec::with_capacity(by_row.items().len());

@@ -75,12 +75,15 @@ impl<T> Grouped<T> {
 pub struct KeyCounts {
     /// Those of key k at k + 2, so that summing and placing need no other list.
     counts: Vec<u32>,
+    /// What ranges of keys add to the count of each key, from that of the key before. Empty if
+    /// there are none.
+    steps: Vec<i32>,
 }
 
 impl KeyCounts {
     /// Starts with none of the keys below `keys`.
     pub fn new(keys: usize) -> Self {
-        Self { counts: vec![0; keys + 2] }
+        Self { counts: vec![0; keys + 2], steps: Vec::new() }
     }
 
     /// Counts an item.
@@ -89,9 +92,24 @@ impl KeyCounts {
         self.counts[key + 2] += 1;
     }
 
+    /// Counts an item of each of some keys.
+    #[inline]
+    pub fn add_each(&mut self, keys: Range<usize>) {
+        if self.steps.is_empty() {
+            self.steps.resize(self.counts.len(), 0);
+        }
+        self.steps[keys.start] += 1;
+        self.steps[keys.end] -= 1;
+    }
+
     /// Makes room for what was counted.
     pub fn into_groups<T: Copy + Default>(self) -> UnfinishedGroups<T> {
         let mut starts = self.counts;
+        let mut of_ranges = 0;
+        for (count, step) in starts[2..].iter_mut().zip(&self.steps) {
+            of_ranges += step;
+            *count += of_ranges as u32;
+        }
         for key in 2..starts.len() {
             starts[key] += starts[key - 1];
         }
@@ -123,5 +141,27 @@ impl<T> UnfinishedGroups<T> {
         // Each start has moved to its group's end, where the next one starts.
         groups.starts.pop();
         groups
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_keys_count_as_each_of_them() {
+        let mut counts = KeyCounts::new(6);
+        let ranges = [1..4, 0..6, 3..5, 2..2, 5..6];
+        ranges.iter().for_each(|range| counts.add_each(range.clone()));
+        counts.add(4);
+        let mut groups = counts.into_groups();
+        for (item, range) in (0u8..).zip(ranges) {
+            range.for_each(|key| assert!(groups.put(key, item).is_some()));
+        }
+        groups.put(4, 9);
+        assert!(groups.put(5, 9).is_none(), "all places are taken");
+        let groups = groups.finish();
+        let expected: [&[u8]; 6] = [&[1], &[0, 1], &[0, 1], &[0, 1, 2], &[1, 2, 9], &[1, 4]];
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|key| groups.group(key)), expected);
     }
 }
