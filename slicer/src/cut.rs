@@ -134,7 +134,7 @@ pub(crate) struct Cutter<'a> {
 }
 
 /// A segment that crosses rows.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RowSegment {
     /// The column and row of its upper end, in pixels.
     upper: [f64; 2],
@@ -155,6 +155,14 @@ impl RowSegment {
     #[inline]
     fn column(&self, row: u32) -> f64 {
         self.upper[0] + self.columns_per_row * (f64::from(row) - self.upper[1])
+    }
+
+    /// Returns in which of some columns of bins across an image its middle lies.
+    #[inline]
+    pub(crate) fn bin(&self, grid: &PixelGrid, bins: usize) -> usize {
+        let middle = self.upper[0] + self.columns_per_row * (0.5 * self.rows().len() as f64);
+        let bin = middle * (bins as f64 / f64::from(grid.width));
+        ceil_clamped(bin, bins as u32 - 1) as usize
     }
 
     #[inline]

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::bodies::{Position, SharedCounts, SharedPixels};
 use crate::closure::{EndSum, RowSums};
-use crate::cut::{BodyCrossing, Crossing, Cutter, InRow, LayerShare, RowCrossing};
+use crate::cut::{BodyCrossing, Crossing, Cutter, InRow, LayerShare, RowCrossing, RowSegment};
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
 use crate::gray::{DepthRows, DepthSpan, LayerLevels, LevelRows, ShadedRows, Shader};
 use crate::grid::PixelGrid;
@@ -304,24 +304,30 @@ impl Table {
         grid: &PixelGrid,
         others: &[(u32, Crossing)],
     ) -> Grouped<RowCrossing> {
+        const BINS: usize = 256;
         let singles = || {
             let of_facets = self.shares(layer).flat_map(LayerShare::crossings);
             of_facets.chain(others.iter().map(|(_, crossing)| crossing)).copied()
         };
-        let segments = || self.shares(layer).flat_map(|share| &share.segments);
+        // From the left, so that rows are nearly sorted.
+        let in_bin = |segment: &RowSegment| (segment.bin(grid, BINS), *segment);
+        let segments = || self.shares(layer).flat_map(|share| &share.segments).map(in_bin);
+        let segments = Grouped::new(BINS, segments).into_items();
         let mut counts = KeyCounts::new(grid.height as usize);
         singles().for_each(|crossing| counts.add(crossing.row()));
-        segments().for_each(|segment| {
+        segments.iter().for_each(|segment| {
             let rows = segment.rows();
             counts.add_each(rows.start as usize..rows.end as usize);
         });
         let mut rows = counts.into_groups();
-        let mut put = |crossing: Crossing| {
-            rows.put(crossing.row(), crossing.in_row()).expect("as many crossings as before");
-        };
-        singles().for_each(&mut put);
-        segments().for_each(|segment| {
-            segment.rows().for_each(|row| put(segment.crossing(grid, row)));
+        let fits = "as many crossings as before";
+        singles().for_each(|crossing| {
+            rows.put(crossing.row(), crossing.in_row()).expect(fits);
+        });
+        segments.iter().for_each(|segment| {
+            let crossing = |row: usize| segment.crossing(grid, row as u32).in_row();
+            let Range { start, end } = segment.rows();
+            rows.put_each(start as usize..end as usize, crossing).expect(fits);
         });
         rows.finish()
     }
@@ -349,13 +355,11 @@ impl Table {
                 by_body(places, transitions, &mut position, &mut shared)
             })
         } else {
-            rows.filled(
-                self.by_row(layer, grid, &more),
-                match rule.fill() {
-                    Fill::EvenOdd => even_odd,
-                    Fill::NonZero => non_zero,
-                },
-            )
+            let by_row = self.by_row(layer, grid, &more);
+            match rule.fill() {
+                Fill::EvenOdd => rows.filled(by_row, even_odd),
+                Fill::NonZero => rows.filled(by_row, non_zero),
+            }
         };
         let closed = self.is_closed(layer, rule.fill());
         (mask, shaded, CutFindings { stray_rows, closed, shared: shared.counts() })

@@ -135,6 +135,18 @@ impl<T> UnfinishedGroups<T> {
         Some(place)
     }
 
+    /// Puts an item into the group of each of some keys; none if more items come than were
+    /// counted.
+    #[inline]
+    pub fn put_each(&mut self, keys: Range<usize>, mut item: impl FnMut(usize) -> T) -> Option<()> {
+        let Grouped { starts, items } = &mut self.0;
+        for (key, place) in keys.clone().zip(&mut starts[keys.start + 1..keys.end + 1]) {
+            *items.get_mut(*place as usize)? = item(key);
+            *place += 1;
+        }
+        Some(())
+    }
+
     /// Returns the groups, once as many items were put in as were counted.
     pub fn finish(self) -> Grouped<T> {
         let mut groups = self.0;
@@ -156,7 +168,7 @@ mod tests {
         counts.add(4);
         let mut groups = counts.into_groups();
         for (item, range) in (0u8..).zip(ranges) {
-            range.for_each(|key| assert!(groups.put(key, item).is_some()));
+            assert!(groups.put_each(range, |_| item).is_some());
         }
         groups.put(4, 9);
         assert!(groups.put(5, 9).is_none(), "all places are taken");

@@ -32,11 +32,19 @@ impl Mask {
     /// # Errors
     /// Returns an error if the arrays break the guarantees of [`RunImage`].
     pub fn new(width: u32, row_offsets: Vec<u32>, transitions: Vec<u32>) -> Result<Self, RunError> {
-        Self::from_arrays(width, row_offsets, transitions)
+        Self::from_transitions(width, row_offsets, transitions)
     }
 
     /// Returns the number of white pixels.
     pub fn white_pixels(&self) -> u64 {
+        let (ends, transitions) = self.row_ends_and_changes();
+        if ends.iter().all(|end| end.is_multiple_of(2)) {
+            // Every pair is a run. No sum passes the 2^64 pixels of an image.
+            let run = |sum: u64, [start, end]: &[u32; 2]| {
+                sum.wrapping_add(end.wrapping_sub(*start).into())
+            };
+            return transitions.as_chunks().0.iter().fold(0, run);
+        }
         self.rows().map(|row| white_in_row(row, self.width())).sum()
     }
 

@@ -122,16 +122,21 @@ impl<C: Change> RunImage<C> {
         row_offsets: Vec<u32>,
         changes: Vec<C>,
     ) -> Result<Self, RunError> {
-        let ends_right = row_offsets.first() == Some(&0)
-            && row_offsets.last().map(|&end| end as usize) == Some(changes.len());
-        if !ends_right || !row_offsets.is_sorted() {
+        let image = Self { width, row_offsets, changes };
+        if !image.has_partition() {
             return Err(RunError::Offsets);
         }
-        let image = Self { width, row_offsets, changes };
         for (row, changes) in image.rows().enumerate() {
             image.check_row(row, changes)?;
         }
         Ok(image)
+    }
+
+    /// Returns whether the row offsets partition the changes.
+    fn has_partition(&self) -> bool {
+        self.row_offsets.first() == Some(&0)
+            && self.row_offsets.last().map(|&end| end as usize) == Some(self.changes.len())
+            && self.row_offsets.is_sorted()
     }
 
     /// Creates an all-black image.
@@ -302,6 +307,41 @@ impl<C: Change> RunImage<C> {
             pixel = next;
         }
         Ok(())
+    }
+}
+
+impl RunImage<u32> {
+    /// Creates a mask, as [`from_arrays`](Self::from_arrays), but checks all rows at once.
+    pub(crate) fn from_transitions(
+        width: u32,
+        row_offsets: Vec<u32>,
+        transitions: Vec<u32>,
+    ) -> Result<Self, RunError> {
+        let image = Self { width, row_offsets, changes: transitions };
+        if image.has_partition() && image.rises_in_rows() {
+            return Ok(image);
+        }
+        Self::from_arrays(width, image.row_offsets, image.changes)
+    }
+
+    /// Returns whether all transitions that do not rise begin a row, and rows end within the width.
+    fn rises_in_rows(&self) -> bool {
+        let (all, mut ends_right) = (&self.changes, true);
+        let next = all.get(1..).unwrap_or_default();
+        // Neither count passes 2^32, the most changes that there are.
+        let falls = |count: u32, (a, b): (&u32, &u32)| count.wrapping_add(u32::from(a >= b));
+        let expected = all.iter().zip(next).fold(0, falls);
+        let mut between_rows = 0;
+        for ends in self.row_offsets.windows(2) {
+            let [start, end] = [ends[0] as usize, ends[1] as usize];
+            if start < end {
+                ends_right &= all[end - 1] < self.width;
+                if start > 0 {
+                    between_rows += u32::from(all[start - 1] >= all[start]);
+                }
+            }
+        }
+        ends_right && between_rows == expected
     }
 }
 
