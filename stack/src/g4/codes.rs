@@ -7,6 +7,14 @@ pub(super) struct Code {
     pub(super) len: u32,
 }
 
+impl Code {
+    /// Returns both codes as one, at most 32 bits long.
+    #[inline]
+    pub(super) fn then(self, next: Self) -> Self {
+        Self { bits: self.bits << next.len | next.bits, len: self.len + next.len }
+    }
+}
+
 /// Parses code words in the recommendations' notation, separated by white space.
 const fn codes<const N: usize>(digits: &str) -> [Code; N] {
     let digits = digits.as_bytes();

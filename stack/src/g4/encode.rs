@@ -42,10 +42,16 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
     let (mut i, mut j) = (0, 0);
     while a0 < width || !started {
         if let Some(code) = four_near(reference, row, i, j, width, four_verticals) {
-            bits.put(code);
             (i, j) = (i + 4, j + 4);
+            if i == row.len() && j == reference.len() {
+                return bits.put(code.then(VERTICAL[3]));
+            }
+            bits.put(code);
             (a0, started) = (row[i - 1], true);
             continue;
+        }
+        if let Some(code) = last_two_near(reference, row, i, j, width) {
+            return bits.put(code);
         }
         let (a1, b1, b2) = (at(row, i), at(reference, j), at(reference, j + 1));
         if b2 < a1 {
@@ -109,6 +115,18 @@ fn four_near(
     (code != 0).then_some(Code { bits: code & 0x07FF_FFFF, len: code >> 27 })
 }
 
+/// Returns the codes of the last two transitions and of the row's end, where they are as in
+/// [`four_near`] and the last two of the reference row.
+#[inline]
+fn last_two_near(reference: &[u32], row: &[u32], i: usize, j: usize, width: u32) -> Option<Code> {
+    let &[a0, a1] = row.get(i..)? else { return None };
+    let &[b0, b1] = reference.get(j..)? else { return None };
+    let is_wide = (j == 0 || b0 - reference[j - 1] >= 4) && b1 - b0 >= 4 && width - b1 >= 4;
+    let vertical = |a: u32, b: u32| VERTICAL.get(a.wrapping_sub(b).wrapping_add(3) as usize);
+    let (first, second) = (vertical(a0, b0)?, vertical(a1, b1)?);
+    is_wide.then(|| first.then(*second).then(VERTICAL[3]))
+}
+
 /// Four vertical codes in one word, indexed by four 3-bit values of `a1 - b1 + 3`, the first
 /// lowest: the length in the top 5 bits, the codes' bits below. 27 bits are enough, because
 /// every code longer than 3 bits starts with zeros.
@@ -116,7 +134,7 @@ static FOUR_VERTICALS: LazyLock<Vec<u32>> = LazyLock::new(|| {
     let join = |index: usize| {
         (0..4).try_fold(Code { bits: 0, len: 0 }, |joined, k| {
             let code = VERTICAL.get(index >> (3 * k) & 7)?;
-            Some(Code { bits: joined.bits << code.len | code.bits, len: joined.len + code.len })
+            Some(joined.then(*code))
         })
     };
     (0..4096).map(|index| join(index).map_or(0, |code| code.len << 27 | code.bits)).collect()
