@@ -192,6 +192,8 @@ fn edit(error: &EditError) -> Option<String> {
             LayerProblem::NoCopies => "copies are for builds that tile made",
             _ => return None,
         },
+        // It is transparent, so that it is no cause of its own.
+        EditError::Page(error) => return stack(error),
         _ => return None,
     };
     Some(hint.to_owned())

@@ -12,7 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, anyhow};
 use lamp_stack::{
     Destination, FileBeside, FolderBeside, Format, Layer, PackLevel, Page, PageInfo, PageWriter,
-    Pages, PictureFormat, StackError, StackInfo, map_in_order, write_packed, write_stack,
+    Pages, PassingLayer, PictureFormat, StackError, StackInfo, map_in_order, write_packed,
+    write_stack,
 };
 
 use crate::exit::Exit;
@@ -158,14 +159,36 @@ pub(crate) fn layers_of_input(
     input: &Input,
     progress: &Progress,
 ) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
-    let progress = progress.clone();
+    decoded(pages_of_input(pages, input, progress), input.stack.clone())
+}
+
+/// Reads the wanted layers of a stack, in order. Those that can pass as their pages have them are
+/// not decoded.
+pub(crate) fn read_passing(
+    input: &Input,
+    progress: &Progress,
+) -> Result<impl Iterator<Item = Result<PassingLayer, Exit>> + use<>, Exit> {
+    let pages = pages_of_input(open_pages(&input.stack)?, input, progress);
     let path = input.stack.clone();
-    let pages = pages_of(pages, path.clone(), input.layers.clone()).inspect(move |page| {
+    Ok(map_in_order(pages, move |(page, stack): (Page, _)| {
+        let layer = PassingLayer::of_page(page);
+        let mut layer = layer.map_err(|error| failed_at(input_name(&path), error))?;
+        layer.info_mut().stack = stack;
+        Ok(layer)
+    }))
+}
+
+fn pages_of_input(
+    pages: Pages,
+    input: &Input,
+    progress: &Progress,
+) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>> + use<> {
+    let progress = progress.clone();
+    pages_of(pages, input.stack.clone(), input.layers.clone()).inspect(move |page| {
         if let Ok((_, Some(StackInfo { layers: Some(layers), .. }))) = page {
             progress.expect((*layers).into());
         }
-    });
-    decoded(pages, path)
+    })
 }
 
 /// Reads the wanted layers of a stack that is open, decoded, in order.
@@ -267,6 +290,24 @@ pub(crate) fn write_layers(
     });
     let written = write_stack(coded, to, format(output.classic));
     written_to(&output.output, written, progress)
+}
+
+/// Writes layers that pass where `output` says, which must [take their codes](takes_codes), counting
+/// them in `report`.
+pub(crate) fn write_passing(
+    layers: impl Iterator<Item = Result<PassingLayer, Exit>>,
+    output: &Output,
+    progress: &Progress,
+) -> Result<(), Exit> {
+    let to = destination(output)?;
+    let counted = layers.inspect(|_| progress.layer_done());
+    let written = write_stack(counted, to, format(output.classic));
+    written_to(&output.output, written, progress)
+}
+
+/// Returns whether pages can pass to `output` as they are coded.
+pub(crate) fn takes_codes(output: &Output) -> bool {
+    !output.packbits && !is_packed_name(&output.output)
 }
 
 /// Writes layers as a packed stack where `output` says, counting them in `report`.

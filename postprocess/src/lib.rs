@@ -39,6 +39,7 @@ mod tile;
 
 pub use edit::{
     EditError, EditProblem, Edits, ImageBounds, LayerProblem, OtherLayers, OtherPicture, edit,
+    edit_passing,
 };
 pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
 pub use offset::{

@@ -55,6 +55,7 @@ mod packbits;
 mod packed;
 mod page_folder;
 mod pairing;
+mod passing;
 mod picture_page;
 mod png_page;
 mod png_write;
@@ -99,6 +100,7 @@ pub use orientation::{Orientation, OrientationError};
 pub use output::{Destination, write_stack};
 pub use packed::{KEY_LAYERS, PackLevel, copy_packed, join_packed, write_packed};
 pub use pairing::{Pairing, PairingError, Section, shift_between};
+pub use passing::PassingLayer;
 pub use picture_page::PictureFormat;
 pub use png_write::{
     png_of_layer, write_gray_animation, write_gray_png, write_png_folder, write_rgb_png,

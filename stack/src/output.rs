@@ -6,8 +6,7 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use crate::error::StackError;
-use crate::layer::Layer;
-use crate::ordered::map_in_order;
+use crate::ordered::{MemorySize, map_in_order};
 use crate::page_folder::PageFolder;
 use crate::temporary::{FileBeside, FolderBeside};
 use crate::tiff::{EncodedPage, Format, PageWriter};
@@ -22,22 +21,24 @@ pub enum Destination {
     Stream(Box<dyn Write>),
 }
 
-/// Writes layers as a stack, encoding them on all threads.
+/// Writes layers, or [layers that pass](crate::PassingLayer), as a stack, encoding them on all
+/// threads.
 ///
 /// # Errors
 /// Returns the first error among the layers, or an error if writing fails. No file then
 /// appears under the final name; a stream ends without its last page, and says why, so that its
 /// reader fails with that sentence.
-pub fn write_stack<E>(
-    layers: impl Iterator<Item = Result<Layer, E>>,
+pub fn write_stack<L, E>(
+    layers: impl Iterator<Item = Result<L, E>>,
     to: Destination,
     format: Format,
 ) -> Result<(), E>
 where
+    L: Into<EncodedPage> + MemorySize + Send,
     E: From<StackError> + Display + Send,
 {
     let mut sink = Sink::new(to, format)?;
-    for page in map_in_order(layers, |layer: Layer| Ok(EncodedPage::new(&layer))) {
+    for page in map_in_order(layers, |layer: L| Ok(layer.into())) {
         match page {
             Ok(page) => sink.push(page)?,
             Err(error) => {

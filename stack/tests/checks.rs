@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use lamp_stack::{
     CheckFault, Dpi, EncodedPage, Format, GrayMask, Image, Layer, LevelChange, Mask, PageInfo,
-    PageWriter, Pages, StackError, StackInfo,
+    PageWriter, Pages, PassingLayer, StackError, StackInfo,
 };
 
 fn mask_layer(index: u32) -> Layer {
@@ -148,7 +148,7 @@ fn reordered(order: &[usize]) -> Result<Vec<Layer>, StackError> {
     let whole = folder.path().join("whole");
     let folder_of_pages = lamp_stack::FolderBeside::over_nothing(&whole).unwrap();
     let to = lamp_stack::Destination::Folder(folder_of_pages);
-    lamp_stack::write_stack::<StackError>(layers.into_iter().map(Ok), to, Format::Big).unwrap();
+    lamp_stack::write_stack::<_, StackError>(layers.into_iter().map(Ok), to, Format::Big).unwrap();
     let other = folder.path().join("other");
     std::fs::create_dir(&other).unwrap();
     for (place, layer) in order.iter().enumerate() {
@@ -231,4 +231,49 @@ fn a_stage_that_gives_up_says_why_to_the_next() {
             assert_eq!(message, "the stage before gave up: 3 rows need a person");
         }
     }
+}
+
+/// Writes the pages of a stack again, without decoding those that can pass.
+fn passed(bytes: &[u8]) -> Result<Vec<u8>, StackError> {
+    let mut pages = PageWriter::new(Vec::new(), Format::Big);
+    for page in Pages::from_stream(Cursor::new(bytes.to_vec()))? {
+        pages.push(PassingLayer::of_page(page?)?.into())?;
+    }
+    pages.finish()
+}
+
+#[test]
+fn pages_pass_byte_for_byte_and_their_damage_stays_visible() {
+    for kind in [mask_layer as fn(u32) -> Layer, gray_layer] {
+        let whole = write(&layers(kind), Format::Big);
+        assert_eq!(passed(&whole).unwrap(), whole);
+        let mut seen = 0;
+        for at in 0..whole.len() {
+            let mut changed = whole.clone();
+            changed[at] ^= 0x10;
+            // Refused at once, or by the next reader, or it was no part of a page.
+            let Ok(result) = passed(&changed) else { continue };
+            match (read(&changed), read(&result)) {
+                (Err(_), Err(_)) => seen += 1,
+                (Ok(before), Ok(after)) => assert_eq!(before, after, "byte {at}"),
+                (before, after) => panic!("byte {at}: {before:?}, then {after:?}"),
+            }
+        }
+        assert!(seen > 20, "{seen} damaged codes passed with their checks");
+    }
+}
+
+#[test]
+fn a_page_without_a_check_is_decoded() {
+    let whole = without_checks(&write(&layers(mask_layer), Format::Big));
+    // Its code is damaged, and no check would tell of it.
+    let mut changed = whole.clone();
+    let at = (0..whole.len()).rev().find(|&at| {
+        changed[at] ^= 0xFF;
+        let is_refused = read(&changed).is_err();
+        changed[at] = whole[at];
+        is_refused
+    });
+    changed[at.unwrap()] ^= 0xFF;
+    assert!(passed(&changed).is_err());
 }

@@ -171,7 +171,7 @@ fn a_file_and_a_folder_read_back() {
             Destination::File(path.clone())
         };
         let stack = layers(12);
-        write_stack::<StackError>(stack.iter().cloned().map(Ok), to, Format::Big).unwrap();
+        write_stack::<_, StackError>(stack.iter().cloned().map(Ok), to, Format::Big).unwrap();
         let read: Vec<_> = Pages::open(&path).unwrap().layers().map(Result::unwrap).collect();
         assert_eq!(read, stack);
     }
@@ -244,7 +244,7 @@ fn a_folder_is_replaced_when_the_new_one_is_complete() {
         let failure = fails.then_some(Err(StackError::CutOff { last_whole: None }));
         let layers = layers(count).into_iter().map(Ok).chain(failure);
         let to = Destination::Folder(FolderBeside::replacing(&path).unwrap());
-        write_stack::<StackError>(layers, to, Format::Big)
+        write_stack::<_, StackError>(layers, to, Format::Big)
     };
     let pages = || std::fs::read_dir(&path).unwrap().count();
     write(3, false).unwrap();
@@ -257,7 +257,7 @@ fn a_folder_is_replaced_when_the_new_one_is_complete() {
     // What came in the meantime is not replaced either.
     let late = FolderBeside::replacing(&path).unwrap();
     std::fs::write(path.join("notes.txt"), "mine").unwrap();
-    let late = write_stack::<StackError>(
+    let late = write_stack::<_, StackError>(
         layers(1).into_iter().map(Ok),
         Destination::Folder(late),
         Format::Big,

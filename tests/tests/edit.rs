@@ -89,6 +89,43 @@ fn layers_that_no_edit_is_for_pass_byte_for_byte() {
 }
 
 #[test]
+fn a_damaged_page_that_passes_is_found_by_its_check() {
+    let scratch = with_cube();
+    scratch.write("one.toml", b"[[edit]]\nlayers = [20, 21]\nbox = { x = [\"-1mm\", \"1mm\"], y = [\"-1mm\", \"1mm\"] }\n");
+    let whole = scratch.bytes("cube.tif");
+    let line = |layer: u32| {
+        let text = format!("{{\"layer\":{layer},");
+        whole.windows(text.len()).position(|window| window == text.as_bytes()).unwrap()
+    };
+    // The strip stands between a line and the next directory.
+    let damaged = |layer: u32| {
+        let text_end = line(layer) + whole[line(layer)..].iter().position(|&b| b == 0).unwrap();
+        let mut bytes = whole.clone();
+        bytes[text_end + 40] ^= 0x10;
+        bytes
+    };
+    scratch.write("edited.tif", &damaged(20));
+    scratch
+        .run("lamp edit edited.tif one.toml -o out.tif")
+        .is_refused_with(&["edited.tif: layer 20"]);
+    assert!(!scratch.path("out.tif").exists());
+    scratch.write("passed.tif", &damaged(10));
+    scratch.run("lamp edit passed.tif one.toml -o out.tif").succeeds_quietly();
+    for stack in ["passed.tif", "out.tif"] {
+        let verified = scratch.run(&format!("lamp verify {stack}")).is_refused_with(&["proven"]);
+        let found = String::from_utf8(verified.stdout).unwrap();
+        assert!(found.starts_with(&format!("{stack}: layer 10: ")), "{found}");
+    }
+    scratch.run("fix out.tif -o fixed.tif").is_refused_with(&["layer 10"]);
+    // Where codes cannot pass, the damage is an error at once.
+    for output in ["out.lamp", "packbits.tif --packbits"] {
+        scratch
+            .run(&format!("lamp edit passed.tif one.toml -o {output}"))
+            .is_refused_with(&["passed.tif: layer 10"]);
+    }
+}
+
+#[test]
 fn two_stacks_are_combined() {
     let scratch = with_cube();
     let square = "[[edit]]\nop = \"intersect\"\nz = [\"0mm\", \"10mm\"]\nbox = { x = [\"-20mm\", \"0mm\"], y = [\"-20mm\", \"20mm\"] }\n";

@@ -6,14 +6,17 @@ use lamp_postprocess::EditError;
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::stages::edit::{EditSettings, Editing, unused_text};
-use crate::streams::{check_not_input, input_name, is_stream, progress, read_layers, write_layers};
+use crate::streams::{
+    check_not_input, input_name, is_stream, progress, read_layers, read_passing, takes_codes,
+    write_layers, write_passing,
+};
 
 /// Change a design at image level, without slicing it again
 ///
 /// Adds or subtracts boxes, cylinders, lines, labels, pictures and other stacks in a range of
 /// heights; crops, pads, mirrors and rotates all layers. Lengths and positions are in part
 /// coordinates. Edits are listed in a TOML file and applied in order; docs/edit.md describes every
-/// key. Layers that no edit applies to pass byte for byte.
+/// key. Pages that no edit changes pass with their code and check, and are not decoded.
 #[derive(Args)]
 #[command(override_usage = "\
 lamp edit [OPTIONS] <STACK> <EDITS.toml>
@@ -59,8 +62,14 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("edit", common, &args.output);
     // Layers that are not wanted are no loss.
     let is_whole = [args.input.layers.is_none(); 2];
-    let layers = editing.layers(read_layers(&args.input, &progress)?, 0..u32::MAX, is_whole)?;
-    write_layers(layers, &args.output, &progress).map_err(|error| match error {
+    let written = if takes_codes(&args.output) {
+        let layers = read_passing(&args.input, &progress)?;
+        write_passing(editing.passing(layers, 0..u32::MAX, is_whole)?, &args.output, &progress)
+    } else {
+        let layers = read_layers(&args.input, &progress)?;
+        write_layers(editing.layers(layers, 0..u32::MAX, is_whole)?, &args.output, &progress)
+    };
+    written.map_err(|error| match error {
         Exit::Failed(error) if error.is::<EditError>() => {
             Exit::Failed(error).at(input_name(&args.input.stack))
         }

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::{ArgGroup, Args};
-use lamp_postprocess::{Edits, OtherLayers, OtherPicture};
-use lamp_stack::{Layer, Limits, Op, Pages, digest_of};
+use lamp_postprocess::{EditError, Edits, OtherLayers, OtherPicture, edit_passing};
+use lamp_stack::{Layer, Limits, Op, PageInfo, Pages, PassingLayer, digest_of};
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;
@@ -133,6 +133,19 @@ impl Editing {
         counted: Range<u32>,
         is_end: [bool; 2],
     ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + 'a, Exit> {
+        let passing = layers.map(|layer| layer.map(PassingLayer::from));
+        let edited = self.passing(passing, counted, is_end)?;
+        Ok(edited.map(|layer| Ok(layer?.decode().map_err(EditError::from)?)))
+    }
+
+    /// Returns the edited layers as [`layers`](Self::layers) does. Those whose image no edit
+    /// changes are not decoded.
+    pub(crate) fn passing<'a>(
+        &'a self,
+        layers: impl Iterator<Item = Result<PassingLayer, Exit>> + 'a,
+        counted: Range<u32>,
+        is_end: [bool; 2],
+    ) -> Result<impl Iterator<Item = Result<PassingLayer, Exit>> + 'a, Exit> {
         let EditFiles { edits, stacks, pictures } = &self.files;
         let may_reach_beyond = is_end.map(|is_end| !is_end);
         let other = |file: &PathBuf| {
@@ -141,11 +154,12 @@ impl Editing {
         };
         let others = stacks.iter().map(other).collect::<Result<_, Exit>>()?;
         let pictures = pictures.iter().map(|file| open_picture(file)).collect::<Result<_, Exit>>();
-        Ok(lamp_postprocess::edit(layers, edits.clone(), others, pictures?, move |layer, done| {
-            if counted.contains(&layer.info.index) {
+        let count = move |page: &PageInfo, done: &[usize]| {
+            if counted.contains(&page.index) {
                 done.iter().for_each(|&edit| self.counts.borrow_mut()[edit] += 1);
             }
-        }))
+        };
+        Ok(edit_passing(layers, edits.clone(), others, pictures?, count))
     }
 
     /// Returns the edits, from 1, that were made in no layer so far.

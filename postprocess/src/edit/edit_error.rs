@@ -1,6 +1,6 @@
 //! Errors of reading a list of edits and of making them.
 
-use lamp_stack::{Dpi, OrientationError};
+use lamp_stack::{Dpi, OrientationError, StackError};
 use thiserror::Error;
 
 use super::ImageBounds;
@@ -47,6 +47,9 @@ pub enum EditError {
         /// The layer's name.
         layer: String,
     },
+    /// A page cannot be decoded.
+    #[error(transparent)]
+    Page(#[from] StackError),
     /// A layer cannot be edited.
     #[error("{layer}: {problem}")]
     Layer {

@@ -354,8 +354,8 @@ fn a_solid_is_for_the_layers_that_it_reaches() {
     let of = |list: &str| {
         let (edits, mut done) = (Edits::from_toml(list).unwrap(), Vec::new());
         let layers = bars(5).into_iter().map(Ok::<_, EditError>);
-        let edited = edit(layers, edits, vec![], vec![], |layer, edits| {
-            done.extend(edits.iter().map(|_| layer.info.index));
+        let edited = edit(layers, edits, vec![], vec![], |page, edits| {
+            done.extend(edits.iter().map(|_| page.index));
         });
         edited.for_each(|layer| drop(layer.unwrap()));
         done

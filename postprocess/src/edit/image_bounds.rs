@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_stack::{Dpi, Frame, Layer, Length, Orientation};
+use lamp_stack::{Dpi, Frame, Layer, Length, Orientation, PageInfo, PassingLayer};
 
 use super::edit_error::EditError;
 
@@ -23,10 +23,18 @@ impl ImageBounds {
     /// Returns the bounds of a layer. If its page does not state them, the lower left
     /// corner is 0, 0.
     pub(crate) fn of(layer: &Layer) -> Self {
-        let (width, height) = (layer.image.width(), layer.image.height());
-        let height_mm = layer.dpi.map_or(0.0, |dpi| f64::from(height) * dpi.pitch().mm());
-        let origin_mm = layer.info.origin_mm.unwrap_or([0.0, height_mm]);
-        Self { origin_mm, dpi: layer.dpi, width, height }
+        Self::of_image(&layer.info, layer.dpi, [layer.image.width(), layer.image.height()])
+    }
+
+    /// Returns the bounds of a layer that need not be decoded.
+    pub(super) fn of_passing(layer: &PassingLayer) -> Self {
+        Self::of_image(layer.info(), layer.dpi(), layer.size())
+    }
+
+    fn of_image(info: &PageInfo, dpi: Option<Dpi>, [width, height]: [u32; 2]) -> Self {
+        let height_mm = dpi.map_or(0.0, |dpi| f64::from(height) * dpi.pitch().mm());
+        let origin_mm = info.origin_mm.unwrap_or([0.0, height_mm]);
+        Self { origin_mm, dpi, width, height }
     }
 
     /// Returns the map from points of the part to pixels.

@@ -24,7 +24,7 @@ mod solid;
 
 use std::sync::Arc;
 
-use lamp_stack::{Layer, MemorySize, PageInfo, map_in_order};
+use lamp_stack::{Layer, MemorySize, PageInfo, PassingLayer, map_in_order};
 
 pub use edit_error::{EditError, EditProblem, LayerProblem};
 pub use image_bounds::ImageBounds;
@@ -37,8 +37,8 @@ use other_stacks::AlignedStack;
 use plan::EditPlan;
 
 /// Makes a list of edits in every layer of a stack. `others` are the stacks that the
-/// edits name, in order, and `pictures` the pictures. `done` is called with each layer
-/// and the indices of the edits that were made in it.
+/// edits name, in order, and `pictures` the pictures. `done` is called with each
+/// layer's page and the indices of the edits that were made in it.
 ///
 /// Shapes and stacks lie in the part's coordinates. A pixel is in a shape if its centre
 /// is, a layer in a range of heights if its middle is.
@@ -74,9 +74,29 @@ pub fn edit<E: From<EditError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     edits: Edits,
     others: Vec<OtherLayers<E>>,
-    mut pictures: Vec<OtherPicture<E>>,
-    mut done: impl FnMut(&Layer, &[usize]),
+    pictures: Vec<OtherPicture<E>>,
+    done: impl FnMut(&PageInfo, &[usize]),
 ) -> impl Iterator<Item = Result<Layer, E>> {
+    let passing = layers.map(|layer| layer.map(PassingLayer::from));
+    edit_passing(passing, edits, others, pictures, done)
+        .map(|layer| Ok(layer?.decode().map_err(EditError::from)?))
+}
+
+/// Makes a list of edits as [`edit`] does, in layers of which those are decoded whose image an
+/// edit changes.
+///
+/// # Errors
+/// A layer comes with the errors of [`edit`], or with one if it cannot be decoded and must be.
+///
+/// # Panics
+/// Panics if there are fewer `others` or `pictures` than the edits name.
+pub fn edit_passing<E: From<EditError> + Send>(
+    layers: impl Iterator<Item = Result<PassingLayer, E>>,
+    edits: Edits,
+    others: Vec<OtherLayers<E>>,
+    mut pictures: Vec<OtherPicture<E>>,
+    mut done: impl FnMut(&PageInfo, &[usize]),
+) -> impl Iterator<Item = Result<PassingLayer, E>> {
     let mut beside = AlignedStacks::new(&edits, others);
     let mut plan: Option<Arc<EditPlan>> = None;
     let mut layers = layers.fuse();
@@ -91,20 +111,20 @@ pub fn edit<E: From<EditError> + Send>(
             None => EditPlan::new(&edits, &layer, &mut beside.others, &mut pictures)
                 .map(|new| Arc::clone(plan.insert(Arc::new(new)))),
         };
-        Some(planned.and_then(|plan| Ok(ToEdit { others: beside.at(&layer.info)?, layer, plan })))
+        Some(planned.and_then(|plan| Ok(ToEdit { others: beside.at(layer.info())?, layer, plan })))
     });
     let edited =
         map_in_order(read, |ToEdit { layer, others, plan }| Ok(plan.apply(layer, &others)?));
     edited.map(move |edited| {
         let (layer, edits) = edited?;
-        done(&layer, &edits);
+        done(layer.info(), &edits);
         Ok(layer)
     })
 }
 
 /// A layer, and the layers of the other stacks at its height.
 struct ToEdit {
-    layer: Layer,
+    layer: PassingLayer,
     others: Vec<Option<Arc<Layer>>>,
     plan: Arc<EditPlan>,
 }

@@ -4,7 +4,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Frame, Image, Layer, MAX_SIDE, Mask, Op, Orientation, PageInfo, gray_runs};
+use lamp_stack::{
+    Frame, Image, Layer, MAX_SIDE, Mask, Op, Orientation, PageInfo, PassingLayer, gray_runs,
+};
 use serde_json::json;
 
 use super::copies::BuildCopy;
@@ -85,13 +87,16 @@ impl EditPlan {
     /// name, and `pictures` the pictures.
     pub(super) fn new<E: From<EditError>>(
         edits: &Edits,
-        first: &Layer,
+        first: &PassingLayer,
         others: &mut [AlignedStack<E>],
         pictures: &mut [OtherPicture<E>],
     ) -> Result<Self, E> {
-        let mut plan =
-            Self { place: ImageBounds::of(first), steps: Vec::new(), command: String::new() };
-        let (mut place, mut info) = (plan.place, first.info.clone());
+        let mut plan = Self {
+            place: ImageBounds::of_passing(first),
+            steps: Vec::new(),
+            command: String::new(),
+        };
+        let (mut place, mut info) = (plan.place, first.info().clone());
         let (mut others, mut pictures) = (others.iter_mut(), pictures.iter_mut());
         let mut told = edits.told.clone();
         for (number, (edit, told)) in (1..).zip(edits.list.iter().zip(&mut told)) {
@@ -129,42 +134,37 @@ impl EditPlan {
     }
 
     /// Makes the edits in a layer, with the layers of `others` at its height. Also
-    /// returns the indices of the edits that were for it.
+    /// returns the indices of the edits that were for it. A layer whose image stays as it is
+    /// is not decoded.
     pub(super) fn apply(
         &self,
-        layer: Layer,
+        mut layer: PassingLayer,
         others: &[Option<Arc<Layer>>],
-    ) -> Result<(Layer, Vec<usize>), EditError> {
-        if ImageBounds::of(&layer) != self.place {
-            return Err(EditError::Unlike { layer: layer.info.name() });
+    ) -> Result<(PassingLayer, Vec<usize>), EditError> {
+        if ImageBounds::of_passing(&layer) != self.place {
+            return Err(EditError::Unlike { layer: layer.info().name() });
         }
-        let Layer { mut info, dpi, mut image } = layer;
         let (mut others, mut done) = (others.iter(), Vec::new());
         for (k, step) in self.steps.iter().enumerate() {
             let other =
                 if matches!(step, PlannedEdit::Other { .. }) { others.next() } else { None };
             let other = other.and_then(Option::as_deref);
-            let too_many = || LayerProblem::TooManyRuns { edit: k + 1 }.of_layer(&info);
-            if step.is_for(&info)? {
-                // An image that stays as it is keeps the codes of its page.
-                let is_unchanged = match step {
-                    PlannedEdit::Frame { frame, .. } => {
-                        frame.is_whole(image.width(), image.height())
-                    }
-                    PlannedEdit::Turn { turn, .. } => *turn == Orientation::default(),
-                    _ => false,
-                };
-                if !is_unchanged {
-                    image = step.of_image(&image, &info, other)?.ok_or_else(too_many)?.into();
+            if step.is_for(layer.info())? {
+                if !step.keeps_images_of(layer.size()) {
+                    let Layer { info, dpi, image } = layer.decode()?;
+                    let image = step.of_image(&image, &info, other)?;
+                    let too_many = || LayerProblem::TooManyRuns { edit: k + 1 }.of_layer(&info);
+                    let image = image.ok_or_else(too_many)?.into();
+                    layer = Layer { info, dpi, image }.into();
                 }
-                step.follow(&mut info)?;
+                step.follow(layer.info_mut())?;
                 done.push(k);
             }
         }
-        if let Some(stack) = &mut info.stack {
+        if let Some(stack) = &mut layer.info_mut().stack {
             stack.commands.push(self.command.clone());
         }
-        Ok((Layer { info, dpi, image }, done))
+        Ok((layer, done))
     }
 }
 
@@ -221,6 +221,16 @@ impl PlannedEdit {
             }
             Self::Shape { reach, shape, .. } => Ok(reach.holds(info)? && shape.reaches(info)?),
             Self::Frame { .. } | Self::Turn { .. } => Ok(true),
+        }
+    }
+
+    /// Returns true if it changes no image of that size, so that images keep the codes of
+    /// their pages.
+    fn keeps_images_of(&self, [width, height]: [u32; 2]) -> bool {
+        match self {
+            Self::Frame { frame, .. } => frame.is_whole(width, height),
+            Self::Turn { turn, .. } => *turn == Orientation::default(),
+            Self::Shape { .. } | Self::Other { .. } => false,
         }
     }
 

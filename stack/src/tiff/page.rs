@@ -191,6 +191,30 @@ impl Page {
         &self.info
     }
 
+    pub(crate) fn info_mut(&mut self) -> &mut PageInfo {
+        &mut self.info
+    }
+
+    /// Returns the resolution, if the page states one in inches or centimetres.
+    pub(crate) fn dpi(&self) -> Option<Dpi> {
+        self.dpi
+    }
+
+    /// Returns the width and height in pixels of the upright image.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        let (width, height) = (self.width, self.layout.page_height);
+        if self.orientation.is_across() { [height, width] } else { [width, height] }
+    }
+
+    /// Returns the compression of the strip and the check of the image, if a page of another stack
+    /// may take over both.
+    pub(crate) fn passed(&self) -> Option<(Compression, ImageCheck)> {
+        if self.compression == Compression::Packed {
+            return None;
+        }
+        self.strip_compression().zip(self.image_check())
+    }
+
     /// Returns the compression of the image.
     pub fn compression(&self) -> Compression {
         self.compression
@@ -212,12 +236,11 @@ impl Page {
 
     /// Returns what the page says, without its image.
     pub fn header(&self) -> PageHeader {
-        let (width, height) = (self.width, self.layout.page_height);
         let check = self.check.as_ref().and_then(|check| check.page.as_ref());
         PageHeader {
             info: self.info.clone(),
             dpi: self.dpi,
-            size: if self.orientation.is_across() { [height, width] } else { [width, height] },
+            size: self.size(),
             gray: self.gray,
             compression: self.compression,
             data_bytes: self.data_bytes,

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use serde::{Deserialize, Serialize};
 
-use super::page::Compression;
+use super::page::{Compression, Page};
 use super::tags::{
     ASCII, BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, DEFLATE, FILL_ORDER, IMAGE_DESCRIPTION,
     IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, NEW_SUBFILE_TYPE, ORIENTATION, PACK_BITS, PER_INCH,
@@ -85,6 +85,24 @@ impl EncodedPage {
         }
     }
 
+    /// Passes a page on with its strip and its check.
+    ///
+    /// # Panics
+    /// Panics if the page [must be decoded](Page::passed).
+    pub(crate) fn passed(mut page: Page) -> Self {
+        let (compression, check) = page.passed().expect("only pages that may pass");
+        let [width, height] = page.size();
+        Self {
+            index: page.info.index,
+            width,
+            height,
+            compression,
+            resolution: page.dpi.map_or((0, 1), crate::Dpi::to_rational),
+            line: OpenLine::new(&page.info, page.dpi, check),
+            strip: page.pieces.pop().expect("pages that pass have a strip"),
+        }
+    }
+
     /// Returns the bytes of the page at offset `start`: directory, texts, strip and padding. The
     /// link is to the byte after them, or zero if the page ends the file.
     fn bytes(&self, description: &str, format: Format, start: u64, ends_file: bool) -> Vec<u8> {
@@ -142,6 +160,12 @@ impl EncodedPage {
         }
         fields.sort_by_key(|field| field.0);
         fields
+    }
+}
+
+impl From<Layer> for EncodedPage {
+    fn from(layer: Layer) -> Self {
+        Self::new(&layer)
     }
 }
 
