@@ -86,7 +86,7 @@ pub(crate) struct TileArgs {
     /// What copies are kept apart by; outline implies --fit
     #[arg(long, default_value_t, value_parser = one_of_described::<PackBy>(&[
         "The boxes around the parts",
-        "The parts' outlines, if boxes place fewer",
+        "The parts' outlines, one after another or, of one part, on a lattice, if boxes place fewer",
     ]))]
     pack: PackBy,
 

@@ -38,14 +38,31 @@ pub(super) fn place(
     let mut parts: Vec<usize> = (0..wanted.len()).collect();
     parts.sort_by_key(area);
     for part in parts {
-        let ways: Vec<Orientation> =
-            turns.quarters().iter().map(|&quarters| Orientation::new(quarters, false)).collect();
+        let ways = turns.orientations();
         for _ in 0..wanted[part] {
             if !free.place(part, &ways, order) {
                 break;
             }
         }
     }
+    let mut placements = free.placements;
+    centre(layout, &mut placements);
+    placements.sort_by_key(|at| (at.part, at.top, at.left));
+    placements
+}
+
+/// Adds copies of the only part to those that stand, up to `wanted`, and centres all of them.
+pub(super) fn fill(
+    layout: &Layout,
+    regions: &mut NoFitRegions,
+    mut placements: Vec<CopyPlacement>,
+    wanted: u32,
+    turns: Turns,
+) -> Vec<CopyPlacement> {
+    placements.truncate(wanted as usize);
+    let mut free = FreeRoom { layout, regions, taken: HashMap::new(), placements };
+    let ways = turns.orientations();
+    while free.placements.len() < wanted as usize && free.place(0, &ways, PlacingRule::Top) {}
     let mut placements = free.placements;
     centre(layout, &mut placements);
     placements.sort_by_key(|at| (at.part, at.top, at.left));

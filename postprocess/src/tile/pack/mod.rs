@@ -1,11 +1,12 @@
 //! Packs copies: finds places for as many as fit, or as are asked for.
 //!
 //! Simple strategies come first: a grid, then boxes wherever they fit, then outlines,
-//! each before and after parts may be turned. A later strategy is taken only if it
-//! places more copies.
+//! each before and after parts may be turned, and lattices of one part. A later strategy is
+//! taken only if it places more copies.
 
 mod greedy;
 mod grid;
+mod lattice;
 mod no_fit;
 
 use lamp_stack::Orientation;
@@ -59,6 +60,11 @@ impl Turns {
             Self::Quarters => &[0, 2, 1, 3],
         }
     }
+
+    /// Returns them as orientations.
+    fn orientations(self) -> Vec<Orientation> {
+        self.quarters().iter().map(|&quarters| Orientation::new(quarters, false)).collect()
+    }
 }
 
 impl Pack {
@@ -102,6 +108,7 @@ impl Pack {
                     PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Outlines, turns, order)),
                 );
             }
+            all.extend(alone.then_some(Strategy::Lattice(self.turns)));
         }
         all
     }
@@ -114,6 +121,8 @@ enum Strategy {
     Grid(u32),
     /// Puts copy after copy where there is room.
     Greedy(PackBy, Turns, PlacingRule),
+    /// Puts copies of the only part on a lattice, and more where there is room.
+    Lattice(Turns),
 }
 
 /// More copies than anyone builds. Parts of a pixel would otherwise fill the area with
@@ -154,6 +163,7 @@ pub(super) fn pack(
                     regions.insert(current.unwrap_or_else(|| NoFitRegions::new(layout, gap, by)));
                 greedy::place(layout, regions, &wanted, turns, order)
             }
+            Strategy::Lattice(turns) => lattice::place(layout, gap, wanted[0], turns),
         };
         if found.len() > best.len() {
             best = found;

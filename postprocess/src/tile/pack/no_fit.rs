@@ -44,6 +44,8 @@ pub(super) struct NoFitRegion {
     /// The number of cells that the first row is up.
     pub(super) top: i32,
     pub(super) rows: Vec<Rc<[CellRun]>>,
+    /// The farthest column and row to either side.
+    pub(super) reach: [i32; 2],
 }
 
 impl NoFitRegions {
@@ -61,6 +63,11 @@ impl NoFitRegions {
             }
         };
         Self { by, gap, cell, outlines: HashMap::new(), regions: HashMap::new() }
+    }
+
+    /// Creates outlines in cells of so many pixels.
+    pub(super) fn in_cells(layout: &Layout, gap: u32, cell: u32) -> Self {
+        Self { cell, ..Self::new(layout, gap, PackBy::Outlines) }
     }
 
     pub(super) fn are_by(&self, by: PackBy) -> bool {
@@ -91,6 +98,12 @@ impl NoFitRegions {
         });
         self.regions.insert([moving, placed], Rc::clone(&no_fit));
         no_fit
+    }
+
+    /// Returns the number of white cells of an outline.
+    pub(super) fn white(&mut self, layout: &Layout, key: (usize, Orientation)) -> i64 {
+        let outline = self.outline(layout, key);
+        outline.rows.iter().flatten().map(|(from, to)| i64::from(to - from)).sum()
     }
 
     fn outline(&mut self, layout: &Layout, key: (usize, Orientation)) -> Rc<CellOutline> {
@@ -143,11 +156,47 @@ fn join_runs(runs: &mut Vec<CellRun>) {
 }
 
 impl NoFitRegion {
+    fn new(top: i32, rows: Vec<Rc<[CellRun]>>) -> Self {
+        let ends = rows.iter().filter_map(|runs| Some([runs.first()?.0, runs.last()?.1]));
+        let across = ends.map(|[from, to]| to.max(-from)).max().unwrap_or(0);
+        let reach = [across, top.max(rows.len() as i32 - top)];
+        Self { top, rows, reach }
+    }
+
+    /// Returns the columns of a row.
+    pub(super) fn row(&self, y: i32) -> &[CellRun] {
+        let row = usize::try_from(y + self.top).ok().and_then(|row| self.rows.get(row));
+        row.map_or(&[], |runs| runs)
+    }
+
+    /// Whether it holds a displacement.
+    pub(super) fn holds(&self, [x, y]: [i32; 2]) -> bool {
+        let runs = self.row(y);
+        runs.get(runs.partition_point(|run| run.1 <= x)).is_some_and(|run| run.0 <= x)
+    }
+
+    /// Returns the union of regions that are moved.
+    pub(super) fn united(regions: &[(&Self, [i32; 2])]) -> Self {
+        let top = regions.iter().map(|(region, by)| region.top - by[1]).max().unwrap_or(0);
+        let end = |(region, by): &(&Self, [i32; 2])| region.rows.len() as i32 - region.top + by[1];
+        let bottom = regions.iter().map(end).max().unwrap_or(0);
+        let rows = (-top..bottom).map(|y| {
+            let mut runs: Vec<CellRun> = Vec::new();
+            for (region, [right, down]) in regions {
+                let row = region.row(y - down).iter();
+                runs.extend(row.map(|(from, to)| (from + right, to + right)));
+            }
+            join_runs(&mut runs);
+            runs.into()
+        });
+        Self::new(top, rows.collect())
+    }
+
     fn of_boxes(moving: PixelSize, placed: PixelSize, gap: u32) -> Self {
         let [width, height] = [moving.width, moving.height].map(|side| (side + gap) as i32);
         let run: Rc<[CellRun]> = Rc::new([(1 - width, (placed.width + gap) as i32)]);
         let rows = height - 1 + (placed.height + gap) as i32;
-        Self { top: height - 1, rows: vec![run; rows as usize] }
+        Self::new(height - 1, vec![run; rows as usize])
     }
 
     fn of_outlines(moving: &CellOutline, placed: &CellOutline) -> Self {
@@ -170,6 +219,6 @@ impl NoFitRegion {
             join_runs(&mut runs);
             runs.into()
         });
-        Self { top, rows: rows.collect() }
+        Self::new(top, rows.collect())
     }
 }
