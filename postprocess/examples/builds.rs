@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let gap = Length::from_mm(if plate == Plate::Aerofoil { 4.0 } else { 1.0 });
         let part = [part(plate, dpi)?];
         for turns in [Turns::None, Turns::Half, Turns::Quarters] {
-            let pack = Pack { by: PackBy::Outlines, turns };
+            let pack = Pack { by: PackBy::Outlines, turns, ..Pack::default() };
             let start = Instant::now();
             let layout =
                 Layout::packed(part.to_vec(), &[None], "584.2x584.2mm".parse()?, gap, pack)?;

@@ -115,6 +115,31 @@ fn outlines_place_more_round_parts_than_boxes() {
 }
 
 #[test]
+fn what_is_left_of_several_parts_is_told() {
+    let scratch = Scratch::with_tower_and_torus();
+    let line = "tile tower.tif:9 torus.tif:1 --area 120x120mm --mesh none --edge-gap 5mm -o b.tif";
+    let told = scratch.run(line).succeeds();
+    assert!(told.stderr.contains("tower.tif: "), "{}", told.stderr);
+    assert!(told.stderr.contains(" of 9 copies are placed: no more fit"), "{}", told.stderr);
+    assert!(check(&scratch, "b.tif", &["tower.tif", "torus.tif"]) < 10);
+    let strict = scratch.run(&format!("{line}.2 --strict"));
+    assert_eq!(strict.statuses, [Some(3)]);
+    assert!(!scratch.path("b.tif.2").exists());
+}
+
+#[test]
+fn copies_by_hand_nearer_than_the_gap_are_told() {
+    let scratch = Scratch::with_tower_and_torus();
+    let packed = "tile tower.tif:4 --area 95x120mm --mesh none --gap 1mm --layout-out l.json";
+    scratch.run(&format!("{packed} -o b.tif")).succeeds_quietly();
+    let again = "tile tower.tif --layout l.json --mesh none -o c.tif";
+    scratch.run(&format!("{again} --gap 1mm")).succeeds_quietly();
+    scratch.run(again).succeeds_quietly();
+    let told = scratch.run(&format!("{again} --gap 2mm")).succeeds();
+    assert!(told.stderr.contains("are nearer to each other than 2mm"), "{}", told.stderr);
+}
+
+#[test]
 fn a_layout_gives_the_same_build_again() {
     let scratch = Scratch::with_tower_and_torus();
     let stacks = "tower.tif torus.tif";
@@ -311,7 +336,7 @@ fn what_cannot_be_meant_is_wrong_usage() {
         ("tile tower.tif tower.tif:3", &["tower.tif is given twice"]),
         ("tile - tower.tif -- -:2", &["standard input is given twice"]),
         ("tile tower.tif:3 --layout l.json", &["leave out the counts"]),
-        ("tile tower.tif --layout l.json --gap 2mm", &["--layout"]),
+        ("tile tower.tif --layout l.json --edge-gap 2mm", &["--layout"]),
         ("tile tower.tif --layout-picture p.jpg", &[".svg or .png"]),
         ("tile tower.tif --layout-out tower.tif", &["that is an input"]),
         ("tile tower.tif --pack tight", &["box", "outline"]),

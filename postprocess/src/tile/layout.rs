@@ -66,11 +66,12 @@ pub(super) struct RequestedPlacement {
 
 impl Layout {
     /// Finds places for copies of each part, at least a gap apart. `None` as a count
-    /// means as many copies as fit of a single part, and one of each of several.
+    /// means as many copies as fit of a single part, and one of each of several. Of several
+    /// parts, fewer copies are placed where not all fit: see [`copies_of`](Self::copies_of).
     ///
     /// # Errors
-    /// Returns an error if the parts have different resolutions, or if not all copies
-    /// find a place.
+    /// Returns an error if the parts have different resolutions, if not all copies of a
+    /// single part find a place, or not one of each of several.
     ///
     /// # Panics
     /// Panics if there are not as many counts as parts, or no part.
@@ -83,9 +84,7 @@ impl Layout {
     ) -> Result<Self, TileError> {
         assert_eq!(parts.len(), counts.len(), "a count for each part");
         let mut layout = Self::empty(parts, area)?;
-        let gap_pixels = (gap.pixels(layout.dpi).max(0.0) - 1e-6).ceil().max(0.0) as u32;
-        // A gap as wide as the area leaves room for one copy, and so does a wider one.
-        let gap_pixels = gap_pixels.min(MAX_SIDE);
+        let gap_pixels = pack::pixels_across(gap, &layout);
         layout.placements = pack::pack(&layout, counts, gap_pixels, pack)?;
         layout.command = layout.packing_command(gap, pack);
         Ok(layout)
@@ -205,7 +204,7 @@ impl Layout {
         all
     }
 
-    fn copy_name(&self, part: usize, number: u32) -> CopyName {
+    pub(super) fn copy_name(&self, part: usize, number: u32) -> CopyName {
         CopyName { name: self.parts[part].name().to_owned(), number }
     }
 
@@ -314,6 +313,22 @@ mod tests {
             Err(TileError::Overlap { .. })
         ));
         assert!(placed(false, &[(0, 0, "0"), (2, 5, "0")]).is_ok());
+    }
+
+    #[test]
+    fn copies_nearer_than_a_gap_are_told() {
+        // A column is free between the two, and the corner of the L is 3 off diagonally.
+        let near = |requested: &[(i64, i64, &str)], mm| {
+            placed(true, requested).unwrap().nearer_than(Length::from_mm(mm)).len()
+        };
+        assert_eq!(near(&[(0, 0, "0"), (5, 0, "0")], 1.0), 0);
+        assert_eq!(near(&[(0, 0, "0"), (5, 0, "0")], 1.1), 1);
+        assert_eq!(near(&[(0, 0, "0"), (4, 0, "0")], 0.0), 0);
+        assert_eq!(near(&[(0, 0, "0"), (4, 0, "0"), (0, 7, "0")], 4.0), 1);
+        let pair = &placed(true, &[(0, 0, "0"), (4, 0, "0")])
+            .unwrap()
+            .nearer_than(Length::from_mm(1.0))[0];
+        assert_eq!(pair.each_ref().map(ToString::to_string), ["l.tif copy 1", "l.tif copy 2"]);
     }
 
     #[test]

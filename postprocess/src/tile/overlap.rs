@@ -1,8 +1,44 @@
-//! Finds where two copies overlap.
+//! Finds where two copies overlap, and which are nearer to each other than a gap.
 
-use lamp_stack::{Mask, white_runs};
+use std::collections::HashMap;
 
-use super::CopyPlacement;
+use lamp_stack::{Frame, Length, Mask, white_runs};
+
+use super::{CopyName, CopyPlacement, Layout, pack};
+use crate::offset::offset_one_bit;
+
+impl Layout {
+    /// Returns the pairs of copies that are nearer to each other than a gap, as packing keeps it.
+    pub fn nearer_than(&self, gap: Length) -> Vec<[CopyName; 2]> {
+        let silhouettes = self.silhouettes();
+        let farthest = self.pixels.width + self.pixels.height;
+        let margin = pack::pixels_across(gap, self).min(farthest);
+        let grown: HashMap<_, Mask> =
+            silhouettes.iter().map(|(key, mask)| (*key, grown_by(mask, margin))).collect();
+        let numbers: Vec<u32> = self.numbers().collect();
+        let name = |k: usize| self.copy_name(self.placements[k].part, numbers[k]);
+        let mut near = Vec::new();
+        for (k, one) in self.placements.iter().enumerate() {
+            let moved = CopyPlacement { left: one.left + margin, top: one.top + margin, ..*one };
+            let mask = &silhouettes[&(one.part, one.turn)];
+            for (l, other) in self.placements[..k].iter().enumerate() {
+                let around = &grown[&(other.part, other.turn)];
+                if common_pixel([mask, around], [&moved, other]).is_some() {
+                    near.push([name(l), name(k)]);
+                }
+            }
+        }
+        near
+    }
+}
+
+/// Returns an outline grown by a margin, which begins as much above and to the left.
+fn grown_by(outline: &Mask, margin: u32) -> Mask {
+    let by = -i64::from(margin);
+    let [width, height] = [outline.width(), outline.height()].map(|side| side + 2 * margin);
+    let wide = outline.framed(Frame { left: by, top: by, width, height });
+    if margin == 0 { wide } else { offset_one_bit(&wide, by as f64) }
+}
 
 /// Returns the column and row of a pixel of the build that is white in two placed masks.
 pub(super) fn common_pixel(masks: [&Mask; 2], at: [&CopyPlacement; 2]) -> Option<(u32, u32)> {

@@ -272,6 +272,7 @@ proptest! {
         let pack = Pack {
             by: if outlines { PackBy::Outlines } else { PackBy::Boxes },
             turns: [Turns::None, Turns::Half, Turns::Quarters][turns],
+            ..Pack::default()
         };
         let area = "60x40mm".parse().unwrap();
         let layout = Layout::packed(parts, &[Some(copies), None], area, Length::from_mm(gap.into()), pack);

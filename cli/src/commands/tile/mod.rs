@@ -74,9 +74,14 @@ pub(crate) struct TileArgs {
     copies: Option<u32>,
 
     /// Smallest distance between copies [default: twice the mesh's clearance and 2mm; 1mm with
-    /// --mesh none]
+    /// --mesh none]. With --layout, nearer copies cause a warning
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     gap: Option<Length>,
+
+    /// Smallest distance of copies to the area's edges
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
+    #[arg(default_value = "0mm")]
+    edge_gap: Length,
 
     /// Place parts by the extent of what is white in any layer, not by their whole images. Stacks
     /// are read twice; standard input is kept in a temporary file
@@ -101,7 +106,7 @@ pub(crate) struct TileArgs {
 
     /// Place copies as this file says, instead of packing them
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    #[arg(conflicts_with_all = ["copies", "gap", "pack", "turns"])]
+    #[arg(conflicts_with_all = ["copies", "edge_gap", "pack", "turns"])]
     layout: Option<PathBuf>,
 
     /// Write the copies' positions, for --layout
@@ -121,7 +126,8 @@ pub(crate) struct TileArgs {
     #[arg(long)]
     resample: bool,
 
-    /// Give up with status 3 if a part's pages list stray rows: no build is written
+    /// Give up with status 3 if a part's pages list stray rows, or not all copies fit: no build is
+    /// written
     #[arg(long)]
     strict: bool,
 
@@ -232,6 +238,7 @@ impl TileArgs {
         let parts = stacks.iter_mut().map(|stack| stack.part(outlines));
         let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
         let placed = self.placed(parts, file.as_ref(), machine.as_ref(), mesh.as_ref())?;
+        self.tell_places(&placed, progress)?;
         let layout = placed.clone();
         let layout = match &mesh {
             Some(mesh) => layout.with_mesh(mesh)?,
@@ -274,6 +281,30 @@ impl TileArgs {
                 Ok(Layout::packed(parts, &self.counts(), area, gap, self.packing())?)
             }
         }
+    }
+
+    /// Tells which copies found no place, and which stand nearer than was asked for.
+    fn tell_places(&self, layout: &Layout, progress: &Progress) -> Result<(), Exit> {
+        if self.layout.is_none()
+            && let Some(text) = left_over(layout, &self.counts())
+        {
+            if self.strict {
+                return Err(Exit::Findings(text));
+            }
+            progress.warn(&text);
+        }
+        if let (Some(_), Some(gap)) = (&self.layout, self.gap)
+            && let near = layout.nearer_than(gap)
+            && let [[one, other], more @ ..] = near.as_slice()
+        {
+            let more = match more.len() {
+                0 => String::new(),
+                1 => ", and so is another pair".to_owned(),
+                more => format!(", and so are {more} more pairs"),
+            };
+            progress.warn(&format!("{one} and {other} are nearer to each other than {gap}{more}"));
+        }
+        Ok(())
     }
 
     /// Checks, before the work, what can be checked.
@@ -325,7 +356,7 @@ impl TileArgs {
             PackBy::Boxes => Turns::None,
             PackBy::Outlines => Turns::Quarters,
         };
-        Pack { by: self.pack, turns: self.turns.unwrap_or(usual) }
+        Pack { by: self.pack, turns: self.turns.unwrap_or(usual), edge_gap: self.edge_gap }
     }
 
     /// Writes the layout as a file and as a picture, if wanted.
@@ -339,6 +370,18 @@ impl TileArgs {
         }
         Ok(())
     }
+}
+
+/// `torus.tif: 3 of 5 copies are placed; tower.tif: ...`, if some of several parts found no place.
+fn left_over(layout: &Layout, counts: &[Option<u32>]) -> Option<String> {
+    let parts = layout.parts().iter().zip(counts).enumerate();
+    let short = parts.filter_map(|(part, (stack, count))| {
+        let (placed, asked) = (layout.copies_of(part), (*count)? as usize);
+        let line = || format!("{}: {placed} of {asked} copies are placed", stack.name());
+        (placed < asked).then(line)
+    });
+    let short: Vec<String> = short.collect();
+    (!short.is_empty()).then(|| format!("{}: no more fit", short.join("; ")))
 }
 
 /// A layout takes a line for each copy.

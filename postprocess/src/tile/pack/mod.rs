@@ -9,19 +9,21 @@ mod grid;
 mod lattice;
 mod no_fit;
 
-use lamp_stack::Orientation;
+use lamp_stack::{Length, MAX_SIDE, Orientation, Size};
 
-use super::{CopyPlacement, Layout, TileError};
+use super::{CopyPlacement, Layout, PixelSize, TileError};
 use greedy::PlacingRule;
 use no_fit::NoFitRegions;
 
 /// Options to find places.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pack {
     /// What keeps the gap from other parts.
     pub by: PackBy,
     /// How parts may be turned.
     pub turns: Turns,
+    /// The least distance from the copies to the area's edges.
+    pub edge_gap: Length,
 }
 
 /// What of a part keeps the gap from other parts.
@@ -77,6 +79,9 @@ impl Pack {
         if self.turns != Turns::default() {
             options += &format!(" --turns {}", self.turns);
         }
+        if self.edge_gap > Length::default() {
+            options += &format!(" --edge-gap {}", self.edge_gap);
+        }
         options
     }
 
@@ -129,12 +134,43 @@ enum Strategy {
 /// billions of them.
 const MAX_COPIES: u32 = 1 << 20;
 
-/// Finds places for all copies.
+/// Finds places for all copies, or for as many of several parts as fit, with so many pixels
+/// between them, and the gap of the options to the area's edges.
 ///
 /// # Errors
-/// Returns an error if a part is larger than the area, or not all copies asked for
-/// find a place.
+/// Returns an error if a part is larger than the area within its edges, if not all copies of a
+/// single part find a place, or not one of several.
 pub(super) fn pack(
+    layout: &Layout,
+    counts: &[Option<u32>],
+    gap: u32,
+    how: Pack,
+) -> Result<Vec<CopyPlacement>, TileError> {
+    let edge = pixels_across(how.edge_gap, layout);
+    let mut within = layout.clone();
+    let side = |pixels: u32| pixels.saturating_sub(edge.saturating_mul(2));
+    let length = |side: Length| {
+        Length::from_um((side.um() - 2.0 * how.edge_gap.um().max(0.0)).max(0.0)).to_whole_nm()
+    };
+    let PixelSize { width, height } = layout.pixels();
+    within.pixels = PixelSize { width: side(width), height: side(height) };
+    let Size { width, height } = layout.area();
+    within.area = Size { width: length(width), height: length(height) };
+    let mut placements = pack_within(&within, counts, gap, how)?;
+    for at in &mut placements {
+        (at.left, at.top) = (at.left + edge, at.top + edge);
+    }
+    Ok(placements)
+}
+
+/// Returns a distance in pixels, rounded up. One as wide as the area leaves room for one copy,
+/// and so does a wider one.
+pub(super) fn pixels_across(gap: Length, layout: &Layout) -> u32 {
+    let pixels = (gap.pixels(layout.dpi()).max(0.0) - 1e-6).ceil().max(0.0) as u32;
+    pixels.min(MAX_SIDE)
+}
+
+fn pack_within(
     layout: &Layout,
     counts: &[Option<u32>],
     gap: u32,
@@ -174,10 +210,9 @@ pub(super) fn pack(
     }
     let short = (0..counts.len()).find_map(|part| {
         let most = best.iter().filter(|placement| placement.part == part).count() as u32;
-        counts[part]
-            .or((!alone).then_some(1))
-            .filter(|&asked| most < asked)
-            .map(|asked| (part, asked, most))
+        let asked = counts[part].or((!alone).then_some(1))?;
+        let least = if alone { asked } else { 1 };
+        (most < least).then_some((part, asked, most))
     });
     match short {
         None => Ok(best),
