@@ -7,7 +7,10 @@
 #   benches/compare.sh [FACETS ...]        default: 100k 750k 5.5M
 #
 # MSLICER=path/to/mslicer adds mslicer, ISLAND_SCAN=path/to/island_scan_cli
-# DragonFruit's search for islands. Needs 3 GB in TMPDIR.
+# DragonFruit's search for islands, LIMIT=path/to/slice a slicer that does no more
+# than the least: crossings in 32 bits, a frame of 76.2 mm from ORIGIN, no survey,
+# no check and no digest, called as `slice IN OUT DPI UM A THREADS`. Needs 3 GB in
+# TMPDIR.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo build --release --quiet -p lamp-cli
@@ -71,6 +74,8 @@ slices() {
     row "\`slice blade.stl --threads 1\`" slice blade.stl --threads 1 -o blade.tif
     row "\`slice blade.stl --memory 64MB\`" slice blade.stl --memory 64MB -o blade.tif
     row "\`slice blade.stl --memory 16MB\`" slice blade.stl --memory 16MB -o blade.tif
+    [ -z "${LIMIT:-}" ] || ORIGIN=-38.1,-38.1,-0.5 \
+        row "the least that slices" "$LIMIT" blade.stl other.tif 1500 100 A 2
     "$bin/examples/shuffle" blade.stl shuffled.stl
     row "\`slice shuffled.stl\` (facets in random order)" slice shuffled.stl -o other.tif
     row "\`slice shuffled.stl --memory 64MB\`" slice shuffled.stl --memory 64MB -o other.tif

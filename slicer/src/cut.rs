@@ -157,7 +157,7 @@ impl RowSegment {
         self.upper[0] + self.columns_per_row * (f64::from(row) - self.upper[1])
     }
 
-    /// Returns in which of some columns of bins across an image its middle lies.
+    /// Returns which of so many equal strips of an image, from the left, holds its middle.
     #[inline]
     pub(crate) fn bin(&self, grid: &PixelGrid, bins: usize) -> usize {
         let middle = self.upper[0] + self.columns_per_row * (0.5 * self.rows().len() as f64);

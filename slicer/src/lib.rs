@@ -48,6 +48,7 @@ mod facet;
 mod facet_index;
 mod gray;
 mod grid;
+mod image_rows;
 mod obj;
 mod open;
 mod part;
