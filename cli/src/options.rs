@@ -181,6 +181,9 @@ impl FromStr for EveryNth {
 
 /// Parses a length that is not below zero.
 pub(crate) fn parse_distance(text: &str) -> Result<Length, String> {
+    if text.trim().parse() == Ok(0.0) {
+        return Ok(Length::default());
+    }
     let length: Length = text.parse().map_err(|error: LengthError| error.to_string())?;
     if length.um() < 0.0 { Err(format!("{length} is below zero")) } else { Ok(length) }
 }
@@ -266,6 +269,17 @@ pub(crate) fn ranges(rows: &[u32]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_is_as_long_in_all_units() {
+        for zero in ["0", " 0 ", "0.0", "0mm", "0in"] {
+            assert_eq!(parse_distance(zero), Ok(Length::default()), "{zero}");
+            assert!(parse_thickness(zero).unwrap_err().contains("above zero"), "{zero}");
+        }
+        for wrong in ["1", "0.5", "", "-1mm", "nan", "0 0"] {
+            assert!(parse_distance(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn every_nth_layer_of_a_range() {

@@ -225,6 +225,11 @@ fn other_heights_are_refused_or_resampled() {
     let resampled = scratch.layers("build.tif");
     scratch.run(&format!("tile tower.tif high.tif --settle {area}")).succeeds_quietly();
     let settled = scratch.layers("build.tif");
+    for (other, option) in [(&plain, ""), (&resampled, " --resample"), (&settled, " --settle")] {
+        let commands = &other[0].info.stack.as_ref().unwrap().commands;
+        let expected = format!("--base-layers 5{option}");
+        assert!(commands[0].ends_with(&expected), "{commands:?}");
+    }
     for other in [&resampled, &settled] {
         assert_eq!(plain.len(), other.len());
         assert!(plain.iter().zip(other).all(|(a, b)| a.image == b.image));

@@ -57,7 +57,7 @@ fn parts_are_untouched_and_moats_are_as_wide_as_stated() {
         let fit = if packed.is_empty() { "" } else { "--fit" };
         let again = format!("tile {stacks} {fit} --layout l.json");
         scratch.run(&format!("{again} --mesh none -o plain.tif")).succeeds_quietly();
-        scratch.run(&format!("{again} --break-width 0um -o unbroken.tif")).succeeds_quietly();
+        scratch.run(&format!("{again} --break-width 0 -o unbroken.tif")).succeeds_quietly();
         let [meshed, plain, unbroken] =
             ["meshed.tif", "plain.tif", "unbroken.tif"].map(|name| scratch.layers(name));
         assert_eq!((plain.len(), meshed.len(), unbroken.len()), (76, 76 + BASE, 76 + BASE));

@@ -22,6 +22,18 @@ pub struct HeightOptions {
     pub resample: bool,
 }
 
+impl HeightOptions {
+    /// Returns the options for the build's first page, after a space.
+    pub(super) fn options(self) -> &'static str {
+        match (self.settle, self.resample) {
+            (false, false) => "",
+            (true, false) => " --settle",
+            (false, true) => " --resample",
+            (true, true) => " --settle --resample",
+        }
+    }
+}
+
 /// Heights nearer than this are the same, in micrometres.
 const TOLERANCE_UM: f64 = 1.0;
 

@@ -182,7 +182,10 @@ impl Layout {
         E: From<TileError> + Send,
     {
         assert_eq!(stacks.len(), self.parts.len(), "a stack for each part");
-        self.resampled = heights.resample && stacks.len() > 1;
+        if stacks.len() > 1 {
+            self.resampled = heights.resample;
+            self.command.push_str(heights.options());
+        }
         let names = self.parts.iter().map(|part| part.name().to_owned()).collect();
         let mesh = self.mesh.clone();
         let mesh_bytes = mesh.as_ref().map_or(0, BuildMesh::bytes);

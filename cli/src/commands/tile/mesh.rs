@@ -41,7 +41,7 @@ pub(super) struct MeshArgs {
     moat: Option<Moat>,
 
     /// Width of the break lines, which cut the mesh from each part up, down, left and right to the
-    /// next part or the area's edge; 0um makes none [default: 500um]
+    /// next part or the area's edge; 0 makes none [default: 500um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
     break_width: Option<Length>,
 
