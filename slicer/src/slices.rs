@@ -292,7 +292,7 @@ impl Slices {
 
     /// Cuts a layer once more, with its plane moved up, but not past its neighbours' or
     /// out of the part. So 002 section 2.2.3 avoids sections that fail. Where doses add up, its
-    /// levels are those of a part without the layers above.
+    /// levels are those under white layers, if there are layers above.
     ///
     /// # Errors
     /// Returns an error if there is no such layer, or the file cannot be read.
