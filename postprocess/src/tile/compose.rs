@@ -6,11 +6,12 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use lamp_stack::{
-    Change, Combine, GrayMask, Image, MAX_RUNS, Mask, MaskBuilder, Op, RunImage, combine_rows,
-    place_row,
+    Change, Combine, GrayMask, Image, LevelChange, MAX_RUNS, Mask, MaskBuilder, Op, RunImage,
+    combine_rows, place_row,
 };
 
 use super::PixelSize;
+use super::mesh::{MeshRows, inlaid};
 
 /// An image and the places where it stands.
 pub(crate) struct PlacedImage {
@@ -28,15 +29,32 @@ pub(crate) enum ComposeError {
     TooManyRuns,
 }
 
-/// Puts images on a black build, which is gray if any of them is.
-pub(super) fn compose(images: &[PlacedImage], build: PixelSize) -> Result<Image, ComposeError> {
+/// Puts images on a build, which is gray if any of them is, and black around them except for a
+/// mesh.
+pub(super) fn compose(
+    images: &[PlacedImage],
+    build: PixelSize,
+    mesh: Option<&MeshRows>,
+) -> Result<Image, ComposeError> {
     if images.iter().all(|placed| matches!(placed.image, Image::Mask(_))) {
-        return compose_masks(images, build, false).map(Image::Mask);
+        return compose_masks(images, build, mesh, false).map(Image::Mask);
     }
     check_runs(images)?;
     let grays: Vec<_> = images.iter().map(|placed| gray_of(&placed.image)).collect();
     let mut gray = GrayMask::new(build.width);
-    merge(&grays, images, build, false, |row| {
+    let (mut walls, mut inlaid) = (Vec::new(), Vec::new());
+    merge(&grays, images, build, false, |index, row| {
+        let row = match mesh {
+            Some(mesh) => {
+                walls.clear();
+                let levels = [255, 0].into_iter().cycle();
+                let change = |(&column, level)| LevelChange { column, level };
+                walls.extend(mesh.row(index).iter().zip(levels).map(change));
+                Op::Union.rows(row, &walls, &mut inlaid);
+                &inlaid
+            }
+            None => row,
+        };
         gray.push_row(row).expect("copies stand on the build");
     })?;
     Ok(Image::Gray(gray))
@@ -47,7 +65,29 @@ pub(super) fn compose(images: &[PlacedImage], build: PixelSize) -> Result<Image,
 /// # Panics
 /// Panics if an image is gray.
 pub(crate) fn united(images: &[PlacedImage], build: PixelSize) -> Result<Mask, ComposeError> {
-    compose_masks(images, build, true)
+    compose_masks(images, build, None, true)
+}
+
+/// Calls `push` with the union of masks, which may overlap, in the rows that are `wanted`.
+///
+/// # Panics
+/// Panics if an image is gray.
+pub(super) fn merge_rows(
+    images: &[&PlacedImage],
+    build: PixelSize,
+    wanted: impl Fn(u32) -> bool,
+    mut push: impl FnMut(u32, &[u32]),
+) {
+    let masks = masks_of(images);
+    let mut row = MergedRow::new(build.width);
+    let done = for_each_row(images, build.height, |index, met| {
+        if wanted(index) {
+            row.merge(&masks, met);
+            push(index, &row.row);
+        }
+        Ok(())
+    });
+    done.expect("masks may overlap");
 }
 
 fn check_runs(images: &[PlacedImage]) -> Result<(), ComposeError> {
@@ -57,21 +97,40 @@ fn check_runs(images: &[PlacedImage]) -> Result<(), ComposeError> {
     if runs > MAX_RUNS { Err(ComposeError::TooManyRuns) } else { Ok(()) }
 }
 
-fn compose_masks(
-    images: &[PlacedImage],
-    build: PixelSize,
-    may_overlap: bool,
-) -> Result<Mask, ComposeError> {
-    check_runs(images)?;
-    let masks = images.iter().map(|placed| match &placed.image {
+/// Returns the images.
+///
+/// # Panics
+/// Panics if one is gray.
+fn masks_of(images: &[impl Borrow<PlacedImage>]) -> Vec<&Mask> {
+    let masks = images.iter().map(|placed| match &placed.borrow().image {
         Image::Mask(mask) => mask,
         Image::Gray(_) => panic!("gray images are composed apart"),
     });
-    let masks: Vec<&Mask> = masks.collect();
+    masks.collect()
+}
+
+fn compose_masks(
+    images: &[PlacedImage],
+    build: PixelSize,
+    mesh: Option<&MeshRows>,
+    may_overlap: bool,
+) -> Result<Mask, ComposeError> {
+    check_runs(images)?;
     let mut mask = MaskBuilder::new(build.width);
     let runs = images.iter().map(|placed| placed.at.len() * placed.image.change_count());
-    mask.reserve(build.height as usize, runs.sum());
-    merge(&masks, images, build, may_overlap, |row| {
+    mask.reserve(
+        build.height as usize,
+        runs.sum::<usize>() + mesh.map_or(0, MeshRows::change_count),
+    );
+    let mut with_mesh = Vec::new();
+    merge(&masks_of(images), images, build, may_overlap, |index, row| {
+        let row = match mesh {
+            Some(mesh) => {
+                inlaid(mesh.row(index), row, &mut with_mesh);
+                &with_mesh
+            }
+            None => row,
+        };
         mask.push_row(row).expect("copies stand on the build");
     })?;
     Ok(mask.finish())
@@ -84,20 +143,14 @@ fn merge<C: Change<Pixel: Combine>>(
     images: &[PlacedImage],
     build: PixelSize,
     may_overlap: bool,
-    mut push: impl FnMut(&[C]),
+    mut push: impl FnMut(u32, &[C]),
 ) -> Result<(), ComposeError> {
-    let mut row =
-        MergedRow { width: build.width, row: Vec::new(), one: Vec::new(), spare: Vec::new() };
-    for_each_row(images, build.height, |met| {
-        row.row.clear();
-        for &CopyRow { image, left, row: index } in met {
-            let source = sources[image].borrow();
-            let overlaps = row.add(source.row(index), source.width(), left);
-            if overlaps && !may_overlap {
-                return Err(ComposeError::Overlap);
-            }
+    let mut row = MergedRow::new(build.width);
+    for_each_row(images, build.height, |index, met| {
+        if row.merge(sources, met) && !may_overlap {
+            return Err(ComposeError::Overlap);
         }
-        push(&row.row);
+        push(index, &row.row);
         Ok(())
     })
 }
@@ -113,28 +166,28 @@ struct CopyRow {
 /// Calls `each` for every row of the build, from the top, with the rows of copies on it
 /// by their left columns.
 fn for_each_row(
-    images: &[PlacedImage],
+    images: &[impl Borrow<PlacedImage>],
     height: u32,
-    mut each: impl FnMut(&[CopyRow]) -> Result<(), ComposeError>,
+    mut each: impl FnMut(u32, &[CopyRow]) -> Result<(), ComposeError>,
 ) -> Result<(), ComposeError> {
     let mut waiting = BinaryHeap::new();
     for (image, placed) in images.iter().enumerate() {
-        waiting.extend(placed.at.iter().map(|&(left, top)| Reverse((top, left, image))));
+        waiting.extend(placed.borrow().at.iter().map(|&(left, top)| Reverse((top, left, image))));
     }
     let mut met: Vec<CopyRow> = Vec::new();
     for index in 0..height {
         met.retain_mut(|met| {
             met.row += 1;
-            met.row < images[met.image].image.height()
+            met.row < images[met.image].borrow().image.height()
         });
         while let Some(&Reverse((_, left, image))) = waiting.peek().filter(|at| at.0.0 == index) {
             waiting.pop();
-            if images[image].image.height() > 0 {
+            if images[image].borrow().image.height() > 0 {
                 let place = met.partition_point(|met| met.left <= left);
                 met.insert(place, CopyRow { image, left, row: 0 });
             }
         }
-        each(&met)?;
+        each(index, &met)?;
     }
     Ok(())
 }
@@ -148,6 +201,21 @@ struct MergedRow<C> {
 }
 
 impl<C: Change<Pixel: Combine>> MergedRow<C> {
+    fn new(width: u32) -> Self {
+        Self { width, row: Vec::new(), one: Vec::new(), spare: Vec::new() }
+    }
+
+    /// Makes it the union of copies' rows. Returns true if any overlap.
+    fn merge(&mut self, sources: &[impl Borrow<RunImage<C>>], copies: &[CopyRow]) -> bool {
+        self.row.clear();
+        let mut overlap = false;
+        for &CopyRow { image, left, row } in copies {
+            let source = sources[image].borrow();
+            overlap |= self.add(source.row(row), source.width(), left);
+        }
+        overlap
+    }
+
     /// Adds a copy's row. Returns true if it overlaps one that was added before.
     fn add(&mut self, changes: &[C], width: u32, left: u32) -> bool {
         let Some(first) = changes.first() else { return false };
@@ -215,7 +283,8 @@ mod tests {
             .iter()
             .zip(at)
             .map(|(image, at)| PlacedImage { image: image.clone(), at: at.to_vec() });
-        compose(&placed.collect::<Vec<_>>(), PixelSize { width, height }).map(|build| drawn(&build))
+        compose(&placed.collect::<Vec<_>>(), PixelSize { width, height }, None)
+            .map(|build| drawn(&build))
     }
 
     #[test]

@@ -23,14 +23,14 @@ mod tile_error;
 #[cfg(test)]
 mod tile_tests;
 
-use std::borrow::Cow;
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use lamp_stack::{Image, Layer, Length, Mask, Op, Orientation, Size, map_in_order};
+use lamp_stack::{Image, Layer, Length, MemorySize, Orientation, Size, map_in_order};
 
 use compose::ComposeError;
 use lockstep::{LayerSet, Lockstep};
-use mesh::{BuildMesh, on_base};
+use mesh::{BuildMesh, KeptMesh, MeshRows, on_base};
 
 pub use build_page::StrayRows;
 pub(crate) use compose::{PlacedImage, united};
@@ -154,6 +154,20 @@ fn unless_black<E: From<TileError>>(
     })
 }
 
+/// What a layer of the build is made of.
+struct MeshedStep {
+    set: LayerSet,
+    /// The images of parts that have a layer here.
+    images: Vec<(usize, Image)>,
+    mesh: Option<MeshRows>,
+}
+
+impl MemorySize for MeshedStep {
+    fn bytes(&self) -> usize {
+        self.set.bytes()
+    }
+}
+
 impl TileOptions {
     fn layout(&self, first: &Layer) -> Result<Layout, TileError> {
         let part = PartStack::of_image("the stack", first)?;
@@ -192,14 +206,25 @@ impl Layout {
         let named = stacks.into_iter().zip(&self.parts).enumerate();
         let stacks =
             named.map(|(k, (stack, part))| (part.name().to_owned(), self.copies_of(k), stack));
-        let steps = Lockstep::new(stacks, heights, mesh_bytes);
-        let layers = map_in_order(steps, move |step: LayerSet| {
-            let layer = Layer {
-                info: self.page(&step)?,
-                dpi: Some(self.dpi),
-                image: self.image(&step)?.into(),
+        let mut steps = Lockstep::new(stacks, heights, mesh_bytes);
+        let layout = Arc::new(self);
+        let meshed = layout.clone();
+        let mut kept = mesh.as_ref().map(|mesh| KeptMesh::new(mesh, &layout));
+        // In order, as the mesh of a layer is made from that of the one below.
+        let steps = std::iter::from_fn(move || {
+            let step = match steps.next()? {
+                Ok(step) => step,
+                Err(error) => return Some(Err(error)),
             };
-            Ok((layer, self.stray_rows(&step), self.exposed_parts(&step)))
+            Some(meshed.meshed_step(step, kept.as_mut()).map_err(E::from))
+        });
+        let layers = map_in_order(steps, move |step: MeshedStep| {
+            let layer = Layer {
+                info: layout.page(&step.set)?,
+                dpi: Some(layout.dpi),
+                image: layout.image(&step)?.into(),
+            };
+            Ok((layer, layout.stray_rows(&step.set), layout.exposed_parts(&step.set)))
         });
         let layers = layers.map(move |made| {
             let (layer, rows, exposed) = made?;
@@ -209,6 +234,30 @@ impl Layout {
         on_base(unless_black(layers, names), mesh)
     }
 
+    /// Adds the mesh to the parts' layers at a height.
+    fn meshed_step(
+        &self,
+        set: LayerSet,
+        kept: Option<&mut KeptMesh>,
+    ) -> Result<MeshedStep, TileError> {
+        let images =
+            self.layers_of(&set).map(|(part, known, layer)| Ok((part, known.framed(layer)?)));
+        let images: Vec<(usize, Image)> = images.collect::<Result<_, TileError>>()?;
+        let mesh = match (kept, &self.mesh) {
+            (Some(kept), Some(mesh)) => {
+                let rows = kept.next(mesh, self, &images);
+                Some(rows.ok_or_else(|| self.too_many_runs(&set))?)
+            }
+            _ => None,
+        };
+        Ok(MeshedStep { set, images, mesh })
+    }
+
+    fn too_many_runs(&self, set: &LayerSet) -> TileError {
+        let layer = set.some_layer().info.name();
+        TileError::TooManyRuns { copies: self.placements.len(), layer }
+    }
+
     /// Returns the parts that are not black at one height.
     fn exposed_parts(&self, step: &LayerSet) -> Vec<usize> {
         let exposed = self.layers_of(step).filter(|(_, _, layer)| layer.image.change_count() > 0);
@@ -216,41 +265,18 @@ impl Layout {
     }
 
     /// Returns the build's image: the parts, and the mesh around them.
-    fn image(&self, step: &LayerSet) -> Result<Image, TileError> {
-        let layers =
-            self.layers_of(step).map(|(part, known, layer)| Ok((part, known.framed(layer)?)));
-        let layers: Vec<(usize, Image)> = layers.collect::<Result<_, TileError>>()?;
-        let layer = || step.some_layer().info.name();
-        let too_many = || TileError::TooManyRuns { copies: self.placements.len(), layer: layer() };
-        let placed = self.placed_images(&layers).ok_or_else(too_many)?;
-        let parts = compose::compose(&placed, self.pixels).map_err(|fault| match fault {
-            ComposeError::TooManyRuns => too_many(),
+    fn image(&self, step: &MeshedStep) -> Result<Image, TileError> {
+        let placed =
+            self.placed_images(&step.images).ok_or_else(|| self.too_many_runs(&step.set))?;
+        let composed = compose::compose(&placed, self.pixels, step.mesh.as_ref());
+        composed.map_err(|fault| match fault {
+            ComposeError::TooManyRuns => self.too_many_runs(&step.set),
             // The layout was checked by outlines, so a layer is white outside its own.
             ComposeError::Overlap => {
-                let name = self.parts[layers[0].0].name().to_owned();
-                TileError::Changed { name, layer: layer() }
+                let name = self.parts[step.images[0].0].name().to_owned();
+                TileError::Changed { name, layer: step.set.some_layer().info.name() }
             }
-        })?;
-        let Some(mesh) = &self.mesh else { return Ok(parts) };
-        let moats = match &mesh.fixed_moats {
-            Some(moats) => Cow::Borrowed(moats),
-            None => Cow::Owned(self.moats(mesh, &layers).ok_or_else(too_many)?),
-        };
-        match &parts {
-            Image::Mask(parts) => Ok(Image::Mask(mesh.around(parts, &moats))),
-            Image::Gray(_) => {
-                let black = Mask::black(self.pixels.width, self.pixels.height);
-                let around = Image::Mask(mesh.around(&black, &moats));
-                parts.combined(Op::Union, &around).ok_or_else(too_many)
-            }
-        }
-    }
-
-    /// Returns the moats around parts' images, or `None` if these have too many runs.
-    fn moats(&self, mesh: &BuildMesh, images: &[(usize, Image)]) -> Option<Mask> {
-        let moat = |(part, image): &(usize, Image)| (*part, Image::Mask(mesh.moat(image)));
-        let moats = self.placed_images(&images.iter().map(moat).collect::<Vec<_>>())?;
-        united(&moats, self.pixels.grown(mesh.reach())).ok()
+        })
     }
 
     /// Orients parts' images in each way in which copies lie. Returns `None` if one

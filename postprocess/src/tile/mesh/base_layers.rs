@@ -16,6 +16,7 @@ pub(in crate::tile) fn on_base<E>(
     let count = mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
     let mut layers = layers.peekable();
     let mut next = 0;
+    let mut whole = None;
     std::iter::from_fn(move || {
         if next < count
             && let Ok(first) = layers.peek_mut()?
@@ -28,11 +29,12 @@ pub(in crate::tile) fn on_base<E>(
             if let Some(layers) = info.stack.as_mut().and_then(|stack| stack.layers.as_mut()) {
                 *layers += count;
             }
-            let layer = Layer { info, dpi: first.dpi, image: Image::Mask(mesh.whole()).into() };
+            let image = whole.get_or_insert_with(|| mesh.whole()).clone();
+            let layer = Layer { info, dpi: first.dpi, image: Image::Mask(image).into() };
             next += 1;
             return Some(Ok(layer));
         }
-        next = count;
+        (next, whole) = (count, None);
         let layer = layers.next()?;
         Some(layer.map(|mut layer| {
             layer.info.index += count;

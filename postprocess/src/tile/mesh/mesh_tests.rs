@@ -1,5 +1,7 @@
 //! Meshes against a pixel-by-pixel referee.
 
+use std::ops::Range;
+
 use lamp_stack::{GrayMask, Image, Layer, Length, Mask, MaskBuilder, Size, StackInfo};
 use proptest::prelude::*;
 
@@ -24,6 +26,13 @@ fn built(layout: &Layout, stacks: Vec<Vec<Layer>>) -> Vec<Layer> {
     let stacks = stacks.into_iter().map(|layers| layers.into_iter().map(Ok::<_, TileError>));
     let build = layout.clone().build(stacks.collect(), HeightOptions::default(), |_| {});
     build.collect::<Result<_, _>>().unwrap()
+}
+
+/// As [`built`], for stacks that may be black.
+fn built_or_black(layout: &Layout, stacks: Vec<Vec<Layer>>) -> Vec<Layer> {
+    let stacks = stacks.into_iter().map(|layers| layers.into_iter().map(Ok::<_, TileError>));
+    let build = layout.clone().build(stacks.collect(), HeightOptions::default(), |_| {});
+    build.map_while(Result::ok).collect()
 }
 
 fn mask(layer: &Layer) -> &Mask {
@@ -86,18 +95,42 @@ proptest! {
         let options =
             MeshOptions { break_width: Length::from_mm(break_width.into()), ..mesh(shape, lengths) };
         let meshed = layout.with_mesh(&options).unwrap();
-        let BuildMesh { breaks, .. } = meshed.mesh.as_ref().unwrap();
-        let walls = meshed.mesh.as_ref().unwrap().whole();
+        let walls = &meshed.mesh.as_ref().unwrap().standing;
         let stacks = parts.iter().map(|part| vec![layer(0, Image::Mask(part.clone()))]).collect();
         let build = built(&meshed, stacks);
         for (x, y) in pixels() {
             let is_part = alone.iter().any(|copy| copy.is_white(x, y));
             let is_free = free.iter().any(|free| free[place(x, y)]);
-            let is_cut = breaks.row(y).partition_point(|&column| column <= x) % 2 == 1;
-            let expected = is_part || (walls.is_white(x, y) && !is_free && !is_cut);
+            let is_wall = walls.row(y).partition_point(|&column| column <= x) % 2 == 1;
+            let expected = is_part || (is_wall && !is_free);
             prop_assert_eq!(mask(&build[0]).is_white(x, y), expected, "{}, {}", x, y);
         }
     }
+}
+
+/// What is kept from layer to layer changes no pixel: each layer is as if it were alone.
+#[test]
+fn layers_are_what_they_are_alone() {
+    let [wide, narrow] =
+        [mask_of(&["######"; 4]), mask_of(&["......", ".####.", ".####.", "......"])];
+    let black = Mask::black(6, 4);
+    let images = [&wide, &narrow, &narrow, &wide, &black, &narrow];
+    let copies = [(0, 5, 5, 0, false), (0, 30, 9, 90, false), (1, 17, 22, 0, true)];
+    let layout = layout(&[wide.clone(), disc()], &copies, "50x40mm").unwrap();
+    let layout = layout.with_mesh(&mesh(CellShape::Hexagon, [6.0, 2.0, 1.0])).unwrap();
+    let stack = |range: Range<usize>| -> Vec<Layer> {
+        let image = |k: usize| layer(k as u32, Image::Mask(images[k].clone()));
+        range.map(image).collect()
+    };
+    let lower = |range: Range<usize>| -> Vec<Layer> {
+        range.filter(|&k| k < 3).map(|k| layer(k as u32, Image::Mask(disc()))).collect()
+    };
+    let build = built_or_black(&layout, vec![stack(0..6), lower(0..6)]);
+    for (k, made) in build.iter().enumerate() {
+        let alone = built_or_black(&layout, vec![stack(k..k + 1), lower(k..k + 1)]);
+        assert!(mask(made) == mask(&alone[0]), "layer {k}");
+    }
+    assert_eq!(build.len(), 6);
 }
 
 const AREA: (u32, u32) = (70, 60);

@@ -7,33 +7,36 @@
 
 mod base_layers;
 mod break_lines;
+mod kept;
 mod lattice;
 mod mesh_options;
+mod mesh_rows;
 #[cfg(test)]
 mod mesh_tests;
 
-use lamp_stack::{Frame, Image, Length, Mask, MaskBuilder, Op, place_row, white_runs};
+use lamp_stack::{Frame, Length, Mask, MaskBuilder, Op, white_runs};
 
 use self::break_lines::{BreakLines, Rect};
 use self::lattice::{Lattice, toggle};
-use super::part_stack::white_of;
 use super::{Layout, PartStack, PixelSize, TileError};
 use crate::offset::{offset_one_bit, without_holes};
 
 pub(super) use base_layers::on_base;
+pub(super) use kept::KeptMesh;
 pub use mesh_options::{CellShape, MeshOptions, MeshPattern, Moat};
+pub(super) use mesh_rows::MeshRows;
 
 /// The mesh of a layout. Lengths are in pixels.
 #[derive(Clone, Debug)]
 pub(super) struct BuildMesh {
     lattice: Lattice,
-    breaks: BreakLines,
+    /// The walls that break lines leave.
+    standing: MeshRows,
     clearance: f64,
-    /// The moats of all layers, if they follow outlines.
-    pub(super) fixed_moats: Option<Mask>,
+    moat: Moat,
     pub(super) base_layers: u32,
     build: PixelSize,
-    /// The number of transitions in all rows, estimated.
+    /// The number of transitions in all rows, without moats.
     changes: usize,
 }
 
@@ -61,25 +64,21 @@ impl Layout {
                     .ok_or(TileError::ManyBreaks)?
             }
         };
+        if options.moat == Moat::Outline
+            && let Some(part) = self.parts.iter().find(|part| part.outline().is_none())
+        {
+            return Err(TileError::NoOutline { name: part.name().to_owned() });
+        }
         let mut mesh = BuildMesh {
             lattice,
-            breaks,
+            standing: MeshRows::default(),
             clearance,
-            fixed_moats: None,
+            moat: options.moat,
             base_layers: options.base_layers,
             build: self.pixels,
             changes: 0,
         };
-        mesh.changes = mesh.count_changes();
-        if options.moat == Moat::Outline {
-            let outline = |(index, part): (usize, &PartStack)| match part.outline() {
-                Some(outline) => Ok((index, Image::Mask(outline.clone()))),
-                None => Err(TileError::NoOutline { name: part.name().to_owned() }),
-            };
-            let outlines = self.parts.iter().enumerate().map(outline);
-            let moats = self.moats(&mesh, &outlines.collect::<Result<Vec<_>, _>>()?);
-            mesh.fixed_moats = Some(moats.ok_or(TileError::FineMesh)?);
-        }
+        mesh.stand(&breaks);
         self.mesh = Some(mesh);
         self.command += &options.command();
         Ok(self)
@@ -107,14 +106,15 @@ impl BuildMesh {
         (self.changes + self.build.height as usize) * size_of::<u32>()
     }
 
-    fn count_changes(&self) -> usize {
-        // Neighbouring rows are alike: one in eight is counted.
-        let mut row = Vec::new();
-        let mut count = |index: u32| {
-            self.wall_row(index, &mut row);
-            8 * row.len()
-        };
-        (0..self.build.height).step_by(8).map(&mut count).sum()
+    /// Makes the walls that break lines leave.
+    fn stand(&mut self, breaks: &BreakLines) {
+        let (mut wall, mut left) = (Vec::new(), Vec::new());
+        for index in 0..self.build.height {
+            self.wall_row(index, &mut wall);
+            Op::Difference.rows(&wall, breaks.row(index), &mut left);
+            self.standing.push(&left);
+        }
+        self.changes = self.standing.change_count();
     }
 
     /// Returns the number of pixels that a moat may reach beyond its part.
@@ -122,43 +122,20 @@ impl BuildMesh {
         self.clearance.ceil() as u32 + 1
     }
 
-    /// Returns the moat around a part's image, on an image that is larger by the
+    /// Returns the moat around what is white, on an image that is larger by the
     /// [`reach`](Self::reach) on every side. Cavities belong to it, as mesh in them
     /// would not come out.
-    pub(super) fn moat(&self, image: &Image) -> Mask {
+    fn moat(&self, white: &Mask) -> Mask {
         let reach = self.reach();
         let frame = Frame {
             left: -i64::from(reach),
             top: -i64::from(reach),
-            width: image.width() + 2 * reach,
-            height: image.height() + 2 * reach,
+            width: white.width() + 2 * reach,
+            height: white.height() + 2 * reach,
         };
         // Offsets round to whole pixels: half a pixel more leaves no less than the
         // clearance between the last pixel of the part and the first of the mesh.
-        let moat = offset_one_bit(&white_of(image).framed(frame), -(self.clearance + 0.5));
-        without_holes(&moat)
-    }
-
-    /// Returns the parts, and outside the moats and break lines the mesh. The moats
-    /// hold the parts, on an image that is larger than the build by the
-    /// [`reach`](Self::reach) on every side.
-    pub(super) fn around(&self, parts: &Mask, moats: &Mask) -> Mask {
-        let PixelSize { width, height } = self.build;
-        let reach = self.reach();
-        let mut mask = MaskBuilder::new(width);
-        mask.reserve(height as usize, self.changes + parts.change_count());
-        let (mut wall, mut moat, mut free) = (Vec::new(), Vec::new(), Vec::new());
-        let mut row = Vec::new();
-        for index in 0..height {
-            self.wall_row(index, &mut wall);
-            moat.clear();
-            let transitions = moats.row(index + reach);
-            place_row(transitions, moats.width(), -i64::from(reach), width, &mut moat);
-            Op::Union.rows(&moat, self.breaks.row(index), &mut free);
-            inlaid(&wall, &free, parts.row(index), width, &mut row);
-            mask.push_row(&row).expect("columns rise");
-        }
-        mask.finish()
+        without_holes(&offset_one_bit(&white.framed(frame), -(self.clearance + 0.5)))
     }
 
     /// Returns the mesh without moats and break lines.
@@ -185,33 +162,55 @@ impl BuildMesh {
     }
 }
 
-/// Replaces `out` by a row of walls, with its `free` columns cut out and the parts, all
-/// of which lie in these, put in.
-fn inlaid(mut wall: &[u32], free: &[u32], mut part: &[u32], width: u32, out: &mut Vec<u32>) {
+/// Replaces `out` by a row of walls without its `free` columns.
+fn cut(mut wall: &[u32], free: &[u32], width: u32, out: &mut Vec<u32>) {
     out.clear();
     // Whether the rest of the walls begins white.
     let mut is_wall = false;
     for (start, end) in white_runs(free, width) {
-        let before = wall.partition_point(|&column| column < start);
+        let before = count_below(wall, start);
         out.extend_from_slice(&wall[..before]);
-        wall = &wall[before..];
         is_wall ^= before % 2 == 1;
         if is_wall {
             toggle(start, width, out);
         }
-        if end == width {
-            part.iter().for_each(|&column| toggle(column, width, out));
-            return;
-        }
-        let within = part.partition_point(|&column| column <= end);
-        part[..within].iter().for_each(|&column| toggle(column, width, out));
-        part = &part[within..];
-        let hidden = wall.partition_point(|&column| column <= end);
+        let hidden = before + count_below(&wall[before..], end + 1);
+        is_wall ^= (hidden - before) % 2 == 1;
         wall = &wall[hidden..];
-        is_wall ^= hidden % 2 == 1;
         if is_wall {
             toggle(end, width, out);
         }
     }
     out.extend_from_slice(wall);
+}
+
+/// Replaces `out` by a row of mesh with a row of parts, all of which lie in its gaps, put in.
+pub(super) fn inlaid(mut mesh: &[u32], mut parts: &[u32], out: &mut Vec<u32>) {
+    out.clear();
+    while let Some(&next) = parts.first() {
+        let before = count_below(mesh, next);
+        out.extend_from_slice(&mesh[..before]);
+        mesh = &mesh[before..];
+        match mesh.first() {
+            None => break,
+            // White goes on where a part and a wall touch.
+            Some(&column) if column == next => (mesh, parts) = (&mesh[1..], &parts[1..]),
+            Some(&column) => {
+                let within = count_below(parts, column);
+                out.extend_from_slice(&parts[..within]);
+                parts = &parts[within..];
+            }
+        }
+    }
+    out.extend_from_slice(parts);
+    out.extend_from_slice(mesh);
+}
+
+/// Returns the number of transitions before a column. It is found from the left, as there are only
+/// some between two copies, while halving the row would read all over it.
+fn count_below(row: &[u32], column: u32) -> usize {
+    let (groups, _) = row.as_chunks::<16>();
+    let before = 16 * groups.iter().take_while(|group| group[15] < column).count();
+    let next = &row[before..row.len().min(before + 16)];
+    before + next.iter().filter(|&&place| place < column).count()
 }

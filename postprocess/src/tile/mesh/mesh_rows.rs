@@ -1,0 +1,31 @@
+//! The rows of a mesh, shared by all layers in which they are the same.
+
+use std::sync::Arc;
+
+/// The transitions of each row of a mesh. Copies share rows that are not changed.
+#[derive(Clone, Debug, Default)]
+pub(in crate::tile) struct MeshRows {
+    rows: Arc<Vec<Arc<[u32]>>>,
+}
+
+impl MeshRows {
+    /// Returns a row's transitions.
+    pub(in crate::tile) fn row(&self, row: u32) -> &[u32] {
+        &self.rows[row as usize]
+    }
+
+    /// Returns the number of transitions in all rows.
+    pub(in crate::tile) fn change_count(&self) -> usize {
+        self.rows.iter().map(|row| row.len()).sum()
+    }
+
+    /// Adds a row below the others.
+    pub(super) fn push(&mut self, row: &[u32]) {
+        Arc::make_mut(&mut self.rows).push(row.into());
+    }
+
+    /// Returns the rows, to be replaced.
+    pub(super) fn rows_mut(&mut self) -> &mut [Arc<[u32]>] {
+        Arc::make_mut(&mut self.rows).as_mut_slice()
+    }
+}
