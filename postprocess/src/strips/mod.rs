@@ -11,8 +11,10 @@
 //! columns with the next swath, so that no seam shows: there the dose of one falls as that of the
 //! other rises, and their sum is the layer's.
 
+mod cut;
 mod index;
 mod join_swaths;
+mod ramps;
 mod read;
 mod strips_error;
 #[cfg(test)]
@@ -21,7 +23,7 @@ mod write;
 
 use std::ops::Range;
 
-use lamp_stack::{Frame, GrayMask, Image, Layer, gray_runs};
+use lamp_stack::{Frame, Image, Layer, LayerImage, PageInfo};
 use serde_json::json;
 use thiserror::Error;
 
@@ -45,7 +47,7 @@ pub use write::StripWriter;
 /// assert_eq!((swaths.count(), swaths.columns(1)), (3, 6..16));
 ///
 /// let layer = Image::Mask(Mask::black(22, 5).inverted());
-/// let cut: Vec<Image> = (0..3).map(|swath| swaths.cut(&layer, swath)).collect();
+/// let cut: Vec<Image> = swaths.cut(&layer, 0..3);
 /// assert_eq!(swaths.join(&cut)?, layer.to_gray().into_owned());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -104,35 +106,23 @@ impl Swaths {
         self.mirrors - self.overlap
     }
 
-    /// Returns the image of a swath, as wide as there are mirrors. In shared columns the levels of
-    /// the two swaths add up to the layer's exactly.
-    ///
-    /// # Panics
-    /// Panics if the image is not as wide as the layers, or there is no such swath.
-    pub fn cut(&self, image: &Image, swath: u32) -> Image {
-        assert_eq!(image.width(), self.width);
-        assert!(swath < self.count());
-        let columns = self.columns(swath);
-        let (left, height) = (i64::from(columns.start), image.height());
-        let cut = image.framed(Frame { left, top: 0, width: self.mirrors, height });
-        match cut {
-            Image::Mask(mask) if self.overlap == 0 || self.count() == 1 => Image::Mask(mask),
-            Image::Mask(mask) => Image::Gray(self.ramped(&GrayMask::from(&mask), swath)),
-            Image::Gray(gray) => Image::Gray(self.ramped(&gray, swath)),
-        }
-    }
-
-    /// Returns a layer's swath. Its page says under `strip` its number, the number of swaths, the
-    /// columns of the build that it exposes, and the bits of the build's pixels.
+    /// Returns some of a layer's swaths. Their pages say under `strip` the swath's number, the number
+    /// of swaths, the columns of the build that it exposes, and the bits of the build's pixels.
     ///
     /// # Panics
     /// Panics if [`cut`](Self::cut) does.
-    pub fn cut_layer(&self, layer: &Layer, swath: u32) -> Layer {
-        let image = match *layer.image {
+    pub fn cut_layer(&self, layer: &Layer, swaths: Range<u32>) -> Vec<Layer> {
+        let images: Vec<LayerImage> = match *layer.image {
             // One swath is the layer itself: nothing is to be encoded again.
-            Image::Mask(_) if self.mirrors == self.width => layer.image.clone(),
-            _ => self.cut(&layer.image, swath).into(),
+            Image::Mask(_) if self.mirrors == self.width => vec![layer.image.clone()],
+            _ => self.cut(&layer.image, swaths.clone()).into_iter().map(LayerImage::from).collect(),
         };
+        let page = |(image, swath)| Layer { info: self.page(layer, swath), dpi: layer.dpi, image };
+        images.into_iter().zip(swaths).map(page).collect()
+    }
+
+    /// Returns the page of a layer's swath.
+    fn page(&self, layer: &Layer, swath: u32) -> PageInfo {
         let Range { start, end } = self.columns(swath);
         let mut info = layer.info.clone();
         // The first swath's image lies where the build's does.
@@ -148,7 +138,7 @@ impl Swaths {
         if let Some(stack) = &mut info.stack {
             stack.commands.push(self.command(swath));
         }
-        Layer { info, dpi: layer.dpi, image }
+        info
     }
 
     /// Returns the command that a swath's first page records.
@@ -156,36 +146,4 @@ impl Swaths {
         let Self { mirrors, overlap, .. } = self;
         format!("strip {swath} --mirrors {mirrors} --overlap {overlap}")
     }
-
-    /// Returns what a swath exposes of an image of its columns.
-    fn ramped(&self, image: &GrayMask, swath: u32) -> GrayMask {
-        let overlap = self.overlap;
-        let rises = if swath == 0 { 0 } else { overlap };
-        let falls = if swath + 1 == self.count() { self.mirrors } else { self.mirrors - overlap };
-        let mut out = GrayMask::new(self.mirrors);
-        let mut runs = Vec::new();
-        for changes in image.rows() {
-            runs.clear();
-            let mut last = 0;
-            for (start, end, level) in gray_runs(changes, self.mirrors) {
-                runs.push((start - last, 0));
-                runs.extend((start..end.min(rises)).map(|c| (1, second_share(level, c, overlap))));
-                let plain = start.max(rises)..end.min(falls);
-                runs.push((plain.len() as u32, level));
-                let fall = |c| (1, level - second_share(level, c - falls, overlap));
-                runs.extend((start.max(falls)..end).map(fall));
-                last = end;
-            }
-            out.push_runs(runs.iter().copied()).expect("runs as wide as the swath");
-        }
-        out
-    }
-}
-
-/// Returns what the second of two swaths exposes of a level in a shared column, counted from the
-/// first shared one: it rises in equal steps. The first swath exposes the rest.
-fn second_share(level: u8, column: u32, overlap: u32) -> u8 {
-    let (steps, all) = (u64::from(column) + 1, u64::from(overlap) + 1);
-    // Rounded to the nearest level.
-    ((2 * u64::from(level) * steps + all) / (2 * all)) as u8
 }

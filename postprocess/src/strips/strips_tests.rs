@@ -1,6 +1,6 @@
 //! Swaths cut and put back together.
 
-use lamp_stack::{Dpi, Mask, PageInfo};
+use lamp_stack::{Dpi, GrayMask, Mask, PageInfo};
 use proptest::prelude::*;
 
 use super::*;
@@ -32,7 +32,9 @@ proptest! {
         let overlap = shared.min((mirrors - 1) / 2);
         let swaths = Swaths::new(mirrors, overlap, width).unwrap();
         let layer = image(width, &rows, levels);
-        let cut: Vec<Image> = (0..swaths.count()).map(|k| swaths.cut(&layer, k)).collect();
+        let cut = swaths.cut(&layer, 0..swaths.count());
+        let apart = (0..swaths.count()).map(|k| swaths.cut(&layer, k..k + 1).remove(0));
+        prop_assert!(apart.eq(cut.iter().cloned()));
         prop_assert!(cut.iter().all(|swath| swath.width() == mirrors));
         for row in 0..layer.height() {
             for column in 0..width {
@@ -58,7 +60,7 @@ fn ramps_rise_in_equal_steps_and_fall_alike() {
     assert_eq!((swaths.count(), swaths.columns(1), swaths.columns(2)), (3, 6..16, 12..22));
     let white = Image::Mask(Mask::black(22, 1).inverted());
     let levels = |k| {
-        let cut = swaths.cut(&white, k);
+        let cut = swaths.cut(&white, k..k + 1).remove(0);
         (0..10).map(|column| cut.level(column, 0)).collect::<Vec<_>>()
     };
     assert_eq!(levels(0), [255, 255, 255, 255, 255, 255, 204, 153, 102, 51]);
@@ -79,7 +81,7 @@ fn a_page_says_where_its_swath_lies() {
     let info = PageInfo { origin_mm: Some([1.0, 5.0]), stray_rows: vec![0], ..PageInfo::default() };
     let image = Image::Mask(Mask::black(22, 1));
     let layer = Layer { info, dpi: Dpi::new(25.4), image: image.into() };
-    let swath = Swaths::new(10, 4, 22).unwrap().cut_layer(&layer, 2);
+    let swath = Swaths::new(10, 4, 22).unwrap().cut_layer(&layer, 2..3).remove(0);
     assert_eq!(swath.info.origin_mm, Some([13.0, 5.0]));
     assert_eq!(swath.info.stray_rows, [0]);
     assert_eq!(

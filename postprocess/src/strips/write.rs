@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::BufWriter;
+use std::ops::Range;
 
 use lamp_stack::{
     EncodedPage, FolderBeside, Format, Layer, MAX_SIDE, MemorySize, PageWriter, StackError,
@@ -71,12 +72,22 @@ impl StripWriter {
         if size != first {
             return Err(StripsError::Size { layer: layer.info.name(), size, first });
         }
-        let cuts = (0..swaths.count()).map(|swath| Ok(SwathCut { layer, swaths, swath }));
-        let pages = map_in_order(cuts, |SwathCut { layer, swaths, swath }| {
-            Ok::<_, StripsError>(EncodedPage::new(&swaths.cut_layer(layer, swath)))
+        // A thread goes through a row once for all of its swaths.
+        let count = swaths.count();
+        let a_thread = count.div_ceil(rayon::current_num_threads() as u32) as usize;
+        let shares = (0..count).step_by(a_thread).map(|first| {
+            let swaths = first..count.min(first + a_thread as u32);
+            Ok::<_, StripsError>(SwathsOfThread { layer, swaths })
         });
-        for (page, file) in pages.zip(&mut open.files) {
-            file.push(page?)?;
+        let pages = map_in_order(shares, |share| {
+            let layers = swaths.cut_layer(share.layer, share.swaths);
+            Ok(layers.iter().map(EncodedPage::new).collect::<Vec<_>>())
+        });
+        let mut files = open.files.iter_mut();
+        for pages in pages {
+            for (page, file) in pages?.into_iter().zip(&mut files) {
+                file.push(page)?;
+            }
         }
         open.layers += 1;
         Ok(())
@@ -124,17 +135,15 @@ impl OpenStrips {
     }
 }
 
-/// A swath of a layer that is to be cut.
-struct SwathCut<'a> {
+/// The swaths of a layer that a thread cuts.
+struct SwathsOfThread<'a> {
     layer: &'a Layer,
-    swaths: Swaths,
-    swath: u32,
+    swaths: Range<u32>,
 }
 
-impl MemorySize for SwathCut<'_> {
+impl MemorySize for SwathsOfThread<'_> {
     fn bytes(&self) -> usize {
-        // About its share of the runs, and the levels of its ramps.
-        let ramps = 16 * self.swaths.overlap as usize * self.layer.image.height() as usize;
-        self.layer.bytes() / self.swaths.count() as usize + ramps
+        // As much as makes one of them enough for a thread.
+        self.layer.bytes()
     }
 }

@@ -1,0 +1,144 @@
+//! Cuts the rows of an image into those of swaths, in one pass from the left.
+
+use std::ops::Range;
+
+use lamp_stack::{Change, GrayMask, Image, LevelChange, Mask, RunImage};
+
+use super::Swaths;
+use super::ramps::Ramps;
+
+impl Swaths {
+    /// Returns the images of some of the swaths, each as wide as there are mirrors. In shared
+    /// columns the levels of the two swaths add up to the layer's exactly.
+    ///
+    /// Each row is gone through once, from the first of these swaths on.
+    ///
+    /// # Panics
+    /// Panics if the image is not as wide as the layers, or there are no such swaths.
+    pub fn cut(&self, image: &Image, swaths: Range<u32>) -> Vec<Image> {
+        assert_eq!(image.width(), self.width);
+        assert!(swaths.end <= self.count());
+        if self.overlap > 0 && self.count() > 1 {
+            return self.ramped(image, swaths).into_iter().map(Image::Gray).collect();
+        }
+        match image {
+            Image::Mask(mask) => {
+                let whole =
+                    |SwathRows { ends, changes, .. }| Mask::new(self.mirrors, ends, changes);
+                let cut = self.cut_rows(mask, swaths).into_iter().map(whole);
+                cut.map(|mask| Image::Mask(mask.expect("transitions within the swath"))).collect()
+            }
+            Image::Gray(gray) => {
+                let cut = self.cut_rows(gray, swaths).into_iter();
+                cut.map(|rows| Image::Gray(rows.into_gray())).collect()
+            }
+        }
+    }
+
+    /// Returns the rows of swaths that share nothing.
+    fn cut_rows<C: Change>(&self, image: &RunImage<C>, swaths: Range<u32>) -> Vec<SwathRows<C>> {
+        let room = image.change_count() / self.count() as usize / 4 * 5;
+        let rows = || SwathRows::new(self.mirrors, image.height() as usize, room);
+        let mut cut: Vec<_> = swaths.clone().map(|_| rows()).collect();
+        let first = self.columns(swaths.start).start;
+        for changes in image.rows() {
+            // The changes left of the next swath.
+            let mut at = match first {
+                0 => 0,
+                first => changes.partition_point(|change| change.column() < first),
+            };
+            for (rows, swath) in cut.iter_mut().zip(swaths.clone()) {
+                let Range { start, end } = self.columns(swath);
+                at = rows.push(changes, at, start..end, start);
+            }
+        }
+        cut
+    }
+
+    /// Returns what swaths expose of an image where their levels rise and fall.
+    fn ramped(&self, image: &Image, swaths: Range<u32>) -> Vec<GrayMask> {
+        let mut cut: Vec<_> = swaths.clone().map(|_| GrayMask::new(self.mirrors)).collect();
+        let mut ramps = Ramps::new(self.overlap);
+        let (mut runs, mut changes): (Vec<(u32, u32, u8)>, _) = (Vec::new(), Vec::new());
+        for row in 0..image.height() {
+            runs.clear();
+            runs.extend(image.runs(row));
+            // The first run that reaches into the next swath.
+            let mut at = 0;
+            for (out, swath) in cut.iter_mut().zip(swaths.clone()) {
+                let Range { start, end } = self.columns(swath);
+                at += runs[at..].iter().take_while(|run| run.1 <= start).count();
+                let shown = runs[at..].iter().take_while(|run| run.0 < end);
+                let shown = shown.map(|&(from, to, level)| {
+                    (from.saturating_sub(start), to.min(end) - start, level)
+                });
+                let rises = if swath == 0 { 0 } else { self.overlap };
+                let falls = if swath + 1 == self.count() { self.mirrors } else { self.step() };
+                changes.clear();
+                ramps.add(shown, rises..falls, &mut changes);
+                changes.pop_if(|change| change.column == self.mirrors);
+                out.push_row(&changes).expect("runs within the swath");
+            }
+        }
+        cut
+    }
+}
+
+/// The rows of a swath, as those of a [`RunImage`].
+struct SwathRows<C> {
+    width: u32,
+    /// The number of changes up to each row's end, after a zero.
+    ends: Vec<u32>,
+    changes: Vec<C>,
+}
+
+impl<C: Change> SwathRows<C> {
+    /// Starts a swath, with room for so many rows and changes.
+    fn new(width: u32, rows: usize, changes: usize) -> Self {
+        let mut ends = Vec::with_capacity(rows + 1);
+        ends.push(0);
+        Self { width, ends, changes: Vec::with_capacity(changes) }
+    }
+
+    /// Adds a row: the columns of `taken` of an image's row, with `left` as the first. `at` is the
+    /// number of changes left of them; returns the number left of their end.
+    #[inline]
+    fn push(&mut self, row: &[C], at: usize, taken: Range<u32>, left: u32) -> usize {
+        let within = row[at..].iter().take_while(|change| change.column() < taken.end).count();
+        let (end, black) = (at + within, C::Pixel::default());
+        let mut pixel = C::last_pixel(&row[..at]);
+        let mut shown = &row[at..end];
+        if pixel != black {
+            match shown.split_first() {
+                Some((&first, rest)) if first.column() == taken.start => {
+                    pixel = first.after(pixel);
+                    shown = rest;
+                }
+                _ => {}
+            }
+        }
+        if pixel != black {
+            self.changes.push(C::new(taken.start - left, pixel));
+        }
+        self.changes.extend(shown.iter().map(|&change| {
+            pixel = change.after(pixel);
+            C::new(change.column() - left, pixel)
+        }));
+        if pixel != black && taken.end - left < self.width {
+            self.changes.push(C::new(taken.end - left, black));
+        }
+        self.ends.push(self.changes.len() as u32);
+        end
+    }
+}
+
+impl SwathRows<LevelChange> {
+    fn into_gray(self) -> GrayMask {
+        let mut gray = GrayMask::new(self.width);
+        for ends in self.ends.windows(2) {
+            let changes = &self.changes[ends[0] as usize..ends[1] as usize];
+            gray.push_row(changes).expect("changes within the swath");
+        }
+        gray
+    }
+}
