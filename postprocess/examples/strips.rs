@@ -5,7 +5,7 @@
 //! slice blade.stl --dpi 1500 --thickness 100um --layers 600..612 -o blade.tif
 //! cargo build --release -p lamp-postprocess --example strips
 //! time target/release/examples/strips blade.tif build
-//! time target/release/examples/strips blade.tif strips/ 1920 64
+//! time target/release/examples/strips blade.tif strips/ 1920 64 comb
 //! ```
 
 use std::fs::File;
@@ -22,7 +22,7 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [part, out, numbers @ ..] = &arguments[..] else {
-        return Err("give a part's stack, and build or a folder, mirrors and overlap".into());
+        return Err("give a part's stack, and build or a folder, mirrors, overlap and seam".into());
     };
     let layers: Vec<Layer> =
         Pages::open(Path::new(part))?.map(|page| page?.decode()).collect::<Result<_, _>>()?;
@@ -43,16 +43,17 @@ fn main() -> Result<(), Failure> {
             }
             pages.finish()?;
         }
-        [mirrors, overlap] => {
+        [mirrors, overlap, seam] => {
             let folder = FolderBeside::replacing(Path::new(out))?;
+            let (mirrors, overlap) = (mirrors.parse()?, overlap.parse()?);
             let mut strips =
-                StripWriter::new(folder, mirrors.parse()?, overlap.parse()?, Format::Big)?;
+                StripWriter::new(folder, mirrors, overlap, seam.parse()?, Format::Big)?;
             for layer in build {
                 strips.push(&layer?)?;
             }
             strips.finish()?;
         }
-        _ => return Err("give mirrors and overlap".into()),
+        _ => return Err("give mirrors, overlap and seam".into()),
     }
     Ok(())
 }

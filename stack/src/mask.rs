@@ -38,14 +38,19 @@ impl Mask {
     /// Returns the number of white pixels.
     pub fn white_pixels(&self) -> u64 {
         let (ends, transitions) = self.row_ends_and_changes();
+        // No sum passes the 2^64 pixels of an image.
+        let run =
+            |sum: u64, [start, end]: &[u32; 2]| sum.wrapping_add(end.wrapping_sub(*start).into());
         if ends.iter().all(|end| end.is_multiple_of(2)) {
-            // Every pair is a run. No sum passes the 2^64 pixels of an image.
-            let run = |sum: u64, [start, end]: &[u32; 2]| {
-                sum.wrapping_add(end.wrapping_sub(*start).into())
-            };
+            // Every pair is a run.
             return transitions.as_chunks().0.iter().fold(0, run);
         }
-        self.rows().map(|row| white_in_row(row, self.width())).sum()
+        let row = |sum, row: &[u32]| {
+            let (runs, last) = row.as_chunks();
+            let sum = runs.iter().fold(sum, run);
+            last.iter().fold(sum, |sum, &start| run(sum, &[start, self.width()]))
+        };
+        self.rows().fold(0, row)
     }
 
     /// Returns true if the pixel is white. Pixels outside the image are black.

@@ -59,6 +59,7 @@ fn check_sum(scratch: &Scratch, folder: &str, build: &str) -> Vec<Vec<Layer>> {
     for (k, layer) in build.iter().enumerate() {
         let expected = levels(&layer.image);
         let mut sum = vec![vec![0; layer.image.width() as usize]; expected.len()];
+        let mut exposures = 0;
         for (strip, listed) in strips.iter().zip(listed) {
             let page = &strip[k].info;
             let facts =
@@ -72,10 +73,13 @@ fn check_sum(scratch: &Scratch, folder: &str, build: &str) -> Vec<Vec<Layer>> {
             for (sum, row) in sum.iter_mut().zip(levels(&strip[k].image)) {
                 for (column, level) in (start..).zip(row).filter(|(_, level)| *level > 0) {
                     sum[column] += level;
+                    exposures += 1;
                 }
             }
         }
         assert!(sum == expected, "layer {k} of {folder}");
+        let white = expected.iter().flatten().filter(|level| **level > 0).count();
+        assert!(exposures == white || index["seam"] == "gray", "layer {k} of {folder}");
     }
     strips
 }
@@ -84,9 +88,12 @@ fn check_sum(scratch: &Scratch, folder: &str, build: &str) -> Vec<Vec<Layer>> {
 fn strips_add_up_to_the_build_and_join_to_its_bytes() {
     let scratch = with_tower();
     for (k, (options, files, gray)) in [
-        ("--mirrors 100 --overlap 20", 3, true),
+        ("--mirrors 100 --overlap 20", 3, false),
+        ("--mirrors 100 --overlap 20 --seam gray", 3, true),
         ("--mirrors 64", 4, false),
-        ("--mirrors 75 --overlap 37", 6, true),
+        ("--mirrors 75 --overlap 37", 6, false),
+        ("--mirrors 75 --overlap 37 --seam gray", 6, true),
+        ("--mirrors 30 --overlap 14", 14, false),
         ("--mirrors 300 --overlap 40", 1, false),
     ]
     .into_iter()
@@ -115,7 +122,8 @@ fn strips_add_up_to_the_build_and_join_to_its_bytes() {
     assert_eq!(columns, [&json!([0, 100]), &json!([80, 180]), &json!([160, 236])]);
     let first = scratch.layers("strips0/strip_001.tif").remove(0).info;
     let commands = first.stack.unwrap().commands;
-    assert_eq!(commands.last().unwrap(), "strip 1 --mirrors 100 --overlap 20");
+    assert_eq!(commands.last().unwrap(), "strip 1 --mirrors 100 --overlap 20 --seam comb");
+    assert_eq!(index["seam"], "comb");
     assert_eq!(
         first.other["strip"],
         json!({"number": 1, "of": 3, "columns": [80, 180], "bits": 1})
@@ -200,7 +208,7 @@ fn dithered_strips_give_seams_their_full_dose() {
         [Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(white).into() }],
     );
     scratch
-        .run("tile white.tif --area 320x320mm --mesh none --strips s --mirrors 192 --overlap 64")
+        .run("tile white.tif --area 320x320mm --mesh none --strips s --mirrors 192 --overlap 64 --seam gray")
         .succeeds_quietly();
     let dots = |k: u32| {
         scratch.run(&format!("dither -q s/strip_00{k}.tif -o {k}.tif")).succeeds();
@@ -230,6 +238,7 @@ fn what_cannot_be_cut_leaves_nothing() {
         ("--strips s --machine alpha", &["--mirrors", "alpha has no [strips]"]),
         ("--mirrors 100", &["--strips"]),
         ("--overlap 3", &["--strips"]),
+        ("--seam gray", &["--strips"]),
         ("--strips s --mirrors 0", &["--mirrors"]),
         ("--strips s --mirrors 100 --overlap 50", &["share less than half"]),
         ("--strips s --mirrors 99999999", &["wider than any image"]),
@@ -264,7 +273,7 @@ fn what_cannot_be_cut_leaves_nothing() {
 #[test]
 fn strips_that_do_not_belong_together_are_named() {
     let scratch = with_tower();
-    let strips = "--mirrors 100 --overlap 20";
+    let strips = "--mirrors 100 --overlap 20 --seam gray";
     let cut = |folder: &str, more: &str| {
         scratch.run(&format!("{TILE} {strips} --strips {folder} {more}")).succeeds_quietly();
     };

@@ -4,55 +4,74 @@ use std::ops::Range;
 
 use lamp_stack::{Change, GrayMask, Image, LevelChange, Mask, RunImage};
 
-use super::Swaths;
 use super::ramps::Ramps;
+use super::seam::tooth;
+use super::{Seam, Swaths};
 
 impl Swaths {
     /// Returns the images of some of the swaths, each as wide as there are mirrors. In shared
-    /// columns the levels of the two swaths add up to the layer's exactly.
+    /// columns the levels of the two swaths add up to the layer's exactly. A comb's teeth depend on
+    /// the index of the layer.
     ///
     /// Each row is gone through once, from the first of these swaths on.
     ///
     /// # Panics
     /// Panics if the image is not as wide as the layers, or there are no such swaths.
-    pub fn cut(&self, image: &Image, swaths: Range<u32>) -> Vec<Image> {
+    pub fn cut<'a>(
+        &self,
+        image: &'a Image,
+        layer: u32,
+        swaths: Range<u32>,
+    ) -> Box<dyn Iterator<Item = Image> + 'a> {
         assert_eq!(image.width(), self.width);
         assert!(swaths.end <= self.count());
-        if self.overlap > 0 && self.count() > 1 {
-            return self.ramped(image, swaths).into_iter().map(Image::Gray).collect();
+        if self.seam == Seam::Gray && self.overlap > 0 && self.count() > 1 {
+            return Box::new(self.ramped(image, swaths).into_iter().map(Image::Gray));
         }
         match image {
             Image::Mask(mask) => {
-                let whole =
-                    |SwathRows { ends, changes, .. }| Mask::new(self.mirrors, ends, changes);
-                let cut = self.cut_rows(mask, swaths).into_iter().map(whole);
-                cut.map(|mask| Image::Mask(mask.expect("transitions within the swath"))).collect()
+                let cut = self.cut_rows(mask, layer, swaths).into_iter();
+                Box::new(cut.map(|rows| Image::Mask(rows.into_mask())))
             }
             Image::Gray(gray) => {
-                let cut = self.cut_rows(gray, swaths).into_iter();
-                cut.map(|rows| Image::Gray(rows.into_gray())).collect()
+                let cut = self.cut_rows(gray, layer, swaths).into_iter();
+                Box::new(cut.map(|rows| Image::Gray(rows.into_gray())))
             }
         }
     }
 
-    /// Returns the rows of swaths that share nothing.
-    fn cut_rows<C: Change>(&self, image: &RunImage<C>, swaths: Range<u32>) -> Vec<SwathRows<C>> {
+    /// Returns the rows of swaths that share no pixel.
+    fn cut_rows<C: Change>(
+        &self,
+        image: &RunImage<C>,
+        layer: u32,
+        swaths: Range<u32>,
+    ) -> Vec<SwathRows<C>> {
         let room = image.change_count() / self.count() as usize / 4 * 5;
         let rows = || SwathRows::new(self.mirrors, image.height() as usize, room);
         let mut cut: Vec<_> = swaths.clone().map(|_| rows()).collect();
-        let first = self.columns(swaths.start).start;
-        for changes in image.rows() {
+        for (changes, row) in image.rows().zip(0..) {
+            let tooth = tooth(self.overlap, row, layer);
             // The changes left of the next swath.
-            let mut at = match first {
+            let mut at = match self.taken(swaths.start, tooth).start {
                 0 => 0,
                 first => changes.partition_point(|change| change.column() < first),
             };
             for (rows, swath) in cut.iter_mut().zip(swaths.clone()) {
-                let Range { start, end } = self.columns(swath);
-                at = rows.push(changes, at, start..end, start);
+                at = rows.push(changes, at, self.taken(swath, tooth), swath * self.step());
             }
         }
         cut
+    }
+
+    /// Returns the columns that a swath takes of a row that goes over to the next swath after so
+    /// many of the shared columns.
+    #[inline]
+    fn taken(&self, swath: u32, tooth: u32) -> Range<u32> {
+        let start = swath * self.step();
+        let first = if swath == 0 { 0 } else { start + tooth };
+        let is_last = swath + 1 == self.count();
+        first..if is_last { self.width } else { start + self.step() + tooth }
     }
 
     /// Returns what swaths expose of an image where their levels rise and fall.
@@ -90,6 +109,8 @@ struct SwathRows<C> {
     /// The number of changes up to each row's end, after a zero.
     ends: Vec<u32>,
     changes: Vec<C>,
+    /// The number of changes that the last row had in the swath.
+    within: usize,
 }
 
 impl<C: Change> SwathRows<C> {
@@ -97,15 +118,23 @@ impl<C: Change> SwathRows<C> {
     fn new(width: u32, rows: usize, changes: usize) -> Self {
         let mut ends = Vec::with_capacity(rows + 1);
         ends.push(0);
-        Self { width, ends, changes: Vec::with_capacity(changes) }
+        Self { width, ends, changes: Vec::with_capacity(changes), within: 0 }
     }
 
     /// Adds a row: the columns of `taken` of an image's row, with `left` as the first. `at` is the
     /// number of changes left of them; returns the number left of their end.
     #[inline]
     fn push(&mut self, row: &[C], at: usize, taken: Range<u32>, left: u32) -> usize {
-        let within = row[at..].iter().take_while(|change| change.column() < taken.end).count();
-        let (end, black) = (at + within, C::Pixel::default());
+        // About as many changes as in the row above are in the swath.
+        let mut end = row.len().min(at + self.within);
+        while end > at && row[end - 1].column() >= taken.end {
+            end -= 1;
+        }
+        while end < row.len() && row[end].column() < taken.end {
+            end += 1;
+        }
+        self.within = end - at;
+        let black = C::Pixel::default();
         let mut pixel = C::last_pixel(&row[..at]);
         let mut shown = &row[at..end];
         if pixel != black {
@@ -129,6 +158,12 @@ impl<C: Change> SwathRows<C> {
         }
         self.ends.push(self.changes.len() as u32);
         end
+    }
+}
+
+impl SwathRows<u32> {
+    fn into_mask(self) -> Mask {
+        Mask::new(self.width, self.ends, self.changes).expect("transitions within the swath")
     }
 }
 

@@ -9,7 +9,7 @@ use lamp_stack::{MAX_SIDE, StackError};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{StripsError, Swaths};
+use super::{Seam, StripsError, Swaths};
 
 /// The index's name in its folder.
 pub(super) const INDEX: &str = "strips.json";
@@ -32,7 +32,7 @@ pub enum IndexError {
 }
 
 /// The index of a build and its strips.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StripIndex {
     /// The build's name.
@@ -42,6 +42,8 @@ pub(super) struct StripIndex {
     pub(super) layers: u32,
     pub(super) mirrors: u32,
     pub(super) overlap: u32,
+    #[serde(default = "Seam::unnamed")]
+    pub(super) seam: Seam,
     pub(super) strips: Vec<StripLine>,
 }
 
@@ -74,19 +76,20 @@ impl StripIndex {
             layers,
             mirrors: swaths.mirrors,
             overlap: swaths.overlap,
+            seam: swaths.seam,
             strips: (0..swaths.count()).map(|swath| StripLine::of(swaths, swath)).collect(),
         }
     }
 
     /// Returns the text, a line for each strip.
     pub(super) fn to_json(&self) -> String {
-        let Self { name, pixels: [width, height], layers, mirrors, overlap, strips } = self;
+        let Self { name, pixels: [width, height], layers, mirrors, overlap, seam, strips } = self;
         let line = |strip| serde_json::to_string(strip).expect("texts and numbers are JSON");
         let strips: Vec<_> = strips.iter().map(|strip| format!("    {}", line(strip))).collect();
         let name = serde_json::to_string(name).expect("a text is JSON");
         format!(
             "{{\n  \"name\": {name},\n  \"pixels\": [{width}, {height}],\n  \"layers\": {layers},\n  \
-             \"mirrors\": {mirrors},\n  \"overlap\": {overlap},\n  \"strips\": [\n{}\n  ]\n}}\n",
+             \"mirrors\": {mirrors},\n  \"overlap\": {overlap},\n  \"seam\": \"{seam}\",\n  \"strips\": [\n{}\n  ]\n}}\n",
             strips.join(",\n")
         )
     }
@@ -127,7 +130,10 @@ mod tests {
         let index = StripIndex::new("a \"b\"", [22, 7], 3, &swaths);
         let text = index.to_json();
         assert_eq!(StripIndex::parse(&text).unwrap(), index);
-        assert_eq!(text.lines().count(), 12);
+        assert_eq!(text.lines().count(), 13);
+        // As before there were seams.
+        let unnamed = StripIndex::parse(&text.replace("  \"seam\": \"comb\",\n", "")).unwrap();
+        assert_eq!(unnamed, StripIndex { seam: Seam::Gray, ..index });
         for (from, to) in [
             ("\"overlap\": 4", "\"overlap\": 5"),
             ("\"mirrors\": 10", "\"mirrors\": 11"),
@@ -135,6 +141,7 @@ mod tests {
             ("strip_001", "../strip_001"),
             ("[6,16]", "[6,15]"),
             ("\"layers\": 3", "\"layers\": -3"),
+            ("\"comb\"", "\"brush\""),
             ("\"mirrors\": 10", "\"mirrors\": 4294967295"),
             ("\"name\"", "\"nom\""),
             ("]\n}", "]"),

@@ -9,13 +9,14 @@
 //!
 //! A swath is as wide as the projector has mirrors across its path, in columns. It shares some
 //! columns with the next swath, so that no seam shows: there the dose of one falls as that of the
-//! other rises, and their sum is the layer's.
+//! other rises, and their sum is the layer's. [`Seam`] says by what.
 
 mod cut;
 mod index;
 mod join_swaths;
 mod ramps;
 mod read;
+mod seam;
 mod strips_error;
 #[cfg(test)]
 mod strips_tests;
@@ -31,9 +32,13 @@ use crate::edit::{ImageBounds, frame_page};
 
 use index::INDEX;
 
+/// The first word of the command that a strip's first page records.
+const COMMAND: &str = "strip";
+
 pub use index::IndexError;
 pub use join_swaths::JoinSwathsError;
 pub use read::{StripDifference, is_strips, join_strips};
+pub use seam::Seam;
 pub use strips_error::StripsError;
 pub use write::StripWriter;
 
@@ -47,7 +52,8 @@ pub use write::StripWriter;
 /// assert_eq!((swaths.count(), swaths.columns(1)), (3, 6..16));
 ///
 /// let layer = Image::Mask(Mask::black(22, 5).inverted());
-/// let cut: Vec<Image> = swaths.cut(&layer, 0..3);
+/// let index = 0;
+/// let cut: Vec<Image> = swaths.cut(&layer, index, 0..3).collect();
 /// assert_eq!(swaths.join(&cut)?, layer.to_gray().into_owned());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -55,6 +61,7 @@ pub use write::StripWriter;
 pub struct Swaths {
     mirrors: u32,
     overlap: u32,
+    seam: Seam,
     width: u32,
 }
 
@@ -76,16 +83,22 @@ pub enum SwathsError {
 
 impl Swaths {
     /// Returns the swaths of `mirrors` columns, each of which shares `overlap` columns with the
-    /// next, of layers of `width` columns.
+    /// next by a [comb](Seam::Comb), of layers of `width` columns.
     ///
     /// # Errors
     /// Returns an error if they share half of their columns or more.
     pub fn new(mirrors: u32, overlap: u32, width: u32) -> Result<Self, SwathsError> {
         if u64::from(overlap) * 2 < u64::from(mirrors) {
-            Ok(Self { mirrors, overlap, width })
+            Ok(Self { mirrors, overlap, seam: Seam::default(), width })
         } else {
             Err(SwathsError::Overlap { mirrors, overlap })
         }
+    }
+
+    /// Returns the same swaths with another seam.
+    #[must_use]
+    pub fn with_seam(self, seam: Seam) -> Self {
+        Self { seam, ..self }
     }
 
     /// Returns the number of swaths: at least one.
@@ -111,14 +124,25 @@ impl Swaths {
     ///
     /// # Panics
     /// Panics if [`cut`](Self::cut) does.
-    pub fn cut_layer(&self, layer: &Layer, swaths: Range<u32>) -> Vec<Layer> {
-        let images: Vec<LayerImage> = match *layer.image {
+    pub fn cut_layer<'a>(
+        &self,
+        layer: &'a Layer,
+        swaths: Range<u32>,
+    ) -> impl Iterator<Item = Layer> + use<'a> {
+        let this = *self;
+        let images: Box<dyn Iterator<Item = LayerImage> + 'a> = match *layer.image {
             // One swath is the layer itself: nothing is to be encoded again.
-            Image::Mask(_) if self.mirrors == self.width => vec![layer.image.clone()],
-            _ => self.cut(&layer.image, swaths.clone()).into_iter().map(LayerImage::from).collect(),
+            Image::Mask(_) if self.mirrors == self.width => {
+                Box::new(std::iter::once(layer.image.clone()))
+            }
+            _ => {
+                let cut = self.cut(&layer.image, layer.info.index, swaths.clone());
+                Box::new(cut.map(LayerImage::from))
+            }
         };
-        let page = |(image, swath)| Layer { info: self.page(layer, swath), dpi: layer.dpi, image };
-        images.into_iter().zip(swaths).map(page).collect()
+        let page =
+            move |(image, swath)| Layer { info: this.page(layer, swath), dpi: layer.dpi, image };
+        images.zip(swaths).map(page)
     }
 
     /// Returns the page of a layer's swath.
@@ -143,7 +167,8 @@ impl Swaths {
 
     /// Returns the command that a swath's first page records.
     fn command(&self, swath: u32) -> String {
-        let Self { mirrors, overlap, .. } = self;
-        format!("strip {swath} --mirrors {mirrors} --overlap {overlap}")
+        let Self { mirrors, overlap, seam, .. } = self;
+        let command = format!("{COMMAND} {swath} --mirrors {mirrors} --overlap {overlap}");
+        if *overlap > 0 { format!("{command} --seam {seam}") } else { command }
     }
 }

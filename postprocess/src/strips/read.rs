@@ -6,7 +6,7 @@ use lamp_stack::{Image, Layer, MemorySize, Page, PageInfo, Pages, map_in_order};
 use thiserror::Error;
 
 use super::index::{INDEX, StripIndex, file_name};
-use super::{JoinSwathsError, StripsError, Swaths};
+use super::{COMMAND, JoinSwathsError, StripsError, Swaths};
 
 /// Returns whether a folder holds strips: then it has an index of them.
 pub fn is_strips(folder: &Path) -> bool {
@@ -186,8 +186,8 @@ impl LayerPages {
             Image::Gray(gray)
         };
         if let Some(stack) = &mut info.stack {
-            let of_strip = self.swaths.command(0);
-            stack.commands.retain(|command| *command != of_strip);
+            let of_strip = format!("{COMMAND} 0 ");
+            stack.commands.retain(|command| !command.starts_with(&of_strip));
         }
         Ok(Layer { info, dpi, image: image.into() })
     }

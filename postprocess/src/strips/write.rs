@@ -10,7 +10,7 @@ use lamp_stack::{
 };
 
 use super::index::{INDEX, MAX_STRIPS, StripIndex, file_name};
-use super::{StripsError, Swaths};
+use super::{Seam, StripsError, Swaths};
 
 /// The size of a file's buffer in bytes: enough for a page of a narrow strip, as hundreds of
 /// files are open at once.
@@ -23,6 +23,7 @@ pub struct StripWriter {
     format: Format,
     mirrors: u32,
     overlap: u32,
+    seam: Seam,
     open: Option<OpenStrips>,
 }
 
@@ -45,13 +46,14 @@ impl StripWriter {
         folder: FolderBeside,
         mirrors: u32,
         overlap: u32,
+        seam: Seam,
         format: Format,
     ) -> Result<Self, StripsError> {
         Swaths::new(mirrors, overlap, 0)?;
         if mirrors > MAX_SIDE {
             return Err(StripsError::Mirrors { mirrors, max: MAX_SIDE });
         }
-        Ok(Self { folder, format, mirrors, overlap, open: None })
+        Ok(Self { folder, format, mirrors, overlap, seam, open: None })
     }
 
     /// Adds a layer to every strip, cut and encoded on all threads.
@@ -81,7 +83,7 @@ impl StripWriter {
         });
         let pages = map_in_order(shares, |share| {
             let layers = swaths.cut_layer(share.layer, share.swaths);
-            Ok(layers.iter().map(EncodedPage::new).collect::<Vec<_>>())
+            Ok(layers.map(|layer| EncodedPage::new(&layer)).collect::<Vec<_>>())
         });
         let mut files = open.files.iter_mut();
         for pages in pages {
@@ -95,7 +97,7 @@ impl StripWriter {
 
     fn open(&self, first: &Layer) -> Result<OpenStrips, StripsError> {
         let (mirrors, width) = (self.mirrors, first.image.width());
-        let swaths = Swaths::new(mirrors, self.overlap, width)?;
+        let swaths = Swaths::new(mirrors, self.overlap, width)?.with_seam(self.seam);
         let strips = swaths.count();
         if strips > MAX_STRIPS {
             return Err(StripsError::TooMany { width, strips, mirrors, max: MAX_STRIPS });

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::machine::Machine;
-use lamp_postprocess::{StripWriter, StripsError};
+use lamp_postprocess::{Seam, StripWriter, StripsError};
 use lamp_stack::Layer;
 
 use crate::exit::Exit;
-use crate::options::Output;
+use crate::options::{Output, one_of_described};
 use crate::progress::Progress;
 use crate::streams::{format, new_folder, write_layers};
 
@@ -32,6 +32,16 @@ pub(super) struct StripArgs {
     /// machine's, or 0 with --mirrors]
     #[arg(long, value_name = "N", requires = "strips", help_heading = HEADING)]
     overlap: Option<u32>,
+
+    /// What a swath and the next expose of the columns that they share; together it is always the
+    /// build
+    #[arg(long, default_value_t, requires = "strips", help_heading = HEADING)]
+    #[arg(value_parser = one_of_described::<Seam>(&[
+        "Each pixel belongs to one of both: each row changes over at a column of its own, and in each \
+         layer at another. Black and white stay so",
+        "Levels fall in one as they rise in the other: gray pages, many times as large",
+    ]))]
+    seam: Seam,
 }
 
 impl StripArgs {
@@ -61,7 +71,7 @@ impl StripArgs {
         let of_machine = of_machine.filter(|_| self.mirrors.is_none());
         let overlap = self.overlap.or(of_machine.map(|strips| strips.overlap)).unwrap_or(0);
         let new = new_folder(folder, force)?;
-        match StripWriter::new(new, mirrors, overlap, format(classic)) {
+        match StripWriter::new(new, mirrors, overlap, self.seam, format(classic)) {
             Ok(writer) => Ok(Some(StripOutput { folder: folder.to_owned(), writer })),
             Err(error @ (StripsError::Swaths(_) | StripsError::Mirrors { .. })) => {
                 Err(Exit::wrong_options(error))
