@@ -194,6 +194,18 @@ pub(crate) fn parse_thickness(text: &str) -> Result<Length, String> {
     if length.um() == 0.0 { Err("the length must be above zero".to_owned()) } else { Ok(length) }
 }
 
+/// Parses an area that is not below zero, in square millimetres.
+pub(crate) fn parse_area(text: &str) -> Result<f64, String> {
+    let number = text.trim();
+    let number = number.strip_suffix("mm2").or((number == "0").then_some("0"));
+    let area: Option<f64> = number.and_then(|number| number.trim_end().parse().ok());
+    match area {
+        Some(area) if area < 0.0 => Err(format!("{area}mm2 is below zero")),
+        Some(area) if area.is_finite() => Ok(area),
+        _ => Err("an area is a number and mm2, such as 1mm2".to_owned()),
+    }
+}
+
 /// Parses the light of full white, which is some.
 pub(crate) fn parse_light(text: &str) -> Result<Intensity, String> {
     match text.parse::<Intensity>() {

@@ -2,7 +2,7 @@
 //! of each layer.
 //!
 //! ```sh
-//! cargo run --release -p lamp-postprocess --example mesh STACK AREA OUT [layer|outline]
+//! cargo run --release -p lamp-postprocess --example mesh STACK AREA OUT [MOAT]
 //! ```
 
 use std::path::Path;

@@ -18,7 +18,7 @@ use crate::progress::{Notes, Progress};
 /// Change when other bytes come from the same options and stacks.
 pub(crate) const JOIN_CODE: u32 = 1;
 pub(crate) const PACK_CODE: u32 = 2;
-const TILE_CODE: u32 = 2;
+const TILE_CODE: u32 = 3;
 const CHECK_CODE: u32 = 1;
 
 /// How a build is laid out: the options of `lamp tile`.

@@ -26,7 +26,7 @@ type PartLayer<'a> = (usize, &'a PartStack, &'a Layer);
 
 impl Layout {
     /// Returns the page of the build's layer at one height.
-    pub(super) fn page(&self, step: &LayerSet) -> Result<PageInfo, TileError> {
+    pub(super) fn page(&self, step: &LayerSet, is_first: bool) -> Result<PageInfo, TileError> {
         let here: Vec<PartLayer<'_>> = self.layers_of(step).collect();
         let infos = || here.iter().map(|(_, _, layer)| &layer.info);
         let closed = infos().map(|info| info.closed).reduce(|a, b| match (a, b) {
@@ -35,7 +35,7 @@ impl Layout {
             _ => None,
         });
         let other = common(&here, self.parts.len());
-        let stack = step.is_first.then(|| self.stack_of(&here));
+        let stack = is_first.then(|| self.stack_of(&here));
         Ok(PageInfo {
             index: step.index,
             z_um: step.z_um,
@@ -101,7 +101,8 @@ impl Layout {
         if let &[(_, part, layer)] = here
             && self.parts.len() == 1
         {
-            let mut stack = layer.info.stack.clone().unwrap_or_else(|| unknown(part));
+            let of_layer = layer.info.stack.clone().or_else(|| part.stack.clone());
+            let mut stack = of_layer.unwrap_or_else(|| unknown(part));
             stack.commands.push(self.command.clone());
             let mut tile = self.described(0);
             tile.append(&mut self.base());

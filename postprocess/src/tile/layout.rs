@@ -38,6 +38,8 @@ pub struct Layout {
     pub(super) command: String,
     /// Whether the build's heights may differ from the parts'.
     pub(super) resampled: bool,
+    /// The first layer that is made.
+    pub(super) first: u32,
     /// The mesh around the copies.
     pub(super) mesh: Option<BuildMesh>,
 }
@@ -152,8 +154,16 @@ impl Layout {
             pixels,
             command: String::new(),
             resampled: false,
+            first: 0,
             mesh: None,
         })
+    }
+
+    /// Makes only the build's layers from number `first` on. The stacks begin with the layers
+    /// below, because the mesh depends on them.
+    #[must_use]
+    pub fn from_layer(self, first: u32) -> Self {
+        Self { first, ..self }
     }
 
     /// Returns the parts, in the order of their stacks.

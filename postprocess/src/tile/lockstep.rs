@@ -45,8 +45,6 @@ pub(super) struct LayerSet {
     pub(super) thickness_um: Option<f64>,
     /// The layer of each stack that has one here.
     pub(super) layers: Vec<Option<Arc<Layer>>>,
-    /// Whether it is the build's first.
-    pub(super) is_first: bool,
     /// The memory that the build's layer will take.
     bytes: usize,
 }
@@ -129,12 +127,12 @@ where
     ) -> LayerSet {
         // A later leader may have counted its layers from another number.
         let index = self.last.map_or(index, |(last, _)| index.max(last.saturating_add(1)));
-        let is_first = self.last.replace((index, span)).is_none();
+        self.last = Some((index, span));
         let bytes = self.stacks.iter().zip(&layers).map(|(stack, layer)| {
             layer.as_ref().map_or(0, |layer| layer.bytes().saturating_mul(stack.copies + 1))
         });
         let bytes = bytes.fold(self.mesh_bytes, usize::saturating_add);
-        LayerSet { index, z_um, thickness_um, layers, is_first, bytes }
+        LayerSet { index, z_um, thickness_um, layers, bytes }
     }
 
     /// Finds how far each stack is raised, and checks that all start at one height.

@@ -160,6 +160,8 @@ struct MeshedStep {
     /// The images of parts that have a layer here.
     images: Vec<(usize, Image)>,
     mesh: Option<MeshRows>,
+    /// Whether it is the build's first.
+    is_first: bool,
 }
 
 impl MemorySize for MeshedStep {
@@ -210,17 +212,28 @@ impl Layout {
         let layout = Arc::new(self);
         let meshed = layout.clone();
         let mut kept = mesh.as_ref().map(|mesh| KeptMesh::new(mesh, &layout));
+        let mut is_first = true;
         // In order, as the mesh of a layer is made from that of the one below.
         let steps = std::iter::from_fn(move || {
-            let step = match steps.next()? {
-                Ok(step) => step,
-                Err(error) => return Some(Err(error)),
-            };
-            Some(meshed.meshed_step(step, kept.as_mut()).map_err(E::from))
+            loop {
+                let step = match steps.next()? {
+                    Ok(step) => step,
+                    Err(error) => return Some(Err(error)),
+                };
+                let is_below = step.index < meshed.first;
+                match meshed.meshed_step(step, kept.as_mut(), is_below) {
+                    Ok(_) if is_below => {}
+                    Ok(made) => {
+                        let is_first = std::mem::take(&mut is_first);
+                        return Some(Ok(MeshedStep { is_first, ..made }));
+                    }
+                    Err(error) => return Some(Err(error.into())),
+                }
+            }
         });
         let layers = map_in_order(steps, move |step: MeshedStep| {
             let layer = Layer {
-                info: layout.page(&step.set)?,
+                info: layout.page(&step.set, step.is_first)?,
                 dpi: Some(layout.dpi),
                 image: layout.image(&step)?.into(),
             };
@@ -239,9 +252,11 @@ impl Layout {
         &self,
         set: LayerSet,
         kept: Option<&mut KeptMesh>,
+        is_below: bool,
     ) -> Result<MeshedStep, TileError> {
+        let framed = if is_below { PartStack::framed_below } else { PartStack::framed };
         let images =
-            self.layers_of(&set).map(|(part, known, layer)| Ok((part, known.framed(layer)?)));
+            self.layers_of(&set).map(|(part, known, layer)| Ok((part, framed(known, layer)?)));
         let images: Vec<(usize, Image)> = images.collect::<Result<_, TileError>>()?;
         let mesh = match (kept, &self.mesh) {
             (Some(kept), Some(mesh)) => {
@@ -250,7 +265,7 @@ impl Layout {
             }
             _ => None,
         };
-        Ok(MeshedStep { set, images, mesh })
+        Ok(MeshedStep { set, images, mesh, is_first: false })
     }
 
     fn too_many_runs(&self, set: &LayerSet) -> TileError {

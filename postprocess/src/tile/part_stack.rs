@@ -72,6 +72,20 @@ impl PartStack {
         Ok(Some(part))
     }
 
+    /// Places another part of the images, which holds what is white.
+    #[cfg(test)]
+    pub(super) fn on(self, frame: Frame) -> Self {
+        let outline = self.outline.map(|outline| {
+            let moved = Frame {
+                left: frame.left - self.frame.left,
+                top: frame.top - self.frame.top,
+                ..frame
+            };
+            outline.framed(moved)
+        });
+        Self { frame, outline, ..self }
+    }
+
     /// Returns the part's name.
     pub fn name(&self) -> &str {
         &self.name
@@ -133,6 +147,13 @@ impl PartStack {
         if self.outline.is_some() && !is_within(&layer.image, self.frame) {
             return Err(TileError::Changed { name: self.name.clone(), layer: layer.info.name() });
         }
+        Ok(layer.image.framed(self.frame))
+    }
+
+    /// What is placed of a layer below those that are built. Where a range's extents are
+    /// placed, the layers below may be wider, and are cut off.
+    pub(super) fn framed_below(&self, layer: &Layer) -> Result<Image, TileError> {
+        self.check(layer)?;
         Ok(layer.image.framed(self.frame))
     }
 }

@@ -8,7 +8,7 @@ use lamp_postprocess::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_stack::{Image, Length, StackError};
 
 use crate::exit::Exit;
-use crate::options::{one_of, parse_distance, parse_thickness};
+use crate::options::{one_of_described, parse_area, parse_distance, parse_thickness};
 use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages};
 
 const HEADING: &str = "Mesh around the parts";
@@ -34,11 +34,18 @@ pub(super) struct MeshArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
     clearance: Option<Length>,
 
-    /// Whether the moat follows the part in each layer or its outline over all layers, so that no
-    /// mesh stands on its faces or in cross bores; outline implies --fit [default: layer]
-    #[arg(long, value_name = "layer|outline", value_parser = one_of::<Moat>())]
-    #[arg(help_heading = HEADING)]
+    /// What the moat follows [default: rising]
+    #[arg(long, help_heading = HEADING, value_parser = one_of_described::<Moat>(&[
+        "The part in each layer and in those below it, so that no mesh stands on its faces",
+        "The part in each layer: mesh stands on faces that look up, and in cross bores",
+        "The part's outline over all layers, also below faces that look down; implies --fit",
+    ]))]
     moat: Option<Moat>,
+
+    /// Least area of a piece of mesh in a layer: smaller ones are left out, and so are those that
+    /// hang on no mesh below; 0 keeps all that hang [default: 1mm2]
+    #[arg(long, value_name = "AREA", value_parser = parse_area, help_heading = HEADING)]
+    least_piece: Option<f64>,
 
     /// Width of the break lines, which cut the mesh from each part up, down, left and right to the
     /// next part or the area's edge; 0 makes none [default: 500um]
@@ -59,6 +66,11 @@ impl MeshArgs {
     /// Returns whether the mesh needs the parts' outlines.
     pub(super) fn needs_outlines(&self) -> bool {
         self.moat == Some(Moat::Outline)
+    }
+
+    /// Returns whether the mesh of a layer depends on the layers below it.
+    pub(super) fn needs_layers_below(&self) -> bool {
+        self.mesh != Path::new("none") && !self.needs_outlines()
     }
 
     /// Returns the file of the mesh's pattern, if any.
@@ -84,6 +96,7 @@ impl MeshArgs {
             options.iter().find(|(_, length)| length.is_some()).map(|(name, _)| *name)
         };
         let base = self.base_layers.map(|_| "--base-layers").or(self.moat.map(|_| "--moat"));
+        let base = base.or(self.least_piece.map(|_| "--least-piece"));
         if self.mesh == Path::new("none")
             && let Some(option) = given(&of_cells).or(given(&lengths)).or(base)
         {
@@ -115,6 +128,7 @@ impl MeshArgs {
             pattern,
             clearance: self.clearance.unwrap_or(plain.clearance),
             moat: self.moat.unwrap_or_default(),
+            least_piece_mm2: self.least_piece.unwrap_or(plain.least_piece_mm2),
             break_width: self.break_width.unwrap_or(plain.break_width),
             break_pitch: self.break_pitch.unwrap_or(plain.break_pitch),
             base_layers: self.base_layers.unwrap_or(plain.base_layers),

@@ -37,8 +37,9 @@ use strips::StripArgs;
 /// them by their outlines if more fit. The first page records where they stand. Several stacks are
 /// matched by the heights of their layers; shorter parts end first. Gray layers make a gray build.
 ///
-/// A mesh fills the rest of the area. A moat along each part's outline stays free, and break lines
-/// cut through the mesh; the first layers are mesh alone. The default dimensions of the mesh are
+/// A mesh fills the rest of the area. A moat around each part stays free, also above it, and break
+/// lines cut through the mesh; the first layers are mesh alone. Pieces of mesh that would float or
+/// are small are left out. The default dimensions of the mesh are
 /// LAMP's own. --mesh none leaves the area black.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
@@ -233,7 +234,9 @@ impl TileArgs {
     fn build(&self, machine: Option<Machine>, progress: &Progress) -> Result<Build, Exit> {
         let mesh = self.mesh.options()?;
         let file = self.layout.as_deref().map(read_layout).transpose()?;
-        let mut stacks = InputStack::open_all(&self.stacks, &self.layers, machine.as_ref())?;
+        let from_bottom = self.mesh.needs_layers_below();
+        let mut stacks =
+            InputStack::open_all(&self.stacks, &self.layers, from_bottom, machine.as_ref())?;
         let outlines = self.fit || self.pack == PackBy::Outlines || self.mesh.needs_outlines();
         let parts = stacks.iter_mut().map(|stack| stack.part(outlines));
         let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
@@ -241,7 +244,9 @@ impl TileArgs {
         self.tell_places(&placed, progress)?;
         let layout = placed.clone();
         let layout = match &mesh {
-            Some(mesh) => layout.with_mesh(mesh)?,
+            Some(mesh) => layout
+                .with_mesh(mesh)?
+                .from_layer(self.layers.as_ref().map_or(0, |layers| layers.start)),
             None => layout,
         };
         let base_layers = mesh.map_or(0, |mesh| mesh.base_layers);

@@ -51,6 +51,8 @@ pub(super) struct InputStack {
     name: String,
     path: PathBuf,
     range: Option<Range<u32>>,
+    /// Whether the build needs the layers below the range, too.
+    from_bottom: bool,
     machine: Option<Machine>,
     /// Standard input, where it is read twice.
     spool: Option<File>,
@@ -60,10 +62,11 @@ pub(super) struct InputStack {
 }
 
 impl InputStack {
-    /// Prepares the stacks. Refuses one that is given twice, because its counts would be ambiguous.
+    /// Prepares the stacks, to be read from their lowest layers on if `from_bottom`. Refuses one that is given twice, because its counts would be ambiguous.
     pub(super) fn open_all(
         stacks: &[StackArg],
         range: &Option<Range<u32>>,
+        from_bottom: bool,
         machine: Option<&Machine>,
     ) -> Result<Vec<Self>, Exit> {
         for (k, stack) in stacks.iter().enumerate() {
@@ -78,6 +81,7 @@ impl InputStack {
             name: input_name(path),
             path: path.clone(),
             range: range.clone(),
+            from_bottom: from_bottom && range.as_ref().is_some_and(|range| range.start > 0),
             machine: machine.cloned(),
             spool: None,
             layers: None,
@@ -94,12 +98,12 @@ impl InputStack {
     /// Reads what placing the part needs: its first layer, or all layers if it needs the outline.
     pub(super) fn part(&mut self, outline: bool) -> Result<PartStack, Exit> {
         let no_layers = failed_at(self.name.clone(), StackError::NoLayers);
+        if (outline || self.from_bottom) && is_stream(&self.path) {
+            self.spool = Some(spool_stdin()?);
+        }
         if outline {
-            if is_stream(&self.path) {
-                self.spool = Some(spool_stdin()?);
-            }
             let mut count = None;
-            let mut layers = self.read()?.inspect(|layer| {
+            let mut layers = self.read(self.range.clone())?.inspect(|layer| {
                 if let Ok(layer) = layer {
                     count = count.or(count_of(layer));
                 }
@@ -111,12 +115,14 @@ impl InputStack {
             self.layer_count = count;
             return part;
         }
-        let mut layers = self.read()?;
+        let mut layers = self.read(self.range.clone())?;
         let first = layers.next().unwrap_or(Err(no_layers))?;
         self.take_name_of_pipe();
         let part = PartStack::of_image(&self.name, &first)?;
         self.layer_count = count_of(&first);
-        self.layers = Some(Box::new(std::iter::once(Ok(first)).chain(layers)));
+        if !self.from_bottom {
+            self.layers = Some(Box::new(std::iter::once(Ok(first)).chain(layers)));
+        }
         Ok(part)
     }
 
@@ -127,16 +133,20 @@ impl InputStack {
         }
     }
 
-    /// Its layers.
+    /// Its layers, from the lowest that the build needs.
     pub(super) fn layers(mut self) -> Result<Layers, Exit> {
         match self.layers.take() {
             Some(layers) => Ok(layers),
-            None => self.read(),
+            None => {
+                let range = self.range.clone();
+                let from = |range: Range<u32>| if self.from_bottom { 0..range.end } else { range };
+                self.read(range.map(from))
+            }
         }
     }
 
     /// Reads it from its start, checking that the machine builds it.
-    fn read(&mut self) -> Result<Layers, Exit> {
+    fn read(&mut self, range: Option<Range<u32>>) -> Result<Layers, Exit> {
         let pages = match &mut self.spool {
             Some(spool) => {
                 let again = |spool: &mut File| -> io::Result<File> {
@@ -148,7 +158,7 @@ impl InputStack {
             }
             None => open_pages(&self.path)?,
         };
-        let layers = layers_of(pages, &self.path, self.range.clone());
+        let layers = layers_of(pages, &self.path, range);
         let Some(machine) = self.machine.clone() else { return Ok(Box::new(layers)) };
         let name = self.name.clone();
         Ok(Box::new(layers.map(move |layer| {

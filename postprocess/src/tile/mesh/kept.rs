@@ -1,11 +1,12 @@
 //! The mesh from layer to layer: rows around which no moat changes are kept.
 
-use lamp_stack::{Image, Mask, place_row};
+use lamp_stack::{Image, Mask, Op, place_row};
 
 use super::super::compose::{PlacedImage, merge_rows};
 use super::super::part_stack::white_of;
 use super::super::{Layout, PixelSize};
 use super::mesh_rows::MeshRows;
+use super::pieces::hanging;
 use super::{BuildMesh, Moat, cut};
 
 /// The mesh of the layer that was made last.
@@ -15,7 +16,10 @@ pub(in crate::tile) struct KeptMesh {
     /// The moat of each part in each way in which its copies lie, on an image that is larger than
     /// the build by the mesh's reach on every side.
     moats: Vec<Vec<PlacedImage>>,
-    rows: MeshRows,
+    /// The walls that moats leave.
+    cut: MeshRows,
+    /// The pieces of these that hang together with the mesh below; none before the first layer.
+    hanging: Option<MeshRows>,
 }
 
 impl KeptMesh {
@@ -33,7 +37,7 @@ impl KeptMesh {
         };
         let followed: Vec<Mask> = layout.parts.iter().map(black).collect();
         let moats = followed.iter().enumerate().map(moat).collect();
-        Self { followed, moats, rows: mesh.standing.clone() }
+        Self { followed, moats, cut: mesh.standing.clone(), hanging: None }
     }
 
     /// Returns the mesh around the parts' `images` in the next layer, or `None` if a moat has too
@@ -46,7 +50,7 @@ impl KeptMesh {
     ) -> Option<MeshRows> {
         let mut changed = Vec::new();
         for part in 0..layout.parts.len() {
-            let followed = self.followed(mesh, layout, part, images);
+            let followed = self.followed(mesh, layout, part, images)?;
             if followed == self.followed[part] {
                 continue;
             }
@@ -62,27 +66,46 @@ impl KeptMesh {
         if !changed.is_empty() {
             self.cut_rows(mesh, layout.pixels, &changed);
         }
-        Some(self.rows.clone())
+        if let (true, Some(hanging)) = (changed.is_empty(), &self.hanging) {
+            return Some(hanging.clone());
+        }
+        let hanging = self.hanging_rows(mesh);
+        self.hanging = Some(hanging.clone());
+        Some(hanging)
     }
 
-    /// Returns what the moat of a part follows in the next layer.
+    /// Returns the pieces of the walls that hang on the mesh of the layer below, or as the first
+    /// stand on the base.
+    fn hanging_rows(&self, mesh: &BuildMesh) -> MeshRows {
+        // Other moats only grow, so the mesh lies within that below.
+        let below = self.hanging.as_ref().filter(|_| mesh.moat == Moat::Layer);
+        if below.is_none() && mesh.least_piece <= 1 {
+            return self.cut.clone();
+        }
+        hanging(&self.cut, below, mesh.least_piece)
+    }
+
+    /// Returns what the moat of a part follows in the next layer, or `None` if it has too many
+    /// runs.
     fn followed(
         &self,
         mesh: &BuildMesh,
         layout: &Layout,
         part: usize,
         images: &[(usize, Image)],
-    ) -> Mask {
+    ) -> Option<Mask> {
         let before = &self.followed[part];
-        match mesh.moat {
-            Moat::Layer => match images.iter().find(|(of, _)| *of == part) {
-                Some((_, image)) => white_of(image),
-                None => Mask::black(before.width(), before.height()),
+        let image = || images.iter().find(|(of, _)| *of == part).map(|(_, image)| white_of(image));
+        Some(match mesh.moat {
+            Moat::Rising => match image() {
+                Some(white) => white.combined(Op::Union, before)?,
+                None => before.clone(),
             },
+            Moat::Layer => image().unwrap_or_else(|| Mask::black(before.width(), before.height())),
             Moat::Outline => {
                 layout.parts[part].outline().expect("checked where the mesh was made").clone()
             }
-        }
+        })
     }
 
     /// Cuts the moats out of the walls, in the rows that changed.
@@ -92,7 +115,7 @@ impl KeptMesh {
         let is_changed = |row| on_build(row).is_some_and(|row| changed[row as usize]);
         let grown = build.grown(reach);
         let (mut moat, mut row) = (Vec::new(), Vec::new());
-        let rows = self.rows.rows_mut();
+        let rows = self.cut.rows_mut();
         let moats: Vec<&PlacedImage> = self.moats.iter().flatten().collect();
         merge_rows(&moats, grown, is_changed, |index, transitions| {
             moat.clear();

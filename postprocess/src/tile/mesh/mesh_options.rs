@@ -37,6 +37,9 @@ pub struct MeshOptions {
     pub clearance: Length,
     /// What moats follow.
     pub moat: Moat,
+    /// The least area of a piece of mesh in a layer, in square millimetres. Smaller ones are
+    /// left out, and so is what would hang on them alone.
+    pub least_piece_mm2: f64,
     /// The width of break lines; zero makes none.
     pub break_width: Length,
     /// The distance between the break lines of a part.
@@ -48,15 +51,18 @@ pub struct MeshOptions {
 /// What moats follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Moat {
+    /// What is white in a layer of the part or in one below it. No mesh stands on faces
+    /// that look up; it carries those that look down.
+    #[default]
+    Rising,
     /// Each layer of the part. Mesh stands on faces that look up, carries those that
     /// look down, and enters bores that are open to the side.
-    #[default]
     Layer,
     /// The part's outline in all layers. No mesh is above, below or in the part.
     Outline,
 }
 
-lamp_stack::named!(Moat { Layer = "layer", Outline = "outline" });
+lamp_stack::named!(Moat { Rising = "rising", Layer = "layer", Outline = "outline" });
 
 /// The walls of a mesh.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,13 +98,14 @@ lamp_stack::named!(CellShape { Hexagon = "hexagon", Square = "square" });
 
 impl Default for MeshOptions {
     /// Returns hexagons of 5 mm with walls of 0.5 mm, 1 mm from the parts; break lines
-    /// of 0.5 mm, 20 mm apart; five base layers.
+    /// of 0.5 mm, 20 mm apart; pieces of 1 mm2 and more; five base layers.
     fn default() -> Self {
         let [cell, wall] = [5.0, 0.5].map(Length::from_mm);
         Self {
             pattern: MeshPattern::Cells { shape: CellShape::Hexagon, cell, wall },
             clearance: Length::from_mm(1.0),
             moat: Moat::default(),
+            least_piece_mm2: 1.0,
             break_width: Length::from_mm(0.5),
             break_pitch: Length::from_mm(20.0),
             base_layers: 5,
@@ -117,10 +124,10 @@ impl MeshOptions {
     /// page.
     pub(super) fn command(&self) -> String {
         let moat = match self.moat {
-            Moat::Layer => String::new(),
+            Moat::Rising => String::new(),
             moat => format!(" --moat {moat}"),
         };
-        let Self { clearance, break_width, break_pitch, base_layers, .. } = self;
+        let Self { clearance, least_piece_mm2, break_width, break_pitch, base_layers, .. } = self;
         let pattern = match &self.pattern {
             MeshPattern::Cells { shape, cell, wall } => {
                 format!("{shape} --cell {cell} --wall {wall}")
@@ -128,8 +135,8 @@ impl MeshOptions {
             MeshPattern::Image { name, .. } => name.clone(),
         };
         format!(
-            " --mesh {pattern} --clearance {clearance}{moat} --break-width {break_width} \
-             --break-pitch {break_pitch} --base-layers {base_layers}"
+            " --mesh {pattern} --clearance {clearance}{moat} \
+             --least-piece {least_piece_mm2}mm2 --break-width {break_width} --break-pitch {break_pitch} --base-layers {base_layers}"
         )
     }
 

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-/// The transitions of each row of a mesh. Copies share rows that are not changed.
+/// The transitions of each row of a mesh: an even number, as no wall reaches the last column. Copies
+/// share rows that are not changed.
 #[derive(Clone, Debug, Default)]
 pub(in crate::tile) struct MeshRows {
     rows: Arc<Vec<Arc<[u32]>>>,
@@ -12,6 +13,11 @@ impl MeshRows {
     /// Returns a row's transitions.
     pub(in crate::tile) fn row(&self, row: u32) -> &[u32] {
         &self.rows[row as usize]
+    }
+
+    /// Returns the number of rows.
+    pub(super) fn height(&self) -> u32 {
+        self.rows.len() as u32
     }
 
     /// Returns the number of transitions in all rows.

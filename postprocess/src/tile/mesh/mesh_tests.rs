@@ -10,19 +10,20 @@ use super::super::{HeightOptions, LayoutFile, Pack, PartStack, Turns};
 use super::*;
 
 /// Millimetres, which are pixels here.
-fn mesh(shape: CellShape, [cell, wall, clearance]: [f64; 3]) -> MeshOptions {
+pub(super) fn mesh(shape: CellShape, [cell, wall, clearance]: [f64; 3]) -> MeshOptions {
     let [cell, wall, clearance] = [cell, wall, clearance].map(Length::from_mm);
     MeshOptions {
         pattern: MeshPattern::Cells { shape, cell, wall },
         clearance,
         moat: Moat::Layer,
+        least_piece_mm2: 0.0,
         break_width: Length::from_mm(0.0),
         break_pitch: Length::from_mm(7.0),
         base_layers: 0,
     }
 }
 
-fn built(layout: &Layout, stacks: Vec<Vec<Layer>>) -> Vec<Layer> {
+pub(super) fn built(layout: &Layout, stacks: Vec<Vec<Layer>>) -> Vec<Layer> {
     let stacks = stacks.into_iter().map(|layers| layers.into_iter().map(Ok::<_, TileError>));
     let build = layout.clone().build(stacks.collect(), HeightOptions::default(), |_| {});
     build.collect::<Result<_, _>>().unwrap()
@@ -35,13 +36,17 @@ fn built_or_black(layout: &Layout, stacks: Vec<Vec<Layer>>) -> Vec<Layer> {
     build.map_while(Result::ok).collect()
 }
 
-fn mask(layer: &Layer) -> &Mask {
+pub(super) fn mask(layer: &Layer) -> &Mask {
     let Image::Mask(mask) = &*layer.image else { panic!("the build is 1-bit") };
     mask
 }
 
 /// Places of parts: left, top and turn of each copy.
-fn layout(parts: &[Mask], copies: &[(usize, u32, u32, u32, bool)], area: &str) -> Option<Layout> {
+pub(super) fn layout(
+    parts: &[Mask],
+    copies: &[(usize, u32, u32, u32, bool)],
+    area: &str,
+) -> Option<Layout> {
     let named = |k: usize, part: &Mask| {
         PartStack::of_image(&format!("p{k}"), &layer(0, Image::Mask(part.clone()))).unwrap()
     };
@@ -58,7 +63,7 @@ fn layout(parts: &[Mask], copies: &[(usize, u32, u32, u32, bool)], area: &str) -
     LayoutFile::from_json(&text).unwrap().place(parts, area.parse::<Size>().unwrap()).ok()
 }
 
-fn blobs(width: u32, height: u32) -> impl Strategy<Value = Mask> {
+pub(super) fn blobs(width: u32, height: u32) -> impl Strategy<Value = Mask> {
     let discs = prop::collection::vec((0..width, 0..height, 1..6u32), 1..4);
     discs.prop_map(move |discs| {
         let mut mask = MaskBuilder::new(width);
@@ -133,17 +138,20 @@ fn layers_are_what_they_are_alone() {
     assert_eq!(build.len(), 6);
 }
 
-const AREA: (u32, u32) = (70, 60);
+pub(super) const AREA: (u32, u32) = (70, 60);
 
-fn pixels() -> impl Iterator<Item = (u32, u32)> {
+pub(super) fn pixels() -> impl Iterator<Item = (u32, u32)> {
     (0..AREA.1).flat_map(|y| (0..AREA.0).map(move |x| (x, y)))
 }
 
-fn place(x: u32, y: u32) -> usize {
+pub(super) fn place(x: u32, y: u32) -> usize {
     (y * AREA.0 + x) as usize
 }
 
-fn drawn_alone(parts: &[Mask], (part, x, y, turn, mirror): (usize, u32, u32, u32, bool)) -> Mask {
+pub(super) fn drawn_alone(
+    parts: &[Mask],
+    (part, x, y, turn, mirror): (usize, u32, u32, u32, bool),
+) -> Mask {
     let part = parts[part].clone();
     let layout =
         layout(std::slice::from_ref(&part), &[(0, x, y, turn, mirror)], "70x60mm").unwrap();
@@ -152,7 +160,7 @@ fn drawn_alone(parts: &[Mask], (part, x, y, turn, mirror): (usize, u32, u32, u32
 
 /// What is nearer to a copy than its moat is wide, from centre to centre, and what
 /// that encloses. The moat does not reach the edges of a larger plane.
-fn free(copy: &Mask, moat: f64) -> Vec<bool> {
+pub(super) fn free(copy: &Mask, moat: f64) -> Vec<bool> {
     let white: Vec<(u32, u32)> = pixels().filter(|&(x, y)| copy.is_white(x, y)).collect();
     let away = |x: i32, y: i32| {
         let away = |&(a, b): &(u32, u32)| f64::from(x - a as i32).hypot(f64::from(y - b as i32));
@@ -213,7 +221,7 @@ fn parts_stand_on_layers_of_mesh() {
     let stack = build[0].info.stack.as_ref().unwrap();
     assert_eq!(stack.layers, Some(5));
     assert!(stack.commands[0].ends_with(
-        "--mesh square --cell 8mm --wall 2mm --clearance 1mm --break-width 0um --break-pitch 7mm --base-layers 3"
+        "--mesh square --cell 8mm --wall 2mm --clearance 1mm --moat layer --least-piece 0mm2 --break-width 0um --break-pitch 7mm --base-layers 3"
     ), "{:?}", stack.commands);
     assert!(build[1..].iter().all(|layer| layer.info.stack.is_none()));
     // A range that begins higher up is what it is in the whole.

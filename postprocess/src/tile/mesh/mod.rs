@@ -4,15 +4,19 @@
 //! (002 section 2.4.2, figure 30). A moat around each part, and all that it encloses,
 //! stays free; break lines cut through the mesh so that parts come free of it. The
 //! first layers are mesh alone: the parts stand on them and break off (section 1.1.3).
+//! Pieces of mesh that would float or are small are left out.
 
 mod base_layers;
 mod break_lines;
+#[cfg(test)]
+mod hanging_tests;
 mod kept;
 mod lattice;
 mod mesh_options;
 mod mesh_rows;
 #[cfg(test)]
 mod mesh_tests;
+mod pieces;
 
 use lamp_stack::{Frame, Length, Mask, MaskBuilder, Op, white_runs};
 
@@ -34,6 +38,8 @@ pub(super) struct BuildMesh {
     standing: MeshRows,
     clearance: f64,
     moat: Moat,
+    /// The least number of pixels that a piece of mesh has.
+    least_piece: u64,
     pub(super) base_layers: u32,
     build: PixelSize,
     /// The number of transitions in all rows, without moats.
@@ -74,6 +80,7 @@ impl Layout {
             standing: MeshRows::default(),
             clearance,
             moat: options.moat,
+            least_piece: (options.least_piece_mm2 / self.dpi.pitch().mm().powi(2)).ceil() as u64,
             base_layers: options.base_layers,
             build: self.pixels,
             changes: 0,

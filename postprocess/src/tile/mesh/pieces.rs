@@ -1,0 +1,128 @@
+//! Pieces of mesh: what hangs together, in a layer and on the one below.
+//!
+//! Runs of neighbouring rows are joined where they share a column (union-find), so the cost follows
+//! the runs. Pixels that only touch at corners do not hang together.
+
+use lamp_stack::sets::{root, unite};
+use lamp_stack::white_runs;
+
+use super::mesh_rows::MeshRows;
+
+/// Returns the pieces of a layer's mesh that have `least` pixels or more and share a pixel with the
+/// mesh `below`, if that is given.
+///
+/// Where each layer's mesh lies within that of the layer below, all of its pieces hang on pieces
+/// that are no smaller, and `below` need not be given.
+pub(super) fn hanging(mesh: &MeshRows, below: Option<&MeshRows>, least: u64) -> MeshRows {
+    let pieces = Pieces::of(mesh, below);
+    let is_left_out = |label: u32| {
+        let piece = &pieces.all[label as usize];
+        piece.pixels < least || !(piece.hangs || below.is_none())
+    };
+    let left_out: Vec<bool> = pieces.roots.iter().map(|&label| is_left_out(label)).collect();
+    let mut kept = mesh.clone();
+    if !left_out.contains(&true) {
+        return kept;
+    }
+    let mut labels = pieces.labels.as_slice();
+    let mut row = Vec::new();
+    for (index, transitions) in kept.rows_mut().iter_mut().enumerate() {
+        let (of_row, rest) = labels.split_at(transitions.len() / 2);
+        labels = rest;
+        if of_row.iter().any(|&label| left_out[label as usize]) {
+            row.clear();
+            let runs = mesh.row(index as u32).chunks(2).zip(of_row);
+            row.extend(runs.filter(|(_, label)| !left_out[**label as usize]).flat_map(|run| run.0));
+            *transitions = row.as_slice().into();
+        }
+    }
+    kept
+}
+
+/// The runs of a mesh by piece.
+struct Pieces {
+    /// The label of each run, row by row.
+    labels: Vec<u32>,
+    /// The label that stands for the piece of each label.
+    roots: Vec<u32>,
+    /// What is known of each piece, by the label that stands for it.
+    all: Vec<Piece>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Piece {
+    pixels: u64,
+    /// Whether it shares a pixel with the mesh below.
+    hangs: bool,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Pieces {
+    fn of(mesh: &MeshRows, below: Option<&MeshRows>) -> Self {
+        let mut labels: Vec<u32> = Vec::with_capacity(mesh.change_count() / 2);
+        let (mut roots, mut all): (Vec<u32>, Vec<Piece>) = (Vec::new(), Vec::new());
+        let mut above: &[u32] = &[];
+        for index in 0..mesh.height() {
+            let row = mesh.row(index);
+            let start = labels.len();
+            labels.resize(start + row.len() / 2, NONE);
+            let (before, of_row) = labels.split_at_mut(start);
+            let of_above = &before[start - above.len() / 2..];
+            if in_step(above, row) {
+                of_row.copy_from_slice(of_above);
+            } else {
+                for_each_overlap(above, row, |upper, lower| {
+                    of_row[lower] = match of_row[lower] {
+                        NONE => of_above[upper],
+                        label => unite(&mut roots, label, of_above[upper]),
+                    };
+                });
+            }
+            for (label, run) in of_row.iter_mut().zip(row.chunks_exact(2)) {
+                if *label == NONE {
+                    *label = roots.len() as u32;
+                    roots.push(*label);
+                    all.push(Piece::default());
+                }
+                all[*label as usize].pixels += u64::from(run[1] - run[0]);
+            }
+            if let Some(below) = below.map(|below| below.row(index)) {
+                for_each_overlap(row, below, |run, _| all[of_row[run] as usize].hangs = true);
+            }
+            above = row;
+        }
+        for label in 0..roots.len() as u32 {
+            let of = root(&mut roots, label);
+            roots[label as usize] = of;
+            if of != label {
+                let Piece { pixels, hangs } = all[label as usize];
+                all[of as usize].pixels += pixels;
+                all[of as usize].hangs |= hangs;
+            }
+        }
+        Self { labels, roots, all }
+    }
+}
+
+/// Returns whether each run of a row shares columns with the run of the same number in another, and
+/// with no other.
+fn in_step(a: &[u32], b: &[u32]) -> bool {
+    let follows = |(a, b): (&[u32], &[u32])| a[0].max(b[0]) < a[1].min(b[1]);
+    a.len() == b.len() && a.windows(2).zip(b.windows(2)).all(follows)
+}
+
+/// Calls `met` with the numbers of the runs of two rows that share a column.
+fn for_each_overlap(a: &[u32], b: &[u32], mut met: impl FnMut(usize, usize)) {
+    let [mut a, mut b] = [a, b].map(|row| white_runs(row, u32::MAX).enumerate().peekable());
+    while let (Some(&(i, (from_a, to_a))), Some(&(j, (from_b, to_b)))) = (a.peek(), b.peek()) {
+        if from_a.max(from_b) < to_a.min(to_b) {
+            met(i, j);
+        }
+        if to_a <= to_b {
+            a.next();
+        } else {
+            b.next();
+        }
+    }
+}
