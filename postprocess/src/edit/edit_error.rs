@@ -66,7 +66,8 @@ pub enum EditError {
 pub enum EditProblem {
     /// It has none or several of the keys that say what to do.
     #[error(
-        "write one of box, cylinder, line, strut, label, picture, stack, crop, pad, mirror and rotate"
+        "write one of box, cylinder, line, polygon, strut, cone, sphere, label, picture, stack, crop, \
+         pad, mirror and rotate"
     )]
     NotOneAction,
     /// An edit of whole images chooses layers or an operation.
@@ -76,7 +77,7 @@ pub enum EditProblem {
     #[error("z and layers say the same: write one of them")]
     TwoRanges,
     /// Copies are chosen for something that is not drawn.
-    #[error("copies are for boxes, cylinders, lines, struts, labels and pictures: take it out")]
+    #[error("copies are for shapes, labels and pictures: take it out")]
     CopiesWithoutShape,
     /// All but the shapes in the copies would go.
     #[error("intersect would take away all of the build but the shapes in these copies")]
@@ -87,7 +88,7 @@ pub enum EditProblem {
     /// The angle is no multiple of 90 degrees.
     #[error("images rotate by 90, 180 or 270 degrees")]
     Angle,
-    /// The line or strut has no length.
+    /// The line, strut or cone has no length.
     #[error("it ends where it begins")]
     NoLength,
     /// The shape has more runs than an image can hold.
@@ -183,8 +184,10 @@ pub enum EditProblem {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LayerProblem {
-    /// A strut or a lying cylinder meets a layer of unknown height.
-    #[error("it does not say at what height it is, so no strut or lying cylinder can cross it")]
+    /// A solid meets a layer of unknown height.
+    #[error(
+        "it does not say at what height it is, so no strut, cone, sphere or lying cylinder can cross it"
+    )]
     NoHeightForSolid,
     /// Layers are chosen by height, but this one does not say its own.
     #[error("it does not say at what height it is: write layers = [first, end] instead of z")]

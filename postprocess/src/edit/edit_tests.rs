@@ -184,6 +184,53 @@ proptest! {
     }
 
     #[test]
+    fn a_pixel_is_in_a_cone_or_sphere_when_its_centre_is(
+        (from, to) in ([4i32..60, -16..36, -8..24], [4i32..60, -16..36, -8..24]),
+        diameters in [0i32..24, 1i32..24],
+        upside_down in any::<bool>(),
+    ) {
+        // No end plane and no side passes through a centre.
+        let place = |end: [i32; 3], off: f64| end.map(|q| f64::from(q) / 4.0 + off);
+        let (from, to) = (place(from, 0.0137), place(to, 0.0271));
+        let mut radii = diameters.map(|diameter| f64::from(diameter) / 8.0);
+        if upside_down {
+            radii.reverse();
+        }
+        let cone = format!(
+            "[[edit]]\ncone = {{ from = {}, to = {}, diameters = [\"{}mm\", \"{}mm\"] }}\n",
+            lengths(from), lengths(to), 2.0 * radii[0], 2.0 * radii[1]
+        );
+        let sphere_radius = radii[0].max(radii[1]);
+        let sphere = format!(
+            "[[edit]]\nsphere = {{ at = {}, diameter = \"{}mm\" }}\n",
+            lengths(from), 2.0 * sphere_radius
+        );
+        let along: [f64; 3] = std::array::from_fn(|k| to[k] - from[k]);
+        let square: f64 = along.iter().map(|part| part * part).sum();
+        let in_cone = |point: [f64; 3]| {
+            let part = (0..3).map(|k| (point[k] - from[k]) * along[k]).sum::<f64>() / square;
+            let away = (0..3).map(|k| (point[k] - from[k] - part * along[k]).powi(2)).sum::<f64>();
+            let radius = radii[0] + part * (radii[1] - radii[0]);
+            ((0.0..1.0).contains(&part) && away.sqrt() < radius, (away.sqrt() - radius).abs())
+        };
+        let in_sphere = |point: [f64; 3]| {
+            let away = (0..3).map(|k| (point[k] - from[k]).powi(2)).sum::<f64>().sqrt();
+            (away < sphere_radius, (away - sphere_radius).abs())
+        };
+        let black = || (0..4).map(|k| layer(k, Image::Mask(Mask::black(WIDTH, HEIGHT)))).collect::<Vec<_>>();
+        let made = [&cone, &sphere].map(|list| edited(black(), list, vec![]).unwrap());
+        for (column, row) in (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |column| (column, row))) {
+            for index in 0..4 {
+                let point = middle(column, row, index);
+                for (layers, (is_in, off)) in made.iter().zip([in_cone(point), in_sphere(point)]) {
+                    let white = mask(&layers[index as usize]).is_white(column, row);
+                    prop_assert!(white == is_in || off < 1e-9, "{} {} {}", column, row, index);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_pixel_is_in_a_picture_when_its_centre_is_in_a_white_pixel_of_it(
         (before, gray) in (arbitrary_mask(), any::<bool>()),
         levels in (1usize..6).prop_flat_map(|width| {
@@ -487,4 +534,18 @@ fn what_would_be_lost_or_cannot_be_is_refused() {
     assert!(error(coarse, "[[edit]]\nrotate = 90\n", vec![]).contains("layer 1"));
     let cropped = "[[edit]]\ncrop = { x = [\"30mm\", \"40mm\"], y = [\"0mm\", \"1mm\"] }\n";
     assert!(error(bars(1), cropped, vec![]).contains("x 3.000 to 15.000"));
+}
+
+#[test]
+fn a_polygon_is_the_same_in_each_layer() {
+    let black = (0..2).map(|k| layer(k, Image::Mask(Mask::black(WIDTH, HEIGHT)))).collect();
+    let list = "[[edit]]\npolygon = { points = [[\"4mm\", \"1mm\"], [\"12.1mm\", \"1mm\"], [\"4mm\", \"5mm\"]] }\n";
+    for (index, layer) in (0..).zip(edited(black, list, vec![]).unwrap()) {
+        for (column, row) in (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |column| (column, row)))
+        {
+            let [x, y, _] = middle(column, row, index);
+            let is_in = x > 4.0 && y > 1.0 && (x - 4.0) / 8.1 + (y - 1.0) / 4.0 < 1.0;
+            assert_eq!(mask(&layer).is_white(column, row), is_in, "{column} {row}");
+        }
+    }
 }

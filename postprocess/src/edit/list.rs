@@ -98,7 +98,10 @@ impl Edit {
             self.block.is_some(),
             self.cylinder.is_some(),
             self.line.is_some(),
+            self.polygon.is_some(),
             self.strut.is_some(),
+            self.cone.is_some(),
+            self.sphere.is_some(),
             self.label.is_some(),
             self.picture.is_some(),
         ];
@@ -187,6 +190,18 @@ mod tests {
             (
                 "strut = { from = [\"0mm\", \"0mm\"], to = [\"1mm\", \"0mm\", \"0mm\"], diameter = \"1mm\" }",
                 &["edit 2, strut.from", "2 lengths where 3"],
+            ),
+            (
+                "polygon = { points = [[\"0mm\", \"0mm\"], [\"1mm\", \"0mm\"]] }",
+                &["edit 2, polygon.points", "2 points where 3"],
+            ),
+            (
+                "cone = { from = [\"0mm\", \"0mm\", \"0mm\"], to = [\"1mm\", \"0mm\", \"0mm\"], diameters = [\"-1mm\", \"2mm\"] }",
+                &["edit 2, cone.diameters", "below zero"],
+            ),
+            (
+                "sphere = { at = [\"0mm\", \"0mm\"], diameter = \"1mm\" }",
+                &["edit 2, sphere.at", "2 lengths where 3"],
             ),
             ("pad = { left = \"-1mm\" }", &["edit 2, pad.left", "below zero"]),
             ("pad = { left = \"1e9mm\" }", &["edit 2, pad.left", "10 m"]),

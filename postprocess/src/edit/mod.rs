@@ -5,6 +5,7 @@
 //!
 //! Source: 002 section 2.4.3.
 
+mod cone;
 mod copies;
 mod edit_error;
 #[cfg(test)]

@@ -27,7 +27,10 @@ pub(super) struct Edit {
     pub(super) block: Option<Rectangle>,
     pub(super) cylinder: Option<Cylinder>,
     pub(super) line: Option<StraightLine>,
+    pub(super) polygon: Option<Polygon>,
     pub(super) strut: Option<StrutEnds>,
+    pub(super) cone: Option<ConeEnds>,
+    pub(super) sphere: Option<Sphere>,
     pub(super) label: Option<Label>,
     pub(super) picture: Option<Picture>,
     pub(super) stack: Option<OtherStack>,
@@ -106,6 +109,36 @@ pub(super) struct StrutEnds {
     pub(super) to: [Length; 3],
     #[serde(deserialize_with = "size")]
     pub(super) diameter: Length,
+}
+
+/// A straight round cone or frustum between two points.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ConeEnds {
+    #[serde(deserialize_with = "lengths")]
+    pub(super) from: [Length; 3],
+    #[serde(deserialize_with = "lengths")]
+    pub(super) to: [Length; 3],
+    /// Those at its ends, not both zero.
+    #[serde(deserialize_with = "distances")]
+    pub(super) diameters: [Length; 2],
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Sphere {
+    #[serde(deserialize_with = "lengths")]
+    pub(super) at: [Length; 3],
+    #[serde(deserialize_with = "size")]
+    pub(super) diameter: Length,
+}
+
+/// A closed line around the same pixels in each layer.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Polygon {
+    #[serde(deserialize_with = "corners")]
+    pub(super) points: Vec<[Length; 2]>,
 }
 
 /// A straight line with square ends.
@@ -240,6 +273,25 @@ fn places<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<[Length; 2]>, D::Err
         Places::Several(places) => places,
     };
     texts.iter().map(|[x, y]| Ok([length(x)?, length(y)?])).collect()
+}
+
+fn corners<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<[Length; 2]>, D::Error> {
+    let points = places(from)?;
+    match points.len() {
+        3.. => Ok(points),
+        count => Err(D::Error::custom(format!("{count} points where 3 are needed"))),
+    }
+}
+
+fn distances<'de, D: Deserializer<'de>>(from: D) -> Result<[Length; 2], D::Error> {
+    let distances: [Length; 2] = lengths(from)?;
+    match distances.iter().find(|length| length.um() < 0.0) {
+        Some(length) => Err(D::Error::custom(format!("{length} is below zero"))),
+        None if distances == [Length::default(); 2] => {
+            Err(D::Error::custom("one of them must be above zero"))
+        }
+        None => Ok(distances),
+    }
 }
 
 fn distance<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {

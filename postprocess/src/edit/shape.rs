@@ -46,6 +46,12 @@ impl EditShape {
         }
         let mask = if let Some(cylinder) = edit.cylinder {
             composed(&copies, place, |k, part| round(cylinder, grids[k], part))
+        } else if let Some(polygon) = &edit.polygon {
+            composed(&copies, place, |k, part| {
+                let corner = |point: &[Length; 2]| grids[k].to_pixels(point.map(Length::mm));
+                let corners = polygon.points.iter().map(corner).collect();
+                polygons(&[corners], part.width, part.height)
+            })
         } else if let Some(label) = &edit.label {
             let lines: Vec<_> = copies
                 .iter()

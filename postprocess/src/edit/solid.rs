@@ -2,27 +2,36 @@
 
 use lamp_stack::{Length, Mask, MaskBuilder, Strut};
 
+use super::cone::Cone;
 use super::edit_error::EditProblem;
-use super::fill::{Point, polygons};
+use super::fill::{Point, disc, polygons};
 use super::image_bounds::{ImageBounds, PixelMap};
-use super::schema::{Cylinder, CylinderAxis, Edit, Rectangle};
+use super::schema::{Cylinder, CylinderAxis, Edit, Rectangle, Sphere};
 
 /// A solid in part coordinates.
 pub(super) enum Solid {
     /// A cylinder along x or y.
     Lying(Cylinder),
     Strut(Strut),
+    Cone(Cone),
+    Sphere(Sphere),
 }
 
 impl Solid {
     /// Returns an edit's solid, if it has one.
     ///
     /// # Errors
-    /// Returns an error if a strut has no length.
+    /// Returns an error if a strut or cone has no length.
     pub(super) fn of(edit: &Edit) -> Result<Option<Self>, EditProblem> {
         if let Some(ends) = edit.strut {
             let strut = Strut::new(ends.from, ends.to, ends.diameter);
             return strut.map(|strut| Some(Self::Strut(strut))).ok_or(EditProblem::NoLength);
+        }
+        if let Some(ends) = &edit.cone {
+            return Cone::new(ends).map(|cone| Some(Self::Cone(cone))).ok_or(EditProblem::NoLength);
+        }
+        if let Some(sphere) = edit.sphere {
+            return Ok(Some(Self::Sphere(sphere)));
         }
         let lying = edit.cylinder.filter(|cylinder| cylinder.along != CylinderAxis::Z);
         Ok(lying.map(Self::Lying))
@@ -31,10 +40,12 @@ impl Solid {
     /// Returns true if it may have a section at a height.
     pub(super) fn reaches(&self, height: Length) -> bool {
         let [low, high] = match self {
-            Self::Lying(Cylinder { at: [_, z], diameter, .. }) => {
+            Self::Lying(Cylinder { at: [_, z], diameter, .. })
+            | Self::Sphere(Sphere { at: [_, _, z], diameter }) => {
                 [-0.5, 0.5].map(|share| Length::from_um(z.um() + share * diameter.um()))
             }
             Self::Strut(strut) => strut.heights(),
+            Self::Cone(cone) => cone.reach_mm(2).map(Length::from_mm),
         };
         (low..=high).contains(&height)
     }
@@ -50,6 +61,15 @@ impl Solid {
                 let dpi = part.dpi.expect("shapes are drawn in known resolutions");
                 let size = [part.width, part.height];
                 of_runs(strut.section(height, part.origin_mm, dpi, size), size)
+            }
+            Self::Cone(cone) => of_runs(cone.section(height, part), [part.width, part.height]),
+            Self::Sphere(Sphere { at: [x, y, z], diameter }) => {
+                let grid = part.grid().expect("shapes are drawn in known resolutions");
+                let [radius, off] = [diameter.um() / 2.0, height.um() - z.um()];
+                let half = (radius * radius - off * off).max(0.0).sqrt();
+                let centre = grid.to_pixels([x, y].map(|at| at.mm()));
+                let half = grid.length(Length::from_um(half));
+                disc(centre, half, part.width, part.height)
             }
         }
     }

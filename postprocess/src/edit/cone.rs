@@ -1,0 +1,106 @@
+//! Cones and frustums between two points, and their sections in the rows of images.
+
+use lamp_stack::Length;
+
+use super::image_bounds::ImageBounds;
+use super::schema::ConeEnds;
+
+/// A round cone or frustum with flat ends, in part coordinates.
+///
+/// A point is in it if it lies between the planes through the ends that the axis stands on, and
+/// nearer to the axis than the radius there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cone {
+    from_mm: [f64; 3],
+    direction: [f64; 3],
+    length_mm: f64,
+    radii_mm: [f64; 2],
+}
+
+impl Cone {
+    /// Creates a cone between the middles of its ends, or returns `None` if they coincide.
+    pub(super) fn new(ends: &ConeEnds) -> Option<Self> {
+        let [from_mm, to_mm] = [ends.from, ends.to].map(|end| end.map(Length::mm));
+        let along: [f64; 3] = std::array::from_fn(|k| to_mm[k] - from_mm[k]);
+        let length_mm = along.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let radii_mm = ends.diameters.map(|diameter| diameter.mm() / 2.0);
+        let direction = along.map(|part| part / length_mm);
+        (length_mm > 0.0).then_some(Self { from_mm, direction, length_mm, radii_mm })
+    }
+
+    /// Returns the least and the greatest coordinate of an axis.
+    pub(super) fn reach_mm(&self, axis: usize) -> [f64; 2] {
+        let along = self.direction[axis];
+        let across = (1.0 - along * along).max(0.0).sqrt();
+        let ends = [self.from_mm[axis], self.from_mm[axis] + self.length_mm * along];
+        let reach = |sign: f64, k: usize| ends[k] + sign * self.radii_mm[k] * across;
+        [reach(-1.0, 0).min(reach(-1.0, 1)), reach(1.0, 0).max(reach(1.0, 1))]
+    }
+
+    /// Returns the pixels whose centres are in its section at a height: at most one run a row, as
+    /// the row, the first column and the column after the last, from the top. The image's
+    /// resolution is known.
+    pub(super) fn section(
+        &self,
+        height: Length,
+        image: &ImageBounds,
+    ) -> impl Iterator<Item = (u32, u32, u32)> + use<> {
+        let (cone, [x0, y1], width) = (*self, image.origin_mm, image.width);
+        let dpi = image.dpi.expect("shapes are drawn in known resolutions");
+        let pitch_mm = dpi.pitch().mm();
+        let up_mm = height.mm() - self.from_mm[2];
+        // Pixel centres are whole numbers; the casts make negative values zero.
+        let pixels = move |mm: f64| mm * (dpi.get() * 5.0) / 127.0 - 0.5;
+        let [low, high] = self.reach_mm(1);
+        let end = (pixels(y1 - low).floor() + 1.0) as u32;
+        (pixels(y1 - high).ceil() as u32..end.min(image.height)).filter_map(move |row| {
+            let y_mm = y1 - (f64::from(row) + 0.5) * pitch_mm;
+            let run = cone.run_mm(y_mm - cone.from_mm[1], up_mm)?;
+            let column = |x: f64| (pixels(cone.from_mm[0] + x - x0).ceil() as u32).min(width);
+            let [start, end] = run.map(column);
+            (start < end).then_some((row, start, end))
+        })
+    }
+
+    /// Returns the run along x at a y and z; all are distances from the first end. A cone is
+    /// convex, so there is one at most.
+    fn run_mm(&self, y: f64, z: f64) -> Option<[f64; 2]> {
+        let [dx, dy, dz] = self.direction;
+        // A point at x is `x dx + s` along the axis, where the radius is `r + k x dx`.
+        let s = y * dy + z * dz;
+        let k = (self.radii_mm[1] - self.radii_mm[0]) / self.length_mm;
+        let r = self.radii_mm[0] + k * s;
+        let [low, high] = if dx == 0.0 {
+            (0.0..self.length_mm).contains(&s).then_some([f64::NEG_INFINITY, f64::INFINITY])?
+        } else {
+            let [a, b] = [-s / dx, (self.length_mm - s) / dx];
+            [a.min(b), a.max(b)]
+        };
+        // In it is where a x^2 + 2 b x + c < 0.
+        let a = dy * dy + dz * dz - k * k * dx * dx;
+        let b = -dx * (s + k * r);
+        let c = y * y + z * z - s * s - r * r;
+        let within = |[from, to]: [f64; 2]| {
+            let run = [from.max(low), to.min(high)];
+            (run[0] < run[1]).then_some(run)
+        };
+        if a.abs() < 1e-12 {
+            return match b {
+                0.0 => (c < 0.0).then(|| within([low, high]))?,
+                b if b > 0.0 => within([low, -c / (2.0 * b)]),
+                b => within([-c / (2.0 * b), high]),
+            };
+        }
+        let square = b * b - a * c;
+        if square <= 0.0 {
+            return (a < 0.0).then(|| within([low, high]))?;
+        }
+        let root = square.sqrt();
+        let ends = [(-b - root) / a, (-b + root) / a];
+        if a > 0.0 {
+            within(ends)
+        } else {
+            within([low, ends[1]]).or_else(|| within([ends[0], high]))
+        }
+    }
+}
