@@ -51,6 +51,7 @@ mod stack_part;
 mod stages;
 mod step_options;
 mod streams;
+mod strip_folder;
 mod target_arg;
 mod terminal_picture;
 mod thumbnails;

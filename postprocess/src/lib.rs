@@ -47,8 +47,8 @@ pub use offset::{
     Widths, beyond_tolerance, compensate, offset, offset_one_bit, shrink,
 };
 pub use strips::{
-    IndexError, JoinSwathsError, Seam, StripDifference, StripWriter, StripsError, Swaths,
-    SwathsError, is_strips, join_strips,
+    IndexError, JoinSwathsError, Seam, StripDifference, StripFile, StripForm, StripWriter,
+    StripsError, Swaths, SwathsError, is_strips, join_strips, strip_files,
 };
 pub use tile::{
     CellShape, CopyName, CopyPlacement, HeightOptions, Layout, LayoutError, LayoutFile,

@@ -312,3 +312,53 @@ fn strips_that_do_not_belong_together_are_named() {
     let both = scratch.run("lamp join s other -o x.tif");
     both.is_wrong_usage(&["s holds the strips of one build"]);
 }
+
+#[test]
+fn stages_take_a_folder_of_strips_for_its_build() {
+    let scratch = Scratch::new();
+    let layer = |index: u32| {
+        let mut ramp = GrayMask::new(90);
+        (0..30).for_each(|_| ramp.push_runs((0..90).map(|l| (1, (l * 2 + index) as u8))).unwrap());
+        let stack = (index == 0).then(StackInfo::default);
+        let info = PageInfo { index, stack, ..PageInfo::default() };
+        Layer { info, dpi: Dpi::new(1500.0), image: Image::Gray(ramp).into() }
+    };
+    scratch.stack("gray.tif", (0..3).map(layer));
+    let tile = "tile gray.tif --area 1.6x0.6mm --mesh none -o build.tif --mirrors 40 --overlap 11";
+    scratch.run(&format!("{tile} --strips s --seam gray")).succeeds_quietly();
+    scratch.run("dither build.tif -q -o dots.tif").succeeds();
+    scratch.run("dither s -q -o dots").succeeds();
+    // Each white pixel is exposed once, although the strips had ramps.
+    assert_eq!(index(&scratch, "dots")["seam"], "comb");
+    check_sum(&scratch, "dots", "dots.tif");
+    scratch.run("lamp join dots -o joined.tif").succeeds_quietly();
+    assert!(scratch.bytes("joined.tif") == scratch.bytes("dots.tif"));
+    scratch.run("fix build.tif -q -o fixed.tif").succeeds();
+    scratch.run("fix s -q -o fixed").succeeds();
+    assert_eq!(index(&scratch, "fixed")["seam"], "gray");
+    check_sum(&scratch, "fixed", "fixed.tif");
+    scratch.run("lamp verify dots fixed -q").succeeds_quietly();
+
+    let info = scratch.run("lamp info dots --json").succeeds_quietly().stdout;
+    let info: Value = serde_json::from_slice(&info).unwrap();
+    let build = scratch.run("lamp info dots.tif --json").succeeds_quietly().stdout;
+    let build: Value = serde_json::from_slice(&build).unwrap();
+    for key in ["layers", "exposed_px", "gray_layers", "checks"] {
+        assert_eq!(info[key], build[key], "{key}");
+    }
+    assert_eq!((&info["schema"], &info["seam"]), (&json!("lamp-info-strips-1"), &json!("comb")));
+    assert_eq!(info["strips"].as_array().unwrap().len(), 3);
+    assert_eq!(info["strips"][1]["columns"], json!([29, 69]));
+    let text = scratch.run("lamp info dots").succeeds_quietly().stdout;
+    let text = String::from_utf8(text).unwrap();
+    assert!(text.contains("strip_001.tif: columns 29 to 68, 3 layers, "), "{text}");
+
+    scratch.run("dither s").is_wrong_usage(&["name the folder"]);
+    scratch.run("dither s --layers 1..2 -o t").is_wrong_usage(&["--layers", "lamp join"]);
+    scratch.run("lamp info s --runs").is_wrong_usage(&["--runs"]);
+    scratch.run("dither s -o dots").is_refused_with(&["dots", "--force replaces a folder"]);
+    fs::remove_file(scratch.path("s/strip_001.tif")).unwrap();
+    scratch.run("dither s -q -o t").is_refused_with(&["s: strip_001.tif"]);
+    scratch.run("fix s -q -o t").is_refused_with(&["s: strip_001.tif"]);
+    assert!(!scratch.path("t").exists());
+}

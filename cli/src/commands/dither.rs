@@ -1,11 +1,13 @@
 //! `lamp dither`: turns gray layers into dots.
 
 use clap::Args;
+use lamp_postprocess::{Seam, StripForm};
 
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::stages::dither::DitherSettings;
-use crate::streams::{progress, read_layers, write_layers};
+use crate::streams::progress;
+use crate::strip_folder::{read_layers_or_strips, write_layers_or_strips};
 
 /// Turn gray layers into dots; 1-bit layers pass unchanged
 ///
@@ -13,13 +15,17 @@ use crate::streams::{progress, read_layers, write_layers};
 /// appears outside the part. The pattern moves from layer to layer, so that holes do not line up;
 /// the same layer always becomes the same dots. Resin averages dots of 17 um, but not of 85 um, so
 /// wider pixels than 17 um cause a warning.
+///
+/// Of a folder of strips, the build that they make is dithered and cut again, by a comb: no pixel of
+/// a seam is white in two strips.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   slice blade.stl | fix | dither | tile > build.tif
   dither gray.tif --layers 100..200 -o dots.tif
   dither gray.tif --method floyd-steinberg -o dots.tif
-  dither scans/ --method threshold -o masks/")]
+  dither scans/ --method threshold -o masks/
+  dither strips/ -o dots/")]
 pub(crate) struct DitherArgs {
     #[command(flatten)]
     input: Input,
@@ -33,6 +39,9 @@ pub(crate) struct DitherArgs {
 
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("dither", common, &args.output);
-    let layers = read_layers(&args.input, &progress)?;
-    write_layers(args.settings.layers(layers, &progress), &args.output, &progress)
+    let layers = read_layers_or_strips(&args.input, &progress)?;
+    let dots = args.settings.layers(layers, &progress);
+    // Dots on ramps would be dots of each side alone.
+    let by_comb = |form| StripForm { seam: Seam::Comb, ..form };
+    write_layers_or_strips(dots, &args.input, by_comb, &args.output, &progress)
 }

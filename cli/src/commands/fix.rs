@@ -12,7 +12,8 @@ use crate::fix_report::whereabouts;
 use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output};
 use crate::stages::fix::{FixSettings, Fixing};
-use crate::streams::{check_beside, progress, read_layers, unless_found, write_layers};
+use crate::streams::{check_beside, progress, unless_found};
+use crate::strip_folder::{read_layers_or_strips, write_layers_or_strips};
 
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
 ///
@@ -23,6 +24,8 @@ use crate::streams::{check_beside, progress, read_layers, unless_found, write_la
 /// A band of rows that is too wide, or whose correction is too uncertain, is left and reported.
 /// Changes are recorded on their pages, and summed up in two lines; --verbose and --report list them
 /// all. All other layers pass byte for byte. Gray layers are corrected by their outlines.
+///
+/// Of a folder of strips, the build that they make is corrected and cut again.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -66,7 +69,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     let mut evidence =
         evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
     let mut layer_count = 0;
-    let layers = read_layers(&args.input, &progress)?.inspect(|_| layer_count += 1);
+    let layers = read_layers_or_strips(&args.input, &progress)?.inspect(|_| layer_count += 1);
     let fixed = fixing.layers(layers, 0..u32::MAX, |fixed| {
         for line in describe(fixed, &options) {
             progress.detail(&line);
@@ -76,7 +79,8 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
         }
     });
     let finding = || fixing.report().text_of_left().filter(|_| args.strict).map(Exit::Findings);
-    let written = write_layers(unless_found(fixed, finding), &args.output, &progress);
+    let fixed = unless_found(fixed, finding);
+    let written = write_layers_or_strips(fixed, &args.input, |form| form, &args.output, &progress);
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }

@@ -1,11 +1,13 @@
 //! `lamp info`: describes a stack.
 
 use clap::Args;
+use lamp_postprocess::is_strips;
 use lamp_stack::{
     NumberRange, Page, PageHeader, PageInfo, Pages, StackInfo, StackTotals, map_in_order,
 };
 use serde::Serialize;
 
+use super::info_strips::print_strips;
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::options::Input;
@@ -15,7 +17,8 @@ use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 /// Describe a stack: pages, size, resolution, heights, area, exposure, checks
 ///
 /// Only directories and texts are read, which takes a moment for any file. Area and volume are
-/// those that the pages state. lamp verify also decodes the images.
+/// those that the pages state. lamp verify also decodes the images. Of a folder of strips, totals and
+/// each strip are described.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -36,6 +39,14 @@ pub(crate) struct InfoArgs {
 }
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
+    if is_strips(&args.input.stack) {
+        if args.runs || args.input.layers.is_some() {
+            return Err(Exit::usage(
+                "--runs and --layers are for one stack: name a strip, or the build of lamp join",
+            ));
+        }
+        return print_strips(&args.input.stack, args.json);
+    }
     let pages = open_pages(&args.input.stack)?;
     let facts = if args.runs {
         runs_of(pages, &args.input)?

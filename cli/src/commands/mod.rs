@@ -15,6 +15,7 @@ mod edit;
 mod fix;
 mod heights;
 mod info;
+mod info_strips;
 mod join;
 mod learn;
 mod machine;

@@ -12,6 +12,7 @@
 //! other rises, and their sum is the layer's. [`Seam`] says by what.
 
 mod cut;
+mod form;
 mod index;
 mod join_swaths;
 mod ramps;
@@ -35,6 +36,7 @@ use index::INDEX;
 /// The first word of the command that a strip's first page records.
 const COMMAND: &str = "strip";
 
+pub use form::{StripFile, StripForm, strip_files};
 pub use index::IndexError;
 pub use join_swaths::JoinSwathsError;
 pub use read::{StripDifference, is_strips, join_strips};

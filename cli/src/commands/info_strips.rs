@@ -1,0 +1,131 @@
+//! `lamp info` of a folder of strips: its totals, and each strip.
+
+use std::path::Path;
+
+use lamp_postprocess::{StripFile, StripForm, strip_files};
+use lamp_stack::{Pages, StackTotals};
+use serde::Serialize;
+
+use crate::exit::Exit;
+use crate::json_report::print_answer;
+use crate::stack_facts::StackFacts;
+use crate::streams::{failed_at, input_name, print};
+
+/// A strip, and what its pages say.
+struct Strip {
+    file: StripFile,
+    totals: StackTotals,
+}
+
+#[derive(Serialize)]
+struct Totals<'a> {
+    mirrors: u32,
+    overlap: u32,
+    seam: &'a str,
+    layers: u64,
+    gray_layers: u64,
+    exposed_px: Option<u64>,
+    data_bytes: u64,
+    checks: bool,
+}
+
+impl<'a> Totals<'a> {
+    fn of(form: &'a StripForm, strips: &[Strip]) -> Self {
+        let sum = |number: fn(&StackTotals) -> u64| strips.iter().map(|s| number(&s.totals)).sum();
+        Self {
+            mirrors: form.mirrors,
+            overlap: form.overlap,
+            seam: form.seam.name(),
+            layers: strips.iter().map(|strip| strip.totals.pages).max().unwrap_or(0),
+            gray_layers: strips.iter().map(|strip| strip.totals.gray_pages).max().unwrap_or(0),
+            exposed_px: strips.iter().map(|strip| strip.totals.exposed_px).sum(),
+            data_bytes: sum(|totals| totals.data_bytes),
+            checks: strips.iter().all(|strip| strip.totals.has_checks()),
+        }
+    }
+}
+
+/// Prints what is known of a folder of strips.
+pub(super) fn print_strips(folder: &Path, as_json: bool) -> Result<(), Exit> {
+    let name = input_name(folder);
+    let failed = |error| Exit::from(error).at(name.clone());
+    let form = StripForm::of(folder).map_err(failed)?;
+    let files = strip_files(folder).map_err(failed)?;
+    let strips = files.into_iter().map(|file| read(folder, file)).collect::<Result<Vec<_>, _>>()?;
+    let totals = Totals::of(&form, &strips);
+    if as_json {
+        return print_answer("lamp-info-strips-1", &json(&totals, &strips));
+    }
+    print(&text(&name, &totals, &strips))
+}
+
+fn read(folder: &Path, file: StripFile) -> Result<Strip, Exit> {
+    let path = folder.join(&file.name);
+    let at = |error| failed_at(input_name(&path), error);
+    let mut totals: Option<StackTotals> = None;
+    for header in Pages::open(&path).map_err(at)?.headers() {
+        let header = header.map_err(at)?;
+        match &mut totals {
+            Some(totals) => totals.add(&header),
+            None => totals = Some(StackTotals::of(&header)),
+        }
+    }
+    let totals = totals.ok_or(lamp_stack::StackError::NoLayers).map_err(at)?;
+    Ok(Strip { file, totals })
+}
+
+fn json<'a>(totals: &'a Totals<'a>, strips: &'a [Strip]) -> impl Serialize + 'a {
+    #[derive(Serialize)]
+    struct Answer<'a> {
+        #[serde(flatten)]
+        totals: &'a Totals<'a>,
+        strips: Vec<Line<'a>>,
+    }
+    #[derive(Serialize)]
+    struct Line<'a> {
+        file: &'a str,
+        columns: [u32; 2],
+        #[serde(flatten)]
+        facts: StackFacts<'a>,
+    }
+    let line = |strip: &'a Strip| Line {
+        file: &strip.file.name,
+        columns: [strip.file.columns.start, strip.file.columns.end],
+        facts: StackFacts::new(&strip.totals),
+    };
+    Answer { totals, strips: strips.iter().map(line).collect() }
+}
+
+fn text(name: &str, totals: &Totals<'_>, strips: &[Strip]) -> String {
+    let exposed = |pixels: Option<u64>| match pixels {
+        Some(pixels) => format!("{pixels} pixels"),
+        None => "an unknown number of pixels".to_owned(),
+    };
+    let gray = match totals.gray_layers {
+        0 => String::new(),
+        gray => format!(", {gray} of them gray"),
+    };
+    let mut text = format!(
+        "strips:     {name}\nlayers:     {}{gray}\nswaths:     {} of {} mirrors, {} shared ({})\n\
+         exposed:    {} in all strips and layers\ndata:       {} bytes\n",
+        totals.layers,
+        strips.len(),
+        totals.mirrors,
+        totals.overlap,
+        totals.seam,
+        exposed(totals.exposed_px),
+        totals.data_bytes,
+    );
+    for Strip { file, totals } in strips {
+        text.push_str(&format!(
+            "{}: columns {} to {}, {} layers, {}, {} bytes\n",
+            file.name,
+            file.columns.start,
+            file.columns.end - 1,
+            totals.pages,
+            exposed(totals.exposed_px),
+            totals.data_bytes,
+        ));
+    }
+    text
+}
