@@ -135,10 +135,7 @@ impl ImageCheck {
     pub(crate) fn of(image: &Image) -> Self {
         let exposed_px = match image {
             Image::Mask(mask) => mask.white_pixels(),
-            Image::Gray(gray) => (0..gray.height())
-                .flat_map(|row| image.runs(row))
-                .map(|(start, end, _)| u64::from(end - start))
-                .sum(),
+            Image::Gray(gray) => gray.exposed_pixels(),
         };
         Self { crc: image_crc(image), exposed_px }
     }

@@ -59,7 +59,9 @@ impl DepthLevels {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LevelSteps {
-    steps_um: Vec<f64>,
+    /// Infinite from `count` on.
+    steps_um: Box<[f64; 256]>,
+    count: u8,
     /// The number of steps below each bin of depths.
     below: Vec<u8>,
     bins_per_um: f64,
@@ -78,8 +80,11 @@ impl LevelSteps {
         let last_um = steps_um.last().copied().unwrap_or(0.0);
         let finite = last_um.is_finite() && last_um > 0.0;
         let bins_per_um = if finite { Self::BINS as f64 / last_um } else { 0.0 };
-        let mut steps = Self { steps_um, below: vec![0; Self::BINS + 1], bins_per_um };
-        for &step_um in &steps.steps_um {
+        let mut padded = Box::new([f64::INFINITY; 256]);
+        padded[..steps_um.len()].copy_from_slice(&steps_um);
+        let (count, below) = (steps_um.len() as u8, vec![0; Self::BINS + 1]);
+        let mut steps = Self { steps_um: padded, count, below, bins_per_um };
+        for step_um in steps_um {
             // Depths of this bin may lie below the step.
             let bin = steps.bin(step_um);
             steps.below[bin + 1..].iter_mut().for_each(|below| *below += 1);
@@ -91,7 +96,7 @@ impl LevelSteps {
     #[inline]
     pub fn level(&self, depth_um: f64) -> u8 {
         let mut level = self.below[self.bin(depth_um)];
-        while self.steps_um.get(usize::from(level)).is_some_and(|&step_um| step_um <= depth_um) {
+        while level < self.count && self.steps_um[usize::from(level)] <= depth_um {
             level += 1;
         }
         level
@@ -100,7 +105,7 @@ impl LevelSteps {
     /// Returns a depth's bin: never a lower one for a greater depth.
     #[inline]
     fn bin(&self, depth_um: f64) -> usize {
-        ((depth_um * self.bins_per_um) as usize).min(Self::BINS)
+        ((depth_um * self.bins_per_um) as u32).min(Self::BINS as u32) as usize
     }
 }
 

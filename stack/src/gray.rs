@@ -58,6 +58,19 @@ impl GrayMask {
         Self::without_rows(width)
     }
 
+    /// Returns the number of pixels that are not black.
+    pub(crate) fn exposed_pixels(&self) -> u64 {
+        let of_row = |changes: &[LevelChange]| {
+            let (mut sum, mut since, mut exposed) = (0, 0, 0);
+            for change in changes {
+                sum += (change.column - since) & exposed;
+                (since, exposed) = (change.column, if change.level > 0 { u32::MAX } else { 0 });
+            }
+            u64::from(sum + ((self.width() - since) & exposed))
+        };
+        self.rows().map(of_row).sum()
+    }
+
     /// Adds a row below the others.
     ///
     /// # Errors

@@ -36,6 +36,7 @@ pub(crate) fn push_below(
 ) {
     let first = list.len();
     let step_um = light.step_um(layer);
+    let first_in_reach = light.first_in_reach(layer);
     let mut rest = layer_below.unwrap_or_default();
     for (start, end, depth_um) in rows.pieces(row) {
         if depth_um == 0.0 {
@@ -49,11 +50,7 @@ pub(crate) fn push_below(
             push_joined(list, first, Below { start, end, layer: DEEP });
             continue;
         }
-        let in_reach = |below: u32| {
-            let reaches =
-                below != DEEP && light.distance_um(layer, below as usize) < light.reach_um();
-            if reaches { below } else { DEEP }
-        };
+        let in_reach = |below: u32| if below >= first_in_reach { below } else { DEEP };
         // Black right below is an underside at the plane between.
         let between = in_reach(layer as u32 - 1);
         let mut column = start;

@@ -17,7 +17,7 @@
 //! Source: 002 section 3.3.10, algorithm 15, but with depths of the facets themselves
 //! instead of a solid cut out for each layer.
 
-mod above;
+mod band;
 mod below;
 mod columns;
 mod levels;
@@ -26,6 +26,8 @@ mod row_lists;
 mod rows;
 mod shade;
 mod sheet;
+mod solid;
+mod stretch;
 
 pub(crate) use columns::Columns;
 pub use levels::LayerLevels;

@@ -26,6 +26,8 @@ pub(crate) struct PrintThrough {
     within_um: f64,
     /// The most layers above a layer that count.
     most_above: u32,
+    /// For each layer the first whose top its light reaches.
+    first_in_reach: Vec<u32>,
     known: Mutex<HashMap<Surroundings, Arc<LevelsByDepth>>>,
 }
 
@@ -48,7 +50,11 @@ impl PrintThrough {
         }
         let within_um = most_um + BEYOND_UM;
         let known = Mutex::default();
-        let mut light = Self { levels, tops_um, white, reach_um, within_um, most_above: 0, known };
+        let reaches =
+            |top_um: &f64| tops_um.partition_point(|below_um| top_um - below_um >= reach_um) as u32;
+        let (most_above, first_in_reach) = (0, tops_um.iter().map(reaches).collect());
+        let mut light =
+            Self { levels, tops_um, white, reach_um, within_um, most_above, first_in_reach, known };
         let above = |layer| (light.end_above(layer) - 1 - layer) as u32;
         light.most_above = (0..light.len()).map(above).max().unwrap_or(0);
         light
@@ -57,11 +63,6 @@ impl PrintThrough {
     /// Returns the most layers above a layer that count.
     pub(crate) fn most_above(&self) -> u32 {
         self.most_above
-    }
-
-    /// Returns the depth from which on all pixels are white in all layers.
-    pub(crate) fn reach_um(&self) -> f64 {
-        self.reach_um
     }
 
     /// Returns the depth that layers look at: their own thickness. Further down, the layers below
@@ -107,6 +108,11 @@ impl PrintThrough {
     pub(crate) fn first_below(&self, layer: usize) -> usize {
         let far_um = self.tops_um[layer] - self.reach_um;
         self.tops_um.partition_point(|top_um| *top_um < far_um)
+    }
+
+    /// Returns the first layer whose top a layer's light reaches.
+    pub(crate) fn first_in_reach(&self, layer: usize) -> u32 {
+        self.first_in_reach[layer]
     }
 
     /// Returns the levels by depth of a layer under so many white ones, or under white as far up as

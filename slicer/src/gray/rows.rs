@@ -10,6 +10,8 @@ use super::row_lists::RowLists;
 pub(crate) trait ShadedRows {
     /// What a pixel becomes.
     type Pixel: Copy + PartialEq;
+    /// A column from which on pixels are another.
+    type Change;
 
     /// A pixel outside the part.
     const OUTSIDE: Self::Pixel;
@@ -19,20 +21,21 @@ pub(crate) trait ShadedRows {
     /// Returns a pixel below which the part is so deep, in micrometres.
     fn of_depth(&self, depth_um: f64) -> Self::Pixel;
 
-    /// Adds the next row, given the columns at which its pixels change.
-    fn push_row(&mut self, changes: &[(u32, Self::Pixel)]);
+    fn change(column: u32, pixel: Self::Pixel) -> Self::Change;
+
+    /// Adds the next row, given where its pixels change.
+    fn push_row(&mut self, changes: &[Self::Change]);
 }
 
 /// Gray levels that cure each depth by themselves.
 pub(crate) struct LevelRows<'a> {
     levels: &'a DepthLevels,
-    changes: Vec<LevelChange>,
     image: GrayMask,
 }
 
 impl<'a> LevelRows<'a> {
     pub(crate) fn new(levels: &'a DepthLevels, width: u32) -> Self {
-        Self { levels, changes: Vec::new(), image: GrayMask::new(width) }
+        Self { levels, image: GrayMask::new(width) }
     }
 
     pub(crate) fn finish(self) -> Image {
@@ -42,6 +45,7 @@ impl<'a> LevelRows<'a> {
 
 impl ShadedRows for LevelRows<'_> {
     type Pixel = u8;
+    type Change = LevelChange;
 
     const OUTSIDE: u8 = 0;
     const DEEP: u8 = 255;
@@ -51,10 +55,13 @@ impl ShadedRows for LevelRows<'_> {
         self.levels.level(lamp_stack::Length::from_um(depth_um))
     }
 
-    fn push_row(&mut self, changes: &[(u32, u8)]) {
-        self.changes.clear();
-        self.changes.extend(changes.iter().map(|&(column, level)| LevelChange { column, level }));
-        self.image.push_row(&self.changes).expect("changes come from the left");
+    #[inline]
+    fn change(column: u32, level: u8) -> LevelChange {
+        LevelChange { column, level }
+    }
+
+    fn push_row(&mut self, changes: &[LevelChange]) {
+        self.image.push_row(changes).expect("changes come from the left");
     }
 }
 
@@ -142,6 +149,7 @@ fn pieces(
 
 impl ShadedRows for DepthRows {
     type Pixel = f32;
+    type Change = (u32, f32);
 
     const OUTSIDE: f32 = 0.0;
     const DEEP: f32 = f32::INFINITY;
@@ -149,6 +157,11 @@ impl ShadedRows for DepthRows {
     #[inline]
     fn of_depth(&self, depth_um: f64) -> f32 {
         depth_um.max(0.0) as f32
+    }
+
+    #[inline]
+    fn change(column: u32, depth_um: f32) -> (u32, f32) {
+        (column, depth_um)
     }
 
     fn push_row(&mut self, changes: &[(u32, f32)]) {

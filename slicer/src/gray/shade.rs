@@ -20,7 +20,9 @@ pub(crate) struct Shader<'a, R: ShadedRows> {
     /// What a pixel's line is in on its way down.
     below: Position<'a>,
     met: Vec<(f64, &'a DepthSpan)>,
-    changes: Vec<(u32, R::Pixel)>,
+    changes: Vec<R::Change>,
+    /// The pixel that the changes end with.
+    last: R::Pixel,
     width: u32,
 }
 
@@ -43,6 +45,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
             open: Vec::new(),
             met: Vec::new(),
             changes: Vec::new(),
+            last: R::OUTSIDE,
             width,
         }
     }
@@ -51,6 +54,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
     pub(crate) fn push_row(&mut self, row: u32, places: &[impl InRow]) {
         let mut spans = self.spans.group(row as usize);
         self.changes.clear();
+        self.last = R::OUTSIDE;
         self.open.clear();
         let mut position = Position::outside(self.rule);
         for (k, place) in places.iter().enumerate() {
@@ -76,6 +80,10 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         }
         let mut column = start;
         while column < end {
+            if self.open.is_empty() {
+                column = self.shade_alone(column, end, position, spans);
+                continue;
+            }
             let begun = spans.partition_point(|span| span.start <= column);
             self.open.extend(&spans[..begun]);
             *spans = &spans[begun..];
@@ -87,12 +95,43 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         }
     }
 
+    /// Adds columns that lie over one facet at most, as far as these go, and returns the first that
+    /// does not; or opens the spans of several.
+    fn shade_alone(
+        &mut self,
+        column: u32,
+        end: u32,
+        position: &Position<'a>,
+        spans: &mut &'a [DepthSpan],
+    ) -> u32 {
+        let Some(span) = spans.first() else {
+            self.push(column, R::DEEP);
+            return end;
+        };
+        if span.start > column {
+            self.push(column, R::DEEP);
+            return span.start.min(end);
+        }
+        if span.end <= column {
+            *spans = &spans[1..];
+            return column;
+        }
+        let to = span.end.min(end);
+        let near_um = self.plane_depth_um + span.tie_um();
+        let is_alone = spans.get(1).is_none_or(|next| next.start >= span.end);
+        if !is_alone || span.depth_um(column).min(span.depth_um(to - 1)) <= near_um {
+            self.open.push(span);
+            *spans = &spans[1..];
+            return column;
+        }
+        self.shade_over(span, column, to, position);
+        to
+    }
+
     /// Adds columns over the same facets.
     fn shade_evenly(&mut self, start: u32, end: u32, position: &Position<'a>) {
-        match self.open[..] {
-            [] => return self.push(start, R::DEEP),
-            [span] => return self.shade_over(span, start, end, position),
-            _ => {}
+        if self.open.is_empty() {
+            return self.push(start, R::DEEP);
         }
         let end = if self.open.iter().all(|span| span.is_level()) { start + 1 } else { end };
         for column in start..end {
@@ -102,20 +141,16 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         }
     }
 
-    /// Adds columns over one facet: the same as any, in fewer steps.
+    /// Adds columns over one facet that lies below the section.
     fn shade_over(&mut self, span: &DepthSpan, start: u32, end: u32, position: &Position<'a>) {
         self.below.move_to(position);
         self.below.cross_often(span.body(), -span.winding());
-        let leaves = !self.below.is_inside();
-        let near_um = self.plane_depth_um + span.tie_um();
+        if self.below.is_inside() {
+            return self.push(start, R::DEEP);
+        }
         let end = if span.is_level() { start + 1 } else { end };
         for column in start..end {
-            let depth_um = span.depth_um(column);
-            let exit = match depth_um > near_um {
-                true => leaves.then_some(depth_um),
-                false => self.exit_um(column, position),
-            };
-            let pixel = exit.map_or(R::DEEP, |depth_um| self.rows.of_depth(depth_um));
+            let pixel = self.rows.of_depth(span.depth_um(column));
             self.push(column, pixel);
         }
     }
@@ -157,9 +192,9 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
     }
 
     fn push(&mut self, column: u32, pixel: R::Pixel) {
-        let here = self.changes.last().map_or(R::OUTSIDE, |&(_, last)| last);
-        if pixel != here {
-            self.changes.push((column, pixel));
+        if pixel != self.last {
+            self.changes.push(R::change(column, pixel));
+            self.last = pixel;
         }
     }
 

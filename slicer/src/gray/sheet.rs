@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use super::stretch::{Looks, RowStretch};
 use crate::cut::Cutter;
 use crate::placement::{PlacedFacet, facet_heights};
 use crate::planes::Planes;
-use crate::scan::{RowFacet, ceil_clamped};
+use crate::scan::RowFacet;
 
 /// Facets closer than this to each other, or to a layer's plane, count as touching: far
 /// more than rounding, far less than anything cures.
@@ -13,10 +14,6 @@ const TOUCHING_UM: f64 = 1e-3;
 
 /// The same sideways: a pixel's centre may be this far off.
 const ASIDE_PIXELS: f64 = 1e-6;
-
-/// Facets this near to the part's lowest point stand on the platform. A flat underside
-/// that was turned into its place is not level to the last digit.
-const STANDING_UM: f64 = 1.0;
 
 /// The columns of a row, from `start` to `end`, over a facet below a section. Depths
 /// along them lie on a straight line.
@@ -80,7 +77,7 @@ impl DepthSpan {
     /// Returns the depths at which a layer looks at it: from just above the section to
     /// the end of the exposure.
     pub(crate) fn depths(&self, planes: &Planes, layer: usize, reach_um: f64) -> Range<f64> {
-        depths(planes, layer, reach_um, self.tie_um())
+        Looks { planes, reach_um, tie_um: self.tie_um() }.depths(layer)
     }
 
     /// Returns true if its depth is the same at all columns.
@@ -88,14 +85,6 @@ impl DepthSpan {
     pub(crate) fn is_level(&self) -> bool {
         self.um_per_column == 0.0
     }
-}
-
-/// Returns the depths below a layer's top at which it looks at facets: from just above
-/// the section to the end of the exposure.
-fn depths(planes: &Planes, layer: usize, reach_um: f64, tie_um: f64) -> Range<f64> {
-    let top_um = planes.top_um(layer);
-    let end_um = (top_um - reach_um).max(planes.bottom_um() + STANDING_UM);
-    top_um - planes.z_um(layer) - tie_um..top_um - end_um
 }
 
 /// A facet seen from above: x and y in pixels, z in micrometres.
@@ -148,6 +137,7 @@ impl Sheet {
         mut each: impl FnMut(usize, DepthSpan),
     ) {
         let planes = cutter.planes;
+        let looks = Looks { planes, reach_um, tie_um: self.tie_um };
         let low_um = planes.z_um(layers.start) - reach_um;
         let high_um = planes.z_um(layers.end - 1) + self.tie_um;
         self.facet.for_each_row(self.facet.rows_between([low_um, high_um]), |row, ends| {
@@ -155,14 +145,11 @@ impl Sheet {
             let Some(stretch) = self.stretch(ends, cutter.grid.width) else { return };
             let [low_um, high_um] = stretch.heights();
             let met = planes.between(low_um - self.tie_um, high_um + reach_um);
-            for layer in met.start.max(layers.start)..met.end.min(layers.end) {
-                let top_um = planes.top_um(layer);
-                let depths = depths(planes, layer, reach_um, self.tie_um);
-                if let Some((columns, depth_um)) = stretch.within(top_um, &depths) {
-                    let um_per_column = -stretch.um_per_column as f32;
-                    each(layer, DepthSpan { um_per_column, ..self.span(row, columns, depth_um) });
-                }
-            }
+            let met = met.start.max(layers.start)..met.end.min(layers.end);
+            let um_per_column = -stretch.um_per_column() as f32;
+            stretch.for_each_look(&looks, met, |layer, columns, depth_um| {
+                each(layer, DepthSpan { um_per_column, ..self.span(row, columns, depth_um) });
+            });
         });
     }
 
@@ -190,7 +177,7 @@ impl Sheet {
         let rows = self.facet.rows_between([heights_um.start, heights_um.end]);
         self.facet.for_each_row(rows, |row, ends| {
             let Some(stretch) = self.stretch(ends, cutter.grid.width) else { return };
-            for column in stretch.columns.clone() {
+            for column in stretch.columns() {
                 let z_um = stretch.height(column);
                 if heights_um.contains(&z_um) {
                     each(self.span(row, column..column + 1, 0.0), z_um);
@@ -205,7 +192,7 @@ impl Sheet {
         if self.facet.rows().contains(&row) {
             self.facet.for_each_row(row..row + 1, |_, ends| {
                 let stretch = self.stretch(ends, width);
-                let stretch = stretch.filter(|stretch| stretch.columns.contains(&column));
+                let stretch = stretch.filter(|stretch| stretch.columns().contains(&column));
                 height_um = stretch.map(|stretch| stretch.height(column));
             });
         }
@@ -217,75 +204,16 @@ impl Sheet {
         self.winding
     }
 
+    /// Returns the columns of a row that meet it, if any.
+    #[inline]
+    fn stretch(&self, ends: [[f64; 2]; 2], width: u32) -> Option<RowStretch> {
+        RowStretch::new(ends, [self.low_um, self.high_um], width)
+    }
+
     /// Returns how much higher or lower a surface at a distance from it may be.
     pub(crate) fn slack_um(&self, near_um: f64) -> f64 {
         // Not more than the facet itself, twice: steeper ones are met by few lines.
         let most = near_um + 2.0 * (self.high_um - self.low_um);
         (near_um * self.steepness).min(most)
-    }
-
-    /// Returns the columns of a row that meet it, if any.
-    #[inline]
-    fn stretch(&self, ends: [[f64; 2]; 2], width: u32) -> Option<RowStretch> {
-        let [long, short] = ends;
-        let ends = [long[0], short[0]];
-        let [a, b] = ends.map(|column| ceil_clamped(column, width));
-        if a == b {
-            return None;
-        }
-        let heights = [long[1], short[1]].map(|z| z.clamp(self.low_um, self.high_um));
-        let um_per_column = (heights[1] - heights[0]) / (ends[1] - ends[0]);
-        Some(RowStretch { columns: a.min(b)..a.max(b), ends, heights, um_per_column })
-    }
-}
-
-/// The columns of a row that meet a facet, with heights along the line from edge to
-/// edge.
-struct RowStretch {
-    columns: Range<u32>,
-    ends: [f64; 2],
-    heights: [f64; 2],
-    um_per_column: f64,
-}
-
-impl RowStretch {
-    /// Returns the heights of the lower and the higher end.
-    #[inline]
-    fn heights(&self) -> [f64; 2] {
-        let [a, b] = self.heights;
-        [a.min(b), a.max(b)]
-    }
-
-    /// Returns the height at a column, clamped to the facet against rounding.
-    #[inline]
-    fn height(&self, column: u32) -> f64 {
-        let [low, high] = self.heights();
-        let z = self.heights[0] + self.um_per_column * (f64::from(column) - self.ends[0]);
-        z.clamp(low, high)
-    }
-
-    /// Returns the columns whose depth below a height is in a range, and the first one's
-    /// depth.
-    #[inline]
-    fn within(&self, top_um: f64, depths: &Range<f64>) -> Option<(Range<u32>, f64)> {
-        let Range { mut start, mut end } = self.columns;
-        let depth = |column: u32| top_um - self.height(column);
-        // Most facets are a few columns wide.
-        if end - start > 4 && self.um_per_column != 0.0 {
-            let first = depth(start);
-            let ends = [depths.start, depths.end].map(|depth| (first - depth) / self.um_per_column);
-            let [near, far] = if self.um_per_column < 0.0 { ends } else { [ends[1], ends[0]] };
-            // One column more on each side for rounding; the loops below are exact.
-            let length = f64::from(end - start);
-            end = start + (far + 2.0).clamp(0.0, length) as u32;
-            start += (near - 1.0).clamp(0.0, length) as u32;
-        }
-        while start < end && !depths.contains(&depth(start)) {
-            start += 1;
-        }
-        while start < end && !depths.contains(&depth(end - 1)) {
-            end -= 1;
-        }
-        (start < end).then(|| (start..end, depth(start)))
     }
 }

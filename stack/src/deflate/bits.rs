@@ -5,7 +5,9 @@ pub(super) const MOST_PUT: u8 = 56;
 
 /// Bits that become bytes.
 pub(super) struct BitWriter {
+    /// The bytes that are full, `len` of them, and room.
     bytes: Vec<u8>,
+    len: usize,
     /// The bits of the byte that is not full yet, and fewer than eight are.
     held: u64,
     count: u8,
@@ -14,7 +16,7 @@ pub(super) struct BitWriter {
 impl BitWriter {
     /// Starts behind bytes.
     pub(super) fn after(bytes: Vec<u8>) -> Self {
-        Self { bytes, held: 0, count: 0 }
+        Self { len: bytes.len(), bytes, held: 0, count: 0 }
     }
 
     /// Appends the lowest `count` bits of `bits`, at most [`MOST_PUT`]; those above are zero.
@@ -22,17 +24,26 @@ impl BitWriter {
     pub(super) fn put(&mut self, bits: u64, count: u8) {
         self.held |= bits << self.count;
         self.count += count;
-        let whole = usize::from(self.count / 8);
-        // Eight at once and back is faster than as many as there are.
-        let end = self.bytes.len() + whole;
-        self.bytes.extend_from_slice(&self.held.to_le_bytes());
-        self.bytes.truncate(end);
-        self.held = self.held.unbounded_shr(8 * whole as u32);
+        let whole = self.count / 8;
+        // Eight at once is faster than as many as there are.
+        let end = self.len + 8;
+        if end > self.bytes.len() {
+            self.make_room();
+        }
+        self.bytes[self.len..end].copy_from_slice(&self.held.to_le_bytes());
+        self.len += usize::from(whole);
+        self.held = self.held.unbounded_shr(8 * u32::from(whole));
         self.count %= 8;
+    }
+
+    #[cold]
+    fn make_room(&mut self) {
+        self.bytes.resize(2 * self.bytes.len() + 4096, 0);
     }
 
     /// Fills the last byte with zeros and returns all.
     pub(super) fn finish(mut self) -> Vec<u8> {
+        self.bytes.truncate(self.len);
         if self.count > 0 {
             self.bytes.push(self.held as u8);
         }

@@ -5,7 +5,7 @@ use super::huffman::{code_lengths, codes};
 use super::{
     END_OF_BLOCK, LENGTH_ORDER, MOST_BITS, MOST_COPIED, MOST_LENGTH_BITS, SYMBOLS, copies_of,
 };
-use crate::gray::{GrayMask, gray_runs};
+use crate::gray::GrayMask;
 
 /// The number of runs in a block: enough that its codes take a hundredth of it.
 const BLOCK_RUNS: usize = 1 << 14;
@@ -28,30 +28,53 @@ pub(crate) fn encode(image: &GrayMask) -> Vec<u8> {
 
 /// Returns the runs `(length, byte)` of all rows; they go on from row to row.
 fn byte_runs(image: &GrayMask) -> Vec<(u32, u8)> {
-    let mut runs = Vec::with_capacity(image.change_count() + 1);
-    let mut push = |mut length: u32, level| {
-        if let Some((before, same)) = runs.last_mut()
-            && *same == level
-        {
-            // A run of a huge image is cut where its length would not fit.
-            let added = length.min(u32::MAX - *before);
-            *before += added;
-            length -= added;
+    let mut runs = ByteRuns::with_room(image.change_count() + image.height() as usize + 1);
+    for (row, changes) in (0..).zip(image.rows()) {
+        let start = row * u64::from(image.width());
+        if changes.first().is_none_or(|first| first.column > 0) {
+            runs.change_at(start, 0);
+        }
+        for change in changes {
+            runs.change_at(start + u64::from(change.column), change.level);
+        }
+    }
+    runs.end_at(u64::from(image.width()) * u64::from(image.height()));
+    runs.runs
+}
+
+/// Runs that are made from the first pixel on.
+struct ByteRuns {
+    runs: Vec<(u32, u8)>,
+    /// The byte of the run that has begun, and its first pixel.
+    byte: u8,
+    since: u64,
+}
+
+impl ByteRuns {
+    fn with_room(runs: usize) -> Self {
+        Self { runs: Vec::with_capacity(runs), byte: 0, since: 0 }
+    }
+
+    #[inline]
+    fn change_at(&mut self, pixel: u64, byte: u8) {
+        if byte != self.byte {
+            self.end_at(pixel);
+            (self.byte, self.since) = (byte, pixel);
+        }
+    }
+
+    #[inline]
+    fn end_at(&mut self, pixel: u64) {
+        let mut length = pixel - self.since;
+        // A run of a huge image is cut where its length would not fit.
+        while length > u64::from(u32::MAX) {
+            self.runs.push((u32::MAX, self.byte));
+            length -= u64::from(u32::MAX);
         }
         if length > 0 {
-            runs.push((length, level));
+            self.runs.push((length as u32, self.byte));
         }
-    };
-    for changes in image.rows() {
-        let mut column = 0;
-        for (start, end, level) in gray_runs(changes, image.width()) {
-            push(start - column, 0);
-            push(end - start, level);
-            column = end;
-        }
-        push(image.width() - column, 0);
     }
-    runs
 }
 
 /// A run as it is written: bytes, then copies of the last.
@@ -66,11 +89,7 @@ struct Copies {
 impl Copies {
     #[inline]
     fn of(length: u32) -> Self {
-        let (longest, last) = if length <= MOST_COPIED {
-            (0, length - 1)
-        } else {
-            ((length - 1) / MOST_COPIED, (length - 1) % MOST_COPIED)
-        };
+        let (longest, last) = ((length - 1) / MOST_COPIED, (length - 1) % MOST_COPIED);
         // No copy is shorter than three.
         let bytes = if last < 3 { 1 + last } else { 1 };
         Self { bytes, longest, last: if last < 3 { 0 } else { last } }
@@ -85,7 +104,10 @@ fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
     out.put(2, 2);
     put_lengths(out, &lengths);
     let code = |symbol: usize| Bits { bits: codes[symbol].into(), count: lengths[symbol] };
-    let bytes: [Bits; 256] = std::array::from_fn(code);
+    // Once, twice and thrice: at most 45 bits.
+    let once: [Bits; 256] = std::array::from_fn(code);
+    let twice = once.map(|byte| byte.then(byte));
+    let bytes = [once, twice, std::array::from_fn(|byte| once[byte].then(twice[byte]))];
     // The only distance, from the byte before, is a zero bit.
     let zero = Bits { bits: 0, count: 1 };
     let longest = Often::new(code(SYMBOLS - 1).then(zero));
@@ -100,17 +122,18 @@ fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
     });
     for &(length, byte) in runs {
         let copies = Copies::of(length);
-        let first = bytes[usize::from(byte)];
-        if copies.bytes == 1 && copies.longest == 0 {
-            // At most 15 bits, and 15 and 5 and one.
-            let both = first.then(last[copies.last as usize]);
-            out.put(both.bits, both.count);
-            continue;
-        }
-        (0..copies.bytes).for_each(|_| out.put(first.bits, first.count));
-        longest.put(out, copies.longest);
+        let first = bytes[copies.bytes as usize - 1][usize::from(byte)];
         let last = last[copies.last as usize];
-        out.put(last.bits, last.count);
+        let bits = first.count + last.count;
+        if u64::from(longest.once) * u64::from(copies.longest) + u64::from(bits) <= MOST_PUT.into()
+        {
+            let all = first.then(longest.times(copies.longest)).then(last);
+            out.put(all.bits, all.count);
+        } else {
+            out.put(first.bits, first.count);
+            longest.put(out, copies.longest);
+            out.put(last.bits, last.count);
+        }
     }
     let end = code(END_OF_BLOCK.into());
     out.put(end.bits, end.count);
@@ -154,26 +177,32 @@ impl Bits {
 
 /// Bits that are written many times, as many at once as fit.
 struct Often {
-    once: Bits,
-    together: u32,
-    all: Bits,
+    once: u8,
+    most: u32,
+    all: u64,
 }
 
 impl Often {
     fn new(once: Bits) -> Self {
-        let together = MOST_PUT / once.count;
-        let all = (0..together).fold(Bits::default(), |all, _| all.then(once));
-        Self { once, together: together.into(), all }
+        let most = MOST_PUT / once.count;
+        let all = (0..most).fold(Bits::default(), |all, _| all.then(once));
+        Self { once: once.count, most: most.into(), all: all.bits }
     }
 
+    /// Returns the bits so many times, at most `most`.
     #[inline]
+    fn times(&self, times: u32) -> Bits {
+        let count = self.once * times as u8;
+        Bits { bits: self.all & ((1 << count) - 1), count }
+    }
+
+    #[cold]
     fn put(&self, out: &mut BitWriter, mut times: u32) {
-        while times >= self.together {
-            out.put(self.all.bits, self.all.count);
-            times -= self.together;
-        }
-        for _ in 0..times {
-            out.put(self.once.bits, self.once.count);
+        while times > 0 {
+            let some = times.min(self.most);
+            let bits = self.times(some);
+            out.put(bits.bits, bits.count);
+            times -= some;
         }
     }
 }

@@ -1,0 +1,146 @@
+//! The columns of a row that are part in all layers above whose light counts: those below which
+//! nearly all undersides lie.
+
+use super::below::Below;
+
+/// Columns of a row, from each start to its end.
+pub(crate) type Columns = Vec<(u32, u32)>;
+
+/// The columns of a row that are part in as many layers as count, or a few more, from a layer down.
+///
+/// What is part in all layers of a window that slides down follows from blocks of half its length:
+/// from two whole blocks and the layers of a third.
+pub(crate) struct SolidRow {
+    width: u32,
+    solid: Columns,
+    /// Part in all layers of the last whole block, and of the one that has begun.
+    last: Columns,
+    begun: Columns,
+    /// The layers that the block still lacks.
+    left: u32,
+    /// The layers of each block but the first.
+    block: u32,
+    spare: Columns,
+}
+
+impl SolidRow {
+    /// Starts with the layer below one of which nothing is known, or with the part's last if it
+    /// `is_top`: no light comes from above that.
+    pub(crate) fn new(width: u32, most_above: u32, is_top: bool) -> Self {
+        let all = vec![(0, width)];
+        let known = if is_top { all.clone() } else { Vec::new() };
+        let block = most_above.div_ceil(2).max(1);
+        let left = if is_top { block } else { (most_above / 2).max(1) };
+        let (solid, spare) = (known.clone(), Vec::new());
+        Self { width, solid, last: known, begun: all, left, block, spare }
+    }
+
+    /// Returns the columns that are part in all layers above that count, but for some that are so
+    /// only in few more.
+    pub(crate) fn columns(&self) -> &[(u32, u32)] {
+        &self.solid
+    }
+
+    /// Goes down through a layer, given what lies below its row.
+    pub(crate) fn go_down(&mut self, layer: usize, below: &[Below]) {
+        let is_through = |piece: &&Below| piece.layer != layer as u32;
+        let part = || below.iter().filter(is_through).map(|piece| (piece.start, piece.end));
+        keep_within(&mut self.solid, part(), &mut self.spare);
+        keep_within(&mut self.begun, part(), &mut self.spare);
+        self.left -= 1;
+        if self.left == 0 {
+            self.solid.clone_from(&self.last);
+            keep_within(&mut self.solid, self.begun.iter().copied(), &mut self.spare);
+            std::mem::swap(&mut self.last, &mut self.begun);
+            self.begun.clear();
+            self.begun.push((0, self.width));
+            self.left = self.block;
+        }
+    }
+}
+
+/// Leaves out columns that are not in a part, whose pieces come from the left.
+fn keep_within(columns: &mut Columns, part: impl Iterator<Item = (u32, u32)>, spare: &mut Columns) {
+    if columns.is_empty() {
+        return;
+    }
+    spare.clear();
+    let mut rest = &columns[..];
+    for (start, end) in part {
+        while let Some(&(from, to)) = rest.first()
+            && from < end
+        {
+            let (from, within) = (from.max(start), to.min(end));
+            match spare.last_mut() {
+                _ if from >= within => {}
+                Some((_, last)) if *last == from => *last = within,
+                _ => spare.push((from, within)),
+            }
+            if to > end {
+                break;
+            }
+            rest = &rest[1..];
+        }
+    }
+    std::mem::swap(columns, spare);
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const WIDTH: u32 = 40;
+
+    /// The part of a row in some layers, from the top down, as pieces with the layer of the underside.
+    fn layers() -> impl Strategy<Value = Vec<Vec<Below>>> {
+        let piece = (0u32..6, 1u32..30, prop::bool::weighted(0.2));
+        let row = prop::collection::vec(piece, 0..4);
+        prop::collection::vec(row, 1..40).prop_map(|rows| {
+            let count = rows.len() as u32;
+            let of_layer = |(k, row): (u32, Vec<(u32, u32, bool)>)| {
+                let mut column = 0;
+                let pieces = row.into_iter().map(|(gap, length, ends_here)| {
+                    let start = (column + gap).min(WIDTH);
+                    column = (start + length).min(WIDTH);
+                    let layer = if ends_here { count - 1 - k } else { 1000 };
+                    Below { start, end: column, layer }
+                });
+                pieces.filter(|piece| piece.start < piece.end).collect()
+            };
+            (0..).zip(rows).map(of_layer).collect()
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn solid_columns_are_part_in_all_layers_that_count(
+            layers in layers(), most_above in 0u32..12, is_top: bool,
+        ) {
+            let is_part = |k: usize, column: u32| {
+                let layer = (layers.len() - 1 - k) as u32;
+                let here = |piece: &&Below| (piece.start..piece.end).contains(&column);
+                layers[k].iter().find(here).is_some_and(|piece| piece.layer != layer)
+            };
+            let mut row = SolidRow::new(WIDTH, most_above, is_top);
+            for (done, below) in layers.iter().enumerate() {
+                row.go_down(layers.len() - 1 - done, below);
+                let solid = row.columns();
+                prop_assert!(solid.is_sorted_by(|a, b| a.1 < b.0));
+                let is_solid = |column: u32| solid.iter().any(|&(from, to)| (from..to).contains(&column));
+                // Those that count, and all that can be looked at.
+                let most_seen = 3 * most_above.div_ceil(2).max(1);
+                let [counts, all] = [most_above, most_seen].map(|most| {
+                    let first = (done + 1).saturating_sub(most as usize);
+                    move |column: u32| (first..=done).all(|k| is_part(k, column))
+                });
+                let knows_enough = is_top || done + 1 >= most_above.max(2) as usize;
+                for column in 0..WIDTH {
+                    prop_assert!(!is_solid(column) || counts(column));
+                    prop_assert!(is_solid(column) || !knows_enough || !all(column));
+                }
+            }
+        }
+    }
+}
