@@ -37,13 +37,16 @@ fn the_example_of_the_documentation_does_what_it_says() {
     for (index, place, is) in [
         (0, [-7.5, 7.0], false), // in the pocket
         (9, [-7.5, 7.0], false),
-        (10, [-7.5, 7.0], true), // above it
-        (28, [7.5, 2.0], false), // in the bore: z 14.0 to 14.5
-        (23, [7.5, 2.0], true),  // below it
-        (39, [0.0, 0.0], true),  // the pin
-        (39, [3.0, 3.0], false), // the hole, above the rib
-        (1, [3.0, 3.0], true),   // the rib
-        (1, [3.0, -3.0], false), // the hole
+        (10, [-7.5, 7.0], true),  // above it
+        (28, [7.5, 2.0], false),  // in the bore: z 14.0 to 14.5
+        (23, [7.5, 2.0], true),   // below it
+        (21, [-8.6, 0.0], false), // in the film-cooling hole: z 10.5 to 11.0
+        (18, [-8.6, 0.0], true),  // below it
+        (26, [-8.6, 0.0], true),  // above it
+        (39, [0.0, 0.0], true),   // the pin
+        (39, [3.0, 3.0], false),  // the hole, above the rib
+        (1, [3.0, 3.0], true),    // the rib
+        (1, [3.0, -3.0], false),  // the hole
     ] {
         assert_eq!(white(index, place), is, "layer {index} at {place:?}");
     }

@@ -13,9 +13,9 @@ use crate::streams::{
 
 /// Change a design at image level, without slicing it again
 ///
-/// Adds or subtracts boxes, cylinders, lines, labels, pictures and other stacks in a range of
-/// heights; crops, pads, mirrors and rotates all layers. Lengths and positions are in part
-/// coordinates. Edits are listed in a TOML file and applied in order; docs/edit.md describes every
+/// Adds or subtracts boxes, cylinders, cones, spheres, lines, polygons, labels, pictures and other
+/// stacks in a range of heights; crops, pads, mirrors and rotates all layers. Lengths and positions
+/// are in part coordinates. Edits are listed in a TOML file and applied in order; docs/edit.md describes every
 /// key. Pages that no edit changes pass with their code and check, and are not decoded.
 #[derive(Args)]
 #[command(override_usage = "\
