@@ -148,6 +148,9 @@ codec() {
 
 [ $# -gt 0 ] || set -- 100k 750k 5.5M
 for count in "$@"; do
+    lamp sample dense-blade --facets "$count" -o blade.stl --quiet
+    printf '\n### Blade mould with a denser core, %s facets, 1500 dpi, 100 um\n' "$count"
+    slices
     lamp sample blade --facets "$count" -o blade.stl --quiet
     printf '\n### Blade mould, %s facets, 1500 dpi, 100 um\n' "$count"
     slices
