@@ -14,14 +14,15 @@ use crate::error::StackError;
 use crate::leftovers::{END, RANDOM_LETTERS, claim, remove_leftovers, start_of_name};
 use crate::text::one_line;
 
-/// The temporary files and folders of this process that exist now.
-static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// The temporary files and folders of this process that exist now; `None` once they have been
+/// removed for good.
+static LIVE: Mutex<Option<BTreeSet<PathBuf>>> = Mutex::new(Some(BTreeSet::new()));
 
 /// How often a temporary file is made anew that another process removed at once.
 const ATTEMPTS: usize = 100;
 
-/// Removes the temporary files and folders of this process. Call it before exiting without
-/// running destructors.
+/// Removes the temporary files and folders of this process, which can make no others from then
+/// on. Call it before exiting without running destructors.
 ///
 /// Gives up after a second if another thread keeps them: that thread may be stopped. The next
 /// process that writes to their folders removes them.
@@ -37,14 +38,14 @@ pub fn remove_temporaries() {
     });
     let Some(mut live) = locked else { return };
     // Nothing gets its final name while it is being removed: the lock is held.
-    for path in std::mem::take(&mut *live) {
+    for path in live.take().unwrap_or_default() {
         // A folder that another thread still fills may need several attempts.
         let remove = || fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
         let _ = (0..100).find(|_| remove().is_ok() || !path.exists());
     }
 }
 
-fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+fn live() -> MutexGuard<'static, Option<BTreeSet<PathBuf>>> {
     LIVE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -52,15 +53,21 @@ fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 struct Registered(PathBuf);
 
 impl Registered {
-    fn new(path: &Path) -> Self {
-        live().insert(path.to_owned());
-        Self(path.to_owned())
+    /// Makes a file or folder, unless [`remove_temporaries`] was faster. Nobody can remove all
+    /// meanwhile, and miss it.
+    fn made<T: AsRef<Path>>(make: impl FnOnce() -> io::Result<T>) -> io::Result<(T, Self)> {
+        let mut live = live();
+        let live = live.as_mut().ok_or(io::ErrorKind::Interrupted)?;
+        let made = make()?;
+        let path = made.as_ref().to_owned();
+        live.insert(path.clone());
+        Ok((made, Self(path)))
     }
 
     /// Gives the file or folder another name, unless [`remove_temporaries`] was faster.
     fn rename<T, E: From<io::Error>>(&self, rename: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
         let live = live();
-        if !live.contains(&self.0) {
+        if !live.as_ref().is_some_and(|live| live.contains(&self.0)) {
             return Err(io::Error::from(io::ErrorKind::Interrupted).into());
         }
         rename()
@@ -69,7 +76,9 @@ impl Registered {
 
 impl Drop for Registered {
     fn drop(&mut self) {
-        live().remove(&self.0);
+        if let Some(live) = live().as_mut() {
+            live.remove(&self.0);
+        }
     }
 }
 
@@ -96,14 +105,13 @@ impl FileBeside {
         let start = start_of_name(path);
         let builder = builder(&start, 0o666);
         for _ in 0..ATTEMPTS {
-            let file = builder.tempfile_in(folder)?;
+            let (file, registered) = Registered::made(|| builder.tempfile_in(folder))?;
             if !claim(file.as_file(), file.path()) {
                 continue;
             }
             if let Ok(before) = fs::metadata(path) {
                 file.as_file().set_permissions(before.permissions())?;
             }
-            let registered = Registered::new(file.path());
             return Ok(Self { file, registered, path: path.to_owned() });
         }
         Err(cannot_claim())
@@ -162,10 +170,9 @@ impl FolderBeside {
         let start = start_of_name(&path);
         let builder = builder(&start, 0o777);
         for _ in 0..ATTEMPTS {
-            let folder = builder.tempdir_in(parent)?;
+            let (folder, registered) = Registered::made(|| builder.tempdir_in(parent))?;
             let handle = File::open(folder.path()).ok();
             if handle.as_ref().is_none_or(|handle| claim(handle, folder.path())) {
-                let registered = Registered::new(folder.path());
                 return Ok(Self { folder, registered, path, replaces, _handle: handle });
             }
         }
@@ -357,7 +364,7 @@ mod tests {
         let path = folder.path().join("build.tif");
         let file = FileBeside::new(&path).unwrap();
         // As a signal does, but for this one alone: other tests run in this process.
-        live().remove(file.file.path());
+        live().as_mut().unwrap().remove(file.file.path());
         assert_eq!(file.persist().unwrap_err().kind(), io::ErrorKind::Interrupted);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
