@@ -189,6 +189,45 @@ fn every_copy_of_a_build_has_its_number_as_if_it_was_edited_before() {
 }
 
 #[test]
+fn a_chosen_copy_is_as_if_its_part_was_edited_before() {
+    let scratch = with_cube();
+    let notch = "op = \"subtract\"\nz = [\"2mm\", \"4mm\"]\n\
+                 box = { x = [\"6mm\", \"9.5mm\"], y = [\"7mm\", \"8.2mm\"] }\n";
+    scratch.write("part.toml", format!("[[edit]]\n{notch}").as_bytes());
+    scratch.write("copy.toml", format!("[[edit]]\ncopies = [2]\n{notch}").as_bytes());
+    scratch.run("lamp edit cube.tif part.toml -o notched.tif").succeeds_quietly();
+    let build = |name: &str, second: &str| {
+        let copy = |part: &str, place: &str| format!("{{\"part\": \"{part}\", {place}}}");
+        let copies = [
+            copy("cube.tif", "\"x_mm\": 1, \"y_mm\": 2"),
+            copy(second, "\"x_mm\": 27, \"y_mm\": 3, \"turn\": 90, \"mirror\": true"),
+            copy("cube.tif", "\"x_mm\": 3, \"y_mm\": 27, \"turn\": 180"),
+        ];
+        let text = format!("{{\"area_mm\": [60, 50], \"copies\": [{}]}}", copies.join(","));
+        scratch.write("layout.json", text.as_bytes());
+        let parts = if second == "cube.tif" { second } else { "cube.tif notched.tif" };
+        scratch
+            .run(&format!("tile {parts} --layout layout.json --mesh none -o {name}"))
+            .succeeds_quietly();
+        scratch.layers(name)
+    };
+    let expected = build("expected.tif", "notched.tif");
+    let plain = build("build.tif", "cube.tif");
+    scratch.run("lamp edit build.tif copy.toml -o after.tif").succeeds_quietly();
+    let after = scratch.layers("after.tif");
+    assert_eq!(masks(&after), masks(&expected));
+    let changed = |(a, b): (&&Mask, &&Mask)| a != b;
+    assert_eq!(masks(&after).iter().zip(&masks(&plain)).filter(|&pair| changed(pair)).count(), 4);
+    scratch.run("lamp verify after.tif").succeeds();
+    scratch.write("none.toml", format!("[[edit]]\ncopies = [1, 4]\n{notch}").as_bytes());
+    scratch.run("lamp edit build.tif none.toml -o x.tif").is_refused_with(&[
+        "build.tif",
+        "no copy 4",
+        "cube have the numbers 1 to 3",
+    ]);
+}
+
+#[test]
 fn stray_rows_move_with_the_image_or_stop_it() {
     let scratch = Scratch::new();
     scratch.run("lamp sample cube --facets 2000 --defect drop --seed 3 -o cube.stl").succeeds();

@@ -22,6 +22,8 @@ pub(super) struct BuildCopy {
     pub(super) turn: Orientation,
     pub(super) left: i64,
     pub(super) top: i64,
+    /// Its place among all copies of the part, from 0.
+    pub(super) index: u32,
 }
 
 /// The first page's entry for a part.
@@ -35,6 +37,14 @@ struct TiledPart {
     turns: Vec<String>,
 }
 
+impl TiledPart {
+    /// Returns the part's name, which the stack has if it is the only one.
+    fn name(&self, info: &PageInfo) -> String {
+        let one = || info.stack.as_ref().map(|stack| stack.part.clone());
+        self.part.clone().or_else(one).unwrap_or_default()
+    }
+}
+
 impl BuildCopy {
     /// Returns the copies that an edit is for, or the whole image if it is for none.
     /// `info` is the stack's first page, `place` the bounds of its images.
@@ -46,7 +56,7 @@ impl BuildCopy {
         info: &PageInfo,
         place: &ImageBounds,
     ) -> Result<Vec<Self>, EditError> {
-        let whole = Self { part: *place, turn: Orientation::default(), left: 0, top: 0 };
+        let whole = Self::whole(place);
         if wanted.is_none() {
             return Ok(vec![whole]);
         }
@@ -61,6 +71,12 @@ impl BuildCopy {
             .collect::<Result<_, _>>()
             .map_err(|error| wrong(LayerProblem::CopiesFormat(error)))?;
         let part = chosen(parts, wanted, info).map_err(wrong)?;
+        let count = part.copies.len();
+        let mut numbers = wanted.numbers().into_iter().flatten();
+        if let Some(&number) = numbers.find(|number| !(1..=count).contains(&(**number as usize))) {
+            let part = part.name(info);
+            return Err(wrong(LayerProblem::NoSuchCopy { number, part, count }));
+        }
         let origin_mm = part.part_origin_mm.ok_or_else(|| wrong(LayerProblem::NoPartOrigin))?;
         let [width, height] = part.part_pixels;
         let far = part.copies.iter().flatten().any(|place| place.abs() > MAX_OFFSET);
@@ -74,14 +90,27 @@ impl BuildCopy {
             .map(|turn| turn.parse().map_err(|error| wrong(LayerProblem::CopyTurn(error))))
             .collect::<Result<Vec<_>, _>>()?;
         let turns = turns.into_iter().chain(std::iter::repeat(Orientation::default()));
-        let copy =
-            |([left, top], turn): ([i64; 2], Orientation)| Self { part: lain, turn, left, top };
-        Ok(part.copies.into_iter().zip(turns).map(copy).collect())
+        let copy = |((index, [left, top]), turn): ((u32, [i64; 2]), Orientation)| Self {
+            part: lain,
+            turn,
+            left,
+            top,
+            index,
+        };
+        let is_wanted = |copy: &Self| {
+            wanted.numbers().is_none_or(|numbers| numbers.contains(&(copy.index + 1)))
+        };
+        Ok((0..).zip(part.copies).zip(turns).map(copy).filter(is_wanted).collect())
     }
 
     /// Returns true if it is all of an image, not turned.
     fn is_whole(&self, place: &ImageBounds) -> bool {
-        *self == Self { part: *place, turn: Orientation::default(), left: 0, top: 0 }
+        *self == Self::whole(place)
+    }
+
+    /// Returns all of an image as if it was a copy.
+    fn whole(place: &ImageBounds) -> Self {
+        Self { part: *place, turn: Orientation::default(), left: 0, top: 0, index: 0 }
     }
 }
 
@@ -91,13 +120,11 @@ fn chosen(
     wanted: &CopySelection,
     info: &PageInfo,
 ) -> Result<TiledPart, LayerProblem> {
-    let one = info.stack.as_ref().map(|stack| stack.part.clone());
-    let name = |part: &TiledPart| part.part.clone().or_else(|| one.clone()).unwrap_or_default();
-    let names = || parts.iter().map(name).collect();
-    let index = match wanted {
-        CopySelection::Of(wanted) => parts.iter().position(|part| name(part) == *wanted),
-        CopySelection::Any(_) => (parts.len() == 1).then_some(0),
+    let index = match wanted.part() {
+        Some(wanted) => parts.iter().position(|part| part.name(info) == wanted),
+        None => (parts.len() == 1).then_some(0),
     };
+    let names = || parts.iter().map(|part| part.name(info)).collect();
     let index = index.ok_or_else(|| LayerProblem::WhichPart { parts: names() })?;
     Ok(parts.swap_remove(index))
 }
@@ -190,10 +217,13 @@ mod tests {
         page.stack.as_mut().unwrap().other["tile"]["turns"] = json!(["0", "90m"]);
         let all = BuildCopy::all(&CopySelection::Any(true), &page, &PLACE).unwrap();
         let lain = ImageBounds { origin_mm: [1.0, 2.0], width: 7, height: 5, ..PLACE };
-        assert_eq!(all[0], BuildCopy { part: lain, turn: Orientation::default(), left: 3, top: 4 });
+        assert_eq!(
+            all[0],
+            BuildCopy { part: lain, turn: Orientation::default(), left: 3, top: 4, index: 0 }
+        );
         assert_eq!(
             all[1],
-            BuildCopy { part: lain, turn: Orientation::new(1, true), left: 5, top: 6 }
+            BuildCopy { part: lain, turn: Orientation::new(1, true), left: 5, top: 6, index: 1 }
         );
         assert_eq!(
             BuildCopy::all(&CopySelection::Of("blade".to_owned()), &page, &PLACE).unwrap(),
@@ -223,6 +253,24 @@ mod tests {
     }
 
     #[test]
+    fn chosen_copies_keep_their_turns_and_numbers() {
+        let mut page = info(part(&[[3, 4], [5, 6], [7, 8]]));
+        page.stack.as_mut().unwrap().other["tile"]["turns"] = json!(["0", "90m", "180"]);
+        let all = BuildCopy::all(&CopySelection::Any(true), &page, &PLACE).unwrap();
+        let numbered = |numbers: &[u32]| {
+            let wanted = CopySelection::Numbered(numbers.iter().copied().collect());
+            BuildCopy::all(&wanted, &page, &PLACE)
+        };
+        assert_eq!(numbered(&[3, 1, 3]).unwrap(), [all[0], all[2]]);
+        assert_eq!(numbered(&[2]).unwrap(), [all[1]]);
+        for wrong in [0, 4, u32::MAX] {
+            let error = numbered(&[1, wrong]).unwrap_err().to_string();
+            assert!(error.contains(&format!("no copy {wrong}: ")), "{error}");
+            assert!(error.contains("blade have the numbers 1 to 3"), "{error}");
+        }
+    }
+
+    #[test]
     fn what_a_page_lacks_is_said() {
         let error = |page: &PageInfo| {
             BuildCopy::all(&CopySelection::Any(true), page, &PLACE).unwrap_err().to_string()
@@ -247,7 +295,7 @@ mod tests {
             let mask = mask.finish();
             let lain = ImageBounds { width: 7, height: 5, ..PLACE };
             let copies: Vec<BuildCopy> = places.iter().map(|&(left, top, quarters, mirrored)| {
-                BuildCopy { part: lain, turn: Orientation::new(quarters, mirrored), left, top }
+                BuildCopy { part: lain, turn: Orientation::new(quarters, mirrored), left, top, index: 0 }
             }).collect();
             let made = composed(&copies, &PLACE, |_, _| mask.clone()).unwrap();
             let mut expected = Mask::black(40, 30);

@@ -79,6 +79,9 @@ pub enum EditProblem {
     /// Copies are chosen for something that is not drawn.
     #[error("copies are for shapes, labels and pictures: take it out")]
     CopiesWithoutShape,
+    /// The list of copies is empty.
+    #[error("copies names no copy: write their numbers, as [1, 5], or true for all")]
+    NoCopyChosen,
     /// All but the shapes in the copies would go.
     #[error("intersect would take away all of the build but the shapes in these copies")]
     IntersectInCopies,
@@ -224,6 +227,18 @@ pub enum LayerProblem {
     WhichPart {
         /// The parts there are.
         parts: Vec<String>,
+    },
+    /// The build has no copy of that number.
+    #[error(
+        "there is no copy {number}: the build's copies of {part} have the numbers 1 to {count}"
+    )]
+    NoSuchCopy {
+        /// The number that is wanted.
+        number: u32,
+        /// The part's name.
+        part: String,
+        /// How many copies there are.
+        count: usize,
     },
     /// A layer of another stack says its height, which the edited stack's do not.
     #[error("says at what height it is, and the stack that is edited does not")]

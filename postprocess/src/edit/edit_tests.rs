@@ -302,6 +302,42 @@ proptest! {
     }
 
     #[test]
+    fn chosen_copies_are_as_if_they_were_edited_before_they_were_placed(
+        part in arbitrary_mask(),
+        copies in prop::collection::vec((0usize..8, any::<bool>()), 1..6),
+        (x, y, op) in (span(12..56), span(-8..24), prop::sample::select(&[Op::Union, Op::Difference, Op::Xor][..])),
+    ) {
+        let numbers: Vec<_> = (1..).zip(&copies).filter_map(|(n, copy)| copy.1.then_some(n)).collect::<Vec<u32>>();
+        prop_assume!(!numbers.is_empty());
+        let shape = format!("op = \"{op}\"\nbox = {{ x = {}, y = {} }}\n", lengths(x), lengths(y));
+        let changed = edited(vec![layer(0, Image::Mask(part.clone()))], &format!("[[edit]]\n{shape}"), vec![]);
+        let Ok(changed) = changed else { return Ok(()) };
+        // All stand apart, each in a square of its own.
+        let turn = |k: usize| lamp_stack::Orientation::ALL[copies[k].0];
+        let place = |k: usize| (13 * k as u32, k as u32);
+        let composed = |of: &dyn Fn(usize) -> Mask| {
+            let placed: Vec<_> = (0..copies.len()).map(|k| {
+                let image = Image::Mask(of(k).oriented(turn(k)).unwrap());
+                crate::tile::PlacedImage { image, at: vec![place(k)] }
+            }).collect();
+            crate::tile::united(&placed, crate::tile::PixelSize { width: 70, height: 20 }).unwrap()
+        };
+        let mut build = layer(0, Image::Mask(composed(&|_| part.clone())));
+        let tile = json!({
+            "part_pixels": [WIDTH, HEIGHT], "part_origin_mm": [3.0, 7.0],
+            "copies": (0..copies.len()).map(place).collect::<Vec<_>>(),
+            "turns": (0..copies.len()).map(|k| turn(k).to_string()).collect::<Vec<_>>(),
+        });
+        build.info.stack.as_mut().unwrap().other.insert("tile".to_owned(), tile);
+        let expected = composed(&|k| if copies[k].1 { mask(&changed[0]).clone() } else { part.clone() });
+        for chosen in [json!(numbers).to_string(), format!("{{ part = \"bars\", numbers = {numbers:?} }}")] {
+            let list = format!("[[edit]]\ncopies = {chosen}\n{shape}");
+            let after = edited(vec![build.clone()], &list, vec![]).unwrap();
+            prop_assert_eq!(mask(&after[0]), &expected);
+        }
+    }
+
+    #[test]
     fn two_stacks_meet_at_their_true_heights(
         masks in prop::collection::vec(arbitrary_mask(), 3),
         others in prop::collection::vec(arbitrary_mask(), 2),
@@ -427,7 +463,7 @@ fn each_copy_of_a_build_has_the_next_number() {
     let tile = json!({ "part_pixels": [12, 9], "part_origin_mm": [3.0, 7.0],
                        "copies": [[0, 0], [20, 30], [40, 5]], "turns": ["0", "180", "90"] });
     build.info.stack.as_mut().unwrap().other.insert("tile".to_owned(), tile);
-    let after = edited(vec![build], list, vec![]).unwrap();
+    let after = edited(vec![build.clone()], list, vec![]).unwrap();
     let mut white = 0;
     for (k, (left, top, turn)) in
         [(0, 0, "0"), (20, 30, "180"), (40, 5, "90")].into_iter().enumerate()
@@ -445,6 +481,11 @@ fn each_copy_of_a_build_has_the_next_number() {
     }
     assert!(white > 20, "{white}");
     assert_eq!(mask(&after[0]).white_pixels(), white);
+    // A chosen copy has the number that it has among all.
+    let last = edited(vec![build], &list.replace("true", "[3]"), vec![]).unwrap();
+    let alone = lamp_stack::Frame { left: 40, top: 5, width: 9, height: 12 };
+    assert_eq!(mask(&last[0]).framed(alone), mask(&after[0]).framed(alone));
+    assert_eq!(mask(&last[0]).white_pixels(), mask(&last[0]).framed(alone).white_pixels());
 }
 
 /// A picture of two rows: white, black, white, black; and white.

@@ -1,5 +1,6 @@
 //! Reads lists of edits from TOML, and checks each edit.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use lamp_stack::{Length, Op, line_of, one_line};
@@ -121,6 +122,9 @@ impl Edit {
         if !self.copies.is_none() && shapes == 0 {
             return Some(EditProblem::CopiesWithoutShape);
         }
+        if self.copies.numbers().is_some_and(BTreeSet::is_empty) {
+            return Some(EditProblem::NoCopyChosen);
+        }
         if !self.copies.is_none() && self.op == Some(Op::Intersect) {
             return Some(EditProblem::IntersectInCopies);
         }
@@ -181,7 +185,13 @@ mod tests {
             ("z = [\"0mm\", \"1mm\"]", &["edit 2", "one of"]),
             ("z = [\"0mm\", \"1mm\"]\nmirror = \"x\"", &["edit 2", "all layers"]),
             ("copies = true\nmirror = \"x\"", &["edit 2", "copies"]),
-            ("copies = 3\nmirror = \"x\"", &["edit 2, copies", "a part's name"]),
+            ("copies = 3\nmirror = \"x\"", &["edit 2, copies", "a part's name", "[1, 5]"]),
+            ("copies = [-1]\nmirror = \"x\"", &["edit 2, copies", "[1, 5]"]),
+            ("copies = { numbers = [1] }\nmirror = \"x\"", &["edit 2, copies", "part"]),
+            (
+                "copies = []\nbox = { x = [\"1mm\", \"2mm\"], y = [\"1mm\", \"2mm\"] }",
+                &["edit 2", "no copy"],
+            ),
             ("rotate = 45", &["edit 2", "90"]),
             (
                 "line = { from = [\"0mm\", \"0mm\"], to = [\"1mm\", \"0mm\"], width = \"0mm\" }",

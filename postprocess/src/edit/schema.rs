@@ -1,6 +1,7 @@
 //! The TOML tables of a list of edits, and their values.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use lamp_stack::{Length, LengthError, Op, Orientation};
@@ -42,12 +43,28 @@ pub(super) struct Edit {
 
 /// The copies of a part that an edit is made in.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(untagged, expecting = "write true, or a part's name")]
+#[serde(
+    untagged,
+    expecting = "write true, numbers of copies as [1, 5], a part's name, or \
+                 { part = \"NAME\", numbers = [1, 5] }"
+)]
 pub(super) enum CopySelection {
     /// Those of the only part, if true.
     Any(bool),
     /// Those of the part of this name.
     Of(String),
+    /// Those of the only part that have these numbers, from 1.
+    Numbered(BTreeSet<u32>),
+    Chosen(ChosenCopies),
+}
+
+/// Some copies of one part.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ChosenCopies {
+    part: String,
+    /// From 1, in the order of the first page.
+    numbers: BTreeSet<u32>,
 }
 
 impl Default for CopySelection {
@@ -60,6 +77,22 @@ impl CopySelection {
     /// Returns true if the edit is made once, in the whole image.
     pub(super) fn is_none(&self) -> bool {
         matches!(self, Self::Any(false))
+    }
+
+    /// Returns the name of the part, if it is given.
+    pub(super) fn part(&self) -> Option<&str> {
+        match self {
+            Self::Of(part) | Self::Chosen(ChosenCopies { part, .. }) => Some(part),
+            Self::Any(_) | Self::Numbered(_) => None,
+        }
+    }
+
+    /// Returns the numbers of the copies, from 1, unless all are meant.
+    pub(super) fn numbers(&self) -> Option<&BTreeSet<u32>> {
+        match self {
+            Self::Numbered(numbers) | Self::Chosen(ChosenCopies { numbers, .. }) => Some(numbers),
+            Self::Any(_) | Self::Of(_) => None,
+        }
     }
 }
 

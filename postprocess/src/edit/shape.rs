@@ -55,9 +55,8 @@ impl EditShape {
         } else if let Some(label) = &edit.label {
             let lines: Vec<_> = copies
                 .iter()
-                .zip(0..)
                 .zip(&grids)
-                .map(|((copy, k), grid)| letters(label, &copy.part, *grid, k))
+                .map(|(copy, grid)| letters(label, copy, *grid))
                 .collect::<Result<_, _>>()
                 .map_err(wrong)?;
             composed(&copies, place, |k, part| polygons(&lines[k], part.width, part.height))
@@ -134,16 +133,15 @@ fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec
     vec![corner(from, -half), corner(to, -half), corner(to, half), corner(from, half)]
 }
 
-/// Returns the outlines of a label at each of its places in the copy of that index.
+/// Returns the outlines of a label at each of its places in a copy.
 fn letters(
     label: &Label,
-    part: &ImageBounds,
+    BuildCopy { part, index, .. }: &BuildCopy,
     grid: PixelMap,
-    copy: i64,
 ) -> Result<Vec<Vec<Point>>, EditProblem> {
     let mut lines: Vec<Vec<Point>> = Vec::new();
     let size = grid.length(label.height);
-    let before = copy * label.at.len() as i64;
+    let before = i64::from(*index) * label.at.len() as i64;
     for (at, k) in label.at.iter().zip(before..) {
         let text = numbered(&label.text, i64::from(label.start) + k * i64::from(label.step))?;
         let glyphs = outlines(&text, label.align, label.turn, TOLERANCE / size)
