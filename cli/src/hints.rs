@@ -146,6 +146,7 @@ fn tile(error: &TileError) -> Option<String> {
         TileError::FineMesh => "give a larger --cell, or --mesh none",
         TileError::ManyBreaks => "give a wider --break-pitch, or --break-width 0um",
         TileError::NoOutline { .. } => "give --fit",
+        TileError::LargePiece { .. } => "give a smaller --least-piece, or --mesh none",
         TileError::WideMoat { .. } => "give a smaller --clearance, or --mesh none",
         TileError::TooManyRuns { .. } => "place fewer copies",
         TileError::Resolutions { .. } => "slice the parts at one resolution",

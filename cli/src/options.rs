@@ -196,10 +196,11 @@ pub(crate) fn parse_thickness(text: &str) -> Result<Length, String> {
 
 /// Parses an area that is not below zero, in square millimetres.
 pub(crate) fn parse_area(text: &str) -> Result<f64, String> {
-    let number = text.trim();
-    let number = number.strip_suffix("mm2").or((number == "0").then_some("0"));
-    let area: Option<f64> = number.and_then(|number| number.trim_end().parse().ok());
-    match area {
+    let text = text.trim();
+    let number = |text: &str| text.trim_end().parse::<f64>().ok();
+    // Zero needs no unit.
+    let zero = number(text).filter(|&area| area == 0.0);
+    match text.strip_suffix("mm2").and_then(number).or(zero) {
         Some(area) if area < 0.0 => Err(format!("{area}mm2 is below zero")),
         Some(area) if area.is_finite() => Ok(area),
         _ => Err("an area is a number and mm2, such as 1mm2".to_owned()),

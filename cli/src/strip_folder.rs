@@ -9,7 +9,7 @@ use crate::exit::Exit;
 use crate::options::{Input, Output};
 use crate::progress::Progress;
 use crate::stages::Layers;
-use crate::streams::{format, input_name, new_folder, read_layers, write_layers};
+use crate::streams::{format, input_name, is_stream, new_folder, read_layers, write_layers};
 
 /// Reads the wanted layers of a stack, or those of the build that a folder of strips makes.
 pub(crate) fn read_layers_or_strips(
@@ -22,8 +22,8 @@ pub(crate) fn read_layers_or_strips(
     }
     if input.layers.is_some() {
         return Err(Exit::usage(
-            "--layers takes some layers of a stack, and strips stay whole: lamp join makes one stack \
-             of them",
+            "--layers is for one stack, and this is a folder of strips: make one stack of them with \
+             lamp join",
         ));
     }
     let name = input_name(folder);
@@ -54,6 +54,13 @@ pub(crate) fn write_layers_or_strips(
     let cut_as = StripForm::of(&input.stack).map_err(|error| failed(&input.stack, error))?;
     let StripForm { mirrors, overlap, seam } = form(cut_as);
     let to = &output.output;
+    if is_stream(to) || is_stack_name(to) {
+        return Err(Exit::usage(format!(
+            "{}: what is made of strips is a folder of strips: name one with -o, or make one stack \
+             of them with lamp join first",
+            to.display()
+        )));
+    }
     let folder = new_folder(to, output.force)?;
     let write = || -> Result<StripWriter, StripsError> {
         StripWriter::new(folder, mirrors, overlap, seam, format(output.classic))
@@ -65,6 +72,12 @@ pub(crate) fn write_layers_or_strips(
     }
     progress.done();
     strips.finish().map_err(|error| failed(to, error))
+}
+
+/// Returns whether a name is that of a stack in one file.
+fn is_stack_name(path: &Path) -> bool {
+    let name = path.to_string_lossy().to_ascii_lowercase();
+    [".tif", ".tiff", ".lamp"].iter().any(|end| name.ends_with(end))
 }
 
 fn failed(folder: &Path, error: StripsError) -> Exit {

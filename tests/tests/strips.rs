@@ -353,7 +353,13 @@ fn stages_take_a_folder_of_strips_for_its_build() {
     let text = String::from_utf8(text).unwrap();
     assert!(text.contains("strip_001.tif: columns 29 to 68, 3 layers, "), "{text}");
 
-    scratch.run("dither s").is_wrong_usage(&["name the folder"]);
+    for to in ["", " -o t.tif", " -o t.lamp"] {
+        scratch.run(&format!("dither s{to}")).is_wrong_usage(&[
+            "folder of strips",
+            "-o",
+            "lamp join",
+        ]);
+    }
     scratch.run("dither s --layers 1..2 -o t").is_wrong_usage(&["--layers", "lamp join"]);
     scratch.run("lamp info s --runs").is_wrong_usage(&["--runs"]);
     scratch.run("dither s -o dots").is_refused_with(&["dots", "--force replaces a folder"]);

@@ -106,13 +106,13 @@ fn text(name: &str, totals: &Totals<'_>, strips: &[Strip]) -> String {
         gray => format!(", {gray} of them gray"),
     };
     let mut text = format!(
-        "strips:     {name}\nlayers:     {}{gray}\nswaths:     {} of {} mirrors, {} shared ({})\n\
+        "strips:     {name}\nlayers:     {}{gray}\nswaths:     {} of {} mirrors, {} shared{}\n\
          exposed:    {} in all strips and layers\ndata:       {} bytes\n",
         totals.layers,
         strips.len(),
         totals.mirrors,
         totals.overlap,
-        totals.seam,
+        if totals.overlap > 0 { format!(" ({})", totals.seam) } else { String::new() },
         exposed(totals.exposed_px),
         totals.data_bytes,
     );

@@ -82,6 +82,14 @@ pub enum TileError {
         /// The area as lengths.
         area_mm: Size,
     },
+    /// No piece of mesh can be so large.
+    #[error("a least piece of {least_mm2} mm2 of mesh is larger than the build area of {area_mm}")]
+    LargePiece {
+        /// The area of the least piece that is wanted, in square millimetres.
+        least_mm2: f64,
+        /// The area as lengths.
+        area_mm: Size,
+    },
     /// The copies have more runs than an image can hold.
     #[error("{copies} copies in {layer} have more runs than an image can hold")]
     TooManyRuns {

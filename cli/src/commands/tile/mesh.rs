@@ -36,8 +36,8 @@ pub(super) struct MeshArgs {
 
     /// What the moat follows [default: rising]
     #[arg(long, help_heading = HEADING, value_parser = one_of_described::<Moat>(&[
-        "The part in each layer and in those below it, so that no mesh stands on its faces",
-        "The part in each layer: mesh stands on faces that look up, and in cross bores",
+        "The part in each layer and in those below it: no mesh stands on faces that look up",
+        "The part in each layer: mesh cures onto faces that look up, and in cross bores",
         "The part's outline over all layers, also below faces that look down; implies --fit",
     ]))]
     moat: Option<Moat>,
@@ -45,6 +45,7 @@ pub(super) struct MeshArgs {
     /// Least area of a piece of mesh in a layer: smaller ones are left out, and so are those that
     /// hang on no mesh below; 0 keeps all that hang [default: 1mm2]
     #[arg(long, value_name = "AREA", value_parser = parse_area, help_heading = HEADING)]
+    #[arg(allow_hyphen_values = true)]
     least_piece: Option<f64>,
 
     /// Width of the break lines, which cut the mesh from each part up, down, left and right to the

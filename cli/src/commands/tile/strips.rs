@@ -37,7 +37,7 @@ pub(super) struct StripArgs {
     /// build
     #[arg(long, default_value_t, requires = "strips", help_heading = HEADING)]
     #[arg(value_parser = one_of_described::<Seam>(&[
-        "Each pixel belongs to one of both: each row changes over at a column of its own, and in each \
+        "Each pixel belongs to one of the two: each row changes over at a column of its own, and in each \
          layer at another. Black and white stay so",
         "Levels fall in one as they rise in the other: gray pages, many times as large",
     ]))]

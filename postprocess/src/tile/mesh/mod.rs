@@ -60,6 +60,11 @@ impl Layout {
         if clearance > f64::from(longest) {
             return Err(TileError::WideMoat { clearance: options.clearance, area_mm: self.area });
         }
+        let least_piece = options.least_piece_mm2 / self.dpi.pitch().mm().powi(2);
+        if least_piece > f64::from(self.pixels.width) * f64::from(self.pixels.height) {
+            let least_mm2 = options.least_piece_mm2;
+            return Err(TileError::LargePiece { least_mm2, area_mm: self.area });
+        }
         let lattice = options.lattice(self.dpi, self.pixels)?;
         let whole = |length| (pixels(length).round().min(f64::from(longest))) as u32;
         let breaks = match whole(options.break_width) {
@@ -80,7 +85,7 @@ impl Layout {
             standing: MeshRows::default(),
             clearance,
             moat: options.moat,
-            least_piece: (options.least_piece_mm2 / self.dpi.pitch().mm().powi(2)).ceil() as u64,
+            least_piece: least_piece.ceil() as u64,
             base_layers: options.base_layers,
             build: self.pixels,
             changes: 0,
