@@ -190,6 +190,7 @@ fn options_that_contradict_each_other_are_wrong_usage() {
         ("--mesh none --base-layers 3", ["--base-layers", "--mesh none"]),
         ("--mesh none --least-piece 3mm2", ["--least-piece", "--mesh none"]),
         ("--least-piece 3mm", ["--least-piece", "such as 1mm2"]),
+        ("--least-piece -3mm2", ["--least-piece", "below zero"]),
         ("--mesh torus.tif --wall 1mm", ["--wall", "an image has its own walls"]),
         ("--base-layers x", ["--base-layers", "invalid"]),
         ("--cell 4", ["--cell", "unit"]),

@@ -263,6 +263,8 @@ fn meshes_that_are_none_are_refused() {
         assert!(matches!(refused(&cells(lengths)), TileError::NoCells { .. }));
     }
     assert!(matches!(refused(&cells([8.0, 1.0, 41.0])), TileError::WideMoat { .. }));
+    let large = MeshOptions { least_piece_mm2: 1e30, ..MeshOptions::default() };
+    assert!(matches!(refused(&large), TileError::LargePiece { .. }));
     let pattern = MeshPattern::Image { name: "x".to_owned(), image: Mask::black(0, 0) };
     let empty = MeshOptions { pattern, ..cells([8.0, 1.0, 1.0]) };
     assert!(matches!(refused(&empty), TileError::NoTemplate { .. }));
