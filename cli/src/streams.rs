@@ -429,7 +429,7 @@ pub(crate) fn check_stl_name(path: &Path) -> Result<(), Exit> {
 }
 
 /// Returns what a file's name ends in, in small letters.
-fn extension(path: &Path) -> String {
+pub(crate) fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 

@@ -9,7 +9,9 @@ use crate::exit::Exit;
 use crate::options::{Input, Output};
 use crate::progress::Progress;
 use crate::stages::Layers;
-use crate::streams::{format, input_name, is_stream, new_folder, read_layers, write_layers};
+use crate::streams::{
+    extension, format, input_name, is_stream, new_folder, read_layers, write_layers,
+};
 
 /// Reads the wanted layers of a stack, or those of the build that a folder of strips makes.
 pub(crate) fn read_layers_or_strips(
@@ -76,8 +78,7 @@ pub(crate) fn write_layers_or_strips(
 
 /// Returns whether a name is that of a stack in one file.
 fn is_stack_name(path: &Path) -> bool {
-    let name = path.to_string_lossy().to_ascii_lowercase();
-    [".tif", ".tiff", ".lamp"].iter().any(|end| name.ends_with(end))
+    matches!(extension(path).as_str(), "tif" | "tiff" | "lamp")
 }
 
 fn failed(folder: &Path, error: StripsError) -> Exit {

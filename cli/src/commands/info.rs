@@ -42,7 +42,8 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
     if is_strips(&args.input.stack) {
         if args.runs || args.input.layers.is_some() {
             return Err(Exit::usage(
-                "--runs and --layers are for one stack: name the file of a strip, or make one stack of all with lamp join",
+                "--runs and --layers are for one stack: name the file of a strip, or make one stack \
+                 of all with lamp join",
             ));
         }
         return print_strips(&args.input.stack, args.json);

@@ -4,7 +4,7 @@
 use super::below::Below;
 
 /// Columns of a row, from each start to its end.
-pub(crate) type Columns = Vec<(u32, u32)>;
+type Intervals = Vec<(u32, u32)>;
 
 /// The columns of a row that are part in as many layers as count, or a few more, from a layer down.
 ///
@@ -12,15 +12,15 @@ pub(crate) type Columns = Vec<(u32, u32)>;
 /// from two whole blocks and the layers of a third.
 pub(crate) struct SolidRow {
     width: u32,
-    solid: Columns,
+    solid: Intervals,
     /// Part in all layers of the last whole block, and of the one that has begun.
-    last: Columns,
-    begun: Columns,
+    last: Intervals,
+    begun: Intervals,
     /// The layers that the block still lacks.
     left: u32,
     /// The layers of each block but the first.
     block: u32,
-    spare: Columns,
+    spare: Intervals,
 }
 
 impl SolidRow {
@@ -60,7 +60,11 @@ impl SolidRow {
 }
 
 /// Leaves out columns that are not in a part, whose pieces come from the left.
-fn keep_within(columns: &mut Columns, part: impl Iterator<Item = (u32, u32)>, spare: &mut Columns) {
+fn keep_within(
+    columns: &mut Intervals,
+    part: impl Iterator<Item = (u32, u32)>,
+    spare: &mut Intervals,
+) {
     if columns.is_empty() {
         return;
     }
