@@ -38,8 +38,8 @@ mod strips;
 mod tile;
 
 pub use edit::{
-    EditError, EditProblem, Edits, ImageBounds, LayerProblem, OtherLayers, OtherPicture, edit,
-    edit_passing,
+    EditError, EditProblem, Edits, ImageBounds, LabelList, LayerProblem, ListProblem, OtherLayers,
+    OtherPicture, edit, edit_passing,
 };
 pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
 pub use offset::{

@@ -189,6 +189,89 @@ fn every_copy_of_a_build_has_its_number_as_if_it_was_edited_before() {
 }
 
 #[test]
+fn copies_have_the_serial_numbers_of_a_list() {
+    let scratch = with_cube();
+    let label = |keys: &str, text: &str| {
+        format!(
+            "[[edit]]\nop = \"subtract\"\nz = [\"0mm\", \"1mm\"]\n{keys}\n[edit.label]\n\
+             text = \"{text}\"\nat = [[\"-9mm\", \"-9mm\"]]\nheight = \"2mm\"\n"
+        )
+    };
+    let list = |copies: &str, column: &str| {
+        format!("{}list = \"art/serials.csv\"\n{column}", label(copies, "#{list}"))
+    };
+    scratch.run("tile cube.tif --mesh none --area 70x50mm --copies 6 -o build.tif").succeeds();
+    let build = scratch.layers("build.tif");
+    let tile = &build[0].info.stack.as_ref().unwrap().other["tile"];
+    let serials = ["A7", "B, 8", "C9", "D\"1", "E22", "F3"];
+    let written = serials.map(|serial| {
+        scratch
+            .write("one.toml", label("", &format!("#{}", serial.replace('"', "\\\""))).as_bytes());
+        scratch.run("lamp edit cube.tif one.toml -o one.tif").succeeds_quietly();
+        scratch.layers("one.tif")
+    });
+    let cut = |layer: &Layer, k: usize| {
+        let place = &tile["copies"][k];
+        let part = &written[k][0].image;
+        mask(layer).framed(lamp_stack::Frame {
+            left: place[0].as_i64().unwrap(),
+            top: place[1].as_i64().unwrap(),
+            width: part.width(),
+            height: part.height(),
+        })
+    };
+    std::fs::create_dir(scratch.path("art")).unwrap();
+    let whole = "A7\r\n\"B, 8\"\r\n C9\r\n\"D\"\"1\"\r\nE22\r\nF3\r\n\r\n";
+    scratch.write("art/serials.csv", format!("\u{feff}{whole}").as_bytes());
+    for (copies, chosen) in [("true", vec![0, 1, 2, 3, 4, 5]), ("[4, 2]", vec![1, 3])] {
+        scratch.write("all.toml", list(&format!("copies = {copies}"), "").as_bytes());
+        scratch.run("lamp edit build.tif all.toml -o out.tif").succeeds_quietly();
+        for (after, before) in scratch.layers("out.tif").iter().zip(&build) {
+            let index = after.info.index as usize;
+            for (k, part) in written.iter().enumerate() {
+                let as_written = mask(&part[index]);
+                let expected = if chosen.contains(&k) { as_written } else { &cut(before, k) };
+                assert_eq!(&cut(after, k), expected, "{copies}, copy {k}, layer {index}");
+            }
+        }
+    }
+    let out = scratch.layers("out.tif");
+    let told = out[0].info.stack.as_ref().unwrap().commands.last().unwrap();
+    assert!(told.contains(r#""list":{"name":"serials.csv","digest":"blake3:"#), "{told}");
+    // Rows that name the copy are in any order.
+    let named = "Copy,SN,by\n4,\"D\"\"1\",me\n2,\"B, 8\",you\n";
+    scratch.write("art/serials.csv", named.as_bytes());
+    scratch.write("two.toml", list("copies = [2, 4]", "column = \"SN\"\n").as_bytes());
+    scratch.run("lamp edit build.tif two.toml -o two.tif").succeeds_quietly();
+    assert_eq!(masks(&scratch.layers("two.tif")), masks(&out));
+    // In the whole image, rows are for places.
+    scratch.write("art/serials.csv", b"A7\n");
+    scratch.write("one.toml", list("", "").as_bytes());
+    scratch.run("lamp edit cube.tif one.toml -o one.tif").succeeds_quietly();
+    assert_eq!(masks(&scratch.layers("one.tif")), masks(&written[0]));
+    scratch.write("all.toml", list("copies = true", "").as_bytes());
+    for (list, words) in [
+        ("A\nB\n", &["build.tif", "art/serials.csv: line 2: the list ends, but copy 3 of 6"][..]),
+        ("A\nB\nC\nD\nE\nF\nG\n", &["art/serials.csv: line 7: there is no copy 7"]),
+        (
+            "A\nB\nA\nD\nE\nF\n",
+            &["all.toml", "edit 1", "art/serials.csv: line 3: A stands on line 1"],
+        ),
+    ] {
+        scratch.write("art/serials.csv", list.as_bytes());
+        scratch.run("lamp edit build.tif all.toml -o no.tif").is_refused_with(words);
+    }
+    scratch.write("art/serials.csv", whole.as_bytes());
+    let ran = scratch.run("lamp edit build.tif all.toml -o art/serials.csv");
+    assert_eq!(ran.statuses, [Some(2)], "{ran:?}");
+    scratch.write("art/serials.csv", &[0xff, 0xfe, b'A', 0]);
+    scratch
+        .run("lamp edit build.tif all.toml -o no.tif")
+        .is_refused_with(&["art/serials.csv", "UTF-8"]);
+    assert!(!scratch.path("no.tif").exists());
+}
+
+#[test]
 fn a_chosen_copy_is_as_if_its_part_was_edited_before() {
     let scratch = with_cube();
     let notch = "op = \"subtract\"\nz = [\"2mm\", \"4mm\"]\n\

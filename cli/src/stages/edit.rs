@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::{ArgGroup, Args};
-use lamp_postprocess::{EditError, Edits, OtherLayers, OtherPicture, edit_passing};
+use lamp_postprocess::{EditError, Edits, LabelList, OtherLayers, OtherPicture, edit_passing};
 use lamp_stack::{Layer, Limits, Op, PageInfo, Pages, PassingLayer, digest_of};
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;
-use crate::streams::{failed_at, input_name, layers_of, read_beside};
+use crate::streams::{failed_at, input_name, is_stream, layers_of, read_beside};
 
 /// Changes when other bytes come from the same options and layers.
 pub(crate) const CODE: u32 = 1;
@@ -51,6 +51,7 @@ struct EditFiles {
     edits: Edits,
     stacks: Vec<PathBuf>,
     pictures: Vec<PathBuf>,
+    lists: Vec<PathBuf>,
 }
 
 impl EditSettings {
@@ -88,18 +89,27 @@ impl EditSettings {
     fn files(&self) -> Result<EditFiles, Exit> {
         if let Some((op, file)) = self.combination() {
             let edits = Edits::combine(op, file.clone());
-            return Ok(EditFiles { edits, stacks: vec![file.clone()], pictures: vec![] });
+            return Ok(EditFiles {
+                edits,
+                stacks: vec![file.clone()],
+                pictures: vec![],
+                lists: vec![],
+            });
         }
         let list = self.edits.as_deref().expect("one of the group is given");
         let edits = || -> anyhow::Result<Edits> {
             Ok(Edits::from_toml(&read_text(list, MAX_LIST_BYTES, "a list of edits")?)?)
         };
-        let edits = edits().with_context(|| input_name(list))?;
+        let named = || input_name(list);
+        let edits = edits().with_context(named)?;
         // Files stand beside the list that names them.
         let folder = list.parent().unwrap_or(Path::new(""));
         let stacks = edits.stacks().map(|file| folder.join(file)).collect();
         let pictures = edits.pictures().map(|file| folder.join(file)).collect();
-        Ok(EditFiles { edits, stacks, pictures })
+        let lists: Vec<_> = edits.lists().map(|file| folder.join(file)).collect();
+        let texts = lists.iter().map(|file| open_list(file)).collect::<Result<_, Exit>>()?;
+        let edits = edits.with_lists(texts).map_err(anyhow::Error::new).with_context(named)?;
+        Ok(EditFiles { edits, stacks, pictures, lists })
     }
 }
 
@@ -121,7 +131,8 @@ impl Editing {
 
     /// Returns all files that are read.
     pub(crate) fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        self.list.iter().chain(&self.files.stacks).chain(&self.files.pictures)
+        let EditFiles { stacks, pictures, lists, .. } = &self.files;
+        self.list.iter().chain(stacks).chain(pictures).chain(lists)
     }
 
     /// Returns the edited layers. Edits in those of `counted` are counted. `is_end` says whether
@@ -146,7 +157,7 @@ impl Editing {
         counted: Range<u32>,
         is_end: [bool; 2],
     ) -> Result<impl Iterator<Item = Result<PassingLayer, Exit>> + 'a, Exit> {
-        let EditFiles { edits, stacks, pictures } = &self.files;
+        let EditFiles { edits, stacks, pictures, .. } = &self.files;
         let may_reach_beyond = is_end.map(|is_end| !is_end);
         let other = |file: &PathBuf| {
             let layers = Box::new(read_beside(file)?);
@@ -173,6 +184,17 @@ impl Editing {
 /// Returns what is said of an edit that was made in no layer.
 pub(crate) fn unused_text(edit: usize) -> String {
     format!("edit {edit} applies to no layer: check its z or layers")
+}
+
+/// Reads a label's list.
+fn open_list(path: &Path) -> Result<LabelList, Exit> {
+    let name = path.display().to_string();
+    // Standard input, which may be the stack, is no file beside the list of edits.
+    let path = if is_stream(path) { &Path::new(".").join(path) } else { path };
+    let text = read_text(path, MAX_LIST_BYTES, "a list of serial numbers");
+    let text = text.with_context(|| name.clone())?;
+    let digest = digest_of(text.as_bytes()).with_context(|| name.clone())?;
+    Ok(LabelList { name, digest, text })
 }
 
 /// Opens a picture. A copy in a temporary file is read, so that the digest is of what is stamped.

@@ -24,6 +24,8 @@ pub(super) struct BuildCopy {
     pub(super) top: i64,
     /// Its place among all copies of the part, from 0.
     pub(super) index: u32,
+    /// How many copies of the part there are.
+    pub(super) count: u32,
 }
 
 /// The first page's entry for a part.
@@ -96,6 +98,7 @@ impl BuildCopy {
             left,
             top,
             index,
+            count: count as u32,
         };
         let is_wanted = |copy: &Self| {
             wanted.numbers().is_none_or(|numbers| numbers.contains(&(copy.index + 1)))
@@ -110,7 +113,7 @@ impl BuildCopy {
 
     /// Returns all of an image as if it was a copy.
     fn whole(place: &ImageBounds) -> Self {
-        Self { part: *place, turn: Orientation::default(), left: 0, top: 0, index: 0 }
+        Self { part: *place, turn: Orientation::default(), left: 0, top: 0, index: 0, count: 1 }
     }
 }
 
@@ -219,11 +222,25 @@ mod tests {
         let lain = ImageBounds { origin_mm: [1.0, 2.0], width: 7, height: 5, ..PLACE };
         assert_eq!(
             all[0],
-            BuildCopy { part: lain, turn: Orientation::default(), left: 3, top: 4, index: 0 }
+            BuildCopy {
+                part: lain,
+                turn: Orientation::default(),
+                left: 3,
+                top: 4,
+                index: 0,
+                count: 2
+            }
         );
         assert_eq!(
             all[1],
-            BuildCopy { part: lain, turn: Orientation::new(1, true), left: 5, top: 6, index: 1 }
+            BuildCopy {
+                part: lain,
+                turn: Orientation::new(1, true),
+                left: 5,
+                top: 6,
+                index: 1,
+                count: 2
+            }
         );
         assert_eq!(
             BuildCopy::all(&CopySelection::Of("blade".to_owned()), &page, &PLACE).unwrap(),
@@ -295,7 +312,7 @@ mod tests {
             let mask = mask.finish();
             let lain = ImageBounds { width: 7, height: 5, ..PLACE };
             let copies: Vec<BuildCopy> = places.iter().map(|&(left, top, quarters, mirrored)| {
-                BuildCopy { part: lain, turn: Orientation::new(quarters, mirrored), left, top, index: 0 }
+                BuildCopy { part: lain, turn: Orientation::new(quarters, mirrored), left, top, index: 0, count: 1 }
             }).collect();
             let made = composed(&copies, &PLACE, |_, _| mask.clone()).unwrap();
             let mut expected = Mask::black(40, 30);

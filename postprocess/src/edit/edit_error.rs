@@ -4,6 +4,7 @@ use lamp_stack::{Dpi, OrientationError, StackError};
 use thiserror::Error;
 
 use super::ImageBounds;
+use super::serials::ListProblem;
 
 /// Why a stack cannot be edited.
 #[derive(Debug, Error)]
@@ -113,8 +114,28 @@ pub enum EditProblem {
     #[error("`{0}` has a brace without its other")]
     Brace(String),
     /// Braces in a label's text hold something else than a number's place.
-    #[error("`{{{0}}}` is no number's place: write {{n}}, or {{n:04}} for four digits")]
+    #[error(
+        "`{{{0}}}` is no number's place: write {{n}}, {{n:04}} for four digits, or {{list}} for a \
+         serial number of a list"
+    )]
     NumberField(String),
+    /// A label shows serial numbers, but has none.
+    #[error("its text has {{list}}: write list = \"FILE.csv\", which has the serial numbers")]
+    NoList,
+    /// A label has serial numbers, but does not show them.
+    #[error("its text does not have {{list}}, where the list's serial numbers would stand")]
+    UnusedList,
+    /// A label names the column of no list.
+    #[error("column is the name of a list's column: write list = \"FILE.csv\", too")]
+    ColumnWithoutList,
+    /// A list of serial numbers does not suit.
+    #[error("{list}: {problem}")]
+    List {
+        /// The list's file.
+        list: String,
+        /// What is wrong with it.
+        problem: ListProblem,
+    },
     /// A label is not all on the image.
     #[error("`{text}` reaches outside the image, which is {image}: move it, or pad first")]
     LabelOutside {

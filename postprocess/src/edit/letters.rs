@@ -137,12 +137,15 @@ impl OutlineBuilder for Pen {
     fn close(&mut self) {}
 }
 
+/// The place of a serial number in a label's text.
+pub(super) const SERIAL: &str = "{list}";
+
 /// Puts the number `n` into a text for `{n}`, or for `{n:4}` and `{n:04}` with four
-/// digits, filled with blanks or zeros.
+/// digits, filled with blanks or zeros, and a serial number for `{list}`.
 ///
 /// # Errors
 /// Returns an error if the text has single braces, or something else in them.
-pub(super) fn numbered(text: &str, n: i64) -> Result<String, EditProblem> {
+pub(super) fn numbered(text: &str, n: i64, serial: &str) -> Result<String, EditProblem> {
     let mut out = String::new();
     let mut rest = text;
     while let Some(start) = rest.find(['{', '}']) {
@@ -151,7 +154,11 @@ pub(super) fn numbered(text: &str, n: i64) -> Result<String, EditProblem> {
             .strip_prefix('{')
             .and_then(|inside| inside.split_once('}'))
             .ok_or_else(|| EditProblem::Brace(text.to_owned()))?;
-        out += &number(field, n).ok_or_else(|| EditProblem::NumberField(field.to_owned()))?;
+        if field == "list" {
+            out += serial;
+        } else {
+            out += &number(field, n).ok_or_else(|| EditProblem::NumberField(field.to_owned()))?;
+        }
         rest = after;
     }
     Ok(out + rest)
@@ -176,11 +183,14 @@ mod tests {
 
     #[test]
     fn numbers_stand_where_they_are_asked_for() {
-        assert_eq!(numbered("SN {n:04}/{n}", 17).unwrap(), "SN 0017/17");
-        assert_eq!(numbered("{n:3}", -1).unwrap(), " -1");
-        assert_eq!(numbered("plain", 1).unwrap(), "plain");
-        for wrong in ["{", "}", "{n", "{m}", "{n:}", "{n:x}", "{n:+4}", "{n:99999999999}", "{}}"] {
-            assert!(numbered(wrong, 1).is_err(), "{wrong}");
+        assert_eq!(numbered("SN {n:04}/{n}", 17, "").unwrap(), "SN 0017/17");
+        assert_eq!(numbered("{n:3}", -1, "").unwrap(), " -1");
+        assert_eq!(numbered("plain", 1, "").unwrap(), "plain");
+        assert_eq!(numbered("SN {list} ({n})", 2, "{A}").unwrap(), "SN {A} (2)");
+        for wrong in
+            ["{", "}", "{n", "{m}", "{n:}", "{n:x}", "{n:+4}", "{n:99999999999}", "{}}", "{List}"]
+        {
+            assert!(numbered(wrong, 1, "").is_err(), "{wrong}");
         }
     }
 

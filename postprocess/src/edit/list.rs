@@ -9,7 +9,9 @@ use serde_json::Value;
 use serde_path_to_error::Segment;
 
 use super::edit_error::{EditError, EditProblem};
-use super::schema::{CylinderAxis, Edit, OtherStack};
+use super::letters::SERIAL;
+use super::schema::{CylinderAxis, Edit, Label, OtherStack};
+use super::serials::{LabelList, SerialList};
 
 /// A list of edits, made one after the other.
 ///
@@ -27,6 +29,8 @@ pub struct Edits {
     pub(super) list: Vec<Edit>,
     /// The list as the result's first page has it.
     pub(super) told: Vec<Value>,
+    /// The lists that labels name, in order, once they are read.
+    pub(super) serials: Vec<SerialList>,
 }
 
 impl Edits {
@@ -57,7 +61,7 @@ impl Edits {
         let told = table.get("edit").and_then(|list| list.as_array()).ok_or(EditError::NoEdits)?;
         let told =
             told.iter().map(|edit| serde_json::to_value(edit).expect("TOML is JSON, dates apart"));
-        let edits = Self { told: told.collect(), list: file.edit };
+        let edits = Self { told: told.collect(), list: file.edit, serials: Vec::new() };
         (1..).zip(&edits.list).try_for_each(|(number, edit)| edit.check(number))?;
         Ok(edits)
     }
@@ -69,6 +73,7 @@ impl Edits {
         Self {
             list: vec![edit],
             told: vec![serde_json::json!({ "op": op.to_string(), "stack": {} })],
+            serials: Vec::new(),
         }
     }
 
@@ -85,6 +90,53 @@ impl Edits {
     /// Returns the files of the pictures that the edits name, in order.
     pub fn pictures(&self) -> impl Iterator<Item = &PathBuf> {
         self.list.iter().filter_map(|edit| Some(&edit.picture.as_ref()?.file))
+    }
+
+    /// Returns the files of the lists that labels name, in order.
+    pub fn lists(&self) -> impl Iterator<Item = &PathBuf> {
+        self.labels_with_lists().filter_map(|(_, label)| label.list.as_ref())
+    }
+
+    /// Reads the serial numbers of the lists that labels name, in order.
+    ///
+    /// ```
+    /// use lamp_postprocess::{Edits, LabelList};
+    ///
+    /// let edits = r#"
+    ///     [[edit]]
+    ///     copies = true
+    ///     label = { text = "{list}", list = "sn.csv", at = ["1mm", "1mm"], height = "2mm" }
+    /// "#;
+    /// let list = LabelList {
+    ///     name: "sn.csv".to_owned(),
+    ///     digest: "blake3:00".to_owned(),
+    ///     text: "A17\nA17\n".to_owned(),
+    /// };
+    /// let error = Edits::from_toml(edits)?.with_lists(vec![list]).unwrap_err();
+    /// assert_eq!(error.to_string(), "edit 1: sn.csv: line 2: A17 stands on line 1, too");
+    /// # Ok::<(), lamp_postprocess::EditError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Returns an error that names the line if a list is none of serial numbers.
+    ///
+    /// # Panics
+    /// Panics if there are fewer `lists` than the labels name.
+    pub fn with_lists(mut self, lists: Vec<LabelList>) -> Result<Self, EditError> {
+        let mut lists = lists.into_iter();
+        let read = self.labels_with_lists().map(|(number, label)| {
+            let file = lists.next().expect("there is a file for each list");
+            SerialList::read(&file, label.column.as_deref())
+                .map_err(|problem| EditProblem::List { list: file.name, problem }.of_edit(number))
+        });
+        self.serials = read.collect::<Result<_, _>>()?;
+        Ok(self)
+    }
+
+    /// Returns the labels that name lists, and the numbers of their edits, from 1.
+    fn labels_with_lists(&self) -> impl Iterator<Item = (usize, &Label)> {
+        let labels = (1..).zip(&self.list).filter_map(|(k, edit)| Some((k, edit.label.as_ref()?)));
+        labels.filter(|(_, label)| label.list.is_some())
     }
 }
 
@@ -131,10 +183,24 @@ impl Edit {
         if self.cylinder.is_some_and(|c| (c.along == CylinderAxis::Z) == c.between.is_some()) {
             return Some(EditProblem::CylinderEnds);
         }
+        if let Some(problem) = self.label.as_ref().and_then(Label::problem) {
+            return Some(problem);
+        }
         if self.rotate.is_some_and(|degrees| degrees % 90 != 0) {
             return Some(EditProblem::Angle);
         }
         None
+    }
+}
+
+impl Label {
+    fn problem(&self) -> Option<EditProblem> {
+        match (&self.list, &self.column, self.text.contains(SERIAL)) {
+            (Some(_), _, false) => Some(EditProblem::UnusedList),
+            (None, _, true) => Some(EditProblem::NoList),
+            (None, Some(_), false) => Some(EditProblem::ColumnWithoutList),
+            _ => None,
+        }
     }
 }
 
@@ -230,6 +296,18 @@ mod tests {
             (
                 "label = { text = \"a\", at = [[\"0mm\", \"0mm\"]], height = \"1mm\", turn = \"45\" }",
                 &["edit 2, label.turn", "`45`"],
+            ),
+            (
+                "label = { text = \"{list}\", at = [\"0mm\", \"0mm\"], height = \"1mm\" }",
+                &["edit 2", "write list = "],
+            ),
+            (
+                "label = { text = \"{n}\", list = \"a.csv\", at = [\"0mm\", \"0mm\"], height = \"1mm\" }",
+                &["edit 2", "{list}"],
+            ),
+            (
+                "label = { text = \"{n}\", column = \"a\", at = [\"0mm\", \"0mm\"], height = \"1mm\" }",
+                &["edit 2", "column is"],
             ),
         ] {
             let error = error(&format!("{first}{text}\n"));

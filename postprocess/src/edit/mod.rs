@@ -7,6 +7,7 @@
 
 mod cone;
 mod copies;
+mod csv;
 mod edit_error;
 #[cfg(test)]
 mod edit_tests;
@@ -20,6 +21,7 @@ mod page_changes;
 mod pictures;
 mod plan;
 mod schema;
+mod serials;
 mod shape;
 mod solid;
 
@@ -33,6 +35,7 @@ pub use list::Edits;
 pub use other_stacks::OtherLayers;
 pub(crate) use page_changes::frame_page;
 pub use pictures::OtherPicture;
+pub use serials::{LabelList, ListProblem};
 
 use other_stacks::AlignedStack;
 use plan::EditPlan;
@@ -70,7 +73,8 @@ use plan::EditPlan;
 /// added over all heights has layers above the last.
 ///
 /// # Panics
-/// Panics if there are fewer `others` or `pictures` than the edits name.
+/// Panics if there are fewer `others` or `pictures` than the edits name, or if a label's list was
+/// not [read](Edits::with_lists).
 pub fn edit<E: From<EditError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     edits: Edits,
@@ -90,7 +94,8 @@ pub fn edit<E: From<EditError> + Send>(
 /// A layer comes with the errors of [`edit`], or with one if it cannot be decoded and must be.
 ///
 /// # Panics
-/// Panics if there are fewer `others` or `pictures` than the edits name.
+/// Panics if there are fewer `others` or `pictures` than the edits name, or if a label's list was
+/// not [read](Edits::with_lists).
 pub fn edit_passing<E: From<EditError> + Send>(
     layers: impl Iterator<Item = Result<PassingLayer, E>>,
     edits: Edits,

@@ -17,8 +17,8 @@ use super::list::Edits;
 use super::other_stacks::{AlignedStack, middle};
 use super::page_changes::{frame_page, turn_page};
 use super::pictures::OtherPicture;
-use super::schema::{Edit, LengthRange, Mirror};
-use super::shape::EditShape;
+use super::schema::{Edit, Label, LengthRange, Mirror};
+use super::shape::{EditShape, FromFiles};
 
 /// The edits of a list in the pixels of one stack.
 pub(super) struct EditPlan {
@@ -98,6 +98,7 @@ impl EditPlan {
         };
         let (mut place, mut info) = (plan.place, first.info().clone());
         let (mut others, mut pictures) = (others.iter_mut(), pictures.iter_mut());
+        let mut lists = edits.serials.iter();
         let mut told = edits.told.clone();
         for (number, (edit, told)) in (1..).zip(edits.list.iter().zip(&mut told)) {
             let step = match &edit.stack {
@@ -111,14 +112,19 @@ impl EditPlan {
                     PlannedEdit::Other { reach: LayerSelection::of(edit), op: edit.op(), frame }
                 }
                 None => {
-                    let mut picture = None;
+                    let mut files = FromFiles::default();
                     if let Some(keys) = &edit.picture {
                         let file = pictures.next().expect("there is a file for each picture");
                         told["picture"]["file"] =
                             json!({ "name": keys.name(), "digest": file.digest });
-                        picture = Some(file.read(number)?);
+                        files.picture = Some(file.read(number)?);
                     }
-                    PlannedEdit::of(edit, number, &place, &info, picture.as_ref())?
+                    if let Some(name) = edit.label.as_ref().and_then(Label::list_name) {
+                        let list = lists.next().expect("lists are read before edits are planned");
+                        told["label"]["list"] = json!({ "name": name, "digest": list.digest });
+                        files.serials = Some(list);
+                    }
+                    PlannedEdit::of(edit, number, &place, &info, &files)?
                 }
             };
             step.follow(&mut info)?;
@@ -170,13 +176,13 @@ impl EditPlan {
 
 impl PlannedEdit {
     /// Plans an edit that names no other stack, for images at `place` and the first page
-    /// `info`, with the picture that it names.
+    /// `info`, with what it takes from the files that it names.
     fn of(
         edit: &Edit,
         number: usize,
         place: &ImageBounds,
         info: &PageInfo,
-        picture: Option<&Mask>,
+        files: &FromFiles<'_>,
     ) -> Result<Self, EditError> {
         let turned = |turn| Self::Turn { turn, height: place.height, place: place.turned(turn) };
         let framed = |frame: Frame| {
@@ -198,7 +204,7 @@ impl PlannedEdit {
             return framed(cropped(crop, number, place)?);
         }
         let copies = BuildCopy::all(&edit.copies, info, place)?;
-        let shape = EditShape::of(edit, number, place, copies, picture)?;
+        let shape = EditShape::of(edit, number, place, copies, files)?;
         let reach = match LayerSelection::of(edit) {
             // Copies begin above the base layers.
             LayerSelection::All if !edit.copies.is_none() => {

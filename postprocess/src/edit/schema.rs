@@ -204,6 +204,17 @@ pub(super) struct Label {
     pub(super) start: i32,
     #[serde(default = "one")]
     pub(super) step: i32,
+    /// A file of comma-separated serial numbers.
+    pub(super) list: Option<PathBuf>,
+    /// The name of the list's column that has them.
+    pub(super) column: Option<String>,
+}
+
+impl Label {
+    /// Returns the name of the list's file without its folder.
+    pub(super) fn list_name(&self) -> Option<Cow<'_, str>> {
+        Some(self.list.as_ref()?.file_name().unwrap_or_default().to_string_lossy())
+    }
 }
 
 /// A picture whose white pixels are the shape.

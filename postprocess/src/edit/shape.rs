@@ -12,6 +12,7 @@ use super::letters::{numbered, outlines};
 use super::other_stacks::middle;
 use super::pictures::stamped;
 use super::schema::{Cylinder, Edit, Label, StraightLine};
+use super::serials::SerialList;
 use super::solid::{Solid, rectangle};
 
 /// The error of letters' curves, in pixels.
@@ -25,18 +26,26 @@ pub(super) enum EditShape {
     Solid { solid: Solid, copies: Vec<BuildCopy>, place: ImageBounds },
 }
 
+/// What an edit takes from the files that it names.
+#[derive(Default)]
+pub(super) struct FromFiles<'a> {
+    pub(super) picture: Option<Mask>,
+    pub(super) serials: Option<&'a SerialList>,
+}
+
 impl EditShape {
-    /// Creates an edit's shape in each of `copies`, with the `picture` that it names.
+    /// Creates an edit's shape in each of `copies`, with what it takes from `files`.
     ///
     /// # Errors
     /// Returns an error if a letter has no outline, a line or strut no length, or the shape no
-    /// pixel, or if a label or picture reaches outside the image.
+    /// pixel, if a label or picture reaches outside the image, or if there is not one serial
+    /// number for each copy or, in the whole image, for each place.
     pub(super) fn of(
         edit: &Edit,
         number: usize,
         place: &ImageBounds,
         copies: Vec<BuildCopy>,
-        picture: Option<&Mask>,
+        files: &FromFiles<'_>,
     ) -> Result<Self, EditError> {
         let wrong = |problem: EditProblem| problem.of_edit(number);
         let grids: Vec<PixelMap> =
@@ -53,14 +62,13 @@ impl EditShape {
                 polygons(&[corners], part.width, part.height)
             })
         } else if let Some(label) = &edit.label {
-            let lines: Vec<_> = copies
-                .iter()
-                .zip(&grids)
-                .map(|(copy, grid)| letters(label, copy, *grid))
+            let serials = serials(edit, label, &copies, files.serials).map_err(wrong)?;
+            let lines: Vec<_> = (0..copies.len())
+                .map(|k| letters(label, &copies[k], grids[k], |place| serials(k, place)))
                 .collect::<Result<_, _>>()
                 .map_err(wrong)?;
             composed(&copies, place, |k, part| polygons(&lines[k], part.width, part.height))
-        } else if let Some((keys, picture)) = edit.picture.as_ref().zip(picture) {
+        } else if let Some((keys, picture)) = edit.picture.as_ref().zip(files.picture.as_ref()) {
             let part = copies.first().map_or(place, |copy| &copy.part);
             let stamp = stamped(keys, picture, part, part.grid()?).map_err(wrong)?;
             composed(&copies, place, |_, _| stamp.clone())
@@ -133,17 +141,46 @@ fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec
     vec![corner(from, -half), corner(to, -half), corner(to, half), corner(from, half)]
 }
 
-/// Returns the outlines of a label at each of its places in a copy.
-fn letters(
+/// Returns the serial number of a label in a copy and at a place there, both from 0. All places of a
+/// copy have the copy's; in the whole image each place has its own.
+///
+/// # Errors
+/// Returns an error if the label's list has too few or too many.
+fn serials<'a>(
+    edit: &Edit,
+    label: &Label,
+    copies: &[BuildCopy],
+    list: Option<&'a SerialList>,
+) -> Result<impl Fn(usize, usize) -> &'a str + use<'a>, EditProblem> {
+    let is_for_copies = !edit.copies.is_none();
+    let serials = list.map_or(Ok(Vec::new()), |list| {
+        let places = label.at.len() as u32;
+        let found = match copies.first().filter(|_| is_for_copies) {
+            Some(first) => list.of(copies.iter().map(|copy| copy.index + 1), first.count, "copy"),
+            None => list.of(1..=places, places, "place"),
+        };
+        found.map_err(|problem| EditProblem::List { list: list.name.clone(), problem })
+    })?;
+    Ok(move |copy, place| {
+        let serial: Option<&&str> = serials.get(if is_for_copies { copy } else { place });
+        serial.copied().unwrap_or_default()
+    })
+}
+
+/// Returns the outlines of a label at each of its places in a copy, which have the serial numbers
+/// `serial`.
+fn letters<'a>(
     label: &Label,
     BuildCopy { part, index, .. }: &BuildCopy,
     grid: PixelMap,
+    serial: impl Fn(usize) -> &'a str,
 ) -> Result<Vec<Vec<Point>>, EditProblem> {
     let mut lines: Vec<Vec<Point>> = Vec::new();
     let size = grid.length(label.height);
     let before = i64::from(*index) * label.at.len() as i64;
-    for (at, k) in label.at.iter().zip(before..) {
-        let text = numbered(&label.text, i64::from(label.start) + k * i64::from(label.step))?;
+    for (place, (at, k)) in label.at.iter().zip(before..).enumerate() {
+        let n = i64::from(label.start) + k * i64::from(label.step);
+        let text = numbered(&label.text, n, serial(place))?;
         let glyphs = outlines(&text, label.align, label.turn, TOLERANCE / size)
             .map_err(EditProblem::Letter)?;
         let [x, y] = grid.to_pixels(at.map(Length::mm));
