@@ -80,13 +80,14 @@ impl Strut {
 
     /// Returns the least and the greatest y of the section `up_mm` above the first end.
     fn rows_mm(&self, up_mm: f64) -> [f64; 2] {
-        let [dx, dy, dz] = self.direction;
+        let [_, dy, dz] = self.direction;
         let [low, high] = self.reach_mm(1);
         if dz == 0.0 {
             return [low, high];
         }
         let middle = self.from_mm[1] + up_mm * dy / dz;
-        let half = self.radius_mm * (1.0 - dx * dx).max(0.0).sqrt() / dz.abs();
+        // Not by 1 - dx^2, which is 0 for a strut that is a trifle off the x axis.
+        let half = self.radius_mm * dy.hypot(dz) / dz.abs();
         [low.max(middle - half), high.min(middle + half)]
     }
 
@@ -162,6 +163,22 @@ mod tests {
                 let [low, high] = strut.heights().map(Length::mm);
                 prop_assert!(!is_in || (low..high).contains(&z));
             }
+        }
+    }
+
+    #[test]
+    fn a_strut_that_rises_by_next_to_nothing_is_level() {
+        let runs = |rise: f64| {
+            let end = |mm: [f64; 3]| mm.map(Length::from_mm);
+            let strut =
+                Strut::new(end([1.0, 4.3, 2.1]), end([7.0, 4.3, 2.1 + rise]), Length::from_mm(3.0));
+            let dpi = Dpi::new(25.4).unwrap();
+            let runs = strut.unwrap().section(Length::from_mm(2.5), [0.0, 9.0], dpi, [9, 9]);
+            runs.collect::<Vec<_>>()
+        };
+        assert_eq!(runs(0.0), [(3, 1, 7), (4, 1, 7), (5, 1, 7)]);
+        for rise in [5e-16, -1e-15, 1e-12, -1e-9] {
+            assert_eq!(runs(rise), runs(0.0), "{rise}");
         }
     }
 

@@ -134,19 +134,19 @@ fn chosen(
 
 /// Returns the union of all copies on an image at `place`, given each copy's `mask`, or
 /// `None` if that has more runs than an image can hold.
-pub(super) fn composed(
+pub(super) fn composed<'a>(
     copies: &[BuildCopy],
     place: &ImageBounds,
-    mask: impl Fn(usize, &ImageBounds) -> Mask,
+    mask: impl Fn(usize) -> &'a Mask,
 ) -> Option<Mask> {
     if let [copy] = copies
         && copy.is_whole(place)
     {
-        return Some(mask(0, place));
+        return Some(mask(0).clone());
     }
     let mut placed = Vec::new();
     for (k, copy) in copies.iter().enumerate() {
-        let mask = mask(k, &copy.part).oriented(copy.turn)?;
+        let mask = mask(k).oriented(copy.turn)?;
         // On a build that was cropped, copies may reach beyond the image.
         let shown = |start: i64, size: u32, limit: u32| {
             start.max(0)..(start + i64::from(size)).min(limit.into())
@@ -314,7 +314,7 @@ mod tests {
             let copies: Vec<BuildCopy> = places.iter().map(|&(left, top, quarters, mirrored)| {
                 BuildCopy { part: lain, turn: Orientation::new(quarters, mirrored), left, top, index: 0, count: 1 }
             }).collect();
-            let made = composed(&copies, &PLACE, |_, _| mask.clone()).unwrap();
+            let made = composed(&copies, &PLACE, |_| &mask).unwrap();
             let mut expected = Mask::black(40, 30);
             for copy in &copies {
                 let frame = Frame { left: -copy.left, top: -copy.top, width: 40, height: 30 };

@@ -80,6 +80,21 @@ pub enum EditProblem {
     /// Copies are chosen for something that is not drawn.
     #[error("copies are for shapes, labels and pictures: take it out")]
     CopiesWithoutShape,
+    /// A pattern is of something that is not drawn.
+    #[error("repeat is for shapes, labels and pictures: take it out")]
+    RepeatWithoutShape,
+    /// Patterns of patterns have too many shapes.
+    #[error("it repeats more than 100000 times")]
+    ManyRepeats,
+    /// A pattern moves or tilts a shape that has no height of its own.
+    #[error(
+        "only struts, cones, spheres and lying cylinders step up and turn about other axes than z: \
+         z or layers are for all repeats"
+    )]
+    RepeatUp,
+    /// A pattern turns a picture by other angles than quarters.
+    #[error("pictures turn by 90, 180 or 270 degrees only, also in a pattern")]
+    RepeatPicture,
     /// The list of copies is empty.
     #[error("copies names no copy: write their numbers, as [1, 5], or true for all")]
     NoCopyChosen,

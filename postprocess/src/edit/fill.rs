@@ -1,47 +1,117 @@
 //! Fills outlines: finds the pixels whose centres are inside.
 
-use lamp_stack::{Mask, MaskBuilder};
+use lamp_stack::{MAX_RUNS, Mask, MaskBuilder};
 
 /// A point as column and row, as a [`PixelMap`](super::image_bounds::PixelMap) returns it.
 pub(super) type Point = [f64; 2];
 
-/// Returns the pixels inside closed lines, by the non-zero rule.
-///
-/// As in slicing, a point on a row of pixel centres counts as below it. So shapes that
-/// share a point or an edge leave no gap between them and share no pixel.
-pub(super) fn polygons(lines: &[Vec<Point>], width: u32, height: u32) -> Mask {
-    let mut crossings = Vec::new();
-    for line in lines {
-        let next = line.iter().cycle().skip(1);
-        line.iter().zip(next).for_each(|(&a, &b)| cross(a, b, height, &mut crossings));
+/// White pixels of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct WhiteRun {
+    row: u32,
+    start: u32,
+    /// The column after the last.
+    end: u32,
+}
+
+/// The union of shapes in an image, as the runs of each. Shapes cost what they cover, whatever the
+/// image's size.
+pub(super) struct RunSet {
+    width: u32,
+    height: u32,
+    runs: Vec<WhiteRun>,
+    /// The number of runs when they were united last.
+    united: usize,
+}
+
+impl RunSet {
+    /// So many runs are gathered before they are united for the first time.
+    const ROOM: usize = 1 << 20;
+
+    pub(super) fn new(width: u32, height: u32) -> Self {
+        Self { width, height, runs: Vec::new(), united: 0 }
     }
-    crossings
-        .sort_unstable_by(|a: &OutlineCrossing, b| a.row.cmp(&b.row).then(a.x.total_cmp(&b.x)));
-    let mut crossings = crossings.as_slice();
-    rows(width, height, |row, out| {
-        let (here, rest) = crossings.split_at(crossings.partition_point(|c| c.row == row));
-        crossings = rest;
+
+    /// Adds the pixels of a row from a column up to another; columns may lie in any order.
+    pub(super) fn add(&mut self, row: u32, [start, end]: [f64; 2]) {
+        // The casts make negative values zero.
+        let [start, end] = [start, end].map(|x| (x.ceil() as u32).min(self.width));
+        if start < end && row < self.height {
+            self.runs.push(WhiteRun { row, start, end });
+        }
+        // Shapes that cover each other again and again need no more room than their union.
+        if self.runs.len() >= 2 * self.united.max(Self::ROOM) {
+            self.unite();
+        }
+    }
+
+    /// Adds the pixels inside closed lines, by the non-zero rule.
+    ///
+    /// As in slicing, a point on a row of pixel centres counts as below it. So shapes that
+    /// share a point or an edge leave no gap between them and share no pixel.
+    pub(super) fn add_polygons(&mut self, lines: &[Vec<Point>]) {
+        let mut crossings = Vec::new();
+        for line in lines {
+            let next = line.iter().cycle().skip(1);
+            line.iter().zip(next).for_each(|(&a, &b)| cross(a, b, self.height, &mut crossings));
+        }
+        crossings
+            .sort_unstable_by(|a: &OutlineCrossing, b| a.row.cmp(&b.row).then(a.x.total_cmp(&b.x)));
         let (mut winding, mut start) = (0, 0.0);
-        for crossing in here {
+        for crossing in crossings {
             let before = winding;
             winding += crossing.winding;
             if before == 0 {
                 start = crossing.x;
             } else if winding == 0 {
-                out.push([start, crossing.x]);
+                self.add(crossing.row, [start, crossing.x]);
             }
         }
-    })
-}
+    }
 
-/// Returns the pixels nearer to a point than `radius`.
-pub(super) fn disc([x, y]: Point, radius: f64, width: u32, height: u32) -> Mask {
-    rows(width, height, |row, out| {
-        let square = radius * radius - (f64::from(row) - y).powi(2);
-        if square > 0.0 {
-            out.push([x - square.sqrt(), x + square.sqrt()]);
+    /// Adds the pixels nearer to a point than `radius`.
+    pub(super) fn add_disc(&mut self, [x, y]: Point, radius: f64) {
+        let end = (y + radius).floor() + 1.0;
+        for row in (y - radius).ceil() as u32..(end as u32).min(self.height) {
+            let square = radius * radius - (f64::from(row) - y).powi(2);
+            if square > 0.0 {
+                self.add(row, [x - square.sqrt(), x + square.sqrt()]);
+            }
         }
-    })
+    }
+
+    /// Makes one run of those that touch or overlap.
+    fn unite(&mut self) {
+        self.runs.sort_unstable();
+        self.runs.dedup_by(|next, last| {
+            let is_one = next.row == last.row && next.start <= last.end;
+            if is_one {
+                last.end = last.end.max(next.end);
+            }
+            is_one
+        });
+        self.united = self.runs.len();
+    }
+
+    /// Returns the image, or `None` if it has more runs than an image can hold.
+    pub(super) fn into_mask(mut self) -> Option<Mask> {
+        self.unite();
+        if self.runs.len() > MAX_RUNS / 2 {
+            return None;
+        }
+        let mut mask = MaskBuilder::new(self.width);
+        let (mut row, mut next) = (Vec::new(), 0);
+        for runs in self.runs.chunk_by(|a, b| a.row == b.row) {
+            row.clear();
+            row.extend(runs.iter().flat_map(|run| [run.start, run.end]));
+            row.pop_if(|last| *last == self.width);
+            mask.push_black(runs[0].row - next);
+            mask.push_row(&row).expect("runs in rising order within the width");
+            next = runs[0].row + 1;
+        }
+        mask.push_black(self.height - next);
+        Some(mask.finish())
+    }
 }
 
 /// Where an outline crosses a row, downwards (`winding` 1) or upwards (-1).
@@ -63,34 +133,23 @@ fn cross(a: Point, b: Point, height: u32, out: &mut Vec<OutlineCrossing>) {
     }
 }
 
-/// Creates an image from the ends of each row's runs, in rising order.
-fn rows(width: u32, height: u32, mut of_row: impl FnMut(u32, &mut Vec<[f64; 2]>)) -> Mask {
-    let mut mask = MaskBuilder::new(width);
-    let mut runs = Vec::new();
-    let mut row: Vec<u32> = Vec::new();
-    // The cast makes negative values zero.
-    let column = |x: f64| (x.ceil() as u32).min(width);
-    for index in 0..height {
-        runs.clear();
-        row.clear();
-        of_row(index, &mut runs);
-        for [start, end] in runs.iter().map(|run| run.map(column)).filter(|[a, b]| a < b) {
-            if row.pop_if(|last| *last == start).is_none() {
-                row.push(start);
-            }
-            row.push(end);
-        }
-        row.pop_if(|last| *last == width);
-        mask.push_row(&row).expect("runs in rising order within the width");
-    }
-    mask.finish()
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    fn polygons(lines: &[Vec<Point>], width: u32, height: u32) -> Mask {
+        let mut runs = RunSet::new(width, height);
+        runs.add_polygons(lines);
+        runs.into_mask().unwrap()
+    }
+
+    fn disc(centre: Point, radius: f64, width: u32, height: u32) -> Mask {
+        let mut runs = RunSet::new(width, height);
+        runs.add_disc(centre, radius);
+        runs.into_mask().unwrap()
+    }
 
     /// How often lines wind about a pixel's centre, by its definition.
     fn winding(lines: &[Vec<Point>], x: f64, y: f64) -> i32 {
@@ -149,6 +208,20 @@ mod tests {
         assert_eq!(left.row(1), [2, 7]);
         assert_eq!((left.row(0), left.row(4)), (&[][..], &[][..]));
         assert_eq!(left.combined(lamp_stack::Op::Xor, &right).unwrap(), both);
+    }
+
+    #[test]
+    fn what_covers_itself_needs_no_more_room() {
+        let mut runs = RunSet::new(9, 4);
+        for _ in 0..RunSet::ROOM {
+            runs.add(3, [2.0, 5.0]);
+            runs.add(1, [7.5, 99.0]);
+            runs.add(1, [5.0, 8.0]);
+        }
+        assert!(runs.runs.len() < 2 * RunSet::ROOM);
+        let mask = runs.into_mask().unwrap();
+        assert_eq!((mask.row(1), mask.row(3)), (&[5][..], &[2, 5][..]));
+        assert_eq!(mask.white_pixels(), 7);
     }
 
     #[test]

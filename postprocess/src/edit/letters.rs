@@ -178,7 +178,7 @@ fn number(field: &str, n: i64) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fill::polygons;
+    use super::super::fill::RunSet;
     use super::*;
 
     #[test]
@@ -206,7 +206,9 @@ mod tests {
         let pixel = |[x, y]: Point| [10.0 + 10.0 * x - 0.5, 12.0 - 10.0 * y - 0.5];
         let lines: Vec<Vec<Point>> =
             lines.into_iter().map(|line| line.into_iter().map(pixel).collect()).collect();
-        let mask = polygons(&lines, 20, 14);
+        let mut runs = RunSet::new(20, 14);
+        runs.add_polygons(&lines);
+        let mask = runs.into_mask().unwrap();
         let row = |row| {
             (0..20).map(|column| if mask.is_white(column, row) { '#' } else { '.' }).collect()
         };

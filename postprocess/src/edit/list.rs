@@ -10,6 +10,7 @@ use serde_path_to_error::Segment;
 
 use super::edit_error::{EditError, EditProblem};
 use super::letters::SERIAL;
+use super::pattern::{MAX_REPEATS, Repeat};
 use super::schema::{CylinderAxis, Edit, Label, OtherStack};
 use super::serials::{LabelList, SerialList};
 
@@ -171,6 +172,9 @@ impl Edit {
         if self.z.is_some() && self.layers.is_some() {
             return Some(EditProblem::TwoRanges);
         }
+        if !self.repeat.is_empty() && shapes == 0 {
+            return Some(EditProblem::RepeatWithoutShape);
+        }
         if !self.copies.is_none() && shapes == 0 {
             return Some(EditProblem::CopiesWithoutShape);
         }
@@ -183,11 +187,32 @@ impl Edit {
         if self.cylinder.is_some_and(|c| (c.along == CylinderAxis::Z) == c.between.is_some()) {
             return Some(EditProblem::CylinderEnds);
         }
+        if let Some(problem) = self.pattern_problem() {
+            return Some(problem);
+        }
         if let Some(problem) = self.label.as_ref().and_then(Label::problem) {
             return Some(problem);
         }
         if self.rotate.is_some_and(|degrees| degrees % 90 != 0) {
             return Some(EditProblem::Angle);
+        }
+        None
+    }
+}
+
+impl Edit {
+    fn pattern_problem(&self) -> Option<EditProblem> {
+        let lies = self.cylinder.is_some_and(|cylinder| cylinder.along != CylinderAxis::Z);
+        let is_solid = lies || self.strut.is_some() || self.cone.is_some() || self.sphere.is_some();
+        let count = self.repeat.iter().map(Repeat::count).try_fold(1u64, u64::checked_mul);
+        if count.is_none_or(|count| count > MAX_REPEATS) {
+            return Some(EditProblem::ManyRepeats);
+        }
+        if !is_solid && !self.repeat.iter().all(Repeat::is_level) {
+            return Some(EditProblem::RepeatUp);
+        }
+        if self.picture.is_some() && !self.repeat.iter().all(Repeat::is_of_quarters) {
+            return Some(EditProblem::RepeatPicture);
         }
         None
     }

@@ -18,6 +18,9 @@ mod letters;
 mod list;
 mod other_stacks;
 mod page_changes;
+mod pattern;
+#[cfg(test)]
+mod pattern_tests;
 mod pictures;
 mod plan;
 mod schema;

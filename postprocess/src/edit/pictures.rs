@@ -1,10 +1,11 @@
 //! Stamps pictures: scales their runs to the pixels of a stack.
 
-use lamp_stack::{Image, Layer, Length, MAX_RUNS, Mask, MaskBuilder};
+use lamp_stack::{Image, Layer, Length, MAX_RUNS, Mask, MaskBuilder, Orientation};
 
 use super::edit_error::{EditError, EditProblem};
 use super::image_bounds::{ImageBounds, PixelMap};
 use super::letters::{Align, turned};
+use super::pattern::Motion;
 use super::schema::Picture;
 use crate::tile::{PixelSize, PlacedImage, united};
 
@@ -43,8 +44,8 @@ impl<E: From<EditError>> OtherPicture<E> {
     }
 }
 
-/// Returns a picture at each of its places on a part's image. A pixel is white if the
-/// pixel of the picture is that its centre lies in.
+/// Returns a picture at each of its places on a part's image, and at each repeat of these, which
+/// turn it by quarters. A pixel is white if the pixel of the picture is that its centre lies in.
 ///
 /// # Errors
 /// Returns an error if the picture reaches outside the image, or has more runs there than
@@ -54,6 +55,7 @@ pub(super) fn stamped(
     picture: &Mask,
     part: &ImageBounds,
     grid: PixelMap,
+    motions: &[Motion],
 ) -> Result<Mask, EditProblem> {
     // The side of the picture's pixels.
     let side = keys.width.map_or(1.0, |width| grid.length(width) / f64::from(picture.width()));
@@ -63,12 +65,19 @@ pub(super) fn stamped(
         Align::Center => -width / 2.0,
         Align::Right => -width,
     };
-    let [a, b] = [[start, 0.0], [start + width, height]].map(|corner| turned(corner, keys.turn));
-    let picture = picture.oriented(keys.turn).ok_or(EditProblem::TooManyRuns)?;
+    let mut stamps: [Option<Mask>; 4] = Default::default();
     let mut placed = Vec::new();
     let mut room = MAX_RUNS;
-    for at in &keys.at {
-        let [x, y] = grid.to_pixels(at.map(Length::mm));
+    for (motion, at) in motions.iter().flat_map(|motion| keys.at.iter().map(move |at| (motion, at)))
+    {
+        let quarters = motion.quarters();
+        let turn = Orientation::new(keys.turn.quarters() + quarters, keys.turn.is_mirrored());
+        let picture = match &mut stamps[quarters as usize] {
+            Some(stamp) => &*stamp,
+            none => none.insert(picture.oriented(turn).ok_or(EditProblem::TooManyRuns)?),
+        };
+        let [a, b] = [[start, 0.0], [start + width, height]].map(|corner| turned(corner, turn));
+        let [x, y] = grid.to_pixels(motion.of_level(*at).map(Length::mm));
         let columns = PixelEdges { start: x + a[0].min(b[0]), side };
         let rows = PixelEdges { start: y - a[1].max(b[1]), side };
         let [left, right] = [0, picture.width()].map(|k| columns.at(k));
@@ -81,7 +90,7 @@ pub(super) fn stamped(
             let picture = keys.name().into_owned();
             return Err(EditProblem::PictureOutside { picture, image: *part });
         }
-        let stamp = scaled(&picture, columns, rows, &mut room).ok_or(EditProblem::TooManyRuns)?;
+        let stamp = scaled(picture, columns, rows, &mut room).ok_or(EditProblem::TooManyRuns)?;
         let at = vec![(left as u32, top as u32)];
         placed.push(PlacedImage { image: Image::Mask(stamp), at });
     }

@@ -8,6 +8,7 @@ use lamp_stack::{Length, LengthError, Op, Orientation};
 use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::letters::Align;
+use super::pattern::{Repeat, repeats};
 
 /// The longest length. Machines are smaller.
 const MAX_LENGTH: Length = Length::from_um(1e7);
@@ -24,6 +25,9 @@ pub(super) struct Edit {
     pub(super) layers: Option<[u32; 2]>,
     #[serde(default)]
     pub(super) copies: CopySelection,
+    /// Patterns of the shape, each of what those before it make.
+    #[serde(default, deserialize_with = "repeats")]
+    pub(super) repeat: Vec<Repeat>,
     #[serde(rename = "box")]
     pub(super) block: Option<Rectangle>,
     pub(super) cylinder: Option<Cylinder>,
@@ -283,10 +287,14 @@ fn length<E: serde::de::Error>(text: &str) -> Result<Length, E> {
     Ok(length)
 }
 
+/// Reads a list of lengths.
+pub(super) fn lengths_of<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Length>, D::Error> {
+    Vec::<String>::deserialize(from)?.iter().map(|text| length(text)).collect()
+}
+
 fn lengths<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[Length; N], D::Error> {
-    let texts = Vec::<String>::deserialize(from)?;
-    let count = texts.len();
-    let lengths = texts.iter().map(|text| length(text)).collect::<Result<Vec<_>, _>>()?;
+    let lengths = lengths_of(from)?;
+    let count = lengths.len();
     lengths
         .try_into()
         .map_err(|_| D::Error::custom(format!("{count} lengths where {N} are needed")))

@@ -6,10 +6,11 @@ use lamp_stack::{Length, Mask, PageInfo};
 
 use super::copies::{BuildCopy, composed};
 use super::edit_error::{EditError, EditProblem, LayerProblem};
-use super::fill::{Point, disc, polygons};
+use super::fill::{Point, RunSet};
 use super::image_bounds::{ImageBounds, PixelMap};
 use super::letters::{numbered, outlines};
 use super::other_stacks::middle;
+use super::pattern::{Motion, Repeat, motions};
 use super::pictures::stamped;
 use super::schema::{Cylinder, Edit, Label, StraightLine};
 use super::serials::SerialList;
@@ -22,8 +23,8 @@ const TOLERANCE: f64 = 1.0 / 64.0;
 pub(super) enum EditShape {
     /// The same pixels in each layer.
     Upright(Mask),
-    /// Others in each layer.
-    Solid { solid: Solid, copies: Vec<BuildCopy>, place: ImageBounds },
+    /// Others in each layer: the union of solids.
+    Solids { solids: Vec<Solid>, copies: Vec<BuildCopy>, place: ImageBounds, grid: PixelMap },
 }
 
 /// What an edit takes from the files that it names.
@@ -48,50 +49,39 @@ impl EditShape {
         files: &FromFiles<'_>,
     ) -> Result<Self, EditError> {
         let wrong = |problem: EditProblem| problem.of_edit(number);
-        let grids: Vec<PixelMap> =
-            copies.iter().map(|copy| copy.part.grid()).collect::<Result<_, _>>()?;
-        if let Some(solid) = Solid::of(edit).map_err(wrong)? {
-            return Ok(Self::Solid { solid, copies, place: *place });
+        // All copies of a part are alike.
+        let part = copies.first().map_or(*place, |copy| copy.part);
+        let grid = part.grid()?;
+        let motions = motions(&edit.repeat);
+        let solids = motions.iter().map(|motion| Solid::of(edit, motion));
+        if let Some(solids) = solids.collect::<Result<Option<Vec<_>>, _>>().map_err(wrong)? {
+            return Ok(Self::Solids { solids, copies, place: *place, grid });
         }
-        let mask = if let Some(cylinder) = edit.cylinder {
-            composed(&copies, place, |k, part| round(cylinder, grids[k], part))
-        } else if let Some(polygon) = &edit.polygon {
-            composed(&copies, place, |k, part| {
-                let corner = |point: &[Length; 2]| grids[k].to_pixels(point.map(Length::mm));
-                let corners = polygon.points.iter().map(corner).collect();
-                polygons(&[corners], part.width, part.height)
-            })
-        } else if let Some(label) = &edit.label {
+        let mask = if let Some(label) = &edit.label {
             let serials = serials(edit, label, &copies, files.serials).map_err(wrong)?;
-            let lines: Vec<_> = (0..copies.len())
-                .map(|k| letters(label, &copies[k], grids[k], |place| serials(k, place)))
-                .collect::<Result<_, _>>()
-                .map_err(wrong)?;
-            composed(&copies, place, |k, part| polygons(&lines[k], part.width, part.height))
+            let mask = |k: usize| {
+                let mut runs = RunSet::new(part.width, part.height);
+                letters(label, &copies[k], &motions, |place| serials(k, place), &mut runs)?;
+                runs.into_mask().ok_or(EditProblem::TooManyRuns)
+            };
+            let masks: Vec<_> =
+                (0..copies.len()).map(mask).collect::<Result<_, _>>().map_err(wrong)?;
+            composed(&copies, place, |k| &masks[k])
         } else if let Some((keys, picture)) = edit.picture.as_ref().zip(files.picture.as_ref()) {
-            let part = copies.first().map_or(place, |copy| &copy.part);
-            let stamp = stamped(keys, picture, part, part.grid()?).map_err(wrong)?;
-            composed(&copies, place, |_, _| stamp.clone())
+            let stamp = stamped(keys, picture, &part, grid, &motions).map_err(wrong)?;
+            composed(&copies, place, |_| &stamp)
         } else {
             if edit.line.is_some_and(|line| line.from == line.to) {
                 return Err(wrong(EditProblem::NoLength));
             }
-            let block = edit.block.map(|block| move |grid| rectangle(block, grid));
-            let line = edit.line.map(|line| move |grid| stroke(line, grid));
-            let corners = |grid| {
-                block
-                    .map(|at| at(grid))
-                    .or_else(|| Some(line?(grid)))
-                    .expect("an edit does something")
-            };
-            composed(&copies, place, |k, part| {
-                polygons(&[corners(grids[k])], part.width, part.height)
-            })
+            let mut runs = RunSet::new(part.width, part.height);
+            motions.iter().for_each(|motion| draw(edit, motion, grid, &mut runs));
+            let mask = runs.into_mask().ok_or_else(|| wrong(EditProblem::TooManyRuns))?;
+            composed(&copies, place, |_| &mask)
         };
         let mask = mask.ok_or_else(|| wrong(EditProblem::TooManyRuns))?;
         if mask.change_count() == 0 {
-            let lain = copies.first().map_or(place, |copy| &copy.part);
-            return Err(wrong(EditProblem::NoPixel(*lain)));
+            return Err(wrong(EditProblem::NoPixel(part)));
         }
         Ok(Self::Upright(mask))
     }
@@ -103,7 +93,10 @@ impl EditShape {
     pub(super) fn reaches(&self, info: &PageInfo) -> Result<bool, EditError> {
         match self {
             Self::Upright(_) => Ok(true),
-            Self::Solid { solid, .. } => Ok(solid.reaches(height(info)?)),
+            Self::Solids { solids, .. } => {
+                let height = height(info)?;
+                Ok(solids.iter().any(|solid| solid.reaches(height)))
+            }
         }
     }
 
@@ -113,12 +106,17 @@ impl EditShape {
     /// # Errors
     /// Returns an error if the shape depends on the layer's height and that is unknown.
     pub(super) fn at(&self, info: &PageInfo) -> Result<Option<Cow<'_, Mask>>, EditError> {
-        let (solid, copies, place) = match self {
+        let (solids, copies, place, grid) = match self {
             Self::Upright(mask) => return Ok(Some(Cow::Borrowed(mask))),
-            Self::Solid { solid, copies, place } => (solid, copies, place),
+            Self::Solids { solids, copies, place, grid } => (solids, copies, place, *grid),
         };
         let height = height(info)?;
-        Ok(composed(copies, place, |_, part| solid.mask(height, part)).map(Cow::Owned))
+        let part = copies.first().map_or(place, |copy| &copy.part);
+        let mut runs = RunSet::new(part.width, part.height);
+        let met = solids.iter().filter(|solid| solid.reaches(height));
+        met.for_each(|solid| solid.draw(height, part, grid, &mut runs));
+        let mask = runs.into_mask();
+        Ok(mask.and_then(|mask| composed(copies, place, |_| &mask)).map(Cow::Owned))
     }
 }
 
@@ -127,9 +125,19 @@ fn height(info: &PageInfo) -> Result<Length, EditError> {
     middle(info).ok_or_else(|| LayerProblem::NoHeightForSolid.of_layer(info))
 }
 
-fn round(cylinder: Cylinder, grid: PixelMap, part: &ImageBounds) -> Mask {
-    let centre = grid.to_pixels(cylinder.at.map(Length::mm));
-    disc(centre, grid.length(cylinder.diameter) / 2.0, part.width, part.height)
+/// Draws an edit's upright shape after a motion.
+fn draw(edit: &Edit, motion: &Motion, grid: PixelMap, runs: &mut RunSet) {
+    let corner = |point: [Length; 2]| grid.to_pixels(motion.of_level(point).map(Length::mm));
+    if let Some(Cylinder { at, diameter, .. }) = edit.cylinder {
+        runs.add_disc(corner(at), grid.length(diameter) / 2.0);
+    } else if let Some(polygon) = &edit.polygon {
+        runs.add_polygons(&[polygon.points.iter().copied().map(corner).collect()]);
+    } else if let Some(StraightLine { from, to, width }) = edit.line {
+        let [from, to] = [from, to].map(|end| motion.of_level(end));
+        runs.add_polygons(&[stroke(StraightLine { from, to, width }, grid)]);
+    } else if let Some(block) = edit.block {
+        runs.add_polygons(&[rectangle(block, grid, motion)]);
+    }
 }
 
 fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec<Point> {
@@ -142,7 +150,7 @@ fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec
 }
 
 /// Returns the serial number of a label in a copy and at a place there, both from 0. All places of a
-/// copy have the copy's; in the whole image each place has its own.
+/// copy have the copy's; in the whole image each place has its own, and each repeat of it.
 ///
 /// # Errors
 /// Returns an error if the label's list has too few or too many.
@@ -154,7 +162,8 @@ fn serials<'a>(
 ) -> Result<impl Fn(usize, usize) -> &'a str + use<'a>, EditProblem> {
     let is_for_copies = !edit.copies.is_none();
     let serials = list.map_or(Ok(Vec::new()), |list| {
-        let places = label.at.len() as u32;
+        let repeats = edit.repeat.iter().map(Repeat::count).product::<u64>();
+        let places = u32::try_from(label.at.len() as u64 * repeats).unwrap_or(u32::MAX);
         let found = match copies.first().filter(|_| is_for_copies) {
             Some(first) => list.of(copies.iter().map(|copy| copy.index + 1), first.count, "copy"),
             None => list.of(1..=places, places, "place"),
@@ -167,31 +176,35 @@ fn serials<'a>(
     })
 }
 
-/// Returns the outlines of a label at each of its places in a copy, which have the serial numbers
-/// `serial`.
+/// Draws a label at each of its places in a copy, and at each repeat of these, which have the serial
+/// numbers `serial`.
 fn letters<'a>(
     label: &Label,
     BuildCopy { part, index, .. }: &BuildCopy,
-    grid: PixelMap,
+    motions: &[Motion],
     serial: impl Fn(usize) -> &'a str,
-) -> Result<Vec<Vec<Point>>, EditProblem> {
-    let mut lines: Vec<Vec<Point>> = Vec::new();
+    runs: &mut RunSet,
+) -> Result<(), EditProblem> {
+    let grid = part.grid().expect("shapes are drawn in known resolutions");
     let size = grid.length(label.height);
-    let before = i64::from(*index) * label.at.len() as i64;
-    for (place, (at, k)) in label.at.iter().zip(before..).enumerate() {
+    let places: Vec<_> =
+        motions.iter().flat_map(|motion| label.at.iter().map(move |at| (motion, *at))).collect();
+    let before = i64::from(*index) * places.len() as i64;
+    for (place, ((motion, at), k)) in places.iter().zip(before..).enumerate() {
         let n = i64::from(label.start) + k * i64::from(label.step);
         let text = numbered(&label.text, n, serial(place))?;
-        let glyphs = outlines(&text, label.align, label.turn, TOLERANCE / size)
+        let mut lines = outlines(&text, label.align, label.turn, TOLERANCE / size)
             .map_err(EditProblem::Letter)?;
-        let [x, y] = grid.to_pixels(at.map(Length::mm));
-        let placed = |[right, up]: Point| [x + size * right, y - size * up];
-        lines.extend(
-            glyphs.into_iter().map(|line| line.into_iter().map(placed).collect::<Vec<_>>()),
-        );
+        let [x, y] = grid.to_pixels(motion.of_level(*at).map(Length::mm));
+        for point in lines.iter_mut().flatten() {
+            let [right, up] = motion.turned(*point);
+            *point = [x + size * right, y - size * up];
+        }
         // A serial number that is cut off would read as another one.
         if !lines.iter().flatten().all(|&point| part.holds(point)) {
             return Err(EditProblem::LabelOutside { text, image: *part });
         }
+        runs.add_polygons(&lines);
     }
-    Ok(lines)
+    Ok(())
 }

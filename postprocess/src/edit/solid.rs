@@ -1,12 +1,13 @@
 //! Solids of edits: shapes with another section at each height.
 
-use lamp_stack::{Length, Mask, MaskBuilder, Strut};
+use lamp_stack::{Length, Strut};
 
 use super::cone::Cone;
 use super::edit_error::EditProblem;
-use super::fill::{Point, disc, polygons};
+use super::fill::{Point, RunSet};
 use super::image_bounds::{ImageBounds, PixelMap};
-use super::schema::{Cylinder, CylinderAxis, Edit, Rectangle, Sphere};
+use super::pattern::Motion;
+use super::schema::{ConeEnds, Cylinder, CylinderAxis, Edit, Rectangle, Sphere, StrutEnds};
 
 /// A solid in part coordinates.
 pub(super) enum Solid {
@@ -18,23 +19,46 @@ pub(super) enum Solid {
 }
 
 impl Solid {
-    /// Returns an edit's solid, if it has one.
+    /// Returns an edit's solid after a motion, if it has one.
     ///
     /// # Errors
     /// Returns an error if a strut or cone has no length.
-    pub(super) fn of(edit: &Edit) -> Result<Option<Self>, EditProblem> {
-        if let Some(ends) = edit.strut {
-            let strut = Strut::new(ends.from, ends.to, ends.diameter);
+    pub(super) fn of(edit: &Edit, motion: &Motion) -> Result<Option<Self>, EditProblem> {
+        if let Some(StrutEnds { from, to, diameter }) = edit.strut {
+            let strut = Strut::new(motion.of(from), motion.of(to), diameter);
             return strut.map(|strut| Some(Self::Strut(strut))).ok_or(EditProblem::NoLength);
         }
-        if let Some(ends) = &edit.cone {
-            return Cone::new(ends).map(|cone| Some(Self::Cone(cone))).ok_or(EditProblem::NoLength);
+        if let Some(ConeEnds { from, to, diameters }) = edit.cone {
+            let ends = ConeEnds { from: motion.of(from), to: motion.of(to), diameters };
+            return Cone::new(&ends)
+                .map(|cone| Some(Self::Cone(cone)))
+                .ok_or(EditProblem::NoLength);
         }
-        if let Some(sphere) = edit.sphere {
-            return Ok(Some(Self::Sphere(sphere)));
+        if let Some(Sphere { at, diameter }) = edit.sphere {
+            return Ok(Some(Self::Sphere(Sphere { at: motion.of(at), diameter })));
         }
         let lying = edit.cylinder.filter(|cylinder| cylinder.along != CylinderAxis::Z);
-        Ok(lying.map(Self::Lying))
+        lying.map(|cylinder| Self::lying(cylinder, motion)).transpose()
+    }
+
+    /// Returns a lying cylinder after a motion: one that is turned is a strut.
+    fn lying(cylinder: Cylinder, motion: &Motion) -> Result<Self, EditProblem> {
+        let Cylinder { at: [across, z], diameter, along, between } = cylinder;
+        let ends = between.expect("one that lies has ends");
+        let [from, to] = ends.map(|end| match along {
+            CylinderAxis::X => [end, across, z],
+            _ => [across, end, z],
+        });
+        let [from, to] = [from, to].map(|end| motion.of(end));
+        if motion.shift().is_none() {
+            let strut = Strut::new(from, to, diameter);
+            return strut.map(Self::Strut).ok_or(EditProblem::NoLength);
+        }
+        let (across, between) = match along {
+            CylinderAxis::X => (from[1], [from[0], to[0]]),
+            _ => (from[0], [from[1], to[1]]),
+        };
+        Ok(Self::Lying(Cylinder { at: [across, from[2]], between: Some(between), ..cylinder }))
     }
 
     /// Returns true if it may have a section at a height.
@@ -50,35 +74,48 @@ impl Solid {
         (low..=high).contains(&height)
     }
 
-    /// Returns its pixels at a height in an image of a part, whose resolution is known.
-    pub(super) fn mask(&self, height: Length, part: &ImageBounds) -> Mask {
+    /// Adds its pixels at a height in an image of a part, whose resolution is known.
+    pub(super) fn draw(
+        &self,
+        height: Length,
+        part: &ImageBounds,
+        grid: PixelMap,
+        runs: &mut RunSet,
+    ) {
+        let columns = |start: u32, end: u32| [start, end].map(f64::from);
         match self {
             Self::Lying(cylinder) => {
-                let grid = part.grid().expect("shapes are drawn in known resolutions");
-                polygons(&[rectangle(section(*cylinder, height), grid)], part.width, part.height)
+                runs.add_polygons(&[rectangle(section(*cylinder, height), grid, &Motion::NONE)]);
             }
             Self::Strut(strut) => {
                 let dpi = part.dpi.expect("shapes are drawn in known resolutions");
                 let size = [part.width, part.height];
-                of_runs(strut.section(height, part.origin_mm, dpi, size), size)
+                strut
+                    .section(height, part.origin_mm, dpi, size)
+                    .for_each(|(row, start, end)| runs.add(row, columns(start, end)));
             }
-            Self::Cone(cone) => of_runs(cone.section(height, part), [part.width, part.height]),
+            Self::Cone(cone) => cone
+                .section(height, part)
+                .for_each(|(row, start, end)| runs.add(row, columns(start, end))),
             Self::Sphere(Sphere { at: [x, y, z], diameter }) => {
-                let grid = part.grid().expect("shapes are drawn in known resolutions");
                 let [radius, off] = [diameter.um() / 2.0, height.um() - z.um()];
                 let half = (radius * radius - off * off).max(0.0).sqrt();
                 let centre = grid.to_pixels([x, y].map(|at| at.mm()));
-                let half = grid.length(Length::from_um(half));
-                disc(centre, half, part.width, part.height)
+                runs.add_disc(centre, grid.length(Length::from_um(half)));
             }
         }
     }
 }
 
-/// Returns the corners of a rectangle in pixels.
-pub(super) fn rectangle(Rectangle { x, y }: Rectangle, grid: PixelMap) -> Vec<Point> {
+/// Returns the corners of a rectangle in pixels, after a motion.
+pub(super) fn rectangle(
+    Rectangle { x, y }: Rectangle,
+    grid: PixelMap,
+    motion: &Motion,
+) -> Vec<Point> {
     let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
-    corners.into_iter().map(|corner| grid.to_pixels(corner.map(Length::mm))).collect()
+    let corner = |corner| grid.to_pixels(motion.of_level(corner).map(Length::mm));
+    corners.into_iter().map(corner).collect()
 }
 
 /// Returns the section of a lying cylinder at a height.
@@ -92,19 +129,4 @@ fn section(cylinder: Cylinder, height: Length) -> Rectangle {
         CylinderAxis::X => Rectangle { x: between, y: across },
         _ => Rectangle { x: across, y: between },
     }
-}
-
-/// Creates an image from at most one run a row, from the top.
-fn of_runs(runs: impl Iterator<Item = (u32, u32, u32)>, [width, height]: [u32; 2]) -> Mask {
-    let mut mask = MaskBuilder::new(width);
-    let mut next = 0;
-    for (row, start, end) in runs {
-        mask.push_black(row - next);
-        let transitions = [start, end];
-        let shown = if end < width { &transitions[..] } else { &transitions[..1] };
-        mask.push_row(shown).expect("a run within the width");
-        next = row + 1;
-    }
-    mask.push_black(height - next);
-    mask.finish()
 }
