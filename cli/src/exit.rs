@@ -9,7 +9,9 @@ use lamp_planning::speed::{PartError, PlatformError};
 use lamp_planning::voxels::PlanError;
 use lamp_planning::{LightError, NoLight};
 use lamp_postprocess::machine::MachineLimit;
-use lamp_postprocess::{CompensateError, EditError, LayoutError, StripsError, TileError};
+use lamp_postprocess::{
+    CompensateError, EditError, LayoutError, RecipeError, StripsError, TileError,
+};
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::NoSolid;
 use lamp_stack::{JoinError, SplitError, StackError};
@@ -143,6 +145,7 @@ failures!(
     TileError,
     StripsError,
     LayoutError,
+    RecipeError,
     MachineLimit,
     NoSolid,
     CompensateError,

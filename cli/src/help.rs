@@ -11,7 +11,7 @@ From part to build:        slice blade.stl | fix | dither | tile > build.tif
   slice       cut a part into layers         fix         correct stray rows
   dither      turn gray levels into dots     tile        lay out copies
   compensate  narrow by what light adds      edit        change a design
-  batch       do that for many parts         demo        try that on a sample
+  compose     make layers by a recipe        batch       do that for many parts
 Stacks:
   view        look at layers in a browser    show        draw layers
   check       find islands and pockets       support     hold islands
@@ -22,12 +22,12 @@ Stacks:
 Parts, resins and machines:
   mesh        check and repair a mesh        orient      find how to build it
   brep        check a STEP part              heights     find layer thicknesses
-  sample      write a sample part            mesh-out    write a stack's surface
+  sample      write a sample part            demo        try all on a sample
+  mesh-out    write a stack's surface        cure        draw what a stack cures
   material    list and check resins          machine     list and check machines
   calibrate   make a material                target      make images to measure
   plan        plan exposures                 learn       correct them by prints
-  projector   list and check projectors      cure        draw what a stack cures
-  completions let shells complete commands   man         write manual pages
+  projector   list and check projectors      completions man   for the shell
 -h lists the usual options of a command, --help all; all have --quiet, --options
 ";
 
@@ -53,7 +53,10 @@ const USUAL: [(&str, &[&str]); 5] = [
             "output",
         ],
     ),
-    ("tile", &["machine", "area", "copies", "gap", "fit", "pack", "layout", "mesh", "output"]),
+    (
+        "tile",
+        &["machine", "area", "copies", "gap", "fit", "pack", "layout", "mesh", "recipe", "output"],
+    ),
     (
         "check",
         &[

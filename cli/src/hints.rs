@@ -17,7 +17,7 @@ use lamp_planning::voxels::PlanError;
 use lamp_postprocess::machine::{MachineError, MachineLimit};
 use lamp_postprocess::{
     CompensateError, CompensateProblem, EditError, EditProblem, LayerProblem, LayoutError,
-    StripsError, TileError,
+    RecipeError, StripsError, TileError,
 };
 use lamp_slicer::SliceError;
 use lamp_slicer::brep::{BrepError, Matter, StepError};
@@ -39,6 +39,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
     hint.or_else(|| error.downcast_ref().and_then(heights))
         .or_else(|| error.downcast_ref().and_then(tile))
         .or_else(|| error.downcast_ref().and_then(layout))
+        .or_else(|| error.downcast_ref().and_then(recipe))
         .or_else(|| error.downcast_ref().and_then(edit))
         .or_else(|| error.downcast_ref().and_then(support))
         .or_else(|| error.downcast_ref().and_then(surface))
@@ -285,6 +286,21 @@ fn timed_part(error: &PartError) -> Option<String> {
     let hint = match error {
         PartError::NoResolution(_) | PartError::NoThickness(_) => "use the stack that slice wrote",
         PartError::Unlike(_) => "use the stack from before its layers were cropped",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+fn recipe(error: &RecipeError) -> Option<String> {
+    let hint = match error {
+        RecipeError::Json { .. }
+        | RecipeError::Schema { .. }
+        | RecipeError::Code { .. }
+        | RecipeError::NoPiece { .. } => "write it anew with tile --recipe",
+        RecipeError::OtherPart { .. } => {
+            "bring that stack back, or write the recipe anew with tile --recipe"
+        }
+        RecipeError::NoPart { .. } => "parts stand where the recipe's folder leads to",
         _ => return None,
     };
     Some(hint.to_owned())

@@ -4,7 +4,8 @@
 //! - [`compensate`] narrows images by the cure width and makes up for firing shrinkage.
 //! - [`edit`] changes a design without slicing it again.
 //! - [`tile`] lays copies of parts out on a build area; a [`Layout`] says where copies of several
-//!   parts stand, a [`Machine`](machine::Machine) how large a build may be.
+//!   parts stand, a [`Machine`](machine::Machine) how large a build may be. A [`Composer`] makes any
+//!   layer of a build by its [`Recipe`].
 //! - [`StripWriter`] cuts build layers into [`Swaths`] for a projector that scans, and
 //!   [`join_strips`] joins them again.
 //!
@@ -51,7 +52,7 @@ pub use strips::{
     StripsError, Swaths, SwathsError, is_strips, join_strips, strip_files,
 };
 pub use tile::{
-    CellShape, CopyName, CopyPlacement, HeightOptions, Layout, LayoutError, LayoutFile,
-    MeshOptions, MeshPattern, Moat, Pack, PackBy, PartStack, PixelSize, StrayRows, TileError,
-    TileOptions, Turns, tile,
+    BuildFinding, CellShape, Composer, CopyName, CopyPlacement, HeightOptions, Layout, LayoutError,
+    LayoutFile, LoosePieces, MeshOptions, MeshPattern, Moat, Pack, PackBy, PartStack, PixelSize,
+    Recipe, RecipeError, RecipePart, StrayRows, TILE_CODE, TileError, TileOptions, Turns, tile,
 };

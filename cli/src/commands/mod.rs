@@ -7,6 +7,7 @@ pub(crate) mod check;
 mod compare;
 mod compensate;
 mod completions;
+mod compose;
 mod convert;
 mod cure;
 mod demo;
@@ -51,6 +52,7 @@ pub(crate) enum Command {
     Compensate(compensate::CompensateArgs),
     Edit(edit::EditArgs),
     Tile(tile::TileArgs),
+    Compose(compose::ComposeArgs),
     Sample(sample::SampleArgs),
     Demo(demo::DemoArgs),
     Info(info::InfoArgs),
@@ -103,6 +105,7 @@ impl Command {
             Self::Compensate(args) => compensate::run(args, common),
             Self::Edit(args) => edit::run(args, common),
             Self::Tile(args) => tile::run(args, common),
+            Self::Compose(args) => compose::run(args, common),
             Self::Sample(args) => sample::run(args, common),
             Self::Demo(args) => demo::run(args, common),
             Self::Info(args) => info::run(args),

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use lamp_postprocess::TILE_CODE;
 use lamp_stack::Layer;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -18,7 +19,6 @@ use crate::progress::{Notes, Progress};
 /// Change when other bytes come from the same options and stacks.
 pub(crate) const JOIN_CODE: u32 = 1;
 pub(crate) const PACK_CODE: u32 = 2;
-const TILE_CODE: u32 = 3;
 const CHECK_CODE: u32 = 1;
 
 /// How a build is laid out: the options of `lamp tile`.

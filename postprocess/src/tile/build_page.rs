@@ -164,7 +164,7 @@ impl Layout {
         let mut all = Map::new();
         all.insert("part_pixels".to_owned(), json!([frame.width, frame.height]));
         all.insert("part_origin_mm".to_owned(), json!(corner));
-        if self.parts[part].outline().is_some() {
+        if self.parts[part].is_fit() {
             all.insert("part_corner".to_owned(), json!([frame.left, frame.top]));
         }
         let places: Vec<_> = copies().map(|at| [at.left, at.top]).collect();

@@ -128,7 +128,8 @@ impl Layout {
         Ok(layout)
     }
 
-    fn empty(parts: Vec<PartStack>, area: Size) -> Result<Self, TileError> {
+    /// Returns a layout without copies.
+    pub(super) fn empty(parts: Vec<PartStack>, area: Size) -> Result<Self, TileError> {
         let first = parts.first().expect("a build has a part");
         let dpi = first.dpi();
         if let Some(other) = parts.iter().find(|part| part.dpi() != dpi) {

@@ -55,6 +55,32 @@ impl MemorySize for LayerSet {
     }
 }
 
+impl LayerSet {
+    /// Returns it with other layers, given the number of copies of each stack and the memory that
+    /// the mesh takes in each layer.
+    pub(super) fn with_layers(
+        &self,
+        layers: Vec<Option<Arc<Layer>>>,
+        copies: &[usize],
+        mesh_bytes: usize,
+    ) -> Self {
+        let bytes = bytes_of(&layers, copies.iter().copied(), mesh_bytes);
+        Self { layers, bytes, ..*self }
+    }
+}
+
+/// Returns the memory that a layer of the build will take.
+fn bytes_of(
+    layers: &[Option<Arc<Layer>>],
+    copies: impl Iterator<Item = usize>,
+    mesh_bytes: usize,
+) -> usize {
+    let bytes = copies.zip(layers).map(|(copies, layer)| {
+        layer.as_ref().map_or(0, |layer| layer.bytes().saturating_mul(copies + 1))
+    });
+    bytes.fold(mesh_bytes, usize::saturating_add)
+}
+
 /// Stacks that are read together.
 pub(super) struct Lockstep<S> {
     stacks: Vec<SteppedStack<S>>,
@@ -128,10 +154,8 @@ where
         // A later leader may have counted its layers from another number.
         let index = self.last.map_or(index, |(last, _)| index.max(last.saturating_add(1)));
         self.last = Some((index, span));
-        let bytes = self.stacks.iter().zip(&layers).map(|(stack, layer)| {
-            layer.as_ref().map_or(0, |layer| layer.bytes().saturating_mul(stack.copies + 1))
-        });
-        let bytes = bytes.fold(self.mesh_bytes, usize::saturating_add);
+        let copies = self.stacks.iter().map(|stack| stack.copies);
+        let bytes = bytes_of(&layers, copies, self.mesh_bytes);
         LayerSet { index, z_um, thickness_um, layers, bytes }
     }
 

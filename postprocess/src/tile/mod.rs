@@ -8,6 +8,7 @@
 //!
 //! Source: 002 section 2.4.2.
 
+mod black_parts;
 mod build_page;
 mod compose;
 mod layout;
@@ -17,6 +18,7 @@ mod mesh;
 mod overlap;
 mod pack;
 mod part_stack;
+mod recipe;
 #[cfg(test)]
 mod testing;
 mod tile_error;
@@ -26,8 +28,9 @@ mod tile_tests;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lamp_stack::{Image, Layer, Length, MemorySize, Orientation, Size, map_in_order};
+use lamp_stack::{Image, Layer, Length, Mask, MemorySize, Orientation, Size, map_in_order};
 
+use black_parts::unless_black;
 use compose::ComposeError;
 use lockstep::{LayerSet, Lockstep};
 use mesh::{BuildMesh, KeptMesh, MeshRows, on_base};
@@ -40,6 +43,7 @@ pub use lockstep::HeightOptions;
 pub use mesh::{CellShape, MeshOptions, MeshPattern, Moat};
 pub use pack::{Pack, PackBy, Turns};
 pub use part_stack::PartStack;
+pub use recipe::{Composer, LoosePieces, Recipe, RecipeError, RecipePart, TILE_CODE};
 pub use tile_error::{CopyName, TileError};
 
 /// Options to lay out one part.
@@ -129,39 +133,25 @@ pub fn tile<E: From<TileError> + Send>(
     build.flatten()
 }
 
-/// Passes on layers that come with the parts that are not black in them. After the last comes an
-/// error if a part was black in all of them.
-fn unless_black<E: From<TileError>>(
-    mut layers: impl Iterator<Item = Result<(Layer, Vec<usize>), E>>,
-    names: Vec<String>,
-) -> impl Iterator<Item = Result<Layer, E>> {
-    let mut black: Vec<Option<String>> = names.into_iter().map(Some).collect();
-    let mut ended = false;
-    std::iter::from_fn(move || match layers.next() {
-        Some(Ok((layer, exposed))) => {
-            exposed.into_iter().for_each(|part| black[part] = None);
-            Some(Ok(layer))
-        }
-        Some(Err(error)) => {
-            ended = true;
-            Some(Err(error))
-        }
-        None if std::mem::replace(&mut ended, true) => None,
-        None => {
-            let name = black.iter_mut().find_map(Option::take)?;
-            Some(Err(TileError::Black { name }.into()))
-        }
-    })
-}
-
 /// What a layer of the build is made of.
 struct MeshedStep {
     set: LayerSet,
     /// The images of parts that have a layer here.
     images: Vec<(usize, Image)>,
     mesh: Option<MeshRows>,
+    /// The pieces of mesh that hang on nothing, if they are others than in the layer below.
+    loose: Option<LoosePieces>,
     /// Whether it is the build's first.
     is_first: bool,
+}
+
+/// What is told while the layers of a build are made.
+#[derive(Clone, Debug)]
+pub enum BuildFinding {
+    /// Rows that a part's page calls stray.
+    Stray(StrayRows),
+    /// Pieces of mesh that are left out though they are not small, from a layer on.
+    Loose(LoosePieces),
 }
 
 impl MemorySize for MeshedStep {
@@ -188,7 +178,7 @@ impl Layout {
     /// # Panics
     /// Panics if there are not as many stacks as parts.
     pub fn build<E, S>(
-        mut self,
+        self,
         stacks: Vec<S>,
         heights: HeightOptions,
         mut stray: impl FnMut(&StrayRows),
@@ -197,11 +187,32 @@ impl Layout {
         S: Iterator<Item = Result<Layer, E>>,
         E: From<TileError> + Send,
     {
+        self.build_telling(stacks, heights, true, move |found| {
+            if let BuildFinding::Stray(rows) = found {
+                stray(&rows);
+            }
+        })
+    }
+
+    /// Makes the build's layers as [`build`](Self::build) does, and tells what a
+    /// [`Recipe`] needs. Without `images` these are left empty: then the stacks are read and checked,
+    /// at a fraction of the cost.
+    ///
+    /// # Panics
+    /// Panics if there are not as many stacks as parts.
+    pub fn build_telling<E, S>(
+        mut self,
+        stacks: Vec<S>,
+        heights: HeightOptions,
+        images: bool,
+        mut told: impl FnMut(BuildFinding),
+    ) -> impl Iterator<Item = Result<Layer, E>>
+    where
+        S: Iterator<Item = Result<Layer, E>>,
+        E: From<TileError> + Send,
+    {
         assert_eq!(stacks.len(), self.parts.len(), "a stack for each part");
-        if stacks.len() > 1 {
-            self.resampled = heights.resample;
-            self.command.push_str(heights.options());
-        }
+        self.join_by(heights);
         let names = self.parts.iter().map(|part| part.name().to_owned()).collect();
         let mesh = self.mesh.clone();
         let mesh_bytes = mesh.as_ref().map_or(0, BuildMesh::bytes);
@@ -211,8 +222,9 @@ impl Layout {
         let mut steps = Lockstep::new(stacks, heights, mesh_bytes);
         let layout = Arc::new(self);
         let meshed = layout.clone();
-        let mut kept = mesh.as_ref().map(|mesh| KeptMesh::new(mesh, &layout));
-        let mut is_first = true;
+        let wanted = mesh.as_ref().filter(|mesh| images || mesh.tells_loose());
+        let mut kept = wanted.map(|mesh| KeptMesh::new(mesh, &layout));
+        let (mut is_first, mut known) = (true, Vec::new());
         // In order, as the mesh of a layer is made from that of the one below.
         let steps = std::iter::from_fn(move || {
             loop {
@@ -225,26 +237,46 @@ impl Layout {
                     Ok(_) if is_below => {}
                     Ok(made) => {
                         let is_first = std::mem::take(&mut is_first);
-                        return Some(Ok(MeshedStep { is_first, ..made }));
+                        let loose = kept.as_ref().filter(|kept| kept.loose() != known);
+                        let loose = loose.map(|kept| {
+                            known = kept.loose().to_vec();
+                            LoosePieces { layer: made.set.index, starts: known.clone() }
+                        });
+                        return Some(Ok(MeshedStep { is_first, loose, ..made }));
                     }
                     Err(error) => return Some(Err(error.into())),
                 }
             }
         });
         let layers = map_in_order(steps, move |step: MeshedStep| {
-            let layer = Layer {
-                info: layout.page(&step.set, step.is_first)?,
-                dpi: Some(layout.dpi),
-                image: layout.image(&step)?.into(),
-            };
-            Ok((layer, layout.stray_rows(&step.set), layout.exposed_parts(&step.set)))
+            let layer = layout.layer(&step, images)?;
+            let mut found: Vec<BuildFinding> =
+                layout.stray_rows(&step.set).into_iter().map(BuildFinding::Stray).collect();
+            let exposed = layout.exposed_parts(&step.set);
+            found.extend(step.loose.map(BuildFinding::Loose));
+            Ok((layer, found, exposed))
         });
         let layers = layers.map(move |made| {
-            let (layer, rows, exposed) = made?;
-            rows.iter().for_each(&mut stray);
+            let (layer, found, exposed) = made?;
+            found.into_iter().for_each(&mut told);
             Ok((layer, exposed))
         });
         on_base(unless_black(layers, names), mesh)
+    }
+
+    /// Takes note of how stacks are joined, for the build's first page.
+    fn join_by(&mut self, heights: HeightOptions) {
+        if self.parts.len() > 1 {
+            self.resampled = heights.resample;
+            self.command.push_str(heights.options());
+        }
+    }
+
+    /// Returns a layer of the build, or only what its page says.
+    fn layer(&self, step: &MeshedStep, image: bool) -> Result<Layer, TileError> {
+        let info = self.page(&step.set, step.is_first)?;
+        let image = if image { self.image(step)? } else { Image::Mask(Mask::black(0, 0)) };
+        Ok(Layer { info, dpi: Some(self.dpi), image: image.into() })
     }
 
     /// Adds the mesh to the parts' layers at a height.
@@ -254,10 +286,7 @@ impl Layout {
         kept: Option<&mut KeptMesh>,
         is_below: bool,
     ) -> Result<MeshedStep, TileError> {
-        let framed = if is_below { PartStack::framed_below } else { PartStack::framed };
-        let images =
-            self.layers_of(&set).map(|(part, known, layer)| Ok((part, framed(known, layer)?)));
-        let images: Vec<(usize, Image)> = images.collect::<Result<_, TileError>>()?;
+        let images = self.framed(&set, is_below)?;
         let mesh = match (kept, &self.mesh) {
             (Some(kept), Some(mesh)) => {
                 let rows = kept.next(mesh, self, &images);
@@ -265,7 +294,13 @@ impl Layout {
             }
             _ => None,
         };
-        Ok(MeshedStep { set, images, mesh, is_first: false })
+        Ok(MeshedStep { set, images, mesh, loose: None, is_first: false })
+    }
+
+    /// Returns what is placed of the parts' layers at a height.
+    fn framed(&self, set: &LayerSet, is_below: bool) -> Result<Vec<(usize, Image)>, TileError> {
+        let framed = if is_below { PartStack::framed_below } else { PartStack::framed };
+        self.layers_of(set).map(|(part, known, layer)| Ok((part, framed(known, layer)?))).collect()
     }
 
     fn too_many_runs(&self, set: &LayerSet) -> TileError {

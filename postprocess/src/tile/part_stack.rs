@@ -15,6 +15,8 @@ pub struct PartStack {
     image: PixelSize,
     /// The part of the image that is placed.
     frame: Frame,
+    /// Whether the frame holds all that is white.
+    is_fit: bool,
     /// The union of all layers, within the frame.
     outline: Option<Mask>,
     pub(super) origin_mm: Option<[f64; 2]>,
@@ -35,7 +37,7 @@ impl PartStack {
         let image = PixelSize::of(&first.image);
         let frame = Frame { left: 0, top: 0, width: image.width, height: image.height };
         let (origin_mm, stack) = (first.info.origin_mm, first.info.stack.clone());
-        Ok(Self { name, dpi, image, frame, outline: None, origin_mm, stack })
+        Ok(Self { name, dpi, image, frame, is_fit: false, outline: None, origin_mm, stack })
     }
 
     /// Creates a part whose extents are placed, the least frame that holds what is white
@@ -68,8 +70,19 @@ impl PartStack {
         let Some((mut part, outline)) = found else { return Ok(None) };
         let frame = extents(&outline);
         part.frame = frame.ok_or_else(|| TileError::Black { name: name.to_owned() })?;
+        part.is_fit = true;
         part.outline = Some(outline.framed(part.frame));
         Ok(Some(part))
+    }
+
+    /// Places the extents of the part, which were found before. Its outline stays unknown.
+    pub(super) fn fit_to(self, frame: Frame) -> Self {
+        Self { frame, is_fit: true, outline: None, ..self }
+    }
+
+    /// Returns whether the extents are placed, not the whole image.
+    pub(super) fn is_fit(&self) -> bool {
+        self.is_fit
     }
 
     /// Places another part of the images, which holds what is white.
@@ -144,7 +157,7 @@ impl PartStack {
     /// Where it is not within the extents that were found.
     pub(super) fn framed(&self, layer: &Layer) -> Result<Image, TileError> {
         self.check(layer)?;
-        if self.outline.is_some() && !is_within(&layer.image, self.frame) {
+        if self.is_fit && !is_within(&layer.image, self.frame) {
             return Err(TileError::Changed { name: self.name.clone(), layer: layer.info.name() });
         }
         Ok(layer.image.framed(self.frame))

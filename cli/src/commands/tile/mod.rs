@@ -1,6 +1,7 @@
 //! `lamp tile`: lays out copies on a build area.
 
 mod mesh;
+mod recipe;
 mod stacks;
 mod strips;
 
@@ -13,8 +14,8 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
-    HeightOptions, Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, StrayRows,
-    TileOptions, Turns,
+    BuildFinding, HeightOptions, Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, Recipe,
+    StrayRows, TileOptions, Turns,
 };
 use lamp_stack::{Layer, Length, Size};
 
@@ -50,7 +51,8 @@ Examples:
   tile blade.tif --area 200x200mm --copies 4 --mesh none -o build.tif
   tile blade.tif:120 core.tif:40 --machine beta --pack outline --layout-out layout.json -o build.tif
   tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif
-  tile blade.tif --machine beta --strips strips/ --mirrors 1920 --overlap 64")]
+  tile blade.tif --machine beta --strips strips/ --mirrors 1920 --overlap 64
+  tile blade.tif --machine beta --recipe build.json")]
 pub(crate) struct TileArgs {
     /// Stacks to read, each with its number of copies: TIFF or picture files, folders of pages, or -
     /// for standard input [default count: as many as fit of one stack, one each of several]
@@ -118,6 +120,11 @@ pub(crate) struct TileArgs {
     #[arg(long, value_name = "FILE")]
     layout_picture: Option<PathBuf>,
 
+    /// Write all that decides the build's pages but its parts' stacks, for lamp compose, which makes
+    /// any of them. Without -o, the build itself is not written
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    recipe: Option<PathBuf>,
+
     /// Count heights from each stack's first layer, so that all parts stand on the platform
     #[arg(long)]
     settle: bool,
@@ -139,7 +146,8 @@ pub(crate) struct TileArgs {
     strips: StripArgs,
 
     /// Where to write the build: a file, a folder of pages (a name that ends in /, or an empty
-    /// folder), or - for standard output [default: -, or nowhere with --strips]
+    /// folder), or - for standard output [default: -, or nowhere with --strips or
+    /// --recipe]
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
@@ -165,11 +173,14 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     };
     let machine = args.machine()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
-    let Build { layers, layout, stray_rows } = args.build(machine, &progress)?;
+    let Build { layers, layout, stray_rows, recipe } = args.build(machine, &progress)?;
     let finding = || stray_rows.borrow().text().filter(|_| args.strict).map(Exit::Findings);
     strips::write(unless_found(layers, finding), strips, output.as_ref(), &progress)?;
     if let Some(text) = stray_rows.borrow().text() {
         progress.warn(&text);
+    }
+    if let Some((path, recipe)) = args.recipe.as_ref().zip(recipe) {
+        write_file(path, |out| out.write_all(recipe.borrow().to_json().as_bytes()))?;
     }
     args.tell(&layout)
 }
@@ -179,6 +190,8 @@ pub(crate) struct Build {
     pub(crate) layers: Layers<'static>,
     layout: Layout,
     pub(crate) stray_rows: Rc<RefCell<StrayTotals>>,
+    /// Its recipe, if that is wanted: complete after the last layer.
+    recipe: Option<Rc<RefCell<Recipe>>>,
 }
 
 impl TileArgs {
@@ -242,6 +255,9 @@ impl TileArgs {
         let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
         let placed = self.placed(parts, file.as_ref(), machine.as_ref(), mesh.as_ref())?;
         self.tell_places(&placed, progress)?;
+        let heights = HeightOptions { settle: self.settle, resample: self.resample };
+        let recipe = self.recipe_of(&placed, mesh.as_ref(), machine.as_ref())?;
+        let recipe = recipe.map(|recipe| Rc::new(RefCell::new(recipe)));
         let layout = placed.clone();
         let layout = match &mesh {
             Some(mesh) => layout
@@ -256,15 +272,22 @@ impl TileArgs {
             .max()
             .inspect(|&layers| progress.expect(u64::from(layers) + u64::from(base_layers)));
         let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
-        let heights = HeightOptions { settle: self.settle, resample: self.resample };
         let stray_rows = Rc::new(RefCell::new(StrayTotals::default()));
         let (found, progress) = (Rc::clone(&stray_rows), progress.clone());
-        let build = layout.build(layers, heights, move |stray| {
-            found.borrow_mut().add(stray);
-            progress.detail(&describe_stray(stray));
+        let (told, images) = (recipe.clone(), self.needs_images());
+        let build = layout.build_telling(layers, heights, images, move |finding| match finding {
+            BuildFinding::Stray(stray) => {
+                found.borrow_mut().add(&stray);
+                progress.detail(&describe_stray(&stray));
+            }
+            BuildFinding::Loose(loose) => {
+                if let Some(recipe) = &told {
+                    recipe.borrow_mut().add_loose(loose);
+                }
+            }
         });
         let layers = Box::new(within_height(build, machine));
-        Ok(Build { layers, layout: placed, stray_rows })
+        Ok(Build { layers, layout: placed, stray_rows, recipe })
     }
 
     /// Places the copies.
@@ -333,13 +356,15 @@ impl TileArgs {
                 .chain(self.mesh.file())
         };
         let output = self.output().map(|output| output.output);
-        let main = output.as_ref().or(self.strips.folder()).expect("it goes somewhere");
+        let main = output.as_ref().or(self.strips.folder()).or(self.recipe.as_ref());
+        let main = main.expect("it goes somewhere");
         for beside in [&self.layout_out, &self.layout_picture].into_iter().flatten() {
             check_beside(beside, main, inputs())?;
         }
         if let (Some(output), Some(folder)) = (&output, self.strips.folder()) {
             check_beside(folder, output, inputs())?;
         }
+        self.check_recipe(output.as_ref().or(self.strips.folder()), inputs())?;
         self.layout_picture.as_deref().map(plots::check_name).transpose()?;
         let read = self.layout.iter().chain(&self.machine).chain(self.mesh.file());
         check_not_input(main, read)
@@ -347,8 +372,8 @@ impl TileArgs {
 
     /// Returns the output of the whole build, if it is wanted.
     fn output(&self) -> Option<Output> {
-        let unless_strips = || self.strips.folder().is_none().then(|| PathBuf::from("-"));
-        let output = self.output.clone().or_else(unless_strips)?;
+        let is_alone = self.strips.folder().is_none() && self.recipe.is_none();
+        let output = self.output.clone().or_else(|| is_alone.then(|| PathBuf::from("-")))?;
         Some(Output { output, classic: self.classic, packbits: self.packbits, force: self.force })
     }
 

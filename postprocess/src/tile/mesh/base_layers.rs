@@ -23,12 +23,7 @@ pub(in crate::tile) fn on_base<E>(
             && let Some(mesh) = &mesh
             && first.info.index == 0
         {
-            let mut info = base_page(&first.info, next, count - next);
-            // The first page describes the stack: now that is the base's first.
-            info.stack = first.info.stack.take();
-            if let Some(layers) = info.stack.as_mut().and_then(|stack| stack.layers.as_mut()) {
-                *layers += count;
-            }
+            let info = base_page(&mut first.info, next, count);
             let image = whole.get_or_insert_with(|| mesh.whole()).clone();
             let layer = Layer { info, dpi: first.dpi, image: Image::Mask(image).into() };
             next += 1;
@@ -37,15 +32,21 @@ pub(in crate::tile) fn on_base<E>(
         (next, whole) = (count, None);
         let layer = layers.next()?;
         Some(layer.map(|mut layer| {
-            layer.info.index += count;
+            layer.info.index = layer.info.index.saturating_add(count);
             layer
         }))
     })
 }
 
-/// Returns the page of the base layer that lies `below` layers under the parts' first.
-fn base_page(first: &PageInfo, index: u32, below: u32) -> PageInfo {
-    let z_um = first.z_um.zip(first.thickness_um).map(|(z, t)| z - f64::from(below) * t);
+/// Returns the page of the layer with this index of a base of `count` layers below the parts' first.
+/// The first page describes the stack: now that is the base's first.
+pub(in crate::tile) fn base_page(first: &mut PageInfo, index: u32, count: u32) -> PageInfo {
+    let below = f64::from(count - index);
+    let z_um = first.z_um.zip(first.thickness_um).map(|(z, t)| z - below * t);
+    let mut stack = first.stack.take();
+    if let Some(layers) = stack.as_mut().and_then(|stack| stack.layers.as_mut()) {
+        *layers = layers.saturating_add(count);
+    }
     PageInfo {
         index,
         z_um: z_um.map(|um| Length::from_um(um).to_whole_nm().um()),
@@ -53,6 +54,7 @@ fn base_page(first: &PageInfo, index: u32, below: u32) -> PageInfo {
         origin_mm: first.origin_mm,
         exposure_ms: first.exposure_ms,
         closed: Some(true),
+        stack,
         ..PageInfo::default()
     }
 }

@@ -6,7 +6,7 @@ use super::super::compose::{PlacedImage, merge_rows};
 use super::super::part_stack::white_of;
 use super::super::{Layout, PixelSize};
 use super::mesh_rows::MeshRows;
-use super::pieces::hanging;
+use super::pieces::{Hanging, Holds, hanging};
 use super::{BuildMesh, Moat, cut};
 
 /// The mesh of the layer that was made last.
@@ -20,6 +20,8 @@ pub(in crate::tile) struct KeptMesh {
     cut: MeshRows,
     /// The pieces of these that hang together with the mesh below; none before the first layer.
     hanging: Option<MeshRows>,
+    /// Where pieces begin that are not small, but hang on nothing.
+    loose: Vec<[u32; 2]>,
 }
 
 impl KeptMesh {
@@ -37,7 +39,7 @@ impl KeptMesh {
         };
         let followed: Vec<Mask> = layout.parts.iter().map(black).collect();
         let moats = followed.iter().enumerate().map(moat).collect();
-        Self { followed, moats, cut: mesh.standing.clone(), hanging: None }
+        Self { followed, moats, cut: mesh.standing.clone(), hanging: None, loose: Vec::new() }
     }
 
     /// Returns the mesh around the parts' `images` in the next layer, or `None` if a moat has too
@@ -48,9 +50,57 @@ impl KeptMesh {
         layout: &Layout,
         images: &[(usize, Image)],
     ) -> Option<MeshRows> {
+        let followed = |part| self.followed(mesh, layout, part, images);
+        let followed = (0..layout.parts.len()).map(followed).collect::<Option<Vec<_>>>()?;
+        let changed = self.cut_moats(mesh, layout, followed)?;
+        if !changed && let Some(hanging) = &self.hanging {
+            return Some(hanging.clone());
+        }
+        let holds = match &self.hanging {
+            Some(below) if mesh.moat == Moat::Layer => Holds::Below(below),
+            // Other moats only grow, so the mesh lies within that below.
+            _ => Holds::All,
+        };
+        Some(self.keep(hanging_pieces(&self.cut, holds, mesh.least_piece)))
+    }
+
+    /// Returns the mesh of any layer, given what each part's moat follows in it and where pieces
+    /// begin that are not small but hang on nothing; `None` if a moat has too many runs.
+    pub(in crate::tile) fn at(
+        &mut self,
+        mesh: &BuildMesh,
+        layout: &Layout,
+        followed: Vec<Mask>,
+        loose: &[[u32; 2]],
+    ) -> Option<MeshRows> {
+        let changed = self.cut_moats(mesh, layout, followed)?;
+        if !changed && let Some(hanging) = self.hanging.as_ref().filter(|_| self.loose == loose) {
+            return Some(hanging.clone());
+        }
+        Some(self.keep(hanging_pieces(&self.cut, Holds::AllBut(loose), mesh.least_piece)))
+    }
+
+    /// Returns where pieces of the layer's mesh begin that are not small, but hang on nothing.
+    pub(in crate::tile) fn loose(&self) -> &[[u32; 2]] {
+        &self.loose
+    }
+
+    fn keep(&mut self, Hanging { kept, loose }: Hanging) -> MeshRows {
+        self.hanging = Some(kept.clone());
+        self.loose = loose;
+        kept
+    }
+
+    /// Makes moats around what they follow now. Returns whether any has changed, or `None` if one has
+    /// too many runs.
+    fn cut_moats(
+        &mut self,
+        mesh: &BuildMesh,
+        layout: &Layout,
+        followed: Vec<Mask>,
+    ) -> Option<bool> {
         let mut changed = Vec::new();
-        for part in 0..layout.parts.len() {
-            let followed = self.followed(mesh, layout, part, images)?;
+        for (part, followed) in followed.into_iter().enumerate() {
             if followed == self.followed[part] {
                 continue;
             }
@@ -66,23 +116,7 @@ impl KeptMesh {
         if !changed.is_empty() {
             self.cut_rows(mesh, layout.pixels, &changed);
         }
-        if let (true, Some(hanging)) = (changed.is_empty(), &self.hanging) {
-            return Some(hanging.clone());
-        }
-        let hanging = self.hanging_rows(mesh);
-        self.hanging = Some(hanging.clone());
-        Some(hanging)
-    }
-
-    /// Returns the pieces of the walls that hang on the mesh of the layer below, or as the first
-    /// stand on the base.
-    fn hanging_rows(&self, mesh: &BuildMesh) -> MeshRows {
-        // Other moats only grow, so the mesh lies within that below.
-        let below = self.hanging.as_ref().filter(|_| mesh.moat == Moat::Layer);
-        if below.is_none() && mesh.least_piece <= 1 {
-            return self.cut.clone();
-        }
-        hanging(&self.cut, below, mesh.least_piece)
+        Some(!changed.is_empty())
     }
 
     /// Returns what the moat of a part follows in the next layer, or `None` if it has too many
@@ -124,6 +158,16 @@ impl KeptMesh {
             cut(mesh.standing.row(index), &moat, build.width, &mut row);
             rows[index as usize] = row.as_slice().into();
         });
+    }
+}
+
+/// Returns the pieces of walls that are not small and hang on something.
+fn hanging_pieces(cut: &MeshRows, holds: Holds<'_>, least: u64) -> Hanging {
+    match holds {
+        Holds::All | Holds::AllBut([]) if least <= 1 => {
+            Hanging { kept: cut.clone(), loose: Vec::new() }
+        }
+        _ => hanging(cut, holds, least),
     }
 }
 

@@ -25,7 +25,7 @@ use self::lattice::{Lattice, toggle};
 use super::{Layout, PartStack, PixelSize, TileError};
 use crate::offset::{offset_one_bit, without_holes};
 
-pub(super) use base_layers::on_base;
+pub(super) use base_layers::{base_page, on_base};
 pub(super) use kept::KeptMesh;
 pub use mesh_options::{CellShape, MeshOptions, MeshPattern, Moat};
 pub(super) use mesh_rows::MeshRows;
@@ -37,7 +37,7 @@ pub(super) struct BuildMesh {
     /// The walls that break lines leave.
     standing: MeshRows,
     clearance: f64,
-    moat: Moat,
+    pub(super) moat: Moat,
     /// The least number of pixels that a piece of mesh has.
     least_piece: u64,
     pub(super) base_layers: u32,
@@ -118,6 +118,12 @@ impl BuildMesh {
         (self.changes + self.build.height as usize) * size_of::<u32>()
     }
 
+    /// Returns whether pieces may hang on nothing that are not small: other moats only grow, so that
+    /// the mesh of each layer lies within that of the layer below.
+    pub(super) fn tells_loose(&self) -> bool {
+        self.moat == Moat::Layer
+    }
+
     /// Makes the walls that break lines leave.
     fn stand(&mut self, breaks: &BreakLines) {
         let (mut wall, mut left) = (Vec::new(), Vec::new());
@@ -151,7 +157,7 @@ impl BuildMesh {
     }
 
     /// Returns the mesh without moats and break lines.
-    fn whole(&self) -> Mask {
+    pub(super) fn whole(&self) -> Mask {
         let PixelSize { width, height } = self.build;
         let mut mask = MaskBuilder::new(width);
         mask.reserve(height as usize, self.changes);

@@ -8,22 +8,54 @@ use lamp_stack::white_runs;
 
 use super::mesh_rows::MeshRows;
 
-/// Returns the pieces of a layer's mesh that have `least` pixels or more and share a pixel with the
-/// mesh `below`, if that is given.
-///
-/// Where each layer's mesh lies within that of the layer below, all of its pieces hang on pieces
-/// that are no smaller, and `below` need not be given.
-pub(super) fn hanging(mesh: &MeshRows, below: Option<&MeshRows>, least: u64) -> MeshRows {
-    let pieces = Pieces::of(mesh, below);
-    let is_left_out = |label: u32| {
-        let piece = &pieces.all[label as usize];
-        piece.pixels < least || !(piece.hangs || below.is_none())
+/// What pieces hang on.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Holds<'a> {
+    /// Each hangs on something: where each layer's mesh lies within that of the layer below, all of
+    /// its pieces hang on pieces that are no smaller.
+    All,
+    /// Those that share a pixel with the mesh below hang on it.
+    Below(&'a MeshRows),
+    /// All but those that begin in these rows and columns, which rise.
+    AllBut(&'a [[u32; 2]]),
+}
+
+/// The pieces of a layer's mesh.
+pub(super) struct Hanging {
+    /// Those that are not small and hang on something.
+    pub(super) kept: MeshRows,
+    /// Where others that are not small begin: their first row, and the first column in it, in order.
+    pub(super) loose: Vec<[u32; 2]>,
+}
+
+/// Finds the pieces of a layer's mesh that have `least` pixels or more and hang on something.
+pub(super) fn hanging(mesh: &MeshRows, holds: Holds<'_>, least: u64) -> Hanging {
+    let below = match holds {
+        Holds::Below(below) => Some(below),
+        Holds::All | Holds::AllBut(_) => None,
     };
-    let left_out: Vec<bool> = pieces.roots.iter().map(|&label| is_left_out(label)).collect();
+    let pieces = Pieces::of(mesh, below);
+    let is_loose = |piece: &Piece| match holds {
+        Holds::All => false,
+        Holds::Below(_) => !piece.hangs,
+        Holds::AllBut(loose) => loose.binary_search(&piece.start).is_ok(),
+    };
+    let is_left_out = |&label: &u32| {
+        let piece = &pieces.all[label as usize];
+        piece.pixels < least || is_loose(piece)
+    };
+    let left_out: Vec<bool> = pieces.roots.iter().map(is_left_out).collect();
+    let whole = (0..).zip(&pieces.roots).filter(|(label, root)| label == *root);
+    let large = whole.map(|(_, &root)| &pieces.all[root as usize]).filter(|p| p.pixels >= least);
+    let loose = large.filter(|piece| is_loose(piece)).map(|piece| piece.start).collect();
+    let kept =
+        if left_out.contains(&true) { without(mesh, &pieces, &left_out) } else { mesh.clone() };
+    Hanging { kept, loose }
+}
+
+/// Returns a mesh without the pieces whose labels are left out.
+fn without(mesh: &MeshRows, pieces: &Pieces, left_out: &[bool]) -> MeshRows {
     let mut kept = mesh.clone();
-    if !left_out.contains(&true) {
-        return kept;
-    }
     let mut labels = pieces.labels.as_slice();
     let mut row = Vec::new();
     for (index, transitions) in kept.rows_mut().iter_mut().enumerate() {
@@ -51,6 +83,8 @@ struct Pieces {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Piece {
+    /// Its first row, and the first column in it.
+    start: [u32; 2],
     pixels: u64,
     /// Whether it shares a pixel with the mesh below.
     hangs: bool,
@@ -83,7 +117,7 @@ impl Pieces {
                 if *label == NONE {
                     *label = roots.len() as u32;
                     roots.push(*label);
-                    all.push(Piece::default());
+                    all.push(Piece { start: [index, run[0]], ..Piece::default() });
                 }
                 all[*label as usize].pixels += u64::from(run[1] - run[0]);
             }
@@ -96,7 +130,8 @@ impl Pieces {
             let of = root(&mut roots, label);
             roots[label as usize] = of;
             if of != label {
-                let Piece { pixels, hangs } = all[label as usize];
+                // The root is the lowest label, so its start is the first of the piece.
+                let Piece { pixels, hangs, .. } = all[label as usize];
                 all[of as usize].pixels += pixels;
                 all[of as usize].hangs |= hangs;
             }
