@@ -52,7 +52,8 @@ pub use strips::{
     StripsError, Swaths, SwathsError, is_strips, join_strips, strip_files,
 };
 pub use tile::{
-    BuildFinding, CellShape, Composer, CopyName, CopyPlacement, HeightOptions, Layout, LayoutError,
-    LayoutFile, LoosePieces, MeshOptions, MeshPattern, Moat, Pack, PackBy, PartStack, PixelSize,
-    Recipe, RecipeError, RecipePart, StrayRows, TILE_CODE, TileError, TileOptions, Turns, tile,
+    BuildFinding, BuildWanted, CellShape, Composer, CopyEntry, CopyName, CopyPlacement,
+    CuredPixels, HeightOptions, LayerAreas, Layout, LayoutError, LayoutFile, LoosePieces,
+    MeshOptions, MeshPattern, Moat, Pack, PackBy, PartStack, PixelSize, Recipe, RecipeError,
+    RecipePart, StrayRows, TILE_CODE, TileError, TileOptions, Turns, tile,
 };

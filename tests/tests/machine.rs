@@ -29,6 +29,11 @@ source = "data sheet"
 mirrors = 64
 overlap = 8
 source = "data sheet"
+
+[times]
+recoat_s = 8
+swath_speed_mm_per_s = 50
+source = "measured"
 "#;
 
 /// Returns a folder with `tower.stl`, 25.4 x 25.4 x 76 mm, and a machine that just builds it.
@@ -112,13 +117,19 @@ fn json_says_what_is_known_of_machines() {
             "mirrors": 64,
             "overlap": 8,
             "recoating_pa": null,
+            "times": {
+                "recoat_s": 8.0,
+                "expose_s": null,
+                "swath_speed_mm_per_s": 50.0,
+                "swath_step_s": null,
+            },
             "defaults": {"dpi": null, "thickness_um": null, "margin": null},
             "sources": {
                 "area": "measured",
                 "height": "data sheet",
                 "dpi": "data sheet",
                 "thickness": "data sheet",
-                "strips": "data sheet", "recoating": null,
+                "strips": "data sheet", "recoating": null, "times": "measured",
             },
         }]})
     );

@@ -60,8 +60,8 @@ fn answer(machines: impl IntoIterator<Item = Machine>) -> Result<(), Exit> {
 
 /// A machine's fields; what is not known is null.
 fn fields(machine: &Machine) -> Value {
-    let Machine { name, description, area, height, dpi, thickness, strips, recoating, defaults } =
-        machine;
+    let Machine { name, description, area, height, dpi, thickness, .. } = machine;
+    let Machine { strips, recoating, times, defaults, .. } = machine;
     json!({
         "name": name,
         "description": description,
@@ -72,6 +72,12 @@ fn fields(machine: &Machine) -> Value {
         "mirrors": strips.as_ref().map(|strips| strips.mirrors),
         "overlap": strips.as_ref().map(|strips| strips.overlap),
         "recoating_pa": recoating.as_ref().map(Recoating::shear_pa),
+        "times": times.as_ref().map(|times| json!({
+            "recoat_s": times.recoat_s,
+            "expose_s": times.expose_s,
+            "swath_speed_mm_per_s": times.swath_speed_mm_per_s,
+            "swath_step_s": times.swath_step_s,
+        })),
         "defaults": {
             "dpi": defaults.dpi,
             "thickness_um": defaults.thickness.map(Length::um),
@@ -84,6 +90,7 @@ fn fields(machine: &Machine) -> Value {
             "thickness": thickness.as_ref().map(|limits| &limits.source),
             "strips": strips.as_ref().map(|strips| &strips.source),
             "recoating": recoating.as_ref().map(|recoating| &recoating.source),
+            "times": times.as_ref().map(|times| &times.source),
         },
     })
 }

@@ -49,7 +49,7 @@ impl std::error::Error for StageError {}
 const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
 
 /// Options that make no sense in a list of stages, and what to do instead.
-const REFUSED: [(&str, &str); 16] = [
+const REFUSED: [(&str, &str); 17] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
     ("classic", "leave out --classic: results are stored packed"),
     ("packbits", "leave out --packbits: results are stored packed"),
@@ -63,6 +63,7 @@ const REFUSED: [(&str, &str); 16] = [
     ("stl", "leave out --stl: run lamp support by hand for its supports alone"),
     ("strips", "leave out --strips: cut strips from the finished build, by lamp tile or lamp join"),
     ("recipe", "leave out --recipe: run lamp tile by hand for the recipe"),
+    ("time", "leave out --time: run lamp tile by hand for the time of the build"),
     ("layout_out", "leave out --layout-out: run lamp tile by hand for the layout"),
     ("layout_picture", "leave out --layout-picture: run lamp tile by hand for the picture"),
     ("part", "leave out --part: the part is the one that the stages are for"),

@@ -31,6 +31,15 @@ pub enum MachineError {
     /// A blade that stands still, or spreads nothing.
     #[error("recoating: travel, seconds, gap and viscosities must be above zero, the least first")]
     Recoating,
+    /// Times that no machine has.
+    #[error("times: each must be between 0.001 and 1000000")]
+    Times,
+    /// A time between swaths that are not known.
+    #[error("times: swath_step_s needs swath_speed_mm_per_s")]
+    StepWithoutSpeed,
+    /// A speed along swaths that are not known.
+    #[error("times: swath_speed_mm_per_s needs [strips], which says how wide a swath is")]
+    SpeedWithoutStrips,
     /// Swaths without a pixel of their own.
     #[error("strips: a swath shares less than half its mirrors with the next")]
     Strips,
@@ -76,6 +85,9 @@ impl Catalogued for Machine {
             }
         }
         self.check_defaults()?;
+        if let Some(times) = &self.times {
+            times.check(self.strips.is_some())?;
+        }
         match &self.strips {
             Some(strips) if strips.overlap >= strips.mirrors.div_ceil(2) => {
                 Err(MachineError::Strips)
@@ -164,8 +176,8 @@ thickness = "50um"
         for builtin in Machine::BUILTINS {
             let machine = Machine::from_toml(builtin.toml).unwrap();
             assert_eq!(machine.name, builtin.name);
-            // Their source gives neither.
-            assert_eq!((machine.strips, machine.height), (None, None));
+            // Their source gives none of these.
+            assert_eq!((machine.strips, machine.height, machine.times), (None, None, None));
         }
         let [alpha, beta] =
             ["alpha", "beta"].map(|name| Machine::builtin(name).unwrap().area.value);

@@ -1,5 +1,5 @@
-//! Machines: how large and how high a build may be, and in what pixels and layers, in
-//! TOML files.
+//! Machines: how large and how high a build may be, in what pixels and layers, and how long
+//! it takes, in TOML files.
 //!
 //! ```
 //! use lamp_postprocess::machine::Machine;
@@ -12,12 +12,14 @@
 
 mod file;
 mod limit;
+mod times;
 
 use lamp_stack::{Length, Size, nonempty_text};
 use serde::Deserialize;
 
 pub use file::MachineError;
 pub use limit::MachineLimit;
+pub use times::{BuildTime, SwathTime, Times};
 
 /// What is known of a machine. What a source does not give is absent, and then
 /// anything goes.
@@ -40,6 +42,8 @@ pub struct Machine {
     pub strips: Option<Strips>,
     /// How a blade spreads the next layer.
     pub recoating: Option<Recoating>,
+    /// How long the steps of a layer take.
+    pub times: Option<Times>,
     /// How it is usually sliced for.
     #[serde(default)]
     pub defaults: Defaults,

@@ -2,20 +2,26 @@
 
 use lamp_stack::Layer;
 
-use super::TileError;
+use super::areas::Areas;
+use super::{BuildFinding, TileError};
 
-/// Passes on layers that come with the parts that are not black in them. After the last comes an
-/// error if a part was black in all of them.
+/// What is told of a layer, and the pixels that make it up.
+pub(super) type Made = (Layer, (Vec<BuildFinding>, Areas));
+
+/// Passes on layers. After the last comes an error if a part was black in all of them.
 pub(super) fn unless_black<E: From<TileError>>(
-    mut layers: impl Iterator<Item = Result<(Layer, Vec<usize>), E>>,
+    mut layers: impl Iterator<Item = Result<Made, E>>,
     names: Vec<String>,
-) -> impl Iterator<Item = Result<Layer, E>> {
+) -> impl Iterator<Item = Result<Made, E>> {
     let mut black: Vec<Option<String>> = names.into_iter().map(Some).collect();
     let mut ended = false;
     std::iter::from_fn(move || match layers.next() {
-        Some(Ok((layer, exposed))) => {
-            exposed.into_iter().for_each(|part| black[part] = None);
-            Some(Ok(layer))
+        Some(Ok(made)) => {
+            let (_, (_, Areas { part_px, .. })) = &made;
+            for (name, _) in black.iter_mut().zip(part_px).filter(|(_, pixels)| **pixels > 0) {
+                *name = None;
+            }
+            Some(Ok(made))
         }
         Some(Err(error)) => {
             ended = true;

@@ -31,6 +31,8 @@ use super::{CopyName, PartStack, PixelSize, TileError};
 pub struct Layout {
     pub(super) parts: Vec<PartStack>,
     pub(super) placements: Vec<CopyPlacement>,
+    /// The serial number of each copy, as far as a layout file gives it.
+    pub(super) serials: Vec<Option<String>>,
     pub(super) dpi: Dpi,
     pub(super) area: Size,
     pub(super) pixels: PixelSize,
@@ -150,6 +152,7 @@ impl Layout {
         Ok(Self {
             parts,
             placements: Vec::new(),
+            serials: Vec::new(),
             dpi,
             area,
             pixels,

@@ -13,7 +13,9 @@
 //! of the copy's image, as it lies there, rounded to pixels. The image is the whole
 //! page with its black margin, which may reach beyond the area where the part does
 //! not. `turn` is 0, 90, 180 or 270 degrees anticlockwise; `"mirror": true` mirrors the
-//! image left to right before it is turned.
+//! image left to right before it is turned. `serial` is a copy's serial number, if it has one.
+
+use std::collections::HashMap;
 
 use lamp_stack::{Frame, Length, Orientation, Size, one_line};
 use serde::{Deserialize, Serialize};
@@ -44,14 +46,22 @@ pub struct LayoutFile {
 /// A copy as a file has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct CopyEntry {
-    part: String,
-    x_mm: f64,
-    y_mm: f64,
+pub struct CopyEntry {
+    /// The part's stack.
+    pub part: String,
+    /// From the area's left edge to that of the copy's image.
+    pub x_mm: f64,
+    /// From the area's lower edge to that of the copy's image.
+    pub y_mm: f64,
+    /// Degrees anticlockwise, after it is mirrored.
     #[serde(default, skip_serializing_if = "is_zero")]
-    turn: u32,
+    pub turn: u32,
+    /// Whether its image is mirrored left to right.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    mirror: bool,
+    pub mirror: bool,
+    /// Its serial number, which no other copy has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub serial: Option<String>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
@@ -86,6 +96,22 @@ pub enum LayoutError {
         copy: usize,
         /// The turn in degrees.
         turn: u32,
+    },
+    /// A serial number says nothing.
+    #[error("copies[{copy}].serial: it is empty: leave it out")]
+    EmptySerial {
+        /// The copy's index, from 0.
+        copy: usize,
+    },
+    /// Two copies have the same serial number.
+    #[error("copies[{copy}].serial: copies[{first}] is {serial:?}, too")]
+    SerialTwice {
+        /// The copy's index, from 0.
+        copy: usize,
+        /// That of the first with this serial number.
+        first: usize,
+        /// The serial number.
+        serial: String,
     },
     /// The layout has no copy.
     #[error("there is no copy in it")]
@@ -134,7 +160,28 @@ impl LayoutFile {
                 return Err(LayoutError::Turn { copy: index, turn: copy.turn });
             }
         }
+        file.check_serials()?;
         if file.copies.is_empty() { Err(LayoutError::Empty) } else { Ok(file) }
+    }
+
+    fn check_serials(&self) -> Result<(), LayoutError> {
+        let mut known = HashMap::new();
+        for (copy, entry) in self.copies.iter().enumerate() {
+            let Some(serial) = &entry.serial else { continue };
+            if serial.trim().is_empty() {
+                return Err(LayoutError::EmptySerial { copy });
+            }
+            if let Some(first) = known.insert(serial, copy) {
+                let serial = serial.clone();
+                return Err(LayoutError::SerialTwice { copy, first, serial });
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the copies, in order.
+    pub fn copies(&self) -> &[CopyEntry] {
+        &self.copies
     }
 
     /// Returns the layout as JSON, with a line for each copy.
@@ -178,7 +225,9 @@ impl LayoutFile {
         {
             return Err(LayoutError::Unused { part: parts[unused].name().to_owned() });
         }
-        Ok(Layout::placed(parts, &requested, area)?)
+        let mut layout = Layout::placed(parts, &requested, area)?;
+        layout.serials = self.copies.iter().map(|copy| copy.serial.clone()).collect();
+        Ok(layout)
     }
 }
 
@@ -188,7 +237,7 @@ impl Layout {
         let nm = |mm: f64| (mm * 1e6).round() / 1e6 + 0.0;
         let Size { width, height } = self.area;
         let pitch = self.dpi.pitch().mm();
-        let line = |at: &CopyPlacement| {
+        let line = |(copy, at): (usize, &CopyPlacement)| {
             let part = &self.parts[at.part];
             let image = image_of(part, at);
             CopyEntry {
@@ -197,11 +246,12 @@ impl Layout {
                 y_mm: nm(height.mm() - (image.top + i64::from(image.height)) as f64 * pitch),
                 turn: at.turn.quarters() * 90,
                 mirror: at.turn.is_mirrored(),
+                serial: self.serials.get(copy).cloned().flatten(),
             }
         };
         LayoutFile {
             area_mm: Some([width.mm(), height.mm()]),
-            copies: self.placements.iter().map(line).collect(),
+            copies: self.placements.iter().enumerate().map(line).collect(),
         }
     }
 }

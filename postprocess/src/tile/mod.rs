@@ -8,6 +8,7 @@
 //!
 //! Source: 002 section 2.4.2.
 
+mod areas;
 mod black_parts;
 mod build_page;
 mod compose;
@@ -30,15 +31,17 @@ use std::sync::Arc;
 
 use lamp_stack::{Image, Layer, Length, Mask, MemorySize, Orientation, Size, map_in_order};
 
+use areas::Areas;
 use black_parts::unless_black;
 use compose::ComposeError;
 use lockstep::{LayerSet, Lockstep};
 use mesh::{BuildMesh, KeptMesh, MeshRows, on_base};
 
+pub use areas::{CuredPixels, LayerAreas};
 pub use build_page::StrayRows;
 pub(crate) use compose::{PlacedImage, united};
 pub use layout::{CopyPlacement, Layout};
-pub use layout_file::{LayoutError, LayoutFile};
+pub use layout_file::{CopyEntry, LayoutError, LayoutFile};
 pub use lockstep::HeightOptions;
 pub use mesh::{CellShape, MeshOptions, MeshPattern, Moat};
 pub use pack::{Pack, PackBy, Turns};
@@ -139,6 +142,8 @@ struct MeshedStep {
     /// The images of parts that have a layer here.
     images: Vec<(usize, Image)>,
     mesh: Option<MeshRows>,
+    /// The pixels of the mesh, if they are wanted.
+    mesh_px: u64,
     /// The pieces of mesh that hang on nothing, if they are others than in the layer below.
     loose: Option<LoosePieces>,
     /// Whether it is the build's first.
@@ -152,6 +157,19 @@ pub enum BuildFinding {
     Stray(StrayRows),
     /// Pieces of mesh that are left out though they are not small, from a layer on.
     Loose(LoosePieces),
+    /// What a layer is made of, if that is wanted: for every layer, in order, those of mesh alone
+    /// among them.
+    Areas(LayerAreas),
+}
+
+/// What is wanted of a build beside the pages of its layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildWanted {
+    /// The images of the layers. Without them these are left empty: then the stacks are read and
+    /// checked, at a fraction of the cost.
+    pub images: bool,
+    /// How many pixels the parts and the mesh of each layer have.
+    pub areas: bool,
 }
 
 impl MemorySize for MeshedStep {
@@ -187,16 +205,16 @@ impl Layout {
         S: Iterator<Item = Result<Layer, E>>,
         E: From<TileError> + Send,
     {
-        self.build_telling(stacks, heights, true, move |found| {
+        let wanted = BuildWanted { images: true, areas: false };
+        self.build_telling(stacks, heights, wanted, move |found| {
             if let BuildFinding::Stray(rows) = found {
                 stray(&rows);
             }
         })
     }
 
-    /// Makes the build's layers as [`build`](Self::build) does, and tells what a
-    /// [`Recipe`] needs. Without `images` these are left empty: then the stacks are read and checked,
-    /// at a fraction of the cost.
+    /// Makes the build's layers as [`build`](Self::build) does, or what is `wanted` of them, and
+    /// tells what a [`Recipe`] needs. What is told of a layer is told before it comes.
     ///
     /// # Panics
     /// Panics if there are not as many stacks as parts.
@@ -204,7 +222,7 @@ impl Layout {
         mut self,
         stacks: Vec<S>,
         heights: HeightOptions,
-        images: bool,
+        wanted: BuildWanted,
         mut told: impl FnMut(BuildFinding),
     ) -> impl Iterator<Item = Result<Layer, E>>
     where
@@ -222,8 +240,9 @@ impl Layout {
         let mut steps = Lockstep::new(stacks, heights, mesh_bytes);
         let layout = Arc::new(self);
         let meshed = layout.clone();
-        let wanted = mesh.as_ref().filter(|mesh| images || mesh.tells_loose());
-        let mut kept = wanted.map(|mesh| KeptMesh::new(mesh, &layout));
+        let BuildWanted { images, areas } = wanted;
+        let made = mesh.as_ref().filter(|mesh| images || areas || mesh.tells_loose());
+        let mut kept = made.map(|mesh| KeptMesh::new(mesh, &layout));
         let (mut is_first, mut known) = (true, Vec::new());
         // In order, as the mesh of a layer is made from that of the one below.
         let steps = std::iter::from_fn(move || {
@@ -236,13 +255,14 @@ impl Layout {
                 match meshed.meshed_step(step, kept.as_mut(), is_below) {
                     Ok(_) if is_below => {}
                     Ok(made) => {
+                        let mesh_px = kept.as_mut().filter(|_| areas).map_or(0, KeptMesh::pixels);
                         let is_first = std::mem::take(&mut is_first);
                         let loose = kept.as_ref().filter(|kept| kept.loose() != known);
                         let loose = loose.map(|kept| {
                             known = kept.loose().to_vec();
                             LoosePieces { layer: made.set.index, starts: known.clone() }
                         });
-                        return Some(Ok(MeshedStep { is_first, loose, ..made }));
+                        return Some(Ok(MeshedStep { is_first, loose, mesh_px, ..made }));
                     }
                     Err(error) => return Some(Err(error.into())),
                 }
@@ -252,16 +272,20 @@ impl Layout {
             let layer = layout.layer(&step, images)?;
             let mut found: Vec<BuildFinding> =
                 layout.stray_rows(&step.set).into_iter().map(BuildFinding::Stray).collect();
-            let exposed = layout.exposed_parts(&step.set);
+            let of_layer = Areas::new(layout.parts.len(), &step.images, step.mesh_px);
             found.extend(step.loose.map(BuildFinding::Loose));
-            Ok((layer, found, exposed))
+            Ok((layer, found, of_layer))
         });
-        let layers = layers.map(move |made| {
-            let (layer, found, exposed) = made?;
+        let layers =
+            layers.map(|made| made.map(|(layer, found, of_layer)| (layer, (found, of_layer))));
+        on_base(unless_black(layers, names), mesh).map(move |made| {
+            let (layer, (found, of_layer)) = made?;
             found.into_iter().for_each(&mut told);
-            Ok((layer, exposed))
-        });
-        on_base(unless_black(layers, names), mesh)
+            if areas {
+                told(BuildFinding::Areas(of_layer.of_layer(&layer)));
+            }
+            Ok(layer)
+        })
     }
 
     /// Takes note of how stacks are joined, for the build's first page.
@@ -294,7 +318,7 @@ impl Layout {
             }
             _ => None,
         };
-        Ok(MeshedStep { set, images, mesh, loose: None, is_first: false })
+        Ok(MeshedStep { set, images, mesh, mesh_px: 0, loose: None, is_first: false })
     }
 
     /// Returns what is placed of the parts' layers at a height.
@@ -306,12 +330,6 @@ impl Layout {
     fn too_many_runs(&self, set: &LayerSet) -> TileError {
         let layer = set.some_layer().info.name();
         TileError::TooManyRuns { copies: self.placements.len(), layer }
-    }
-
-    /// Returns the parts that are not black at one height.
-    fn exposed_parts(&self, step: &LayerSet) -> Vec<usize> {
-        let exposed = self.layers_of(step).filter(|(_, _, layer)| layer.image.change_count() > 0);
-        exposed.map(|(part, _, _)| part).collect()
     }
 
     /// Returns the build's image: the parts, and the mesh around them.

@@ -2,7 +2,8 @@
 
 use std::cell::RefCell;
 
-use lamp_postprocess::machine::Machine;
+use lamp_postprocess::PixelSize;
+use lamp_postprocess::machine::{BuildTime, Machine};
 use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
 use lamp_supports::{CheckError, Findings};
 use serde_json::{Value, json};
@@ -35,31 +36,6 @@ pub(super) struct Found {
     pub(super) lines: Vec<FindingLine>,
     /// Pictures of the worst, each with the number of its line.
     pub(super) pictures: Vec<(usize, Picture)>,
-}
-
-/// How long a build takes, as far as that is known.
-pub(super) struct BuildTime {
-    /// The sum of all exposures in seconds, if every layer states one.
-    pub(super) exposure_s: Option<f64>,
-    /// The machine and the time that its recoating takes in all, if it is known.
-    pub(super) recoating: Option<(String, f64)>,
-}
-
-impl BuildTime {
-    fn new(layers: &[LayerNumbers], machine: Option<&Machine>) -> Self {
-        let exposures = layers.iter().map(|layer| layer.exposure_ms);
-        let exposure_ms: Option<f64> = exposures.sum();
-        let recoating = machine.and_then(|machine| {
-            let seconds = machine.recoating.as_ref()?.seconds * layers.len() as f64;
-            Some((machine.name.clone(), seconds))
-        });
-        Self { exposure_s: exposure_ms.map(|ms| ms / 1000.0), recoating }
-    }
-
-    /// Returns exposures and recoating in seconds, as far as they are known.
-    pub(super) fn sum_s(&self) -> Option<f64> {
-        Some(self.exposure_s? + self.recoating.as_ref().map_or(0.0, |(_, seconds)| *seconds))
-    }
 }
 
 impl Found {
@@ -100,7 +76,9 @@ impl StackReport {
             Err(why) => Err(why),
         };
         let layers = numbers.into_inner();
-        let time = BuildTime::new(&layers, machine);
+        let exposures = layers.iter().map(|layer| layer.exposure_ms);
+        let [width, height] = headers[0].size;
+        let time = BuildTime::new(machine, exposures, PixelSize { width, height }, headers[0].dpi);
         Ok(Self { name: name.to_owned(), totals, layers, found, sheet: sheet.into_inner(), time })
     }
 
@@ -124,7 +102,7 @@ impl StackReport {
         if totals.first.dpi.is_none() {
             warnings.push("It states no resolution: lengths are in pixels.".to_owned());
         }
-        if self.time.exposure_s.is_none() {
+        if self.time.sum_s().is_none() {
             warnings.push(
                 "Not every layer states an exposure: the build time is not known.".to_owned(),
             );
@@ -144,7 +122,8 @@ impl StackReport {
             "fault": null,
             "warnings": self.warnings(),
             "build_exposure_s": self.time.exposure_s,
-            "recoating_s": self.time.recoating.as_ref().map(|(_, seconds)| seconds),
+            "recoating_s": self.time.recoating_s,
+            "swaths_s": self.time.swaths.map(|swaths| swaths.seconds),
             "build_s": self.time.sum_s(),
             "fixed_rows": self.layers.iter().map(|layer| layer.fixed_rows).sum::<u64>(),
             "unchecked": self.found.as_ref().err(),

@@ -105,17 +105,21 @@ fn option_of<'a>(commands: &'a [String], option: &str) -> Option<&'a str> {
 fn build_time(report: &StackReport) -> Markup {
     let time = &report.time;
     html! {
-        @match time.exposure_s {
+        @match time.sum_s() {
             None => p { "Not known: not every layer states its exposure." },
-            Some(exposure_s) => table.facts {
-                tr { th { "exposures" } td { (time_text(exposure_s)) } }
-                @if let Some((machine, seconds)) = &time.recoating {
-                    tr { th { "recoating" } td { (time_text(*seconds)) " by the blade of " (printable(machine)) } }
+            Some(sum) => table.facts {
+                @if let Some(swaths) = time.swaths {
+                    tr { th { "swaths" } td { (time_text(swaths.seconds)) ", " (swaths.count) " in each layer" } }
+                } @else if let Some(exposure_s) = time.exposure_s {
+                    tr { th { "exposures" } td { (time_text(exposure_s)) } }
                 }
-                @if let Some(sum) = time.sum_s() { tr { th { "in all" } td { (time_text(sum)) } } }
+                @if let Some(seconds) = time.recoating_s {
+                    tr { th { "recoating" } td { (time_text(seconds)) } }
+                }
+                tr { th { "in all" } td { (time_text(sum)) } }
             },
         }
-        @if time.recoating.is_none() {
+        @if time.recoating_s.is_none() {
             p.note { "Recoating, peeling and moving are not in it: name a machine whose recoating is known with --machine." }
         } @else {
             p.note { "Peeling, waiting and moving are not in it." }

@@ -1,34 +1,39 @@
 //! `lamp tile`: lays out copies on a build area.
 
+mod check;
+mod found;
 mod mesh;
+mod placing;
 mod recipe;
+mod report;
 mod stacks;
 mod strips;
+mod time;
 
 use std::cell::RefCell;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::rc::Rc;
 
-use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
-    BuildFinding, HeightOptions, Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, Recipe,
-    StrayRows, TileOptions, Turns,
+    BuildFinding, BuildWanted, HeightOptions, Layout, PackBy, PartStack, Recipe, Turns,
 };
-use lamp_stack::{Layer, Length, Size};
+use lamp_stack::{Length, Size};
 
-use crate::catalogue::{canonical_word, entry, is_file, read_text};
+use crate::catalogue::{canonical_word, entry, is_file};
 use crate::exit::Exit;
 use crate::json_report::parse_report;
-use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers, ranges};
-use crate::plots;
+use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::progress::Progress;
 use crate::stages::Layers;
-use crate::streams::{check_beside, check_not_input, progress, unless_found, write_file};
+use crate::streams::{progress, unless_found, write_file};
 
+use found::{StrayTotals, describe_stray, within_height};
 use mesh::MeshArgs;
+use placing::read_layout;
+use report::BuildTotals;
 use stacks::{InputStack, StackArg};
 use strips::StripArgs;
 
@@ -52,7 +57,9 @@ Examples:
   tile blade.tif:120 core.tif:40 --machine beta --pack outline --layout-out layout.json -o build.tif
   tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif
   tile blade.tif --machine beta --strips strips/ --mirrors 1920 --overlap 64
-  tile blade.tif --machine beta --recipe build.json")]
+  tile blade.tif --machine beta --recipe build.json
+  tile blade.tif --machine mine.toml --report report.json -o build.tif
+  tile blade.tif --machine mine.toml --time")]
 pub(crate) struct TileArgs {
     /// Stacks to read, each with its number of copies: TIFF or picture files, folders of pages, or -
     /// for standard input [default count: as many as fit of one stack, one each of several]
@@ -125,6 +132,15 @@ pub(crate) struct TileArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     recipe: Option<PathBuf>,
 
+    /// Write areas and volumes of each copy and layer, and how long the build takes, as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    report: Option<PathBuf>,
+
+    /// Print how long the build takes on the machine, as far as its file says ([times] and
+    /// [recoating]). Without -o, the build itself is not written
+    #[arg(long)]
+    time: bool,
+
     /// Count heights from each stack's first layer, so that all parts stand on the platform
     #[arg(long)]
     settle: bool,
@@ -146,8 +162,8 @@ pub(crate) struct TileArgs {
     strips: StripArgs,
 
     /// Where to write the build: a file, a folder of pages (a name that ends in /, or an empty
-    /// folder), or - for standard output [default: -, or nowhere with --strips or
-    /// --recipe]
+    /// folder), or - for standard output [default: -, or nowhere with --strips,
+    /// --recipe or --time]
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
@@ -173,7 +189,8 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     };
     let machine = args.machine()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
-    let Build { layers, layout, stray_rows, recipe } = args.build(machine, &progress)?;
+    let built = args.build(machine.clone(), &progress)?;
+    let Build { layers, layout, stray_rows, recipe, totals } = built;
     let finding = || stray_rows.borrow().text().filter(|_| args.strict).map(Exit::Findings);
     strips::write(unless_found(layers, finding), strips, output.as_ref(), &progress)?;
     if let Some(text) = stray_rows.borrow().text() {
@@ -182,7 +199,8 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     if let Some((path, recipe)) = args.recipe.as_ref().zip(recipe) {
         write_file(path, |out| out.write_all(recipe.borrow().to_json().as_bytes()))?;
     }
-    args.tell(&layout)
+    args.tell(&layout)?;
+    args.tell_totals(&layout, &totals.borrow(), machine.as_ref(), output.as_ref())
 }
 
 /// A build that is being made.
@@ -192,6 +210,8 @@ pub(crate) struct Build {
     pub(crate) stray_rows: Rc<RefCell<StrayTotals>>,
     /// Its recipe, if that is wanted: complete after the last layer.
     recipe: Option<Rc<RefCell<Recipe>>>,
+    /// What its layers are made of, if that is wanted: complete after the last layer.
+    totals: Rc<RefCell<BuildTotals>>,
 }
 
 impl TileArgs {
@@ -274,8 +294,11 @@ impl TileArgs {
         let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
         let stray_rows = Rc::new(RefCell::new(StrayTotals::default()));
         let (found, progress) = (Rc::clone(&stray_rows), progress.clone());
-        let (told, images) = (recipe.clone(), self.needs_images());
-        let build = layout.build_telling(layers, heights, images, move |finding| match finding {
+        let told = recipe.clone();
+        let totals = Rc::new(RefCell::new(BuildTotals::new(&layout)));
+        let added = Rc::clone(&totals);
+        let wanted = BuildWanted { images: self.needs_images(), areas: self.report.is_some() };
+        let build = layout.build_telling(layers, heights, wanted, move |finding| match finding {
             BuildFinding::Stray(stray) => {
                 found.borrow_mut().add(&stray);
                 progress.detail(&describe_stray(&stray));
@@ -285,207 +308,21 @@ impl TileArgs {
                     recipe.borrow_mut().add_loose(loose);
                 }
             }
+            BuildFinding::Areas(areas) => added.borrow_mut().add(areas),
         });
-        let layers = Box::new(within_height(build, machine));
-        Ok(Build { layers, layout: placed, stray_rows, recipe })
-    }
-
-    /// Places the copies.
-    fn placed(
-        &self,
-        parts: Vec<PartStack>,
-        file: Option<&LayoutFile>,
-        machine: Option<&Machine>,
-        mesh: Option<&MeshOptions>,
-    ) -> Result<Layout, Exit> {
-        let plain = TileOptions::default();
-        let machine_area = machine.map(|machine| machine.area.value);
-        let file_area = file.and_then(LayoutFile::area);
-        let area = self.area.or(machine_area).or(file_area).unwrap_or(plain.area);
-        match file {
-            Some(file) => place(file, parts, area, self.layout.as_deref()),
-            None => {
-                let gap = self.gap.or(mesh.map(MeshOptions::gap)).unwrap_or(plain.gap);
-                Ok(Layout::packed(parts, &self.counts(), area, gap, self.packing())?)
+        let timed = Rc::clone(&totals);
+        let layers = Box::new(within_height(build, machine).inspect(move |layer| {
+            if let Ok(layer) = layer {
+                timed.borrow_mut().exposures_ms.push(layer.info.exposure_ms);
             }
-        }
-    }
-
-    /// Tells which copies found no place, and which stand nearer than was asked for.
-    fn tell_places(&self, layout: &Layout, progress: &Progress) -> Result<(), Exit> {
-        if self.layout.is_none()
-            && let Some(text) = left_over(layout, &self.counts())
-        {
-            if self.strict {
-                return Err(Exit::Findings(text));
-            }
-            progress.warn(&text);
-        }
-        if let (Some(_), Some(gap)) = (&self.layout, self.gap)
-            && let near = layout.nearer_than(gap)
-            && let [[one, other], more @ ..] = near.as_slice()
-        {
-            let more = match more.len() {
-                0 => String::new(),
-                1 => ", and so is another pair".to_owned(),
-                more => format!(", and so are {more} more pairs"),
-            };
-            progress.warn(&format!("{one} and {other} are nearer to each other than {gap}{more}"));
-        }
-        Ok(())
-    }
-
-    /// Checks, before the work, what can be checked.
-    fn check(&self) -> Result<(), Exit> {
-        let counted = self.stacks.iter().any(|stack| stack.copies.is_some());
-        if self.copies.is_some() && (counted || self.stacks.len() > 1) {
-            return Err(Exit::usage(
-                "--copies is for one stack without a count: write blade.tif:120 core.tif:40",
-            ));
-        }
-        if self.layout.is_some() && counted {
-            return Err(Exit::usage("--layout gives the number of copies: leave out the counts"));
-        }
-        self.mesh.check()?;
-        let inputs = || {
-            self.stacks
-                .iter()
-                .map(|stack| &stack.path)
-                .chain(&self.layout)
-                .chain(&self.machine)
-                .chain(self.mesh.file())
-        };
-        let output = self.output().map(|output| output.output);
-        let main = output.as_ref().or(self.strips.folder()).or(self.recipe.as_ref());
-        let main = main.expect("it goes somewhere");
-        for beside in [&self.layout_out, &self.layout_picture].into_iter().flatten() {
-            check_beside(beside, main, inputs())?;
-        }
-        if let (Some(output), Some(folder)) = (&output, self.strips.folder()) {
-            check_beside(folder, output, inputs())?;
-        }
-        self.check_recipe(output.as_ref().or(self.strips.folder()), inputs())?;
-        self.layout_picture.as_deref().map(plots::check_name).transpose()?;
-        let read = self.layout.iter().chain(&self.machine).chain(self.mesh.file());
-        check_not_input(main, read)
+        }));
+        Ok(Build { layers, layout: placed, stray_rows, recipe, totals })
     }
 
     /// Returns the output of the whole build, if it is wanted.
     fn output(&self) -> Option<Output> {
-        let is_alone = self.strips.folder().is_none() && self.recipe.is_none();
+        let is_alone = self.strips.folder().is_none() && self.recipe.is_none() && !self.time;
         let output = self.output.clone().or_else(|| is_alone.then(|| PathBuf::from("-")))?;
         Some(Output { output, classic: self.classic, packbits: self.packbits, force: self.force })
     }
-
-    fn counts(&self) -> Vec<Option<u32>> {
-        self.stacks.iter().map(|stack| stack.copies.or(self.copies)).collect()
-    }
-
-    fn packing(&self) -> Pack {
-        let usual = match self.pack {
-            PackBy::Boxes => Turns::None,
-            PackBy::Outlines => Turns::Quarters,
-        };
-        Pack { by: self.pack, turns: self.turns.unwrap_or(usual), edge_gap: self.edge_gap }
-    }
-
-    /// Writes the layout as a file and as a picture, if wanted.
-    fn tell(&self, layout: &Layout) -> Result<(), Exit> {
-        if let Some(path) = &self.layout_out {
-            write_file(path, |out| out.write_all(layout.to_file().to_json().as_bytes()))?;
-        }
-        if let Some(path) = &self.layout_picture {
-            let picture = plots::layout_picture(layout, path)?;
-            write_file(path, |out| out.write_all(&picture))?;
-        }
-        Ok(())
-    }
-}
-
-/// `torus.tif: 3 of 5 copies are placed; tower.tif: ...`, if some of several parts found no place.
-fn left_over(layout: &Layout, counts: &[Option<u32>]) -> Option<String> {
-    let parts = layout.parts().iter().zip(counts).enumerate();
-    let short = parts.filter_map(|(part, (stack, count))| {
-        let (placed, asked) = (layout.copies_of(part), (*count)? as usize);
-        let line = || format!("{}: {placed} of {asked} copies are placed", stack.name());
-        (placed < asked).then(line)
-    });
-    let short: Vec<String> = short.collect();
-    (!short.is_empty()).then(|| format!("{}: no more fit", short.join("; ")))
-}
-
-/// A layout takes a line for each copy.
-const MAX_LAYOUT_BYTES: u64 = 64 << 20;
-
-fn read_layout(path: &Path) -> Result<LayoutFile, Exit> {
-    let read =
-        || anyhow::Ok(LayoutFile::from_json(&read_text(path, MAX_LAYOUT_BYTES, "a layout")?)?);
-    Ok(read().with_context(|| path.display().to_string())?)
-}
-
-fn place(
-    file: &LayoutFile,
-    parts: Vec<PartStack>,
-    area: Size,
-    path: Option<&Path>,
-) -> Result<Layout, Exit> {
-    let path = path.unwrap_or(Path::new("-")).display();
-    file.place(parts, area).map_err(|error| Exit::Failed(anyhow!(error)).at(path.to_string()))
-}
-
-/// Checks that a build is no higher than the machine's are.
-fn within_height(
-    build: impl Iterator<Item = Result<Layer, Exit>>,
-    machine: Option<Machine>,
-) -> impl Iterator<Item = Result<Layer, Exit>> {
-    let mut bottom_um = None;
-    build.map(move |layer| {
-        let layer = layer?;
-        if let Some(machine) = &machine
-            && let (Some(z_um), Some(thickness_um)) = (layer.info.z_um, layer.info.thickness_um)
-        {
-            let height_um = z_um + thickness_um - *bottom_um.get_or_insert(z_um);
-            let what = format!("the build up to {}", layer.info.name());
-            machine.check_height(Length::from_um(height_um).to_whole_nm(), &what)?;
-        }
-        Ok(layer)
-    })
-}
-
-/// The stray rows that the parts' pages list.
-#[derive(Default)]
-pub(crate) struct StrayTotals {
-    rows: usize,
-    layers: usize,
-    /// The part and the layer of the first.
-    first: Option<(String, String)>,
-}
-
-impl StrayTotals {
-    fn add(&mut self, StrayRows { part, layer, rows }: &StrayRows) {
-        self.rows += rows.len();
-        self.layers += 1;
-        self.first.get_or_insert_with(|| (part.clone(), layer.clone()));
-    }
-
-    /// `blade.tif: 14 stray rows in 3 layers, the first in layer 12 (z 1.20 mm): ...`.
-    pub(crate) fn text(&self) -> Option<String> {
-        let (part, layer) = self.first.as_ref()?;
-        let counted = |count, one: &str, more| match count {
-            1 => format!("1 {one}"),
-            count => format!("{count} {more}"),
-        };
-        let rows = counted(self.rows, "stray row", "stray rows");
-        let layers = counted(self.layers, "layer", "layers");
-        Some(format!(
-            "{part}: {rows} in {layers}, the first in {layer}: run fix before tile, and repair the \
-             CAD model where fix cannot"
-        ))
-    }
-}
-
-/// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
-fn describe_stray(StrayRows { part, layer, rows }: &StrayRows) -> String {
-    let word = if rows.len() == 1 { "row" } else { "rows" };
-    format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows))
 }

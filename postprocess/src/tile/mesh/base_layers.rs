@@ -2,6 +2,8 @@
 
 use lamp_stack::{Image, Layer, Length, PageInfo};
 
+use super::super::areas::Areas;
+use super::super::black_parts::Made;
 use super::BuildMesh;
 
 /// Puts a mesh's base layers before a build's layers, and numbers all of them.
@@ -10,30 +12,36 @@ use super::BuildMesh;
 /// it, so that heights stay the parts'. A range of layers that does not begin at
 /// layer 0 gets no base, but counts with it: so ranges can be joined later.
 pub(in crate::tile) fn on_base<E>(
-    layers: impl Iterator<Item = Result<Layer, E>>,
+    layers: impl Iterator<Item = Result<Made, E>>,
     mesh: Option<BuildMesh>,
-) -> impl Iterator<Item = Result<Layer, E>> {
+) -> impl Iterator<Item = Result<Made, E>> {
     let count = mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
     let mut layers = layers.peekable();
     let mut next = 0;
     let mut whole = None;
     std::iter::from_fn(move || {
         if next < count
-            && let Ok(first) = layers.peek_mut()?
+            && let Ok((first, (_, areas))) = layers.peek_mut()?
             && let Some(mesh) = &mesh
             && first.info.index == 0
         {
             let info = base_page(&mut first.info, next, count);
-            let image = whole.get_or_insert_with(|| mesh.whole()).clone();
-            let layer = Layer { info, dpi: first.dpi, image: Image::Mask(image).into() };
+            let (image, mesh_px) = whole.get_or_insert_with(|| {
+                let image = mesh.whole();
+                let pixels = image.white_pixels();
+                (image, pixels)
+            });
+            let areas = Areas { part_px: vec![0; areas.part_px.len()], mesh_px: *mesh_px };
+            let image = Image::Mask(image.clone());
+            let layer = Layer { info, dpi: first.dpi, image: image.into() };
             next += 1;
-            return Some(Ok(layer));
+            return Some(Ok((layer, (Vec::new(), areas))));
         }
         (next, whole) = (count, None);
         let layer = layers.next()?;
-        Some(layer.map(|mut layer| {
+        Some(layer.map(|(mut layer, told)| {
             layer.info.index = layer.info.index.saturating_add(count);
-            layer
+            (layer, told)
         }))
     })
 }

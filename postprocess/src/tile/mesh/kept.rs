@@ -20,6 +20,8 @@ pub(in crate::tile) struct KeptMesh {
     cut: MeshRows,
     /// The pieces of these that hang together with the mesh below; none before the first layer.
     hanging: Option<MeshRows>,
+    /// How many pixels these have, once they are counted.
+    pixels: Option<u64>,
     /// Where pieces begin that are not small, but hang on nothing.
     loose: Vec<[u32; 2]>,
 }
@@ -39,7 +41,14 @@ impl KeptMesh {
         };
         let followed: Vec<Mask> = layout.parts.iter().map(black).collect();
         let moats = followed.iter().enumerate().map(moat).collect();
-        Self { followed, moats, cut: mesh.standing.clone(), hanging: None, loose: Vec::new() }
+        Self {
+            followed,
+            moats,
+            cut: mesh.standing.clone(),
+            hanging: None,
+            pixels: None,
+            loose: Vec::new(),
+        }
     }
 
     /// Returns the mesh around the parts' `images` in the next layer, or `None` if a moat has too
@@ -85,8 +94,15 @@ impl KeptMesh {
         &self.loose
     }
 
-    fn keep(&mut self, Hanging { kept, loose }: Hanging) -> MeshRows {
+    /// Returns how many pixels the mesh of the layer that was made last has.
+    pub(in crate::tile) fn pixels(&mut self) -> u64 {
+        let Self { hanging, pixels, .. } = self;
+        *pixels.get_or_insert_with(|| hanging.as_ref().map_or(0, MeshRows::white_pixels))
+    }
+
+    fn keep(&mut self, Hanging { kept, pixels, loose }: Hanging) -> MeshRows {
         self.hanging = Some(kept.clone());
+        self.pixels = pixels;
         self.loose = loose;
         kept
     }
@@ -165,7 +181,7 @@ impl KeptMesh {
 fn hanging_pieces(cut: &MeshRows, holds: Holds<'_>, least: u64) -> Hanging {
     match holds {
         Holds::All | Holds::AllBut([]) if least <= 1 => {
-            Hanging { kept: cut.clone(), loose: Vec::new() }
+            Hanging { kept: cut.clone(), pixels: None, loose: Vec::new() }
         }
         _ => hanging(cut, holds, least),
     }

@@ -25,6 +25,12 @@ impl MeshRows {
         self.rows.iter().map(|row| row.len()).sum()
     }
 
+    /// Returns the number of white pixels.
+    pub(super) fn white_pixels(&self) -> u64 {
+        let runs = self.rows.iter().flat_map(|row| row.chunks_exact(2));
+        runs.map(|run| u64::from(run[1] - run[0])).sum()
+    }
+
     /// Adds a row below the others.
     pub(super) fn push(&mut self, row: &[u32]) {
         Arc::make_mut(&mut self.rows).push(row.into());

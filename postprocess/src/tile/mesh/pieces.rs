@@ -24,6 +24,8 @@ pub(super) enum Holds<'a> {
 pub(super) struct Hanging {
     /// Those that are not small and hang on something.
     pub(super) kept: MeshRows,
+    /// How many pixels these have, if they were counted.
+    pub(super) pixels: Option<u64>,
     /// Where others that are not small begin: their first row, and the first column in it, in order.
     pub(super) loose: Vec<[u32; 2]>,
 }
@@ -45,12 +47,14 @@ pub(super) fn hanging(mesh: &MeshRows, holds: Holds<'_>, least: u64) -> Hanging 
         piece.pixels < least || is_loose(piece)
     };
     let left_out: Vec<bool> = pieces.roots.iter().map(is_left_out).collect();
-    let whole = (0..).zip(&pieces.roots).filter(|(label, root)| label == *root);
-    let large = whole.map(|(_, &root)| &pieces.all[root as usize]).filter(|p| p.pixels >= least);
+    let whole = || (0..).zip(&pieces.roots).filter(|(label, root)| label == *root);
+    let pixels = whole().filter(|(label, _)| !left_out[*label as usize]);
+    let pixels = pixels.map(|(_, &root)| pieces.all[root as usize].pixels).sum();
+    let large = whole().map(|(_, &root)| &pieces.all[root as usize]).filter(|p| p.pixels >= least);
     let loose = large.filter(|piece| is_loose(piece)).map(|piece| piece.start).collect();
     let kept =
         if left_out.contains(&true) { without(mesh, &pieces, &left_out) } else { mesh.clone() };
-    Hanging { kept, loose }
+    Hanging { kept, pixels: Some(pixels), loose }
 }
 
 /// Returns a mesh without the pieces whose labels are left out.

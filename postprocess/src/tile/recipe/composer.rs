@@ -223,7 +223,7 @@ impl Composer {
         let set = set.with_layers(layers, &self.copies, mesh_bytes);
         let images = self.canvas.layout.framed(&set, false)?;
         let mesh = self.mesh(step, &set, &images)?;
-        Ok(MeshedStep { set, images, mesh, loose: None, is_first: false })
+        Ok(MeshedStep { set, images, mesh, mesh_px: 0, loose: None, is_first: false })
     }
 
     /// Returns the mesh around the parts' images.

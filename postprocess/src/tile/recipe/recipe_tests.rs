@@ -11,8 +11,8 @@ use lamp_stack::{
 
 use super::super::testing::layer;
 use super::super::{
-    BuildFinding, CellShape, HeightOptions, Layout, MeshOptions, MeshPattern, Moat, Pack, PackBy,
-    PartStack, TileError, Turns,
+    BuildFinding, BuildWanted, CellShape, HeightOptions, Layout, MeshOptions, MeshPattern, Moat,
+    Pack, PackBy, PartStack, TileError, Turns,
 };
 use super::{Composer, Recipe, RecipeError, RecipePart};
 
@@ -169,14 +169,14 @@ impl Plan {
                 recipe.add_loose(loose);
             }
         };
-        let walked = layout.clone().build_telling(stacks(), self.heights, false, |found| {
+        let walked = layout.clone().build_telling(stacks(), self.heights, wanted(false), |found| {
             told(found, &mut recipe);
         });
         let pages: Vec<Layer> = walked.collect::<Result<_, Failure>>().unwrap();
         let mut again = recipe.clone();
         again.form.loose.clear();
-        let build =
-            layout.build_telling(stacks(), self.heights, true, |found| told(found, &mut again));
+        let build = layout
+            .build_telling(stacks(), self.heights, wanted(true), |found| told(found, &mut again));
         let build: Vec<Layer> = build.collect::<Result<_, Failure>>().unwrap();
         assert!(again == recipe, "a walk without images tells the same");
         assert!(pages.iter().map(|page| &page.info).eq(build.iter().map(|layer| &layer.info)));
@@ -217,6 +217,10 @@ impl Plan {
         );
         assert!(composer.range(last + 1..last + 9).is_err());
     }
+}
+
+fn wanted(images: bool) -> BuildWanted {
+    BuildWanted { images, areas: false }
 }
 
 #[test]

@@ -1,0 +1,57 @@
+//! Checks, before the work, that options go together and files are not written twice.
+
+use std::path::{Path, PathBuf};
+
+use crate::exit::Exit;
+use crate::plots;
+use crate::streams::{check_beside, check_not_input};
+
+use super::TileArgs;
+
+impl TileArgs {
+    /// Checks, before the work, what can be checked.
+    pub(super) fn check(&self) -> Result<(), Exit> {
+        let counted = self.stacks.iter().any(|stack| stack.copies.is_some());
+        if self.copies.is_some() && (counted || self.stacks.len() > 1) {
+            return Err(Exit::usage(
+                "--copies is for one stack without a count: write blade.tif:120 core.tif:40",
+            ));
+        }
+        if self.layout.is_some() && counted {
+            return Err(Exit::usage("--layout gives the number of copies: leave out the counts"));
+        }
+        self.mesh.check()?;
+        let inputs = || {
+            self.stacks
+                .iter()
+                .map(|stack| &stack.path)
+                .chain(&self.layout)
+                .chain(&self.machine)
+                .chain(self.mesh.file())
+        };
+        let output = self.output().map(|output| output.output);
+        let main = output.as_ref().or(self.strips.folder()).or(self.recipe.as_ref());
+        let main = main.map_or(Path::new("-"), PathBuf::as_path);
+        self.check_by_products()?;
+        for beside in [&self.layout_out, &self.layout_picture, &self.report].into_iter().flatten() {
+            check_beside(beside, main, inputs())?;
+        }
+        if let (Some(output), Some(folder)) = (&output, self.strips.folder()) {
+            check_beside(folder, output, inputs())?;
+        }
+        self.check_recipe(output.as_ref().or(self.strips.folder()), inputs())?;
+        self.layout_picture.as_deref().map(plots::check_name).transpose()?;
+        let read = self.layout.iter().chain(&self.machine).chain(self.mesh.file());
+        check_not_input(main, read)
+    }
+
+    /// Checks that what is written beside the build goes to several files.
+    fn check_by_products(&self) -> Result<(), Exit> {
+        let files = [&self.layout_out, &self.layout_picture, &self.report, &self.recipe];
+        let files: Vec<&PathBuf> = files.into_iter().flatten().collect();
+        for (k, file) in files.iter().enumerate() {
+            check_beside(file, Path::new("-"), files[..k].iter().copied())?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,77 @@
+//! What is wrong with a build: stray rows, copies without a place, too great a height.
+
+use lamp_postprocess::machine::Machine;
+use lamp_postprocess::{Layout, StrayRows};
+use lamp_stack::{Layer, Length};
+
+use crate::exit::Exit;
+use crate::options::ranges;
+
+/// `torus.tif: 3 of 5 copies are placed; tower.tif: ...`, if some of several parts found no place.
+pub(super) fn left_over(layout: &Layout, counts: &[Option<u32>]) -> Option<String> {
+    let parts = layout.parts().iter().zip(counts).enumerate();
+    let short = parts.filter_map(|(part, (stack, count))| {
+        let (placed, asked) = (layout.copies_of(part), (*count)? as usize);
+        let line = || format!("{}: {placed} of {asked} copies are placed", stack.name());
+        (placed < asked).then(line)
+    });
+    let short: Vec<String> = short.collect();
+    (!short.is_empty()).then(|| format!("{}: no more fit", short.join("; ")))
+}
+
+/// Checks that a build is no higher than the machine's are.
+pub(super) fn within_height(
+    build: impl Iterator<Item = Result<Layer, Exit>>,
+    machine: Option<Machine>,
+) -> impl Iterator<Item = Result<Layer, Exit>> {
+    let mut bottom_um = None;
+    build.map(move |layer| {
+        let layer = layer?;
+        if let Some(machine) = &machine
+            && let (Some(z_um), Some(thickness_um)) = (layer.info.z_um, layer.info.thickness_um)
+        {
+            let height_um = z_um + thickness_um - *bottom_um.get_or_insert(z_um);
+            let what = format!("the build up to {}", layer.info.name());
+            machine.check_height(Length::from_um(height_um).to_whole_nm(), &what)?;
+        }
+        Ok(layer)
+    })
+}
+
+/// The stray rows that the parts' pages list.
+#[derive(Default)]
+pub(crate) struct StrayTotals {
+    rows: usize,
+    layers: usize,
+    /// The part and the layer of the first.
+    first: Option<(String, String)>,
+}
+
+impl StrayTotals {
+    pub(super) fn add(&mut self, StrayRows { part, layer, rows }: &StrayRows) {
+        self.rows += rows.len();
+        self.layers += 1;
+        self.first.get_or_insert_with(|| (part.clone(), layer.clone()));
+    }
+
+    /// `blade.tif: 14 stray rows in 3 layers, the first in layer 12 (z 1.20 mm): ...`.
+    pub(crate) fn text(&self) -> Option<String> {
+        let (part, layer) = self.first.as_ref()?;
+        let counted = |count, one: &str, more| match count {
+            1 => format!("1 {one}"),
+            count => format!("{count} {more}"),
+        };
+        let rows = counted(self.rows, "stray row", "stray rows");
+        let layers = counted(self.layers, "layer", "layers");
+        Some(format!(
+            "{part}: {rows} in {layers}, the first in {layer}: run fix before tile, and repair the \
+             CAD model where fix cannot"
+        ))
+    }
+}
+
+/// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
+pub(super) fn describe_stray(StrayRows { part, layer, rows }: &StrayRows) -> String {
+    let word = if rows.len() == 1 { "row" } else { "rows" };
+    format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows))
+}

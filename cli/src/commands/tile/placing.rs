@@ -1,0 +1,109 @@
+//! Places the copies of a build, and tells where they stand.
+
+use std::path::Path;
+
+use anyhow::{Context, anyhow};
+use lamp_postprocess::machine::Machine;
+use lamp_postprocess::{
+    Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, TileOptions, Turns,
+};
+use lamp_stack::Size;
+
+use crate::catalogue::read_text;
+use crate::exit::Exit;
+use crate::plots;
+use crate::progress::Progress;
+use crate::streams::write_file;
+
+use super::TileArgs;
+use super::found::left_over;
+
+impl TileArgs {
+    /// Places the copies.
+    pub(super) fn placed(
+        &self,
+        parts: Vec<PartStack>,
+        file: Option<&LayoutFile>,
+        machine: Option<&Machine>,
+        mesh: Option<&MeshOptions>,
+    ) -> Result<Layout, Exit> {
+        let plain = TileOptions::default();
+        let machine_area = machine.map(|machine| machine.area.value);
+        let file_area = file.and_then(LayoutFile::area);
+        let area = self.area.or(machine_area).or(file_area).unwrap_or(plain.area);
+        match file {
+            Some(file) => place(file, parts, area, self.layout.as_deref()),
+            None => {
+                let gap = self.gap.or(mesh.map(MeshOptions::gap)).unwrap_or(plain.gap);
+                Ok(Layout::packed(parts, &self.counts(), area, gap, self.packing())?)
+            }
+        }
+    }
+
+    /// Tells which copies found no place, and which stand nearer than was asked for.
+    pub(super) fn tell_places(&self, layout: &Layout, progress: &Progress) -> Result<(), Exit> {
+        if self.layout.is_none()
+            && let Some(text) = left_over(layout, &self.counts())
+        {
+            if self.strict {
+                return Err(Exit::Findings(text));
+            }
+            progress.warn(&text);
+        }
+        if let (Some(_), Some(gap)) = (&self.layout, self.gap)
+            && let near = layout.nearer_than(gap)
+            && let [[one, other], more @ ..] = near.as_slice()
+        {
+            let more = match more.len() {
+                0 => String::new(),
+                1 => ", and so is another pair".to_owned(),
+                more => format!(", and so are {more} more pairs"),
+            };
+            progress.warn(&format!("{one} and {other} are nearer to each other than {gap}{more}"));
+        }
+        Ok(())
+    }
+
+    fn counts(&self) -> Vec<Option<u32>> {
+        self.stacks.iter().map(|stack| stack.copies.or(self.copies)).collect()
+    }
+
+    fn packing(&self) -> Pack {
+        let usual = match self.pack {
+            PackBy::Boxes => Turns::None,
+            PackBy::Outlines => Turns::Quarters,
+        };
+        Pack { by: self.pack, turns: self.turns.unwrap_or(usual), edge_gap: self.edge_gap }
+    }
+
+    /// Writes the layout as a file and as a picture, if wanted.
+    pub(super) fn tell(&self, layout: &Layout) -> Result<(), Exit> {
+        if let Some(path) = &self.layout_out {
+            write_file(path, |out| out.write_all(layout.to_file().to_json().as_bytes()))?;
+        }
+        if let Some(path) = &self.layout_picture {
+            let picture = plots::layout_picture(layout, path)?;
+            write_file(path, |out| out.write_all(&picture))?;
+        }
+        Ok(())
+    }
+}
+
+/// A layout takes a line for each copy.
+const MAX_LAYOUT_BYTES: u64 = 64 << 20;
+
+pub(super) fn read_layout(path: &Path) -> Result<LayoutFile, Exit> {
+    let read =
+        || anyhow::Ok(LayoutFile::from_json(&read_text(path, MAX_LAYOUT_BYTES, "a layout")?)?);
+    Ok(read().with_context(|| path.display().to_string())?)
+}
+
+fn place(
+    file: &LayoutFile,
+    parts: Vec<PartStack>,
+    area: Size,
+    path: Option<&Path>,
+) -> Result<Layout, Exit> {
+    let path = path.unwrap_or(Path::new("-")).display();
+    file.place(parts, area).map_err(|error| Exit::Failed(anyhow!(error)).at(path.to_string()))
+}

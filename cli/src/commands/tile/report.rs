@@ -1,0 +1,163 @@
+//! What a build is made of, and the report of it.
+
+use lamp_postprocess::machine::{BuildTime, Machine};
+use lamp_postprocess::{CopyEntry, CuredPixels, LayerAreas, Layout};
+use lamp_stack::Dpi;
+use serde_json::{Value, json};
+
+use crate::exit::Exit;
+use crate::json_report::{JsonReport, to_nm};
+use crate::options::Output;
+use crate::streams::{is_stream, print};
+
+use super::TileArgs;
+use super::time;
+
+/// What the layers of a build are made of: numbers of each part and of each layer, whatever the number
+/// of copies.
+pub(super) struct BuildTotals {
+    /// The number of copies of each part.
+    copies: Vec<u64>,
+    /// A copy of each part.
+    parts: Vec<CuredPixels>,
+    mesh: CuredPixels,
+    all: CuredPixels,
+    layers: Vec<LayerTotals>,
+    /// The exposure that each layer states.
+    pub(super) exposures_ms: Vec<Option<f64>>,
+}
+
+struct LayerTotals {
+    areas: LayerAreas,
+    exposed_px: u64,
+}
+
+impl BuildTotals {
+    pub(super) fn new(layout: &Layout) -> Self {
+        let parts = 0..layout.parts().len();
+        Self {
+            copies: parts.clone().map(|part| layout.copies_of(part) as u64).collect(),
+            parts: vec![CuredPixels::default(); parts.len()],
+            mesh: CuredPixels::default(),
+            all: CuredPixels::default(),
+            layers: Vec::new(),
+            exposures_ms: Vec::new(),
+        }
+    }
+
+    /// Adds the next layer.
+    pub(super) fn add(&mut self, mut areas: LayerAreas) {
+        let thickness_um = areas.thickness_um;
+        let mut exposed_px = areas.mesh_px;
+        for ((part, copies), &pixels) in self.parts.iter_mut().zip(&self.copies).zip(&areas.part_px)
+        {
+            part.add(pixels, thickness_um);
+            exposed_px += copies * pixels;
+        }
+        self.mesh.add(areas.mesh_px, thickness_um);
+        self.all.add(exposed_px, thickness_um);
+        areas.part_px = Vec::new();
+        self.layers.push(LayerTotals { areas, exposed_px });
+    }
+
+    fn report(&self, layout: &Layout, machine: Option<&Machine>, time: &BuildTime) -> JsonReport {
+        let dpi = layout.dpi();
+        let file = layout.to_file();
+        let cured = |pixels: &CuredPixels| {
+            json!({
+                "exposed_px": pixels.pixels,
+                "area_mm2": to_nm(pixels.area_mm2(dpi)),
+                "volume_mm3": pixels.volume_mm3(dpi).map(to_nm),
+            })
+        };
+        let head = json!({
+            "schema": "lamp-build-report-1",
+            "machine": machine.map(|machine| &machine.name),
+            "area_mm": file.area().map(|area| [to_nm(area.width.mm()), to_nm(area.height.mm())]),
+            "width_px": layout.pixels().width,
+            "height_px": layout.pixels().height,
+            "dpi": dpi.get(),
+            "layers": self.layers.len(),
+            "all": cured(&self.all),
+            "mesh": cured(&self.mesh),
+            "build_exposure_s": time.exposure_s.map(to_nm),
+            "recoating_s": time.recoating_s.map(to_nm),
+            "swaths_s": time.swaths.map(|swaths| to_nm(swaths.seconds)),
+            "swaths": time.swaths.map(|swaths| swaths.count),
+            "build_s": time.sum_s().map(to_nm),
+            "warnings": time::missing(time, machine),
+        });
+        let part = |part: usize| {
+            let first = layout.placements().iter().position(|at| at.part == part);
+            let name = first.map(|first| &file.copies()[first].part);
+            let of_part = json!({ "part": name, "copies": self.copies[part] });
+            with(of_part, cured(&self.parts[part]))
+        };
+        let places = file.copies().iter().zip(layout.numbers()).zip(layout.placements());
+        let copies = places.map(|((entry, number), at)| {
+            let CopyEntry { part, x_mm, y_mm, turn, mirror, serial } = entry;
+            let place = json!({
+                "part": part, "number": number, "serial": serial,
+                "x_mm": x_mm, "y_mm": y_mm, "turn": turn, "mirror": mirror,
+            });
+            with(place, cured(&self.parts[at.part]))
+        });
+        JsonReport::new(&head)
+            .list("parts", (0..self.parts.len()).map(part))
+            .list("copies", copies)
+            .list("by_layer", self.layers.iter().map(|layer| layer.json(dpi)))
+    }
+}
+
+impl LayerTotals {
+    fn json(&self, dpi: Dpi) -> Value {
+        let Self { areas, exposed_px } = self;
+        let mm2 = |pixels: u64| to_nm(pixels as f64 * dpi.pitch().mm().powi(2));
+        let share = (*exposed_px > 0).then(|| areas.mesh_px as f64 / *exposed_px as f64);
+        json!({
+            "layer": areas.index,
+            "z_um": areas.z_um,
+            "thickness_um": areas.thickness_um,
+            "exposure_ms": areas.exposure_ms,
+            "exposed_px": exposed_px,
+            "mesh_px": areas.mesh_px,
+            "area_mm2": mm2(*exposed_px),
+            "mesh_mm2": mm2(areas.mesh_px),
+            "mesh_share": share.map(to_nm),
+        })
+    }
+}
+
+/// Returns an object with the keys of another.
+fn with(mut object: Value, more: Value) -> Value {
+    if let (Value::Object(object), Value::Object(more)) = (&mut object, more) {
+        object.extend(more);
+    }
+    object
+}
+
+impl TileArgs {
+    /// Writes the report and tells the time of a build that is done, if they are wanted.
+    pub(super) fn tell_totals(
+        &self,
+        layout: &Layout,
+        totals: &BuildTotals,
+        machine: Option<&Machine>,
+        output: Option<&Output>,
+    ) -> Result<(), Exit> {
+        let exposures = totals.exposures_ms.iter().copied();
+        let time = BuildTime::new(machine, exposures, layout.pixels(), Some(layout.dpi()));
+        if let Some(path) = &self.report {
+            totals.report(layout, machine, &time).write(path)?;
+        }
+        if self.time {
+            let text = time::text(&time, machine);
+            if output.is_some_and(|output| is_stream(&output.output)) {
+                text.lines().for_each(crate::progress::say);
+            } else {
+                print(&text)?;
+            }
+        }
+        Ok(())
+    }
+}

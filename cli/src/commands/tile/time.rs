@@ -1,0 +1,53 @@
+//! How long a build takes, in words.
+
+use lamp_postprocess::machine::{BuildTime, Machine};
+
+use crate::height_options::time_text;
+
+/// Returns a line for the build, each part of its time, and what is not known of it.
+pub(super) fn text(time: &BuildTime, machine: Option<&Machine>) -> String {
+    let layers = match time.layers {
+        1 => "1 layer".to_owned(),
+        layers => format!("{layers} layers"),
+    };
+    let whole = time.sum_s().map_or("not known".to_owned(), time_text);
+    let mut text = format!("build time: {whole}, {layers}\n");
+    let mut line = |name: &str, seconds: f64, how: &str| {
+        text += &format!("{:<12}{}{how}\n", format!("{name}:"), time_text(seconds));
+    };
+    if let Some(seconds) = time.exposure_s {
+        let within = if time.swaths.is_some() { ", within the swaths" } else { "" };
+        line("exposure", seconds, within);
+    }
+    if let Some(swaths) = time.swaths {
+        let how = format!(", {} of {:.1} mm in each layer", swaths.count, swaths.length_mm);
+        line("swaths", swaths.seconds, &how);
+    }
+    if let Some(seconds) = time.recoating_s {
+        line("recoating", seconds, "");
+    }
+    for sentence in missing(time, machine) {
+        text += &format!("{sentence}\n");
+    }
+    text
+}
+
+/// Returns sentences about what is missing of the time, and which keys of the machine's file give it.
+pub(super) fn missing(time: &BuildTime, machine: Option<&Machine>) -> Vec<String> {
+    let (which, name) = match machine {
+        Some(machine) => ("the machine's file", machine.name.as_str()),
+        None => ("a file for --machine", "beta"),
+    };
+    let file = format!("[times] of {which} (lamp machine show {name} > mine.toml starts one)");
+    let mut missing = Vec::new();
+    if time.sum_s().is_none() {
+        missing.push(format!(
+            "not every layer states an exposure: write expose_s, or swath_speed_mm_per_s for a \
+             projector that scans, into {file}"
+        ));
+    }
+    if time.recoating_s.is_none() {
+        missing.push(format!("recoating is not in it: write recoat_s into {file}"));
+    }
+    missing
+}

@@ -1,0 +1,89 @@
+//! How many pixels the parts and the mesh of each layer of a build have.
+
+use lamp_stack::{Dpi, Image, Layer};
+
+use super::part_stack::white_of;
+
+/// The pixels of a layer of a build that are not black. No pixel belongs to two.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerAreas {
+    /// The index of the build's layer.
+    pub index: u32,
+    /// The height of its bottom in micrometres.
+    pub z_um: Option<f64>,
+    /// Its thickness in micrometres.
+    pub thickness_um: Option<f64>,
+    /// How long it is exposed, in milliseconds.
+    pub exposure_ms: Option<f64>,
+    /// The pixels of one copy of each part, in the order of the parts.
+    pub part_px: Vec<u64>,
+    /// The pixels of the mesh.
+    pub mesh_px: u64,
+}
+
+/// The pixels that make up the layer of a build.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Areas {
+    pub(super) part_px: Vec<u64>,
+    pub(super) mesh_px: u64,
+}
+
+impl Areas {
+    /// Returns the pixels of the parts' `images`, and those of the mesh.
+    pub(super) fn new(parts: usize, images: &[(usize, Image)], mesh_px: u64) -> Self {
+        let mut part_px = vec![0; parts];
+        for (part, image) in images {
+            part_px[*part] = match image {
+                Image::Mask(mask) => mask.white_pixels(),
+                Image::Gray(_) => white_of(image).white_pixels(),
+            };
+        }
+        Self { part_px, mesh_px }
+    }
+
+    pub(super) fn of_layer(self, layer: &Layer) -> LayerAreas {
+        let info = &layer.info;
+        LayerAreas {
+            index: info.index,
+            z_um: info.z_um,
+            thickness_um: info.thickness_um,
+            exposure_ms: info.exposure_ms,
+            part_px: self.part_px,
+            mesh_px: self.mesh_px,
+        }
+    }
+}
+
+/// A number of pixels that are not black, in some layers, and their volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CuredPixels {
+    /// The number of pixels.
+    pub pixels: u64,
+    /// The sum of pixels times thicknesses in micrometres, if all thicknesses are known.
+    pixel_um: Option<f64>,
+}
+
+impl Default for CuredPixels {
+    fn default() -> Self {
+        Self { pixels: 0, pixel_um: Some(0.0) }
+    }
+}
+
+impl CuredPixels {
+    /// Adds pixels of a layer.
+    pub fn add(&mut self, pixels: u64, thickness_um: Option<f64>) {
+        self.pixels = self.pixels.saturating_add(pixels);
+        let added = thickness_um.map(|um| pixels as f64 * um);
+        self.pixel_um = self.pixel_um.zip(added).map(|(sum, added)| sum + added);
+    }
+
+    /// Returns their area in square millimetres, added up over all layers.
+    pub fn area_mm2(&self, dpi: Dpi) -> f64 {
+        self.pixels as f64 * dpi.pitch().mm().powi(2)
+    }
+
+    /// Returns their volume in cubic millimetres, if all thicknesses are known.
+    pub fn volume_mm3(&self, dpi: Dpi) -> Option<f64> {
+        Some(self.pixel_um? * dpi.pitch().mm().powi(2) / 1000.0)
+    }
+}
