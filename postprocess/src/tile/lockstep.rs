@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use lamp_stack::{Layer, Length, MemorySize};
+use lamp_stack::{Layer, Length, MemorySize, PageInfo};
 
 use super::TileError;
 
@@ -210,6 +210,14 @@ where
             }
             (None, _) => return Ok(None),
         };
+        let thickness = span[1] - span[0];
+        // Layers that do not rise would never end.
+        if thickness.is_nan() || thickness < TOLERANCE_UM {
+            let info = PageInfo { index, z_um: Some(span[0]), ..PageInfo::default() };
+            let [name, layer] = [first.name.clone(), info.name()];
+            let thickness = Length::from_um(thickness);
+            return Err(TileError::TooThin { name, layer, thickness }.into());
+        }
         let layers: Vec<_> = self
             .stacks
             .iter_mut()
@@ -221,7 +229,7 @@ where
         if self.stacks[0].next.is_some() {
             self.stacks[0].advance()?;
         }
-        let heights = [span[0], span[1] - span[0]].map(Some);
+        let heights = [span[0], thickness].map(Some);
         Ok(Some(self.layer_set(index, Some(span), heights, layers)))
     }
 }
@@ -287,7 +295,7 @@ where
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{Mask, PageInfo};
+    use lamp_stack::Mask;
 
     use super::*;
 
@@ -374,6 +382,20 @@ mod tests {
         assert_eq!(
             joined(fine, false, true).unwrap(),
             [[Some(0), Some(3)], [Some(1), Some(7)], [Some(2), None]]
+        );
+    }
+
+    #[test]
+    fn layers_that_do_not_rise_are_refused() {
+        for (z, thicknesses) in [(0.0, [100.0, 0.0]), (0.0, [100.0, -5.0]), (1e20, [1e5, 100.0])] {
+            let stacks = vec![stack(z, &thicknesses), stack(z, &[1e5; 3])];
+            let error = joined(stacks, false, true).unwrap_err();
+            assert!(matches!(&error, TileError::TooThin { name, .. } if name == "a"), "{error}");
+        }
+        let flat = joined(vec![stack(0.0, &[0.0]), stack(0.0, &[100.0])], false, true);
+        assert_eq!(
+            flat.unwrap_err().to_string(),
+            "a: layer 0 (z 0.00 mm) is 0 um thick, too thin to take layers of other stacks by"
         );
     }
 }

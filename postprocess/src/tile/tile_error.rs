@@ -215,6 +215,18 @@ pub enum TileError {
         /// The layer.
         layer: String,
     },
+    /// The first stack's layers give the build its heights, and one has none itself.
+    #[error(
+        "{name}: {layer} is {} um thick, too thin to take layers of other stacks by", thickness.um()
+    )]
+    TooThin {
+        /// The first part.
+        name: String,
+        /// The layer.
+        layer: String,
+        /// Its thickness.
+        thickness: Length,
+    },
     /// Two parts have different exposures in one layer.
     #[error(
         "in {layer}, {name} is to be exposed for {ms} ms and {first} for {first_ms} ms: a build's layer has one exposure"

@@ -57,11 +57,11 @@ impl TileArgs {
     pub(super) fn recipe_of(
         &self,
         layout: &Layout,
+        heights: HeightOptions,
         mesh: Option<&MeshOptions>,
         machine: Option<&Machine>,
     ) -> Result<Option<Recipe>, Exit> {
         let Some(path) = &self.recipe else { return Ok(None) };
-        let heights = HeightOptions { settle: self.settle, resample: self.resample };
         let parts = self.stacks.iter().map(|stack| part_of(&stack.path, path));
         let parts = parts.collect::<Result<Vec<_>, _>>()?;
         let recipe = Recipe::new(layout, parts, heights, mesh, self.layers.clone());
