@@ -271,3 +271,25 @@ fn mesh_keeps_out_of_a_part_that_lies() {
     assert!(inside(&format!("{mesh} --moat layer")) > 50);
     assert_eq!([inside(mesh), inside(&format!("{mesh} --moat outline"))], [0, 0]);
 }
+
+#[test]
+fn layers_without_mesh_are_told_once() {
+    let scratch = Scratch::with_tower_and_torus();
+    let build = "tile tower.tif --copies 1 --area 60x60mm";
+    scratch.run(&format!("{build} --gap 4mm --mesh none -o plain.tif")).succeeds_quietly();
+    let plain = scratch.layers("plain.tif");
+    for options in ["", "--clearance 40mm", "--least-piece 150mm2"] {
+        let ran = scratch.run(&format!("{build} {options} -o meshed.tif")).succeeds();
+        let meshed = scratch.layers("meshed.tif");
+        let of_parts = plain.iter().zip(&meshed[BASE..]);
+        let bare: Vec<_> = of_parts.filter(|(a, b)| a.image == b.image).map(|(_, b)| b).collect();
+        let Some(first) = bare.first() else {
+            assert_eq!((options, ran.stderr.as_str()), ("", ""));
+            continue;
+        };
+        assert_ne!(options, "");
+        let layers = format!("{} layers, the first {}:", bare.len(), first.info.name());
+        assert!(ran.stderr.contains(&layers), "no `{layers}` in {ran:?}");
+        assert_eq!(ran.stderr.lines().count(), 1, "{ran:?}");
+    }
+}

@@ -68,10 +68,10 @@ impl Tiling {
     ) -> Result<Vec<String>, Exit> {
         let notes = Notes::default();
         let build = self.0.build_of(stacks, &Progress::noting("tile", &notes))?;
-        let Build { mut layers, stray_rows, .. } = build;
+        let Build { mut layers, stray_rows, no_mesh, .. } = build;
         write(&mut layers)?;
-        let stray = stray_rows.borrow().text().map(|text| format!("tile: {text}"));
-        Ok(taken(&notes).into_iter().chain(stray).collect())
+        let found = [stray_rows.borrow().text(), no_mesh.borrow().text()].into_iter().flatten();
+        Ok(taken(&notes).into_iter().chain(found.map(|text| format!("tile: {text}"))).collect())
     }
 }
 

@@ -29,7 +29,9 @@ mod tile_tests;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lamp_stack::{Image, Layer, Length, Mask, MemorySize, Orientation, Size, map_in_order};
+use lamp_stack::{
+    Image, Layer, Length, Mask, MemorySize, Orientation, PageInfo, Size, map_in_order,
+};
 
 use areas::Areas;
 use black_parts::unless_black;
@@ -157,6 +159,8 @@ pub enum BuildFinding {
     Stray(StrayRows),
     /// Pieces of mesh that are left out though they are not small, from a layer on.
     Loose(LoosePieces),
+    /// Nothing is left of the mesh in this layer of the build.
+    NoMesh(String),
     /// What a layer is made of, if that is wanted: for every layer, in order, those of mesh alone
     /// among them.
     Areas(LayerAreas),
@@ -241,6 +245,7 @@ impl Layout {
         let layout = Arc::new(self);
         let meshed = layout.clone();
         let BuildWanted { images, areas } = wanted;
+        let base_layers = mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
         let made = mesh.as_ref().filter(|mesh| images || areas || mesh.tells_loose());
         let mut kept = made.map(|mesh| KeptMesh::new(mesh, &layout));
         let (mut is_first, mut known) = (true, Vec::new());
@@ -274,6 +279,11 @@ impl Layout {
                 layout.stray_rows(&step.set).into_iter().map(BuildFinding::Stray).collect();
             let of_layer = Areas::new(layout.parts.len(), &step.images, step.mesh_px);
             found.extend(step.loose.map(BuildFinding::Loose));
+            if step.mesh.is_some_and(|mesh| mesh.is_black()) {
+                let index = layer.info.index.saturating_add(base_layers);
+                let info = PageInfo { index, ..layer.info.clone() };
+                found.push(BuildFinding::NoMesh(info.name()));
+            }
             Ok((layer, found, of_layer))
         });
         let layers =

@@ -70,6 +70,36 @@ impl StrayTotals {
     }
 }
 
+/// The layers of a build in which nothing is left of its mesh.
+#[derive(Default)]
+pub(crate) struct NoMesh {
+    layers: u32,
+    first: String,
+}
+
+impl NoMesh {
+    pub(super) fn add(&mut self, layer: String) {
+        if self.layers == 0 {
+            self.first = layer;
+        }
+        self.layers += 1;
+    }
+
+    /// `nothing is left of the mesh in 14 layers, the first layer 12 (z 1.20 mm): ...`.
+    pub(crate) fn text(&self) -> Option<String> {
+        let Self { layers, first } = self;
+        let found = match layers {
+            0 => return None,
+            1 => first.clone(),
+            _ => format!("{layers} layers, the first {first}"),
+        };
+        Some(format!(
+            "nothing is left of the mesh in {found}: give a smaller --least-piece or --clearance, \
+             fewer copies or a larger --area, or --mesh none"
+        ))
+    }
+}
+
 /// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
 pub(super) fn describe_stray(StrayRows { part, layer, rows }: &StrayRows) -> String {
     let word = if rows.len() == 1 { "row" } else { "rows" };

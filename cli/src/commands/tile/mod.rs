@@ -30,7 +30,7 @@ use crate::progress::Progress;
 use crate::stages::Layers;
 use crate::streams::{progress, unless_found, write_file};
 
-use found::{StrayTotals, describe_stray, within_height};
+use found::{NoMesh, StrayTotals, describe_stray, within_height};
 use mesh::MeshArgs;
 use placing::read_layout;
 use report::BuildTotals;
@@ -190,10 +190,13 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     let machine = args.machine()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
     let built = args.build(machine.clone(), &progress)?;
-    let Build { layers, layout, stray_rows, recipe, totals } = built;
+    let Build { layers, layout, stray_rows, no_mesh, recipe, totals } = built;
     let finding = || stray_rows.borrow().text().filter(|_| args.strict).map(Exit::Findings);
     strips::write(unless_found(layers, finding), strips, output.as_ref(), &progress)?;
     if let Some(text) = stray_rows.borrow().text() {
+        progress.warn(&text);
+    }
+    if let Some(text) = no_mesh.borrow().text() {
         progress.warn(&text);
     }
     if let Some((path, recipe)) = args.recipe.as_ref().zip(recipe) {
@@ -208,6 +211,7 @@ pub(crate) struct Build {
     pub(crate) layers: Layers<'static>,
     layout: Layout,
     pub(crate) stray_rows: Rc<RefCell<StrayTotals>>,
+    pub(crate) no_mesh: Rc<RefCell<NoMesh>>,
     /// Its recipe, if that is wanted: complete after the last layer.
     recipe: Option<Rc<RefCell<Recipe>>>,
     /// What its layers are made of, if that is wanted: complete after the last layer.
@@ -293,6 +297,8 @@ impl TileArgs {
             .inspect(|&layers| progress.expect(u64::from(layers) + u64::from(base_layers)));
         let layers = stacks.into_iter().map(InputStack::layers).collect::<Result<Vec<_>, _>>()?;
         let stray_rows = Rc::new(RefCell::new(StrayTotals::default()));
+        let no_mesh = Rc::new(RefCell::new(NoMesh::default()));
+        let bare = Rc::clone(&no_mesh);
         let (found, progress) = (Rc::clone(&stray_rows), progress.clone());
         let told = recipe.clone();
         let totals = Rc::new(RefCell::new(BuildTotals::new(&layout)));
@@ -308,6 +314,7 @@ impl TileArgs {
                     recipe.borrow_mut().add_loose(loose);
                 }
             }
+            BuildFinding::NoMesh(layer) => bare.borrow_mut().add(layer),
             BuildFinding::Areas(areas) => added.borrow_mut().add(areas),
         });
         let timed = Rc::clone(&totals);
@@ -316,7 +323,7 @@ impl TileArgs {
                 timed.borrow_mut().exposures_ms.push(layer.info.exposure_ms);
             }
         }));
-        Ok(Build { layers, layout: placed, stray_rows, recipe, totals })
+        Ok(Build { layers, layout: placed, stray_rows, no_mesh, recipe, totals })
     }
 
     /// Returns the output of the whole build, if it is wanted.

@@ -25,6 +25,11 @@ impl MeshRows {
         self.rows.iter().map(|row| row.len()).sum()
     }
 
+    /// Returns whether nothing is white.
+    pub(in crate::tile) fn is_black(&self) -> bool {
+        self.rows.iter().all(|row| row.is_empty())
+    }
+
     /// Returns the number of white pixels.
     pub(super) fn white_pixels(&self) -> u64 {
         let runs = self.rows.iter().flat_map(|row| row.chunks_exact(2));
